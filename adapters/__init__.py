@@ -1,5 +1,30 @@
 """Bridges between collide and other libraries; nothing third-party is imported before it is asked for.
 
 `collide.adapters.peers` asks other engines the same questions and compares the answers;
-`collide.adapters.hosts` lets programs written for another engine run on collide.
+`collide.adapters.hosts` lets programs written for another engine run on collide;
+`collide.adapters.view(world)` shows a World in a browser, and follows it.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collide.adapters.live.world_viewer import WorldViewer, view
+
+__all__ = ["WorldViewer", "view"]
+
+_HOME = dict.fromkeys(__all__, "collide.adapters.live.world_viewer")
+
+
+def __getattr__(name: str):
+    if name not in _HOME:
+        raise AttributeError(f"module 'collide.adapters' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__():
+    return sorted({*globals(), *__all__})

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collide import errors as errors
+    from collide import polytopes as polytopes
     from collide import results as results
     from collide import transforms as transforms
     from collide.casts.ray_hits import RayHits
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from collide.kernels.library import library_path as get_library
     from collide.motion.impact_query import moved_poses, poses_in_motion, time_of_impact
     from collide.motion.impact_rows import TimeOfImpact
+    from collide.polytopes.convex_polygon import ConvexPolygon
     from collide.query import collide, distance
     from collide.results import How, PairResult, WorldResult
     from collide.robots.certified_edges import CertifiedEdges
@@ -95,6 +97,7 @@ _HOMES = {
     "collide.hierarchies.hierarchy_queries": ("walk",),
     "collide.motion.impact_query": ("moved_poses", "poses_in_motion", "time_of_impact"),
     "collide.motion.impact_rows": ("TimeOfImpact",),
+    "collide.polytopes.convex_polygon": ("ConvexPolygon",),
     "collide.query": ("collide", "distance"),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robots.certified_edges": ("CertifiedEdges",),
@@ -124,19 +127,19 @@ _RENAMED = {
 
 __all__ = [
     "Box", "Capsule", "Certificate", "CertificateRefused", "CertifiedEdges", "CollideError", "Compound", "Cone",
-    "Contacts", "ConvexHull", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace",
-    "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Mesh", "MissingExtra",
-    "Overlay", "PairResult", "Proposal", "RayHits", "Robot", "RobotChecker", "RobotDistances", "SceneError",
-    "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "SweepResults", "TimeOfImpact", "UnknownBody",
-    "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify", "collide", "contacts", "contains", "distance",
-    "facet_pairs", "get_include", "get_library", "moved_poses", "overlay", "pose", "poses_in_motion",
-    "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "shape_cast", "sweep", "tessellate",
-    "time_of_impact", "verify", "walk",
+    "Contacts", "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs",
+    "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair",
+    "Mesh", "MissingExtra", "Overlay", "PairResult", "Proposal", "RayHits", "Robot", "RobotChecker",
+    "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "SweepResults",
+    "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify", "collide",
+    "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses", "overlay",
+    "pose", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "shape_cast",
+    "sweep", "tessellate", "time_of_impact", "verify", "walk",
 ]
 
 
 #: Modules that are reached by name alone: ``collide.results.HOW``.
-_MODULES = ("errors", "results", "transforms")
+_MODULES = ("errors", "polytopes", "results", "transforms")
 
 if not TYPE_CHECKING:  # checkers are to know the names above, and no others
 

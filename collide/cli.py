@@ -11,14 +11,13 @@ imports what it needs.
 from __future__ import annotations
 
 import os
-import re
 import sys
 import time
 from collections.abc import Callable
 from contextlib import contextmanager
 
 from collide import cli_arguments as arguments
-from collide import cli_srdf, cli_sweep
+from collide import cli_pages, cli_scenes, cli_srdf, cli_sweep, cli_view
 from collide.cli_files import check_place, copy_scene, first_words, print_lines, write_json, write_text
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
 from collide.reports.number_format import count
@@ -61,6 +60,10 @@ def _run(argv: list[str]) -> int:
         return FREE
     if getattr(args, "json", None) not in (None, "-"):
         check_place("--json", args.json, ".json")  # before the work, not after it
+    if getattr(args, "html", None) is not None:
+        cli_pages.check_page_place(args.html)
+    if getattr(args, "json", None) == getattr(args, "html", None) == "-":
+        raise InvalidArgument("--json and --html: standard output takes one of them")
     with _log_on_stderr(getattr(args, "quiet", False)):
         return _COMMANDS[args.command](args)
 
@@ -131,14 +134,17 @@ def _report(args) -> int:
 
     if args.geometry and not args.json:
         raise InvalidArgument("--geometry adds to the JSON of a report: give --json FILE too")
-    made = _make(args, clearance=args.clearance)
+    progress = _progress(args.quiet)
+    made = cli_scenes.reports(args, progress, _STARTED, clearance=args.clearance)
     if args.geometry:
         from collide.reports import scene_geometry as geometry
 
         for state_report in made:
             state_report.report.geometry = geometry.of_scene(state_report.scene)
     _write_reports(made, args.json)
-    if args.json != "-" and not args.quiet:
+    if args.html:
+        cli_pages.write_report(args, made, progress)
+    if _has_stdout(args):
         from collide.reports import state_reports as states
 
         width, whole_names = terminal.output_width(sys.stdout)
@@ -154,7 +160,8 @@ def _check(args) -> int:
     for place, suffix in ((args.write_baseline, ".json"), (args.junit, ".xml")):
         if place:
             check_place("--write-baseline" if suffix == ".json" else "--junit", place, suffix)
-    made = _make(args, min_depth=args.min_depth)
+    progress = _progress(args.quiet)
+    made = cli_scenes.reports(args, progress, _STARTED, min_depth=args.min_depth)
     checks = [
         checking.check(
             result.report, result.label, touching_counts=args.touching_is_collision, known=known,
@@ -167,7 +174,9 @@ def _check(args) -> int:
         write_text(checking.baseline_text(checks), args.write_baseline)
     if args.junit:
         write_text(junit.text(checks), args.junit)
-    if args.json != "-" and not args.quiet:
+    if args.html:
+        cli_pages.write_check(args, made, checks, progress)
+    if _has_stdout(args):
         print_lines(line for result in checks for line in result.lines(len(checks) > 1))
     if not args.quiet:
         for result in checks:
@@ -194,61 +203,9 @@ def _say_what_was_taken(report) -> None:
             _say(f"{what}: {', '.join(bodies[:3])}{more} (see: collide report)")
 
 
-def _make(args, **limits) -> list:
-    """Load the scene of the arguments and report on it, in each state asked for: `state_reports.Stated`."""
-    progress = _progress(args.quiet)
-    scenes = _load(args, progress)
-    trajectory = _trajectory(args, scenes)
-    ignore = [_pair(scenes[0][1], words) for words in args.ignore]
-    from collide.reports import report
-    from collide.reports import state_reports as states
-    from collide.reports.trajectory_report import at_start, follow
-
-    made = []
-    for label, scene in scenes:
-        if trajectory is not None:
-            scene = at_start(scene, trajectory)
-        state_report = report.make(scene, progress=progress, started=_STARTED, ignore=ignore, **limits)
-        if trajectory is not None:
-            tested = report.without(scene, ignore)
-            state_report.trajectory = follow(
-                tested, trajectory, resolution=args.resolution, progress=progress, **limits
-            )
-        made.append(states.Stated(label, scene, state_report))
-    return made
-
-
-def _trajectory(args, scenes):
-    if args.trajectory is None:
-        return None
-    if len(scenes) > 1:
-        raise InvalidArgument("--trajectory starts from one state: give --state once, with one state")
-    from collide.scenes.loaders.trajectories import read_trajectory
-
-    return read_trajectory(args.trajectory)
-
-
-def _pair(scene, words: str) -> tuple[str, str]:
-    """The two bodies that ``A,B`` names; a comma may also stand in a name."""
-    names = {body.name for body in scene.bodies}
-    pieces = words.split(",")
-    splits = [(",".join(pieces[:k]).strip(), ",".join(pieces[k:]).strip()) for k in range(1, len(pieces))]
-    if not splits:
-        raise InvalidArgument(f"--ignore: takes two bodies, A,B, got {words!r}")
-    for a, b in splits:
-        if a in names and b in names and a != b:
-            return a, b
-    a, b = splits[0]
-    if a == b:
-        raise InvalidArgument(f"--ignore: {a!r} twice; a body is never tested against itself")
-    import difflib
-
-    wrong = b if a in names else a
-    near = difflib.get_close_matches(wrong, sorted(names), 3, 0.5)
-    known = [body.name for body in scene.bodies]
-    listed = ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
-    hint = f"did you mean {' or '.join(near)}?" if near else f"it has {listed}"
-    raise InvalidArgument(f"--ignore: scene {scene.name} has no body {wrong!r}; {hint}")
+def _has_stdout(args) -> bool:
+    """Whether tables may be printed: standard output is not taken by JSON or a page, and nobody asked for quiet."""
+    return "-" not in (args.json, args.html) and not args.quiet
 
 
 def _progress(quiet: bool) -> Callable:
@@ -257,25 +214,9 @@ def _progress(quiet: bool) -> Callable:
     return silent if quiet else Progress()
 
 
-def _load(args, progress: Callable) -> list:
-    """The scene in each state asked for: (label, Scene); one without a label where no state was named."""
-    with progress("reading the scene"):
-        from collide.scenes import load
-
-        options = ("robot", "srdf", "meshes", "missing_meshes", "package_path", "scale")
-        load_options = {name: getattr(args, name) for name in options if getattr(args, name) is not None}
-        words = args.state or []
-        if not words or (len(words) == 1 and not re.search(r"[,=]|^[-+\d.]", words[0])):  # a name, or a file
-            return [("", load(*args.scenes, state=words[0] if words else None, **load_options))]
-        from collide.scenes.loaders.state_words import in_states
-
-        states = in_states(load(*args.scenes, state=None, **load_options), words)
-        return states if len(states) > 1 else [("", states[0][1])]
-
-
 def _compare(args) -> int:
     progress = _progress(args.quiet)
-    scenes = _load(args, progress)
+    scenes = cli_scenes.load_states(args, progress)
     if len(scenes) > 1:
         raise InvalidArgument("--state: compare takes one state")
     from collide.adapters.peers.compare import compare
@@ -286,7 +227,9 @@ def _compare(args) -> int:
         )
     if args.json:
         write_json(comparison.to_dict().items(), args.json)
-    if args.json != "-" and not args.quiet:
+    if args.html:
+        cli_pages.write_comparison(args, scenes[0][1], comparison, progress)
+    if _has_stdout(args):
         from collide.reports import comparing, terminal
 
         width, whole_names = terminal.output_width(sys.stdout)
@@ -395,4 +338,5 @@ _COMMANDS: dict[str, Callable] = {
     "scenes": _scenes, "doctor": _doctor,
     "srdf": lambda args: FREE if cli_srdf.run(args, _progress(args.quiet)) else YES,
     "sweep": lambda args: FREE if cli_sweep.run(args, _progress(args.quiet)) else YES,
+    "view": lambda args: cli_view.run(args, _progress(args.quiet), _STARTED, _say),
 }  # fmt: skip

@@ -11,7 +11,7 @@ import math
 import re
 from typing import NoReturn
 
-from collide import __version__, cli_srdf, cli_sweep
+from collide import __version__, cli_pages, cli_srdf, cli_sweep, cli_view
 from collide.errors import InvalidArgument
 from collide.reports.number_format import UNITS, parse_length
 
@@ -59,6 +59,7 @@ _TOP = """examples:
   collide report panda_workbench --clearance 50mm
   collide report part_a.stl part_b.obj    do two meshes meet?
   collide check scene.yaml && echo free   for scripts
+  collide view panda_workbench            look at it, in a browser
   collide doctor                          is this installation sound?
 
 exit status: 0 done or free, 1 collision found, 2 error (one line on stderr)"""
@@ -72,9 +73,10 @@ _REPORT = """examples:
   collide report robot.urdf cell.yaml --trajectory plan.csv --clearance 2cm
   collide report part_a.stl part_b.obj --scale mm --meshes pieces
   collide report scene.yaml --json - | jq '.colliding[] | [.a, .b, .depth]'
+  collide report panda_workbench --html page.html       to look at, in a browser
 
-A scene is a file (URDF, planning scene, mesh, scene YAML) or the name of a
-shipped one; several files make one scene.
+A scene is a file (URDF, MJCF, planning scene, mesh, scene YAML) or the name of
+a shipped one; several files make one scene.
 
 The first page holds what needs a person: collisions, then what is nearer than
 the clearance. A body that is in many pairs takes one row, contacts within
@@ -182,6 +184,7 @@ def parser() -> argparse.ArgumentParser:
     commands = made.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     _add_report(commands)
     _add_check(commands)
+    _add_view(commands)
     _add_compare(commands)
     _add_stress(commands)
     _add_locality(commands)
@@ -232,8 +235,7 @@ def _add_report(commands) -> None:
     parser = _add(commands, "report", "what collides, what is near, and how that is known", _REPORT)
     _scene_arguments(parser)
     _motion_arguments(parser)
-    parser.add_argument("--clearance", type=_length, default=0.0, metavar="D",
-                        help="list pairs nearer than this too: 0.05 (metres), 50mm, 5cm")
+    _clearance_argument(parser)
     _ignore_argument(parser)
     parser.add_argument("--all", action="store_true", help="every pair, mesh and note, and what --proofs shows")
     parser.add_argument("--proofs", action="store_true",
@@ -241,6 +243,21 @@ def _add_report(commands) -> None:
     parser.add_argument("--geometry", action="store_true",
                         help="add poses, shapes and triangles of every body to the JSON, to draw it from")
     _output_arguments(parser)
+    cli_pages.add_argument(parser)
+
+
+def _add_view(commands) -> None:
+    parser = _add(commands, "view", "look at a scene in a browser, while its files are edited", cli_view.EPILOG)
+    _scene_arguments(parser)
+    _motion_arguments(parser)
+    _clearance_argument(parser)
+    _ignore_argument(parser)
+    cli_view.add_arguments(parser)
+
+
+def _clearance_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--clearance", type=_length, default=0.0, metavar="D",
+                        help="list pairs nearer than this too: 0.05 (metres), 50mm, 5cm")
 
 
 def _add_check(commands) -> None:
@@ -260,6 +277,7 @@ def _add_check(commands) -> None:
     group.add_argument("--write-baseline", metavar="FILE", help="write the collisions there are as known ones; exit 0")
     group.add_argument("--junit", metavar="FILE", help="write JUnit XML, a test case for every body")
     _output_arguments(parser)
+    cli_pages.add_argument(parser)
 
 
 def _add_compare(commands) -> None:
@@ -275,6 +293,7 @@ def _add_compare(commands) -> None:
                         help="exit 1 where an answer of collide's is wrong (default), or where any engine's is")
     parser.add_argument("--all", action="store_true", help="do not shorten long lists")
     _output_arguments(parser)
+    cli_pages.add_argument(parser)
 
 
 def _add_scenes(commands) -> None:
@@ -293,8 +312,8 @@ def _scene_arguments(parser: argparse.ArgumentParser) -> None:
         help="joint values: a state's name, a YAML or JSON file, 0,0.5,... in the order of the joints, "
         "or joint=0.5,...; several names or files, separated by commas or given again, are several states",
     )
-    group.add_argument("--robot", metavar="URDF", help="the robot of a planning scene")
-    group.add_argument("--srdf", metavar="FILE", help="disabled pairs and named states (default: beside the URDF)")
+    group.add_argument("--robot", metavar="FILE", help="the robot of a planning scene, URDF or MJCF")
+    group.add_argument("--srdf", metavar="FILE", help="disabled pairs and named states (default: beside the robot)")
     group.add_argument("--meshes", choices=("mesh", "hull", "pieces"),
                        help="how meshes enter: as they are (default), as convex hulls, or as unions of convex pieces")
     group.add_argument("--missing-meshes", choices=("error", "skip"),

@@ -72,7 +72,7 @@ def write_text(pieces, place: str) -> None:
 def check_place(option: str, place: str, suffix: str) -> None:
     """``--json a.yaml b.yaml`` must not overwrite a scene; devices and pipes are written to as they are."""
     if not place.lower().endswith(suffix) and (os.path.isfile(place) or not os.path.exists(place)):
-        otherwise = ", or be - for standard output" if option == "--json" else ""
+        otherwise = ", or be - for standard output" if option in ("--json", "--html") else ""
         raise InvalidArgument(f"{option}: {place!r} must end in {suffix}{otherwise}")
     if _is_scene(place):
         raise InvalidArgument(f"{option}: {place!r} is a scene; it is not overwritten by a report")

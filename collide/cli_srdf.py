@@ -28,16 +28,20 @@ besides: its nearest configurations are followed downhill, and where that ends
 in a collision, the pair is tested. The file says how many configurations were
 drawn, and what that leaves open.
 
+The file keeps what the robot's SRDF, beside it or given, says besides: groups,
+states, end effectors, virtual joints. --pairs-only leaves them out.
+
 --compare judges the disabled pairs of an SRDF: one that it says never collide,
 and that do, is wrong, and a configuration is shown.
 
-ROBOT is a URDF, or a scene (a file or a shipped one) with a robot in it.
+ROBOT is a URDF or MJCF file, or a scene (a file or a shipped one) with a robot
+in it.
 
 exit status: 0 done, 1 the SRDF compared with is wrong about a pair, 2 error"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("robot", metavar="ROBOT", help="a URDF, or a scene with a robot in it")
+    parser.add_argument("robot", metavar="ROBOT", help="a URDF or MJCF file, or a scene with a robot in it")
     parser.add_argument("--name", metavar="NAME", help="which robot, of a scene with several")
     parser.add_argument("--samples", type=count, default=10_000, metavar="N", help="configurations drawn (10000)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds draw others (0)")
@@ -47,6 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="share of the sample that makes a pair Always (1; MoveIt: 0.95)")
     parser.add_argument("--out", metavar="F.srdf", help="write the SRDF")
     parser.add_argument("--force", action="store_true", help="let --out overwrite a file")
+    parser.add_argument("--srdf", metavar="F.srdf", help="whose groups and states are kept (default: beside the robot)")
+    parser.add_argument("--pairs-only", action="store_true", help="write disabled pairs, and nothing that an SRDF has")
     parser.add_argument("--compare", metavar="F.srdf", help="an SRDF to be judged")
     parser.add_argument("--meshes", choices=("mesh", "hull", "pieces"),
                         help="how meshes enter: as they are (default), as convex hulls, or as unions of convex pieces")
@@ -59,29 +65,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace, progress: Callable) -> bool:
     """Whether the SRDF compared with, if there was one, is right."""
+    from pathlib import Path
+
     from collide.sweeps.pair_comparison import compare_pairs
     from collide.sweeps.pair_proposal import propose_disabled_pairs
     from collide.sweeps.pair_tables import to_dict
     from collide.sweeps.srdf_text import srdf_text
 
     _check_out(args)
+    carried: list[tuple[str, str]] = []
     with progress("reading the robot"):
         robot = robot_of(args.robot, args.name, load_options(args))
+        if args.srdf is not None and str(Path(args.srdf)) not in robot.sources:
+            raise InvalidArgument(f"--srdf: {args.robot} is a scene, which names the SRDF of each of its robots itself")
         theirs = None if args.compare is None else _disabled_pairs(robot, args.compare)
+        if args.out and not args.pairs_only:
+            carried = _carried(robot)
     proposal = propose_disabled_pairs(
         robot, args.samples, seed=args.seed, rounds=args.rounds, always_share=args.always, progress=progress
     )
     comparison = None if theirs is None else compare_pairs(proposal, theirs)
     if args.out:
-        write_text([srdf_text(proposal)], args.out)
+        write_text([srdf_text(proposal, [text for _, text in carried])], args.out)
     if args.json:
         write_json(to_dict(proposal, comparison, args.compare).items(), args.json)
     if args.json != "-" and not args.quiet:
-        _print(proposal, comparison, args)
+        _print(proposal, comparison, args, carried)
     return comparison is None or not comparison.wrong
 
 
-def _print(proposal, comparison, args: argparse.Namespace) -> None:
+def _print(proposal, comparison, args: argparse.Namespace, carried: list[tuple[str, str]]) -> None:
     from collide.reports import terminal
     from collide.reports.tables import wrapped
     from collide.sweeps import pair_tables
@@ -101,8 +114,28 @@ def _print(proposal, comparison, args: argparse.Namespace) -> None:
     if comparison is not None:
         say("")
         say(pair_tables.comparison_words(comparison, os.path.basename(args.compare)))
+    if carried:
+        say("")
+        say(_carried_words(proposal.robot, carried))
     for note in proposal.notes if args.all else ():
         say(f"note: {note}")
+
+
+def _carried(robot) -> list[tuple[str, str]]:
+    """(tag, text) of what the SRDF that was read with a robot says besides collisions."""
+    from pathlib import Path
+
+    from collide.scenes.loaders.srdf import other_elements
+
+    return [element for file in robot.sources[1:] for element in other_elements(Path(file), robot.prefix)]
+
+
+def _carried_words(robot, carried: list[tuple[str, str]]) -> str:
+    counts: dict[str, int] = {}
+    for tag, _ in carried:
+        counts[tag] = counts.get(tag, 0) + 1
+    listed = ", ".join(f"{n} {tag}" for tag, n in counts.items())
+    return f"kept from {os.path.basename(robot.sources[1])}: {listed}"
 
 
 def _check_out(args: argparse.Namespace) -> None:
@@ -112,7 +145,9 @@ def _check_out(args: argparse.Namespace) -> None:
     if not args.out.lower().endswith(".srdf"):
         raise InvalidArgument(f"--out: {args.out!r} must end in .srdf")
     if os.path.exists(args.out) and not args.force:
-        raise InvalidArgument(f"--out: {args.out} exists, and may hold groups and states: --force overwrites it")
+        raise InvalidArgument(
+            f"--out: {args.out} exists: --force overwrites it; groups and states of the robot's own SRDF are kept"
+        )
     if args.json not in (None, "-"):
         check_place("--json", args.json, ".json")
 
@@ -133,7 +168,8 @@ def robot_of(place: str, name: str | None, options: dict):
     if name in scene.robots:
         return scene.robots[name]
     what = f"has no robot {name!r}" if name is not None else "has several robots" if scene.robots else "has no robot"
-    known = f": --name takes one of {', '.join(scene.robots)}" if scene.robots else ": give a URDF, or a scene with one"
+    names = ", ".join(scene.robots)
+    known = f": --name takes one of {names}" if names else ": give a file of a robot, or a scene with one"
     raise InvalidArgument(f"{place} {what}{known}")
 
 

@@ -212,7 +212,7 @@ def _check_rotations(X: np.ndarray, name: str) -> None:
 
 #: So far from a rotation a matrix may be that is accepted without the check by `_check_rotations`, which rounds
 #: otherwise.
-_SAFE_TOLERANCE = 0.5 * ROTATION_TOLERANCE
+SAFE_TOLERANCE = 0.5 * ROTATION_TOLERANCE
 #: Poses checked together: their entries stay in the cache.
 _TOGETHER = 1024
 _FLOAT64 = np.dtype(np.float64)
@@ -224,12 +224,12 @@ def _is_surely_pose(row_x: list, row_y: list, row_z: list, last: list) -> bool:
     return (
         last == [0.0, 0.0, 0.0, 1.0]
         and -LARGEST <= x <= LARGEST and -LARGEST <= y <= LARGEST and -LARGEST <= z <= LARGEST
-        and -_SAFE_TOLERANCE <= a * a + d * d + g * g - 1.0 <= _SAFE_TOLERANCE
-        and -_SAFE_TOLERANCE <= b * b + e * e + h * h - 1.0 <= _SAFE_TOLERANCE
-        and -_SAFE_TOLERANCE <= c * c + f * f + i * i - 1.0 <= _SAFE_TOLERANCE
-        and -_SAFE_TOLERANCE <= a * b + d * e + g * h <= _SAFE_TOLERANCE
-        and -_SAFE_TOLERANCE <= a * c + d * f + g * i <= _SAFE_TOLERANCE
-        and -_SAFE_TOLERANCE <= b * c + e * f + h * i <= _SAFE_TOLERANCE
+        and -SAFE_TOLERANCE <= a * a + d * d + g * g - 1.0 <= SAFE_TOLERANCE
+        and -SAFE_TOLERANCE <= b * b + e * e + h * h - 1.0 <= SAFE_TOLERANCE
+        and -SAFE_TOLERANCE <= c * c + f * f + i * i - 1.0 <= SAFE_TOLERANCE
+        and -SAFE_TOLERANCE <= a * b + d * e + g * h <= SAFE_TOLERANCE
+        and -SAFE_TOLERANCE <= a * c + d * f + g * i <= SAFE_TOLERANCE
+        and -SAFE_TOLERANCE <= b * c + e * f + h * i <= SAFE_TOLERANCE
         and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.5
     )  # fmt: skip
 
@@ -250,7 +250,7 @@ def _is_surely_rigid(block: np.ndarray) -> bool:
         np.maximum(worst, np.abs(product), out=worst)
     determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
     return bool(
-        worst.max() <= _SAFE_TOLERANCE and determinant.min() > 0.5 and np.abs(columns[3:12:4]).max() <= LARGEST
+        worst.max() <= SAFE_TOLERANCE and determinant.min() > 0.5 and np.abs(columns[3:12:4]).max() <= LARGEST
         and not columns[12:15].any() and (columns[15] == 1.0).all()
     )  # fmt: skip
 

@@ -27,6 +27,7 @@ from collide.adapters.hosts.mujoco_limits import max_contacts
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.kernels.library import library_path
 from collide.kernels.mode import COMPILED, MODE, WHY
+from collide.scenes.loaders.mjcf_pairs import filtered
 
 MODES = ("contacts", "cull")
 _FLOOR = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
@@ -245,29 +246,7 @@ def world(model: Any, data: Any = None) -> World:
         X_WG[:3, :3], X_WG[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
         out.add(shapes[rows[geom]], X_WG, name=model.geom(geom).name or f"geom {geom}", static=bool(welded[geom] == 0))
     if len(geoms):
-        out.allow(_never_tested(mujoco, model, geoms), reason="never tested by MuJoCo")
+        never = filtered(model, geoms) != 0
+        np.fill_diagonal(never, False)
+        out.allow(never, reason="never tested by MuJoCo")
     return out
-
-
-def _never_tested(mujoco, model, geoms: np.ndarray) -> np.ndarray:
-    """(n, n) bool: pairs of these geoms that MuJoCo's filters leave out, but for those named as pairs."""
-    body = model.geom_bodyid[geoms]
-    weld = model.body_weldid[body]
-    contype, conaffinity = model.geom_contype[geoms], model.geom_conaffinity[geoms]
-    takes = (contype[:, None] & conaffinity[None, :]) != 0
-    never = ~(takes | takes.T) | (weld[:, None] == weld[None, :])
-    if not model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT):
-        parent = model.body_weldid[model.body_parentid[weld]]
-        is_child = (parent[:, None] == weld[None, :]) & (weld[:, None] != 0) & (weld[None, :] != 0)
-        never |= is_child | is_child.T
-    for signature in model.exclude_signature.tolist():
-        first, second = signature >> 16, signature & 0xFFFF
-        excluded = (body[:, None] == first) & (body[None, :] == second)
-        never |= excluded | excluded.T
-    if model.npair:
-        place = {geom: k for k, geom in enumerate(geoms.tolist())}
-        for first, second in zip(model.pair_geom1.tolist(), model.pair_geom2.tolist()):
-            if first in place and second in place:
-                never[place[first], place[second]] = never[place[second], place[first]] = False
-    np.fill_diagonal(never, False)
-    return never

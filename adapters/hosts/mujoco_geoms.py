@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide import Box, Capsule, ConvexHull, Cylinder, Ellipsoid, Halfspace, HeightField, Shape, Sphere
+from collide import ConvexHull, Shape, Sphere
 from collide.adapters.hosts.mujoco_layout import FIELD, KINDS, OURS, PLANE, N, check_model
 from collide.adapters.hosts.mujoco_limits import max_contacts
 from collide.contact.contact_rows import CONTACT_DTYPE
@@ -22,6 +22,7 @@ from collide.errors import CollideError, InvalidShape
 from collide.lowering.hull_faces import FACE_INTS, HullFaceTable, face_table_of
 from collide.lowering.parts import convex_set_of
 from collide.lowering.shape_table import RADIUS, REACH, ShapeTable
+from collide.scenes.loaders.mjcf_geoms import shape_of
 
 
 class GeomShapes(NamedTuple):
@@ -66,31 +67,7 @@ def geom_shapes(model, with_fields: bool = True) -> GeomShapes:
 
 
 def _shape(model, geom: int, name: str) -> Shape:
-    size = [float(length) for length in model.geom_size[geom]]
-    if name == "plane":
-        return Halfspace((0.0, 0.0, 1.0), 0.0)
-    if name == "sphere":
-        return Sphere(size[0])
-    if name == "capsule":
-        return Capsule(size[0], 2.0 * size[1])
-    if name == "cylinder":
-        return Cylinder(size[0], 2.0 * size[1])
-    if name == "ellipsoid":
-        return Ellipsoid(size)
-    if name == "box":
-        return Box([2.0 * length for length in size])
-    if name == "hfield":
-        return _height_field(model, int(model.geom_dataid[geom]))
-    return ConvexHull(_hull_vertices(model, int(model.geom_dataid[geom])))
-
-
-def _height_field(model, field: int) -> HeightField:
-    n_rows, n_columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
-    first = int(model.hfield_adr[field])
-    x, y, z, base = model.hfield_size[field].tolist()
-    heights = z * np.array(model.hfield_data[first : first + n_rows * n_columns], dtype=np.float64)
-    cell = 2.0 * x / (n_columns - 1), 2.0 * y / (n_rows - 1)
-    return HeightField(heights.reshape(n_rows, n_columns), cell, bottom=-base)
+    return ConvexHull(_hull_vertices(model, int(model.geom_dataid[geom]))) if name == "mesh" else shape_of(model, geom)
 
 
 def _hull_vertices(model, mesh: int) -> np.ndarray:

@@ -15,7 +15,7 @@ from collide.adapters.hosts.posed_objects import HostObject, box_of, boxes_of_ob
 from collide.broadphase.box_tree import BoxTree
 from collide.broadphase.boxes_ahead import SWEEP, bodies_ahead
 from collide.broadphase.graded_boxes import BODY
-from collide.broadphase.walk_boxes import boxes_met, pairs_among
+from collide.broadphase.walk_boxes import boxes_met
 from collide.kernels import address_of
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
@@ -223,7 +223,7 @@ class _Tree(BoxTree):
     def _among_first(self, n_leaves: int, margin: float) -> np.ndarray:
         """(k, 2) pairs of rows, one of which is at the first leaves."""
         leaves = np.flatnonzero(self.links[: self.n_nodes, BODY] >= 0)[:n_leaves]
-        return self.walk_pairs(pairs_among, 0, int(leaves.max(initial=-1)) + 1, margin, False)
+        return self.pairs_among(0, int(leaves.max(initial=-1)) + 1, margin)
 
     def blocks(self, margin: float) -> Iterator[np.ndarray]:
         """Blocks (k, 2) of rows i < j whose boxes come within margin along every axis."""

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_f64, view_i64
+from collide.numerics.counting_sort import only_class, sort_by_class
 
 #: Doubles of a facet while the tree is built: centroid, box.
 _FACET = 9
@@ -134,9 +135,9 @@ def fill_graded(
         first = stack[at + FIRST]
         last = stack[at + LAST]
         _sort_by_child(facets, low, width, levels, stack, at, order, scratch, counts)
-        while used > 0 and _only_child(counts, last - first) >= 0:
+        while used > 0 and only_class(counts, 8, last - first) >= 0:
             # All facets go to one child and nothing branches: the node is that child. Only the root stays.
-            child = _only_child(counts, last - first)
+            child = only_class(counts, 8, last - first)
             stack[at + LEVEL] += 1
             for axis in range(3):
                 stack[at + CELL + axis] = 2 * stack[at + CELL + axis] + ((child >> axis) & 1)
@@ -166,36 +167,13 @@ def fill_graded(
 
 
 @kernel
-def _only_child(counts, n):
-    """The child that has all facets; −1 where they branch or hang here."""
-    for child in range(8):
-        if counts[child] == n:
-            return child
-    return -1
-
-
-@kernel
 def _sort_by_child(facets, low, width, levels, stack, at, order, scratch, counts):
     """Order a node's facets by child, 8 for outliers; counts become how many there are of each."""
     level, first, last = stack[at + LEVEL], stack[at + FIRST], stack[at + LAST]
     cell = width / float(1 << level)
-    half = len(order)
-    for child in range(9):
-        counts[child] = 0
     for k in range(first, last):
-        child = 8
-        if level < levels:
-            child = _child_of(facets, _FACET * order[k], low, cell, stack, at)
-        scratch[k] = child
-        scratch[half + k] = order[k]
-        counts[child] += 1
-    counts[9] = first
-    for child in range(8):
-        counts[10 + child] = counts[9 + child] + counts[child]
-    for k in range(first, last):
-        child = scratch[k]
-        order[counts[9 + child]] = scratch[half + k]
-        counts[9 + child] += 1
+        scratch[k] = _child_of(facets, _FACET * order[k], low, cell, stack, at) if level < levels else 8
+    sort_by_class(order, first, last, 9, scratch, counts)
 
 
 @kernel

@@ -34,7 +34,7 @@ OPTIONAL = (
     ("matplotlib", "plots", "collide locality --plot"),
     ("pyarrow", "sweep", "collide sweep"),
     ("distributed", "sweep", "collide sweep --scheduler"),
-    ("mujoco", "mujoco", "MuJoCo's steps with collide's contacts"),
+    ("mujoco", "mujoco", "MJCF models; MuJoCo's steps with collide's contacts"),
     ("coal", "peers", "collide compare"),
     ("python-fcl", "peers", "collide compare"),
     ("pybullet", "peers", "collide compare (wheels up to Python 3.11)"),

@@ -17,11 +17,15 @@ _SHORT = 12
 
 
 class Stated(NamedTuple):
-    """A report, and the state it is of: its label as the user wrote it, "" where none was asked for."""
+    """A report, and the state it is of: its label as the user wrote it, "" where none was asked for.
+
+    watch : what followed the trajectory, where there is one (`collide.reports.trajectory_report.Watch`).
+    """
 
     label: str
     scene: Any
     report: Report
+    watch: Any = None
 
 
 def items(made: list[Stated]) -> Iterator[tuple[str, object]]:
@@ -58,7 +62,7 @@ def _verdict(made: list[Stated]) -> str:
 def _state_table(made: list[Stated]) -> Table:
     columns = [Column("state", "name"), Column("collisions"), Column("touching"), Column("near"), Column("deepest")]
     rows = []
-    for label, _, report in made:
+    for label, _, report, _ in made:
         deepest = [pair.depth if pair.depth is not None else float("inf") for pair in report.colliding[:1]]
         numbers = [str(len(pairs)) for pairs in (report.colliding, report.touching, report.near)]
         rows.append([label, *numbers, lengths(deepest)[0].strip() if deepest else "-"])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,8 @@ RESOLUTION = 0.02
 MAX_SAMPLES = 1_000_000
 #: Samples whose poses are worked out at a time.
 _CHUNK = 256
+#: Samples of which a `Watch` keeps the rows, where they will be looked at again.
+_MAX_KEPT = 20_000
 
 
 @dataclass
@@ -108,25 +111,53 @@ def follow(
     scene : stands at the state that joints keep which the trajectory does not name.
     clearance, min_depth : as in `report.make` [m].   progress : as there.
     """
+    return watched(
+        scene, trajectory, clearance=clearance, min_depth=min_depth, resolution=resolution, progress=progress
+    ).to_dict()
+
+
+def watched(
+    scene, trajectory, *, clearance: float = 0.0, min_depth: float = 0.0, resolution: float = RESOLUTION,
+    progress=None, keep: bool = False,
+) -> Watch:  # fmt: skip
+    """As `follow`, for those who want to look at samples again: what has followed the trajectory to its end.
+
+    keep : samples will be looked at again; rows of the first 20,000 are kept.
+    """
     path = sample(scene, trajectory, resolution)
     with (progress or silent)("following the trajectory") as set_label:
-        watch = _Watch(scene, path, clearance, min_depth)
+        watch = Watch(scene, path, clearance, min_depth, _MAX_KEPT if keep else 0)
         for k, poses in watch.poses():
             watch.see(k, poses)
             if set_label:
                 set_label(f"following the trajectory: {path.share[k]:.0%}")
-    return {
+    watch.about = {
         "source": str(trajectory.source), "waypoints": len(trajectory.waypoints), "samples": len(path.share),
         "resolution": resolution, "certified": False, "moving": watch.moving,
         "duration": None if path.times is None else float(path.times[-1] - path.times[0]),
-        **watch.summary(), "notes": path.notes,
     }  # fmt: skip
+    return watch
 
 
-class _Watch:
-    """A World that follows a path, and the worst that it has seen of every pair."""
+class Look(NamedTuple):
+    """What is near at one sample: rows of `collide.results.PAIR_DTYPE`, and of each class which of them.
 
-    def __init__(self, scene, path: Path, clearance: float, min_depth: float):
+    least : signed distance of the nearest pair [m]; None where there is none, or it is not known.
+    """
+
+    rows: np.ndarray
+    by_class: dict[str, np.ndarray]
+    least: float | None
+
+
+class Watch:
+    """A World that follows a path, and the worst that it has seen of every pair.
+
+    verdicts : (samples,) row of the worst class in `classes.NAMES` at each, their number where nothing is in any.
+    """
+
+    def __init__(self, scene, path: Path, clearance: float, min_depth: float, max_kept: int = 0):
+        self._max_kept, self._kept_rows = max_kept, list[np.ndarray]()
         self.scene, self.path, self.clearance, self.min_depth = scene, path, clearance, min_depth
         self.moving = self._movers()
         fixed = [replace(body, static=body.name not in self.moving) for body in scene.bodies]
@@ -139,6 +170,8 @@ class _Watch:
         self.first: dict | None = None
         self.least: dict | None = None
         self.unanswered: list[dict] = []
+        self.about: dict = {}
+        self.verdicts = np.full(len(path.share), len(classes.NAMES), dtype=np.int8)
 
     def _movers(self) -> list[str]:
         """Names of the bodies that stand elsewhere at some waypoint, in the order of the scene."""
@@ -163,21 +196,25 @@ class _Watch:
         count = len(self.path.share)
         for start in range(0, count, _CHUNK):
             samples = np.arange(start, min(start + _CHUNK, count))
-            carried = dict(self._carried(samples))
-            stacked = np.array([carried[name] for name in self.moving]).reshape(len(self.moving), len(samples), 4, 4)
-            yield from zip(samples.tolist(), stacked.transpose(1, 0, 2, 3))
+            yield from zip(samples.tolist(), self.poses_at(samples))
+
+    def poses_at(self, samples: np.ndarray) -> np.ndarray:
+        """(n, m, 4, 4) poses of the moving bodies at samples."""
+        carried = dict(self._carried(samples))
+        stacked = np.array([carried[name] for name in self.moving]).reshape(len(self.moving), len(samples), 4, 4)
+        return stacked.transpose(1, 0, 2, 3)
 
     def see(self, k: int, poses: np.ndarray) -> None:
         """Ask the World at sample k, and keep what is first, worst or nearest."""
-        moved = [self.ids[name] for name in self.moving]
-        self.world.set_poses(moved, poses)
-        self.size[moved] = np.abs(poses[:, :3, 3]).max(axis=1, initial=0.0) + self.reach[moved]
+        self._go_to(poses)
         rows = self._near_rows()
-        rounding = classes.roundings(self.size[rows["a"]], self.size[rows["b"]])
-        by_class = classes.classify(rows, rounding, clearance=self.clearance, min_depth=self.min_depth)
+        by_class = self._sorted(rows)
+        if k == len(self._kept_rows) < self._max_kept:
+            self._kept_rows.append(rows)
         for name, indices in by_class.items():
             for row in rows[indices]:
                 self._keep(self.worst[name], k, row)
+        self.verdicts[k] = next((n for n, name in enumerate(classes.NAMES) if len(by_class[name])), len(classes.NAMES))
         hits = rows[by_class[classes.COLLIDING]]
         if self.first is None and len(hits):
             self.first = self._event(k, hits[np.argmin(hits["distance"])])
@@ -187,10 +224,34 @@ class _Watch:
             if self.least is None or nearest["distance"] < self.least["order"]:
                 self.least = self._event(k, nearest)
 
+    def look_at(self, k: int, poses: np.ndarray) -> Look:
+        """What is near at sample k, whose moving bodies are at these poses (m, 4, 4): kept, or asked once more."""
+        self._go_to(poses)
+        needed = max(self.clearance, self._largest_rounding())
+        rows = self._kept_rows[k] if k < len(self._kept_rows) else self._rows(needed)
+        apart = rows[~rows["beyond"]]
+        if not len(apart):  # the nearest pair is farther than any that was asked for
+            try:
+                apart = self.world.minimum().rows
+            except UnsupportedQuery:  # a pair far away that the path never comes near
+                pass
+        return Look(rows, self._sorted(rows), _finite(apart["distance"].min()) if len(apart) else None)
+
+    def _go_to(self, poses: np.ndarray) -> None:
+        moved = [self.ids[name] for name in self.moving]
+        self.world.set_poses(moved, poses)
+        self.size[moved] = np.abs(poses[:, :3, 3]).max(axis=1, initial=0.0) + self.reach[moved]
+
+    def _sorted(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        rounding = classes.roundings(self.size[rows["a"]], self.size[rows["b"]])
+        return classes.classify(rows, rounding, clearance=self.clearance, min_depth=self.min_depth)
+
+    def _largest_rounding(self) -> float:
+        return float(classes.roundings(self.size, 0.0).max(initial=0.0))
+
     def _near_rows(self) -> np.ndarray:
         """Pairs as near as any seen so far, or within the clearance or rounding."""
-        rounding = float(classes.roundings(self.size, 0.0).max(initial=0.0))
-        needed = max(self.clearance, rounding)
+        needed = max(self.clearance, self._largest_rounding())
         if self.least is not None:
             return self._rows(max(needed, float(self.least["order"])))
         limit = max(needed, 0.01 * float(self.size.max(initial=0.0)))
@@ -227,13 +288,14 @@ class _Watch:
 
     # --- plain data -----------------------------------------------------------------------------
 
-    def summary(self) -> dict:
+    def to_dict(self) -> dict:
+        """The path and the worst that was seen along it, as plain data."""
         listed = {name: self._listed(name) for name in classes.NAMES}
         return {
-            "collides": self.first is not None,
+            **self.about, "collides": self.first is not None,
             "first_collision": None if self.first is None else self._entry(self.first),
             "least": None if self.least is None else self._entry(self.least),
-            **listed, "unanswered": self.unanswered,
+            **listed, "unanswered": self.unanswered, "notes": self.path.notes,
         }  # fmt: skip
 
     def _listed(self, name: str) -> list[dict]:

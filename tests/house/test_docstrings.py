@@ -17,18 +17,22 @@ import numpy as np
 import pytest
 
 import collide
+import collide.polytopes
 import collide.scenes
+from collide.adapters.live import world_viewer
 from collide.adapters.peers import compare, exact, protocol, question, stress
 
 #: Modules, and their public names.
 PUBLIC = {
     collide: collide.__all__,
     collide.scenes: collide.scenes.__all__,
+    collide.polytopes: collide.polytopes.__all__,
     compare: ("compare", "Comparison", "Disagreement"),
     exact: ("hit", "distance", "depth", "signed_distance", "verify", "world_points"),
     protocol: ("engine", "Peer", "Table"),
     question: ("Question",),
     stress: ("run", "StressTable"),
+    world_viewer: ("view", "WorldViewer"),
 }
 SECTIONS = ("Parameters", "Attributes", "Returns", "Yields", "Raises", "Notes", "Examples", "References", "See Also")
 #: Parameters that are lengths, whatever function has them: their description names the unit.

@@ -99,6 +99,10 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
         (f"collide/hierarchies/{name}.py", "P"): "polytopes P and R, Q the polar of R, as Barba and Langerman name them"
         for name in ("hierarchy_queries", "matrix_game", "validate_walk", "walk_steps")
     },
+    **{
+        (f"collide/polytopes/{name}.py", "P"): "the polygons P and Q of Barba and Langerman"
+        for name in ("planar_certificates", "planar_predicates")
+    },
     ("collide/results.py", "SWEPT"): "swept overlap: how a pair was decided, one of `How`",
 }
 #: Rooms that are being rebuilt, and how many names each may still have; none is. Numbers only go down.

@@ -25,8 +25,16 @@ NEEDS = {
 HOSTS_SAY = ("pybullet build time", "Warp CUDA warning")
 #: What each example's output must hold.
 SHOWS = {
+    "22_safe_corridor": ["region 2: the pillar reaches into it", "region 3 with that plane: 0.4000 m away"],
+    "23_wrench_polytope": ["friction 0.3, 30 N: not held", "by 3 bounds of the task", "friction 0.8, 30 N: held"],
+    "24_footprints": [
+        "23.7% of 100000 poses hit", "a common point checked in fractions", "a line between checked in fractions",
+        "0.196 m, from [1.381 0.1  ] to [1.381 0.296]", "0.097 m inside", "outside, it falls", "moved by 0 m: stands",
+        "moved by -1e-200 m: falls",
+    ],
     "18_certified_planning": ["nodes; a path", "motions are proven free", "of it in collision checks"],
     "19_nearest_obstacles": ["in something, gaps up to", "collide, depths up to", "nearest in"],
+    "21_look_at_a_world": ["13 bodies at http://127.0.0.1:", "no longer live"],
     "20_reachable_positions": ["200000 postures", "free of collision, layer by layer", "m above the floor"],
     "17_newton_solver": ["newton: ", "collide: ", "of 500 pairs: Newton 20, collide 0"],
     "16_pybullet_arm": ["Bullet says otherwise in", "finger over the table: +0.800 mm, Bullet -0.200 mm", "a World of"],
