@@ -2,15 +2,19 @@
 
     python benchmarks/page_sizes.py                # a minute
     python benchmarks/page_sizes.py --runs 5
+    python benchmarks/page_sizes.py --open         # and in a headless Chromium, which draws in software (selenium)
 
 Scenes: both shipped ones with what their robots look like, 1,000 meshes of 524 facets each, no two of them the same,
 1,000 bodies that share one mesh, and one mesh of 500,000 facets, which is drawn with fewer. ``report`` is the time of
-the report itself, ``page`` of drawing, contacts and writing after it; medians.
+the report itself, ``page`` of drawing, contacts and writing after it; medians. With ``--open``: seconds from asking for
+the page until it is ready, and until its first picture stands; milliseconds a picture while the camera moves, at 1,280
+by 800 pixels; draw calls and triangles of a picture.
 """
 
 from __future__ import annotations
 
 import argparse
+import shutil
 import statistics
 import tempfile
 import time
@@ -59,8 +63,48 @@ SCENES: dict[str, Callable[[], Scene]] = {
 }
 
 
-def measured(scene: Scene, runs: int) -> tuple[float, float, int, int, int]:
-    """Seconds of the report and of its page, bytes, facets in the scene's shapes before and in the page."""
+#: Moves the camera ten times; a pixel is read back, so that the picture is really there.
+_TURN = """
+const canvas = document.querySelector("canvas");
+const gl = canvas.getContext("webgl2");
+const pixel = new Uint8Array(4);
+const shown = () => { window.collideViewer.renderNow(); gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); };
+const times = [];
+shown();
+const first = performance.now();
+for (let k = 0; k < 10; k += 1) {
+  canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: k % 2 ? 40 : -40, bubbles: true, cancelable: true }));
+  const start = performance.now();
+  shown();
+  times.push(performance.now() - start);
+}
+times.sort((a, b) => a - b);
+return [window.collideViewer.measures(), first, times[5]];
+"""
+
+
+def opened(place: Path) -> tuple[float, float, float, int, int]:
+    """(ready [s], first picture [s], a picture [ms], draw calls, triangles) in a headless browser."""
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    options = webdriver.ChromeOptions()
+    for argument in ("--headless=new", "--no-sandbox", "--enable-unsafe-swiftshader", "--window-size=1280,800"):
+        options.add_argument(argument)
+    driver = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+    try:
+        driver.get(place.as_uri())
+        ready = "return document.documentElement.dataset.ready === 'true'"
+        WebDriverWait(driver, 60, poll_frequency=0.05).until(lambda browser: browser.execute_script(ready))
+        measures, first, picture = driver.execute_script(_TURN)
+    finally:
+        driver.quit()
+    return measures["opened"] / 1e3, first / 1e3, picture, measures["calls"], measures["triangles"]
+
+
+def measured(scene: Scene, runs: int, look: bool) -> tuple[float, float, int, int, int, tuple]:
+    """Seconds of the report and of its page, bytes, facets in the scene's shapes before and in the page, `opened`."""
     of_report, of_page = [], []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder, "page.html")
@@ -74,33 +118,38 @@ def measured(scene: Scene, runs: int) -> tuple[float, float, int, int, int]:
             of_report.append(middle - start)
             of_page.append(time.perf_counter() - middle)
         size = place.stat().st_size
+        seen = opened(place) if look else ()
     shapes = next(block.data["shapes"] for block in blocks if block.id == "drawing")
     before = sum(shape["simplified_from"] or shape["triangle_count"] for shape in shapes)
     drawn = sum(shape["triangle_count"] for shape in shapes)
-    return statistics.median(of_report), statistics.median(of_page), size, before, drawn
+    return statistics.median(of_report), statistics.median(of_page), size, before, drawn, seen
 
 
-def rows(runs: int) -> Iterator[str]:
+def rows(runs: int, look: bool) -> Iterator[str]:
     for name, build in SCENES.items():
         try:
             scene = build()
         except CollideError as error:
             yield f"| {name} | {error} |"
             continue
-        of_report, of_page, size, before, drawn = measured(scene, runs)
-        yield (
-            f"| {name} | {len(scene.bodies)} | {before:,} | {drawn:,} | {of_report:.2f} | {of_page:.2f} "
-            f"| {size / 1e6:.1f} |"
-        )
+        of_report, of_page, size, before, drawn, seen = measured(scene, runs, look)
+        row = f"| {name} | {len(scene.bodies)} | {before:,} | {drawn:,} "
+        row += f"| {of_report:.2f} | {of_page:.2f} | {size / 1e6:.1f} |"
+        if look:
+            ready, first, picture, calls, triangles = seen
+            row += f" {ready:.2f} | {first:.2f} | {picture:.0f} | {calls} | {triangles:,} |"
+        yield row
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=3, help="of which the median is printed (3)")
+    parser.add_argument("--open", action="store_true", help="open each in a headless Chromium as well")
     args = parser.parse_args()
-    print("| scene | bodies | facets | drawn | report [s] | page [s] | MB |")
-    print("| --- |" + " ---: |" * 6)
-    for row in rows(args.runs):
+    more = " ready [s] | first picture [s] | a picture [ms] | draw calls | triangles |" if args.open else ""
+    print("| scene | bodies | facets | drawn | report [s] | page [s] | MB |" + more)
+    print("| --- |" + " ---: |" * (11 if args.open else 6))
+    for row in rows(args.runs, args.open):
         print(row, flush=True)
 
 
