@@ -16,11 +16,12 @@ from reproduction import reproducing
 
 import collide
 from collide import polytopes
+from collide.least_distance.homogeneous_rows import HomogeneousRows
+from collide.least_distance.input_rows import input_rows
+from collide.least_distance.interior_point import interior_point
+from collide.least_distance.nearest_pair import APART, nearest_pair
+from collide.least_distance.pair_proposals import Work
 from collide.polytopes import acit
-from collide.polytopes.homogeneous_rows import HomogeneousRows
-from collide.polytopes.input_rows import input_rows
-from collide.polytopes.nearest_pair import APART, nearest_pair
-from collide.polytopes.pair_proposals import Work
 from collide.polytopes.recentred_polars import recentred_spaces
 
 #: So small that some dozens of rows are pruned several times.
@@ -28,8 +29,8 @@ SMALL = acit.Sizes(0.3, 12, 16)
 AGAIN = """
 import numpy as np
 from collide.polytopes import acit
-from collide.polytopes.input_rows import input_rows
-from collide.polytopes.pair_proposals import Work
+from collide.least_distance.input_rows import input_rows
+from collide.least_distance.pair_proposals import Work
 rows = input_rows(np.array({points}), np.array({normals}), np.array({offsets}))
 print(acit.acit(rows, Work(), acit.Sizes(0.3, 12, 16)))
 """
@@ -40,7 +41,7 @@ class Asked:
 
     def __init__(self, question: families.Question):
         rows, self.work, self.spaces = input_rows(*question), Work(), None
-        interior = acit.interior_point(rows.halfspaces, self.work, exactly=True)
+        interior = interior_point(rows.halfspaces, self.work, exactly=True)
         if interior is None:
             return
         spaces = recentred_spaces(rows.points, rows.halfspaces, interior)

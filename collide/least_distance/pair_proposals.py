@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import UnsupportedQuery
-from collide.polytopes.complementary_pivoting import propose_basis
-from collide.polytopes.homogeneous_rows import HomogeneousRows
+from collide.least_distance.complementary_pivoting import propose_basis
+from collide.least_distance.homogeneous_rows import HomogeneousRows
 
 #: Doubles no longer tell a violation from rounding below this, relative to the size of the products.
 _NOISE = 1e-14
