@@ -12,10 +12,10 @@ from itertools import combinations
 import numpy as np
 
 from collide.errors import UnsupportedQuery
-from collide.polytopes.complementary_pivoting import propose_solution
-from collide.polytopes.input_rows import InputRows
-from collide.polytopes.nearest_pair import APART, NearestPair, nearest_pair
-from collide.polytopes.pair_proposals import Work
+from collide.least_distance.complementary_pivoting import propose_solution
+from collide.least_distance.input_rows import InputRows
+from collide.least_distance.nearest_pair import APART, NearestPair, nearest_pair
+from collide.least_distance.pair_proposals import Work
 from collide.polytopes.seidel_program import seidel_program
 
 #: Subsets of d points that brute force tries at most.

@@ -9,9 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from collide.polytopes.input_rows import InputRows
+from collide.least_distance.input_rows import InputRows
+from collide.least_distance.nearest_pair import APART, EMPTY, MEETING, NearestPair
 from collide.polytopes.meeting import Meeting, MeetingCertificate
-from collide.polytopes.nearest_pair import APART, EMPTY, MEETING, NearestPair
 
 _KINDS: dict[str, Literal["common point", "separating plane", "contradiction"]] = {
     MEETING: "common point", APART: "separating plane", EMPTY: "contradiction",

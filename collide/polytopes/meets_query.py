@@ -8,13 +8,13 @@ from numpy.typing import ArrayLike
 
 from collide.argument_checks import integer
 from collide.errors import InvalidArgument
+from collide.least_distance.input_rows import InputRows, input_rows
+from collide.least_distance.nearest_pair import NearestPair, nearest_pair
+from collide.least_distance.pair_proposals import Work
 from collide.polytopes.acit import acit
 from collide.polytopes.alternatives import brute_force, gjk, lp_type
 from collide.polytopes.exact_answers import make_meeting
-from collide.polytopes.input_rows import InputRows, input_rows
 from collide.polytopes.meeting import Meeting
-from collide.polytopes.nearest_pair import NearestPair, nearest_pair
-from collide.polytopes.pair_proposals import Work
 
 #: The algorithms by name; benchmarks/polytopes.py compares them.
 ALGORITHMS: dict[str, Callable[[InputRows, Work], NearestPair]] = {

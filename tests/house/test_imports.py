@@ -31,9 +31,12 @@ ROOMS = {
     "results": {"errors"},
     "numerics": {"errors", "kernels"},
     "hull": {"errors", "kernels", "numerics"},
+    "least_distance": {"errors", "argument_checks", "kernels"},
     "support": {"errors", "fork_safe_lock", "kernels", "numerics", "hull", "log"},
     "mesh": {"errors", "fork_safe_lock", "kernels", "numerics", "log"},
-    "shapes": {"errors", "argument_checks", "log", "transforms", "hull", "mesh", "support", "lazy_modules"},
+    "shapes": {
+        "errors", "argument_checks", "log", "transforms", "hull", "least_distance", "mesh", "support", "lazy_modules",
+    },
     "lowering": {
         "errors",
         "argument_checks",
@@ -170,7 +173,9 @@ ROOMS = {
         "batches",
         "pair_arguments",
     },
-    "polytopes": {"errors", "argument_checks", "certificates", "kernels", "numerics", "shapes", "transforms"},
+    "polytopes": {
+        "errors", "argument_checks", "certificates", "kernels", "least_distance", "numerics", "shapes", "transforms",
+    },
     "world_bodies": {"errors", "argument_checks", "transforms", "numerics", "shapes", "broadphase"},
     "world_hits": set(),
     "world_parts": {"shapes", "lowering", "broadphase"},

@@ -14,7 +14,7 @@ import meeting_families as families
 
 import collide
 from collide import polytopes
-from collide.polytopes.complementary_pivoting import decide_basis, propose_solution
+from collide.least_distance.complementary_pivoting import decide_basis, propose_solution
 from collide.polytopes.seidel_program import seidel_program
 
 

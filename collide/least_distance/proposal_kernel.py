@@ -11,8 +11,8 @@ import math
 from typing import Any, NamedTuple
 
 from collide.kernels import entry, kernel, view_f64, view_i64
-from collide.polytopes.pivoting_kernel import UNCLEAR, begin_dictionary, pivot_to_solution
-from collide.polytopes.row_products import BLOCK, Function, least_product, rows_of_record, size_of_products
+from collide.least_distance.pivoting_kernel import UNCLEAR, begin_dictionary, pivot_to_solution
+from collide.least_distance.row_products import BLOCK, Function, least_product, rows_of_record, size_of_products
 
 #: Doubles no longer tell a violation from rounding below this, relative to the size of the products.
 NOISE = 1e-14
@@ -20,19 +20,21 @@ NOISE = 1e-14
 _MAX_ROUNDS = 200
 #: How a search ended: nothing is violated; doubles cannot tell; working sets are full; too much was read.
 SETTLED, LOST, FULL, STOPPED = 0, 1, 2, 3
+#: Coordinates of points at most: one more than questions have, for `interior_point.py`.
+MAX_D = 9
 #: The state of a search: integers at these places, then four lists of ``capacity`` rows each: working points, working
 #: half-spaces, points of the basis, half-spaces of the basis.
 N_POINTS, N_HALFSPACES, ROUNDS, PIVOTS, POINTS_READ, HALFSPACES_READ = 0, 1, 2, 3, 4, 5
 N_BASIC_POINTS, N_BASIC_HALFSPACES, LISTS = 6, 7, 8
 #: Its doubles: y, u, −x, a block of products; then p₀ and the edges from it, the values of the basic variables, and
 #: the dictionary.
-Y, U, MINUS_X, PRODUCTS = 0, 8, 16, 24
+Y, U, MINUS_X, PRODUCTS = 0, MAX_D, 2 * MAX_D, 3 * MAX_D
 MATRICES = PRODUCTS + BLOCK
 
 
 def n_doubles(capacity: int) -> int:
     """Doubles of the state of a search with room for so many rows of either kind."""
-    return MATRICES + 10 * capacity + 2 * capacity * (2 * capacity + 2)
+    return MATRICES + (MAX_D + 2) * capacity + 2 * capacity * (2 * capacity + 2)
 
 
 def n_integers(capacity: int) -> int:
@@ -107,7 +109,7 @@ def _read_solution(search, halfspaces, d, s, t):
     doubles = search.doubles
     integers = search.integers
     size = s + t
-    values = MATRICES + 8 * search.capacity
+    values = MATRICES + MAX_D * search.capacity
     for k in range(size):
         doubles[values + k] = -1.0  # not in the basis
     basic_points = LISTS + 2 * search.capacity
@@ -194,13 +196,13 @@ def _grow(search, points, halfspaces, s, t):
 def propose_rows(d, points_at, halfspaces_at, doubles_at, integers_at, capacity, max_read):
     """How the search ended. The state has the working sets at first, at the end also a basis, y and u.
 
-    d : the dimension, at most 8.   points_at, halfspaces_at : addresses of records (`row_products.py`).   doubles_at,
+    d : at most MAX_D.   points_at, halfspaces_at : addresses of records (`row_products.py`).   doubles_at,
     integers_at, capacity : the state, of `n_doubles` and `n_integers`.   max_read : rows it may read, or a negative
     number.
     """
     points = rows_of_record(points_at, d)
     halfspaces = rows_of_record(halfspaces_at, d)
-    n_before = MATRICES + 10 * capacity
+    n_before = MATRICES + (MAX_D + 2) * capacity
     n_lists = LISTS + 4 * capacity
     basic_at = integers_at + 8 * n_lists
     integers = view_i64(integers_at, n_lists)

@@ -14,10 +14,11 @@ import numpy as np
 
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of
-from collide.polytopes.homogeneous_rows import HomogeneousRows
-from collide.polytopes.proposal_kernel import (
+from collide.least_distance.homogeneous_rows import HomogeneousRows
+from collide.least_distance.proposal_kernel import (
     FULL,
     LISTS,
+    MAX_D,
     N_BASIC_HALFSPACES,
     N_BASIC_POINTS,
     NOISE,
@@ -153,6 +154,7 @@ def propose_pair(
     working_halfspaces: list[int],
 ) -> Proposal | None:
     """What doubles take for the nearest pair, or None where they cannot tell. Nothing is proven."""
+    assert points.dimension <= MAX_D
     records = points.record(point_rows), halfspaces.record(halfspace_rows)
     counts = (0, 0, 0, 0)
     while True:

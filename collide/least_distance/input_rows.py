@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from collide.argument_checks import array, describe
 from collide.errors import InvalidArgument
-from collide.polytopes.homogeneous_rows import HomogeneousRows, as_integers
+from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
 
 #: Dimensions answered: what integers do grows with d³, and the numbers of digits with d.
 MAX_DIMENSION = 8

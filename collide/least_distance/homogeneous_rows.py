@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
-from collide.polytopes.row_products import BLOCK, RECORD, products_below
+from collide.least_distance.row_products import BLOCK, RECORD, products_below
 
 #: Half a unit in the last place of 1.
 _UNIT = 2.0**-53

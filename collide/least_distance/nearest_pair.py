@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import UnsupportedQuery
-from collide.polytopes.complementary_pivoting import decide_basis
-from collide.polytopes.homogeneous_rows import HomogeneousRows, Violations, dot
-from collide.polytopes.pair_proposals import Work, propose_from_samples
+from collide.least_distance.complementary_pivoting import decide_basis
+from collide.least_distance.homogeneous_rows import HomogeneousRows, Violations, dot
+from collide.least_distance.pair_proposals import Work, propose_from_samples
 
 APART, MEETING, EMPTY = "apart", "meeting", "empty"
 #: Rows that violate the answer are added by so many a round.

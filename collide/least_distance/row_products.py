@@ -108,7 +108,7 @@ def _fill(rows, first, count, f, d):
 def _fill_block(rows, first, count, f):
     """The function at rows first … first + count − 1 of those to look at."""
     d = rows.d
-    if not rows.all_rows or d == 1:
+    if not rows.all_rows or d < 2 or d > 8:
         for k in range(count):
             i = _row(rows, first + k) * d
             total = 0.0

@@ -15,7 +15,7 @@ import numpy as np
 
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of
-from collide.polytopes.pivoting_kernel import UNCLEAR, solve_complementarity
+from collide.least_distance.pivoting_kernel import UNCLEAR, solve_complementarity
 
 
 class Basis(NamedTuple):
