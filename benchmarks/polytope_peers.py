@@ -15,6 +15,8 @@ import numpy as np
 
 #: What is said to have a common point, of distances that solvers give.
 _HIT = 1e-9
+#: What each method of HiGHS is given before it counts as without an answer.
+_HIGHS_SECONDS = 20.0
 
 
 class Question(NamedTuple):
@@ -48,7 +50,7 @@ def linprog(question: Question) -> bool:
     for method in ("highs-ds", "highs-ipm"):
         answer = scipy.optimize.linprog(
             np.zeros(n + d), inside, question.offsets, equalities, right, bounds, method=method,
-            options={"time_limit": 60.0},
+            options={"time_limit": _HIGHS_SECONDS},
         )  # fmt: skip
         if answer.status in (0, 2):
             return answer.status == 0

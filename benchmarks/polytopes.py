@@ -88,6 +88,8 @@ def fits(args) -> Iterator[dict]:
     for algorithm in args.algorithms or ("acit", "active-set"):
         for d in args.dimensions or (3,):
             for family, make in FIT_FAMILIES.items():
+                if args.families and family not in args.families:
+                    continue
                 rows = []
                 for n in (size for size in SIZES if size <= (args.largest if d == 3 else min(args.largest, 100_000))):
                     rows.append(_measured(algorithm, family, d, n, make, args.highs and algorithm == "acit"))
@@ -167,11 +169,15 @@ def plot(rows: list[dict], place: Path) -> None:
 
 
 def table(args) -> Iterator[dict]:
-    """Medians of all contestants, interleaved, and how often they were wrong."""
+    """Medians of all contestants, in another order each time, and how often they were wrong."""
     contestants: dict[str, Callable[[Question], bool]] = {
         name: (lambda question, name=name: polytopes.meets(*question, algorithm=name).hit) for name in ALGORITHMS
     }
     contestants.update({name: ask for name, (module, ask, _) in PEERS.items() if is_installed(module)})
+    chosen = args.contestants or list(contestants)
+    if missing := set(chosen) - set(contestants):
+        raise SystemExit(f"no contestants: {', '.join(sorted(missing))}; there are {', '.join(contestants)}")
+    order = np.random.default_rng(0)
     for d, n, m in TABLE:
         questions = [balls(np.random.default_rng([d, n, m, k]), d, n, m, gap)
                      for k, gap in enumerate((0.5, -0.2, 1e-3, -1.5, 1.0)[: args.questions])]  # fmt: skip
@@ -184,12 +190,12 @@ def table(args) -> Iterator[dict]:
         wrong: dict[str, int] = {}
         for _ in range(args.runs):
             for question, truth in zip(questions, truths):
-                for name, ask in contestants.items():
+                for name in order.permutation(chosen).tolist():  # whoever follows Drake finds the caches empty
                     if max(seconds.get(name, [0.0])) > args.longest or _too_large(name, n):
                         continue
                     start = time.perf_counter()
                     try:
-                        hit: bool | None = ask(question)
+                        hit: bool | None = contestants[name](question)
                     except (ArithmeticError, RuntimeError, ValueError, CollideError) as error:  # no answer
                         hit = None
                         print(f"{name} d={d} n={n} m={m}: {type(error).__name__}: {str(error)[:80]}", file=sys.stderr)
@@ -233,8 +239,10 @@ def main() -> None:
     parser.add_argument("--algorithms", nargs="+", choices=["auto", *ALGORITHMS], help="for --fits and --judge")
     parser.add_argument("--dimensions", nargs="+", type=int, help="for --fits, 3 by default, and for --judge, 1 to 5")
     parser.add_argument("--largest", type=int, default=SIZES[-1], help="the most rows of --fits")
+    parser.add_argument("--families", nargs="+", choices=list(FIT_FAMILIES), help="for --fits: these alone")
     parser.add_argument("--highs", action="store_true", help="with --fits: HiGHS beside ACIT where it can see the gap")
     parser.add_argument("--plot", type=Path, help="with --fits: a picture of them (needs matplotlib)")
+    parser.add_argument("--contestants", nargs="+", help="of --table: these alone")
     parser.add_argument("--runs", type=int, default=5, help="of --table, each of all questions")
     parser.add_argument("--questions", type=int, default=5, help="of --table a size")
     parser.add_argument("--longest", type=float, default=3.0, help="seconds that a contestant may take")
