@@ -1,0 +1,101 @@
+"""A case made as small as it can be while an engine still errs in the same way.
+
+The simpler cases are tried the boldest first, and the first that still shows the flaw is gone on from, until none does:
+delta debugging (Zeller and Hildebrandt, Simplifying and isolating failure-inducing input, 2002) on shapes and poses.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+from collide.adapters.fuzzing.disagreements import Flaw
+from collide.adapters.fuzzing.fuzz_case import Case
+from collide.adapters.fuzzing.simpler_cases import STEPS, complexity, fingerprint
+from collide.adapters.peers.answers import ABORTED, HUNG
+
+#: Cases asked at a time, at most. Kinds of flaws that cost a process each are asked one by one.
+CHUNK = 16
+COSTLY = ABORTED, HUNG
+#: Cases that shrinking one may ask, and how long it may take [s].
+MAX_CASES, MAX_SECONDS = 2500, 60.0
+
+
+class Shrunk(NamedTuple):
+    """case, flaw : the smallest found.   asked : cases tried.   is_minimal : no simpler one errs in the same way."""
+
+    case: Case
+    flaw: Flaw
+    asked: int
+    is_minimal: bool
+
+
+def shrink(
+    case: Case, flaw: Flaw, flaws: Callable[[Sequence[Case]], list[list[Flaw]]], *, max_cases: int = MAX_CASES,
+    max_seconds: float = MAX_SECONDS,
+) -> Shrunk:
+    """The smallest case that was found to show the same flaw.
+
+    Parameters
+    ----------
+    case, flaw : Case, Flaw
+        What was found.
+    flaws : callable
+        From cases to the flaws of each, as `Examiner.flaws`.
+    max_cases : int
+        How many simpler cases may be tried.
+    max_seconds : float
+        How long it may take [s].
+
+    Returns
+    -------
+    Shrunk
+        Never more complicated than what was given.
+    """
+    search = _Search(case, flaw, flaws, max_cases, time.monotonic() + max_seconds)
+    progress = True
+    while progress and not search.is_spent:
+        progress = False
+        for step in STEPS:
+            while search.takes(step):
+                progress = True
+    return Shrunk(search.case, search.flaw, search.asked, not search.is_spent)
+
+
+class _Search:
+    """The smallest case so far, and what was tried."""
+
+    def __init__(self, case: Case, flaw: Flaw, flaws: Callable, max_cases: int, deadline: float):
+        self.case, self.flaw, self._flaws = case, flaw, flaws
+        self._max_cases, self._deadline, self.asked = max_cases, deadline, 0
+        self._tried: set[tuple] = {fingerprint(case)}
+
+    @property
+    def is_spent(self) -> bool:
+        return self.asked >= self._max_cases or time.monotonic() >= self._deadline
+
+    def takes(self, step: Callable[[Case], Iterator[Case | None]]) -> bool:
+        """Go on from the first case of a step that is simpler and shows the flaw; False where there is none."""
+        candidates, size = self._new(step), 1
+        while not self.is_spent and (batch := list(itertools.islice(candidates, size))):
+            self.asked += len(batch)
+            for tried, found in zip(batch, self._flaws(batch)):
+                same = next((f for f in found if self.flaw.same_way(f)), None)
+                if same is not None:
+                    self.case, self.flaw = tried, same
+                    return True
+            size = size if self.flaw.kind in COSTLY else min(2 * size, CHUNK)
+        return False
+
+    def _new(self, step: Callable[[Case], Iterator[Case | None]]) -> Iterator[Case]:
+        """Cases of a step that are simpler, and were not tried before."""
+        limit = complexity(self.case)
+        for made in step(self.case):
+            if made is None or complexity(made) >= limit:
+                continue
+            key = fingerprint(made)
+            if key not in self._tried:
+                self._tried.add(key)
+                yield made
