@@ -14,13 +14,12 @@ import numpy as np
 
 from collide.adapters.fuzzing.fuzz_case import Case, isolated
 from collide.adapters.fuzzing.support_bounds import SLACK, lower_bound
+from collide.adapters.peers.answers import ABORTED, HUNG, NO_LENGTH, NOT_A_NUMBER, RAISED, STATUSES, Table
 from collide.adapters.peers.collide_peer import CollidePeer
 from collide.adapters.peers.compare import TOLERANCE, Summary
 from collide.adapters.peers.exact_peer import INSIDE, ExactPeer
 from collide.adapters.peers.judge import BRACKET, EXACT, Disagreement, Judge, contradictions, differences
-from collide.adapters.peers.answers import ABORTED, HUNG, NO_LENGTH, NOT_A_NUMBER, RAISED, STATUSES, Table
-from collide.adapters.peers.question import Question
-from collide.adapters.peers.question import has_mesh
+from collide.adapters.peers.question import Question, has_mesh
 from collide.reports import classes
 from collide.shapes import Mesh
 

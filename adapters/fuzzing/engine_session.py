@@ -46,12 +46,6 @@ class EngineSession:
         self._process: subprocess.Popen | None = None
         self.starts = 0
 
-    def __enter__(self) -> EngineSession:
-        return self
-
-    def __exit__(self, *_) -> None:
-        self.close()
-
     def answer(self, question: Question) -> Table:
         """The engine's table for a question of unrelated pairs.
 
@@ -97,7 +91,7 @@ class EngineSession:
         if self._process is not None:
             return
         self.starts += 1
-        self._stderr = tempfile.TemporaryFile()
+        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - it is closed with the child
         command = [sys.executable, "-m", "collide.adapters.fuzzing.engine_session", self.name]
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._stderr

@@ -1,4 +1,4 @@
-"""Findings kept in a folder: for each a scene file that `collide compare` takes, a snippet for the peer alone, an issue.
+"""Findings in a folder: for each a scene file that `collide compare` takes, a snippet for the peer alone, an issue.
 
 Two findings are duplicates where engine, kind of error, shapes and class of position are the same; the simpler is kept.
 """
@@ -18,10 +18,10 @@ from collide.adapters.fuzzing.fuzz_case import Case
 from collide.adapters.fuzzing.proofs import proof
 from collide.adapters.fuzzing.simpler_cases import complexity
 from collide.adapters.peers.protocol import engine
+from collide.adapters.peers.question import Body
 from collide.errors import SceneError
 from collide.scenes import load
 from collide.scenes.write_scene import document_text, write_whole
-from collide.adapters.peers.question import Body
 
 #: What `collide compare` takes as the clearance by default [m].
 CLEARANCE = 0.1
@@ -92,8 +92,8 @@ def load_finding(path: str | Path) -> tuple[Finding, dict[str, Any]]:
     stored["severity"] = float("inf") if stored["severity"] is None else stored["severity"]
     flaw = Flaw(**stored)
     case = Case(bodies, world=flaw.engine == "collide" and len(bodies) > 2)
-    found = Finding(case, flaw, about.get("seed"), about.get("round"), about.get("times", 1), about.get("minimal", True))
-    return found, about
+    place = about.get("seed"), about.get("round")
+    return Finding(case, flaw, *place, about.get("times", 1), about.get("minimal", True)), about
 
 
 def command(finding: Finding, name: str) -> str:

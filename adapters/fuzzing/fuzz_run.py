@@ -1,11 +1,11 @@
-"""The search: rounds of invented cases, every disagreement judged, shrunk and kept, in a folder that can be gone on from.
+"""The search: rounds of invented cases, every disagreement judged, shrunk and kept, in a folder to go on from.
 
     from collide.adapters.fuzzing.fuzz_run import fuzz
     run = fuzz(["coal", "fcl"], "findings", minutes=10, seed=1)
     run.ours, run.kinds, run.findings()
 
-``fuzz.json`` in the folder holds the seed, the rounds done and what was met; each finding has files of its own. Every file
-is there whole or not at all: a run that is killed loses the round it was in.
+``fuzz.json`` in the folder holds the seed, the rounds done and what was met; each finding has files of its own. Every
+file is there whole or not at all: a run that is killed loses the round it was in.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack, closing, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -161,7 +161,7 @@ def fuzz(
     run = _opened(Path(folder), seed, names, resume)
     deadline, started, before = time.monotonic() + 60.0 * minutes, time.monotonic(), run.seconds
     with ExitStack() as stack:
-        sessions = {name: stack.enter_context(EngineSession(name, timeout)) for name in names}
+        sessions = {name: stack.enter_context(closing(EngineSession(name, timeout))) for name in names}
         rename = stack.enter_context((progress or nullcontext_of)("fuzzing")) or (lambda label: None)
         examiner = Examiner({name: session.answer for name, session in sessions.items()})
         while time.monotonic() < deadline and (rounds is None or run.rounds < rounds):

@@ -54,9 +54,9 @@ def said(flaw: Flaw) -> str:
 def certificate_text(known: dict[str, Any]) -> str:
     """How to read a certificate."""
     if isinstance(known["certificate"], list):
-        return "Vertices as `collide.certificates.certificate` describes them; `collide.verify` checks them in integers."
+        return "Vertices as `collide.certificates.certificate` describes; `collide.verify` checks them in integers."
     return (
-        "`vertices`: (vertex of A, vertex of B, weight) of the nearest points of the two hulls, radii left out; `axis`: a "
-        "direction along which the hulls are exactly that far apart; `facet_normal`, `facet`: the nearest face of A − B "
-        "where they overlap. All are exact, and found in integers."
+        "`vertices`: (vertex of A, vertex of B, weight) of the nearest points of the two hulls, radii left out; "
+        "`axis`: a direction along which the hulls are exactly that far apart; `facet_normal`, `facet`: the nearest "
+        "face of A − B where they overlap. All are exact, and found in integers."
     )

@@ -41,7 +41,10 @@ def snippet(flaw: Flaw, case: Case, known: dict[str, Any]) -> str | None:
 
 
 def _n_rows(shape: Shape) -> int:
-    return sum(len(getattr(shape, field, ())) for field in ("points", "vertices", "faces"))
+    if isinstance(shape, Mesh):
+        return len(shape.vertices) + len(shape.faces)
+    points = None if isinstance(shape, Halfspace) else corners(shape)
+    return 0 if points is None else len(points[0])
 
 
 def _numbers(array) -> str:

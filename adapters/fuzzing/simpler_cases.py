@@ -40,7 +40,7 @@ def _of_shape(shape: Shape) -> int:
     if isinstance(shape, Compound):
         return sum(PART + _of_shape(part) + _of_pose(X) for part, X in shape.items)
     arrays = [np.asarray(getattr(shape, field)) for field in shape._fields if field not in ("faces", "solid")]
-    rows = sum(len(array) for array in arrays if array.ndim == 2) + len(getattr(shape, "faces", ()))
+    rows = sum(len(array) for array in arrays if array.ndim == 2) + (len(shape.faces) if isinstance(shape, Mesh) else 0)
     return POINT * rows + sum(n_digits(x) for array in arrays for x in array.ravel())
 
 

@@ -1,9 +1,10 @@
 """Bounds of the signed distance of two convex bodies from support functions alone, to judge curved shapes with.
 
-For a unit vector n the gap along it is g(n) = min of n·x over B less max of n·x over A = −h_B(−n) − h_A(n). The signed
-distance of two convex bodies is the largest g over all n (Ericson, Real-Time Collision Detection, 2005, section 9.3), so
-that any n gives a lower bound of it. Directions are tried all around and the best are bettered locally; nothing is
-shared with the engine. In doubles: what it finds counts only beyond `SLACK` of the bodies' coordinates.
+For a unit vector n the gap along it is g(n) = min of n·x over B less max of n·x over A = −h_B(−n) − h_A(n). The
+signed distance of two convex bodies is the largest g over all n (Boyd and Vandenberghe, Convex Optimization, 2004,
+section 8.2, for bodies apart; of A − B for depths), so that any n gives a lower bound of it. Directions are tried all
+around and the best are bettered locally; nothing is shared with the engine. In doubles: what it finds counts only
+beyond `SLACK` of the bodies' coordinates.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _STEPS = np.random.default_rng(8).standard_normal((40, 3))
 
 
 def support(shape: Shape, X_WB: np.ndarray, n: np.ndarray) -> np.ndarray | None:
-    """(k,) max of n·x over a convex shape at a pose (4, 4), for directions n (k, 3); None for shapes without one here."""
+    """(k,) max of n·x over a convex shape at a pose (4, 4), for directions n (k, 3); None where there is no formula."""
     m = n @ X_WB[:3, :3]  # in the body's frame
     there = n @ X_WB[:3, 3]
     if isinstance(shape, Ellipsoid):
