@@ -179,7 +179,7 @@ def _gravest(flaws: list[list[Flaw]], truth: _Truth, table: Table, disputes: lis
 
 def _of_dispute(truth: _Truth, k: int, d: Disagreement, name: str) -> Flaw | None:
     """A disagreement as a flaw of one engine; None where that engine is not to blame."""
-    size = truth.judge.size[k]
+    size = truth.judge.size[k] or 1.0  # two points have none
     position = truth.position(k, d)
     blamed = name in d.wrong
     if d.kind == "left out":
@@ -237,7 +237,7 @@ def _refuted_by_supports(case: Case, truth: _Truth, ours: Table, k: int) -> list
     return [Flaw(
         OURS, WRONG_BRACKET, truth.position(k), bool(row["hit"]), float(row["distance"]),
         f"along {np.round(bound[1], 6).tolist()} the bodies are {bound[0]!r} m apart", None, None, lower, upper,
-        "support functions", (bound[0] - upper) / truth.judge.size[k],
+        "support functions", (bound[0] - upper) / (truth.judge.size[k] or 1.0),
     )]  # fmt: skip
 
 

@@ -55,7 +55,7 @@ def n_digits(x: float) -> int:
         return 0
     if abs(x) == 1.0:
         return 1 + (x < 0)
-    digits, _, power = f"{abs(x)!r}".partition("e")
+    digits, _, power = repr(abs(float(x))).partition("e")
     whole, _, part = digits.partition(".")
     length = len((whole + part.rstrip("0")).strip("0"))
     return 1 + length + (x < 0) + (abs(int(power or 0)) > 3)
