@@ -20,7 +20,8 @@ from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, 
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _DUMP = re.compile(
-    r"Shape 1:(?P<a>.*?)X_FS1(?P<X_a>.*?)Shape 2:(?P<b>.*?)X_FS2(?P<X_b>.*?)(?=Solver|Shape 1:|Original error|\Z)", re.DOTALL
+    r"Shape 1:(?P<a>.*?)X_FS1(?P<X_a>.*?)Shape 2:(?P<b>.*?)X_FS2(?P<X_b>.*?)(?=Solver|Shape 1:|Original error|\Z)",
+    re.DOTALL,
 )
 _MESSAGE = re.compile(r"Original error message:(?P<text>.*?)(?=Shape 1:)", re.DOTALL)
 #: Name of a shape in FCL → how many numbers it takes, and what is made of them.

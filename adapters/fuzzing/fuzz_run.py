@@ -222,8 +222,8 @@ def _round(run: FuzzRun, examiner: Examiner, cases: list[Case], deadline: float,
                     rename(f"round {run.rounds + 1}: shrinking {kind}")
                     run.shrunk[kind] = _kept(run, examiner, case, flaw)
                     run.save()
-        if time.monotonic() >= deadline and start + BATCH < len(cases):
-            return False
+                    if time.monotonic() >= deadline:
+                        return False
     run.kinds = dict(Counter(run.kinds) + met)
     run.pairs += len(cases)
     return True
@@ -231,7 +231,7 @@ def _round(run: FuzzRun, examiner: Examiner, cases: list[Case], deadline: float,
 
 def _kept(run: FuzzRun, examiner: Examiner, case: Case, flaw: Flaw) -> str:
     """Shrink a case and write it down, unless a simpler one of its kind is there; the file's name."""
-    small = shrinking.shrink(case, flaw, lambda cases: examiner.flaws(cases, [flaw.engine]))
+    small = shrinking.shrink(case, flaw, examiner.flaws)
     found = Finding(small.case, small.flaw, run.seed, run.rounds, 1, small.is_minimal)
     place = Path(run.folder) / f"{found.stem}.json"
     if place.exists():

@@ -61,7 +61,7 @@ def save_findings(
         kept: dict[Kind, Finding] = {}
         for kind, (case, flaw) in worst.items():
             rename(f"shrinking {' '.join(kind)}")
-            small = shrink(case, flaw, lambda tried, name=flaw.engine: examiner.flaws(tried, [name]))
+            small = shrink(case, flaw, examiner.flaws)
             found = Finding(small.case, small.flaw, times=times[kind], is_minimal=small.is_minimal)
             kept[found.kind] = simpler_of(kept[found.kind], found) if found.kind in kept else found
     return [save_finding(found, folder) for found in kept.values()]

@@ -12,13 +12,15 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from collide.adapters.fuzzing.disagreements import Flaw
-from collide.adapters.fuzzing.fuzz_case import Case
+from collide.adapters.fuzzing.fuzz_case import Case, isolated
 from collide.adapters.fuzzing.simpler_cases import STEPS, complexity, fingerprint
 from collide.adapters.peers.answers import ABORTED, HUNG
 
 #: Cases asked at a time, at most. Kinds of flaws that cost a process each are asked one by one.
 CHUNK = 16
 COSTLY = ABORTED, HUNG
+#: A case may get smaller, and an error less grave, down to this part of what they were.
+LEAST = 0.1
 #: Cases that shrinking one may ask, and how long it may take [s].
 MAX_CASES, MAX_SECONDS = 2500, 60.0
 
@@ -33,8 +35,8 @@ class Shrunk(NamedTuple):
 
 
 def shrink(
-    case: Case, flaw: Flaw, flaws: Callable[[Sequence[Case]], list[list[Flaw]]], *, max_cases: int = MAX_CASES,
-    max_seconds: float = MAX_SECONDS,
+    case: Case, flaw: Flaw, flaws: Callable[[Sequence[Case], Sequence[str]], list[list[Flaw]]], *,
+    max_cases: int = MAX_CASES, max_seconds: float = MAX_SECONDS,
 ) -> Shrunk:
     """The smallest case that was found to show the same flaw.
 
@@ -43,7 +45,7 @@ def shrink(
     case, flaw : Case, Flaw
         What was found.
     flaws : callable
-        From cases to the flaws of each, as `Examiner.flaws`.
+        From cases, and the engines to ask, to the flaws of each: `Examiner.flaws`.
     max_cases : int
         How many simpler cases may be tried.
     max_seconds : float
@@ -71,6 +73,8 @@ class _Search:
         self.case, self.flaw, self._flaws = case, flaw, flaws
         self._max_cases, self._deadline, self.asked = max_cases, deadline, 0
         self._tried: set[tuple] = {fingerprint(case)}
+        self._least_severity = LEAST * flaw.severity
+        self._least_size = LEAST * _size(case)
 
     @property
     def is_spent(self) -> bool:
@@ -81,9 +85,9 @@ class _Search:
         candidates, size = self._new(step), 1
         while not self.is_spent and (batch := list(itertools.islice(candidates, size))):
             self.asked += len(batch)
-            for tried, found in zip(batch, self._flaws(batch)):
+            for tried, found in zip(batch, self._flaws(batch, [self.flaw.engine])):
                 same = next((f for f in found if self.flaw.same_way(f)), None)
-                if same is not None:
+                if same is not None and same.severity >= self._least_severity:
                     self.case, self.flaw = tried, same
                     return True
             size = size if self.flaw.kind in COSTLY else min(2 * size, CHUNK)
@@ -93,9 +97,14 @@ class _Search:
         """Cases of a step that are simpler, and were not tried before."""
         limit = complexity(self.case)
         for made in step(self.case):
-            if made is None or complexity(made) >= limit:
+            if made is None or complexity(made) >= limit or _size(made) < self._least_size:
                 continue
             key = fingerprint(made)
             if key not in self._tried:
                 self._tried.add(key)
                 yield made
+
+
+def _size(case: Case) -> float:
+    """Of the pair: the larger bounded body's diagonal [m]; 1 where neither is bounded."""
+    return isolated([case]).sizes()[0]

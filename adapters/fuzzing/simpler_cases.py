@@ -8,12 +8,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
 from collide import distance
 from collide.adapters.fuzzing.fuzz_case import Case
-from collide.adapters.peers.question import Body
 from collide.errors import CollideError
 from collide.scenes.loaders.fields import rotation_from_degrees
 from collide.shapes import Compound, ConvexHull, Halfspace, HeightField, HPolytope, Mesh, Shape
@@ -50,7 +50,8 @@ def _of_pose(X: np.ndarray) -> int:
 
 
 def n_digits(x: float) -> int:
-    """How long a number is to read: 0 for 0, 1 for 1, and one more for other numbers of one digit."""
+    """How long a number is to read: 0 for 0, 1 for 1, one more for other numbers of one digit; a power of ten counts
+    as its exponent, so that nothing gets tiny for the sake of a digit."""
     if x == 0.0:
         return 0
     if abs(x) == 1.0:
@@ -58,7 +59,7 @@ def n_digits(x: float) -> int:
     digits, _, power = repr(abs(float(x))).partition("e")
     whole, _, part = digits.partition(".")
     length = len((whole + part.rstrip("0")).strip("0"))
-    return 1 + length + (x < 0) + (abs(int(power or 0)) > 3)
+    return 1 + length + (x < 0) + abs(int(power or 0))
 
 
 def degrees(R: np.ndarray) -> tuple[float, float, float]:
@@ -94,12 +95,12 @@ def _fewer_bodies(case: Case) -> Iterator[Case]:
 
 
 def _fewer_parts(case: Case) -> Iterator[Case | None]:
-    for k, body in _compounds(case):
-        for part, X_BP in body.shape.items:
+    for k, body in enumerate(case.bodies[:2]):
+        parts = body.shape.items if isinstance(body.shape, Compound) else ()
+        for part, X_BP in parts:
             yield case.replaced(k, shape=part, X_WB=body.X_WB @ X_BP)
-        for i in range(len(body.shape.items)):
-            items = [item for j, item in enumerate(body.shape.items) if j != i]
-            yield _with_shape(case, k, lambda items=items: Compound(items)) if items else None
+        for i in range(len(parts)):
+            yield _with_shape(case, k, Compound, [item for j, item in enumerate(parts) if j != i])
 
 
 def _fewer_points(case: Case) -> Iterator[Case | None]:
@@ -107,22 +108,22 @@ def _fewer_points(case: Case) -> Iterator[Case | None]:
         shape = body.shape
         if isinstance(shape, HeightField):
             for heights in _smaller_fields(shape.heights):
-                yield _with_shape(case, k, lambda h=heights, s=shape: HeightField(h, s.cell, bottom=s.bottom))
+                yield _with_shape(case, k, HeightField, heights, shape.cell, bottom=shape.bottom)
         elif isinstance(shape, Mesh):
             for chunk in _chunks(len(shape.faces)):
                 faces = np.delete(shape.faces, sorted(chunk), axis=0)
-                yield _with_shape(case, k, lambda f=faces, s=shape: _tidy(s.vertices, f))
+                yield _with_shape(case, k, _tidy, shape.vertices, faces)
             yield from _collapsed(case, k, shape)
         elif isinstance(shape, ConvexHull):
             if shape.radius:
-                yield _with_shape(case, k, lambda s=shape: ConvexHull(s.points))
+                yield _with_shape(case, k, ConvexHull, shape.points)
             for chunk in _chunks(len(shape.points)):
                 points = np.delete(shape.points, sorted(chunk), axis=0)
-                yield _with_shape(case, k, lambda p=points, s=shape: ConvexHull(p, radius=s.radius))
+                yield _with_shape(case, k, ConvexHull, points, radius=shape.radius)
         elif isinstance(shape, HPolytope):
             for i in range(len(shape.offsets)):
-                n, b = np.delete(shape.normals, i, axis=0), np.delete(shape.offsets, i)
-                yield _with_shape(case, k, lambda n=n, b=b: HPolytope(n, b))
+                normals, offsets = np.delete(shape.normals, i, axis=0), np.delete(shape.offsets, i)
+                yield _with_shape(case, k, HPolytope, normals, offsets)
 
 
 def _collapsed(case: Case, k: int, mesh: Mesh) -> Iterator[Case | None]:
@@ -132,7 +133,7 @@ def _collapsed(case: Case, k: int, mesh: Mesh) -> Iterator[Case | None]:
         faces = np.where(mesh.faces == j, i, mesh.faces)
         faces = faces[[len(set(face)) == 3 for face in faces.tolist()]]
         if len(faces):
-            yield _with_shape(case, k, lambda f=faces: _tidy(mesh.vertices, f, solid=mesh.solid or None))
+            yield _with_shape(case, k, _tidy, mesh.vertices, faces, solid=mesh.solid or None)
 
 
 def _plain_poses(case: Case) -> Iterator[Case | None]:
@@ -206,12 +207,10 @@ def _plain_sizes(case: Case) -> Iterator[Case | None]:
     """Everything scaled so that the larger body is about 1; sizes of a body all 1."""
     for k in (0, 1):
         shape = case.bodies[k].shape
-        if isinstance(shape, Mesh | Compound | Halfspace | HPolytope):
+        if isinstance(shape, Mesh | Compound | Halfspace | HPolytope | ConvexHull):
             continue
-        ones = {f: np.ones_like(np.asarray(getattr(shape, f))) for f in shape._fields if f not in ("points",)}
-        if isinstance(shape, ConvexHull):
-            continue
-        made = _with_shape(case, k, lambda s=shape, o=ones: type(s)(*(_scalar(o[f]) for f in s._fields)))
+        ones = [_scalar(np.ones_like(np.asarray(getattr(shape, field)))) for field in shape._fields]
+        made = _with_shape(case, k, type(shape), *ones)
         if made is not None:
             yield made
             for target in _plain_distances(case):
@@ -224,7 +223,7 @@ def _rounded(case: Case) -> Iterator[Case | None]:
         for k in ((0, 1), (0,), (1,)):
             made: Case | None = case
             for i in k:
-                made = made and _with_numbers(made, i, lambda x, digits=digits: _to_digits(x, digits))
+                made = made and _with_numbers(made, i, partial(_to_digits, digits=digits))
             yield made
             if made is not None and not case.world:
                 for target in _plain_distances(case):
@@ -249,7 +248,7 @@ def _short_numbers(case: Case) -> Iterator[Case | None]:
                 for value in _shorter(float(array[place])):
                     changed = array.copy()
                     changed[place] = value
-                    yield _with_shape(case, k, lambda s=body.shape, f=field, c=changed: _with_field(s, f, c))
+                    yield _with_shape(case, k, _with_field, body.shape, field, changed)
 
 
 def _shorter(x: float) -> Iterator[float]:
@@ -274,10 +273,10 @@ STEPS: tuple[Callable[[Case], Iterator[Case | None]], ...] = (
 # --- making shapes --------------------------------------------------------------------------------
 
 
-def _with_shape(case: Case, k: int, make: Callable[[], Shape]) -> Case | None:
-    """The case with another shape of body k; None where there is no such shape."""
+def _with_shape(case: Case, k: int, make: Callable[..., Shape], *numbers, **options) -> Case | None:
+    """The case with another shape of body k, made of these numbers; None where there is no such shape."""
     try:
-        return case.replaced(k, shape=make())
+        return case.replaced(k, shape=make(*numbers, **options))
     except (CollideError, IndexError, ValueError):
         return None
 
@@ -304,8 +303,7 @@ def _with_numbers(case: Case, k: int, change: Callable[[float], float]) -> Case 
             continue
         array = np.asarray(getattr(shape, field), dtype=np.float64)
         changed = np.array([change(float(x)) for x in array.ravel()]).reshape(array.shape)
-        current = made.bodies[k].shape
-        made = _with_shape(made, k, lambda s=current, f=field, c=changed: _with_field(s, f, c))
+        made = _with_shape(made, k, _with_field, made.bodies[k].shape, field, changed)
     return made
 
 
@@ -334,7 +332,3 @@ def _chunks(n: int) -> Iterator[set[int]]:
         for start in range(0, n, size):
             yield set(range(start, min(start + size, n)))
         size //= 2
-
-
-def _compounds(case: Case) -> Iterator[tuple[int, Body]]:
-    return ((k, body) for k, body in enumerate(case.bodies[:2]) if isinstance(body.shape, Compound))
