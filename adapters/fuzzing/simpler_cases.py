@@ -203,6 +203,24 @@ def _signed_distance(case: Case) -> float | None:
         return None
 
 
+def _on_an_axis(case: Case) -> Iterator[Case | None]:
+    """B along a coordinate axis from A, about as far as it is, or at a plain signed distance."""
+    A, B = case.bodies[:2]
+    step = B.X_WB[:3, 3] - A.X_WB[:3, 3]
+    length = float(np.linalg.norm(step))
+    if case.world or np.count_nonzero(step) < 2:
+        return
+    for axis in np.argsort(-np.abs(step)).tolist():
+        for size in (_to_digits(length, 1), _to_digits(1.1 * length, 1), _to_digits(length, 2), length):
+            X = B.X_WB.copy()
+            X[:3, 3] = A.X_WB[:3, 3]
+            X[axis, 3] += math.copysign(size, step[axis])
+            moved = case.replaced(1, X_WB=X)
+            yield moved
+            for target in _plain_distances(case):
+                yield at_distance(moved, target)
+
+
 def _plain_sizes(case: Case) -> Iterator[Case | None]:
     """Everything scaled so that the larger body is about 1; sizes of a body all 1."""
     for k in (0, 1):
@@ -266,7 +284,7 @@ def _to_digits(x: float, digits: int) -> float:
 
 #: From a case to simpler ones, the boldest first; None stands for one that cannot be built.
 STEPS: tuple[Callable[[Case], Iterator[Case | None]], ...] = (
-    _fewer_bodies, _fewer_parts, _fewer_points, _plain_poses, _plain_sizes, _rounded, _short_numbers,
+    _fewer_bodies, _fewer_parts, _fewer_points, _plain_poses, _on_an_axis, _plain_sizes, _rounded, _short_numbers,
 )  # fmt: skip
 
 
