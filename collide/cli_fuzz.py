@@ -79,8 +79,8 @@ def run(args: argparse.Namespace, progress: Callable) -> bool:
 
 def _listed(result: Any) -> list[dict[str, Any]]:
     return [
-        {"file": f"{found.stem}.json", "kind": list(found.kind), "times": found.times, "minimal": found.is_minimal}
-        for found in result.findings()
+        {"file": f"{f.stem}.json", "kind": list(f.kind), "times": f.times, "minimal": f.is_minimal}
+        for f in result.findings()
     ]
 
 
@@ -98,8 +98,7 @@ def _print(result: Any) -> None:
     findings = result.findings()
     if findings:
         listed = [
-            [found.flaw.engine, found.flaw.kind, " ".join(found.case.kinds), found.flaw.position, f"{found.stem}.json"]
-            for found in findings
+            [f.flaw.engine, f.flaw.kind, " ".join(f.case.kinds), f.flaw.position, f"{f.stem}.json"] for f in findings
         ]
         heads = ("engine", "wrong", "shapes", "position", f"file in {result.folder}")
         kinds = ("label", "text", "text", "text", "name")

@@ -89,8 +89,8 @@ class Examiner:
         pairs = [k for k, case in enumerate(cases) if not case.world]
         flaws: list[list[Flaw]] = [[] for _ in cases]
         if pairs:
-            for k, found in zip(pairs, self._of_pairs([cases[k] for k in pairs], engines)):
-                flaws[k] = found
+            for k, of_pair in zip(pairs, self._of_pairs([cases[k] for k in pairs], engines)):
+                flaws[k] = of_pair
         for k, case in enumerate(cases):
             if case.world and (engines is None or OURS in engines):
                 flaws[k] = world_flaws(case)
@@ -162,18 +162,18 @@ class _Truth:
 
 def _gravest(flaws: list[list[Flaw]], truth: _Truth, table: Table, disputes: list[Disagreement], name: str) -> None:
     """Add an engine's flaws, one a case at most."""
-    found: dict[int, list[Flaw]] = {}
+    by_case: dict[int, list[Flaw]] = {}
     for dispute in disputes:
         k = int(dispute.a[1:]) if dispute.a[1:].isdigit() else 0
         flaw = _of_dispute(truth, k, dispute, name)
         if flaw is not None:
-            found.setdefault(k, []).append(flaw)
+            by_case.setdefault(k, []).append(flaw)
     for k, row in enumerate(table.rows):
         mishap = table.mishaps[k]
         if mishap:
             hit = bool(row["hit"]) if row["answered"] else None
-            found.setdefault(k, []).append(_mishap(truth, k, name, mishap, hit, table.reasons[k]))
-    for k, several in found.items():
+            by_case.setdefault(k, []).append(_mishap(truth, k, name, mishap, hit, table.reasons[k]))
+    for k, several in by_case.items():
         flaws[k].append(min(several, key=lambda flaw: KINDS.index(flaw.kind)))
 
 
@@ -194,12 +194,12 @@ def _of_dispute(truth: _Truth, k: int, d: Disagreement, name: str) -> Flaw | Non
             return _flaw(d, name, WRONG_BRACKET, position, math.inf)
         hit = d.reference_hit if d.exact_hit is None else d.exact_hit
         return _flaw(d, name, WRONG_DEPTH if hit else WRONG_GAP, position, (d.off or 0.0) / size)
-    said = d.reference_hit if name == OURS else d.hit
+    answer = d.reference_hit if name == OURS else d.hit
     excused = name in d.undecided or (d.touching and name not in d.proven)
     if excused or position == "touching":
         return None
     known = d.reference_distance if d.exact_distance is None else d.exact_distance
-    return _flaw(d, name, FALSE_HIT if said else FALSE_MISS, position, abs(known or 0.0) / size)
+    return _flaw(d, name, FALSE_HIT if answer else FALSE_MISS, position, abs(known or 0.0) / size)
 
 
 def _flaw(d: Disagreement, name: str, kind: str, position: str, severity: float) -> Flaw:

@@ -69,12 +69,12 @@ def read_fcl_dumps(path: str | Path) -> list[FclDump]:
 def parse_fcl_dumps(text: str, place: str = "the text") -> list[FclDump]:
     """Every dump in a text; ``place`` stands in messages. Raises SceneError as `read_fcl_dumps`."""
     text = _unquoted(text)
-    messages = [" ".join(found["text"].split()) for found in _MESSAGE.finditer(text)]
+    messages = [" ".join(match["text"].split()) for match in _MESSAGE.finditer(text)]
     dumps = []
-    for k, found in enumerate(_DUMP.finditer(text)):
+    for k, match in enumerate(_DUMP.finditer(text)):
         where = f"{place}: dump {k + 1}"
-        A, B = (_shape(found[name], f"{where}: Shape {i}") for i, name in ((1, "a"), (2, "b")))
-        X_WA, X_WB = (_pose(found[name], f"{where}: X_FS{i}") for i, name in ((1, "X_a"), (2, "X_b")))
+        A, B = (_shape(match[name], f"{where}: Shape {i}") for i, name in ((1, "a"), (2, "b")))
+        X_WA, X_WB = (_pose(match[name], f"{where}: X_FS{i}") for i, name in ((1, "X_a"), (2, "X_b")))
         try:
             case = pair_case(A, B, X_WA, X_WB)
         except InvalidPose as error:
@@ -126,7 +126,7 @@ def _hull(text: str, place: str) -> Shape:
             f"{place}: this FCL printed only how many vertices the Convex has, not where they are; FCL since 2023 "
             "prints them all"
         )
-    points = [_numbers(found) for found in re.findall(r"Vector3\s*\(([^()]*)\)", text)]
+    points = [_numbers(row) for row in re.findall(r"Vector3\s*\(([^()]*)\)", text)]
     if not points or any(len(point) != 3 for point in points):
         raise SceneError(f"{place}: a Convex without vertices: {' '.join(text.split())[:80]}")
     return ConvexHull(np.array(points))
@@ -150,5 +150,5 @@ def answered(dump: FclDump, known: dict) -> list[str]:
         sentence += f": signed distance {known['distance']} m, by {known['by']}"
     elif known["lower"] is not None:
         sentence += f": signed distance within [{known['lower']!r}, {known['upper']!r}] m, by {known['by']}"
-    said = [f"FCL: {dump.message}"] if dump.message else []
-    return [f"A: {A.shape!r}", f"B: {B.shape!r}", *said, f"proven: {sentence}"]
+    message = [f"FCL: {dump.message}"] if dump.message else []
+    return [f"A: {A.shape!r}", f"B: {B.shape!r}", *message, f"proven: {sentence}"]

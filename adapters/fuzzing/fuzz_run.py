@@ -80,8 +80,8 @@ class FuzzRun:
         list of Finding
             One for each kind, read from the folder.
         """
-        found = [load_finding(Path(self.folder) / name)[0] for name in sorted(set(self.shrunk.values()))]
-        return sorted(found, key=lambda f: (f.flaw.engine, KINDS.index(f.flaw.kind), -f.flaw.severity))
+        findings = [load_finding(Path(self.folder) / name)[0] for name in sorted(set(self.shrunk.values()))]
+        return sorted(findings, key=lambda f: (f.flaw.engine, KINDS.index(f.flaw.kind), -f.flaw.severity))
 
     def counts(self) -> dict[str, Counter]:
         """Wrong answers by engine and kind.
@@ -220,7 +220,7 @@ def _round(run: FuzzRun, examiner: Examiner, cases: list[Case], deadline: float,
                 met[kind] += 1
                 if kind not in run.shrunk:
                     rename(f"round {run.rounds + 1}: shrinking {kind}")
-                    run.shrunk[kind] = _kept(run, examiner, case, flaw)
+                    run.shrunk[kind] = _shrink_and_save(run, examiner, case, flaw)
                     run.save()
                     if time.monotonic() >= deadline:
                         return False
@@ -229,11 +229,11 @@ def _round(run: FuzzRun, examiner: Examiner, cases: list[Case], deadline: float,
     return True
 
 
-def _kept(run: FuzzRun, examiner: Examiner, case: Case, flaw: Flaw) -> str:
+def _shrink_and_save(run: FuzzRun, examiner: Examiner, case: Case, flaw: Flaw) -> str:
     """Shrink a case and write it down, unless a simpler one of its kind is there; the file's name."""
     small = shrinking.shrink(case, flaw, examiner.flaws)
-    found = Finding(small.case, small.flaw, run.seed, run.rounds, 1, small.is_minimal)
-    place = Path(run.folder) / f"{found.stem}.json"
+    finding = Finding(small.case, small.flaw, run.seed, run.rounds, 1, small.is_minimal)
+    place = Path(run.folder) / f"{finding.stem}.json"
     if place.exists():
-        found = simpler_of(load_finding(place)[0], found)
-    return save_finding(found, run.folder).name
+        finding = simpler_of(load_finding(place)[0], finding)
+    return save_finding(finding, run.folder).name

@@ -17,7 +17,7 @@ def issue(flaw: Flaw, case: Case, about: dict[str, Any], snippet: str | None) ->
     """
     names = " and ".join(case.kinds)
     lines = [f"# {title(flaw, case)}", ""]
-    lines += [f"`{flaw.engine}` is asked about a {names}. It answers: **{said(flaw)}**.", ""]
+    lines += [f"`{flaw.engine}` is asked about a {names}. It answers: **{answer_text(flaw)}**.", ""]
     lines += [f"True is: **{expected_text(about['exact'])}**.", ""]
     if snippet is not None:
         lines += ["```python", snippet.rstrip(), "```", ""]
@@ -42,7 +42,7 @@ def title(flaw: Flaw, case: Case) -> str:
     return f"{flaw.kind.capitalize()}: {names}, {place}"
 
 
-def said(flaw: Flaw) -> str:
+def answer_text(flaw: Flaw) -> str:
     """What an engine answered, in a few words."""
     if flaw.hit is None:
         return f"nothing: {flaw.reason or flaw.kind}"

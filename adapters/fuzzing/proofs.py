@@ -48,9 +48,9 @@ def _n_answers(case: Case) -> bool:
 
 def _of_hulls(case: Case, A: tuple[np.ndarray, float], B: tuple[np.ndarray, float]) -> dict[str, Any]:
     """Swept polytopes: the exact distance, and vertices with weights, an axis, or the nearest facet."""
-    (P, radius_a), (Q, radius_b) = A, B
+    (points_a, radius_a), (points_b, radius_b) = A, B
     X_WA, X_WB = case.bodies[0].X_WB, case.bodies[1].X_WB
-    pair = P, X_WA[:3, :3], X_WA[:3, 3], Q, X_WB[:3, :3], X_WB[:3, 3]
+    pair = points_a, X_WA[:3, :3], X_WA[:3, 3], points_b, X_WB[:3, :3], X_WB[:3, 3]
     radii = {"radius_a": radius_a, "radius_b": radius_b}
     signed = exact.signed_distance(*pair, digits=DIGITS, **radii)
     answer: Any = exact.distance(*pair, digits=DIGITS)

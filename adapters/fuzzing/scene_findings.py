@@ -58,13 +58,15 @@ def save_findings(
         rename = stack.enter_context((progress or nullcontext_of)("shrinking")) or (lambda label: None)
         examiner = Examiner({name: session.answer for name, session in sessions.items()}, tolerance)
         worst, times = _worst(cases, examiner)
-        kept: dict[Kind, Finding] = {}
+        findings: dict[Kind, Finding] = {}
         for kind, (case, flaw) in worst.items():
             rename(f"shrinking {' '.join(kind)}")
             small = shrink(case, flaw, examiner.flaws)
-            found = Finding(small.case, small.flaw, times=times[kind], is_minimal=small.is_minimal)
-            kept[found.kind] = simpler_of(kept[found.kind], found) if found.kind in kept else found
-    return [save_finding(found, folder) for found in kept.values()]
+            finding = Finding(small.case, small.flaw, times=times[kind], is_minimal=small.is_minimal)
+            findings[finding.kind] = (
+                simpler_of(findings[finding.kind], finding) if finding.kind in findings else finding
+            )
+    return [save_finding(finding, folder) for finding in findings.values()]
 
 
 def _worst(cases: list[Case], examiner: Examiner) -> tuple[dict[Kind, tuple[Case, Flaw]], Counter]:

@@ -85,8 +85,8 @@ class _Search:
         candidates, size = self._new(step), 1
         while not self.is_spent and (batch := list(itertools.islice(candidates, size))):
             self.asked += len(batch)
-            for tried, found in zip(batch, self._flaws(batch, [self.flaw.engine])):
-                same = next((f for f in found if self.flaw.same_way(f)), None)
+            for tried, its_flaws in zip(batch, self._flaws(batch, [self.flaw.engine])):
+                same = next((f for f in its_flaws if self.flaw.same_way(f)), None)
                 if same is not None and same.severity >= self._least_severity:
                     self.case, self.flaw = tried, same
                     return True

@@ -60,10 +60,10 @@ def lower_bound(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple
         while reach > 1e-10:
             tries = n + reach * _STEPS
             tries /= np.linalg.norm(tries, axis=1)[:, None]
-            found = gaps(tries)
-            k = int(np.argmax(found))  # type: ignore[arg-type]
-            if found[k] > value:  # type: ignore[index]
-                value, n = float(found[k]), tries[k]  # type: ignore[index]
+            values = gaps(tries)
+            k = int(np.argmax(values))  # type: ignore[arg-type]
+            if values[k] > value:  # type: ignore[index]
+                value, n = float(values[k]), tries[k]  # type: ignore[index]
             else:
                 reach *= 0.4
         if value > best:
