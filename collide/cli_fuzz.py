@@ -40,6 +40,10 @@ exit status: 0 no answer of collide's is wrong, 1 one is, 2 error, 130
 interrupted"""
 
 
+#: Findings listed without --all.
+SHORT = 20
+
+
 def add_arguments(parser: argparse.ArgumentParser, engines: Callable) -> None:
     """engines : reads names of engines."""
     parser.add_argument("--engines", type=engines, default="fcl,coal,pybullet", metavar="NAMES",
@@ -52,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser, engines: Callable) -> None:
     parser.add_argument("--resume", action="store_true", help="go on with the search that DIR holds")
     parser.add_argument("--timeout", type=minutes, default=5.0, metavar="T",
                         help="seconds that an engine may take for one pair (5)")
+    parser.add_argument("--all", action="store_true", help="do not shorten the list of findings")
     parser.add_argument("--json", metavar="FILE|-", help="write counts and findings as JSON, or - to standard output")
     parser.add_argument("--quiet", action="store_true", help="no table, no progress; errors are still told")
 
@@ -73,7 +78,7 @@ def run(args: argparse.Namespace, progress: Callable) -> bool:
     if args.json:
         write_json({**result.to_dict(), "ours": result.ours, "findings": _listed(result)}.items(), args.json)
     if args.json != "-" and not args.quiet:
-        _print(result)
+        _print(result, args)
     return not result.ours
 
 
@@ -84,7 +89,7 @@ def _listed(result: Any) -> list[dict[str, Any]]:
     ]
 
 
-def _print(result: Any) -> None:
+def _print(result: Any, args: argparse.Namespace) -> None:
     from collide.adapters.fuzzing.disagreements import KINDS
     from collide.reports import terminal
     from collide.reports.tables import Column, Table
@@ -98,10 +103,12 @@ def _print(result: Any) -> None:
     findings = result.findings()
     if findings:
         listed = [
-            [f.flaw.engine, f.flaw.kind, " ".join(f.case.kinds), f.flaw.position, f"{f.stem}.json"] for f in findings
+            [f.flaw.engine, f.flaw.kind, " ".join(f.case.kinds), f.flaw.position, f"{f.stem}.json"]
+            for f in findings[: None if args.all else SHORT]
         ]
         heads = ("engine", "wrong", "shapes", "position", f"file in {result.folder}")
         kinds = ("label", "text", "text", "text", "name")
         terminal.write_text("\n")
-        title = "FINDINGS  one small case of every kind"
-        terminal.show_table(Table(title, [Column(head, kind) for head, kind in zip(heads, kinds)], listed))
+        title = f"FINDINGS  {len(findings)} kinds of wrong answers, a small case of each"
+        columns = [Column(head, kind) for head, kind in zip(heads, kinds)]
+        terminal.show_table(Table(title, columns, listed, more=len(findings) - len(listed)))

@@ -32,6 +32,8 @@ from collide.shapes import (
 )
 
 VERSION = 1
+#: Of groups and masks in scene files.
+BITS = 0xFFFF
 
 
 def save(scene, path, *, about: str | Mapping[str, Any] | None = None) -> None:
@@ -50,7 +52,7 @@ def save(scene, path, *, about: str | Mapping[str, Any] | None = None) -> None:
     Raises
     ------
     SceneError
-        Where the file does not end in .json, or a shape has no form in scene files.
+        Where the file does not end in .json, a shape has no form in scene files, or a group has more than 16 bits.
     OSError
         Where it cannot be written.
     """
@@ -144,8 +146,11 @@ def _body(body) -> dict[str, Any]:
     if not np.array_equal(body.X_WB, np.eye(4)):
         item["pose"] = _pose(body.X_WB)
     item |= {"static": True} if body.static else {}
+    if body.group > BITS:
+        raise SceneError(f'body "{body.name}": scene files have groups of 16 bits, got {body.group:#x}')
+    mask = int(body.mask) & BITS  # no group has higher ones
     item |= {"group": int(body.group)} if body.group != 1 else {}
-    return item | ({"mask": int(body.mask)} if body.mask != 0xFFFF else {})
+    return item | ({"mask": mask} if mask != BITS else {})
 
 
 def _pose(X: np.ndarray) -> dict[str, Any]:

@@ -124,7 +124,7 @@ def _hull(text: str, place: str) -> Shape:
     if "v count" in text:
         raise SceneError(
             f"{place}: this FCL printed only how many vertices the Convex has, not where they are; FCL since 2023 "
-            "prints them all"
+            "prints them all, and collide.adapters.fuzzing.recorders writes pairs of a program down"
         )
     points = [_numbers(row) for row in re.findall(r"Vector3\s*\(([^()]*)\)", text)]
     if not points or any(len(point) != 3 for point in points):

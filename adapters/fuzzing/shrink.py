@@ -11,10 +11,14 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from collide.adapters.fuzzing.disagreements import Flaw
 from collide.adapters.fuzzing.fuzz_case import Case, isolated
 from collide.adapters.fuzzing.simpler_cases import STEPS, complexity, fingerprint
 from collide.adapters.peers.answers import ABORTED, HUNG
+from collide.adapters.peers.question import convex_parts
+from collide.shapes import Mesh
 
 #: Cases asked at a time, at most. Kinds of flaws that cost a process each are asked one by one.
 CHUNK = 16
@@ -75,6 +79,7 @@ class _Search:
         self._tried: set[tuple] = {fingerprint(case)}
         self._least_severity = LEAST * flaw.severity
         self._least_size = LEAST * _size(case)
+        self._flat_facets = has_flat_facets(case)
 
     @property
     def is_spent(self) -> bool:
@@ -99,6 +104,8 @@ class _Search:
         for made in step(self.case):
             if made is None or complexity(made) >= limit or _size(made) < self._least_size:
                 continue
+            if not self._flat_facets and has_flat_facets(made):
+                continue  # an error about facets without area is another one
             key = fingerprint(made)
             if key not in self._tried:
                 self._tried.add(key)
@@ -108,3 +115,15 @@ class _Search:
 def _size(case: Case) -> float:
     """Of the pair: the larger bounded body's diagonal [m]; 1 where neither is bounded."""
     return isolated([case]).sizes()[0]
+
+
+def has_flat_facets(case: Case) -> bool:
+    """Whether a mesh of the pair has a facet without area."""
+    for body in case.bodies[:2]:
+        for part, _ in convex_parts(body.shape, np.eye(4)):
+            if isinstance(part, Mesh):
+                corners = part.vertices[part.faces]
+                cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+                if not np.abs(cross).max(axis=1).all():
+                    return True
+    return False

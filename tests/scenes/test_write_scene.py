@@ -99,6 +99,14 @@ def test_what_cannot_be_written(tmp_path):
     with pytest.raises(OSError, match="absent"):
         save(World(), tmp_path / "absent" / "scene.json")
 
+    world = World()
+    world.add(Sphere(1), name="a", mask=0xFFFFFFFF)
+    save(world, tmp_path / "scene.json")
+    assert load(tmp_path / "scene.json").bodies[0].mask == 0xFFFF, "no group has the bits that are left out"
+    world.add(Sphere(1), name="b", group=0x10000)
+    with pytest.raises(SceneError, match='"b": scene files have groups of 16 bits'):
+        save(world, tmp_path / "scene.json")
+
     class Odd(Sphere):
         pass
 
