@@ -13,6 +13,8 @@ import numpy as np
 from collide.adapters.fuzzing.disagreements import Flaw
 from collide.adapters.fuzzing.fuzz_case import Case
 from collide.adapters.fuzzing.proofs import expected_text
+from collide.adapters.peers.coal_peer import CoalPeer
+from collide.adapters.peers.fcl_peer import FclPeer
 from collide.adapters.peers.hull_facets import triangulate
 from collide.adapters.peers.pybullet_peer import quaternion_xyzw
 from collide.adapters.peers.question import corners
@@ -90,8 +92,6 @@ def _primitive(module: str, shape: Shape) -> str | None:
 
 
 def _fcl(case: Case, setting: str, expected: str) -> list[str]:
-    if setting:
-        raise KeyError(setting)
     lines = ["import fcl", "import numpy as np", ""]
     for letter, body in zip("AB", case.bodies):
         lines += _fcl_shape(letter, body.shape)
@@ -101,8 +101,19 @@ def _fcl(case: Case, setting: str, expected: str) -> list[str]:
         "a = fcl.CollisionObject(A, fcl.Transform(R_A, t_A))",
         "b = fcl.CollisionObject(B, fcl.Transform(R_B, t_B))",
         f"print({f'true: {expected}'!r}, flush=True)",
-        "print('fcl collide:', fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0, flush=True)",
     ]
+    if setting:
+        solver = FclPeer.settings[setting].values["solver"]
+        return [
+            *lines,
+            f"request = fcl.CollisionRequest(8, True, gjk_solver_type=fcl.GJKSolverType.{solver})",
+            "result = fcl.CollisionResult()",
+            "print('fcl collide:', fcl.collide(a, b, request, result) > 0)",
+            "print('fcl depths:', [contact.penetration_depth for contact in result.contacts])",
+        ]
+    lines.append(
+        "print('fcl collide:', fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0, flush=True)"
+    )
     if not flat:
         lines += [
             "request = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=True)",
@@ -138,8 +149,6 @@ def _hull(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _coal(case: Case, setting: str, expected: str) -> list[str]:
-    if setting:
-        raise KeyError(setting)
     lines = ["import coal", "import numpy as np", ""]
     meshed = any(isinstance(body.shape, Mesh) for body in case.bodies[:2])
     hulls = any(_primitive("coal", body.shape) is None and not isinstance(body.shape, Mesh) for body in case.bodies[:2])
@@ -156,13 +165,25 @@ def _coal(case: Case, setting: str, expected: str) -> list[str]:
     lines += _poses(case)
     lines += [
         "X_A, X_B = coal.Transform3s(R_A, t_A), coal.Transform3s(R_B, t_B)",
-        "request = coal.CollisionRequest()",
-        "request.enable_contact = False" + ("; request.break_distance = 0.0" if meshed else ""),
+        "boolean, number = coal.CollisionRequest(), coal.DistanceRequest()",
+        "boolean.enable_contact = False" + ("; boolean.break_distance = 0.0" if meshed else ""),
+        *_coal_setting(setting),
         f"print({f'true: {expected}'!r}, flush=True)",
-        "print('coal collide:', coal.collide(A, X_A, B, X_B, request, coal.CollisionResult()) > 0, flush=True)",
-        "print('coal distance:', coal.distance(A, X_A, B, X_B, coal.DistanceRequest(), coal.DistanceResult()))",
+        "print('coal collide:', coal.collide(A, X_A, B, X_B, boolean, coal.CollisionResult()) > 0, flush=True)",
+        "print('coal distance:', coal.distance(A, X_A, B, X_B, number, coal.DistanceResult()))",
     ]
     return lines
+
+
+def _coal_setting(setting: str) -> list[str]:
+    """Lines that set up both requests as the peer does."""
+    if not setting:
+        return []
+    values = [
+        f"request.{name} = " + (f"coal.GJKVariant.{value}" if name == "gjk_variant" else repr(value))
+        for name, value in CoalPeer.settings[setting].values.items()
+    ]
+    return [f"for request in (boolean, number): {'; '.join(values)}"]
 
 
 def _coal_shape(letter: str, shape: Shape) -> list[str]:
@@ -172,7 +193,7 @@ def _coal_shape(letter: str, shape: Shape) -> list[str]:
     if isinstance(shape, Mesh):
         return [
             f"{letter} = coal.BVHModelOBBRSS(); {letter}.beginModel({len(shape.faces)}, {len(shape.vertices)})",
-            f"{letter}.addVertices(np.array({_numbers(shape.vertices)}))",
+            f"{letter}.addVertices(np.array({_numbers(shape.vertices)})); "
             f"{letter}.addTriangles(np.array({_numbers(shape.faces)})); {letter}.endModel()",
         ]
     vertices, triangles = _hull(shape)
@@ -183,11 +204,10 @@ def _coal_shape(letter: str, shape: Shape) -> list[str]:
 
 
 def _pybullet(case: Case, setting: str, expected: str) -> list[str]:
-    if setting:
-        raise KeyError(setting)
     lines = ["import pybullet as p", "", "p.connect(p.DIRECT)", "def body(**shape):"]
     lines += ["    made = p.createMultiBody(0, p.createCollisionShape(**shape))"]
-    lines += ["    p.changeDynamics(made, -1, collisionMargin=0.0)", "    return made"]
+    lines += [] if setting == "margins" else ["    p.changeDynamics(made, -1, collisionMargin=0.0)"]
+    lines += ["    return made"]
     for letter, body in zip("AB", case.bodies):
         shape, X = body.shape, body.X_WB.copy()
         if isinstance(shape, Halfspace):
