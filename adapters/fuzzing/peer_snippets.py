@@ -193,8 +193,8 @@ def _coal_shape(letter: str, shape: Shape) -> list[str]:
     if isinstance(shape, Mesh):
         return [
             f"{letter} = coal.BVHModelOBBRSS(); {letter}.beginModel({len(shape.faces)}, {len(shape.vertices)})",
-            f"{letter}.addVertices(np.array({_numbers(shape.vertices)})); "
-            f"{letter}.addTriangles(np.array({_numbers(shape.faces)})); {letter}.endModel()",
+            (f"{letter}.addVertices(np.array({_numbers(shape.vertices)})); "
+            f"{letter}.addTriangles(np.array({_numbers(shape.faces)})); {letter}.endModel()"),
         ]
     vertices, triangles = _hull(shape)
     return [f"{letter} = hull({_numbers(vertices)}, {_numbers(triangles)})"]
