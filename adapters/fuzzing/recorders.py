@@ -152,17 +152,18 @@ def record_mujoco(model: Any, data: Any, path: str | Path) -> Scene:
     if geoms.remaining:
         geom, why = next(iter(geoms.remaining.items()))
         raise UnsupportedQuery(f"geom {geom} ({model.geom(geom).name or 'no name'}) cannot be recorded: {why}")
-    scene, taken, still = Scene("mujoco"), {}, ~moves(model)
+    scene, still = Scene("mujoco"), ~moves(model)
+    taken: dict[str, int] = {}
     for k, row in enumerate(geoms.rows.tolist()):
         name = free_name(model.geom(k).name or f"geom_{k}", taken)
         taken[name] = 1
         X_WG = pose(data.geom_xpos[k], R=np.array(data.geom_xmat[k]).reshape(3, 3))
         scene.add(SceneBody(name, geoms.shapes[row], X_WG, bool(still[model.geom_bodyid[k]])))
-    why = filtered(model, np.arange(model.ngeom))
+    codes = filtered(model, np.arange(model.ngeom))
     names = [body.name for body in scene.bodies]
     scene.allowed = [
-        (names[i], names[j], f"MuJoCo never tests it: {REASONS[why[i, j]]}")
-        for i, j in zip(*(side.tolist() for side in np.nonzero(np.triu(why, 1))))
+        (names[i], names[j], f"MuJoCo never tests it: {REASONS[codes[i, j]]}")
+        for i, j in zip(*(side.tolist() for side in np.nonzero(np.triu(codes, 1))))
         if not (scene.bodies[i].static and scene.bodies[j].static)
     ]
     save(scene, path, about="recorded from MuJoCo")
