@@ -106,9 +106,8 @@ def record_pybullet(
         For links that cannot be read, naming them.
     """
     mirror = Mirror(client, shapes=shapes)
-    if mirror.remaining:
-        (body, link), why = next(iter(mirror.remaining.items()))
-        raise UnsupportedQuery(f"body {body}, link {link} of client {client} cannot be recorded: {why}")
+    for (number, link), why in mirror.remaining.items():
+        raise UnsupportedQuery(f"body {number}, link {link} of client {client} cannot be recorded: {why}")
     world = mirror.world
     read = [world.body(i) for i in world.ids]
     scene = Scene("pybullet")
@@ -149,8 +148,7 @@ def record_mujoco(model: Any, data: Any, path: str | Path) -> Scene:
     except ImportError:
         raise MissingExtra("mujoco", extra="mujoco", purpose="record a model") from None
     geoms = geom_shapes(model)
-    if geoms.remaining:
-        geom, why = next(iter(geoms.remaining.items()))
+    for geom, why in geoms.remaining.items():
         raise UnsupportedQuery(f"geom {geom} ({model.geom(geom).name or 'no name'}) cannot be recorded: {why}")
     scene, still = Scene("mujoco"), ~moves(model)
     taken: dict[str, int] = {}
