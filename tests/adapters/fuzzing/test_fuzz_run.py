@@ -165,7 +165,7 @@ def test_invented_scenes_are_the_same_for_the_same_seed():
     assert a == b and a != c
     kinds = {kind for case in invent(5, 0, 150) for kind in case.kinds}
     assert kinds >= {"Sphere", "Box", "Capsule", "Cylinder", "Cone", "Ellipsoid", "ConvexHull", "HPolytope", "Mesh",
-                     "Compound", "Halfspace"}  # fmt: skip
+                     "HeightField", "Compound", "Halfspace"}  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", [11])
