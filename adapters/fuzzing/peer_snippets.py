@@ -17,7 +17,7 @@ from collide.adapters.peers.coal_peer import CoalPeer
 from collide.adapters.peers.fcl_peer import FclPeer
 from collide.adapters.peers.hull_facets import triangulate
 from collide.adapters.peers.pybullet_peer import quaternion_xyzw
-from collide.adapters.peers.question import corners
+from collide.adapters.peers.question import bounds, corners
 from collide.errors import CollideError
 from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
 
@@ -245,4 +245,65 @@ def _bullet_shape(shape: Shape) -> str:
     return f"shapeType=p.GEOM_MESH, vertices={_numbers(points[0])}"
 
 
-_ENGINES: dict[str, Callable[[Case, str, str], list[str]]] = {"fcl": _fcl, "coal": _coal, "pybullet": _pybullet}
+# --- MuJoCo -----------------------------------------------------------------------------------------
+
+
+def _mujoco(case: Case, setting: str, expected: str) -> list[str]:
+    solver = " | mujoco.mjtDisableBit.mjDSBL_NATIVECCD" if "libccd" in setting else ""
+    lines = ["import mujoco", "import numpy as np", "", "spec = mujoco.MjSpec()"]
+    lines += [f"spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_MULTICCD{solver}"]
+    for letter, body in zip("AB", case.bodies):
+        geom, points = _mujoco_geom(letter, body.shape)
+        if points is not None:
+            lines.append(
+                f"mesh = spec.add_mesh(name='{letter}', inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX); "
+                f"mesh.uservert = {_numbers(points.ravel())}"
+            )
+        x, y, z, w = quaternion_xyzw(body.X_WB[:3, :3])
+        place = f"pos={_numbers(body.X_WB[:3, 3])}, quat={[w, x, y, z]!r}"
+        lines += [f"{letter} = spec.worldbody.add_body(name='{letter}', {place})"]
+        lines += [f"{letter}.add_geom(name='{letter}', {geom})"]
+    lines += [
+        "spec.add_pair(geomname1='A', geomname2='B', margin=0.0, gap=0.0)",
+        "model = spec.compile()",
+        "data = mujoco.MjData(model)",
+        "mujoco.mj_kinematics(model, data)",
+        f"print({f'true: {expected}'!r}, flush=True)",
+    ]
+    if "distance" in setting:
+        far = _far(case)
+        return [*lines, f"print('mujoco distance:', mujoco.mj_geomDistance(model, data, 0, 1, {far!r}, np.zeros(6)))"]
+    return [
+        *lines,
+        "mujoco.mj_collision(model, data)",
+        "print('mujoco collide:', data.ncon > 0)",
+        "print('mujoco contacts:', data.contact.dist.tolist())",
+    ]
+
+
+def _mujoco_geom(letter: str, shape: Shape) -> tuple[str, np.ndarray | None]:
+    """Arguments of add_geom, and the corners of its mesh."""
+    if isinstance(shape, Sphere):
+        return f"type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[{shape.radius!r}, 0, 0]", None
+    if isinstance(shape, Box):
+        return f"type=mujoco.mjtGeom.mjGEOM_BOX, size={_numbers(shape.size / 2)}", None
+    if isinstance(shape, Capsule | Cylinder):
+        kind = "CAPSULE" if isinstance(shape, Capsule) else "CYLINDER"
+        return f"type=mujoco.mjtGeom.mjGEOM_{kind}, size=[{shape.radius!r}, {shape.length / 2!r}, 0]", None
+    if isinstance(shape, Ellipsoid):
+        return f"type=mujoco.mjtGeom.mjGEOM_ELLIPSOID, size={_numbers(shape.radii)}", None
+    points = None if isinstance(shape, Mesh | Halfspace) else corners(shape)
+    if points is None or points[1]:
+        raise KeyError(type(shape).__name__)
+    return f"type=mujoco.mjtGeom.mjGEOM_MESH, meshname='{letter}'", np.unique(points[0], axis=0)
+
+
+def _far(case: Case) -> float:
+    """A length that the pair is surely not apart by [m]."""
+    (low_a, high_a), (low_b, high_b) = (bounds(body) for body in case.bodies[:2])
+    return float(np.ceil(2.0 * np.linalg.norm(np.maximum(high_a, high_b) - np.minimum(low_a, low_b))))
+
+
+_ENGINES: dict[str, Callable[[Case, str, str], list[str]]] = {
+    "fcl": _fcl, "coal": _coal, "pybullet": _pybullet, "mujoco": _mujoco,
+}  # fmt: skip
