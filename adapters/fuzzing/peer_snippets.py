@@ -17,7 +17,7 @@ from collide.adapters.peers.coal_peer import CoalPeer
 from collide.adapters.peers.fcl_peer import FclPeer
 from collide.adapters.peers.hull_facets import triangulate
 from collide.adapters.peers.pybullet_peer import quaternion_xyzw
-from collide.adapters.peers.question import bounds, corners
+from collide.adapters.peers.question import corners
 from collide.errors import CollideError
 from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
 
@@ -299,9 +299,18 @@ def _mujoco_geom(letter: str, shape: Shape) -> tuple[str, np.ndarray | None]:
 
 
 def _far(case: Case) -> float:
-    """A length that the pair is surely not apart by [m]."""
-    (low_a, high_a), (low_b, high_b) = (bounds(body) for body in case.bodies[:2])
-    return float(np.ceil(2.0 * np.linalg.norm(np.maximum(high_a, high_b) - np.minimum(low_a, low_b))))
+    """A length that the pair is surely not apart by [m], small as the peer's: libccd loses digits where it is large."""
+    reach = 0.0
+    for body in case.bodies[:2]:
+        shape = body.shape
+        if isinstance(shape, Box | Ellipsoid):
+            reach += float(np.sum(shape.size / 2 if isinstance(shape, Box) else shape.radii))
+        elif isinstance(shape, Sphere | Capsule | Cylinder):
+            reach += shape.radius + (0.0 if isinstance(shape, Sphere) else shape.length / 2)
+        else:
+            points = corners(shape)
+            reach += float(np.linalg.norm(points[0], axis=1).max()) if points is not None else 0.0
+    return 1.01 * (float(np.linalg.norm(case.bodies[0].X_WB[:3, 3] - case.bodies[1].X_WB[:3, 3])) + reach)
 
 
 _ENGINES: dict[str, Callable[[Case, str, str], list[str]]] = {

@@ -73,8 +73,7 @@ def test_snippets_say_what_the_peer_says(name):
             assert said[1].endswith(str(bool(row["hit"]))), (cases[k], said)
         distances = [float(line.split(": ")[1]) for line in said if "distance: " in line and line != said[0]]
         if distances and row["has_distance"]:
-            exactly = 0.0 if not name.startswith("mujoco") else 1e-5  # it searches within another distance
-            assert distances == pytest.approx([row["distance"]], rel=exactly, abs=exactly), (cases[k], said)
+            assert distances == pytest.approx([row["distance"]], rel=1e-14, abs=0), (cases[k], said)
 
 
 def _grouped(lines: list[str]) -> list[list[str]]:
