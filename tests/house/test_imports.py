@@ -39,6 +39,8 @@ ROOMS = {
     },
     "lowering": {
         "errors",
+        "fork_safe_lock",
+        "least_distance",
         "argument_checks",
         "kernels",
         "log",
@@ -52,6 +54,7 @@ ROOMS = {
     "broadphase": {"errors", "kernels", "numerics", "lowering", "support"},
     "narrowphase": {
         "errors",
+        "least_distance",
         "kernels",
         "transforms",
         "numerics",
@@ -64,7 +67,7 @@ ROOMS = {
         "results",
         "threads",
     },
-    "certificates": {"errors", "transforms", "numerics", "lowering", "results", "shapes"},
+    "certificates": {"errors", "least_distance", "transforms", "numerics", "lowering", "results", "shapes"},
     "pair_arguments": {"errors", "argument_checks", "transforms", "shapes"},
     "batches": {"errors", "transforms", "shapes", "lowering", "narrowphase", "results", "threads"},
     "security_margin": {

@@ -1,0 +1,78 @@
+"""A step of the exact stage: a closed region, whose corners are rounded, against points swept by a ball.
+
+The planes as given decide, and the points as given, at poses as given: whether the least distance of the hull from the
+intersection of the half-spaces exceeds the radius is a least-distance program in integers (`least_distance/`). Only
+half-spaces that cut the ball around the points take part: the others hold all of it.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from collide.least_distance.nearest_pair import APART, nearest_pair
+from collide.least_distance.pair_proposals import Work
+from collide.least_distance.posed_sets import planes_at, points_at, rows_of_planes, rows_of_points
+from collide.lowering.packed_convex import POINTS, PackedConvex
+from collide.lowering.shape_table import PoseTable, ShapeTable
+from collide.narrowphase.bounds import PROMISE_STORED
+from collide.results import EXACT
+
+#: A half-space is left out that a ball is inside by more than this part of the numbers that say so.
+_CLEAR = 2.0**-40
+
+
+def settle_regions(
+    rows: np.ndarray,
+    undecided: np.ndarray,
+    pairs: np.ndarray,
+    table: ShapeTable,
+    poses: PoseTable,
+    shape_of: np.ndarray,
+) -> None:
+    """Settle those of the undecided rows (their numbers) that are of a closed region and swept points, in place."""
+    for k in undecided.tolist():
+        parts = [int(part) for part in pairs[k]]
+        packed = [table.packed[shape_of[part]] for part in parts]
+        planes = [shape.prepared.made.get("planes") for shape in packed]
+        for region, body in ((0, 1), (1, 0)):
+            if planes[region] is not None and packed[body].kind == POINTS and packed[body].slop == 0.0:
+                X = [(poses.rows[part, :9].reshape(3, 3), poses.rows[part, 9:12]) for part in parts]
+                normals, offsets = _near(*planes[region], packed[body], X[region], X[body])
+                exact = poses.exact(parts[region]), poses.exact(parts[body])
+                is_apart = are_apart(normals, offsets, packed[body].points, packed[body].radius, *exact)
+                size = sum(shape.reach + shape.radius for shape in packed) + float(np.abs(X[1][1] - X[0][1]).max())
+                _settle(rows[k : k + 1], is_apart, size)
+                break
+
+
+def are_apart(normals, offsets, points: np.ndarray, radius: float, pose_of_planes, pose_of_points) -> bool:
+    """Whether points (n, 3) are farther than the radius [m] from a region of half-spaces, both at exact poses."""
+    if not len(normals):
+        return False
+    halfspaces = rows_of_planes(planes_at(normals, offsets, pose_of_planes))
+    pair = nearest_pair(rows_of_points(points_at(points, pose_of_points)), halfspaces, Work())
+    return pair.kind == APART and sum(u * u for u in pair.u) > (Fraction(radius) * pair.denominator) ** 2
+
+
+def _near(normals, offsets, body: PackedConvex, X_region, X_body) -> tuple[np.ndarray, np.ndarray]:
+    """The half-spaces that may cut the ball around a body."""
+    (R, t), (R_body, t_body) = X_region, X_body
+    centre = np.linalg.solve(R, t_body - t)
+    reach = (1.0 + _CLEAR) * np.linalg.norm(np.linalg.solve(R, R_body), 2) * (body.reach + body.radius)
+    lengths = np.sqrt(np.square(normals).sum(axis=1))
+    size = lengths * (np.abs(centre).sum() + np.abs(t).max() + np.abs(t_body).max() + reach) + np.abs(offsets)
+    cut = normals @ centre + lengths * reach > offsets - _CLEAR * size
+    return normals[cut], offsets[cut]
+
+
+def _settle(row: np.ndarray, is_apart: bool, size: float) -> None:
+    row["how"], row["exact"], row["hit"] = EXACT, 1, not is_apart
+    if is_apart:
+        row["lower"] = np.maximum(row["lower"], 0.0)
+        row["distance"] = np.where(row["distance"] > 0.0, row["distance"], row["upper"])
+    else:
+        row["upper"] = np.minimum(row["upper"], 0.0)
+        row["distance"] = np.minimum(row["distance"], row["upper"])
+    row["certified"] = row["upper"] - row["lower"] <= PROMISE_STORED * size
