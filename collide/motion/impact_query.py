@@ -16,6 +16,7 @@ from collide.motion.convex_motions import Motions, convex_impacts, single_impact
 from collide.motion.impact_jobs import WRONG_TURN
 from collide.motion.impact_rows import TimeOfImpact, as_result, free_rows
 from collide.motion.placed_motion import poses_at
+from collide.motion.region_motions import with_regions_closed
 from collide.motion.surface_motions import surface_impacts
 from collide.narrowphase.convex_batches import Question
 from collide.numerics.sine_cosine import LARGEST_ANGLE
@@ -99,7 +100,8 @@ def time_of_impact(
     omegas, single_omegas = zip(*(_checked_omega(omega, name) for name, omega in turns.items()))
     counts = {name: len(X) for name, X in zip((*matrices, *turns), (*poses, *omegas)) if X is not None}
     n, are_shapes = matched_counts(A, B, counts)
-    question = _Question(*_distinct(A, B, n), Motions(*poses, *omegas), width, n_threads)
+    shapes = with_regions_closed(*_distinct(A, B, n), Motions(*poses, *omegas))
+    question = _Question(*shapes, Motions(*poses, *omegas), width, n_threads)
     return as_result(_answer(question), width, are_shapes and all(singles) and all(single_omegas))
 
 
@@ -301,7 +303,7 @@ def _answer(question: _Question) -> np.ndarray:
 def _has_halfspace(shape: Shape) -> bool:
     if isinstance(shape, Compound):
         return any(_has_halfspace(item) for item, _ in shape.items)
-    return kind_of(shape) == Kind.HALFSPACE
+    return kind_of(shape) in (Kind.HALFSPACE, Kind.REGION)
 
 
 def _start_of(question: _Question, some: np.ndarray):
@@ -359,8 +361,8 @@ def _refuse_planes(question: _Question, some: np.ndarray) -> None:
     if len(some):
         names = " and ".join(type(question.shapes[side[some[0]]]).__name__ for side in (question.a, question.b))
         raise UnsupportedQuery(
-            f"time_of_impact of {names} (motion {some[0]}): two half-spaces that start apart meet as soon as one "
-            "tilts, however far away; a large Box can stand in for one of them"
+            f"time_of_impact of {names} (motion {some[0]}): two bodies without end that start apart may meet as soon as "
+            "one tilts, however far away; a large Box can stand in for one of them"
         )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from collide.errors import InvalidShape
 from collide.hull.double_description import halfspace_vertices
+from collide.lazy_modules import lazy_module
 from collide.least_distance.input_rows import input_rows
 from collide.least_distance.nearest_pair import EMPTY, MEETING, nearest_pair
 from collide.least_distance.pair_proposals import Work
@@ -18,6 +19,10 @@ from collide.transforms import LARGEST
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+    from collide.hull import region_corners
+else:
+    region_corners = lazy_module("collide.hull.region_corners")
 
 #: More than what a quotient, a root and a sum round.
 _UP = 1 + 2.0**-40
@@ -91,14 +96,31 @@ class HPolytope(Shape):
             normals=normals, offsets=offsets, bounded=True, vertices=vertices, slop=slop, is_closed=False
         )
 
-    @classmethod
-    def of_vertices(cls, normals: np.ndarray, offsets: np.ndarray, vertices: np.ndarray, slop: float) -> HPolytope:
-        """A region that a box closes, whose vertices (v, 3) are known, within ``slop`` [m]; nothing is checked."""
-        shape = cls.__new__(cls)
-        shape._store(normals=normals, offsets=offsets, bounded=True, vertices=vertices, slop=slop, is_closed=True)
-        for array in (normals, offsets, vertices):
-            array.flags.writeable = False
-        return shape
+    def closed(self, size: float) -> HPolytope:
+        """A region within the box [−size, size]³ of its frame, with corners; made once and kept.
+
+        Parameters
+        ----------
+        size : float
+            A power of two [m], so large that the box holds a point of the region: twice ``boundary_within`` is.
+
+        Raises
+        ------
+        UnsupportedQuery
+            Of a region without inside of more than 394 half-spaces.
+        """
+        if not hasattr(self, "_closed"):
+            self._store(_closed={})
+        if size not in self._closed:
+            sides = np.vstack([np.eye(3), -np.eye(3)])
+            normals, offsets = np.vstack([self.normals, sides]), np.append(self.offsets, np.full(6, size))
+            vertices, slop = region_corners.region_corners(normals, offsets, size)
+            shape = object.__new__(HPolytope)
+            shape._store(normals=normals, offsets=offsets, bounded=True, vertices=vertices, slop=slop, is_closed=True)
+            for array in (normals, offsets, vertices):
+                array.flags.writeable = False
+            self._closed.setdefault(size, shape)
+        return self._closed[size]
 
     @classmethod
     def _from_fields(cls, normals: np.ndarray, offsets: np.ndarray, bounded: bool = True) -> HPolytope:

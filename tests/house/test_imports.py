@@ -30,8 +30,8 @@ ROOMS = {
     "transforms": {"errors", "argument_checks"},
     "results": {"errors"},
     "numerics": {"errors", "kernels"},
-    "hull": {"errors", "kernels", "numerics"},
     "least_distance": {"errors", "argument_checks", "kernels"},
+    "hull": {"errors", "kernels", "least_distance", "numerics"},
     "support": {"errors", "fork_safe_lock", "kernels", "numerics", "hull", "log"},
     "mesh": {"errors", "fork_safe_lock", "kernels", "numerics", "log"},
     "shapes": {
@@ -39,8 +39,6 @@ ROOMS = {
     },
     "lowering": {
         "errors",
-        "fork_safe_lock",
-        "least_distance",
         "argument_checks",
         "kernels",
         "log",
@@ -114,6 +112,7 @@ ROOMS = {
     },
     "casts": {
         "errors",
+        "least_distance",
         "argument_checks",
         "kernels",
         "threads",
