@@ -14,8 +14,7 @@ import numpy as np
 
 from collide.casts.directions import Directions
 from collide.casts.ray_hits import RayEvents
-from collide.least_distance.homogeneous_rows import dot
-from collide.least_distance.posed_sets import exact_pose, planes_at
+from collide.least_distance.posed_sets import exact_dot, exact_pose, planes_at
 from collide.numerics.exact_points import rounded
 from collide.shapes.hpolytope import HPolytope
 
@@ -39,25 +38,25 @@ class _Span(NamedTuple):
 def planes_met(
     region: HPolytope, X_WA: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, *, every: bool
 ) -> RayEvents:
-    """Events of n rays and a region at checked poses (n, 4, 4) or (1, 4, 4), in order; arguments as of `surfaces_met`."""
+    """Events of n rays and a region at checked poses (n, 4, 4) or (1, 4, 4), in order, as `surfaces_met` has them."""
     found: list[tuple[int, Fraction, int]] = []
     for k in range(len(origins)):
         X, exponent = X_WA[k if len(X_WA) > 1 else 0], int(directions.exponents[k])
         span = _span_of(region, X, origins[k], directions.vectors[k])
-        for t, facet in _places(span, every):
-            t = t / Fraction(2) ** exponent
+        for place, row in _places(span, every):
+            t = place / Fraction(2) ** exponent
             if t <= limit:
-                found.append((k, t, facet))
+                found.append((k, t, row))
     ray = np.array([k for k, _, _ in found], dtype=np.int64)
     facet = np.array([row for _, _, row in found], dtype=np.int64)
-    t = np.array([rounded(value) for _, value, _ in found]).reshape(-1, 3)
+    brackets = np.array([rounded(t) for _, t, _ in found]).reshape(-1, 3)
     proven = np.ones(len(found), dtype=bool)
     normals = np.linalg.solve(
         np.swapaxes((X_WA[ray] if len(X_WA) > 1 else np.broadcast_to(X_WA, (len(ray), 4, 4)))[:, :3, :3], 1, 2),
         region.normals[facet][:, :, None],
     )[:, :, 0]
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return RayEvents(ray, t, normals, facet, np.zeros(len(ray), dtype=np.int64), proven, proven.copy())
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True) + 0.0
+    return RayEvents(ray, brackets, normals, facet, np.zeros(len(ray), dtype=np.int64), proven, proven.copy())
 
 
 def _places(span: _Span | None, every: bool) -> list[tuple[Fraction, int]]:
@@ -87,7 +86,7 @@ def _span_of(region: HPolytope, X_WA: np.ndarray, origin: np.ndarray, direction:
     along = -1
     planes = planes_at(region.normals[rows], region.offsets[rows], exact_pose(X_WA))
     for row, (*normal, offset) in zip(rows.tolist(), planes):
-        height, rate = offset - dot(normal, start), dot(normal, step)  # type: ignore[arg-type]
+        height, rate = offset - exact_dot(normal, start), exact_dot(normal, step)
         if rate == 0:
             if height < 0:
                 return None

@@ -83,7 +83,8 @@ def _corners(normals: np.ndarray, offsets: np.ndarray, centre: np.ndarray) -> tu
     corners, error = _facet_polars(*polars[hull.facets].transpose(1, 0, 2))
     inner_radius = 1.0 / float(np.sqrt(np.square(polars[hull.vertices]).sum(axis=1)).max())
     across = float(np.sqrt(np.square(corners).sum(axis=1)).max())
-    slop = _UP * (_TURNED * across * across / inner_radius + error + 2.0**-51 * (across + float(np.abs(centre).max())))
+    rounding = error + 2.0**-51 * (across + float(np.abs(centre).max()))
+    slop = _UP * (_POLAR_ERROR * across * across / inner_radius + rounding)
     return np.unique(corners + centre, axis=0), slop
 
 
@@ -122,7 +123,7 @@ def _facet_polars(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarr
 
 
 def _exact_polar(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> list[float]:
-    p, q, r = (tuple(Fraction(v) for v in corner.tolist()) for corner in (a, b, c))
+    p, q, r = ((Fraction(x), Fraction(y), Fraction(z)) for x, y, z in (a.tolist(), b.tolist(), c.tolist()))
     normal = cross(minus(q, p), minus(r, p))
     height = inner(p, normal)
     return [float(v / height) for v in normal]

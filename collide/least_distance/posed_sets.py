@@ -8,13 +8,20 @@ from math import frexp
 
 import numpy as np
 
-from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers, dot
+from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
 
 #: Numbers of `ExactPose` are R row by row, then t, without rounding.
 ExactPose = Sequence[Fraction]
 #: Three coordinates, or a normal and an offset.
 ExactRow = list[Fraction]
 _UNIT = 2.0**-53
+#: A half-space is left out that a ball is inside by more than this part of the numbers that say so.
+_CLEAR = 2.0**-40
+
+
+def exact_dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
+    """The inner product of two vectors of fractions."""
+    return sum((x * y for x, y in zip(a, b)), Fraction(0))
 
 
 def exact_pose(X: np.ndarray) -> list[Fraction]:
@@ -25,7 +32,7 @@ def exact_pose(X: np.ndarray) -> list[Fraction]:
 def points_at(points: np.ndarray, pose: ExactPose) -> list[ExactRow]:
     """Points (n, 3) at a pose."""
     return [
-        [dot(pose[3 * i : 3 * i + 3], point) + pose[9 + i] for i in range(3)]  # type: ignore[arg-type]
+        [exact_dot(pose[3 * i : 3 * i + 3], point) + pose[9 + i] for i in range(3)]
         for point in ([Fraction(v) for v in row] for row in points.tolist())
     ]  # fmt: skip
 
@@ -33,20 +40,45 @@ def points_at(points: np.ndarray, pose: ExactPose) -> list[ExactRow]:
 def planes_at(normals: np.ndarray, offsets: np.ndarray, pose: ExactPose) -> list[ExactRow]:
     """Half-spaces at a pose: {x : n·x ≤ b} becomes n' = cof(R) n, b' = b det R + n'·t."""
     r = [pose[0:3], pose[3:6], pose[6:9]]
-    cofactors = [_cross(r[1], r[2]), _cross(r[2], r[0]), _cross(r[0], r[1])]
-    determinant, t = dot(r[0], cofactors[0]), pose[9:12]  # type: ignore[arg-type]
+    cofactors: list[ExactRow] = [_cross(r[1], r[2]), _cross(r[2], r[0]), _cross(r[0], r[1])]
+    determinant, t = exact_dot(r[0], cofactors[0]), pose[9:12]
     planes = []
     for *normal, offset in np.column_stack((normals, offsets)).tolist():
-        n = [dot(row, [Fraction(v) for v in normal]) for row in cofactors]  # type: ignore[arg-type]
-        planes.append([*n, Fraction(offset) * determinant + dot(n, t)])  # type: ignore[arg-type]
-    return planes  # type: ignore[return-value]
+        n = [exact_dot(row, [Fraction(v) for v in normal]) for row in cofactors]
+        planes.append([*n, Fraction(offset) * determinant + exact_dot(n, t)])
+    return planes
+
+
+def planes_near(
+    normals: np.ndarray, offsets: np.ndarray, X_planes: tuple, X_body: tuple, reach: float
+) -> np.ndarray:
+    """Numbers of the half-spaces that do not surely hold the ball of a body.
+
+    X_planes, X_body : (R (3, 3), t (3,)) where they stand, in doubles.   reach : of the body from its origin [m].
+    """
+    (R, t), (R_body, t_body) = X_planes, X_body
+    centre = np.linalg.solve(R, t_body - t)
+    inverse = np.linalg.inv(R)
+    reach *= (1.0 + _CLEAR) * max(np.linalg.norm(inverse @ R_body, 2), np.linalg.norm(inverse, 2))
+    lengths = np.sqrt(np.square(normals).sum(axis=1))
+    size = lengths * (np.abs(centre).sum() + np.abs(t).max() + np.abs(t_body).max() + reach) + np.abs(offsets)
+    return np.flatnonzero(normals @ centre + lengths * reach > offsets - _CLEAR * size)
+
+
+def point_seen_from(point: Sequence[Fraction], pose: ExactPose) -> ExactRow:
+    """A point of the world, in the frame that stands at a pose."""
+    r = [pose[0:3], pose[3:6], pose[6:9]]
+    cofactors: list[ExactRow] = [_cross(r[1], r[2]), _cross(r[2], r[0]), _cross(r[0], r[1])]
+    determinant = exact_dot(r[0], cofactors[0])
+    away = [x - t for x, t in zip(point, pose[9:12])]
+    return [sum((cofactors[i][k] * away[i] for i in range(3)), Fraction(0)) / determinant for k in range(3)]
 
 
 def planes_seen_from(planes: list[ExactRow], pose: ExactPose) -> list[ExactRow]:
     """Half-spaces of the world, in the frame that stands at a pose."""
     columns = [pose[0:9:3], pose[1:9:3], pose[2:9:3]]
     return [
-        [*(dot(column, n) for column in columns), b - dot(n, pose[9:12])]  # type: ignore[arg-type, list-item]
+        [*(exact_dot(column, n) for column in columns), b - exact_dot(n, pose[9:12])]
         for *n, b in planes
     ]  # fmt: skip
 

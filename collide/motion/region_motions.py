@@ -33,8 +33,8 @@ def with_regions_closed(
     )
     # Origins move on lines, so that they are farthest from each other at an end.
     room = np.maximum(end - start, 0.0) * _UP
-    sides = [[shapes[k] for k in which[some].tolist()] for which in (a, b)]
-    sides = closed_shapes(*sides, motions.X_WA0, motions.X_WB0, len(some), room)
+    A, B = ([shapes[k] for k in which[some].tolist()] for which in (a, b))
+    sides = closed_shapes(A, B, motions.X_WA0, motions.X_WB0, len(some), room)
     shapes, numbers = list(shapes), {id(shape): k for k, shape in enumerate(shapes)}
     a, b = a.copy(), b.copy()
     for which, side in zip((a, b), sides):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,14 +51,14 @@ def _prepare_curved(A: Shape, B: Shape) -> Any:
 
 
 def _answer_region(out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
-    answer_closed(_batch_of, out, A, B, *_poses_of(out, X_WA, X_WB, question), question)
+    answer_closed(_batch_of, out, A, B, _poses_of(out, X_WA, X_WB, question), question)
     return True
 
 
 def _answer_regions(
     out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question
 ) -> bool:
-    answer_unbounded(_batch_of, out, A, B, *_poses_of(out, X_WA, X_WB, question), question)
+    answer_unbounded(_batch_of, out, A, B, _poses_of(out, X_WA, X_WB, question), question)
     return True
 
 
@@ -66,10 +66,10 @@ def _batch_of(A: Shape, B: Shape) -> Batch:
     return answer_of(A, B).batch
 
 
-def _poses_of(out: np.ndarray, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> Iterator[np.ndarray]:
+def _poses_of(out: np.ndarray, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> tuple[np.ndarray, np.ndarray]:
     """Both batches as long as the answers, checked as the question wants."""
-    for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")):
-        yield np.ascontiguousarray(np.broadcast_to(as_poses(X, name, check=question.check), (len(out), 4, 4)))
+    X_WA, X_WB = as_poses(X_WA, "X_WA", check=question.check), as_poses(X_WB, "X_WB", check=question.check)
+    return np.broadcast_to(X_WA, (len(out), 4, 4)), np.broadcast_to(X_WB, (len(out), 4, 4))
 
 
 def _unprepared(A: Shape, B: Shape) -> None:

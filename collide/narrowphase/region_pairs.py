@@ -18,10 +18,17 @@ from collide.least_distance.homogeneous_rows import HomogeneousRows
 from collide.least_distance.interior_point import origin_point
 from collide.least_distance.nearest_pair import EMPTY, nearest_pair
 from collide.least_distance.pair_proposals import Work
-from collide.least_distance.posed_sets import ExactRow, exact_pose, planes_at, planes_seen_from, rows_of_planes
+from collide.least_distance.posed_sets import (
+    ExactRow,
+    exact_dot,
+    exact_pose,
+    planes_at,
+    planes_seen_from,
+    rows_of_planes,
+)
 from collide.lowering.closed_regions import box_sizes, closed, closings
-from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.bounds import PROMISE_STORED
+from collide.narrowphase.convex_batches import Question
 from collide.results import EXACT, PAIR_DTYPE
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.primitives import Halfspace
@@ -30,6 +37,8 @@ from collide.transforms import LARGEST
 
 #: A method's function for two shapes: ``batch(out, A, B, X_WA, X_WB, question)``.
 Batch = Callable[..., bool]
+#: (n, 4, 4) each, of A and of B.
+Poses = tuple[np.ndarray, np.ndarray]
 #: A deciding point nearer to the box than this part of its size says nothing.
 _INSIDE = 1.0 - 2.0**-10
 #: Boxes grow by this.
@@ -40,11 +49,14 @@ _ROUNDED, _LEAST_GAP = 2.0**-48, 5e-324
 _DIRECTIONS = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, -1, -1))
 
 
-def answer_closed(batch_of: Callable[[Shape, Shape], Batch], out, A, B, X_WA, X_WB, question: Question) -> None:
-    """Answers of a region and a body that has an end, at checked poses (n, 4, 4).
+def answer_closed(
+    batch_of: Callable[[Shape, Shape], Batch], out: np.ndarray, A: Shape, B: Shape, poses: Poses, question: Question
+) -> None:
+    """Answers of a region and a body that has an end, at checked poses.
 
     batch_of : what answers two other shapes.   out, question : as of `convex_batches.answer_sets`.
     """
+    X_WA, X_WB = poses
     for K_a, K_b, some in closings(A, B, X_WA, X_WB):
         part, axes = out[some], None if question.axes is None else question.axes[some]
         batch_of(K_a, K_b)(
@@ -55,8 +67,11 @@ def answer_closed(batch_of: Callable[[Shape, Shape], Batch], out, A, B, X_WA, X_
             question.axes[some] = axes
 
 
-def answer_unbounded(batch_of: Callable[[Shape, Shape], Batch], out, A, B, X_WA, X_WB, question: Question) -> None:
+def answer_unbounded(
+    batch_of: Callable[[Shape, Shape], Batch], out: np.ndarray, A: Shape, B: Shape, poses: Poses, question: Question
+) -> None:
     """The same of two bodies that have none."""
+    X_WA, X_WB = poses
     for k in range(len(out)):
         gap, is_endless = _state(A, B, X_WA[k], X_WB[k], with_depth=question.depths and not question.boolean)
         hit = gap == 0.0
@@ -97,15 +112,14 @@ def _planes_of(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
 
 def _through(plane: ExactRow, v: tuple[int, ...]) -> ExactRow:
     """The half-space behind a parallel plane through a point."""
-    return [*plane[:3], sum((a * x for a, x in zip(plane, v)), Fraction(0))]
+    return [*plane[:3], exact_dot(plane, [Fraction(x) for x in v])]
 
 
 def _gap_of(halfspaces: HomogeneousRows, n_first: int, X: np.ndarray) -> float:
-    """0 where half-spaces have a point in common; else a width, at most, by which a contradiction of them parts those of
-    the first n from the others [m].
+    """0 where half-spaces have a point in common, else a width [m] that is proven between the first n and the others.
 
-    Multipliers μ ≥ 0 with Σ μᵢ aᵢ = 0 and Σ μᵢ bᵢ < 0: with u the sum over the first, u·x ≤ c there, u·x ≥ c + |Σ μᵢ bᵢ|
-    in the others.   X : where all stand; lengths are those of the world.
+    Multipliers μ ≥ 0 with Σ μᵢ aᵢ = 0 and Σ μᵢ bᵢ < 0: with u the sum over the first, u·x ≤ c there, and in the others
+    u·x ≥ c + |Σ μᵢ bᵢ|.   X : where all stand; lengths are those of the world.
     """
     pair = nearest_pair(origin_point(3), halfspaces, Work())
     if pair.kind != EMPTY:
@@ -138,7 +152,7 @@ def _row(batch_of, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, gap: 
         row = np.zeros(1, dtype=PAIR_DTYPE)
         batch_of(K_a, K_b)(row, K_a, K_b, X_WA, X_WB, Question(False, math.inf))
         decided = _is_inside(A, X_WA[0], row["point_a"][0], size) and _is_inside(B, X_WB[0], row["point_b"][0], size)
-        if decided and bool(row["hit"][0]) == hit or size * _GROWTH > LARGEST / 4.0:
+        if (decided and bool(row["hit"][0]) == hit) or size * _GROWTH > LARGEST / 4.0:
             break
         size *= _GROWTH
     row["hit"], row["certified"], row["how"], row["exact"] = hit, False, EXACT, 1

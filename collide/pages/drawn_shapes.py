@@ -46,7 +46,8 @@ class Triangles(NamedTuple):
 class ShapeTable:
     """The shapes of one page, gathered first, written together: how much each may take depends on all of them.
 
-    size : edge length of what stands for a body without end [m]: a square for a half-space, a box around a region.   max_facets : see `MAX_FACETS`.
+    size : edge length of what stands for a body without end [m]: a square for a half-space, a box around a region.
+    max_facets : see `MAX_FACETS`.
     """
 
     def __init__(self, size: float, max_facets: int = MAX_FACETS):

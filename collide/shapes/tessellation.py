@@ -114,7 +114,9 @@ def _together(parts: list[tuple[Tessellation, np.ndarray]]) -> Tessellation:
 
 def _within_box(shape: Shape, size: float | None) -> Tessellation:
     if size is None:
-        raise UnsupportedQuery("tessellate: an HPolytope with bounded=False may have no end; give the size [m] of a box")
+        raise UnsupportedQuery(
+            "tessellate: an HPolytope with bounded=False may have no end; give the size [m] of a box to stand for it"
+        )
     assert isinstance(shape, HPolytope)
     half = max(0.5 * size, 2.0 * shape.boundary_within)
     return _hull(shape.closed(math.ldexp(1.0, math.frexp(half)[1])).vertices)

@@ -13,14 +13,11 @@ import numpy as np
 
 from collide.least_distance.nearest_pair import APART, nearest_pair
 from collide.least_distance.pair_proposals import Work
-from collide.least_distance.posed_sets import planes_at, points_at, rows_of_planes, rows_of_points
-from collide.lowering.packed_convex import POINTS, PackedConvex
+from collide.least_distance.posed_sets import planes_at, planes_near, points_at, rows_of_planes, rows_of_points
+from collide.lowering.packed_convex import POINTS
 from collide.lowering.shape_table import PoseTable, ShapeTable
 from collide.narrowphase.bounds import PROMISE_STORED
 from collide.results import EXACT
-
-#: A half-space is left out that a ball is inside by more than this part of the numbers that say so.
-_CLEAR = 2.0**-40
 
 
 def settle_regions(
@@ -39,32 +36,22 @@ def settle_regions(
         for region, body in ((0, 1), (1, 0)):
             if planes[region] is not None and packed[body].kind == POINTS and packed[body].slop == 0.0:
                 X = [(poses.rows[part, :9].reshape(3, 3), poses.rows[part, 9:12]) for part in parts]
-                normals, offsets = _near(*planes[region], packed[body], X[region], X[body])
+                normals, offsets = planes[region]
+                near = planes_near(normals, offsets, X[region], X[body], packed[body].reach + packed[body].radius)
                 exact = poses.exact(parts[region]), poses.exact(parts[body])
-                is_apart = are_apart(normals, offsets, packed[body].points, packed[body].radius, *exact)
+                is_apart = _are_apart(normals[near], offsets[near], packed[body].points, packed[body].radius, *exact)
                 size = sum(shape.reach + shape.radius for shape in packed) + float(np.abs(X[1][1] - X[0][1]).max())
                 _settle(rows[k : k + 1], is_apart, size)
                 break
 
 
-def are_apart(normals, offsets, points: np.ndarray, radius: float, pose_of_planes, pose_of_points) -> bool:
+def _are_apart(normals, offsets, points: np.ndarray, radius: float, pose_of_planes, pose_of_points) -> bool:
     """Whether points (n, 3) are farther than the radius [m] from a region of half-spaces, both at exact poses."""
     if not len(normals):
         return False
     halfspaces = rows_of_planes(planes_at(normals, offsets, pose_of_planes))
     pair = nearest_pair(rows_of_points(points_at(points, pose_of_points)), halfspaces, Work())
     return pair.kind == APART and sum(u * u for u in pair.u) > (Fraction(radius) * pair.denominator) ** 2
-
-
-def _near(normals, offsets, body: PackedConvex, X_region, X_body) -> tuple[np.ndarray, np.ndarray]:
-    """The half-spaces that may cut the ball around a body."""
-    (R, t), (R_body, t_body) = X_region, X_body
-    centre = np.linalg.solve(R, t_body - t)
-    reach = (1.0 + _CLEAR) * np.linalg.norm(np.linalg.solve(R, R_body), 2) * (body.reach + body.radius)
-    lengths = np.sqrt(np.square(normals).sum(axis=1))
-    size = lengths * (np.abs(centre).sum() + np.abs(t).max() + np.abs(t_body).max() + reach) + np.abs(offsets)
-    cut = normals @ centre + lengths * reach > offsets - _CLEAR * size
-    return normals[cut], offsets[cut]
 
 
 def _settle(row: np.ndarray, is_apart: bool, size: float) -> None:
