@@ -70,17 +70,17 @@ def _with_regions(sides, X_WA, X_WB, directions: Directions, limits: np.ndarray,
     ways = [
         Way(sides[0][k], X_WA[k], sides[1][k], X_WB[k], directions.vectors[k]) for k in some.tolist()
     ]
-    found = ask(some, ways, far=False)
-    again = are_to_be_asked_again(ways, found.hit, limits[some])
+    rows = ask(some, ways, far=False)
+    again = are_to_be_asked_again(ways, rows.hit, limits[some])
     if len(again):
-        for column, values in zip(found, ask(some[again], [ways[k] for k in again.tolist()], far=True)):
+        for column, values in zip(rows, ask(some[again], [ways[k] for k in again.tolist()], far=True)):
             column[again] = values
-    proven = are_proven(ways, found.hit, limits[some])
-    found = found._replace(proven=found.proven & proven, certified=found.certified & proven)
+    proven = are_proven(ways, rows.hit, limits[some])
+    rows = rows._replace(proven=rows.proven & proven, certified=rows.certified & proven)
     others = np.setdiff1d(np.arange(n), some)
     if not len(others):
-        return found
-    answers = found, ask(others, [], far=False)
+        return rows
+    answers = rows, ask(others, [], far=False)
     order = np.argsort(np.concatenate([some, others]), kind="stable")
     return CastRows._make(np.concatenate(columns)[order] for columns in zip(*answers))
 

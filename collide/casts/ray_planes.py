@@ -30,8 +30,8 @@ class _Span(NamedTuple):
 
     enters: Fraction | None
     leaves: Fraction | None
-    entered: int
-    left: int
+    row_entered: int
+    row_left: int
     along: int
 
 
@@ -39,18 +39,18 @@ def planes_met(
     region: HPolytope, X_WA: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, *, every: bool
 ) -> RayEvents:
     """Events of n rays and a region at checked poses (n, 4, 4) or (1, 4, 4), in order, as `surfaces_met` has them."""
-    found: list[tuple[int, Fraction, int]] = []
+    places: list[tuple[int, Fraction, int]] = []
     for k in range(len(origins)):
         X, exponent = X_WA[k if len(X_WA) > 1 else 0], int(directions.exponents[k])
         span = _span_of(region, X, origins[k], directions.vectors[k])
-        for place, row in _places(span, every):
-            t = place / Fraction(2) ** exponent
+        for at, row in _places(span, every):
+            t = at / Fraction(2) ** exponent
             if t <= limit:
-                found.append((k, t, row))
-    ray = np.array([k for k, _, _ in found], dtype=np.int64)
-    facet = np.array([row for _, _, row in found], dtype=np.int64)
-    brackets = np.array([rounded(t) for _, t, _ in found]).reshape(-1, 3)
-    proven = np.ones(len(found), dtype=bool)
+                places.append((k, t, row))
+    ray = np.array([k for k, _, _ in places], dtype=np.int64)
+    facet = np.array([row for _, _, row in places], dtype=np.int64)
+    brackets = np.array([rounded(t) for _, t, _ in places]).reshape(-1, 3)
+    proven = np.ones(len(places), dtype=bool)
     normals = np.linalg.solve(
         np.swapaxes((X_WA[ray] if len(X_WA) > 1 else np.broadcast_to(X_WA, (len(ray), 4, 4)))[:, :3, :3], 1, 2),
         region.normals[facet][:, :, None],
@@ -66,12 +66,12 @@ def _places(span: _Span | None, every: bool) -> list[tuple[Fraction, int]]:
     places: list[tuple[Fraction, int]] = []
     if span.along >= 0:
         start = max(span.enters, Fraction(0)) if span.enters is not None else Fraction(0)
-        facet = min(span.along, span.entered) if span.enters == start else span.along
+        facet = min(span.along, span.row_entered) if span.enters == start else span.along
         places.append((start, facet))
     elif span.enters is not None and span.enters >= 0:
-        places.append((span.enters, span.entered))
+        places.append((span.enters, span.row_entered))
     if span.leaves is not None and not (places and places[0][0] == span.leaves):
-        places.append((span.leaves, span.left))
+        places.append((span.leaves, span.row_left))
     return places if every else places[:1]
 
 

@@ -51,13 +51,13 @@ class Way:
         if len(beside):
             self._look_at(beside, region, X_WB, vector, height > reach + 2.0**-40 * (abs(start) * speed + reach))
 
-    def _look_at(self, rows: np.ndarray, region: HPolytope, X_WB: np.ndarray, vector: np.ndarray, clear) -> None:
+    def _look_at(self, rows: np.ndarray, region: HPolytope, X_WB: np.ndarray, vector: np.ndarray, is_outside) -> None:
         """Planes along which the body is moved, within rounding: exactly, it is approached or it is not."""
         exact = [Fraction(v) for v in vector.tolist()]
         planes = planes_at(region.normals[rows], region.offsets[rows], exact_pose(X_WB))
         for row, (*normal, _) in zip(rows.tolist(), planes):
             if exact_dot(normal, exact) >= 0:
-                self.misses = self.misses or bool(clear[row])
+                self.misses = self.misses or bool(is_outside[row])
             else:
                 self.is_whole = False
 

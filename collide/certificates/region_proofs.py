@@ -62,8 +62,7 @@ def make_region_certificate(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarr
     if sides is None:
         return None
     region, body, X_WR, X_WO = sides
-    posed, posed_body = (X_WR[:3, :3], X_WR[:3, 3]), (X_WO[:3, :3], X_WO[:3, 3])
-    near = planes_near(region.normals, region.offsets, posed, posed_body, body.reach + body.radius)
+    near = planes_near(region.normals, region.offsets, X_WR, X_WO, body.reach + body.radius)
     if not len(near):
         return RegionCertificate(TOGETHER, (0,), (Fraction(1),), (), ())
     planes = planes_at(region.normals[near], region.offsets[near], exact_pose(X_WR))
@@ -137,10 +136,10 @@ def _total(factors: Sequence[Fraction], values) -> Fraction:
 
 def _sides(A: Shape, B: Shape, X_WA, X_WB) -> tuple[HPolytope, PackedConvex, np.ndarray, np.ndarray] | None:
     """(region, the other body, their poses) where that is points swept by a ball."""
-    region, other, X_WR, X_WO = (A, B, X_WA, X_WB) if A.is_region else (B, A, X_WB, X_WA)
-    if not isinstance(region, HPolytope) or kind_of(other) not in (Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE):
+    region, partner, X_WR, X_WO = (A, B, X_WA, X_WB) if A.is_region else (B, A, X_WB, X_WA)
+    if not isinstance(region, HPolytope) or kind_of(partner) not in (Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE):
         return None
-    return region, convex_set_of(other), X_WR, X_WO
+    return region, convex_set_of(partner), X_WR, X_WO
 
 
 def _read(values) -> RegionCertificate:

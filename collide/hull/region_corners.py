@@ -22,7 +22,7 @@ from collide.least_distance.pair_proposals import Work
 from collide.numerics.exact_points import cross, inner, minus
 
 #: So many planes at most, the box's among them, go to double description; so many where the region is flat.
-_FEW, _FEW_FLAT = 48, 400
+_MAX_INTEGERS, _MAX_FLAT = 48, 400
 #: A polar is good to this part of itself: a difference good to four units in the last place, and a quotient.
 _POLAR_ERROR = 2.0**-50
 #: Corners whose rounding is bounded by more than this part of the size are found in fractions.
@@ -48,7 +48,7 @@ def region_corners(normals: np.ndarray, offsets: np.ndarray, size: float) -> tup
 
     O(m log m): 100,000 half-spaces take a second or two.
     """
-    if len(normals) <= _FEW:
+    if len(normals) <= _MAX_INTEGERS:
         return halfspace_vertices(normals, offsets)[:2]
     scaled, right = _in_box_units(normals, offsets, size)
     planes = HomogeneousRows(scaled, right, lambda row: as_integers([*scaled[row].tolist(), float(right[row])])[0])
@@ -57,10 +57,10 @@ def region_corners(normals: np.ndarray, offsets: np.ndarray, size: float) -> tup
         corners = None if centre is None else _corners(scaled, right, centre)
         if corners is not None:
             return corners[0] * size, corners[1] * size
-    if len(normals) > _FEW_FLAT:
+    if len(normals) > _MAX_FLAT:
         raise UnsupportedQuery(
             f"HPolytope(bounded=False): a region without inside of {len(normals) - 6} half-spaces takes too long; at "
-            f"most {_FEW_FLAT - 6} are taken: leave out those that others imply"
+            f"most {_MAX_FLAT - 6} are taken: leave out those that others imply"
         )
     return halfspace_vertices(normals, offsets)[:2]
 

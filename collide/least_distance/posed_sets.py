@@ -16,7 +16,7 @@ ExactPose = Sequence[Fraction]
 ExactRow = list[Fraction]
 _UNIT = 2.0**-53
 #: A half-space is left out that a ball is inside by more than this part of the numbers that say so.
-_CLEAR = 2.0**-40
+_MARGIN = 2.0**-40
 
 
 def exact_dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
@@ -50,19 +50,19 @@ def planes_at(normals: np.ndarray, offsets: np.ndarray, pose: ExactPose) -> list
 
 
 def planes_near(
-    normals: np.ndarray, offsets: np.ndarray, X_planes: tuple, X_body: tuple, reach: float
+    normals: np.ndarray, offsets: np.ndarray, X_WP: np.ndarray, X_WB: np.ndarray, reach: float
 ) -> np.ndarray:
     """Numbers of the half-spaces that do not surely hold the ball of a body.
 
-    X_planes, X_body : (R (3, 3), t (3,)) where they stand, in doubles.   reach : of the body from its origin [m].
+    X_WP, X_WB : (4, 4) where they stand, in doubles, rounded or not.   reach : of the body from its origin [m].
     """
-    (R, t), (R_body, t_body) = X_planes, X_body
+    R, t, R_body, t_body = X_WP[:3, :3], X_WP[:3, 3], X_WB[:3, :3], X_WB[:3, 3]
     centre = np.linalg.solve(R, t_body - t)
     inverse = np.linalg.inv(R)
-    reach *= (1.0 + _CLEAR) * max(np.linalg.norm(inverse @ R_body, 2), np.linalg.norm(inverse, 2))
+    reach *= (1.0 + _MARGIN) * max(np.linalg.norm(inverse @ R_body, 2), np.linalg.norm(inverse, 2))
     lengths = np.sqrt(np.square(normals).sum(axis=1))
     size = lengths * (np.abs(centre).sum() + np.abs(t).max() + np.abs(t_body).max() + reach) + np.abs(offsets)
-    return np.flatnonzero(normals @ centre + lengths * reach > offsets - _CLEAR * size)
+    return np.flatnonzero(normals @ centre + lengths * reach > offsets - _MARGIN * size)
 
 
 def point_seen_from(point: Sequence[Fraction], pose: ExactPose) -> ExactRow:
@@ -100,18 +100,18 @@ def rows_of_planes(
     """Half-spaces, as a program reads them; behind those given as doubles (m, 3), (m,), if any are."""
     scaled = [_scaled(plane) for plane in planes]
     rows = np.array([[float(v) for v in plane] for plane in scaled]).reshape(-1, 4)
-    n_given = 0
+    n_first = 0
     if normals is not None and offsets is not None:
-        n_given = len(normals)
+        n_first = len(normals)
         exponents = np.frexp(np.abs(normals).max(axis=1))[1]
-        given = np.ldexp(np.column_stack((normals, offsets)), -exponents[:, None])
-        rows = np.vstack((given, rows))
+        values = np.ldexp(np.column_stack((normals, offsets)), -exponents[:, None])
+        rows = np.vstack((values, rows))
 
     def integers(row: int) -> list[int]:
-        if row < n_given:
+        if row < n_first:
             return as_integers(rows[row].tolist())[0]
-        denominator = _common_denominator(scaled[row - n_given])
-        return [int(v * denominator) for v in scaled[row - n_given]]
+        denominator = _common_denominator(scaled[row - n_first])
+        return [int(v * denominator) for v in scaled[row - n_first]]
 
     return HomogeneousRows(rows[:, :3], rows[:, 3], integers, _UNIT if planes else 0.0)
 

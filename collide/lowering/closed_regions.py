@@ -41,11 +41,11 @@ def closings(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> Iterator
         yield (closed(A, size), B, some) if A.is_region else (A, closed(B, size), some)
 
 
-def closed_shapes(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, room: np.ndarray | float = 0.0):
+def closed_shapes(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, leeway: np.ndarray | float = 0.0):
     """(A, B) of n pairs with regions closed: as they are where there are none, else sequences of n shapes.
 
     A, B : shapes, or sequences of n.   X_WA, X_WB : poses (n, 4, 4) or (1, 4, 4).
-    room : or (n,): how far A may be moved from where it is, or what is within this of it matters, too [m].
+    leeway : or (n,): how far A may be moved from where it is, or what is within this of it matters, too [m].
     Raises as `closings`.
     """
     sides = [[S] * n if isinstance(S, Shape) else S for S in (A, B)]
@@ -55,11 +55,11 @@ def closed_shapes(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, room: np.nda
             pairs.setdefault((id(a), id(b)), []).append(k)
     if not pairs:
         return A, B
-    X_WA, X_WB, room = (np.broadcast_to(v, (n, *np.shape(v)[1:])) for v in (X_WA, X_WB, np.atleast_1d(room)))
+    X_WA, X_WB, leeway = (np.broadcast_to(v, (n, *np.shape(v)[1:])) for v in (X_WA, X_WB, np.atleast_1d(leeway)))
     out_a, out_b = list(sides[0]), list(sides[1])
     for some in pairs.values():
         a, b = sides[0][some[0]], sides[1][some[0]]
-        for k, size in zip(some, sizes_at(a, b, X_WA[some], X_WB[some], room[some]).tolist()):
+        for k, size in zip(some, sizes_at(a, b, X_WA[some], X_WB[some], leeway[some]).tolist()):
             if a.is_region:
                 out_a[k] = closed(a, size)
             else:
@@ -67,14 +67,14 @@ def closed_shapes(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, room: np.nda
     return out_a, out_b
 
 
-def sizes_at(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, room: np.ndarray | float = 0.0) -> np.ndarray:
-    """(n,) box sizes for a region and another body at poses (n, 4, 4), or up to ``room`` [m] from there."""
-    region, other, X_WR, X_WO = (A, B, X_WA, X_WB) if A.is_region else (B, A, X_WB, X_WA)
-    reach = reach_of(other)
+def sizes_at(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, leeway: np.ndarray | float = 0.0) -> np.ndarray:
+    """(n,) box sizes for a region and another body at poses (n, 4, 4), or up to ``leeway`` [m] from there."""
+    region, body, X_WR, X_WO = (A, B, X_WA, X_WB) if A.is_region else (B, A, X_WB, X_WA)
+    reach = reach_of(body)
     if not reach < math.inf:
         names = " and ".join(map(name_of, (A, B)))
         raise UnsupportedQuery(f"{names}: neither has an end, which this query needs; collide() and distance() answer")
-    apart = np.sqrt(np.square(X_WO[:, :3, 3] - X_WR[:, :3, 3]).sum(axis=1)) + room
+    apart = np.sqrt(np.square(X_WO[:, :3, 3] - X_WR[:, :3, 3]).sum(axis=1)) + leeway
     assert isinstance(region, HPolytope)
     return box_sizes(region, _stretch(X_WR) * (apart + _stretch(X_WO) * reach + region.boundary_within))
 

@@ -355,8 +355,8 @@ def _refuse_planes(question: _Question, some: np.ndarray) -> None:
     if len(some):
         names = " and ".join(type(question.shapes[side[some[0]]]).__name__ for side in (question.a, question.b))
         raise UnsupportedQuery(
-            f"time_of_impact of {names} (motion {some[0]}): two bodies without end that start apart may meet when one "
-            "tilts, however far away; a large Box can stand in for one of them"
+            f"time_of_impact of {names} (motion {some[0]}): two half-spaces, or regions of them, that start apart may "
+            "meet when one tilts, however far away; a large Box can stand in for one of them"
         )
 
 

@@ -22,8 +22,8 @@ def with_regions_closed(
     is_region = np.array([shape.is_region for shape in shapes], dtype=bool)
     if not is_region.any():
         return shapes, a, b
-    is_endless = np.array([not reach_of(shape) < np.inf for shape in shapes], dtype=bool)
-    some = np.flatnonzero((is_region[a] | is_region[b]) & ~(is_endless[a] & is_endless[b]))
+    is_unbounded = np.array([not reach_of(shape) < np.inf for shape in shapes], dtype=bool)
+    some = np.flatnonzero((is_region[a] | is_region[b]) & ~(is_unbounded[a] & is_unbounded[b]))
     if not len(some):
         return shapes, a, b
     motions = motions.picked(some)
@@ -32,9 +32,9 @@ def with_regions_closed(
         for X_WA, X_WB in ((motions.X_WA0, motions.X_WB0), (motions.X_WA1, motions.X_WB1))
     )
     # Origins move on lines, so that they are farthest from each other at an end.
-    room = np.maximum(end - start, 0.0) * _UP
+    leeway = np.maximum(end - start, 0.0) * _UP
     A, B = ([shapes[k] for k in which[some].tolist()] for which in (a, b))
-    sides = closed_shapes(A, B, motions.X_WA0, motions.X_WB0, len(some), room)
+    sides = closed_shapes(A, B, motions.X_WA0, motions.X_WB0, len(some), leeway)
     shapes, numbers = list(shapes), {id(shape): k for k, shape in enumerate(shapes)}
     a, b = a.copy(), b.copy()
     for which, side in zip((a, b), sides):

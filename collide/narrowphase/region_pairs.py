@@ -73,11 +73,11 @@ def answer_unbounded(
     """The same of two bodies that have none."""
     X_WA, X_WB = poses
     for k in range(len(out)):
-        gap, is_endless = _state(A, B, X_WA[k], X_WB[k], with_depth=question.depths and not question.boolean)
+        gap, is_unbounded = _state(A, B, X_WA[k], X_WB[k], with_depth=question.depths and not question.boolean)
         hit = gap == 0.0
         if question.boolean:
             out[k] = hit
-        elif is_endless or (hit and not question.depths):
+        elif is_unbounded or (hit and not question.depths):
             _write_common_point(out[k : k + 1], -math.inf if question.depths else 0.0)
         else:
             out[k] = _row(batch_of, A, B, X_WA[k : k + 1], X_WB[k : k + 1], gap)

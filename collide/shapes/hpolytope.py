@@ -104,6 +104,11 @@ class HPolytope(Shape):
         size : float
             A power of two [m], so large that the box holds a point of the region: twice ``boundary_within`` is.
 
+        Returns
+        -------
+        HPolytope
+            Its ``vertices`` within ``slop`` [m] of those of the planes as given.
+
         Raises
         ------
         UnsupportedQuery

@@ -35,12 +35,12 @@ def settle_regions(
         planes = [shape.prepared.made.get("planes") for shape in packed]
         for region, body in ((0, 1), (1, 0)):
             if planes[region] is not None and packed[body].kind == POINTS and packed[body].slop == 0.0:
-                X = [(poses.rows[part, :9].reshape(3, 3), poses.rows[part, 9:12]) for part in parts]
+                X = [_matrix(poses.rows[part]) for part in parts]
                 normals, offsets = planes[region]
                 near = planes_near(normals, offsets, X[region], X[body], packed[body].reach + packed[body].radius)
                 exact = poses.exact(parts[region]), poses.exact(parts[body])
                 is_apart = _are_apart(normals[near], offsets[near], packed[body].points, packed[body].radius, *exact)
-                size = sum(shape.reach + shape.radius for shape in packed) + float(np.abs(X[1][1] - X[0][1]).max())
+                size = sum(shape.reach + shape.radius for shape in packed) + float(np.abs((X[1] - X[0])[:3, 3]).max())
                 _settle(rows[k : k + 1], is_apart, size)
                 break
 
@@ -52,6 +52,13 @@ def _are_apart(normals, offsets, points: np.ndarray, radius: float, pose_of_plan
     halfspaces = rows_of_planes(planes_at(normals, offsets, pose_of_planes))
     pair = nearest_pair(rows_of_points(points_at(points, pose_of_points)), halfspaces, Work())
     return pair.kind == APART and sum(u * u for u in pair.u) > (Fraction(radius) * pair.denominator) ** 2
+
+
+def _matrix(row: np.ndarray) -> np.ndarray:
+    """The (4, 4) matrix of a row of poses."""
+    X = np.eye(4)
+    X[:3, :3], X[:3, 3] = row[:9].reshape(3, 3), row[9:12]
+    return X
 
 
 def _settle(row: np.ndarray, is_apart: bool, size: float) -> None:
