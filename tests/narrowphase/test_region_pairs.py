@@ -204,7 +204,7 @@ def test_what_is_no_question_is_refused_by_name():
         collide.collide(region, collide.Box((1, 1, 1)), np.eye(4), np.eye(4), algorithm="barba-langerman")
     assert not hasattr(region, "vertices")
     far = pose(t=(0, 0, -5e49))
-    with pytest.raises(UnsupportedQuery, match="may be 1.0008e"):
+    with pytest.raises(UnsupportedQuery, match="may be 1"):
         collide.collide(region, collide.Sphere(1.0), np.eye(4), far)
 
 
