@@ -148,12 +148,12 @@ def plot(rows: list[dict], place: Path) -> None:
     panels = list(dict.fromkeys((row["algorithm"], row["d"]) for row in rows))
     figure, axes = plt.subplots(1, len(panels), figsize=(4.6 * len(panels), 4.2), sharey=True, squeeze=False)
     for axis, panel in zip(axes[0], panels):
-        shown = [row for row in rows if (row["algorithm"], row["d"]) == panel]
+        of_panel = [row for row in rows if (row["algorithm"], row["d"]) == panel]
         for family, marker in zip(FIT_FAMILIES, "osD^v"):
-            of_family = [row for row in shown if row["family"] == family]
+            of_family = [row for row in of_panel if row["family"] == family]
             axis.loglog([row["n"] for row in of_family], [row["rows_read"] for row in of_family], marker=marker,
                         markersize=4, linewidth=1.2, label=family)  # fmt: skip
-        n = np.array([min(row["n"] for row in shown), max(row["n"] for row in shown)])
+        n = np.array([min(row["n"] for row in of_panel), max(row["n"] for row in of_panel)])
         axis.loglog(n, 2 * n, color="grey", linestyle=":", label="every row once")
         axis.loglog(n, 20 * n, color="grey", linestyle="--", label="ten times")
         axis.set_title(f"{panel[0]}, d = {panel[1]}", fontsize=10)
@@ -174,8 +174,8 @@ def table(args) -> Iterator[dict]:
         name: (lambda question, name=name: polytopes.meets(*question, algorithm=name).hit) for name in ALGORITHMS
     }
     contestants.update({name: ask for name, (module, ask, _) in PEERS.items() if is_installed(module)})
-    chosen = args.contestants or list(contestants)
-    if missing := set(chosen) - set(contestants):
+    asked = args.contestants or list(contestants)
+    if missing := set(asked) - set(contestants):
         raise SystemExit(f"no contestants: {', '.join(sorted(missing))}; there are {', '.join(contestants)}")
     order = np.random.default_rng(0)
     for d, n, m in TABLE:
@@ -190,7 +190,7 @@ def table(args) -> Iterator[dict]:
         wrong: dict[str, int] = {}
         for _ in range(args.runs):
             for question, truth in zip(questions, truths):
-                for name in order.permutation(chosen).tolist():  # whoever follows Drake finds the caches empty
+                for name in order.permutation(asked).tolist():  # whoever follows Drake finds the caches empty
                     if max(seconds.get(name, [0.0])) > args.longest or _too_large(name, n):
                         continue
                     start = time.perf_counter()
