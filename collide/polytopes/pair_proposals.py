@@ -59,12 +59,17 @@ class Work:
 
 
 class Proposal(NamedTuple):
-    """points, halfspaces : rows of a basis that doubles take for optimal.   y, u : the nearest pair in doubles."""
+    """points, halfspaces : rows of a basis that doubles take for optimal.   y, u : the nearest pair in doubles.
+
+    weights, multipliers : y of the points, of sum 1, and u of the half-spaces, all ≥ 0.
+    """
 
     points: list[int]
     halfspaces: list[int]
     y: np.ndarray
     u: np.ndarray
+    weights: np.ndarray
+    multipliers: np.ndarray
 
 
 def propose_from_samples(
@@ -145,7 +150,8 @@ def propose_pair(
             work.check(points, halfspaces)
             if not grown:
                 return Proposal(
-                    [working_points[k] for k in active_points], [working_halfspaces[k] for k in active_halfspaces], y, u
+                    [working_points[k] for k in active_points], [working_halfspaces[k] for k in active_halfspaces], y, u,
+                    weights[active_points], multipliers[active_halfspaces],
                 )  # fmt: skip
     return None
 

@@ -170,7 +170,7 @@ ROOMS = {
         "batches",
         "pair_arguments",
     },
-    "polytopes": {"errors", "argument_checks", "certificates", "kernels", "numerics", "shapes", "transforms"},
+    "polytopes": {"errors", "argument_checks", "certificates", "hull", "kernels", "numerics", "shapes", "transforms"},
     "world_bodies": {"errors", "argument_checks", "transforms", "numerics", "shapes", "broadphase"},
     "world_hits": set(),
     "world_parts": {"shapes", "lowering", "broadphase"},
