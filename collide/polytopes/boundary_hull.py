@@ -20,7 +20,7 @@ from collide.polytopes.planar_hull import hull_of_points
 BITS = 48
 _UNIT = 2.0**-53
 #: From so many points on the kernels for the plane and space are taken.
-_MANY = 400
+_N_KERNEL = 400
 
 
 class Boundary(NamedTuple):
@@ -57,7 +57,7 @@ def boundary_hull(points: np.ndarray, with_planes: bool = True) -> Boundary | No
     if d == 2:
         ring = hull_of_points(points)
         facets = np.sort(np.column_stack((ring, np.roll(ring, -1))), axis=1)
-    elif d == 3 and n >= _MANY:
+    elif d == 3 and n >= _N_KERNEL:
         facets = np.sort(np.asarray(convex_hull(points).facets, dtype=np.int64), axis=1)
     else:
         growing = _Growing(points, corners)
@@ -138,11 +138,11 @@ def exact_planes(points: np.ndarray, facets: np.ndarray, within: np.ndarray) -> 
     d = points.shape[1]
     corners = _integers(points[facets.ravel()]).reshape(len(facets), d, d)
     edges = corners[:, 1:] - corners[:, :1]
-    minors = {(k,): edges[:, 0, k] for k in range(d)}
+    minors: dict[tuple[int, ...], np.ndarray] = {(k,): edges[:, 0, k] for k in range(d)}
     for row in range(1, d - 1):  # Laplace along rows; columns are kept by which of them a minor has
-        larger = {}
+        larger: dict[tuple[int, ...], np.ndarray] = {}
         for columns in combinations(range(d), row + 1):
-            total = 0
+            total = np.zeros(len(facets), dtype=object)
             for place, column in enumerate(columns):
                 rest = columns[:place] + columns[place + 1 :]
                 term = edges[:, row, column] * minors[rest]

@@ -33,7 +33,7 @@ class Sizes(NamedTuple):
     leaf: int
 
 
-#: By dimension, chosen by benchmarks/hierarchical_trees.py --sizes.
+#: By dimension, sampled by benchmarks/hierarchical_trees.py --sizes.
 SIZES = {2: Sizes(0.5, 12, 24), 3: Sizes(0.5, 24, 48), 4: Sizes(0.5, 24, 96), 5: Sizes(0.5, 24, 160)}
 
 
@@ -74,8 +74,8 @@ class Node:
     @property
     def n_bytes(self) -> int:
         """What the node keeps, without its children: net, hull, cones, and of a leaf its simplices."""
-        kept = self.net.nbytes + self.corners.nbytes + self.hull.facets.nbytes + self.hull.planes.nbytes
-        return kept + sum(c.facets.nbytes + c.inverses.nbytes for c in self.cones.values())
+        n_held = self.net.nbytes + self.corners.nbytes + self.hull.facets.nbytes + self.hull.planes.nbytes
+        return n_held + sum(c.facets.nbytes + c.inverses.nbytes for c in self.cones.values())
 
 
 class FacetTree:
@@ -102,20 +102,17 @@ class FacetTree:
         Bytes of all nodes, how many, and samples that were drawn again.
     """
 
-    def __init__(self, points: np.ndarray, memory: int, limits: Sizes | None = None, boundary: np.ndarray | None = None):
+    def __init__(self, points: np.ndarray, memory: int, limits: Sizes | None = None):
         first = first_simplex(points)
-        whole = None if first is None else boundary
-        if first is not None and whole is None:
-            hull = boundary_hull(points, with_planes=False)
-            whole = None if hull is None else hull.facets
-        if first is None or whole is None:
+        hull = None if first is None else boundary_hull(points, with_planes=False)
+        if first is None or hull is None:
             raise UnsupportedQuery("a hierarchical tree needs a body with interior; ask polytopes.meets of flat ones")
-        self.points, self.facets = points, whole.astype(np.int32)
+        self.points, self.facets = points, hull.facets.astype(np.int32)
         self.first = first
         self.reach = float(np.abs(points).max(initial=1.0))
         self.limits, self.memory = limits or sizes(points.shape[1]), memory
         self.n_bytes, self.n_nodes, self.n_redrawn = 0, 0, 0
-        self.root = self.make_node(np.arange(len(whole), dtype=np.int32), 1)
+        self.root = self.make_node(np.arange(len(hull.facets), dtype=np.int32), 1)
 
     @property
     def dimension(self) -> int:
@@ -132,14 +129,14 @@ class FacetTree:
         return node
 
     def _draw(self, node: Node, n_net: int) -> None:
-        chosen = node.facets
-        if len(chosen) > max(self.limits.leaf, n_net):  # the same set has the same net, whatever was asked before
-            rng = np.random.default_rng([n_net, zlib.crc32(chosen.tobytes())])
-            chosen = chosen[rng.choice(len(chosen), n_net, replace=False)]
+        sampled = node.facets
+        if len(sampled) > max(self.limits.leaf, n_net):  # the same set has the same net, whatever was asked before
+            rng = np.random.default_rng([n_net, zlib.crc32(sampled.tobytes())])
+            sampled = sampled[rng.choice(len(sampled), n_net, replace=False)]
         else:
             node.is_leaf = True
         self.n_bytes -= node.n_bytes
-        net = np.unique(np.concatenate((self.facets[chosen].ravel(), self.first)))
+        net = np.unique(np.concatenate((self.facets[sampled].ravel(), self.first)))
         hull = boundary_hull(self.points[net])
         if hull is None:
             raise AssertionError("a net that holds a first simplex is flat")
@@ -168,12 +165,12 @@ class FacetTree:
 
     def cones(self, node: Node, vertex: int) -> Cones:
         """The shell cones at a vertex of a net's hull, made when first asked for."""
-        found = node.cones.get(vertex)
-        if found is None:
-            found = node.cones[vertex] = cones_at(vertex, node.hull.facets, node.hull.planes)
-            self.n_bytes += found.facets.nbytes + found.inverses.nbytes
+        cones = node.cones.get(vertex)
+        if cones is None:
+            cones = node.cones[vertex] = cones_at(vertex, node.hull.facets, node.hull.planes)
+            self.n_bytes += cones.facets.nbytes + cones.inverses.nbytes
             self._check_memory()
-        return found
+        return cones
 
     def child(self, node: Node, vertex: int, cone: int) -> Node | None:
         """The child of a shell cone: None where nothing is outside it.

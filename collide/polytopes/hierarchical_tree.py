@@ -78,14 +78,17 @@ class HierarchicalTree:
         limits: Sizes | None = None,
     ):
         limit = integer("HierarchicalTree: memory", memory, 1)
-        if (points is None) == (normals is None) or (normals is None) != (offsets is None):
-            raise InvalidArgument("HierarchicalTree: give either points, or normals with offsets")
-        self.points = self.normals = self.offsets = self.interior = None
-        if points is not None:
+        self.points: np.ndarray | None = None
+        self.normals: np.ndarray | None = None
+        self.offsets: np.ndarray | None = None
+        self.interior: np.ndarray | None = None
+        if points is not None and normals is None and offsets is None:
             self.points = cloud = read_points(points)
+        elif points is not None or normals is None or offsets is None:
+            raise InvalidArgument("HierarchicalTree: give either points, or normals with offsets")
         else:
-            n_columns = np.shape(normals)[1] if np.ndim(normals) == 2 else 0
-            self.normals, self.offsets = read_halfspaces(normals, offsets, n_columns)
+            shape = np.asarray(normals).shape
+            self.normals, self.offsets = read_halfspaces(normals, offsets, shape[1] if len(shape) == 2 else 0)
             self.interior, cloud = _polars(self.normals, self.offsets)
         if not 2 <= cloud.shape[1] <= 8:
             raise InvalidArgument(f"HierarchicalTree: 2 ≤ d ≤ 8, got d = {cloud.shape[1]}")
@@ -145,8 +148,9 @@ def trees_meet(
     ----------
     A, B : HierarchicalTree
         One of points, the other of half-spaces.
-    X_WA, X_WB : (d + 1, d + 1) array_like, float64, optional
-        Their poses: any invertible affine maps, entries taken as exact; the identity by default.
+    X_WA : (k, k) array_like, float64, optional
+    X_WB : (k, k) array_like, float64, optional
+        Their poses, k = d + 1: any invertible affine maps, entries taken as exact; the identity by default.
     certificate : bool
         Whether to make one: an exact search over all rows, begun with those that the trees found.
 

@@ -150,8 +150,8 @@ def propose_pair(
             work.check(points, halfspaces)
             if not grown:
                 return Proposal(
-                    [working_points[k] for k in active_points], [working_halfspaces[k] for k in active_halfspaces], y, u,
-                    weights[active_points], multipliers[active_halfspaces],
+                    [working_points[k] for k in active_points], [working_halfspaces[k] for k in active_halfspaces], y,
+                    u, weights[active_points], multipliers[active_halfspaces],
                 )  # fmt: skip
     return None
 

@@ -87,16 +87,16 @@ class TreeWalk:
 
     Parameters
     ----------
-    P, Q : FacetTree
+    hull_tree, polar_tree : FacetTree
         Of P's points and of the points w of R's half-spaces, on their grids.
-    Q_grid : Grid
+    polar_grid : Grid
         Of the latter.
     relative : Relative
         Of P and R.
     """
 
-    def __init__(self, P: FacetTree, Q: FacetTree, Q_grid: Grid, relative: Relative):
-        self.P, self.Q, self.Q_grid, self.relative = P, Q, Q_grid, relative
+    def __init__(self, hull_tree: FacetTree, polar_tree: FacetTree, polar_grid: Grid, relative: Relative):
+        self.hull_tree, self.polar_tree, self.polar_grid, self.relative = hull_tree, polar_tree, polar_grid, relative
         self.work = Work()
         self.planes: list[Plane] = []
         self.points: list[int] = []
@@ -121,7 +121,7 @@ class TreeWalk:
         A plane of a net's hull that the origin is beyond parts the net from the ray on which the origin leaves P's
         first simplex. The ray is unbounded, so that it is not inside P: it meets P on the boundary, or not at all.
         """
-        o, zeta, tree = self.relative.o, self.relative.zeta, self.P
+        o, zeta, tree = self.relative.o, self.relative.zeta, self.hull_tree
         centre = tree.points[tree.first].mean(axis=0)
         node: Node | None = tree.root
         while node is not None:
@@ -151,8 +151,8 @@ class TreeWalk:
     def compare(self) -> str:
         """The rounds of two nets."""
         A, a, _, eta, _ = self.relative
-        p, q = self.P.root, self.Q.root
-        y, w = self._posed(p), self._polar(q)
+        p, q = self.hull_tree.root, self.polar_tree.root
+        y, w = self._in_frame_of_region(p), self._polar(q)
         z, x = a, -a
         while True:
             self.rounds += 1
@@ -161,7 +161,7 @@ class TreeWalk:
             if answer is None:
                 return OPEN
             is_apart, vector = answer
-            tree, node = (self.P, p) if is_apart else (self.Q, q)
+            tree, node = (self.hull_tree, p) if is_apart else (self.polar_tree, q)
             if node.is_leaf:
                 return MISS if is_apart else HIT
             if is_apart:
@@ -169,22 +169,22 @@ class TreeWalk:
                 child = self._go_down(tree, node, -z @ A, float(a @ z) - 1.0 - eta)
             else:
                 x = vector
-                grid = self.Q_grid
+                grid = self.polar_grid
                 child = self._go_down(tree, node, grid.unit * x, 1.0 - eta - float(grid.centre @ x))
             if child is None:
                 return MISS if is_apart else HIT
-            if child == OPEN:
+            if isinstance(child, str):
                 return OPEN
             if is_apart:
-                p, y = child, self._posed(child)
+                p, y = child, self._in_frame_of_region(child)
             else:
                 q, w = child, self._polar(child)
 
-    def _posed(self, node: Node) -> np.ndarray:
+    def _in_frame_of_region(self, node: Node) -> np.ndarray:
         return node.corners @ self.relative.A.T + self.relative.a
 
     def _polar(self, node: Node) -> np.ndarray:
-        return self.Q_grid.centre + self.Q_grid.unit * node.corners
+        return self.polar_grid.centre + self.polar_grid.unit * node.corners
 
     def _compare_nets(self, p: Node, q: Node, y, w, z, x) -> tuple[bool, np.ndarray] | None:
         """(True, z) where z parts the nets, (False, x) where x is in both, by more than η; else None."""
@@ -217,10 +217,10 @@ class TreeWalk:
 
     def _go_down(self, tree: FacetTree, node: Node, g: np.ndarray, height: float) -> Node | str | None:
         """The child that holds every simplex of the node with a corner at which g·x exceeds a height."""
-        found = find_cone(tree, node, g)
-        if found is None:
+        at_cone = find_cone(tree, node, g)
+        if at_cone is None:
             return OPEN
-        vertex, cone, coefficients = found
+        vertex, cone, coefficients = at_cone
         cones = tree.cones(node, vertex)
         self.simplices_read += len(cones.facets)
         if apex_height(node, cones.facets[cone], g, coefficients, tree.reach) > height:
@@ -261,10 +261,10 @@ def extreme_row(tree: FacetTree, g: np.ndarray) -> tuple[int, int, int] | None:
             best, best_row = float(heights[at]), int(node.net[at])
         if node.is_leaf:
             break
-        found = find_cone(tree, node, g)
-        if found is None:
+        at_cone = find_cone(tree, node, g)
+        if at_cone is None:
             return None
-        vertex, cone, _ = found
+        vertex, cone, _ = at_cone
         n_read += len(tree.cones(node, vertex).facets)
         node = tree.child(node, vertex, cone)
     return best_row, n_nodes, n_read

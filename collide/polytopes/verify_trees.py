@@ -30,8 +30,8 @@ def verify_trees(
         Of the other, in its frame.
     answer : TreeMeeting
         With its certificate.
-    X_WP, X_WR : (d + 1, d + 1) array_like, float64, optional
-        Poses of the points and of the half-spaces; the identity by default.
+    X_WP, X_WR : (k, k) array_like, float64, optional
+        k = d + 1. Poses of the points and of the half-spaces; the identity by default.
 
     Raises
     ------
@@ -48,15 +48,15 @@ def verify_trees(
     proof = answer.certificate
     if proof is None:
         raise CertificateRefused("trees: the answer has no certificate: ask with certificate=True")
-    P, R = _fractions(X_WP, d), _fractions(X_WR, d)
+    M_P, M_R = _fractions(X_WP, d), _fractions(X_WR, d)
     if proof.kind == "common point":
         _check(answer.hit, "a common point is a hit")
         _check_rows(proof.points, proof.weights, len(p), d + 1)
         _check(sum(proof.weights) == 1, "weights do not sum to 1")
         x = [sum((w * Fraction(float(p[row, k])) for row, w in zip(proof.points, proof.weights)), Fraction(0))
              for k in range(d)]  # fmt: skip
-        x_W = [sum((m * y for m, y in zip(line, x)), line[d]) for line in P[:d]]
-        x_R = _solve([line[:d] for line in R[:d]], [y - line[d] for y, line in zip(x_W, R)])
+        x_W = [sum((m * y for m, y in zip(line, x)), line[d]) for line in M_P[:d]]
+        x_R = _solve([line[:d] for line in M_R[:d]], [y - line[d] for y, line in zip(x_W, M_R)])
         highest, row = largest_value(np.column_stack((a, b)), [*x_R, Fraction(-1)])
         _check(highest <= 0, f"half-space {row} does not hold the point")
         return
@@ -66,9 +66,9 @@ def verify_trees(
     u_R = [sum((m * Fraction(float(a[row, k])) for row, m in terms), Fraction(0)) for k in range(d)]
     c = sum((m * Fraction(float(b[row])) for row, m in terms), Fraction(0))
     # In W the plane is u_W·(x − t_R) ≤ c with u_R = M_Rᵀ u_W; of a point p, x = M_P p + t_P.
-    u_W = _solve([[R[i][k] for i in range(d)] for k in range(d)], u_R)
-    constant = sum((u * (P[i][d] - R[i][d]) for i, u in enumerate(u_W)), Fraction(0)) - c
-    u_P = [sum((u * P[i][k] for i, u in enumerate(u_W)), Fraction(0)) for k in range(d)]
+    u_W = _solve([[M_R[i][k] for i in range(d)] for k in range(d)], u_R)
+    constant = sum((u * (M_P[i][d] - M_R[i][d]) for i, u in enumerate(u_W)), Fraction(0)) - c
+    u_P = [sum((u * M_P[i][k] for i, u in enumerate(u_W)), Fraction(0)) for k in range(d)]
     highest, row = largest_value(p, [-u for u in u_P])
     _check(constant - highest > 0, f"the plane does not separate point {row} from the half-spaces")
 
@@ -78,8 +78,8 @@ def _check(condition: bool, reason: str) -> None:
         raise CertificateRefused(f"trees: {reason}")
 
 
-def _check_rows(rows, numbers, count: int, most: int) -> None:
-    _check(0 < len(rows) == len(numbers) == len(set(rows)) <= most, "rows and their numbers do not match")
+def _check_rows(rows, numbers, count: int, max_rows: int) -> None:
+    _check(0 < len(rows) == len(numbers) == len(set(rows)) <= max_rows, "rows and their numbers do not match")
     _check(all(type(row) is int and 0 <= row < count for row in rows), f"no such rows: {rows}")
     _check(all(isinstance(number, (int, Fraction)) and number > 0 for number in numbers), "a number is not > 0")
 
