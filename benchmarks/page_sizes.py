@@ -64,7 +64,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
 
 
 #: Moves the camera ten times; a pixel is read back, so that the picture is really there.
-_TURN = """
+_ROTATION = """
 const canvas = document.querySelector("canvas");
 const gl = canvas.getContext("webgl2");
 const pixel = new Uint8Array(4);
@@ -97,7 +97,7 @@ def opened(place: Path) -> tuple[float, float, float, int, int]:
         driver.get(place.as_uri())
         ready = "return document.documentElement.dataset.ready === 'true'"
         WebDriverWait(driver, 60, poll_frequency=0.05).until(lambda browser: browser.execute_script(ready))
-        measures, first, picture = driver.execute_script(_TURN)
+        measures, first, picture = driver.execute_script(_ROTATION)
     finally:
         driver.quit()
     return measures["opened"] / 1e3, first / 1e3, picture, measures["calls"], measures["triangles"]

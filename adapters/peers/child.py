@@ -1,6 +1,6 @@
 """An engine in a child process: a crash, an abort or a hang costs the pair at hand and no more.
 
-The parent starts ``python -m collide.adapters.peers.child module:class``, sends one pickled job
+The parent starts ``python -m collide.adapters.peers.child module:class[:setting]``, sends one pickled job
 down its input and reads pickled events back as they come, each led by its length in 8 bytes. When
 the child dies or falls silent, the pair (or the body) it was at is marked failed with the reason,
 and a new child goes on behind it. The child's own output is kept apart from the events: what
@@ -22,12 +22,11 @@ import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
-from collide.adapters.peers.protocol import BUILDING, FAILED, STATUSES, Event, Peer, Question, load_engine
+from collide.adapters.peers.answers import ABORTED, BUILDING, FAILED, HUNG, STATUSES, Event
+from collide.adapters.peers.protocol import Peer, Question, load_engine
 from collide.shapes import Shape
 
 _LENGTH = struct.Struct("<Q")
-#: How long a child may take to start and import its engine [s].
-START_TIMEOUT = 60.0
 #: How many children a question may use up before the rest is given up.
 MAX_RESTARTS = 100
 #: How many characters of a dead child's stderr go into a reason.
@@ -37,7 +36,7 @@ LAST_WORDS = 240
 class IsolatedPeer(Peer):
     """Any engine, asked in child processes.
 
-    spec : ``module:class`` of the engine.
+    spec : ``module:class`` or ``module:class:setting`` of the engine.
     timeout : how long the child may be silent about one pair [s].
     """
 
@@ -46,8 +45,9 @@ class IsolatedPeer(Peer):
     def __init__(self, spec: str, *, timeout: float = 10.0, max_restarts: int = MAX_RESTARTS):
         self._spec, self._timeout, self._max_restarts = spec, timeout, max_restarts
         self._peer = load_engine(spec)
-        self.name, self.package, self.module = self._peer.name, self._peer.package, self._peer.module
-        self.hint = self._peer.hint
+        names = "name", "package", "module", "hint", "extra", "about", "receives", "cannot", "settings", "values"
+        for attribute in names:
+            setattr(self, attribute, getattr(self._peer, attribute))
 
     @property
     def version(self) -> str:
@@ -61,14 +61,15 @@ class IsolatedPeer(Peer):
 
     def stream(self, question: Question, wanted: Iterable[int]) -> Iterator[Event]:
         unanswered = list(wanted)
-        lost: dict[int, str] = {}
+        lost: dict[int, tuple[str, str]] = {}
         for _ in range(self._max_restarts + 1):
             yield from _of_lost_bodies(question, unanswered, lost)
             unanswered = [k for k in unanswered if not lost.keys() & question.pairs[k]]
             if not unanswered:
                 return
             building = None
-            with _child(self._spec, question, unanswered, self._timeout) as child:
+            limits = self._timeout, self._peer.start_timeout
+            with _child(self._spec, question, unanswered, *limits) as child:
                 for event in child.events():
                     if event.kind in STATUSES:
                         unanswered.remove(event.at)
@@ -76,35 +77,38 @@ class IsolatedPeer(Peer):
                     building = event.at if event.kind == BUILDING else None
                 if not unanswered:
                     return
-                reason = child.epitaph()
+                mishap, reason = child.epitaph()
             if not child.started:
                 break
             if building is None:
-                yield Event(FAILED, unanswered.pop(0), None, reason)
+                yield Event(FAILED, unanswered.pop(0), None, reason, mishap=mishap)
             else:
-                lost[building] = f"building {question.bodies[building].name!r}: {reason}"
+                lost[building] = f"building {question.bodies[building].name!r}: {reason}", mishap
         else:
             reason = f"given up after {self._max_restarts} restarts; the last: {reason}"
-        yield from (Event(FAILED, k, None, reason) for k in unanswered)
+        yield from (Event(FAILED, k, None, reason, mishap=mishap) for k in unanswered)
 
 
-def _of_lost_bodies(question: Question, rows: list[int], lost: dict[int, str]) -> Iterator[Event]:
+def _of_lost_bodies(question: Question, rows: list[int], lost: dict[int, tuple[str, str]]) -> Iterator[Event]:
     """Failures of the rows whose body could not even be built."""
     for k in rows:
         for i in question.pairs[k]:
             if i in lost:
-                yield Event(FAILED, k, None, lost[i])
+                reason, mishap = lost[i]
+                yield Event(FAILED, k, None, reason, mishap=mishap)
                 break
 
 
 @contextmanager
-def _child(spec: str, question: Question, wanted: list[int], timeout: float) -> Iterator[_Child]:
+def _child(
+    spec: str, question: Question, wanted: list[int], timeout: float, start_timeout: float
+) -> Iterator[_Child]:
     """A child process at work on one job; its end is the end of the block."""
     with tempfile.TemporaryFile() as stderr:
         command = [sys.executable, "-m", "collide.adapters.peers.child", spec]
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr)
         try:
-            yield _Child(process, stderr, (question, wanted), timeout)
+            yield _Child(process, stderr, (question, wanted), timeout, start_timeout)
         finally:
             process.kill()
             process.wait()
@@ -115,8 +119,8 @@ def _child(spec: str, question: Question, wanted: list[int], timeout: float) -> 
 class _Child:
     """The parent's end of a child process."""
 
-    def __init__(self, process: subprocess.Popen, stderr, job: tuple, timeout: float):
-        self.started = False
+    def __init__(self, process: subprocess.Popen, stderr, job: tuple, timeout: float, start_timeout: float):
+        self.started, self._start_timeout = False, start_timeout
         self._process, self._stderr, self._timeout, self._silent_for = process, stderr, timeout, 0.0
         self._inbox: queue.SimpleQueue = queue.SimpleQueue()
         # Two threads, so that neither a full pipe nor a silent child can hold the parent up.
@@ -141,7 +145,7 @@ class _Child:
     def events(self) -> Iterator[Event]:
         """What the child reports, until it is done, dead, or silent for too long."""
         while True:
-            limit = self._timeout if self.started else START_TIMEOUT
+            limit = self._timeout if self.started else self._start_timeout
             try:
                 event = self._inbox.get(timeout=limit)
             except queue.Empty:
@@ -154,10 +158,10 @@ class _Child:
             else:
                 yield event
 
-    def epitaph(self) -> str:
-        """Why it is over, with the child's last words."""
+    def epitaph(self) -> tuple[str, str]:
+        """The mishap, and why it is over, with the child's last words."""
         if self._silent_for:
-            return f"no answer in {self._silent_for:g} s"
+            return HUNG, f"no answer in {self._silent_for:g} s"
         code = self._process.wait()
         what = f"process ended with code {code}"
         if code < 0:
@@ -167,7 +171,7 @@ class _Child:
                 what = f"process aborted (signal {-code})"
         self._stderr.seek(0)
         words = last_words(self._stderr.read().decode(errors="replace"))
-        return f"{what}: {words}" if words else what
+        return ABORTED, f"{what}: {words}" if words else what
 
 
 def last_words(stderr: str) -> str:
@@ -207,8 +211,7 @@ def main(spec: str) -> None:
     sys.path[:] = pickle.load(sys.stdin.buffer)
     peer = load_engine(spec)
     question, wanted = pickle.load(sys.stdin.buffer)
-    if peer.module is not None:
-        __import__(peer.module)  # counts as starting, not as the first pair's time
+    peer.prepare()
     send(Event("ready", 0))
     for event in peer.stream(question, wanted):
         send(event)

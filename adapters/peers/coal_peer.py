@@ -1,4 +1,4 @@
-"""Coal with its default settings: GJK and EPA, signed distance, normal from A to B.
+"""Coal: GJK and EPA, signed distance, normal from A to B; plain, with tight tolerances, or accelerated.
 
 Hulls are handed over with faces of our own: coal's own hull builder ends the interpreter on thin
 boxes. Its separate boolean (no contact wanted) is asked too, since its tolerances differ.
@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide.adapters.peers.answers import NO_DEPTH, Reply
 from collide.adapters.peers.hull_facets import triangulate
-from collide.adapters.peers.protocol import NO_DEPTH, PairwisePeer, Reply
+from collide.adapters.peers.protocol import PairwisePeer, Setting
 from collide.adapters.peers.question import corners
 from collide.errors import UnsupportedQuery
 from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
@@ -21,6 +22,28 @@ class CoalPeer(PairwisePeer):
     """coal's `collide` with contacts off for the boolean, its `distance` for the rest."""
 
     name, package, module = "coal", "coal", "coal"
+    about = "collide with contacts off for the boolean, distance for the rest, default tolerances of 1e-6"
+    receives = (
+        "doubles; hulls with faces of our own, since its hull builder ends the interpreter on thin boxes",
+        "meshes as BVHModelOBBRSS, break_distance 0 instead of 1e-3",
+    )
+    cannot = ("insides and depths of meshes", "hulls that are flat, or with a vertex of 255 or more neighbours")
+    settings = {
+        "tight": Setting(
+            "as coal, with tolerances of 1e-12 and 1,000 iterations at most",
+            {"gjk_tolerance": 1e-12, "epa_tolerance": 1e-12, "gjk_max_iterations": 1000, "epa_max_iterations": 1000},
+        ),
+        "nesterov": Setting("as coal, GJK with Nesterov's acceleration", {"gjk_variant": "NesterovAcceleration"}),
+        "polyak": Setting("as coal, GJK with Polyak's acceleration", {"gjk_variant": "PolyakAcceleration"}),
+    }
+
+    def _request(self, request):
+        """A request with the setting's values."""
+        import coal
+
+        for name, value in self.values.items():
+            setattr(request, name, getattr(coal.GJKVariant, value) if name == "gjk_variant" else value)
+        return request
 
     def build(self, part: Shape):
         import coal
@@ -80,7 +103,7 @@ class CoalPeer(PairwisePeer):
         import coal
 
         T_WA, T_WB = (coal.Transform3s(X[:3, :3], X[:3, 3]) for X in (X_WA, X_WB))
-        request = coal.CollisionRequest()
+        request = self._request(coal.CollisionRequest())
         request.enable_contact = False
         meshed = isinstance(A, coal.BVHModelBase) or isinstance(B, coal.BVHModelBase)
         if meshed:
@@ -89,6 +112,6 @@ class CoalPeer(PairwisePeer):
         if hit and meshed:
             return Reply(hit, note=NO_DEPTH)
         result = coal.DistanceResult()  # a fresh one each time: an old one keeps its answer
-        distance = float(coal.distance(A, T_WA, B, T_WB, coal.DistanceRequest(), result))
+        distance = float(coal.distance(A, T_WA, B, T_WB, self._request(coal.DistanceRequest()), result))
         point_a, point_b = tuple(result.getNearestPoint1()), tuple(result.getNearestPoint2())
         return Reply(hit, distance, tuple(result.normal), point_a, point_b)

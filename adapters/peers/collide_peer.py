@@ -7,11 +7,13 @@ reported.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable, Iterator
 
 import collide
-from collide.adapters.peers.protocol import ANSWERED, FAILED, UNSUPPORTED, Event, Peer, Question, Reply, complaint
+from collide.adapters.peers.answers import ANSWERED, FAILED, UNSUPPORTED, Event, Reply
+from collide.adapters.peers.protocol import Peer, Question, complaint
 from collide.errors import UnsupportedQuery
 from collide.results import UNDECIDED
 
@@ -20,6 +22,9 @@ class CollidePeer(Peer):
     """The engine under test."""
 
     name = "collide"
+    about = "World.collisions and World.distances of a scene; collide and distance of unrelated pairs"
+    receives = ("doubles, as they stand",)
+    cannot = ("depths of meshes that meet",)
 
     def stream(self, question: Question, wanted: Iterable[int]) -> Iterator[Event]:
         if question.isolated:
@@ -74,7 +79,7 @@ def _from_world(question: Question, k: int, hits: set, rows: dict) -> Reply:
         return _reply(rows[pair])._replace(hit=hit)
     alone = _pair(question, k)
     note = ""
-    if alone.distance <= question.max_distance:
+    if alone.distance is not None and alone.distance <= question.max_distance:
         note = f"the World left this pair out, the pair query finds it at {alone.distance!r} m"
     return alone._replace(hit=hit, note=note)
 
@@ -89,7 +94,8 @@ def _pair(question: Question, k: int) -> Reply:
 
 def _reply(row) -> Reply:
     normal, point_a, point_b = (tuple(row[name].tolist()) for name in ("normal", "point_a", "point_b"))
+    distance = None if math.isnan(row["distance"]) else float(row["distance"])
     return Reply(
-        bool(row["hit"]), float(row["distance"]), normal, point_a, point_b, certified=bool(row["certified"]),
+        bool(row["hit"]), distance, normal, point_a, point_b, certified=bool(row["certified"]),
         undecided=bool(row["how"] == UNDECIDED), lower=float(row["lower"]), upper=float(row["upper"]),
     )

@@ -26,8 +26,9 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from collide.adapters.peers.answers import counted
 from collide.adapters.peers.judge import Disagreement, Judge, contradictions, differences
-from collide.adapters.peers.protocol import ENGINES, Question, Table, engine
+from collide.adapters.peers.protocol import Peer, Question, Table, check_names, engine
 from collide.adapters.peers.question import ask
 from collide.errors import InvalidArgument
 
@@ -65,7 +66,10 @@ class Summary:
     contradictions : boolean against own distance, beyond rounding.
     gap, depth : largest differences to the reference, apart and overlapping; overlaps of unions and meshes
         are left out, since engines mean different things by their depth.
-    failed : each pair lost, with the reason.   unsupported : reasons and their counts.
+    failed : each pair lost, with the reason and the kind of mishap.   unsupported : reasons and their counts.
+    mishaps : how many answers of each kind of `collide.adapters.peers.answers.MISHAPS`: those of the failed, and
+        distances that are NaN or no length.
+    about, receives, cannot : which of its calls were asked, what it was really given, and what it cannot answer.
     seconds : spent in this engine's interface; not a benchmark.
     """
 
@@ -89,6 +93,10 @@ class Summary:
     gap: Largest = field(default_factory=Largest)
     depth: Largest = field(default_factory=Largest)
     furthest_off: Largest = field(default_factory=Largest)
+    mishaps: dict[str, int] = field(default_factory=dict)
+    about: str = ""
+    receives: list[str] = field(default_factory=list)
+    cannot: list[str] = field(default_factory=list)
     failed: list[dict[str, str]] = field(default_factory=list)
     unsupported: dict[str, int] = field(default_factory=dict)
     seconds: float = 0.0
@@ -186,7 +194,7 @@ class Comparison:
             "engine", "version", "answered", "agree", "differ", "inside", "wrong", "within rounding", "not judged",
             "contradicts itself", "wrong distances", "furthest off", "largest gap difference",
             "largest depth difference",
-            "failed", "unsupported",
+            "failed", "unsupported", "mishaps",
         ]
         return headers, [_printed(s, s.engine == self.reference) for s in self.summaries]
 
@@ -229,21 +237,20 @@ def compare(
     """
     if isinstance(engines, str) or not all(isinstance(name, str) for name in engines):
         raise InvalidArgument(f"engines must be a sequence of names, got {engines!r}")
-    for name in (reference, *engines):
-        if name not in ENGINES:
-            raise InvalidArgument(f"no engine {name!r}; there are {', '.join(sorted(ENGINES))}")
+    check_names((reference, *engines))
     question = ask(of, max_distance, every_pair=every_pair)
     judge = Judge(question, tolerance)
-    ours = engine(reference, isolated=False).answer(question)
-    summaries = [_counts(question, ours)]
+    ours_engine = engine(reference, isolated=False)
+    ours = ours_engine.answer(question)
+    summaries = [_counts(question, ours, ours_engine)]
     disagreements = contradictions(judge, ours)
     for name in dict.fromkeys(n for n in engines if n != reference):
         peer = engine(name, timeout=timeout)
         if peer.missing():
-            summaries.append(Summary(name, skipped=str(peer.missing())))
+            summaries.append(Summary(name, skipped=str(peer.missing()), **_statement(peer)))
             continue
         theirs = peer.answer(question)
-        summaries.append(_counts(question, theirs))
+        summaries.append(_counts(question, theirs, peer))
         disagreements += contradictions(judge, theirs) + differences(judge, ours, theirs, summaries[-1])
     for summary in summaries:
         _tally(summary, disagreements, reference)
@@ -253,7 +260,12 @@ def compare(
     )
 
 
-def _counts(question: Question, table: Table) -> Summary:
+def _statement(peer: Peer) -> dict:
+    """What an engine says of itself."""
+    return {"about": peer.about, "receives": list(peer.receives), "cannot": list(peer.cannot)}
+
+
+def _counts(question: Question, table: Table, peer: Peer) -> Summary:
     """What can be counted from one engine's table alone."""
     rows = table.rows
     return Summary(
@@ -262,11 +274,11 @@ def _counts(question: Question, table: Table) -> Summary:
         undecided=int(rows["undecided"].sum()),
         without_distance=int((rows["answered"] & ~rows["has_distance"]).sum()),
         failed=[
-            {"a": a, "b": b, "reason": table.reasons[k]}
+            {"a": a, "b": b, "reason": table.reasons[k], "mishap": table.mishaps[k]}
             for k in np.flatnonzero(rows["failed"]).tolist() for a, b in [question.names(k)]
         ],
         unsupported=dict(Counter(table.reasons[k] for k in np.flatnonzero(rows["unsupported"]))),
-        seconds=float(rows["seconds"].sum()),
+        mishaps=dict(Counter(filter(None, table.mishaps))), seconds=float(rows["seconds"].sum()), **_statement(peer),
     )
 
 
@@ -293,14 +305,14 @@ def _tally(summary: Summary, disagreements: list[Disagreement], reference: str) 
 
 def _printed(s: Summary, is_reference: bool) -> list[str]:
     if s.skipped:
-        return [s.engine, f"skipped: {s.skipped}", *[""] * 14]
+        return [s.engine, f"skipped: {s.skipped}", *[""] * 15]
     agree, differ, inside = ("", "", "") if is_reference else map(str, (s.agreeing, s.hit_disagreements, s.inside))
     largest = ("", "") if is_reference else (_length(s.gap), _length(s.depth))
     return [
         s.engine, s.version, f"{s.answered} of {s.asked}", agree, differ, inside, str(s.wrong),
         str(s.wrong_within_rounding),
         str(s.not_judged), str(s.contradictions), str(s.wrong_distances), _length(s.furthest_off), *largest,
-        str(len(s.failed)), str(sum(s.unsupported.values())),
+        str(len(s.failed)), str(sum(s.unsupported.values())), counted(s.mishaps),
     ]
 
 

@@ -14,7 +14,8 @@ from fractions import Fraction
 import numpy as np
 
 from collide.adapters.peers import exact, exact_meshes
-from collide.adapters.peers.protocol import PairwisePeer, Reply
+from collide.adapters.peers.answers import Reply
+from collide.adapters.peers.protocol import PairwisePeer
 from collide.adapters.peers.question import Body, convex_parts, corners
 from collide.errors import UnsupportedQuery
 from collide.shapes import Compound, HPolytope, Mesh, Shape
@@ -29,6 +30,9 @@ class ExactPeer(PairwisePeer):
     """`collide.adapters.peers.exact` behind the protocol; the distance is its Decimal, rounded once."""
 
     name = "exact"
+    about = "rational arithmetic in plain Python"
+    receives = ("doubles as they are, poses entry by entry",)
+    cannot = ("cylinders, cones, ellipsoids, half-spaces", "depths of meshes that meet")
 
     def refuses(self, part: Shape) -> str | None:
         return (

@@ -1,4 +1,4 @@
-"""FCL through python-fcl: libccd's GJK and EPA, signed distance, no normal with a distance.
+"""FCL through python-fcl: libccd's GJK and EPA or its own, signed distance, no normal with a distance.
 
 Asked in a child process: on some inputs its signed distance throws through Cython and ends the
 interpreter, and any distance to a half-space crashes it. Of half-spaces only the boolean is asked.
@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 
+from collide.adapters.peers.answers import NO_DEPTH, Reply
 from collide.adapters.peers.hull_facets import triangulate
-from collide.adapters.peers.protocol import NO_DEPTH, PairwisePeer, Reply, has_radius
+from collide.adapters.peers.protocol import PairwisePeer, Setting, has_radius
 from collide.adapters.peers.question import corners
 from collide.errors import UnsupportedQuery
 from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
@@ -23,6 +24,21 @@ class FclPeer(PairwisePeer):
 
     name, package, module = "fcl", "python-fcl", "fcl"
     isolated = True
+    about = "collide for the boolean, distance with everything enabled for the rest, solver libccd"
+    receives = ("doubles; hulls with faces of our own, which its Convex wants", "meshes as BVHModels")
+    cannot = (
+        "insides and depths of meshes", "distances to half-spaces, which crash it", "hulls with a radius, flat hulls",
+        "a normal with a distance: taken from its nearest points",
+    )  # fmt: skip
+    settings = {
+        "indep": Setting(
+            "collide alone, with contacts, by FCL's own GJK and EPA", {"solver": "GST_INDEP"},
+            cannot=(
+                "gaps: python-fcl hands the solver of distance to FCL as rel_err, so only collide obeys it",
+                "insides and depths of meshes", "hulls with a radius, flat hulls",
+            ),
+        )
+    }  # fmt: skip
 
     def refuses(self, part: Shape) -> str | None:
         return "python-fcl has no hull with a radius" if has_radius(part) else None
@@ -63,17 +79,35 @@ class FclPeer(PairwisePeer):
         import fcl
 
         a, b = (fcl.CollisionObject(g, fcl.Transform(X[:3, :3], X[:3, 3])) for g, X in ((A, X_WA), (B, X_WB)))
+        meshed = isinstance(A, fcl.BVHModel) or isinstance(B, fcl.BVHModel)
+        if "solver" in self.values:
+            return _by_contact(a, b, getattr(fcl.GJKSolverType, self.values["solver"]), meshed)
         # Requests and results are made anew for every call: results accumulate.
         hit = fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
         if isinstance(A, fcl.Halfspace) or isinstance(B, fcl.Halfspace):
             return Reply(hit, note="boolean only: python-fcl's distance to a half-space crashes")
-        if hit and (isinstance(A, fcl.BVHModel) or isinstance(B, fcl.BVHModel)):
+        if hit and meshed:
             return Reply(hit, note=NO_DEPTH)
         request = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=True)
         result = fcl.DistanceResult()
         distance = float(fcl.distance(a, b, request, result))
         point_a, point_b = (p if p is not None else np.full(3, np.nan) for p in result.nearest_points)
         return Reply(hit, distance, _along(point_b - point_a, distance), tuple(point_a), tuple(point_b))
+
+
+def _by_contact(a, b, solver, meshed: bool) -> Reply:
+    """What `fcl.collide` says with contacts wanted: of an overlap the deepest contact, of a gap nothing."""
+    import fcl
+
+    result = fcl.CollisionResult()
+    request = fcl.CollisionRequest(num_max_contacts=8, enable_contact=True, gjk_solver_type=solver)
+    if not fcl.collide(a, b, request, result):
+        return Reply(False, note="boolean only: a contact is all that is asked")
+    if meshed or not result.contacts:
+        return Reply(True, note=NO_DEPTH)
+    # Its closed forms write depths above 0, its EPA below.
+    deepest = max(result.contacts, key=lambda contact: abs(contact.penetration_depth))
+    return Reply(True, -abs(float(deepest.penetration_depth)), tuple(deepest.normal))
 
 
 def _along(step_AB: np.ndarray, distance: float) -> tuple:

@@ -11,145 +11,67 @@ signed, negative inside; `normal` is the unit vector nhat_AB_W from A towards B.
 from __future__ import annotations
 
 import itertools
-import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from collide.adapters.peers.answers import (
+    ANSWERED,
+    ASKING,
+    BUILDING,
+    FAILED,
+    STATUSES,
+    TABLE_DTYPE,
+    UNSUPPORTED,
+    Event,
+    Reply,
+    Table,
+    nearest,
+)  # fmt: skip
 from collide.adapters.peers.question import Body, Question, convex_parts
 from collide.errors import CollideError, InvalidArgument, MissingExtra, UnsupportedQuery
 from collide.shapes import ConvexHull, Shape
 
-__all__ = ["ENGINES", "TABLE_DTYPE", "Body", "PairwisePeer", "Peer", "Question", "Reply", "Table", "engine"]
+__all__ = [
+    "ENGINES", "TABLE_DTYPE", "Body", "PairwisePeer", "Peer", "Question", "Reply", "Setting", "Table", "engine",
+    "installed",
+]  # fmt: skip
 
-#: One row per pair asked. `a`, `b` index the question's bodies. `answered`: the engine gave a boolean.
-#: `has_distance`: and a usable number; else `distance` is NaN. `certified`: the engine claims a proof
-#: (collide only). `undecided`: it says itself that rounding leaves the boolean open, and calls it a hit
-#: (collide only). `lower`, `upper` [m]: its proven bracket. `failed`: it crashed, raised or ran out of
-#: time. `unsupported`: it has no such shape or question. Numbers that the engine does not give are NaN.
-#: `seconds` is wall time inside this interface, for orientation: Python overhead included, never a
-#: benchmark.
-TABLE_DTYPE = np.dtype(
-    [
-        ("distance", "f8"), ("lower", "f8"), ("upper", "f8"),
-        ("normal", "f8", 3), ("point_a", "f8", 3), ("point_b", "f8", 3), ("seconds", "f8"),
-        ("a", "i4"), ("b", "i4"),
-        ("hit", "?"), ("answered", "?"), ("has_distance", "?"), ("certified", "?"), ("undecided", "?"),
-        ("failed", "?"), ("unsupported", "?"),
-    ],
-    align=True,
-)
-
-#: The engines by name, each as ``module:class``; loaded when first asked for.
+_HERE = "collide.adapters.peers"
+#: The engines by name, each as ``module:class`` or ``module:class:setting``; loaded when first asked for. A name with a
+#: setting, ``engine:setting``, is the same engine asked in another way: `Peer.settings`.
 ENGINES = {
-    "collide": "collide.adapters.peers.collide_peer:CollidePeer",
-    "fcl": "collide.adapters.peers.fcl_peer:FclPeer",
-    "coal": "collide.adapters.peers.coal_peer:CoalPeer",
-    "pybullet": "collide.adapters.peers.pybullet_peer:PybulletPeer",
-    "exact": "collide.adapters.peers.exact_peer:ExactPeer",
+    "collide": f"{_HERE}.collide_peer:CollidePeer",
+    "fcl": f"{_HERE}.fcl_peer:FclPeer",
+    "fcl:indep": f"{_HERE}.fcl_peer:FclPeer:indep",
+    "coal": f"{_HERE}.coal_peer:CoalPeer",
+    "coal:tight": f"{_HERE}.coal_peer:CoalPeer:tight",
+    "coal:nesterov": f"{_HERE}.coal_peer:CoalPeer:nesterov",
+    "coal:polyak": f"{_HERE}.coal_peer:CoalPeer:polyak",
+    "pybullet": f"{_HERE}.pybullet_peer:PybulletPeer",
+    "pybullet:margins": f"{_HERE}.pybullet_peer:PybulletPeer:margins",
+    "exact": f"{_HERE}.exact_peer:ExactPeer",
 }
 #: Asks one of them in a child process.
-_ISOLATED = "collide.adapters.peers.child:IsolatedPeer"
-
-#: The note of meshes that meet, of engines that look at one pair of facets at a time.
-NO_DEPTH = "boolean only: it gives no depth of meshes"
-
-ANSWERED, FAILED, UNSUPPORTED = STATUSES = "answered", "failed", "unsupported"
-BUILDING, ASKING = "building", "asking"
-_NOWHERE = (math.nan,) * 3
+_ISOLATED = f"{_HERE}.child:IsolatedPeer"
 
 
-class Reply(NamedTuple):
-    """What an engine says about one pair; plain data, since it crosses process borders.
+class Setting(NamedTuple):
+    """Another way to ask an engine than its plain one.
 
-    distance : signed [m]; NaN where the engine gives none.
-    normal, point_a, point_b : (3,) in the world; NaN where the engine gives none.
-    certified, undecided, lower, upper : as in `TABLE_DTYPE`; only collide fills them.
-    note : a remark that belongs to an answer ("the distance was no number").
+    about : which calls are asked, and how, in one line, as `Peer.about`.
+    values : what the engine's own file reads, by name.
+    receives, cannot : in place of the engine's `Peer.receives` and `Peer.cannot`; None where they stay.
     """
 
-    hit: bool
-    distance: float = math.nan
-    normal: tuple = _NOWHERE
-    point_a: tuple = _NOWHERE
-    point_b: tuple = _NOWHERE
-    certified: bool = False
-    note: str = ""
-    undecided: bool = False
-    lower: float = math.nan
-    upper: float = math.nan
-
-
-class Event(NamedTuple):
-    """One step of an engine at work.
-
-    kind : a row's status (ANSWERED, FAILED, UNSUPPORTED), or where the engine is now: BUILDING a
-        body, ASKING a row. A child process that dies is known to have died there.
-    at : index of the body for BUILDING, of the row otherwise.
-    """
-
-    kind: str
-    at: int
-    reply: Reply | None = None
-    reason: str = ""
-    seconds: float = 0.0
-
-
-class Table:
-    """Answers of one engine: ``rows`` of `TABLE_DTYPE` in the order asked, and ``reasons``.
-
-    ``reasons`` has one text per row: empty, or why there is no answer, or a remark about it.
-
-    Parameters
-    ----------
-    question : Question
-        What was asked.
-    engine, version : str
-        Who answers.
-    """
-
-    def __init__(self, question: Question, engine: str, version: str):
-        self.engine, self.version = engine, version
-        self.rows = np.zeros(len(question.pairs), TABLE_DTYPE)
-        self.reasons = [""] * len(question.pairs)
-        for name in ("distance", "lower", "upper", "normal", "point_a", "point_b"):
-            self.rows[name] = np.nan
-        if question.pairs:
-            self.rows["a"], self.rows["b"] = np.array(question.pairs).T
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def __repr__(self) -> str:
-        counts = ", ".join(f"{int(self.rows[n].sum())} {n}" for n in STATUSES)
-        return f"Table({self.engine} {self.version}: {len(self)} rows, {counts})"
-
-    def record(self, event: Event) -> None:
-        """Write one row's event down; distances that are no finite length are dropped, with a remark.
-
-        Parameters
-        ----------
-        event : Event
-            About one row.
-        """
-        row = self.rows[event.at]
-        row["seconds"], row[event.kind] = event.seconds, True
-        self.reasons[event.at] = event.reason
-        if event.reply is None:
-            return
-        reply = event.reply
-        for name in ("hit", "certified", "undecided", "lower", "upper", "normal", "point_a", "point_b"):
-            row[name] = getattr(reply, name)
-        remark = reply.note
-        if abs(reply.distance) < 1e300:
-            row["distance"], row["has_distance"] = reply.distance, True
-        elif not math.isnan(reply.distance):
-            remark = f"the distance {reply.distance:g} is no length"
-        self.reasons[event.at] = remark or event.reason
+    about: str
+    values: Mapping[str, Any] = {}
+    receives: tuple[str, ...] | None = None
+    cannot: tuple[str, ...] | None = None
 
 
 class Peer:
@@ -167,14 +89,53 @@ class Peer:
         Ask it in a child process by default, because it can end the interpreter, or prints where it should not.
     hint
         Added to the reason where the package is missing.
+    extra
+        The extra that brings it.
+    about
+        Which of its calls are asked, in one line.
+    receives
+        What it was really given: how its input differs from the question, sentence by sentence.
+    cannot
+        What it cannot answer, sentence by sentence.
+    settings
+        Other ways to ask it, by name.
+    start_timeout
+        How long a child process may take until the engine is ready [s].
+
+    Parameters
+    ----------
+    setting : str
+        One of `settings`; empty for the plain way.
+
+    Raises
+    ------
+    InvalidArgument
+        For an unknown setting.
     """
 
     name = ""
     package: str | None = None
     module: str | None = None
     isolated = False
-    #: Added to the reason where the package is missing.
     hint = ""
+    extra = "peers"
+    about = ""
+    receives: tuple[str, ...] = ()
+    cannot: tuple[str, ...] = ()
+    settings: Mapping[str, Setting] = {}
+    start_timeout = 60.0
+
+    def __init__(self, setting: str = ""):
+        self.values: Mapping[str, Any] = {}
+        if not setting:
+            return
+        if setting not in self.settings:
+            raise InvalidArgument(f"{self.name} has no setting {setting!r}; there are {', '.join(self.settings)}")
+        named = self.settings[setting]
+        self.name = f"{self.name}:{setting}"
+        self.about, self.values = named.about, named.values
+        self.receives = self.receives if named.receives is None else named.receives
+        self.cannot = self.cannot if named.cannot is None else named.cannot
 
     @property
     def version(self) -> str:
@@ -205,7 +166,12 @@ class Peer:
             Naming the package and the extra that brings it.
         """
         if self.missing():
-            raise MissingExtra(str(self.package), extra="peers", purpose=f"ask the engine {self.name!r}")
+            raise MissingExtra(str(self.package), extra=self.extra, purpose=f"ask the engine {self.name!r}")
+
+    def prepare(self) -> None:
+        """Do what counts as starting, not as the first pair's time: import the engine."""
+        if self.module is not None:
+            import_module(self.module)
 
     def supports(self, shape: Shape) -> str | None:
         """Why the engine cannot hold a shape.
@@ -347,17 +313,6 @@ class PairwisePeer(Peer):
         return Event(ANSWERED, k, nearest(replies), "", time.perf_counter() - start)
 
 
-def nearest(replies: list[Reply]) -> Reply:
-    """The reply of a union: it hits where any part hits, and is as far as its nearest part."""
-    if len(replies) == 1:
-        return replies[0]
-    hit = any(reply.hit for reply in replies)
-    silent = [reply for reply in replies if math.isnan(reply.distance)]
-    if silent:  # the nearest part may be the one without a number
-        return Reply(hit, note=silent[0].note)
-    return min(replies, key=lambda reply: reply.distance)._replace(hit=hit)
-
-
 def complaint(error: BaseException) -> str:
     """An exception in one line."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
@@ -370,8 +325,9 @@ def has_radius(part: Shape) -> bool:
 
 
 def load_engine(spec: str) -> Peer:
-    """The engine that a ``module:class`` text names."""
-    return _named(spec)()
+    """The engine that a ``module:class`` or ``module:class:setting`` text names."""
+    module, kind, setting = (*spec.split(":"), "")[:3]
+    return _named(f"{module}:{kind}")(setting) if setting else _named(spec)()
 
 
 def _named(spec: str) -> Any:
@@ -380,13 +336,34 @@ def _named(spec: str) -> Any:
     return getattr(import_module(module), name)
 
 
+def installed() -> list[str]:
+    """Names of `ENGINES` whose packages are there, in the table's order.
+
+    Returns
+    -------
+    list of str
+        collide and exact among them.
+    """
+    return [name for name, spec in ENGINES.items() if not load_engine(spec).missing()]
+
+
+def check_names(names: Iterable[str]) -> None:
+    """Complain about a name that is not in `ENGINES`; InvalidArgument lists those that are."""
+    for name in names:
+        if name not in ENGINES:
+            settings = {base: [s for b, _, s in (n.partition(":") for n in sorted(ENGINES)) if b == base and s]
+                        for base in sorted({n.partition(":")[0] for n in ENGINES})}  # fmt: skip
+            listed = (f"{base} (:{', :'.join(of)})" if of else base for base, of in settings.items())
+            raise InvalidArgument(f"no engine {name!r}; there are {', '.join(listed)}")
+
+
 def engine(name: str, *, isolated: bool | None = None, timeout: float = 10.0) -> Peer:
     """An engine by its name in `ENGINES`.
 
     Parameters
     ----------
     name : str
-        For example "coal".
+        For example "coal", or "coal:nesterov".
     isolated : bool, optional
         Ask it in a child process, so that a crash or a hang costs one pair; None leaves it to the engine.
     timeout : float
@@ -402,8 +379,7 @@ def engine(name: str, *, isolated: bool | None = None, timeout: float = 10.0) ->
     InvalidArgument
         For an unknown name.
     """
-    if name not in ENGINES:
-        raise InvalidArgument(f"no engine {name!r}; there are {', '.join(sorted(ENGINES))}")
+    check_names([name])
     peer = load_engine(ENGINES[name])
     if peer.isolated if isolated is None else isolated:
         return _named(_ISOLATED)(ENGINES[name], timeout=timeout)

@@ -1,4 +1,4 @@
-"""Bullet through pybullet: `getClosestPoints` of two bodies with their margins set to 0.
+"""Bullet through pybullet: `getClosestPoints` of two bodies, their margins set to 0 or as they come.
 
 pybullet has no boolean of its own for posed bodies: a hit is a closest distance ≤ 0. Hull corners
 are snapped to a grid by Bullet, up to 1e-4 of the hull's size; that error is Bullet's answer.
@@ -12,7 +12,8 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from collide.adapters.peers.protocol import NO_DEPTH, Event, PairwisePeer, Question, Reply
+from collide.adapters.peers.answers import NO_DEPTH, Event, Reply
+from collide.adapters.peers.protocol import PairwisePeer, Question, Setting
 from collide.adapters.peers.question import corners
 from collide.errors import CollideError, UnsupportedQuery
 from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
@@ -21,12 +22,31 @@ from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, M
 _MAX_VERTICES, _MAX_INDICES = 131_072, 524_288
 
 
+_RECEIVES = (
+    "doubles; hull corners, which Bullet snaps to a grid of up to 1e-4 of the hull's size",
+    "meshes as static concave triangle meshes",
+)
+
+
 class PybulletPeer(PairwisePeer):
     """A client without a window, open while a question is answered."""
 
     name, package, module = "pybullet", "pybullet", "pybullet"
     isolated = True
     hint = "it has wheels up to Python 3.11 only"
+    about = "getClosestPoints; a hit is a distance of 0 or less"
+    receives = ("collision margins set to 0", *_RECEIVES)
+    cannot = (
+        "a boolean of its own for posed bodies", "cones, ellipsoids, hulls with a radius", "two planes",
+        "meshes against meshes or planes, depths of meshes",
+    )  # fmt: skip
+    settings = {
+        "margins": Setting(
+            "getClosestPoints as it comes; a hit is a distance of 0 or less",
+            {"margins": True},
+            ("collision margins as Bullet sets them", *_RECEIVES),
+        )
+    }
     _client = -1
 
     def stream(self, question: Question, wanted: Iterable[int]) -> Iterator[Event]:
@@ -62,7 +82,8 @@ class PybulletPeer(PairwisePeer):
         if shape < 0:
             raise CollideError(f"pybullet made no collision shape of {part!r}")
         body = pybullet.createMultiBody(0, shape, physicsClientId=self._client)
-        pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=self._client)
+        if not self.values.get("margins"):
+            pybullet.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=self._client)
         return body, X_PB, reach, part
 
     def ask(self, A, X_WA, B, X_WB) -> Reply:

@@ -22,9 +22,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import collide
-from collide.adapters.peers.protocol import ENGINES, FAILED, UNSUPPORTED, Question, complaint, engine
+from collide.adapters.peers.answers import FAILED, RAISED, UNSUPPORTED, counted
+from collide.adapters.peers.protocol import Question, check_names, complaint, engine
 from collide.adapters.peers.stress_truth import Truth, gap_along, truth
-from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.errors import UnsupportedQuery
 from collide.results import HOW, UNDECIDED
 from collide.scenes.families import Case, MeshCase, generate, mesh_names, names
 
@@ -45,6 +46,7 @@ class Reply(NamedTuple):
     how : which of its arguments decided (collide only).   undecided : it says rounding leaves the
         boolean open.   certified : it calls its answer certified (collide only).
         failed, unsupported : the reason where there is no answer, else "".
+    mishap : one of `collide.adapters.peers.answers.MISHAPS`, or "".
     """
 
     hits: tuple[bool, ...] = ()
@@ -57,6 +59,7 @@ class Reply(NamedTuple):
     normal: tuple[float, float, float] = (math.nan,) * 3
     failed: str = ""
     unsupported: str = ""
+    mishap: str = ""
 
 
 @dataclass
@@ -90,6 +93,7 @@ class FamilyResult:
         engine's own distance.
     certified : answers that the engine calls so.
     how : what decided, and how often.   failed, unsupported : without an answer; `reasons` say why.
+    mishaps : answers of their own kind, counted: exceptions, aborts, hangs, and distances that are no length.
     distance_error, depth_error : largest error as a part of the exact gap or depth; the same as a part
         of L in distance_error_of_size and depth_error_of_size; None: nothing to compare.
     normal_excess : by how much the gap along the normal given falls short of the exact signed distance, at
@@ -119,6 +123,7 @@ class FamilyResult:
     normal_excess: float | None = None
     how: dict[str, int] = field(default_factory=dict)
     reasons: dict[str, int] = field(default_factory=dict)
+    mishaps: dict[str, int] = field(default_factory=dict)
 
     def see(self, name: str, value: float | Decimal) -> None:
         """Keep the larger of a recorded largest value and this one."""
@@ -201,7 +206,7 @@ class StressTable:
             A cell a column.
         """
         headers = [
-            "family", "cases", "hits", "wrong", "undecided", "missed brackets", "failed", "unsupported",
+            "family", "cases", "hits", "wrong", "undecided", "missed brackets", "failed", "unsupported", "mishaps",
             "distance error", "depth error", "normal excess", "decided by",
         ]
         rows = [_printed(f) for f in self.families]
@@ -260,8 +265,7 @@ def run(
     MissingExtra
         Where the engine is absent.
     """
-    if engine not in ENGINES:
-        raise InvalidArgument(f"no engine {engine!r}; there are {', '.join(sorted(ENGINES))}")
+    check_names([engine])
     wanted = (
         [*names(), *mesh_names()] if families is None else [families] if isinstance(families, str) else list(families)
     )
@@ -291,21 +295,22 @@ def _asker(name: str, timeout: float) -> tuple[Callable[[list[Case | MeshCase]],
         return (lambda cases: [_ask_collide(case) for case in cases]), peer.version
 
     def ask(cases: list[Case | MeshCase]) -> list[Reply]:
-        replies = []
+        replies: list[Reply] = []
         for start in range(0, len(cases), BATCH):
             table = peer.answer(Question.from_pairs([case.shapes() for case in cases[start : start + BATCH]]))
-            replies += [_from_row(row, reason) for row, reason in zip(table.rows, table.reasons)]
+            replies += map(_from_row, table.rows, table.reasons, table.mishaps)
         return replies
 
     return ask, peer.version
 
 
-def _from_row(row, reason: str) -> Reply:
+def _from_row(row, reason: str, mishap: str) -> Reply:
     """A row of the protocol's table as a reply."""
     if not row["answered"]:
         failed = bool(row[FAILED]) or not row[UNSUPPORTED]
-        return Reply(failed=reason or "no answer") if failed else Reply(unsupported=reason)
-    return Reply((bool(row["hit"]),), float(row["distance"]), normal=tuple(row["normal"].tolist()))
+        return Reply(failed=reason or "no answer", mishap=mishap) if failed else Reply(unsupported=reason)
+    normal = tuple(row["normal"].tolist())
+    return Reply((bool(row["hit"]),), float(row["distance"]), normal=normal, mishap=mishap)
 
 
 def _ask_collide(case: Case | MeshCase) -> Reply:
@@ -317,7 +322,7 @@ def _ask_collide(case: Case | MeshCase) -> Reply:
     except UnsupportedQuery as error:
         return Reply(unsupported=complaint(error))
     except Exception as error:  # noqa: BLE001 - any failure of the engine under test is a finding
-        return Reply(failed=complaint(error))
+        return Reply(failed=complaint(error), mishap=RAISED)
     return Reply(
         (hit, bool(row["hit"])), float(row["distance"]), float(row["lower"]), float(row["upper"]),
         HOW[row["how"]], bool(row["how"] == UNDECIDED), bool(row["certified"]), tuple(row["normal"].tolist()),
@@ -333,6 +338,8 @@ def _judge(result: FamilyResult, name: str, case: Case | MeshCase, exact: Truth,
     result.hits += exact.hit
     if name != "collide" and exact.inside and not (reply.failed or reply.unsupported or any(reply.hits)):
         reply = Reply(unsupported=SURFACES)
+    if reply.mishap:
+        result.mishaps[reply.mishap] = result.mishaps.get(reply.mishap, 0) + 1
     if reply.failed or reply.unsupported:
         result.failed += bool(reply.failed)
         result.unsupported += not reply.failed
@@ -422,6 +429,7 @@ def _printed(f: FamilyResult) -> list[str]:
     return [
         f.family, str(f.cases), str(f.hits), _wrong(f),
         _with_gap(f.undecided, f.undecided_gap), _with_gap(f.missed, f.missed_by), str(f.failed), str(f.unsupported),
+        counted(f.mishaps),
         _part(f.distance_error), _part(f.depth_error), _part(f.normal_excess), _shares(f),
     ]
 

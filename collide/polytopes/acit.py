@@ -21,10 +21,11 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import UnsupportedQuery
-from collide.polytopes.homogeneous_rows import HomogeneousRows, as_integers
-from collide.polytopes.input_rows import InputRows
-from collide.polytopes.nearest_pair import APART, EMPTY, NearestPair, finish_exactly, nearest_pair
-from collide.polytopes.pair_proposals import Work, propose_from_samples
+from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
+from collide.least_distance.input_rows import InputRows
+from collide.least_distance.interior_point import interior_point
+from collide.least_distance.nearest_pair import APART, NearestPair, finish_exactly, nearest_pair
+from collide.least_distance.pair_proposals import Work, propose_from_samples
 from collide.polytopes.recentred_polars import (
     Centre,
     Space,
@@ -249,48 +250,6 @@ def _of_verdict(verdict: Verdict, points: HomogeneousRows, polar: Space, centre:
         return common_point_of_polar(verdict.pair(POLAR), points, polar)
     touching = verdict.pair(PRIMAL)
     return common_point(points, touching.points, [Fraction(weight) for weight in touching.weights])
-
-
-def interior_point(halfspaces: HomogeneousRows, work: Work, exactly: bool) -> np.ndarray | None:
-    """A point inside every half-space, clear of all: proposed in doubles, or exactly; None where there is none.
-
-    (x, s) with a·x − b·s ≤ −1 and s ≥ 0 exists where FH has interior, which then x/s is in; the shortest such vector
-    has the widest margin. It is a program in d + 1 variables over all half-spaces, as in theorem 4.5.
-    """
-    work.add("whole_programs")
-    d = halfspaces.dimension
-    last = np.broadcast_to(halfspaces.last, len(halfspaces))
-    values = np.vstack((np.column_stack((halfspaces.values, -last)), [[0.0] * d + [-1.0]]))
-    right = np.full(len(values), -1.0)
-    right[-1] = 0.0
-    lifted = HomogeneousRows(values, right, lambda row: as_integers([*values[row].tolist(), float(right[row])])[0])
-    shortest, margin = _shortest(_origin_point(d + 1), lifted, work, exactly)
-    halfspaces.n_read += lifted.n_read
-    lifted.n_read = 0  # counted now
-    if shortest is None:
-        return None
-    # Half of the margin is spent on a nearer point: where FH holds a cone, s may be 0.
-    depth, reach = -float(last.min()), float(np.abs(last).max())
-    s = shortest[-1] + 0.5 * margin / (depth if depth > 0.0 else reach if reach > 0.0 else 1.0)
-    with np.errstate(all="ignore"):
-        interior = shortest[:-1] / s
-    return interior if np.isfinite(interior).all() else None
-
-
-def _shortest(origin, lifted, work: Work, exactly: bool) -> tuple[np.ndarray | None, float]:
-    """The point of lifted half-spaces nearest the origin and what 1 is in its units; None where they have none."""
-    if not exactly:
-        proposal = propose_from_samples(origin, lifted, work, None, None, [0], [])
-        return (None, 0.0) if proposal is None else (proposal.y - proposal.u, 1.0)
-    pair = nearest_pair(origin, lifted, work)
-    if pair.kind == EMPTY:
-        return None, 0.0
-    scale = 1 << max(max(abs(number) for number in pair.x).bit_length() - 60, 0)
-    return np.array([number / scale for number in pair.x]), pair.denominator / scale
-
-
-def _origin_point(d: int) -> HomogeneousRows:
-    return HomogeneousRows(np.zeros((1, d)), 1.0, lambda row: [0] * d + [1])
 
 
 def _origin(d: int) -> HomogeneousRows:

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import UnsupportedQuery
+from collide.least_distance.homogeneous_rows import as_integers
 from collide.polytopes.boundary_hull import Boundary, boundary_hull, first_simplex
-from collide.polytopes.homogeneous_rows import as_integers
 from collide.polytopes.shell_cones import Cones, cones_at
 
 _UNIT = 2.0**-53

@@ -12,15 +12,15 @@ from numpy.typing import ArrayLike
 
 from collide.argument_checks import integer
 from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.polytopes.acit import interior_point
+from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
+from collide.least_distance.input_rows import InputRows, read_halfspaces, read_points
+from collide.least_distance.interior_point import interior_point
+from collide.least_distance.nearest_pair import nearest_pair
+from collide.least_distance.pair_proposals import Work
 from collide.polytopes.boundary_hull import BITS
 from collide.polytopes.exact_answers import make_meeting
 from collide.polytopes.facet_tree import FacetTree, Sizes
-from collide.polytopes.homogeneous_rows import HomogeneousRows, as_integers
-from collide.polytopes.input_rows import InputRows, read_halfspaces, read_points
 from collide.polytopes.meeting import MeetingCertificate
-from collide.polytopes.nearest_pair import nearest_pair
-from collide.polytopes.pair_proposals import Work
 from collide.polytopes.recentred_polars import recentred_spaces
 from collide.polytopes.relative_pose import Rows, affine_map, as_doubles, homogeneous_integers, inverse, product
 from collide.polytopes.tree_walk import HIT, MISS, OPEN, Grid, Plane, Relative, TreeWalk

@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.least_distance.homogeneous_rows import HomogeneousRows
+from collide.least_distance.pair_proposals import Work, propose_pair
 from collide.polytopes.facet_tree import FacetTree, Node, apex_height
-from collide.polytopes.homogeneous_rows import HomogeneousRows
-from collide.polytopes.pair_proposals import Work, propose_pair
 
 HIT, MISS, OPEN = "hit", "miss", "open"
 #: Coefficients above this are no less than 0 but for rounding, relative to the largest.
@@ -196,16 +196,17 @@ class TreeWalk:
         )  # fmt: skip
         if proposal is None:
             return None
-        total = float(proposal.multipliers.sum())
+        weights, multipliers = _coefficients(y[proposal.points], w[proposal.halfspaces], proposal.y, proposal.u)
+        total = float(multipliers.sum())
         if total > 0.0:
-            plane = proposal.multipliers / total
+            plane = multipliers / total
             z = plane @ w[proposal.halfspaces]
             if float((y @ z).min()) > 1.0 + 2.0 * eta:
                 rows = q.net[proposal.halfspaces].tolist()
                 self.planes.append(Plane(tuple(rows), tuple(plane.tolist())))
                 self._remember(p.net[proposal.points].tolist(), rows)
                 return True, z
-        x = proposal.weights @ y[proposal.points] / float(proposal.weights.sum())
+        x = weights @ y[proposal.points]
         if float((w @ x).max()) < 1.0 - 2.0 * eta:
             self._remember(p.net[proposal.points].tolist(), q.net[proposal.halfspaces].tolist())
             return False, x
@@ -226,6 +227,16 @@ class TreeWalk:
         if apex_height(node, cones.facets[cone], g, coefficients, tree.reach) > height:
             return OPEN
         return tree.child(node, vertex, cone)
+
+
+def _coefficients(points, halfspaces, y: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(weights of sum 1, multipliers), all ≥ 0, that make y of points and u of half-spaces as nearly as doubles can."""
+    system = np.vstack((points.T, np.ones(len(points))))
+    weights = np.maximum(np.linalg.lstsq(system, np.append(y, 1.0), rcond=None)[0], 0.0)
+    if len(halfspaces) == 0:
+        return weights / weights.sum(), np.zeros(0)
+    multipliers = np.maximum(np.linalg.lstsq(halfspaces.T, u, rcond=None)[0], 0.0)
+    return weights / weights.sum(), multipliers
 
 
 def find_cone(tree: FacetTree, node: Node, g: np.ndarray) -> tuple[int, int, np.ndarray] | None:

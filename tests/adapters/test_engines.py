@@ -30,7 +30,7 @@ from collide import (
     pose,
 )
 from collide.adapters.peers.hull_facets import triangulate
-from collide.adapters.peers.protocol import ENGINES, Question, engine
+from collide.adapters.peers.protocol import ENGINES, Question, engine, load_engine
 from collide.adapters.peers.question import bounds, convex_parts, corners
 
 CUBE = (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5).astype(float)
@@ -56,13 +56,25 @@ CASES = {
 }
 SWEPT, PLANES = {"swept hull"}, {"half-space box", "half-space sphere"}
 CURVED = {"cylinder box", "cone sphere", "ellipsoid sphere"}
+APART = {case for case, (*_, distance, _normal) in CASES.items() if distance > 0}
+#: By name, or by the name before the colon, as the next ones: cases that the engine has no shape for.
 UNSUPPORTED = {
     "collide": set(), "coal": set(), "fcl": SWEPT, "pybullet": SWEPT | {"cone sphere", "ellipsoid sphere"},
     "exact": CURVED | PLANES,
 }
-WITHOUT_DISTANCE = {"fcl": PLANES}
+#: Cases answered by a boolean alone.
+WITHOUT_DISTANCE = {"fcl": PLANES, "fcl:indep": APART}
 #: [m] at sizes of about 1 m. Bullet snaps hull corners to a grid; FCL and coal stop at 1e-6 on what is round.
-TOLERANCE = {"collide": 1e-9, "coal": 1e-6, "fcl": 2e-5, "pybullet": 1e-3, "exact": 1e-14}
+TOLERANCE = {
+    "collide": 1e-9, "coal": 1e-6, "fcl": 2e-5, "pybullet": 1e-3, "pybullet:margins": 3e-3, "exact": 1e-14,
+}
+#: Depths of random pairs are off by more: FCL's own EPA by a quarter of the pairs, and by half a metre.
+WRONG_DEPTHS = {"fcl:indep"}
+
+
+def known(by_name: dict, name: str, default=None):
+    """What is written down of an engine with its setting, else of the engine."""
+    return by_name.get(name, by_name.get(name.partition(":")[0], default))
 
 
 def available(name: str, **options):
@@ -79,19 +91,19 @@ def test_closed_forms(name):
     assert not table.rows["failed"].any(), table.reasons
     for k, (case, (*_, distance, normal)) in enumerate(CASES.items()):
         row = table.rows[k]
-        assert row["unsupported"] == (case in UNSUPPORTED[name]), (case, table.reasons[k])
+        assert row["unsupported"] == (case in known(UNSUPPORTED, name)), (case, table.reasons[k])
         assert row["answered"] != row["unsupported"]
         if row["unsupported"]:
             assert table.reasons[k]
             continue
         assert row["hit"] == (distance <= 0), case
-        assert row["has_distance"] == (case not in WITHOUT_DISTANCE.get(name, ())), (case, table.reasons[k])
+        assert row["has_distance"] == (case not in known(WITHOUT_DISTANCE, name, ())), (case, table.reasons[k])
         if row["has_distance"]:
-            assert row["distance"] == pytest.approx(distance, abs=TOLERANCE[name]), case
+            assert row["distance"] == pytest.approx(distance, abs=known(TOLERANCE, name)), case
         if row["has_distance"] and not np.isnan(row["normal"]).any():
             assert row["normal"] == pytest.approx(normal, abs=3e-3), case
-            step = row["point_b"] - row["point_a"]
-            assert step == pytest.approx(row["distance"] * row["normal"], abs=TOLERANCE[name]), case
+            step, off = row["point_b"] - row["point_a"], known(TOLERANCE, name)
+            assert np.isnan(step).all() or step == pytest.approx(row["distance"] * row["normal"], abs=off), case
 
 
 @pytest.mark.parametrize("name", ENGINES)
@@ -99,7 +111,7 @@ def test_swapping_the_bodies_negates_the_normal(name):
     cases = [CASES[c] for c in ("boxes apart", "boxes overlapping", "sphere capsule", "hull box")]
     there = available(name).answer(Question.from_pairs(c[:4] for c in cases)).rows
     back = available(name).answer(Question.from_pairs((B, A, X_WB, X_WA) for A, B, X_WA, X_WB, *_ in cases)).rows
-    assert back["distance"] == pytest.approx(there["distance"], abs=TOLERANCE[name])
+    assert back["distance"] == pytest.approx(there["distance"], abs=known(TOLERANCE, name), nan_ok=True)
     assert back["normal"] == pytest.approx(-there["normal"], abs=3e-3, nan_ok=True)
 
 
@@ -131,13 +143,17 @@ def test_random_pairs_agree_with_exact_arithmetic(name):
     assert 0.3 <= truth["hit"].mean() <= 0.7
     answers = available(name).answer(question)
     rows = answers.rows
-    assert rows["answered"].all() and rows["has_distance"].all(), answers.reasons
+    asked_gaps = not known(WITHOUT_DISTANCE, name, set()) >= APART
+    assert rows["answered"].all() and (rows["has_distance"] == (truth["hit"] | asked_gaps)).all(), answers.reasons
+    assert not any(answers.mishaps)
     # Booleans may differ only where the truth is nearer to touching than the engine's own error.
-    clear = np.abs(truth["distance"]) > TOLERANCE[name]
+    clear = np.abs(truth["distance"]) > known(TOLERANCE, name)
     assert clear.mean() > 0.95
     assert (rows["hit"] == truth["hit"])[clear].all()
-    assert rows["distance"] == pytest.approx(truth["distance"], abs=TOLERANCE[name])
-    assert np.linalg.norm(rows["normal"], axis=1) == pytest.approx(1, abs=1e-12)
+    told = rows["has_distance"]
+    off = np.abs(rows["distance"] - truth["distance"])[told] > known(TOLERANCE, name)
+    assert off.any() == (name in WRONG_DEPTHS)
+    assert np.linalg.norm(rows["normal"][told], axis=1) == pytest.approx(1, abs=1e-12)
 
 
 def test_round_shapes_agree_with_coal():
@@ -201,7 +217,7 @@ def test_supports_says_why_not():
 
 
 def test_unknown_engines_are_named_together_with_the_known_ones():
-    with pytest.raises(InvalidArgument, match="no engine 'ode'; there are coal, collide, exact, fcl, pybullet"):
+    with pytest.raises(InvalidArgument, match=r"no engine 'ode'; there are .*coal \(:nesterov, .*collide, "):
         engine("ode")
 
 
@@ -237,6 +253,24 @@ def surface(part, directions):
         return np.column_stack([radial, np.sign(directions[:, 2]) * part.length / 2])
     points, radius = corners(part)
     return points[np.argmax(directions @ points.T, axis=1)] + directions * radius
+
+
+def test_settings_are_listed_under_their_engines():
+    peers = {name: load_engine(spec) for name, spec in ENGINES.items()}
+    for name, peer in peers.items():
+        base, _, setting = name.partition(":")
+        assert peer.name == name and (not setting or setting in peers[base].settings)
+        listed = [other.partition(":")[2] for other in ENGINES if other.startswith(base + ":")]
+        assert sorted(listed) == sorted(peers[base].settings)
+        for told in (*peer.receives, *peer.cannot, peer.about):
+            assert told and told == told.strip(" .") and len(told) < 120, (name, told)
+        assert peer.receives, f"{name} says nothing about what it is given"
+        assert set(engine(name, isolated=True).receives) == set(peer.receives)
+
+
+def test_a_setting_that_is_not_there_is_named():
+    with pytest.raises(InvalidArgument, match="coal has no setting 'sharp'; there are tight, nesterov"):
+        load_engine("collide.adapters.peers.coal_peer:CoalPeer:sharp")
 
 
 def test_importing_the_protocol_imports_no_engine():

@@ -13,8 +13,9 @@ from mesh_shapes import block_ring, box, bumpy_sphere
 
 from collide import Box, Capsule, Cylinder, Halfspace, Mesh, Sphere, pose
 from collide.adapters.peers import exact, exact_meshes
+from collide.adapters.peers.answers import NO_DEPTH
 from collide.adapters.peers.compare import compare
-from collide.adapters.peers.protocol import NO_DEPTH, Question, engine
+from collide.adapters.peers.protocol import Question, engine
 from collide.adapters.peers.question import Body as Posed
 from collide.adapters.peers.question import bounds, is_compound_or_mesh
 from collide.reports import comparing
@@ -174,7 +175,7 @@ def test_insides_are_a_class_of_their_own():
 
 LIARS = '''
 from collide.adapters.peers.collide_peer import CollidePeer
-from collide.adapters.peers.protocol import Event
+from collide.adapters.peers.answers import Event
 
 
 class Hollow(CollidePeer):

@@ -16,11 +16,12 @@ from reproduction import reproducing
 
 import collide
 from collide import polytopes
+from collide.least_distance.homogeneous_rows import HomogeneousRows
+from collide.least_distance.input_rows import input_rows
+from collide.least_distance.interior_point import interior_point
+from collide.least_distance.nearest_pair import APART, nearest_pair
+from collide.least_distance.pair_proposals import Work
 from collide.polytopes import acit
-from collide.polytopes.homogeneous_rows import HomogeneousRows
-from collide.polytopes.input_rows import input_rows
-from collide.polytopes.nearest_pair import APART, nearest_pair
-from collide.polytopes.pair_proposals import Work
 from collide.polytopes.recentred_polars import recentred_spaces
 
 #: So small that some dozens of rows are pruned several times.
@@ -28,8 +29,8 @@ SMALL = acit.Sizes(0.3, 12, 16)
 AGAIN = """
 import numpy as np
 from collide.polytopes import acit
-from collide.polytopes.input_rows import input_rows
-from collide.polytopes.pair_proposals import Work
+from collide.least_distance.input_rows import input_rows
+from collide.least_distance.pair_proposals import Work
 rows = input_rows(np.array({points}), np.array({normals}), np.array({offsets}))
 print(acit.acit(rows, Work(), acit.Sizes(0.3, 12, 16)))
 """
@@ -40,7 +41,7 @@ class Asked:
 
     def __init__(self, question: families.Question):
         rows, self.work, self.spaces = input_rows(*question), Work(), None
-        interior = acit.interior_point(rows.halfspaces, self.work, exactly=True)
+        interior = interior_point(rows.halfspaces, self.work, exactly=True)
         if interior is None:
             return
         spaces = recentred_spaces(rows.points, rows.halfspaces, interior)
@@ -89,6 +90,19 @@ def test_answers_are_proven_and_need_no_further_search(d):
             assert (pair.kind == "meeting") == polytopes.meets(*question).hit
         n_pruned += work.counters.get("net_rounds", 0) > 0
     assert n_pruned >= 8
+
+
+def test_eight_dimensions_need_a_ninth():
+    """A point inside all half-spaces is a program in one dimension more than questions have."""
+    rng, kinds = np.random.default_rng(37), []
+    for k in range(6):
+        normals, points = rng.normal(size=(40, 8)), rng.normal(size=(30, 8)) + (2.5 if k % 2 else 0.3)
+        question = families.Question(points, normals, np.full(40, 1.5))
+        answer = polytopes.meets(*question, algorithm="acit")
+        polytopes.verify(*question, answer)
+        assert answer.distance == polytopes.meets(*question).distance
+        kinds.append(answer.hit)
+    assert any(kinds) and not all(kinds)
 
 
 def test_touching_is_a_third_answer():

@@ -1,0 +1,1 @@
+"""The nearest points of a hull of points and an intersection of half-spaces: doubles propose, integers decide."""
