@@ -83,12 +83,13 @@ class HierarchicalTree:
         self.offsets: np.ndarray | None = None
         self.interior: np.ndarray | None = None
         if points is not None and normals is None and offsets is None:
-            self.points = cloud = read_points(points)
+            cloud, _ = read_points(points)
+            self.points = cloud
         elif points is not None or normals is None or offsets is None:
             raise InvalidArgument("HierarchicalTree: give either points, or normals with offsets")
         else:
             shape = np.asarray(normals).shape
-            self.normals, self.offsets = read_halfspaces(normals, offsets, shape[1] if len(shape) == 2 else 0)
+            self.normals, self.offsets, _ = read_halfspaces(normals, offsets, shape[1] if len(shape) == 2 else 0)
             self.interior, cloud = _polars(self.normals, self.offsets)
         if not 2 <= cloud.shape[1] <= 8:
             raise InvalidArgument(f"HierarchicalTree: 2 ≤ d ≤ 8, got d = {cloud.shape[1]}")
@@ -187,8 +188,7 @@ def trees_meet(
     rows = posed_rows(A, B, X_BA)
     start = walk.points[-2 * (d + 1) :], walk.halfspaces[-2 * (d + 1) :]
     pair = nearest_pair(rows.points, rows.halfspaces, Work(), start=start)
-    assert B.normals is not None
-    meeting = make_meeting(pair, rows, B.normals, {})
+    meeting = make_meeting(pair, rows, {})
     if walk.status != OPEN and meeting.hit != (walk.status == HIT):
         raise AssertionError(f"trees_meet: the trees say {walk.status}, the exact search hit={meeting.hit}")
     counters["rows_read"] = rows.points.n_read + rows.halfspaces.n_read
@@ -265,4 +265,6 @@ def posed_rows(A: HierarchicalTree, B: HierarchicalTree, X_BA: Rows) -> InputRow
         return as_integers([*normals[row].tolist(), float(offsets[row])])[0]
 
     error = (2 * d + 6) * _UNIT * max(size / magnitude, 1.0)
-    return InputRows(HomogeneousRows(values, 1.0, point, error), HomogeneousRows(normals, offsets, halfspace), 0)
+    return InputRows(
+        HomogeneousRows(values, 1.0, point, error), HomogeneousRows(normals, offsets, halfspace), 0, normals
+    )
