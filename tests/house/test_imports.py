@@ -176,7 +176,7 @@ ROOMS = {
         "pair_arguments",
     },
     "polytopes": {
-        "errors", "argument_checks", "certificates", "hull", "kernels", "least_distance", "numerics", "shapes",
+        "errors", "argument_checks", "certificates", "hull", "kernels", "least_distance", "numerics", "shapes", "threads",
         "transforms",
     },
     "world_bodies": {"errors", "argument_checks", "transforms", "numerics", "shapes", "broadphase"},
