@@ -1,6 +1,6 @@
 """Hierarchical trees in R^d: boundary simplices, nodes, bytes, rounds and shell cones read, beside `polytopes.meets`.
 
-    python benchmarks/hierarchical_trees.py                       # balls of 100 to 3,000 points, d = 2 to 5
+    python benchmarks/hierarchical_trees.py                       # balls of 100 points up to LARGEST, d = 2 to 5
     python benchmarks/hierarchical_trees.py --poses 1000 --sizes 1000 100000 --dimensions 3
 
 Points on a unit sphere against as many half-spaces tangent to one, at random rotations, 0 to 2.2 apart. Each answer
