@@ -16,11 +16,13 @@ from collide.shapes import Cone, Cylinder, Ellipsoid, Halfspace, Shape
 
 #: What rounding may do to a gap, as a part of the largest coordinate.
 SLACK = 1e-13
+#: Times that a direction is bettered: along a ridge the steps get small, and go on for ever.
+MAX_TURNS = 150
 _SPHERE = np.random.default_rng(7).standard_normal((3000, 3))
 _DIRECTIONS = np.concatenate([
     _SPHERE / np.linalg.norm(_SPHERE, axis=1)[:, None], np.eye(3), -np.eye(3),
 ])  # fmt: skip
-_STEPS = np.random.default_rng(8).standard_normal((40, 3))
+_STEPS = np.random.default_rng(8).standard_normal((60, 3))
 
 
 def support(shape: Shape, X_WB: np.ndarray, n: np.ndarray) -> np.ndarray | None:
@@ -57,15 +59,17 @@ def lower_bound(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple
     best, direction = -np.inf, _DIRECTIONS[0]
     for start in _DIRECTIONS[np.argsort(-first)[:3]]:
         value, n, reach = float(gaps(start[None])[0]), start, 0.05  # type: ignore[index]
-        while reach > 1e-10:
+        for _ in range(MAX_TURNS):
+            if reach < 1e-10:
+                break
             tries = n + reach * _STEPS
             tries /= np.linalg.norm(tries, axis=1)[:, None]
             values = gaps(tries)
             k = int(np.argmax(values))  # type: ignore[arg-type]
             if values[k] > value:  # type: ignore[index]
-                value, n = float(values[k]), tries[k]  # type: ignore[index]
+                value, n, reach = float(values[k]), tries[k], min(2.0 * reach, 0.3)  # type: ignore[index]
             else:
-                reach *= 0.4
+                reach *= 0.5
         if value > best:
             best, direction = value, n
     return best, direction

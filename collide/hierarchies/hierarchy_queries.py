@@ -36,7 +36,7 @@ class Walks:
 
     hit : (n,) bool.
     walked : (n,) bool, whether the walk proved the answer; elsewhere the default narrowphase gave it.
-    exact_rounds : (n,) int64, simplices looked at in integers at the walk's end; 0 where doubles left room for rounding.
+    exact_rounds : (n,) int64, simplices looked at in integers at the end; 0 where doubles sufficed.
     rows : (n,) `WALK_DTYPE`: rounds, constant-size tests, small linear programs and their pivots, levels reached, and
         the plane or the point that proves the answer. Zeros where neither body has a polar.
     exchanged : A plays R, and B plays P, since B has no interior.
