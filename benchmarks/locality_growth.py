@@ -120,8 +120,8 @@ def walks() -> list[dict]:
     scans = [name for name in ("teapot", "bunny") if DATA.is_dir()]
     bodies = [(f"harpsicordia {n}", *harpsicordia(n, 10.0)) for n in (1000, 4000, 16_000, 64_000)]
     bodies += [(name, Mesh(*mesh(name), solid=False), Mesh(*mesh(name), solid=False), 0) for name in scans]
-    turn = rotation(np.random.default_rng(5))
-    small = 0.02 * (turn - turn.T)
+    R_turned = rotation(np.random.default_rng(5))
+    small = 0.02 * (R_turned - R_turned.T)
     for name, A, B, meetings in bodies:
         trees = {
             kind: [make(body) for body in (A, B)] for kind, make in (
