@@ -47,16 +47,16 @@ def add_arguments(parser: argparse.ArgumentParser, engines: Callable) -> None:
     pareto.add_argument("--cases", type=count, metavar="N", help="pairs of a class (60; with --quick 12)")
     scaling = actions.add_parser("scaling", help="run time and operations against size, with slopes")
     scaling.add_argument("--sizes", type=_sizes, metavar="N,N", help="vertices of each hull (8 to 32,768)")
-    for chosen, least in ((pareto, 3.0), (scaling, 2.0)):
-        chosen.add_argument("--engines", type=engines, metavar="NAMES",
+    for action, least in ((pareto, 3.0), (scaling, 2.0)):
+        action.add_argument("--engines", type=engines, metavar="NAMES",
                             help="engines and settings, commas between (all installed)")
-        chosen.add_argument("--minutes", type=minutes, metavar="M",
+        action.add_argument("--minutes", type=minutes, metavar="M",
                             help=f"about how long to time ({least:g}; with --quick 0.2)")
-        chosen.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds make other pairs (0)")
-        chosen.add_argument("--out", metavar="DIR", default="bench-results", help="the folder (%(default)s)")
-        chosen.add_argument("--quick", action="store_true", help="a look: fewer pairs, less time")
-        chosen.add_argument("--csv-only", action="store_true", help="no picture, which needs the extra plots")
-        chosen.add_argument("--quiet", action="store_true", help="no table, no progress; errors are still told")
+        action.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds make other pairs (0)")
+        action.add_argument("--out", metavar="DIR", default="bench-results", help="the folder (%(default)s)")
+        action.add_argument("--quick", action="store_true", help="a look: fewer pairs, less time")
+        action.add_argument("--csv-only", action="store_true", help="no picture, which needs the extra plots")
+        action.add_argument("--quiet", action="store_true", help="no table, no progress; errors are still told")
     actions.add_parser("list", help="what can be measured, explained")
     script = actions.add_parser("run", help="run a script of a clone's benchmarks/")
     script.add_argument("name", metavar="NAME", help="as collide bench list prints it")
@@ -75,12 +75,12 @@ def run(args: argparse.Namespace, progress: Callable) -> int:
 
 
 def _list() -> int:
-    from collide.adapters.bench.benchmark_scripts import OWN, scripts
+    from collide.adapters.bench.benchmark_scripts import PACKAGED, scripts
     from collide.reports import terminal
     from collide.reports.tables import Column, Table
 
     columns = [Column("name", "label"), Column("what it measures", "text")]
-    terminal.show_table(Table("BENCH  collide bench NAME", columns, [[name, about] for name, about in OWN.items()]))
+    terminal.show_table(Table("BENCH  collide bench NAME", columns, [[name, about] for name, about in PACKAGED.items()]))
     listed = scripts()
     terminal.write_text("\n")
     if not listed:
@@ -103,8 +103,8 @@ def _pareto(args: argparse.Namespace, progress: Callable) -> int:
     with progress("measuring") as rename:
         points = pareto.measure(
             args.engines or pareto.default_engines(), args.classes or list(CLASSES),
-            minutes=args.minutes or (0.2 if args.quick else 3.0), cases=args.cases or (12 if args.quick else 60),
-            seed=args.seed, progress=_told(rename),
+            minutes=args.minutes or (0.2 if args.quick else 3.0), n=args.cases or (12 if args.quick else 60),
+            seed=args.seed, progress=_renamer(rename),
         )  # fmt: skip
     rows = [point.row() for point in points]
     write_csv(places[0], rows, stamp)
@@ -131,7 +131,7 @@ def _scaling(args: argparse.Namespace, progress: Callable) -> int:
     with progress("measuring") as rename:
         grown = scaling.measure(
             args.engines or default_engines(), sizes, minutes=args.minutes or (0.2 if args.quick else 2.0),
-            seed=args.seed, progress=_told(rename),
+            seed=args.seed, progress=_renamer(rename),
         )  # fmt: skip
     write_csv(places[0], [row for growth in grown for row in growth.rows()], stamp)
     if places[1:]:
@@ -163,7 +163,7 @@ def _prepared(args: argparse.Namespace, name: str, check_picture: Callable) -> l
     return [folder / f"{name}.csv", *pictures]
 
 
-def _told(rename: Callable | None) -> Callable:
+def _renamer(rename: Callable | None) -> Callable:
     return (lambda label: None) if rename is None else rename
 
 

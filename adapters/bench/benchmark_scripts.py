@@ -16,7 +16,7 @@ from collide.errors import CollideError, InvalidArgument
 #: In a clone; a wheel's own folders have nothing there.
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 #: What `collide bench` measures itself, from a wheel too.
-OWN = {
+PACKAGED = {
     "pareto": "Run time against error: every engine and setting on the same pairs, by class, as one picture.",
     "scaling": "Run time and operations against the size of hulls, with fitted slopes.",
 }

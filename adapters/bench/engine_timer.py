@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import sys
+import tempfile
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +21,8 @@ from collide.adapters.peers.protocol import Peer, load_engine
 
 #: A pair is repeated for so long at least, and the mean of its repeats is its time [s].
 SPAN = 50e-6
+#: How long an engine may take to be imported [s].
+START_TIMEOUT = 60.0
 #: More repeats than this the clock does not need.
 MAX_REPEATS = 100
 #: Rows of a batch: the pairs over and over, where that takes no longer than so many seconds.
@@ -43,14 +48,14 @@ class EngineTimer:
         self.name, self.failure, self._n, self._timeout = name, "", len(pairs), timeout
         context = multiprocessing.get_context("spawn")
         self._pipe, child_end = context.Pipe()
-        self._process = context.Process(target=_child, args=(child_end, name, spec), daemon=True)
-        self._process.start()
-        child_end.close()
-        try:
-            self._pipe.send(pairs)
-        except OSError:
-            pass  # dead already, which the next answer tells
-        self.refused = self._receive(60.0 + timeout) or []
+        # Through a file: a pipe that is full would hold this process up for as long as a child does not read.
+        with tempfile.TemporaryDirectory() as folder:
+            place = Path(folder) / "pairs"
+            place.write_bytes(pickle.dumps(pairs))
+            self._process = context.Process(target=_child, args=(child_end, name, spec, str(place)), daemon=True)
+            self._process.start()
+            child_end.close()
+            self._receive(START_TIMEOUT + timeout)
 
     def seconds(self) -> np.ndarray:
         """(n,) seconds of a call for each pair; NaN where it refuses, and for all once the child is dead or hangs."""
@@ -79,7 +84,7 @@ class EngineTimer:
         self._pipe.close()
 
 
-def _child(pipe: Any, name: str, spec: str) -> None:
+def _child(pipe: Any, name: str, spec: str, place: str) -> None:
     """Make the pairs ready, then a turn through all of them for every word that comes down the pipe."""
     sys.stdout.flush()
     for stream in (1, 2):  # some engines print when they are imported
@@ -87,7 +92,7 @@ def _child(pipe: Any, name: str, spec: str) -> None:
     peer = load_engine(spec)
     peer.prepare()
     open_client(peer)
-    pairs = pipe.recv()
+    pairs = pickle.loads(Path(place).read_bytes())
     calls: list[Any] = []
     for pair in pairs:
         try:
@@ -101,7 +106,7 @@ def _child(pipe: Any, name: str, spec: str) -> None:
         if copies > 1 and mean_seconds(calls[0], 1) * copies < MAX_BATCH_SECONDS:
             calls, rows = [batch_call(pairs * copies)], rows * copies
     repeats = [_repeats(call) for call in calls]
-    pipe.send([k for k, call in enumerate(calls) if call is None])
+    pipe.send("ready")
     while True:
         try:
             pipe.recv()

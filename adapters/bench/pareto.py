@@ -102,59 +102,54 @@ def check_engines(names: list[str]) -> None:
 
 
 def measure(
-    engines: list[str], classes: list[str], *, minutes: float = 3.0, cases: int = 60, seed: int = 0,
+    engines: list[str], classes: list[str], *, minutes: float = 3.0, n: int = 60, seed: int = 0,
     progress: Callable[[str], object] | None = None,
 ) -> list[Point]:
     """All engines on all classes.
 
     engines : of `ENGINES`, or "collide:batch".   classes : of `CLASSES`.   minutes : about how long to time in all;
-    answering and judging come before it.   cases : pairs of a class.   seed : other seeds make other pairs.
+    answering and judging come before it.   n : pairs of a class.   seed : other seeds make other pairs.
     progress : told what comes next.
 
     Raises InvalidArgument for unknown names, MissingExtra for an engine that is not installed.
     """
     check_engines(engines)
     check_classes(classes)
+    report = progress or (lambda label: None)
+    report("making and judging pairs")
+    cases = {name: cases_of(name, n, seed) for name in classes}
+    truths = {name: [truth(case) for case in cases[name]] for name in classes}
+    every = [case for name in classes for case in cases[name]]
+    tables = {}
+    for asked in dict.fromkeys(map(engine_of, engines)):
+        report(f"{asked} answers")
+        tables[asked] = _answers(asked, every)
     points: list[Point] = []
-    for name in classes:
-        if progress is not None:
-            progress(name)
-        points += _class(name, engines, cases, seed, 60.0 * minutes / len(classes))
-    return points
-
-
-def _class(name: str, engines: list[str], n: int, seed: int, seconds: float) -> list[Point]:
-    cases = cases_of(name, n, seed)
-    truths = [truth(case) for case in cases]
-    tables: dict[str, Table] = {}
-    for engine_name in engines:
-        asked = "collide" if engine_name == BATCH else engine_name
-        if asked not in tables:
-            tables[asked] = _answers(asked, cases)
-    points = [judged(name, e, tables["collide" if e == BATCH else e], truths) for e in engines]
-    timers = []
-    for point in points:
-        table = tables["collide" if point.engine == BATCH else point.engine]
-        rows = np.flatnonzero(table.rows["answered"])
-        timers.append((point, rows, [cases[k].shapes() for k in rows]))
-    _time(timers, len(cases), seconds)
+    for k, name in enumerate(classes):
+        report(f"timing {name}")
+        rows = slice(k * n, (k + 1) * n)
+        made = [judged(name, e, tables[engine_of(e)], truths[name], rows) for e in engines]
+        pairs = [case.shapes() for case in cases[name]]
+        answered = [np.flatnonzero(tables[engine_of(e)].rows["answered"][rows]) for e in engines]
+        _time([(p, a, [pairs[i] for i in a]) for p, a in zip(made, answered)], n, 60.0 * minutes / len(classes))
+        points += made
     return points
 
 
 def _answers(name: str, cases: list[Case | MeshCase]) -> Table:
-    """All answers of one engine, in a child process whatever it is."""
+    """All answers of one engine; of all but ours in child processes."""
     peer = engine(name, isolated=None if name == "collide" else True, timeout=ANSWER_TIMEOUT)
     return peer.answer(Question.from_pairs([case.shapes() for case in cases]))
 
 
-def judged(kind: str, name: str, table: Table, truths: list[Truth]) -> Point:
-    """An engine's answers as a point that has no times yet."""
-    rows, nothing = table.rows, np.full(len(truths), math.nan)
+def judged(kind: str, name: str, table: Table, truths: list[Truth], of: slice) -> Point:
+    """An engine's answers as a point that has no times yet.   of : the class's rows of the table."""
+    rows, nothing = table.rows[of], np.full(len(truths), math.nan)
     point = Point(kind, name, table.version, len(truths), nothing.copy(), nothing.copy())
     point.answered, point.with_distance = int(rows["answered"].sum()), int(rows["has_distance"].sum())
     point.unsupported, point.undecided = int(rows["unsupported"].sum()), int(rows["undecided"].sum())
-    point.mishaps = dict(Counter(mishap for mishap in table.mishaps if mishap))
-    silent = Counter(r for r, row in zip(table.reasons, rows) if r and not row["answered"])
+    point.mishaps = dict(Counter(mishap for mishap in table.mishaps[of] if mishap))
+    silent = Counter(r for r, row in zip(table.reasons[of], rows) if r and not row["answered"])
     point.reason = silent.most_common(1)[0][0] if silent else ""
     for k, (row, exact) in enumerate(zip(rows, truths)):
         apart = exact.distance is None or abs(float(exact.distance)) > TOUCHING * exact.size
@@ -172,7 +167,7 @@ def judged(kind: str, name: str, table: Table, truths: list[Truth]) -> Point:
 def _time(timers: list[tuple[Point, np.ndarray, list]], n: int, seconds: float) -> None:
     """Fill in the times: rounds in which every engine takes its turn, the first one another each time."""
     running = [
-        (point, rows, EngineTimer(point.engine, ENGINES[spec_name(point.engine)], pairs, TURN_TIMEOUT))
+        (point, rows, EngineTimer(point.engine, ENGINES[engine_of(point.engine)], pairs, TURN_TIMEOUT))
         for point, rows, pairs in timers if pairs
     ]  # fmt: skip
     taken: dict[str, list[np.ndarray]] = {point.engine: [] for point, _, _ in running}
@@ -197,7 +192,7 @@ def _time(timers: list[tuple[Point, np.ndarray, list]], n: int, seconds: float) 
             point.ratio = median_ratio(taken[point.engine], taken[REFERENCE])
 
 
-def spec_name(name: str) -> str:
+def engine_of(name: str) -> str:
     """The engine in `ENGINES` that a timed name is."""
     return "collide" if name == BATCH else name
 

@@ -144,8 +144,8 @@ def _labels(panel: Any, marks: list[dict], styles: dict[str, tuple[str, str]]) -
 
     panel.figure.canvas.draw()  # so that pixels are known
     forward = panel.transData.transform
-    left, bottom = panel.transAxes.transform((0, 0))
-    right, top = panel.transAxes.transform((1, 1))
+    low_x, bottom = panel.transAxes.transform((0, 0))
+    high_x, top = panel.transAxes.transform((1, 1))
     pixel = panel.figure.dpi / 72.0
     height = 9.5 * pixel
     taken: list[tuple[float, float, float, float]] = []
@@ -158,7 +158,7 @@ def _labels(panel: Any, marks: list[dict], styles: dict[str, tuple[str, str]]) -
         spots = [(dx, dy * height) for dy in _steps(24) for dx in (8 * pixel, -8 * pixel - width)]
         free = [
             (dx, dy) for dx, dy in spots
-            if left < x + dx and x + dx + width < right and bottom + height < y + dy < top - height
+            if low_x < x + dx and x + dx + width < high_x and bottom + height < y + dy < top - height
             and not any(_overlap((x + dx, y + dy - height / 2, x + dx + width, y + dy + height / 2), t) for t in taken)
         ]  # fmt: skip
         dx, dy = min(free or spots[:1], key=lambda spot: abs(spot[1]) + (6 * pixel if spot[0] < 0 else 0))

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.adapters.bench.engine_timer import EngineTimer
-from collide.adapters.bench.pareto import check_engines, number, over_rounds, quantile, spec_name
+from collide.adapters.bench.pareto import check_engines, engine_of, number, over_rounds, quantile
 from collide.adapters.peers.protocol import ENGINES
 from collide.hull.exact_hull import convex_hull
 from collide.scenes.families.ingredients import direction, rotation
@@ -106,7 +106,7 @@ def _times(engines: list[str], n: int, seed: int, seconds: float) -> dict[str, f
         X_WA[:3, :3], X_WB[:3, :3] = rotation(random), rotation(random)
         X_WB[:3, 3] = direction(random) * (2.0 + (0.5, 0.01, -0.4)[k % 3])
         pairs.append((A, B, X_WA, X_WB))
-    timers = [EngineTimer(name, ENGINES[spec_name(name)], pairs, TURN_TIMEOUT) for name in engines]
+    timers = [EngineTimer(name, ENGINES[engine_of(name)], pairs, TURN_TIMEOUT) for name in engines]
     taken: dict[str, list[np.ndarray]] = {name: [] for name in engines}
     started = time.perf_counter()
     try:

@@ -21,7 +21,7 @@ def draw(grown: list[Growth], places: list[Path], stamp: dict[str, str]) -> None
     figure = Figure(figsize=(12.0, 5.2), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     times, counts = figure.subplots(1, 2, width_ratios=(2, 1))
-    for panel, chosen, unit in (
+    for panel, curves, unit in (
         (times, [g for g in grown if g.name != OPERATIONS], "µs a signed distance"),
         (counts, [g for g in grown if g.name == OPERATIONS], "vertices looked at, a support query"),
     ):  # fmt: skip
@@ -30,7 +30,7 @@ def draw(grown: list[Growth], places: list[Path], stamp: dict[str, str]) -> None
         panel.grid(alpha=0.25, which="major", lw=0.6)
         panel.set_xlabel("vertices of each hull", fontsize=9)
         panel.set_ylabel(unit, fontsize=9)
-        _lines(panel, chosen)
+        _lines(panel, curves)
     figure.suptitle(
         "Hulls of n points on a sphere, apart, near and overlapping; slopes over the upper half of the sizes\n"
         f"{stamp['cpu']}, {stamp['cores']} cores, load {stamp['load']}", fontsize=10,

@@ -75,10 +75,10 @@ def _coal(peer: Peer, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) -> Cal
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     for name, value in peer.values.items():
         setattr(request, name, getattr(coal.GJKVariant, value) if name == "gjk_variant" else value)
-    ask, clear = coal.distance, result.clear
+    ask, reset = coal.distance, result.clear
 
     def call() -> None:
-        clear()  # a result that is not cleared keeps its answer
+        reset()  # a result that is not cleared keeps its answer
         ask(A, T_WA, B, T_WB, request, result)
 
     return call

@@ -46,7 +46,7 @@ def points():
     for name in STUBS:
         patch.setitem(protocol.ENGINES, name, f"stub_engines:{name.capitalize()}")
     try:
-        made = pareto.measure(["collide", pareto.BATCH, *STUBS], ["cubes"], minutes=0.001, cases=4)
+        made = pareto.measure(["collide", pareto.BATCH, *STUBS], ["cubes"], minutes=0.001, n=4)
     finally:
         patch.undo()
         sys.modules.pop("stub_engines", None)
@@ -161,7 +161,7 @@ def test_list_explains_every_script(capsys):
     assert not [script.name for script in listed if len(script.about) < 20], "give it a docstring"
     assert main(["bench", "list"]) == 0
     printed = capsys.readouterr().out
-    assert not [name for name in files | set(benchmark_scripts.OWN) if name not in printed]
+    assert not [name for name in files | set(benchmark_scripts.PACKAGED) if name not in printed]
 
 
 def test_run_gives_arguments_and_status_on(tmp_path):
