@@ -80,7 +80,8 @@ def _list() -> int:
     from collide.reports.tables import Column, Table
 
     columns = [Column("name", "label"), Column("what it measures", "text")]
-    terminal.show_table(Table("BENCH  collide bench NAME", columns, [[name, about] for name, about in PACKAGED.items()]))
+    rows = [[name, about] for name, about in PACKAGED.items()]
+    terminal.show_table(Table("BENCH  collide bench NAME", columns, rows))
     listed = scripts()
     terminal.write_text("\n")
     if not listed:
