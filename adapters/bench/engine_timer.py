@@ -103,8 +103,8 @@ def _child(pipe: Any, name: str, spec: str, place: str) -> None:
     if name == BATCH:
         calls = [batch_call(pairs)]
         copies = max(1, BATCH_ROWS // rows)
-        if copies > 1 and mean_seconds(calls[0], 1) * copies < MAX_BATCH_SECONDS:
-            calls, rows = [batch_call(pairs * copies)], rows * copies
+        if copies > 1 and mean_seconds(calls[0], _repeats(calls[0])) * copies < MAX_BATCH_SECONDS:
+            calls, rows = [batch_call(pairs, copies)], rows * copies
     repeats = [_repeats(call) for call in calls]
     pipe.send("ready")
     while True:

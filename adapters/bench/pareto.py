@@ -44,7 +44,8 @@ class Point:
     wrong, wrong_apart : refuted booleans, of all pairs and of those farther than `TOUCHING` from touching; what an
         engine itself calls undecided is not among them.   apart : how many such pairs there are.
     mishaps : answers of their own kind, by kind.   unsupported : pairs that it has no shapes for.
-    ratio : its time over collide's for the same pair, the median over pairs, of that the median over rounds.
+    ratio : its time over collide's for the same pair, the median over pairs, of that the median over rounds;
+        of a batch the ratio of the means.
     """
 
     kind: str
@@ -189,7 +190,8 @@ def _time(timers: list[tuple[Point, np.ndarray, list]], n: int, seconds: float) 
     for point, _, _ in running:
         point.rounds, point.us = len(taken[point.engine]), 1e6 * over_rounds(taken[point.engine])
         if REFERENCE in taken:
-            point.ratio = median_ratio(taken[point.engine], taken[REFERENCE])
+            ratio = mean_ratio if point.engine == BATCH else median_ratio
+            point.ratio = ratio(taken[point.engine], taken[REFERENCE])
 
 
 def engine_of(name: str) -> str:
@@ -206,6 +208,11 @@ def median_ratio(theirs: list[np.ndarray], ours: list[np.ndarray]) -> float:
     """The median over rounds of the median over pairs of their time over ours."""
     per_round = [quantile(a / b, 0.5) for a, b in zip(theirs, ours)]
     return quantile(np.array(per_round), 0.5)
+
+
+def mean_ratio(theirs: list[np.ndarray], ours: list[np.ndarray]) -> float:
+    """The median over rounds of the mean of their times over the mean of ours: a batch has no times of single pairs."""
+    return quantile(np.array([np.nanmean(a) / np.nanmean(b) for a, b in zip(theirs, ours)]), 0.5)
 
 
 def quantile(values: np.ndarray, share: float) -> float:

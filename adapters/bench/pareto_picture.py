@@ -140,8 +140,6 @@ def _axes(panel: Any, kind: str, points: list[Point]) -> None:
 
 def _labels(panel: Any, marks: list[dict], styles: dict[str, tuple[str, str]]) -> None:
     """Names beside their points, moved up or down until no two overlap; a thin line leads back where one has moved."""
-    from matplotlib.patheffects import withStroke
-
     panel.figure.canvas.draw()  # so that pixels are known
     forward = panel.transData.transform
     low_x, bottom = panel.transAxes.transform((0, 0))
@@ -167,7 +165,7 @@ def _labels(panel: Any, marks: list[dict], styles: dict[str, tuple[str, str]]) -
         panel.annotate(
             mark["text"], (mark["x"], mark["y"]), (dx / pixel, dy / pixel), textcoords="offset points", fontsize=7,
             va="center", ha="left", color=styles[mark["engine"]][0], arrowprops=arrow if abs(dy) > height else None,
-            zorder=5, path_effects=[withStroke(linewidth=2.2, foreground="white")],
+            zorder=5, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.85},
         )  # fmt: skip
 
 

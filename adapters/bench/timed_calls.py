@@ -51,10 +51,10 @@ def timed_call(peer: Peer, pair: Pair) -> Callable[[], Any]:
     return _CALLS.get(base, _ask)(peer, parts[0], pair[2], parts[1], pair[3])
 
 
-def batch_call(pairs: list[Pair]) -> Callable[[], Any]:
-    """One call of `collide.distance` for all pairs."""
-    A, B = (collide.ShapeSet([pair[k] for pair in pairs])[np.arange(len(pairs))] for k in (0, 1))
-    X_WAs, X_WBs = (np.array([pair[k] for pair in pairs]) for k in (2, 3))
+def batch_call(pairs: list[Pair], copies: int = 1) -> Callable[[], Any]:
+    """One call of `collide.distance` for all pairs, so many times over."""
+    A, B = (collide.ShapeSet([pair[k] for pair in pairs])[np.tile(np.arange(len(pairs)), copies)] for k in (0, 1))
+    X_WAs, X_WBs = (np.array([pair[k] for pair in pairs] * copies) for k in (2, 3))
     return partial(collide.distance, A, B, X_WAs, X_WBs)
 
 
