@@ -50,7 +50,8 @@ def _lines(panel, grown: list[Growth]) -> None:
         points = [(n, v) for n, v in zip(growth.sizes, growth.values) if math.isfinite(v)]
         if points:
             panel.plot(*zip(*points), "o-", ms=4, lw=1.3, color=_COLOURS[k % len(_COLOURS)])
-            ends.append((points[-1], f"{growth.name}  n^{growth.slope:.2f}", _COLOURS[k % len(_COLOURS)]))
+            name = "" if growth.name == OPERATIONS else f"{growth.name}  "  # the axis names it
+            ends.append((points[-1], f"{name}n^{growth.slope:.2f}", _COLOURS[k % len(_COLOURS)]))
     panel.figure.canvas.draw()
     height, last = 11.0 * panel.figure.dpi / 72.0, -math.inf
     for (x, y), text, colour in sorted(ends, key=lambda end: end[0][1]):
