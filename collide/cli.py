@@ -17,7 +17,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 
 from collide import cli_arguments as arguments
-from collide import cli_compare, cli_fuzz, cli_pages, cli_scenes, cli_srdf, cli_sweep, cli_view
+from collide import cli_bench, cli_compare, cli_fuzz, cli_pages, cli_scenes, cli_srdf, cli_sweep, cli_view
 from collide.cli_files import check_place, copy_scene, first_words, print_lines, write_json, write_text
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
 from collide.reports.number_format import count
@@ -311,6 +311,7 @@ def _write_reports(made: list, place: str | None) -> None:
 _COMMANDS: dict[str, Callable] = {
     "report": _report, "check": _check, "stress": _stress, "locality": _locality,
     "scenes": _scenes, "doctor": _doctor,
+    "bench": lambda args: cli_bench.run(args, _progress(getattr(args, "quiet", True))),
     "compare": lambda args: FREE if cli_compare.run(args, _progress(args.quiet)) else YES,
     "fuzz": lambda args: FREE if cli_fuzz.run(args, _progress(args.quiet)) else YES,
     "srdf": lambda args: FREE if cli_srdf.run(args, _progress(args.quiet)) else YES,

@@ -11,7 +11,7 @@ import math
 import re
 from typing import NoReturn
 
-from collide import __version__, cli_compare, cli_fuzz, cli_pages, cli_srdf, cli_sweep, cli_view
+from collide import __version__, cli_bench, cli_compare, cli_fuzz, cli_pages, cli_srdf, cli_sweep, cli_view
 from collide.errors import InvalidArgument
 from collide.reports.number_format import UNITS, parse_length
 
@@ -174,6 +174,8 @@ def parser() -> argparse.ArgumentParser:
     _add_stress(commands)
     fuzz = _add(commands, "fuzz", "search other engines for wrong answers, shrunk to small cases", cli_fuzz.EPILOG)
     cli_fuzz.add_arguments(fuzz, _engines)
+    bench = _add(commands, "bench", "run time against error, and against size", cli_bench.EPILOG)
+    cli_bench.add_arguments(bench, _engines)
     _add_locality(commands)
     _add_scenes(commands)
     cli_srdf.add_arguments(_add(commands, "srdf", "which links of a robot can collide at all?", cli_srdf.EPILOG))

@@ -286,14 +286,16 @@ ROOMS = {
     "cli_srdf": {"cli_files", "cli_numbers", "errors", "reports", "sweeps"},
     "cli_sweep": {"cli_files", "cli_numbers", "errors", "reports", "sweeps"},
     "cli_view": {"cli_pages", "cli_scenes", "pages"},
+    "cli_bench": {"cli_numbers", "errors", "reports"},
     "cli_compare": {"cli_files", "cli_pages", "cli_scenes", "errors", "reports", ""},
     "cli_fuzz": {"cli_files", "cli_numbers", "errors", "reports"},
     "cli_arguments": {
-        "cli_compare", "cli_fuzz", "cli_pages", "cli_srdf", "cli_sweep", "cli_view", "errors", "reports", "",
+        "cli_bench", "cli_compare", "cli_fuzz", "cli_pages", "cli_srdf", "cli_sweep", "cli_view", "errors", "reports",
+        "",
     },
     "cli": {
-        "cli_arguments", "cli_compare", "cli_files", "cli_fuzz", "cli_pages", "cli_scenes", "cli_srdf", "cli_sweep",
-        "cli_view", "errors", "reports", "",
+        "cli_arguments", "cli_bench", "cli_compare", "cli_files", "cli_fuzz", "cli_pages", "cli_scenes", "cli_srdf",
+        "cli_sweep", "cli_view", "errors", "reports", "",
     },
     "__main__": {"cli"},
 }
@@ -304,6 +306,7 @@ LATE = {
     "kernels": {"numba", "llvmlite"},
     "reports": {"rich", "matplotlib"},
     "cli": {"scenes", "adapters", "hierarchies"},
+    "cli_bench": {"adapters"},
     "cli_compare": {"scenes", "adapters"},
     "cli_files": {"scenes"},
     "cli_fuzz": {"adapters"},

@@ -1,0 +1,50 @@
+"""What timings depend on: processor, cores, system, versions, load. The machine's name is not kept."""
+
+from __future__ import annotations
+
+import csv
+import os
+import platform
+import re
+from importlib import metadata
+from pathlib import Path
+
+from collide.errors import CollideError
+
+
+def machine_stamp() -> dict[str, str]:
+    """cpu, cores, load (of the last minute, as the measurement began), system, python, numpy, collide."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return {
+        "cpu": _cpu(), "cores": str(cores), "load": _load(), "system": platform.system(),
+        "python": platform.python_version(), "numpy": metadata.version("numpy"), "collide": _collide(),
+    }  # fmt: skip
+
+
+def _cpu() -> str:
+    try:
+        models = re.findall(r"^model name\s*:\s*(.+)$", Path("/proc/cpuinfo").read_text(), flags=re.MULTILINE)
+    except OSError:
+        models = []
+    return models[0] if models else platform.processor() or platform.machine()
+
+
+def _load() -> str:
+    return f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
+
+
+def _collide() -> str:
+    try:
+        return metadata.version("collide-robotics")
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def write_csv(place: Path, rows: list[dict], stamp: dict[str, str]) -> None:
+    """Rows with the same keys, each followed by the stamp; a file that exists is overwritten."""
+    if not rows:
+        raise CollideError(f"{place.name}: there is nothing to write down: no engine was asked")
+    with place.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [*rows[0], *stamp], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({**row, **stamp} for row in rows)
