@@ -270,15 +270,16 @@ def _too_large(name: str, n: int, m: int) -> bool:
 
 def judge(args) -> Iterator[dict]:
     """Every answer of many small pairs against the rational simplex, and its certificate verified."""
-    for d in (1, 2, 3, 4, 5):
-        hits = 0
+    for d in args.dimensions or (1, 2, 3, 4, 5):
+        hits, in_integers = 0, 0
         for name, question in meeting_families.questions(7, d, args.judge, 30):
             answer = polytopes.meets(*question, algorithm=args.algorithms[0] if args.algorithms else "auto")
             polytopes.verify(*question, answer)
             if answer.hit != rational_simplex.have_common_point(*question):
                 raise SystemExit(f"WRONG: {name} {question!r}")
             hits += answer.hit
-        row = {"d": d, "pairs": args.judge, "hits": hits, "wrong": 0}
+            in_integers += answer.counters.get("exact_programs", 0) > 0
+        row = {"d": d, "pairs": args.judge, "hits": hits, "begun_anew_in_integers": in_integers, "wrong": 0}
         print(row, flush=True)
         yield row
 
@@ -289,7 +290,7 @@ def main() -> None:
     parser.add_argument("--table", action="store_true", help="algorithms and peers")
     parser.add_argument("--judge", type=int, default=0, metavar="N", help="pairs a dimension against the oracle")
     parser.add_argument("--algorithms", nargs="+", choices=["auto", *ALGORITHMS], help="for --fits and --judge")
-    parser.add_argument("--dimensions", nargs="+", type=int, help="for --fits: 3 by default")
+    parser.add_argument("--dimensions", nargs="+", type=int, help="for --fits, 3 by default, and for --judge, 1 to 5")
     parser.add_argument("--largest", type=int, default=SIZES[-1], help="the most rows of --fits")
     parser.add_argument("--runs", type=int, default=5, help="of --table, each of all questions")
     parser.add_argument("--questions", type=int, default=5, help="of --table a size")

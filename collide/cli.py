@@ -1,7 +1,7 @@
 """The command ``collide``: arguments in, reports out, exit statuses for scripts.
 
 Exit statuses: 0 done (``check``: free), 1 what was asked about is so (``check``: a collision,
-``compare``: an answer of ours proven wrong, ``doctor``: something is broken), 2 an error, told in
+``compare``, ``fuzz``: an answer of ours proven wrong, ``doctor``: something is broken), 2 an error, told in
 one line on stderr, 130 interrupted, 141 the reader of a pipe went away.
 
 This module imports the standard library alone, so that ``--help`` answers at once; each command
@@ -17,7 +17,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 
 from collide import cli_arguments as arguments
-from collide import cli_pages, cli_scenes, cli_srdf, cli_sweep, cli_view
+from collide import cli_compare, cli_fuzz, cli_pages, cli_scenes, cli_srdf, cli_sweep, cli_view
 from collide.cli_files import check_place, copy_scene, first_words, print_lines, write_json, write_text
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
 from collide.reports.number_format import count
@@ -214,31 +214,6 @@ def _progress(quiet: bool) -> Callable:
     return silent if quiet else Progress()
 
 
-def _compare(args) -> int:
-    progress = _progress(args.quiet)
-    scenes = cli_scenes.load_states(args, progress)
-    if len(scenes) > 1:
-        raise InvalidArgument("--state: compare takes one state")
-    from collide.adapters.peers.compare import compare
-
-    with progress("asking the engines"):
-        comparison = compare(
-            scenes[0][1], engines=args.engines, max_distance=args.clearance, tolerance=args.tolerance
-        )
-    if args.json:
-        write_json(comparison.to_dict().items(), args.json)
-    if args.html:
-        cli_pages.write_comparison(args, scenes[0][1], comparison, progress)
-    if _has_stdout(args):
-        from collide.reports import comparing, terminal
-
-        width, whole_names = terminal.output_width(sys.stdout)
-        lines = comparing.render(comparison, everything=args.all, width=width, whole_names=whole_names)
-        terminal.write(lines)
-    wrong = comparison.ours_wrong or (args.fail_on == "peer-wrong" and comparison.peers_wrong)
-    return YES if wrong else FREE
-
-
 def _stress(args) -> int:
     from collide.adapters.peers.stress import run
     from collide.reports import terminal
@@ -334,8 +309,10 @@ def _write_reports(made: list, place: str | None) -> None:
 
 
 _COMMANDS: dict[str, Callable] = {
-    "report": _report, "check": _check, "compare": _compare, "stress": _stress, "locality": _locality,
+    "report": _report, "check": _check, "stress": _stress, "locality": _locality,
     "scenes": _scenes, "doctor": _doctor,
+    "compare": lambda args: FREE if cli_compare.run(args, _progress(args.quiet)) else YES,
+    "fuzz": lambda args: FREE if cli_fuzz.run(args, _progress(args.quiet)) else YES,
     "srdf": lambda args: FREE if cli_srdf.run(args, _progress(args.quiet)) else YES,
     "sweep": lambda args: FREE if cli_sweep.run(args, _progress(args.quiet)) else YES,
     "view": lambda args: cli_view.run(args, _progress(args.quiet), _STARTED, _say),

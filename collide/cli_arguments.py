@@ -11,7 +11,7 @@ import math
 import re
 from typing import NoReturn
 
-from collide import __version__, cli_pages, cli_srdf, cli_sweep, cli_view
+from collide import __version__, cli_compare, cli_fuzz, cli_pages, cli_srdf, cli_sweep, cli_view
 from collide.errors import InvalidArgument
 from collide.reports.number_format import UNITS, parse_length
 
@@ -113,21 +113,6 @@ is no more is printed as `gone`. docs/ci.md has a workflow to copy.
 exit status: 0 free, 1 collision, 2 error. Pairs that touch within rounding are
 printed, and do not count as collisions unless --touching-is-collision is given."""
 
-_COMPARE = """examples:
-  collide compare workcell
-  collide compare scene.yaml --engines fcl,coal --clearance 10cm
-  collide compare panda_workbench --json comparison.json
-  collide compare scene.yaml --engines fcl --fail-on peer-wrong
-
-The same scene is asked of every engine. Where two booleans differ, exact
-arithmetic decides. A distance is wrong where it lies outside the exact one, or
-outside the bracket that collide proves, by more than the tolerance: those are
-listed with the amount, the worst first.
-Engines come with: pip install 'collide-robotics[peers]'
-
-exit status: 0 no answer of collide's is wrong, 1 one is, 2 error; with
---fail-on peer-wrong also 1 where another engine's boolean or distance is."""
-
 _STRESS = """examples:
   collide stress                                 every family, 40 cases each
   collide stress --family needles --family flat --cases 300 --seed 7
@@ -187,6 +172,8 @@ def parser() -> argparse.ArgumentParser:
     _add_view(commands)
     _add_compare(commands)
     _add_stress(commands)
+    fuzz = _add(commands, "fuzz", "search other engines for wrong answers, shrunk to small cases", cli_fuzz.EPILOG)
+    cli_fuzz.add_arguments(fuzz, _engines)
     _add_locality(commands)
     _add_scenes(commands)
     cli_srdf.add_arguments(_add(commands, "srdf", "which links of a robot can collide at all?", cli_srdf.EPILOG))
@@ -281,17 +268,9 @@ def _add_check(commands) -> None:
 
 
 def _add_compare(commands) -> None:
-    parser = _add(commands, "compare", "ask other engines about the same scene", _COMPARE)
-    _scene_arguments(parser)
-    parser.add_argument("--engines", type=_engines, default="fcl,coal,pybullet", metavar="NAMES",
-                        help="engines to ask, separated by commas (default: %(default)s)")
-    parser.add_argument("--clearance", type=_length, default=0.1, metavar="D",
-                        help="compare distances up to this: 0.05 (metres), 50mm (default: 10cm)")
-    parser.add_argument("--tolerance", type=_part, default=1e-6, metavar="T",
-                        help="distances off by more than this part of the pair's size are wrong (1e-6)")
-    parser.add_argument("--fail-on", choices=("ours-wrong", "peer-wrong"), default="ours-wrong",
-                        help="exit 1 where an answer of collide's is wrong (default), or where any engine's is")
-    parser.add_argument("--all", action="store_true", help="do not shorten long lists")
+    parser = _add(commands, "compare", "ask other engines about the same scene", cli_compare.EPILOG)
+    _scene_arguments(parser, at_least=0)
+    cli_compare.add_arguments(parser, _length, _part, _engines)
     _output_arguments(parser)
     cli_pages.add_argument(parser)
 
@@ -302,9 +281,10 @@ def _add_scenes(commands) -> None:
     parser.add_argument("--force", action="store_true", help="let --copy overwrite a file")
 
 
-def _scene_arguments(parser: argparse.ArgumentParser) -> None:
+def _scene_arguments(parser: argparse.ArgumentParser, at_least: int = 1) -> None:
     group = parser.add_argument_group("scene")
-    group.add_argument("scenes", nargs="+", metavar="SCENE", help="a file, or the name of a shipped scene")
+    group.add_argument("scenes", nargs="+" if at_least else "*", metavar="SCENE",
+                       help="a file, or the name of a shipped scene")
     group.add_argument(
         "--state",
         action="append",

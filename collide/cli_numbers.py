@@ -1,8 +1,9 @@
-"""Whole numbers as commands take them, underscores allowed: 1_000_000."""
+"""Numbers as commands take them; in whole ones underscores are allowed: 1_000_000."""
 
 from __future__ import annotations
 
 import argparse
+import math
 
 
 def count(text: str) -> int:
@@ -21,4 +22,15 @@ def count_or_none(text: str) -> int:
         number = -1
     if number < 0:
         raise argparse.ArgumentTypeError(f"must be a whole number, 0 or more, got {text!r}")
+    return number
+
+
+def minutes(text: str) -> float:
+    """A length of time, above 0."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0.0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"must be a number above 0, got {text!r}")
     return number

@@ -5,7 +5,8 @@
     scene.world().distances(max_distance=0.05)
 
 `load` reads URDF with SRDF, MJCF, MoveIt planning scenes, meshes and the project's own scene files
-(docs/scene-format.md); `generate` makes seeded scenes. Importing this package imports numpy alone:
+(docs/scene-format.md); `generate` makes seeded scenes; `save` writes a scene
+or a World as such a file. Importing this package imports numpy alone:
 each format's library is loaded when a file needs it.
 """
 
@@ -22,8 +23,9 @@ if TYPE_CHECKING:
     from collide.scenes.generators import generate
     from collide.scenes.loaders.allowed_pairs import allow_pairs
     from collide.scenes.loaders.load_scene import load
+    from collide.scenes.write_scene import save
 
-__all__ = ["Scene", "SceneBody", "allow_pairs", "generate", "load", "path", "shipped"]
+__all__ = ["Scene", "SceneBody", "allow_pairs", "generate", "load", "path", "save", "shipped"]
 
 _HOME = {
     "Scene": "collide.scenes.description",
@@ -31,6 +33,7 @@ _HOME = {
     "allow_pairs": "collide.scenes.loaders.allowed_pairs",
     "generate": "collide.scenes.generators",
     "load": "collide.scenes.loaders.load_scene",
+    "save": "collide.scenes.write_scene",
 }
 _SUFFIXES = (".yaml", ".json")
 

@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import UnsupportedQuery
-
-#: A column's entry below this, relative to the largest, is taken for zero.
-_PIVOT_TOLERANCE = 1e-11
+from collide.kernels import address_of
+from collide.least_distance.pivoting_kernel import UNCLEAR, solve_complementarity
 
 
 class Basis(NamedTuple):
@@ -33,8 +32,8 @@ class Basis(NamedTuple):
     n_pivots: int
 
 
-def propose_basis(M: np.ndarray, q: np.ndarray, max_pivots: int) -> Basis | None:
-    """A complementary basis in doubles; None where doubles came to no end.
+def propose_solution(M: np.ndarray, q: np.ndarray, max_pivots: int) -> np.ndarray | None:
+    """z in doubles; None where doubles came to no end.
 
     Parameters
     ----------
@@ -45,39 +44,10 @@ def propose_basis(M: np.ndarray, q: np.ndarray, max_pivots: int) -> Basis | None
     max_pivots : int
         Give up after so many.
     """
-    n = len(q)
-    table = np.empty((n, 2 * n + 2))
-    table[:, :n] = np.eye(n)
-    np.negative(M, out=table[:, n : 2 * n])
-    table[:, 2 * n] = -1.0
-    table[:, -1] = q
-    variables = list(range(n))
-    row = int(np.argmin(q))
-    if q[row] >= 0.0:
-        return Basis(variables, table[:, -1].tolist(), None, 0)
-    entering, ratios = 2 * n, np.empty(n)
-    for n_pivots in range(1, max_pivots + 1):
-        table[row] /= table[row, entering]
-        column = table[:, entering].copy()
-        column[row] = 0.0
-        table -= column[:, None] * table[row]
-        leaving, variables[row] = variables[row], entering
-        if leaving == 2 * n:
-            return Basis(variables, table[:, -1].tolist(), None, n_pivots)
-        entering = leaving + n if leaving < n else leaving - n
-        column = table[:, entering]
-        steep = column > _PIVOT_TOLERANCE * float(np.abs(column).max())
-        if not steep.any():
-            return None
-        ratios.fill(np.inf)
-        np.divide(table[:, -1], column, out=ratios, where=steep)
-        row = int(np.argmin(ratios))
-        level = ratios <= ratios[row] + 1e-14
-        if level.sum() > 1:  # the artificial variable leaves first, then the safest pivot
-            row = int(np.argmax(np.where(level, column, 0.0)))
-            artificial = variables.index(2 * n)
-            row = artificial if level[artificial] else row
-    return None
+    n, M, z = len(q), np.ascontiguousarray(M), np.array(q)
+    work = np.empty(n * (n + 4) + 1)
+    n_pivots = solve_complementarity(address_of(M), address_of(z), n, max_pivots, address_of(work))
+    return None if n_pivots == UNCLEAR else z
 
 
 def decide_basis(M: list[list[int]], q: list[int]) -> tuple[Basis, int]:

@@ -8,18 +8,24 @@ the same rows read in the other sense.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from operator import mul
 from typing import NamedTuple
 
 import numpy as np
 
+from collide.kernels import address_of
+from collide.least_distance.row_products import BLOCK, RECORD, products_below
+
 #: Half a unit in the last place of 1.
 _UNIT = 2.0**-53
+#: So many rows near a plane have room at first.
+_N_BELOW = 1024
 #: From so many doubtful rows on, equal ones are looked for first.
 _DEDUPLICATED_FROM = 64
 
 
 class Violations(NamedTuple):
-    """rows : indices of rows at which a linear function is proven negative.   values : it, in doubles, scaled."""
+    """rows : indices of rows at which a linear function is negative.   values : it, in doubles, scaled."""
 
     rows: np.ndarray
     values: np.ndarray
@@ -38,9 +44,13 @@ class HomogeneousRows:
         Row number → the row as d + 1 integers, exactly, but for a positive factor of the row.
     error : float
         No number of ``values`` and ``last`` differs from the exact one by more than this times itself.
+    magnitude : float, optional
+        The largest magnitude in ``values``, where it is known.
     """
 
-    __slots__ = ("_integers", "_known", "error", "last", "magnitude", "max_last", "n_exact", "n_read", "values")
+    __slots__ = (
+        "_integers", "_known", "_record", "error", "last", "magnitude", "max_last", "n_exact", "n_read", "values",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -48,13 +58,18 @@ class HomogeneousRows:
         last: np.ndarray | float,
         integers: Callable[[int], Sequence[int]],
         error: float = 0.0,
+        magnitude: float | None = None,
     ):
-        self.values, self.last, self.error = values, last, error
+        self.values, self.error = np.ascontiguousarray(values), error
+        self.last = np.ascontiguousarray(last) if isinstance(last, np.ndarray) else last
         self._integers = integers
         self._known: dict[int, Sequence[int]] = {}
-        self.magnitude = max(float(values.max()), -float(values.min())) if values.size else 0.0
+        if magnitude is None:
+            magnitude = max(float(values.max()), -float(values.min())) if values.size else 0.0
+        self.magnitude = magnitude
         self.max_last = float(np.abs(last).max()) if np.size(last) else 0.0
         self.n_read = self.n_exact = 0
+        self._record: tuple[np.ndarray, np.ndarray] | None = None
 
     def __len__(self) -> int:
         return len(self.values)
@@ -75,6 +90,20 @@ class HomogeneousRows:
         """The last numbers of some rows."""
         return self.last[rows] if isinstance(self.last, np.ndarray) else self.last
 
+    def record(self, rows: np.ndarray | None = None) -> int:
+        """Address of what kernels are told of all rows, or of some: `row_products.py`. Good until the next call."""
+        if self._record is None:
+            lasts = self.last if isinstance(self.last, np.ndarray) else np.array([self.last])
+            words = np.array([address_of(self.values), address_of(lasts), len(lasts) > 1, len(self), 0, 0, 0, 0])
+            words[RECORD - 2 :].view(np.float64)[:] = self.magnitude, self.max_last
+            self._record = words, lasts
+        words = self._record[0]
+        if rows is None:
+            words[4:6] = 0
+        else:
+            words[4:6] = address_of(rows), len(rows)
+        return address_of(words)
+
     def products(self, vector: np.ndarray, last: float, rows: np.ndarray | None = None) -> np.ndarray:
         """(vector, last) · row of all rows, or of some, in doubles."""
         self.n_read += len(self.values) if rows is None else len(rows)
@@ -89,20 +118,29 @@ class HomogeneousRows:
         whatever order they are summed (Higham 2002, section 3.1); to that come the error of the rows and the rounding
         of the function. Rows nearer to zero are decided in integers.
         """
-        bits = max(max(abs(number) for number in function).bit_length(), 1)
-        scaled = [number / (1 << bits) for number in function]
-        vector = np.array(scaled[:-1])
-        values = self.products(vector, scaled[-1], rows)
-        size = self.magnitude * float(np.abs(vector).sum()) + self.max_last * abs(scaled[-1])
+        bits = max(max(map(abs, function)).bit_length(), 1)
+        vector = np.array([number / (1 << bits) for number in function])
+        size = self.magnitude * float(np.abs(vector[:-1]).sum()) + self.max_last * abs(float(vector[-1]))
         bound = ((self.dimension + 6) * _UNIT + self.error) * 1.01 * size + 1e-290
-        near = np.flatnonzero(values <= bound)
-        negative = values[near] < -bound
-        doubtful = np.flatnonzero(~negative)
+        near = self.below(vector, bound, rows)
+        is_negative = near.values < -bound
+        doubtful = np.flatnonzero(~is_negative)
         if len(doubtful):
-            places = near[doubtful] if rows is None else rows[near[doubtful]]
-            negative[doubtful] = self._negative_exactly(function, places)
-        at = near[negative]
-        return Violations(at if rows is None else rows[at], values[at])
+            is_negative[doubtful] = self._negative_exactly(function, near.rows[doubtful])
+        return Violations(near.rows[is_negative], near.values[is_negative])
+
+    def below(self, vector: np.ndarray, bound: float, rows: np.ndarray | None = None) -> Violations:
+        """The rows, of all or of some, whose product in doubles with d + 1 numbers is ≤ a bound."""
+        self.n_read += len(self) if rows is None else len(rows)
+        record, capacity = self.record(rows), _N_BELOW
+        while True:
+            at, values = np.empty(capacity, dtype=np.int64), np.empty(capacity + BLOCK)
+            count = products_below(
+                record, self.dimension, address_of(vector), bound, address_of(at), address_of(values), capacity
+            )  # fmt: skip
+            if count <= capacity:
+                return Violations(at[:count], values[:count])
+            capacity = count
 
     def _negative_exactly(self, function: Sequence[int], rows: np.ndarray) -> np.ndarray:
         """Whether the function is negative, by integers, at each of some rows."""
@@ -118,9 +156,9 @@ class HomogeneousRows:
         return np.array([dot(function, self.integers(row)) < 0 for row in rows.tolist()], dtype=bool)
 
 
-def dot(a: Sequence[int], b: Sequence[int]) -> int:
-    """The inner product of two vectors of integers."""
-    return sum(x * y for x, y in zip(a, b))
+def dot(a: Sequence[int], b: Sequence[int], count: int | None = None) -> int:
+    """The inner product of two vectors of integers, or of their first ``count`` numbers."""
+    return sum(map(mul, a, b if count is None else b[:count]))
 
 
 def as_integers(numbers: Sequence[float]) -> tuple[list[int], int]:

@@ -9,6 +9,9 @@ it ends. u = 0 is a common point; a ray of the method is a combination of half-s
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from operator import mul
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +33,7 @@ class NearestPair(NamedTuple):
     points, weights : rows of points, and λ · denominator, > 0.
     halfspaces, multipliers : rows of half-spaces, and μ · denominator, > 0.
     y, x, u : the point of the hull, the one of the half-spaces, and y − x, each times the denominator.
-    theta : the least u·p of all points, times denominator.
+    plane : d + 1 integers; negative at points p with u·p < θ, the least u·p of all points.
     """
 
     kind: str
@@ -41,13 +44,8 @@ class NearestPair(NamedTuple):
     y: list[int]
     x: list[int]
     u: list[int]
-    theta: int
+    plane: list[int]
     denominator: int
-
-    @property
-    def plane(self) -> list[int]:
-        """Negative at points p with u·p < θ."""
-        return [*self.u, -self.theta]
 
     @property
     def corner(self) -> list[int]:
@@ -156,59 +154,71 @@ def settle_basis(
 ) -> NearestPair | None:
     """The exact solution with these rows in the basis; None where it is singular or some number of it is negative.
 
-    Of the rows themselves it is the nearest pair; other rows are not looked at. O((s + t)³) operations of integers.
+    Of the rows themselves it is the nearest pair; other rows are not looked at. With p₀ + Σ λᵢ eᵢ for y, eᵢ the edges
+    from p₀, unknown are the multipliers and λ: a_j·(p₀ + Σ λᵢ eᵢ − Σ μ_k a_k) = b_j and Σ μ_j a_j·eᵢ = 0. O((s + t)³)
+    operations of integers.
     """
-    v = [points.integers(row) for row in point_rows]
+    d = points.dimension
+    v, unit = _over_one_denominator([points.integers(row) for row in point_rows], d)
     a = [halfspaces.integers(row) for row in halfspace_rows]
-    s, t, d = len(v), len(a), points.dimension
-    cross = [[dot(normal[:d], point[:d]) for normal in a] for point in v]
-    system = [[0] * s + cross[i] + [-v[i][d], 0] for i in range(s)]
-    for j in range(t):
-        gram = [-dot(a[j][:d], a[k][:d]) for k in range(t)]
-        system.append([cross[i][j] for i in range(s)] + gram + [0, a[j][d]])
-    system.append([point[d] for point in v] + [0] * (t + 1) + [1])
-    solved = solve_integers(system)
+    base, t = v[0], len(a)
+    edges = [[x - y for x, y in zip(point, base)] for point in v[1:]]
+    system = [
+        [dot(a[j], a[k], d) for k in range(j, t)]
+        + [-dot(a[j], edge, d) for edge in edges]
+        + [dot(a[j], base, d) - unit * a[j][d]]
+        for j in range(t)
+    ] + [[0] * (len(edges) - i + 1) for i in range(len(edges))]
+    solved = solve_symmetric(system)
     if solved is None:
         return None
     numerators, denominator = solved
-    weights, multipliers, theta = numerators[:s], numerators[s : s + t], numerators[s + t]
+    multipliers, weights = numerators[:t], numerators[t:]
+    weights.insert(0, denominator - sum(weights))
     if min(weights) < 0 or min(multipliers, default=0) < 0:
         return None
-    return _pair(v, a, point_rows, halfspace_rows, weights, multipliers, theta, denominator, d)
-
-
-def _pair(v, a, point_rows, halfspace_rows, weights, multipliers, theta, denominator, d) -> NearestPair:
-    y = [sum(weight * point[k] for weight, point in zip(weights, v)) for k in range(d)]
-    u = [sum(multiplier * normal[k] for multiplier, normal in zip(multipliers, a)) for k in range(d)]
-    x = [p - q for p, q in zip(y, u)]
-    positive_points = [k for k, weight in enumerate(weights) if weight]
-    positive_halfspaces = [k for k, multiplier in enumerate(multipliers) if multiplier]
+    y = [denominator * place for place in base[:d]]
+    for weight, edge in zip(weights[1:], edges):
+        y = [total + weight * step for total, step in zip(y, edge)]
+    u = [sum(map(mul, multipliers, along)) for along in zip(*a)][:d] or [0] * d
+    of_points = [(row, unit * weight) for row, weight in zip(point_rows, weights) if weight]
+    of_halfspaces = [(row, number) for row, number in zip(halfspace_rows, multipliers) if number]
     return NearestPair(
-        APART if any(u) else MEETING, [point_rows[k] for k in positive_points],
-        [weights[k] * v[k][d] for k in positive_points], [halfspace_rows[k] for k in positive_halfspaces],
-        [multipliers[k] for k in positive_halfspaces], y, x, u, theta, denominator,
+        APART if any(u) else MEETING, [row for row, _ in of_points], [weight for _, weight in of_points],
+        [row for row, _ in of_halfspaces], [number for _, number in of_halfspaces], y,
+        [p - q for p, q in zip(y, u)], u, [unit * number for number in u] + [-dot(u, base)], unit * denominator,
     )  # fmt: skip
 
 
-def solve_integers(rows: list[list[int]]) -> tuple[list[int], int] | None:
-    """The solution of n equations [coefficients, right-hand side] in n unknowns: (numerators, denominator > 0).
+def _over_one_denominator(vectors: list[Sequence[int]], d: int) -> tuple[list[Sequence[int]], int]:
+    """Points as integers over the least common denominator, and that."""
+    unit = math.lcm(*(vector[d] for vector in vectors))
+    return [
+        vector if vector[d] == unit else [number * (unit // vector[d]) for number in vector] for vector in vectors
+    ], unit
 
-    Fraction-free elimination (Bareiss 1968). None where they are dependent.
+
+def solve_symmetric(rows: list[list[int]]) -> tuple[list[int], int] | None:
+    """The solution of symmetric equations: (numerators, denominator > 0); None where a leading minor is 0.
+
+    Row k holds the coefficients k … n − 1 and the right-hand side. Fraction-free elimination (Bareiss 1968), of the
+    upper half alone. Leading minors are not 0 where a positive definite block stands first, and one of zeros last of
+    which the whole is not singular.
     """
-    n, rows, previous = len(rows), [list(row) for row in rows], 1
-    for k in range(n):
-        row = next((i for i in range(k, n) if rows[i][k]), None)
-        if row is None:
+    n, previous = len(rows), 1
+    for k, line in enumerate(rows):
+        pivot = line[0]
+        if pivot == 0:
             return None
-        rows[k], rows[row] = rows[row], rows[k]
-        pivot, line = rows[k][k], rows[k]
-        for i in range(n):
-            if i != k:
-                factor = rows[i][k]
-                rows[i] = [(pivot * x - factor * y) // previous for x, y in zip(rows[i], line)]
+        for i in range(k + 1, n):
+            factor = line[i - k]
+            rows[i] = [(pivot * x - factor * y) // previous for x, y in zip(rows[i], line[i - k :])]
         previous = pivot
-    sign = 1 if previous > 0 else -1
-    return [sign * rows[k][n] for k in range(n)], sign * previous
+    solution: list[int] = []
+    for k in range(n - 1, -1, -1):
+        pivot, *coefficients, right = rows[k]
+        solution.insert(0, (previous * right - dot(coefficients, solution)) // pivot)
+    return (solution, previous) if previous > 0 else ([-number for number in solution], -previous)
 
 
 def _solve_in_integers(points, halfspaces, working_points, working_halfspaces, work: Work) -> NearestPair:
@@ -222,16 +232,16 @@ def _solve_in_integers(points, halfspaces, working_points, working_halfspaces, w
     spans = [point[d] * base[d] for point in v[1:]]
     M, q = [], []
     for edge, span in zip(edges, spans):
-        M.append([0] * (n_points - 1) + [span] + [dot(edge, normal[:d]) for normal in a])
+        M.append([0] * (n_points - 1) + [span] + [dot(edge, normal, d) for normal in a])
         q.append(0)
     M.append([-span for span in spans] + [0] * (n_halfspaces + 1))
     q.append(1)
     for normal in a:
         M.append(
-            [-base[d] * dot(edge, normal[:d]) for edge in edges]
-            + [0] + [base[d] * dot(normal[:d], beside[:d]) for beside in a]
+            [-base[d] * dot(edge, normal, d) for edge in edges]
+            + [0] + [base[d] * dot(normal, beside, d) for beside in a]
         )  # fmt: skip
-        q.append(normal[d] * base[d] - dot(normal[:d], base[:d]))
+        q.append(normal[d] * base[d] - dot(normal, base, d))
     basis, _ = decide_basis(M, q)
     work.add("exact_pivots", basis.n_pivots)
     if basis.ray is not None:
@@ -256,5 +266,5 @@ def _contradiction(a, working_halfspaces, multipliers: list[int], d: int) -> Nea
     zero = [0] * d
     return NearestPair(
         EMPTY, [], [], [working_halfspaces[k] for k in positive], [multipliers[k] for k in positive],
-        zero, zero, zero, 0, 1,
+        zero, zero, zero, [*zero, 0], 1,
     )  # fmt: skip

@@ -7,20 +7,39 @@ are added until there is none; of many rows a sample first.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from threading import local
 from typing import NamedTuple
 
 import numpy as np
 
 from collide.errors import UnsupportedQuery
-from collide.least_distance.complementary_pivoting import propose_basis
+from collide.kernels import address_of
 from collide.least_distance.homogeneous_rows import HomogeneousRows
+from collide.least_distance.proposal_kernel import (
+    FULL,
+    LISTS,
+    MAX_D,
+    N_BASIC_HALFSPACES,
+    N_BASIC_POINTS,
+    NOISE,
+    POINTS_READ,
+    SETTLED,
+    U,
+    Y,
+    n_doubles,
+    n_integers,
+    propose_rows,
+)
 
-#: Doubles no longer tell a violation from rounding below this, relative to the size of the products.
-_NOISE = 1e-14
-#: Rounds in doubles before integers take over.
-_MAX_ROUNDS = 200
+#: Samples of one question before integers take over.
+_MAX_SAMPLES = 200
 #: So many rows are searched first, where there are _LEAST_STEP times as many: passes over all rows are then few.
 _N_SAMPLED, _LEAST_STEP = 1024, 4
+#: Of those that violate an answer so many join the sample.
+_MAX_ADDED = 4096
+#: Working sets of so many rows have room at first.
+_CAPACITY = 40
+
 
 @dataclass
 class Work:
@@ -48,11 +67,23 @@ class Work:
         """Keep the largest value of something."""
         self.counters[name] = max(self.counters.get(name, 0), value)
 
+    def remaining(self, *rows: HomogeneousRows) -> int:
+        """How many more rows may be read, of these and of all seen before; −1 for no limit."""
+        if self.limit is None:
+            return -1
+        self._see(rows)
+        return max(self.limit - sum(r.n_read for r in self.seen), 0)
+
+    def _see(self, rows: tuple[HomogeneousRows, ...]) -> None:
+        self.seen.extend(r for r in rows if not any(r is known for known in self.seen))
+
     def check(self, *rows: HomogeneousRows) -> None:
         """Raise UnsupportedQuery where more rows than the limit have been read, of these and of all seen before."""
-        self.seen.extend(r for r in rows if not any(r is known for known in self.seen))
+        if self.limit is None:
+            return
+        self._see(rows)
         n_read = sum(r.n_read for r in self.seen)
-        if self.limit is not None and n_read > self.limit:
+        if n_read > self.limit:
             raise UnsupportedQuery(
                 f"meets: {n_read} rows were read, more than work={self.limit} allows; raise it or leave it out"
             )
@@ -76,7 +107,7 @@ def propose_from_samples(
     a sample of r, joins it; and so on. A pass each time, and no more of them than the answer has rows.
     """
     some_points, some_halfspaces = _some(len(points), point_rows), _some(len(halfspaces), halfspace_rows)
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(_MAX_SAMPLES):
         proposal = propose_pair(
             points, halfspaces, work, some_points, some_halfspaces, working_points, working_halfspaces
         )  # fmt: skip
@@ -87,7 +118,7 @@ def propose_from_samples(
         if some_halfspaces is not None and some_halfspaces is not halfspace_rows:
             violated = _violated(halfspaces, proposal.u - proposal.y, 1.0, halfspace_rows)
             some_halfspaces, n_violated = np.concatenate((some_halfspaces, violated)), len(violated)
-        is_apart = float(np.abs(proposal.u).max()) > _NOISE * points.magnitude
+        is_apart = float(np.abs(proposal.u).max()) > NOISE * points.magnitude
         if is_apart and some_points is not None and some_points is not point_rows:
             values = points.values[proposal.points] @ proposal.u
             lasts = points.last_of(np.array(proposal.points))
@@ -103,20 +134,14 @@ def _some(count: int, rows: np.ndarray | None) -> np.ndarray | None:
     step = (count if rows is None else len(rows)) // _N_SAMPLED
     if step < _LEAST_STEP:
         return rows
-    return np.arange(0, count, step) if rows is None else rows[::step]
+    return np.arange(0, count, step) if rows is None else np.ascontiguousarray(rows[::step])
 
 
 def _violated(rows: HomogeneousRows, vector: np.ndarray, last: float, subset: np.ndarray | None) -> np.ndarray:
     """The rows at which a function is negative, as far as doubles can tell; of very many those farthest from 0."""
-    values = rows.products(vector, last, subset)
-    at = np.flatnonzero(values < -_noise(rows, vector, last))
-    if len(at) > 4 * _N_SAMPLED:
-        at = at[np.argpartition(values[at], 4 * _N_SAMPLED)[: 4 * _N_SAMPLED]]
-    return at if subset is None else subset[at]
-
-
-def _noise(rows: HomogeneousRows, vector: np.ndarray, last: float) -> float:
-    return _NOISE * (rows.magnitude * float(np.abs(vector).sum()) + rows.max_last * abs(last))
+    size = rows.magnitude * float(np.abs(vector).sum()) + rows.max_last * abs(last)
+    at, values = rows.below(np.append(vector, last), -NOISE * size, subset)
+    return at if len(at) <= _MAX_ADDED else at[np.argpartition(values, _MAX_ADDED)[:_MAX_ADDED]]
 
 
 def propose_pair(
@@ -128,68 +153,67 @@ def propose_pair(
     working_points: list[int],
     working_halfspaces: list[int],
 ) -> Proposal | None:
-    """What doubles take for the nearest pair, or None where they cannot tell. Working sets grow; nothing is proven."""
-    with np.errstate(all="ignore"):  # what overflows is settled in integers
-        for _ in range(_MAX_ROUNDS):
-            work.add("rounds")
-            p = points.values[working_points] / np.reshape(points.last_of(np.array(working_points)), (-1, 1))
-            a, b = halfspaces.values[working_halfspaces], halfspaces.last_of(np.array(working_halfspaces, dtype=int))
-            basis = _basis_in_doubles(p, a, np.broadcast_to(b, len(a)), work)
-            if basis is None:
-                return None
-            weights, multipliers, active_points, active_halfspaces = basis
-            u, y = multipliers @ a, weights @ p
-            grown = _grow(halfspaces, u - y, 1.0, halfspace_rows, working_halfspaces)
-            if float(np.abs(u).max()) > _NOISE * points.magnitude:
-                grown |= _grow(points, u, -float((p @ u).min()), point_rows, working_points)
-            work.check(points, halfspaces)
-            if not grown:
-                return Proposal(
-                    [working_points[k] for k in active_points], [working_halfspaces[k] for k in active_halfspaces], y, u
-                )  # fmt: skip
-    return None
+    """What doubles take for the nearest pair, or None where they cannot tell. Nothing is proven."""
+    assert points.dimension <= MAX_D
+    records = points.record(point_rows), halfspaces.record(halfspace_rows)
+    counts = (0, 0, 0, 0)
+    while True:
+        state = _of_thread.state_for(max(len(working_points), len(working_halfspaces)))
+        state.begin(working_points, working_halfspaces, counts)
+        ended = propose_rows(points.dimension, *records, *state.arguments, work.remaining(points, halfspaces))
+        n_points, n_halfspaces, *counts_now = state.integers[:POINTS_READ + 2].tolist()
+        counts = tuple(counts_now)
+        if ended != FULL:
+            break
+        working_points, working_halfspaces = state.rows(0, n_points), state.rows(1, n_halfspaces)
+    rounds, pivots, points_read, halfspaces_read = counts
+    work.add("rounds", rounds)
+    work.add("pivots", pivots)
+    points.n_read += points_read
+    halfspaces.n_read += halfspaces_read
+    work.check(points, halfspaces)
+    return state.proposal(points.dimension) if ended == SETTLED else None
 
 
-def _grow(rows: HomogeneousRows, vector: np.ndarray, last: float, subset, working: list[int]) -> bool:
-    """Add the row with the least product to a working set, if doubles can tell that it is negative."""
-    values = rows.products(vector, last, subset)
-    k = int(np.argmin(values))
-    if values[k] >= -_noise(rows, vector, last):
-        return False
-    row = k if subset is None else int(subset[k])
-    if row in working:
-        return False
-    working.append(row)
-    return True
+class _State:
+    """The state of a search in `propose_rows`, with room for ``capacity`` rows of either kind."""
+
+    def __init__(self, capacity: int):
+        self.capacity = capacity
+        self.doubles = np.zeros(n_doubles(capacity))
+        self.integers = np.zeros(n_integers(capacity), dtype=np.int64)
+        self.arguments = address_of(self.doubles), address_of(self.integers), capacity
+
+    def begin(self, points: list[int], halfspaces: list[int], counts: tuple[int, ...]) -> None:
+        """Working sets to begin with, and what was counted before."""
+        self.integers[:LISTS] = [len(points), len(halfspaces), *counts, 0, 0]
+        for which, working in enumerate((points, halfspaces)):
+            first = LISTS + which * self.capacity
+            self.integers[first : first + len(working)] = working
+
+    def rows(self, which: int, count: int) -> list[int]:
+        """The first rows of a list: 0, 1 working points and half-spaces, 2, 3 those of the basis."""
+        first = LISTS + which * self.capacity
+        return self.integers[first : first + count].tolist()
+
+    def proposal(self, d: int) -> Proposal:
+        """What was found."""
+        n_points, n_halfspaces = self.integers[N_BASIC_POINTS : N_BASIC_HALFSPACES + 1].tolist()
+        y, u = self.doubles[Y : Y + d].copy(), self.doubles[U : U + d].copy()
+        return Proposal(self.rows(2, n_points), self.rows(3, n_halfspaces), y, u)
 
 
-def _basis_in_doubles(p: np.ndarray, a: np.ndarray, b: np.ndarray, work: Work):
-    """(weights, multipliers, rows of p and of a in the basis) of the nearest pair of some rows; None where unclear."""
-    n_points, n_halfspaces = len(p), len(a)
-    if n_halfspaces == 0:
-        weights = np.zeros(n_points)
-        weights[0] = 1.0
-        return weights, np.zeros(0), [0], []
-    edges, size = p[1:] - p[0], n_points + n_halfspaces
-    M, q = np.zeros((size, size)), np.empty(size)
-    cross = edges @ a.T
-    M[: n_points - 1, n_points - 1] = 1.0
-    M[: n_points - 1, n_points:] = cross
-    M[n_points - 1, : n_points - 1] = -1.0
-    M[n_points:, : n_points - 1] = -cross.T
-    M[n_points:, n_points:] = a @ a.T
-    q[: n_points - 1], q[n_points - 1], q[n_points:] = 0.0, 1.0, b - a @ p[0]
-    basis = propose_basis(M, q, 20 * size + 50)
-    if basis is None:
-        return None
-    work.add("pivots", basis.n_pivots)
-    z, is_basic = np.zeros(2 * size), np.zeros(2 * size, dtype=bool)
-    z[basis.variables], is_basic[basis.variables] = basis.values, True
-    edge_weights = np.maximum(z[size : size + n_points - 1], 0.0)
-    weights = np.concatenate(([max(1.0 - edge_weights.sum(), 0.0)], edge_weights))
-    active_points = [k + 1 for k in np.flatnonzero(is_basic[size : size + n_points - 1]).tolist()]
-    if is_basic[n_points - 1]:
-        active_points.insert(0, 0)
-    return weights, np.maximum(z[size + n_points :], 0.0), active_points, np.flatnonzero(
-        is_basic[size + n_points :]
-    ).tolist()
+class _OfThread(local):
+    """The state of one thread, made when the thread first asks; a larger one where it did not do."""
+
+    def __init__(self) -> None:
+        self.state = _State(_CAPACITY)
+
+    def state_for(self, count: int) -> _State:
+        """A state with room for more than so many rows of either kind."""
+        while self.state.capacity <= count:
+            self.state = _State(2 * self.state.capacity)
+        return self.state
+
+
+_of_thread = _OfThread()

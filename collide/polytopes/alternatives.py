@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from collide.errors import UnsupportedQuery
-from collide.least_distance.complementary_pivoting import propose_basis
+from collide.least_distance.complementary_pivoting import propose_solution
 from collide.least_distance.input_rows import InputRows
 from collide.least_distance.nearest_pair import APART, NearestPair, nearest_pair
 from collide.least_distance.pair_proposals import Work
@@ -137,12 +137,8 @@ def _nearest_to_origin(points: np.ndarray) -> np.ndarray | None:
     M[: n - 1, : n - 1] = edges @ edges.T
     M[: n - 1, n - 1], M[n - 1, : n - 1] = 1.0, -1.0
     q[: n - 1] = edges @ points[0]
-    basis = propose_basis(M, q, 20 * n + 50)
-    if basis is None:
-        return None
-    z = np.zeros(2 * n)
-    z[basis.variables] = basis.values
-    return points[0] + np.maximum(z[n : 2 * n - 1], 0.0) @ edges
+    z = propose_solution(M, q, 20 * n + 50)
+    return None if z is None else points[0] + np.maximum(z[: n - 1], 0.0) @ edges
 
 
 # --- brute force ------------------------------------------------------------------------------------------------------

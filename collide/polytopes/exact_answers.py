@@ -18,9 +18,7 @@ _KINDS: dict[str, Literal["common point", "separating plane", "contradiction"]] 
 }  # fmt: skip
 
 
-def make_meeting(
-    pair: NearestPair, rows: InputRows, normals: np.ndarray, counters: Mapping[str, int | str]
-) -> Meeting:
+def make_meeting(pair: NearestPair, rows: InputRows, counters: Mapping[str, int | str]) -> Meeting:
     """The answer that an exact pair amounts to.
 
     Parameters
@@ -29,67 +27,71 @@ def make_meeting(
         Of all rows.
     rows : InputRows
         What was asked.
-    normals : (m, d) float64
-        As they were given.
     counters : mapping
         What was done.
     """
-    certificate = _certificate(pair, rows, normals)
+    up, down = 1 << max(rows.exponent, 0), pair.denominator << max(-rows.exponent, 0)
+    certificate = _certificate(pair, rows, up, down)
     if pair.kind == EMPTY:
         return Meeting(False, None, math.inf, None, None, None, math.inf, math.inf, certificate, counters)
-    unit = Fraction(2) ** rows.exponent / pair.denominator
-    y, x = _rounded(pair.y, unit), _rounded(pair.x, unit)
+    x = np.array([_as_double(number * up, down) for number in pair.x])
+    y = np.array([_as_double(number * up, down) for number in pair.y])
     if pair.kind == MEETING:
         return Meeting(True, x, 0.0, y, x, None, 0.0, 0.0, certificate, counters)
-    lower, upper = root_bracket(sum(number * number for number in pair.u) * unit * unit)
+    lower, upper = root_bracket(sum(number * number for number in pair.u) * up * up, down * down)
     return Meeting(False, None, upper, y, x, _direction(pair.u), lower, upper, certificate, counters)
 
 
-def _certificate(pair: NearestPair, rows: InputRows, normals: np.ndarray) -> MeetingCertificate:
-    weights = sorted((row, Fraction(weight, pair.denominator)) for row, weight in zip(pair.points, pair.weights))
-    multipliers = []
-    if pair.kind != MEETING:
-        unit = Fraction(2) ** rows.exponent / pair.denominator
-        for row, multiplier in sorted(zip(pair.halfspaces, pair.multipliers)):
-            axis = int(np.argmax(np.abs(normals[row])))
-            factor = Fraction(rows.halfspaces.integers(row)[axis]) / Fraction(float(normals[row, axis]))
-            multipliers.append((row, multiplier * factor * unit))
+def _certificate(pair: NearestPair, rows: InputRows, up: int, down: int) -> MeetingCertificate:
+    weights = sorted(zip(pair.points, pair.weights))
+    multipliers = sorted(zip(pair.halfspaces, pair.multipliers)) if pair.kind != MEETING else []
     return MeetingCertificate(
-        _KINDS[pair.kind], tuple(row for row, _ in weights), tuple(weight for _, weight in weights),
-        tuple(row for row, _ in multipliers), tuple(multiplier for _, multiplier in multipliers),
+        _KINDS[pair.kind], tuple(row for row, _ in weights),
+        tuple(Fraction(weight, pair.denominator) for _, weight in weights), tuple(row for row, _ in multipliers),
+        tuple(Fraction(number * _factor(rows, row) * up, down) for row, number in multipliers),
     )  # fmt: skip
 
 
-def _rounded(numerators: list[int], unit: Fraction) -> np.ndarray:
-    return np.array([_as_double(number * unit) for number in numerators])
+def _factor(rows: InputRows, row: int) -> int:
+    """By what a half-space was multiplied to become integers."""
+    numbers = rows.normals[row].tolist()
+    axis = next(k for k, number in enumerate(numbers) if number)
+    numerator, denominator = numbers[axis].as_integer_ratio()
+    return rows.halfspaces.integers(row)[axis] * denominator // numerator
 
 
-def _as_double(value: Fraction) -> float:
+def _as_double(numerator: int, denominator: int) -> float:
     """The nearest double; a fraction beyond the doubles is given as the largest."""
     try:
-        return value.numerator / value.denominator
+        return numerator / denominator
     except OverflowError:
-        return math.copysign(1.7976931348623157e308, value)
+        return math.copysign(1.7976931348623157e308, numerator)
 
 
 def _direction(u: list[int]) -> np.ndarray:
     """−u/|u| to some units in the last place, whatever the size of its integers."""
     bits = max(abs(number) for number in u).bit_length()
     vector = np.array([-number / (1 << bits) for number in u])
-    return vector / np.linalg.norm(vector) + 0.0
+    return vector / math.sqrt(vector @ vector) + 0.0
 
 
-def root_bracket(square: Fraction) -> tuple[float, float]:
+def root_bracket(numerator: int, denominator: int) -> tuple[float, float]:
     """Two doubles, equal or next to each other, with the square root of a fraction > 0 between them."""
-    shift = 128 - (square.numerator.bit_length() - square.denominator.bit_length())
+    shift = 128 - (numerator.bit_length() - denominator.bit_length())
     shift += shift % 2
-    scaled = math.isqrt(int(square * Fraction(2) ** shift))
-    middle = _as_double(Fraction(scaled) / Fraction(2) ** (shift // 2))
+    scaled = math.isqrt((numerator << max(shift, 0)) // (denominator << max(-shift, 0)))
+    half = shift // 2
+    middle = _as_double(scaled << max(-half, 0), 1 << max(half, 0))
+
+    def compared(x: float) -> int:
+        above, below = x.as_integer_ratio()
+        return above * above * denominator - numerator * below * below
+
     lower = upper = middle
-    while Fraction(lower) ** 2 > square:
+    while compared(lower) > 0:
         lower = math.nextafter(lower, 0.0)
-    while Fraction(upper) ** 2 < square:
+    while compared(upper) < 0:
         upper = math.nextafter(upper, math.inf)
-    if Fraction(math.nextafter(lower, math.inf)) ** 2 <= square:
+    if compared(math.nextafter(lower, math.inf)) <= 0:
         lower = math.nextafter(lower, math.inf)
     return lower, upper

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from collide.argument_checks import integer
 from collide.errors import InvalidArgument
-from collide.least_distance.input_rows import InputRows, input_rows, read_halfspaces, read_points
+from collide.least_distance.input_rows import InputRows, input_rows
 from collide.least_distance.nearest_pair import NearestPair, nearest_pair
 from collide.least_distance.pair_proposals import Work
 from collide.polytopes.acit import acit
@@ -66,13 +66,11 @@ def meets(
     if algorithm != "auto" and algorithm not in ALGORITHMS:
         raise InvalidArgument(f"meets: algorithm must be auto or one of {', '.join(ALGORITHMS)}, got {algorithm!r}")
     limit = None if work is None else integer("meets: work", work, 1)
-    p = read_points(points)
-    a, b = read_halfspaces(normals, offsets, p.shape[1])
-    rows = input_rows(p, a, b)
+    rows = input_rows(points, normals, offsets)
     log = Work(limit)
     pair = ALGORITHMS[AUTO if algorithm == "auto" else algorithm](rows, log)
     counters = {
         **log.counters, "points_read": rows.points.n_read, "halfspaces_read": rows.halfspaces.n_read,
         "decided_in_integers": rows.points.n_exact + rows.halfspaces.n_exact,
     }  # fmt: skip
-    return make_meeting(pair, rows, a, counters)
+    return make_meeting(pair, rows, counters)

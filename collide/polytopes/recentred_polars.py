@@ -116,7 +116,8 @@ def pair_in_input(pair: NearestPair, centre: Centre) -> NearestPair:
         weights=[number * unit for number in pair.weights],
         multipliers=[number * unit * unit for number in pair.multipliers],
         y=[p + q for p, q in zip(y, shift)], x=[p + q for p, q in zip(x, shift)], u=u,
-        theta=pair.theta * unit + dot(pair.u, c), denominator=pair.denominator * unit,
+        plane=[*(number * unit for number in pair.plane[:-1]), pair.plane[-1] * unit - dot(pair.plane, c)],
+        denominator=pair.denominator * unit,
     )  # fmt: skip
 
 
@@ -133,7 +134,7 @@ def common_point(points: HomogeneousRows, rows: list[int], weights: list[Fractio
     y = [int(number * denominator) for number in place]
     return NearestPair(
         MEETING, [row for row, _ in terms], [int(weight * denominator) for _, weight in terms], [], [], y, list(y),
-        [0] * d, 0, denominator,
+        [0] * d, [0] * (d + 1), denominator,
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from collide.shapes import (
     Halfspace,
     HeightField,
     HPolytope,
+    Mesh,
     Shape,
     Sphere,
 )
@@ -39,7 +40,7 @@ KINDS = {
     "hull": ("points", "radius"),
     "hpolytope": ("normals", "offsets"),
     "heightfield": ("heights", "cell", "bottom"),
-    "mesh": ("file", "scale", "as"),
+    "mesh": ("file", "scale", "as", "vertices", "faces", "solid"),
     "compound": ("shape", "pose"),
 }
 
@@ -73,7 +74,7 @@ def read_shape(data: Any, path: object, place: str, metres: float, mesh: Callabl
             return _compound(kinds, metres, mesh)
         fields = kinds.sub(kind, KINDS[kind])
         if kind == "mesh":
-            return _mesh(fields, mesh)
+            return _mesh(fields, mesh) if "file" in fields else Described(_mesh_in_place(fields, metres))
         return Described(_plain(kind, fields, metres))
     except InvalidShape as error:
         raise InvalidShape(_placed(error, path, f"{place}.{kind}")) from None
@@ -134,7 +135,23 @@ def _compound(kinds: Fields, metres: float, mesh: Callable) -> Described:
     return Described(Compound(items), approximation, notes)
 
 
+def _mesh_in_place(fields: Fields, metres: float) -> Mesh:
+    """Facets that stand in the scene file itself, taken as they are."""
+    beside = [key for key in ("scale", "as") if key in fields]
+    if beside or "vertices" not in fields or "faces" not in fields:
+        fields.fail(
+            f"{beside[0]!r} goes with a file" if beside else "give either file, or vertices and faces"
+        )
+    vertices, faces = scaled(fields.numbers("vertices", (None, 3)), metres), fields.numbers("faces", (None, 3))
+    if (faces != np.round(faces)).any():
+        fields.fail("must be whole numbers, rows of vertices", "faces")
+    return Mesh(vertices, faces.astype(np.int64), solid=fields.flag("solid", False) if "solid" in fields else None)
+
+
 def _mesh(fields: Fields, mesh: Callable) -> Described:
+    beside = [key for key in ("vertices", "faces", "solid") if key in fields]
+    if beside:
+        fields.fail(f"{beside[0]!r} stands in place of a file: give one of them")
     scale = _mesh_scale(fields)
     taken = fields.choice("as", mesh_loader.OPTIONS, "mesh") if "as" in fields else None
     file = mesh(fields.text("file"), fields.place("file"), taken)

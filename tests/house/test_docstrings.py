@@ -19,6 +19,7 @@ import pytest
 import collide
 import collide.polytopes
 import collide.scenes
+from collide.adapters.fuzzing import fuzz_run, recorders, scene_findings
 from collide.adapters.live import world_viewer
 from collide.adapters.peers import compare, exact, protocol, question, stress
 
@@ -33,6 +34,9 @@ PUBLIC = {
     question: ("Question",),
     stress: ("run", "StressTable"),
     world_viewer: ("view", "WorldViewer"),
+    fuzz_run: ("fuzz", "FuzzRun"),
+    recorders: ("record_fcl", "record_coal", "record_pybullet", "record_mujoco"),
+    scene_findings: ("save_findings",),
 }
 SECTIONS = ("Parameters", "Attributes", "Returns", "Yields", "Raises", "Notes", "Examples", "References", "See Also")
 #: Parameters that are lengths, whatever function has them: their description names the unit.

@@ -92,6 +92,19 @@ def test_answers_are_proven_and_need_no_further_search(d):
     assert n_pruned >= 8
 
 
+def test_eight_dimensions_need_a_ninth():
+    """A point inside all half-spaces is a program in one dimension more than questions have."""
+    rng, kinds = np.random.default_rng(37), []
+    for k in range(6):
+        normals, points = rng.normal(size=(40, 8)), rng.normal(size=(30, 8)) + (2.5 if k % 2 else 0.3)
+        question = families.Question(points, normals, np.full(40, 1.5))
+        answer = polytopes.meets(*question, algorithm="acit")
+        polytopes.verify(*question, answer)
+        assert answer.distance == polytopes.meets(*question).distance
+        kinds.append(answer.hit)
+    assert any(kinds) and not all(kinds)
+
+
 def test_touching_is_a_third_answer():
     """Squares with many redundant half-spaces, and points on and beyond one of their edges."""
     rng, kinds, rounds = np.random.default_rng(33), [], []

@@ -14,6 +14,7 @@ import meeting_families as families
 
 import collide
 from collide import polytopes
+from collide.least_distance.complementary_pivoting import decide_basis, propose_solution
 from collide.polytopes.seidel_program import seidel_program
 
 
@@ -72,3 +73,22 @@ def _best_corner(a: np.ndarray, b: np.ndarray, f: np.ndarray) -> float | None:
             if (a @ x <= b + 1e-9).all() and (best is None or x @ f > best):
                 best = float(x @ f)
     return best
+
+
+def test_lemke_in_doubles_solves_what_integers_solve():
+    """Problems of random semidefinite matrices: the kernel's solution is one, where integers say that there is one."""
+    rng, n_solved, n_rays = np.random.default_rng(8), 0, 0
+    for _ in range(120):
+        n = int(rng.integers(1, 9))
+        factor = rng.integers(-3, 4, (n, rng.integers(1, 4)))
+        skew = np.triu(rng.integers(-2, 3, (n, n)), 1) * rng.integers(0, 2)
+        M, q = factor @ factor.T + skew - skew.T, rng.integers(-6, 5, n)
+        basis, _ = decide_basis(M.tolist(), q.tolist())
+        z = propose_solution(M.astype(float), q.astype(float), 20 * n + 50)
+        if z is None:
+            n_rays += basis.ray is not None
+            continue
+        w = M @ z + q
+        assert basis.ray is None and z.min() >= -1e-9 and w.min() >= -1e-9 and abs(w @ z) <= 1e-9 * (1 + z.max() ** 2)
+        n_solved += 1
+    assert n_solved >= 80 and n_rays >= 5

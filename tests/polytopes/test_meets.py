@@ -86,6 +86,28 @@ def test_a_unit_in_the_last_place_either_side_of_touching():
         assert answered(question).hit == (sum(Fraction(v) ** 2 for v in tilted[0].tolist()) <= Fraction(offset))
 
 
+def test_no_plane_that_keeps_the_points_away_cuts_less():
+    """The gap along any unit vector is at most the distance, and along the answer's normal it is the distance."""
+    rng, angles = np.random.default_rng(9), np.linspace(0, 2 * np.pi, 7)[:-1]
+    points = rng.normal((4.0, 1.0), 0.5, (50, 2))
+    normals, offsets = np.column_stack((np.cos(angles), np.sin(angles))), rng.uniform(0.8, 1.2, 6)
+    answer = polytopes.meets(points, normals, offsets)
+    corners = [
+        np.linalg.solve(normals[[i, j]], offsets[[i, j]]) for i in range(6) for j in range(i)
+        if abs(np.linalg.det(normals[[i, j]])) > 1e-9
+    ]  # fmt: skip
+    region = np.array([corner for corner in corners if (normals @ corner <= offsets + 1e-9).all()])
+
+    def gap(n: np.ndarray) -> float:
+        return float((points @ n).min() - (region @ n).max())
+
+    assert gap(-answer.normal) == pytest.approx(answer.distance, abs=1e-12)
+    tried = [gap(np.array([math.cos(t), math.sin(t)])) for t in rng.uniform(0, 2 * np.pi, 500)]
+    assert max(tried) <= answer.distance + 1e-12 and max(tried) > 0.9 * answer.distance
+    smaller = np.vstack((normals, -answer.normal)), np.append(offsets, -answer.normal @ answer.point_p - 2.0)
+    assert polytopes.meets(points, *smaller).distance == pytest.approx(2.0, abs=1e-12)
+
+
 def test_contradictory_planes_are_answered_with_multipliers():
     answer = polytopes.meets([[0.0, 0]], [[1, 0], [-2, 0], [0, 1]], [1, -2.5, 5])
     assert not answer.hit and answer.distance == answer.lower == answer.upper == math.inf

@@ -1,0 +1,164 @@
+"""Scenes written down as scene files (docs/scene-format.md): `load` reads back the same doubles.
+
+Meshes stand in the file itself, so that one file holds all there is to know. Robots are written as the bodies that
+their links are, where they stand now; their joints are left out, and `about` may say so.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from collide.errors import InvalidArgument, SceneError
+from collide.shapes import (
+    Box,
+    Capsule,
+    Compound,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    Ellipsoid,
+    Halfspace,
+    HeightField,
+    HPolytope,
+    Mesh,
+    Shape,
+    Sphere,
+)
+
+VERSION = 1
+#: Of groups and masks in scene files.
+BITS = 0xFFFF
+
+
+def save(scene, path, *, about: str | Mapping[str, Any] | None = None) -> None:
+    """Write a scene, or a World, as a scene file in JSON.
+
+    Parameters
+    ----------
+    scene : Scene or World
+        Bodies with shapes and poses, groups and masks, and pairs never tested. Of a robot the bodies are written, at
+        the poses they have; joints are not.
+    path : str or Path
+        The file, ending in .json; one that exists is overwritten, and never left half written.
+    about : str or mapping, optional
+        A remark for the file's ``about``, which nobody reads back.
+
+    Raises
+    ------
+    SceneError
+        Where the file does not end in .json, a shape has no form in scene files, or a group has more than 16 bits.
+    OSError
+        Where it cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".json":
+        raise SceneError(f"a scene is written to a .json file, got {str(path)!r}")
+    document = scene_document(*_bodies_and_allowed(scene), name=getattr(scene, "name", "") or path.stem, about=about)
+    write_whole(path, document_text(document))
+
+
+def scene_document(
+    bodies: Iterable, allowed: Iterable[tuple] = (), *, name: str = "", about: str | Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """A scene file as plain data.
+
+    bodies : with ``name``, ``shape``, ``X_WB`` (4, 4) [m], ``static``, ``group`` and ``mask``.
+    allowed : (name, name) or (name, name, reason).
+    """
+    document: dict[str, Any] = {"collide": VERSION}
+    document |= {"name": name} if name else {}
+    document |= {"about": about} if about else {}
+    document["bodies"] = [_body(body) for body in bodies]
+    pairs = [[str(word) for word in pair] for pair in allowed]
+    return document | ({"allow": pairs} if pairs else {})
+
+
+def document_text(document: Mapping[str, Any]) -> str:
+    """A scene document as JSON: one body a line, every double in the shortest digits that give it back."""
+    lines = []
+    for key, value in document.items():
+        if key == "bodies":
+            bodies = ",\n    ".join(json.dumps(body, allow_nan=False) for body in value)
+            lines.append(f'  "bodies": [\n    {bodies}\n  ]' if value else '  "bodies": []')
+        else:
+            text = json.dumps(value, allow_nan=False, indent=2 if isinstance(value, Mapping) else None)
+            lines.append(f"  {json.dumps(key)}: " + text.replace("\n", "\n  "))
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def write_whole(path: str | Path, text: str) -> None:
+    """A text file that is there whole, or not at all."""
+    path = Path(path)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror, str(path)) from None
+
+
+def shape_document(shape: Shape) -> dict[str, Any]:
+    """A shape as scene files write it: one key, its kind. Raises SceneError for one that has no such form."""
+    if isinstance(shape, Compound):
+        return {"compound": [{"shape": shape_document(part), "pose": _pose(X)} for part, X in shape.items]}
+    for kind, name, fields in _FORMS:
+        if type(shape) is kind:
+            return {name: {key: _plain(getattr(shape, field)) for key, field in fields.items()}}
+    raise SceneError(f"a {type(shape).__name__} has no form in scene files")
+
+
+#: Class, the key in scene files, and its keys with the attributes that they are.
+_FORMS: tuple[tuple[type[Shape], str, dict[str, str]], ...] = (
+    (Box, "box", {"size": "size"}),
+    (Sphere, "sphere", {"radius": "radius"}),
+    (Capsule, "capsule", {"radius": "radius", "length": "length"}),
+    (Cylinder, "cylinder", {"radius": "radius", "length": "length"}),
+    (Cone, "cone", {"radius": "radius", "length": "length"}),
+    (Ellipsoid, "ellipsoid", {"radii": "radii"}),
+    (Halfspace, "halfspace", {"normal": "normal", "offset": "offset"}),
+    (ConvexHull, "hull", {"points": "points", "radius": "radius"}),
+    (HPolytope, "hpolytope", {"normals": "normals", "offsets": "offsets"}),
+    (HeightField, "heightfield", {"heights": "heights", "cell": "cell", "bottom": "bottom"}),
+    (Mesh, "mesh", {"vertices": "vertices", "faces": "faces", "solid": "solid"}),
+)
+
+
+def _bodies_and_allowed(scene) -> tuple[list, list[tuple]]:
+    if hasattr(scene, "bodies"):
+        return list(scene.bodies), list(scene.allowed)
+    if not hasattr(scene, "ids"):
+        raise InvalidArgument(f"save takes a Scene or a World, got {type(scene).__name__}")
+    bodies = [scene.body(i) for i in scene.ids]
+    names = {body.id: body.name for body in bodies}
+    allowed = scene._allowed  # pairs of ids; the World shows them nowhere else
+    return bodies, [(names[a], names[b], *reason) for a, b, *reason in allowed if a in names and b in names]
+
+
+def _body(body) -> dict[str, Any]:
+    item: dict[str, Any] = {"name": str(body.name), "shape": shape_document(body.shape)}
+    if not np.array_equal(body.X_WB, np.eye(4)):
+        item["pose"] = _pose(body.X_WB)
+    item |= {"static": True} if body.static else {}
+    if body.group > BITS:
+        raise SceneError(f'body "{body.name}": scene files have groups of 16 bits, got {body.group:#x}')
+    mask = int(body.mask) & BITS  # no group has higher ones
+    item |= {"group": int(body.group)} if body.group != 1 else {}
+    return item | ({"mask": mask} if mask != BITS else {})
+
+
+def _pose(X: np.ndarray) -> dict[str, Any]:
+    """Only a translation, or the matrix as it stands: rotations are not rounded."""
+    if np.array_equal(X[:3, :3], np.eye(3)):
+        return {"xyz": _plain(X[:3, 3])}
+    return {"matrix": _plain(X)}
+
+
+def _plain(value) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

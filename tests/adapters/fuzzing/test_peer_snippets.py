@@ -1,0 +1,103 @@
+"""Snippets run in an interpreter of their own, without collide, and print the peer's answer and the true one."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from collide import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere, pose
+from collide.adapters.fuzzing.disagreements import Flaw
+from collide.adapters.fuzzing.fuzz_case import Case, isolated, pair_case
+from collide.adapters.fuzzing.peer_snippets import MAX_LINES, snippet
+from collide.adapters.fuzzing.proofs import expected_text, proof
+from collide.adapters.peers.protocol import engine
+
+TETRAHEDRON = ConvexHull([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+SURFACE = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3]])
+AWAY, TURNED = pose((3.25, 0.5, 0.125)), pose((2.5, 0.25, 0.125), rpy=(0.3, 0.2, 0.1))
+PAIRS: dict[str, tuple[Shape, Shape]] = {
+    "boxes": (Box((1, 2, 3)), Box((1, 1, 1))), "rounds": (Sphere(0.5), Capsule(0.25, 1)),
+    "curved": (Cylinder(0.5, 1), Sphere(0.25)), "hulls": (TETRAHEDRON, TETRAHEDRON),
+    "mesh": (SURFACE, Sphere(0.25)), "hull and mesh": (TETRAHEDRON, SURFACE),
+    "plane": (Halfspace((0, 0, 2), -8), Box((1, 1, 1))),
+    "cones": (Cone(0.5, 1), Ellipsoid((0.1, 0.2, 0.3))),
+}  # fmt: skip
+SETTINGS = ["fcl", "fcl:indep", "coal", "coal:tight", "coal:nesterov", "coal:polyak", "pybullet", "pybullet:margins"]
+
+
+def flaw(name: str) -> Flaw:
+    return Flaw(name, "wrong gap", "apart", False, 1.0, "", False, 1.0, None, None, "exact arithmetic", 1.0)
+
+
+def printed(text: str) -> list[str]:
+    program = [sys.executable, "-I", "-c", _without_collide(text)]
+    ended = subprocess.run(program, check=False, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    return [line for line in ended.stdout.splitlines() if line.startswith(("true: ", "fcl ", "coal ", "pybullet dist"))]
+
+
+def _without_collide(text: str) -> str:
+    """The snippets of a test in one interpreter, which may not import collide; those of coal need its path."""
+    return f"import sys\nsys.path[:] = {sys.path!r}\nsys.modules['collide'] = None\n{text}"
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_snippets_say_what_the_peer_says(name):
+    peer = engine(name)
+    if peer.missing():
+        pytest.skip(str(peer.missing()))
+    cases = [pair_case(A, B, X, Y) for A, B in PAIRS.values() for X, Y in ((pose(), AWAY), (TURNED, pose((0, 6, 0))))]
+    texts = [snippet(flaw(name), case, proof(case)) for case in cases]
+    table = peer.answer(isolated(cases))
+    asked = [k for k in range(len(cases)) if table.rows["answered"][k]]
+    assert len(asked) >= 12 and all(texts[k] for k in asked)
+    for text in filter(None, texts):
+        assert len(text.splitlines()) <= MAX_LINES
+        modules = {a.name for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import) for a in node.names}
+        assert modules <= {name.split(":")[0], "numpy"}
+    lines = printed("\n".join(str(texts[k]) for k in asked))
+    per_case = _grouped(lines)
+    assert len(per_case) == len(asked)
+    for k, said in zip(asked, per_case):
+        assert said[0] == f"true: {expected_text(proof(cases[k]))}"
+        row = table.rows[k]
+        if any(line.split(": ")[0].endswith("collide") for line in said):
+            assert said[1].endswith(str(bool(row["hit"]))), (cases[k], said)
+        distances = [float(line.split(": ")[1]) for line in said if "distance: " in line and line != said[0]]
+        if distances and row["has_distance"]:
+            assert distances == [row["distance"]], (cases[k], said)
+
+
+def _grouped(lines: list[str]) -> list[list[str]]:
+    groups: list[list[str]] = []
+    for line in lines:
+        if line.startswith("true: "):
+            groups.append([])
+        groups[-1].append(line)
+    return groups
+
+
+def test_what_has_no_snippet():
+    case = pair_case(Box((1, 1, 1)), Sphere(1), pose(), AWAY)
+    known = proof(case)
+    assert snippet(flaw("exact"), case, known) is None and snippet(flaw("collide"), case, known) is None
+    assert snippet(flaw("fcl"), Case(case.bodies, world=True), known) is None
+    many = ConvexHull(np.random.default_rng(0).standard_normal((200, 3)))
+    assert snippet(flaw("fcl"), pair_case(many, many, pose(), AWAY), known) is None
+    flat = ConvexHull([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    assert snippet(flaw("coal"), pair_case(flat, flat, pose(), AWAY), known) is None, "coal cannot be given it"
+
+
+def test_proofs_are_told_with_where_they_come_from():
+    apart = proof(pair_case(Box((1, 1, 1)), Box((1, 1, 1)), pose(), pose((1.5, 0, 0))))
+    assert expected_text(apart) == "apart, signed distance 0.5 m (exact arithmetic on integers)"
+    deep = proof(pair_case(Box((1, 1, 1)), Sphere(0.25), pose(), pose((0.5, 0, 0))))
+    assert deep["distance"] == "-0.25" and deep["certificate"]["facet_normal"] is not None
+    curved = proof(pair_case(Cylinder(1, 1), Sphere(0.5), pose(), pose((0, 0, 2))))
+    assert curved["lower"] <= 1.0 <= curved["upper"] and curved["by"] == "the bracket that collide proves"
+    union = proof(pair_case(SURFACE, Sphere(0.25), pose(), pose()))
+    assert union["hit"] is True and union["distance"] is None
