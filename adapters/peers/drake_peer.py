@@ -23,8 +23,8 @@ class DrakePeer(PairwisePeer):
     isolated, extra = True, "all-peers"
     about = "HasCollisions for the boolean, ComputeSignedDistancePairClosestPoints for the rest"
     receives = (
-        "doubles; hull corners, of which Drake takes its own hull", "rotations projected where it refuses them as given",
-        "a SceneGraph made for each pair",
+        "doubles; hull corners, of which Drake takes its own hull", "a SceneGraph made for each pair",
+        "rotations projected where it refuses them",
     )  # fmt: skip
     cannot = (
         "cones, hulls with a radius, meshes other than as their hull", "flat hulls",
@@ -49,7 +49,7 @@ class DrakePeer(PairwisePeer):
 
     def build(self, part: Shape) -> tuple:
         """Drake's shape, and the pose (4, 4) of its frame in the part."""
-        import pydrake.geometry as geometry
+        from pydrake import geometry
 
         if isinstance(part, Sphere):
             return geometry.Sphere(part.radius), np.eye(4)
@@ -98,7 +98,7 @@ class DrakePeer(PairwisePeer):
 
 def _scene(A, X_WA: np.ndarray, B, X_WB: np.ndarray):
     """What must stay alive, the query object of its two geometries, and their ids."""
-    import pydrake.geometry as geometry
+    from pydrake import geometry
 
     scene = geometry.SceneGraph()
     source = scene.RegisterSource("pair")
