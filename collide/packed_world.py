@@ -16,6 +16,7 @@ from collide.lazy_modules import lazy_module
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_kernel_calls import run_pairs
+from collide.narrowphase.method_functions import rows_of_pair
 from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
@@ -185,7 +186,7 @@ class PackedWorld:
 
     @property
     def meshed(self) -> np.ndarray:
-        """(n,) bool: bodies that are meshes or hold one."""
+        """(n,) bool: bodies that have no convex parts: meshes, what holds one, regions."""
         return self.parts.meshed
 
     def take_work(self) -> dict:
@@ -317,7 +318,9 @@ class PackedWorld:
         """Rows of pairs (k, 2) of bodies of the same two shapes. Raises UnsupportedQuery."""
         a, b = pairs.T
         A, B = self.shapes[self.shape_of[a[0]]], self.shapes[self.shape_of[b[0]]]
-        if boolean:
+        if A.is_region or B.is_region:
+            rows = rows_of_pair(A, B, self.X_WBs[a], self.X_WBs[b], limit)
+        elif boolean:
             rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
             states = mesh_batches.pair_states(A, B, self.X_WBs[a], self.X_WBs[b])
             rows["hit"] = states != mesh_batches.APART

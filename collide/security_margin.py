@@ -61,6 +61,8 @@ def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     Of two swept sets of points only the sum of the radii counts, which two doubles nearly always hold. A half-space
     stays.
     """
+    if A.is_region or B.is_region:
+        return _grown_beside_region(A, B, margin)
     if not (is_single_convex(A) and is_single_convex(B)):
         return None
     packed = [convex_set_of(shape) for shape in (A, B)]
@@ -79,3 +81,16 @@ def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     if rest == 0.0 and is_swept_points[1] and packed[0].kind == HALFSPACE:
         return A, ConvexHull(packed[1].points, radius=first)
     return None
+
+
+def _grown_beside_region(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
+    """The same of a region, which stays, and points swept by a ball."""
+    body = B if A.is_region else A
+    packed = convex_set_of(body) if is_single_convex(body) else None
+    if packed is None or packed.kind != POINTS or packed.slop:
+        return None
+    radius = packed.radius + margin
+    if Fraction(radius) != Fraction(packed.radius) + Fraction(margin) or radius > LARGEST:
+        return None
+    grown = ConvexHull(packed.points, radius=radius)
+    return (A, grown) if A.is_region else (grown, B)

@@ -13,6 +13,7 @@ from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, pose_table
 from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_kernel_calls import run_pairs
+from collide.narrowphase.method_functions import rows_of_pair
 from collide.packed_world import PackedWorld, batches_of_shapes
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
@@ -77,7 +78,7 @@ def answer_outside(packed: PackedWorld, questions: Questions, limit: float, thre
         return np.zeros(0, dtype=PAIR_DTYPE)
     pairs = packed.tree.boxes_met(questions.boxes, limit)
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
-    is_meshed = np.array([shape.meshed for shape in questions.shapes], dtype=bool)
+    is_meshed = np.array([shape.is_asked_whole for shape in questions.shapes], dtype=bool)
     meshed = is_meshed[questions.shape_of[pairs[:, 0]]] | packed.meshed[pairs[:, 1]]
     answered = [np.zeros(0, dtype=PAIR_DTYPE), _of_convex(packed, questions, pairs[~meshed], limit, threads)]
     shape_of = np.concatenate([questions.shape_of, len(questions.shapes) + packed.shape_of])
@@ -92,7 +93,8 @@ def _of_mesh(packed: PackedWorld, questions: Questions, pairs: np.ndarray, limit
     """Rows of pairs (k, 2) of the same two shapes."""
     q, b = pairs.T
     A, B = questions.shapes[questions.shape_of[q[0]]], packed.shapes[packed.shape_of[b[0]]]
-    rows = mesh_batches.rows_within(A, B, questions.X_WS[q], packed.X_WBs[b], limit)
+    rows_of = rows_of_pair if A.is_region or B.is_region else mesh_batches.rows_within
+    rows = rows_of(A, B, questions.X_WS[q], packed.X_WBs[b], limit)
     rows["a"], rows["b"] = q, b
     return rows
 

@@ -33,7 +33,8 @@ class WorldParts:
     Attributes
     ----------
     shapes : the distinct shapes.   shape_of : (n,) which of them each body has.   X_WBs : (n, 4, 4) poses, copied.
-    meshed, single_convex : (n,) bool: bodies that are meshes or hold one; that are one convex set in their own frame.
+    meshed, single_convex : (n,) bool: bodies that are asked as a whole, meshes above all; that are one convex set in
+        their own frame.
     counts, first : (n,), (n + 1,) how many parts each body has, and where they begin.   body_of : (parts,).
     table, row_of, poses : as `run_pairs` takes them.   X_BP : (parts, 4, 4).   boxes : (parts, 6).
     all_of_one_part : whether parts are bodies.
@@ -100,7 +101,7 @@ class WorldParts:
         reach = np.array([packed.reach for of_shape in parts for packed, _ in of_shape])
         counts = np.array([len(of_shape) for of_shape in parts], dtype=np.int64)
         first = len(self._shape_parts[0].rows) + np.cumsum(counts) - counts
-        meshed, single = [s.meshed for s in distinct.values()], [is_single_convex(s) for s in distinct.values()]
+        meshed, single = [s.is_asked_whole for s in distinct.values()], [is_single_convex(s) for s in distinct.values()]
         for column, values in zip(self._of_shapes, (first, counts, meshed, single)):
             column.extend(np.asarray(values, dtype=column.rows.dtype))
         for column, rows in zip(self._shape_parts, (row_of, X_SP, reach, has_own_pose(X_SP))):

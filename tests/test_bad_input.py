@@ -31,7 +31,6 @@ from collide import (
     Mesh,
     Sphere,
     UnknownBody,
-    UnsupportedQuery,
     World,
     distance,
     pose,
@@ -114,11 +113,6 @@ def test_what_is_no_shape_is_refused(make, words):
     assert isinstance(caught.value, CollideError) and isinstance(caught.value, ValueError)
     for word in words:
         assert word in str(caught.value), str(caught.value)
-
-
-def test_unbounded_polytopes_are_a_question_not_supported_yet():
-    with pytest.raises(UnsupportedQuery, match="HPolytope"):
-        HPolytope(CUBE[:5], np.ones(5), bounded=False)
 
 
 @pytest.mark.parametrize("X", [np.diag([1.0, 1, -1, 1]), np.full((4, 4), NAN), np.zeros((2, 4, 4)) + EYE, np.eye(3)])

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide.adapters.peers.question import Body, Question, bounds, convex_parts
+from collide.adapters.peers.question import Body, Question
 from collide.scenes.write_scene import scene_document
 from collide.shapes import Shape
 from collide.transforms import as_poses
@@ -64,14 +64,3 @@ def pair_of(question: Question, i: int, j: int) -> Case:
 def isolated(cases: Sequence[Case]) -> Question:
     """The pairs of cases as one question; row k is case k."""
     return Question.from_pairs([case.pair() for case in cases])
-
-
-def box_gap(case: Case) -> float:
-    """How far the axis-aligned boxes of the pair are apart [m]; 0 or less where they meet."""
-    (low_a, high_a), (low_b, high_b) = (bounds(body) for body in case.bodies[:2])
-    return float(np.maximum(low_a - high_b, low_b - high_a).max())
-
-
-def n_parts(shape: Shape) -> int:
-    """Convex parts and meshes whose union a shape is."""
-    return sum(1 for _ in convex_parts(shape, np.eye(4)))

@@ -27,6 +27,7 @@ from collide.shapes import (
     Cylinder,
     Ellipsoid,
     Halfspace,
+    HeightField,
     HPolytope,
     Mesh,
     Shape,
@@ -84,7 +85,7 @@ def _hull(rng: Random) -> Shape:
     points = rng.standard_normal((int(rng.integers(4, 20)), 3)) * _length(rng)
     if rng.random() < 0.5:
         points = np.round(points, 2)
-    return ConvexHull(points)
+    return ConvexHull(points, radius=_length(rng) if rng.random() < 0.1 else 0.0)
 
 
 def _hpolytope(rng: Random) -> Shape:
@@ -98,6 +99,11 @@ def _mesh(rng: Random) -> Shape:
         return _box_mesh(np.array([_length(rng) for _ in range(3)]))
     case = families.generate(str(rng.choice(families.mesh_names())), 1, int(rng.integers(1 << 30)))[0]
     return case.shapes()[int(rng.integers(2))]
+
+
+def _height_field(rng: Random) -> Shape:
+    heights = rng.uniform(0, 1, rng.integers(2, 5, 2)) * _length(rng)
+    return HeightField(np.round(heights, 2) if rng.random() < 0.5 else heights, _length(rng))
 
 
 def _compound(rng: Random) -> Shape:
@@ -114,7 +120,7 @@ _ROUND_AND_FLAT: list[Callable[[Random], Shape]] = [
     lambda rng: Ellipsoid([_length(rng) for _ in range(3)]),
     _hull,
 ]
-_SHAPES = [*_ROUND_AND_FLAT, *_ROUND_AND_FLAT, _hpolytope, _mesh, _mesh, _compound]
+_SHAPES = [*_ROUND_AND_FLAT, *_ROUND_AND_FLAT, _hpolytope, _mesh, _mesh, _height_field, _compound]
 
 
 def _shape(rng: Random) -> Shape:

@@ -29,7 +29,7 @@ def issue(flaw: Flaw, case: Case, about: dict[str, Any], snippet: str | None) ->
             "<details><summary>Certificate</summary>", "", certificate_text(about["exact"]), "", "```json",
             json.dumps(about["exact"]["certificate"]), "```", "", "</details>", "",
         ]  # fmt: skip
-    lines += [f"Found and shrunk by `collide fuzz`; `{about['command']}` shows it again."]
+    lines += [f"Found and shrunk by collide; `{about['command']}` shows it again."]
     return "\n".join(lines) + "\n"
 
 

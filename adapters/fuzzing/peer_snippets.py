@@ -245,4 +245,74 @@ def _bullet_shape(shape: Shape) -> str:
     return f"shapeType=p.GEOM_MESH, vertices={_numbers(points[0])}"
 
 
-_ENGINES: dict[str, Callable[[Case, str, str], list[str]]] = {"fcl": _fcl, "coal": _coal, "pybullet": _pybullet}
+# --- MuJoCo -----------------------------------------------------------------------------------------
+
+
+def _mujoco(case: Case, setting: str, expected: str) -> list[str]:
+    solver = " | mujoco.mjtDisableBit.mjDSBL_NATIVECCD" if "libccd" in setting else ""
+    lines = ["import mujoco", "import numpy as np", "", "spec = mujoco.MjSpec()"]
+    lines += [f"spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_MULTICCD{solver}"]
+    for letter, body in zip("AB", case.bodies):
+        geom, points = _mujoco_geom(letter, body.shape)
+        if points is not None:
+            lines.append(
+                f"mesh = spec.add_mesh(name='{letter}', inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX); "
+                f"mesh.uservert = {_numbers(points.ravel())}"
+            )
+        x, y, z, w = quaternion_xyzw(body.X_WB[:3, :3])
+        place = f"pos={_numbers(body.X_WB[:3, 3])}, quat={[w, x, y, z]!r}"
+        lines += [f"{letter} = spec.worldbody.add_body(name='{letter}', {place})"]
+        lines += [f"{letter}.add_geom(name='{letter}', {geom})"]
+    lines += [
+        "spec.add_pair(geomname1='A', geomname2='B', margin=0.0, gap=0.0)",
+        "model = spec.compile()",
+        "data = mujoco.MjData(model)",
+        "mujoco.mj_kinematics(model, data)",
+        f"print({f'true: {expected}'!r}, flush=True)",
+    ]
+    if "distance" in setting:
+        far = _far(case)
+        return [*lines, f"print('mujoco distance:', mujoco.mj_geomDistance(model, data, 0, 1, {far!r}, np.zeros(6)))"]
+    return [
+        *lines,
+        "mujoco.mj_collision(model, data)",
+        "print('mujoco collide:', data.ncon > 0)",
+        "print('mujoco contacts:', data.contact.dist.tolist())",
+    ]
+
+
+def _mujoco_geom(letter: str, shape: Shape) -> tuple[str, np.ndarray | None]:
+    """Arguments of add_geom, and the corners of its mesh."""
+    if isinstance(shape, Sphere):
+        return f"type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[{shape.radius!r}, 0, 0]", None
+    if isinstance(shape, Box):
+        return f"type=mujoco.mjtGeom.mjGEOM_BOX, size={_numbers(shape.size / 2)}", None
+    if isinstance(shape, Capsule | Cylinder):
+        kind = "CAPSULE" if isinstance(shape, Capsule) else "CYLINDER"
+        return f"type=mujoco.mjtGeom.mjGEOM_{kind}, size=[{shape.radius!r}, {shape.length / 2!r}, 0]", None
+    if isinstance(shape, Ellipsoid):
+        return f"type=mujoco.mjtGeom.mjGEOM_ELLIPSOID, size={_numbers(shape.radii)}", None
+    points = None if isinstance(shape, Mesh | Halfspace) else corners(shape)
+    if points is None or points[1]:
+        raise KeyError(type(shape).__name__)
+    return f"type=mujoco.mjtGeom.mjGEOM_MESH, meshname='{letter}'", np.unique(points[0], axis=0)
+
+
+def _far(case: Case) -> float:
+    """A length that the pair is surely not apart by [m], small as the peer's: libccd loses digits where it is large."""
+    reach = 0.0
+    for body in case.bodies[:2]:
+        shape = body.shape
+        if isinstance(shape, Box | Ellipsoid):
+            reach += float(np.sum(shape.size / 2 if isinstance(shape, Box) else shape.radii))
+        elif isinstance(shape, Sphere | Capsule | Cylinder):
+            reach += shape.radius + (0.0 if isinstance(shape, Sphere) else shape.length / 2)
+        else:
+            points = corners(shape)
+            reach += float(np.linalg.norm(points[0], axis=1).max()) if points is not None else 0.0
+    return 1.01 * (float(np.linalg.norm(case.bodies[0].X_WB[:3, 3] - case.bodies[1].X_WB[:3, 3])) + reach)
+
+
+_ENGINES: dict[str, Callable[[Case, str, str], list[str]]] = {
+    "fcl": _fcl, "coal": _coal, "pybullet": _pybullet, "mujoco": _mujoco,
+}  # fmt: skip

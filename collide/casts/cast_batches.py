@@ -12,6 +12,8 @@ from collide.casts.directions import Directions
 from collide.casts.leaves import Leaf, leaves_of
 from collide.casts.mesh_casts import cast_leaves
 from collide.casts.posed_parts import part_pairs
+from collide.casts.region_casts import Way, are_proven, are_to_be_asked_again, limits_of
+from collide.lowering.closed_regions import closed_shapes
 from collide.narrowphase.convex_batches import Question
 from collide.results import UNDECIDED
 from collide.shapes.compound import Compound
@@ -28,6 +30,9 @@ def cast_batch(
     """
     n = len(limits)
     sides = [[side] * n if isinstance(side, Shape) else side for side in (A, B)]
+    onto_region = np.flatnonzero([b.is_region for b in sides[1]])
+    if len(onto_region):
+        return _with_regions(sides, X_WA, X_WB, directions, limits, onto_region)
     meshed = np.array([a.meshed or b.meshed for a, b in zip(*sides)], dtype=bool)
     if not meshed.any():
         return cast_parts(part_pairs(A, B, X_WA, X_WB, n), directions.vectors, limits, n)
@@ -45,6 +50,38 @@ def cast_batch(
         else:
             answers.append(_cast_meshed(sides[0][some[0]], sides[1][some[0]], *poses, vectors, limit))
     order = np.argsort(np.concatenate(list(numbers.values())), kind="stable")
+    return CastRows._make(np.concatenate(columns)[order] for columns in zip(*answers))
+
+
+def _with_regions(sides, X_WA, X_WB, directions: Directions, limits: np.ndarray, some: np.ndarray) -> CastRows:
+    """The same where B of some casts is a region, to be closed by a box around the way that matters."""
+    n = len(limits)
+    X_WA, X_WB = (np.broadcast_to(X, (n, 4, 4)) for X in (X_WA, X_WB))
+
+    def ask(which: np.ndarray, ways: list[Way], *, far: bool) -> CastRows:
+        A, B = ([side[k] for k in which.tolist()] for side in sides)
+        vectors = directions.vectors[which]
+        ends = limits_of(ways, limits[which], far=far) if ways else limits[which]
+        poses = np.ascontiguousarray(X_WA[which]), np.ascontiguousarray(X_WB[which])
+        if ways:
+            A, B = closed_shapes(A, B, *poses, len(which), ends * np.linalg.norm(vectors, axis=1))
+        return cast_batch(A, B, *poses, Directions(vectors, directions.exponents[which]), ends)
+
+    ways = [
+        Way(sides[0][k], X_WA[k], sides[1][k], X_WB[k], directions.vectors[k]) for k in some.tolist()
+    ]
+    rows = ask(some, ways, far=False)
+    again = are_to_be_asked_again(ways, rows.hit, limits[some])
+    if len(again):
+        for column, values in zip(rows, ask(some[again], [ways[k] for k in again.tolist()], far=True)):
+            column[again] = values
+    proven = are_proven(ways, rows.hit, limits[some])
+    rows = rows._replace(proven=rows.proven & proven, certified=rows.certified & proven)
+    others = np.setdiff1d(np.arange(n), some)
+    if not len(others):
+        return rows
+    answers = rows, ask(others, [], far=False)
+    order = np.argsort(np.concatenate([some, others]), kind="stable")
     return CastRows._make(np.concatenate(columns)[order] for columns in zip(*answers))
 
 

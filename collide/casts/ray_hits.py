@@ -22,10 +22,10 @@ class RayHits(NamedTuple):
     point : in W [m], origin + distance · direction, rounded; zeros where nothing is met.
     normal : outward unit normal of the surface in W: of a facet that from which its corners run counter-clockwise.
         Zeros for a facet without area, and where nothing is met.
-    facet : number of the facet of a `Mesh`, `Box`, `ConvexHull` or `HPolytope`; of several met at the same point the
-        least. Of cylinders and cones 0 round about, 1 below and 2 above, of capsules 1 and 2 on the balls at their
-        ends; 0 of balls, ellipsoids and half-spaces. −1 where nothing is met, and for polytopes within a `Compound`,
-        or swept by a ball.
+    facet : number of the facet of a `Mesh`, `Box`, `ConvexHull` or `HPolytope`, of one with bounded=False the row of
+        its half-space; of several met at the same point the least. Of cylinders and cones 0 round about, 1 below and 2
+        above, of capsules 1 and 2 on the balls at their ends; 0 of balls, ellipsoids and half-spaces. −1 where nothing
+        is met, and for polytopes within a `Compound`, or swept by a ball.
     starts : (N + 1,) with ``all_hits``, where the places of each ray begin and end: then the fields above and below,
         but for ``hit``, have a row for every place, by distance, then item and facet. None otherwise.
     certified : that hit or miss is proven, and the bracket is as narrow as said. Rays that touch a curved surface, or

@@ -14,12 +14,14 @@ from collide.casts.posed_parts import posed_parts
 from collide.casts.ray_facets import facets_met
 from collide.casts.ray_hits import RayEvents, RayHits, as_hits, in_order, joined
 from collide.casts.ray_parts import parts_met
+from collide.casts.ray_planes import planes_met
 from collide.errors import InvalidArgument
 from collide.lowering.facet_bodies import body_of
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import moved_pose
 from collide.shapes.compound import Compound
+from collide.shapes.hpolytope import HPolytope
 from collide.shapes.shape import IDENTITY, Shape
 from collide.transforms import poses_as_given
 
@@ -85,6 +87,8 @@ def surfaces_met(
 
     every : all of them; else at least the first of each ray, and what may come before it.
     """
+    if isinstance(shape, HPolytope) and shape.is_region:
+        return planes_met(shape, X_WA, origins, directions, limit, every=every)
     if _is_facets(shape):
         return facets_met(body_of(shape), X_WA, origins, directions, limit, every)
     if not isinstance(shape, Compound):

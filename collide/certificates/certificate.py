@@ -14,7 +14,11 @@ Unions of convex parts: together, one certificate names the two parts that meet;
 parts. Pairs with a mesh have one certificate: together, of two facets that come within r_A + r_B of each other, whose
 corners are the vertices named (a convex shape is taken whole, its facet is 0); apart, an axis between the convex hulls.
 
-Without a certificate are: cylinders, cones and ellipsoids; two half-spaces; results whose sign is open or that are
+A region of half-spaces (`HPolytope` with ``bounded=False``) and points swept by a ball have a certificate of their own
+(`region_proofs.py`), which names half-spaces.
+
+Without a certificate are: cylinders, cones and ellipsoids; two half-spaces; regions beside
+other bodies; results whose sign is open or that are
 beyond the query's max_distance; meshes apart whose hull meets the other body (it would take an axis for every pair of
 facets).
 

@@ -11,6 +11,7 @@ from collide.certificates.convex_proofs import flaw_of_proof
 from collide.certificates.exact_parts import ExactPart, common_vertices, exact_parts, has_exact_numbers
 from collide.certificates.mesh_proofs import ProofBody, flaw_of_inside_proof
 from collide.certificates.nearest_to_origin import nearest_vertex_pairs
+from collide.certificates.region_proofs import RegionCertificate, make_region_certificate
 from collide.certificates.verify import check_question
 from collide.errors import InvalidArgument
 from collide.lowering.packed_convex import HALFSPACE
@@ -18,8 +19,8 @@ from collide.numerics.exact_points import inner
 from collide.results import UNDECIDED, PairResult, question_of_row
 from collide.transforms import as_poses
 
-#: Certificates of one pair of bodies; None where it has none.
-Certificates = tuple[Certificate, ...] | None
+#: Certificates of one pair of bodies, or that of a region and another body; None where it has none.
+Certificates = tuple[Certificate, ...] | RegionCertificate | None
 
 
 def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates]:
@@ -62,6 +63,8 @@ def certificate_of_row(A, B, X_WA, X_WB, row) -> Certificates:
     """The certificate of one row of `distance` at poses (1, 4, 4); None where the pair has none."""
     if row["how"] == UNDECIDED or row["beyond"]:
         return None
+    if A.is_region or B.is_region:
+        return make_region_certificate(A, B, X_WA[0], X_WB[0])
     if A.meshed or B.meshed:
         return _of_meshes(ProofBody(A, X_WA[0]), ProofBody(B, X_WB[0]), row)
     parts_a, parts_b = exact_parts(A, X_WA[0]), exact_parts(B, X_WB[0])

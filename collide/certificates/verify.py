@@ -10,6 +10,7 @@ from collide.certificates.certificate import APART, TOGETHER, Certificate, Certi
 from collide.certificates.convex_proofs import flaw_of_proof
 from collide.certificates.exact_parts import exact_parts
 from collide.certificates.mesh_proofs import flaw_of_mesh_certificates
+from collide.certificates.region_proofs import flaw_of_region_certificate
 from collide.errors import InvalidArgument
 from collide.shapes.shape import Shape
 from collide.transforms import as_poses
@@ -51,8 +52,13 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
             "verify: this result carries no certificate (curved shapes, open sign, beyond, or bodies apart of which "
             "one is a mesh whose hull meets the other)"
         )
-    certificates = read_certificates(certificate)
     claim = TOGETHER if bool(np.all(r.hit)) else APART
+    if A.is_region or B.is_region:
+        flaw = flaw_of_region_certificate(A, B, X_WA[0], X_WB[0], certificate, claim)
+        if flaw:
+            raise CertificateRefused(flaw)
+        return
+    certificates = read_certificates(certificate)
     flaw_of = flaw_of_mesh_certificates if A.meshed or B.meshed else _flaw_of_parts
     flaw = flaw_of(A, B, X_WA[0], X_WB[0], certificates, claim)
     if flaw:

@@ -12,6 +12,7 @@ from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.curved_contacts import curved_contacts
 from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
+from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of
@@ -66,6 +67,7 @@ def contact_batch(
     """
     if n == 0:
         return np.zeros(0, dtype=CONTACT_DTYPE), np.zeros(0, dtype=np.int64)
+    A, B = closed_shapes(A, B, X_WA, X_WB, n, margin)
     if not (isinstance(A, Shape) and isinstance(B, Shape)):
         A, B = of_one_set(A, B, n)
     if _all_convex(A, B):

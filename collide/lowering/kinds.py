@@ -24,6 +24,7 @@ class Kind(IntEnum):
     MESH = 8
     COMPOUND = 9
     MESH_COMPOUND = 10
+    REGION = 11
 
 
 #: Kinds whose surface is that of a hull of doubles swept by a ball, or a mesh: `facet_bodies.body_of` serves them.
@@ -36,6 +37,8 @@ def kind_of(shape: Shape) -> Kind:
     """The kind of a shape."""
     if isinstance(shape, Compound):
         return Kind.MESH_COMPOUND if shape.meshed else Kind.COMPOUND
+    if shape.is_region:
+        return Kind.REGION
     return Kind.MESH if shape.meshed else _kind_of_convex(convex_set_of(shape))
 
 

@@ -38,21 +38,25 @@ _ULPS_PER_PRODUCT = 8
 _ULP = 2.0**-53
 #: Points of a mesh that are their own bounds; of more, boxes of so many cells along each axis hold them.
 _MAX_OWN_BOUNDS, _CELLS = 512, 6
+#: Corners of an `HPolytope` from which it gets a support tree: no shape made of few planes has as many.
+_CORNERS_WITH_TREE = 2000
 
 
 @kept_with_shape("_parts")
 def parts_of(shape: Shape) -> tuple[Part, ...]:
-    """The convex sets whose union a shape is. Raises UnsupportedQuery for meshes."""
+    """The convex sets whose union a shape is. Raises UnsupportedQuery for meshes and regions."""
     return _rule_for(shape)(shape)
 
 
 def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:
-    """Convex sets that hold a shape: its parts, or something larger and simpler where meshes are in it. For culling."""
-    return _bounds_around_meshes(shape) if shape.meshed else parts_of(shape)
+    """Convex sets that hold a shape: its parts, or something larger and simpler where it has none. For culling."""
+    return _bounds_around(shape) if shape.is_asked_whole else parts_of(shape)
 
 
 @kept_with_shape("_bounds")
-def _bounds_around_meshes(shape: Compound | Mesh) -> tuple[Part, ...]:
+def _bounds_around(shape: Compound | Mesh | HPolytope) -> tuple[Part, ...]:
+    if isinstance(shape, HPolytope):
+        return _alone(_half_space_around(shape))
     return _compound(shape, bounding_parts_of) if isinstance(shape, Compound) else _mesh_bounds(shape)
 
 
@@ -63,7 +67,7 @@ def convex_set_of(shape: Shape) -> PackedConvex:
 
 def is_single_convex(shape: Shape) -> bool:
     """Whether a shape is one convex set in its own frame."""
-    if shape.meshed:
+    if shape.is_asked_whole:
         return False
     parts = parts_of(shape)
     return len(parts) == 1 and (parts[0][1] is IDENTITY or np.array_equal(parts[0][1], IDENTITY))
@@ -112,7 +116,23 @@ def _convex_hull(shape: ConvexHull) -> tuple[Part, ...]:
 
 
 def _hpolytope(shape: HPolytope) -> tuple[Part, ...]:
-    return _alone(pack_points(shape.vertices, slop=shape.slop))
+    if shape.is_region:
+        raise UnsupportedQuery(
+            "HPolytope(bounded=False): a region has no corners, which this query needs; with bounded=True, closed by "
+            "half-spaces far away, it has"
+        )
+    packed = pack_points(shape.vertices, slop=shape.slop, with_tree=len(shape.vertices) > _CORNERS_WITH_TREE)
+    if shape.is_closed:
+        packed.prepared.made["planes"] = shape.normals, shape.offsets
+    return _alone(packed)
+
+
+def _half_space_around(region: HPolytope) -> PackedConvex:
+    """The half-space that reaches least beyond the origin, of those that hold a region."""
+    exponents = np.frexp(np.abs(region.normals).max(axis=1))[1]
+    normals, offsets = np.ldexp(region.normals, -exponents[:, None]), np.ldexp(region.offsets, -exponents)
+    least = int(np.argmin(offsets / np.sqrt(np.square(normals).sum(axis=1))))
+    return pack_halfspace(tuple(normals[least]), float(offsets[least]))
 
 
 def _mesh(shape: Mesh) -> tuple[Part, ...]:

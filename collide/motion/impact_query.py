@@ -10,18 +10,19 @@ import numpy as np
 from collide import argument_checks as checks
 from collide.batches import answer_batch
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
+from collide.lowering.closed_regions import reach_of
 from collide.lowering.kinds import Kind, kind_of
 from collide.motion.convex_impact import CONTACT, FREE, OPEN_START, TOO_SMALL
 from collide.motion.convex_motions import Motions, convex_impacts, single_impact
 from collide.motion.impact_jobs import WRONG_TURN
 from collide.motion.impact_rows import TimeOfImpact, as_result, free_rows
 from collide.motion.placed_motion import poses_at
+from collide.motion.region_motions import with_regions_closed
 from collide.motion.surface_motions import surface_impacts
 from collide.narrowphase.convex_batches import Question
 from collide.numerics.sine_cosine import LARGEST_ANGLE
 from collide.pair_arguments import checked_shapes, matched_counts
 from collide.results import UNDECIDED
-from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.threads import check_threads, share_if_it_helps
 from collide.transforms import LARGEST, SMALLEST, as_pose, poses_as_given
@@ -99,7 +100,8 @@ def time_of_impact(
     omegas, single_omegas = zip(*(_checked_omega(omega, name) for name, omega in turns.items()))
     counts = {name: len(X) for name, X in zip((*matrices, *turns), (*poses, *omegas)) if X is not None}
     n, are_shapes = matched_counts(A, B, counts)
-    question = _Question(*_distinct(A, B, n), Motions(*poses, *omegas), width, n_threads)
+    motions = Motions(*poses, *omegas)
+    question = _Question(*with_regions_closed(*_distinct(A, B, n), motions), motions, width, n_threads)
     return as_result(_answer(question), width, are_shapes and all(singles) and all(single_omegas))
 
 
@@ -281,7 +283,7 @@ def _answer(question: _Question) -> np.ndarray:
     rows = free_rows(len(a))
     meshed = np.array([kind_of(shape) in (Kind.MESH, Kind.MESH_COMPOUND) for shape in shapes], dtype=bool)
     of_facets = meshed[a] | meshed[b]
-    unbounded = np.array([_has_halfspace(shape) for shape in shapes], dtype=bool)
+    unbounded = np.array([reach_of(shape) == np.inf for shape in shapes], dtype=bool)
     to_ask_first = of_facets | (unbounded[a] & unbounded[b])
     _ask_start(question, rows, np.flatnonzero(to_ask_first))
     apart = rows["status"] == FREE
@@ -296,12 +298,6 @@ def _answer(question: _Question) -> np.ndarray:
     _ask_start(question, rows, np.flatnonzero(rows["status"] == OPEN_START))
     _describe_start(question, rows)
     return rows
-
-
-def _has_halfspace(shape: Shape) -> bool:
-    if isinstance(shape, Compound):
-        return any(_has_halfspace(item) for item, _ in shape.items)
-    return kind_of(shape) == Kind.HALFSPACE
 
 
 def _start_of(question: _Question, some: np.ndarray):
@@ -359,8 +355,8 @@ def _refuse_planes(question: _Question, some: np.ndarray) -> None:
     if len(some):
         names = " and ".join(type(question.shapes[side[some[0]]]).__name__ for side in (question.a, question.b))
         raise UnsupportedQuery(
-            f"time_of_impact of {names} (motion {some[0]}): two half-spaces that start apart meet as soon as one "
-            "tilts, however far away; a large Box can stand in for one of them"
+            f"time_of_impact of {names} (motion {some[0]}): two half-spaces, or regions of them, that start apart may "
+            "meet when one tilts, however far away; a large Box can stand in for one of them"
         )
 
 

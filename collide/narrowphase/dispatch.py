@@ -40,6 +40,11 @@ class Method(Enum):
         "composite/composite_meshes",
         "pairs of parts of which some are meshes, culled by boxes, combined to one row",
     )
+    REGION = (
+        "region_pairs",
+        "the region is closed by a box that changes nothing, then as the table says; touching by its planes",
+    )
+    REGIONS = "region_pairs", "both without end: booleans by a program over all planes; boxes that grow until they tell"
 
     @property
     def file(self) -> str:
@@ -53,24 +58,26 @@ class Method(Enum):
 C, H, P, G = Method.CLOSED, Method.PLANE, Method.PLANES, Method.CONVEX
 F, E, L = Method.FACETS, Method.CURVED, Method.HULL
 U, M = Method.PARTS, Method.MESH_PARTS
+R, S = Method.REGION, Method.REGIONS
 
 #: Row and column in the order of `Kind`; what stands below the diagonal is mirrored.
-#: The last column, "both", is of compounds with meshes among their parts.
+#: The column "both" is of compounds with meshes among their parts, the last of an `HPolytope` kept as planes.
 #: ROUNDED is an `HPolytope` whose corners are not doubles: to kernels it is points, to meshes it has no exact facets.
 # fmt: off
 _UPPER_HALF = (
-    #                   sphere  capsule  polytope  rounded  cylinder  cone  ellipsoid  halfspace  mesh  compound  both
-    (Kind.SPHERE,       (C,     C,       G,        G,       G,        G,    G,         H,         F,    U,        M)),
-    (Kind.CAPSULE,      (       C,       G,        G,       G,        G,    G,         H,         F,    U,        M)),
-    (Kind.POLYTOPE,     (                G,        G,       G,        G,    G,         H,         F,    U,        M)),
-    (Kind.ROUNDED,      (                          G,       G,        G,    G,         H,         E,    U,        M)),
-    (Kind.CYLINDER,     (                                   G,        G,    G,         H,         E,    U,        M)),
-    (Kind.CONE,         (                                             G,    G,         H,         E,    U,        M)),
-    (Kind.ELLIPSOID,    (                                                   G,         H,         E,    U,        M)),
-    (Kind.HALFSPACE,    (                                                              P,         L,    U,        M)),
-    (Kind.MESH,         (                                                                         F,    M,        M)),
-    (Kind.COMPOUND,     (                                                                               U,        M)),
-    (Kind.MESH_COMPOUND,(                                                                                         M,)),
+    #                      sphere capsule polytope rounded cylinder cone ellipsoid halfspace mesh compound both region
+    (Kind.SPHERE,         (C,     C,      G,       G,      G,       G,   G,        H,        F,   U,       M,   R)),
+    (Kind.CAPSULE,        (       C,      G,       G,      G,       G,   G,        H,        F,   U,       M,   R)),
+    (Kind.POLYTOPE,       (               G,       G,      G,       G,   G,        H,        F,   U,       M,   R)),
+    (Kind.ROUNDED,        (                        G,      G,       G,   G,        H,        E,   U,       M,   R)),
+    (Kind.CYLINDER,       (                                G,       G,   G,        H,        E,   U,       M,   R)),
+    (Kind.CONE,           (                                         G,   G,        H,        E,   U,       M,   R)),
+    (Kind.ELLIPSOID,      (                                              G,        H,        E,   U,       M,   R)),
+    (Kind.HALFSPACE,      (                                                        P,        L,   U,       M,   S)),
+    (Kind.MESH,           (                                                                  F,   M,       M,   R)),
+    (Kind.COMPOUND,       (                                                                       U,       M,   R)),
+    (Kind.MESH_COMPOUND,  (                                                                                M,   R)),
+    (Kind.REGION,         (                                                                                     S,)),
 )
 # fmt: on
 
@@ -84,6 +91,7 @@ REFUSED: dict[tuple[Method, str], str] = {
         "their overlap has no end, so no translation of finite length separates them; collide() still answers"
     ),
 }
+REFUSED[Method.REGIONS, "distance"] = REFUSED[Method.PLANES, "distance"]
 
 
 def method_of(kind_a: Kind, kind_b: Kind) -> Method:

@@ -11,7 +11,10 @@ from collide.lazy_modules import lazy_module
 from collide.lowering.kinds import kind_of
 from collide.narrowphase.convex_batches import Question, answer_parts, answer_sets, prepare_parts, prepare_sets
 from collide.narrowphase.dispatch import TABLE, Method
+from collide.narrowphase.region_pairs import Batch, answer_closed, answer_unbounded
+from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
+from collide.transforms import as_poses
 
 #: Half of the engine, which scenes without meshes never load.
 mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
@@ -47,6 +50,28 @@ def _prepare_curved(A: Shape, B: Shape) -> Any:
     return mesh_batches.curved_pair(A, B)
 
 
+def _answer_region(out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
+    answer_closed(_batch_of, out, A, B, _poses_of(out, X_WA, X_WB, question), question)
+    return True
+
+
+def _answer_regions(
+    out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question
+) -> bool:
+    answer_unbounded(_batch_of, out, A, B, _poses_of(out, X_WA, X_WB, question), question)
+    return True
+
+
+def _batch_of(A: Shape, B: Shape) -> Batch:
+    return answer_of(A, B).batch
+
+
+def _poses_of(out: np.ndarray, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> tuple[np.ndarray, np.ndarray]:
+    """Both batches as long as the answers, checked as the question wants."""
+    X_WA, X_WB = as_poses(X_WA, "X_WA", check=question.check), as_poses(X_WB, "X_WB", check=question.check)
+    return np.broadcast_to(X_WA, (len(out), 4, 4)), np.broadcast_to(X_WB, (len(out), 4, 4))
+
+
 def _unprepared(A: Shape, B: Shape) -> None:
     return None
 
@@ -67,6 +92,8 @@ ANSWERS: dict[Method, Answer] = {
     Method.CURVED: _CURVED,
     Method.HULL: _MESHES,
     Method.MESH_PARTS: _MESHES,
+    Method.REGION: Answer(_answer_region, _unprepared, True),
+    Method.REGIONS: Answer(_answer_regions, _unprepared, True),
 }
 
 
@@ -79,3 +106,13 @@ OF_ONE_PAIR = np.array([[ANSWERS[method].of_one_pair for method in row] for row 
 def answer_of(A: Shape, B: Shape) -> Answer:
     """What answers a pair of shapes."""
     return _ANSWER_TABLE[kind_of(A)][kind_of(B)]
+
+
+def rows_of_pair(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
+    """Rows of `PAIR_DTYPE` of two shapes, whatever they are, at checked poses (n, 4, 4); limit [m] as of `distance`.
+
+    Raises UnsupportedQuery.
+    """
+    rows = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
+    answer_of(A, B).batch(rows, A, B, X_WA, X_WB, Question(False, limit))
+    return rows

@@ -46,7 +46,8 @@ class Triangles(NamedTuple):
 class ShapeTable:
     """The shapes of one page, gathered first, written together: how much each may take depends on all of them.
 
-    size : edge length of the square that stands for a half-space [m].   max_facets : see `MAX_FACETS`.
+    size : edge length of what stands for a body without end [m]: a square for a half-space, a box around a region.
+    max_facets : see `MAX_FACETS`.
     """
 
     def __init__(self, size: float, max_facets: int = MAX_FACETS):
@@ -86,7 +87,7 @@ class ShapeTable:
         return Triangles(
             np.concatenate(vertices), np.concatenate(faces), max(deviations),
             any(is_smooth(shape) for shape, _ in shapes),
-            any(isinstance(shape, Halfspace) for shape, _ in shapes),
+            any(isinstance(shape, Halfspace) or shape.is_region for shape, _ in shapes),
         )  # fmt: skip
 
     def boxes(self) -> list[np.ndarray | None]:

@@ -14,7 +14,7 @@ def of_scene(scene) -> dict:
 
     A body has ``name``, ``static``, ``owner``, ``X_WB`` (4, 4) and ``shape``, a row of ``shapes``. A shape has
     ``kind``, ``parameters``, ``vertices`` (V, 3), ``faces`` (F, 3) and their ``deviation`` [m]. A half-space is drawn
-    as a square twice as large as the scene.
+    as a square twice as large as the scene, a region of half-spaces within a box as large at least.
     """
     size = 2.0 * _extent(scene)
     rows: dict[int, int] = {}

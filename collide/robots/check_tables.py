@@ -162,8 +162,10 @@ def convex_parts_of(shape: Shape) -> _LinkParts:
 
     A solid mesh that is its own convex hull is that.
     """
-    if not shape.meshed:
+    if not shape.is_asked_whole:
         return _LinkParts(list(parts_of(shape)), False)
+    if shape.is_region:
+        return _LinkParts(list(bounding_parts_of(shape)), True)
     items = shape.items if isinstance(shape, Compound) else ((shape, np.eye(4)),)
     hulls = [(_as_hull(item), X) for item, X in items]
     if all(hull is not None for hull, _ in hulls):

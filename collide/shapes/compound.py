@@ -65,6 +65,11 @@ class Compound(Shape):
 def _check_item(k: int, shape, X) -> tuple[Shape, np.ndarray]:
     if not isinstance(shape, Shape):
         raise InvalidShape(f"Compound: items[{k}] must start with a shape, got {type(shape).__name__}")
+    if shape.is_region:
+        raise InvalidShape(
+            f"Compound: items[{k}] is an HPolytope with bounded=False; make it a body of its own, or close it by "
+            "half-spaces far away and leave bounded=False out"
+        )
     X = as_poses(X, f"Compound: items[{k}] pose")
     if len(X) != 1:
         raise InvalidPose(f"Compound: items[{k}] pose must be one (4, 4) matrix, got {len(X)}")

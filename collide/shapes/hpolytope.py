@@ -1,22 +1,35 @@
-"""HPolytope: a bounded intersection of half-spaces."""
+"""HPolytope: an intersection of half-spaces."""
 
 from __future__ import annotations
 
+import math
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide.errors import InvalidShape, UnsupportedQuery
+from collide.errors import InvalidShape
 from collide.hull.double_description import halfspace_vertices
+from collide.lazy_modules import lazy_module
+from collide.least_distance.input_rows import input_rows
+from collide.least_distance.nearest_pair import EMPTY, MEETING, nearest_pair
+from collide.least_distance.pair_proposals import Work
 from collide.shapes.shape import Shape, rows
 from collide.transforms import LARGEST
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from collide.hull import region_corners
+else:
+    region_corners = lazy_module("collide.hull.region_corners")
+
+#: More than what a quotient, a root and a sum round.
+_UP = 1 + 2.0**-40
+
 
 class HPolytope(Shape):
-    """The polytope {x : normals @ x ≤ offsets}, bounded and not empty.
+    """The polytope {x : normals @ x ≤ offsets}, not empty.
 
     Parameters
     ----------
@@ -25,29 +38,38 @@ class HPolytope(Shape):
     offsets : (m,) array_like, float64
         In the units of normals·x: metres, where normals have length 1.
     bounded : bool
-        Must be True: unbounded polyhedra are not supported yet.
+        True: refused where it has no end; its corners are found now. False: a region that may have none, kept as the
+        planes given: frusta, corridors, workspace limits (docs/polytopes.md, "Regions in scenes").
 
     Raises
     ------
     InvalidShape
-        Where the set is empty or unbounded, which is decided exactly, or numbers are out of range.
-    UnsupportedQuery
-        For ``bounded=False``.
+        Where the set is empty, naming half-spaces that contradict each other, or, with ``bounded``, has no end: both
+        are decided exactly. Where numbers are not finite or out of range, lengths do not match, or a normal is zero.
 
     Notes
     -----
-    The vertices are found exactly, by double description in integers (Motzkin, Raiffa, Thompson and Thrall 1953), and
-    rounded once to float64; ``vertices`` (v, 3) holds them, and every bracket counts that rounding in. About O(m v²)
-    integer operations: meant for m up to a few hundred.
+    Bounded: the vertices are found exactly, by double description in integers (Motzkin, Raiffa, Thompson and Thrall
+    1953), and rounded once to float64; ``vertices`` (v, 3) holds them, and every bracket counts that rounding in. About
+    O(m v²) integer operations: meant for m up to a few hundred.
+
+    Otherwise an exact least-distance program says whether there is a point in it, in O(m) for each of a few rounds:
+    0.1 s for 100,000 half-spaces. ``boundary_within`` [m] is how far the boundary is from the frame's origin, at most.
+    It has no ``vertices``: a pair query closes it by a box that is proven to change nothing
+    (`lowering/closed_regions.py`).
     """
 
-    __slots__ = ("bounded", "normals", "offsets", "slop", "vertices")
-    _fields = ("normals", "offsets")
+    __slots__ = ("_closed", "boundary_within", "bounded", "is_closed", "normals", "offsets", "slop", "vertices")
     normals: np.ndarray
     offsets: np.ndarray
     vertices: np.ndarray
     slop: float
     bounded: bool
+    boundary_within: float
+    #: True of a region that a box closes: its planes, not its rounded corners, decide what doubles leave open.
+    is_closed: bool
+    #: Closed by boxes of sizes that were needed (`lowering/closed_regions.py`).
+    _closed: dict[float, HPolytope]
 
     def __init__(self, normals: ArrayLike, offsets: ArrayLike, *, bounded: bool = True):
         normals = rows("HPolytope", "normals", normals, (None, 3))
@@ -56,15 +78,98 @@ class HPolytope(Shape):
         if zero.any():
             raise InvalidShape(f"HPolytope: normals[{int(np.argmax(zero))}] is zero and names no half-space")
         if not bounded:
-            raise UnsupportedQuery("HPolytope: bounded=False is not supported yet; add half-spaces that bound it")
+            self._store(normals=normals, offsets=offsets, bounded=False)
+            self._store(boundary_within=_boundary_within(normals, offsets))
+            return
         vertices, slop, unbounded = halfspace_vertices(normals, offsets)
         if unbounded is not None:
             raise InvalidShape(
-                f"HPolytope: unbounded in direction {unbounded.tolist()}; add a half-space that ends it"
+                f"HPolytope: unbounded in direction {unbounded.tolist()}; add a half-space that ends it, or say "
+                "bounded=False"
             )
         if not len(vertices):
             raise InvalidShape("HPolytope: empty: no point satisfies all half-spaces at once")
         if not np.abs(vertices).max() <= LARGEST:
             raise InvalidShape(f"HPolytope: a vertex lies beyond {LARGEST:g} m; scale the scene")
         vertices.flags.writeable = False
-        self._store(normals=normals, offsets=offsets, bounded=True, vertices=vertices, slop=slop)
+        self._store(
+            normals=normals, offsets=offsets, bounded=True, vertices=vertices, slop=slop, is_closed=False
+        )
+
+    def closed(self, size: float) -> HPolytope:
+        """A region within the box [−size, size]³ of its frame, with corners; made once and kept.
+
+        Parameters
+        ----------
+        size : float
+            A power of two [m], so large that the box holds a point of the region: twice ``boundary_within`` is.
+
+        Returns
+        -------
+        HPolytope
+            Its ``vertices`` within ``slop`` [m] of those of the planes as given.
+
+        Raises
+        ------
+        UnsupportedQuery
+            Of a region without inside of more than 394 half-spaces.
+        """
+        if not hasattr(self, "_closed"):
+            self._store(_closed={})
+        if size not in self._closed:
+            sides = np.vstack([np.eye(3), -np.eye(3)])
+            normals, offsets = np.vstack([self.normals, sides]), np.append(self.offsets, np.full(6, size))
+            vertices, slop = region_corners.region_corners(normals, offsets, size)
+            shape = object.__new__(HPolytope)
+            shape._store(normals=normals, offsets=offsets, bounded=True, vertices=vertices, slop=slop, is_closed=True)
+            for array in (normals, offsets, vertices):
+                array.flags.writeable = False
+            self._closed.setdefault(size, shape)
+        return self._closed[size]
+
+    @classmethod
+    def _from_fields(cls, normals: np.ndarray, offsets: np.ndarray, bounded: bool = True) -> HPolytope:
+        return cls(normals, offsets, bounded=bounded)
+
+    @property
+    def _fields(self) -> tuple[str, ...]:  # type: ignore[override]
+        return ("normals", "offsets") if self.bounded else ("normals", "offsets", "bounded")
+
+    @property
+    def is_region(self) -> bool:  # type: ignore[override]
+        """Whether it is kept as planes."""
+        return not self.bounded
+
+
+def _boundary_within(normals: np.ndarray, offsets: np.ndarray) -> float:
+    """An upper bound of the distance of the boundary from the origin [m]. Raises InvalidShape where the set is empty.
+
+    Outside, the boundary is as far as the set; inside, no farther than the nearest plane.
+    """
+    lengths = np.abs(normals).max(axis=1)
+    far = np.abs(offsets) > LARGEST * np.minimum(lengths, 1.0)
+    if far.any():
+        k = int(np.argmax(far))
+        raise InvalidShape(
+            f"HPolytope: half-space {k} is farther than {LARGEST:g} m from the origin: offset {offsets[k]:g}, normal "
+            f"{normals[k].tolist()}; scale the scene"
+        )
+    read = input_rows(np.zeros((1, 3)), normals, offsets)
+    pair = nearest_pair(read.points, read.halfspaces, Work())
+    if pair.kind == EMPTY:
+        named = sorted(pair.halfspaces)
+        raise InvalidShape(
+            f"HPolytope: empty: half-spaces {', '.join(map(str, named[:-1]))} and {named[-1]} contradict each other, "
+            "no point satisfies all of them"
+            if len(named) > 1
+            else f"HPolytope: empty: no point satisfies half-space {named[0]}"
+        )
+    if pair.kind == MEETING:
+        exponents = np.frexp(lengths)[1]
+        scaled = np.ldexp(normals, -exponents[:, None])
+        return float((np.ldexp(offsets, -exponents) / np.sqrt(np.square(scaled).sum(axis=1))).min()) * _UP
+    unit = Fraction(2) ** read.exponent / pair.denominator
+    place = [number * unit for number in pair.x]
+    if max(map(abs, place)) > LARGEST:
+        raise InvalidShape(f"HPolytope: all of it lies beyond {LARGEST:g} m; scale the scene")
+    return math.hypot(*map(float, place)) * _UP

@@ -56,6 +56,13 @@ class Shape:
     convex = True
     #: True where triangles are in it (`Mesh`, a `Compound` with one): `parts_of` has no convex parts for those.
     meshed = False
+    #: True of an `HPolytope` that is kept as planes: it has no convex parts either, until a box closes it.
+    is_region = False
+
+    @property
+    def is_asked_whole(self) -> bool:
+        """Whether `parts_of` has no convex parts for it."""
+        return self.meshed or self.is_region
 
     def _store(self, **values: Any) -> None:
         for name, value in values.items():

@@ -65,7 +65,8 @@ def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | No
         of each shape's largest radius.
     size : float, optional
         Edge length [m] of the square that stands for a `Halfspace`, which is unbounded: around the point of its plane
-        nearest the origin, facing out of the solid, open.
+        nearest the origin, facing out of the solid, open. Of an `HPolytope` with ``bounded=False`` the part in a box
+        around the origin, of twice this edge length at most, or more where the region is farther away, closed.
 
     Returns
     -------
@@ -78,7 +79,7 @@ def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | No
     InvalidArgument
         For a tolerance or size that is not above 0, and where a shape would take more than 2,000,000 vertices.
     UnsupportedQuery
-        For a half-space without ``size``.
+        For a half-space, and an `HPolytope` with ``bounded=False``, without ``size``.
     """
     if not isinstance(shape, Shape):
         raise InvalidArgument(f"tessellate: shape must be a shape, for example collide.Sphere(0.1), got {shape!r}")
@@ -89,6 +90,8 @@ def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | No
         return _together([(tessellate(part, tolerance=tolerance, size=size), X) for part, X in shape.items])
     if isinstance(shape, Halfspace):
         return _square(shape, size)
+    if shape.is_region:
+        return _within_box(shape, size)
     for kind, made in _KINDS.items():
         if isinstance(shape, kind):
             return made(shape, tolerance)
@@ -107,6 +110,16 @@ def _together(parts: list[tuple[Tessellation, np.ndarray]]) -> Tessellation:
     starts = np.cumsum([0, *map(len, vertices)])
     faces = [part.faces + start for (part, _), start in zip(parts, starts)]
     return Tessellation(np.concatenate(vertices), np.concatenate(faces), max(part.deviation for part, _ in parts))
+
+
+def _within_box(shape: Shape, size: float | None) -> Tessellation:
+    if size is None:
+        raise UnsupportedQuery(
+            "tessellate: an HPolytope with bounded=False may have no end; give the size [m] of a box to stand for it"
+        )
+    assert isinstance(shape, HPolytope)
+    half = max(0.5 * size, 2.0 * shape.boundary_within)
+    return _hull(shape.closed(math.ldexp(1.0, math.frexp(half)[1])).vertices)
 
 
 def _square(shape: Halfspace, size: float | None) -> Tessellation:

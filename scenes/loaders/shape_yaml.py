@@ -38,7 +38,7 @@ KINDS = {
     "ellipsoid": ("radii",),
     "halfspace": ("normal", "offset"),
     "hull": ("points", "radius"),
-    "hpolytope": ("normals", "offsets"),
+    "hpolytope": ("normals", "offsets", "bounded"),
     "heightfield": ("heights", "cell", "bottom"),
     "mesh": ("file", "scale", "as", "vertices", "faces", "solid"),
     "compound": ("shape", "pose"),
@@ -111,7 +111,8 @@ def _plain(kind: str, fields: Fields, metres: float) -> Shape:
         heights, sides = scaled(fields.numbers("heights", (None, None)), metres), _cell(fields, metres)
         return HeightField(heights, sides, bottom=length("bottom") if "bottom" in fields else None)
     normals = fields.numbers("normals", (None, 3))
-    return HPolytope(normals, scaled(fields.numbers("offsets", (None,)), metres))
+    offsets = scaled(fields.numbers("offsets", (None,)), metres)
+    return HPolytope(normals, offsets, bounded=fields.flag("bounded", True))
 
 
 def _cell(fields: Fields, metres: float) -> np.ndarray | float:

@@ -30,8 +30,8 @@ ROOMS = {
     "transforms": {"errors", "argument_checks"},
     "results": {"errors"},
     "numerics": {"errors", "kernels"},
-    "hull": {"errors", "kernels", "numerics"},
     "least_distance": {"errors", "argument_checks", "kernels"},
+    "hull": {"errors", "kernels", "least_distance", "numerics"},
     "support": {"errors", "fork_safe_lock", "kernels", "numerics", "hull", "log"},
     "mesh": {"errors", "fork_safe_lock", "kernels", "numerics", "log"},
     "shapes": {
@@ -52,6 +52,7 @@ ROOMS = {
     "broadphase": {"errors", "kernels", "numerics", "lowering", "support"},
     "narrowphase": {
         "errors",
+        "least_distance",
         "kernels",
         "transforms",
         "numerics",
@@ -64,7 +65,7 @@ ROOMS = {
         "results",
         "threads",
     },
-    "certificates": {"errors", "transforms", "numerics", "lowering", "results", "shapes"},
+    "certificates": {"errors", "least_distance", "transforms", "numerics", "lowering", "results", "shapes"},
     "pair_arguments": {"errors", "argument_checks", "transforms", "shapes"},
     "batches": {"errors", "transforms", "shapes", "lowering", "narrowphase", "results", "threads"},
     "security_margin": {
@@ -111,6 +112,7 @@ ROOMS = {
     },
     "casts": {
         "errors",
+        "least_distance",
         "argument_checks",
         "kernels",
         "threads",

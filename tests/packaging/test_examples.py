@@ -27,6 +27,12 @@ HOSTS_SAY = ("pybullet build time", "Warp CUDA warning")
 SHOWS = {
     "22_safe_corridor": ["region 2: the pillar reaches into it", "region 3 with that plane: 0.4000 m away"],
     "23_wrench_polytope": ["friction 0.3, 30 N: not held", "by 3 bounds of the task", "friction 0.8, 30 N: held"],
+    "25_workspace_limits": [
+        "x = 1.36: forearm and limit 0, limit 0 and tool; ", "x = 1.1: free; +0.2343 m", "camera's view and tool",
+        "seen from t = 0.4706 on",
+        "radius 0.5 on top of it: touches", "radius 0.49999999999999994 on top of it: apart",
+        "half-spaces 0 and 2 contradict each other",
+    ],
     "24_footprints": [
         "23.7% of 100000 poses hit", "a common point checked in fractions", "a line between checked in fractions",
         "0.196 m, from [1.381 0.1  ] to [1.381 0.296]", "0.097 m inside", "outside, it falls", "moved by 0 m: stands",

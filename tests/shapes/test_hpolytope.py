@@ -11,7 +11,7 @@ import pytest
 from naive import rng_of, unit
 from naive_triangles import cross, inner
 
-from collide import HPolytope, InvalidShape, UnsupportedQuery
+from collide import HPolytope, InvalidShape
 
 CUBE = np.concatenate([np.eye(3), -np.eye(3)])
 
@@ -70,8 +70,6 @@ def test_what_is_no_polytope():
         HPolytope([[1, 0, 0], [0, 0, 0]], [1, 1])
     with pytest.raises(InvalidShape, match="offsets must have shape"):
         HPolytope(CUBE, np.ones(5))
-    with pytest.raises(UnsupportedQuery, match="bounded=False"):
-        HPolytope(CUBE, np.ones(6), bounded=False)
     with pytest.raises(InvalidShape, match="empty"):
         HPolytope(CUBE, [1, 1, 1, -2, 1, 1])
 

@@ -21,6 +21,7 @@ from collide.narrowphase.exact.exact_depth import exact_depth
 from collide.narrowphase.exact.opposite_halfspaces import settle_opposite_halfspaces
 from collide.narrowphase.exact.settle_halfspaces import settle_halfspaces
 from collide.narrowphase.exact.settle_hulls import settle_hulls
+from collide.narrowphase.exact.settle_regions import settle_regions
 from collide.results import EXACT, UNDECIDED
 
 
@@ -49,9 +50,10 @@ def settle_rows(
     3. `exact_depth`: overlaps that 1 has settled without a depth, where depths are wanted and hulls are small: the
        least extent over all planes there are (`all_planes.py`). After 1, which says that they are overlaps.
     4. `settle_opposite_halfspaces`: two half-spaces with opposite normals, in fractions.
+    5. `settle_regions`: a closed region, whose corners are rounded, against a swept hull, by its planes.
 
-    What stays open: curved cores, shapes whose stored numbers are rounded, and magnitudes that span more than 1600
-    bits.
+    What stays open: curved cores, other shapes whose stored numbers are rounded, and magnitudes that span more than
+    1600 bits.
 
     Parameters
     ----------
@@ -74,3 +76,4 @@ def settle_rows(
         if shallow.any():
             exact_depth(*tables, address_of(shallow), n, limit, rows_at, *terms, digits_at)
     settle_opposite_halfspaces(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
+    settle_regions(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)

@@ -84,10 +84,10 @@ def test_the_simpler_of_two_is_kept(stubs, tmp_path):
 
 
 def test_going_on_gives_what_one_run_gives(stubs, tmp_path):
-    fuzz(["large_boxes"], tmp_path / "whole", rounds=4, seed=1, source=boxes_and_spheres)
-    for rounds in (1, 2, 4):
+    fuzz(["large_boxes"], tmp_path / "whole", rounds=3, seed=1, source=boxes_and_spheres)
+    for rounds in (1, 3):
         run = fuzz(["large_boxes"], tmp_path / "parts", rounds=rounds, seed=1, resume=True, source=boxes_and_spheres)
-    assert run.rounds == 4
+    assert run.rounds == 3
     assert contents(tmp_path / "parts") == contents(tmp_path / "whole")
 
 
@@ -163,13 +163,13 @@ class _Absent(protocol.Peer):
 def test_invented_scenes_are_the_same_for_the_same_seed():
     a, b, c = (list(map(fingerprint, invent(seed, 2, 30))) for seed in (5, 5, 6))
     assert a == b and a != c
-    kinds = {kind for case in invent(5, 0, 250) for kind in case.kinds}
+    kinds = {kind for case in invent(5, 0, 150) for kind in case.kinds}
     assert kinds >= {"Sphere", "Box", "Capsule", "Cylinder", "Cone", "Ellipsoid", "ConvexHull", "HPolytope", "Mesh",
-                     "Compound", "Halfspace"}  # fmt: skip
+                     "HeightField", "Compound", "Halfspace"}  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", [11])
 def test_collide_is_right_about_invented_scenes(seed, tmp_path):
-    run = fuzz([], tmp_path, rounds=4, seed=seed)
-    assert run.pairs >= 240
+    run = fuzz([], tmp_path, rounds=2, seed=seed)
+    assert run.pairs >= 120
     assert run.findings() == [], [found.case.document() for found in run.findings()]

@@ -1,0 +1,131 @@
+"""Points and half-spaces at poses, entries taken as exact numbers, as rows for a least-distance program."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from math import frexp
+
+import numpy as np
+
+from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
+
+#: Numbers of `ExactPose` are R row by row, then t, without rounding.
+ExactPose = Sequence[Fraction]
+#: Three coordinates, or a normal and an offset.
+ExactRow = list[Fraction]
+_UNIT = 2.0**-53
+#: A half-space is left out that a ball is inside by more than this part of the numbers that say so.
+_MARGIN = 2.0**-40
+
+
+def exact_dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
+    """The inner product of two vectors of fractions."""
+    return sum((x * y for x, y in zip(a, b)), Fraction(0))
+
+
+def exact_pose(X: np.ndarray) -> list[Fraction]:
+    """The 12 numbers of a pose (4, 4)."""
+    return [Fraction(v) for v in (*X[:3, :3].ravel().tolist(), *X[:3, 3].tolist())]
+
+
+def points_at(points: np.ndarray, pose: ExactPose) -> list[ExactRow]:
+    """Points (n, 3) at a pose."""
+    return [
+        [exact_dot(pose[3 * i : 3 * i + 3], point) + pose[9 + i] for i in range(3)]
+        for point in ([Fraction(v) for v in row] for row in points.tolist())
+    ]  # fmt: skip
+
+
+def planes_at(normals: np.ndarray, offsets: np.ndarray, pose: ExactPose) -> list[ExactRow]:
+    """Half-spaces at a pose: {x : n·x ≤ b} becomes n' = cof(R) n, b' = b det R + n'·t."""
+    r = [pose[0:3], pose[3:6], pose[6:9]]
+    cofactors: list[ExactRow] = [_cross(r[1], r[2]), _cross(r[2], r[0]), _cross(r[0], r[1])]
+    determinant, t = exact_dot(r[0], cofactors[0]), pose[9:12]
+    planes = []
+    for *normal, offset in np.column_stack((normals, offsets)).tolist():
+        n = [exact_dot(row, [Fraction(v) for v in normal]) for row in cofactors]
+        planes.append([*n, Fraction(offset) * determinant + exact_dot(n, t)])
+    return planes
+
+
+def planes_near(
+    normals: np.ndarray, offsets: np.ndarray, X_WP: np.ndarray, X_WB: np.ndarray, reach: float
+) -> np.ndarray:
+    """Numbers of the half-spaces that do not surely hold the ball of a body.
+
+    X_WP, X_WB : (4, 4) where they stand, in doubles, rounded or not.   reach : of the body from its origin [m].
+    """
+    R, t, R_body, t_body = X_WP[:3, :3], X_WP[:3, 3], X_WB[:3, :3], X_WB[:3, 3]
+    centre = np.linalg.solve(R, t_body - t)
+    inverse = np.linalg.inv(R)
+    reach *= (1.0 + _MARGIN) * max(np.linalg.norm(inverse @ R_body, 2), np.linalg.norm(inverse, 2))
+    lengths = np.sqrt(np.square(normals).sum(axis=1))
+    size = lengths * (np.abs(centre).sum() + np.abs(t).max() + np.abs(t_body).max() + reach) + np.abs(offsets)
+    return np.flatnonzero(normals @ centre + lengths * reach > offsets - _MARGIN * size)
+
+
+def point_seen_from(point: Sequence[Fraction], pose: ExactPose) -> ExactRow:
+    """A point of the world, in the frame that stands at a pose."""
+    r = [pose[0:3], pose[3:6], pose[6:9]]
+    cofactors: list[ExactRow] = [_cross(r[1], r[2]), _cross(r[2], r[0]), _cross(r[0], r[1])]
+    determinant = exact_dot(r[0], cofactors[0])
+    away = [x - t for x, t in zip(point, pose[9:12])]
+    return [sum((cofactors[i][k] * away[i] for i in range(3)), Fraction(0)) / determinant for k in range(3)]
+
+
+def planes_seen_from(planes: list[ExactRow], pose: ExactPose) -> list[ExactRow]:
+    """Half-spaces of the world, in the frame that stands at a pose."""
+    columns = [pose[0:9:3], pose[1:9:3], pose[2:9:3]]
+    return [
+        [*(exact_dot(column, n) for column in columns), b - exact_dot(n, pose[9:12])]
+        for *n, b in planes
+    ]  # fmt: skip
+
+
+def rows_of_points(points: list[ExactRow]) -> HomogeneousRows:
+    """Points, as a program reads them."""
+    values = np.array([[float(v) for v in point] for point in points])
+
+    def integers(row: int) -> list[int]:
+        denominator = _common_denominator(points[row])
+        return [*(int(v * denominator) for v in points[row]), denominator]
+
+    return HomogeneousRows(values, 1.0, integers, _UNIT)
+
+
+def rows_of_planes(
+    planes: list[ExactRow], normals: np.ndarray | None = None, offsets: np.ndarray | None = None
+) -> HomogeneousRows:
+    """Half-spaces, as a program reads them; behind those given as doubles (m, 3), (m,), if any are."""
+    scaled = [_scaled(plane) for plane in planes]
+    rows = np.array([[float(v) for v in plane] for plane in scaled]).reshape(-1, 4)
+    n_first = 0
+    if normals is not None and offsets is not None:
+        n_first = len(normals)
+        exponents = np.frexp(np.abs(normals).max(axis=1))[1]
+        values = np.ldexp(np.column_stack((normals, offsets)), -exponents[:, None])
+        rows = np.vstack((values, rows))
+
+    def integers(row: int) -> list[int]:
+        if row < n_first:
+            return as_integers(rows[row].tolist())[0]
+        denominator = _common_denominator(scaled[row - n_first])
+        return [int(v * denominator) for v in scaled[row - n_first]]
+
+    return HomogeneousRows(rows[:, :3], rows[:, 3], integers, _UNIT if planes else 0.0)
+
+
+def _scaled(plane: ExactRow) -> ExactRow:
+    """The same half-space, its normal of about unit length."""
+    factor = Fraction(2) ** -frexp(float(max(map(abs, plane[:3]))))[1]
+    return [v * factor for v in plane]
+
+
+def _common_denominator(row: ExactRow) -> int:
+    """Of numbers that are all integers over powers of two."""
+    return max(v.denominator for v in row)
+
+
+def _cross(a: ExactPose, b: ExactPose) -> ExactRow:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
