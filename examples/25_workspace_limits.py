@@ -24,8 +24,7 @@ arm = world.add(collide.Capsule(0.06, 0.5), name="forearm")
 tool = world.add(collide.Box((0.1, 0.1, 0.2)), name="tool")
 world.allow("forearm", "tool")
 for x in (1.36, 1.1, 0.7):
-    world.set_pose(arm, collide.pose((x, 0.0, 1.6)))
-    world.set_pose(tool, collide.pose((x, 0.0, 1.25)))
+    world.set_poses([arm, tool], [collide.pose((x, 0.0, 1.6)), collide.pose((x, 0.0, 1.25))])
     hits = [" and ".join(sorted(names)) for names in world.collisions().names]
     near = world.distances()
     seen = min(row["distance"] for row, names in zip(near, near.names) if "camera's view" in names)
@@ -37,8 +36,7 @@ t = collide.time_of_impact(collide.Box((0.1, 0.1, 0.2)), frustum, *way, X_WC, X_
 print(f"on a straight way inwards it is seen from t = {t.time:.4f} on")
 
 # A region of 5,000 half-spaces: its planes, not rounded corners, decide where a ball touches it.
-rng = np.random.default_rng(0)
-normals = rng.normal(size=(5000, 3))
+normals = np.random.default_rng(0).normal(size=(5000, 3))
 normals /= np.linalg.norm(normals, axis=1)[:, None]
 normals[0] = (0.0, 0.0, 1.0)
 corridor = collide.HPolytope(normals, 1.0 + np.abs(normals[:, 0]), bounded=False)

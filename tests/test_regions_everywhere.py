@@ -12,6 +12,7 @@ from regions import FAMILIES, by_far_box, region_rows
 from reproduction import reproducing
 
 import collide
+from collide.adapters.peers.question import ask
 from collide.pages.drawn_shapes import ShapeTable
 from collide.reports import report
 from collide.scenes import load
@@ -201,3 +202,15 @@ def test_scene_files_reports_and_pages(tmp_path):
     page.row([(view.shape, np.eye(4))])
     (drawn,) = page.written()
     assert drawn["unbounded"] and drawn["triangle_count"] >= 8 and page.boxes() == [None]
+
+
+def test_peers_are_asked_about_regions_as_hulls():
+    region, ball = collide.HPolytope([(0, 0, 1.0)], [0.0], bounded=False), collide.Sphere(0.5)
+    pairs = [(region, ball, pose(t=(0, 0, 7.0)), pose(t=(0, 0, z))) for z in (8.0, 7.4)]
+    asked = ask(pairs)
+    assert all(isinstance(body.shape, (collide.ConvexHull, collide.Sphere)) for body in asked.bodies)
+    up, low = (
+        collide.distance(asked.bodies[i].shape, asked.bodies[j].shape, asked.bodies[i].X_WB, asked.bodies[j].X_WB)
+        for i, j in asked.pairs
+    )
+    assert up.distance == pytest.approx(0.5, abs=1e-12) and low.distance == pytest.approx(-0.1, abs=1e-12)

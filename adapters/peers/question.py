@@ -7,6 +7,7 @@ other engines are asked pair by pair.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -49,6 +50,9 @@ class Question:
     isolated : bool
         The pairs stand for themselves (bodies of different pairs may lie anywhere), so they are asked one by one even
         of an engine that answers whole worlds.
+
+    Regions of half-spaces (`HPolytope` with bounded=False), which no peer knows, are asked of every engine as hulls of
+    their corners in a box that all bodies with an end are well inside: that changes no answer by more than rounding.
     """
 
     bodies: list[Body]
@@ -56,6 +60,9 @@ class Question:
     max_distance: float = 0.0
     allowed: list[tuple[int, int]] = field(default_factory=list)
     isolated: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bodies", _with_regions_closed(self.bodies))
 
     @classmethod
     def from_pairs(cls, pairs: Iterable[tuple], max_distance: float = 0.0) -> Question:
@@ -111,6 +118,7 @@ class Question:
             Not isolated.
         """
         bodies, allowed = _read(scene)
+        bodies = _with_regions_closed(bodies)
         tested = _tested(bodies, allowed)
         if not every_pair:
             tested = _near(bodies, tested, max_distance)
@@ -173,6 +181,21 @@ def _read(scene) -> tuple[list[Body], list[tuple[int, int]]]:
     # A body that the scene allows but does not hold has nothing to ask.
     pairs = [(key[a], key[b]) for a, b, *_ in listed if a in key and b in key]
     return bodies, sorted({(min(p), max(p)) for p in pairs})
+
+
+def _with_regions_closed(bodies: list[Body]) -> list[Body]:
+    """The bodies with the hull of its corners for each region."""
+    if not any(isinstance(body.shape, HPolytope) and body.shape.is_region for body in bodies):
+        return bodies
+    boxes = [bounds(body) for body in bodies if not body.shape.is_region]
+    corners_of_all = np.array([box for box in boxes if np.isfinite(box).all()]).reshape(-1, 3)
+    closed = list(bodies)
+    for k, body in enumerate(bodies):
+        if isinstance(body.shape, HPolytope) and body.shape.is_region:
+            about = np.linalg.norm(corners_of_all - body.X_WB[:3, 3], axis=1).max(initial=1.0)
+            size = math.ldexp(1.0, math.frexp(4.0 * (2.0 * about + body.shape.boundary_within))[1])
+            closed[k] = body._replace(shape=ConvexHull(body.shape.closed(size).vertices))
+    return closed
 
 
 def _tested(bodies: list[Body], allowed) -> list[tuple[int, int]]:

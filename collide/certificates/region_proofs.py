@@ -10,14 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from collide.certificates.certificate import APART, TOGETHER, CertificateRefused
-from collide.least_distance.homogeneous_rows import as_integers, dot
-from collide.least_distance.nearest_pair import EMPTY, nearest_pair
-from collide.least_distance.pair_proposals import Work
+from collide.lazy_modules import lazy_module
 from collide.least_distance.posed_sets import (
     ExactRow,
     exact_dot,
@@ -26,14 +24,20 @@ from collide.least_distance.posed_sets import (
     planes_near,
     point_seen_from,
     points_at,
-    rows_of_planes,
-    rows_of_points,
 )
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.parts import convex_set_of
+from collide.numerics.exact_points import inner, integers
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.shape import Shape
+
+if TYPE_CHECKING:
+    from collide.least_distance import nearest_pair, pair_proposals, posed_rows
+else:  # with kernels, which making a certificate needs, and checking one does not
+    nearest_pair = lazy_module("collide.least_distance.nearest_pair")
+    pair_proposals = lazy_module("collide.least_distance.pair_proposals")
+    posed_rows = lazy_module("collide.least_distance.posed_rows")
 
 
 class RegionCertificate(NamedTuple):
@@ -66,9 +70,10 @@ def make_region_certificate(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarr
     if not len(near):
         return RegionCertificate(TOGETHER, (0,), (Fraction(1),), (), ())
     planes = planes_at(region.normals[near], region.offsets[near], exact_pose(X_WR))
-    halfspaces = rows_of_planes(planes)
-    pair = nearest_pair(rows_of_points(points_at(body.points, exact_pose(X_WO))), halfspaces, Work())
-    if pair.kind == EMPTY:
+    halfspaces = posed_rows.rows_of_planes(planes)
+    points = posed_rows.rows_of_points(points_at(body.points, exact_pose(X_WO)))
+    pair = nearest_pair.nearest_pair(points, halfspaces, pair_proposals.Work())
+    if pair.kind == nearest_pair.EMPTY:
         return None
     u_square = sum(v * v for v in pair.u)
     kind = APART if u_square > (Fraction(body.radius) * pair.denominator) ** 2 else TOGETHER
@@ -124,8 +129,8 @@ def _flaw_of_point(region: HPolytope, x: ExactRow) -> str | None:
     denominator = int(np.lcm.reduce(np.array([v.denominator for v in x], dtype=object)))
     numerators = [int(v * denominator) for v in x]
     for k, row in enumerate(np.column_stack((region.normals, region.offsets)).tolist()):
-        *normal, offset = as_integers(row)[0]
-        if dot(normal, numerators) > offset * denominator:
+        (x_normal, y_normal, z_normal, offset), _ = integers(row)
+        if inner((x_normal, y_normal, z_normal), numerators) > offset * denominator:
             return f"the point is not in half-space {k}"
     return None
 

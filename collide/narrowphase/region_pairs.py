@@ -18,14 +18,8 @@ from collide.least_distance.homogeneous_rows import HomogeneousRows
 from collide.least_distance.interior_point import origin_point
 from collide.least_distance.nearest_pair import EMPTY, nearest_pair
 from collide.least_distance.pair_proposals import Work
-from collide.least_distance.posed_sets import (
-    ExactRow,
-    exact_dot,
-    exact_pose,
-    planes_at,
-    planes_seen_from,
-    rows_of_planes,
-)
+from collide.least_distance.posed_rows import rows_of_planes
+from collide.least_distance.posed_sets import ExactRow, exact_dot, exact_pose, planes_at, planes_seen_from
 from collide.lowering.closed_regions import box_sizes, closed, closings
 from collide.narrowphase.bounds import PROMISE_STORED
 from collide.narrowphase.convex_batches import Question

@@ -11,9 +11,6 @@ import numpy as np
 from collide.errors import InvalidShape
 from collide.hull.double_description import halfspace_vertices
 from collide.lazy_modules import lazy_module
-from collide.least_distance.input_rows import input_rows
-from collide.least_distance.nearest_pair import EMPTY, MEETING, nearest_pair
-from collide.least_distance.pair_proposals import Work
 from collide.shapes.shape import Shape, rows
 from collide.transforms import LARGEST
 
@@ -21,8 +18,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from collide.hull import region_corners
-else:
+    from collide.least_distance import input_rows, nearest_pair, pair_proposals
+else:  # with kernels, which those who only check certificates do not load
     region_corners = lazy_module("collide.hull.region_corners")
+    input_rows = lazy_module("collide.least_distance.input_rows")
+    nearest_pair = lazy_module("collide.least_distance.nearest_pair")
+    pair_proposals = lazy_module("collide.least_distance.pair_proposals")
 
 #: More than what a quotient, a root and a sum round.
 _UP = 1 + 2.0**-40
@@ -154,9 +155,9 @@ def _boundary_within(normals: np.ndarray, offsets: np.ndarray) -> float:
             f"HPolytope: half-space {k} is farther than {LARGEST:g} m from the origin: offset {offsets[k]:g}, normal "
             f"{normals[k].tolist()}; scale the scene"
         )
-    read = input_rows(np.zeros((1, 3)), normals, offsets)
-    pair = nearest_pair(read.points, read.halfspaces, Work())
-    if pair.kind == EMPTY:
+    read = input_rows.input_rows(np.zeros((1, 3)), normals, offsets)
+    pair = nearest_pair.nearest_pair(read.points, read.halfspaces, pair_proposals.Work())
+    if pair.kind == nearest_pair.EMPTY:
         named = sorted(pair.halfspaces)
         raise InvalidShape(
             f"HPolytope: empty: half-spaces {', '.join(map(str, named[:-1]))} and {named[-1]} contradict each other, "
@@ -164,7 +165,7 @@ def _boundary_within(normals: np.ndarray, offsets: np.ndarray) -> float:
             if len(named) > 1
             else f"HPolytope: empty: no point satisfies half-space {named[0]}"
         )
-    if pair.kind == MEETING:
+    if pair.kind == nearest_pair.MEETING:
         exponents = np.frexp(lengths)[1]
         scaled = np.ldexp(normals, -exponents[:, None])
         return float((np.ldexp(offsets, -exponents) / np.sqrt(np.square(scaled).sum(axis=1))).min()) * _UP

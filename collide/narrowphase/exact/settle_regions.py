@@ -13,7 +13,8 @@ import numpy as np
 
 from collide.least_distance.nearest_pair import APART, nearest_pair
 from collide.least_distance.pair_proposals import Work
-from collide.least_distance.posed_sets import planes_at, planes_near, points_at, rows_of_planes, rows_of_points
+from collide.least_distance.posed_rows import rows_of_planes, rows_of_points
+from collide.least_distance.posed_sets import planes_at, planes_near, points_at
 from collide.lowering.packed_convex import POINTS
 from collide.lowering.shape_table import PoseTable, ShapeTable
 from collide.narrowphase.bounds import PROMISE_STORED
