@@ -59,7 +59,7 @@ def families(name: str, n: int, seed: int, timeout: float) -> list[dict]:
     return rows
 
 
-def published(chosen: list[str], timeout: float) -> list[dict]:
+def published(engines: list[str], timeout: float) -> list[dict]:
     """A row for every engine: the published pairs, against their references."""
     if not PUBLISHED.exists():
         print(f"published cases left out: {PUBLISHED} is not beside this checkout")
@@ -70,17 +70,17 @@ def published(chosen: list[str], timeout: float) -> list[dict]:
     ]
     question = Question.from_pairs(pairs)
     truth, size = np.array([r["ref"] for r in records]), np.array(question.sizes())
-    clear = np.abs(truth) > 1e-7 * size  # some references are good to 1e-8
+    gap = np.abs(truth) > 1e-7 * size  # some references are good to 1e-8
     rows = []
-    for name in chosen:
+    for name in engines:
         table = engine(name, timeout=timeout).answer(question)
-        answered, told = table.rows["answered"], table.rows["has_distance"]
-        wrong = answered & clear & (table.rows["hit"] != (truth <= 0))
-        off = np.where(told, np.abs(table.rows["distance"] - truth) / size, 0.0)
+        answered, with_distance = table.rows["answered"], table.rows["has_distance"]
+        wrong = answered & gap & (table.rows["hit"] != (truth <= 0))
+        off = np.where(with_distance, np.abs(table.rows["distance"] - truth) / size, 0.0)
         rows.append({
             "engine": name, "version": table.version, "cases": len(records), "answered": int(answered.sum()),
-            "wrong booleans, clear of touching": int(wrong.sum()), "of": int((answered & clear).sum()),
-            "wrong distances": int((off > WRONG).sum()), "with a distance": int(told.sum()),
+            "wrong booleans, clear of touching": int(wrong.sum()), "of": int((answered & gap).sum()),
+            "wrong distances": int((off > WRONG).sum()), "with a distance": int(with_distance.sum()),
             "off by at most": float(off.max()), "mishaps": counted(Counter(filter(None, table.mishaps))),
             "worst": records[int(off.argmax())]["id"] if off.max() > WRONG else "",
         })  # fmt: skip
@@ -111,17 +111,17 @@ def main() -> None:
     parser.add_argument("--timeout", type=float, default=5.0, help="seconds an engine in a process may take a pair (5)")
     parser.add_argument("--no-csv", action="store_true", help="keep the results as they are")
     args = parser.parse_args()
-    chosen = args.engines.split(",") if args.engines else [name for name in installed() if name != "exact"]
-    check_names(chosen)
+    engines = args.engines.split(",") if args.engines else [name for name in installed() if name != "exact"]
+    check_names(engines)
     absent = [name for name in ENGINES if name not in installed()]
     print(f"not installed: {', '.join(absent) or 'none'}\n")
     parts = args.part or ["families", "published"]
     folder = None if args.no_csv else HERE / "results"
     if "published" in parts:
-        show(published(chosen, args.timeout), folder and folder / "engine-errors-published.csv")
+        show(published(engines, args.timeout), folder and folder / "engine-errors-published.csv")
     if "families" in parts:
         rows = []
-        for name in chosen:
+        for name in engines:
             start = time.perf_counter()
             rows += families(name, args.cases, args.seed, args.timeout)
             print(f"{name}: {time.perf_counter() - start:.0f} s", flush=True)

@@ -84,16 +84,16 @@ class DrakePeer(PairwisePeer):
                 return Reply(False, note="boolean only: bodies apart have no penetration")
             (pair,) = pairs
             sign = 1.0 if pair.id_A == ids[0] else -1.0
-            points = (pair.p_WCa, pair.p_WCb)[:: int(sign)]
+            point_a, point_b = (pair.p_WCa, pair.p_WCb)[:: int(sign)]
             # Its normal points from B into A.
-            return Reply(True, -pair.depth, tuple(-sign * pair.nhat_BA_W), *map(tuple, points))
+            return Reply(True, -pair.depth, tuple(-sign * pair.nhat_BA_W), tuple(point_a), tuple(point_b))
         hit = query.HasCollisions()
         pair = query.ComputeSignedDistancePairClosestPoints(*ids)
         if (pair.id_A, pair.id_B) != ids:
             raise CollideError("Drake answered for another pair")
-        X_WGs = [query.GetPoseInWorld(i) for i in ids]
-        points = [X.multiply(p) for X, p in zip(X_WGs, (pair.p_ACa, pair.p_BCb))]
-        return Reply(hit, pair.distance, tuple(-pair.nhat_BA_W), *map(tuple, points))
+        X_WA, X_WB = (query.GetPoseInWorld(i) for i in ids)
+        point_a, point_b = tuple(X_WA.multiply(pair.p_ACa)), tuple(X_WB.multiply(pair.p_BCb))
+        return Reply(hit, pair.distance, tuple(-pair.nhat_BA_W), point_a, point_b)
 
 
 def _scene(A, X_WA: np.ndarray, B, X_WB: np.ndarray):

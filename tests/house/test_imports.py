@@ -286,9 +286,10 @@ ROOMS = {
     "cli_sweep": {"cli_files", "cli_numbers", "errors", "reports", "sweeps"},
     "cli_view": {"cli_pages", "cli_scenes", "pages"},
     "cli_compare": {"cli_files", "cli_pages", "cli_scenes", "errors", "reports", ""},
+    "cli_engines": {"reports"},
     "cli_fuzz": {"cli_files", "cli_numbers", "errors", "reports"},
     "cli_arguments": {
-        "cli_compare", "cli_fuzz", "cli_pages", "cli_srdf", "cli_sweep", "cli_view", "errors", "reports", "",
+        "cli_compare", "cli_engines", "cli_fuzz", "cli_pages", "cli_srdf", "cli_sweep", "cli_view", "errors", "reports", "",
     },
     "cli": {
         "cli_arguments", "cli_compare", "cli_files", "cli_fuzz", "cli_pages", "cli_scenes", "cli_srdf", "cli_sweep",
@@ -305,6 +306,7 @@ LATE = {
     "cli": {"scenes", "adapters", "hierarchies"},
     "cli_compare": {"scenes", "adapters"},
     "cli_files": {"scenes"},
+    "cli_engines": {"adapters"},
     "cli_fuzz": {"adapters"},
     "cli_pages": {"scenes"},
     "cli_scenes": {"scenes"},
