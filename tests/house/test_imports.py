@@ -289,7 +289,8 @@ ROOMS = {
     "cli_engines": {"reports"},
     "cli_fuzz": {"cli_files", "cli_numbers", "errors", "reports"},
     "cli_arguments": {
-        "cli_compare", "cli_engines", "cli_fuzz", "cli_pages", "cli_srdf", "cli_sweep", "cli_view", "errors", "reports", "",
+        "cli_compare", "cli_engines", "cli_fuzz", "cli_pages", "cli_srdf", "cli_sweep", "cli_view", "errors", "reports",
+        "",
     },
     "cli": {
         "cli_arguments", "cli_compare", "cli_files", "cli_fuzz", "cli_pages", "cli_scenes", "cli_srdf", "cli_sweep",
