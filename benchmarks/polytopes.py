@@ -1,20 +1,19 @@
 """Hulls of points against intersections of half-spaces: rows read, depth, time; every algorithm beside the peers.
 
     python benchmarks/polytopes.py --fits       # ACIT and the default to 10^6 rows, exponents fitted, answers verified
+    python benchmarks/polytopes.py --fits --highs --plot docs/pictures/polytopes-rows.png
     python benchmarks/polytopes.py --table      # all algorithms and the peers that are installed, interleaved
     python benchmarks/polytopes.py --judge 2000 # so many pairs a dimension against the rational simplex
 
-Peers are asked whether there is a common point: HiGHS (`scipy.optimize.linprog`) with a variable a point; quadprog,
-daqp, clarabel, osqp and proxsuite with the least distance (a hit below 1e-9); Drake's `HPolyhedron.IntersectsWith`.
-Their answers are judged by ours, which are proven. Peers that are not installed are left out, and so are those that
-took longer than --longest seconds before.
+Peers are asked whether there is a common point, each in the form that suits it (`polytope_peers.py`); solvers of
+quadratic programs have one where the distance is below 1e-9. Their answers are judged by ours, which are proven. Peers
+that are not installed are left out, and so are those that took longer than --longest seconds before.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
-import importlib
 import statistics
 import sys
 import time
@@ -24,9 +23,10 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT / "tests" / "polytopes"), str(ROOT / "tests" / "oracles")]
+sys.path[:0] = [str(Path(__file__).parent), str(ROOT / "tests" / "polytopes"), str(ROOT / "tests" / "oracles")]
 import meeting_families
 import rational_simplex
+from polytope_peers import PEERS, is_installed, linprog
 
 from collide import polytopes
 from collide.errors import CollideError
@@ -36,8 +36,8 @@ Question = meeting_families.Question
 SIZES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
 TABLE = [(3, 30, 30), (2, 100, 50), (2, 100_000, 50), (3, 100, 30), (3, 1000, 100), (3, 100_000, 50),
          (3, 10_000, 10_000), (6, 1000, 50), (6, 100_000, 50), (7, 200, 100)]  # fmt: skip
-#: What is said to have a common point, of distances that solvers give.
-_HIT = 1e-9
+#: Gaps above this are seen by HiGHS, whose tolerance it is.
+_SEEN_BY_HIGHS = 1e-7
 
 
 # --- questions --------------------------------------------------------------------------------------------------------
@@ -83,28 +83,50 @@ FIT_FAMILIES: dict[str, Callable[[np.random.Generator, int, int, int], Question]
 
 
 def fits(args) -> Iterator[dict]:
-    """Rows read by ACIT and by the default, with the exponent of n that fits best."""
+    """Rows read by ACIT and by the default, with what of n fits them."""
+    everything = []
     for algorithm in args.algorithms or ("acit", "active-set"):
         for d in args.dimensions or (3,):
             for family, make in FIT_FAMILIES.items():
+                if args.families and family not in args.families:
+                    continue
                 rows = []
                 for n in (size for size in SIZES if size <= (args.largest if d == 3 else min(args.largest, 100_000))):
-                    rows.append(_measured(algorithm, family, d, n, make))
+                    rows.append(_measured(algorithm, family, d, n, make, args.highs and algorithm == "acit"))
                     print("  ".join(f"{value:.4g}" if isinstance(value, float) else str(value)
                                     for value in rows[-1].values()), flush=True)  # fmt: skip
                     yield rows[-1]
-                read = [row["rows_read"] for row in rows]
-                if len(rows) > 1:
-                    exponent = np.polyfit(np.log([row["n"] for row in rows]), np.log(read), 1)[0]
-                    print(f"{algorithm} d={d} {family}: rows read ~ n^{exponent:.3f}", flush=True)
+                everything += rows
+                if len(rows) > 2:
+                    print(f"{algorithm} d={d} {family}: {_fit(rows)}", flush=True)
+    if args.plot:
+        plot(everything, args.plot)
 
 
-def _measured(algorithm: str, family: str, d: int, n: int, make) -> dict:
+def _fit(rows: list[dict]) -> str:
+    """The exponents of n over all sizes and over the largest two, and c + k·n with the least relative errors."""
+    n, read = (np.array([row[name] for row in rows], dtype=float) for name in ("n", "rows_read"))
+    exponent = np.polyfit(np.log(n), np.log(read), 1)[0]
+    last = np.log(read[-1] / read[-2]) / np.log(n[-1] / n[-2])
+    (c, k), *_ = np.linalg.lstsq(np.column_stack((1 / read, n / read)), np.ones(len(n)), rcond=None)
+    off = np.abs((c + k * n) / read - 1).max()
+    return f"rows read ~ n^{exponent:.3f}, n^{last:.3f} at last; {c:.0f} + {k:.2f} n within {off:.0%}"
+
+
+def _measured(algorithm: str, family: str, d: int, n: int, make, with_highs: bool) -> dict:
     question = make(np.random.default_rng([n, d]), d, n, n)
     start = time.perf_counter()
     answer = polytopes.meets(*question, algorithm=algorithm)
     seconds = time.perf_counter() - start
     polytopes.verify(*question, answer)
+    highs, highs_seconds = "", 0.0
+    if with_highs and (answer.hit or answer.distance > _SEEN_BY_HIGHS):
+        start = time.perf_counter()
+        try:
+            highs = "agrees" if linprog(question) == answer.hit else "DISAGREES"
+        except RuntimeError as error:
+            highs = f"no answer: {str(error)[:60]}"
+        highs_seconds = time.perf_counter() - start
     counters = answer.counters
     return {
         "algorithm": algorithm, "family": family, "d": d, "n": n, "hit": answer.hit, "distance": answer.distance,
@@ -112,123 +134,50 @@ def _measured(algorithm: str, family: str, d: int, n: int, make) -> dict:
         "depth": counters.get("depth", 0), "calls": counters.get("calls", 0),
         "base_calls": counters.get("base_calls", 0), "most_net_rounds": counters.get("most_net_rounds", 0),
         "nets_redrawn": counters.get("nets_redrawn", 0), "exact_programs": counters.get("exact_programs", 0),
+        "highs": highs, "highs_seconds": highs_seconds,
     }  # fmt: skip
+
+
+def plot(rows: list[dict], place: Path) -> None:
+    """Rows read against n, a line a family, a panel an algorithm and dimension."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    panels = list(dict.fromkeys((row["algorithm"], row["d"]) for row in rows))
+    figure, axes = plt.subplots(1, len(panels), figsize=(4.6 * len(panels), 4.2), sharey=True, squeeze=False)
+    for axis, panel in zip(axes[0], panels):
+        of_panel = [row for row in rows if (row["algorithm"], row["d"]) == panel]
+        for family, marker in zip(FIT_FAMILIES, "osD^v"):
+            of_family = [row for row in of_panel if row["family"] == family]
+            axis.loglog([row["n"] for row in of_family], [row["rows_read"] for row in of_family], marker=marker,
+                        markersize=4, linewidth=1.2, label=family)  # fmt: skip
+        n = np.array([min(row["n"] for row in of_panel), max(row["n"] for row in of_panel)])
+        axis.loglog(n, 2 * n, color="grey", linestyle=":", label="every row once")
+        axis.loglog(n, 20 * n, color="grey", linestyle="--", label="ten times")
+        axis.set_title(f"{panel[0]}, d = {panel[1]}", fontsize=10)
+        axis.set_xlabel("points, and as many half-spaces")
+        axis.grid(alpha=0.25)
+    axes[0][0].set_ylabel("rows read")
+    axes[0][0].legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(place, dpi=90)
 
 
 # --- peers ------------------------------------------------------------------------------------------------------------
 
 
-def _linprog(question: Question) -> bool:
-    """HiGHS: λ ≥ 0, Σ λ = 1, excess·λ ≤ 0, a variable a point."""
-    from scipy.optimize import linprog
-
-    excess = question.normals @ question.points.T - question.offsets[:, None]
-    n = excess.shape[1]
-    return linprog(np.zeros(n), excess, np.zeros(len(excess)), np.ones((1, n)), [1.0], method="highs").status == 0
-
-
-def _program(question: Question):
-    """min |Pᵀλ − x|² as (H, equality row, inequality matrix G z ≤ h) with z = (λ, x)."""
-    points, normals, offsets = question
-    n, d = points.shape
-    half = np.hstack((points.T, -np.eye(d)))
-    H = half.T @ half
-    equality = np.concatenate((np.ones(n), np.zeros(d)))
-    G = np.vstack((np.hstack((-np.eye(n), np.zeros((n, d)))), np.hstack((np.zeros((len(normals), n)), normals))))
-    return H, equality, G, np.concatenate((np.zeros(n), offsets)), half
-
-
-def _quadprog(question: Question) -> bool:
-    import quadprog
-
-    H, equality, G, h, half = _program(question)
-    regular = H + 1e-12 * np.eye(len(H))
-    z = quadprog.solve_qp(regular, np.zeros(len(H)), np.vstack((equality, -G)).T, np.concatenate(([1.0], -h)), 1)[0]
-    return float(np.linalg.norm(half @ z)) <= _HIT
-
-
-def _daqp(question: Question) -> bool:
-    import daqp
-
-    H, equality, G, h, half = _program(question)
-    A, upper = np.vstack((equality, G)), np.concatenate(([1.0], h))
-    lower = np.concatenate(([1.0], np.full(len(h), -1e30)))
-    sense = np.zeros(len(upper), dtype=np.int32)
-    sense[0] = 5
-    z = daqp.solve(H, np.zeros(len(H)), A, upper, lower, sense, eps_prox=1e-6, primal_tol=1e-9, dual_tol=1e-9)[0]
-    return float(np.linalg.norm(half @ z)) <= _HIT
-
-
-def _clarabel(question: Question) -> bool:
-    import clarabel
-    from scipy import sparse
-
-    H, equality, G, h, half = _program(question)
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-9
-    solver = clarabel.DefaultSolver(
-        sparse.csc_matrix(np.triu(H)), np.zeros(len(H)), sparse.csc_matrix(np.vstack((equality, G))),
-        np.concatenate(([1.0], h)), [clarabel.ZeroConeT(1), clarabel.NonnegativeConeT(len(h))], settings,
-    )  # fmt: skip
-    return float(np.linalg.norm(half @ np.array(solver.solve().x))) <= _HIT
-
-
-def _osqp(question: Question) -> bool:
-    import osqp
-    from scipy import sparse
-
-    H, equality, G, h, half = _program(question)
-    solver = osqp.OSQP()
-    solver.setup(
-        sparse.csc_matrix(np.triu(H)), np.zeros(len(H)), sparse.csc_matrix(np.vstack((equality, G))),
-        np.concatenate(([1.0], np.full(len(h), -np.inf))), np.concatenate(([1.0], h)),
-        verbose=False, eps_abs=1e-9, eps_rel=1e-9, max_iter=20_000,
-    )  # fmt: skip
-    return float(np.linalg.norm(half @ solver.solve().x)) <= _HIT
-
-
-def _proxsuite(question: Question) -> bool:
-    import proxsuite
-
-    H, equality, G, h, half = _program(question)
-    result = proxsuite.proxqp.dense.solve(
-        H, np.zeros(len(H)), equality[None], np.array([1.0]), G, np.full(len(h), -1e30), h, eps_abs=1e-9
-    )  # fmt: skip
-    return float(np.linalg.norm(half @ result.x)) <= _HIT
-
-
-def _drake(question: Question) -> bool:
-    from pydrake.geometry.optimization import HPolyhedron, VPolytope
-
-    return HPolyhedron(question.normals, question.offsets).IntersectsWith(VPolytope(question.points.T))
-
-
-PEERS: dict[str, tuple[str, Callable[[Question], bool]]] = {
-    "HiGHS, n variables": ("scipy", _linprog), "quadprog": ("quadprog", _quadprog), "daqp": ("daqp", _daqp),
-    "clarabel": ("clarabel", _clarabel), "osqp": ("osqp", _osqp), "proxsuite": ("proxsuite", _proxsuite),
-    "Drake": ("pydrake", _drake),
-}  # fmt: skip
-#: Solvers whose Hessian is a matrix of n by n doubles stop here.
-_MAX_DENSE = 1000
-#: Entries of the matrix that HiGHS is given at most.
-_MAX_ENTRIES = 10_000_000
-
-
-def _installed(module: str) -> bool:
-    try:
-        importlib.import_module(module)
-    except ImportError:
-        return False
-    return True
-
-
 def table(args) -> Iterator[dict]:
-    """Medians of all contestants, interleaved, and how often they were wrong."""
+    """Medians of all contestants, in another order each time, and how often they were wrong."""
     contestants: dict[str, Callable[[Question], bool]] = {
         name: (lambda question, name=name: polytopes.meets(*question, algorithm=name).hit) for name in ALGORITHMS
     }
-    contestants.update({name: ask for name, (module, ask) in PEERS.items() if _installed(module)})
+    contestants.update({name: ask for name, (module, ask, _) in PEERS.items() if is_installed(module)})
+    asked = args.contestants or list(contestants)
+    if missing := set(asked) - set(contestants):
+        raise SystemExit(f"no contestants: {', '.join(sorted(missing))}; there are {', '.join(contestants)}")
+    order = np.random.default_rng(0)
     for d, n, m in TABLE:
         questions = [balls(np.random.default_rng([d, n, m, k]), d, n, m, gap)
                      for k, gap in enumerate((0.5, -0.2, 1e-3, -1.5, 1.0)[: args.questions])]  # fmt: skip
@@ -241,12 +190,12 @@ def table(args) -> Iterator[dict]:
         wrong: dict[str, int] = {}
         for _ in range(args.runs):
             for question, truth in zip(questions, truths):
-                for name, ask in contestants.items():
-                    if max(seconds.get(name, [0.0])) > args.longest or _too_large(name, n, m):
+                for name in order.permutation(asked).tolist():  # whoever follows Drake finds the caches empty
+                    if max(seconds.get(name, [0.0])) > args.longest or _too_large(name, n):
                         continue
                     start = time.perf_counter()
                     try:
-                        hit: bool | None = ask(question)
+                        hit: bool | None = contestants[name](question)
                     except (ArithmeticError, RuntimeError, ValueError, CollideError) as error:  # no answer
                         hit = None
                         print(f"{name} d={d} n={n} m={m}: {type(error).__name__}: {str(error)[:80]}", file=sys.stderr)
@@ -261,11 +210,9 @@ def table(args) -> Iterator[dict]:
             yield row
 
 
-def _too_large(name: str, n: int, m: int) -> bool:
+def _too_large(name: str, n: int) -> bool:
     """Whether a contestant's matrices would not fit, or its subsets be too many."""
-    if name == "HiGHS, n variables":
-        return n * m > _MAX_ENTRIES
-    return n > (_MAX_DENSE if name in PEERS and name != "Drake" else 40 if name == "brute-force" else n)
+    return n > (PEERS[name][2] if name in PEERS else 40 if name == "brute-force" else n)
 
 
 def judge(args) -> Iterator[dict]:
@@ -292,6 +239,10 @@ def main() -> None:
     parser.add_argument("--algorithms", nargs="+", choices=["auto", *ALGORITHMS], help="for --fits and --judge")
     parser.add_argument("--dimensions", nargs="+", type=int, help="for --fits, 3 by default, and for --judge, 1 to 5")
     parser.add_argument("--largest", type=int, default=SIZES[-1], help="the most rows of --fits")
+    parser.add_argument("--families", nargs="+", choices=list(FIT_FAMILIES), help="for --fits: these alone")
+    parser.add_argument("--highs", action="store_true", help="with --fits: HiGHS beside ACIT where it can see the gap")
+    parser.add_argument("--plot", type=Path, help="with --fits: a picture of them (needs matplotlib)")
+    parser.add_argument("--contestants", nargs="+", help="of --table: these alone")
     parser.add_argument("--runs", type=int, default=5, help="of --table, each of all questions")
     parser.add_argument("--questions", type=int, default=5, help="of --table a size")
     parser.add_argument("--longest", type=float, default=3.0, help="seconds that a contestant may take")

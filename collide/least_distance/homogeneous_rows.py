@@ -101,7 +101,7 @@ class HomogeneousRows:
         if rows is None:
             words[4:6] = 0
         else:
-            words[4:6] = address_of(rows), len(rows)
+            words[4:6] = address_of(rows) or 1, len(rows)  # 0 would mean all
         return address_of(words)
 
     def products(self, vector: np.ndarray, last: float, rows: np.ndarray | None = None) -> np.ndarray:

@@ -39,7 +39,7 @@ def _shortest(origin, lifted, work: Work, exactly: bool) -> tuple[np.ndarray | N
     """The point of lifted half-spaces nearest the origin and what 1 is in its units; None where they have none."""
     if not exactly:
         proposal = propose_from_samples(origin, lifted, work, None, None, [0], [])
-        return (None, 0.0) if proposal is None else (proposal.y - proposal.u, 1.0)
+        return (proposal.y - proposal.u, 1.0) if proposal.is_settled else (None, 0.0)
     pair = nearest_pair(origin, lifted, work)
     if pair.kind == EMPTY:
         return None, 0.0

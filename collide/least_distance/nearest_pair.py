@@ -89,9 +89,8 @@ def nearest_pair(
     proposal = propose_from_samples(
         points, halfspaces, work, point_rows, halfspace_rows, working_points, working_halfspaces
     )  # fmt: skip
-    pair = None
-    if proposal is not None:
-        working_points, working_halfspaces = proposal.points, proposal.halfspaces
+    pair, working_points, working_halfspaces = None, proposal.points, proposal.halfspaces
+    if proposal.is_settled:
         pair = settle_basis(points, halfspaces, working_points, working_halfspaces)
     return finish_exactly(
         pair, points, halfspaces, work, point_rows, halfspace_rows, working_points, working_halfspaces

@@ -17,12 +17,13 @@ from collide.kernels import address_of
 from collide.least_distance.homogeneous_rows import HomogeneousRows
 from collide.least_distance.proposal_kernel import (
     FULL,
+    HALFSPACES_READ,
     LISTS,
     MAX_D,
     N_BASIC_HALFSPACES,
     N_BASIC_POINTS,
     NOISE,
-    POINTS_READ,
+    ROUNDS,
     SETTLED,
     U,
     Y,
@@ -90,17 +91,21 @@ class Work:
 
 
 class Proposal(NamedTuple):
-    """points, halfspaces : rows of a basis that doubles take for optimal.   y, u : the nearest pair in doubles."""
+    """points, halfspaces : rows of a basis that doubles take for optimal.   y, u : the nearest pair in doubles.
+
+    is_settled : False where doubles came to no end; the rows are then those of the last step that they could make.
+    """
 
     points: list[int]
     halfspaces: list[int]
     y: np.ndarray
     u: np.ndarray
+    is_settled: bool
 
 
 def propose_from_samples(
     points, halfspaces, work: Work, point_rows, halfspace_rows, working_points, working_halfspaces
-):
+) -> Proposal:
     """What doubles take for the nearest pair, with few passes over many rows.
 
     As of Clarkson (1995): an even sample is searched; what violates its answer, in the mean at most d·n/r rows of n for
@@ -111,7 +116,7 @@ def propose_from_samples(
         proposal = propose_pair(
             points, halfspaces, work, some_points, some_halfspaces, working_points, working_halfspaces
         )  # fmt: skip
-        if proposal is None or (some_points is point_rows and some_halfspaces is halfspace_rows):
+        if not proposal.is_settled or (some_points is point_rows and some_halfspaces is halfspace_rows):
             return proposal
         working_points, working_halfspaces = list(proposal.points), list(proposal.halfspaces)
         n_violated = 0
@@ -126,7 +131,7 @@ def propose_from_samples(
             some_points, n_violated = np.concatenate((some_points, violated)), n_violated + len(violated)
         if n_violated == 0:
             return proposal
-    return None
+    return proposal._replace(is_settled=False)
 
 
 def _some(count: int, rows: np.ndarray | None) -> np.ndarray | None:
@@ -152,27 +157,26 @@ def propose_pair(
     halfspace_rows: np.ndarray | None,
     working_points: list[int],
     working_halfspaces: list[int],
-) -> Proposal | None:
-    """What doubles take for the nearest pair, or None where they cannot tell. Nothing is proven."""
+) -> Proposal:
+    """What doubles take for the nearest pair. Nothing is proven."""
     assert points.dimension <= MAX_D
     records = points.record(point_rows), halfspaces.record(halfspace_rows)
-    counts = (0, 0, 0, 0)
+    state = _of_thread.state
+    while state.capacity <= max(len(working_points), len(working_halfspaces)):
+        _of_thread.state = state = _State(2 * state.capacity)
+    state.begin(working_points, working_halfspaces)
     while True:
-        state = _of_thread.state_for(max(len(working_points), len(working_halfspaces)))
-        state.begin(working_points, working_halfspaces, counts)
         ended = propose_rows(points.dimension, *records, *state.arguments, work.remaining(points, halfspaces))
-        n_points, n_halfspaces, *counts_now = state.integers[:POINTS_READ + 2].tolist()
-        counts = tuple(counts_now)
         if ended != FULL:
             break
-        working_points, working_halfspaces = state.rows(0, n_points), state.rows(1, n_halfspaces)
-    rounds, pivots, points_read, halfspaces_read = counts
+        _of_thread.state = state = state.enlarged()
+    rounds, pivots, points_read, halfspaces_read = state.integers[ROUNDS : HALFSPACES_READ + 1].tolist()
     work.add("rounds", rounds)
     work.add("pivots", pivots)
     points.n_read += points_read
     halfspaces.n_read += halfspaces_read
     work.check(points, halfspaces)
-    return state.proposal(points.dimension) if ended == SETTLED else None
+    return state.proposal(points.dimension, ended == SETTLED)
 
 
 class _State:
@@ -184,36 +188,45 @@ class _State:
         self.integers = np.zeros(n_integers(capacity), dtype=np.int64)
         self.arguments = address_of(self.doubles), address_of(self.integers), capacity
 
-    def begin(self, points: list[int], halfspaces: list[int], counts: tuple[int, ...]) -> None:
-        """Working sets to begin with, and what was counted before."""
-        self.integers[:LISTS] = [len(points), len(halfspaces), *counts, 0, 0]
+    def begin(self, points: list[int], halfspaces: list[int]) -> None:
+        """Working sets to begin with."""
+        self.integers[:LISTS] = 0
         for which, working in enumerate((points, halfspaces)):
             first = LISTS + which * self.capacity
-            self.integers[first : first + len(working)] = working
+            self.integers[which], self.integers[first : first + len(working)] = len(working), working
+
+    def enlarged(self) -> _State:
+        """The same with twice the room."""
+        larger = _State(2 * self.capacity)
+        larger.integers[:LISTS] = self.integers[:LISTS]
+        for which in range(4):
+            first, rows = LISTS + which * larger.capacity, self.rows(which, self.capacity)
+            larger.integers[first : first + self.capacity] = rows
+        return larger
 
     def rows(self, which: int, count: int) -> list[int]:
         """The first rows of a list: 0, 1 working points and half-spaces, 2, 3 those of the basis."""
         first = LISTS + which * self.capacity
         return self.integers[first : first + count].tolist()
 
-    def proposal(self, d: int) -> Proposal:
-        """What was found."""
+    def proposal(self, d: int, is_settled: bool) -> Proposal:
+        """What was found; of a search that came to no end its last basis, and the rows added after it."""
         n_points, n_halfspaces = self.integers[N_BASIC_POINTS : N_BASIC_HALFSPACES + 1].tolist()
+        points, halfspaces = self.rows(2, n_points), self.rows(3, n_halfspaces)
+        if not is_settled:
+            first = -1 if points else 0  # from the first where there was no step
+            n_points, n_halfspaces = self.integers[:2].tolist()
+            points += [row for row in self.rows(0, n_points)[first:] if row not in points]
+            halfspaces += [row for row in self.rows(1, n_halfspaces)[first:] if row not in halfspaces]
         y, u = self.doubles[Y : Y + d].copy(), self.doubles[U : U + d].copy()
-        return Proposal(self.rows(2, n_points), self.rows(3, n_halfspaces), y, u)
+        return Proposal(points, halfspaces, y, u, is_settled)
 
 
 class _OfThread(local):
-    """The state of one thread, made when the thread first asks; a larger one where it did not do."""
+    """The state of one thread, made when the thread first asks; a larger one from when it did not do."""
 
     def __init__(self) -> None:
         self.state = _State(_CAPACITY)
-
-    def state_for(self, count: int) -> _State:
-        """A state with room for more than so many rows of either kind."""
-        while self.state.capacity <= count:
-            self.state = _State(2 * self.state.capacity)
-        return self.state
 
 
 _of_thread = _OfThread()

@@ -231,7 +231,7 @@ def _centre_in_hull(primal: Space, points: HomogeneousRows, work: Work) -> Neare
     work.add("whole_programs")
     d, origin = points.dimension, _origin(points.dimension)
     proposal = propose_from_samples(primal.points, origin, work, None, None, [0], [])
-    if proposal is not None:
+    if proposal.is_settled:
         away, _ = as_integers([*(-proposal.u).tolist(), 0.0])
         if any(away) and len(primal.points.negative(away).rows) == len(points):
             return None

@@ -23,6 +23,7 @@ from collide.polytopes.planar_distance import (
 )
 from collide.polytopes.planar_kernel import meet_polygons
 from collide.polytopes.planar_layout import DOUBLES, HIT, HOW, INTEGERS, LOST, READ, ROUNDS, ROW
+from collide.threads import check_threads, share_if_it_helps
 
 
 class PolygonQuestion:
@@ -138,7 +139,7 @@ class PolygonHits:
         return f"PolygonHits({self.hit})" if self._question.single else f"PolygonHits(<{len(self)} pairs>)"
 
 
-def polygons_meet(A, B, X_WA, X_WB) -> PolygonHits:
+def polygons_meet(A, B, X_WA, X_WB, *, threads: int = 1) -> PolygonHits:
     """Whether convex polygons in the plane have a common point, decided exactly.
 
     Parameters
@@ -147,6 +148,8 @@ def polygons_meet(A, B, X_WA, X_WB) -> PolygonHits:
         One goes with all poses; of a list each has its own.
     X_WA, X_WB : (3, 3) or (n, 3, 3) array_like, float64
         Poses in W, used as they stand, entry by entry [m]: `planar_pose` makes one. A single one goes with all others.
+    threads : int
+        Answer a batch in at most so many threads; the answers are the same bits.
 
     Returns
     -------
@@ -156,7 +159,7 @@ def polygons_meet(A, B, X_WA, X_WB) -> PolygonHits:
     Raises
     ------
     InvalidArgument
-        Where A or B are no polygons, or numbers of polygons do not match.
+        Where A or B are no polygons, numbers of polygons do not match, or threads is no integer ≥ 1.
     InvalidPose
         Where a pose is not finite or no rotation, or their numbers do not match.
 
@@ -166,8 +169,11 @@ def polygons_meet(A, B, X_WA, X_WB) -> PolygonHits:
     detection of intersections between convex polyhedra", section 2, Theorem 2.1. What doubles leave open is decided in
     integers.
     """
+    threads = check_threads(threads)
     question = PolygonQuestion(A, B, X_WA, X_WB)
-    return PolygonHits(question, _search(question, *question.arguments()))
+    table = np.zeros((question.n, ROW), dtype=np.int64)
+    _answer(question, table, None, threads)
+    return PolygonHits(question, table)
 
 
 class PolygonDistances(PolygonHits):
@@ -208,7 +214,7 @@ class PolygonDistances(PolygonHits):
         return f"PolygonDistances(<{len(self)} pairs>)"
 
 
-def polygon_distance(A, B, X_WA, X_WB) -> PolygonDistances:
+def polygon_distance(A, B, X_WA, X_WB, *, threads: int = 1) -> PolygonDistances:
     """Signed distance, normal and witness points of convex polygons in the plane.
 
     Parameters
@@ -217,6 +223,8 @@ def polygon_distance(A, B, X_WA, X_WB) -> PolygonDistances:
         One goes with all poses; of a list each has its own.
     X_WA, X_WB : (3, 3) or (n, 3, 3) array_like, float64
         Poses in W, used as they stand, entry by entry [m]. A single one goes with all others.
+    threads : int
+        Answer a batch in at most so many threads; the answers are the same bits.
 
     Returns
     -------
@@ -226,7 +234,7 @@ def polygon_distance(A, B, X_WA, X_WB) -> PolygonDistances:
     Raises
     ------
     InvalidArgument
-        Where A or B are no polygons, or numbers of polygons do not match.
+        Where A or B are no polygons, numbers of polygons do not match, or threads is no integer ≥ 1.
     InvalidPose
         Where a pose is not finite or no rotation, or their numbers do not match.
 
@@ -236,24 +244,41 @@ def polygon_distance(A, B, X_WA, X_WB) -> PolygonDistances:
     translation has to be tried along the normal of every edge. Polygons without area that meet have depth 0 where their
     Minkowski difference has none. Distances are doubles, off by at most 2⁻⁴⁶ (1.4e-14) of the pair's size.
     """
+    threads = check_threads(threads)
     question = PolygonQuestion(A, B, X_WA, X_WB)
-    arrays, numbers = question.arguments()
-    table = _search(question, arrays, numbers)
+    table = np.zeros((question.n, ROW), dtype=np.int64)
     distances = np.zeros((question.n, DISTANCE_ROW))
-    if question.n:
-        measure_polygons(*numbers, question.n, address_of(table), address_of(distances))
+    _answer(question, table, distances, threads)
     return PolygonDistances(question, table, distances)
 
 
-def _search(question: PolygonQuestion, arrays: list[np.ndarray], numbers: tuple[int, ...]) -> np.ndarray:
-    """Rows of `planar_layout.py`; ``arrays`` hold what the numbers are addresses of."""
-    assert arrays
-    table = np.zeros((question.n, ROW), dtype=np.int64)
-    if question.n:
-        meet_polygons(*numbers, question.n, address_of(table), *_of_thread.addresses)
+def _answer(question: PolygonQuestion, table: np.ndarray, distances: np.ndarray | None, threads: int) -> None:
+    """Rows of `planar_layout.py` of all pairs, and of `planar_distance.py` where they are wanted."""
+    arrays, numbers = question.arguments()
+    assert arrays  # the numbers are addresses of them
+
+    def answer(piece: slice) -> None:
+        n, rows = piece.stop - piece.start, address_of(table) + table.itemsize * ROW * piece.start
+        arguments = _arguments_from(numbers, piece.start)
+        meet_polygons(*arguments, n, rows, *_of_thread.addresses)
+        if distances is not None:
+            measure_polygons(*arguments, n, rows, address_of(distances) + 8 * DISTANCE_ROW * piece.start)
+
+    if threads > 1 and question.n > 1:
+        share_if_it_helps(question.n, answer, threads)
+    elif question.n:
+        answer(slice(0, question.n))
     if (table[:, HOW] == LOST).any():
         raise AssertionError(f"planar search without a proof, pair {int(np.argmax(table[:, HOW] == LOST))}")
-    return table
+
+
+def _arguments_from(numbers: tuple[int, ...], first: int) -> tuple[int, ...]:
+    """The arguments of a kernel for the pairs from one on: rows of polygons have 16 bytes, poses 72."""
+    polygons_a, step_a, poses_a, pose_step_a, polygons_b, step_b, poses_b, pose_step_b = numbers
+    return (
+        polygons_a + 16 * step_a * first, step_a, poses_a + 72 * pose_step_a * first, pose_step_a,
+        polygons_b + 16 * step_b * first, step_b, poses_b + 72 * pose_step_b * first, pose_step_b,
+    )  # fmt: skip
 
 
 class _OfThread(local):

@@ -176,7 +176,8 @@ ROOMS = {
         "pair_arguments",
     },
     "polytopes": {
-        "errors", "argument_checks", "certificates", "kernels", "least_distance", "numerics", "shapes", "transforms",
+        "errors", "argument_checks", "certificates", "kernels", "least_distance", "numerics", "shapes", "threads",
+        "transforms",
     },
     "world_bodies": {"errors", "argument_checks", "transforms", "numerics", "shapes", "broadphase"},
     "world_hits": set(),

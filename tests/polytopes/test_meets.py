@@ -19,6 +19,7 @@ from reproduction import reproducing
 import collide
 from collide import polytopes
 from collide.certificates.certificate import CertificateRefused
+from collide.least_distance import pair_proposals
 from collide.polytopes.meeting import Meeting
 from collide.polytopes.meets_query import ALGORITHMS
 
@@ -106,6 +107,33 @@ def test_no_plane_that_keeps_the_points_away_cuts_less():
     assert max(tried) <= answer.distance + 1e-12 and max(tried) > 0.9 * answer.distance
     smaller = np.vstack((normals, -answer.normal)), np.append(offsets, -answer.normal @ answer.point_p - 2.0)
     assert polytopes.meets(points, *smaller).distance == pytest.approx(2.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_origin_on_the_boundary(algorithm):
+    """Of the region, of the hull, of both, which then touch; polars seen from there would have no end."""
+    corner = np.array([[-1.0, 0], [0, -1], [1, 1]]), np.array([0.0, 0, 2])
+    beyond = np.array([[0.0, 0], [-1, 0], [-1, -1]])
+    hits = []
+    for points in (beyond, beyond - [0.5, 0], beyond - [-0.25, -0.5], beyond * 3 - [1, 1]):
+        hits.append(answered(families.Question(points, *corner), algorithm).hit)
+    assert hits == [True, False, True, False]
+    assert answered(families.Question(np.zeros((1, 2)), np.array([[1.0, 2]]), np.zeros(1)), algorithm).hit
+
+
+def test_working_sets_outgrow_their_room(monkeypatch):
+    """Answers and counts are the same where the state of the search has room for one row of each kind at first."""
+    asked = [question for _, question in families.questions(22, 4, 24, 40)]
+    before = [polytopes.meets(*question) for question in asked]
+    monkeypatch.setattr(pair_proposals, "_CAPACITY", 1)
+    n_grown = 0
+    for question, known in zip(asked, before):
+        monkeypatch.setattr(pair_proposals, "_of_thread", pair_proposals._OfThread())
+        answer = polytopes.meets(*question)
+        assert (answer.hit, answer.distance, answer.certificate) == (known.hit, known.distance, known.certificate)
+        assert answer.counters["points_read"] == known.counters["points_read"]
+        n_grown += pair_proposals._of_thread.state.capacity > 2
+    assert n_grown >= 12
 
 
 def test_contradictory_planes_are_answered_with_multipliers():

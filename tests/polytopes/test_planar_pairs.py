@@ -14,7 +14,8 @@ from reproduction import reproducing
 from collide import ConvexPolygon
 from collide.certificates.certificate import CertificateRefused
 from collide.errors import InvalidArgument, InvalidPose
-from collide.polytopes import planar_pose, polygons_meet, verify_polygons
+from collide.kernels import PLAIN_PYTHON
+from collide.polytopes import planar_pose, polygon_distance, polygons_meet, verify_polygons
 from collide.polytopes.planar_layout import DOUBLES, HIT, HOW, INTEGERS, READ, ROUNDS, ROW, TWO_LINES
 from collide.polytopes.planar_predicates import PolygonPair, set_planar_poses
 from collide.polytopes.planar_search import search_planar
@@ -115,6 +116,24 @@ def test_batch_equals_single_calls_and_swapped():
         )  # fmt: skip
         assert single.certificate() == batch.certificate(k)
     assert polygons_meet([], [], np.eye(3), np.eye(3)).hit.shape == (0,)
+
+
+@pytest.mark.parametrize("ask", [polygons_meet, polygon_distance])
+def test_threads_give_the_same_bits(ask, monkeypatch):
+    monkeypatch.setattr("collide.threads._ALONE", 0.0)  # else so few pairs are shared by nobody
+    rng = np.random.default_rng(8)
+    n = 40_000 if not PLAIN_PYTHON else 40
+    many = [ConvexPolygon(rng.normal(size=(k, 2))) for k in (3, 12, 40)]
+    A = [many[k] for k in rng.integers(0, 3, n)]
+    X_WAs = np.array([pose_at(rng.normal(size=2) * 2.0, rng.uniform(0, 7)) for _ in range(n)])
+    for B, X_WB in ((many[2], pose_at((0.5, 0.1), 0.3)), (A[::-1], X_WAs[::-1])):
+        one, three = ask(A, B, X_WAs, X_WB), ask(A, B, X_WAs, X_WB, threads=3)
+        assert 0.1 < one.hit.mean() < 0.9
+        assert np.array_equal(one._rows, three._rows)
+        if ask is polygon_distance:
+            assert np.array_equal(one.distance, three.distance) and np.array_equal(one.point_b, three.point_b)
+    with pytest.raises(InvalidArgument, match="threads must be an integer"):
+        ask(A, many[0], X_WAs, np.eye(3), threads=0)
 
 
 def test_tampered_certificates_are_refused():
