@@ -52,42 +52,60 @@ function geometry(positions, normals, triangles) {
 /** Vertices with averaged normals: one for each normal that the facets around a vertex see. */
 function curvedGeometry(positions, triangles) {
   const facets = facetNormals(positions, triangles);
-  const around = cornersOfVertices(triangles, positions.length / 3);
-  const [points, normals] = [[], []];
+  const directions = unitRows(facets);
+  const { starts, corners } = cornersOfVertices(triangles, positions.length / 3);
+  const points = new Float32Array(3 * triangles.length); // as many as there are corners, at most
+  const normals = new Float32Array(3 * triangles.length);
   const index = new Uint32Array(triangles.length);
-  const { starts, corners } = around;
+  const normal = new Float32Array(3);
+  let rows = 0;
   for (let vertex = 0; vertex < starts.length - 1; vertex += 1) {
-    const first = points.length / 3;
+    const first = rows;
     for (let k = starts[vertex]; k < starts[vertex + 1]; k += 1) {
-      const normal = cornerNormal(facets, Math.floor(corners[k] / 3), around, vertex);
+      const around = corners.subarray(starts[vertex], starts[vertex + 1]);
+      putCornerNormal(normal, facets, directions, facetOf(corners[k]), around);
       let row = first;
-      while (row < points.length / 3 && !isNormal(normals, row, normal)) row += 1;
-      if (row === points.length / 3) {
-        points.push(positions[3 * vertex], positions[3 * vertex + 1], positions[3 * vertex + 2]);
-        normals.push(...normal);
+      while (row < rows && !isNormal(normals, row, normal)) row += 1;
+      if (row === rows) {
+        points.set(positions.subarray(3 * vertex, 3 * vertex + 3), 3 * row);
+        normals.set(normal, 3 * row);
+        rows += 1;
       }
       index[corners[k]] = row;
     }
   }
-  return geometry(new Float32Array(points), new Float32Array(normals), index);
+  return geometry(points.slice(0, 3 * rows), normals.slice(0, 3 * rows), index);
 }
 
-/** The average over the facets around a vertex that are flat enough against this one. */
-function cornerNormal(facets, facet, { starts, corners }, vertex) {
+/** The average over the facets of corners at one vertex that are flat enough against one of them; all, if it has no area. */
+function putCornerNormal(normal, facets, directions, own, corners) {
+  const all = innerProduct(directions, own, own) === 0;
   let [x, y, z] = [0, 0, 0];
-  for (let k = starts[vertex]; k < starts[vertex + 1]; k += 1) {
-    const near = Math.floor(corners[k] / 3);
-    if (near !== facet && cosineBetween(facets, facet, near) < COS_CREASE) continue;
-    x += facets[3 * near];
-    y += facets[3 * near + 1];
-    z += facets[3 * near + 2];
+  for (let k = 0; k < corners.length; k += 1) {
+    const near = facetOf(corners[k]);
+    if (!all && near !== own && innerProduct(directions, own, near) < COS_CREASE) continue;
+    x += facets[near];
+    y += facets[near + 1];
+    z += facets[near + 2];
   }
-  const length = Math.hypot(x, y, z) || 1;
-  return [x / length, y / length, z / length];
+  const length = Math.sqrt(x * x + y * y + z * z) || 1;
+  normal[0] = x / length;
+  normal[1] = y / length;
+  normal[2] = z / length;
+}
+
+/** Where the numbers of a corner's facet begin: a facet has three corners, and its normal three numbers. */
+function facetOf(corner) {
+  return corner - (corner % 3);
+}
+
+function innerProduct(rows, i, j) {
+  return rows[i] * rows[j] + rows[i + 1] * rows[j + 1] + rows[i + 2] * rows[j + 2];
 }
 
 function isNormal(normals, row, normal) {
-  return normal.every((c, axis) => Math.abs(normals[3 * row + axis] - c) < 1e-4);
+  for (let axis = 0; axis < 3; axis += 1) if (Math.abs(normals[3 * row + axis] - normal[axis]) >= 1e-4) return false;
+  return true;
 }
 
 /** Normals of facets, as long as twice their areas. */
@@ -118,9 +136,12 @@ function cornersOfVertices(triangles, n) {
   return { starts, corners };
 }
 
-function cosineBetween(normals, f, g) {
-  const [i, j] = [3 * f, 3 * g];
-  const inner = normals[i] * normals[j] + normals[i + 1] * normals[j + 1] + normals[i + 2] * normals[j + 2];
-  const lengths = Math.hypot(normals[i], normals[i + 1], normals[i + 2]) * Math.hypot(normals[j], normals[j + 1], normals[j + 2]);
-  return lengths > 0 ? inner / lengths : 1;
+/** Rows of three numbers brought to length 1; zeros stay zeros. */
+function unitRows(rows) {
+  const units = new Float32Array(rows.length);
+  for (let k = 0; k < rows.length; k += 3) {
+    const length = Math.sqrt(innerProduct(rows, k, k)) || 1;
+    for (let axis = 0; axis < 3; axis += 1) units[k + axis] = rows[k + axis] / length;
+  }
+  return units;
 }
