@@ -32,7 +32,7 @@ Vertex ids are rows of `PackedConvex.points`: the points of a `ConvexHull` as ha
 from __future__ import annotations
 
 from operator import index
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from collide.errors import CollideError
 
@@ -42,8 +42,6 @@ NO_VERTEX = -1
 
 #: (vertex of A, vertex of B).
 VertexPair = tuple[int, int]
-#: A normal in whole numbers, in the world.
-Normal = tuple[int, int, int]
 
 
 class Certificate(NamedTuple):
@@ -59,7 +57,7 @@ class Certificate(NamedTuple):
     kind: str
     part_a: int
     part_b: int
-    pairs: tuple[VertexPair, ...] | tuple[Normal]
+    pairs: tuple[Any, ...]
 
 
 class CertificateRefused(CollideError):
@@ -76,7 +74,7 @@ def read_certificates(values) -> list[Certificate]:
         ) from None
 
 
-def _read_rows(kind: str, rows) -> tuple[VertexPair, ...] | tuple[Normal]:
+def _read_rows(kind: str, rows) -> tuple[Any, ...]:
     if kind == PLANE:
         ((x, y, z),) = rows
         return ((index(x), index(y), index(z)),)

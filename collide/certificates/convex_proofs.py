@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from collide.certificates.certificate import Normal, VertexPair
+from collide.certificates.certificate import VertexPair
 from collide.certificates.exact_parts import ExactPart, common_vertices
 from collide.certificates.nearest_to_origin import nearest_to_origin
 from collide.lowering.packed_convex import HALFSPACE, POINTS
-from collide.numerics.exact_points import inner, minus
+from collide.numerics.exact_points import Point, inner, minus
 
 
 def flaw_of_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hit: bool) -> str | None:
@@ -61,7 +61,7 @@ def flaw_of_plane_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair],
     return None if all(is_clear) else f"vertex {is_clear.index(False)} reaches the half-space"
 
 
-def flaw_of_normal(A: ExactPart, B: ExactPart, normal: Normal) -> str | None:
+def flaw_of_normal(A: ExactPart, B: ExactPart, normal: Point) -> str | None:
     """Why a normal does not prove that A lies beyond B along it; None where it does. O(vertices)."""
     if not (A.kind == B.kind == POINTS and A.radius == B.radius == 0):
         return "a plane proves something of convex bodies of vertices without radii alone"

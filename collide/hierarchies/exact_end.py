@@ -53,7 +53,13 @@ def last_corners(body_p: WalkBody, body_r: WalkBody, walk) -> tuple[int, list[in
 
 
 def end_exactly(
-    body_p: WalkBody, body_r: WalkBody, packed_p: PackedConvex, packed_r: PackedConvex, X_WP, X_WR, walks: np.ndarray
+    body_p: WalkBody,
+    body_r: WalkBody,
+    packed_p: PackedConvex,
+    packed_r: PackedConvex,
+    X_WP: np.ndarray,
+    X_WR: np.ndarray,
+    walks: np.ndarray,
 ) -> ExactEnds:
     """Settle walks that ended without a proof, each at its pose.
 
@@ -73,8 +79,8 @@ def end_exactly(
     table.build_trees(np.arange(2))
     pairs = np.stack([np.arange(n), np.arange(n, 2 * n)], axis=1)
     settle_proposals(table, poses, np.repeat(np.arange(2), n), pairs, rows, boolean=True)
-    begun = (walks["status"] == OPEN_APART) | (walks["status"] == OPEN_MEETING)
-    proven = begun & (rows["how"] == EXACT) & (rows["exact"] > 0)
+    is_open = (walks["status"] == OPEN_APART) | (walks["status"] == OPEN_MEETING)
+    proven = is_open & (rows["how"] == EXACT) & (rows["exact"] > 0)
     return ExactEnds(
         proven, rows["hit"].copy(), rows["exact"].astype(np.int64), rows["vertices_a"], rows["vertices_b"],
         rows["count"].astype(np.int64),

@@ -183,24 +183,21 @@ def walk_poses(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_op
     """
     body_a, body_b = walk_body(A), walk_body(B)
     n = number_of_poses(X_WA, X_WB)
-    exchanged = body_a.plays_r_better_than(body_b)
+    exchanged = not body_b.has_own_polar and body_a.has_own_polar
     sides = (A, body_a, X_WA), (B, body_b, X_WB)
     (P, body_p, X_WP), (R, body_r, X_WR) = reversed(sides) if exchanged else sides
     if body_r.polar is None:
-        rows, rounds = no_walks(n), ()
-        walks = Walks((A, B, X_WA, X_WB), rows["status"] == MEETING, rows, exchanged, (0, 0), rounds)
+        rows = no_walks(n)
+        walks = Walks((A, B, X_WA, X_WB), rows["status"] == MEETING, rows, exchanged, (0, 0), ())
     else:
-        question = (
-            body_p, body_r, convex_set_of(P), convex_set_of(R), np.broadcast_to(X_WP, (n, 4, 4)),
-            np.broadcast_to(X_WR, (n, 4, 4)),
-        )  # fmt: skip
-        rows, rounds = run_walks(*question, trace=trace)
+        bodies = body_p, body_r, convex_set_of(P), convex_set_of(R)
+        X_WP, X_WR = (np.broadcast_to(X, (n, 4, 4)) for X in (X_WP, X_WR))
+        rows, rounds = run_walks(*bodies, X_WP, X_WR, trace=trace)
         depths = body_p.hierarchy.depth, body_r.depth_of_polar
         walks = Walks((A, B, X_WA, X_WB), rows["status"] == MEETING, rows, exchanged, depths, rounds)
         open_ids = np.flatnonzero((rows["status"] == OPEN_APART) | (rows["status"] == OPEN_MEETING))
         if len(open_ids):
-            bodies, poses = question[:4], (X[open_ids] for X in question[4:])
-            walks._take_ends(open_ids, end_exactly(*bodies, *poses, rows[open_ids]))
+            walks._take_ends(open_ids, end_exactly(*bodies, X_WP[open_ids], X_WR[open_ids], rows[open_ids]))
     hit = walks.hit
     if not walks.walked.all():
         open_ids = np.flatnonzero(~walks.walked)

@@ -78,12 +78,9 @@ class WalkBody:
         thick = thickened(self.points)
         return PolarSide(thick, convex_hull(thick), len(self.points))
 
-    def plays_r_better_than(self, other: WalkBody) -> bool:
-        """Whether this body is to play R: it has a polar of its own, and the other has not."""
-        return not other._has_own_polar and self._has_own_polar
-
     @property
-    def _has_own_polar(self) -> bool:
+    def has_own_polar(self) -> bool:
+        """Whether the body plays R as it is, not thickened."""
         return self.has_interior and self.polar is not None and not self.polar.is_thickened
 
     @property
