@@ -45,7 +45,13 @@ def distances(
             within[field] -= padding + margin
         within["point_a"] += padding * within["normal"]
         within["point_b"] -= margin * within["normal"]
-        within["hit"] |= (within["lower"] <= 0.0) & (padding + margin > 0.0)
+        if padding + margin > 0.0:
+            within["hit"] |= within["upper"] <= 0.0
+            open_ = np.flatnonzero(~within["hit"] & (within["lower"] <= 0.0))
+            if len(open_):  # what brackets leave open is decided as `are_hits` does
+                swell = padding + margin
+                X_WB = np.broadcast_to(X_WB, X_WA.shape)[open_]
+                within["hit"][open_] = query.collide(A, B, X_WA[open_], X_WB, security_margin=swell, check_poses=False)
         out[rows] = within
     out["a"], out["b"] = pairs[:, 1], pairs[:, 2]
     return out
