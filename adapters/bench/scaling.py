@@ -56,7 +56,10 @@ def fitted_slope(sizes: list[int], values: list[float]) -> float:
     """Least squares of log(value) against log(n) over the upper half of those that have a value."""
     valid = [(math.log(n), math.log(v)) for n, v in zip(sizes, values) if v > 0 and math.isfinite(v)]
     valid = valid[len(valid) // 2 - (len(valid) % 2 == 0) if len(valid) > 3 else 0 :]
-    return float(np.polyfit(*np.array(valid).T, 1)[0]) if len(valid) > 1 else math.nan
+    if len(valid) < 2:
+        return math.nan
+    x, y = np.array(valid).T
+    return float(np.polyfit(x, y, 1)[0])
 
 
 def measure(
