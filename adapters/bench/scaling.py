@@ -16,6 +16,7 @@ import numpy as np
 
 from collide.adapters.bench.engine_timer import EngineTimer
 from collide.adapters.bench.pareto import check_engines, engine_of, number, over_rounds, quantile
+from collide.adapters.bench.timed_calls import Pair
 from collide.adapters.peers.protocol import ENGINES
 from collide.hull.exact_hull import convex_hull
 from collide.scenes.families.ingredients import direction, rotation
@@ -103,7 +104,7 @@ def _times(engines: list[str], n: int, seed: int, seconds: float) -> dict[str, f
     """µs a call by engine, the median over poses of the median over rounds."""
     random = np.random.default_rng([2, n, seed])
     A, B = ConvexHull(sphere(n, seed)), ConvexHull(sphere(n, seed + 1))
-    pairs = []
+    pairs: list[Pair] = []
     for k in range(POSES):
         X_WA, X_WB = np.eye(4), np.eye(4)
         X_WA[:3, :3], X_WB[:3, :3] = rotation(random), rotation(random)
