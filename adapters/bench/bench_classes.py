@@ -53,7 +53,7 @@ def meshes(random: np.random.Generator, index: int) -> MeshCase:
         X[:3, :3], X[:3, 3] = rotation(random), k * step * factor
         vertices, faces = _bumpy_ball(random, RINGS)
         sides.append(Surface(vertices, faces, True, X))
-    return MeshCase("meshes", index, *sides)
+    return MeshCase("meshes", index, sides[0], sides[1])
 
 
 #: By name, in the order of the picture.

@@ -94,7 +94,8 @@ def _panel(panel: Any, points: list[Point], styles: dict[str, tuple[str, str]]) 
     kind = points[0].kind
     panel.set_xscale("log")
     panel.set_yscale("log")
-    marks, silent = [], []
+    marks: list[dict] = []
+    silent: list[str] = []
     for point in points:
         x, y, text = place_of(point)
         marks.append({"class": kind, "engine": point.engine, "x": x, "y": y, "text": text})

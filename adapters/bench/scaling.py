@@ -16,6 +16,7 @@ import numpy as np
 
 from collide.adapters.bench.engine_timer import EngineTimer
 from collide.adapters.bench.pareto import check_engines, engine_of, number, over_rounds, quantile
+from collide.adapters.bench.timed_calls import Pair
 from collide.adapters.peers.protocol import ENGINES
 from collide.hull.exact_hull import convex_hull
 from collide.scenes.families.ingredients import direction, rotation
@@ -56,7 +57,10 @@ def fitted_slope(sizes: list[int], values: list[float]) -> float:
     """Least squares of log(value) against log(n) over the upper half of those that have a value."""
     valid = [(math.log(n), math.log(v)) for n, v in zip(sizes, values) if v > 0 and math.isfinite(v)]
     valid = valid[len(valid) // 2 - (len(valid) % 2 == 0) if len(valid) > 3 else 0 :]
-    return float(np.polyfit(*np.array(valid).T, 1)[0]) if len(valid) > 1 else math.nan
+    if len(valid) < 2:
+        return math.nan
+    x, y = np.array(valid).T
+    return float(np.polyfit(x, y, 1)[0])
 
 
 def measure(
@@ -100,7 +104,7 @@ def _times(engines: list[str], n: int, seed: int, seconds: float) -> dict[str, f
     """µs a call by engine, the median over poses of the median over rounds."""
     random = np.random.default_rng([2, n, seed])
     A, B = ConvexHull(sphere(n, seed)), ConvexHull(sphere(n, seed + 1))
-    pairs = []
+    pairs: list[Pair] = []
     for k in range(POSES):
         X_WA, X_WB = np.eye(4), np.eye(4)
         X_WA[:3, :3], X_WB[:3, :3] = rotation(random), rotation(random)

@@ -17,9 +17,10 @@ import collide
 from collide.adapters.peers.protocol import Peer
 from collide.adapters.peers.pybullet_peer import quaternion_xyzw
 from collide.errors import CollideError, UnsupportedQuery
+from collide.shapes import Shape
 
 #: One pair: two shapes and their poses (4, 4).
-Pair = tuple[Any, Any, np.ndarray, np.ndarray]
+Pair = tuple[Shape, Shape, np.ndarray, np.ndarray]
 #: What is in the time, by engine (without its setting), for tables and CSV.
 WHAT_IS_TIMED = {
     "collide": "collide.distance(A, B, X_WA, X_WB), poses and shapes as a user holds them: with its result",
@@ -53,9 +54,10 @@ def timed_call(peer: Peer, pair: Pair) -> Callable[[], Any]:
 
 def batch_call(pairs: list[Pair], copies: int = 1) -> Callable[[], Any]:
     """One call of `collide.distance` for all pairs, so many times over."""
-    A, B = (collide.ShapeSet([pair[k] for pair in pairs])[np.tile(np.arange(len(pairs)), copies)] for k in (0, 1))
-    X_WAs, X_WBs = (np.array([pair[k] for pair in pairs] * copies) for k in (2, 3))
-    return partial(collide.distance, A, B, X_WAs, X_WBs)
+    As, Bs, X_WAs, X_WBs = zip(*pairs)
+    rows = np.tile(np.arange(len(pairs)), copies)
+    A, B = (collide.ShapeSet(list(shapes))[rows] for shapes in (As, Bs))
+    return partial(collide.distance, A, B, np.array(X_WAs)[rows], np.array(X_WBs)[rows])
 
 
 def what_is_timed(name: str) -> str:
