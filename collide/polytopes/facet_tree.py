@@ -33,7 +33,7 @@ class Sizes(NamedTuple):
     leaf: int
 
 
-#: By dimension, sampled by benchmarks/hierarchical_trees.py --sizes.
+#: By dimension: of the few tried, what reads fewest cones.
 SIZES = {2: Sizes(0.5, 12, 24), 3: Sizes(0.5, 24, 48), 4: Sizes(0.5, 24, 96), 5: Sizes(0.5, 24, 160)}
 
 
