@@ -2,10 +2,13 @@
 
     python benchmarks/locality_growth.py         # three minutes; --parts growth build meshes, --no-files
 
-* growth: pairs of boxes that the walk looks at for all pairs of facets, on harpsicordia (local: n log n is proven; with
-  Σ = n, and with Σ ≤ 1000 whatever n, where meetings are linear), accordions and
-  Chazelle's polyhedra (not local: n² is proven), touching and 1e-12 apart, with exponents fitted.
+* growth: nodes that the walk compares with a box (one against up to eight) and pairs of facets that it tests for all
+  pairs of facets, on harpsicordia (local: n log n is proven; with Σ = n, and with Σ ≤ 1000 whatever n, where meetings
+  are linear), accordions and Chazelle's polyhedra (not local: n² is proven), touching and 1e-12 apart, with exponents
+  fitted.
 * build: seconds of both trees up to a million facets, over n log2 n.
+* walks: pairs of boxes and of facets that the walk of theorem 3.6 looks at on its own tree, the graded one, and on the
+  tree of queries, both counted by the same loop, with B as it stands, turned, and turned and scaled; a minute.
 * meshes: stretches of all meshes of shared/data and of a sample of pybullet_data's, beside what queries about them look
   at; rank correlations between the two.
 
@@ -27,6 +30,7 @@ from meshes import DATA, FILES, RESULTS, mesh, rotation, touching
 
 from collide import CollideError, Mesh
 from collide.hierarchies.graded_tree import graded_tree
+from collide.hierarchies.graded_walk import BoxHierarchy, boxes_of_graded, boxes_of_queries, count_walk
 from collide.hierarchies.tree_figures import tree_figures
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits
@@ -63,23 +67,25 @@ def growth() -> list[dict]:
                 X = np.eye(4)
                 X[2, 3] = gap
                 hits = all_hits(A.tree, B.tree, X, np.eye(4))
-                boxes, triangles, exact = hits.counters[0].tolist()
+                nodes, tested, exact = hits.counters[0].tolist()
                 rows.append({
                     "family": family, "gap": gap, "vertices": len(A.vertices), "meetings": meetings,
                     "pairs": len(hits.pairs),
-                    "boxes": boxes, "triangles": triangles, "exact": exact,
+                    "nodes": nodes, "facet_pairs": tested, "exact": exact,
                 })  # fmt: skip
         for gap in (0.0, 1e-12):
             of = [r for r in rows if r["family"] == family and r["gap"] == gap][-5:]
-            n, boxes = (np.array([r[key] for r in of], dtype=float) for key in ("vertices", "boxes"))
-            slope = np.polyfit(np.log(n), np.log(boxes), 1)[0]
+            n = np.array([r["vertices"] for r in of], dtype=float)
             units = {"n²": n**2} if not family.startswith("harpsicordia") else {
                 "n log2 n": n * np.log2(n), "n log2² n": n * np.log2(n) ** 2,
                 "meetings": np.array([r["meetings"] for r in of])}  # fmt: skip
-            text = "; ".join(
-                f"over {unit}: {', '.join(f'{x:.3f}' for x in boxes / size)}" for unit, size in units.items()
-            )
-            print(f"{family:20} gap {gap:5g}: n^{slope:.2f}; {text}", flush=True)
+            for what in ("nodes", "facet_pairs"):
+                counted = np.array([r[what] for r in of], dtype=float)
+                slope = np.polyfit(np.log(n), np.log(counted), 1)[0]
+                text = "; ".join(
+                    f"over {unit}: {', '.join(f'{x:.3f}' for x in counted / size)}" for unit, size in units.items()
+                )
+                print(f"{family:20} gap {gap:5g}: {what} n^{slope:.2f}; {text}", flush=True)
     return rows
 
 
@@ -106,6 +112,41 @@ def build() -> list[dict]:
             f"{made.size() / (2 * len(faces) - 1):.2f} (2F − 1)"
         )
     return rows
+
+
+def walks() -> list[dict]:
+    """Rows of counts of `graded_walk.py`: a pair of meshes, a motion and a tree each."""
+    rows = []
+    scans = [name for name in ("teapot", "bunny") if DATA.is_dir()]
+    bodies = [(f"harpsicordia {n}", *harpsicordia(n, 10.0)) for n in (1000, 4000, 16_000, 64_000)]
+    bodies += [(name, Mesh(*mesh(name), solid=False), Mesh(*mesh(name), solid=False), 0) for name in scans]
+    R_turned = rotation(np.random.default_rng(5))
+    small = 0.02 * (R_turned - R_turned.T)
+    for name, A, B, meetings in bodies:
+        trees = {
+            kind: [make(body) for body in (A, B)] for kind, make in (
+                ("graded, cubes", lambda b: _graded(b, False)), ("graded, tight", lambda b: _graded(b, True)),
+                ("queries", lambda b: boxes_of_queries(b.tree, b.vertices, b.faces)),
+            )
+        }  # fmt: skip
+        for motion, R in (
+            ("none", np.eye(3)), ("turned", np.eye(3) + small), ("turned, scaled 1.25", 1.25 * (np.eye(3) + small))
+        ):  # fmt: skip
+            X = np.eye(4)
+            X[:3, :3] = R
+            for kind, (a, b) in trees.items():
+                counts = count_walk(a, b, X)
+                n = len(A.vertices)
+                rows.append({
+                    "bodies": name, "vertices": n, "meetings": meetings, "motion": motion, "tree": kind,
+                    **counts._asdict(), "meeting_over_nlogn": f"{counts.meeting / (n * np.log2(n)):.3f}",
+                })  # fmt: skip
+                print(" ".join(str(value) for value in rows[-1].values()), flush=True)
+    return rows
+
+
+def _graded(body: Mesh, tight: bool) -> BoxHierarchy:
+    return boxes_of_graded(graded_tree(body.vertices, body.faces), body.vertices, body.faces, tight)
 
 
 def sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -234,27 +275,29 @@ def draw_growth(rows: list[dict]) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(figsize=(7, 4.2), layout="constrained")
-    for family, colour in (
-        ("harpsicordia", "#3b6ea5"),
-        ("harpsicordia, Σ 1000", "#d9a441"),
-        ("accordions", "#c0504d"),
-        ("chazelle", "#4f8a4f"),
+    figure, panels = pyplot.subplots(1, 2, figsize=(10, 4.2), sharex=True, layout="constrained")
+    for axes, what, label, local, square in zip(
+        panels, ("nodes", "facet_pairs"), ("nodes compared with a box", "pairs of facets tested"), (1, 4), (0.05, 0.3)
     ):
-        for gap, style in ((0.0, "o-"), (1e-12, "x:")):
-            of = [r for r in rows if r["family"] == family and r["gap"] == gap]
-            label = f"{family}, {'touching' if gap == 0 else '1e-12 apart'}"
-            axes.loglog(
-                [r["vertices"] for r in of], [r["boxes"] for r in of], style, color=colour, label=label, markersize=4
-            )
-    n = np.array([60.0, 2e5])
-    axes.loglog(n, 2 * n * np.log2(n), color="#9a9a9a", linewidth=0.8)
-    axes.text(n[1], 2 * n[1] * np.log2(n[1]), " 2 n log n", fontsize=8, va="center")
-    n = np.array([60.0, 6e3])
-    axes.loglog(n, 0.05 * n**2, color="#9a9a9a", linewidth=0.8)
-    axes.text(n[1], 0.05 * n[1] ** 2, " n²/20", fontsize=8, va="center")
-    axes.set(xlabel="vertices of each mesh", ylabel="pairs of boxes looked at, all pairs of facets")
-    axes.legend(fontsize=8)
+        for family, colour in (
+            ("harpsicordia", "#3b6ea5"),
+            ("harpsicordia, Σ 1000", "#d9a441"),
+            ("accordions", "#c0504d"),
+            ("chazelle", "#4f8a4f"),
+        ):
+            for gap, style in ((0.0, "o-"), (1e-12, "x:")):
+                of = [r for r in rows if r["family"] == family and r["gap"] == gap]
+                name = f"{family}, {'touching' if gap == 0 else '1e-12 apart'}"
+                x, y = [r["vertices"] for r in of], [r[what] for r in of]
+                axes.loglog(x, y, style, color=colour, label=name, markersize=4)
+        n = np.array([60.0, 2e5])
+        axes.loglog(n, local * n * np.log2(n), color="#9a9a9a", linewidth=0.8)
+        axes.text(n[1], local * n[1] * np.log2(n[1]) / 2.5, f"{local} n log n", fontsize=8, ha="right")
+        n = np.array([60.0, 6e3])
+        axes.loglog(n, square * n**2, color="#9a9a9a", linewidth=0.8)
+        axes.text(n[1], square * n[1] ** 2, f" {square:g} n²", fontsize=8, va="center")
+        axes.set(xlabel="vertices of each mesh", ylabel=label, title="all pairs of facets")
+    panels[0].legend(fontsize=8)
     figure.savefig(PICTURES / "locality-growth.png", dpi=130)
 
 
@@ -275,12 +318,13 @@ def draw_meshes(rows: list[dict]) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument(
-        "--parts", nargs="*", default=["growth", "build", "meshes"], choices=["growth", "build", "meshes"]
+        "--parts", nargs="*", default=["growth", "build", "walks", "meshes"],
+        choices=["growth", "build", "walks", "meshes"],
     )
     parser.add_argument("--no-files", action="store_true")
     options = parser.parse_args()
     for part in options.parts:
-        rows = {"growth": growth, "build": build, "meshes": meshes}[part]()
+        rows = {"growth": growth, "build": build, "walks": walks, "meshes": meshes}[part]()
         if part == "meshes" and rows:
             correlations = correlated(rows)
         if options.no_files or not rows:

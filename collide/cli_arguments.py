@@ -11,7 +11,7 @@ import math
 import re
 from typing import NoReturn
 
-from collide import __version__, cli_bench, cli_compare, cli_fuzz, cli_pages, cli_srdf, cli_sweep, cli_view
+from collide import __version__, cli_bench, cli_compare, cli_engines, cli_fuzz, cli_pages, cli_srdf, cli_sweep, cli_view
 from collide.errors import InvalidArgument
 from collide.reports.number_format import UNITS, parse_length
 
@@ -173,9 +173,9 @@ def parser() -> argparse.ArgumentParser:
     _add_compare(commands)
     _add_stress(commands)
     fuzz = _add(commands, "fuzz", "search other engines for wrong answers, shrunk to small cases", cli_fuzz.EPILOG)
-    cli_fuzz.add_arguments(fuzz, _engines)
+    cli_fuzz.add_arguments(fuzz, cli_engines.engines)
     bench = _add(commands, "bench", "run time against error, and against size", cli_bench.EPILOG)
-    cli_bench.add_arguments(bench, _engines)
+    cli_bench.add_arguments(bench, cli_engines.engines)
     _add_locality(commands)
     _add_scenes(commands)
     cli_srdf.add_arguments(_add(commands, "srdf", "which links of a robot can collide at all?", cli_srdf.EPILOG))
@@ -194,7 +194,8 @@ def _add_stress(commands) -> None:
     parser.add_argument("--family", action="append", metavar="NAME", help="only this one; may be given again")
     parser.add_argument("--cases", type=_positive_count, default=40, metavar="N", help="cases a family (40)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds make other cases (0)")
-    parser.add_argument("--engine", default="collide", metavar="E", help="collide, fcl, coal or pybullet (collide)")
+    parser.add_argument("--engine", type=cli_engines.one_engine, default="collide", metavar="E",
+                        help="whom to ask, such as coal or coal:nesterov; help lists them (collide)")
     parser.add_argument("--save", metavar="FILE", help="write every refuted answer with a snippet that repeats it")
     _output_arguments(parser)
 
@@ -272,7 +273,7 @@ def _add_check(commands) -> None:
 def _add_compare(commands) -> None:
     parser = _add(commands, "compare", "ask other engines about the same scene", cli_compare.EPILOG)
     _scene_arguments(parser, at_least=0)
-    cli_compare.add_arguments(parser, _length, _part, _engines)
+    cli_compare.add_arguments(parser, _length, _part, cli_engines.engines)
     _output_arguments(parser)
     cli_pages.add_argument(parser)
 
@@ -360,10 +361,3 @@ def _number(text: str, complaint: str) -> float:
         return float(text)
     except ValueError:
         raise argparse.ArgumentTypeError(complaint) from None
-
-
-def _engines(text: str) -> list[str]:
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    if not names:
-        raise argparse.ArgumentTypeError("names no engine: give one of fcl, coal, pybullet, or several with commas")
-    return names

@@ -39,11 +39,15 @@ exit status: 0 measured, 2 error; of run, the script's own"""
 _FILES = ("svg", "png")
 
 
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
 def add_arguments(parser: argparse.ArgumentParser, engines: Callable) -> None:
     """engines : reads names of engines."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", title="actions", required=True)
     pareto = actions.add_parser("pareto", help="run time against error, as one picture")
-    pareto.add_argument("--classes", type=engines, metavar="NAMES", help="classes of pairs, commas between (all)")
+    pareto.add_argument("--classes", type=_names, metavar="NAMES", help="classes of pairs, commas between (all)")
     pareto.add_argument("--cases", type=count, metavar="N", help="pairs of a class (60; with --quick 12)")
     scaling = actions.add_parser("scaling", help="run time and operations against size, with slopes")
     scaling.add_argument("--sizes", type=_sizes, metavar="N,N", help="vertices of each hull (8 to 32,768)")

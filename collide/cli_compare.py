@@ -42,7 +42,7 @@ exit status: 0 no answer of collide's is wrong, 1 one is, 2 error; with
 def add_arguments(parser: argparse.ArgumentParser, length: Callable, part: Callable, engines: Callable) -> None:
     """Those of compare alone; the functions read a length, a part of one, and names of engines."""
     parser.add_argument("--engines", type=engines, default="fcl,coal,pybullet", metavar="NAMES",
-                        help="engines to ask, separated by commas (default: %(default)s)")
+                        help="engines to ask, separated by commas; all, or help for a list (%(default)s)")
     parser.add_argument("--clearance", type=length, default=0.1, metavar="D",
                         help="compare distances up to this: 0.05 (metres), 50mm (default: 10cm)")
     parser.add_argument("--tolerance", type=part, default=1e-6, metavar="T",

@@ -47,7 +47,7 @@ SHORT = 20
 def add_arguments(parser: argparse.ArgumentParser, engines: Callable) -> None:
     """engines : reads names of engines."""
     parser.add_argument("--engines", type=engines, default="fcl,coal,pybullet", metavar="NAMES",
-                        help="engines to search, separated by commas (default: %(default)s)")
+                        help="engines to search, separated by commas; all, or help for a list (%(default)s)")
     parser.add_argument("--minutes", type=minutes, default=60.0, metavar="M", help="how long to search (60)")
     parser.add_argument("--rounds", type=count, metavar="N", help="stop after so many rounds in all")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds invent other scenes (0)")

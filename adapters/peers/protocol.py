@@ -54,6 +54,13 @@ ENGINES = {
     "coal:polyak": f"{_HERE}.coal_peer:CoalPeer:polyak",
     "pybullet": f"{_HERE}.pybullet_peer:PybulletPeer",
     "pybullet:margins": f"{_HERE}.pybullet_peer:PybulletPeer:margins",
+    "mujoco": f"{_HERE}.mujoco_peer:MujocoPeer",
+    "mujoco:libccd": f"{_HERE}.mujoco_peer:MujocoPeer:libccd",
+    "mujoco:distance": f"{_HERE}.mujoco_peer:MujocoPeer:distance",
+    "mujoco:distance-libccd": f"{_HERE}.mujoco_peer:MujocoPeer:distance-libccd",
+    "drake": f"{_HERE}.drake_peer:DrakePeer",
+    "drake:penetration": f"{_HERE}.drake_peer:DrakePeer:penetration",
+    "trimesh": f"{_HERE}.trimesh_peer:TrimeshPeer",
     "exact": f"{_HERE}.exact_peer:ExactPeer",
 }
 #: Asks one of them in a child process.

@@ -7,6 +7,8 @@ apart     v, the point of hull(D) nearest the origin (one to four pairs), is a s
           v·(a − b) > (r_A + r_B)|v| for all vertices a of A and b of B.
 together  hull(D) (one to four pairs) comes within r_A + r_B of the origin. Of a half-space and a body: a vertex named
           lies within the body's radius of the half-space, or in it.
+plane     of two convex bodies without radii, which are apart: three whole numbers in place of vertex pairs, a normal n
+          with n·(a − b) > 0 for all vertices a of A and b of B.
 inside    one vertex named, −1 standing for the other body, lies in that body, a solid mesh: the winding number of
           its facets around the vertex is positive.
 
@@ -30,11 +32,11 @@ Vertex ids are rows of `PackedConvex.points`: the points of a `ConvexHull` as ha
 from __future__ import annotations
 
 from operator import index
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from collide.errors import CollideError
 
-APART, TOGETHER, INSIDE = "apart", "together", "inside"
+APART, TOGETHER, INSIDE, PLANE = "apart", "together", "inside", "plane"
 #: Stands for a body that names no vertex: a half-space, or the solid that holds the other body's vertex.
 NO_VERTEX = -1
 
@@ -47,15 +49,15 @@ class Certificate(NamedTuple):
 
     Parameters
     ----------
-    kind : "apart", "together" or "inside".
+    kind : "apart", "together", "plane" or "inside".
     part_a, part_b : numbers of the parts of A and of B, of facets where a body is a mesh; 0 for convex bodies.
-    pairs : ((vertex of A, vertex of B), …), at most four; −1 where a body names no vertex.
+    pairs : ((vertex of A, vertex of B), …), at most four; −1 where a body names no vertex. Of a plane ((x, y, z),).
     """
 
     kind: str
     part_a: int
     part_b: int
-    pairs: tuple[VertexPair, ...]
+    pairs: tuple[Any, ...]
 
 
 class CertificateRefused(CollideError):
@@ -65,11 +67,15 @@ class CertificateRefused(CollideError):
 def read_certificates(values) -> list[Certificate]:
     """Certificates of Python integers from what may come from a file. Raises CertificateRefused for another form."""
     try:
-        return [
-            Certificate(kind, index(i), index(j), tuple((index(p), index(q)) for p, q in pairs))
-            for kind, i, j, pairs in values
-        ]
+        return [Certificate(kind, index(i), index(j), _read_rows(kind, rows)) for kind, i, j, rows in values]
     except (TypeError, ValueError):
         raise CertificateRefused(
             "a certificate is rows of (kind, part, part, pairs of vertex numbers), all numbers whole"
         ) from None
+
+
+def _read_rows(kind: str, rows) -> tuple[Any, ...]:
+    if kind == PLANE:
+        ((x, y, z),) = rows
+        return ((index(x), index(y), index(z)),)
+    return tuple((index(p), index(q)) for p, q in rows)

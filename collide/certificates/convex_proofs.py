@@ -8,8 +8,8 @@ from fractions import Fraction
 from collide.certificates.certificate import VertexPair
 from collide.certificates.exact_parts import ExactPart, common_vertices
 from collide.certificates.nearest_to_origin import nearest_to_origin
-from collide.lowering.packed_convex import HALFSPACE
-from collide.numerics.exact_points import inner, minus
+from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.numerics.exact_points import Point, inner, minus
 
 
 def flaw_of_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hit: bool) -> str | None:
@@ -59,3 +59,15 @@ def flaw_of_plane_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair],
             return None
         return "no vertex named reaches the half-space"
     return None if all(is_clear) else f"vertex {is_clear.index(False)} reaches the half-space"
+
+
+def flaw_of_normal(A: ExactPart, B: ExactPart, normal: Point) -> str | None:
+    """Why a normal does not prove that A lies beyond B along it; None where it does. O(vertices)."""
+    if not (A.kind == B.kind == POINTS and A.radius == B.radius == 0):
+        return "a plane proves something of convex bodies of vertices without radii alone"
+    points_a, points_b, _ = common_vertices(A, B)
+    along_a, along_b = [inner(normal, p) for p in points_a], [inner(normal, q) for q in points_b]
+    if min(along_a) > max(along_b):
+        return None
+    i, j = along_a.index(min(along_a)), along_b.index(max(along_b))
+    return f"vertex {i} of A and vertex {j} of B are not on different sides of the plane"

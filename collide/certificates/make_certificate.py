@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 
 import numpy as np
 
-from collide.certificates.certificate import APART, INSIDE, NO_VERTEX, TOGETHER, Certificate, VertexPair
-from collide.certificates.convex_proofs import flaw_of_proof
+from collide.certificates.certificate import APART, INSIDE, NO_VERTEX, PLANE, TOGETHER, Certificate, VertexPair
+from collide.certificates.convex_proofs import flaw_of_normal, flaw_of_proof
 from collide.certificates.exact_parts import ExactPart, common_vertices, exact_parts, has_exact_numbers
 from collide.certificates.mesh_proofs import ProofBody, flaw_of_inside_proof
 from collide.certificates.nearest_to_origin import nearest_vertex_pairs
@@ -90,6 +91,18 @@ def certificate_from_pairs(A, B, X_WA, X_WB, pairs: Sequence[VertexPair], *, hit
     """
     (part_a,), (part_b,) = exact_parts(A, X_WA), exact_parts(B, X_WB)
     return (_of_parts(part_a, part_b, 0, 0, list(pairs)[:4], hit=hit),)
+
+
+def certificate_from_normal(A, B, X_WA, X_WB, normal: np.ndarray) -> tuple[Certificate, ...] | None:
+    """The certificate "plane" of two convex polytopes from a normal (3,) towards A, its doubles taken exactly; None
+    where the plane does not part them."""
+    fractions = [Fraction(float(c)) for c in normal]
+    scale = max(c.denominator for c in fractions)
+    x, y, z = (int(c * scale) for c in fractions)
+    (part_a,), (part_b,) = exact_parts(A, X_WA), exact_parts(B, X_WB)
+    if flaw_of_normal(part_a, part_b, (x, y, z)) is not None:
+        return None
+    return (Certificate(PLANE, 0, 0, ((x, y, z),)),)
 
 
 def _of_parts(A: ExactPart, B: ExactPart, i: int, j: int, pairs: list[VertexPair], *, hit: bool) -> Certificate:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from collide.certificates.certificate import APART, TOGETHER, Certificate, CertificateRefused, read_certificates
-from collide.certificates.convex_proofs import flaw_of_proof
+from collide.certificates.certificate import APART, PLANE, TOGETHER, Certificate, CertificateRefused, read_certificates
+from collide.certificates.convex_proofs import flaw_of_normal, flaw_of_proof
 from collide.certificates.exact_parts import exact_parts
 from collide.certificates.mesh_proofs import flaw_of_mesh_certificates
 from collide.certificates.region_proofs import flaw_of_region_certificate
@@ -82,11 +82,14 @@ def _flaw_of_parts(A, B, X_WA, X_WB, certificates: Sequence[Certificate], claim:
     parts_a, parts_b = exact_parts(A, X_WA), exact_parts(B, X_WB)
     proven = set()
     for kind, i, j, pairs in certificates:
-        if kind != claim:
+        if kind != claim and not (kind == PLANE and claim == APART):
             return f"the result says {claim}, the certificate {kind!r}"
         if not (0 <= i < len(parts_a) and 0 <= j < len(parts_b)):
             return f"there are no parts {i} and {j}"
-        flaw = flaw_of_proof(parts_a[i], parts_b[j], pairs, hit=kind == TOGETHER)
+        if kind == PLANE:
+            flaw = flaw_of_normal(parts_a[i], parts_b[j], pairs[0])
+        else:
+            flaw = flaw_of_proof(parts_a[i], parts_b[j], pairs, hit=kind == TOGETHER)
         if flaw:
             return f"parts {i} and {j}: {flaw}"
         proven.add((i, j))

@@ -1,8 +1,8 @@
 """The walk of Barba and Langerman, and distances along hierarchies, from Python: arguments in, answers out.
 
-Polytopes only. The body that has an interior plays R, whose polar is prepared; B where both have one. Where neither
-has, the default narrowphase answers. What the walk cannot prove in spite of rounding it hands over to the default
-narrowphase too, which settles it exactly.
+Polytopes only. The body that has an interior plays R, whose polar is prepared; B where both have one, or neither: the
+walk then sees a thickened R, and its end in integers the one that was given. What doubles leave no room for, the walk's
+last vertices prove in integers (`exact_end.py`). Walks that rounding has lost go to the default narrowphase.
 """
 
 from __future__ import annotations
@@ -12,11 +12,13 @@ import math
 import numpy as np
 
 from collide.batches import answer_batch
-from collide.certificates.make_certificate import certificate_from_pairs, certify
+from collide.certificates.certificate import VertexPair
+from collide.certificates.make_certificate import certificate_from_normal, certificate_from_pairs, certify
 from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.hierarchies.exact_end import ExactEnds, end_exactly, last_corners
 from collide.hierarchies.hierarchy_distance import hierarchy_distance
-from collide.hierarchies.run_walk import TracedRound, no_walks, run_walks
-from collide.hierarchies.walk import APART, MEETING, OPEN_MEETING
+from collide.hierarchies.run_walk import no_walks, run_walks
+from collide.hierarchies.walk import APART, MEETING, OPEN_APART, OPEN_MEETING
 from collide.hierarchies.walk_bodies import WalkBody
 from collide.lowering.packed_convex import POINTS
 from collide.lowering.parts import convex_set_of, is_single_convex
@@ -34,19 +36,35 @@ class Walks:
 
     hit : (n,) bool.
     walked : (n,) bool, whether the walk proved the answer; elsewhere the default narrowphase gave it.
+    exact_rounds : (n,) int64, simplices looked at in integers at the end; 0 where doubles sufficed.
     rows : (n,) `WALK_DTYPE`: rounds, constant-size tests, small linear programs and their pivots, levels reached, and
-        the plane or the point that proves the answer. Zeros where neither body has an interior.
+        the plane or the point that proves the answer. Zeros where neither body has a polar.
     exchanged : A plays R, and B plays P, since B has no interior.
-    depth_p, depth_q : levels of P's hierarchy and of that of Q = ρ0(R); 0 where neither body has an interior.
+    depth_p, depth_q : levels of P's hierarchy and of that of Q = ρ0(R); 0 where no body of the two has a polar.
     trace : of the last pose, where it was asked for: its rounds one by one.
     """
 
-    __slots__ = ("_question", "depth_p", "depth_q", "exchanged", "hit", "rows", "trace", "walked")
+    __slots__ = (
+        "_ends", "_question", "depth_p", "depth_q", "exact_rounds", "exchanged", "hit", "rows", "trace", "walked",
+    )  # fmt: skip
 
     def __init__(self, question, hit, rows, exchanged, depths, trace):
         self._question, self.hit, self.rows, self.exchanged, self.trace = question, hit, rows, exchanged, trace
         self.walked = rows["status"] >= APART
+        self.exact_rounds = np.zeros(len(rows), dtype=np.int64)
         self.depth_p, self.depth_q = depths
+        self._ends: dict[int, list[VertexPair]] = {}
+
+    def _take_ends(self, ids: np.ndarray, ends: ExactEnds) -> None:
+        """Enter what integers have proven of the walks of these numbers; the status says which invariant was."""
+        proven = ids[ends.proven]
+        self.walked[proven] = True
+        self.hit[proven] = ends.hit[ends.proven]
+        self.exact_rounds[proven] = ends.rounds[ends.proven]
+        for k, p, r, count in zip(ids[ends.proven].tolist(), *(
+            field[ends.proven].tolist() for field in (ends.vertices_p, ends.vertices_r, ends.counts)
+        )):  # fmt: skip
+            self._ends[k] = [(j, i) if self.exchanged else (i, j) for i, j in zip(p[:count], r[:count])]
 
     def __len__(self) -> int:
         return len(self.hit)
@@ -55,18 +73,24 @@ class Walks:
     def certificate(self):
         """Of a single pose, plain data that proves the boolean: vertex pairs, as `distance` has them.
 
-        Made from the vertices where the walk ended, in integers; ``collide.verify(A, B, X_WA, X_WB, walks)``
-        checks it against all vertices. The plane or the point in ``rows`` proves the answer too, in doubles.
+        The walk's own plane where that parts the bodies exactly ("plane"), its numbers taken as they are; else the
+        simplex that its end in integers has decided by, or, for hits that a ball has proven, one found from the
+        vertices where the walk ended. ``collide.verify(A, B, X_WA, X_WB, walks)`` puts all vertices in.
         """
         if len(self) != 1:
             raise InvalidArgument(f"a certificate is for one pose, and there are {len(self)}")
         A, B, X_WA, X_WB = self._question
         row, hit = self.rows[0], bool(self.hit[0])
-        size_a, size_b = len(walk_body(A).points), len(walk_body(B).points)
-        size_p = size_b if self.exchanged else size_a
-        vertex = int(row["vertex_p"]) if row["vertex_p"] < size_p else 0
-        corners = dict.fromkeys(row["corners"].tolist()) if row["status"] in (MEETING, OPEN_MEETING) else (0,)
-        pairs = [(c, vertex) if self.exchanged else (vertex, c) for c in corners]
+        if not hit and row["status"] in (APART, OPEN_APART):
+            toward_a = row["axis"] if self.exchanged else -row["axis"]
+            certificate = certificate_from_normal(A, B, X_WA[0], X_WB[0], toward_a)
+            if certificate is not None:
+                return certificate
+        pairs = self._ends.get(0)
+        if pairs is None:
+            body_p, body_r = (walk_body(S) for S in ((B, A) if self.exchanged else (A, B)))
+            vertex, corners = last_corners(body_p, body_r, row) if body_r.polar is not None else (0, [0])
+            pairs = [(c, vertex) if self.exchanged else (vertex, c) for c in corners]
         return certificate_from_pairs(A, B, X_WA[0], X_WB[0], pairs, hit=hit)
 
     def __repr__(self) -> str:
@@ -159,20 +183,22 @@ def walk_poses(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, answer_op
     """
     body_a, body_b = walk_body(A), walk_body(B)
     n = number_of_poses(X_WA, X_WB)
-    exchanged = body_b.polar is None
-    if exchanged and body_a.polar is None:
-        rows, depths = no_walks(n), (0, 0)
-        rounds: tuple[TracedRound, ...] = ()
+    exchanged = not body_b.has_own_polar and body_a.has_own_polar
+    sides = (A, body_a, X_WA), (B, body_b, X_WB)
+    (P, body_p, X_WP), (R, body_r, X_WR) = reversed(sides) if exchanged else sides
+    if body_r.polar is None:
+        rows = no_walks(n)
+        walks = Walks((A, B, X_WA, X_WB), rows["status"] == MEETING, rows, exchanged, (0, 0), ())
     else:
-        sides = (A, body_a, X_WA), (B, body_b, X_WB)
-        (P, body_p, X_WP), (R, body_r, X_WR) = reversed(sides) if exchanged else sides
-        rows, rounds = run_walks(
-            body_p, body_r, convex_set_of(P), convex_set_of(R), np.broadcast_to(X_WP, (n, 4, 4)),
-            np.broadcast_to(X_WR, (n, 4, 4)), trace=trace,
-        )  # fmt: skip
+        bodies = body_p, body_r, convex_set_of(P), convex_set_of(R)
+        X_WP, X_WR = (np.broadcast_to(X, (n, 4, 4)) for X in (X_WP, X_WR))
+        rows, rounds = run_walks(*bodies, X_WP, X_WR, trace=trace)
         depths = body_p.hierarchy.depth, body_r.depth_of_polar
-    hit = rows["status"] == MEETING
-    walks = Walks((A, B, X_WA, X_WB), hit, rows, exchanged, depths, rounds)
+        walks = Walks((A, B, X_WA, X_WB), rows["status"] == MEETING, rows, exchanged, depths, rounds)
+        open_ids = np.flatnonzero((rows["status"] == OPEN_APART) | (rows["status"] == OPEN_MEETING))
+        if len(open_ids):
+            walks._take_ends(open_ids, end_exactly(*bodies, X_WP[open_ids], X_WR[open_ids], rows[open_ids]))
+    hit = walks.hit
     if not walks.walked.all():
         open_ids = np.flatnonzero(~walks.walked)
         hit[open_ids] = answer_open(open_ids)

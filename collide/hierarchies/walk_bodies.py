@@ -32,7 +32,7 @@ class WalkBody:
         self._hull = hull
         self._hierarchy: PackedHierarchy | None = None
         self._polar: PolarSide | None = None
-        self._too_thin = False
+        self._has_no_polar = False
 
     @property
     def hull(self) -> Hull:
@@ -57,15 +57,31 @@ class WalkBody:
 
     @property
     def polar(self) -> PolarSide | None:
-        """For the part of R; None where the body has no interior, or one too thin for a polar in doubles."""
-        if self._polar is None and self.has_interior and not self._too_thin:
+        """For the part of R. Where the body has no interior, or one too thin for a polar in doubles, that of a body
+        thickened by 2⁻¹² of its size; None for sizes that have no polar in ordinary doubles."""
+        if self._polar is None and not self._has_no_polar:
             with _build_lock():
-                if self._polar is None and not self._too_thin:
+                if self._polar is None and not self._has_no_polar:
                     try:
-                        self._polar = PolarSide(self.points, self.hull)
+                        self._polar = self._new_polar()
                     except ValueError:
-                        self._too_thin = True
+                        self._has_no_polar = True
         return self._polar
+
+    def _new_polar(self) -> PolarSide:
+        """Raises ValueError where there is none."""
+        if self.has_interior:
+            try:
+                return PolarSide(self.points, self.hull)
+            except ValueError:
+                pass
+        thick = thickened(self.points)
+        return PolarSide(thick, convex_hull(thick), len(self.points))
+
+    @property
+    def has_own_polar(self) -> bool:
+        """Whether the body plays R as it is, not thickened."""
+        return self.has_interior and self.polar is not None and not self.polar.is_thickened
 
     @property
     def depth_of_polar(self) -> int:
@@ -76,22 +92,27 @@ class WalkBody:
 class PolarSide:
     """R as the walk reads it: the hierarchy of its polar, a ball inside, and the triangles of each facet.
 
+    points : (n, 3), with their hull.   count : of the body itself, where those behind thicken it.
+
     body : the `PolarBody` of R.   hierarchy : of Q = ρ0(R − origin), packed.   origin : (3,), inside R.
     radius : of a ball about it that R holds, proven [m]; 0 where rounding leaves none, and then nothing is proven by
         it.
     starts, triangles : the facets of R for which vertex k of Q stands are triangles[starts[k]:starts[k + 1]].
     """
 
-    def __init__(self, points: np.ndarray, hull: Hull):
+    def __init__(self, points: np.ndarray, hull: Hull, count: int | None = None):
         polar = polar_of_hull(points, hull)
+        self.is_thickened = count is not None
         self.body = polar
         self.hierarchy = PackedHierarchy(polar.hierarchy)
         self.origin = np.asarray(polar.origin, dtype=np.float64)
         facets = np.ascontiguousarray(hull.facets, dtype=np.int32)
-        self.radius = _inner_radius(points, facets, self.origin)
+        self.radius = 0.0 if self.is_thickened else _inner_radius(points, facets, self.origin)
         patch = polar.groups[_facet_of(points, facets)]
         order = np.argsort(patch, kind="stable")
         self.triangles = np.ascontiguousarray(facets[order])
+        if count is not None:  # the body has no such vertices; the first one stands for them
+            self.triangles[self.triangles >= count] = 0
         self.starts = np.searchsorted(patch[order], np.arange(len(polar.points) + 1)).astype(np.int64)
         self._centre = np.array([*self.origin, self.radius])
         self._ball = np.array(
@@ -106,6 +127,19 @@ class PolarSide:
     def address(self) -> int:
         """Address of the ball and the facets, as `walk_proof.ball_at` reads them."""
         return address_of(self._ball)
+
+
+#: By how much of its size a body without a polar of its own is thickened.
+_THICKENED = 2.0**-12
+
+
+def thickened(points: np.ndarray) -> np.ndarray:
+    """Points (n, 3), and behind them the six corners of a small octahedron about their middle."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = 0.5 * low + 0.5 * high
+    size = max(float((high - low).max()), 2.0**-20 * float(np.abs(middle).max())) or 1.0
+    offsets = _THICKENED * size * np.eye(3)
+    return np.ascontiguousarray(np.concatenate([points, middle + offsets, middle - offsets]))
 
 
 def _facet_of(points: np.ndarray, facets: np.ndarray) -> np.ndarray:

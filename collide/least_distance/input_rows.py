@@ -46,8 +46,8 @@ def input_rows(points: ArrayLike, normals: ArrayLike, offsets: ArrayLike) -> Inp
     InvalidArgument
         Naming what is wrong, and where.
     """
-    p, size = _read_points(points)
-    a, b, sizes = _read_halfspaces(normals, offsets, p.shape[1])
+    p, size = read_points(points)
+    a, b, sizes = read_halfspaces(normals, offsets, p.shape[1])
     exponent = math.frexp(size or float((np.abs(b) / sizes).max()) or 1.0)[1]
     exponent = 0 if abs(exponent) <= _EASY else max(min(exponent, 500), -500)
     point_values, values, last = p, a, b
@@ -72,7 +72,7 @@ def input_rows(points: ArrayLike, normals: ArrayLike, offsets: ArrayLike) -> Inp
     )  # fmt: skip
 
 
-def _read_points(points: ArrayLike) -> tuple[np.ndarray, float]:
+def read_points(points: ArrayLike) -> tuple[np.ndarray, float]:
     """((n, d) float64, the largest magnitude)."""
     read = array("meets: points", points, "(n, d)", InvalidArgument)
     if read.ndim != 2 or not 1 <= read.shape[1] <= MAX_DIMENSION:
@@ -84,7 +84,7 @@ def _read_points(points: ArrayLike) -> tuple[np.ndarray, float]:
     return np.ascontiguousarray(read), _largest("points", read)
 
 
-def _read_halfspaces(normals: ArrayLike, offsets: ArrayLike, d: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def read_halfspaces(normals: ArrayLike, offsets: ArrayLike, d: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """((m, d), (m,) float64, the largest magnitude in each normal)."""
     a = array("meets: normals", normals, "(m, d)", InvalidArgument)
     b = array("meets: offsets", offsets, "(m,)", InvalidArgument)

@@ -67,12 +67,18 @@ def run_pairs(
 
 
 def settle_proposals(
-    table: ShapeTable, poses: PoseTable, shape_of: np.ndarray, pairs: np.ndarray, rows: np.ndarray
+    table: ShapeTable,
+    poses: PoseTable,
+    shape_of: np.ndarray,
+    pairs: np.ndarray,
+    rows: np.ndarray,
+    *,
+    boolean: bool = False,
 ) -> None:
     """Let the exact stage settle rows in place whose vertices were found elsewhere: it begins with those.
 
     Arguments as in `run_pairs`; rows : with vertices, count, points and a distance that is a guess. Bodies that meet
-    are told to, without a depth.
+    are told to, without a depth.   boolean : no distance is wanted either.
     """
     rows["how"], rows["lower"], rows["upper"] = UNDECIDED, -np.inf, np.inf
     _of_thread.space.integers[REQUESTS_AT] = 0
@@ -82,7 +88,7 @@ def settle_proposals(
         table,
         poses,
         shape_of,
-        boolean=False,
+        boolean=boolean,
         limit=np.inf,
         depths=False,
     )

@@ -1,13 +1,16 @@
 """Convex sets given by points and by half-spaces: exact answers in the plane, in space and up to d = 8."""
 
 from collide.polytopes.convex_polygon import ConvexPolygon, planar_pose
+from collide.polytopes.hierarchical_tree import HierarchicalTree, TreeMeeting, trees_meet
 from collide.polytopes.meeting import Meeting, MeetingCertificate
 from collide.polytopes.meets_query import meets
 from collide.polytopes.planar_certificates import PlanarCertificate, verify_polygons
 from collide.polytopes.planar_pairs import PolygonDistances, PolygonHits, polygon_distance, polygons_meet
 from collide.polytopes.verify_meeting import verify
+from collide.polytopes.verify_trees import verify_trees
 
 __all__ = [
-    "ConvexPolygon", "Meeting", "MeetingCertificate", "PlanarCertificate", "PolygonDistances", "PolygonHits", "meets",
-    "planar_pose", "polygon_distance", "polygons_meet", "verify", "verify_polygons",
+    "ConvexPolygon", "HierarchicalTree", "Meeting", "MeetingCertificate", "PlanarCertificate", "PolygonDistances",
+    "PolygonHits", "TreeMeeting", "meets", "planar_pose", "polygon_distance", "polygons_meet", "trees_meet", "verify",
+    "verify_polygons", "verify_trees",
 ]  # fmt: skip

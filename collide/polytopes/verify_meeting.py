@@ -90,12 +90,12 @@ def _combination(rows, numbers, values: np.ndarray) -> list[Fraction]:
 
 
 def _check_inside(x: list[Fraction], a: np.ndarray, b: np.ndarray) -> None:
-    highest, row = _largest(np.column_stack((a, b)), [*x, Fraction(-1)])
+    highest, row = largest_value(np.column_stack((a, b)), [*x, Fraction(-1)])
     _check(highest <= 0, f"half-space {row} does not hold the point")
 
 
 def _check_bracket(answer: Meeting, p: np.ndarray, a: np.ndarray, b: np.ndarray, u: list[Fraction], c: Fraction):
-    negated, row = _largest(p, [-number for number in u])
+    negated, row = largest_value(p, [-number for number in u])
     gap, square = -negated - c, sum(number * number for number in u)
     _check(gap > 0, f"the plane does not separate point {row} from the half-spaces")
     _check(0.0 <= answer.lower <= answer.distance <= answer.upper < math.inf, "lower ≤ distance ≤ upper fails")
@@ -107,7 +107,7 @@ def _check_bracket(answer: Meeting, p: np.ndarray, a: np.ndarray, b: np.ndarray,
     _check(share * share * square <= Fraction(answer.upper) ** 2, "the two points are farther apart than upper")
 
 
-def _largest(values: np.ndarray, function: list[Fraction]) -> tuple[Fraction, int]:
+def largest_value(values: np.ndarray, function: list[Fraction]) -> tuple[Fraction, int]:
     """The largest value of a linear function over rows of doubles, exactly, and the first row that has it."""
     common = math.lcm(*(number.denominator for number in function))
     factors = [number.numerator * (common // number.denominator) for number in function]

@@ -60,16 +60,30 @@ APART = {case for case, (*_, distance, _normal) in CASES.items() if distance > 0
 #: By name, or by the name before the colon, as the next ones: cases that the engine has no shape for.
 UNSUPPORTED = {
     "collide": set(), "coal": set(), "fcl": SWEPT, "pybullet": SWEPT | {"cone sphere", "ellipsoid sphere"},
+    "mujoco": SWEPT | {"cone sphere"}, "drake": SWEPT | {"cone sphere", "half-space box"},
+    "drake:penetration": SWEPT | {"cone sphere"},
+    "trimesh": {case for case, (A, B, *_) in CASES.items() if {type(A), type(B)} & {Sphere, Halfspace, Cylinder}},
     "exact": CURVED | PLANES,
-}
+}  # fmt: skip
 #: Cases answered by a boolean alone.
-WITHOUT_DISTANCE = {"fcl": PLANES, "fcl:indep": APART}
-#: [m] at sizes of about 1 m. Bullet snaps hull corners to a grid; FCL and coal stop at 1e-6 on what is round.
+WITHOUT_DISTANCE = {
+    "fcl": PLANES, "fcl:indep": APART, "mujoco": APART, "mujoco:distance": set(), "mujoco:distance-libccd": set(),
+    "drake:penetration": APART,
+}  # fmt: skip
+#: [m] at sizes of about 1 m. Bullet snaps hull corners to a grid; FCL and coal stop at 1e-6 on what is round; MuJoCo
+#: holds corners, and trimesh's managers poses, in single precision.
 TOLERANCE = {
-    "collide": 1e-9, "coal": 1e-6, "fcl": 2e-5, "pybullet": 1e-3, "pybullet:margins": 3e-3, "exact": 1e-14,
-}
-#: Depths of random pairs are off by more: FCL's own EPA by a quarter of the pairs, and by half a metre.
-WRONG_DEPTHS = {"fcl:indep"}
+    "collide": 1e-9, "coal": 1e-6, "fcl": 2e-5, "pybullet": 1e-3, "pybullet:margins": 3e-3, "mujoco": 2e-6,
+    "drake": 2e-5, "trimesh": 2e-6, "exact": 1e-14,
+}  # fmt: skip
+#: Depths of random pairs are off by more: of FCL's own EPA, MuJoCo's capsule and box, and all that libccd's MPR finds.
+WRONG_DEPTHS = {
+    "fcl:indep", "mujoco", "mujoco:libccd", "mujoco:distance", "mujoco:distance-libccd", "drake:penetration",
+}  # fmt: skip
+#: One of them is a closed form.
+WRONG_CASES = {"mujoco:distance-libccd": {"polytope box"}}
+#: And booleans of pairs clear of touching.
+WRONG_BOOLEANS = {"mujoco:distance-libccd"}
 
 
 def known(by_name: dict, name: str, default=None):
@@ -98,9 +112,11 @@ def test_closed_forms(name):
             continue
         assert row["hit"] == (distance <= 0), case
         assert row["has_distance"] == (case not in known(WITHOUT_DISTANCE, name, ())), (case, table.reasons[k])
-        if row["has_distance"]:
+        if case in known(WRONG_CASES, name, ()):
+            assert abs(row["distance"] - distance) > 0.1, case
+        elif row["has_distance"]:
             assert row["distance"] == pytest.approx(distance, abs=known(TOLERANCE, name)), case
-        if row["has_distance"] and not np.isnan(row["normal"]).any():
+        if case not in known(WRONG_CASES, name, ()) and not np.isnan(row["normal"]).any():
             assert row["normal"] == pytest.approx(normal, abs=3e-3), case
             step, off = row["point_b"] - row["point_a"], known(TOLERANCE, name)
             assert np.isnan(step).all() or step == pytest.approx(row["distance"] * row["normal"], abs=off), case
@@ -144,16 +160,20 @@ def test_random_pairs_agree_with_exact_arithmetic(name):
     answers = available(name).answer(question)
     rows = answers.rows
     asked_gaps = not known(WITHOUT_DISTANCE, name, set()) >= APART
+    asked = ~rows["unsupported"] if name == "trimesh" else np.full(len(rows), True)
+    assert asked.mean() > 0.25
+    rows, truth = rows[asked], truth[asked]
     assert rows["answered"].all() and (rows["has_distance"] == (truth["hit"] | asked_gaps)).all(), answers.reasons
     assert not any(answers.mishaps)
     # Booleans may differ only where the truth is nearer to touching than the engine's own error.
     clear = np.abs(truth["distance"]) > known(TOLERANCE, name)
     assert clear.mean() > 0.95
-    assert (rows["hit"] == truth["hit"])[clear].all()
+    assert (rows["hit"] == truth["hit"])[clear].all() == (name not in WRONG_BOOLEANS)
     told = rows["has_distance"]
     off = np.abs(rows["distance"] - truth["distance"])[told] > known(TOLERANCE, name)
     assert off.any() == (name in WRONG_DEPTHS)
-    assert np.linalg.norm(rows["normal"][told], axis=1) == pytest.approx(1, abs=1e-12)
+    lengths = np.linalg.norm(rows["normal"][told], axis=1)
+    assert lengths[~np.isnan(lengths)] == pytest.approx(1, abs=1e-12)
 
 
 def test_round_shapes_agree_with_coal():

@@ -228,13 +228,35 @@ def test_theorem_3_7_touching():
         assert separates(plane, cube, body)
 
 
+@SETTINGS
+@given(solids, points, solids)
+def test_theorem_3_7_with_the_spaces_exchanged(body, shift, other):
+    """The symmetric half: Q meets ρ∞(P) if and only if a plane separates ρ0(Q) from P, with (1) and (2)."""
+    far = Polyhedron(tuple(minus(v, tuple(2 * c for c in shift)) for v in body.vertices))
+    near = other if sum(map(sum, other.vertices)) % 3 else around(other)
+    polar = polar_vertices(polar_zero(near))
+    common = meet(near, polar_infinity(far)).vertices
+    planes = from_halfspaces([*polar_zero(polar), *polar_infinity(far)]).vertices
+    assert bool(common) == bool(planes), (far, near)
+    for x in common:
+        assert separates(separating_plane(x), polar, far), "(1)"
+    for z in planes:
+        level = max(inner(z, y) for y in polar.vertices)
+        assert level > 0, "ρ0(Q) has the origin inside the plane"
+        x = tuple(c / level for c in z)  # of the parallel plane that is tangent to ρ0(Q)
+        assert contains(facets(near), x) and contains(polar_infinity(far), x), "(2)"
+    HITS["exchanged"] = HITS.get("exchanged", 0) + 1
+    HITS["exchanged, meet"] = HITS.get("exchanged, meet", 0) + bool(common)
+
+
 def test_cases_were_not_one_sided():
     """Runs after the properties: they must have seen both answers, and the origin inside and outside."""
-    if "anywhere" not in HITS or "inside Q, meet" not in HITS:
+    if "anywhere" not in HITS or "inside Q, meet" not in HITS or "exchanged" not in HITS:
         pytest.skip("needs the other tests of this file")
     assert 0.1 < HITS["anywhere, meet"] / HITS["anywhere"] < 0.9, HITS
     assert HITS["outside P"] >= 20 and HITS["inside Q, meet"] >= 6, HITS
     assert HITS["tangent"] >= 20, HITS
+    assert 0.1 < HITS["exchanged, meet"] / HITS["exchanged"] < 0.9, HITS
 
 
 # --- where the text does not hold ---------------------------------------------------------------

@@ -15,6 +15,7 @@ import pytest
 
 import collide
 from collide.adapters.peers import exact
+from collide.certificates.nearest_to_origin import _weights, nearest_to_origin
 from collide.hierarchies.hierarchy_queries import Walks, walk_body
 from collide.hierarchies.run_walk import no_walks, run_walks
 from collide.hierarchies.validate_walk import validate_rounds
@@ -76,6 +77,10 @@ def test_equal_to_the_oracle_on_the_hard_families(name):
         for one, other, X_WO, X_WT in ((A, B, X_WA, X_WB), (B, A, X_WB, X_WA)):
             found = collide.walk(one, other, X_WO, X_WT, trace=not large)
             assert found.hit.tolist() == [truth], case.snippet()
+            assert found.walked.all() and found.depth_q, f"the walk has proven nothing\n{case.snippet()}"
+            row = found.rows[0]  # it went to the bottom of one hierarchy, and no level is missed out
+            assert min(row["level_p"], row["level_q"]) == 0 and row["rounds"] <= found.depth_p + found.depth_q - 1
+            assert found.exact_rounds[0] <= 10, case.snippet()
             assert collide.collide(one, other, X_WO, X_WT, algorithm=WALK) is truth
             if found.depth_p and not large:
                 P, R, X_WP, X_WR = roles(found, one, other, X_WO, X_WT)
@@ -111,7 +116,7 @@ def test_touching_is_a_hit_and_one_ulp_decides():
 
 
 def test_bodies_without_interior():
-    """One of them has an interior and plays R; two flat ones go to the default narrowphase."""
+    """One of them has an interior and plays R; of two flat ones the second, thickened for the walk, plays it."""
     square = collide.ConvexHull([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 0), (0.5, 0, 0)])
     segment, point = collide.ConvexHull([(0, 0, 0), (0, 0, 3), (0, 0, 1)]), collide.ConvexHull([(0, 0, 0)])
     angle = np.linspace(0, 2 * np.pi, 900, endpoint=False)
@@ -125,7 +130,7 @@ def test_bodies_without_interior():
             assert (found.hit == collide.collide(A, B, X_WA, EYE)).all()
             assert found.walked.mean() > 0.9
         both = collide.walk(flat, square, X_WA, EYE[None])
-        assert not both.walked.any() and both.depth_p == 0
+        assert both.walked.all() and both.depth_p and not both.exchanged
         assert (both.hit == collide.collide(flat, square, X_WA, EYE)).all()
     X = np.array([turned(rng, rng.uniform(0.5, 1.6)) for _ in range(100)])
     assert max(collide.walk(disc, box, X, EYE[None]).rows["rounds"]) > 8
@@ -188,13 +193,11 @@ def test_every_answer_of_the_walk_is_proven_and_the_proof_checks():
             Q = [tuple(c << (e_q - min(e_p, e_q)) for c in q) for q in Q]
             assert max(exact.dot(axis, p) for p in P) < min(exact.dot(axis, q) for q in Q)
         else:
-            point = X[:3, :3] @ row["point"] + X[:3, 3]
-            normals = B.points[B.hull.facets]
-            n = np.cross(normals[:, 1] - normals[:, 0], normals[:, 2] - normals[:, 0])
-            assert ((point - normals[:, 0]) * n).sum(axis=1).max() <= 1e-12
-            own = A.points[A.hull.facets]
-            n = np.cross(own[:, 1] - own[:, 0], own[:, 2] - own[:, 0])
-            assert ((row["point"] - own[:, 0]) * n).sum(axis=1).max() <= 1e-12
+            (one,) = collide.walk(A, B, X, EYE).certificate
+            point = common_point(A, B, X, EYE, one.pairs)
+            for body, pose in ((A, X), (B, EYE)):
+                assert is_inside(body, pose, point)
+                assert not is_inside(body, pose, [c + 3 for c in point])
 
 
 @pytest.mark.parametrize("name", ["rand_pen", "near_sep", "touch_ee", "touch_1ulp", "flat", "degenerate"])
@@ -204,10 +207,66 @@ def test_every_answer_has_a_certificate_that_verifies(name):
         found = collide.walk(A, B, X_WA, X_WB)
         collide.verify(A, B, X_WA, X_WB, found)
         (one,) = found.certificate
-        assert one.kind == ("together" if found.hit[0] else "apart")
+        assert one.kind in (("together",) if found.hit[0] else ("plane", "apart"))
         with pytest.raises(collide.CertificateRefused):
             wrong = one._replace(kind="apart" if found.hit[0] else "together")
             collide.verify(A, B, X_WA, X_WB, found, certificate=(wrong,))
+
+
+def moved_exactly(body, X, vertex: int) -> list[Fraction]:
+    R, t = X[:3, :3].tolist(), X[:3, 3].tolist()
+    p = [Fraction(c) for c in body.points[vertex].tolist()]
+    return [Fraction(t[i]) + sum(Fraction(R[i][j]) * p[j] for j in range(3)) for i in range(3)]
+
+
+def common_point(A, B, X_WA, X_WB, pairs) -> list[Fraction]:
+    """The point of A that a certificate's vertex pairs say is one of B too, checked to be the same, in fractions."""
+    corners_a = [moved_exactly(A, X_WA, i) for i, _ in pairs]
+    corners_b = [moved_exactly(B, X_WB, j) for _, j in pairs]
+    scale = 1
+    for c in (c for p in (*corners_a, *corners_b) for c in p):
+        scale = max(scale, c.denominator)
+    _, total, carrier = nearest_to_origin(
+        [tuple(int((x - y) * scale) for x, y in zip(p, q)) for p, q in zip(corners_a, corners_b)]
+    )
+    rows = [tuple(int((x - y) * scale) for x, y in zip(corners_a[k], corners_b[k])) for k in carrier]
+    weights = [Fraction(w, total) for w in _weights(rows)]
+    of_a, of_b = (
+        [sum(w * corners[k][i] for w, k in zip(weights, carrier)) for i in range(3)]
+        for corners in (corners_a, corners_b)
+    )
+    assert of_a == of_b and min(weights) > 0 and sum(weights) == 1
+    return of_a
+
+
+def is_inside(body, X, point) -> bool:
+    """In fractions, against every facet."""
+    for a, b, c in body.hull.facets.tolist():
+        p, q, r = (moved_exactly(body, X, v) for v in (a, b, c))
+        if exact.dot(exact.cross(exact.minus(q, p), exact.minus(r, p)), exact.minus(point, p)) > 0:
+            return False
+    return True
+
+
+def test_planes_of_the_walk_are_certificates_by_substitution():
+    """The walk's plane stands in the certificate as it is; another one, or one for hits or meshes, is refused."""
+    rng = np.random.default_rng(14)
+    A, B = ball(rng, 60), ball(rng, 80)
+    X_WA = np.array([turned(rng, 2.3) for _ in range(10)])
+    for X in X_WA:
+        found = collide.walk(A, B, X, EYE)
+        (one,) = found.certificate
+        assert not found.hit[0] and one.kind == "plane"
+        (normal,) = one.pairs
+        axis = [Fraction(c) for c in found.rows["axis"][0].tolist()]
+        assert exact.cross(axis, normal) == (0, 0, 0) and exact.dot(axis, normal) < 0
+        collide.verify(A, B, X, EYE, found)
+        for wrong in (tuple(-c for c in normal), (0, 0, 0), (1, 2), (0.5, 1, 1)):
+            with pytest.raises(collide.CertificateRefused):
+                collide.verify(A, B, X, EYE, found, certificate=(one._replace(pairs=(wrong,)),))
+    mesh = collide.Mesh(B.points, B.hull.facets)
+    with pytest.raises(collide.CertificateRefused):
+        collide.verify(A, mesh, X, EYE, collide.distance(A, mesh, X, EYE), certificate=(one,))
 
 
 def test_the_checking_mode_sees_what_is_wrong():
@@ -317,7 +376,8 @@ def test_rounds_grow_with_the_logarithm():
         A, B = ball(rng, n), ball(rng, n)
         X_WA = np.array([turned(rng, rng.uniform(1.6, 2.0)) for _ in range(200)])
         found = collide.walk(A, B, X_WA, EYE[None])
-        assert (found.rows["tests"] > 0).all()
+        a_round = found.rows["tests"] / found.rows["rounds"]
+        assert (a_round > 0).all() and a_round.mean() < 12 and a_round.max() < 40, "a round is O(1)"
         most.append(int(found.rows["rounds"].max()))
     assert most[2] <= 12 + 3.5 * 2 * np.log2(3000) and most[2] < 2.5 * most[1]
 

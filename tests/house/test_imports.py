@@ -176,8 +176,8 @@ ROOMS = {
         "pair_arguments",
     },
     "polytopes": {
-        "errors", "argument_checks", "certificates", "kernels", "least_distance", "numerics", "shapes", "threads",
-        "transforms",
+        "errors", "argument_checks", "certificates", "hull", "kernels", "least_distance", "numerics", "shapes",
+        "threads", "transforms",
     },
     "world_bodies": {"errors", "argument_checks", "transforms", "numerics", "shapes", "broadphase"},
     "world_hits": set(),
@@ -288,10 +288,11 @@ ROOMS = {
     "cli_view": {"cli_pages", "cli_scenes", "pages"},
     "cli_bench": {"cli_numbers", "errors", "reports"},
     "cli_compare": {"cli_files", "cli_pages", "cli_scenes", "errors", "reports", ""},
+    "cli_engines": {"reports"},
     "cli_fuzz": {"cli_files", "cli_numbers", "errors", "reports"},
     "cli_arguments": {
-        "cli_bench", "cli_compare", "cli_fuzz", "cli_pages", "cli_srdf", "cli_sweep", "cli_view", "errors", "reports",
-        "",
+        "cli_bench", "cli_compare", "cli_engines", "cli_fuzz", "cli_pages", "cli_srdf", "cli_sweep", "cli_view",
+        "errors", "reports", "",
     },
     "cli": {
         "cli_arguments", "cli_bench", "cli_compare", "cli_files", "cli_fuzz", "cli_pages", "cli_scenes", "cli_srdf",
@@ -309,6 +310,7 @@ LATE = {
     "cli_bench": {"adapters"},
     "cli_compare": {"scenes", "adapters"},
     "cli_files": {"scenes"},
+    "cli_engines": {"adapters"},
     "cli_fuzz": {"adapters"},
     "cli_pages": {"scenes"},
     "cli_scenes": {"scenes"},
