@@ -11,6 +11,7 @@ import pickle
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,88 +33,107 @@ BATCH = "collide:batch"
 
 
 class EngineTimer:
-    """One engine's child process, ready with the pairs of one class.
+    """One engine's child process, started when it is first asked, and anew after one that died.
 
-    Parameters
-    ----------
-    name, spec : str
-        The engine, and the ``module:class`` to load it from.
-    pairs : list of (A, B, X_WA, X_WB)
-        Those that it has answered once already.
-    timeout : float
-        Of one turn through all pairs, and of making them ready [s].
+    name, spec : the engine, and the ``module:class`` to load it from.
+    groups : lists of pairs, those of each class that the engine has answered once already.
+    timeout : of one turn through a group [s].
     """
 
-    def __init__(self, name: str, spec: str, pairs: list[Pair], timeout: float):
-        self.name, self.failure, self._n, self._timeout = name, "", len(pairs), timeout
+    def __init__(self, name: str, spec: str, groups: list[list[Pair]], timeout: float):
+        self.name, self._spec, self._groups, self._timeout = name, spec, groups, timeout
+        #: Group → how the child ended on it, "hang" or "abort".
+        self.failures: dict[int, str] = {}
+        self._process: Any = None
+        self._pipe: Any = None
+
+    def seconds(self, group: int) -> np.ndarray:
+        """(n,) seconds of a call for each pair of a group; NaN where it refuses, and for all once a child has died."""
+        n = len(self._groups[group])
+        if group in self.failures or not n:
+            return np.full(n, np.nan)
+        limit = self._timeout
+        if self._process is None:
+            self._start()
+            limit += START_TIMEOUT
+        try:
+            self._pipe.send(group)
+            if self._pipe.poll(limit):
+                return np.asarray(self._pipe.recv())
+            self.failures[group] = "hang"
+        except (EOFError, OSError):
+            self.failures[group] = "abort"
+        self.close()
+        return np.full(n, np.nan)
+
+    def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, child_end = context.Pipe()
         # Through a file: a pipe that is full would hold this process up for as long as a child does not read.
         with tempfile.TemporaryDirectory() as folder:
             place = Path(folder) / "pairs"
-            place.write_bytes(pickle.dumps(pairs))
-            self._process = context.Process(target=_child, args=(child_end, name, spec, str(place)), daemon=True)
+            place.write_bytes(pickle.dumps(self._groups))
+            arguments = child_end, self.name, self._spec, str(place)
+            self._process = context.Process(target=_child, args=arguments, daemon=True)
             self._process.start()
             child_end.close()
-            self._receive(START_TIMEOUT + timeout)
-
-    def seconds(self) -> np.ndarray:
-        """(n,) seconds of a call for each pair; NaN where it refuses, and for all once the child is dead or hangs."""
-        if not self.failure:
-            try:
-                self._pipe.send("go")
-            except OSError:
-                pass
-        taken = None if self.failure else self._receive(self._timeout)
-        return np.full(self._n, np.nan) if taken is None else np.asarray(taken)
-
-    def _receive(self, timeout: float) -> Any:
-        try:
-            if self._pipe.poll(timeout):
-                return self._pipe.recv()
-            self.failure = "hang"
-        except (EOFError, OSError):
-            self.failure = "abort"
-        self.close()
-        return None
+            if self._pipe.poll(START_TIMEOUT):
+                try:
+                    self._pipe.recv()
+                except (EOFError, OSError):
+                    pass  # it died, which the first question tells
 
     def close(self) -> None:
         """End the child."""
-        self._process.kill()
-        self._process.join()
-        self._pipe.close()
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+            self._pipe.close()
+            self._process = None
 
 
 def _child(pipe: Any, name: str, spec: str, place: str) -> None:
-    """Make the pairs ready, then a turn through all of them for every word that comes down the pipe."""
+    """Load the engine and the pairs, then a turn through a group for every number that comes down the pipe."""
     sys.stdout.flush()
     for stream in (1, 2):  # some engines print when they are imported
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+    groups = pickle.loads(Path(place).read_bytes())
+    pipe.send("read")
     peer = load_engine(spec)
     peer.prepare()
     open_client(peer)
-    pairs = pickle.loads(Path(place).read_bytes())
+    ready: dict[int, Callable[[], list[float]]] = {}
+    while True:
+        try:
+            group = pipe.recv()
+        except EOFError:
+            return
+        if group not in ready:
+            ready[group] = (_batch if name == BATCH else _singles)(peer, groups[group])
+        pipe.send(ready[group]())
+
+
+def _singles(peer: Peer, pairs: list[Pair]) -> Callable[[], list[float]]:
+    """A turn through pairs, each asked by itself."""
     calls: list[Any] = []
     for pair in pairs:
         try:
             calls.append(timed_call(peer, pair))
         except Exception:  # noqa: BLE001 - whatever a binding throws costs this pair alone
             calls.append(None)
-    rows = len(pairs)
-    if name == BATCH:
-        calls = [batch_call(pairs)]
-        copies = max(1, BATCH_ROWS // rows)
-        if copies > 1 and mean_seconds(calls[0], _repeats(calls[0])) * copies < MAX_BATCH_SECONDS:
-            calls, rows = [batch_call(pairs, copies)], rows * copies
     repeats = [_repeats(call) for call in calls]
-    pipe.send("ready")
-    while True:
-        try:
-            pipe.recv()
-        except EOFError:
-            return
-        taken = [mean_seconds(call, count) for call, count in zip(calls, repeats)]
-        pipe.send([taken[0] / rows] * len(pairs) if name == BATCH else taken)
+    return lambda: [mean_seconds(call, count) for call, count in zip(calls, repeats)]
+
+
+def _batch(peer: Peer, pairs: list[Pair]) -> Callable[[], list[float]]:
+    """A turn of one call for all pairs, over and over where that is quick; each has the mean."""
+    call, copies = batch_call(pairs), max(1, BATCH_ROWS // len(pairs))
+    if mean_seconds(call, _repeats(call)) * copies < MAX_BATCH_SECONDS:
+        call = batch_call(pairs, copies)
+    else:
+        copies = 1
+    repeats = _repeats(call)
+    return lambda: [mean_seconds(call, repeats) / (copies * len(pairs))] * len(pairs)
 
 
 def open_client(peer: Peer) -> None:

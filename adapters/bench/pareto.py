@@ -125,16 +125,29 @@ def measure(
     for asked in dict.fromkeys(map(engine_of, engines)):
         report(f"{asked} answers")
         tables[asked] = _answers(asked, every)
+    answered = {e: tables[engine_of(e)].rows["answered"].reshape(len(classes), n) for e in engines}
+    pairs = {name: [case.shapes() for case in cases[name]] for name in classes}
+    timers = [
+        EngineTimer(e, ENGINES[engine_of(e)], groups_of(answered[e], pairs), TURN_TIMEOUT) for e in engines
+    ]  # fmt: skip
     points: list[Point] = []
-    for k, name in enumerate(classes):
-        report(f"timing {name}")
-        rows = slice(k * n, (k + 1) * n)
-        made = [judged(name, e, tables[engine_of(e)], truths[name], rows) for e in engines]
-        pairs = [case.shapes() for case in cases[name]]
-        answered = [np.flatnonzero(tables[engine_of(e)].rows["answered"][rows]) for e in engines]
-        _time([(p, a, [pairs[i] for i in a]) for p, a in zip(made, answered)], n, 60.0 * minutes / len(classes))
-        points += made
+    try:
+        for k, name in enumerate(classes):
+            report(f"timing {name}")
+            rows = slice(k * n, (k + 1) * n)
+            made = [judged(name, e, tables[engine_of(e)], truths[name], rows) for e in engines]
+            _time(made, timers, [answered[e][k] for e in engines], k, 60.0 * minutes / len(classes))
+            points += made
+    finally:
+        for timer in timers:
+            timer.close()
     return points
+
+
+def groups_of(answered: np.ndarray, pairs: dict[str, list]) -> list[list]:
+    """The pairs of each class that an engine has answered.   answered : (classes, n) bools."""
+    groups = zip(answered, pairs.values())
+    return [[pair for pair, is_answered in zip(group, row) if is_answered] for row, group in groups]
 
 
 def _answers(name: str, cases: list[Case | MeshCase]) -> Table:
@@ -165,29 +178,25 @@ def judged(kind: str, name: str, table: Table, truths: list[Truth], of: slice) -
     return point
 
 
-def _time(timers: list[tuple[Point, np.ndarray, list]], n: int, seconds: float) -> None:
+def _time(
+    points: list[Point], timers: list[EngineTimer], answered: list[np.ndarray], group: int, seconds: float
+) -> None:
     """Fill in the times: rounds in which every engine takes its turn, the first one another each time."""
-    running = [
-        (point, rows, EngineTimer(point.engine, ENGINES[engine_of(point.engine)], pairs, TURN_TIMEOUT))
-        for point, rows, pairs in timers if pairs
-    ]  # fmt: skip
+    running = [turn for turn in zip(points, timers, answered) if turn[2].any()]
     taken: dict[str, list[np.ndarray]] = {point.engine: [] for point, _, _ in running}
     started = time.perf_counter()
-    try:
-        for r in range(MAX_ROUNDS):
-            if r >= MIN_ROUNDS and time.perf_counter() - started > seconds:
-                break
-            for point, rows, timer in running[r % len(running) :] + running[: r % len(running)]:
-                times = np.full(n, math.nan)
-                times[rows] = timer.seconds()
-                taken[point.engine].append(times)
-    finally:
-        for point, _, timer in running:
-            timer.close()
-            if timer.failure:
-                point.mishaps[timer.failure] = point.mishaps.get(timer.failure, 0) + 1
-                point.reason = point.reason or f"{timer.failure} while it was timed"
-    for point, _, _ in running:
+    for r in range(MAX_ROUNDS if running else 0):
+        if r >= MIN_ROUNDS and time.perf_counter() - started > seconds:
+            break
+        for point, timer, rows in running[r % len(running) :] + running[: r % len(running)]:
+            times = np.full(len(rows), math.nan)
+            times[rows] = timer.seconds(group)
+            taken[point.engine].append(times)
+    for point, timer, _ in running:
+        if group in timer.failures:
+            failure = timer.failures[group]
+            point.mishaps[failure] = point.mishaps.get(failure, 0) + 1
+            point.reason = point.reason or f"{failure} while it was timed"
         point.rounds, point.us = len(taken[point.engine]), 1e6 * over_rounds(taken[point.engine])
         if REFERENCE in taken:
             ratio = mean_ratio if point.engine == BATCH else median_ratio

@@ -50,7 +50,7 @@ def draw(points: list[Point], places: list[Path], stamp: dict[str, str]) -> list
     figure = Figure(figsize=(5.4 * columns, 4.6 * lines + 0.9), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     panels = figure.subplots(lines, columns, squeeze=False).ravel()
-    styles = _styles(points)
+    styles = styles_of([point.engine for point in points])
     marks: list[dict] = []
     for panel, kind in zip(panels, kinds):
         marks += _panel(panel, [point for point in points if point.kind == kind], styles)
@@ -65,9 +65,9 @@ def draw(points: list[Point], places: list[Path], stamp: dict[str, str]) -> list
     return marks
 
 
-def _styles(points: list[Point]) -> dict[str, tuple[str, str]]:
-    """Colour and marker of each engine:setting."""
-    names = list(dict.fromkeys(point.engine for point in points))
+def styles_of(engines: list[str]) -> dict[str, tuple[str, str]]:
+    """Colour and marker of each engine:setting: a colour an engine, a marker a setting."""
+    names = list(dict.fromkeys(engines))
     bases = list(dict.fromkeys(name.partition(":")[0] for name in names))
     settings = {base: [name for name in names if name.partition(":")[0] == base] for base in bases}
     return {

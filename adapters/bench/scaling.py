@@ -110,7 +110,7 @@ def _times(engines: list[str], n: int, seed: int, seconds: float) -> dict[str, f
         X_WA[:3, :3], X_WB[:3, :3] = rotation(random), rotation(random)
         X_WB[:3, 3] = direction(random) * (2.0 + (0.5, 0.01, -0.4)[k % 3])
         pairs.append((A, B, X_WA, X_WB))
-    timers = [EngineTimer(name, ENGINES[engine_of(name)], pairs, TURN_TIMEOUT) for name in engines]
+    timers = [EngineTimer(name, ENGINES[engine_of(name)], [pairs], TURN_TIMEOUT) for name in engines]
     taken: dict[str, list[np.ndarray]] = {name: [] for name in engines}
     started = time.perf_counter()
     try:
@@ -118,7 +118,7 @@ def _times(engines: list[str], n: int, seed: int, seconds: float) -> dict[str, f
             if r >= MIN_ROUNDS and time.perf_counter() - started > seconds:
                 break
             for timer in timers[r % len(timers) :] + timers[: r % len(timers)]:
-                taken[timer.name].append(timer.seconds())
+                taken[timer.name].append(timer.seconds(0))
     finally:
         for timer in timers:
             timer.close()

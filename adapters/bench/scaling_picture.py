@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from collide.adapters.bench.pareto_picture import check_picture
+from collide.adapters.bench.pareto_picture import check_picture, styles_of
 from collide.adapters.bench.scaling import OPERATIONS, Growth
-
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6000", "#555555")
 
 
 def draw(grown: list[Growth], places: list[Path], stamp: dict[str, str]) -> None:
@@ -46,12 +44,15 @@ def _lines(panel, grown: list[Growth]) -> None:
     largest = max(n for g in grown for n in g.sizes)
     panel.set_xlim(min(n for g in grown for n in g.sizes) / 1.3, largest * 12)
     ends = []
-    for k, growth in enumerate(grown):
+    styles = styles_of([growth.name for growth in grown])
+    for growth in grown:
+        colour, marker = styles[growth.name]
         points = [(n, v) for n, v in zip(growth.sizes, growth.values) if math.isfinite(v)]
         if points:
-            panel.plot(*zip(*points), "o-", ms=4, lw=1.3, color=_COLOURS[k % len(_COLOURS)])
+            panel.plot(*zip(*points), marker + "-", ms=4, lw=1.3, color=colour)
             name = "" if growth.name == OPERATIONS else f"{growth.name}  "  # the axis names it
-            ends.append((points[-1], f"{name}n^{growth.slope:.2f}", _COLOURS[k % len(_COLOURS)]))
+            ends.append((points[-1], f"{name}n^{growth.slope:.2f}", colour))
+    panel.margins(y=0.12)
     panel.figure.canvas.draw()
     height, last = 11.0 * panel.figure.dpi / 72.0, -math.inf
     for (x, y), text, colour in sorted(ends, key=lambda end: end[0][1]):

@@ -52,6 +52,19 @@ class Crashing(Right):
         os.abort()
 
 
+class Fragile(Right):
+    """Answers once a pair, and dies when it is asked again and again."""
+
+    name = "fragile"
+    calls = 0
+
+    def ask(self, A, X_WA, B, X_WB):
+        self.calls += 1
+        if self.calls > 4:
+            os.abort()
+        return super().ask(A, X_WA, B, X_WB)
+
+
 class Silent(Right):
     name = "silent"
 

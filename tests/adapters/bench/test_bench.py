@@ -16,6 +16,7 @@ import pytest
 
 from collide.adapters.bench import benchmark_scripts, pareto, scaling
 from collide.adapters.bench.bench_classes import CLASSES, BenchClass, cases_of
+from collide.adapters.bench.engine_timer import EngineTimer
 from collide.adapters.bench.machine_stamp import machine_stamp, write_csv
 from collide.adapters.peers import protocol
 from collide.adapters.peers.stress_truth import truth
@@ -24,7 +25,7 @@ from collide.errors import CollideError, InvalidArgument
 from collide.scenes.families.case import Body, pair
 
 HERE = Path(__file__).parent
-STUBS = ("right", "wrong", "slow", "crashing", "silent")
+STUBS = ("right", "wrong", "slow", "crashing", "fragile", "silent")
 #: Gaps of unit cubes along x [m]: the second is touching, the third is missed by what the wrong engine is off.
 GAPS = (0.5, 0.0, -0.0005, -0.25)
 needs_plots = pytest.mark.skipif(importlib.util.find_spec("matplotlib") is None, reason="needs the extra plots")
@@ -69,6 +70,25 @@ def test_slow_is_slower_and_crashing_has_no_time(points):
     assert points["crashing"].mishaps == {"abort": 4} and points["crashing"].answered == 0
     assert np.isnan(points["crashing"].us).all() and not points["crashing"].rounds
     assert points["collide"].ratio == 1 and points["collide"].rounds >= pareto.MIN_ROUNDS
+
+
+def test_dying_while_timed_costs_its_own_times_alone(points):
+    fragile = points["fragile"]
+    assert fragile.answered == 4 and fragile.mishaps == {"abort": 1} and "timed" in fragile.reason
+    assert np.isnan(fragile.us).all() and np.isfinite(fragile.error).all()
+    assert np.isfinite(points["silent"].us).all()
+
+
+def test_a_timer_starts_again_behind_a_death(monkeypatch):
+    monkeypatch.syspath_prepend(str(HERE))
+    pairs = [cubes(None, k).shapes() for k in range(4)]
+    timer = EngineTimer("fragile", "stub_engines:Fragile", [pairs, pairs[:1]], 20.0)
+    try:
+        assert np.isnan(timer.seconds(0)).all() and np.isnan(timer.seconds(0)).all()
+        assert timer.failures == {0: "abort"}
+        assert np.isnan(timer.seconds(1)).all() and timer.failures == {0: "abort", 1: "abort"}
+    finally:
+        timer.close()
 
 
 def test_booleans_alone_have_no_error(points):
@@ -117,7 +137,7 @@ def test_labels_do_not_overlap():
     figure = Figure(figsize=(5.4, 4.6))
     canvas = FigureCanvasAgg(figure)
     panel = figure.subplots()
-    picture._panel(panel, points, picture._styles(points))
+    picture._panel(panel, points, picture.styles_of([point.engine for point in points]))
     canvas.draw()
     boxes = [Text.get_window_extent(text) for text in panel.texts if text.get_text().startswith("engine")]
     assert len(boxes) == 9
