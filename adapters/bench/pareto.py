@@ -182,7 +182,7 @@ def _time(
     points: list[Point], timers: list[EngineTimer], answered: list[np.ndarray], group: int, seconds: float
 ) -> None:
     """Fill in the times: rounds in which every engine takes its turn, the first one another each time."""
-    running = [turn for turn in zip(points, timers, answered) if turn[2].any()]
+    running = [asked for asked in zip(points, timers, answered) if asked[2].any()]
     taken: dict[str, list[np.ndarray]] = {point.engine: [] for point, _, _ in running}
     started = time.perf_counter()
     for r in range(MAX_ROUNDS if running else 0):
