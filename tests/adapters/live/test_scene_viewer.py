@@ -42,6 +42,15 @@ def events(url: str, drawing: int):
                 yield name, value
 
 
+#: The command `collide`; where tests run in the background, what they start would ignore Ctrl-C.
+MINDS_CTRL_C = """
+import signal, sys
+from collide.cli import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.exit(main())
+"""
+
+
 class Maker:
     """Makes a page of a file's text; refuses text that is marked as wrong."""
 
@@ -153,7 +162,7 @@ def test_a_scene_in_a_browser_from_start_to_end(tmp_path):
     """The command itself: prints its address, reads an edited file again, ends with 0 on Ctrl-C."""
     scene = tmp_path / "cell.yaml"
     write(scene, SCENE.replace("HEIGHT", "0.5"))
-    command = [sys.executable, "-m", "collide", "view", str(scene), "--no-browser"]
+    command = [sys.executable, "-c", MINDS_CTRL_C, "view", str(scene), "--no-browser"]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT, start_new_session=True
     ) as process:
