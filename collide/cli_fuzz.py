@@ -101,14 +101,8 @@ def _print(result: Any, args: argparse.Namespace) -> None:
     title = f"FUZZING  wrong answers to {result.pairs} pairs, seed {result.seed}, {result.rounds} rounds"
     terminal.show_table(Table(title, columns, rows))
     findings = result.findings()
-    if findings:
-        listed = [
-            [f.flaw.engine, f.flaw.kind, " ".join(f.case.kinds), f.flaw.position, f"{f.stem}.json"]
-            for f in findings[: None if args.all else SHORT]
-        ]
-        heads = ("engine", "wrong", "shapes", "position", f"file in {result.folder}")
-        kinds = ("label", "text", "text", "text", "name")
-        terminal.write_text("\n")
-        title = f"FINDINGS  {len(findings)} kinds of wrong answers, a small case of each"
-        columns = [Column(head, kind) for head, kind in zip(heads, kinds)]
-        terminal.show_table(Table(title, columns, listed, more=len(findings) - len(listed)))
+    if findings:  # names of files say engine, error, shapes and position, and stay whole on a narrow terminal
+        listed = findings[: None if args.all else SHORT]
+        title = f"FINDINGS  {len(findings)} kinds of wrong answers, a small case of each, in {result.folder}"
+        more = [f"  {len(findings) - len(listed)} more: --all"] if len(listed) < len(findings) else []
+        terminal.write_text("\n".join(["", title, *(f"  {f.stem}.json" for f in listed), *more, ""]))
