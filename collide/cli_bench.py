@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser, engines: Callable) -> None:
     scaling.add_argument("--sizes", type=_sizes, metavar="N,N", help="vertices of each hull (8 to 32,768)")
     for action, least in ((pareto, 3.0), (scaling, 2.0)):
         action.add_argument("--engines", type=engines, metavar="NAMES",
-                            help="engines and settings, commas between (all installed)")
+                            help="engines and settings, commas between (installed ones whose own call is timed)")
         action.add_argument("--minutes", type=minutes, metavar="M",
                             help=f"about how long to time ({least:g}; with --quick 0.2)")
         action.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds make other pairs (0)")

@@ -19,7 +19,7 @@ import numpy as np
 
 from collide.adapters.bench.bench_classes import cases_of, check_classes
 from collide.adapters.bench.engine_timer import BATCH, EngineTimer
-from collide.adapters.bench.timed_calls import what_is_timed
+from collide.adapters.bench.timed_calls import has_prepared_call, what_is_timed
 from collide.adapters.peers.answers import counted
 from collide.adapters.peers.protocol import ENGINES, Question, Table, check_names, engine, load_engine
 from collide.adapters.peers.stress_truth import Truth, truth
@@ -89,8 +89,11 @@ class Point:
 
 
 def default_engines() -> list[str]:
-    """Every engine and setting whose package is installed, and ours in batches; not exact arithmetic."""
-    names = [name for name, spec in ENGINES.items() if name != "exact" and not load_engine(spec).missing()]
+    """Every engine and setting that is installed and has a call of its own prepared here, and ours in batches.
+
+    Others are timed where they are named: with their adapter around them, which would be unfair unasked.
+    """
+    names = [name for name, spec in ENGINES.items() if has_prepared_call(name) and not load_engine(spec).missing()]
     return [name for k, name in enumerate([*names[:1], BATCH, *names[1:]]) if k < 2 or name != BATCH]
 
 

@@ -33,6 +33,11 @@ WHAT_IS_TIMED = {
 ADAPTER = "the adapter's ask: the engine's call with Python's work around it"
 
 
+def has_prepared_call(name: str) -> bool:
+    """Whether an engine or setting is timed without its adapter around it."""
+    return name.partition(":")[0] in ("collide", *_CALLS)
+
+
 def timed_call(peer: Peer, pair: Pair) -> Callable[[], Any]:
     """A function without arguments that asks an engine about one pair.
 
