@@ -124,7 +124,7 @@ _FORMS: tuple[tuple[type[Shape], str, dict[str, str]], ...] = (
     (Ellipsoid, "ellipsoid", {"radii": "radii"}),
     (Halfspace, "halfspace", {"normal": "normal", "offset": "offset"}),
     (ConvexHull, "hull", {"points": "points", "radius": "radius"}),
-    (HPolytope, "hpolytope", {"normals": "normals", "offsets": "offsets"}),
+    (HPolytope, "hpolytope", {"normals": "normals", "offsets": "offsets", "bounded": "bounded"}),
     (HeightField, "heightfield", {"heights": "heights", "cell": "cell", "bottom": "bottom"}),
     (Mesh, "mesh", {"vertices": "vertices", "faces": "faces", "solid": "solid"}),
 )

@@ -33,7 +33,8 @@ TURNED = pose((0.1, 1 / 3, -2e-17), rpy=(0.1, 0.2, 0.3))
 SHAPES = [
     Box((1, 2 / 3, 3)), Sphere(0.1), Capsule(0.1, 0.3), Cylinder(1e-9, 1e5), Cone(0.7, 0.1), Ellipsoid((0.1, 0.2, 0.3)),
     Halfspace((0.1, 0.2, 0.7), 1 / 7), ConvexHull(TETRAHEDRON[0]), ConvexHull(TETRAHEDRON[0], radius=0.01),
-    HPolytope(np.vstack([np.eye(3), -np.eye(3)]), [0.1] * 6), Mesh(*TETRAHEDRON), Mesh(*TETRAHEDRON, solid=False),
+    HPolytope(np.vstack([np.eye(3), -np.eye(3)]), [0.1] * 6), HPolytope([(0, 0, 1)], [0.1], bounded=False),
+    Mesh(*TETRAHEDRON), Mesh(*TETRAHEDRON, solid=False),
     Mesh(TETRAHEDRON[0], TETRAHEDRON[1][:2]), HeightField([[0, 0.1, 0.2], [0.3, 0, 1 / 3]], (0.5, 0.25)),
     Compound([(Sphere(0.1), TURNED), (Compound([(Mesh(*TETRAHEDRON), TURNED)]), pose())]),
 ]  # fmt: skip
