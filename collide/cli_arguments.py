@@ -12,7 +12,16 @@ import re
 from typing import NoReturn
 
 from collide import (
-    __version__, cli_bench, cli_compare, cli_engines, cli_fuzz, cli_numbers, cli_pages, cli_srdf, cli_sweep, cli_view,
+    __version__,
+    cli_bench,
+    cli_compare,
+    cli_engines,
+    cli_fuzz,
+    cli_numbers,
+    cli_pages,
+    cli_srdf,
+    cli_sweep,
+    cli_view,
 )
 from collide.errors import InvalidArgument
 from collide.reports.number_format import UNITS, parse_length

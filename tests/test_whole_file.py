@@ -32,7 +32,7 @@ def test_an_error_leaves_what_was_there(tmp_path, failure):
 
 def test_a_full_disk_is_told_with_the_file(tmp_path):
     place = tmp_path / "full.txt"
-    with pytest.raises(OSError, match="full.txt"), whole_file(place):
+    with pytest.raises(OSError, match=r"full\.txt"), whole_file(place):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     with pytest.raises(OSError, match="absent"):
         write_whole(tmp_path / "absent" / "file.txt", "")
