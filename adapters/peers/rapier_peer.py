@@ -155,8 +155,13 @@ def _query_pipeline(A, places):
 
 def _intersect(A, B, places) -> bool:
     _alive, pipeline = _query_pipeline(A, places)
-    hits: list = []
-    pipeline.intersect_shape(places[1], B[0], lambda handle: bool(hits.append(handle)) or True)
+    hits = []
+
+    def go_on(handle) -> bool:
+        hits.append(handle)
+        return True
+
+    pipeline.intersect_shape(places[1], B[0], go_on)
     return bool(hits)
 
 
