@@ -126,19 +126,19 @@ def _around(sheets: Sheets, points: CutPoints, low: int, high: int, sheet: np.nd
     # A sheet lies in the direction n × d from the edge; such directions make the angles that their n make.
     reference = normals[0]
 
-    def half(n: Point) -> int:
-        turn = inner(d, cross(reference, n))
-        return 0 if turn > 0 or (turn == 0 and inner(reference, n) > 0) else 1
+    def half_turn(n: Point) -> int:
+        sign = inner(d, cross(reference, n))
+        return 0 if sign > 0 or (sign == 0 and inner(reference, n) > 0) else 1
 
-    halves = [half(n) for n in normals]
+    sector = [half_turn(n) for n in normals]
 
     def compare(i: int, j: int) -> int:
-        if halves[i] != halves[j]:
-            return halves[i] - halves[j]
-        turn = inner(d, cross(normals[i], normals[j]))
-        if turn == 0 and i != j:
+        if sector[i] != sector[j]:
+            return sector[i] - sector[j]
+        sign = inner(d, cross(normals[i], normals[j]))
+        if sign == 0 and i != j:
             raise CollideError("an arrangement of solids has two sheets in one place; please report it")
-        return -1 if turn > 0 else 1
+        return -1 if sign > 0 else 1
 
     return sorted(range(len(normals)), key=cmp_to_key(compare))
 

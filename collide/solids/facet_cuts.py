@@ -150,8 +150,8 @@ class FacetCuts:
         lines: dict[int, set[Segment]] = {}
         for a, b, c in self.facets.thin.tolist():
             edges = {segment(a, b), segment(b, c), segment(c, a)}
-            for other in {id(lines[v]): lines[v] for v in (a, b, c) if v in lines}.values():
-                edges |= other
+            for line in {id(lines[v]): lines[v] for v in (a, b, c) if v in lines}.values():
+                edges |= line
             for p, q in edges:
                 lines[p] = lines[q] = edges
         for edges in {id(line): line for line in lines.values()}.values():
