@@ -23,8 +23,8 @@ class Shape:
     """
 
     __slots__ = (
-        "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_kind", "_laid_out", "_moving", "_parts",
-        "_pieces", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk",
+        "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges", "_kind", "_laid_out",
+        "_moving", "_parts", "_pieces", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk",
     )  # fmt: skip
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -51,6 +51,8 @@ class Shape:
     _pieces: tuple
     #: A mesh of the same facets (`solids/solid_operands.py`).
     _as_solid: Any
+    #: Which facets of a mesh share which edge (`solids/facet_edges.py`).
+    _facet_edges: Any
     #: Facets of a mesh that cross each other (`solids/arrangement.py`).
     _crossings: Any
     #: Row and column of the pair table (`lowering/kinds.py`).

@@ -14,10 +14,13 @@ import numpy as np
 
 from collide.narrowphase.facets.facet_queries import all_hits, self_hits
 from collide.shapes.shape import kept_with_shape
-from collide.solids.cells import Cells, Sheets, cells_of, merged_sheets
+from collide.solids.around_edges import Sheets
+from collide.solids.cells import Cells, cells_of, merged_sheets
+from collide.solids.crossing_pairs import crossing_pairs
 from collide.solids.cut_points import CutPoints, axis_of
 from collide.solids.facet_cuts import FacetCuts, segment
 from collide.solids.placed_facets import Operand, PlacedFacets
+from collide.solids.split_facets import split_facets
 from collide.solids.sweep_triangulation import triangulate
 
 #: Of the winding numbers (c, r) of cells: which cells belong, (c,) bool.
@@ -59,25 +62,76 @@ def arrange(operands: list[Operand]) -> Arrangement:
     facets = PlacedFacets(operands)
     points = CutPoints(facets)
     pairs = meeting_pairs(facets)
-    cuts = FacetCuts(facets, points, pairs)
+    crossings, ids, exactly = _clear_crossings(facets, points, pairs)
+    by_paths = np.setdiff1d(crossings.pairs, exactly)
+    triangles, of_triangle, rest = split_facets(facets, crossings, ids, by_paths)
+    exactly = np.union1d(exactly, rest)
+    drawn = np.isin(crossings.pairs, exactly).any(axis=1)
+    clear = pair_keys(facets, crossings.pairs)
+    unclear = pairs[~np.isin(pair_keys(facets, pairs), clear)]
+    cuts = FacetCuts(facets, points, unclear, crossings.pairs[drawn], ids[drawn], exactly)
     pieces, of = [], []
     for f in sorted(cuts.corners_of):
-        triangles = _cut_facet(cuts, f)
-        pieces += triangles
-        of += [f] * len(triangles)
-    whole = np.ones(len(facets.corners), dtype=bool)
-    whole[list(cuts.corners_of)] = False
-    rows = np.flatnonzero(whole)
-    r = len(operands)
-    of_cut = np.array(of, dtype=np.int64)
-    cut = merged_sheets(np.array(pieces, dtype=np.int64).reshape(-1, 3), of_cut, facets.body[of_cut], r)
-    steps = np.zeros((len(rows), r), dtype=np.int8)
+        made = _cut_facet(cuts, f)
+        pieces += made
+        of += [f] * len(made)
+    is_cut = np.zeros(len(facets.corners), dtype=bool)
+    is_cut[by_paths] = is_cut[list(cuts.corners_of)] = True
+    of_piece = np.array(of, dtype=np.int64)
+    body = facets.body[of_piece]
+    merged = merged_sheets(np.array(pieces, dtype=np.int64).reshape(-1, 3), of_piece, body, len(operands))
+    sheets = _all_sheets(facets, np.flatnonzero(~is_cut), triangles, of_triangle, merged)
+    cells = cells_of(sheets, points, is_cut, crossings.pairs, ids)
+    return Arrangement(facets, points, sheets, cells, len(pairs), int(is_cut.sum()))
+
+
+def pair_keys(facets: PlacedFacets, pairs: np.ndarray) -> np.ndarray:
+    """(k,) one number for each pair of rows."""
+    return pairs[:, 0] * len(facets.corners) + pairs[:, 1]
+
+
+def _clear_crossings(facets: PlacedFacets, points: CutPoints, pairs: np.ndarray):
+    """(clear crossings of two bodies, ids (k, 2) of their ends, facets that have to be cut exactly).
+
+    Ends are points in one place where the same edge pierces the same facet. That holds of two bodies; facets that cross
+    their own body's, and those that meet them, are cut exactly, as are all facets of three bodies and more.
+    """
+    of_one = facets.body[pairs[:, 0]] == facets.body[pairs[:, 1]]
+    crossings, proven = crossing_pairs(facets, pairs[~of_one])
+    exactly = np.zeros(len(facets.corners), dtype=bool)
+    if len(facets.operands) > 2:
+        exactly[pairs] = True
+    exactly[pairs[of_one]] = True
+    exactly[pairs[exactly[pairs].any(axis=1)]] = True
+    exactly[pairs[~of_one][~proven]] = True
+    two_sided = np.concatenate([edges.sides[:, 0] >= 0 for edges in facets.edges])
+    rows = np.unique(crossings.pairs)
+    exactly[rows[~two_sided[facets.edge[rows]].all(axis=1)]] = True
+    keys, first, ends = np.unique(
+        crossings.edge * len(facets.corners) + crossings.facet, return_index=True, return_inverse=True
+    )
+    del keys
+    pair, end = first // 2, first % 2
+    facet = crossings.facet[pair, end]
+    edge = crossings.edge[pair, end]
+    owner = crossings.pairs[pair].sum(axis=1) - facet
+    slot = np.argmax(facets.edge[owner] == edge[:, None], axis=1)
+    corners = facets.corners[owner]
+    k = np.arange(len(owner))
+    start = len(points)
+    points.add_piercings(np.stack([corners[k, slot], corners[k, (slot + 1) % 3]], axis=1), facet)
+    return crossings, start + ends.reshape(-1, 2), np.flatnonzero(exactly)
+
+
+def _all_sheets(facets: PlacedFacets, whole: np.ndarray, triangles: np.ndarray, of: np.ndarray, merged: Sheets) -> Sheets:
+    """Whole facets first, then those split by paths, then merged ones."""
+    rows = np.concatenate([whole, of])
+    steps = np.zeros((len(rows), len(facets.operands)), dtype=np.int8)
     steps[np.arange(len(rows)), facets.body[rows]] = 1
-    sheets = Sheets(
-        np.concatenate([facets.corners[rows], cut.triangles]), np.concatenate([rows, cut.facet]),
-        np.concatenate([steps, cut.steps]),
+    return Sheets(
+        np.concatenate([facets.corners[whole], triangles, merged.triangles]), np.concatenate([rows, merged.facet]),
+        np.concatenate([steps, merged.steps]),
     )  # fmt: skip
-    return Arrangement(facets, points, sheets, cells_of(sheets, points), len(pairs), len(cuts.corners_of))
 
 
 def meeting_pairs(facets: PlacedFacets) -> np.ndarray:

@@ -10,27 +10,15 @@ the sheet between them says, and one ray for each part that hangs together tells
 from __future__ import annotations
 
 from collections import defaultdict
-from functools import cmp_to_key
 from typing import NamedTuple
 
 import numpy as np
 
 from collide.errors import CollideError
-from collide.numerics.exact_points import Point, cross, inner
+from collide.numerics.exact_points import inner
+from collide.solids.around_edges import Sheets, joined_sides
 from collide.solids.cut_points import CutPoints
-
-
-class Sheets(NamedTuple):
-    """Triangles that cross no others, each once.
-
-    triangles : (k, 3) ids of points, counter-clockwise seen from the front.
-    facet : (k,) row of a facet it is part of, which has the same front; of several the first.
-    steps : (k, r) int8: by how much each body's winding number is greater behind the sheet than before it.
-    """
-
-    triangles: np.ndarray
-    facet: np.ndarray
-    steps: np.ndarray
+from collide.solids.facet_edges import components, uncut_parts
 
 
 class Cells(NamedTuple):
@@ -59,97 +47,38 @@ def _turns(triangles: np.ndarray) -> np.ndarray:
     return np.where((a < b).astype(np.int8) + (b < c) + (c < a) == 2, 1, -1).astype(np.int8)
 
 
-def cells_of(sheets: Sheets, points: CutPoints) -> Cells:
-    """The cells of sheets that close."""
-    n = len(sheets.triangles)
-    first, second = _joined_sides(sheets, points)
-    root = components(2 * n, first, second)
-    cells, sides = np.unique(root, return_inverse=True)
-    sides = sides.reshape(n, 2)
-    return Cells(sides, _windings(sheets, sides, len(cells), points))
+def cells_of(sheets: Sheets, points: CutPoints, is_cut: np.ndarray, crossings: np.ndarray, ids: np.ndarray) -> Cells:
+    """The cells of sheets that close.
 
-
-def components(n: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(n,) the least number of each component of a graph with edges a[k] – b[k]; O((n + k) log n)."""
-    root = np.arange(n)
-    while True:
-        ra, rb = root[a], root[b]
-        low, high = np.minimum(ra, rb), np.maximum(ra, rb)
-        open_edges = low != high
-        if not open_edges.any():
-            return root
-        a, b = a[open_edges], b[open_edges]
-        np.minimum.at(root, high[open_edges], low[open_edges])
-        while True:
-            shorter = root[root]
-            if (shorter == root).all():
-                break
-            root = shorter
-
-
-# --- around edges -------------------------------------------------------------------------------
-
-
-def _joined_sides(sheets: Sheets, points: CutPoints) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of sides that look into one cell; side 2 i is the front of sheet i, 2 i + 1 its back."""
-    T = sheets.triangles
-    starts, ends = T.ravel(), np.roll(T, -1, axis=1).ravel()
-    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
-    order = np.lexsort((high, low))
-    low, high = low[order], high[order]
-    sheet, upward = order // 3, (starts < ends)[order]
-    new = np.flatnonzero(np.concatenate([[True], (low[1:] != low[:-1]) | (high[1:] != high[:-1])]))
-    counts = np.diff(np.append(new, len(low)))
-    # Turning counter-clockwise about an edge, from its lower end to its higher, one leaves a sheet on its front where
-    # the edge runs upward in it, and enters it on its other side.
-    leaves = 2 * sheet + ~upward
-    enters = leaves ^ 1
-    pairs = new[counts == 2]
-    first = [leaves[pairs], leaves[pairs + 1]]
-    second = [enters[pairs + 1], enters[pairs]]
-    for at, count in zip(new[counts != 2].tolist(), counts[counts != 2].tolist()):
-        rows = np.arange(at, at + count)
-        turned = rows[_around(sheets, points, int(low[at]), int(high[at]), sheet[rows], upward[rows])]
-        first.append(leaves[turned])
-        second.append(enters[np.roll(turned, -1)])
-    return np.concatenate(first), np.concatenate(second)
-
-
-def _around(sheets: Sheets, points: CutPoints, low: int, high: int, sheet: np.ndarray, upward: np.ndarray) -> list[int]:
-    """The order in which sheets stand around an edge, counter-clockwise seen against its direction."""
-    p, q = points.exact(low), points.exact(high)
-    d: Point = tuple(y * p[3] - x * q[3] for x, y in zip(p[:3], q[:3]))  # type: ignore[assignment]
-    normals = []
-    for k, up in zip(sheet.tolist(), upward.tolist()):
-        n = points.facets.normal(int(sheets.facet[k]))
-        normals.append(n if up else (-n[0], -n[1], -n[2]))
-    # A sheet lies in the direction n × d from the edge; such directions make the angles that their n make.
-    reference = normals[0]
-
-    def half_turn(n: Point) -> int:
-        sign = inner(d, cross(reference, n))
-        return 0 if sign > 0 or (sign == 0 and inner(reference, n) > 0) else 1
-
-    sector = [half_turn(n) for n in normals]
-
-    def compare(i: int, j: int) -> int:
-        if sector[i] != sector[j]:
-            return sector[i] - sector[j]
-        sign = inner(d, cross(normals[i], normals[j]))
-        if sign == 0 and i != j:
-            raise CollideError("an arrangement of solids has two sheets in one place; please report it")
-        return -1 if sign > 0 else 1
-
-    return sorted(range(len(normals)), key=cmp_to_key(compare))
+    sheets : whole facets first.   is_cut : (F,) bool, which facets are not whole.
+    crossings : (k, 2) facets that cross clearly, and ids : (k, 2) the ends of what they share, along n_a × n_b.
+    """
+    facets = points.facets
+    parts = [
+        uncut_parts(edges, ~is_cut[start:end]) + start
+        for edges, start, end in zip(facets.edges, facets.first_facet.tolist(), facets.first_facet[1:].tolist())
+    ]
+    tops, patch = np.unique(np.concatenate(parts)[~is_cut], return_inverse=True)
+    n = len(tops) + len(sheets.triangles) - len(patch)
+    patch = np.concatenate([patch, np.arange(len(tops), n)])
+    first, second = joined_sides(sheets, points, is_cut, crossings, ids)
+    root = components(2 * n, 2 * patch[first // 2] + first % 2, 2 * patch[second // 2] + second % 2)
+    cells, of_side = np.unique(root, return_inverse=True)
+    of_patch = of_side.reshape(n, 2)
+    first_sheet = np.empty(n, dtype=np.int64)
+    first_sheet[patch[::-1]] = np.arange(len(patch))[::-1]
+    return Cells(of_patch[patch], _windings(sheets, first_sheet, of_patch, len(cells), points))
 
 
 # --- winding numbers ----------------------------------------------------------------------------
 
 
-def _windings(sheets: Sheets, sides: np.ndarray, n_cells: int, points: CutPoints) -> np.ndarray:
-    """(cells, r) winding numbers."""
+def _windings(
+    sheets: Sheets, first_sheet: np.ndarray, sides: np.ndarray, n_cells: int, points: CutPoints
+) -> np.ndarray:
+    """(cells, r) winding numbers.   first_sheet : (patches,) one of each.   sides : (patches, 2) its cells."""
     r = sheets.steps.shape[1]
-    passages, first = np.unique(np.column_stack([sides, sheets.steps]), axis=0, return_index=True)
+    passages, first = np.unique(np.column_stack([sides, sheets.steps[first_sheet]]), axis=0, return_index=True)
     beyond: dict[int, list[tuple[int, np.ndarray]]] = defaultdict(list)
     for row in passages:
         beyond[int(row[0])].append((int(row[1]), row[2:]))
@@ -157,10 +86,10 @@ def _windings(sheets: Sheets, sides: np.ndarray, n_cells: int, points: CutPoints
     winding = np.zeros((n_cells, r), dtype=np.int64)
     known = np.zeros(n_cells, dtype=bool)
     rays = _Rays(sheets, points)
-    for row in np.sort(first).tolist():
-        if known[sides[row, 0]]:
+    for patch in np.sort(first).tolist():
+        if known[sides[patch, 0]]:
             continue
-        cell, absolute = rays.shoot(row, sides[row])
+        cell, absolute = rays.shoot(int(first_sheet[patch]), sides[patch])
         winding[cell], known[cell] = absolute, True
         stack = [cell]
         while stack:
@@ -180,12 +109,12 @@ class _Rays:
 
     def __init__(self, sheets: Sheets, points: CutPoints):
         self.sheets, self.points, facets = sheets, points, points.facets
-        rows = [v @ o.X[:3, :3].T + o.X[:3, 3] for o in facets.operands for v in (o.mesh.vertices,)]
-        near = np.concatenate(rows)[facets.corners]
-        size = np.concatenate([np.abs(o.mesh.vertices) @ np.abs(o.X[:3, :3]).T + np.abs(o.X[:3, 3])
-                               for o in facets.operands])  # fmt: skip
-        self.slack = 2.0**-46 * float(size.max())
-        self.low, self.high = near.min(axis=1), near.max(axis=1)
+        self.near = np.concatenate([o.mesh.vertices @ o.X[:3, :3].T + o.X[:3, 3] for o in facets.operands])
+        # Sums of three products and a shift are off by less than six units of the sum of their sizes.
+        self.slack = 2.0**-48 * max(
+            float(np.abs(o.X[:3, :3]).sum() * np.abs(o.mesh.vertices).max() + np.abs(o.X[:3, 3]).max())
+            for o in facets.operands
+        )
 
     def shoot(self, row: int, sides: np.ndarray) -> tuple[int, np.ndarray]:
         """(the cell on that side of a sheet towards which an axis points, its winding numbers)."""
@@ -209,9 +138,13 @@ class _Rays:
         grid, origin = facets.grid, facets.origin
         p = np.array([_double(x + o * point[3], point[3], grid) for x, o in zip(point[:3], origin)])
         u, v = (axis + 1) % 3, (axis + 2) % 3
-        near = self.high[:, axis] >= p[axis] - self.slack
-        for k in (u, v):
-            near &= (self.low[:, k] <= p[k] + self.slack) & (self.high[:, k] >= p[k] - self.slack)
+        # What a vertex lies beyond, as bits: facets are out of the way that have a bit of all their corners.
+        beyond = (self.near[:, axis] < p[axis] - self.slack).astype(np.uint8)
+        for bit, k in ((2, u), (8, v)):
+            beyond |= (self.near[:, k] < p[k] - self.slack).astype(np.uint8) * np.uint8(bit)
+            beyond |= (self.near[:, k] > p[k] + self.slack).astype(np.uint8) * np.uint8(2 * bit)
+        a, b, c = (beyond[facets.corners[:, k]] for k in range(3))
+        near = a & b & c == 0
         total = np.zeros(self.sheets.steps.shape[1], dtype=np.int64)
         for f in np.flatnonzero(near).tolist():
             passage = self._passage(f, point, axis, u, v)

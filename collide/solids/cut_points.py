@@ -10,7 +10,9 @@ import math
 from collections.abc import Iterable
 from functools import cmp_to_key
 
-from collide.numerics.exact_points import Point
+import numpy as np
+
+from collide.numerics.exact_points import Point, inner, minus
 from collide.solids.placed_facets import PlacedFacets
 
 Rational = tuple[int, int, int, int]
@@ -29,6 +31,7 @@ class CutPoints:
         self._exact: dict[int, Rational] = {}
         self._near: dict[int, tuple[float, float, float]] = {}
         self.same_as: dict[int, int] = {}
+        self._piercings: dict[int, tuple[int, int, int]] = {}
         self._next = self.n_vertices
 
     def __len__(self) -> int:
@@ -45,6 +48,24 @@ class CutPoints:
                 self._exact[vertex] = (x, y, z, 1)
         return known
 
+    def add_piercings(self, edges: np.ndarray, rows: np.ndarray) -> None:
+        """Points for the next ids, where edges (k, 2) of vertices go through facets (k,): worked out when asked for."""
+        ids = range(self._next, self._next + len(rows))
+        self._piercings.update(zip(ids, zip(*edges.T.tolist(), rows.tolist())))
+        self._next += len(rows)
+
+    def place_of(self, point: int) -> int:
+        """The id of the place of such a point: where others work it out again, it is found by its coordinates."""
+        return self._ids.setdefault(self.exact(point), point)
+
+    def _pierce(self, p: int, q: int, row: int) -> Rational:
+        """Where the edge from vertex p to vertex q goes through a facet's plane."""
+        a, b = self.facets.exact(p), self.facets.exact(q)
+        n, start = self.facets.normal(row), self.facets.exact(int(self.facets.corners[row, 0]))
+        above, below = abs(inner(n, minus(a, start))), abs(inner(n, minus(b, start)))
+        x, y, z = (u * below + v * above for u, v in zip(a, b))
+        return reduced(x, y, z, above + below)
+
     def add(self, point: Rational) -> int:
         """The id of a point, which has no common factor."""
         known = self._ids.get(point)
@@ -56,7 +77,8 @@ class CutPoints:
 
     def exact(self, point: int) -> Rational:
         if point not in self._exact:
-            self._exact[point] = (*self.facets.exact(point), 1)
+            piercing = self._piercings.get(point)
+            self._exact[point] = self._pierce(*piercing) if piercing else (*self.facets.exact(point), 1)
         return self._exact[point]
 
     def near(self, point: int) -> tuple[float, float, float]:

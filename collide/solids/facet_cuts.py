@@ -23,11 +23,16 @@ class FacetCuts:
     """The segments of facets that are cut.
 
     pairs : (k, 2) rows of facets that meet, each once; neighbours that share no more than corners and edges are none.
+    crossings : (k, 2) pairs that are known to cross clearly, and ids : (k, 2) of the ends of what they share.
+    rows : facets to cut; of pairs both, of crossings one at least.
     corners_of : ids of a facet's corners.   sides_of : the three segments of its border.
     segments_of, points_of : those on a facet, its border among them.   splits : points within a segment.
     """
 
-    def __init__(self, facets: PlacedFacets, points: CutPoints, pairs: np.ndarray):
+    def __init__(
+        self, facets: PlacedFacets, points: CutPoints, pairs: np.ndarray, crossings: np.ndarray, ids: np.ndarray,
+        rows: np.ndarray,
+    ):  # fmt: skip
         self.facets, self.points = facets, points
         self.corners_of: dict[int, tuple[int, int, int]] = {}
         self.segments_of: dict[int, set[Segment]] = {}
@@ -37,9 +42,12 @@ class FacetCuts:
         self._pieces: dict[int, dict[int, list[Segment]]] = defaultdict(dict)
         self._changed: set[int] = set()
         self._meets: dict[int, set[int]] = defaultdict(set)
-        facets.load(np.unique(facets.corners[np.unique(pairs)]).tolist() + np.unique(facets.thin).tolist())
-        for f in np.unique(pairs).tolist():
+        some = np.unique(crossings) if len(rows) else rows
+        facets.load(np.unique(np.concatenate([facets.corners[np.union1d(rows, some)].ravel(), facets.thin.ravel()])).tolist())
+        for f in rows.tolist():
             self._start(f)
+        for f, g, p, q in np.column_stack([crossings, ids]).tolist():
+            self._put_piece(f, g, [points.place_of(p), points.place_of(q)])
         for f, g in pairs.tolist():
             self._draw(f, g)
         for f in self._pieces:
@@ -71,14 +79,19 @@ class FacetCuts:
                 self._changed.add(f)
 
     def _draw(self, f: int, g: int) -> None:
-        """What two facets share, on both."""
+        """What two facets share, worked out in integers, on both."""
         piece = common_piece(self.facets.exact_corners(f), self.facets.exact_corners(g))
-        ids = [self.points.add(p) for p in piece]
+        self._put_piece(f, g, [self.points.add(p) for p in piece])
+
+    def _put_piece(self, f: int, g: int, ids: list[int]) -> None:
+        """A point, the ends of a segment or the corners of a polygon, on those of two facets that are to be cut."""
         ring = list(zip(ids, [*ids[1:], ids[0]])) if len(ids) > 2 else [(ids[0], ids[1])] if len(ids) == 2 else []
         segments = [segment(p, q) for p, q in ring]
         self._meets[f].add(g)
         self._meets[g].add(f)
         for a, b in ((f, g), (g, f)):
+            if a not in self.corners_of:
+                continue
             self._pieces[a][b] = segments
             self.points_of[a].update(ids)
             self._changed.add(a)

@@ -17,6 +17,7 @@ from collide.mesh.mesh_topology import COLLAPSED
 from collide.numerics.exact_points import Point, cross, minus, placed
 from collide.numerics.lowest_bits import NO_BITS, lowest_exponents
 from collide.shapes.mesh import Mesh
+from collide.solids.facet_edges import FacetEdges, facet_edges
 
 
 class Operand(NamedTuple):
@@ -31,48 +32,38 @@ class PlacedFacets:
     """Facets of r bodies; those without area are left out, their corners kept as points of the edges they lie on.
 
     corners : (F, 3) int64 vertex ids, counter-clockwise from outside; equal vertices of a body have one id.
+    edge : (F, 3) the edges from corner k to corner k + 1.
     body, number : (F,) int64: whose facet, and its row in that body's faces.
     local : (V, 3) vertices in the frames of their bodies.   body_of : (V,) int64.
-    first_facet, first_vertex : (r + 1,) where each body's begin.
+    first_facet, first_vertex, first_edge : (r + 1,) where each body's begin.   poses : (r, 4, 4).
     grid : exponent of the unit of exact coordinates.   origin : their origin in that unit.
     thin : ids (k, 3) of facets whose corners are distinct and lie on one line.
     """
 
     def __init__(self, operands: list[Operand]):
         self.operands = operands
-        corners, bodies, numbers, local, owner, thin = [], [], [], [], [], []
-        self._place_of: list[np.ndarray] = []
-        n_vertices = n_facets = 0
-        first_vertex, first_facet = [0], [0]
-        for k, operand in enumerate(operands):
-            mesh = operand.mesh
-            flags, ids = mesh.survey.flags, mesh.survey.corners.astype(np.int64)
-            proper = np.flatnonzero((flags & (NO_AREA | COLLAPSED)) == 0)
-            place = np.full(len(ids), -1, dtype=np.int64)
-            place[proper] = n_facets + np.arange(len(proper))
-            self._place_of.append(place)
-            corners.append(ids[proper] + n_vertices)
-            thin.append(ids[(flags & NO_AREA != 0) & (flags & COLLAPSED == 0)] + n_vertices)
-            bodies.append(np.full(len(proper), k))
-            numbers.append(proper)
-            local.append(mesh.vertices)
-            owner.append(np.full(len(mesh.vertices), k))
-            n_vertices += len(mesh.vertices)
-            n_facets += len(proper)
-            first_vertex.append(n_vertices)
-            first_facet.append(n_facets)
-        self.corners, self.thin = np.concatenate(corners), np.concatenate(thin)
-        self.body, self.number = np.concatenate(bodies), np.concatenate(numbers)
-        self.local, self.body_of = np.concatenate(local), np.concatenate(owner)
-        self.first_vertex, self.first_facet = np.array(first_vertex), np.array(first_facet)
-        self.grid = min(_grid_of(operand) for operand in operands)
+        self.poses = np.stack([operand.X for operand in operands])
+        self.edges = [facet_edges(operand.mesh) for operand in operands]
+        counts = [[len(o.mesh.vertices), len(e.rows), len(e.sides)] for o, e in zip(operands, self.edges)]
+        starts = np.vstack([np.zeros((1, 3), dtype=np.int64), np.cumsum(counts, axis=0)])
+        self.first_vertex, self.first_facet, self.first_edge = starts.T
+        self.corners = np.concatenate([e.corners + k for e, k in zip(self.edges, self.first_vertex)])
+        self.edge = np.concatenate([e.edge + k for e, k in zip(self.edges, self.first_edge)])
+        self.body = np.repeat(np.arange(len(operands)), np.diff(self.first_facet))
+        self.number = np.concatenate([e.rows for e in self.edges])
+        self.local = np.concatenate([operand.mesh.vertices for operand in operands])
+        self.body_of = np.repeat(np.arange(len(operands)), np.diff(self.first_vertex))
+        thin = [_thin_corners(operand.mesh) + k for operand, k in zip(operands, self.first_vertex)]
+        self.thin = np.concatenate(thin)
+        self.grid = min(_grid_of(operand.X, edges) for operand, edges in zip(operands, self.edges))
         self.origin = self._on_grid(*placed(operands[0].X, operands[0].mesh.vertices[:1]))[0]
         self._exact: dict[int, Point] = {}
         self._normals: dict[int, Point] = {}
 
     def rows_of(self, body: int, numbers: np.ndarray) -> np.ndarray:
         """(k,) rows here of facets of a body by their own numbers; −1 for facets without area."""
-        return self._place_of[body][numbers]
+        place = self.edges[body].place[numbers]
+        return np.where(place >= 0, place + self.first_facet[body], -1)
 
     def load(self, vertices: Iterable[int]) -> None:
         """Work out the exact coordinates of vertices, all at once: quicker than one by one."""
@@ -107,10 +98,14 @@ class PlacedFacets:
         return [(x << shift, y << shift, z << shift) for x, y, z in points]
 
 
-def _grid_of(operand: Operand) -> int:
-    """The exponent of the unit in which all vertices of a placed body are whole."""
-    R = int(lowest_exponents(operand.X[:3, :3].ravel()))
-    v = int(lowest_exponents(operand.mesh.vertices.ravel()))
-    t = int(lowest_exponents(operand.X[:3, 3]))
-    product = R + v if NO_BITS not in (R, v) else NO_BITS
+def _grid_of(X: np.ndarray, edges: FacetEdges) -> int:
+    """The exponent of a unit in which all vertices of a placed body are whole."""
+    R, t = int(lowest_exponents(X[:3, :3].ravel())), int(lowest_exponents(X[:3, 3]))
+    product = R + edges.lowest_bit if NO_BITS not in (R, edges.lowest_bit) else NO_BITS
     return min(product, t) if min(product, t) < NO_BITS else 0
+
+
+def _thin_corners(mesh: Mesh) -> np.ndarray:
+    """(k, 3) corners of facets with three corners on one line."""
+    flags = mesh.survey.flags
+    return mesh.survey.corners[(flags & NO_AREA != 0) & (flags & COLLAPSED == 0)].astype(np.int64)

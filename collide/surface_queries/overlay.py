@@ -114,16 +114,16 @@ def _crossing_segments(A: np.ndarray, B: np.ndarray, X_WA, X_WB) -> tuple[np.nda
 
 
 def _crossings(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray]:
-    A, error_a = _in_world(A, X_WA)
-    B, error_b = _in_world(B, X_WB)
+    A, error_a = posed_corners(A, X_WA)
+    B, error_b = posed_corners(B, X_WB)
     error = np.maximum(error_a, error_b)  # (k,) of every coordinate
     largest = np.maximum(np.abs(A).max(axis=(1, 2)), np.abs(B).max(axis=(1, 2)))
-    n, sides_b, limit_b = _sides(A, B, error)
-    m, sides_a, limit_a = _sides(B, A, error)
+    n, sides_b, limit_b = sides_of_planes(A, B, error)
+    m, sides_a, limit_a = sides_of_planes(B, A, error)
     proven = (np.abs(sides_b) > limit_b[:, None]).all(axis=1) & (np.abs(sides_a) > limit_a[:, None]).all(axis=1)
     proven &= (np.abs(np.sign(sides_b).sum(axis=1)) == 1) & (np.abs(np.sign(sides_a).sum(axis=1)) == 1)
-    on_a, error_on_a = _on_line(A, sides_a, limit_a, error)
-    on_b, error_on_b = _on_line(B, sides_b, limit_b, error)
+    on_a, error_on_a = plane_crossings(A, sides_a, limit_a, error)
+    on_b, error_on_b = plane_crossings(B, sides_b, limit_b, error)
     off = np.maximum(error_on_a, error_on_b)
     along = np.cross(n, m)
     along /= np.abs(along).max(axis=1, keepdims=True)
@@ -149,7 +149,7 @@ def _crossings(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([start, end], axis=1), proven
 
 
-def _in_world(T: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def posed_corners(T: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """((k, 3, 3) corners in W, (k,) bound of the error of a coordinate)."""
     terms = X[:, None, :3, :3] * T[:, :, None, :]
     shift = X[:, None, :3, 3]
@@ -157,7 +157,7 @@ def _in_world(T: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return terms.sum(axis=3) + shift, 6.0 * _U * size.max(axis=(1, 2))
 
 
-def _sides(T: np.ndarray, points: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def sides_of_planes(T: np.ndarray, points: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(normals of T, heights of points (k, 3, 3) over T's plane times the normal's length, bounds of their errors).
 
     As in `narrowphase/facets/filtered_triangles.py`, all corners off by E: edges by f = 2E + 2uL, components of normals
@@ -174,7 +174,7 @@ def _sides(T: np.ndarray, points: np.ndarray, error: np.ndarray) -> tuple[np.nda
     return n, (w * n[:, None]).sum(axis=2), limit
 
 
-def _on_line(T: np.ndarray, sides: np.ndarray, limit: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def plane_crossings(T: np.ndarray, sides: np.ndarray, limit: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """((k, 2, 3) where the two sides of T from its lonely corner cross the other's plane, (k,) bound of their errors).
 
     A point a + (b − a) s / (s − t) is off by |b − a| · δ(s / (s − t)) ≤ |b − a| · 2 δ / (|s − t| − 2δ), and by E and

@@ -15,7 +15,7 @@ from solid_judge import judge, snippet, solids_of
 
 import collide
 from collide.errors import CollideError, InvalidArgument, InvalidPose, UnsupportedQuery
-from collide.solids import cells, facet_cuts
+from collide.solids import around_edges, cells, facet_cuts
 
 I = np.eye(4)
 OPERATIONS = ("union", "intersection", "difference", "symmetric_difference")
@@ -215,7 +215,7 @@ def test_bad_input():
 def test_faults_are_noticed(monkeypatch):
     """Wrong orders around edges, crossings left out, steps of one body dropped: refused, or judged wrong."""
 
-    def around_backwards(sheets, points, low, high, sheet, upward, right=cells._around):
+    def around_backwards(sheets, points, low, high, sheet, upward, right=around_edges.around_edge):
         return right(sheets, points, low, high, sheet, upward)[::-1]
 
     def noticed(family, seed) -> bool:
@@ -226,7 +226,7 @@ def test_faults_are_noticed(monkeypatch):
         return bool(verdict.wrong) or not verdict.adds_up
 
     faults = [
-        (cells, "_around", around_backwards),
+        (around_edges, "around_edge", around_backwards),
         (facet_cuts.FacetCuts, "_cross_segments", lambda self, f: None),
         (facet_cuts.FacetCuts, "_lies_within", lambda self, p, s, u, v: False),
         (cells._Rays, "_passage", lambda self, f, p, axis, u, v: 0),

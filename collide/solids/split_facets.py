@@ -1,0 +1,160 @@
+"""Facets that paths of clear crossings cut, split all at once: around every part from segment to segment, then triangles.
+
+On such a facet a path enters through its border, turns where edges of others pierce it, and leaves through the border.
+No angle has to be compared: at a point of the border the way around a part turns inwards, at a point inside it goes on
+along the path. Facets of which doubles prove less are left to the exact sweep, among them those with a ring of cuts.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.solids.crossing_pairs import CrossingPairs
+from collide.solids.placed_facets import PlacedFacets
+from collide.solids.polygon_ears import clip_ears
+from collide.surface_queries.overlay import posed_corners
+
+#: Parts with more corners are left to the sweep.
+_MAX_CORNERS = 40
+
+
+class _Chains(NamedTuple):
+    """The borders of facets, from corner to corner over the points that cut them.
+
+    facet, point : (m,) ids of points in order, facet by facet, each counter-clockwise.
+    following : (m,) the next one of the facet.   is_corner : (m,).
+    """
+
+    facet: np.ndarray
+    point: np.ndarray
+    following: np.ndarray
+    is_corner: np.ndarray
+
+
+def split_facets(
+    facets: PlacedFacets, crossings: CrossingPairs, ids: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(triangles (t, 3) of point ids with the fronts of facets, facet (t,), facets that are left (k,)).
+
+    ids : (k, 2) of the crossings' ends, from the number of vertices on.   rows : facets cut by these crossings alone.
+    """
+    n_vertices = len(facets.local)
+    n_points = int(ids.max(initial=n_vertices - 1)) + 1
+    place, error = np.zeros((n_points - n_vertices, 3)), np.zeros(n_points - n_vertices)
+    place[ids - n_vertices] = crossings.place
+    np.maximum.at(error, (ids - n_vertices).ravel(), np.repeat(crossings.error, 2))
+    wanted = np.zeros(len(facets.corners), dtype=bool)
+    wanted[rows] = True
+    # Every crossing lies on two facets and runs along it both ways.
+    facet = np.concatenate([crossings.pairs[:, 0], crossings.pairs[:, 1]])
+    ends, pierced = np.tile(ids, (2, 1)), np.tile(crossings.facet, (2, 1))
+    mine = wanted[facet]
+    facet, ends, pierced = facet[mine], ends[mine], pierced[mine]
+    edge = np.tile(crossings.edge, (2, 1))[mine]
+    facet = np.concatenate([facet, facet])
+    start, end = np.concatenate([ends, ends[:, ::-1]]).T
+    at_border = np.concatenate([pierced, pierced[:, ::-1]]).T != facet
+    edge = np.concatenate([edge[:, 0], edge[:, 1]])
+    chains, bad = _borders(facets, rows, facet, start, edge, at_border[0], place, error)
+    following, unpaired = _ways_around(chains, facet, start, end, at_border, n_points)
+    bad = np.union1d(bad, unpaired)
+    all_facets, all_points = np.concatenate([chains.facet, facet]), np.concatenate([chains.point, start])
+    heads, lengths = _rounds(following, len(chains.facet))
+    is_bad = np.zeros(len(facets.corners), dtype=bool)
+    is_bad[bad] = True
+    is_bad[all_facets[heads[lengths <= 0]]] = True
+    good = (lengths > 0) & ~is_bad[all_facets[heads]]
+    polygons = _corners_of(following, heads[good], lengths[good])
+    triangles, polygon, failed = clip_ears(
+        [all_points[p] for p in polygons], [all_facets[p[:, 0]] for p in polygons], facets, place, error
+    )
+    is_bad[failed] = True
+    remaining = ~is_bad[polygon]
+    return triangles[remaining], polygon[remaining], rows[is_bad[rows]]
+
+
+def _borders(facets: PlacedFacets, rows, facet, start, edge, at_border, place, error) -> tuple[_Chains, np.ndarray]:
+    """(the borders of facets, those on which the order of points is not proven)."""
+    f, p = facet[at_border], start[at_border]
+    slot = np.argmax(facets.edge[f] == edge[at_border][:, None], axis=1)
+    corners, corner_error = posed_corners(facets.local[facets.corners[f]], facets.poses[facets.body[f]])
+    k = np.arange(len(f))
+    a, b = corners[k, slot], corners[k, (slot + 1) % 3]
+    rows_of = p - len(facets.local)
+    along = ((place[rows_of] - a) * (b - a)).sum(axis=1)
+    slack = 16.0 * (error[rows_of] + corner_error) * np.abs(b - a).sum(axis=1)
+    at = np.concatenate([np.repeat(rows, 3), f])
+    slots = np.concatenate([np.tile(np.arange(3), len(rows)), slot])
+    height = np.concatenate([np.full(3 * len(rows), -np.inf), along])
+    points = np.concatenate([facets.corners[rows].ravel(), p])
+    order = np.lexsort((height, slots, at))
+    at, slots, height, points = at[order], slots[order], height[order], points[order]
+    slack = np.concatenate([np.zeros(3 * len(rows)), slack])[order]
+    same = (at[1:] == at[:-1]) & (slots[1:] == slots[:-1]) & np.isfinite(height[:-1])
+    with np.errstate(invalid="ignore"):
+        tight = same & ~(height[1:] - height[:-1] > slack[1:] + slack[:-1])
+    following = np.arange(1, len(at) + 1)
+    last = np.flatnonzero(np.append(at[1:] != at[:-1], True)) if len(at) else np.zeros(0, dtype=np.int64)
+    following[last] = np.append(0, last[:-1] + 1) if len(last) else last
+    return _Chains(at, points, following, ~np.isfinite(height)), np.unique(at[1:][tight])
+
+
+def _ways_around(chains: _Chains, facet, start, end, at_border, n_points) -> tuple[np.ndarray, np.ndarray]:
+    """(after each step of the borders, then of the segments, the next around the same part; facets where none fits)."""
+    m, n = len(chains.facet), len(facet)
+    keys = facet * n_points + start
+    order = np.argsort(keys, kind="stable")
+    ordered = keys[order]
+
+    def leaving(f: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(a segment of each facet that starts at a point, how many do)."""
+        wanted = f * n_points + p
+        first = np.searchsorted(ordered, wanted)
+        count = np.searchsorted(ordered, wanted, side="right") - first
+        return first, count
+
+    following = np.empty(m + n, dtype=np.int64)
+    then = chains.following
+    first, count = leaving(chains.facet, chains.point[then])
+    on_border = ~chains.is_corner[then]
+    following[:m] = np.where(on_border, m + order[np.minimum(first, n - 1)] if n else 0, then)
+    bad = [chains.facet[on_border & (count != 1)]]
+    # Segments that end on the border go on along it; those that end inside go on along the path, never back.
+    border_keys = chains.facet * n_points + chains.point
+    border_order = np.argsort(border_keys, kind="stable")
+    at = np.searchsorted(border_keys[border_order], facet * n_points + end)
+    onward = border_order[np.minimum(at, m - 1)] if m else at
+    first, count = leaving(facet, end)
+    one, two = order[np.minimum(first, n - 1)], order[np.minimum(first + 1, n - 1)]
+    back = (np.arange(n) + n // 2) % n if n else one
+    following[m:] = np.where(at_border[1], onward, m + np.where(one == back, two, one))
+    bad.append(facet[~at_border[1] & (count != 2)])
+    return following, np.unique(np.concatenate(bad))
+
+
+def _rounds(following: np.ndarray, n_border: int) -> tuple[np.ndarray, np.ndarray]:
+    """(the first step of each round, its length); a length of 0 where it touches no border, −1 where it is too long."""
+    least, jump = np.arange(len(following)), following.copy()
+    for _ in range(int(_MAX_CORNERS).bit_length()):
+        least = np.minimum(least, least[jump])
+        jump = jump[jump]
+    closed = least == least[following]
+    heads, lengths = np.unique(least, return_counts=True)
+    broken = np.unique(least[~closed])
+    lengths[np.isin(heads, broken)] = -1
+    lengths[lengths > _MAX_CORNERS] = -1
+    lengths[heads >= n_border] = 0
+    return heads, lengths
+
+
+def _corners_of(following: np.ndarray, heads: np.ndarray, lengths: np.ndarray) -> list[np.ndarray]:
+    """The steps of rounds, (k, m) for every length m there is."""
+    polygons = []
+    for m in np.unique(lengths).tolist():
+        steps = [heads[lengths == m]]
+        for _ in range(m - 1):
+            steps.append(following[steps[-1]])
+        polygons.append(np.stack(steps, axis=1))
+    return polygons
