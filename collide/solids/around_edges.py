@@ -14,7 +14,6 @@ import numpy as np
 from collide.errors import CollideError
 from collide.numerics.exact_points import Point, cross, inner
 from collide.solids.cut_points import CutPoints
-from collide.solids.placed_facets import PlacedFacets
 
 
 class Sheets(NamedTuple):

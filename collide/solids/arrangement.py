@@ -67,8 +67,8 @@ def arrange(operands: list[Operand]) -> Arrangement:
     triangles, of_triangle, rest = split_facets(facets, crossings, ids, by_paths)
     exactly = np.union1d(exactly, rest)
     drawn = np.isin(crossings.pairs, exactly).any(axis=1)
-    clear = pair_keys(facets, crossings.pairs)
-    unclear = pairs[~np.isin(pair_keys(facets, pairs), clear)]
+    keys = pair_keys(facets, crossings.pairs)
+    unclear = pairs[~np.isin(pair_keys(facets, pairs), keys)]
     cuts = FacetCuts(facets, points, unclear, crossings.pairs[drawn], ids[drawn], exactly)
     pieces, of = [], []
     for f in sorted(cuts.corners_of):
@@ -123,7 +123,9 @@ def _clear_crossings(facets: PlacedFacets, points: CutPoints, pairs: np.ndarray)
     return crossings, start + ends.reshape(-1, 2), np.flatnonzero(exactly)
 
 
-def _all_sheets(facets: PlacedFacets, whole: np.ndarray, triangles: np.ndarray, of: np.ndarray, merged: Sheets) -> Sheets:
+def _all_sheets(
+    facets: PlacedFacets, whole: np.ndarray, triangles: np.ndarray, of: np.ndarray, merged: Sheets
+) -> Sheets:
     """Whole facets first, then those split by paths, then merged ones."""
     rows = np.concatenate([whole, of])
     steps = np.zeros((len(rows), len(facets.operands)), dtype=np.int8)

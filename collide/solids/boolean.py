@@ -29,7 +29,7 @@ class BooleanResult(NamedTuple):
     mesh : the solid, vertices in the world W [m]; None where it has no points inside.
     body : (k,) int64, of every facet of the mesh whose facet it is part of: 0 of A, 1 of B (of both: of A).
     facet : (k,) int64, the number of that facet. Facets of convex shapes are numbered as in `facet_pairs`.
-    moved : the farthest that a vertex was moved by rounding it to doubles [m].
+    moved : no vertex was moved farther than this by rounding it to doubles [m].
     n_collapsed, n_thin : triangles, and shells, so thin that rounding left nothing of them; they are not in the mesh.
     n_meeting, n_cut : pairs of facets that meet, and facets that were cut.
     """

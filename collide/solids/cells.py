@@ -58,9 +58,13 @@ def cells_of(sheets: Sheets, points: CutPoints, is_cut: np.ndarray, crossings: n
         uncut_parts(edges, ~is_cut[start:end]) + start
         for edges, start, end in zip(facets.edges, facets.first_facet.tolist(), facets.first_facet[1:].tolist())
     ]
-    tops, patch = np.unique(np.concatenate(parts)[~is_cut], return_inverse=True)
-    n = len(tops) + len(sheets.triangles) - len(patch)
-    patch = np.concatenate([patch, np.arange(len(tops), n)])
+    top = np.concatenate(parts)[~is_cut]
+    tops = np.zeros(len(is_cut), dtype=bool)
+    tops[top] = True
+    number = np.cumsum(tops) - 1
+    n_tops = int(tops.sum())
+    n = n_tops + len(sheets.triangles) - len(top)
+    patch = np.concatenate([number[top], np.arange(n_tops, n)])
     first, second = joined_sides(sheets, points, is_cut, crossings, ids)
     root = components(2 * n, 2 * patch[first // 2] + first % 2, 2 * patch[second // 2] + second % 2)
     cells, of_side = np.unique(root, return_inverse=True)

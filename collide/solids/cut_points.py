@@ -1,7 +1,7 @@
 """Points of an arrangement: exact coordinates, one id for each place, and doubles near them to begin a decision with.
 
-A point is (x, y, z, w), integers without a common factor, w > 0: x/w, y/w, z/w in units of the grid of
-`placed_facets.py`. Vertices keep their ids; where vertices of several bodies coincide, all have the id of the first.
+A point is (x, y, z, w), integers, w > 0, without a common factor where points are compared by them: x/w, y/w, z/w in
+units of the grid of `placed_facets.py`. Vertices keep their ids; where vertices of several bodies coincide, all have the id of the first.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ class CutPoints:
 
     def place_of(self, point: int) -> int:
         """The id of the place of such a point: where others work it out again, it is found by its coordinates."""
-        return self._ids.setdefault(self.exact(point), point)
+        self._exact[point] = reduced(*self.exact(point))
+        return self._ids.setdefault(self._exact[point], point)
 
     def _pierce(self, p: int, q: int, row: int) -> Rational:
         """Where the edge from vertex p to vertex q goes through a facet's plane."""
@@ -64,7 +65,7 @@ class CutPoints:
         n, start = self.facets.normal(row), self.facets.exact(int(self.facets.corners[row, 0]))
         above, below = abs(inner(n, minus(a, start))), abs(inner(n, minus(b, start)))
         x, y, z = (u * below + v * above for u, v in zip(a, b))
-        return reduced(x, y, z, above + below)
+        return x, y, z, above + below
 
     def add(self, point: Rational) -> int:
         """The id of a point, which has no common factor."""
@@ -80,6 +81,16 @@ class CutPoints:
             piercing = self._piercings.get(point)
             self._exact[point] = self._pierce(*piercing) if piercing else (*self.facets.exact(point), 1)
         return self._exact[point]
+
+    def load(self, some: Iterable[int]) -> None:
+        """The vertices behind points, worked out all at once: quicker than one by one."""
+        vertices: set[int] = set()
+        for point in some:
+            p, q, row = self._piercings.get(point, (point, point, -1))
+            vertices.update((p, q))
+            if row >= 0:
+                vertices.update(self.facets.corners[row].tolist())
+        self.facets.load(v for v in vertices if v < self.n_vertices)
 
     def near(self, point: int) -> tuple[float, float, float]:
         """Coordinates less the origin, in units of the grid, rounded to the nearest doubles (scaled, if need be)."""
@@ -130,19 +141,15 @@ class CutPoints:
 
         return sorted(some, key=cmp_to_key(compare))
 
-    def in_world(self, point: int) -> tuple[tuple[float, float, float], float]:
-        """(coordinates in W rounded to the nearest doubles [m], how far that is off)."""
+    def in_world(self, point: int) -> tuple[float, float, float]:
+        """Coordinates in W, each rounded once to the nearest double [m]."""
         x, y, z, w = self.exact(point)
-        grid, origin = self.facets.grid, self.facets.origin
-        n, d = (1 << grid, 1) if grid >= 0 else (1, 1 << -grid)
-        coordinates, off = [], []
-        for value, start in zip((x, y, z), origin):
-            numerator, denominator = (value + start * w) * n, w * d
-            nearest = _quotient(numerator, denominator)
-            coordinates.append(nearest)
-            p, q = nearest.as_integer_ratio()
-            off.append(_quotient(p * denominator - numerator * q, q * denominator))
-        return (coordinates[0], coordinates[1], coordinates[2]), math.hypot(*off)
+        (a, b, c), grid = self.facets.origin, self.facets.grid
+        up, down = max(grid, 0), max(-grid, 0)
+        unit = w << down
+        return (
+            _quotient((x + a * w) << up, unit), _quotient((y + b * w) << up, unit), _quotient((z + c * w) << up, unit)
+        )  # fmt: skip
 
 
 def _quotient(numerator: int, denominator: int) -> float:

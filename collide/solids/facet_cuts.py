@@ -43,7 +43,8 @@ class FacetCuts:
         self._changed: set[int] = set()
         self._meets: dict[int, set[int]] = defaultdict(set)
         some = np.unique(crossings) if len(rows) else rows
-        facets.load(np.unique(np.concatenate([facets.corners[np.union1d(rows, some)].ravel(), facets.thin.ravel()])).tolist())
+        of_rows = facets.corners[np.union1d(rows, some)]
+        facets.load(np.unique(np.concatenate([of_rows.ravel(), facets.thin.ravel()])).tolist())
         for f in rows.tolist():
             self._start(f)
         for f, g, p, q in np.column_stack([crossings, ids]).tolist():

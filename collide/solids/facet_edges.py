@@ -19,7 +19,8 @@ class FacetEdges(NamedTuple):
     rows : (n,) which facets of the mesh these are.   place : their numbers here, −1 for facets without area.
     corners : (n, 3) int64 welded vertex ids.   edge : (n, 3) the edge from corner k to corner k + 1.
     sides : (e, 2) the facets at an edge where there are two, else −1.
-    lower_neighbour : (n,) of a facet's neighbours the least, itself where it is less than all.
+    links : (2, m) int32 the same of edges with two.
+    lower_neighbour : (n,) int32 of a facet's neighbours the least, itself where it is less than all.
     lowest_bit : exponent of the lowest bit set in any coordinate.
     """
 
@@ -28,6 +29,7 @@ class FacetEdges(NamedTuple):
     corners: np.ndarray
     edge: np.ndarray
     sides: np.ndarray
+    links: np.ndarray
     lower_neighbour: np.ndarray
     lowest_bit: int
 
@@ -50,13 +52,14 @@ def facet_edges(mesh: Mesh) -> FacetEdges:
     two = first[np.diff(np.append(first, len(keys))) == 2]
     sides = np.full((len(first), 2), -1, dtype=np.int64)
     sides[edge[order[two]]] = np.stack([order[two], order[two + 1]], axis=1) // 3
-    edge = edge.reshape(-1, 3)
-    own = np.arange(len(rows))
-    beyond = sides[edge].sum(axis=2) - own[:, None]
-    beyond[sides[edge][:, :, 0] < 0] = len(rows)
-    lower = np.minimum(beyond.min(axis=1, initial=len(rows)), own)
+    numbers = np.arange(len(rows))
+    of_facet = edge.reshape(-1, 3)
+    beyond = sides[of_facet].sum(axis=2) - numbers[:, None]
+    beyond[sides[of_facet][:, :, 0] < 0] = len(rows)
+    lower = np.minimum(beyond.min(axis=1, initial=len(rows)), numbers)
     lowest = int(lowest_exponents(mesh.vertices.ravel()))
-    return FacetEdges(rows, place, corners, edge, sides, lower, lowest)
+    links = np.ascontiguousarray(sides[sides[:, 0] >= 0].T.astype(np.int32))
+    return FacetEdges(rows, place, corners, of_facet, sides, links, lower.astype(np.int32), lowest)
 
 
 def uncut_parts(edges: FacetEdges, whole: np.ndarray) -> np.ndarray:
@@ -64,19 +67,25 @@ def uncut_parts(edges: FacetEdges, whole: np.ndarray) -> np.ndarray:
 
     whole : (n,) bool. O(n log n) in a few operations on arrays.
     """
-    root = np.where(whole & whole[edges.lower_neighbour], edges.lower_neighbour, np.arange(len(whole)))
+    numbers = np.arange(len(whole), dtype=np.int32)
+    root = np.where(whole & whole[edges.lower_neighbour], edges.lower_neighbour, numbers)
     while True:
         higher = root[root]
         if (higher == root).all():
             break
         root = higher
-    a, b = edges.sides.T
-    a, b = a[a >= 0], b[a >= 0]
-    across = (root[a] != root[b]) & whole[a] & whole[b]
-    tops, small = np.unique(np.concatenate([root[a[across]], root[b[across]]]), return_inverse=True)
-    joined = np.arange(len(whole))
-    half = len(small) // 2
-    joined[tops] = tops[components(len(tops), small[:half], small[half:])]
+    a, b = edges.links
+    of_a, of_b = root[a], root[b]
+    across = np.flatnonzero(of_a != of_b)
+    across = across[whole[a[across]] & whole[b[across]]]
+    of_a, of_b = of_a[across], of_b[across]
+    is_top = np.zeros(len(whole), dtype=bool)
+    is_top[of_a] = is_top[of_b] = True
+    tops = np.flatnonzero(is_top)
+    number = np.empty(len(whole), dtype=np.int32)
+    number[tops] = np.arange(len(tops))
+    joined = np.arange(len(whole), dtype=np.int32)
+    joined[tops] = tops[components(len(tops), number[of_a], number[of_b])]
     return np.where(whole, joined[root], -1)
 
 

@@ -47,7 +47,7 @@ def overlap_volume(A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True) 
     Returns
     -------
     OverlapVolume. Whether the volume is 0 is exact, and so is where surfaces lie on one another: a box that stands on
-    another has volume 0 and a patch. Brackets are some 1e-13 of the volume wide, at most 2⁻³⁶: where doubles leave more
+    another has volume 0 and a patch. Brackets are some 1e-12 of the volume wide, at most 2⁻³²: where doubles leave more
     open, as for the thinnest overlaps, volumes are added up in integers. Areas and centroids are rounded.
 
     Raises

@@ -45,8 +45,8 @@ def _seen(ids: np.ndarray, rows: np.ndarray, facets: PlacedFacets, place, error)
     points[~is_vertex] = place[ids[~is_vertex] - n_vertices]
     bound = np.where(is_vertex, corner_error[:, None], 0.0)
     bound[~is_vertex] = error[ids[~is_vertex] - n_vertices]
-    own = np.broadcast_to(rows[:, None], ids.shape)[is_vertex]
-    slot = np.argmax(facets.corners[own] == of_vertex[:, None], axis=1)
+    of_polygon = np.broadcast_to(rows[:, None], ids.shape)[is_vertex]
+    slot = np.argmax(facets.corners[of_polygon] == of_vertex[:, None], axis=1)
     polygon = np.broadcast_to(np.arange(len(rows))[:, None], ids.shape)[is_vertex]
     points[is_vertex] = corners[polygon, slot]
     n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -94,9 +94,9 @@ class _Polygons:
             for k in range(3):
                 a, b = corners[k][:, :, None], corners[(k + 1) % 3][:, :, None]
                 outside |= _area(a, b, p[:, None]) < -limit[:, None, None]
-            own = np.arange(m)
+            numbers = np.arange(m)
             for step in (-1, 0, 1):
-                outside[:, own, (own + step) % m] = True
+                outside[:, numbers, (numbers + step) % m] = True
             is_ear &= outside.all(axis=2)
         longest = np.square(after - before).sum(axis=2) + np.square(p - before).sum(axis=2)
         roundness = np.where(is_ear, area / (longest + np.square(after - p).sum(axis=2)), -1.0)

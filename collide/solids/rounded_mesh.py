@@ -21,7 +21,7 @@ class RoundedMesh(NamedTuple):
     """What is there after rounding.
 
     mesh : a solid, None where nothing remains.   rows : (k,) which of the triangles its facets are.
-    moved : how far the farthest vertex was moved by rounding [m].
+    moved : no vertex was moved farther by rounding [m].
     n_collapsed : triangles, and n_thin shells, that rounding left without an inside: they are not in the mesh.
     """
 
@@ -34,8 +34,7 @@ class RoundedMesh(NamedTuple):
 
 def rounded_mesh(points: CutPoints, triangles: np.ndarray) -> RoundedMesh:
     """The solid of triangles (k, 3) that close, vertices rounded to the nearest doubles of W."""
-    ids, faces = np.unique(triangles, return_inverse=True)
-    faces = faces.reshape(-1, 3)
+    ids, faces = used_points(triangles, len(points))
     vertices, moved = rounded_points(points, ids)
     same = weld(vertices) if len(vertices) else np.zeros(0, dtype=np.int32)
     corners = same[faces]
@@ -44,8 +43,8 @@ def rounded_mesh(points: CutPoints, triangles: np.ndarray) -> RoundedMesh:
     )
     rows, n_thin = proper, 0
     while len(rows):
-        used, compact = np.unique(corners[rows], return_inverse=True)
-        mesh = Mesh(vertices[used], compact.reshape(-1, 3))
+        used, compact = used_points(corners[rows], len(vertices))
+        mesh = Mesh(vertices[used], compact)
         if mesh.solid:
             return RoundedMesh(mesh, rows, moved, len(faces) - len(proper), n_thin)
         survey = mesh.survey
@@ -55,8 +54,18 @@ def rounded_mesh(points: CutPoints, triangles: np.ndarray) -> RoundedMesh:
     return RoundedMesh(None, rows, moved, len(faces) - len(proper), n_thin)
 
 
+def used_points(triangles: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """(the ids below n that triangles (k, 3) use, the triangles in their numbers); O(n + k)."""
+    used = np.zeros(n, dtype=bool)
+    used[triangles] = True
+    ids = np.flatnonzero(used)
+    place = np.empty(n, dtype=np.int32)
+    place[ids] = np.arange(len(ids))
+    return ids, place[triangles]
+
+
 def rounded_points(points: CutPoints, ids: np.ndarray) -> tuple[np.ndarray, float]:
-    """((k, 3) points in W, how far the farthest was moved)."""
+    """((k, 3) points in W, farther than which none was moved)."""
     out = np.empty((len(ids), 3))
     facets = points.facets
     is_vertex = ids < points.n_vertices
@@ -69,11 +78,11 @@ def rounded_points(points: CutPoints, ids: np.ndarray) -> tuple[np.ndarray, floa
     out[is_vertex] = coordinates
     moved = float(off[proven].max(initial=0.0))
     open_rows = np.concatenate([np.flatnonzero(is_vertex)[~proven], np.flatnonzero(~is_vertex)])
-    facets.load(ids[open_rows[ids[open_rows] < points.n_vertices]].tolist())
+    points.load(ids[open_rows].tolist())
     for row, point in zip(open_rows.tolist(), ids[open_rows].tolist()):
-        out[row], distance = points.in_world(point)
-        moved = max(moved, distance)
-    return out + 0.0, moved
+        out[row] = points.in_world(point)
+    by_rounding = np.square(0.5 * np.spacing(np.abs(out[open_rows]))).sum(axis=1)
+    return out + 0.0, max(moved, float(np.sqrt(by_rounding.max(initial=0.0))))
 
 
 def placed_vertices(X: np.ndarray, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

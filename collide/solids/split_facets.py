@@ -1,4 +1,4 @@
-"""Facets that paths of clear crossings cut, split all at once: around every part from segment to segment, then triangles.
+"""Facets that paths of clear crossings cut, split all at once: around every part, then into triangles.
 
 On such a facet a path enters through its border, turns where edges of others pierce it, and leaves through the border.
 No angle has to be compared: at a point of the border the way around a part turns inwards, at a point inside it goes on
@@ -127,9 +127,9 @@ def _ways_around(chains: _Chains, facet, start, end, at_border, n_points) -> tup
     at = np.searchsorted(border_keys[border_order], facet * n_points + end)
     onward = border_order[np.minimum(at, m - 1)] if m else at
     first, count = leaving(facet, end)
-    one, two = order[np.minimum(first, n - 1)], order[np.minimum(first + 1, n - 1)]
-    back = (np.arange(n) + n // 2) % n if n else one
-    following[m:] = np.where(at_border[1], onward, m + np.where(one == back, two, one))
+    onto, or_onto = order[np.minimum(first, n - 1)], order[np.minimum(first + 1, n - 1)]
+    back = (np.arange(n) + n // 2) % n if n else onto
+    following[m:] = np.where(at_border[1], onward, m + np.where(onto == back, or_onto, onto))
     bad.append(facet[~at_border[1] & (count != 2)])
     return following, np.unique(np.concatenate(bad))
 

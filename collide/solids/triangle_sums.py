@@ -10,10 +10,10 @@ import numpy as np
 
 from collide.numerics.exact_points import Point, cross, inner, rounded
 from collide.solids.cut_points import CutPoints
-from collide.solids.rounded_mesh import rounded_points
+from collide.solids.rounded_mesh import rounded_points, used_points
 
 #: Brackets of volumes wider than this share of them are worked out again in integers.
-_WIDEST = 2.0**-36
+_WIDEST = 2.0**-33
 _U = 2.0**-53
 
 
@@ -30,19 +30,21 @@ def enclosed(points: CutPoints, triangles: np.ndarray) -> Volume:
     """What closed triangles (k, 3) of points of an arrangement enclose."""
     if not len(triangles):
         return Volume(0.0, 0.0, 0.0, np.zeros(3))
-    ids, faces = np.unique(triangles, return_inverse=True)
+    ids, faces = used_points(triangles, len(points))
     corners, _ = rounded_points(points, ids)
     start = corners[0]
     corners = corners - start
     # Each difference is off by the rounding of its ends, by less than those ends' last place, and its own.
     error = 4.0 * _U * (np.abs(start).max() + np.abs(corners).max())
-    a, b, c = (corners[k] for k in faces.reshape(-1, 3).T)
-    six = (a * np.cross(b, c)).sum(axis=1)
-    D = np.maximum(np.maximum(np.abs(a).max(axis=1), np.abs(b).max(axis=1)), np.abs(c).max(axis=1)) + error
-    bound = float((18.0 * D * D * error + 48.0 * _U * D**3).sum()) * (1 + 1e-9)
-    bound += len(six) * _U * float(np.abs(six).sum())
+    a, b, c = (corners[k] for k in faces.T)
+    e, f = b - a, c - a
+    six = (a * np.cross(e, f)).sum(axis=1)
+    # a · (e × f) with a off by δ, e and f by 2δ: 6 δ |e| |f| + 12 |a| δ (|e| + |f|), and 24 u |a| |e| |f| by rounding.
+    far, long_e, long_f = (np.abs(x).max(axis=1) + 2.0 * error for x in (a, e, f))
+    bound = float((6.0 * error * long_e * long_f + 12.0 * far * error * (long_e + long_f)).sum())
+    bound += float((24.0 * _U * far * long_e * long_f).sum()) + len(six) * _U * float(np.abs(six).sum())
     volume = float(six.sum()) / 6.0
-    bound = bound / 6.0 + 4.0 * _U * abs(volume)
+    bound = bound * (1.0 + 1e-9) / 6.0 + 4.0 * _U * abs(volume)
     middle = start + ((a + b + c) * six[:, None]).sum(axis=0) / (4.0 * six.sum()) if six.sum() > 0.0 else start
     if bound <= _WIDEST * volume:
         return Volume(volume, volume - bound, volume + bound, middle)
@@ -92,9 +94,9 @@ def areas(points: CutPoints, triangles: np.ndarray) -> tuple[np.ndarray, np.ndar
     """((k,) areas of triangles [m²], (k, 3) their centroids in W), rounded."""
     if not len(triangles):
         return np.zeros(0), np.zeros((0, 3))
-    ids, faces = np.unique(triangles, return_inverse=True)
+    ids, faces = used_points(triangles, len(points))
     corners, _ = rounded_points(points, ids)
-    a, b, c = (corners[k] for k in faces.reshape(-1, 3).T)
+    a, b, c = (corners[k] for k in faces.T)
     n = np.cross(b - a, c - a)
     return 0.5 * np.sqrt(np.square(n).sum(axis=1)), (a + b + c) / 3.0
 

@@ -174,7 +174,9 @@ def sides_of_planes(T: np.ndarray, points: np.ndarray, error: np.ndarray) -> tup
     return n, (w * n[:, None]).sum(axis=2), limit
 
 
-def plane_crossings(T: np.ndarray, sides: np.ndarray, limit: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def plane_crossings(
+    T: np.ndarray, sides: np.ndarray, limit: np.ndarray, error: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """((k, 2, 3) where the two sides of T from its lonely corner cross the other's plane, (k,) bound of their errors).
 
     A point a + (b − a) s / (s − t) is off by |b − a| · δ(s / (s − t)) ≤ |b − a| · 2 δ / (|s − t| − 2δ), and by E and
