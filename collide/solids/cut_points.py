@@ -1,7 +1,8 @@
 """Points of an arrangement: exact coordinates, one id for each place, and doubles near them to begin a decision with.
 
 A point is (x, y, z, w), integers, w > 0, without a common factor where points are compared by them: x/w, y/w, z/w in
-units of the grid of `placed_facets.py`. Vertices keep their ids; where vertices of several bodies coincide, all have the id of the first.
+units of the grid of `placed_facets.py`. Vertices keep their ids; where those of several bodies coincide, all
+have the id of the first.
 """
 
 from __future__ import annotations
