@@ -6,6 +6,7 @@ import copy
 import math
 import time
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,9 +22,13 @@ from collide.world_minimum import nearest_pair
 from collide.world_record import QueryRecord
 from collide.world_scene import WorldScene
 
+if TYPE_CHECKING:
+    from collide.world_overlaps import WorldOverlaps
+
 #: Contacts need what meshes need, which other questions about convex scenes do not.
 contact_query = lazy_module("collide.contact.contact_query")
 world_contacts = lazy_module("collide.world_contacts")
+world_overlaps = lazy_module("collide.world_overlaps")
 
 
 class WorldPairs(WorldScene):
@@ -153,6 +158,29 @@ class WorldPairs(WorldScene):
             of_groups.append(rows)
         rows = of_groups[0] if len(of_groups) == 1 else _sorted_by_pair(np.concatenate(of_groups), CONTACT_DTYPE)
         return WorldContacts(rows, packed.bodies_named(pairs[counts > 0]))
+
+    def overlaps(self, *, threads: int = 1) -> WorldOverlaps:
+        """How much bodies overlap: volume, centroid and areas of every tested pair that hits; `stats` stays as it is.
+
+        Parameters
+        ----------
+        threads : at most so many look for pairs that hit; volumes are added up one after another.
+
+        Returns
+        -------
+        WorldOverlaps : rows of `collide.world_overlaps.OVERLAP_DTYPE` sorted by (a, b), as `collide.overlap_volume`
+            says. Pairs that hit and have no volume to tell, of curved shapes, surfaces and unions, are listed in
+            ``unanswered`` with the reason.
+
+        Raises
+        ------
+        UnsupportedQuery : for pairs that `collide.collide` does not answer.
+
+        Notes
+        -----
+        Milliseconds a pair, more with the number of facets that meet (docs/solids.md).
+        """
+        return world_overlaps.overlaps_of(self._pack(), check_threads(threads))
 
     def unanswerable(self, max_distance: float = math.inf) -> list[tuple[int, int, str]]:
         """Pairs for which `distances` raises UnsupportedQuery.

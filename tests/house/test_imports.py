@@ -214,6 +214,7 @@ ROOMS = {
         "shapes",
         "world_hits",
     },
+    "world_overlaps": {"errors", "packed_world", "solids"},
     "world_minimum": {"packed_world"},
     "world_outside": {
         "broadphase",
@@ -246,6 +247,7 @@ ROOMS = {
         "threads",
         "world_contacts",
         "world_minimum",
+        "world_overlaps",
         "world_record",
         "world_scene",
     },
