@@ -158,6 +158,9 @@ ROOMS = {
         "results",
         "batches",
     },
+    "tetrahedra": {
+        "errors", "argument_checks", "kernels", "log", "mesh", "numerics", "reports", "shapes", "threads", "transforms",
+    },
     "hierarchies": {
         "errors",
         "fork_safe_lock",
@@ -318,6 +321,7 @@ LATE = {
     "cli_sweep": {"scenes"},
     "cli_view": {"adapters"},
     "sweeps": {"pyarrow", "distributed"},
+    "tetrahedra": {"meshio"},
 }
 #: Names that say nothing about what a module is for, and names that shadow a package when run as a script.
 BAD_NAMES = {"utils", "util", "helpers", "core", "common", "misc", "fcl", "coal", "pybullet", "numba", "numpy"}
