@@ -27,7 +27,7 @@ from collide.adapters.fuzzing.fuzz_case import Case
 from collide.adapters.fuzzing.invented_scenes import invent
 from collide.adapters.peers.protocol import engine
 from collide.errors import InvalidArgument
-from collide.scenes.write_scene import write_whole
+from collide.whole_file import write_whole
 
 STATE = "fuzz.json"
 #: Changes where a state written before would be misread.
