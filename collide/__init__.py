@@ -135,10 +135,10 @@ __all__ = [
     "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair",
     "Mesh", "MissingExtra", "Overlay", "PairResult", "Proposal", "RayHits", "Robot", "RobotChecker",
     "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "SweepResults",
-    "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify", "collide",
-    "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses", "overlapping_cells", "overlay",
-    "pose", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "shape_cast",
-    "sweep", "tessellate", "time_of_impact", "verify", "walk",
+    "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify",
+    "collide", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses",
+    "overlapping_cells", "overlay", "pose", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep",
+    "self_collisions", "shape_cast", "sweep", "tessellate", "time_of_impact", "verify", "walk",
 ]
 
 

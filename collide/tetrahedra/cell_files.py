@@ -19,8 +19,8 @@ def read_cells(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
         raise SceneError("there is no such file", path=path)
     try:
         read = meshio.read(path)
-    except SystemExit:  # meshio's end for a name it does not know
-        raise SceneError("meshio cannot tell what kind of file this is by its name", path=path) from None
+    except SystemExit:  # how meshio ends where no reader of its takes the file
+        raise SceneError("meshio cannot read it: by its name it is of another kind, or of none", path=path) from None
     except Exception as error:
         raise SceneError(f"meshio cannot read it: {error}", path=path) from error
     kinds = sorted({block.type for block in read.cells})

@@ -113,7 +113,7 @@ def self_overlaps(mesh: TetMesh, *, threads: int = 1, progress: Callable | None 
 
 
 class _Rows(NamedTuple):
-    """The answer at one pair of poses: pairs, (k, 5) volumes, errors and centroids, and counters."""
+    """The answer at one pair of poses: pairs; volumes, errors and centroids as asked for; and counters."""
 
     pairs: np.ndarray
     answers: np.ndarray
@@ -130,12 +130,12 @@ def _at_pose(A, B, X_WA, X_WB, flags: int, settle: bool, workers: int, progress)
         a, b = pairs[row].tolist()
         shared = exact_overlap(A, B, X_WA, X_WB, a, b)
         holds[row] = shared.centroid is not None
-        if flags & VOLUMES and holds[row]:
-            answers[row] = _rounded_once(shared)
+        if holds[row]:
+            answers[row] = _rounded_once(shared)[: answers.shape[1]]
     order = np.argsort(pairs[:, 0] * len(B.cells) + pairs[:, 1])
     order = order[holds[order]]
     counters = [*walked.counters, int(undecided.sum()), int(unsettled.sum())]
-    return _Rows(pairs[order], answers[order] if flags & VOLUMES else answers, counters)
+    return _Rows(pairs[order], answers[order], counters)
 
 
 def exact_overlap(A: TetMesh, B: TetMesh, X_WA, X_WB, a: int, b: int) -> exact_cells.Shared:
@@ -167,6 +167,7 @@ def _joined(parts: list[_Rows], flags: int) -> CellOverlaps:
     counters = np.array([part.counters for part in parts], dtype=np.int64).reshape(-1, 4)
     columns: list[Any] = [None, None, None]
     if flags & VOLUMES:
-        answers = np.concatenate([np.zeros((0, 5)), *(part.answers for part in parts)])
+        nothing = np.zeros((0, walk_cells.answers_width(flags)))
+        answers = np.concatenate([nothing, *(part.answers for part in parts)])
         columns = [answers[:, 0].copy(), answers[:, 1].copy(), answers[:, 2:].copy() if flags & CENTROIDS else None]
     return CellOverlaps(pairs, starts, *columns, counters)

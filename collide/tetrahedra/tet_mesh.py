@@ -234,10 +234,10 @@ def _check_cells(cells, n: int) -> np.ndarray:
         raise InvalidShape(f"TetMesh: cells must be integers, got {array.dtype} (whole ones: cells.astype(int))")
     outside = ((array < 0) | (array >= n)).any(axis=1)
     if outside.any():
-        row = int(np.argmax(outside))
+        row, n_outside = int(np.argmax(outside)), int(outside.sum())
         raise InvalidShape(
             f"TetMesh: cells[{row}] is {array[row].tolist()}, but there are vertices 0 … {n - 1} "
-            f"({outside.sum()} such cell{'s' * (outside.sum() != 1)})"
+            f"({n_outside} such cell{'s' * (n_outside != 1)})"
         )
     return np.array(array, dtype=np.int32, order="C")
 

@@ -22,8 +22,9 @@ _QUERY_ERROR = 2.0**-45
 
 
 class Walked(NamedTuple):
-    """Pairs (k, 2) int64, what the kernel knows of each (k,), its answers (k, 5) in W, and counters: steps, pairs of
-    boxes.
+    """Pairs (k, 2) int64, what the kernel knows of each (k,), its answers in W, and counters: steps, pairs of boxes.
+
+    answers : (k, 5) volumes, errors and centroids; (k, 2) without centroids, (k, 0) without volumes.
     """
 
     pairs: np.ndarray
@@ -62,7 +63,7 @@ def walk(A: TetMesh, B: TetMesh, X_WA, X_WB, flags: int, workers: int, progress)
     parts = [part for first in sorted(pieces) for part in pieces[first]]
     counts = np.sum([part.counts for part in parts], axis=0)
     answers = np.concatenate([part.answers for part in parts])
-    if flags & kernel.VOLUMES:
+    if answers.size:
         _to_world(answers, corners, X_WA)
     pairs = np.concatenate([part.pairs for part in parts]).astype(np.int64)
     return Walked(pairs, np.concatenate([part.status for part in parts]), answers, [int(counts[1]), int(counts[2])])
@@ -118,7 +119,7 @@ def _walk_piece(job: np.ndarray, first: int, last: int, depth: int, flags: int) 
     stack = np.empty(WIDTH * (depth + 2), dtype=np.int32)
     work = np.zeros(kernel.WORK)
     capacity = _PAIRS_A_CELL * (last - first)
-    width = kernel.ANSWER if flags & kernel.VOLUMES else 0
+    width = answers_width(flags)
     pieces = []
     while first < last:
         pairs, status = np.empty((capacity, 2), dtype=np.int32), np.empty(capacity, dtype=np.uint8)
@@ -129,17 +130,25 @@ def _walk_piece(job: np.ndarray, first: int, last: int, depth: int, flags: int) 
             address_of(stack), len(stack), address_of(work), address_of(counts),
         )  # fmt: skip
         n = int(counts[0])
-        pieces.append(_Piece(pairs[:n].copy(), status[:n].copy(), answers[: n if width else 0].copy(), counts))
+        kept_answers = answers[:n, :width].copy() if width else np.empty((n, 0))
+        pieces.append(_Piece(pairs[:n].copy(), status[:n].copy(), kept_answers, counts))
         if stopped == first:
             capacity *= 4
         first = stopped
     return pieces
 
 
+def answers_width(flags: int) -> int:
+    """Columns of `Walked.answers`."""
+    if flags & kernel.CENTROIDS:
+        return kernel.ANSWER
+    return 2 if flags & kernel.VOLUMES else 0
+
+
 def _to_world(answers: np.ndarray, corners: PlacedCorners, X_WA) -> None:
     """Volumes and centroids from the kernel's frame and units to W's."""
     answers[:, :2] = np.ldexp(answers[:, :2], 3 * corners.exponent)
     centroids = np.ldexp(answers[:, 2:], corners.exponent)
-    if corners.local:
+    if corners.local and centroids.size:
         centroids = centroids @ X_WA[:3, :3].T + X_WA[:3, 3]
     answers[:, 2:] = centroids

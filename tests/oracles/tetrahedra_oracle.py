@@ -1,13 +1,14 @@
 """What two tetrahedra share, from the definition: corners are common points of three of the eight planes.
 
-In fractions, on the poses as they stand. Shares no code with the engine: no cutting, no determinants of corners in
-turn, no shares of volume.
+In integers and fractions, on the poses as they stand. Shares no code with the engine: nothing is cut, no shares of
+volume are multiplied, no edge is looked at.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
 from itertools import combinations, pairwise
+from math import lcm
 
 import numpy as np
 
@@ -22,36 +23,29 @@ def placed_cell(X, corners):
 def volume_of(cell):
     """The volume of a tetrahedron."""
     a, b, c = ([x - y for x, y in zip(p, cell[0])] for p in cell[1:])
-    return abs(_det(a, b, c)) / 6
+    return Fraction(abs(_det(a, b, c))) / 6
 
 
 def shared(A, B):
-    """(volume, centroid or None) of the common part of two tetrahedra."""
+    """(volume, centroid or None) of the common part of two tetrahedra, corners in fractions."""
     for k in range(3):
         if max(p[k] for p in A) <= min(p[k] for p in B) or max(p[k] for p in B) <= min(p[k] for p in A):
             return Fraction(0), None
+    unit = lcm(*(x.denominator for p in [*A, *B] for x in p))
+    A, B = ([tuple(int(x * unit) for x in p) for p in cell] for cell in (A, B))
     planes = _planes(A) + _planes(B)
-    points = set()
-    for i, j, k in combinations(range(8), 3):
-        x = _meeting(planes[i], planes[j], planes[k])
-        if x is not None and all(_dot(n, x) <= d for n, d in planes):
-            points.add(x)
+    points = {point for three in combinations(planes, 3) for point in _corner(three, planes)}
     if len(points) < 4:
         return Fraction(0), None
     middle = tuple(sum(p[k] for p in points) / len(points) for k in range(3))
-    faces = {}
-    for n, d in planes:
-        on = frozenset(p for p in points if _dot(n, p) == d)
-        if len(on) >= 3:
-            faces[on] = n
     volume, moment = Fraction(0), [Fraction(0)] * 3
-    for on, n in faces.items():
-        ring = _ring(on, n)
+    for on, n in {frozenset(p for p in points if _dot(n, p) == d): n for n, d in planes}.items():
+        ring = _ring(on, n) if len(on) > 2 else []
         for p, q in pairwise(ring[1:]):
             piece = volume_of([middle, ring[0], p, q])
             volume += piece
             moment = [m + piece * (a + b + c + d) / 4 for m, a, b, c, d in zip(moment, middle, ring[0], p, q)]
-    return (volume, tuple(m / volume for m in moment)) if volume else (volume, None)
+    return (volume / unit**3, tuple(m / volume / unit for m in moment)) if volume else (volume, None)
 
 
 def _planes(cell):
@@ -67,22 +61,21 @@ def _planes(cell):
     return planes
 
 
-def _meeting(first, second, third):
-    """The common point of three planes, None where there is not just one (Cramer's rule)."""
-    rows = [first[0], second[0], third[0]]
+def _corner(three, planes):
+    """The common point of three planes, if there is just one (Cramer's rule) and it is in all half-spaces."""
+    rows, offsets = [n for n, _ in three], [d for _, d in three]
     whole = _det(*rows)
     if whole == 0:
-        return None
-    offsets = [first[1], second[1], third[1]]
-    point = []
-    for k in range(3):
-        replaced = [[offsets[i] if j == k else row[j] for j in range(3)] for i, row in enumerate(rows)]
-        point.append(_det(*replaced) / whole)
-    return tuple(point)
+        return
+    sign = 1 if whole > 0 else -1
+    columns = list(zip(*rows))
+    point = [sign * _det(*(offsets if j == k else columns[j] for j in range(3))) for k in range(3)]
+    if all(_dot(n, point) <= d * abs(whole) for n, d in planes):
+        yield tuple(Fraction(x, abs(whole)) for x in point)
 
 
 def _ring(points, n):
-    """Points of a plane around their convex polygon (monotone chains, along the axis that n is largest in)."""
+    """Points of a plane around their convex polygon (monotone chains, without the axis that n is largest along)."""
     drop = max(range(3), key=lambda k: abs(n[k]))
     u, v = (k for k in range(3) if k != drop)
     ordered = sorted(points, key=lambda p: (p[u], p[v]))
