@@ -64,16 +64,16 @@ def measure(n: int) -> list[Row]:
     A.tree, B.tree  # noqa: B018
     trees = time.process_time() - started
     rows = []
-    for family, other, X_WB in (("one frame", B, STILL), ("turned", B, ASIDE), ("itself", A, STILL)):
+    for family, second, X_WB in (("one frame", B, STILL), ("turned", B, ASIDE), ("itself", A, STILL)):
         seconds, result = {}, None
         for name, asked in (("pairs", {}), ("volumes", {"volumes": True}), ("centroids", {"centroids": True})):
             result = None
             started = time.process_time()
-            result = collide.overlapping_cells(A, other, STILL, X_WB, **asked)
+            result = collide.overlapping_cells(A, second, STILL, X_WB, **asked)
             seconds[name] = round(time.process_time() - started, 2)
         assert result is not None and result.volumes is not None
         rows.append({
-            "family": family, "cells A": len(A.cells), "cells B": len(other.cells), "made s": round(made, 2),
+            "family": family, "cells A": len(A.cells), "cells B": len(second.cells), "made s": round(made, 2),
             "trees s": round(trees, 2), **{f"{name} s": s for name, s in seconds.items()}, "pairs": len(result.pairs),
             "pairs of boxes": int(result.counters[0, 1]), "in integers": int(result.counters[0, 2]),
             "in fractions": int(result.counters[0, 3]), "sum of volumes": float(result.volumes.sum()),
@@ -90,9 +90,9 @@ def peers(n: int, count: int) -> list[Row]:
     rng = np.random.default_rng(0)
     hair = collide.pose((2.0**-47, 2.0**-48, 2.0**-48))
     rows = []
-    for kind, other, X_WB in (("overlapping", B, STILL), ("by a hair", A, hair), ("touching", A, STILL)):
+    for kind, second, X_WB in (("overlapping", B, STILL), ("by a hair", A, hair), ("touching", A, STILL)):
         started = time.process_time()
-        ours = collide.overlapping_cells(A, other, STILL, X_WB, volumes=True, settle=kind != "by a hair")
+        ours = collide.overlapping_cells(A, second, STILL, X_WB, volumes=True, settle=kind != "by a hair")
         seconds = time.process_time() - started
         if kind == "touching":
             around = [np.flatnonzero((A.cells == v).any(axis=1)) for v in range(len(A.vertices))]
@@ -101,12 +101,12 @@ def peers(n: int, count: int) -> list[Row]:
             volumes = np.isin(pairs @ [len(A.cells), 1], ours.pairs @ [len(A.cells), 1]).astype(float)
             seconds /= ours.counters[0, 1] / len(pairs)
         else:
-            thin = np.flatnonzero(ours.pairs[:, 0] != ours.pairs[:, 1]) if other is A else np.arange(len(ours.pairs))
+            thin = np.flatnonzero(ours.pairs[:, 0] != ours.pairs[:, 1]) if second is A else np.arange(len(ours.pairs))
             some = rng.choice(thin, count, replace=False)
             pairs, volumes = ours.pairs[some], ours.volumes[some]
             seconds *= len(pairs) / len(ours.pairs)
-        exact = [exact_overlap(A, other, STILL, X_WB, a, b) for a, b in pairs.tolist()]
-        corners = A.vertices[A.cells[pairs[:, 0]]], other.vertices[other.cells[pairs[:, 1]]] + X_WB[:3, 3]
+        exact = [exact_overlap(A, second, STILL, X_WB, a, b) for a, b in pairs.tolist()]
+        corners = A.vertices[A.cells[pairs[:, 0]]], second.vertices[second.cells[pairs[:, 1]]] + X_WB[:3, 3]
         answers = {"collide": (volumes, seconds)}
         answers.update((name, engine(*corners, exact)) for name, engine in engines().items())
         for name, (volumes, seconds) in answers.items():
@@ -115,7 +115,8 @@ def peers(n: int, count: int) -> list[Row]:
             off = [abs(Fraction(float(v)) - e.volume) / e.volume for v, e in zip(volumes, exact) if e.volume and v]
             wrong = sum((v > 0) != (e.volume > 0) for v, e in zip(volumes, exact))
             rows.append({
-                "pairs": kind, "engine": name, "n": len(pairs), "us a pair": round(float(1e6 * seconds / len(pairs)), 2),
+                "pairs": kind, "engine": name, "n": len(pairs),
+                "us a pair": round(float(1e6 * seconds / len(pairs)), 2),
                 "off": f"{float(max(off, default=0)):.1e}", "wrong": int(wrong),
             })  # fmt: skip
             print(rows[-1], flush=True)

@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     from collide.sweeps.pair_proposal import LinkPair, Proposal, propose_disabled_pairs
     from collide.sweeps.sweep import sweep
     from collide.sweeps.sweep_results import SweepResults, read_sweep
-    from collide.tetrahedra.cell_overlaps import CellOverlaps, overlapping_cells
+    from collide.tetrahedra.cell_overlaps import CellOverlaps, overlapping_cells, self_overlapping_cells
     from collide.tetrahedra.tet_mesh import TetMesh
     from collide.transforms import pose
     from collide.world import World
@@ -115,7 +115,7 @@ _HOMES = {
     "collide.sweeps.pair_proposal": ("LinkPair", "Proposal", "propose_disabled_pairs"),
     "collide.sweeps.sweep": ("sweep",),
     "collide.sweeps.sweep_results": ("SweepResults", "read_sweep"),
-    "collide.tetrahedra.cell_overlaps": ("CellOverlaps", "overlapping_cells"),
+    "collide.tetrahedra.cell_overlaps": ("CellOverlaps", "overlapping_cells", "self_overlapping_cells"),
     "collide.tetrahedra.tet_mesh": ("TetMesh",),
     "collide.transforms": ("pose",),
     "collide.world": ("World",),
@@ -138,7 +138,8 @@ __all__ = [
     "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify",
     "collide", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses",
     "overlapping_cells", "overlay", "pose", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep",
-    "self_collisions", "shape_cast", "sweep", "tessellate", "time_of_impact", "verify", "walk",
+    "self_collisions", "self_overlapping_cells", "shape_cast", "sweep", "tessellate", "time_of_impact", "verify",
+    "walk",
 ]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -106,8 +106,36 @@ def overlapping_cells(
     return _joined(parts, flags)
 
 
-def self_overlaps(mesh: TetMesh, *, threads: int = 1, progress: Callable | None = None) -> np.ndarray:
-    """(k, 2) int64 pairs of cells of one mesh whose interiors meet."""
+def self_overlapping_cells(mesh: TetMesh, *, threads: int = 1, progress: Callable | None = None) -> np.ndarray:
+    """Pairs of cells of one tetrahedral mesh whose interiors meet: none in a mesh that fills a body.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The mesh.
+    threads : int
+        At most so many.
+    progress : callable, optional
+        As `overlapping_cells` has it.
+
+    Returns
+    -------
+    (k, 2) int64
+        Cell numbers, the smaller first, sorted; decided exactly.
+
+    Raises
+    ------
+    InvalidArgument
+        For anything but a TetMesh.
+
+    Notes
+    -----
+    O(n log n + k) for local meshes, about 15 µs a cell.
+    """
+    if not isinstance(mesh, TetMesh):
+        raise InvalidArgument(
+            f"self_overlapping_cells takes a TetMesh, got {type(mesh).__name__}; surfaces have self_collisions"
+        )
     eye = np.eye(4)
     return _at_pose(mesh, mesh, eye, eye, WITH_ITSELF, True, check_threads(threads), progress).pairs
 
@@ -165,9 +193,8 @@ def _joined(parts: list[_Rows], flags: int) -> CellOverlaps:
     starts = np.concatenate([[0], np.cumsum([len(part.pairs) for part in parts])]).astype(np.int64)
     pairs = np.concatenate([np.zeros((0, 2), np.int64), *(part.pairs for part in parts)])
     counters = np.array([part.counters for part in parts], dtype=np.int64).reshape(-1, 4)
-    columns: list[Any] = [None, None, None]
-    if flags & VOLUMES:
-        nothing = np.zeros((0, walk_cells.answers_width(flags)))
-        answers = np.concatenate([nothing, *(part.answers for part in parts)])
-        columns = [answers[:, 0].copy(), answers[:, 1].copy(), answers[:, 2:].copy() if flags & CENTROIDS else None]
-    return CellOverlaps(pairs, starts, *columns, counters)
+    nothing = np.zeros((0, walk_cells.answers_width(flags)))
+    answers = np.concatenate([nothing, *(part.answers for part in parts)])
+    volumes = answers[:, 0].copy() if flags & VOLUMES else None
+    errors = answers[:, 1].copy() if flags & VOLUMES else None
+    return CellOverlaps(pairs, starts, volumes, errors, answers[:, 2:].copy() if flags & CENTROIDS else None, counters)

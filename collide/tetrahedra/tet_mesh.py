@@ -22,8 +22,6 @@ from collide.tetrahedra.cell_files import read_cells
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from collide.reports.progress import Progress
-
 #: Corners of the four faces, counter-clockwise from outside; face k is opposite to corner k.
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
@@ -48,9 +46,8 @@ class TetMesh:
     Notes
     -----
     ``vertices`` (n, 3) float64, ``cells`` (m, 4) int32 and ``turned`` (k,) int64 are read-only. Ids in results are rows
-    of ``cells``. Whether cells overlap each other is told on request (`overlapping_pairs`). The mesh is no shape:
-    `boundary` is a `Mesh` for every other query. Immutable, picklable, compared by value. O(m log m), about 0.5 µs a
-    cell.
+    of ``cells``. Whether cells overlap each other `collide.self_overlapping_cells` says. The mesh is no shape:
+    `boundary` is a `Mesh` for every other query. Immutable, picklable, compared by value. About 0.5 µs a cell.
     """
 
     __slots__ = ("__weakref__", "_boundary", "_tree", "cells", "turned", "vertices")
@@ -184,7 +181,7 @@ class TetMesh:
             first = order[np.flatnonzero(is_new)[np.argmax(counts > 2)]]
             raise InvalidShape(
                 f"TetMesh: the face of vertices {keys[first].tolist()} belongs to {counts.max()} cells, "
-                f"cells[{first // 4}] among them: two lie on one side of it; mesh.overlapping_pairs() has their numbers"
+                f"cells[{first // 4}] among them: two of them overlap: collide.self_overlapping_cells(mesh)"
             )
         return faces[np.sort(order[is_new][counts == 1])]
 
@@ -200,25 +197,6 @@ class TetMesh:
                 facets = np.stack([first, first + 1, first + 1], axis=1)
                 object.__setattr__(self, "_tree", build_mesh_tree(ends, facets))
         return self._tree
-
-    def overlapping_pairs(self, *, threads: int = 1, progress: Progress | None = None) -> np.ndarray:
-        """Pairs of cells of this mesh whose interiors meet: none in a mesh that fills a body.
-
-        Parameters
-        ----------
-        threads : int
-            At most so many.
-        progress : callable, optional
-            Called with a label, gives a context manager; for long work.
-
-        Returns
-        -------
-        (k, 2) int64
-            Cell numbers, the smaller first, sorted; decided exactly.
-        """
-        from collide.tetrahedra.cell_overlaps import self_overlaps
-
-        return self_overlaps(self, threads=threads, progress=progress)
 
 
 def _check_cells(cells, n: int) -> np.ndarray:

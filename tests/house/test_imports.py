@@ -160,7 +160,7 @@ ROOMS = {
         "batches",
     },
     "tetrahedra": {
-        "errors", "argument_checks", "kernels", "log", "mesh", "numerics", "reports", "shapes", "threads", "transforms",
+        "errors", "argument_checks", "kernels", "log", "mesh", "numerics", "shapes", "threads", "transforms",
     },
     "hierarchies": {
         "errors",

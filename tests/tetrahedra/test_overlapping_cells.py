@@ -140,11 +140,11 @@ def test_volumes_left_as_they_are_have_a_bound():
 
 def test_overlaps_within_one_mesh():
     rng = np.random.default_rng(7)
-    assert len(shaken(rng, 2).overlapping_pairs()) == 0
+    assert len(collide.self_overlapping_cells(shaken(rng, 2))) == 0
     mesh = lattice_cells(rng, 12)
     cells = [placed_cell(EYE, mesh.vertices[cell]) for cell in mesh.cells]
     want = [[i, j] for i in range(12) for j in range(i + 1, 12) if shared(cells[i], cells[j])[0]]
-    assert mesh.overlapping_pairs().tolist() == want and len(want) > 10
+    assert collide.self_overlapping_cells(mesh).tolist() == want and len(want) > 10
 
 
 def test_large_cells_and_few_pairs_at_a_time(monkeypatch):
@@ -188,6 +188,8 @@ def test_bad_arguments_are_named():
         collide.overlapping_cells(A, A, np.diag([1.0, 1, 0, 1]), EYE, check_poses=False)
     with pytest.raises(InvalidArgument, match="lengths do not match"):
         collide.overlapping_cells(A, A, np.stack([EYE] * 2), np.stack([EYE] * 3))
+    with pytest.raises(InvalidArgument, match="takes a TetMesh, got Mesh; surfaces have self_collisions"):
+        collide.self_overlapping_cells(box)
     with pytest.raises(InvalidArgument, match="threads"):
         collide.overlapping_cells(A, A, EYE, EYE, threads=0)
 

@@ -84,7 +84,7 @@ def test_the_boundary_is_a_solid():
     three = quiet([*CORNERS[:4], [0.1, 0.2, 2], [0, 0, -1]], [[0, 1, 2, k] for k in (3, 4, 5)])
     with pytest.raises(InvalidShape, match=r"face of vertices \[0, 1, 2\] belongs to 3 cells, cells\[0\] among them"):
         three.boundary  # noqa: B018
-    assert three.overlapping_pairs().tolist() == [[0, 1]]
+    assert collide.self_overlapping_cells(three).tolist() == [[0, 1]]
 
 
 def test_value_and_copies():
