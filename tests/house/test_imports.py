@@ -162,6 +162,10 @@ ROOMS = {
     "tetrahedra": {
         "errors", "argument_checks", "kernels", "log", "mesh", "numerics", "shapes", "threads", "transforms",
     },
+    "solids": {
+        "errors", "argument_checks", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",
+        "surface_queries",
+    },
     "hierarchies": {
         "errors",
         "fork_safe_lock",
