@@ -49,6 +49,37 @@ def slivers(rng, m: int) -> TetMesh:
     return soup(cells)
 
 
+def edges_near_faces(rng, m: int) -> tuple[np.ndarray, np.ndarray]:
+    """Cells (m, 4, 3) and (m, 4, 3), an edge of each of the first within rounding of a face of the second's."""
+    B = rng.normal(size=(m, 4, 3))
+    A = np.empty_like(B)
+    for k, (a, b, c, d) in enumerate(B):
+        n = np.cross(b - a, c - a)
+        n *= -np.sign(n @ (d - a)) / np.linalg.norm(n)
+        p, q = rng.dirichlet([1.0, 1.0, 1.0], size=2) @ [a, b, c]
+        out = rng.normal(size=(2, 3))
+        A[k] = p, q, *(0.5 * (p + q) + out + np.outer(rng.uniform(0.2, 1.0, 2) - out @ n, n))
+    return A, B
+
+
+def edges_near_edges(rng, m: int) -> tuple[np.ndarray, np.ndarray]:
+    """The same of edges that cross within rounding, the cells on both sides of them."""
+    B = rng.normal(size=(m, 4, 3))
+    A = np.empty_like(B)
+    for k, (a, b, c, d) in enumerate(B):
+        x = a + rng.uniform(0.2, 0.8) * (b - a)
+        away = x - 0.5 * (c + d)
+        e = np.cross(b - a, away) + 0.3 * rng.normal() * (b - a)
+        side = 0.3 * (b - a)
+        A[k] = x + 0.7 * e, x - rng.uniform(0.3, 0.8) * e, x + away + side, x + away - side + 0.1 * e
+    return A, B
+
+
+def carried_into(X, cells: np.ndarray) -> np.ndarray:
+    """Points in the frame of a pose, rounded."""
+    return (cells - X[:3, 3]) @ np.linalg.inv(X[:3, :3]).T
+
+
 def kuhn_cubes(n: int, size: float = 1.0, shift=(0.0, 0.0, 0.0)) -> TetMesh:
     """A cube of n³ cubes, each cut into six tetrahedra around a diagonal (H. W. Kuhn, 1960)."""
     ticks = [np.arange(n + 1) * (size / n) + s for s in shift]
@@ -78,10 +109,13 @@ def pairs_of_meshes(seed: int):
     X, Y, Z = (random_pose(rng) for _ in range(3))
     X[:3, 3] *= 0.1
     Y[:3, 3] *= 0.1
+    far, near = random_pose(rng, 1e4), random_pose(rng, 1e4)
+    faces, edges = edges_near_faces(rng, 8), edges_near_edges(rng, 8)
+    apart = tuple(np.concatenate(cells) for cells in zip(edges_near_faces(rng, 4), edges_near_edges(rng, 4)))
     cubes, tenths = kuhn_cubes(1), kuhn_cubes(1, 0.3)
-    far = lattice_cells(rng, 3)
-    cells = np.concatenate([far.cells, far.cells + 12])
-    tiny = quiet(np.concatenate([far.vertices, far.vertices * 1e-70]), cells)
+    large = lattice_cells(rng, 3)
+    cells = np.concatenate([large.cells, large.cells + 12])
+    tiny = quiet(np.concatenate([large.vertices, large.vertices * 1e-70]), cells)
     return {
         "random": (random_cells(rng, 7), random_cells(rng, 7), eye, eye),
         "random, posed": (random_cells(rng, 7), random_cells(rng, 7), X, Y),
@@ -94,6 +128,11 @@ def pairs_of_meshes(seed: int):
         "one frame, turned": (lattice_cells(rng, 9), lattice_cells(rng, 9), Z, Z),
         "slivers": (slivers(rng, 6), slivers(rng, 6), eye, eye),
         "slivers, posed": (slivers(rng, 5), slivers(rng, 5), X, Y),
+        "edges near faces": (soup(faces[0]), soup(faces[1]), eye, eye),
+        "edges near edges": (soup(edges[0]), soup(edges[1]), eye, eye),
+        "edges near faces and edges, far away": (
+            soup(carried_into(far, apart[0])), soup(carried_into(near, apart[1])), far, near,
+        ),
         "tiny within large": (tiny, tiny, eye, eye),
         "cubes on themselves": (cubes, cubes, eye, eye),
         "cubes by halves": (kuhn_cubes(2), cubes, eye, pose((0.25, 0.5, 0))),

@@ -22,7 +22,9 @@ HITS = {
     "random": (8, 3, 0), "random, posed": (8, 2, 0), "random, 1e9 m": (6, 2, 0), "random, 1e-9 m": (6, 2, 0),
     "whole numbers": (50, 20, 0), "tenths": (20, 20, 0), "tenths, moved": (5, 20, 3), "a quarter turn": (30, 15, 0),
     "one frame, turned": (30, 15, 0), "slivers": (10, 2, 1), "slivers, posed": (6, 1, 1),
-    "tiny within large": (12, 20, 0), "cubes on themselves": (6, 20, 0), "cubes by halves": (40, 100, 0),
+    "edges near faces": (12, 15, 2), "edges near edges": (8, 15, 1),
+    "edges near faces and edges, far away": (12, 15, 2), "tiny within large": (12, 20, 0),
+    "cubes on themselves": (6, 20, 0), "cubes by halves": (40, 100, 0),
     "cubes by halves in one frame": (40, 100, 0), "cubes by tenths": (8, 8, 1), "cubes, mirrored": (6, 5, 0),
 }  # fmt: skip
 
@@ -40,6 +42,7 @@ def check_every_pair(name, A, B, X, Y) -> tuple[int, int, int]:
     """Every pair against the oracle; (pairs that overlap, that do not though their boxes do, settled in Python)."""
     got = collide.overlapping_cells(A, B, X, Y, volumes=True, centroids=True, check_poses=False)
     assert got.pairs.tolist() == sorted(got.pairs.tolist())
+    assert np.array_equal(collide.overlapping_cells(A, B, X, Y, check_poses=False).pairs, got.pairs), name
     rows = {tuple(pair): k for k, pair in enumerate(got.pairs.tolist())}
     cells_a = [placed_cell(X, A.vertices[cell]) for cell in A.cells]
     cells_b = [placed_cell(Y, B.vertices[cell]) for cell in B.cells]
@@ -73,7 +76,7 @@ def test_equal_to_fractions(name):
 def test_the_exact_end_is_equal_to_fractions():
     """What is settled in Python, asked about every pair of some families."""
     pairs = 0
-    for name in ("random, posed", "whole numbers", "cubes on themselves", "cubes, mirrored", "slivers"):
+    for name in ("random, posed", "whole numbers", "cubes on themselves", "cubes, mirrored", "edges near faces"):
         A, B, X, Y = FAMILIES[name]
         for a in range(0, len(A.cells), 2):
             for b in range(0, len(B.cells), 3):
@@ -85,7 +88,7 @@ def test_the_exact_end_is_equal_to_fractions():
 
 def test_pieces_of_a_cell_sum_to_its_volume_in_fractions():
     """Two meshes of one body: every cell of either is covered once, exactly."""
-    A, B = kuhn_cubes(2), shaken(np.random.default_rng(2), 2)
+    A, B = kuhn_cubes(1), shaken(np.random.default_rng(2), 2)
     X = random_pose(np.random.default_rng(3))
     got = collide.overlapping_cells(A, B, X, X, volumes=True)
     pieces = [cell_overlaps.exact_overlap(A, B, X, X, a, b).volume for a, b in got.pairs.tolist()]
@@ -93,7 +96,7 @@ def test_pieces_of_a_cell_sum_to_its_volume_in_fractions():
         for cell in range(len(mesh.cells)):
             whole = volume_of(placed_cell(X, mesh.vertices[mesh.cells[cell]]))
             assert sum(pieces[k] for k in np.flatnonzero(got.pairs[:, column] == cell)) == whole, cell
-    assert [float(v) for v in pieces] == got.volumes.tolist() and len(pieces) > 200
+    assert [float(v) for v in pieces] == got.volumes.tolist() and len(pieces) > 90
 
 
 def test_volumes_of_the_bodies_overlap():
