@@ -1,13 +1,14 @@
 """Overlays of tetrahedral meshes to a million cells against a million, and beside manifold3d and Qhull cell by cell.
 
-    python benchmarks/overlays.py                  # five minutes, 6 GB; pip install manifold3d scipy for the peers
+    python benchmarks/overlays.py                  # twelve minutes, 4 GB; pip install manifold3d scipy for the peers
     python benchmarks/overlays.py --cubes 8 20     # a look, no CSV
 
 Two meshes of one cube, n³ small cubes of six cells each, inner vertices shaken by up to a fifth of a small cube. "one
 frame" has both at one pose, "turned" the second one a little aside, "itself" one mesh twice: cells touch in faces,
-edges and corners everywhere. One thread; seconds are the processor's: making both `TetMesh` and their trees, pairs,
-pairs with volumes, pairs with volumes and centroids. "in fractions" are volumes that double-doubles could not round.
-Memory is the largest that the process had by then.
+edges and corners everywhere. "Delaunay" has random points (scipy), so slivers of any kind, up to 10⁵ cells. One thread;
+seconds are the processor's: making both `TetMesh` and their trees, pairs, pairs with volumes, pairs with volumes and
+centroids. "in fractions" are volumes that double-doubles could not round. Memory is the largest that the process had by
+then.
 
 The peers intersect given pairs one by one: manifold3d as two solids, Qhull (scipy) as half-spaces around a point
 within, which it has to be given. Our time is that of the whole overlay, finding the pairs included, divided by the
@@ -56,24 +57,39 @@ def block(n: int, seed: int, shaken: float = 0.2) -> tuple[np.ndarray, np.ndarra
 
 
 def measure(n: int) -> list[Row]:
-    """All three families of one size."""
+    """All families of one size; Delaunay's of as many cells, up to 10⁵."""
+    rows = families(*(block(n, seed) for seed in (0, 1)), names=("one frame", "turned", "itself"))
+    if n > 26:
+        return rows
+    try:
+        from scipy.spatial import Delaunay
+    except ImportError:
+        print("Delaunay's meshes are left out: scipy is not installed")
+        return rows
+    points = [np.random.default_rng(seed).uniform(size=(9 * n**3 // 10, 3)) for seed in (0, 1)]
+    return rows + families(*((p, Delaunay(p).simplices) for p in points), names=("Delaunay",))
+
+
+def families(first: tuple, second: tuple, names: tuple[str, ...]) -> list[Row]:
+    """Two meshes by their vertices and cells, in the families of these names."""
     started = time.process_time()
-    A, B = (collide.TetMesh(*block(n, seed)) for seed in (0, 1))
+    A, B = collide.TetMesh(*first), collide.TetMesh(*second)
     made = time.process_time() - started
     started = time.process_time()
     A.tree, B.tree  # noqa: B018
     trees = time.process_time() - started
     rows = []
-    for family, second, X_WB in (("one frame", B, STILL), ("turned", B, ASIDE), ("itself", A, STILL)):
+    for family in names:
         seconds, result = {}, None
+        arguments = A, A if family == "itself" else B, STILL, ASIDE if family == "turned" else STILL
         for name, asked in (("pairs", {}), ("volumes", {"volumes": True}), ("centroids", {"centroids": True})):
             result = None
             started = time.process_time()
-            result = collide.overlapping_cells(A, second, STILL, X_WB, **asked)
+            result = collide.overlapping_cells(*arguments, **asked)
             seconds[name] = round(time.process_time() - started, 2)
         assert result is not None and result.volumes is not None
         rows.append({
-            "family": family, "cells A": len(A.cells), "cells B": len(second.cells), "made s": round(made, 2),
+            "family": family, "cells A": len(A.cells), "cells B": len(arguments[1].cells), "made s": round(made, 2),
             "trees s": round(trees, 2), **{f"{name} s": s for name, s in seconds.items()}, "pairs": len(result.pairs),
             "pairs of boxes": int(result.counters[0, 1]), "in integers": int(result.counters[0, 2]),
             "in fractions": int(result.counters[0, 3]), "sum of volumes": float(result.volumes.sum()),

@@ -110,7 +110,7 @@ def pairs_of_meshes(seed: int):
     X[:3, 3] *= 0.1
     Y[:3, 3] *= 0.1
     far, near = random_pose(rng, 1e4), random_pose(rng, 1e4)
-    faces, edges = edges_near_faces(rng, 8), edges_near_edges(rng, 8)
+    faces, edges = edges_near_faces(rng, 5), edges_near_edges(rng, 5)
     apart = tuple(np.concatenate(cells) for cells in zip(edges_near_faces(rng, 4), edges_near_edges(rng, 4)))
     cubes, tenths = kuhn_cubes(1), kuhn_cubes(1, 0.3)
     large = lattice_cells(rng, 3)
