@@ -17,11 +17,11 @@ def block(cubes: int, seed: int) -> collide.TetMesh:
     corners = np.stack(np.meshgrid(*[np.arange(cubes)] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
     units = np.eye(3, dtype=int)
     steps = [np.cumsum([[0, 0, 0], *units[list(axes)]], axis=0) for axes in permutations(range(3))]
+    steps = [s if np.linalg.det(s[1:]) > 0 else s[[0, 1, 3, 2]] for s in steps]
     return collide.TetMesh(vertices, np.concatenate([(corners + s) @ [(cubes + 1) ** 2, cubes + 1, 1] for s in steps]))
 
 
-# A part, simulated on one mesh; its heat is wanted on another one. Both fill the same cube, at the same pose. That half
-# of the cells run the other way round is logged: they are turned.
+# A part, simulated on one mesh; its heat is wanted on another one. Both fill the same cube, at the same pose.
 old, new = block(6, 0), block(9, 1)
 X = collide.pose((0.4, 0.1, 0.8), rpy=(0.1, 0.2, 0.3))
 shared = collide.overlapping_cells(old, new, X, X, volumes=True, centroids=True)
