@@ -32,6 +32,8 @@ Of every kind (engine, error, the two shapes, how they stand) the folder gets
   NAME.md    the text of an issue for its tracker
 and fuzz.json, the state. A search that is interrupted or killed goes on with
 --resume, and loses the round it was in. Equal seeds invent equal scenes.
+Shrinking takes half of the time at most; kinds that wait for it are counted,
+and --resume goes on with them.
 
 Booleans of pairs that touch within rounding count against nobody.
 Engines come with: pip install 'collide-robotics[peers]'
@@ -100,9 +102,12 @@ def _print(result: Any, args: argparse.Namespace) -> None:
     columns = [Column("engine", "label"), *(Column(kind) for kind in met), Column("all")]
     title = f"FUZZING  wrong answers to {result.pairs} pairs, seed {result.seed}, {result.rounds} rounds"
     terminal.show_table(Table(title, columns, rows))
+    sources = (f"{n} {name}" for name, n in sorted(result.invented.items()) if not name.startswith("shape "))
+    terminal.write_text(f"pairs invented: {', '.join(sources)}\n")
     findings = result.findings()
     if findings:  # names of files say engine, error, shapes and position, and stay whole on a narrow terminal
         listed = findings[: None if args.all else SHORT]
         title = f"FINDINGS  {len(findings)} kinds of wrong answers, a small case of each, in {result.folder}"
         more = [f"  {len(findings) - len(listed)} more: --all"] if len(listed) < len(findings) else []
+        more += [f"  {len(result.waiting)} kinds wait to be shrunk: --resume goes on"] if result.waiting else []
         terminal.write_text("\n".join(["", title, *(f"  {f.stem}.json" for f in listed), *more, ""]))

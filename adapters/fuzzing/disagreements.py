@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.adapters.fuzzing.fuzz_case import Case, isolated
+from collide.adapters.fuzzing.nearest_points import POINTS_TOLERANCE, points_off
 from collide.adapters.fuzzing.support_bounds import SLACK, lower_bound
 from collide.adapters.peers.answers import ABORTED, HUNG, NO_LENGTH, NOT_A_NUMBER, RAISED, STATUSES, Table
 from collide.adapters.peers.collide_peer import CollidePeer
@@ -24,11 +25,12 @@ from collide.reports import classes
 from collide.shapes import Mesh
 
 FALSE_HIT, FALSE_MISS, WRONG_GAP, WRONG_DEPTH = "false hit", "false miss", "wrong gap", "wrong depth"
+WRONG_POINTS = "wrong points"
 CONTRADICTION, LEFT_OUT, WRONG_BRACKET = "contradicts itself", "left out of a World", "wrong bracket"
 #: The kinds, the gravest first. Those that are no answers are the protocol's mishaps.
 KINDS = (
-    ABORTED, HUNG, RAISED, FALSE_MISS, FALSE_HIT, NOT_A_NUMBER, NO_LENGTH, WRONG_GAP, WRONG_DEPTH, CONTRADICTION,
-    LEFT_OUT, WRONG_BRACKET,
+    ABORTED, HUNG, RAISED, FALSE_MISS, FALSE_HIT, NOT_A_NUMBER, NO_LENGTH, WRONG_GAP, WRONG_DEPTH, WRONG_POINTS,
+    CONTRADICTION, LEFT_OUT, WRONG_BRACKET,
 )  # fmt: skip
 OURS = "collide"
 #: A gap or a depth below this part of the pair's size is near touching.
@@ -106,12 +108,15 @@ class Examiner:
             exact = truth.table_of_small()
             disputes = contradictions(judge, ours) + differences(judge, ours, exact, Summary("exact"))
             _gravest(flaws, truth, ours, disputes, OURS)
+            _add_wrong_points(flaws, cases, truth, ours, OURS)
             for k, case in enumerate(cases):
-                flaws[k] += _refuted_by_supports(case, truth, ours, k) if not flaws[k] else []
+                if not flaws[k] and not exact.rows["has_distance"][k]:
+                    flaws[k] += _refuted_by_supports(case, truth, ours, k)
         for name in self.answers if engines is None else [name for name in engines if name != OURS]:
             table = self.answers[name](question)
             disputes = contradictions(judge, table) + differences(judge, ours, table, Summary(name))
             _gravest(flaws, truth, table, disputes, name)
+            _add_wrong_points(flaws, cases, truth, table, name)
         return flaws
 
 
@@ -175,6 +180,21 @@ def _gravest(flaws: list[list[Flaw]], truth: _Truth, table: Table, disputes: lis
             by_case.setdefault(k, []).append(_mishap(truth, k, name, mishap, hit, table.reasons[k]))
     for k, several in by_case.items():
         flaws[k].append(min(several, key=lambda flaw: KINDS.index(flaw.kind)))
+
+
+def _add_wrong_points(flaws: list[list[Flaw]], cases: list[Case], truth: _Truth, table: Table, name: str) -> None:
+    """An engine's nearest points that are none, of pairs about which it says nothing else that is wrong."""
+    for k, case in enumerate(cases):
+        row, size = table.rows[k], truth.judge.size[k] or 1.0
+        if any(flaw.engine == name for flaw in flaws[k]) or row["hit"] or truth.ours.rows["hit"][k]:
+            continue
+        off, why = points_off(case, row, float(truth.ours.rows["upper"][k]))
+        if off > POINTS_TOLERANCE * size:
+            gap, distance = truth.ours.rows[k], _number(row["distance"])
+            flaws[k].append(Flaw(
+                name, WRONG_POINTS, truth.position(k), False, distance, why, False, _number(gap["distance"]),
+                _number(gap["lower"]), _number(gap["upper"]), BRACKET, off / size,
+            ))  # fmt: skip
 
 
 def _of_dispute(truth: _Truth, k: int, d: Disagreement, name: str) -> Flaw | None:

@@ -88,6 +88,16 @@ def test_a_wrong_distance_stays_as_grave(stubs):
     assert made.flaw.judged_by == "exact arithmetic"
 
 
+def test_nearest_points_that_are_none(stubs):
+    apart = pose((7.1, 0.3, 0.2))
+    made = smallest("exchanges_points", pair_case(Sphere(0.31), Sphere(0.72), pose(), apart), "wrong points")
+    assert "exchanged: each is on the other body" in made.flaw.reason and made.flaw.judged_by == "the proven bracket"
+    made = smallest("exchanges_points", pair_case(Box((1, 1, 1)), Box((2, 1, 1)), pose(), apart), "wrong points")
+    assert "the one on A 0.01" in made.flaw.reason and made.flaw.severity * made.case.bodies[0].shape.size.max() < 0.01
+    right = [pair_case(Sphere(0.5), Box((1, 1, 1)), pose(), apart), pair_case(Sphere(1), Sphere(1), pose(), pose())]
+    assert in_process("exchanges_points").flaws(right) == [[], []], "overlaps are not judged"
+
+
 def test_an_abort_and_a_hang_are_shrunk_in_children(stubs):
     with closing(EngineSession("cones_abort")) as aborting, closing(EngineSession("ellipsoids_hang", 2.0)) as hanging:
         examiner = Examiner({"cones_abort": aborting.answer, "ellipsoids_hang": hanging.answer})
