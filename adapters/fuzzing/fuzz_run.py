@@ -29,7 +29,7 @@ from collide.adapters.fuzzing.shrink import COSTLY, Shrunk, shrink
 from collide.adapters.peers.answers import HUNG
 from collide.adapters.peers.protocol import engine
 from collide.errors import InvalidArgument
-from collide.scenes.write_scene import write_whole
+from collide.whole_file import write_whole
 
 STATE = "fuzz.json"
 #: Changes where a state written before would be misread.
