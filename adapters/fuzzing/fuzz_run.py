@@ -239,7 +239,8 @@ class _Search:
 
     def round(self) -> bool:
         """One round; False where time ran out before its end: it is not counted, and what it shrank is kept."""
-        run, met = self.run, Counter()
+        run = self.run
+        met: Counter = Counter()
         cases = self.cases_of(run.rounds)
         for start in range(0, len(cases), BATCH):
             self.rename(_progress_line(run, start))
