@@ -20,7 +20,7 @@ from collide.adapters.peers.collide_peer import CollidePeer
 from collide.adapters.peers.compare import TOLERANCE, Summary
 from collide.adapters.peers.exact_peer import INSIDE, ExactPeer
 from collide.adapters.peers.judge import BRACKET, EXACT, Disagreement, Judge, contradictions, differences
-from collide.adapters.peers.question import Question, has_mesh
+from collide.adapters.peers.question import Question, has_mesh, is_compound_or_mesh
 from collide.reports import classes
 from collide.shapes import Mesh
 
@@ -43,7 +43,7 @@ POSITIONS = ("apart", "near", "touching", "shallow", "deep", "meeting", "inside"
 class Flaw(NamedTuple):
     """One wrong answer, or one that was owed.
 
-    kind : of `KINDS`.   position : of `POSITIONS`: "meeting" is of meshes, whose depth nobody knows.
+    kind : of `KINDS`.   position : of `POSITIONS`: "meeting" is of meshes and unions, whose depth nobody knows.
     hit, distance [m], reason : what the engine said; None where it said nothing.
     exact_hit, exact_distance, lower, upper : the verdict [m]; None where not known.
     judged_by : exact arithmetic, the proven bracket, or empty where no judge is needed.
@@ -64,8 +64,12 @@ class Flaw(NamedTuple):
     severity: float
 
     def same_way(self, flaw: Flaw) -> bool:
-        """Whether two flaws are one engine's, of one kind, in one class of position."""
-        return (self.engine, self.kind, self.position) == (flaw.engine, flaw.kind, flaw.position)
+        """Whether a flaw of a simpler case is the same engine's, of the same kind, in the same class of position.
+
+        Where nobody knows how deep bodies meet, as of meshes, their parts may meet to any depth.
+        """
+        same = self.position == flaw.position or (self.position == "meeting" and flaw.position in ("shallow", "deep"))
+        return same and (self.engine, self.kind) == (flaw.engine, flaw.kind)
 
 
 class Examiner:
@@ -152,8 +156,9 @@ class _Truth:
             distance = distance if dispute.exact_distance is None else dispute.exact_distance
         if abs(distance) <= self.judge.rounding[k]:
             return "touching"
-        if any(has_mesh(self.question.bodies[i].shape) for i in self.question.pairs[k]) and hit:
-            return "inside" if self.is_inside(k) else "meeting"
+        shapes = [self.question.bodies[i].shape for i in self.question.pairs[k]]
+        if hit and any(map(is_compound_or_mesh, shapes)):
+            return "inside" if any(map(has_mesh, shapes)) and self.is_inside(k) else "meeting"
         if hit:
             return "shallow" if abs(distance) <= NEAR * size else "deep"
         return "near" if distance <= NEAR * size else "apart"

@@ -8,6 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
+from collide import distance
 from collide.adapters.fuzzing import library_snippets, simulator_snippets
 from collide.adapters.fuzzing.disagreements import WRONG_POINTS, Flaw
 from collide.adapters.fuzzing.fuzz_case import Case
@@ -33,9 +36,17 @@ def snippet(flaw: Flaw, case: Case, known: dict[str, Any]) -> str | None:
     name, _, setting = flaw.engine.partition(":")
     if name not in _ENGINES or case.world or any(n_rows(body.shape) > MAX_ROWS for body in case.bodies[:2]):
         return None
+    points = flaw.kind == WRONG_POINTS
+    expected = expected_text(known) + (f"; nearest points {_nearest_points(case)}" if points else "")
     try:
-        lines = _ENGINES[name](Asked(case, setting, expected_text(known), flaw.kind == WRONG_POINTS))
+        lines = _ENGINES[name](Asked(case, setting, expected, points))
     except (CollideError, KeyError):
         return None  # a shape that the peer cannot be given
     assert len(lines) <= MAX_LINES, lines
     return "\n".join(lines) + "\n"
+
+
+def _nearest_points(case: Case) -> str:
+    """Those that collide finds; of parallel faces there are others."""
+    r = distance(*case.pair())
+    return f"for example {np.asarray(r.point_a).tolist()} on A, {np.asarray(r.point_b).tolist()} on B"
