@@ -24,7 +24,7 @@ MAX_ROWS = 120
 _ENGINES: dict[str, Callable[[Asked], list[str]]] = {
     "fcl": library_snippets.fcl_lines, "coal": library_snippets.coal_lines, "trimesh": library_snippets.trimesh_lines,
     "pybullet": simulator_snippets.pybullet_lines, "mujoco": simulator_snippets.mujoco_lines,
-    "drake": simulator_snippets.drake_lines,
+    "drake": simulator_snippets.drake_lines, "rapier": simulator_snippets.rapier_lines,
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Findings in the calls of simulators: pybullet, MuJoCo, Drake."""
+"""Findings in the calls of simulators: pybullet, MuJoCo, Drake, Rapier."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from collide.adapters.fuzzing.snippet_parts import Asked, numbers, rotation
 from collide.adapters.peers.mujoco_peer import plane_pose
 from collide.adapters.peers.pybullet_peer import quaternion_xyzw
 from collide.adapters.peers.question import corners
-from collide.shapes import Box, Capsule, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
+from collide.adapters.peers.rapier_peer import X_ALONG_Y, rapier_reach
+from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
 
 # --- pybullet ---------------------------------------------------------------------------------------
 
@@ -196,3 +197,65 @@ def _drake_shape(shape: Shape) -> str:
     if points is None or points[1]:
         raise KeyError(type(shape).__name__)
     return f"g.Convex(points=np.array({numbers(points[0])}).T, label='hull')"
+
+
+# --- Rapier -------------------------------------------------------------------------------------------
+
+
+def rapier_lines(asked: Asked) -> list[str]:
+    """A program for Rapier's manifolds; KeyError for its casts and its nearest points, which have none."""
+    if asked.setting or asked.points:
+        raise KeyError(asked.setting)
+    bodies = asked.case.bodies[:2]
+    lines = [
+        "import rapier3d as r", "",
+        "def world(*placed):",
+        "    made, kinds = r.PhysicsWorld(), r.ActiveCollisionTypes.all()",
+        "    of = [r.Collider.new(shape).position(X).active_collision_types(kinds) for shape, X in placed]",
+        "    return made, [made.add_collider(collider) for collider in of]",
+    ]  # fmt: skip
+    for letter, body in zip("AB", bodies):
+        shape, X_BS = _rapier_shape(body.shape)
+        x, y, z, w = quaternion_xyzw((body.X_WB @ X_BS)[:3, :3])
+        t = ", ".join(map(repr, (body.X_WB @ X_BS)[:3, 3].tolist()))
+        lines.append(f"{letter} = r.SharedShape.{shape}, r.Isometry3(r.Vec3({t}), r.Rotation3({w}, {x}, {y}, {z}))")
+    lines += [
+        asked.true_line(), "only_A, _ = world(A); hits = []",
+        "only_A.detect_collisions(); only_A.update_query_pipeline()",
+        "only_A.query_pipeline.intersect_shape(B[1], B[0], lambda handle: hits.append(handle) or True)",
+        "print('rapier collide:', bool(hits), flush=True)",
+    ]  # fmt: skip
+    if any(isinstance(body.shape, Mesh) for body in bodies):
+        return lines
+    X_WA, X_WB = (body.X_WB @ _rapier_shape(body.shape)[1] for body in bodies)
+    farthest = 1.01 * (float(np.linalg.norm(X_WA[:3, 3] - X_WB[:3, 3])) + sum(rapier_reach(b.shape) for b in bodies))
+    return [
+        *lines, "both, (a, b) = world(A, B)",
+        f"both.collision_pipeline.step({farthest!r}, both.islands, both.broad_phase, both.narrow_phase,",
+        "                             both.rigid_bodies, both.colliders)",
+        "pair = both.narrow_phase.contact_pair(a, b)",
+        "distances = [point.dist for manifold in (pair.manifolds if pair else ()) for point in manifold.points]",
+        "print('rapier distance:', min(distances, default='no contact at all'))",
+    ]
+
+
+def _rapier_shape(shape: Shape) -> tuple[str, np.ndarray]:
+    """The call that makes a shape, and the pose (4, 4) of Rapier's in it."""
+    if isinstance(shape, Sphere):
+        return f"ball({shape.radius!r})", np.eye(4)
+    if isinstance(shape, Box):
+        return f"cuboid({', '.join(map(repr, (shape.size / 2).tolist()))})", np.eye(4)
+    if isinstance(shape, Capsule):
+        return f"capsule_z({shape.length / 2!r}, {shape.radius!r})", np.eye(4)
+    if isinstance(shape, Cylinder | Cone):
+        return f"{type(shape).__name__.lower()}({shape.length / 2!r}, {shape.radius!r})", X_ALONG_Y
+    if isinstance(shape, Halfspace):
+        return "halfspace((0.0, 0.0, 1.0))", plane_pose(shape)
+    if isinstance(shape, Mesh):
+        return f"trimesh({numbers(shape.vertices)}, {numbers(shape.faces)})", np.eye(4)
+    points = corners(shape)
+    if points is None:
+        raise KeyError(type(shape).__name__)
+    if isinstance(shape, ConvexHull) and shape.radius:
+        return f"round_convex_hull({numbers(points[0])}, {shape.radius!r})", np.eye(4)
+    return f"convex_hull({numbers(points[0])})", np.eye(4)
