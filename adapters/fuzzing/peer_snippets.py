@@ -21,7 +21,8 @@ from collide.errors import CollideError
 MAX_LINES = 20
 #: Points and facets above which a snippet would not be read.
 MAX_ROWS = 120
-_ENGINES: dict[str, Callable[[Asked], list[str]]] = {
+#: Engines that have a form here.
+FORMS: dict[str, Callable[[Asked], list[str]]] = {
     "fcl": library_snippets.fcl_lines, "coal": library_snippets.coal_lines, "trimesh": library_snippets.trimesh_lines,
     "pybullet": simulator_snippets.pybullet_lines, "mujoco": simulator_snippets.mujoco_lines,
     "drake": simulator_snippets.drake_lines, "rapier": simulator_snippets.rapier_lines,
@@ -34,12 +35,12 @@ def snippet(flaw: Flaw, case: Case, known: dict[str, Any]) -> str | None:
     known : as `proofs.proof` gives it.
     """
     name, _, setting = flaw.engine.partition(":")
-    if name not in _ENGINES or case.world or any(n_rows(body.shape) > MAX_ROWS for body in case.bodies[:2]):
+    if name not in FORMS or case.world or any(n_rows(body.shape) > MAX_ROWS for body in case.bodies[:2]):
         return None
     points = flaw.kind == WRONG_POINTS
     expected = expected_text(known) + (f"; nearest points {_nearest_points(case)}" if points else "")
     try:
-        lines = _ENGINES[name](Asked(case, setting, expected, points))
+        lines = FORMS[name](Asked(case, setting, expected, points))
     except (CollideError, KeyError):
         return None  # a shape that the peer cannot be given
     assert len(lines) <= MAX_LINES, lines

@@ -235,7 +235,7 @@ def rapier_lines(asked: Asked) -> list[str]:
         "                             both.rigid_bodies, both.colliders)",
         "pair = both.narrow_phase.contact_pair(a, b)",
         "distances = [point.dist for manifold in (pair.manifolds if pair else ()) for point in manifold.points]",
-        "print('rapier distance:', min(distances, default='no contact at all'))",
+        "print('rapier distance:', min(distances, default=float('inf')))",
     ]
 
 
