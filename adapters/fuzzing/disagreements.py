@@ -194,7 +194,7 @@ def _add_wrong_points(flaws: list[list[Flaw]], cases: list[Case], truth: _Truth,
         if any(flaw.engine == name for flaw in flaws[k]) or row["hit"] or truth.ours.rows["hit"][k]:
             continue
         off, why = points_off(case, row, float(truth.ours.rows["upper"][k]))
-        if off > POINTS_TOLERANCE * size:
+        if off > POINTS_TOLERANCE * size + truth.judge.rounding[k]:  # a tiny body may be far away
             gap, distance = truth.ours.rows[k], _number(row["distance"])
             flaws[k].append(Flaw(
                 name, WRONG_POINTS, truth.position(k), False, distance, why, False, _number(gap["distance"]),

@@ -15,6 +15,7 @@ from collide import (
     ConvexHull,
     Cylinder,
     Ellipsoid,
+    Halfspace,
     HeightField,
     HPolytope,
     Mesh,
@@ -96,6 +97,9 @@ def test_nearest_points_that_are_none(stubs):
     assert "the one on A 0.01" in made.flaw.reason and made.flaw.severity * made.case.bodies[0].shape.size.max() < 0.01
     right = [pair_case(Sphere(0.5), Box((1, 1, 1)), pose(), apart), pair_case(Sphere(1), Sphere(1), pose(), pose())]
     assert in_process("exchanges_points").flaws(right) == [[], []], "overlaps are not judged"
+    tiny = Mesh([[0, 0, 0], [0, 0, 9e-13], [0, 1e-12, 0]], [[0, 2, 1]])
+    far = pair_case(tiny, Halfspace((0, 0, 1), -0.06), pose(), pose((0, 0, -1000)))
+    assert Examiner({}).flaws([far]) == [[]], "rounding of where a tiny body is"
 
 
 def test_an_abort_and_a_hang_are_shrunk_in_children(stubs):
