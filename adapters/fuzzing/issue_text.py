@@ -48,9 +48,10 @@ def body_text(body: Body) -> str:
         text = f"{name} of {len(shape.faces)} triangle{'s' * (len(shape.faces) > 1)}"
     elif isinstance(shape, Compound):
         text = f"{name} of {len(shape.items)} parts"
-    elif isinstance(shape, ConvexHull | HPolytope):
-        text = f"{name} of {len(shape.vertices)} vertices"
-        text += f" and radius {shape.radius!r}" if isinstance(shape, ConvexHull) and shape.radius else ""
+    elif isinstance(shape, ConvexHull):
+        text = f"{name} of {len(shape.points)} points" + (f" and radius {shape.radius!r}" if shape.radius else "")
+    elif isinstance(shape, HPolytope):
+        text = f"{name} of {len(shape.offsets)} half-spaces"
     else:
         text = repr(shape)
     roll, pitch, yaw = (float(f"{angle:.6g}") for angle in degrees(X_WB[:3, :3]))

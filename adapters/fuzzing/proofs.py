@@ -82,11 +82,10 @@ def _proven(case: Case) -> dict[str, Any]:
     except CollideError:
         return {}
     lower, upper = (float(x) if math.isfinite(x) else None for x in (float(r.lower), float(r.upper)))
-    plain = None if certificate is None else [
+    plain: Any = _direction_and_points(case, r) if certificate is None else [
         {"kind": c.kind, "part_a": c.part_a, "part_b": c.part_b, "pairs": [list(map(int, p)) for p in c.pairs]}
         for c in certificate
     ]  # fmt: skip
-    plain = _direction_and_points(case, r) if plain is None else plain
     by = "the bracket that collide proves" if lower is not None and upper is not None else "nothing"
     return {"hit": bool(r.hit), "lower": lower, "upper": upper, "by": by, "certificate": plain}
 
