@@ -16,6 +16,7 @@ EPILOG = """examples:
   collide fuzz --engines fcl,coal,pybullet --minutes 60 --seed 7 --save found
   collide fuzz --engines fcl,coal,pybullet --minutes 60 --seed 7 --save found --resume
   collide compare found/coal-false-miss-box-cylinder-shallow.json --engines coal
+  collide fuzz --draw found/coal-*.json --picture plate.png
 
 Scenes are invented: pairs of all shapes and meshes at random, nearly touching,
 resting on each other, thin, flat, tiny against huge, concentric; Worlds of many
@@ -58,6 +59,10 @@ def add_arguments(parser: argparse.ArgumentParser, engines: Callable) -> None:
     parser.add_argument("--resume", action="store_true", help="go on with the search that DIR holds")
     parser.add_argument("--timeout", type=minutes, default=5.0, metavar="T",
                         help="seconds that an engine may take for one pair (5)")
+    parser.add_argument("--draw", nargs="+", metavar="FINDING",
+                        help="search nothing: draw these scene files of findings as one plate")
+    parser.add_argument("--picture", metavar="FILE", default="findings.png",
+                        help="where --draw writes: .png, .svg or .pdf (%(default)s)")
     parser.add_argument("--all", action="store_true", help="do not shorten the list of findings")
     parser.add_argument("--json", metavar="FILE|-", help="write counts and findings as JSON, or - to standard output")
     parser.add_argument("--quiet", action="store_true", help="no table, no progress; errors are still told")
@@ -65,6 +70,8 @@ def add_arguments(parser: argparse.ArgumentParser, engines: Callable) -> None:
 
 def run(args: argparse.Namespace, progress: Callable) -> bool:
     """True: no answer of collide's is wrong."""
+    if args.draw:
+        return _draw(args)
     from collide.adapters.fuzzing.fuzz_run import fuzz
 
     if args.seed < 0:
@@ -82,6 +89,15 @@ def run(args: argparse.Namespace, progress: Callable) -> bool:
     if args.json != "-" and not args.quiet:
         _print(result, args)
     return not result.ours
+
+
+def _draw(args: argparse.Namespace) -> bool:
+    from collide.adapters.fuzzing.case_plate import draw_findings
+
+    drawn = draw_findings(args.draw, args.picture)
+    if not args.quiet:
+        print(f"{drawn} findings drawn: {args.picture}")
+    return True
 
 
 def _listed(result: Any) -> list[dict[str, Any]]:

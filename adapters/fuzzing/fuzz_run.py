@@ -301,8 +301,8 @@ def _progress_line(run: FuzzRun, asked: int) -> str:
     """How far a search is, with the pairs of every source."""
     sources = ", ".join(f"{n} {name}" for name, n in sorted(run.invented.items()) if not name.startswith("shape "))
     kinds = len(set(run.shrunk.values())) + len(run.waiting)
-    found = f"{run.pairs + asked} pairs, {kinds} kinds of wrong answers"
-    return f"round {run.rounds + 1}: {found}" + (f" ({sources})" if sources else "")
+    counts = f"{run.pairs + asked} pairs, {kinds} kinds of wrong answers"
+    return f"round {run.rounds + 1}: {counts}" + (f" ({sources})" if sources else "")
 
 
 def shrunk_in(sessions: Mapping[str, EngineSession], examiner: Examiner, case: Case, flaw: Flaw) -> Shrunk:

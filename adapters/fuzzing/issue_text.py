@@ -54,9 +54,9 @@ def body_text(body: Body) -> str:
         text = f"{name} of {len(shape.offsets)} half-spaces"
     else:
         text = repr(shape)
-    roll, pitch, yaw = (float(f"{angle:.6g}") for angle in degrees(X_WB[:3, :3]))
-    turned = f", turned by roll {roll:g}°, pitch {pitch:g}°, yaw {yaw:g}°" if any((roll, pitch, yaw)) else ""
-    return f"{text} at {X_WB[:3, 3].tolist()}{turned}"
+    angles = dict(zip(("roll", "pitch", "yaw"), (float(f"{angle:.6g}") for angle in degrees(X_WB[:3, :3]))))
+    turned = ", ".join(f"{name} {angle:g}°" for name, angle in angles.items() if angle)
+    return f"{text} at {X_WB[:3, 3].tolist()}" + (f", turned by {turned}" if turned else "")
 
 
 def title(flaw: Flaw, case: Case) -> str:

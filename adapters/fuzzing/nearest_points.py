@@ -29,14 +29,14 @@ def points_off(case: Case, row: np.void, upper: float) -> tuple[float, str]:
     if not np.isfinite(points).all():
         return 0.0, ""
     between = float(np.linalg.norm(points[1] - points[0]))
-    said = f"points {points[0].tolist()} on A and {points[1].tolist()} on B"
-    worst = max(between - upper, 0.0) if np.isfinite(upper) else 0.0, f"{said} are {between!r} m apart"
+    answer = f"points {points[0].tolist()} on A and {points[1].tolist()} on B"
+    worst = max(between - upper, 0.0) if np.isfinite(upper) else 0.0, f"{answer} are {between!r} m apart"
     offs = [_off_surface(body.shape, body.X_WB, point) for body, point in zip(case.bodies, points)]
     if max(offs) > worst[0]:
         off, name = max(zip(offs, "AB"))
         exchanged = max(_off_surface(b.shape, b.X_WB, point) for b, point in zip(case.bodies, points[::-1]))
         why = "exchanged: each is on the other body" if exchanged <= 1e-6 * off else f"the one on {name} {off!r} m off"
-        worst = off, f"{said}, {why}"
+        worst = off, f"{answer}, {why}"
     return worst
 
 
