@@ -65,6 +65,8 @@ if TYPE_CHECKING:
         Sphere,
     )
     from collide.shapes.tessellation import tessellate
+    from collide.solids.boolean import BooleanResult, boolean
+    from collide.solids.overlap_volume import OverlapVolume, overlap_volume
     from collide.surface_queries.contains import contains
     from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
     from collide.surface_queries.overlay import Overlay, overlay
@@ -109,6 +111,8 @@ _HOMES = {
         "Halfspace", "HeightField", "Mesh", "Shape", "ShapeSet", "Sphere",
     ),
     "collide.shapes.tessellation": ("tessellate",),
+    "collide.solids.boolean": ("BooleanResult", "boolean"),
+    "collide.solids.overlap_volume": ("OverlapVolume", "overlap_volume"),
     "collide.sweeps.configurations": ("DrawnConfigurations",),
     "collide.sweeps.pair_proposal": ("LinkPair", "Proposal", "propose_disabled_pairs"),
     "collide.sweeps.sweep": ("sweep",),
@@ -126,15 +130,15 @@ _RENAMED = {
 }
 
 __all__ = [
-    "Box", "Capsule", "Certificate", "CertificateRefused", "CertifiedEdges", "CollideError", "Compound", "Cone",
-    "Contacts", "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs",
-    "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair",
-    "Mesh", "MissingExtra", "Overlay", "PairResult", "Proposal", "RayHits", "Robot", "RobotChecker",
-    "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "SweepResults",
-    "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify", "collide",
-    "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses", "overlay",
-    "pose", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "shape_cast",
-    "sweep", "tessellate", "time_of_impact", "verify", "walk",
+    "BooleanResult", "Box", "Capsule", "Certificate", "CertificateRefused", "CertifiedEdges", "CollideError",
+    "Compound", "Cone", "Contacts", "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid",
+    "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape",
+    "LinkPair", "Mesh", "MissingExtra", "OverlapVolume", "Overlay", "PairResult", "Proposal", "RayHits", "Robot",
+    "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere",
+    "SweepResults", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "boolean",
+    "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library",
+    "moved_poses", "overlap_volume", "overlay", "pose", "poses_in_motion", "propose_disabled_pairs", "raycast",
+    "read_sweep", "self_collisions", "shape_cast", "sweep", "tessellate", "time_of_impact", "verify", "walk",
 ]
 
 

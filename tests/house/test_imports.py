@@ -159,6 +159,10 @@ ROOMS = {
         "results",
         "batches",
     },
+    "solids": {
+        "errors", "argument_checks", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",
+        "surface_queries",
+    },
     "hierarchies": {
         "errors",
         "fork_safe_lock",
