@@ -74,6 +74,8 @@ if TYPE_CHECKING:
     from collide.sweeps.pair_proposal import LinkPair, Proposal, propose_disabled_pairs
     from collide.sweeps.sweep import sweep
     from collide.sweeps.sweep_results import SweepResults, read_sweep
+    from collide.tetrahedra.cell_overlaps import CellOverlaps, overlapping_cells, self_overlapping_cells
+    from collide.tetrahedra.tet_mesh import TetMesh
     from collide.transforms import pose
     from collide.world import World
     from collide.world_hits import WorldHits
@@ -117,6 +119,8 @@ _HOMES = {
     "collide.sweeps.pair_proposal": ("LinkPair", "Proposal", "propose_disabled_pairs"),
     "collide.sweeps.sweep": ("sweep",),
     "collide.sweeps.sweep_results": ("SweepResults", "read_sweep"),
+    "collide.tetrahedra.cell_overlaps": ("CellOverlaps", "overlapping_cells", "self_overlapping_cells"),
+    "collide.tetrahedra.tet_mesh": ("TetMesh",),
     "collide.transforms": ("pose",),
     "collide.world": ("World",),
     "collide.world_hits": ("WorldHits",),
@@ -130,15 +134,16 @@ _RENAMED = {
 }
 
 __all__ = [
-    "BooleanResult", "Box", "Capsule", "Certificate", "CertificateRefused", "CertifiedEdges", "CollideError",
-    "Compound", "Cone", "Contacts", "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid",
-    "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape",
-    "LinkPair", "Mesh", "MissingExtra", "OverlapVolume", "Overlay", "PairResult", "Proposal", "RayHits", "Robot",
-    "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere",
-    "SweepResults", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "boolean",
-    "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library",
-    "moved_poses", "overlap_volume", "overlay", "pose", "poses_in_motion", "propose_disabled_pairs", "raycast",
-    "read_sweep", "self_collisions", "shape_cast", "sweep", "tessellate", "time_of_impact", "verify", "walk",
+    "BooleanResult", "Box", "Capsule", "CellOverlaps", "Certificate", "CertificateRefused", "CertifiedEdges",
+    "CollideError", "Compound", "Cone", "Contacts", "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations",
+    "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose",
+    "InvalidShape", "LinkPair", "Mesh", "MissingExtra", "OverlapVolume", "Overlay", "PairResult", "Proposal", "RayHits",
+    "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
+    "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits",
+    "WorldResult", "boolean", "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include",
+    "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses_in_motion",
+    "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "self_overlapping_cells", "shape_cast",
+    "sweep", "tessellate", "time_of_impact", "verify", "walk",
 ]
 
 

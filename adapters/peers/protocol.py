@@ -13,6 +13,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from typing import Any, NamedTuple
@@ -44,6 +45,7 @@ __all__ = [
 
 #: Asks one of them in a child process.
 _ISOLATED = "collide.adapters.peers.child:IsolatedPeer"
+_version = cache(metadata.version)  # it reads a file, and every table asks
 
 
 class Setting(NamedTuple):
@@ -127,7 +129,7 @@ class Peer:
     def version(self) -> str:
         """The engine's version, without importing it."""
         try:
-            return metadata.version(self.package or "collide-robotics")
+            return _version(self.package or "collide-robotics")
         except metadata.PackageNotFoundError:
             return "unknown"
 

@@ -22,7 +22,7 @@ from collide.errors import CollideError, UnsupportedQuery
 from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
 
 #: Rapier's cylinders and cones stand along y, ours along z.
-_X_ALONG_Y = np.array([(1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1)], dtype=float)
+X_ALONG_Y = np.array([(1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1)], dtype=float)
 _CANNOT = (
     "ellipsoids, two half-spaces, hulls of one point or on a line",
     "distances, insides and depths of meshes: manifolds that reach far hold all pairs of facets",
@@ -73,7 +73,7 @@ class RapierPeer(PairwisePeer):
             return shapes.capsule_z(part.length / 2, part.radius), X_PS, part
         if isinstance(part, Cylinder | Cone):
             kind = shapes.cylinder if isinstance(part, Cylinder) else shapes.cone
-            return kind(part.length / 2, part.radius), _X_ALONG_Y, part
+            return kind(part.length / 2, part.radius), X_ALONG_Y, part
         if isinstance(part, Halfspace):
             return shapes.halfspace((0.0, 0.0, 1.0)), plane_pose(part), part
         if isinstance(part, Mesh):
@@ -225,10 +225,11 @@ def unit(vector) -> tuple:
 def _farthest(A, X_WA: np.ndarray, B, X_WB: np.ndarray) -> float:
     """A distance that the two bodies surely do not exceed [m]; a half-space is as far as its plane."""
     between = float(np.linalg.norm(X_WA[:3, 3] - X_WB[:3, 3]))
-    return 1.01 * (between + sum(_reach(part) for _, _, part in (A, B)))
+    return 1.01 * (between + sum(rapier_reach(part) for _, _, part in (A, B)))
 
 
-def _reach(part: Shape) -> float:
+def rapier_reach(part: Shape) -> float:
+    """How far a shape reaches from its origin [m]; 0 for half-spaces."""
     if isinstance(part, Halfspace):
         return 0.0
     if isinstance(part, Cylinder | Cone):

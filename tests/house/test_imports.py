@@ -159,6 +159,9 @@ ROOMS = {
         "results",
         "batches",
     },
+    "tetrahedra": {
+        "errors", "argument_checks", "kernels", "log", "mesh", "numerics", "shapes", "threads", "transforms",
+    },
     "solids": {
         "errors", "argument_checks", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",
         "surface_queries",
@@ -325,6 +328,7 @@ LATE = {
     "cli_sweep": {"scenes"},
     "cli_view": {"adapters"},
     "sweeps": {"pyarrow", "distributed"},
+    "tetrahedra": {"meshio"},
 }
 #: Names that say nothing about what a module is for, and names that shadow a package when run as a script.
 BAD_NAMES = {"utils", "util", "helpers", "core", "common", "misc", "fcl", "coal", "pybullet", "numba", "numpy"}
