@@ -39,8 +39,8 @@ def manifold_of(vertices, faces):
     return manifold3d.Manifold(mesh)
 
 
-def asked(P, Q, sign: str):
-    made = P + Q if sign == "+" else P ^ Q if sign == "^" else P - Q
+def asked(A, B, sign: str):
+    made = A + B if sign == "+" else A ^ B if sign == "^" else A - B
     return made, made.volume()
 
 
@@ -55,8 +55,8 @@ def compare(n: int, runs: int) -> None:
     solids = [bumpy_sphere(n, seed) for seed in (0, 1)]
     A, B = (collide.Mesh(*solid, solid=True) for solid in solids)
     X, Y = np.eye(4), collide.pose((0.9, 0.3, 0.2), rpy=(0.3, 0.5, 0.7))
-    P = manifold_of(*solids[0])
-    Q = manifold_of(solids[1][0] @ Y[:3, :3].T + Y[:3, 3], solids[1][1])
+    manifold_a = manifold_of(*solids[0])
+    manifold_b = manifold_of(solids[1][0] @ Y[:3, :3].T + Y[:3, 3], solids[1][1])
     for mesh in (A, B):
         crossings_of(mesh)
     collide.boolean(A, B, X, Y, "union")
@@ -65,15 +65,15 @@ def compare(n: int, runs: int) -> None:
         for _ in range(runs):
             seconds, r = processor_time(lambda op=op: collide.boolean(A, B, X, Y, op))
             ours.append(seconds)
-            seconds, (made, volume) = processor_time(lambda sign=sign: asked(P, Q, sign))
+            seconds, (made, volume) = processor_time(lambda sign=sign: asked(manifold_a, manifold_b, sign))
             theirs.append(seconds)
         volumes = processor_time(lambda: collide.overlap_volume(A, B, X, Y))[0]
         boxes, tested = (int(x) for x in collide.facet_pairs(A, B, X, Y).counters[0, :2])
         exact = r.mesh.report.volume
-        mine, other = median(ours), median(theirs)
+        our_time, peer_time = median(ours), median(theirs)
         print(
-            f"{n:8d} {op:13s} {1e3 * mine:8.1f} {1e3 * other:8.1f} {other / mine:6.2f} {1e3 * volumes:8.1f}"
-            f" {abs(volume - exact) / exact:9.1e} {len(r.mesh.faces):8d} {made.num_tri():8d}"
+            f"{n:8d} {op:13s} {1e3 * our_time:8.1f} {1e3 * peer_time:8.1f} {peer_time / our_time:6.2f}"
+            f" {1e3 * volumes:8.1f} {abs(volume - exact) / exact:9.1e} {len(r.mesh.faces):8d} {made.num_tri():8d}"
             f" {len(r.self_collisions):5d} {r.n_meeting:7d} {r.n_cut:7d} {boxes:8d} {tested:8d}",
             flush=True,
         )  # fmt: skip
@@ -88,18 +88,20 @@ def judged(count: int) -> None:
             if len(crossings_of(A)) or len(crossings_of(B)):
                 crossing += 1
                 continue
-            P, Q = (manifold_of(m.vertices @ Z[:3, :3].T + Z[:3, 3], m.faces) for m, Z in ((A, X), (B, Y)))
-            if P.is_empty() or Q.is_empty():
+            manifold_a, manifold_b = (
+                manifold_of(mesh.vertices @ pose[:3, :3].T + pose[:3, 3], mesh.faces) for mesh, pose in ((A, X), (B, Y))
+            )
+            if manifold_a.is_empty() or manifold_b.is_empty():
                 refused += 1
                 continue
             arrangement = arrangement_of(A, B, X, Y)
             held = arrangement.holds()
-            size = float(P.volume() + Q.volume())
+            size = float(manifold_a.volume() + manifold_b.volume())
             for sign, keep in (("+", held.any(axis=1)), ("^", held.all(axis=1)), ("-", held[:, 0] & ~held[:, 1])):
                 origin = [0, 0, 0]
                 exact = float(six_volumes(exact_corners(arrangement, arrangement.boundary(keep)[0], origin)) / 6)
                 n_asked += 1
-                wrong += abs(asked(P, Q, sign)[1] - exact) > 1e-9 * size
+                wrong += abs(asked(manifold_a, manifold_b, sign)[1] - exact) > 1e-9 * size
         print(
             f"{family:20s} asked {n_asked:5d}  wrong {wrong:4d}  pairs refused {refused:4d}, left out {crossing:4d}",
             flush=True,
