@@ -65,6 +65,8 @@ if TYPE_CHECKING:
         Sphere,
     )
     from collide.shapes.tessellation import tessellate
+    from collide.solids.boolean import BooleanResult, boolean
+    from collide.solids.overlap_volume import OverlapVolume, overlap_volume
     from collide.surface_queries.contains import contains
     from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
     from collide.surface_queries.overlay import Overlay, overlay
@@ -72,6 +74,8 @@ if TYPE_CHECKING:
     from collide.sweeps.pair_proposal import LinkPair, Proposal, propose_disabled_pairs
     from collide.sweeps.sweep import sweep
     from collide.sweeps.sweep_results import SweepResults, read_sweep
+    from collide.tetrahedra.cell_overlaps import CellOverlaps, overlapping_cells, self_overlapping_cells
+    from collide.tetrahedra.tet_mesh import TetMesh
     from collide.transforms import pose
     from collide.world import World
     from collide.world_hits import WorldHits
@@ -109,10 +113,14 @@ _HOMES = {
         "Halfspace", "HeightField", "Mesh", "Shape", "ShapeSet", "Sphere",
     ),
     "collide.shapes.tessellation": ("tessellate",),
+    "collide.solids.boolean": ("BooleanResult", "boolean"),
+    "collide.solids.overlap_volume": ("OverlapVolume", "overlap_volume"),
     "collide.sweeps.configurations": ("DrawnConfigurations",),
     "collide.sweeps.pair_proposal": ("LinkPair", "Proposal", "propose_disabled_pairs"),
     "collide.sweeps.sweep": ("sweep",),
     "collide.sweeps.sweep_results": ("SweepResults", "read_sweep"),
+    "collide.tetrahedra.cell_overlaps": ("CellOverlaps", "overlapping_cells", "self_overlapping_cells"),
+    "collide.tetrahedra.tet_mesh": ("TetMesh",),
     "collide.transforms": ("pose",),
     "collide.world": ("World",),
     "collide.world_hits": ("WorldHits",),
@@ -126,14 +134,15 @@ _RENAMED = {
 }
 
 __all__ = [
-    "Box", "Capsule", "Certificate", "CertificateRefused", "CertifiedEdges", "CollideError", "Compound", "Cone",
-    "Contacts", "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs",
-    "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair",
-    "Mesh", "MissingExtra", "Overlay", "PairResult", "Proposal", "RayHits", "Robot", "RobotChecker",
-    "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "Sphere", "SweepResults",
-    "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "certify", "collide",
-    "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses", "overlay",
-    "pose", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "shape_cast",
+    "BooleanResult", "Box", "Capsule", "CellOverlaps", "Certificate", "CertificateRefused", "CertifiedEdges",
+    "CollideError", "Compound", "Cone", "Contacts", "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations",
+    "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose",
+    "InvalidShape", "LinkPair", "Mesh", "MissingExtra", "OverlapVolume", "Overlay", "PairResult", "Proposal", "RayHits",
+    "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
+    "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits",
+    "WorldResult", "boolean", "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include",
+    "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses_in_motion",
+    "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "self_overlapping_cells", "shape_cast",
     "sweep", "tessellate", "time_of_impact", "verify", "walk",
 ]
 

@@ -11,7 +11,18 @@ import math
 import re
 from typing import NoReturn
 
-from collide import __version__, cli_bench, cli_compare, cli_engines, cli_fuzz, cli_pages, cli_srdf, cli_sweep, cli_view
+from collide import (
+    __version__,
+    cli_bench,
+    cli_compare,
+    cli_engines,
+    cli_fuzz,
+    cli_numbers,
+    cli_pages,
+    cli_srdf,
+    cli_sweep,
+    cli_view,
+)
 from collide.errors import InvalidArgument
 from collide.reports.number_format import UNITS, parse_length
 
@@ -192,7 +203,7 @@ def _add(commands, name: str, summary: str, epilog: str) -> argparse.ArgumentPar
 def _add_stress(commands) -> None:
     parser = _add(commands, "stress", "the hard families, judged exactly", _STRESS)
     parser.add_argument("--family", action="append", metavar="NAME", help="only this one; may be given again")
-    parser.add_argument("--cases", type=_positive_count, default=40, metavar="N", help="cases a family (40)")
+    parser.add_argument("--cases", type=cli_numbers.count, default=40, metavar="N", help="cases a family (40)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds make other cases (0)")
     parser.add_argument("--engine", type=cli_engines.one_engine, default="collide", metavar="E",
                         help="whom to ask, such as coal or coal:nesterov; help lists them (collide)")
@@ -209,16 +220,6 @@ def _add_locality(commands) -> None:
     parser.add_argument("--repeated", action="store_true",
                         help="count vertices with equal coordinates one by one, as Table 1 of the paper does")
     _output_arguments(parser)
-
-
-def _positive_count(text: str) -> int:
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of cases (1 or more)")
-    return number
 
 
 def _add_report(commands) -> None:

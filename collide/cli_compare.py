@@ -121,7 +121,8 @@ def _answer_fcl(args: argparse.Namespace, progress: Callable) -> bool:
 def _saved_dump(folder: str, k: int, entry: dict[str, Any]) -> Any:
     from pathlib import Path
 
-    from collide.scenes.write_scene import document_text, write_whole
+    from collide.scenes.write_scene import document_text
+    from collide.whole_file import write_whole
 
     Path(folder).mkdir(parents=True, exist_ok=True)
     place = Path(folder) / f"fcl-error-{k + 1}.json"

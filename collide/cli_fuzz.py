@@ -16,6 +16,7 @@ EPILOG = """examples:
   collide fuzz --engines fcl,coal,pybullet --minutes 60 --seed 7 --save found
   collide fuzz --engines fcl,coal,pybullet --minutes 60 --seed 7 --save found --resume
   collide compare found/coal-false-miss-box-cylinder-shallow.json --engines coal
+  collide fuzz --draw found/coal-*.json --picture plate.png
 
 Scenes are invented: pairs of all shapes and meshes at random, nearly touching,
 resting on each other, thin, flat, tiny against huge, concentric; Worlds of many
@@ -32,6 +33,8 @@ Of every kind (engine, error, the two shapes, how they stand) the folder gets
   NAME.md    the text of an issue for its tracker
 and fuzz.json, the state. A search that is interrupted or killed goes on with
 --resume, and loses the round it was in. Equal seeds invent equal scenes.
+Shrinking takes half of the time at most; kinds that wait for it are counted,
+and --resume goes on with them.
 
 Booleans of pairs that touch within rounding count against nobody.
 Engines come with: pip install 'collide-robotics[peers]'
@@ -56,6 +59,10 @@ def add_arguments(parser: argparse.ArgumentParser, engines: Callable) -> None:
     parser.add_argument("--resume", action="store_true", help="go on with the search that DIR holds")
     parser.add_argument("--timeout", type=minutes, default=5.0, metavar="T",
                         help="seconds that an engine may take for one pair (5)")
+    parser.add_argument("--draw", nargs="+", metavar="FINDING",
+                        help="search nothing: draw these scene files of findings as one plate")
+    parser.add_argument("--picture", metavar="FILE", default="findings.png",
+                        help="where --draw writes: .png, .svg or .pdf (%(default)s)")
     parser.add_argument("--all", action="store_true", help="do not shorten the list of findings")
     parser.add_argument("--json", metavar="FILE|-", help="write counts and findings as JSON, or - to standard output")
     parser.add_argument("--quiet", action="store_true", help="no table, no progress; errors are still told")
@@ -63,6 +70,8 @@ def add_arguments(parser: argparse.ArgumentParser, engines: Callable) -> None:
 
 def run(args: argparse.Namespace, progress: Callable) -> bool:
     """True: no answer of collide's is wrong."""
+    if args.draw:
+        return _draw(args)
     from collide.adapters.fuzzing.fuzz_run import fuzz
 
     if args.seed < 0:
@@ -80,6 +89,15 @@ def run(args: argparse.Namespace, progress: Callable) -> bool:
     if args.json != "-" and not args.quiet:
         _print(result, args)
     return not result.ours
+
+
+def _draw(args: argparse.Namespace) -> bool:
+    from collide.adapters.fuzzing.case_plate import draw_findings
+
+    drawn = draw_findings(args.draw, args.picture)
+    if not args.quiet:
+        print(f"{drawn} findings drawn: {args.picture}")
+    return True
 
 
 def _listed(result: Any) -> list[dict[str, Any]]:
@@ -100,9 +118,12 @@ def _print(result: Any, args: argparse.Namespace) -> None:
     columns = [Column("engine", "label"), *(Column(kind) for kind in met), Column("all")]
     title = f"FUZZING  wrong answers to {result.pairs} pairs, seed {result.seed}, {result.rounds} rounds"
     terminal.show_table(Table(title, columns, rows))
+    sources = (f"{n} {name}" for name, n in sorted(result.invented.items()) if not name.startswith("shape "))
+    terminal.write_text(f"pairs invented: {', '.join(sources)}\n")
     findings = result.findings()
     if findings:  # names of files say engine, error, shapes and position, and stay whole on a narrow terminal
         listed = findings[: None if args.all else SHORT]
         title = f"FINDINGS  {len(findings)} kinds of wrong answers, a small case of each, in {result.folder}"
         more = [f"  {len(findings) - len(listed)} more: --all"] if len(listed) < len(findings) else []
+        more += [f"  {len(result.waiting)} kinds wait to be shrunk: --resume goes on"] if result.waiting else []
         terminal.write_text("\n".join(["", title, *(f"  {f.stem}.json" for f in listed), *more, ""]))

@@ -11,8 +11,6 @@ import hashlib
 import io
 import json
 import logging
-import os
-import tempfile
 import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -21,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from collide.cache_folder import cache_folder
+from collide.whole_file import whole_file
 
 #: Raised with every change in what a loader stores; old entries are then never read again.
 VERSION = 3
@@ -61,14 +60,8 @@ def store(name: str, arrays: Mapping[str, Any]) -> bool:
     try:
         folder = directory()
         folder.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=folder, prefix=".", suffix=".part")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                np.savez(file, **arrays)
-            os.replace(temporary, folder / f"{name}.npz")
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+        with whole_file(folder / f"{name}.npz", private=True) as file:
+            np.savez(file, **arrays)
         return True
     except OSError as error:
         _log.debug("prepared input %s not kept: %s", name, error)

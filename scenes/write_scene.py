@@ -7,7 +7,6 @@ their links are, where they stand now; their joints are left out, and `about` ma
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -30,6 +29,7 @@ from collide.shapes import (
     Shape,
     Sphere,
 )
+from collide.whole_file import write_whole
 
 VERSION = 1
 #: Of groups and masks in scene files.
@@ -90,18 +90,6 @@ def document_text(document: Mapping[str, Any]) -> str:
             text = json.dumps(value, allow_nan=False, indent=2 if isinstance(value, Mapping) else None)
             lines.append(f"  {json.dumps(key)}: " + text.replace("\n", "\n  "))
     return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
-def write_whole(path: str | Path, text: str) -> None:
-    """A text file that is there whole, or not at all."""
-    path = Path(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise OSError(error.errno, error.strerror, str(path)) from None
 
 
 def shape_document(shape: Shape) -> dict[str, Any]:

@@ -13,22 +13,24 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.adapters.fuzzing.fuzz_case import Case, isolated
+from collide.adapters.fuzzing.nearest_points import POINTS_TOLERANCE, points_off
 from collide.adapters.fuzzing.support_bounds import SLACK, lower_bound
 from collide.adapters.peers.answers import ABORTED, HUNG, NO_LENGTH, NOT_A_NUMBER, RAISED, STATUSES, Table
 from collide.adapters.peers.collide_peer import CollidePeer
 from collide.adapters.peers.compare import TOLERANCE, Summary
 from collide.adapters.peers.exact_peer import INSIDE, ExactPeer
 from collide.adapters.peers.judge import BRACKET, EXACT, Disagreement, Judge, contradictions, differences
-from collide.adapters.peers.question import Question, has_mesh
+from collide.adapters.peers.question import Question, has_mesh, is_compound_or_mesh
 from collide.reports import classes
 from collide.shapes import Mesh
 
 FALSE_HIT, FALSE_MISS, WRONG_GAP, WRONG_DEPTH = "false hit", "false miss", "wrong gap", "wrong depth"
+WRONG_POINTS = "wrong points"
 CONTRADICTION, LEFT_OUT, WRONG_BRACKET = "contradicts itself", "left out of a World", "wrong bracket"
 #: The kinds, the gravest first. Those that are no answers are the protocol's mishaps.
 KINDS = (
-    ABORTED, HUNG, RAISED, FALSE_MISS, FALSE_HIT, NOT_A_NUMBER, NO_LENGTH, WRONG_GAP, WRONG_DEPTH, CONTRADICTION,
-    LEFT_OUT, WRONG_BRACKET,
+    ABORTED, HUNG, RAISED, FALSE_MISS, FALSE_HIT, NOT_A_NUMBER, NO_LENGTH, WRONG_GAP, WRONG_DEPTH, WRONG_POINTS,
+    CONTRADICTION, LEFT_OUT, WRONG_BRACKET,
 )  # fmt: skip
 OURS = "collide"
 #: A gap or a depth below this part of the pair's size is near touching.
@@ -41,7 +43,7 @@ POSITIONS = ("apart", "near", "touching", "shallow", "deep", "meeting", "inside"
 class Flaw(NamedTuple):
     """One wrong answer, or one that was owed.
 
-    kind : of `KINDS`.   position : of `POSITIONS`: "meeting" is of meshes, whose depth nobody knows.
+    kind : of `KINDS`.   position : of `POSITIONS`: "meeting" is of meshes and unions, whose depth nobody knows.
     hit, distance [m], reason : what the engine said; None where it said nothing.
     exact_hit, exact_distance, lower, upper : the verdict [m]; None where not known.
     judged_by : exact arithmetic, the proven bracket, or empty where no judge is needed.
@@ -62,8 +64,12 @@ class Flaw(NamedTuple):
     severity: float
 
     def same_way(self, flaw: Flaw) -> bool:
-        """Whether two flaws are one engine's, of one kind, in one class of position."""
-        return (self.engine, self.kind, self.position) == (flaw.engine, flaw.kind, flaw.position)
+        """Whether a flaw of a simpler case is the same engine's, of the same kind, in the same class of position.
+
+        Where nobody knows how deep bodies meet, as of meshes, their parts may meet to any depth.
+        """
+        same = self.position == flaw.position or (self.position == "meeting" and flaw.position in ("shallow", "deep"))
+        return same and (self.engine, self.kind) == (flaw.engine, flaw.kind)
 
 
 class Examiner:
@@ -106,12 +112,15 @@ class Examiner:
             exact = truth.table_of_small()
             disputes = contradictions(judge, ours) + differences(judge, ours, exact, Summary("exact"))
             _gravest(flaws, truth, ours, disputes, OURS)
+            _add_wrong_points(flaws, cases, truth, ours, OURS)
             for k, case in enumerate(cases):
-                flaws[k] += _refuted_by_supports(case, truth, ours, k) if not flaws[k] else []
+                if not flaws[k] and not exact.rows["has_distance"][k]:
+                    flaws[k] += _refuted_by_supports(case, truth, ours, k)
         for name in self.answers if engines is None else [name for name in engines if name != OURS]:
             table = self.answers[name](question)
             disputes = contradictions(judge, table) + differences(judge, ours, table, Summary(name))
             _gravest(flaws, truth, table, disputes, name)
+            _add_wrong_points(flaws, cases, truth, table, name)
         return flaws
 
 
@@ -147,8 +156,9 @@ class _Truth:
             distance = distance if dispute.exact_distance is None else dispute.exact_distance
         if abs(distance) <= self.judge.rounding[k]:
             return "touching"
-        if any(has_mesh(self.question.bodies[i].shape) for i in self.question.pairs[k]) and hit:
-            return "inside" if self.is_inside(k) else "meeting"
+        shapes = [self.question.bodies[i].shape for i in self.question.pairs[k]]
+        if hit and any(map(is_compound_or_mesh, shapes)):
+            return "inside" if any(map(has_mesh, shapes)) and self.is_inside(k) else "meeting"
         if hit:
             return "shallow" if abs(distance) <= NEAR * size else "deep"
         return "near" if distance <= NEAR * size else "apart"
@@ -175,6 +185,21 @@ def _gravest(flaws: list[list[Flaw]], truth: _Truth, table: Table, disputes: lis
             by_case.setdefault(k, []).append(_mishap(truth, k, name, mishap, hit, table.reasons[k]))
     for k, several in by_case.items():
         flaws[k].append(min(several, key=lambda flaw: KINDS.index(flaw.kind)))
+
+
+def _add_wrong_points(flaws: list[list[Flaw]], cases: list[Case], truth: _Truth, table: Table, name: str) -> None:
+    """An engine's nearest points that are none, of pairs about which it says nothing else that is wrong."""
+    for k, case in enumerate(cases):
+        row, size = table.rows[k], truth.judge.size[k] or 1.0
+        if any(flaw.engine == name for flaw in flaws[k]) or row["hit"] or truth.ours.rows["hit"][k]:
+            continue
+        off, why = points_off(case, row, float(truth.ours.rows["upper"][k]))
+        if off > POINTS_TOLERANCE * size + truth.judge.rounding[k]:  # a tiny body may be far away
+            gap, distance = truth.ours.rows[k], _number(row["distance"])
+            flaws[k].append(Flaw(
+                name, WRONG_POINTS, truth.position(k), False, distance, why, False, _number(gap["distance"]),
+                _number(gap["lower"]), _number(gap["upper"]), BRACKET, off / size,
+            ))  # fmt: skip
 
 
 def _of_dispute(truth: _Truth, k: int, d: Disagreement, name: str) -> Flaw | None:

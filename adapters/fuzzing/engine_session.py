@@ -16,6 +16,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import IO, Any
 
 from collide.adapters.peers import protocol
@@ -73,6 +74,21 @@ class EngineSession:
                 table.record(Event(FAILED, k, None, reason, mishap=mishap))
                 unanswered.remove(k)
         return table
+
+    @contextmanager
+    def hurried(self, seconds: float) -> Iterator[None]:
+        """With a shorter time limit for a while.
+
+        Parameters
+        ----------
+        seconds : float
+            The limit, where it is below the session's own [s].
+        """
+        patient, self.timeout = self.timeout, min(self.timeout, seconds)
+        try:
+            yield
+        finally:
+            self.timeout = patient
 
     def close(self) -> None:
         """End the child."""

@@ -21,7 +21,8 @@ from collide.adapters.peers.protocol import engine
 from collide.adapters.peers.question import Body
 from collide.errors import SceneError
 from collide.scenes import load
-from collide.scenes.write_scene import document_text, write_whole
+from collide.scenes.write_scene import document_text
+from collide.whole_file import write_whole
 
 #: What `collide compare` takes as the clearance by default [m].
 CLEARANCE = 0.1

@@ -17,10 +17,12 @@ class Case(NamedTuple):
     """Bodies, the first two of which are the pair in question.
 
     world : the flaw is one of a whole World: the bodies beside the pair, and how it is asked, matter.
+    source : of an invented case, a name of `invented_scenes.SOURCES`.
     """
 
     bodies: tuple[Body, ...]
     world: bool = False
+    source: str = ""
 
     @property
     def kinds(self) -> tuple[str, str]:

@@ -13,27 +13,34 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing, nullcontext
 from dataclasses import dataclass, field
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from collide.adapters.fuzzing import shrink as shrinking
 from collide.adapters.fuzzing.disagreements import KINDS, OURS, Examiner, Flaw
 from collide.adapters.fuzzing.engine_session import EngineSession
 from collide.adapters.fuzzing.findings import Finding, kind_of, load_finding, save_finding, simpler_of
 from collide.adapters.fuzzing.fuzz_case import Case
 from collide.adapters.fuzzing.invented_scenes import invent
+from collide.adapters.fuzzing.shrink import COSTLY, Shrunk, shrink
+from collide.adapters.peers.answers import HUNG
 from collide.adapters.peers.protocol import engine
 from collide.errors import InvalidArgument
-from collide.scenes.write_scene import write_whole
+from collide.whole_file import write_whole
 
 STATE = "fuzz.json"
 #: Changes where a state written before would be misread.
 FORMAT = 1
-#: Pairs a round, and pairs asked at a time.
-ROUND, BATCH = 60, 20
+#: Pairs asked at a time.
+BATCH = 20
+#: Simpler cases that may be asked for each pair of the search, and beyond that at all times; what a hang or an abort
+#: counts as.
+SHRINK_SHARE, SHRINK_AT_LEAST, COSTLY_CASE = 2, 5000, 50
+#: How long an engine may be silent about the simpler cases of a hang [s]; the last is asked with the whole limit again.
+HURRIED = 1.0
 
 
 @dataclass
@@ -56,6 +63,12 @@ class FuzzRun:
         "engine | kind | shape | shape | position", as first met → how often.
     shrunk : dict of str to str
         The same → the finding's file.
+    invented : dict of str to int
+        Source, "shape X", → how many of the pairs.
+    waiting : dict of str to list
+        Kinds that are not shrunk yet → number of the round, and of the case in it, where each was met first.
+    tried : int
+        Simpler cases asked, costly ones counted as several.
     """
 
     folder: str
@@ -66,11 +79,14 @@ class FuzzRun:
     seconds: float = 0.0
     kinds: dict[str, int] = field(default_factory=dict)
     shrunk: dict[str, str] = field(default_factory=dict)
+    invented: dict[str, int] = field(default_factory=dict)
+    waiting: dict[str, list[int]] = field(default_factory=dict)
+    tried: int = 0
 
     @property
     def ours(self) -> int:
         """How many kinds of wrong answers of collide's were met."""
-        return sum(kind.split(" | ")[0] == OURS for kind in self.shrunk)
+        return sum(kind.split(" | ")[0] == OURS for kind in (*self.shrunk, *self.waiting))
 
     def findings(self) -> list[Finding]:
         """What is kept, the gravest kinds first.
@@ -108,6 +124,7 @@ class FuzzRun:
         return {
             "format": FORMAT, "seed": self.seed, "engines": self.engines, "rounds": self.rounds, "pairs": self.pairs,
             "seconds": self.seconds, "kinds": self.kinds, "shrunk": self.shrunk,
+            "invented": self.invented, "waiting": self.waiting, "tried": self.tried,
         }  # fmt: skip
 
     def save(self) -> None:
@@ -129,7 +146,8 @@ def fuzz(
     folder : str or Path
         Where findings and the state go; made if need be.
     minutes : float
-        How long to search; what is being shrunk then is finished.
+        How long to search; what is being shrunk then is finished. Shrinking takes about half of it at most: what was
+        not shrunk waits, the gravest kinds before the others, and `FuzzRun.waiting` has what is left.
     rounds : int, optional
         Stop after so many rounds in all.
     seed : int
@@ -163,9 +181,9 @@ def fuzz(
     with ExitStack() as stack:
         sessions = {name: stack.enter_context(closing(EngineSession(name, timeout))) for name in names}
         rename = stack.enter_context((progress or nullcontext_of)("fuzzing")) or (lambda label: None)
-        examiner = Examiner({name: session.answer for name, session in sessions.items()})
+        search = _Search(run, sessions, lru_cache(maxsize=8)(partial(source, seed)), deadline, rename)
         while time.monotonic() < deadline and (rounds is None or run.rounds < rounds):
-            if not _round(run, examiner, source(seed, run.rounds), deadline, rename):
+            if not search.round():
                 break
             run.rounds, run.seconds = run.rounds + 1, before + time.monotonic() - started
             run.save()
@@ -205,35 +223,93 @@ def _opened(folder: Path, seed: int, names: list[str], resume: bool) -> FuzzRun:
     return run
 
 
-def _round(run: FuzzRun, examiner: Examiner, cases: list[Case], deadline: float, rename: Callable) -> bool:
-    """One round; False where time ran out before its end: it is not counted, and what it shrank is kept."""
-    met: Counter = Counter()
-    for start in range(0, len(cases), BATCH):
-        rename(
-            f"round {run.rounds + 1}: {run.pairs + start} pairs asked, {len(set(run.shrunk.values()))} kinds of wrong "
-            "answers"
-        )
-        batch = cases[start : start + BATCH]
-        for case, flaws in zip(batch, examiner.flaws(batch)):
-            for flaw in flaws:
-                kind = " | ".join(kind_of(case, flaw))
-                met[kind] += 1
-                if kind not in run.shrunk:
-                    rename(f"round {run.rounds + 1}: shrinking {kind}")
-                    run.shrunk[kind] = _shrink_and_save(run, examiner, case, flaw)
+class _Search:
+    """A run at work.
+
+    cases_of : from the number of a round to its cases.   rename : says what is being done.
+    """
+
+    def __init__(
+        self, run: FuzzRun, sessions: Mapping[str, EngineSession], cases_of: Callable[[int], list[Case]],
+        deadline: float, rename: Callable,
+    ):
+        self.run, self.sessions, self.cases_of = run, sessions, cases_of
+        self.deadline, self.rename = deadline, rename
+        self.examiner = Examiner({name: session.answer for name, session in sessions.items()})
+
+    def round(self) -> bool:
+        """One round; False where time ran out before its end: it is not counted, and what it shrank is kept."""
+        run = self.run
+        met: Counter = Counter()
+        cases = self.cases_of(run.rounds)
+        for start in range(0, len(cases), BATCH):
+            self.rename(_progress_line(run, start))
+            batch = cases[start : start + BATCH]
+            for at, (case, flaws) in enumerate(zip(batch, self.examiner.flaws(batch)), start):
+                for flaw in flaws:
+                    kind = " | ".join(kind_of(case, flaw))
+                    met[kind] += 1
+                    if kind not in run.shrunk:
+                        run.waiting.setdefault(kind, [run.rounds, at])
+            self._shrink_waiting()
+            if time.monotonic() >= self.deadline:
+                return False
+        run.kinds = dict(Counter(run.kinds) + met)
+        run.invented = dict(Counter(run.invented) + Counter(label for case in cases for label in _labels(case)))
+        run.pairs += len(cases)
+        return True
+
+    def _shrink_waiting(self) -> None:
+        """Shrink kinds that wait, the gravest first, as long as time and their share last; collide's own always."""
+        run = self.run
+        for kind in sorted(run.waiting, key=_gravity):
+            is_ours = kind.startswith(f"{OURS} | ")
+            spent = run.tried > SHRINK_AT_LEAST + SHRINK_SHARE * run.pairs or time.monotonic() >= self.deadline
+            if spent and not is_ours:
+                return
+            self.rename(f"round {run.rounds + 1}: shrinking {kind}")
+            number, at = run.waiting.pop(kind)
+            case = self.cases_of(number)[at]
+            for flaw in self.examiner.flaws([case], [kind.split(" | ")[0]])[0]:
+                if " | ".join(kind_of(case, flaw)) == kind:  # else it is not there alone: it waits to be met again
+                    run.shrunk[kind] = self._shrink_and_save(case, flaw)
                     run.save()
-                    if time.monotonic() >= deadline:
-                        return False
-    run.kinds = dict(Counter(run.kinds) + met)
-    run.pairs += len(cases)
-    return True
+
+    def _shrink_and_save(self, case: Case, flaw: Flaw) -> str:
+        """Shrink a case and write it down, unless a simpler one of its kind is there; the file's name."""
+        small = shrunk_in(self.sessions, self.examiner, case, flaw)
+        self.run.tried += small.asked * (COSTLY_CASE if flaw.kind in COSTLY else 1)
+        finding = Finding(small.case, small.flaw, self.run.seed, self.run.rounds, 1, small.is_minimal)
+        place = Path(self.run.folder) / f"{finding.stem}.json"
+        if place.exists():
+            finding = simpler_of(load_finding(place)[0], finding)
+        return save_finding(finding, self.run.folder).name
 
 
-def _shrink_and_save(run: FuzzRun, examiner: Examiner, case: Case, flaw: Flaw) -> str:
-    """Shrink a case and write it down, unless a simpler one of its kind is there; the file's name."""
-    small = shrinking.shrink(case, flaw, examiner.flaws)
-    finding = Finding(small.case, small.flaw, run.seed, run.rounds, 1, small.is_minimal)
-    place = Path(run.folder) / f"{finding.stem}.json"
-    if place.exists():
-        finding = simpler_of(load_finding(place)[0], finding)
-    return save_finding(finding, run.folder).name
+def _gravity(kind: str) -> int:
+    """Where a kind stands among those that wait to be shrunk."""
+    name, error, *_ = kind.split(" | ")
+    return -1 if name == OURS else KINDS.index(error)
+
+
+def _labels(case: Case) -> list[str]:
+    """What a case is counted as: its source, and the kinds of its shapes."""
+    return [case.source or "other", *(f"shape {kind}" for kind in sorted(set(case.kinds)))]
+
+
+def _progress_line(run: FuzzRun, asked: int) -> str:
+    """How far a search is, with the pairs of every source."""
+    sources = ", ".join(f"{n} {name}" for name, n in sorted(run.invented.items()) if not name.startswith("shape "))
+    kinds = len(set(run.shrunk.values())) + len(run.waiting)
+    counts = f"{run.pairs + asked} pairs, {kinds} kinds of wrong answers"
+    return f"round {run.rounds + 1}: {counts}" + (f" ({sources})" if sources else "")
+
+
+def shrunk_in(sessions: Mapping[str, EngineSession], examiner: Examiner, case: Case, flaw: Flaw) -> Shrunk:
+    """A case shrunk; one that hangs with a short time limit, and what is left of it asked with the whole one again."""
+    if flaw.kind != HUNG or flaw.engine not in sessions:
+        return shrink(case, flaw, examiner.flaws)
+    with sessions[flaw.engine].hurried(HURRIED):
+        small = shrink(case, flaw, examiner.flaws)
+    again = next((f for f in examiner.flaws([small.case], [flaw.engine])[0] if flaw.same_way(f)), None)
+    return Shrunk(case, flaw, small.asked, False) if again is None else small._replace(flaw=again)

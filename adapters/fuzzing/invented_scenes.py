@@ -1,6 +1,7 @@
 """Scenes invented from a seed: pairs and Worlds of every shape, near touching, resting, degenerate, and robots.
 
-What depends on the engine under test is where near pairs are put; whether they are there is for the judge to say.
+Where near pairs are put depends on collide's own distance; whether they are there is for the judge to say. Every case
+tells its source.
 """
 
 from __future__ import annotations
@@ -12,34 +13,27 @@ from functools import cache
 import numpy as np
 
 from collide.adapters.fuzzing.fuzz_case import Case, cases_of, pair_case, pair_of
+from collide.adapters.fuzzing.invented_shapes import (
+    Random,
+    any_pose,
+    any_rotation,
+    any_shape,
+    extent,
+    length,
+    reach,
+)
 from collide.adapters.fuzzing.simpler_cases import at_distance
 from collide.adapters.peers.question import Body, Question
 from collide.errors import CollideError
 from collide.scenes import families, load
-from collide.scenes.families.ingredients import EXACT_ROTATIONS, rotation
 from collide.scenes.generators import generate
-from collide.shapes import (
-    Box,
-    Capsule,
-    Compound,
-    Cone,
-    ConvexHull,
-    Cylinder,
-    Ellipsoid,
-    Halfspace,
-    HeightField,
-    HPolytope,
-    Mesh,
-    Shape,
-    Sphere,
-)
+from collide.shapes import Box, ConvexHull, Halfspace, Sphere
 from collide.transforms import pose
 
 #: Pairs of a World that are asked of other engines.
 MAX_WORLD_PAIRS = 12
 #: Families whose cases take exact arithmetic long.
 _LARGE = ("spheres_big", "cyl1000", "bipyramids", "repeats")
-Random = np.random.Generator
 
 
 def invent(seed: int, round_number: int, n: int = 60) -> list[Case]:
@@ -48,133 +42,37 @@ def invent(seed: int, round_number: int, n: int = 60) -> list[Case]:
     seed, round_number : whole numbers ≥ 0.   n : about how many pairs.
     """
     cases: list[Case] = []
-    kinds = list(_SOURCES)
+    names, shares = list(SOURCES), [share for share, _ in SOURCES.values()]
     k = 0
     while len(cases) < n:
         rng = np.random.default_rng([seed, round_number, k])
-        source = kinds[int(rng.choice(len(kinds), p=[share for share in _SOURCES.values()]))]
+        name = names[int(rng.choice(len(names), p=shares))]
         try:
-            cases += source(rng)
+            cases += [case._replace(source=name) for case in SOURCES[name][1](rng)]
         except CollideError:
             pass  # sizes that no shape has
         k += 1
     return cases
 
 
-# --- sizes, shapes, poses -------------------------------------------------------------------------
-
-
-def _length(rng: Random) -> float:
-    """A length as people write it, or any [m]."""
-    kind = rng.random()
-    if kind < 0.4:
-        return float(rng.choice([0.1, 0.2, 0.25, 0.3, 0.5, 1.0, 1.5, 2.0, 3.0]))
-    if kind < 0.8:
-        return float(round(rng.uniform(0.01, 2.0), 2)) or 0.5
-    return float(10.0 ** rng.uniform(-3, 1.5))
-
-
-def _box_mesh(size: np.ndarray) -> Mesh:
-    corners = (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5) * size
-    faces = [(0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5), (2, 3, 7), (2, 7, 6), (0, 2, 6),
-             (0, 6, 4), (1, 5, 7), (1, 7, 3)]  # fmt: skip
-    return Mesh(corners, faces)
-
-
-def _hull(rng: Random) -> Shape:
-    points = rng.standard_normal((int(rng.integers(4, 20)), 3)) * _length(rng)
-    if rng.random() < 0.5:
-        points = np.round(points, 2)
-    return ConvexHull(points, radius=_length(rng) if rng.random() < 0.1 else 0.0)
-
-
-def _hpolytope(rng: Random) -> Shape:
-    normals = np.concatenate([np.eye(3), -np.eye(3), np.round(rng.uniform(-1, 1, (3, 3)), 1)])
-    normals = normals[np.abs(normals).sum(axis=1) > 0]
-    return HPolytope(normals, np.full(len(normals), _length(rng)))
-
-
-def _mesh(rng: Random) -> Shape:
-    if rng.random() < 0.5:
-        return _box_mesh(np.array([_length(rng) for _ in range(3)]))
-    case = families.generate(str(rng.choice(families.mesh_names())), 1, int(rng.integers(1 << 30)))[0]
-    return case.shapes()[int(rng.integers(2))]
-
-
-def _height_field(rng: Random) -> Shape:
-    heights = rng.uniform(0, 1, rng.integers(2, 5, 2)) * _length(rng)
-    return HeightField(np.round(heights, 2) if rng.random() < 0.5 else heights, _length(rng))
-
-
-def _compound(rng: Random) -> Shape:
-    parts = [(_ROUND_AND_FLAT[int(rng.integers(len(_ROUND_AND_FLAT)))](rng), _pose(rng)) for _ in range(3)]
-    return Compound(parts)
-
-
-_ROUND_AND_FLAT: list[Callable[[Random], Shape]] = [
-    lambda rng: Sphere(_length(rng)),
-    lambda rng: Box([_length(rng) for _ in range(3)]),
-    lambda rng: Capsule(_length(rng), _length(rng)),
-    lambda rng: Cylinder(_length(rng), _length(rng)),
-    lambda rng: Cone(_length(rng), _length(rng)),
-    lambda rng: Ellipsoid([_length(rng) for _ in range(3)]),
-    _hull,
-]
-_SHAPES = [*_ROUND_AND_FLAT, *_ROUND_AND_FLAT, _hpolytope, _mesh, _mesh, _height_field, _compound]
-
-
-def _shape(rng: Random) -> Shape:
-    return _SHAPES[int(rng.integers(len(_SHAPES)))](rng)
-
-
-def _rotation(rng: Random) -> np.ndarray:
-    kind = rng.random()
-    if kind < 0.35:
-        return np.eye(3)
-    if kind < 0.55:
-        return EXACT_ROTATIONS[int(rng.integers(len(EXACT_ROTATIONS)))]
-    if kind < 0.7:  # barely tilted
-        return pose(rpy=rng.standard_normal(3) * 10.0 ** rng.uniform(-9, -2))[:3, :3]
-    if kind < 0.8:
-        return pose(rpy=np.radians(15.0) * rng.integers(0, 24, 3))[:3, :3]
-    return rotation(rng)
-
-
-def _pose(rng: Random, spread: float = 1.0) -> np.ndarray:
-    t = rng.uniform(-spread, spread, 3)
-    return pose(np.round(t, 2) if rng.random() < 0.5 else t, R=_rotation(rng))
-
-
-def _reach(shape: Shape) -> float:
-    from_origin = [1.0]
-    for name in ("radius", "length"):
-        from_origin += [float(getattr(shape, name))] if hasattr(shape, name) else []
-    for name in ("size", "radii", "points", "vertices"):
-        from_origin += [float(np.abs(getattr(shape, name)).max())] if hasattr(shape, name) else []
-    return max(from_origin[1:] or from_origin)
-
-
-# --- sources of cases -----------------------------------------------------------------------------
-
-
 def _random_pairs(rng: Random) -> list[Case]:
     """Anywhere near each other."""
-    A, B = _shape(rng), _shape(rng)
-    return [pair_case(A, B, _pose(rng), _pose(rng, _reach(A) + _reach(B)))]
+    A, B = any_shape(rng), any_shape(rng)
+    return [pair_case(A, B, any_pose(rng), any_pose(rng, reach(A) + reach(B)))]
 
 
 def _near_pairs(rng: Random) -> list[Case]:
     """Moved along their normal to a gap or a depth of 1e-1 … 1e-12 of a length."""
     case = _random_pairs(rng)[0]
-    gap = _reach(case.bodies[0].shape) * 10.0 ** -int(rng.integers(1, 13)) * float(rng.choice([1, 1, -1]))
+    gap = reach(case.bodies[0].shape) * 10.0 ** -int(rng.integers(1, 13)) * float(rng.choice([1, 1, -1]))
     moved = at_distance(case, gap)
     return [] if moved is None else [moved]
 
 
 def _resting_pairs(rng: Random) -> list[Case]:
     """One on top of the other, axis-aligned, with decimal numbers: touching within rounding, or a plain gap."""
-    A, B = _shape(rng), _shape(rng)
-    top, bottom = _extent(A), _extent(B)
+    A, B = any_shape(rng), any_shape(rng)
+    top, bottom = extent(A), extent(B)
     if top is None or bottom is None:
         return []
     gap = float(rng.choice([0.0, 0.0, 1e-9, -1e-9, 1e-6, -1e-6, 1e-3, -1e-3]))
@@ -185,52 +83,58 @@ def _resting_pairs(rng: Random) -> list[Case]:
     return [pair_case(A, B, pose(), at)]
 
 
-def _extent(shape: Shape) -> tuple[float, float] | None:
-    """The least and the greatest z of a shape in its own frame [m]; None where that is not plain."""
-    if isinstance(shape, Sphere):
-        return -shape.radius, shape.radius
-    if isinstance(shape, Box):
-        return -shape.size[2] / 2, shape.size[2] / 2
-    if isinstance(shape, Capsule):
-        return -shape.length / 2 - shape.radius, shape.length / 2 + shape.radius
-    if isinstance(shape, Cylinder | Cone):
-        return -shape.length / 2, shape.length / 2
-    if isinstance(shape, Ellipsoid):
-        return -shape.radii[2], shape.radii[2]
-    points = getattr(shape, "points", None) if isinstance(shape, ConvexHull) else getattr(shape, "vertices", None)
-    return None if points is None else (float(points[:, 2].min()), float(points[:, 2].max()))
+# --- degenerate pairs -----------------------------------------------------------------------------
 
 
-def _degenerate_pairs(rng: Random) -> list[Case]:
-    """Needles, plates, flat and doubled hulls, tiny against huge, far from the origin, concentric, identical."""
-    kind = int(rng.integers(6))
-    A, B = _shape(rng), _shape(rng)
-    if kind == 0:
-        thin = [1.0, 1.0, 1.0]
-        thin[int(rng.integers(3))] = 10.0 ** -int(rng.integers(2, 9))
-        A = Box(np.array(thin) * _length(rng)) if rng.random() < 0.5 else ConvexHull(
-            np.round(rng.standard_normal((8, 3)), 2) * thin)  # fmt: skip
-    elif kind == 1:
-        points = np.round(rng.uniform(-1, 1, (int(rng.integers(1, 6)), 3)), 1)
-        points[:, 2] = 0.0
-        A = ConvexHull(np.concatenate([points, points[:1]]))
-    elif kind == 2:
-        A, B = Sphere(10.0 ** rng.uniform(-6, -3)), Box(np.full(3, 10.0 ** rng.uniform(1, 4)))
-    elif kind == 3:
-        far = rng.standard_normal(3) * 10.0 ** rng.uniform(2, 5)
-        X_WA, X_WB = _pose(rng), _pose(rng)
-        X_WA[:3, 3] += far
-        X_WB[:3, 3] += far
-        return [pair_case(A, B, X_WA, X_WB)]
-    elif kind == 4:
-        X = _pose(rng)
-        return [pair_case(A, B, X, pose(X[:3, 3], R=_rotation(rng)))]
-    else:
-        X = _pose(rng)
-        return [pair_case(A, A, X, X)]
-    case = pair_case(A, B, _pose(rng), _pose(rng))
-    moved = at_distance(case, _reach(B) * 10.0 ** -int(rng.integers(1, 12)) * float(rng.choice([1, -1])))
+def _thin(rng: Random) -> list[Case]:
+    """Needles and plates, a hundredth to a hundred-millionth as thick as long."""
+    sizes = np.ones(3)
+    for axis in rng.choice(3, int(rng.integers(1, 3)), replace=False):
+        sizes[axis] = 10.0 ** -int(rng.integers(2, 9))
+    hull = np.round(rng.standard_normal((8, 3)), 2) * sizes
+    return _brought_near(rng, Box(sizes * length(rng)) if rng.random() < 0.5 else ConvexHull(hull), any_shape(rng))
+
+
+def _flat_hulls(rng: Random) -> list[Case]:
+    """Hulls of a few points in one plane, one of them twice: points, segments, polygons."""
+    points = np.round(rng.uniform(-1, 1, (int(rng.integers(1, 6)), 3)), 1)
+    points[:, 2] = 0.0
+    return _brought_near(rng, ConvexHull(np.concatenate([points, points[:1]])), any_shape(rng))
+
+
+def _tiny_and_huge(rng: Random) -> list[Case]:
+    A = ConvexHull(np.round(rng.standard_normal((6, 3)), 2) * 10.0 ** rng.uniform(-6, -3))
+    tiny = Sphere(10.0 ** rng.uniform(-6, -3)) if rng.random() < 0.5 else A
+    return _brought_near(rng, tiny, Box(np.full(3, 10.0 ** rng.uniform(1, 4))))
+
+
+def _far_away(rng: Random) -> list[Case]:
+    """Both bodies 100 m to 100 km from the origin."""
+    far = rng.standard_normal(3) * 10.0 ** rng.uniform(2, 5)
+    X_WA, X_WB = any_pose(rng), any_pose(rng)
+    X_WA[:3, 3] += far
+    X_WB[:3, 3] += far
+    return [pair_case(any_shape(rng), any_shape(rng), X_WA, X_WB)]
+
+
+def _concentric(rng: Random) -> list[Case]:
+    X = any_pose(rng)
+    return [pair_case(any_shape(rng), any_shape(rng), X, pose(X[:3, 3], R=any_rotation(rng)))]
+
+
+def _identical(rng: Random) -> list[Case]:
+    A, X = any_shape(rng), any_pose(rng)
+    return [pair_case(A, A, X, X)]
+
+
+def _brought_near(rng: Random, A, B) -> list[Case]:
+    """The pair at a gap or a depth of 1e-1 … 1e-11 of a length, where that can be told."""
+    case = pair_case(A, B, any_pose(rng), any_pose(rng))
+    moved = at_distance(case, reach(B) * 10.0 ** -int(rng.integers(1, 12)) * float(rng.choice([1, -1])))
     return [case if moved is None else moved]
+
+
+# --- families, Worlds, robots ---------------------------------------------------------------------
 
 
 def _family_cases(rng: Random) -> list[Case]:
@@ -279,9 +183,11 @@ def _of_question(rng: Random, question: Question) -> list[Case]:
     return cases + worlds
 
 
-#: Where cases come from, and their shares.
-_SOURCES: dict[Callable[[Random], list[Case]], float] = {
-    _random_pairs: 0.22, _near_pairs: 0.26, _resting_pairs: 0.16, _degenerate_pairs: 0.16, _family_cases: 0.14,
-    _worlds: 0.04, _robots: 0.02,
+#: Where cases come from: name → share, and what makes them.
+SOURCES: dict[str, tuple[float, Callable[[Random], list[Case]]]] = {
+    "random": (0.22, _random_pairs), "near touching": (0.26, _near_pairs), "resting": (0.14, _resting_pairs),
+    "thin": (0.03, _thin), "flat": (0.03, _flat_hulls), "tiny and huge": (0.03, _tiny_and_huge),
+    "far away": (0.03, _far_away), "concentric": (0.03, _concentric), "identical": (0.03, _identical),
+    "hard family": (0.14, _family_cases), "world": (0.04, _worlds), "robot": (0.02, _robots),
 }  # fmt: skip
-assert math.isclose(sum(_SOURCES.values()), 1.0)
+assert math.isclose(sum(share for share, _ in SOURCES.values()), 1.0)

@@ -10,6 +10,7 @@ import numpy as np
 
 from collide import distance
 from collide.adapters.fuzzing.fuzz_case import Case, isolated
+from collide.adapters.fuzzing.support_bounds import lower_bound
 from collide.adapters.peers import exact
 from collide.adapters.peers.exact_peer import ExactPeer, is_rounded
 from collide.adapters.peers.question import corners
@@ -81,7 +82,7 @@ def _proven(case: Case) -> dict[str, Any]:
     except CollideError:
         return {}
     lower, upper = (float(x) if math.isfinite(x) else None for x in (float(r.lower), float(r.upper)))
-    plain = None if certificate is None else [
+    plain: Any = _direction_and_points(case, r) if certificate is None else [
         {"kind": c.kind, "part_a": c.part_a, "part_b": c.part_b, "pairs": [list(map(int, p)) for p in c.pairs]}
         for c in certificate
     ]  # fmt: skip
@@ -89,9 +90,25 @@ def _proven(case: Case) -> dict[str, Any]:
     return {"hit": bool(r.hit), "lower": lower, "upper": upper, "by": by, "certificate": plain}
 
 
+def _direction_and_points(case: Case, r: Any) -> dict[str, Any] | None:
+    """A direction along which two convex bodies are about as far apart as they are, and their nearest points.
+
+    Anybody can check either bound with a support function and a norm.
+    """
+    bound = lower_bound(*case.pair())
+    if bound is None:
+        return None
+    made: dict[str, Any] = {"direction": bound[1].tolist(), "gap": bound[0]}
+    points = [np.asarray(p).ravel().tolist() for p in (r.point_a, r.point_b)]
+    return made | {"points": points} if not r.hit and np.isfinite(points).all() else made
+
+
 def expected_text(known: dict[str, Any]) -> str:
     """A proof's answer in a few words, for people."""
     word = {True: "overlap or touch", False: "apart", None: "not known"}[known["hit"]]
+    farthest = known["upper"] if known["distance"] is None else float(known["distance"])
+    if known["hit"] and farthest is not None and farthest < 0.0:
+        word = "overlap"
     if known["distance"] is not None:
         return f"{word}, signed distance {known['distance']} m ({known['by']})"
     if known["lower"] is not None and known["upper"] is not None and known["by"] == "the bracket that collide proves":

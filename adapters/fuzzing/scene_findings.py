@@ -11,8 +11,7 @@ from collide.adapters.fuzzing.disagreements import OURS, Examiner, Flaw
 from collide.adapters.fuzzing.engine_session import EngineSession
 from collide.adapters.fuzzing.findings import Finding, Kind, kind_of, save_finding, simpler_of
 from collide.adapters.fuzzing.fuzz_case import Case, cases_of
-from collide.adapters.fuzzing.fuzz_run import BATCH, nullcontext_of
-from collide.adapters.fuzzing.shrink import shrink
+from collide.adapters.fuzzing.fuzz_run import BATCH, nullcontext_of, shrunk_in
 from collide.adapters.peers.compare import TOLERANCE
 from collide.adapters.peers.protocol import engine
 from collide.adapters.peers.question import ask
@@ -61,7 +60,7 @@ def save_findings(
         findings: dict[Kind, Finding] = {}
         for kind, (case, flaw) in worst.items():
             rename(f"shrinking {' '.join(kind)}")
-            small = shrink(case, flaw, examiner.flaws)
+            small = shrunk_in(sessions, examiner, case, flaw)
             finding = Finding(small.case, small.flaw, times=times[kind], is_minimal=small.is_minimal)
             findings[finding.kind] = (
                 simpler_of(findings[finding.kind], finding) if finding.kind in findings else finding

@@ -57,7 +57,8 @@ def lower_bound(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple
     if first is None:
         return None
     best, direction = -np.inf, _DIRECTIONS[0]
-    for start in _DIRECTIONS[np.argsort(-first)[:3]]:
+    n_starts = 1 if first.max() > 0.0 else 3  # of bodies apart the gap has one summit, of others many
+    for start in _DIRECTIONS[np.argsort(-first)[:n_starts]]:
         value, n, reach = float(gaps(start[None])[0]), start, 0.05  # type: ignore[index]
         for _ in range(MAX_TURNS):
             if reach < 1e-10:

@@ -108,6 +108,8 @@ class CoalPeer(PairwisePeer):
         meshed = isinstance(A, coal.BVHModelBase) or isinstance(B, coal.BVHModelBase)
         if meshed:
             request.break_distance = 0.0
+        if meshed and any(isinstance(g, coal.ShapeBase) and g.getSweptSphereRadius() for g in (A, B)):
+            raise UnsupportedQuery("coal has no hull with a radius against meshes")
         hit = coal.collide(A, T_WA, B, T_WB, request, coal.CollisionResult()) > 0
         if hit and meshed:
             return Reply(hit, note=NO_DEPTH)

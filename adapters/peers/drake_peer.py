@@ -72,7 +72,7 @@ class DrakePeer(PairwisePeer):
             return self._asked(A, X_WA, B, X_WB)
         except RuntimeError as error:
             text = " ".join(str(error).split())
-            if "not supported" in text or "are supported" in text or "coplanar" in text.lower():
+            if "not supported" in text or "are supported" in text or "MakeConvexHull" in text:
                 raise UnsupportedQuery(f"Drake refuses: {text[:160]}") from None
             raise
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from typing import Any, NamedTuple
@@ -32,6 +33,7 @@ from collide.adapters.peers.answers import (
     Table,
     nearest,
 )  # fmt: skip
+from collide.adapters.peers.engine_names import ENGINES
 from collide.adapters.peers.question import Body, Question, convex_parts
 from collide.errors import CollideError, InvalidArgument, MissingExtra, UnsupportedQuery
 from collide.shapes import ConvexHull, Shape
@@ -41,30 +43,9 @@ __all__ = [
     "installed",
 ]  # fmt: skip
 
-_HERE = "collide.adapters.peers"
-#: The engines by name, each as ``module:class`` or ``module:class:setting``; loaded when first asked for. A name with a
-#: setting, ``engine:setting``, is the same engine asked in another way: `Peer.settings`.
-ENGINES = {
-    "collide": f"{_HERE}.collide_peer:CollidePeer",
-    "fcl": f"{_HERE}.fcl_peer:FclPeer",
-    "fcl:indep": f"{_HERE}.fcl_peer:FclPeer:indep",
-    "coal": f"{_HERE}.coal_peer:CoalPeer",
-    "coal:tight": f"{_HERE}.coal_peer:CoalPeer:tight",
-    "coal:nesterov": f"{_HERE}.coal_peer:CoalPeer:nesterov",
-    "coal:polyak": f"{_HERE}.coal_peer:CoalPeer:polyak",
-    "pybullet": f"{_HERE}.pybullet_peer:PybulletPeer",
-    "pybullet:margins": f"{_HERE}.pybullet_peer:PybulletPeer:margins",
-    "mujoco": f"{_HERE}.mujoco_peer:MujocoPeer",
-    "mujoco:libccd": f"{_HERE}.mujoco_peer:MujocoPeer:libccd",
-    "mujoco:distance": f"{_HERE}.mujoco_peer:MujocoPeer:distance",
-    "mujoco:distance-libccd": f"{_HERE}.mujoco_peer:MujocoPeer:distance-libccd",
-    "drake": f"{_HERE}.drake_peer:DrakePeer",
-    "drake:penetration": f"{_HERE}.drake_peer:DrakePeer:penetration",
-    "trimesh": f"{_HERE}.trimesh_peer:TrimeshPeer",
-    "exact": f"{_HERE}.exact_peer:ExactPeer",
-}
 #: Asks one of them in a child process.
-_ISOLATED = f"{_HERE}.child:IsolatedPeer"
+_ISOLATED = "collide.adapters.peers.child:IsolatedPeer"
+_version = cache(metadata.version)  # it reads a file, and every table asks
 
 
 class Setting(NamedTuple):
@@ -148,7 +129,7 @@ class Peer:
     def version(self) -> str:
         """The engine's version, without importing it."""
         try:
-            return metadata.version(self.package or "collide-robotics")
+            return _version(self.package or "collide-robotics")
         except metadata.PackageNotFoundError:
             return "unknown"
 

@@ -49,7 +49,10 @@ class TrimeshPeer(PairwisePeer):
         import trimesh
 
         if isinstance(part, Mesh):
-            return trimesh.Trimesh(part.vertices, part.faces, process=False)
+            mesh = trimesh.Trimesh(part.vertices, part.faces, process=False)
+            if mesh.is_convex and not part.solid:
+                raise UnsupportedQuery("trimesh takes a convex surface for a solid")
+            return mesh
         points = corners(part)
         if points is None:
             raise UnsupportedQuery(str(self.refuses(part)))

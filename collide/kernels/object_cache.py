@@ -14,7 +14,6 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
-import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -22,6 +21,7 @@ from pathlib import Path
 
 from collide.cache_folder import TRUST, cache_folder, make_private, why_distrusted
 from collide.log import log
+from collide.whole_file import whole_file
 
 #: Raised with every change of what a file holds.
 _VERSION = 2
@@ -43,7 +43,8 @@ def kept_or_made(name: str, key: str, compiled: Callable[[], bytes]) -> bytes:
     if code is None:
         code = compiled()
         try:
-            _write(file, _digest(identity, code) + code)
+            with whole_file(file, private=True) as written:
+                written.write(_digest(identity, code) + code)
         except OSError as error:
             say_once(f"compiled kernels cannot be kept in {folder} ({error}); {_REMEDY} that can be written.")
     return code
@@ -107,19 +108,6 @@ def _read(file: Path) -> bytes | None:
             return opened.read()
     except FileNotFoundError:
         return None
-
-
-def _write(file: Path, content: bytes) -> None:
-    """Write a file so that readers see all of it or nothing."""
-    handle, temporary = tempfile.mkstemp(dir=file.parent, prefix=".", suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as opened:
-            opened.write(content)
-        os.replace(temporary, file)
-    except BaseException:
-        with suppress(OSError):
-            os.unlink(temporary)
-        raise
 
 
 @cache

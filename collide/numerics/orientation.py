@@ -182,6 +182,26 @@ def write_differences(points, work, a, b, c, d, axis):
             work[at + 13] = 0.0
 
 
+@kernel(inline=True)
+def write_difference(points, base, tip, work, row):
+    """The difference of the points that stand at two places as a row of ``work``, for `sign_of_rows`."""
+    for k in range(3):
+        at = _DIFFERENCES + 6 * row + 2 * k
+        work[at], work[at + 1] = two_sum(points[tip + k], -points[base + k])
+
+
+@kernel
+def sign_of_rows(work):
+    """Exact sign of the determinant of three differences, where nothing underflows: no lowest bit below 2⁻³³³."""
+    value, size = double_determinant(work)
+    if abs(value) > _DOUBLE_ERROR * size:
+        return 1 if value > 0.0 else -1
+    value = dd_determinant(work)
+    if abs(value) > _DD_ERROR * size:
+        return 1 if value > 0.0 else -1
+    return by_expansions(work)
+
+
 @kernel
 def double_determinant(work):
     """The determinant of the differences' heads, and the sum of its terms' magnitudes."""

@@ -8,19 +8,18 @@ shows nothing else, and asks no server for anything.
 from __future__ import annotations
 
 import base64
-import errno
 import hashlib
 import html
 import json
 import os
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 from collide.errors import InvalidArgument, cut
 from collide.reports.json_text import pieces
+from collide.whole_file import whole_file
 
 #: The page, its style and its script.
 VIEWER = Path(__file__).resolve().parent / "viewer"
@@ -162,7 +161,8 @@ def write_page(text: Iterable[str], place: str) -> None:
             with open(place, "w", encoding="utf-8", newline="\n") as file:
                 file.writelines(text)
         else:
-            _write_whole(text, os.path.realpath(place))
+            with whole_file(place) as page:
+                page.writelines(piece.encode() for piece in text)
     except OSError as error:  # a full disk is told without the file's name
         raise OSError(error.errno, error.strerror, place) from None
 
@@ -177,20 +177,3 @@ def _write_to_stdout(text: Iterable[str]) -> None:
         else:
             binary.write(piece.encode())
     sys.stdout.flush()
-
-
-def _write_whole(text: Iterable[str], place: str) -> None:
-    """By way of a file beside it: a page that is interrupted, or for which there is no space, leaves the old one."""
-    beside = f"{place}.{os.getpid()}.part"
-    if len(os.path.basename(beside)) > 255:  # the longest name that file systems have
-        raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG), place)
-    try:
-        with open(beside, "w", encoding="utf-8", newline="\n") as file:
-            file.writelines(text)
-        if os.path.exists(place):
-            os.chmod(beside, os.stat(place).st_mode & 0o777)
-        os.replace(beside, place)
-    except BaseException:
-        with suppress(OSError):
-            os.remove(beside)
-        raise

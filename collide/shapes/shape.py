@@ -23,8 +23,8 @@ class Shape:
     """
 
     __slots__ = (
-        "__weakref__", "_bounds", "_convex_parts", "_kind", "_laid_out", "_moving", "_parts", "_pieces", "_prepared",
-        "_serial", "_surface", "_topology", "_union", "_walk",
+        "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_kind", "_laid_out", "_moving", "_parts",
+        "_pieces", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk",
     )  # fmt: skip
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -49,6 +49,10 @@ class Shape:
     _laid_out: Any
     #: Meshes and convex shapes that it is made of, with their trees (`motion/surface_motions.py`).
     _pieces: tuple
+    #: A mesh of the same facets (`solids/solid_operands.py`).
+    _as_solid: Any
+    #: Facets of a mesh that cross each other (`solids/arrangement.py`).
+    _crossings: Any
     #: Row and column of the pair table (`lowering/kinds.py`).
     _kind: Any
 

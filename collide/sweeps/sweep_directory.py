@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from collide.errors import InvalidArgument, MissingExtra, SceneError, listing
+from collide.whole_file import whole_file
 
 #: Readers of Parquet leave out what begins with an underscore, so that the folder is one table to them.
 MANIFEST, LOCK, PARTIAL = "_sweep.json", "_sweep.lock", "_partial-"
@@ -158,12 +158,8 @@ def _arrow_column(pyarrow, values):
 
 
 def _write_whole(file: Path, content) -> None:
-    partial = file.with_name(PARTIAL + file.name)
-    with open(partial, "wb") as stream:
+    with whole_file(file, durable=True, prefix=PARTIAL) as stream:
         stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
-    os.replace(partial, file)
 
 
 def _lock(file) -> bool:

@@ -34,7 +34,7 @@ PAGES = {
     "errors": ("Errors, and where the C interface is", ("errors", "kernels")),
 }
 #: In this order; rooms that are not named come after them.
-ORDER = ("shapes", "pairs", "worlds", "contact", "casts", "motion", "robots", "sweeps", "surface_queries")
+ORDER = ("shapes", "pairs", "worlds", "contact", "casts", "motion", "robots", "sweeps", "surface_queries", "tetrahedra")
 #: Public modules beside `collide` and `collide.scenes`: page → (title, modules).
 MODULES = {
     "live": ("Looking at a World", ("collide.adapters.live.world_viewer",)),

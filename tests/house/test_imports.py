@@ -20,11 +20,12 @@ from house_sources import (
 ROOMS = {
     "errors": set(),
     "cache_folder": set(),
+    "whole_file": set(),
     "log": set(),
     "lazy_modules": set(),
     "fork_safe_lock": set(),
     "algorithms": {"errors"},
-    "kernels": {"cache_folder", "errors", "log"},
+    "kernels": {"cache_folder", "errors", "log", "whole_file"},
     "argument_checks": {"errors"},
     "threads": {"errors", "argument_checks"},
     "transforms": {"errors", "argument_checks"},
@@ -158,6 +159,13 @@ ROOMS = {
         "results",
         "batches",
     },
+    "tetrahedra": {
+        "errors", "argument_checks", "kernels", "log", "mesh", "numerics", "shapes", "threads", "transforms",
+    },
+    "solids": {
+        "errors", "argument_checks", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",
+        "surface_queries",
+    },
     "hierarchies": {
         "errors",
         "fork_safe_lock",
@@ -276,9 +284,9 @@ ROOMS = {
         "query",
         "world",
     },
-    "sweeps": {"errors", "argument_checks", "query", "shapes", "robots", "world", "reports", ""},
+    "sweeps": {"errors", "argument_checks", "query", "shapes", "robots", "world", "reports", "whole_file", ""},
     "reports": {"errors", "lowering", "results", "shapes", "cache_folder", "kernels", ""},
-    "pages": {"errors", "contact", "lowering", "reports", "results", "shapes"},
+    "pages": {"errors", "contact", "lowering", "reports", "results", "shapes", "whole_file"},
     "cli_files": {"errors", "reports"},
     "cli_scenes": {"errors", "reports"},
     "cli_pages": {"cli_files", "cli_scenes", "errors", "pages", "reports"},
@@ -287,12 +295,12 @@ ROOMS = {
     "cli_sweep": {"cli_files", "cli_numbers", "errors", "reports", "sweeps"},
     "cli_view": {"cli_pages", "cli_scenes", "pages"},
     "cli_bench": {"cli_numbers", "errors", "reports"},
-    "cli_compare": {"cli_files", "cli_pages", "cli_scenes", "errors", "reports", ""},
+    "cli_compare": {"cli_files", "cli_pages", "cli_scenes", "errors", "reports", "whole_file", ""},
     "cli_engines": {"reports"},
     "cli_fuzz": {"cli_files", "cli_numbers", "errors", "reports"},
     "cli_arguments": {
-        "cli_bench", "cli_compare", "cli_engines", "cli_fuzz", "cli_pages", "cli_srdf", "cli_sweep", "cli_view",
-        "errors", "reports", "",
+        "cli_bench", "cli_compare", "cli_engines", "cli_fuzz", "cli_numbers", "cli_pages", "cli_srdf", "cli_sweep",
+        "cli_view", "errors", "reports", "",
     },
     "cli": {
         "cli_arguments", "cli_bench", "cli_compare", "cli_files", "cli_fuzz", "cli_pages", "cli_scenes", "cli_srdf",
@@ -318,6 +326,7 @@ LATE = {
     "cli_sweep": {"scenes"},
     "cli_view": {"adapters"},
     "sweeps": {"pyarrow", "distributed"},
+    "tetrahedra": {"meshio"},
 }
 #: Names that say nothing about what a module is for, and names that shadow a package when run as a script.
 BAD_NAMES = {"utils", "util", "helpers", "core", "common", "misc", "fcl", "coal", "pybullet", "numba", "numpy"}

@@ -38,6 +38,10 @@ SHOWS = {
         "0.196 m, from [1.381 0.1  ] to [1.381 0.296]", "0.097 m inside", "outside, it falls", "moved by 0 m: stands",
         "moved by -1e-200 m: falls",
     ],
+    "27_field_transfer": [
+        "1296 and 4374 cells", "conserved: True", "no new extremes: True", "as it is: True",
+        "sum to its volume in fractions: True",
+    ],
     "26_bezier_regions": ["region 0: entered at 0.000, left at 0.361", "region 2: never entered", "proven outside)"],
     "18_certified_planning": ["nodes; a path", "motions are proven free", "of it in collision checks"],
     "19_nearest_obstacles": ["in something, gaps up to", "collide, depths up to", "nearest in"],

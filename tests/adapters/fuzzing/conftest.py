@@ -11,6 +11,7 @@ from collide.adapters.peers import protocol
 STUBS = {
     "stub": "Honest", "large_boxes": "LargeBoxes", "cones_abort": "ConesAbort", "ellipsoids_hang": "EllipsoidsHang",
     "spheres_nan": "SpheresNaN", "raises": "Raises",
+    "exchanges_points": "ExchangesPoints",
 }  # fmt: skip
 
 

@@ -82,3 +82,18 @@ class Raises(Honest):
             raise RuntimeError("too far")
         capsules = type(A).__name__ == type(B).__name__ == "Capsule"
         return reply._replace(distance=reply.distance + 0.01) if capsules and not reply.hit else reply
+
+
+class ExchangesPoints(Honest):
+    """Nearest points of two spheres the other way round, of boxes a hundredth too far along the normal on A."""
+
+    name = "exchanges_points"
+
+    def ask(self, A, X_WA, B, X_WB) -> Reply:
+        r = collide.distance(A, B, X_WA, X_WB)
+        point_a, point_b = r.point_a, r.point_b
+        if type(A) is type(B) is Sphere:
+            point_a, point_b = point_b, point_a
+        if type(A) is type(B) is Box:
+            point_a = point_a + 0.01 * r.normal
+        return Reply(bool(r.hit), float(r.distance), point_a=tuple(point_a), point_b=tuple(point_b))

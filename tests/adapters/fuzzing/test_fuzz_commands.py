@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from collide import Box, Ellipsoid, Sphere, World, cli, pose
+from collide import Box, Cylinder, Ellipsoid, Sphere, World, cli, pose
 from collide.adapters.fuzzing import fuzz_run
 from collide.adapters.fuzzing.findings import load_finding
 from collide.adapters.fuzzing.fuzz_case import pair_case
@@ -44,9 +44,11 @@ def test_fuzz_saves_and_goes_on(large_boxes, tmp_path, capsys):
     assert run("compare", place, "--engines", "large_boxes", "--fail-on", "peer-wrong") == 1
 
 
-def test_an_answer_of_ours_that_is_wrong_sets_the_status(large_boxes, tmp_path, monkeypatch):
+def test_an_answer_of_ours_that_is_wrong_sets_the_status(stubs, tmp_path, monkeypatch):
     from collide.adapters.fuzzing import disagreements
 
+    rounds = {"source": lambda seed, number: [pair_case(Cylinder(1, 1), Box((1, 1, 1)), pose(), pose((0.2, 0, 0)))]}
+    monkeypatch.setattr(fuzz_run.fuzz, "__kwdefaults__", fuzz_run.fuzz.__kwdefaults__ | rounds)
     real = disagreements.lower_bound
     monkeypatch.setattr(disagreements, "lower_bound", lambda *pair: (real(*pair)[0] + 5.0, real(*pair)[1]))
     assert run("fuzz", "--engines", "stub", "--rounds", 1, "--save", tmp_path / "x", "--quiet") == 1

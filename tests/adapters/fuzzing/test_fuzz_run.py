@@ -8,16 +8,19 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from collide import Box, InvalidArgument, MissingExtra, Sphere, pose
+from collide import Box, InvalidArgument, MissingExtra, Sphere, distance, pose
+from collide.adapters.fuzzing import fuzz_run
 from collide.adapters.fuzzing.findings import load_finding, save_finding, simpler_of
-from collide.adapters.fuzzing.fuzz_case import pair_case
+from collide.adapters.fuzzing.fuzz_case import Case, isolated, pair_case
 from collide.adapters.fuzzing.fuzz_run import STATE, FuzzRun, fuzz
-from collide.adapters.fuzzing.invented_scenes import invent
+from collide.adapters.fuzzing.invented_scenes import SOURCES, invent
 from collide.adapters.fuzzing.simpler_cases import complexity, fingerprint
 from collide.adapters.peers import protocol
 from collide.errors import SceneError
@@ -163,9 +166,72 @@ class _Absent(protocol.Peer):
 def test_invented_scenes_are_the_same_for_the_same_seed():
     a, b, c = (list(map(fingerprint, invent(seed, 2, 30))) for seed in (5, 5, 6))
     assert a == b and a != c
-    kinds = {kind for case in invent(5, 0, 150) for kind in case.kinds}
-    assert kinds >= {"Sphere", "Box", "Capsule", "Cylinder", "Cone", "Ellipsoid", "ConvexHull", "HPolytope", "Mesh",
-                     "HeightField", "Compound", "Halfspace"}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def invented() -> list[Case]:
+    return [case for number in range(5) for case in invent(5, number)]
+
+
+def test_every_kind_of_scene_is_invented(invented):
+    by_source = Counter(case.source for case in invented)
+    assert by_source.keys() == SOURCES.keys(), "each has its share of 300 pairs"
+    assert min(by_source.values()) >= 2 and by_source["near touching"] >= 20 and by_source["resting"] >= 10
+    kinds = Counter(kind for case in invented for kind in case.kinds)
+    assert kinds.keys() == {
+        "Sphere", "Box", "Capsule", "Cylinder", "Cone", "Ellipsoid", "ConvexHull", "HPolytope", "Mesh", "HeightField",
+        "Compound", "Halfspace",
+    }  # fmt: skip
+    assert min(kinds.values()) >= 5, kinds
+    worlds = [case for case in invented if case.world]
+    assert worlds and max(len(case.bodies) for case in worlds) > 5
+
+
+def test_near_and_resting_pairs_are_near_and_resting(invented):
+    near = [case for case in invented if case.source in ("near touching", "resting")]
+    sizes = isolated(near).sizes()
+    gaps = np.array([abs(_signed_distance(case)) / size for case, size in zip(near, sizes)])
+    for below, least in ((0.2, 0.9), (1e-3, 0.5), (1e-8, 0.2)):
+        assert np.mean(gaps <= below) >= least, (below, sorted(gaps))
+    hits = np.mean([_signed_distance(case) <= 0 for case in near])
+    assert 0.2 < hits < 0.8, "on both sides of touching"
+
+
+def _signed_distance(case: Case) -> float:
+    r = distance(*case.pair())
+    return float(r.distance if np.isfinite(r.distance) else r.upper if np.isfinite(r.upper) else 0.0)
+
+
+def test_what_was_invented_is_counted_and_told(stubs, tmp_path):
+    labels: list[str] = []
+    run = fuzz([], tmp_path, rounds=2, seed=3, progress=_told(labels), source=lambda seed, k: invent(seed, k, 10))
+    sources = {name: n for name, n in run.invented.items() if not name.startswith("shape ")}
+    assert sum(sources.values()) == run.pairs and sources.keys() <= SOURCES.keys()
+    first = json.loads((tmp_path / STATE).read_text())
+    assert first["invented"] == run.invented and run.invented["shape Box"] > 0
+    assert any("pairs, 0 kinds of wrong answers (" in label and "random" in label for label in labels), labels
+
+
+def _told(labels: list[str]):
+    @contextmanager
+    def progress(label: str):
+        yield labels.append
+
+    return progress
+
+
+def test_what_is_not_shrunk_waits(stubs, tmp_path, monkeypatch):
+    monkeypatch.setattr(fuzz_run, "SHRINK_AT_LEAST", -1000)
+    run = fuzz(["large_boxes"], tmp_path, rounds=2, seed=4, source=boxes_and_spheres)
+    assert run.shrunk == {} and list(run.waiting) == ["large_boxes | false miss | Box | Box | deep"]
+    assert run.counts()["large_boxes"]["false miss"] > 4, "counted all the same"
+    number, at = run.waiting["large_boxes | false miss | Box | Box | deep"]
+    assert boxes_and_spheres(4, number)[at].kinds == ("Box", "Box")
+    monkeypatch.setattr(fuzz_run, "SHRINK_AT_LEAST", 5000)
+    run = fuzz(["large_boxes"], tmp_path, rounds=3, seed=4, resume=True, source=boxes_and_spheres)
+    assert run.waiting == {} and len(run.findings()) == 1 and run.tried > 0
+    (found,) = run.findings()
+    assert found.is_minimal
 
 
 @pytest.mark.parametrize("seed", [11])

@@ -5,7 +5,8 @@ An engine that is absent, or of another version than the one that erred, is skip
 
 from __future__ import annotations
 
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import numpy as np
@@ -60,15 +61,29 @@ def test_collide_is_right(place):
     assert Examiner({}).flaws([found.case]) == [[]]
 
 
+@pytest.fixture(scope="module")
+def session_of() -> Iterator[Callable[[str], EngineSession]]:
+    """One process an engine for all of its cases."""
+    sessions: dict[str, EngineSession] = {}
+    with ExitStack() as stack:
+        def started(name: str) -> EngineSession:
+            if name not in sessions:
+                sessions[name] = stack.enter_context(closing(EngineSession(name, 10.0)))
+            return sessions[name]
+
+        yield started
+
+
 @CASES
-def test_the_engine_still_errs(place):
+def test_the_engine_still_errs(place, session_of):
     found, about = load_finding(place)
     peer = engine(found.flaw.engine)
     if peer.missing():
         pytest.skip(str(peer.missing()))
     if peer.version != about["versions"][str(peer.package)]:
         pytest.skip(f"{peer.package} {peer.version} is not {about['versions'][str(peer.package)]}, which erred")
-    with closing(EngineSession(found.flaw.engine, 0.7 if found.flaw.kind == "hang" else 10.0)) as session:
+    session = session_of(found.flaw.engine)
+    with session.hurried(0.7 if found.flaw.kind == "hang" else 10.0):
         (flaws,) = Examiner({found.flaw.engine: session.answer}).flaws([found.case], [found.flaw.engine])
     assert [(flaw.kind, flaw.position) for flaw in flaws] == [(found.flaw.kind, found.flaw.position)]
     if found.flaw.distance is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 
@@ -12,7 +13,7 @@ import pytest
 from collide import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere, pose
 from collide.adapters.fuzzing.disagreements import Flaw
 from collide.adapters.fuzzing.fuzz_case import Case, isolated, pair_case
-from collide.adapters.fuzzing.peer_snippets import MAX_LINES, snippet
+from collide.adapters.fuzzing.peer_snippets import FORMS, MAX_LINES, snippet
 from collide.adapters.fuzzing.proofs import expected_text, proof
 from collide.adapters.peers.protocol import ENGINES, engine
 
@@ -26,14 +27,16 @@ PAIRS: dict[str, tuple[Shape, Shape]] = {
     "plane": (Halfspace((0, 0, 2), -8), Box((1, 1, 1))),
     "cones": (Cone(0.5, 1), Ellipsoid((0.1, 0.2, 0.3))),
 }  # fmt: skip
-SETTINGS = ["fcl", "fcl:indep", "coal", "coal:tight", "coal:nesterov", "coal:polyak", "pybullet", "pybullet:margins",
-            *(name for name in ENGINES if name.startswith("mujoco"))]  # fmt: skip
+#: Rapier's casts have no form.
+SETTINGS = [
+    name for name in ENGINES if name.partition(":")[0] in FORMS and name not in ("rapier:cast", "rapier:nonlinear")
+]
 #: How the lines of snippets begin; pybullet prints others.
-PRINTED = ("true: ", "fcl ", "coal ", "pybullet dist", "mujoco ")
+PRINTED = ("true: ", "fcl ", "coal ", "pybullet dist", "pybullet points", "mujoco ", "drake ", "trimesh ", "rapier ")
 
 
-def flaw(name: str) -> Flaw:
-    return Flaw(name, "wrong gap", "apart", False, 1.0, "", False, 1.0, None, None, "exact arithmetic", 1.0)
+def flaw(name: str, kind: str = "wrong gap") -> Flaw:
+    return Flaw(name, kind, "apart", False, 1.0, "", False, 1.0, None, None, "exact arithmetic", 1.0)
 
 
 def printed(text: str) -> list[str]:
@@ -57,15 +60,16 @@ def test_snippets_say_what_the_peer_says(name):
     texts = [snippet(flaw(name), case, proof(case)) for case in cases]
     table = peer.answer(isolated(cases))
     asked = [k for k in range(len(cases)) if table.rows["answered"][k]]
-    asked = [k for k in asked if texts[k] or not name.startswith("mujoco")]  # its planes have none
-    assert len(asked) >= 8 and all(texts[k] for k in asked)
+    assert len(asked) >= 6 and all(texts[k] for k in asked)
     for text in filter(None, texts):
         assert len(text.splitlines()) <= MAX_LINES
-        modules = {a.name for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import) for a in node.names}
-        assert modules <= {name.split(":")[0], "numpy"}
-    lines = printed("\n".join(str(texts[k]) for k in asked))
-    per_case = _grouped(lines)
-    assert len(per_case) == len(asked)
+        assert _imported(text) <= {str(peer.module), "numpy"}
+    of_points = snippet(flaw(name, "wrong points"), cases[asked[0]], proof(cases[asked[0]]))
+    per_case = _grouped(printed("\n".join([*(str(texts[k]) for k in asked), of_points or ""])))
+    if of_points is not None:
+        assert len(of_points.splitlines()) <= MAX_LINES
+        _check_points(per_case.pop(), table.rows[asked[0]])
+    assert len(per_case) == len(asked) and (of_points or name == "rapier")
     for k, said in zip(asked, per_case):
         assert said[0] == f"true: {expected_text(proof(cases[k]))}"
         row = table.rows[k]
@@ -74,6 +78,23 @@ def test_snippets_say_what_the_peer_says(name):
         distances = [float(line.split(": ")[1]) for line in said if "distance: " in line and line != said[0]]
         if distances and row["has_distance"]:
             assert distances == pytest.approx([row["distance"]], rel=1e-14, abs=0), (cases[k], said)
+
+
+def _check_points(said: list[str], row) -> None:
+    """Where the engine gives nearest points of bodies apart they are printed, as the peer reads them."""
+    printed_points = [line for line in said if " points: " in line]
+    assert bool(printed_points) == bool(np.isfinite(row["point_a"]).all() and not row["hit"]), said
+    for line in printed_points:
+        numbers = [float(x) for x in re.findall(r"-?\d+(?:\.\d*)?(?:e-?\d+)?", line.split(": ")[1])]
+        assert numbers == pytest.approx([*row["point_a"], *row["point_b"]], rel=1e-12, abs=1e-12)
+
+
+def _imported(text: str) -> set[str]:
+    """Packages that a program imports."""
+    nodes = list(ast.walk(ast.parse(text)))
+    names = [a.name for node in nodes if isinstance(node, ast.Import) for a in node.names]
+    names += [str(node.module) for node in nodes if isinstance(node, ast.ImportFrom)]
+    return {name.partition(".")[0] for name in names}
 
 
 def _grouped(lines: list[str]) -> list[list[str]]:

@@ -15,6 +15,7 @@ from collide import (
     ConvexHull,
     Cylinder,
     Ellipsoid,
+    Halfspace,
     HeightField,
     HPolytope,
     Mesh,
@@ -86,6 +87,19 @@ def test_a_wrong_distance_stays_as_grave(stubs):
     made = smallest("raises", case, "wrong gap")
     assert made.flaw.distance - made.flaw.exact_distance == pytest.approx(0.01)
     assert made.flaw.judged_by == "exact arithmetic"
+
+
+def test_nearest_points_that_are_none(stubs):
+    apart = pose((7.1, 0.3, 0.2))
+    made = smallest("exchanges_points", pair_case(Sphere(0.31), Sphere(0.72), pose(), apart), "wrong points")
+    assert "exchanged: each is on the other body" in made.flaw.reason and made.flaw.judged_by == "the proven bracket"
+    made = smallest("exchanges_points", pair_case(Box((1, 1, 1)), Box((2, 1, 1)), pose(), apart), "wrong points")
+    assert "the one on A 0.01" in made.flaw.reason and made.flaw.severity * made.case.bodies[0].shape.size.max() < 0.01
+    right = [pair_case(Sphere(0.5), Box((1, 1, 1)), pose(), apart), pair_case(Sphere(1), Sphere(1), pose(), pose())]
+    assert in_process("exchanges_points").flaws(right) == [[], []], "overlaps are not judged"
+    tiny = Mesh([[0, 0, 0], [0, 0, 9e-13], [0, 1e-12, 0]], [[0, 2, 1]])
+    far = pair_case(tiny, Halfspace((0, 0, 1), -0.06), pose(), pose((0, 0, -1000)))
+    assert Examiner({}).flaws([far]) == [[]], "rounding of where a tiny body is"
 
 
 def test_an_abort_and_a_hang_are_shrunk_in_children(stubs):

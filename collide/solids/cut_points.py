@@ -1,0 +1,147 @@
+"""Points of an arrangement: exact coordinates, one id for each place, and doubles near them to begin a decision with.
+
+A point is (x, y, z, w), integers without a common factor, w > 0: x/w, y/w, z/w in units of the grid of
+`placed_facets.py`. Vertices keep their ids; where vertices of several bodies coincide, all have the id of the first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from functools import cmp_to_key
+
+from collide.numerics.exact_points import Point
+from collide.solids.placed_facets import PlacedFacets
+
+Rational = tuple[int, int, int, int]
+#: A determinant of two differences of rounded coordinates below D, each off by a unit of M, the largest of them: its
+#: error is below 8 D · 2⁻⁵² M + 4 · 2⁻⁵³ D²; twice that.
+_ERROR = 2.0**-48
+
+
+class CutPoints:
+    """Points by id: those below the number of vertices are vertices, the others were made by cutting."""
+
+    def __init__(self, facets: PlacedFacets):
+        self.facets = facets
+        self.n_vertices = len(facets.local)
+        self._ids: dict[Rational, int] = {}
+        self._exact: dict[int, Rational] = {}
+        self._near: dict[int, tuple[float, float, float]] = {}
+        self.same_as: dict[int, int] = {}
+        self._next = self.n_vertices
+
+    def __len__(self) -> int:
+        return self._next
+
+    def vertex(self, vertex: int) -> int:
+        """The id of the place of a vertex."""
+        known = self.same_as.get(vertex)
+        if known is None:
+            x, y, z = self.facets.exact(vertex)
+            known = self._ids.setdefault((x, y, z, 1), vertex)
+            self.same_as[vertex] = known
+            if known == vertex:
+                self._exact[vertex] = (x, y, z, 1)
+        return known
+
+    def add(self, point: Rational) -> int:
+        """The id of a point, which has no common factor."""
+        known = self._ids.get(point)
+        if known is None:
+            known = self._ids[point] = self._next
+            self._exact[known] = point
+            self._next += 1
+        return known
+
+    def exact(self, point: int) -> Rational:
+        if point not in self._exact:
+            self._exact[point] = (*self.facets.exact(point), 1)
+        return self._exact[point]
+
+    def near(self, point: int) -> tuple[float, float, float]:
+        """Coordinates less the origin, in units of the grid, rounded to the nearest doubles (scaled, if need be)."""
+        known = self._near.get(point)
+        if known is None:
+            x, y, z, w = self.exact(point)
+            known = self._near[point] = _quotient(x, w), _quotient(y, w), _quotient(z, w)
+        return known
+
+    def side(self, a: int, b: int, c: int, u: int, v: int) -> int:
+        """Orientation of three points seen along an axis; u, v : the numbers of the other two coordinates."""
+        p, q, r = self.near(a), self.near(b), self.near(c)
+        pu, pv = p[u], p[v]
+        qu, qv, ru, rv = q[u] - pu, q[v] - pv, r[u] - pu, r[v] - pv
+        value = qu * rv - qv * ru
+        D = max(abs(qu), abs(qv), abs(ru), abs(rv))
+        M = max(abs(pu), abs(pv)) + D
+        limit = _ERROR * D * M
+        if value > limit:
+            return 1
+        if value < -limit:
+            return -1
+        pu_, pv_, pw = (self.exact(a)[k] for k in (u, v, 3))
+        qu_, qv_, qw = (self.exact(b)[k] for k in (u, v, 3))
+        ru_, rv_, rw = (self.exact(c)[k] for k in (u, v, 3))
+        exact = (
+            (qu_ * pw - pu_ * qw) * (rv_ * pw - pv_ * rw) - (qv_ * pw - pv_ * qw) * (ru_ * pw - pu_ * rw)
+        )  # fmt: skip
+        return (exact > 0) - (exact < 0)
+
+    def before(self, a: int, b: int, u: int, v: int) -> int:
+        """−1, 0 or 1 as point a comes before b, is b, or comes after it, by coordinate u, then v."""
+        p, q = self.near(a), self.near(b)
+        for k in (u, v):
+            if p[k] != q[k]:  # rounding keeps the order
+                return -1 if p[k] < q[k] else 1
+            x, y = self.exact(a), self.exact(b)
+            difference = x[k] * y[3] - y[k] * x[3]
+            if difference:
+                return -1 if difference < 0 else 1
+        return 0
+
+    def in_order(self, some: Iterable[int], u: int, v: int) -> list[int]:
+        """Points by coordinate u, then v."""
+
+        def compare(a: int, b: int) -> int:
+            return self.before(a, b, u, v)
+
+        return sorted(some, key=cmp_to_key(compare))
+
+    def in_world(self, point: int) -> tuple[tuple[float, float, float], float]:
+        """(coordinates in W rounded to the nearest doubles [m], how far that is off)."""
+        x, y, z, w = self.exact(point)
+        grid, origin = self.facets.grid, self.facets.origin
+        n, d = (1 << grid, 1) if grid >= 0 else (1, 1 << -grid)
+        coordinates, off = [], []
+        for value, start in zip((x, y, z), origin):
+            numerator, denominator = (value + start * w) * n, w * d
+            nearest = _quotient(numerator, denominator)
+            coordinates.append(nearest)
+            p, q = nearest.as_integer_ratio()
+            off.append(_quotient(p * denominator - numerator * q, q * denominator))
+        return (coordinates[0], coordinates[1], coordinates[2]), math.hypot(*off)
+
+
+def _quotient(numerator: int, denominator: int) -> float:
+    """Correctly rounded; what is beyond all doubles is ± infinity."""
+    try:
+        return numerator / denominator
+    except OverflowError:
+        return math.inf if numerator > 0 else -math.inf
+
+
+def reduced(x: int, y: int, z: int, w: int) -> Rational:
+    """Without a common factor, w > 0."""
+    common = math.gcd(x, y, z, w)
+    if w < 0:
+        common = -common
+    return x // common, y // common, z // common, w // common
+
+
+def axis_of(normal: Point) -> tuple[int, int, int]:
+    """(the axis along which a facet is seen largest, the numbers of the other two coordinates in cyclic order)."""
+    sizes = [abs(x) for x in normal]
+    axis = sizes.index(max(sizes))
+    return axis, (axis + 1) % 3, (axis + 2) % 3
+

@@ -1,0 +1,185 @@
+"""Where facets are cut: for every facet that meets others, the segments that they draw on it, ends and crossings exact.
+
+What two facets share (a point, a segment, a polygon of one plane) is worked out once and drawn on both. Then segments
+of one facet are split where they cross and where points of others lie on them, until nothing changes: a segment that
+several facets have is split in all of them alike, so that neighbours keep fitting together.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+
+import numpy as np
+
+from collide.solids.cut_points import CutPoints, Rational, axis_of, reduced
+from collide.solids.placed_facets import PlacedFacets
+from collide.surface_queries.overlay import common_piece
+
+Segment = tuple[int, int]
+
+
+class FacetCuts:
+    """The segments of facets that are cut.
+
+    pairs : (k, 2) rows of facets that meet, each once; neighbours that share no more than corners and edges are none.
+    corners_of : ids of a facet's corners.   sides_of : the three segments of its border.
+    segments_of, points_of : those on a facet, its border among them.   splits : points within a segment.
+    """
+
+    def __init__(self, facets: PlacedFacets, points: CutPoints, pairs: np.ndarray):
+        self.facets, self.points = facets, points
+        self.corners_of: dict[int, tuple[int, int, int]] = {}
+        self.segments_of: dict[int, set[Segment]] = {}
+        self.points_of: dict[int, set[int]] = {}
+        self.splits: dict[Segment, set[int]] = defaultdict(set)
+        self._facets_of: dict[Segment, set[int]] = defaultdict(set)
+        self._pieces: dict[int, dict[int, list[Segment]]] = defaultdict(dict)
+        self._changed: set[int] = set()
+        self._meets: dict[int, set[int]] = defaultdict(set)
+        facets.load(np.unique(facets.corners[np.unique(pairs)]).tolist() + np.unique(facets.thin).tolist())
+        for f in np.unique(pairs).tolist():
+            self._start(f)
+        for f, g in pairs.tolist():
+            self._draw(f, g)
+        for f in self._pieces:
+            self._cross_segments(f)
+        self._split_thin_edges()
+        while self._changed:
+            self._split_segments(self._changed.pop())
+
+    def _start(self, f: int) -> None:
+        a, b, c = (self.points.vertex(v) for v in self.facets.corners[f].tolist())
+        self.corners_of[f] = a, b, c
+        self.segments_of[f], self.points_of[f] = set(), {a, b, c}
+        for p, q in ((a, b), (b, c), (c, a)):
+            self._put_segment(f, segment(p, q))
+
+    def _put_segment(self, f: int, s: Segment) -> None:
+        self.segments_of[f].add(s)
+        self.points_of[f].update(s)
+        self.points_of[f].update(self.splits.get(s, ()))
+        self._facets_of[s].add(f)
+        self._changed.add(f)
+
+    def _split(self, s: Segment, point: int) -> None:
+        """The point lies within the segment: all facets that have it are to know."""
+        if point not in self.splits[s]:
+            self.splits[s].add(point)
+            for f in self._facets_of[s]:
+                self.points_of[f].add(point)
+                self._changed.add(f)
+
+    def _draw(self, f: int, g: int) -> None:
+        """What two facets share, on both."""
+        piece = common_piece(self.facets.exact_corners(f), self.facets.exact_corners(g))
+        ids = [self.points.add(p) for p in piece]
+        ring = list(zip(ids, [*ids[1:], ids[0]])) if len(ids) > 2 else [(ids[0], ids[1])] if len(ids) == 2 else []
+        segments = [segment(p, q) for p, q in ring]
+        self._meets[f].add(g)
+        self._meets[g].add(f)
+        for a, b in ((f, g), (g, f)):
+            self._pieces[a][b] = segments
+            self.points_of[a].update(ids)
+            self._changed.add(a)
+            for s in segments:
+                self._put_segment(a, s)
+
+    def _cross_segments(self, f: int) -> None:
+        """Where segments cross that are drawn by facets which meet each other: others share ends at most."""
+        pieces = self._pieces[f]
+        _, u, v = axis_of(self.facets.normal(f))
+        for g, drawn in pieces.items():
+            for h in pieces.keys() & self._meets[g]:
+                if h > g:
+                    for s in drawn:
+                        for t in pieces[h]:
+                            self._cross(s, t, u, v)
+
+    def _cross(self, s: Segment, t: Segment, u: int, v: int) -> None:
+        if s[0] in t or s[1] in t:
+            return
+        side = self.points.side
+        if side(*s, t[0], u, v) * side(*s, t[1], u, v) >= 0 or side(*t, s[0], u, v) * side(*t, s[1], u, v) >= 0:
+            return
+        point = self.points.add(self._crossing(s, t, u, v))
+        self._split(s, point)
+        self._split(t, point)
+
+    def _crossing(self, s: Segment, t: Segment, u: int, v: int) -> Rational:
+        """The point at which two segments of a plane cross, which are not parallel."""
+        a, b, c, d = (self.points.exact(p) for p in (*s, *t))
+        line = _line(c, d, u, v)
+        at_a, at_b = (line[0] * p[u] + line[1] * p[v] + line[2] * p[3] for p in (a, b))
+        # Weights of homogeneous points: |at_b| and |at_a| meet on the line.
+        x, y, z, w = (abs(at_b) * p + abs(at_a) * q for p, q in zip(a, b))
+        return reduced(x, y, z, w)
+
+    def _split_segments(self, f: int) -> None:
+        """Segments of a facet at the points of it that lie within them."""
+        _, u, v = axis_of(self.facets.normal(f))
+        for s, p in self._candidates(f, u, v):
+            if self._lies_within(p, s, u, v):
+                self._split(s, p)
+
+    def _candidates(self, f: int, u: int, v: int) -> Iterable[tuple[Segment, int]]:
+        """Segments and points of a facet that may lie within them, by doubles."""
+        segments, points = list(self.segments_of[f]), list(self.points_of[f])
+        near = np.array([self.points.near(p) for p in points])[:, (u, v)]
+        ends = np.array([[self.points.near(p) for p in s] for s in segments])[:, :, (u, v)]
+        with np.errstate(all="ignore"):
+            for k, s in enumerate(segments):
+                a, b = ends[k]
+                inside = ((near >= ends[k].min(axis=0)) & (near <= ends[k].max(axis=0))).all(axis=1)
+                e, w = b - a, near - a
+                height = np.abs(e[0] * w[:, 1] - e[1] * w[:, 0])
+                size = np.maximum(np.abs(e).max(), np.abs(w).max(axis=1))
+                limit = 2.0**-47 * size * (np.abs(a).max() + size)
+                for row in np.flatnonzero(inside & ~(height > limit)).tolist():
+                    if points[row] not in s and points[row] not in self.splits[s]:
+                        yield s, points[row]
+
+    def _lies_within(self, p: int, s: Segment, u: int, v: int) -> bool:
+        """Whether a point of the facet's plane lies on a segment, other than its ends."""
+        if self.points.side(*s, p, u, v) != 0:
+            return False
+        return self.points.before(s[0], p, u, v) * self.points.before(p, s[1], u, v) > 0
+
+    def _split_thin_edges(self) -> None:
+        """Corners of facets without area lie on edges of others: all edges of a line of such facets know them all."""
+        lines: dict[int, set[Segment]] = {}
+        for a, b, c in self.facets.thin.tolist():
+            edges = {segment(a, b), segment(b, c), segment(c, a)}
+            for line in {id(lines[v]): lines[v] for v in (a, b, c) if v in lines}.values():
+                edges |= line
+            for p, q in edges:
+                lines[p] = lines[q] = edges
+        for edges in {id(line): line for line in lines.values()}.values():
+            self._split_line(edges)
+
+    def _split_line(self, edges: set[Segment]) -> None:
+        ids = {self.points.vertex(v) for edge in edges for v in edge}
+        rows = np.flatnonzero(np.isin(self.facets.corners, np.unique(list(edges))).sum(axis=1) >= 2)
+        for f in rows.tolist():
+            a, b, c = self.facets.corners[f].tolist()
+            if edges & {segment(a, b), segment(b, c), segment(c, a)}:
+                if f not in self.corners_of:
+                    self.facets.load((a, b, c))
+                    self._start(f)
+                self.points_of[f].update(ids)
+                self._changed.add(f)
+
+
+def segment(p: int, q: int) -> Segment:
+    return (p, q) if p < q else (q, p)
+
+
+def _line(p: Rational, q: Rational, u: int, v: int) -> tuple[int, int, int]:
+    """(a, b, c) with a·x + b·y + c·w = 0 on the line of two points, seen along an axis."""
+    return (
+        p[v] * q[3] - p[3] * q[v],
+        p[3] * q[u] - p[u] * q[3],
+        p[u] * q[v] - p[v] * q[u],
+    )
+
+

@@ -1,0 +1,84 @@
+"""How much two solids overlap: the volume with its bracket, its centroid, and the areas of both surfaces there."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.shapes.shape import Shape
+from collide.solids.arrangement import Arrangement, arrange
+from collide.solids.solid_operands import solid_operand
+from collide.solids.triangle_sums import areas, enclosed, mean_point
+
+
+class OverlapVolume(NamedTuple):
+    """What two solids have in common.
+
+    volume, lower, upper : of the points inside both [m³], lower ≤ truth ≤ upper proven; all 0 where there are none.
+    centroid : (3,) of the overlap in W [m]; of the patch where the volume is 0; zeros where there is neither.
+    area_a, area_b : of A's surface inside B, and of B's inside A [m²].
+    patch_area : of where the surfaces lie on one another and face each other, as a box on a table [m²].
+    flush_area : of where they lie on one another and face the same way [m²].
+    n_meeting, n_cut : pairs of facets that meet, and facets that were cut.
+    """
+
+    volume: float
+    lower: float
+    upper: float
+    centroid: np.ndarray
+    area_a: float
+    area_b: float
+    patch_area: float
+    flush_area: float
+    n_meeting: int
+    n_cut: int
+
+
+def overlap_volume(A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True) -> OverlapVolume:
+    """Volume, centroid and surfaces of the overlap of two posed solids; no mesh is made of it.
+
+    Parameters
+    ----------
+    A, B : solids with facets, as for `boolean`.
+    X_WA, X_WB : (4, 4) poses in the world W [m].
+    check_poses : refuse matrices that are no rotation.
+
+    Returns
+    -------
+    OverlapVolume. Whether the volume is 0 is exact, and so is where surfaces lie on one another: a box that stands on
+    another has volume 0 and a patch. Brackets are some 1e-13 of the volume wide, at most 2⁻³⁶: where doubles leave more
+    open, as for the thinnest overlaps, volumes are added up in integers. Areas and centroids are rounded.
+
+    Raises
+    ------
+    As `boolean`.
+
+    Notes
+    -----
+    The cells are those of `boolean`, and so is what it costs but for the mesh.
+    """
+    operands = [
+        solid_operand("overlap_volume", name, shape, X, check_poses)
+        for name, shape, X in (("A", A, X_WA), ("B", B, X_WB))
+    ]
+    arrangement = arrange(operands)
+    holds = arrangement.holds()
+    triangles, rows = arrangement.boundary(holds[:, 0] & holds[:, 1])
+    volume = enclosed(arrangement.points, triangles)
+    size, _ = areas(arrangement.points, triangles)
+    steps = arrangement.sheets.steps[rows] != 0
+    patch, places = _patch(arrangement, holds)
+    centroid = volume.centroid if len(triangles) else mean_point(patch, places)
+    return OverlapVolume(
+        volume.volume, volume.lower, volume.upper, centroid, float(size[steps[:, 0] & ~steps[:, 1]].sum()),
+        float(size[steps[:, 1] & ~steps[:, 0]].sum()), float(patch.sum()), float(size[steps.all(axis=1)].sum()),
+        arrangement.n_meeting, arrangement.n_cut,
+    )  # fmt: skip
+
+
+def _patch(arrangement: Arrangement, holds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(areas, centroids) of the sheets with A alone on one side and B alone on the other."""
+    before, behind = (holds[arrangement.cells.sides[:, k]] for k in range(2))
+    rows = (before != behind).all(axis=1) & (before[:, 0] != before[:, 1])
+    return areas(arrangement.points, arrangement.sheets.triangles[rows])

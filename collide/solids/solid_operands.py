@@ -1,0 +1,58 @@
+"""Arguments of questions about solids, checked: shapes that are facets and what they enclose, and their poses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.lowering.facet_bodies import body_of, facet_body
+from collide.narrowphase.facets.facet_geometry import FacetCorners
+from collide.shapes.mesh import Mesh
+from collide.shapes.shape import Shape, kept_with_shape
+from collide.solids.placed_facets import Operand
+from collide.transforms import as_poses
+
+
+def solid_operand(caller: str, name: str, shape, X, check: bool) -> Operand:
+    """A shape and its pose as the arrangement takes them.   name : "A"; its pose's is "X_WA".
+
+    Raises InvalidArgument for surfaces and flat hulls, with the facets to blame; InvalidPose; UnsupportedQuery for
+    curved shapes, unions and half-spaces, by name.
+    """
+    try:
+        body = facet_body(shape, caller)
+    except UnsupportedQuery as error:
+        raise UnsupportedQuery(f"{error}; Mesh(*collide.tessellate(shape, tolerance)[:2]) is one") from None
+    if not body.solid:
+        raise InvalidArgument(f"{caller}: {name} has no inside: {_why_not(shape)}")
+    poses = as_poses(X, f"X_W{name}", check=check)
+    if len(poses) != 1:
+        raise InvalidArgument(f"{caller}: X_W{name} must be one (4, 4) pose, got {len(poses)}: ask pose by pose")
+    mesh = _unscaled(shape) if isinstance(shape, Mesh) else _as_mesh(shape)
+    return Operand(body_of(mesh), mesh, poses[0])
+
+
+def _why_not(shape: Shape) -> str:
+    if isinstance(shape, Mesh):
+        spoilt = [str(defect) for defect in shape.report.defects if defect.spoils]
+        return "; ".join(spoilt) or "it was made with solid=False"
+    return f"the points of this {type(shape).__name__} lie in one plane"
+
+
+def _unscaled(mesh: Mesh) -> Mesh:
+    """The mesh itself, or one of its own vertices: which facets of a scaled copy have an area, the base cannot tell."""
+    return mesh if mesh.base is mesh else _copied(mesh)
+
+
+@kept_with_shape("_as_solid")
+def _copied(mesh: Mesh) -> Mesh:
+    return Mesh(mesh.vertices, mesh.faces, solid=True)
+
+
+@kept_with_shape("_as_solid")
+def _as_mesh(shape: Shape) -> Mesh:
+    """A convex shape as the triangles of its hull, numbered as they are everywhere."""
+    tree = body_of(shape).tree
+    corners = FacetCorners(tree)[np.arange(len(tree.ids))].reshape(-1, 3)
+    vertices, faces = np.unique(corners, axis=0, return_inverse=True)
+    return Mesh(vertices, faces.reshape(-1, 3), solid=True)
