@@ -1,14 +1,16 @@
 """Hierarchies: depth, size, degrees and build times against the number of vertices, with the lines fitted.
 
     python benchmarks/hierarchies.py
-    # some ten minutes to 10^6 vertices; --sizes, --kinds, --no-csv, --plot FILE
+    # some ten minutes to 10^6 vertices; --sizes, --kinds, --which, --no-csv, --plot FILE
     python benchmarks/hierarchies.py --bounds      # depth and size against the bound on the degrees
     python benchmarks/hierarchies.py --distance    # distances down the hierarchies, beside the default
 
 Of every body three hierarchies: Dobkin and Kirkpatrick's ("DK"), with bounded degrees ("BDK"), and with bounded
 degrees of its polar ("polar", of which n counts the facets). Depths are exact, so they are fitted: depth = a + b·log2 n
 for each kind. ``degree_1`` is the largest degree of the finest level, ``degree_2`` that of the one after it,
-``degree`` that of all levels but the finest, ``over`` how many levels but the finest have one above the bound.
+``degree`` that of all levels but the finest, ``over`` how many levels but the finest have one above the bound,
+``share`` the least part by which a level of 16 vertices or more shrinks where none is cut. A row with more levels over
+the bound than `MAY_BE_OVER` names, or a share below a tenth, ends the run with an error.
 """
 
 from __future__ import annotations
@@ -44,7 +46,18 @@ KINDS: dict[str, Callable[[int], np.ndarray]] = {
     "needle": lambda n: families.turned(families.sphere(n) * [1.0, 1e-3, 1e-3]),
     "pancake": lambda n: families.turned(families.sphere(n) * [1.0, 1.0, 1e-3]),
     "moment curve": families.moment_curve,
+    "arcs": families.arcs,
+    "bipyramid, turned": lambda n: families.turned(families.bipyramid(n, 0.1)),
+    "cone, turned": lambda n: families.turned(families.cone(n)),
+    "prism, turned": lambda n: families.turned(families.prism(n // 2)),
+    "pancake prism, turned": lambda n: families.turned(families.prism(n // 2, 1e-6)),
+    "arcs, turned": lambda n: families.turned(families.arcs(n)),
 }
+#: Hierarchies of a body: plain, with bounded degrees, and that of its polar.
+WHICH = ("DK", "BDK", "polar")
+#: Levels but the finest that may have a vertex over the bound: two large ones are neighbours in the finest level, and
+#: no double lies between them to cut both at once (docs/barba-langerman.md).
+MAY_BE_OVER = {("moment curve", "BDK"): 1, ("arcs", "BDK"): 1, ("arcs, turned", "BDK"): 1}
 
 
 def measured(kind: str, which: str, n: int, hierarchy: Hierarchy, hull_s: float, build_s: float) -> dict:
@@ -56,10 +69,19 @@ def measured(kind: str, which: str, n: int, hierarchy: Hierarchy, hull_s: float,
         "depth": hierarchy.depth, "total_per_n": sizes.sum() / sizes[0], "largest_per_n": sizes.max() / sizes[0],
         "degree_1": degrees[0], "degree_2": degrees[1] if len(degrees) > 1 else 0,
         "degree": max(degrees[1:], default=0),
-        "over": sum(d > bound for d in degrees[1:]), "added": int((hierarchy.birth > 0).sum()),
+        "over": sum(d > bound for d in degrees[1:]), "share": float(families.removed_shares(hierarchy).min()),
+        "added": int((hierarchy.birth > 0).sum()),
         "bytes_per_n": sum(a.nbytes for a in hierarchy if isinstance(a, np.ndarray)) / sizes[0],
         "hull_s": hull_s, "build_s": build_s,
     }  # fmt: skip
+
+
+def check(row: dict) -> None:
+    """B3 beyond the finest level, and the size of the independent sets."""
+    name = f"{row['which']} of {row['kind']}, {row['n']} vertices"
+    allowed = MAY_BE_OVER.get((row["kind"], row["which"]), 0)
+    assert row["over"] <= allowed, f"{name}: {row['over']} levels over the bound, the largest degree {row['degree']}"
+    assert row["share"] >= 0.1, f"{name}: a level shrinks by {row['share']:.3f} of itself"
 
 
 def timed(task):
@@ -70,6 +92,7 @@ def timed(task):
 
 
 def rows_of(kind: str, n: int, bounds: tuple[int, ...], polar: bool) -> list[dict]:
+    """Of one body. Bounds: 0 for a plain hierarchy."""
     points = KINDS[kind](n)
     hull, hull_s = timed(lambda: convex_hull(points))
     rows = []
@@ -179,9 +202,17 @@ def show(rows: list[dict], row: dict) -> None:
 
 
 def write(rows: list[dict], name: str, args) -> None:
+    """Rows of an earlier run are kept where they were not measured again."""
     if args.no_csv:
         return
-    with (Path(__file__).parent / "results" / name).open("w", newline="") as file:
+    path = Path(__file__).parent / "results" / name
+    if name == "hierarchies.csv" and path.exists():
+        known = {(r["kind"], r["which"], int(r["vertices"])): r for r in rows}
+        with path.open(newline="") as file:
+            earlier = {(r["kind"], r["which"], int(r["vertices"])): r for r in csv.DictReader(file)}
+        ordered = sorted({**earlier, **known}, key=lambda k: (list(KINDS).index(k[0]), k[2], WHICH.index(k[1])))
+        rows = [{column: {**earlier, **known}[key].get(column, "") for column in rows[0]} for key in ordered]
+    with path.open("w", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
@@ -190,14 +221,18 @@ def write(rows: list[dict], name: str, args) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", default=",".join(map(str, SIZES)), help="numbers of vertices, with commas")
-    parser.add_argument("--kinds", default=",".join(KINDS), help="bodies, with commas")
+    parser.add_argument("--kinds", default=";".join(KINDS), help="bodies, with semicolons")
+    parser.add_argument("--which", default=",".join(WHICH), help="hierarchies, with commas")
     parser.add_argument("--bounds", action="store_true", help="compare bounds on the degrees, at the first two sizes")
     parser.add_argument("--no-csv", action="store_true", help="print only")
     parser.add_argument("--plot", metavar="FILE", help="draw depth, degrees and times (needs matplotlib)")
     parser.add_argument("--distance", action="store_true", help="distances down the hierarchies")
     args = parser.parse_args()
     sizes = list(map(int, args.sizes.split(",")))
-    bounds = (12, 16, 24, 32, 48, 64) if args.bounds else (0, DEGREE_BOUND)
+    which = args.which.split(",")
+    bounds = (12, 16, 24, 32, 48, 64) if args.bounds else tuple(
+        bound for name, bound in (("DK", 0), ("BDK", DEGREE_BOUND)) if name in which
+    )  # fmt: skip
     for warm in ("bipyramid", "prism"):  # compile
         rows_of(warm, 200, (0, 12), True)
     rows: list[dict] = []
@@ -208,10 +243,12 @@ def main() -> None:
         print(f"levels gone down = {a:.1f} + {b:.2f}·(log2 n)²")
         write(rows, "hierarchies-distance.csv", args)
         return
-    for kind in args.kinds.split(","):
+    for kind in args.kinds.split(";"):
         for n in sizes[:2] if args.bounds else sizes:
-            for row in rows_of(kind, n, bounds, not args.bounds):
+            for row in rows_of(kind, n, bounds, not args.bounds and "polar" in which):
                 show(rows, row)
+                if not args.bounds and row["bound"]:
+                    check(row)
     if not args.bounds:
         print("\n".join(["", *fitted(rows)]))
     write(rows, "hierarchies-bounds.csv" if args.bounds else "hierarchies.csv", args)

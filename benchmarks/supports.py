@@ -94,7 +94,7 @@ def _scan(coordinates_at, n, m, directions_at, count, ids_at):
     g = view_f64(directions_at, 3 * count)
     ids = view_i64(ids_at, count)
     for k in range(count):
-        ids[k] = support_vertex(coordinates, n, m, vec3_at(g, 3 * k))
+        ids[k] = support_vertex(coordinates, m, vec3_at(g, 3 * k))
 
 
 scan = entry("void(int64, int64, int64, int64, int64, int64)")(_scan)

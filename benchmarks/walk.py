@@ -1,9 +1,11 @@
-"""The walk of Barba and Langerman: rounds and constant-size tests against the number of vertices, and time.
+"""The walk of Barba and Langerman: rounds, constant-size tests a round and time against the number of vertices.
 
     python benchmarks/walk.py                # some minutes; --sizes, --kinds, --no-csv, --plot FILE
+    python benchmarks/walk.py --fits         # of the rows written before
 
 Pairs of bodies of n vertices of several kinds, at poses of which about half meet and many nearly touch. Counts are
-exact, so they are fitted: rounds ≤ a + b·(log2 n + log2 m), for the mean and for the largest of all poses. Time is
+exact, so they are fitted: rounds ≤ a + b·(log2 n + log2 m), for the mean and for the largest of all poses, and tests a
+round, which must not grow: a mean above MAX_TESTS ends the run with an error. Time is
 taken in turns with the default algorithm on the same hundred poses, the fastest of several turns; every answer is
 compared with the default's. Two hybrids are timed beside them: the walk that tries every new plane against the whole
 bodies at once (early), and the default given the walk's last plane to begin with, free of charge (default_with_axes).
@@ -20,6 +22,8 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "hierarchies"))
+import hierarchy_families as families
 from supports import cloud, least
 
 import collide
@@ -28,54 +32,22 @@ from collide.hierarchies.walk import APART
 from collide.lowering.parts import convex_set_of
 
 SIZES = (32, 128, 512, 2048, 8192, 32768, 131072, 1000000)
-KINDS = ("sphere", "pancake", "cylinder", "bipyramid", "doubling")
-#: Larger ones of this generator crowd their vertices; benchmarks/hierarchies.py has one of 786,433.
-MAX_DOUBLING = 200_000
+KINDS = ("sphere", "pancake", "cylinder", "bipyramid", "doubling", "moment curve")
+#: Tests a round that no row may exceed in the mean. A round scans what went beside one vertex, some ten vertices, and
+#: one in ten plays a game of two stars.
+MAX_TESTS = 16.0
 POSES = 1000
 #: Poses timed together: few enough that a turn is seldom interrupted.
 CHUNK = 100
 TURNS = 9
 
 
-def degree_doubling(n: int) -> np.ndarray:
-    """The polyhedron of section 4: over every face at one vertex q of a tetrahedron a new vertex, again and again.
-
-    Each has degree three when it is made, and the degree of q doubles. At least n vertices, the first one q.
-    """
-    q = np.array([0.0, 0.0, 1.0])
-    angle = np.arange(3) * (2 * np.pi / 3)
-    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle - 0.5], axis=1)
-    outer = np.tile([0.0, 0.0, -1.0, 0.5], (3, 1))  # the planes beyond the edges of the ring: ⟨n, x⟩ ≤ d
-    points = [q[None], ring]
-    while sum(map(len, points)) < n:
-        a, b = ring, np.roll(ring, -1, axis=0)
-        normal = np.cross(a - q, b - q)
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
-        height = normal @ q
-        middle = (q + a + b) / 3
-        slack = np.full(len(ring), np.inf)
-        for n_other, d_other in (
-            (np.roll(normal, 1, axis=0), np.roll(height, 1)), (np.roll(normal, -1, axis=0), np.roll(height, -1)),
-            (outer[:, :3], outer[:, 3]),
-        ):  # fmt: skip
-            along = (normal * n_other).sum(axis=1)
-            remainder = d_other - (middle * n_other).sum(axis=1)
-            with np.errstate(divide="ignore"):
-                slack = np.where(along > 0, np.minimum(slack, remainder / along), slack)
-        made = middle + (0.2 * np.minimum(slack, 0.1))[:, None] * normal
-        new = np.cross(made - a, b - a)
-        new *= np.sign((new * (a - q)).sum(axis=1))[:, None]
-        planes = np.concatenate([new, (new * a).sum(axis=1)[:, None]], axis=1)
-        ring = np.stack([a, made], axis=1).reshape(-1, 3)
-        outer = np.repeat(planes / np.linalg.norm(new, axis=1)[:, None], 2, axis=0)
-        points.append(made)
-    return np.concatenate(points)
-
-
 def body(kind: str, n: int, seed: int) -> collide.ConvexHull:
     """About n vertices. "doubling" is the example of section 4: the degree of one vertex doubles level by level."""
     if kind == "doubling":
-        return collide.ConvexHull(degree_doubling(n))
+        return collide.ConvexHull(families.degree_doubling(round(np.log2(n / 3))))
+    if kind == "moment curve":
+        return collide.ConvexHull(families.moment_curve(n + seed))
     points = cloud(kind, n + seed)
     return collide.ConvexHull(points)
 
@@ -142,6 +114,7 @@ def measured(kind: str, n: int) -> dict:
         "depth_p": result.depth_p, "depth_q": result.depth_q, "hits": truth.mean(),
         "rounds_mean": rows["rounds"].mean(), "rounds_most": int(rows["rounds"].max()),
         "tests_mean": rows["tests"].mean(), "tests_most": int(rows["tests"].max()),
+        "tests_a_round": rows["tests"].sum() / rows["rounds"].sum(),
         "games_mean": rows["games"].mean(), "pivots_mean": rows["pivots"].mean(),
         "proven": result.walked.mean(), "prepare_ms": prepared * 1e3,
         "bytes_a_vertex_p": hierarchy_p.bytes / n, "bytes_a_vertex_q": hierarchy_q.bytes / n,
@@ -157,12 +130,12 @@ def fitted(rows: list[dict]) -> list[str]:
         if len({r["n"] for r in of}) < 3:
             continue
         x = np.log2([float(r["n"]) for r in of]) + np.log2([float(r["m"]) for r in of])
-        for what in ("rounds_mean", "rounds_most", "tests_mean"):
+        for what in ("rounds_mean", "rounds_most", "tests_mean", "tests_a_round", "walk_kernel_us"):
             y = np.array([r[what] for r in of])
             b, a = np.polyfit(x, y, 1)
             above = (y - b * x).max()
             lines.append(
-                f"{kind:>10}: {what} = {a:.1f} + {b:.2f}·(log2 n + log2 m), "
+                f"{kind:>12}: {what} = {a:.1f} + {b:.2f}·(log2 n + log2 m), "
                 f"all ≤ {above:.1f} + {b:.2f}·(log2 n + log2 m)"
             )
     return lines
@@ -174,17 +147,19 @@ def drawn(rows: list[dict], path: str) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    figure, (rounds, times) = pyplot.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
+    figure, (rounds, tests, times) = pyplot.subplots(1, 3, figsize=(15, 4.2), layout="constrained")
     for kind in dict.fromkeys(r["kind"] for r in rows):
         of = [r for r in rows if r["kind"] == kind]
         n = np.array([r["n"] for r in of])
         line = rounds.plot(n, [r["rounds_most"] for r in of], "o-", label=f"{kind}, most")[0]
         rounds.plot(n, [r["rounds_mean"] for r in of], "o--", color=line.get_color())
+        tests.plot(n, [r["tests_a_round"] for r in of], "o-", color=line.get_color(), label=kind)
         times.plot(n, [r["walk_kernel_us"] for r in of], "o-", color=line.get_color(), label=kind)
         times.plot(n, [r["default_us"] for r in of], "o:", color=line.get_color())
     rounds.set(
         title="rounds of a query: most of 1000, and (dashed) mean", xscale="log", xlabel="vertices", ylim=(0, None)
     )
+    tests.set(title="tests a round, mean", xscale="log", xlabel="vertices", ylim=(0, None))
     times.set(title="time of a query [µs]: walk, and (dotted) default", xscale="log", yscale="log", xlabel="vertices")
     rounds.legend()
     times.legend()
@@ -195,17 +170,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", default=",".join(map(str, SIZES)), help="numbers of vertices, with commas")
     parser.add_argument("--kinds", default=",".join(KINDS))
+    parser.add_argument("--fits", action="store_true", help="measure nothing; fit, and draw, the rows written before")
     parser.add_argument("--no-csv", action="store_true", help="print only; else sizes not asked for keep their rows")
     parser.add_argument("--plot", metavar="FILE", help="draw rounds and times (needs matplotlib)")
     args = parser.parse_args()
     path = Path(__file__).parent / "results" / "walk.csv"
     rows = {} if args.no_csv else read(path)
     warned = False
-    for kind in args.kinds.split(","):
+    for kind in () if args.fits else args.kinds.split(","):
         for n in map(int, args.sizes.split(",")):
-            if kind == "doubling" and n > MAX_DOUBLING:
-                continue
             row = measured(kind, n)
+            assert row["tests_a_round"] <= MAX_TESTS, f"{kind} {n}: {row['tests_a_round']:.1f} tests a round"
             if not warned:
                 print("  ".join(f"{c:>11.11}" for c in row))
                 warned = True
@@ -227,6 +202,8 @@ def read(path: Path) -> dict[tuple[str, int], dict]:
         return {}
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
+    for row in rows:
+        row.setdefault("tests_a_round", float(row["tests_mean"]) / float(row["rounds_mean"]))
     return {
         (row["kind"], int(float(row["asked"]))): {k: v if k == "kind" else float(v) for k, v in row.items()}
         for row in rows
@@ -236,7 +213,7 @@ def read(path: Path) -> dict[tuple[str, int], dict]:
 def write(path: Path, rows: dict[tuple[str, int], dict]) -> None:
     ordered = [rows[key] for key in sorted(rows, key=lambda key: (KINDS.index(key[0]), key[1]))]
     with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(ordered[0]), lineterminator="\n")
+        writer = csv.DictWriter(file, list(ordered[-1]), lineterminator="\n")
         writer.writeheader()
         writer.writerows({k: as_text(v) for k, v in row.items()} for row in ordered)
 

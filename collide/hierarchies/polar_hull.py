@@ -3,8 +3,9 @@
 A facet with normal n through a has the polar point n / (n·(a − o)), a quotient of polynomials of degree 2 and 3. Its
 rounding to doubles could lie outside the polar Q of R − o, and the hull of such points would be the
 polar of a body that R sticks out of. Here each point is drawn towards 0 by as much as rounding can do, about 2⁻⁵¹ of it
-(the bound is at `_polar_points`). So Q' ⊆ Q exactly, and R' = o + ρ0(Q') ⊇ R exactly (Lemma 3.6); no facet of R'
-is further than a few units of the last place of R's size from R.
+(the bound is at `_polar_points`). So Q' ⊆ Q exactly, and R' = o + ρ0(Q') ⊇ R exactly (Lemma 3.6). Facets that nearly
+lie in one plane share a polar point (`merged_facets`), and corners of flat sides are drawn a little more
+(`polar_domes`): of a round body, R' is larger by a part of 2⁻⁴³ at most.
 
 Barba and Langerman work with real numbers and pass over this. A plane that separates P from R'
 separates it from R. A point of P and R' has yet to be tested against R: `walk_proof` does that.
@@ -18,7 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.hierarchies.hierarchy import DEGREE_BOUND, Hierarchy, build_hierarchy
-from collide.hierarchies.symbolic_perturbation import exact_side, rank_of
+from collide.hierarchies.merged_facets import merged_facets
+from collide.hierarchies.polar_domes import dome_drops
+from collide.hierarchies.symbolic_perturbation import exact_side
 from collide.hierarchies.true_facets import Cloud, cloud_at, named_in, true_facets
 from collide.hull.exact_hull import Hull, convex_hull
 from collide.kernels import address_of, entry, kernel, view_f64, view_i32
@@ -27,8 +30,6 @@ from collide.numerics.error_free import DD, two_sum
 
 #: How far a polar point may be drawn inside, as a part of it. A hull 10¹¹ times as wide as thick may need more.
 _MAX_DRAWN = 2.0**-10
-#: A vertex with more facets than this is polar to a side that is better not left flat: see `_uneven`.
-_LARGE_DEGREE, _SPREAD = 64, 8.0
 #: Sizes of a body (largest distance from the origin along an axis) whose polar has ordinary doubles.
 SMALLEST, LARGEST = 1e-60, 1e60
 
@@ -38,7 +39,7 @@ class PolarBody(NamedTuple):
 
     origin : (3,) float64, strictly inside R; exact.
     points : (m, 3) float64, 1/length; (v − origin)·q < 1 for every v of R, exactly. One for every true facet of R, or
-        for several whose points coincide as far as doubles tell: see `_clusters`.
+        for several that lie in one plane as far as doubles tell: see `merged_facets`.
     spans : (m, 3) int32, three vertices of R, counter-clockwise from outside, in the plane of that facet.
     hierarchy : of Q'; its vertices below m are rows of ``points``.
     groups : (facets,) int64, for each true facet of R the row of ``points`` that stands for it.
@@ -63,34 +64,22 @@ def polar_of_hull(
     if hull.dimension != 3:
         raise ValueError(f"the polar of a hull of dimension {hull.dimension} is not bounded; it has no interior")
     cloud = Cloud(points)
-    triangles, _, spans = true_facets(cloud, hull)
+    spans = true_facets(cloud, hull).spans
     centre = interior_point(cloud, spans) if origin is None else np.asarray(origin, dtype=np.float64)
     if origin is not None and not strictly_inside(cloud, spans, centre):
         raise ValueError(f"the origin {centre.tolist()} does not lie strictly inside the hull")
     extent = np.nextafter(np.abs(cloud.originals[hull.vertices] - centre).max(axis=0), np.inf)
     if not SMALLEST <= extent.max() <= LARGEST:
         raise ValueError(f"a body of size {extent.max():g} has no polar in ordinary doubles; scale it to about 1")
-    polar = _polar_points(cloud, spans, centre, extent, _uneven(triangles, spans))
-    keep, groups = _clusters(polar, extent)
-    polar, spans = np.ascontiguousarray(polar[keep]), np.ascontiguousarray(spans[keep])
+    polar = _polar_points(cloud, spans, centre, extent)
+    weight = np.abs(polar) @ extent
+    facets = np.ascontiguousarray(hull.facets, dtype=np.int32)
+    keep, groups, patch = merged_facets(cloud, facets, centre, polar, weight)
+    polar, spans, weight = polar[keep], np.ascontiguousarray(spans[keep]), weight[keep]
+    drops = dome_drops(cloud.originals[: cloud.count], facets, groups[patch], centre, polar, weight)
+    # Two more roundings, which a step of a dome exceeds.
+    polar = np.ascontiguousarray(polar * (1.0 - drops)[:, None])
     return PolarBody(centre, polar, spans, build_hierarchy(polar, convex_hull(polar), degree_bound), groups)
-
-
-def _clusters(polar: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(one point of each cluster, ascending; for each point the number of its cluster).
-
-    Facets that rounding split from one flat side have polar points an ulp or so apart. Which of them is highest along
-    a direction is then a matter of rounding, and Lemma 4.2, which looks around one of them only, loses the maximum.
-    Fewer points make Q' smaller and R' larger: by some 3·2⁻³⁰ of its size at most, and 3·2⁻⁴⁰ for bodies that are
-    round.
-    """
-    scaled = polar * extent
-    cell = min(2.0**-40 * float(np.abs(scaled).max()), 2.0**-30)
-    _, first, groups = np.unique(np.rint(scaled / cell), axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    number = np.empty(len(first), dtype=np.int64)
-    number[order] = np.arange(len(first))
-    return first[order], number[groups.ravel()]
 
 
 def interior_point(cloud: Cloud, spans: np.ndarray) -> np.ndarray:
@@ -132,23 +121,7 @@ def strictly_inside(cloud: Cloud, spans: np.ndarray, point: np.ndarray) -> bool:
     return not touches_or_sees(*cloud.addresses, address_of(spans), len(spans), row)
 
 
-def _uneven(triangles: np.ndarray, spans: np.ndarray) -> np.ndarray:
-    """(m,) how much further than it must each polar point is drawn inside.
-
-    The facets at a vertex of large degree are polar to the corners of one flat side. Rounding errors would decide
-    how it is triangulated, and errors that change slowly along its border make a fan of it. Points drawn by
-    different amounts, half of them most, a quarter half of that, and so on, leave degrees of the order of a logarithm.
-    """
-    degree = np.bincount(triangles.ravel(), minlength=spans.max() + 1)
-    large = (degree[spans] > _LARGE_DEGREE).any(axis=1)
-    levels = np.empty(len(spans), dtype=np.int32)
-    write_levels(address_of(levels), len(levels))
-    return np.where(large, 1.0 + _SPREAD * 2.0**-levels, 1.0)
-
-
-def _polar_points(
-    cloud: Cloud, spans: np.ndarray, origin: np.ndarray, extent: np.ndarray, uneven: np.ndarray
-) -> np.ndarray:
+def _polar_points(cloud: Cloud, spans: np.ndarray, origin: np.ndarray, extent: np.ndarray) -> np.ndarray:
     """(m, 3) polar points, drawn inside.
 
     Let q* be the true point, |v_k − o_k| ≤ V_k for all vertices, and W = Σ V_k |q_k| ≥ 1. What is stored is
@@ -162,7 +135,7 @@ def _polar_points(
     centre, reach = np.ascontiguousarray(origin), np.ascontiguousarray(extent)
     write_polar(
         address_of(cloud.originals), len(cloud.originals), address_of(triples), len(triples), address_of(centre),
-        address_of(reach), address_of(uneven), address_of(polar), address_of(proven),
+        address_of(reach), address_of(polar), address_of(proven),
     )  # fmt: skip
     for k in np.flatnonzero(proven == 0).tolist():
         polar[k] = _from_fractions(cloud.originals[triples[k]], centre, reach)
@@ -196,21 +169,13 @@ def touches_or_sees(scaled_at, originals_at, rows, work_at, digits_at, spans_at,
     return 0
 
 
-@entry("void(int64, int64)")
-def write_levels(levels_at, count):
-    levels = view_i32(levels_at, count)
-    for k in range(count):
-        levels[k] = level_of(k)
-
-
-@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def write_polar(points_at, rows, spans_at, count, origin_at, extent_at, spread_at, polar_at, proven_at):
+@entry("void(int64, int64, int64, int64, int64, int64, int64, int64)")
+def write_polar(points_at, rows, spans_at, count, origin_at, extent_at, polar_at, proven_at):
     """Polar points in pairs of doubles, drawn inside; ``proven`` is 0 where pairs do not suffice."""
     points = view_f64(points_at, 3 * rows)
     spans = view_i32(spans_at, 3 * count)
     origin = view_f64(origin_at, 3)
     extent = view_f64(extent_at, 3)
-    spread = view_f64(spread_at, count)
     polar = view_f64(polar_at, 3 * count)
     proven = view_i32(proven_at, count)
     for k in range(count):
@@ -234,21 +199,11 @@ def write_polar(points_at, rows, spans_at, count, origin_at, extent_at, spread_a
         if d > 0.0 and d_size * 2.0**-36 < d and sizes * 2.0**-36 < largest and d > 1e-250:
             qx, qy, qz = quotient(x, x_low, d, d_low), quotient(y, y_low, d, d_low), quotient(z, z_low, d, d_low)
             within = extent[0] * abs(qx) + extent[1] * abs(qy) + extent[2] * abs(qz)
-            drawn = (2.0**-51 * within + 2.0**-55 * (largest / d) * reach) * spread[k]
+            drawn = 2.0**-51 * within + 2.0**-55 * (largest / d) * reach
             polar[3 * k] = qx * (1.0 - drawn)
             polar[3 * k + 1] = qy * (1.0 - drawn)
             polar[3 * k + 2] = qz * (1.0 - drawn)
             proven[k] = 1 if drawn <= _MAX_DRAWN else 0
-
-
-@kernel
-def level_of(k):
-    """How often a coin that is tossed for k falls on one side, at most 30 times."""
-    mixed = rank_of(k) >> 27
-    level = 0
-    while level < 30 and (mixed >> level) & 1 == 0:
-        level += 1
-    return level
 
 
 @kernel

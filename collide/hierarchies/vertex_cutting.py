@@ -25,13 +25,11 @@ from collide.hierarchies.cut_placement import (
     INSETS,
     Cut,
     axis_of,
-    difference,
     find_inner,
     inset_of,
     place,
     prove_new,
     shortest_part,
-    unit_normal,
 )  # fmt: skip
 from collide.hierarchies.half_edges import (
     degree_of,
@@ -46,11 +44,10 @@ from collide.hierarchies.half_edges import (
     read_ring,
 )  # fmt: skip
 from collide.hierarchies.independent_sets import mesh_at
-from collide.hierarchies.symbolic_perturbation import side
+from collide.hierarchies.symbolic_perturbation import exact_side, side
 from collide.hierarchies.true_facets import cloud_at
 from collide.hierarchies.vertex_insertion import insert_near
 from collide.kernels import entry, kernel, view_i32, view_i64
-from collide.numerics.vec3 import Vec3, add, dot
 
 #: Integers of workspace for each neighbour of the vertex: ring, outer, fresh, and what either way of cutting takes.
 SCRATCH = 20
@@ -254,26 +251,21 @@ def all_extreme(cloud, mesh, cut):
 
 @kernel
 def proven_extreme(cloud, mesh, v):
-    """Whether doubles show a plane through v with all of its neighbours strictly on one side."""
-    points = cloud.scaled
+    """Whether v is strictly extreme on a surface that is convex: its facets are in three planes or more, exactly."""
     corners, twins, leaving = mesh.corners, mesh.twins, mesh.leaving
-    normal = Vec3(0.0, 0.0, 0.0)
+    bends = 0
     first = np.int64(leaving[v])
     h = first
     while True:
-        normal = add(normal, unit_normal(points, v, np.int64(corners[following(h)]), np.int64(corners[preceding(h)])))
+        b, c = np.int64(corners[following(h)]), np.int64(corners[preceding(h)])
+        d = np.int64(corners[preceding(np.int64(twins[h]))])
+        if exact_side(cloud, v, b, c, d) != 0:
+            bends += 1
+            if bends == 3:
+                return True
         h = np.int64(twins[preceding(h)])
         if h == first:
-            break
-    while True:
-        d = difference(points, v, np.int64(corners[following(h)]))
-        # Three products and their sums: a few units of the last place of the terms.
-        margin = 2.0**-48 * (abs(normal.x * d.x) + abs(normal.y * d.y) + abs(normal.z * d.z)) + 2.0**-1000
-        if dot(normal, d) >= -margin:
             return False
-        h = np.int64(twins[preceding(h)])
-        if h == first:
-            return True
 
 
 @kernel

@@ -14,9 +14,10 @@ import numpy as np
 from collide.fork_safe_lock import ForkSafeLock
 from collide.hierarchies.flat_hierarchy import flat_hierarchy
 from collide.hierarchies.hierarchy import build_hierarchy
+from collide.hierarchies.merged_facets import facet_of_triangles
 from collide.hierarchies.packed_hierarchy import PackedHierarchy
 from collide.hierarchies.polar_hull import polar_of_hull
-from collide.hierarchies.true_facets import Cloud, label_patches, twins_of
+from collide.hierarchies.true_facets import Cloud, twins_of
 from collide.hull.exact_hull import Hull, convex_hull
 from collide.kernels import address_of
 
@@ -108,7 +109,7 @@ class PolarSide:
         self.origin = np.asarray(polar.origin, dtype=np.float64)
         facets = np.ascontiguousarray(hull.facets, dtype=np.int32)
         self.radius = 0.0 if self.is_thickened else _inner_radius(points, facets, self.origin)
-        patch = polar.groups[_facet_of(points, facets)]
+        patch = polar.groups[facet_of_triangles(Cloud(points), facets, twins_of(facets))]
         order = np.argsort(patch, kind="stable")
         self.triangles = np.ascontiguousarray(facets[order])
         if count is not None:  # the body has no such vertices; the first one stands for them
@@ -140,17 +141,6 @@ def thickened(points: np.ndarray) -> np.ndarray:
     size = max(float((high - low).max()), 2.0**-20 * float(np.abs(middle).max())) or 1.0
     offsets = _THICKENED * size * np.eye(3)
     return np.ascontiguousarray(np.concatenate([points, middle + offsets, middle - offsets]))
-
-
-def _facet_of(points: np.ndarray, facets: np.ndarray) -> np.ndarray:
-    """The number of each triangle's true facet, as `PolarBody` counts them."""
-    cloud, twins = Cloud(points), twins_of(facets)
-    patch = np.empty(len(facets), dtype=np.int32)
-    stack = np.empty(len(facets), dtype=np.int32)
-    label_patches(
-        *cloud.addresses, address_of(facets), address_of(twins), len(facets), address_of(patch), address_of(stack)
-    )
-    return patch
 
 
 #: Rounding of a distance to a facet's plane, in units of the largest coordinate: some twenty operations, and

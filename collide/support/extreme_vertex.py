@@ -17,7 +17,7 @@ import numpy as np
 
 from collide.kernels import kernel, view_f64, view_i32, view_i64
 from collide.numerics.exact_dot_sign import exact_sign, product_and_bound, scaled_into_range
-from collide.numerics.vec3 import cross, dot, sub, vec3_at
+from collide.numerics.vec3 import cross, dot, max_abs, sub, vec3_at
 from collide.support.support_tree import (  # fmt: skip
     AT_POINTS,
     AT_RANGE,
@@ -35,9 +35,11 @@ SCANNED, STEPS, LOOKED_AT, EXACT_SIGNS = range(4)
 _LONG_RING = 64
 #: A search stops where so many corners remain between two certain ones.
 _MAX_SCANNED_CORNERS = 8
-#: Relative error of a triple product of two facet normals and a direction, with a margin: each term is
-#: a product of five differences or components, with at most a dozen roundings along the way.
-_TRIPLE_ROUNDING = 64.0 * 2.0**-53
+#: Error of a component of a facet's normal, in units of the product of its edges' lengths: two differences of rounded
+#: differences, four roundings each, and one more. The normal itself is shorter, in long thin facets by far.
+_NORMAL_ROUNDING = 8.0 * 2.0**-53
+#: Roundings of a triple product of two normals and a direction: three and the sums.
+_TRIPLE_ROUNDING = 8.0 * 2.0**-53
 
 
 class Ring(NamedTuple):
@@ -187,8 +189,12 @@ def _side(ring, i, g):
     a, size_a = _corner(ring, 0)
     b, size_b = _corner(ring, i)
     value = dot(cross(a, b), g)
-    # Every term is at most size_a·size_b·|g|, and there are six.
-    bound = _TRIPLE_ROUNDING * (2.0 * size_a * size_b * (abs(g.x) + abs(g.y) + abs(g.z)))
+    # Six terms a_i·b_j·g_k. Errors of a and of b are in proportion to their sizes, not to a and b themselves.
+    error_a, error_b = _NORMAL_ROUNDING * size_a, _NORMAL_ROUNDING * size_b
+    max_a, max_b = max_abs(a) + error_a, max_abs(b) + error_b
+    rounding = _TRIPLE_ROUNDING * max_a * max_b
+    term = error_a * max_b + max_a * error_b + rounding
+    bound = 2.0 * term * (abs(g.x) + abs(g.y) + abs(g.z))
     if not (size_a > 2.0**-400 and size_b > 2.0**-400 and bound > 2.0**-900):
         return 0  # products may have fallen below the smallest normal double
     if value > bound:

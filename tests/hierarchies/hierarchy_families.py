@@ -93,3 +93,16 @@ def families(n: int) -> dict[str, np.ndarray]:
 
 #: Families in which vertices of large degree are neighbours, or cannot all be cut.
 STUBBORN = {"moment curve", "arcs", "arcs, turned", "crowded"}
+
+
+def removed_shares(hierarchy, least: int = 16) -> np.ndarray:
+    """(levels,) by which part each level of at least so many vertices shrinks to the next one, where none is cut.
+
+    A P-independent set has a tenth of the vertices or more (Barba and Langerman, section 4); cuts are another step.
+    """
+    leaves = np.bincount(hierarchy.last[hierarchy.birth >= 0], minlength=hierarchy.depth)
+    without_cut = np.ones(hierarchy.depth, dtype=bool)
+    without_cut[hierarchy.birth[hierarchy.birth > 0] - 1] = False
+    without_cut[-1] = False
+    counted = without_cut & (hierarchy.sizes >= least)
+    return leaves[counted] / hierarchy.sizes[counted]

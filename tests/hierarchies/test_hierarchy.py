@@ -33,7 +33,7 @@ def built(name: str, bound: int) -> tuple[np.ndarray, Hierarchy]:
 @pytest.mark.parametrize("bound", [0, 12, DEGREE_BOUND])
 def test_families(name, bound):
     points, hierarchy = built(name, bound)
-    late = hierarchy.depth if name == "crowded" or bound == 12 else (3 if name in STUBBORN else 1)
+    late = hierarchy.depth if name == "crowded" or bound == 12 else (2 if name in STUBBORN else 1)
     validate_hierarchy(points, hierarchy, bounded_from=late)
 
 
@@ -42,7 +42,7 @@ def test_polars(name):
     points = families(SIZE // 2)[name]
     body = polar_of_hull(points, convex_hull(points))
     check_polar(points, body)
-    validate_hierarchy(body.points, body.hierarchy, bounded_from=body.hierarchy.depth if name in STUBBORN else 1)
+    validate_hierarchy(body.points, body.hierarchy, bounded_from=body.hierarchy.depth if name == "crowded" else 1)
 
 
 def check_polar(points, body) -> None:
