@@ -64,19 +64,22 @@ UNSUPPORTED = {
     "drake:penetration": SWEPT | {"cone sphere"},
     "trimesh": {case for case, (A, B, *_) in CASES.items() if {type(A), type(B)} & {Sphere, Halfspace, Cylinder}},
     "rapier": {"ellipsoid sphere"}, "rapier:nonlinear": {"ellipsoid sphere"} | PLANES,
+    "distance3d": PLANES, "newton": SWEPT, "cgal": CASES.keys() - {"boxes apart", "boxes overlapping", "hull box", "polytope box"},
     "exact": CURVED | PLANES,
 }  # fmt: skip
 #: Cases answered by a boolean alone.
 WITHOUT_DISTANCE = {
     "fcl": PLANES, "fcl:indep": APART, "mujoco": APART, "mujoco:distance": set(), "mujoco:distance-libccd": set(),
     "drake:penetration": APART, "rapier": set(), "rapier:cast": CASES.keys() - APART,
-    "rapier:nonlinear": CASES.keys() - APART,
+    "rapier:nonlinear": CASES.keys() - APART, "distance3d": CASES.keys() - APART, "distance3d:epa": set(),
+    "distance3d:mpr": APART, "cgal": CASES.keys(),
 }  # fmt: skip
 #: [m] at sizes of about 1 m. Bullet snaps hull corners to a grid; FCL and coal stop at 1e-6 on what is round; MuJoCo
 #: holds corners, and trimesh's managers poses, in single precision; Rapier's points near round shapes are off by more.
 TOLERANCE = {
     "collide": 1e-9, "coal": 1e-6, "fcl": 2e-5, "pybullet": 1e-3, "pybullet:margins": 3e-3, "mujoco": 2e-6,
     "drake": 2e-5, "trimesh": 2e-6, "rapier": 1e-4, "rapier:cast": 1e-3, "rapier:nonlinear": 3e-4, "exact": 1e-14,
+    "distance3d": 1e-6, "distance3d:nesterov": 1e-5, "distance3d:epa": 1e-2, "distance3d:mpr": 1e-4, "newton": 1e-5, "cgal": 1e-14,
 }  # fmt: skip
 #: Distances of random pairs are off by more: depths of FCL's own EPA, MuJoCo's capsule and box, and all that libccd's
 #: MPR finds, gaps of Rapier's manifolds.
@@ -84,13 +87,13 @@ WRONG_DISTANCES = {
     "fcl:indep", "mujoco", "mujoco:libccd", "mujoco:distance", "mujoco:distance-libccd", "drake:penetration", "rapier",
 }  # fmt: skip
 #: One of them is a closed form.
-WRONG_CASES = {"mujoco:distance-libccd": {"polytope box"}}
+WRONG_CASES = {"mujoco:distance-libccd": {"polytope box"}, "distance3d:nesterov": {"cone sphere", "swept hull"}}
 #: Rapier's normal of a sphere whose centre lies on a plane is not the plane's.
 WRONG_NORMALS = {"rapier": {"half-space sphere"}, "rapier:cast": set()}
 #: Rows of random pairs without an answer: two boxes 0.39 m apart have no contact in Rapier, however far it looks.
 WITHOUT_CONTACT = {"rapier": {34}, "rapier:cast": {34}, "rapier:nonlinear": {34}}
 #: Engines without some of the shapes of random pairs.
-WITHOUT_SHAPES = {"trimesh"}
+WITHOUT_SHAPES = {"trimesh", "cgal"}
 #: And booleans of pairs clear of touching.
 WRONG_BOOLEANS = {"mujoco:distance-libccd"}
 
