@@ -50,8 +50,12 @@ class CgalPeer(PairwisePeer):
         return points[0], None
 
     def ask(self, A, X_WA, B, X_WB) -> Reply:
-        placed = [(points @ X[:3, :3].T + X[:3, 3], facets) for (points, facets), X in ((A, X_WA), (B, X_WB))]
-        return Reply(meets(*(polyhedron(*body) for body in placed)), note=_NO_DISTANCE)
+        return Reply(meets(self.placed(A, X_WA), self.placed(B, X_WB)), note=_NO_DISTANCE)
+
+    def placed(self, body, X_WB: np.ndarray) -> Any:
+        """CGAL's mesh of a body at a pose (4, 4)."""
+        points, facets = body
+        return polyhedron(points @ X_WB[:3, :3].T + X_WB[:3, 3], facets)
 
 
 def polyhedron(points: np.ndarray, facets: np.ndarray | None) -> Any:

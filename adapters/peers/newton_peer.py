@@ -71,11 +71,15 @@ class NewtonPeer(PairwisePeer):
     def ask(self, A, X_WA, B, X_WB) -> Reply:
         if A[0] == B[0] == "PLANE":
             raise UnsupportedQuery("Newton has no contact of two planes")
-        placed = [(geometry, X_WP @ geometry[3]) for geometry, X_WP in ((A, X_WA), (B, X_WB))]
-        between = float(np.linalg.norm(placed[0][1][:3, 3] - placed[1][1][:3, 3]))
-        launch, contacts = launched(placed, 1.01 * (between + A[4] + B[4]))
+        launch, contacts = self.launch_of(A, X_WA, B, X_WB)
         launch()
         return nearest_contact(contacts)
+
+    def launch_of(self, A, X_WA: np.ndarray, B, X_WB: np.ndarray):
+        """A launch for two geometries, whose gap is larger than their distance, and the arrays that it fills."""
+        placed = [(geometry, X_WP @ geometry[3]) for geometry, X_WP in ((A, X_WA), (B, X_WB))]
+        between = float(np.linalg.norm(placed[0][1][:3, 3] - placed[1][1][:3, 3]))
+        return launched(placed, 1.01 * (between + A[4] + B[4]))
 
 
 def quiet_warp() -> None:
@@ -125,7 +129,7 @@ def launched(placed, gap: float):
     }  # fmt: skip
     narrow_phase, count = _narrow_phase(), contacts["contact_count"].numpy()
 
-    def launch() -> None:
+    def launch(_alive=placed) -> None:  # the arrays hold numbers of the hulls' meshes, which must not end before
         count[0] = 0
         narrow_phase.launch(**arguments, **contacts)
 

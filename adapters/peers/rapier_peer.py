@@ -108,9 +108,9 @@ class RapierPeer(PairwisePeer):
             hit = _starts_in_contact(cast, A, B, places) if cast else _intersect(A, B, places)
             return Reply(hit, note="boolean only: no distance of meshes is asked of Rapier")
         if cast:
-            return _gap_by_cast(cast, A, B, places, _farthest(A, X_WA, B, X_WB))
+            return _gap_by_cast(cast, A, B, places, farthest(A, X_WA, B, X_WB))
         hit = _intersect(A, B, places)
-        deepest = _deepest(A, B, places, _farthest(A, X_WA, B, X_WB))
+        deepest = _deepest(A, B, places, farthest(A, X_WA, B, X_WB))
         if deepest is None:
             return Reply(hit, math.inf)  # that is what no contact within any distance says
         distance, normal, p_Aq, p_Bq = deepest
@@ -222,7 +222,7 @@ def unit(vector) -> tuple:
     return tuple(np.asarray(vector) / length) if length > 0 else (math.nan,) * 3
 
 
-def _farthest(A, X_WA: np.ndarray, B, X_WB: np.ndarray) -> float:
+def farthest(A, X_WA: np.ndarray, B, X_WB: np.ndarray) -> float:
     """A distance that the two bodies surely do not exceed [m]; a half-space is as far as its plane."""
     between = float(np.linalg.norm(X_WA[:3, 3] - X_WB[:3, 3]))
     return 1.01 * (between + sum(rapier_reach(part) for _, _, part in (A, B)))
