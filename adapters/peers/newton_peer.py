@@ -6,7 +6,7 @@ Its kernels are compiled at the first launch, a minute or so once a machine; the
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -77,9 +77,30 @@ class NewtonPeer(PairwisePeer):
 
     def launch_of(self, A, X_WA: np.ndarray, B, X_WB: np.ndarray):
         """A launch for two geometries, whose gap is larger than their distance, and the arrays that it fills."""
-        placed = [(geometry, X_WP @ geometry[3]) for geometry, X_WP in ((A, X_WA), (B, X_WB))]
-        between = float(np.linalg.norm(placed[0][1][:3, 3] - placed[1][1][:3, 3]))
-        return launched(placed, 1.01 * (between + A[4] + B[4]))
+        return launched(placed_pair(A, X_WA, B, X_WB))
+
+
+class PlacedPair(NamedTuple):
+    """Two geometries in the world, as the narrow phase takes them.
+
+    places : positions and quaternions (x, y, z, w).   gap : larger than their distance [m].
+    reaches, boxes : radii of balls and half sizes of boxes around them [m].
+    """
+
+    geometries: tuple
+    places: list[tuple]
+    gap: float
+    reaches: list[float]
+    boxes: list[float]
+
+
+def placed_pair(A, X_WA: np.ndarray, B, X_WB: np.ndarray) -> PlacedPair:
+    """Two built geometries at the poses (4, 4) of their parts."""
+    Xs = X_WA @ A[3], X_WB @ B[3]
+    between = float(np.linalg.norm(Xs[0][:3, 3] - Xs[1][:3, 3]))
+    places = [(*X[:3, 3].tolist(), *map(float, quaternion_xyzw(X[:3, :3]))) for X in Xs]
+    reaches = [1e6 if geometry[0] == "PLANE" else geometry[4] for geometry in (A, B)]
+    return PlacedPair((A, B), places, 1.01 * (between + A[4] + B[4]), reaches, [A[4], B[4]])
 
 
 def quiet_warp() -> None:
@@ -97,18 +118,17 @@ def _mesh(points: np.ndarray, facets: np.ndarray) -> Any:
     return mesh
 
 
-def launched(placed, gap: float):
-    """A launch of the narrow phase for two geometries, each at a pose (4, 4), and the arrays that it fills."""
+def launched(pair: PlacedPair):
+    """A launch of the narrow phase for a pair, and the arrays that it fills."""
     import newton
     import warp as wp
 
     def array(values, dtype):
         return wp.array(values, dtype=dtype, device="cpu")
 
-    kinds = [int(newton.GeoType[geometry[0]]) for geometry, _ in placed]
-    places = [(*X[:3, 3].tolist(), *quaternion_xyzw(X[:3, :3])) for _, X in placed]
-    reaches = [1e6 if geometry[0] == "PLANE" else geometry[4] for geometry, _ in placed]
-    corners_of = [(geometry[4],) * 3 for geometry, _ in placed]
+    kinds = [int(newton.GeoType[geometry[0]]) for geometry in pair.geometries]
+    meshes = [geometry[2] for geometry in pair.geometries]
+    boxes = np.repeat(pair.boxes, 3).reshape(2, 3)
     contacts = {
         "contact_pair": wp.zeros(_ROOM, dtype=wp.vec2i, device="cpu"),
         "contact_position": wp.zeros(_ROOM, dtype=wp.vec3, device="cpu"),
@@ -118,18 +138,19 @@ def launched(placed, gap: float):
     }
     arguments = {
         "candidate_pair": array([(0, 1)], wp.vec2i), "candidate_pair_count": array([1], wp.int32),
-        "shape_types": array(kinds, wp.int32), "shape_data": array([(*g[1], 0.0) for g, _ in placed], wp.vec4),
-        "shape_transform": array(places, wp.transform),
-        "shape_source": array([g[2].finalize("cpu") if g[2] else 0 for g, _ in placed], wp.uint64),
-        "shape_gap": array([gap / 2, gap / 2], wp.float32), "shape_collision_radius": array(reaches, wp.float32),
+        "shape_types": array(kinds, wp.int32),
+        "shape_data": array([(*geometry[1], 0.0) for geometry in pair.geometries], wp.vec4),
+        "shape_transform": array(pair.places, wp.transform),
+        "shape_source": array([mesh.finalize("cpu") if mesh else 0 for mesh in meshes], wp.uint64),
+        "shape_gap": array([pair.gap / 2] * 2, wp.float32), "shape_collision_radius": array(pair.reaches, wp.float32),
         "shape_flags": array([int(newton.ShapeFlags.COLLIDE_SHAPES)] * 2, wp.int32),
-        "shape_collision_aabb_lower": array(-np.array(corners_of), wp.vec3),
-        "shape_collision_aabb_upper": array(np.array(corners_of), wp.vec3),
+        "shape_collision_aabb_lower": array(-boxes, wp.vec3),
+        "shape_collision_aabb_upper": array(boxes, wp.vec3),
         "shape_voxel_resolution": array([(4, 4, 4)] * 2, wp.vec3i), "device": "cpu",
     }  # fmt: skip
     narrow_phase, count = _narrow_phase(), contacts["contact_count"].numpy()
 
-    def launch(_alive=placed) -> None:  # the arrays hold numbers of the hulls' meshes, which must not end before
+    def launch(_alive=meshes) -> None:  # the arrays hold numbers of the hulls' meshes, which must not end before
         count[0] = 0
         narrow_phase.launch(**arguments, **contacts)
 
