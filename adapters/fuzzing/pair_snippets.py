@@ -6,7 +6,7 @@ import numpy as np
 
 from collide.adapters.fuzzing.snippet_parts import Asked, hull, numbers
 from collide.adapters.peers.distance3d_peer import TOUCHING, cone_pose
-from collide.adapters.peers.newton_peer import NewtonPeer, placed_pair
+from collide.adapters.peers.newton_peer import NewtonPeer, PlacedPair, placed_pair
 from collide.adapters.peers.question import corners
 from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Mesh, Shape, Sphere
 
@@ -90,20 +90,31 @@ def newton_lines(asked: Asked) -> list[str]:
         "phase = NarrowPhase(max_candidate_pairs=1, max_triangle_pairs=1, reduce_contacts=False, has_meshes=False,",
         "                    device='cpu', verify_buffers=False)",
         "phase.launch(candidate_pair=array([(0, 1)], wp.vec2i), candidate_pair_count=array([1], int), device='cpu',",
-        f"    shape_types=array([{kinds}], int), shape_data=array(sizes, wp.vec4),"
-        " shape_transform=array(places, wp.transform),"
-        " shape_source=array([h.finalize('cpu') if h else 0 for h in hulls], wp.uint64),",
-        f"    shape_gap=array([{pair.gap / 2!r}] * 2, float), shape_collision_radius=array({pair.reaches!r}, float),"
-        " shape_flags=array([int(newton.ShapeFlags.COLLIDE_SHAPES)] * 2, int),"
-        f" shape_collision_aabb_lower=array({[[-r] * 3 for r in pair.boxes]!r}, wp.vec3),"
-        f" shape_collision_aabb_upper=array({[[r] * 3 for r in pair.boxes]!r}, wp.vec3),"
-        " shape_voxel_resolution=array([(4, 4, 4)] * 2, wp.vec3i),"
-        " contact_pair=wp.zeros(64, dtype=wp.vec2i, device='cpu'), contact_position=at, contact_normal=normal,"
-        " contact_penetration=gaps, contact_count=n)",
+        *_launch_lines(kinds, pair),
         asked.true_line(),
         "print('newton distance:', float(gaps.numpy()[: n.numpy()[0]].min(initial=np.inf)))",
     ]
     return lines
+
+
+def _launch_lines(kinds: str, pair: PlacedPair) -> list[str]:
+    """The rest of the arguments of a launch, on two lines."""
+    boxes = [[[sign * r] * 3 for r in pair.boxes] for sign in (-1, 1)]
+    shapes = [
+        f"shape_types=array([{kinds}], int)", "shape_data=array(sizes, wp.vec4)",
+        "shape_transform=array(places, wp.transform)",
+        "shape_source=array([h.finalize('cpu') if h else 0 for h in hulls], wp.uint64)",
+    ]  # fmt: skip
+    rest = [
+        f"shape_gap=array([{pair.gap / 2!r}] * 2, float)", f"shape_collision_radius=array({pair.reaches!r}, float)",
+        "shape_flags=array([int(newton.ShapeFlags.COLLIDE_SHAPES)] * 2, int)",
+        f"shape_collision_aabb_lower=array({boxes[0]!r}, wp.vec3)",
+        f"shape_collision_aabb_upper=array({boxes[1]!r}, wp.vec3)",
+        "shape_voxel_resolution=array([(4, 4, 4)] * 2, wp.vec3i)",
+        "contact_pair=wp.zeros(64, dtype=wp.vec2i, device='cpu')", "contact_position=at", "contact_normal=normal",
+        "contact_penetration=gaps", "contact_count=n)",
+    ]  # fmt: skip
+    return [f"    {', '.join(shapes)},", f"    {', '.join(rest)}"]
 
 
 # --- CGAL -------------------------------------------------------------------------------------------

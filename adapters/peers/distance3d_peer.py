@@ -50,7 +50,8 @@ class Distance3dPeer(PairwisePeer):
     def prepare(self) -> None:
         warnings.filterwarnings("ignore", module="distance3d")  # Numba's, about the speed of products
         # What is compiled on the way is no part of a pair's time.
-        for body in Sphere(1.0), Box((1.0, 1.0, 1.0)), Capsule(1.0, 1.0), Cylinder(1.0, 1.0), Ellipsoid((1.0, 1.0, 2.0)):
+        bodies = (Sphere(1.0), Box((1, 1, 1)), Capsule(1.0, 1.0), Cylinder(1.0, 1.0), Ellipsoid((1, 1, 2)))
+        for body in bodies:
             for x in 3.5, 0.25:
                 apart = np.eye(4)
                 apart[0, 3] = x
