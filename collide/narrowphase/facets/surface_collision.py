@@ -120,14 +120,14 @@ def _open_pair(query, pair, stack, top):
     if link_a < 0 and (a & _TRIANGLE or box_size(A.boxes, a) * units > _LARGE * box_size(B.boxes, b)):
         for t in range(~link_a >> 3, (~link_a >> 3) + (~link_a & 7)):
             query.counters[BOXES] += 1
-            set_prism(placing, 0, A, t, probe)
+            set_prism(placing, 0, A, t, B, link_b, probe)
             mask = boxes_meeting_prism(B.boxes, NODE * link_b, trees.frame_a, probe)
             top = push_children(stack, top, mask, word_of(_TRIANGLE | t, WIDTH * link_b), OF_B)
         return top
     if link_b < 0 and (b & _TRIANGLE or box_size(B.boxes, b) > _LARGE * units * box_size(A.boxes, a)):
         for t in range(~link_b >> 3, (~link_b >> 3) + (~link_b & 7)):
             query.counters[BOXES] += 1
-            set_prism(placing, 1, B, t, probe)
+            set_prism(placing, 1, B, t, A, link_a, probe)
             mask = boxes_meeting_prism(A.boxes, NODE * link_a, trees.frame_b, probe)
             top = push_children(stack, top, mask, word_of(WIDTH * link_a, _TRIANGLE | t), OF_A)
         return top
