@@ -30,8 +30,9 @@ from collide.numerics.vec3 import Vec3, absolute, add, divide, dot, max_abs, neg
 # A row of results, doubles: distance, proven bounds, points on A and on B and the direction between them in the world.
 DISTANCE, LOWER, UPPER, POINT_A, POINT_B, NORMAL = 0, 1, 2, 3, 6, 9
 RESULT = 12
-# And integers: facet of A, facet of B, whether the surfaces meet; boxes, triangles and exact decisions.
-FACET_A, FACET_B, MEETS, BOXES, TRIANGLES, EXACT = range(6)
+# And integers: facet of A, facet of B, whether the surfaces meet; nodes compared with a box, pairs of triangles, exact
+# decisions.
+FACET_A, FACET_B, MEETS, NODES, TRIANGLES, EXACT = range(6)
 MARKS = 6
 
 # What changes on the way, doubles ("near"): the direction from A to B (3) and, in units of A's boxes, its products with

@@ -17,8 +17,8 @@ from collide.narrowphase.facets.exact_corners import B_LOCAL_AT, CORNERS, STATE,
 from collide.narrowphase.facets.exact_triangles import ExactCall, ask_exactly
 from collide.narrowphase.facets.posed_surfaces import PLACING, Extent, extent_of, place, put_in_frame_of_a
 
-# Counters, integers: boxes compared, triangles tested, of them decided exactly.
-BOXES, TRIANGLES, EXACT = range(3)
+# Counters, integers: nodes compared with the segment, triangles tested, of them decided exactly.
+NODES, TRIANGLES, EXACT = range(3)
 COUNTERS = 3
 #: Doubles and floats of workspace.
 SEGMENT_DOUBLES = PLACING + CORNERS + NUMBERS

@@ -26,8 +26,8 @@ from collide.narrowphase.facets.exact_triangles import MEET
 from collide.narrowphase.facets.filtered_triangles import AMBIGUOUS, APART
 from collide.narrowphase.facets.fine_probes import probe_of_node
 from collide.narrowphase.facets.posed_segment import (
-    BOXES,
     COUNTERS,
+    NODES,
     SEGMENT_DOUBLES,
     SEGMENT_FLOATS,
     TRIANGLES,
@@ -149,7 +149,7 @@ def _visit_leaf(query, pair):
 def _open_box(query, pair, stack, top):
     """Push the children that the ray may meet, the one that begins first on top."""
     keys, segment = query.keys, query.segment
-    segment.counters[BOXES] += 1
+    segment.counters[NODES] += 1
     probe = probe_of_node(segment.tree, pair.link_a, segment.frame_b, segment.probe, segment.moved)
     mask = boxes_meeting(segment.tree.boxes, NODE * pair.link_a, segment.frame_b, probe)
     base = top

@@ -37,8 +37,8 @@ from collide.numerics.vec3 import Vec3, add, cross, dot, equal_at, max_abs, put_
 
 #: Doubles and floats of workspace: a placing, corners, and a pose that moves nothing.
 DOUBLES, FLOATS = PLACING + CORNERS + 16, 2 * FRAME + PROBE
-# Counters, integers: pairs of boxes compared, pairs of triangles tested, of them decided exactly.
-BOXES, TRIANGLES, EXACT = range(3)
+# Counters, integers: nodes compared with a box, pairs of triangles tested, of them decided exactly.
+NODES, TRIANGLES, EXACT = range(3)
 #: Doubles of a facet's plane: a normal (3), and the largest component of an edge, squared.
 PLANE = 4
 # Progress, integers: the stack's height, the facet pairs found.
@@ -328,7 +328,7 @@ def _children_meeting(query, ref, node):
     """Mask of the boxes of a node that the one behind a reference meets: in one tree only its own axes separate."""
     trees = query.trees
     probe = trees.probe
-    query.counters[BOXES] += 1
+    query.counters[NODES] += 1
     box = box_at(trees.A, ref)
     centre = box.centre
     if trees.A.header[HAS_ORIGINS] != 0:

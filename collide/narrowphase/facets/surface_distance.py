@@ -22,7 +22,6 @@ from collide.narrowphase.facets.distance_search import (
     ALONG_B,
     BEST,
     BOUND,
-    BOXES,
     DIRECTION,
     DISTANCE,
     EXACT,
@@ -38,6 +37,7 @@ from collide.narrowphase.facets.distance_search import (
     MEETS,
     NEAR,
     NEW,
+    NODES,
     NORMAL,
     OF_A_AT,
     POINT_A,
@@ -111,7 +111,7 @@ def _open_pair(query, pair, stack, top):
     A, B = trees.A, trees.B
     if is_beyond_bound(query.near, pair):
         return top
-    query.marks[BOXES] += 1
+    query.marks[NODES] += 1
     if opens_b(A, B, pair, trees.placing[UNITS]):
         node = pair.link_b
         set_near_probe(query, 0, A, pair.a, pair.gap_a, B, node)

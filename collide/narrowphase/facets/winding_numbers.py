@@ -23,8 +23,8 @@ from collide.narrowphase.facets.exact_triangles import BACK, BY, FROM, PASS, THR
 from collide.narrowphase.facets.filtered_triangles import AMBIGUOUS, APART, segment_against_triangle
 from collide.narrowphase.facets.fine_probes import probe_of_node
 from collide.narrowphase.facets.posed_segment import (
-    BOXES,
     COUNTERS,
+    NODES,
     SEGMENT_DOUBLES,
     SEGMENT_FLOATS,
     TRIANGLES,
@@ -148,7 +148,7 @@ def _visit_leaf(query, pair):
 @kernel(inline=True)
 def _open_box(query, pair, stack, top):
     segment = query.segment
-    segment.counters[BOXES] += 1
+    segment.counters[NODES] += 1
     probe = probe_of_node(segment.tree, pair.link_a, segment.frame_b, segment.probe, segment.moved)
     mask = boxes_meeting(segment.tree.boxes, NODE * pair.link_a, segment.frame_b, probe)
     return push_children(stack, top, mask, WIDTH * pair.link_a, OF_B)
