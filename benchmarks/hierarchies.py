@@ -130,9 +130,9 @@ def distance_row(kind: str, n: int, bound: int, count: int = 200) -> dict:
     assert np.abs(apart - default.distance).max() < 1e-12
     levels_a, levels_b, problems, looked_at = np.mean([f.counters for f in results], axis=0)
     return {
-        "kind": kind, "n": len(points), "bound": bound, "depth": body.hierarchy.depth, "levels_a": levels_a, "levels_b": levels_b,
-        "problems": problems, "looked_at": looked_at, "us": best / count * 1e6,
-        "default_us": best_default / count * 1e6,
+        "kind": kind, "n": len(points), "bound": bound, "depth": body.hierarchy.depth,
+        "levels_a": levels_a, "levels_b": levels_b, "problems": problems, "looked_at": looked_at,
+        "us": best / count * 1e6, "default_us": best_default / count * 1e6,
     }  # fmt: skip
 
 
