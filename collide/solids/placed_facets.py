@@ -6,6 +6,7 @@ and one origin on it near the bodies, so that the integers are as short as they 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -37,6 +38,7 @@ class PlacedFacets:
     local : (V, 3) vertices in the frames of their bodies.   body_of : (V,) int64.
     first_facet, first_vertex, first_edge : (r + 1,) where each body's begin.   poses : (r, 4, 4).
     grid : exponent of the unit of exact coordinates.   origin : their origin in that unit.
+    slack : more than the errors of coordinates in W, [m], that are worked out in doubles, and of their differences.
     thin : ids (k, 3) of facets whose corners are distinct and lie on one line.
     """
 
@@ -57,6 +59,11 @@ class PlacedFacets:
         self.thin = np.concatenate(thin)
         self.grid = min(_grid_of(operand.X, edges) for operand, edges in zip(operands, self.edges))
         self.origin = self._on_grid(*placed(operands[0].X, operands[0].mesh.vertices[:1]))[0]
+        # Sums of three products and a shift are off by less than six units of the sum of their sizes.
+        self.slack = 2.0**-48 * max(
+            float(np.abs(o.X[:3, :3]).sum() * np.abs(o.mesh.vertices).max() + np.abs(o.X[:3, 3]).max())
+            for o in operands
+        )
         self._exact: dict[int, Point] = {}
         self._normals: dict[int, Point] = {}
 
@@ -91,11 +98,29 @@ class PlacedFacets:
             n = self._normals[facet] = cross(minus(b, a), minus(c, a))
         return n
 
+    def in_world(self, point: tuple[int, int, int, int]) -> tuple[float, float, float]:
+        """A point x/w, y/w, z/w as exact coordinates are, in W, each rounded once to the nearest double [m]."""
+        x, y, z, w = point
+        a, b, c = self.origin
+        up, down = max(self.grid, 0), max(-self.grid, 0)
+        unit = w << down
+        return (
+            quotient((x + a * w) << up, unit), quotient((y + b * w) << up, unit), quotient((z + c * w) << up, unit)
+        )  # fmt: skip
+
     def _on_grid(self, points: list[Point], grid: int) -> list[Point]:
         shift = grid - self.grid
         if shift < 0:  # integers that end in zeros, all of them
             return [(x >> -shift, y >> -shift, z >> -shift) for x, y, z in points]
         return [(x << shift, y << shift, z << shift) for x, y, z in points]
+
+
+def quotient(numerator: int, denominator: int) -> float:
+    """Correctly rounded; what is beyond all doubles is ± infinity."""
+    try:
+        return numerator / denominator
+    except OverflowError:
+        return math.inf if numerator > 0 else -math.inf
 
 
 def _grid_of(X: np.ndarray, edges: FacetEdges) -> int:

@@ -16,9 +16,6 @@ from collide.solids.placed_facets import PlacedFacets
 from collide.solids.polygon_ears import clip_ears
 from collide.surface_queries.overlay import posed_corners
 
-#: Parts with more corners are left to the sweep.
-_MAX_CORNERS = 40
-
 
 class _Chains(NamedTuple):
     """The borders of facets, from corner to corner over the points that cut them.
@@ -61,18 +58,12 @@ def split_facets(
     following, unpaired = _ways_around(chains, facet, start, end, at_border, n_points)
     bad = np.union1d(bad, unpaired)
     all_facets, all_points = np.concatenate([chains.facet, facet]), np.concatenate([chains.point, start])
-    heads, lengths = _rounds(following, len(chains.facet))
-    is_bad = np.zeros(len(facets.corners), dtype=bool)
-    is_bad[bad] = True
-    is_bad[all_facets[heads[lengths <= 0]]] = True
-    good = (lengths > 0) & ~is_bad[all_facets[heads]]
-    polygons = _corners_of(following, heads[good], lengths[good])
-    triangles, polygon, failed = clip_ears(
-        [all_points[p] for p in polygons], [all_facets[p[:, 0]] for p in polygons], facets, place, error
-    )
-    is_bad[failed] = True
-    remaining = ~is_bad[polygon]
-    return triangles[remaining], polygon[remaining], rows[is_bad[rows]]
+    failed = np.zeros(len(facets.corners), dtype=np.uint8)
+    failed[bad] = 1
+    triangles, owners = clip_ears(facets, following, len(chains.facet), all_points, all_facets, place, error, failed)
+    is_bad = failed.view(bool)
+    remaining = ~is_bad[owners]
+    return triangles[remaining], owners[remaining], rows[is_bad[rows]]
 
 
 def _borders(facets: PlacedFacets, rows, facet, start, edge, at_border, place, error) -> tuple[_Chains, np.ndarray]:
@@ -132,29 +123,3 @@ def _ways_around(chains: _Chains, facet, start, end, at_border, n_points) -> tup
     following[m:] = np.where(at_border[1], onward, m + np.where(onto == back, or_onto, onto))
     bad.append(facet[~at_border[1] & (count != 2)])
     return following, np.unique(np.concatenate(bad))
-
-
-def _rounds(following: np.ndarray, n_border: int) -> tuple[np.ndarray, np.ndarray]:
-    """(the first step of each round, its length); a length of 0 where it touches no border, −1 where it is too long."""
-    least, jump = np.arange(len(following)), following.copy()
-    for _ in range(int(_MAX_CORNERS).bit_length()):
-        least = np.minimum(least, least[jump])
-        jump = jump[jump]
-    closed = least == least[following]
-    heads, lengths = np.unique(least, return_counts=True)
-    broken = np.unique(least[~closed])
-    lengths[np.isin(heads, broken)] = -1
-    lengths[lengths > _MAX_CORNERS] = -1
-    lengths[heads >= n_border] = 0
-    return heads, lengths
-
-
-def _corners_of(following: np.ndarray, heads: np.ndarray, lengths: np.ndarray) -> list[np.ndarray]:
-    """The steps of rounds, (k, m) for every length m there is."""
-    polygons = []
-    for m in np.unique(lengths).tolist():
-        steps = [heads[lengths == m]]
-        for _ in range(m - 1):
-            steps.append(following[steps[-1]])
-        polygons.append(np.stack(steps, axis=1))
-    return polygons

@@ -164,7 +164,7 @@ ROOMS = {
     },
     "solids": {
         "errors", "argument_checks", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",
-        "surface_queries",
+        "surface_queries", "kernels",
     },
     "hierarchies": {
         "errors",
