@@ -57,7 +57,7 @@ def cells_of(sheets: Sheets, points: CutPoints, is_cut: np.ndarray, crossings: n
     """
     facets = points.facets
     parts = [
-        uncut_parts(edges, ~is_cut[start:end]) + start
+        uncut_parts(edges.links, ~is_cut[start:end]) + start
         for edges, start, end in zip(facets.edges, facets.first_facet.tolist(), facets.first_facet[1:].tolist())
     ]
     top = np.concatenate(parts)[~is_cut]

@@ -163,4 +163,3 @@ def axis_of(normal: Point) -> tuple[int, int, int]:
     sizes = [abs(x) for x in normal]
     axis = sizes.index(max(sizes))
     return axis, (axis + 1) % 3, (axis + 2) % 3
-

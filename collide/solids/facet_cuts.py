@@ -195,5 +195,3 @@ def _line(p: Rational, q: Rational, u: int, v: int) -> tuple[int, int, int]:
         p[3] * q[u] - p[u] * q[3],
         p[u] * q[v] - p[v] * q[u],
     )
-
-

@@ -6,15 +6,14 @@ import numpy as np
 
 from collide.kernels import address_of, entry, view_i32, view_u8
 from collide.mesh.union_find import find, union
-from collide.solids.facet_edges import FacetEdges
 
 
-def uncut_parts(edges: FacetEdges, whole: np.ndarray) -> np.ndarray:
+def uncut_parts(links: np.ndarray, whole: np.ndarray) -> np.ndarray:
     """(n,) int32: the least facet of each part into which whole facets fall, joined along edges of two; −1 for others.
 
-    whole : (n,) bool. O(n), nearly.
+    links : (2, m) int32, the facets on both sides of each such edge.   whole : (n,) bool. O(n), nearly.
     """
-    return _joined(whole, *edges.links)
+    return _joined(whole, *links)
 
 
 def components(n: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:

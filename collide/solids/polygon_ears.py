@@ -2,44 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from collide.kernels import address_of, entry, kernel, view_f64, view_i64, view_u8
+from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.numerics.vec3 import Vec3, cross, sub
-from collide.solids.placed_facets import PlacedFacets
 
 #: Parts with more corners are left to the sweep.
 MAX_CORNERS = 40
 #: Doubles: of each corner two coordinates and its id, and room for one more.
-_WORKSPACE = 3 * (MAX_CORNERS + 1)
+WORKSPACE = 3 * (MAX_CORNERS + 1)
 _U = 2.0**-53
-
-
-def clip_ears(
-    facets: PlacedFacets, following: np.ndarray, n_border: int, points: np.ndarray, rows: np.ndarray,
-    place: np.ndarray, error: np.ndarray, failed: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """(triangles (t, 3) of point ids, their facets (t,)); those of facets that failed among them.
-
-    following : (n,) from each step the next around the same part; the first ``n_border`` are along borders.
-    points, rows : (n,) where a step starts, and its facet.   place, error : of the points that are no vertices, in W.
-    failed : (F,) uint8, set for facets with a ring of cuts, too many corners or no proven ear.
-    """
-    n = len(following)
-    triangles, owners = np.empty((n, 3), dtype=np.int64), np.empty(n, dtype=np.int64)
-    following, points, rows = (np.ascontiguousarray(x, dtype=np.int64) for x in (following, points, rows))
-    workspace = np.empty(_WORKSPACE)
-    seen = np.zeros(n, dtype=np.uint8)
-    count = clip_parts(
-        address_of(facets.poses), len(facets.poses), address_of(facets.local), len(facets.local),
-        address_of(facets.corners), address_of(facets.body), len(facets.corners), address_of(place), address_of(error),
-        len(place), address_of(following), address_of(points), address_of(rows), n, n_border, address_of(seen),
-        address_of(failed), address_of(triangles), address_of(owners), address_of(workspace),
-    )  # fmt: skip
-    return triangles[:count], owners[:count]
-
-
-# --- kernels ------------------------------------------------------------------------------------
 
 
 @kernel
@@ -187,7 +157,14 @@ def clip_parts(
     poses_at, n_bodies, local_at, n_vertices, corners_at, body_at, n_facets, place_at, error_at, n_points, following_at,
     points_at, rows_at, n, n_border, seen_at, failed_at, triangles_at, owners_at, workspace_at,
 ):  # fmt: skip
-    """How many triangles were made: as `clip_ears` says.   workspace : _WORKSPACE doubles."""
+    """How many triangles were made, those of facets that fail among them.
+
+    poses, local, corners, body : of `PlacedFacets`.   place, error : of the points that are no vertices, in W.
+    following : (n,) from each step the next around the same part; the first ``n_border`` are along borders.
+    points, rows : (n,) where a step starts, and its facet.   seen : (n,) uint8, 0 at first.
+    failed : (F,) uint8, set for facets with a ring of cuts, too many corners or no proven ear.
+    triangles, owners : out, (n, 3) ids of points and (n,) facets.   workspace : WORKSPACE doubles.
+    """
     poses = view_f64(poses_at, 16 * n_bodies)
     local = view_f64(local_at, 3 * n_vertices)
     corners = view_i64(corners_at, 3 * n_facets)

@@ -11,22 +11,23 @@ import math
 import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_f64, view_i64
-from collide.mesh.bvh import CENTRE, EXPONENT, NODE, WIDTH, box_at, open_tree
-from collide.solids.placed_facets import Operand
+from collide.mesh.bvh import CENTRE, EXPONENT, NODE, WIDTH, MeshTree, box_at, open_tree
 
 #: Answers of a facet: how often it is passed, or that doubles do not tell.
 _OPEN = 2
 
 
-def count_passages(operand: Operand, points: np.ndarray, axes: np.ndarray, slack: float) -> tuple[np.ndarray, np.ndarray]:
+def count_passages(
+    tree: MeshTree, X: np.ndarray, points: np.ndarray, axes: np.ndarray, slack: float
+) -> tuple[np.ndarray, np.ndarray]:
     """((k,) int64 passages that are proven, (m, 2) rays and facets that are left open).
 
-    points : (k, 3) in W, where rays begin.   axes : (k,) int64, 0, 1 or 2: along which they run, upwards.
+    X : (4, 4), the body's pose.   points : (k, 3) in W, where rays begin.   axes : (k,) int64, 0, 1 or 2: along which they run, upwards.
     slack : bound of the errors of coordinates in W, of points and of vertices worked out in doubles, and of their
     differences. O(log n) a ray for well-shaped bodies.
     """
-    tree, X = operand.body.tree, np.ascontiguousarray(operand.X)
-    points, axes = np.ascontiguousarray(points), np.ascontiguousarray(axes, dtype=np.int64)
+    X, points = np.ascontiguousarray(X), np.ascontiguousarray(points)
+    axes = np.ascontiguousarray(axes, dtype=np.int64)
     totals = np.empty(len(axes), dtype=np.int64)
     stack = np.empty(WIDTH * (tree.depth + 2), dtype=np.int64)
     left = np.empty((64 + 4 * len(axes), 2), dtype=np.int64)

@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.kernels import address_of
 from collide.solids.crossing_pairs import CrossingPairs
 from collide.solids.placed_facets import PlacedFacets
-from collide.solids.polygon_ears import clip_ears
+from collide.solids.polygon_ears import WORKSPACE, clip_parts
 from collide.surface_queries.overlay import posed_corners
 
 
@@ -57,13 +58,29 @@ def split_facets(
     chains, bad = _borders(facets, rows, facet, start, edge, at_border[0], place, error)
     following, unpaired = _ways_around(chains, facet, start, end, at_border, n_points)
     bad = np.union1d(bad, unpaired)
-    all_facets, all_points = np.concatenate([chains.facet, facet]), np.concatenate([chains.point, start])
-    failed = np.zeros(len(facets.corners), dtype=np.uint8)
-    failed[bad] = 1
-    triangles, owners = clip_ears(facets, following, len(chains.facet), all_points, all_facets, place, error, failed)
-    is_bad = failed.view(bool)
+    steps = np.concatenate([chains.facet, facet]), np.concatenate([chains.point, start])
+    is_bad = np.zeros(len(facets.corners), dtype=bool)
+    is_bad[bad] = True
+    triangles, owners = _clipped(facets, following, len(chains.facet), *steps, place, error, is_bad)
     remaining = ~is_bad[owners]
     return triangles[remaining], owners[remaining], rows[is_bad[rows]]
+
+
+def _clipped(
+    facets: PlacedFacets, following: np.ndarray, n_border: int, rows: np.ndarray, points: np.ndarray,
+    place: np.ndarray, error: np.ndarray, is_bad: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """(triangles (t, 3), their facets (t,)) as of `polygon_ears.clip_parts`, which marks further facets as bad."""
+    n = len(following)
+    triangles, owners = np.empty((n, 3), dtype=np.int64), np.empty(n, dtype=np.int64)
+    seen, workspace = np.zeros(n, dtype=np.uint8), np.empty(WORKSPACE)
+    count = clip_parts(
+        address_of(facets.poses), len(facets.poses), address_of(facets.local), len(facets.local),
+        address_of(facets.corners), address_of(facets.body), len(facets.corners), address_of(place), address_of(error),
+        len(place), address_of(following), address_of(points), address_of(rows), n, n_border, address_of(seen),
+        address_of(is_bad.view(np.uint8)), address_of(triangles), address_of(owners), address_of(workspace),
+    )  # fmt: skip
+    return triangles[:count], owners[:count]
 
 
 def _borders(facets: PlacedFacets, rows, facet, start, edge, at_border, place, error) -> tuple[_Chains, np.ndarray]:

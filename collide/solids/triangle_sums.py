@@ -8,19 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.kernels import address_of, entry, kernel, view_f64, view_i32
-from collide.numerics import exact_points
-from collide.numerics.exact_points import Point, inner, rounded
-from collide.numerics.vec3 import cross, dot, norm, sub, vec3_at
+from collide.kernels import address_of
+from collide.numerics.exact_points import Point, cross, inner, rounded
 from collide.solids.cut_points import CutPoints
 from collide.solids.rounded_mesh import used_points
 from collide.solids.rounded_points import rounded_points
+from collide.solids.sum_kernel import SUMS, sum_triangles
 
 #: Brackets of volumes wider than this share of them are worked out again in integers.
 _WIDEST = 2.0**-33
 _U = 2.0**-53
-#: Of `sum_triangles`.
-_SUMS = 6
 
 
 class Volume(NamedTuple):
@@ -42,7 +39,7 @@ def enclosed(points: CutPoints, triangles: np.ndarray) -> tuple[Volume, np.ndarr
     corners -= start
     # Each difference is off by the rounding of its ends, by less than those ends' last place, and its own.
     error = 4.0 * _U * float(np.abs(start).max() + np.abs(corners).max())
-    sums, areas = np.empty(_SUMS), np.empty(len(faces))
+    sums, areas = np.empty(SUMS), np.empty(len(faces))
     sum_triangles(
         address_of(corners), len(corners), address_of(faces), len(faces), error, address_of(sums), address_of(areas)
     )
@@ -53,46 +50,6 @@ def enclosed(points: CutPoints, triangles: np.ndarray) -> tuple[Volume, np.ndarr
     if bound <= _WIDEST * volume:
         return Volume(volume, volume - bound, volume + bound, start + np.array(moments) / (4.0 * six)), areas
     return _exactly(points, triangles), areas
-
-
-@entry("void(int64, int64, int64, int64, float64, int64, int64)")
-def sum_triangles(corners_at, n, faces_at, k, error, sums_at, areas_at):
-    """Of k triangles (int32) of n corners that are off by ``error``: six volumes summed, their sizes, a bound of their
-    errors but for that of the sum, and moments; areas, one a triangle.
-
-    a · (e × f) with a off by δ, e and f by 2δ: 6 δ |e| |f| + 12 |a| δ (|e| + |f|), and 24 u |a| |e| |f| by rounding.
-    """
-    corners = view_f64(corners_at, 3 * n)
-    faces = view_i32(faces_at, 3 * k)
-    sums = view_f64(sums_at, _SUMS)
-    areas = view_f64(areas_at, k)
-    six, size, bound, x, y, z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(k):
-        a = vec3_at(corners, 3 * faces[3 * i])
-        b = vec3_at(corners, 3 * faces[3 * i + 1])
-        c = vec3_at(corners, 3 * faces[3 * i + 2])
-        e = sub(b, a)
-        f = sub(c, a)
-        normal = cross(e, f)
-        areas[i] = 0.5 * norm(normal)
-        volume = dot(a, normal)
-        six += volume
-        size += abs(volume)
-        x += volume * (a.x + b.x + c.x)
-        y += volume * (a.y + b.y + c.y)
-        z += volume * (a.z + b.z + c.z)
-        far = _largest(a) + 2.0 * error
-        long_e = _largest(e) + 2.0 * error
-        long_f = _largest(f) + 2.0 * error
-        bound += 6.0 * error * long_e * long_f + 12.0 * far * error * (long_e + long_f)
-        bound += 24.0 * _U * far * long_e * long_f
-    sums[0], sums[1], sums[2] = six, size, bound
-    sums[3], sums[4], sums[5] = x, y, z
-
-
-@kernel
-def _largest(a):
-    return max(abs(a.x), abs(a.y), abs(a.z))
 
 
 def _exactly(points: CutPoints, triangles: np.ndarray) -> Volume:
@@ -127,7 +84,7 @@ def _fixed_point_sums(points: CutPoints, triangles: np.ndarray, bits: int) -> tu
                 seen[p] = tuple(q[k] * start[3] - start[k] * q[3] for k in range(3)), q[3] * start[3]  # type: ignore
             corners.append(seen[p])
         (a, wa), (b, wb), (c, wc) = corners
-        six = (inner(a, exact_points.cross(b, c)) << bits) // (wa * wb * wc)
+        six = (inner(a, cross(b, c)) << bits) // (wa * wb * wc)
         total += six
         for k in range(3):
             moments[k] += six * (a[k] * wb * wc + b[k] * wa * wc + c[k] * wa * wb) // (wa * wb * wc)

@@ -15,7 +15,7 @@ from solid_judge import judge, snippet, solids_of
 
 import collide
 from collide.errors import CollideError, InvalidArgument, InvalidPose, UnsupportedQuery
-from collide.solids import around_edges, facet_cuts, polygon_ears, rays
+from collide.solids import around_edges, facet_cuts, rays, split_facets
 
 I = np.eye(4)
 OPERATIONS = ("union", "intersection", "difference", "symmetric_difference")
@@ -218,7 +218,7 @@ def test_faults_are_noticed(monkeypatch):
     def around_backwards(sheets, points, low, high, sheet, upward, right=around_edges.around_edge):
         return right(sheets, points, low, high, sheet, upward)[::-1]
 
-    def without_an_ear(*arguments, right=polygon_ears.clip_parts):
+    def without_an_ear(*arguments, right=split_facets.clip_parts):
         return max(right(*arguments) - 1, 0)
 
     def noticed(family, seed) -> bool:
@@ -232,10 +232,11 @@ def test_faults_are_noticed(monkeypatch):
         (around_edges, "around_edge", around_backwards),
         (facet_cuts.FacetCuts, "_cross_segments", lambda self, f: None),
         (facet_cuts.FacetCuts, "_lies_within", lambda self, p, s, u, v: False),
-        (rays, "count_passages", lambda operand, points, axes, slack: (0, np.zeros((0, 2), dtype=np.int64))),
-        (polygon_ears, "clip_parts", without_an_ear),
+        (rays, "count_passages", lambda tree, X, points, axes, slack: (0, np.zeros((0, 2), dtype=np.int64))),
+        (split_facets, "clip_parts", without_an_ear),
     ]
     for owner, name, fault in faults:
         with monkeypatch.context() as patch:
             patch.setattr(owner, name, fault)
-            assert any(noticed(family, 1) for family in ("random shells", "boxes", "turned grid shells", "smooth")), name
+            families = ("random shells", "boxes", "turned grid shells", "smooth")
+            assert any(noticed(family, 1) for family in families), name
