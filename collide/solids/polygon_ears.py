@@ -46,7 +46,7 @@ def _look_at(facet, ids, m, place, n_vertices, u, v, seen):
 
     facet : its three ids, and where these are.   seen : out, m pairs of coordinates.
     """
-    a, b, c, p, q, r = facet
+    a, b, _, p, q, r = facet
     largest = 0.0
     for k in range(m):
         point = int(ids[k])

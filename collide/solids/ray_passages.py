@@ -22,7 +22,8 @@ def count_passages(
 ) -> tuple[np.ndarray, np.ndarray]:
     """((k,) int64 passages that are proven, (m, 2) rays and facets that are left open).
 
-    X : (4, 4), the body's pose.   points : (k, 3) in W, where rays begin.   axes : (k,) int64, 0, 1 or 2: along which they run, upwards.
+    X : (4, 4), the body's pose.   points : (k, 3) in W, where rays begin.
+    axes : (k,) int64, 0, 1 or 2: along which they run, upwards.
     slack : bound of the errors of coordinates in W, of points and of vertices worked out in doubles, and of their
     differences. O(log n) a ray for well-shaped bodies.
     """
@@ -73,7 +74,8 @@ def _passage(T, at, X, p, axis, slack):
     """1 where the ray leaves through a triangle, −1 where it enters, 0 where it passes by; _OPEN where that is unclear.
 
     Relative coordinates below D across the axis, off by ε each, make determinants s that are off by 4Dε + 2ε² and by
-    their rounding, less than Dε / 4; heights z below Z make Σ s z off by 3 (2D²ε + (Z + ε) limit) and less for rounding.
+    their rounding, less than Dε / 4; heights z below Z make Σ s z off by 3 (2D²ε + (Z + ε) limit), and
+    by less for rounding.
     """
     u = (axis + 1) % 3
     v = (axis + 2) % 3
