@@ -56,23 +56,22 @@ def cells_of(sheets: Sheets, points: CutPoints, is_cut: np.ndarray, crossings: n
     crossings : (k, 2) facets that cross clearly, and ids : (k, 2) the ends of what they share, along n_a × n_b.
     """
     facets = points.facets
-    parts = [
-        uncut_parts(edges.links, ~is_cut[start:end]) + start
-        for edges, start, end in zip(facets.edges, facets.first_facet.tolist(), facets.first_facet[1:].tolist())
-    ]
-    top = np.concatenate(parts)[~is_cut]
-    tops = np.zeros(len(is_cut), dtype=bool)
-    tops[top] = True
-    number = np.cumsum(tops) - 1
-    n_tops = int(tops.sum())
-    n = n_tops + len(sheets.triangles) - len(top)
-    patch = np.concatenate([number[top], np.arange(n_tops, n)])
+    top = np.empty(len(is_cut), dtype=np.int64)
+    for edges, start, end in zip(facets.edges, facets.first_facet.tolist(), facets.first_facet[1:].tolist()):
+        top[start:end] = uncut_parts(edges.links, ~is_cut[start:end])
+        top[start:end] += start
+    whole = np.flatnonzero(~is_cut)
+    top = top[whole]
+    is_top = np.flatnonzero(top == whole)
+    number = np.empty(len(is_cut), dtype=np.int64)
+    number[top[is_top]] = np.arange(len(is_top))
+    first_sheet = np.concatenate([is_top, np.arange(len(whole), len(sheets.triangles))])
+    n = len(first_sheet)
+    patch = np.concatenate([number[top], np.arange(len(is_top), n)])
     first, second = joined_sides(sheets, points, is_cut, crossings, ids)
     root = components(2 * n, 2 * patch[first // 2] + first % 2, 2 * patch[second // 2] + second % 2)
     cells, of_side = np.unique(root, return_inverse=True)
     of_patch = of_side.reshape(n, 2)
-    first_sheet = np.empty(n, dtype=np.int64)
-    first_sheet[patch[::-1]] = np.arange(len(patch))[::-1]
     return Cells(of_patch[patch], _windings(sheets, first_sheet, of_patch, len(cells), points))
 
 

@@ -20,6 +20,7 @@ class FacetEdges(NamedTuple):
     corners : (n, 3) int64 welded vertex ids.   edge : (n, 3) the edge from corner k to corner k + 1.
     sides : (e, 2) the facets at an edge where there are two, else −1.
     links : (2, m) int32 the same of edges with two.
+    odd : half-edges 3 · facet + corner of all other edges.
     lowest_bit : exponent of the lowest bit set in any coordinate.
     """
 
@@ -29,6 +30,7 @@ class FacetEdges(NamedTuple):
     edge: np.ndarray
     sides: np.ndarray
     links: np.ndarray
+    odd: np.ndarray
     lowest_bit: int
 
 
@@ -53,4 +55,5 @@ def facet_edges(mesh: Mesh) -> FacetEdges:
     of_facet = edge.reshape(-1, 3)
     lowest = int(lowest_exponents(mesh.vertices.ravel()))
     links = np.ascontiguousarray(sides[sides[:, 0] >= 0].T.astype(np.int32))
-    return FacetEdges(rows, place, corners, of_facet, sides, links, lowest)
+    odd = np.flatnonzero(sides[edge, 0] < 0)
+    return FacetEdges(rows, place, corners, of_facet, sides, links, odd, lowest)

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from collide.lowering.facet_bodies import Body
+from collide.mesh.bvh import MeshTree
 from collide.mesh.mesh_survey import NO_AREA
 from collide.mesh.mesh_topology import COLLAPSED
 from collide.numerics.exact_points import Point, cross, minus, placed
@@ -38,7 +40,6 @@ class PlacedFacets:
     local : (V, 3) vertices in the frames of their bodies.   body_of : (V,) int64.
     first_facet, first_vertex, first_edge : (r + 1,) where each body's begin.   poses : (r, 4, 4).
     grid : exponent of the unit of exact coordinates.   origin : their origin in that unit.
-    slack : more than the errors of coordinates in W, [m], that are worked out in doubles, and of their differences.
     thin : ids (k, 3) of facets whose corners are distinct and lie on one line.
     """
 
@@ -59,13 +60,35 @@ class PlacedFacets:
         self.thin = np.concatenate(thin)
         self.grid = min(_grid_of(operand.X, edges) for operand, edges in zip(operands, self.edges))
         self.origin = self._on_grid(*placed(operands[0].X, operands[0].mesh.vertices[:1]))[0]
-        # Sums of three products and a shift are off by less than six units of the sum of their sizes.
-        self.slack = 2.0**-48 * max(
-            float(np.abs(o.X[:3, :3]).sum() * np.abs(o.mesh.vertices).max() + np.abs(o.X[:3, 3]).max())
-            for o in operands
-        )
         self._exact: dict[int, Point] = {}
         self._normals: dict[int, Point] = {}
+
+    @cached_property
+    def slack(self) -> float:
+        """More than the errors of coordinates in W, [m], that are worked out in doubles, and of their differences."""
+        # Sums of three products and a shift are off by less than six units of the sum of their sizes.
+        return 2.0**-48 * max(
+            float(np.abs(o.X[:3, :3]).sum() * np.abs(o.mesh.vertices).max() + np.abs(o.X[:3, 3]).max())
+            for o in self.operands
+        )
+
+    def tree_of(self, body: int) -> MeshTree:
+        """The box-tree of a body's facets, in its frame."""
+        return self.operands[body].body.tree
+
+    def beside(self, edges: np.ndarray) -> np.ndarray:
+        """(k, 2) the facets at edges of two; −1 at others."""
+        body = np.searchsorted(self.first_edge, edges, side="right") - 1
+        sides = np.empty((len(edges), 2), dtype=np.int64)
+        for k, of_body in enumerate(self.edges):
+            rows = np.flatnonzero(body == k)
+            two = of_body.sides[edges[rows] - self.first_edge[k]]
+            sides[rows] = np.where(two >= 0, two + self.first_facet[k], -1)
+        return sides
+
+    def odd_half_edges(self) -> np.ndarray:
+        """3 · facet + corner of all edges without exactly two facets."""
+        return np.concatenate([edges.odd + 3 * k for edges, k in zip(self.edges, self.first_facet.tolist())])
 
     def rows_of(self, body: int, numbers: np.ndarray) -> np.ndarray:
         """(k,) rows here of facets of a body by their own numbers; −1 for facets without area."""

@@ -61,7 +61,7 @@ def _windings(facets: PlacedFacets, starts: list[Rational], axes: np.ndarray) ->
     winding = np.zeros((len(starts), len(facets.operands)), dtype=np.int64)
     is_unclear = np.zeros(len(starts), dtype=bool)
     for k, operand in enumerate(facets.operands):
-        winding[:, k], left = count_passages(operand.body.tree, operand.X, places, axes, facets.slack)
+        winding[:, k], left = count_passages(facets.tree_of(k), operand.X, places, axes, facets.slack)
         left_rows = facets.rows_of(k, left[:, 1])
         for ray, f in zip(left[left_rows >= 0, 0].tolist(), left_rows[left_rows >= 0].tolist()):
             passage = _passage(facets, f, starts[ray], int(axes[ray]))

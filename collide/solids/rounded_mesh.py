@@ -32,15 +32,14 @@ def rounded_mesh(points: CutPoints, triangles: np.ndarray) -> RoundedMesh:
     """The solid of triangles (k, 3) that close, vertices rounded to the nearest doubles of W."""
     ids, faces = used_points(triangles, len(points))
     vertices, moved = rounded_points(points, ids)
-    same = weld(vertices) if len(vertices) else np.zeros(0, dtype=np.int32)
-    corners = same[faces]
-    proper = np.flatnonzero(
-        (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
-    )
+    corners, proper = _welded(vertices, faces)
     rows, n_thin = proper, 0
     while len(rows):
-        used, compact = used_points(corners[rows], len(vertices))
-        mesh = Mesh(vertices[used], compact)
+        if len(rows) < len(faces) or corners is not faces:
+            used, compact = used_points(corners[rows], len(vertices))
+            mesh = Mesh(vertices[used], compact)
+        else:
+            mesh = Mesh(vertices, faces)
         if mesh.solid:
             return RoundedMesh(mesh, rows, moved, len(faces) - len(proper), n_thin)
         survey = mesh.survey
@@ -48,6 +47,16 @@ def rounded_mesh(points: CutPoints, triangles: np.ndarray) -> RoundedMesh:
         n_thin += len(np.unique(survey.shells[spoilt]))
         rows = rows[~spoilt] if spoilt.any() else rows[:0]
     return RoundedMesh(None, rows, moved, len(faces) - len(proper), n_thin)
+
+
+def _welded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(the faces with equal vertices named by the first, and those with three distinct corners)."""
+    same = weld(vertices) if len(vertices) else np.zeros(0, dtype=np.int32)
+    if (same == np.arange(len(same))).all():
+        return faces, np.arange(len(faces))
+    corners = same[faces]
+    a, b, c = corners.T
+    return corners, np.flatnonzero((a != b) & (b != c) & (c != a))
 
 
 def used_points(triangles: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
