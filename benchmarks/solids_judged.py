@@ -5,9 +5,9 @@
 
 A line a family: pairs; points put elsewhere than the solids' own winding numbers put them, and pairs whose volumes do
 not add up in fractions; results, those that are no closed solid, those with facets that cross after rounding, and how
-many pairs of facets; triangles of which rounding left nothing. Of manifold3d: volumes asked, off by more than 1e-9 of the
-solids', once where facets of both come within 1e-6 of one plane and once where none do; solids it does not take, pairs
-left out because a solid crosses itself.
+many pairs of facets; triangles of which rounding left nothing. Of manifold3d: volumes asked, and off by more than 1e-9
+of the solids', once where facets of both come within 1e-6 of one plane, once where none do; solids it does not take,
+pairs left out because a solid crosses itself.
 """
 
 from __future__ import annotations
