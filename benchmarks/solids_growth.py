@@ -5,8 +5,8 @@
 
 Bumpy spheres in each other, whose facets meet along a curve, and harpsicordia, local by proof, with Σ = n and with
 Σ ≤ 1000. A line a size: pairs of facets that meet, pairs of boxes looked at, pairs of facets tested; per meeting and
-over n log2 n. Below each family the exponents e of n^e fitted, and c of c n log2 n with the largest factor that any size is
-off it. Counts are the same on every machine.
+over n log2 n. Below each family the exponents e of n^e fitted, and c of c n log2 n with the largest factor that any
+size is off it. Counts are the same on every machine.
 """
 
 from __future__ import annotations

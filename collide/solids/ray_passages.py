@@ -52,8 +52,8 @@ def _placed(X, i, x, y, z):
 
 
 @kernel
-def _box_is_beside(tree, ref, unit, X, p, axis, slack):
-    """Whether the box behind a reference may meet the ray from p upwards along an axis."""
+def _box_is_beside(tree, ref, unit, X, points, k, axis, slack):
+    """Whether the box behind a reference may meet ray k, from its point upwards along an axis."""
     box = box_at(tree.boxes, ref)
     centre, half = box.centre, box.half
     if half.x < 0.0:
@@ -63,14 +63,14 @@ def _box_is_beside(tree, ref, unit, X, p, axis, slack):
     z = tree.numbers[CENTRE + 2] + unit * centre.z
     for i in range(3):
         reach = unit * (abs(X[4 * i]) * half.x + abs(X[4 * i + 1]) * half.y + abs(X[4 * i + 2]) * half.z) + slack
-        off = _placed(X, i, x, y, z) - p[i]
+        off = _placed(X, i, x, y, z) - points[3 * k + i]
         if off + reach < 0.0 or (i != axis and off - reach > 0.0):
             return False
     return True
 
 
 @kernel
-def _passage(T, at, X, p, axis, slack):
+def _passage(T, at, X, points, k, axis, slack):
     """1 where the ray leaves through a triangle, −1 where it enters, 0 where it passes by; _OPEN where that is unclear.
 
     Relative coordinates below D across the axis, off by ε each, make determinants s that are off by 4Dε + 2ε² and by
@@ -79,12 +79,12 @@ def _passage(T, at, X, p, axis, slack):
     """
     u = (axis + 1) % 3
     v = (axis + 2) % 3
-    ax = _placed(X, u, T[at], T[at + 1], T[at + 2]) - p[u]
-    ay = _placed(X, v, T[at], T[at + 1], T[at + 2]) - p[v]
-    bx = _placed(X, u, T[at + 3], T[at + 4], T[at + 5]) - p[u]
-    by = _placed(X, v, T[at + 3], T[at + 4], T[at + 5]) - p[v]
-    cx = _placed(X, u, T[at + 6], T[at + 7], T[at + 8]) - p[u]
-    cy = _placed(X, v, T[at + 6], T[at + 7], T[at + 8]) - p[v]
+    ax = _placed(X, u, T[at], T[at + 1], T[at + 2]) - points[3 * k + u]
+    ay = _placed(X, v, T[at], T[at + 1], T[at + 2]) - points[3 * k + v]
+    bx = _placed(X, u, T[at + 3], T[at + 4], T[at + 5]) - points[3 * k + u]
+    by = _placed(X, v, T[at + 3], T[at + 4], T[at + 5]) - points[3 * k + v]
+    cx = _placed(X, u, T[at + 6], T[at + 7], T[at + 8]) - points[3 * k + u]
+    cy = _placed(X, v, T[at + 6], T[at + 7], T[at + 8]) - points[3 * k + v]
     D = max(abs(ax), abs(ay), abs(bx), abs(by), abs(cx), abs(cy))
     limit = 8.0 * D * slack + 4.0 * slack * slack
     of_c = ax * by - ay * bx
@@ -96,9 +96,9 @@ def _passage(T, at, X, p, axis, slack):
         return 0
     if not (lowest > limit or highest < -limit):
         return _OPEN
-    az = _placed(X, axis, T[at], T[at + 1], T[at + 2]) - p[axis]
-    bz = _placed(X, axis, T[at + 3], T[at + 4], T[at + 5]) - p[axis]
-    cz = _placed(X, axis, T[at + 6], T[at + 7], T[at + 8]) - p[axis]
+    az = _placed(X, axis, T[at], T[at + 1], T[at + 2]) - points[3 * k + axis]
+    bz = _placed(X, axis, T[at + 3], T[at + 4], T[at + 5]) - points[3 * k + axis]
+    cz = _placed(X, axis, T[at + 6], T[at + 7], T[at + 8]) - points[3 * k + axis]
     sense = 1 if lowest > 0.0 else -1
     height = (of_a * az + of_b * bz + of_c * cz) * sense
     Z = max(abs(az), abs(bz), abs(cz)) + slack
@@ -123,7 +123,6 @@ def pass_facets(
     unit = math.ldexp(1.0, int(tree.header[EXPONENT]))
     count = 0
     for k in range(n):
-        p = (points[3 * k], points[3 * k + 1], points[3 * k + 2])
         axis = axes[k]
         totals[k] = 0
         stack[0] = 0
@@ -133,13 +132,13 @@ def pass_facets(
             link = stack[top]
             if link >= 0:
                 for slot in range(WIDTH):
-                    if _box_is_beside(tree, 8 * link + slot, unit, X, p, axis, slack):
+                    if _box_is_beside(tree, 8 * link + slot, unit, X, points, k, axis, slack):
                         stack[top] = tree.links[NODE * link + 6 * WIDTH + slot]
                         top += 1
                 continue
             run = ~link
             for a in range(run >> 3, (run >> 3) + (run & 7)):
-                passage = _passage(tree.triangles, 9 * a, X, p, axis, slack)
+                passage = _passage(tree.triangles, 9 * a, X, points, k, axis, slack)
                 if passage != _OPEN:
                     totals[k] += passage
                     continue
