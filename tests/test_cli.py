@@ -131,7 +131,7 @@ def test_json_alone_on_standard_output(scene, capsys, command):
     scene(HIT)
     cli.main([command, "x.yaml", "--json", "-"])
     data = json.loads(capsys.readouterr().out)
-    assert data["schema"] == "collide-report/3" and data["colliding"][0]["depth"] == 0.01
+    assert data["schema"] == "collide-report/4" and data["colliding"][0]["depth"] == 0.01
 
 
 def test_json_beside_the_table(scene, capsys, tmp_path):
