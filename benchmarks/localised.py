@@ -20,26 +20,27 @@ from pathlib import Path
 import numpy as np
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests" / "families")]
-import mesh_shapes
-from locality_growth import counted
-from meshes import rotation
+import surfaces
+from meshes import rotation, touching
 
 import collide
 from collide import CollideError, Mesh
 from collide.mesh.facet_pieces import edges_of
 from collide.mesh.predicted_facets import predicted_facets
+from collide.narrowphase.facets.facet_queries import all_hits, first_hits
 from collide.scenes.loaders.triangles import read_meshes
 
 #: Facets of the parts that are looked at, and what a part may grow to.
 MIN_FACETS, MAX_FACETS, GROWTH = 100, 5000, 10
-POSES = 100
+#: Pairs of poses in touch, and of booleans that are timed.
+POSES, BOOLEANS = 6, 100
 
 
 def growth() -> None:
     counts = []
     for k in range(1, 21):
         n = 2.0**k
-        made = Mesh(*mesh_shapes.box((0, 0, 0), (n, n, 1.0))).localised()
+        made = Mesh(*surfaces.box((0, 0, 0), (n, n, 1.0))).localised()
         counts.append(len(made.mesh.faces))
         print(f"2^{k:<2} × 2^{k:<2} × 1: σ {made.before.local_stretches[0]:11.6g} → {made.after.local_stretches[0]:5.3f}, "
               f"{counts[-1]:5} facets, moved {made.moved:g}", flush=True)  # fmt: skip
@@ -118,32 +119,47 @@ def part(name: str, mesh: Mesh) -> dict | None:
     after = made.after
     text += f" {len(made.mesh.faces):6} Σ {after.global_stretch:9.4g} σ {after.local_stretches[0]:6.3g} "
     text += f"σ10 {after.local_stretches[9]:6.3g} moved {made.moved:.1e}"
-    old, new = costs(mesh), costs(made.mesh)
-    ratios = {key: new[key] / max(old[key], 1e-9) for key in old}
+    ratios = cost_ratios(mesh, made.mesh)
     print(text, "; cost after/before", " ".join(f"{key} {ratio:.2f}" for key, ratio in ratios.items()), flush=True)
     return ratios
 
 
-def costs(mesh: Mesh) -> dict[str, float]:
-    """Pairs looked at, in all, and µs of a boolean of two copies near one another."""
-    found = counted(mesh)
-    rng = np.random.default_rng(2)
-    reach = np.linalg.norm(np.ptp(mesh.vertices[mesh.faces].reshape(-1, 3), axis=0))
-    poses = np.tile(np.eye(4), (POSES, 1, 1))
-    for X in poses:
-        X[:3, :3] = rotation(rng)
-        X[:3, 3] = 0.5 * reach * rng.standard_normal(3)
-    collide.collide(mesh, mesh, np.eye(4), poses)
-    times = []
-    for _ in range(5):
-        started = time.process_time()
-        collide.collide(mesh, mesh, np.eye(4), poses)
-        times.append(time.process_time() - started)
-    n = len(mesh.faces)
-    return {
-        "shells": n * found["shells"], "shallow": n * found["shallow"], "boolean": found["boolean"],
-        "us": 1e6 * float(np.median(times)) / POSES,
-    }  # fmt: skip
+def cost_ratios(old: Mesh, new: Mesh) -> dict[str, float]:
+    """Pairs of boxes and of facets looked at, and µs, by the same questions about two copies of the part: new over old.
+
+    shells : all pairs of facets of copies nearly alike; shallow : of copies 1e-3 deep in each other; boolean : of
+    copies 1e-4 apart; us : booleans of copies near one another. Lengths are of the part's diagonal.
+    """
+    diagonal = float(np.linalg.norm(np.ptp(old.vertices[old.faces].reshape(-1, 3), axis=0)))
+    bodies = [mesh.scaled(1.0 / diagonal) for mesh in (old, new)]
+    rng = np.random.default_rng(1)
+    small = 1e-3 * np.cross(np.eye(3), rng.standard_normal(3))
+    shift = collide.pose(1e-3 * rng.standard_normal(3))
+    shift[:3, :3] = np.linalg.qr(np.eye(3) + small)[0]
+    shift[:3, :3] *= np.sign(np.diag(shift[:3, :3]))
+    questions = [("shells", all_hits, np.eye(4), shift)]
+    for _ in range(POSES):
+        X, Y, direction, way = touching(bodies[0].tree, bodies[0].tree, rng)
+        for name, ask, further in (("shallow", all_hits, -1e-3), ("boolean", first_hits, 1e-4)):
+            moved = Y.copy()
+            moved[:3, 3] = X[:3, 3] + (way + further) * direction
+            questions.append((name, ask, X, moved))
+    totals = [{"shells": 0, "shallow": 0, "boolean": 0, "us": 0.0} for _ in bodies]
+    for body, total in zip(bodies, totals):
+        for name, ask, X, Y in questions:
+            total[name] += int(ask(body.tree, body.tree, X, Y).counters[0, :2].sum())
+    X_WBs = np.tile(np.eye(4), (BOOLEANS, 1, 1))
+    for X in X_WBs:
+        X[:3, :3], X[:3, 3] = rotation(rng), 0.5 * rng.standard_normal(3)
+    times = np.zeros((6, 2))
+    for run in times:  # the first warms up
+        for k, body in enumerate(bodies):
+            started = time.process_time()
+            collide.collide(body, body, np.eye(4), X_WBs)
+            run[k] = time.process_time() - started
+    for total, seconds in zip(totals, np.median(times[1:], axis=0)):
+        total["us"] = 1e6 * float(seconds) / BOOLEANS
+    return {name: totals[1][name] / totals[0][name] for name in totals[0]}
 
 
 def main() -> None:

@@ -13,12 +13,14 @@ from naive import rng_of
 from reproduction import reproducing
 
 import collide
+from collide import cli
 from collide.mesh import localise
 from collide.mesh.facet_pieces import Pieces, edges_of
 from collide.mesh.locality import quiet
 from collide.mesh.nearest_neighbours import PointTree
 from collide.mesh.predicted_facets import predicted_facets
 from collide.mesh.weld import weld
+from collide.scenes.loaders.triangles import read_meshes
 
 
 def pizza_box(n: float, height: float = 1.0, depth: float | None = None):
@@ -115,7 +117,7 @@ def judge(vertices, faces, stretch=10.0, order=1, **options):
 
 def test_pizza_boxes_take_logarithmically_many_facets():
     """Figure 12: n × n × 1 for n = 2 … 2^20; exact, for all cuts are at sixteenths of what stands on a grid."""
-    for k in range(1, 21):
+    for k in (1, 2, 3, 4, 6, 8, 10, 13, 16, 18, 20):
         old = collide.Mesh(*pizza_box(2.0**k))
         made = old.localised()
         assert len(made.mesh.faces) <= 12 + 68 * k, k
@@ -129,7 +131,7 @@ def test_pizza_boxes_take_logarithmically_many_facets():
 def test_random_boxes_and_prisms():
     rng = rng_of("localised")
     cut = exact = 0
-    for case in range(14):
+    for case in range(8):
         kind = case % 4
         scale = 2.0 ** rng.integers(-40, 40)
         if kind == 0:
@@ -152,7 +154,7 @@ def test_random_boxes_and_prisms():
             made = judge(vertices, faces, stretch, order)
         cut += len(made.mesh.faces) > len(faces)
         exact += made.moved == 0.0
-    assert cut >= 8 and 2 <= exact <= 12, (cut, exact)
+    assert cut >= 6 and 1 <= exact <= 7, (cut, exact)
 
 
 def test_pieces_tile_their_facets_exactly_in_weights():
@@ -237,3 +239,20 @@ def test_nearest_to_others(n, k):
     m = min(n, k)
     assert np.array_equal(squares[:, :m], np.sort(away, axis=1)[:, :m]) and (ids[:, m:] == -1).all()
     assert np.array_equal(np.take_along_axis(away, ids[:, :m], axis=1), squares[:, :m])
+
+
+@pytest.mark.parametrize("suffix", ["obj", "stl"])
+def test_the_command_writes_the_same_solid(tmp_path, capsys, suffix):
+    vertices, faces = pizza_box(100.3)
+    text = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
+    (tmp_path / "box.obj").write_text(text + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces.tolist()))
+    out = tmp_path / f"local.{suffix}"
+    assert cli.main(["locality", str(tmp_path / "box.obj"), "--localised", str(out)]) == 0
+    table = capsys.readouterr().out
+    assert "box, localised" in table and "141.84" in table
+    expected = collide.Mesh(vertices, faces).localised().mesh
+    (_, read), = read_meshes(out)
+    assert np.array_equal(read.vertices[read.faces], expected.vertices[expected.faces])
+    assert cli.main(["locality", str(out), str(out), "--localised", str(out)]) == 2
+    assert "one mesh at a time, got 2" in capsys.readouterr().err
+    assert cli.main(["locality", str(out), "--localised", str(tmp_path / "x.ply")]) == 2
