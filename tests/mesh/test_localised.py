@@ -138,10 +138,10 @@ def test_random_boxes_and_prisms():
             vertices, faces = pizza_box(rng.uniform(30, 300), 1.0, rng.uniform(30, 300))
         elif kind == 1:
             vertices, faces = surfaces.ball(int(rng.integers(3, 5)), int(rng.integers(4, 8)))
-            vertices = vertices * (1, 1, rng.uniform(8, 12))
+            vertices = vertices * (1, 1, rng.uniform(0.004, 0.02))
         elif kind == 2:
             vertices, faces = surfaces.torus(12, 7, rng.uniform(0.05, 0.3))
-            vertices, faces = surfaces.loosened(vertices * (1, 1, rng.uniform(15, 30)), faces)
+            vertices, faces = surfaces.loosened(vertices * (1, 1, rng.uniform(0.02, 0.1)), faces)
         else:
             vertices, faces = pizza_box(rng.uniform(20, 200))
             faces = faces[2:]  # open
@@ -154,7 +154,7 @@ def test_random_boxes_and_prisms():
             made = judge(vertices, faces, stretch, order)
         cut += len(made.mesh.faces) > len(faces)
         exact += made.moved == 0.0
-    assert cut >= 6 and 1 <= exact <= 7, (cut, exact)
+    assert cut >= 4 and 2 <= exact <= 6, (cut, exact)
 
 
 def test_pieces_tile_their_facets_exactly_in_weights():
