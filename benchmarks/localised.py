@@ -1,11 +1,13 @@
 """Meshes made local: facets it takes for boxes n × n × 1 and cylinders, CAD parts before and after, and whether it pays.
 
-    python benchmarks/localised.py                 # about two minutes; --parts growth cylinders parts, --files 20
+    python benchmarks/localised.py                 # about two minutes; --parts growth cylinders parts picture, --files 20
 
 * growth: facets of the box n × n × 1, n = 2 … 2^20, with a + b · log2 n fitted.
 * cylinders: facets of cylinders of n sides beside the estimate that is made before the first cut.
 * parts: every so many of the mesh files of pybullet_data: stretches and facets before and after; boxes of the trees
   looked at and pairs of facets tested by queries about two copies of the part, and µs a query, before and after.
+
+* picture: writes docs/pictures/localised.png (needs matplotlib and pybullet_data).
 
 Counts are the same on every machine.
 """
@@ -162,13 +164,43 @@ def cost_ratios(old: Mesh, new: Mesh) -> dict[str, float]:
     return {name: totals[1][name] / totals[0][name] for name in totals[0]}
 
 
+def picture() -> None:
+    """A box and a part, before and after, facets that face the eye."""
+    import pybullet_data
+    from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    surface = read_meshes(next(Path(pybullet_data.getDataPath()).rglob("fr12_h103_lowres.stl")))[0][1]
+    figure = Figure(figsize=(11, 7), layout="constrained")
+    axes = figure.subplots(2, 2, subplot_kw={"projection": "3d"})
+    elevation, azimuth = np.radians(50.0), np.radians(35.0)
+    towards = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    bodies = (("64 × 64 × 1 box", Mesh(*surfaces.box((0, 0, 0), (64.0, 64.0, 1.0)))),
+              ("fr12_h103_lowres.stl", Mesh(surface.vertices, surface.faces)))  # fmt: skip
+    for panels, (name, body) in zip(axes, bodies):
+        made = body.localised()
+        for panel, mesh, locality in zip(panels, (body, made.mesh), (made.before, made.after)):
+            corners = mesh.vertices[mesh.faces]
+            low, high = corners.reshape(-1, 3).min(axis=0), corners.reshape(-1, 3).max(axis=0)
+            faces_eye = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ towards > 0.0
+            panel.add_collection3d(
+                Poly3DCollection(corners[faces_eye], facecolors="#dbe8f5", edgecolors="#16324f", linewidths=0.35)
+            )
+            panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+            panel.set_box_aspect(high - low, zoom=0.95)
+            panel.set_axis_off()
+            panel.view_init(np.degrees(elevation), np.degrees(azimuth))
+            panel.set_title(f"{name}: {len(mesh.faces)} facets, σ = {locality.local_stretches[0]:.1f}", fontsize=10)
+    figure.savefig(Path(__file__).parents[1] / "docs" / "pictures" / "localised.png", dpi=110)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--parts", nargs="+", default=["growth", "cylinders", "parts"])
     parser.add_argument("--files", type=int, default=24, help="files of pybullet_data")
     args = parser.parse_args()
     for name in args.parts:
-        {"growth": growth, "cylinders": cylinders, "parts": lambda: parts(args.files)}[name]()
+        {"growth": growth, "cylinders": cylinders, "parts": lambda: parts(args.files), "picture": picture}[name]()
 
 
 if __name__ == "__main__":

@@ -196,10 +196,10 @@ def test_a_cylinder_takes_the_square_of_its_sides():
 def test_what_cannot_be_had_is_refused():
     box = collide.Mesh(*pizza_box(1000.0))
     for bad, match in (
-        (dict(stretch=3.1), "at least 3.2"), (dict(stretch=0), "at least 3.2"), (dict(stretch=-5.0), "at least 3.2"),
-        (dict(stretch=math.nan), "at least 3.2"), (dict(stretch="ten"), "'ten'"), (dict(order=0), "order"),
-        (dict(order=1.5), "order"), (dict(order=11), "1 … 10"), (dict(order=8), "8 distinct vertices"),
-        (dict(max_facets=0), "max_facets"), (dict(max_facets=20), "more than max_facets = 20"),
+        ({"stretch": 3.1}, "at least 3.2"), ({"stretch": 0}, "at least 3.2"), ({"stretch": -5.0}, "at least 3.2"),
+        ({"stretch": math.nan}, "at least 3.2"), ({"stretch": "ten"}, "'ten'"), ({"order": 0}, "order"),
+        ({"order": 1.5}, "order"), ({"order": 11}, "1 … 10"), ({"order": 8}, "8 distinct vertices"),
+        ({"max_facets": 0}, "max_facets"), ({"max_facets": 20}, "more than max_facets = 20"),
     ):  # fmt: skip
         with pytest.raises(collide.InvalidArgument, match=match):
             box.localised(**bad)
