@@ -11,18 +11,20 @@ from collide.partitions.vertices import Sides, Vertices
 
 
 class Polygons(NamedTuple):
-    """Convex polygons, each in the plane of a facet or of a face of a cell, (k,) int64 each.
+    """Convex polygons, pieces of facets or faces of cells, (k,) int64 each.
 
     plane : number of the plane.   cell : the cell it lies in.   begin, count : its edges, rows of `Edges`.
+    side : of a face of a cell, where the cell lies of its plane: 1 above, −1 below; 0 of a piece of a facet.
     """
 
     plane: np.ndarray
     cell: np.ndarray
     begin: np.ndarray
     count: np.ndarray
+    side: np.ndarray
 
     def __getitem__(self, rows) -> Polygons:  # type: ignore[override]
-        return Polygons(*(tuple.__getitem__(self, k)[rows] for k in range(4)))
+        return Polygons(*(column[rows] for column in self))
 
 
 def joined(*groups: Polygons) -> Polygons:
@@ -65,6 +67,7 @@ class Cut(NamedTuple):
     below, above : which polygons have points strictly on that side, (k,) bool; those with neither lie in the plane.
     minus, plus : the pieces of those that have both, in the order of `both`.
     both : rows of the polygons that were cut.
+    sign : of every vertex of all polygons, in the order of `edge_rows`.
     """
 
     below: np.ndarray
@@ -72,6 +75,7 @@ class Cut(NamedTuple):
     both: np.ndarray
     minus: Polygons
     plus: Polygons
+    sign: np.ndarray
 
 
 def cut_polygons(vertices: Vertices, edges: Edges, polygons: Polygons, planes: np.ndarray, shared: bool = False) -> Cut:
@@ -91,13 +95,13 @@ def cut_polygons(vertices: Vertices, edges: Edges, polygons: Polygons, planes: n
     kept = number[owner] >= 0
     if len(both) == 0:
         nothing = polygons[both]
-        return Cut(below, above, both, nothing, nothing)
+        return Cut(below, above, both, nothing, nothing, sides.sign)
     rows, owner, vertex = rows[kept], number[owner[kept]], vertex[kept]
     part = polygons[both]
     minus, plus = _halves(
         vertices, edges, part, planes[both], rows, owner, vertex, Sides(*(column[kept] for column in sides)), shared
     )
-    return Cut(below, above, both, minus, plus)
+    return Cut(below, above, both, minus, plus, sides.sign)
 
 
 def _sides(vertices: Vertices, vertex: np.ndarray, planes: np.ndarray, shared: bool) -> Sides:

@@ -40,7 +40,8 @@ class OrthogonalLevel:
         carrier = n + 3 * np.arange(n)[:, None] + np.arange(3)
         begin = 3 * np.arange(n)
         edges.add(planes.faces.ravel(), carrier.ravel())
-        self.polygons = Polygons(np.arange(n), np.zeros(n, dtype=np.int64), begin, np.full(n, 3))
+        nothing = np.zeros(n, dtype=np.int64)
+        self.polygons = Polygons(np.arange(n), nothing, begin, np.full(n, 3), nothing)
         corners = planes.vertices[planes.faces]
         self.boxes = np.stack((corners.min(axis=1), corners.max(axis=1)), axis=1)  # of the polygons, (k, 2, 3)
         low, high = self.boxes[:, 0].min(axis=0), self.boxes[:, 1].max(axis=0)

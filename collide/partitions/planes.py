@@ -11,6 +11,8 @@ are kept of it, and its coefficients in integers are worked out when a sign need
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 
 from collide.numerics.lowest_bits import NO_BITS, lowest_exponents
@@ -46,6 +48,13 @@ class Planes:
         """Numbers of new planes x[axis] = value."""
         self.axis.add(axis)
         return 4 * self.n + self.value.add(value)
+
+    def with_own_axis_planes(self) -> Planes:
+        """The same planes, to which axis-parallel ones may be added that the others do not have."""
+        twin = copy.copy(self)
+        twin.axis, twin.value = GrowingRows(np.int64), GrowingRows(np.float64)
+        twin.add_axis_planes(self.axis.rows, self.value.rows)
+        return twin
 
     # --- doubles --------------------------------------------------------------------------------------------------
 
