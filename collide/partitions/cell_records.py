@@ -127,10 +127,11 @@ def part_of_block(block: CellBlock) -> _Part:
     faces, planes = block.faces, block.vertices.planes
     rows, _ = edge_rows(faces)
     used, loops = np.unique(block.edges.vertex.rows[rows], return_inverse=True)
+    vertices, error = block.vertices.rounded(used)
     on_axis = faces.plane >= 4 * planes.n
     k = np.where(on_axis, faces.plane - 4 * planes.n, 0)
     return _Part(
-        block.leaf, block.vertices.xyz.rows[used], float(block.vertices.error.rows[used].max(initial=0.0)),
+        block.leaf, vertices, error,
         np.searchsorted(faces.cell, np.arange(len(block.leaf) + 1)), np.append(0, np.cumsum(faces.count)),
         np.ravel(loops), np.where(on_axis, -1, faces.plane), np.where(on_axis, planes.axis.rows[k], -1),
         np.where(on_axis, planes.value.rows[k], np.nan), faces.side,

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 
 from collide.errors import UnsupportedQuery
 from collide.lowering.facet_bodies import body_of
 from collide.narrowphase.facets.facet_queries import points_in_solid
 from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE, UNDECIDED
-from collide.partitions.convex_cells import cell_blocks
+from collide.partitions.convex_cells import CellBlock, cell_blocks
+from collide.partitions.cut_polygons import edge_rows
 from collide.partitions.finished_tree import FinishedTree, exact_points
-from collide.partitions.planes import signs_of
+from collide.partitions.planes import Planes, signs_of
 from collide.shapes.mesh import Mesh
 from collide.surface_queries.contains import winds_around
 
 #: How far off a cut points are tried, in widths of the piece of facet that lies in it.
-_STEPS = (0.25, 0.03, 2e-3, 1e-4, 1e-6, 1e-8, 1e-11)
+_STEPS = (0.25, 0.03, 2e-3, 1e-5)
 
 
 def leaves_inside(tree: FinishedTree, mesh: Mesh, seats: np.ndarray, middles: np.ndarray) -> tuple[np.ndarray, int]:
@@ -27,18 +30,45 @@ def leaves_inside(tree: FinishedTree, mesh: Mesh, seats: np.ndarray, middles: np
     left = np.arange(tree.n_leaves)
     for step in _STEPS:
         points = _candidates(tree, seats, middles, left, step)
-        touched = tree.touches(points)
-        times = np.bincount(touched.point, minlength=len(left))
-        leaf = np.full(len(left), -1)
-        leaf[touched.point] = touched.leaf
-        good = (times == 1) & (leaf == left)
+        good = _strictly_in(tree, points, left)
         inside[left[good]] = _winds(mesh, points[good])
         left = left[~good]
         if len(left) == 0:
             return inside, 0
-    for leaf in left.tolist():
-        inside[leaf] = _winds_around_leaf(tree, leaf)
-    return inside, len(left)
+    n_fractions = 0
+    low, high = tree.planes.vertices.min(axis=0), tree.planes.vertices.max(axis=0)  # all inside is within
+    facet_boxes = _FacetBoxes(tree.planes)
+    for block in cell_blocks(tree, left, low, high):
+        n_fractions += _label_block(tree, mesh, block, inside, facet_boxes)
+    return inside, n_fractions
+
+
+def _label_block(tree: FinishedTree, mesh: Mesh, block: CellBlock, inside: np.ndarray, facets: _FacetBoxes) -> int:
+    """Thin leaves: the mean of their corners, rounded; in fractions where rounding leaves the leaf."""
+    rows, owner = edge_rows(block.faces)
+    used, vertex = np.unique(block.edges.vertex.rows[rows], return_inverse=True)
+    cell = block.faces.cell[owner]
+    pairs = np.unique(np.stack((cell, np.ravel(vertex)), axis=1), axis=0)
+    xyz, _ = block.vertices.rounded(used)
+    count = np.bincount(pairs[:, 0], minlength=len(block.leaf))
+    points = np.stack([np.bincount(pairs[:, 0], xyz[pairs[:, 1], k], len(count)) for k in range(3)], axis=1)
+    points /= count[:, None]
+    good = _strictly_in(tree, points, block.leaf)
+    inside[block.leaf[good]] = _winds(mesh, points[good])
+    left = np.flatnonzero(~good)
+    starts = np.cumsum(count) - count
+    for k in left.tolist():
+        corners = used[pairs[starts[k] : starts[k] + count[k], 1]]
+        inside[block.leaf[k]] = _winds_around_cell(block, k, corners, facets)
+    return len(left)
+
+
+def _strictly_in(tree: FinishedTree, points: np.ndarray, leaves: np.ndarray) -> np.ndarray:
+    """Which points lie in the open cells of their leaves."""
+    touched = tree.touches(points)
+    leaf = np.full(len(leaves), -1)
+    leaf[touched.point] = touched.leaf
+    return (np.bincount(touched.point, minlength=len(leaves)) == 1) & (leaf == leaves)
 
 
 def _candidates(tree: FinishedTree, seats, middles, leaves: np.ndarray, step: float) -> np.ndarray:
@@ -66,52 +96,56 @@ def _winds(mesh: Mesh, points: np.ndarray) -> np.ndarray:
     return where != OUTSIDE
 
 
-def _winds_around_leaf(tree: FinishedTree, leaf: int) -> bool:
-    """The same for a leaf too thin to hold a double that was tried: a rational point of it, a ray along x, in integers."""
-    planes = tree.planes
-    low, high = planes.vertices.min(axis=0), planes.vertices.max(axis=0)
-    for block in cell_blocks(tree, np.array([leaf]), low, high):
-        if len(block.leaf) == 0:
-            return False  # outside of the mesh's box
-        rows = np.unique(block.edges.vertex.rows[np.concatenate([
-            np.arange(b, b + c) for b, c in zip(block.faces.begin.tolist(), block.faces.count.tolist())
-        ])])  # fmt: skip
-        exact, near = block.vertices.exact(rows), block.vertices.xyz.rows[rows]
-        error = float(block.vertices.error.rows[rows].max())
-        for attempt in range(1, 50):
-            weights = [1 + attempt * k * k % 97 for k in range(len(rows))]
-            winding = _winding_number(planes, _mean(exact, weights), near.min(axis=0) - error, near.max(axis=0) + error)
-            if winding is not None:
-                return winding > 0
-    raise UnsupportedQuery(f"SpacePartition: every ray tried from cell {leaf} passes an edge; please report it")
+class _FacetBoxes:
+    """The planes of facets, and the boxes that facets lie in."""
+
+    def __init__(self, planes: Planes):
+        self.planes = planes
+        corners = planes.vertices[planes.faces]
+        self.low, self.high = corners.min(axis=1), corners.max(axis=1)
+
+    def ahead(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Facets that a ray along +x may meet that begins between low and high."""
+        near = (self.low[:, 1:] <= high[1:]) & (self.high[:, 1:] >= low[1:])
+        return np.flatnonzero(near.all(axis=1) & (self.high[:, 0] >= low[0]))
 
 
-def _mean(points: np.ndarray, weights: list[int]) -> tuple[int, int, int, int]:
-    """A weighted mean of homogeneous points, of Python integers."""
-    common = 1
-    for w in points[:, 3].tolist():
-        common *= w
-    sums = [sum(weight * p[k] * (common // p[3]) for weight, p in zip(weights, points.tolist())) for k in range(3)]
-    return sums[0], sums[1], sums[2], common * sum(weights)
+def _winds_around_cell(block: CellBlock, k: int, corners: np.ndarray, facets: _FacetBoxes) -> bool:
+    """The same for a cell too thin for doubles: a finer point of it, and a ray along x, in integers."""
+    exact = block.vertices.exact(corners)
+    near, error = block.vertices.rounded(corners)
+    rows = facets.ahead(near.min(axis=0) - error, near.max(axis=0) + error)
+    faces = block.faces[np.searchsorted(block.faces.cell, k) : np.searchsorted(block.faces.cell, k, "right")]
+    walls = block.vertices.planes.coefficients(faces.plane)
+    for attempt in range(1, 50):
+        weights = [1 + attempt * i * i % 97 for i in range(len(corners))]
+        winding = _winding_number(facets.planes, rows, _point_between(exact, weights, walls, faces.side))
+        if winding is not None:
+            return winding > 0
+    raise UnsupportedQuery("SpacePartition: every ray tried from a cell passes an edge; please report it")
 
 
-def _winding_number(planes, point, low: np.ndarray, high: np.ndarray) -> int | None:
-    """How often facets wind around a rational point, by a ray along +x; None where it passes an edge.
+def _point_between(corners: np.ndarray, weights: list[int], walls: np.ndarray, side: np.ndarray):
+    """(x, y, z, w) Python integers, strictly within walls (f, 4): a mean of the corners to as few bits as will do."""
+    total = sum(weights)
+    mean = [sum(weight * Fraction(p[k], p[3]) for weight, p in zip(weights, corners.tolist())) / total for k in range(3)]
+    bits = 64
+    while True:
+        point = np.array([[*(round(x * (1 << bits)) for x in mean), 1 << bits]], dtype=object)
+        if np.array_equal(signs_of(point, walls), side):
+            return point[0]
+        bits *= 2
 
-    low, high : doubles between which the point lies.
-    """
+
+def _winding_number(planes: Planes, rows: np.ndarray, point) -> int | None:
+    """How often facets wind around a rational point, by a ray along +x that may meet the rows; None where at an edge."""
     x, y, z, w = point
-    corners = planes.vertices[planes.faces]
-    near = (corners[:, :, 0].max(axis=1) >= low[0]) & np.all(
-        (corners[:, :, 1:].min(axis=1) <= high[1:]) & (corners[:, :, 1:].max(axis=1) >= low[1:]), axis=1
-    )
-    rows = np.flatnonzero(near)
-    above = signs_of(np.array([[x, y, z, w]], dtype=object), planes.coefficients(rows)) if len(rows) else []
+    coefficients = planes.coefficients(rows)
+    above = signs_of(np.array([[x, y, z, w]], dtype=object), coefficients)
     winding = 0
-    for row, side in zip(rows.tolist(), above):
-        plane = planes.coefficients(np.array([row]))[0]
+    for row, plane, side in zip(rows.tolist(), coefficients, above):
         turns = []
-        exact = exact_points(planes, corners[row])
+        exact = exact_points(planes, planes.vertices[planes.faces[row]])
         for a, b in ((0, 1), (1, 2), (2, 0)):
             (ya, za), (yb, zb) = (exact[k, 1:3] * w // exact[k, 3] - np.array([y, z], dtype=object) for k in (a, b))
             turns.append(ya * zb - za * yb)

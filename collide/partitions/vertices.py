@@ -9,6 +9,9 @@ import numpy as np
 from collide.partitions.growing_rows import GrowingRows
 from collide.partitions.planes import Planes, meeting_points, signs_of
 
+#: Errors of vertices that are worked out in integers before they are shown, of the largest coordinate.
+_BADLY_KNOWN = 2.0**-46
+
 
 class Sides(NamedTuple):
     """On which sides of planes vertices lie, (k,) each.
@@ -92,6 +95,17 @@ class Vertices:
             names = self.names.rows[vertex[rows]]
             out[rows] = meeting_points(self.planes.coefficients(names.ravel()).reshape(-1, 3, 4))
         return out
+
+    def rounded(self, vertex: np.ndarray) -> tuple[np.ndarray, float]:
+        """((k, 3) doubles, how far a coordinate may be off): vertices known badly are worked out and rounded once."""
+        xyz, error = self.xyz.rows[vertex].copy(), self.error.rows[vertex].copy()
+        largest = np.abs(xyz).max(initial=0.0)
+        rows = np.flatnonzero(error > _BADLY_KNOWN * largest)
+        if len(rows):
+            exact = self.exact(vertex[rows])
+            xyz[rows] = [[x / (w << self.planes.grid) for x in p] for *p, w in exact.tolist()]
+            error[rows] = np.spacing(np.abs(xyz[rows]).max(axis=1))
+        return xyz, float(error.max(initial=0.0))
 
     @property
     def n_bytes(self) -> int:
