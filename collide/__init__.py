@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from collide.motion.impact_query import moved_poses, poses_in_motion, time_of_impact
     from collide.motion.impact_rows import TimeOfImpact
     from collide.polytopes.convex_polygon import ConvexPolygon
+    from collide.partitions.cell_records import CellPlanes, ConvexCells
+    from collide.partitions.space_partition import Located, PartitionSize, SpacePartition
     from collide.query import collide, distance
     from collide.results import How, PairResult, WorldResult
     from collide.robots.certified_edges import CertifiedEdges
@@ -102,6 +104,8 @@ _HOMES = {
     "collide.motion.impact_query": ("moved_poses", "poses_in_motion", "time_of_impact"),
     "collide.motion.impact_rows": ("TimeOfImpact",),
     "collide.polytopes.convex_polygon": ("ConvexPolygon",),
+    "collide.partitions.cell_records": ("CellPlanes", "ConvexCells"),
+    "collide.partitions.space_partition": ("Located", "PartitionSize", "SpacePartition"),
     "collide.query": ("collide", "distance"),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robots.certified_edges": ("CertifiedEdges",),

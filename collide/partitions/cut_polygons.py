@@ -153,7 +153,7 @@ def _new_vertices(vertices, polygons, planes, owner, tail, head, carrier, at_tai
         at_tail, at_head = (Sides(*(column[one] for column in at)) for at in (at_tail, at_head))
     a, b = (np.maximum(at.height * at.sign, 0.0) for at in (at_tail, at_head))
     sum_ = a + b
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         t = np.where(sum_ > 0.0, a / sum_, 0.5)
         # The share is a weighted mean of the two bounds over the sum, and lies within [0, 1] whatever they are.
         off = np.where(sum_ > 0.0, np.minimum(1.0, 1.01 * np.maximum(at_tail.bound, at_head.bound) / sum_ + 2e-15), 1.0)

@@ -49,6 +49,7 @@ class OrthogonalLevel:
         self.high.add(low[None] + (high - low).max())
         which = (np.arange(8)[:, None] >> np.arange(3)) & 1
         xyz = np.stack([self.boxes[:, which[:, k], k] for k in range(3)], axis=2).reshape(-1, 3)
+        xyz = xyz[((xyz > self.low.rows[0]) & (xyz < self.high.rows[0])).all(axis=1)]
         self.guards = Guards(xyz, np.zeros(len(xyz), dtype=np.int64))
 
     def grow(self, progress) -> None:

@@ -10,7 +10,7 @@ from collide.partitions.growing_rows import GrowingRows
 from collide.partitions.planes import Planes, meeting_points, signs_of
 
 #: Errors of vertices that are worked out in integers before they are shown, of the largest coordinate.
-_BADLY_KNOWN = 2.0**-46
+_BADLY_KNOWN = 2.0**-40
 
 
 class Sides(NamedTuple):
