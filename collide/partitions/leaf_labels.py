@@ -12,13 +12,13 @@ from collide.narrowphase.facets.facet_queries import points_in_solid
 from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE, UNDECIDED
 from collide.partitions.convex_cells import CellBlock, cell_blocks
 from collide.partitions.cut_polygons import edge_rows
-from collide.partitions.finished_tree import FinishedTree, exact_points
+from collide.partitions.finished_tree import FinishedTree
 from collide.partitions.planes import Planes, signs_of
 from collide.shapes.mesh import Mesh
 from collide.surface_queries.contains import winds_around
 
 #: How far off a cut points are tried, in widths of the piece of facet that lies in it.
-_STEPS = (0.25, 0.03, 2e-3, 1e-5)
+_STEPS = tuple(2.0**-k for k in (2, 5, 8, 11, 14, 18, 22, 27, 32, 40))
 
 
 def leaves_inside(tree: FinishedTree, mesh: Mesh, seats: np.ndarray, middles: np.ndarray) -> tuple[np.ndarray, int]:
@@ -145,9 +145,9 @@ def _winding_number(planes: Planes, rows: np.ndarray, point) -> int | None:
     winding = 0
     for row, plane, side in zip(rows.tolist(), coefficients, above):
         turns = []
-        exact = exact_points(planes, planes.vertices[planes.faces[row]])
+        corners = planes.grid_vertices[planes.faces[row]]
         for a, b in ((0, 1), (1, 2), (2, 0)):
-            (ya, za), (yb, zb) = (exact[k, 1:3] * w // exact[k, 3] - np.array([y, z], dtype=object) for k in (a, b))
+            (ya, za), (yb, zb) = (corners[k, 1:] * w - np.array([y, z], dtype=object) for k in (a, b))
             turns.append(ya * zb - za * yb)
         if plane[0] == 0:  # seen along the ray it is a segment
             if all(t == 0 for t in turns):

@@ -12,6 +12,7 @@ are kept of it, and its coefficients in integers are worked out when a sign need
 from __future__ import annotations
 
 import copy
+from functools import cached_property
 
 import numpy as np
 
@@ -43,6 +44,8 @@ class Planes:
         low = int(lowest_exponents(vertices.reshape(1, -1))[0])
         #: Coordinates of the mesh are integers times 2^−grid.
         self.grid = 0 if low == NO_BITS else max(0, -low)
+        self._facet_coefficients = np.zeros((self.n, 4), dtype=object)
+        self._has_coefficients = np.zeros(self.n, dtype=bool)
 
     def add_axis_planes(self, axis: np.ndarray, value: np.ndarray) -> np.ndarray:
         """Numbers of new planes x[axis] = value."""
@@ -104,31 +107,37 @@ class Planes:
             above, below = self.integers_of(self.value.rows[k])
             out[rows, self.axis.rows[k]] = below
             out[rows, 3] = -above
-        rows = np.flatnonzero(cut < 4 * self.n)
+        rows = np.flatnonzero(cut < self.n)
         if len(rows):
-            out[rows] = self._through_facets(cut[rows])
+            out[rows] = self._of_facets(cut[rows])
+        rows = np.flatnonzero((cut >= self.n) & (cut < 4 * self.n))
+        if len(rows):
+            out[rows] = self._of_edges(cut[rows] - self.n)
         return out
 
-    def _through_facets(self, cut: np.ndarray) -> np.ndarray:
-        edge = cut >= self.n
-        facet = np.where(edge, (cut - self.n) // 3, cut)
-        above, below = self.integers_of(self.vertices[self.faces[facet]])
-        corners = above // below  # on the grid: nothing is left over
-        u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        normal, origin = _cross(u, v), corners[:, 0].copy()
-        for row in np.flatnonzero(edge).tolist():
-            side = int(cut[row] - self.n) % 3
-            along = corners[row, (side + 1) % 3] - corners[row, side]
-            axis = max(range(3), key=lambda i, n=normal[row]: abs(n[i]))
-            normal[row], origin[row] = _along_axis(along, axis), corners[row, side]
-        return np.concatenate((normal, -_dot(normal, origin)[:, None]), axis=1)
+    @cached_property
+    def grid_vertices(self) -> np.ndarray:
+        """(v, 3) Python integers: the mesh's vertices in units of 2^−grid."""
+        above, below = self.integers_of(self.vertices)
+        return above // below
 
+    def _of_facets(self, facets: np.ndarray) -> np.ndarray:
+        new = np.unique(facets[~self._has_coefficients[facets]])
+        if len(new):
+            a, b, c = (self.grid_vertices[self.faces[new, k]] for k in range(3))
+            normal = _cross(b - a, c - a)
+            self._facet_coefficients[new] = np.concatenate((normal, -_dot(normal, a)[:, None]), axis=1)
+            self._has_coefficients[new] = True
+        return self._facet_coefficients[facets]
 
-def _along_axis(u: np.ndarray, axis: int) -> np.ndarray:
-    """u × the unit vector of an axis."""
-    n = np.array([0, 0, 0], dtype=object)
-    n[(axis + 1) % 3], n[(axis + 2) % 3] = u[(axis + 2) % 3], -u[(axis + 1) % 3]
-    return n
+    def _of_edges(self, edges: np.ndarray) -> np.ndarray:
+        facet, side = np.divmod(edges, 3)
+        begin = self.grid_vertices[self.faces[facet, side]]
+        along = self.grid_vertices[self.faces[facet, (side + 1) % 3]] - begin
+        axis = np.abs(self._of_facets(facet)[:, :3]).argmax(axis=1)
+        normal, k = np.zeros_like(along), np.arange(len(edges))
+        normal[k, (axis + 1) % 3], normal[k, (axis + 2) % 3] = along[k, (axis + 2) % 3], -along[k, (axis + 1) % 3]
+        return np.concatenate((normal, -_dot(normal, begin)[:, None]), axis=1)
 
 
 def meeting_points(planes: np.ndarray) -> np.ndarray:

@@ -88,8 +88,7 @@ class Vertices:
         corner = vertex < self.n_corners
         rows = np.flatnonzero(corner)
         if len(rows):
-            above, below = self.planes.integers_of(self.xyz.rows[vertex[rows]])
-            out[rows, :3], out[rows, 3] = above // below, 1
+            out[rows, :3], out[rows, 3] = self.planes.grid_vertices[vertex[rows]], 1
         rows = np.flatnonzero(~corner)
         if len(rows):
             names = self.names.rows[vertex[rows]]
