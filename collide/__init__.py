@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from collide.motion.impact_rows import TimeOfImpact
     from collide.polytopes.convex_polygon import ConvexPolygon
     from collide.partitions.cell_records import CellPlanes, ConvexCells
+    from collide.partitions.portals import Portals
     from collide.partitions.space_partition import Located, PartitionSize, SpacePartition
     from collide.query import collide, distance
     from collide.results import How, PairResult, WorldResult
@@ -105,6 +106,7 @@ _HOMES = {
     "collide.motion.impact_rows": ("TimeOfImpact",),
     "collide.polytopes.convex_polygon": ("ConvexPolygon",),
     "collide.partitions.cell_records": ("CellPlanes", "ConvexCells"),
+    "collide.partitions.portals": ("Portals",),
     "collide.partitions.space_partition": ("Located", "PartitionSize", "SpacePartition"),
     "collide.query": ("collide", "distance"),
     "collide.results": ("How", "PairResult", "WorldResult"),

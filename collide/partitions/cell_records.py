@@ -9,6 +9,7 @@ import numpy as np
 from collide.errors import InvalidArgument
 from collide.partitions.convex_cells import CellBlock
 from collide.partitions.cut_polygons import edge_rows
+from collide.partitions.finished_tree import FinishedTree
 from collide.shapes.convex_hull import ConvexHull
 
 
@@ -29,6 +30,16 @@ class CellPlanes(NamedTuple):
     offsets: np.ndarray
 
 
+class CellSource(NamedTuple):
+    """What cells were made from: the arguments of `cell_blocks`."""
+
+    tree: FinishedTree
+    leaves: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    whole: np.ndarray
+
+
 class ConvexCells:
     """Convex polytopes that share no inner points.
 
@@ -43,9 +54,11 @@ class ConvexCells:
         seen from outside.
     facet, axis, value, side : (f,), the plane of each face, exactly, as in `CellPlanes`.
     volumes : (k,) float64 [m³], from the rounded corners.
+    source : what the cells were made from.
     """
 
-    def __init__(self, inside: np.ndarray, facets: np.ndarray, parts: list[_Part]):
+    def __init__(self, inside: np.ndarray, facets: np.ndarray, parts: list[_Part], source: CellSource):
+        self.source = source
         self.cell = np.concatenate([part.cell for part in parts])
         self.inside = inside[self.cell]
         self.vertices = np.concatenate([part.vertices for part in parts])

@@ -14,7 +14,7 @@ from collide.lowering.facet_bodies import body_of
 from collide.mesh.shell_volumes import without_area
 from collide.mesh.weld import weld
 from collide.narrowphase.facets.facet_queries import surfaces_meet
-from collide.partitions.cell_records import ConvexCells, part_of_block
+from collide.partitions.cell_records import CellSource, ConvexCells, part_of_block
 from collide.partitions.convex_cells import cell_blocks
 from collide.partitions.cut_polygons import Edges
 from collide.partitions.facet_level import cut_along_facets
@@ -24,6 +24,7 @@ from collide.partitions.orthogonal_level import OrthogonalLevel
 from collide.partitions.partition_tree import PartitionTree
 from collide.partitions.planes import Planes
 from collide.partitions.vertices import Vertices
+from collide.partitions.portals import Portals, portals_of_block
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh
 from collide.surface_queries.contains import thin_facets
@@ -187,7 +188,8 @@ class SpacePartition:
             others are clipped by it: cells at the rim have no end.
         """
         low, high = self._box("cells", box)
-        return self._made(np.arange(self._tree.n_leaves), low, high, None)
+        whole = np.zeros(len(self._tree.plane), dtype=bool)
+        return self._made(np.arange(self._tree.n_leaves), low, high, whole)
 
     def convex_pieces(self, inside: bool = True, box=None) -> ConvexCells:
         """The solid, or the free space around it, as convex pieces that share no inner points.
@@ -219,13 +221,39 @@ class SpacePartition:
             firsts = np.sort(tree.first, kind="stable")
             whole &= n_held[np.searchsorted(firsts, tree.last, "right")] == n_held[np.searchsorted(firsts, tree.first)]
         wanted = self.inside == inside
-        for cut in np.flatnonzero(whole):
-            wanted[tree.first[cut] + 1 : tree.last[cut] + 1] = False
+        follows = np.zeros(tree.n_leaves + 1, dtype=np.int64)  # all leaves of a whole cut but the first
+        np.add.at(follows, tree.first[whole] + 1, 1)
+        np.add.at(follows, tree.last[whole] + 1, -1)
+        wanted &= np.cumsum(follows)[:-1] == 0
         return self._made(np.flatnonzero(wanted), low, high, whole)
 
+    def portals(self, cells: ConvexCells) -> Portals:
+        """Where cells of this partition open into one another: the graph of a planner.
+
+        cells : of `cells` or `convex_pieces` of this partition.
+
+        Returns
+        -------
+        Portals: pairs of cells whose closures share a piece of a face with an area, exactly, each piece once. Of cells
+        that touch in an edge or a corner there is none.
+        """
+        if not isinstance(cells, ConvexCells) or cells.source.tree is not self._tree:
+            raise InvalidArgument("portals: cells must come from cells() or convex_pieces() of this partition")
+        tree, leaves, low, high, whole = cells.source
+        row = np.full(tree.n_leaves, -1)
+        row[cells.cell] = np.arange(len(cells))
+        found = [portals_of_block(tree, block, whole) for block in cell_blocks(tree, leaves, low, high, whole)]
+        if not found:
+            return Portals(np.zeros((0, 2), dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
+        one, other, middle, area = (np.concatenate(columns) for columns in zip(*found))
+        both = row[other] >= 0
+        pairs = np.stack((row[one[both]], row[other[both]]), axis=1)
+        return Portals(np.sort(pairs, axis=1), middle[both], area[both])
+
     def _made(self, leaves: np.ndarray, low, high, whole) -> ConvexCells:
-        parts = [part_of_block(block) for block in cell_blocks(self._tree, leaves, low, high, whole)]
-        return ConvexCells(self.inside, self._facets, parts)
+        source = CellSource(self._tree, leaves, low, high, whole)
+        parts = [part_of_block(block) for block in cell_blocks(*source)]
+        return ConvexCells(self.inside, self._facets, parts, source)
 
     def _box(self, caller: str, box) -> tuple[np.ndarray, np.ndarray]:
         if box is None:

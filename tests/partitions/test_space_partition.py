@@ -202,6 +202,36 @@ def test_sizes_grow_as_n_log_n():
     assert max(ratios) < 2 * min(ratios) and max(depths) < 4
 
 
+@pytest.mark.parametrize("name", ["ring", "cavity", "boxes that share a wall", "sphere"])
+def test_portals_cover_the_faces_of_cells(name):
+    """All faces but those in the box's sides are portals, from both sides; of free space all but those on facets."""
+    mesh = collide.Mesh(*WHOLE[name])
+    limits = around(mesh)
+    partition = collide.SpacePartition(mesh)
+    cells = partition.cells(limits)
+    portals = partition.portals(cells)
+    faces, area = np.zeros(len(cells)), np.zeros(len(cells))
+    for i in range(len(cells)):
+        for j in range(cells.face_starts[i], cells.face_starts[i + 1]):
+            if cells.axis[j] >= 0 and cells.value[j] in (limits[0][cells.axis[j]], limits[1][cells.axis[j]]):
+                continue
+            at = cells.vertices[cells.loops[cells.loop_starts[j] : cells.loop_starts[j + 1]]]
+            faces[i] += 0.5 * np.linalg.norm(np.cross(at - at[0], np.roll(at, -1, axis=0) - at[0]).sum(axis=0))
+    for side in range(2):
+        np.add.at(area, portals.cells[:, side], portals.area)
+    assert np.allclose(area, faces, rtol=1e-9, atol=1e-12) and (portals.cells[:, 0] < portals.cells[:, 1]).all()
+    free = partition.convex_pieces(inside=False, box=limits)
+    doors = partition.portals(free)
+    assert not (partition.locate(doors.middle[doors.area > 1e-6]).inside).any()
+    assert len(np.unique(doors.cells)) == len(free)
+    crossing = portals.area[partition.inside[cells.cell[portals.cells]].sum(axis=1) == 1]
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    surface = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+    assert np.isclose(crossing.sum(), surface - (8.0 if "wall" in name else 0.0), rtol=1e-9)
+    with pytest.raises(InvalidArgument, match="this partition"):
+        collide.SpacePartition(mesh).portals(free)
+
+
 def test_bad_meshes_are_refused_with_facet_numbers():
     vertices, faces = box()
     with pytest.raises(InvalidArgument, match=r"open edges.*facet"):
