@@ -89,6 +89,19 @@ class ConvexCells:
         a, b, c = at[self.loop_starts[:-1]][face] - apex, at - apex, at[following] - apex
         return np.bincount(cell, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, minlength=len(self))
 
+    def rows_of(self, leaves) -> np.ndarray:
+        """(k,) int64: of leaves of the partition, as `locate` names them, the rows that hold them; −1 where none does."""
+        leaves = np.asarray(leaves, dtype=np.int64).reshape(-1)
+        if not len(self):
+            return np.full(len(leaves), -1)
+        tree, last = self.source.tree, self.cell.copy()
+        first = tree.first[self.source.whole]
+        row = np.minimum(np.searchsorted(self.cell, first), len(self) - 1)
+        mine = self.cell[row] == first
+        np.maximum.at(last, row[mine], tree.last[self.source.whole][mine])
+        row = np.maximum(np.searchsorted(self.cell, leaves, "right") - 1, 0)
+        return np.where((self.cell[row] <= leaves) & (leaves <= last[row]), row, -1)
+
     def corners(self, i: int) -> np.ndarray:
         """(n, 3) the corners of cell i [m], rounded."""
         i = self._row(i)

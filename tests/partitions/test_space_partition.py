@@ -224,6 +224,10 @@ def test_portals_cover_the_faces_of_cells(name):
     doors = partition.portals(free)
     assert not (partition.locate(doors.middle[doors.area > 1e-6]).inside).any()
     assert len(np.unique(doors.cells)) == len(free)
+    rows = free.rows_of(np.arange(partition.size.cells))
+    assert (rows[free.cell] == np.arange(len(free))).all() and (rows[partition.inside] == -1).all()
+    held = np.flatnonzero(~partition.inside & np.isin(np.arange(len(rows)), cells.cell))
+    assert (rows[held] >= 0).all() and free.rows_of([0]).shape == (1,)
     crossing = portals.area[partition.inside[cells.cell[portals.cells]].sum(axis=1) == 1]
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     surface = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
