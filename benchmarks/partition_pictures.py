@@ -76,14 +76,14 @@ def main() -> None:
     first, last = free.rows_of(partition.locate([START, GOAL]).cell).tolist()
     path = shortest(free, portals, first, last)
     figure = pyplot.figure(figsize=(11, 6.2))
-    axes = figure.add_axes((-0.12, -0.22, 1.24, 1.4), projection="3d", computed_zorder=False)
+    axes = figure.add_axes((-0.24, -0.3, 1.48, 1.58), projection="3d", computed_zorder=False, proj_type="ortho")
     draw_cells(axes, free, [matplotlib.colormaps["tab20"](k) for k in range(20)], 0.5, 0.95)
     draw_cells(axes, solid, [BODY], 1.0, 1.0)
-    axes.plot(*(path + [0, 0, 0.6]).T, color=RED, linewidth=2.5, marker="o", markersize=4)
+    axes.plot(*(path + [0, 0, 1.0]).T, color=RED, linewidth=2.5, marker="o", markersize=4)
     axes.set(xlim=(0, 8), ylim=(0, 5), zlim=(0, 1))
     axes.set_box_aspect((8, 5, 1))
     axes.set_axis_off()
-    axes.view_init(elev=58, azim=-72)
+    axes.view_init(elev=90, azim=-90)
     figure.text(0.02, 0.03, f"{partition.size.facets} facets of 6 pillars: {len(free)} convex cells of free space, "
                 f"{len(portals.area)} portals; in red a path through {len(path) - 2} of them", fontsize=10)  # fmt: skip
     figure.savefig(FILE, dpi=110)
