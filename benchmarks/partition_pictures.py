@@ -79,7 +79,7 @@ def main() -> None:
     axes = figure.add_axes((-0.24, -0.3, 1.48, 1.58), projection="3d", computed_zorder=False, proj_type="ortho")
     draw_cells(axes, free, [matplotlib.colormaps["tab20"](k) for k in range(20)], 0.5, 0.95)
     draw_cells(axes, solid, [BODY], 1.0, 1.0)
-    axes.plot(*(path + [0, 0, 1.0]).T, color=RED, linewidth=2.5, marker="o", markersize=4)
+    axes.plot(*(path + np.array([0.0, 0.0, 1.0])).T, color=RED, linewidth=2.5, marker="o", markersize=4)
     axes.set(xlim=(0, 8), ylim=(0, 5), zlim=(0, 1))
     axes.set_box_aspect((8, 5, 1))
     axes.set_axis_off()

@@ -23,7 +23,7 @@ from collide.scenes import generate
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "tests" / "families"), str(ROOT / "tests" / "oracles")]
-from mesh_shapes import block_ring, bumpy_sphere  # noqa: E402
+from mesh_shapes import block_ring, bumpy_sphere
 
 
 def sphere(n: int, seed: int = 0) -> collide.Mesh:
@@ -143,7 +143,7 @@ def hard_points(mesh: collide.Mesh, partition: collide.SpacePartition, n: int, s
     low, high = corners.min(axis=0), corners.max(axis=0)
     k = n // 3
     some = mesh.vertices[mesh.faces[rng.integers(len(mesh.faces), size=k)]]
-    weights = rng.integers(0, 5, size=(k, 3)) + [[1, 0, 0]]
+    weights = rng.integers(0, 5, size=(k, 3)) + np.array([1, 0, 0])
     on = np.einsum("ij,ijk->ik", weights / weights.sum(axis=1, keepdims=True), some)
     cells = partition.cells()
     rows = np.flatnonzero(cells.axis >= 0)
@@ -165,9 +165,8 @@ def points(runs: int) -> None:
         found = partition.locate(every)
         wrong = int((found.inside != collide.contains(mesh, np.eye(4), every)).sum())
         timed = every[: len(every) // 3]
-        times = np.array([[_ns(lambda: partition.locate(timed), len(timed)),
-                           _ns(lambda: collide.contains(mesh, np.eye(4), timed), len(timed))]
-                          for _ in range(runs)])  # fmt: skip
+        tasks = (lambda p=partition, q=timed: p.locate(q), lambda m=mesh, q=timed: collide.contains(m, np.eye(4), q))
+        times = np.array([[_ns(task, len(timed)) for task in tasks] for _ in range(runs)])
         mine, theirs = np.median(times, axis=0)
         print(f"| {name}, {len(mesh.faces):,} facets | {len(every):,} | {found.inside.sum():,} "
               f"| {found.boundary.sum():,} | {wrong} | {mine:.0f} | {theirs:.0f} |", flush=True)  # fmt: skip

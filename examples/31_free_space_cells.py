@@ -1,6 +1,7 @@
 """Free space as convex cells for a planner: a room of overlapping parts, its cells, their portals, and a path."""
 
 import heapq
+from itertools import pairwise
 
 import numpy as np
 
@@ -41,5 +42,5 @@ while queue:
             heapq.heappush(queue, (further, len(queue), int(portals.cells[k].sum()) - cell, [*path, through]))
 path.append(goal)
 print(f"a path through {len(path) - 2} portals, {np.linalg.norm(np.diff(path, axis=0), axis=1).sum():.2f} m long")
-points = np.concatenate([np.linspace(a, b, 100) for a, b in zip(path, path[1:])])
+points = np.concatenate([np.linspace(a, b, 100) for a, b in pairwise(path)])
 print(f"{partition.locate(points).inside.sum()} of {len(points)} points of it are in a body")

@@ -50,8 +50,8 @@ class ConvexCells:
     vertices : (v, 3) float64 [m], the exact corners rounded; cells may name corners at one place twice.
     error : float [m], no coordinate of a vertex is off by more.
     face_starts : (k + 1,), the faces of cell i are face_starts[i] … face_starts[i + 1] − 1.
-    loop_starts, loops : the corners of face j are vertices[loops[loop_starts[j] : loop_starts[j + 1]]], counter-clockwise
-        seen from outside.
+    loop_starts, loops : the corners of face j are vertices[loops[loop_starts[j] : loop_starts[j + 1]]],
+        counter-clockwise seen from outside.
     facet, axis, value, side : (f,), the plane of each face, exactly, as in `CellPlanes`.
     volumes : (k,) float64 [m³], from the rounded corners.
     source : what the cells were made from.
@@ -90,7 +90,7 @@ class ConvexCells:
         return np.bincount(cell, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, minlength=len(self))
 
     def rows_of(self, leaves) -> np.ndarray:
-        """(k,) int64: of leaves of the partition, as `locate` names them, the rows that hold them; −1 where none does."""
+        """(k,) int64: the rows that hold leaves of the partition, as `locate` names them; −1 where none does."""
         leaves = np.asarray(leaves, dtype=np.int64).reshape(-1)
         if not len(self):
             return np.full(len(leaves), -1)

@@ -18,7 +18,8 @@ _AT_ONCE = 8192
 class CellBlock(NamedTuple):
     """Some leaves of a partition, clipped by a box.
 
-    leaf : (c,) their numbers; of a cut taken as one cell, the first under it.   faces : their faces, sorted by `cell`, which counts rows of `leaf`.
+    leaf : (c,) their numbers; of a cut taken as one cell, the first under it.
+    faces : their faces, sorted by `cell`, which counts rows of `leaf`.
     vertices, edges : what the faces are made of; counter-clockwise seen from outside.
     """
 
@@ -43,7 +44,7 @@ def cell_blocks(
         yield _block(tree, whole, np.cumsum(wanted), low, high)
 
 
-def _block(tree: FinishedTree, whole: np.ndarray, wanted: np.ndarray, low: np.ndarray, high: np.ndarray) -> CellBlock:
+def _block(tree: FinishedTree, whole: np.ndarray, wanted: np.ndarray, low, high) -> CellBlock:
     vertices, edges = Vertices(tree.planes.with_own_axis_planes()), Edges()
     faces, place = _box(vertices, edges, low, high), np.zeros(1, dtype=np.int64)
     done: list[tuple[np.ndarray, Polygons]] = []

@@ -136,7 +136,8 @@ def _halves(vertices, edges, polygons, planes, rows, owner, vertex, sides, share
         emit = np.stack((here >= 0, new >= 0), axis=1).ravel()
         whose = np.repeat(owner, 2)[emit]
         count = np.bincount(whose, minlength=len(planes))
-        begin = edges.add(np.stack((vertex, new), axis=1).ravel()[emit], np.stack((first, second), axis=1).ravel()[emit])
+        pairs = (np.stack(two, axis=1).ravel()[emit] for two in ((vertex, new), (first, second)))
+        begin = edges.add(*pairs)
         halves.append(polygons._replace(begin=begin[0] + np.cumsum(count) - count, count=count))
     return halves[0], halves[1]
 

@@ -1,9 +1,9 @@
 """The second level of a space partition: each cell of the first cut along planes of the facets in it.
 
-M. S. Paterson, F. F. Yao, "Efficient binary space partitions for hidden-surface removal and solid modeling" (1990). Facets
-are taken in random order, and one that reaches from wall to wall of its cell is taken at once: its plane cuts no other
-facet that does not cross it (a free cut). k facets make O(k²) cells in expectation. No cell is left through which a
-facet passes.
+M. S. Paterson, F. F. Yao, "Efficient binary space partitions for hidden-surface removal and solid modeling" (1990).
+Facets are taken in random order, and one that reaches from wall to wall of its cell is taken at once: its plane cuts no
+other facet that does not cross it (a free cut). k facets make O(k²) cells in expectation. No cell is left through which
+a facet passes.
 """
 
 from __future__ import annotations

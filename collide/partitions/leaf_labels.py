@@ -1,4 +1,4 @@
-"""Which leaves of a partition are inside its solid: one point of each leaf, asked of the winding numbers of the mesh."""
+"""Which leaves of a partition are inside its solid: facets wind around all points of a leaf alike, so one is asked."""
 
 from __future__ import annotations
 
@@ -128,7 +128,8 @@ def _winds_around_cell(block: CellBlock, k: int, corners: np.ndarray, facets: _F
 def _point_between(corners: np.ndarray, weights: list[int], walls: np.ndarray, side: np.ndarray):
     """(x, y, z, w) Python integers, strictly within walls (f, 4): a mean of the corners to as few bits as will do."""
     total = sum(weights)
-    mean = [sum(weight * Fraction(p[k], p[3]) for weight, p in zip(weights, corners.tolist())) / total for k in range(3)]
+    weighed = [(weight, p[3], p[:3]) for weight, p in zip(weights, corners.tolist())]
+    mean = [sum(weight * Fraction(p[k], w) for weight, w, p in weighed) / total for k in range(3)]
     bits = 64
     while True:
         point = np.array([[*(round(x * (1 << bits)) for x in mean), 1 << bits]], dtype=object)
@@ -138,7 +139,7 @@ def _point_between(corners: np.ndarray, weights: list[int], walls: np.ndarray, s
 
 
 def _winding_number(planes: Planes, rows: np.ndarray, point) -> int | None:
-    """How often facets wind around a rational point, by a ray along +x that may meet the rows; None where at an edge."""
+    """How often facets wind around a rational point, by a ray along +x that may meet the rows; None at an edge."""
     x, y, z, w = point
     coefficients = planes.coefficients(rows)
     above = signs_of(np.array([[x, y, z, w]], dtype=object), coefficients)

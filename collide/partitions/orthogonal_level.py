@@ -2,8 +2,8 @@
 
 J. Erickson, "Local polyhedra and geometric graphs" (2005), lemma 5.2, after M. de Berg, "Linear size binary space
 partitions for uncluttered scenes" (2000). A cube with more than κ corners of facets' axis-aligned boxes (de Berg's
-guards) is cut into eight. Where all but κ of them are in one eighth, the smallest cube at that corner that holds all but κ
-is cut off instead, so that empty levels cost nothing. Beyond the lemma, cells of few facets are left as they are.
+guards) is cut into eight. Where all but κ of them are in one eighth, the smallest cube at that corner that holds all
+but κ is cut off instead, so that empty levels cost nothing. Beyond the lemma, cells of few facets are left as they are.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ class OrthogonalLevel:
         on[rows] = x != value[row]  # those on a cut are inside no cell
         self.guards = Guards(self.guards.xyz[on], cell[on])
 
-    def _cut_facets(self, axis: int, number: np.ndarray, value: np.ndarray, planes: np.ndarray, cuts: np.ndarray) -> None:
+    def _cut_facets(self, axis: int, number: np.ndarray, value: np.ndarray, planes, cuts: np.ndarray) -> None:
         row = number[self.polygons.cell]
         of_cut = np.flatnonzero(row >= 0)
         at = row[of_cut]

@@ -1,7 +1,7 @@
 """Planes that cut space, by number: the facets' own, axis-parallel ones at doubles, and those through edges of facets.
 
-Nothing about a plane is rounded: it is the numbers of the mesh that it goes through. Doubles with bounds of their errors
-are kept of it, and its coefficients in integers are worked out when a sign needs them.
+Nothing about a plane is rounded: it is the numbers of the mesh that it goes through. Doubles with bounds of their
+errors are kept of it, and its coefficients in integers are worked out when a sign needs them.
 
     number f < n                  through the corners of facet f
     n + 3 f + e                   through edge e of facet f (corners e and e + 1) and parallel to an axis that facet f's
@@ -141,7 +141,10 @@ class Planes:
 
 
 def meeting_points(planes: np.ndarray) -> np.ndarray:
-    """(k, 4) Python integers x, y, z, w > 0, the points x / w, … in which three planes each meet.   planes : (k, 3, 4)."""
+    """(k, 4) Python integers x, y, z, w > 0, the points x / w, … in which three planes each meet.
+
+    planes : (k, 3, 4).
+    """
     n, d = planes[:, :, :3], planes[:, :, 3]
     pairs = [_cross(n[:, 1], n[:, 2]), _cross(n[:, 2], n[:, 0]), _cross(n[:, 0], n[:, 1])]
     w = _dot(n[:, 0], pairs[0])

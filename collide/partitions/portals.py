@@ -25,10 +25,10 @@ class Portals(NamedTuple):
 
 
 def portals_of_block(tree: FinishedTree, block: CellBlock, whole: np.ndarray) -> tuple[np.ndarray, ...]:
-    """(leaf of a cell (m,), leaf beyond (m,), middle (m, 3), area (m,)) of the faces of a block's cells, each pair once.
+    """(leaf of a cell (m,), leaf beyond (m,), middle (m, 3), area (m,)) of faces of a block's cells, each pair once.
 
-    A face is sent down the tree from the root: cut where it is cut, and where it lies in a cut, to the side on which its
-    cell is not. Leaves are numbered as `cell_blocks` has them, with `whole`.
+    A face is sent down the tree from the root: cut where it is cut, and where it lies in a cut, to the side on which
+    its cell is not. Leaves are numbered as `cell_blocks` has them, with `whole`.
     """
     vertices, edges = block.vertices, block.edges
     n_tree_planes = 4 * tree.planes.n + len(tree.planes.axis.rows)

@@ -23,8 +23,8 @@ from collide.partitions.leaf_labels import leaves_inside
 from collide.partitions.orthogonal_level import OrthogonalLevel
 from collide.partitions.partition_tree import PartitionTree
 from collide.partitions.planes import Planes
-from collide.partitions.vertices import Vertices
 from collide.partitions.portals import Portals, portals_of_block
+from collide.partitions.vertices import Vertices
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh
 from collide.surface_queries.contains import thin_facets
@@ -80,8 +80,8 @@ class SpacePartition:
     Parameters
     ----------
     mesh : a solid `Mesh` (it closes; inside is what its facets wind around once or more: docs/meshes.md).
-    kappa : how many corners of facets' boxes a cell of the first level may hold (de Berg's guards; the clutter factor of
-        the lemma). More make fewer and flatter cells.
+    kappa : how many corners of facets' boxes a cell of the first level may hold (de Berg's guards; the clutter factor
+        of the lemma). More make fewer and flatter cells.
     seed : of the random order in which facets cut: the same seed, the same cells.
     memory : bytes that the partition may take while it grows.
     progress : called with a label, gives a context manager around long work.
@@ -93,13 +93,13 @@ class SpacePartition:
 
     Notes
     -----
-    Cutting planes are the facets' own and axis-parallel ones at doubles; sides are decided exactly, by doubles with error
-    bounds, by the planes that name a vertex, or in integers, so that every cell is exactly an intersection of half-spaces.
+    Cutting planes are the facets' own and axis-parallel ones at doubles; sides are decided exactly, by doubles with
+    error bounds, by the planes that name a vertex, or in integers: every cell is exactly an intersection of half-spaces.
     Facets of no area have no plane and cut nothing.
 
-    J. Erickson, "Local polyhedra and geometric graphs" (2005), section 5: lemma 5.2's orthogonal level with κ, then M. S.
-    Paterson and F. F. Yao's planes of facets in each of its cells. A local mesh in space makes O(n log n) cells of depth
-    O(log n) (docs/partitions.md).
+    J. Erickson, "Local polyhedra and geometric graphs" (2005), section 5: lemma 5.2's orthogonal level with κ, then
+    M. S. Paterson and F. F. Yao's planes of facets in each of its cells. A local mesh in space makes O(n log n) cells of
+    depth O(log n) (docs/partitions.md).
     """
 
     def __init__(
@@ -113,7 +113,8 @@ class SpacePartition:
     ):
         _check_mesh(mesh)
         kappa = checks.integer("SpacePartition: kappa", kappa, 1)
-        seed, memory = checks.integer("SpacePartition: seed", seed, 0), checks.integer("SpacePartition: memory", memory, 0)
+        seed = checks.integer("SpacePartition: seed", seed, 0)
+        memory = checks.integer("SpacePartition: memory", memory, 0)
         self.mesh = mesh
         corners = weld(mesh.vertices)[mesh.faces].astype(np.int64)
         self._facets = np.flatnonzero(~without_area(mesh.vertices, np.ascontiguousarray(corners, dtype=np.int32)))
@@ -201,8 +202,8 @@ class SpacePartition:
 
         Returns
         -------
-        ConvexCells. Their union is exactly the solid's closure of what its facets wind around, or that of the free space
-        in the box. Cells that a cut parted for nothing are one piece.
+        ConvexCells. Their union is exactly the closure of what facets wind around, or that of the free space in the
+        box. Cells that a cut parted for nothing are one piece.
 
         Raises
         ------
@@ -283,6 +284,6 @@ def _predicted(facets_in: np.ndarray, n_cuts: int) -> str:
     """What the second level may come to: k facets make at most O(k²) cells, and k where no plane cuts another facet."""
     least = n_cuts + 1 + int(facets_in.sum())
     return (
-        f"the first level has {len(facets_in):,} cells with up to {int(facets_in.max()):,} facets: {least:,} cells where no "
-        f"plane cuts other facets, some {n_cuts + int((facets_in.astype(float) ** 2).sum()):,} where all do; "
+        f"the first level has {len(facets_in):,} cells with up to {int(facets_in.max()):,} facets: {least:,} cells "
+        f"where no plane cuts other facets, some {n_cuts + int((facets_in.astype(float) ** 2).sum()):,} where all do; "
     )

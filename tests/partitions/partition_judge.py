@@ -1,4 +1,4 @@
-"""Judges space partitions in integers, from the planes of their cells and the mesh alone: shares no code with the engine.
+"""Judges space partitions in integers, from the planes of cells and the mesh alone: shares no code with the engine.
 
 A cell is {x : every plane on its side}. Its corners are found by trying all threes of planes.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import cmp_to_key
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import gcd
 from typing import NamedTuple
 
@@ -151,7 +151,7 @@ def polytope_volume(walls, corners) -> Fraction:
             return -1 if s > 0 else int(s < 0)
 
         rim = sorted(on[1:], key=cmp_to_key(turn))
-        total += sum(det3(minus(first, apex), minus(a, apex), minus(b, apex)) for a, b in zip(rim, rim[1:]))
+        total += sum(det3(minus(first, apex), minus(a, apex), minus(b, apex)) for a, b in pairwise(rim))
     return total / 6
 
 

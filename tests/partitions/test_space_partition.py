@@ -1,4 +1,4 @@
-"""Space partitions, judged in integers: no facet passes through a cell, volumes add up, points are where `contains` is."""
+"""Space partitions, judged in integers: no facet passes through a cell, volumes add up; points as `contains` has them."""
 
 from __future__ import annotations
 
@@ -50,7 +50,8 @@ def points_near(partition, n: int, seed: int) -> np.ndarray:
     cells = partition.cells()
     points = [
         rng.uniform(low, high, (n, 3)), some[:, 0], 0.5 * (some[:, 0] + some[:, 1]), some.mean(axis=1),
-        0.25 * some[:, 0] + 0.25 * some[:, 1] + 0.5 * some[:, 2], cells.vertices[rng.integers(len(cells.vertices), size=n)],
+        0.25 * some[:, 0] + 0.25 * some[:, 1] + 0.5 * some[:, 2],
+        cells.vertices[rng.integers(len(cells.vertices), size=n)],
     ]  # fmt: skip
     on_cut = rng.uniform(low, high, (n, 3))
     axis_rows = np.flatnonzero(cells.axis >= 0)
