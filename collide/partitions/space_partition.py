@@ -94,12 +94,12 @@ class SpacePartition:
     Notes
     -----
     Cutting planes are the facets' own and axis-parallel ones at doubles; sides are decided exactly, by doubles with
-    error bounds, by the planes that name a vertex, or in integers: every cell is exactly an intersection of half-spaces.
+    error bounds, by planes that name a vertex, or in integers: every cell is exactly an intersection of half-spaces.
     Facets of no area have no plane and cut nothing.
 
     J. Erickson, "Local polyhedra and geometric graphs" (2005), section 5: lemma 5.2's orthogonal level with κ, then
-    M. S. Paterson and F. F. Yao's planes of facets in each of its cells. A local mesh in space makes O(n log n) cells of
-    depth O(log n) (docs/partitions.md).
+    M. S. Paterson and F. F. Yao's planes of facets in each of its cells. A local mesh makes O(n log n) cells of depth
+    O(log n) (docs/partitions.md).
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Space partitions, judged in integers: no facet passes through a cell, volumes add up; points as `contains` has them."""
+"""Space partitions, judged in integers: no facet in a cell, volumes add up; points are where `contains` has them."""
 
 from __future__ import annotations
 
@@ -67,13 +67,13 @@ def test_cells_hold_no_facets_and_tell_inside_from_outside(family):
     limits = around(mesh)
     partition = collide.SpacePartition(mesh, kappa=16)
     cells = partition.cells(limits)
-    chosen = _some_cells(cells, 8, np.random.default_rng(3))
+    chosen = some_cells(cells, 8, np.random.default_rng(3))
     verdict = Judge(mesh.vertices, mesh.faces, limits).judge(chosen)
     assert not verdict.wrong, (verdict.wrong[:3], SNIPPET.format(family=family, seed=3))
     assert verdict.n_facet_tests > 0
 
 
-class _Some:
+class SomeCells:
     """Some of the cells."""
 
     def __init__(self, cells, rows):
@@ -86,8 +86,8 @@ class _Some:
         return self.cells.planes(self.rows[i])
 
 
-def _some_cells(cells, n, rng):
-    return _Some(cells, rng.permutation(len(cells))[:n])
+def some_cells(cells, n, rng):
+    return SomeCells(cells, rng.permutation(len(cells))[:n])
 
 
 WHOLE = {
