@@ -17,8 +17,8 @@ from collide.least_distance.input_rows import InputRows, read_halfspaces, read_p
 from collide.least_distance.interior_point import interior_point
 from collide.least_distance.nearest_pair import nearest_pair
 from collide.least_distance.pair_proposals import Work
-from collide.polytopes.boundary_hull import BITS
 from collide.polytopes.exact_answers import make_meeting
+from collide.polytopes.exact_planes import BITS
 from collide.polytopes.facet_tree import FacetTree, Sizes
 from collide.polytopes.meeting import MeetingCertificate
 from collide.polytopes.recentred_polars import recentred_spaces
