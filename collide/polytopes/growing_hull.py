@@ -11,8 +11,10 @@ import numpy as np
 
 from collide.polytopes.exact_planes import exact_planes, nearby_planes, whole_numbers
 
-#: Bytes of a simplex while a hull grows: its slot (planes, integers, corners), twice since slots are doubled.
-BYTES_A_SLOT = 300
+
+def bytes_a_slot(d: int) -> int:
+    """Bytes of a simplex while a hull grows: plane, error, corners, integers; twice, since slots are doubled."""
+    return 2 * (24 * d + 34)
 
 
 class BoundaryTooLarge(Exception):
