@@ -25,10 +25,12 @@ from collide.polytopes.growing_hull import BoundaryTooLarge, bytes_a_slot
 from collide.polytopes.shell_cones import cones_at
 
 _UNIT = 2.0**-53
+#: Why there is no tree of a flat body.
+FLAT = "a hierarchical tree needs a body with interior; ask polytopes.meets of flat ones"
 #: Samples drawn for one node before it gives up.
 _MAX_DRAWS = 12
-#: Simplices of the smallest net; how many a net has for each leaf that the corners of its node would fill.
-_SMALLEST_NET, _SIMPLICES_A_LEAF = 6, 4.0
+#: Simplices of the smallest net; how many a net has, times d − 1, for each leaf that the corners of its node would fill.
+_SMALLEST_NET, _SIMPLICES_A_LEAF = 12, 6.0
 #: What Python takes for a node beside its arrays.
 _BYTES_A_NODE = 600
 
@@ -42,12 +44,12 @@ class Sizes(NamedTuple):
 
 
 #: By dimension: nets and leaves that numpy looks at in some ten microseconds.
-SIZES = {2: Sizes(0.5, 100, 200), 3: Sizes(0.5, 300, 1000), 4: Sizes(0.5, 100, 1000), 5: Sizes(0.5, 40, 1000)}
+SIZES = {2: Sizes(0.5, 200, 200), 3: Sizes(0.5, 1000, 1000), 4: Sizes(0.5, 200, 1000), 5: Sizes(0.5, 64, 1500)}
 
 
 def sizes(d: int) -> Sizes:
     """ε, net and leaf for a dimension."""
-    return SIZES.get(d, Sizes(0.5, 24, 1000))
+    return SIZES.get(d, Sizes(0.5, 48, 1500))
 
 
 _NOTHING = np.empty(0, dtype=np.int32)
@@ -125,7 +127,7 @@ class FacetTree:
     def __init__(self, points: np.ndarray, memory: int, limits: Sizes | None = None):
         first = first_simplex(points)
         if first is None:
-            raise UnsupportedQuery("a hierarchical tree needs a body with interior; ask polytopes.meets of flat ones")
+            raise UnsupportedQuery(FLAT)
         self.points, self.first = points, first
         self.centre = points[first].mean(axis=0)
         self.reach = float(np.abs(points).max(initial=1.0))
@@ -180,7 +182,7 @@ class FacetTree:
         if len(corners) <= self.limits.leaf:
             return self._count(Node(len(facets), depth, leaf=corners.astype(np.int32)))
         node = self._count(Node(len(facets), depth, facets=facets))
-        wanted = math.ceil(_SIMPLICES_A_LEAF * len(corners) / self.limits.leaf)
+        wanted = math.ceil(_SIMPLICES_A_LEAF * (self.dimension - 1) * len(corners) / self.limits.leaf)
         self._draw(node, min(max(wanted, _SMALLEST_NET), self.limits.net))
         return node
 

@@ -60,7 +60,7 @@ class Relative(NamedTuple):
 
 
 class Plane(NamedTuple):
-    """z = Σ multipliers·w of some rows of Q; R is in {x : ⟨z, x⟩ ≤ Σ multipliers}."""
+    """Σ multipliers·rows ≤ Σ multipliers·offsets: in a walk of rows w of Q, ⟨z, x⟩ ≤ Σ multipliers, which R is in."""
 
     rows: tuple[int, ...]
     multipliers: tuple[float, ...]
@@ -114,8 +114,8 @@ class TreeWalk:
         if status == MISS:
             status = self.compare()
         return Walk(
-            status, self.planes, self.origin_planes, self.origin_rounds, self.rounds, self.points, self.halfspaces, self.simplices_read,
-            self.net_rows,
+            status, self.planes, self.origin_planes, self.origin_rounds, self.rounds, self.points, self.halfspaces,
+            self.simplices_read, self.net_rows,
         )  # fmt: skip
 
     # --- the origin ---------------------------------------------------------------------------------------------------

@@ -20,32 +20,43 @@ def build_whole(tree: FacetTree) -> None:
 
 def _make_children(tree: FacetTree, node: Node) -> bool:
     """All children of a node; whether its sample is a net, so that none has more than ε of it."""
-    corners = tree.facets[node.facets]
-    marks = np.zeros(len(tree.points), dtype=bool)
-    marks[corners] = True
-    rows = np.flatnonzero(marks).astype(np.int32)
-    places = np.zeros(len(tree.points), dtype=np.int32)
-    places[rows] = np.arange(len(rows))
-    corners, points = places[corners], tree.points[rows]
-    beyond = [  # for each plane of the net's hull the simplices of F with a corner outside it
-        np.flatnonzero(tree.beyond(points, plane[None])[0][corners].any(axis=1)) for plane in node.hull.planes
-    ]
+    rows, corners = np.unique(tree.facets[node.facets], return_inverse=True)
+    corners = corners.reshape(node.n_facets, -1)
+    beyond = _beyond_planes(tree, node, tree.points[rows], corners)
     has_facet, has_corner = np.zeros(node.n_facets, dtype=bool), np.zeros(len(rows), dtype=bool)
     most = tree.limits.epsilon * node.n_facets
     for vertex in np.unique(node.hull.facets).tolist():
         for cone, planes in enumerate(tree.cones(node, vertex).tolist()):
-            for plane in planes:
-                has_facet[beyond[plane]] = True
-            outside = np.flatnonzero(has_facet)
-            has_facet[outside] = False
+            outside = _members(np.concatenate([beyond[plane] for plane in planes]), has_facet)
             if len(outside) > most:
                 return False
-            if (vertex, cone) in node.children:  # made by an earlier query
-                continue
-            has_corner[corners[outside]] = True
-            at = np.flatnonzero(has_corner)
-            has_corner[at] = False
-            node.children[vertex, cone] = (
-                tree.make_node(node.facets[outside], node.depth + 1, rows[at]) if len(outside) else None
-            )
+            if (vertex, cone) not in node.children:  # else made by an earlier query
+                at = _members(corners[outside].ravel(), has_corner)
+                node.children[vertex, cone] = (
+                    tree.make_node(node.facets[outside], node.depth + 1, rows[at]) if len(outside) else None
+                )
     return True
+
+
+def _beyond_planes(tree: FacetTree, node: Node, points: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
+    """For each plane of the net's hull the places in F of simplices with a corner outside it."""
+    order = np.argsort(corners, axis=None, kind="stable") // corners.shape[1]  # simplices at each point
+    ends = np.cumsum(np.bincount(corners.ravel(), minlength=len(points)))
+    starts = np.concatenate((ends[:1] * 0, ends[:-1]))
+    has_facet = np.zeros(node.n_facets, dtype=bool)
+    beyond = []
+    for plane in node.hull.planes:
+        at = np.flatnonzero(tree.beyond(points, plane[None])[0])
+        lists = [order[start:end] for start, end in zip(starts[at].tolist(), ends[at].tolist())]
+        beyond.append(_members(np.concatenate((order[:0], *lists)), has_facet).astype(np.int32))
+    return beyond
+
+
+def _members(numbers: np.ndarray, marks: np.ndarray) -> np.ndarray:
+    """The different ones of some numbers, ascending; by marks, all False before and after, where they are many."""
+    if 16 * len(numbers) < len(marks):
+        return np.unique(numbers)
+    marks[numbers] = True
+    members = np.flatnonzero(marks)
+    marks[members] = False
+    return members

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 import numpy as np
@@ -11,9 +12,13 @@ import rational_simplex
 from collide import polytopes
 from collide.certificates.certificate import CertificateRefused
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
-from collide.polytopes import HierarchicalTree, trees_meet, verify_trees
+from collide.polytopes import (
+    HierarchicalTree, hull_boundary, trees_meet, verify_boundary, verify_exclusion, verify_trees,
+)  # fmt: skip
 from collide.polytopes.boundary_hull import boundary_hull
-from collide.polytopes.facet_tree import Sizes
+from collide.polytopes.facet_tree import FacetTree, Sizes
+from collide.polytopes.hierarchical_tree import as_grid
+from collide.polytopes.tree_size import most_simplices, predicted_size
 from collide.polytopes.tree_walk import extreme_row
 from collide.polytopes.validate_facet_tree import validate_facet_tree
 
@@ -74,23 +79,129 @@ def test_every_answer_is_proven_and_every_set_recomputed(d, n):
     assert validate_facet_tree(R.tree) >= 1
 
 
-def test_planes_of_a_miss_leave_out_the_hull():
-    rng = np.random.default_rng(5)
-    V, A = _ball(rng, 400, 3), _ball(rng, 400, 3)
-    P, R = HierarchicalTree(V), HierarchicalTree(normals=A, offsets=np.ones(400))
-    most = misses = 0
-    for _ in range(20):
-        X = _pose(rng, 3, rng.uniform(1.97, 2.1))
-        answer = trees_meet(P, R, X, certificate=False)
-        if answer.hit or not answer.planes:
+@pytest.mark.parametrize(("d", "n", "limits"), [
+    (2, 300, Sizes(0.6, 12, 12)), (3, 250, Sizes(0.6, 16, 30)), (4, 70, Sizes(0.75, 16, 30)),
+    (5, 24, Sizes(0.75, 16, 16)),
+])  # fmt: skip
+def test_planes_of_a_miss_leave_out_the_hull(d, n, limits):
+    """O(log n) planes, substituted in fractions by a reader who has checked the boundary once."""
+    rng = np.random.default_rng([5, d])
+    V, A, b = _ball(rng, n, d) + 0.3, _ball(rng, n, d), np.ones(n)
+    P, R = HierarchicalTree(V, limits=limits), HierarchicalTree(normals=A, offsets=b, limits=limits)
+    boundary = hull_boundary(P)
+    verify_boundary(V, boundary)
+    most = misses = needed = 0
+    for _ in range(16):
+        X, Y = _pose(rng, d, rng.uniform(1.9, 2.3)), _pose(rng, d, 0.2)
+        answer = trees_meet(P, R, X, Y, certificate=False)
+        if answer.hit:
+            assert answer.exclusion is None
             continue
-        misses, most = misses + 1, max(most, len(answer.planes))
-        assert R.interior is not None
-        w = A / (1.0 - A @ R.interior)[:, None]
-        z = np.array([np.array(plane.multipliers) @ w[list(plane.rows)] for plane in answer.planes])
-        points = V @ X[:3, :3].T + X[:3, 3] - R.interior
-        assert not polytopes.meets(points, z, np.ones(len(z))).hit
-    assert misses >= 5 and 2 <= most <= 12
+        proof = answer.exclusion
+        assert proof is not None
+        verify_exclusion(boundary, A, b, answer, X, Y)
+        misses, most = misses + 1, max(most, len(proof.planes) + len(proof.ray_planes))
+        mutants = [
+            proof._replace(planes=()), proof._replace(ray_planes=()),
+            proof._replace(outside=(np.linalg.inv(Y) @ X @ np.append(V.mean(axis=0), 1.0))[:d].tolist()),
+            proof._replace(ray=tuple(-x for x in proof.ray)),
+            proof._replace(planes=(proof.planes[0]._replace(multipliers=(-1.0,) * len(proof.planes[0].rows)),)),
+        ]  # fmt: skip
+        for mutant in mutants:
+            with pytest.raises(CertificateRefused):
+                verify_exclusion(boundary, A, b, polytopes.TreeMeeting(False, False, None, mutant, {}), X, Y)
+        for k in range(len(proof.planes)):
+            mutant = proof._replace(planes=proof.planes[:k] + proof.planes[k + 1 :])
+            try:
+                verify_exclusion(boundary, A, b, polytopes.TreeMeeting(False, False, None, mutant, {}), X, Y)
+            except CertificateRefused:
+                needed += 1
+        u = np.array([np.array(plane.multipliers) @ A[list(plane.rows)] for plane in proof.planes])
+        c = np.array([np.array(plane.multipliers) @ b[list(plane.rows)] for plane in proof.planes])
+        M = np.linalg.inv(Y) @ X
+        assert not polytopes.meets(V @ M[:d, :d].T + M[:d, d], u, c).hit
+    assert misses >= 4 and needed >= misses and 2 <= most <= 24
+
+
+def test_a_boundary_that_is_none_is_refused():
+    rng = np.random.default_rng(2)
+    V = _ball(rng, 40, 3)
+    boundary = hull_boundary(HierarchicalTree(V))
+    verify_boundary(V, boundary)
+    grid = np.array(np.meshgrid(*[np.arange(3.0)] * 3)).reshape(3, -1).T
+    verify_boundary(grid, hull_boundary(HierarchicalTree(grid)))  # flat faces in several simplices
+    facets, whole = boundary.facets, boundary.whole.copy()
+    whole[0] += 3
+    for mutant, reason in (
+        (boundary._replace(facets=facets[1:]), "nothing beyond it"),
+        (boundary._replace(facets=np.concatenate((facets, facets[:1]))), "in others too"),
+        (boundary._replace(facets=np.concatenate((facets, [[0, 1, 2]]))), "both sides|flat"),
+        (boundary._replace(whole=whole), "a unit from its place"),
+    ):
+        with pytest.raises(CertificateRefused, match=reason):
+            verify_boundary(V, mutant)
+
+
+# --- whole trees ------------------------------------------------------------------------------------------------------
+
+
+def _curve(n, d):
+    t = np.linspace(-1.0, 1.0, n)
+    return np.stack([t**k for k in range(1, d + 1)], axis=1)
+
+
+def _lattice(n, d):
+    k = math.ceil(n ** (1.0 / d)) // 2 + 2
+    grid = np.array(np.meshgrid(*[np.arange(-k, k + 1.0)] * d)).reshape(d, -1).T
+    return grid[np.argsort((grid * grid).sum(axis=1), kind="stable")[:n]]
+
+
+WHOLE = [
+    (2, 500, Sizes(0.5, 20, 20)), (3, 250, Sizes(0.6, 30, 40)), (4, 100, Sizes(0.75, 24, 50)),
+    (5, 40, Sizes(0.75, 24, 28)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("family", ["ball", "curve", "lattice"])
+@pytest.mark.parametrize(("d", "n", "limits"), WHOLE)
+def test_whole_trees_are_validated_and_their_bytes_were_predicted(d, n, limits, family):
+    rng = np.random.default_rng([3, d])
+    points = {"ball": lambda: _ball(rng, n, d), "curve": lambda: _curve(n, d), "lattice": lambda: _lattice(n, d)}[family]()
+    body = HierarchicalTree(points, whole=True, limits=limits)
+    size = body.size
+    assert validate_facet_tree(body.tree, whole=True) == size.nodes
+    assert body.predicted is not None and body.predicted.simplices == pytest.approx(size.simplices, rel=0.1)
+    assert size.n_bytes / 4 <= body.predicted.n_bytes <= 4 * size.n_bytes, (body.predicted, size)
+    assert family == "lattice" or size.depth >= 2
+    assert body.build() == size  # nothing is made twice
+    with pytest.raises(UnsupportedQuery, match=f"predicted to take {body.predicted.n_bytes:,} bytes"):
+        HierarchicalTree(points, whole=True, limits=limits, memory=body.predicted.n_bytes - 1)
+
+
+def test_the_polar_side_is_validated_and_answers_are_those_of_nodes_made_when_needed():
+    rng = np.random.default_rng(6)
+    limits, A, V = Sizes(0.6, 30, 40), _ball(rng, 250, 3), _ball(rng, 250, 3)
+    R = HierarchicalTree(normals=A, offsets=np.ones(250), limits=limits, whole=True)
+    P = HierarchicalTree(V, limits=limits, whole=True)
+    assert validate_facet_tree(R.tree, whole=True) == R.size.nodes > 20
+    before, hits = (P.size, R.size), 0
+    for _ in range(40):
+        X = _pose(rng, 3, rng.uniform(1.5, 2.4))
+        answer = trees_meet(P, R, X)
+        verify_trees(V, A, np.ones(250), answer, X)
+        hits += answer.hit
+    assert 8 <= hits <= 32 and (P.size, R.size) == before
+
+
+def test_sizes_are_predicted_from_a_sample():
+    """The boundary is that of a sample of 60 to 480 points when the size of a tree over 4,000 is told."""
+    for d, points, simplices in ((4, _curve(4000, 4), 4000 * 3997 // 2), (3, _curve(200_000, 3), 399_996)):
+        assert predicted_size(as_grid(points).whole).simplices == pytest.approx(simplices, rel=0.02)
+    with pytest.raises(UnsupportedQuery, match="boundary is predicted to have [78],[0-9,]* simplices"):
+        HierarchicalTree(_curve(4000, 4))
+    with pytest.raises(UnsupportedQuery, match="after .* of 4,000 points the boundary has"):
+        FacetTree(as_grid(_curve(4000, 4)).whole, 1 << 20)
+    assert [most_simplices(n, d) for d, n in ((2, 9), (3, 9), (4, 9), (4, 5), (5, 6))] == [9, 14, 27, 5, 6]
 
 
 def test_touching_is_a_hit_and_is_settled_in_integers():
@@ -192,25 +303,28 @@ def test_planes_that_leave_out_every_face_may_hold_a_point_of_the_hull():
 def test_mutants_are_noticed():
     rng = np.random.default_rng(9)
     V, A = _ball(rng, 300, 3), _ball(rng, 50, 3)
-    P, R = HierarchicalTree(V), HierarchicalTree(normals=A, offsets=np.ones(50))
+    P = HierarchicalTree(V, limits=Sizes(0.6, 24, 40))
+    R = HierarchicalTree(normals=A, offsets=np.ones(50), limits=Sizes(0.6, 24, 40))
     X = _pose(rng, 3, 2.02)
     answer = trees_meet(P, R, X)
     child = next(node for node in P.tree.root.children.values() if node is not None)
-    kept = child.facets
-    child.facets = kept[1:]
-    with pytest.raises(AssertionError, match="outside its shell cone"):
-        validate_facet_tree(P.tree)
-    child.facets = kept
+    for name in ("facets", "rows", "n_facets", "depth"):
+        value = getattr(child, name)
+        if len(np.atleast_1d(value)):
+            setattr(child, name, value[1:] if isinstance(value, np.ndarray) else value + 1)
+            with pytest.raises(AssertionError):
+                validate_facet_tree(P.tree)
+            setattr(child, name, value)
     validate_facet_tree(P.tree)
     proof = answer.certificate
     assert proof is not None
     numbers = "weights" if answer.hit else "multipliers"
     changed = (-getattr(proof, numbers)[0], *getattr(proof, numbers)[1:])
-    forged = polytopes.TreeMeeting(answer.hit, False, proof._replace(**{numbers: changed}), (), {})
+    forged = polytopes.TreeMeeting(answer.hit, False, proof._replace(**{numbers: changed}), None, {})
     with pytest.raises(CertificateRefused):
         verify_trees(V, A, np.ones(50), forged, X)
     with pytest.raises(CertificateRefused):
-        verify_trees(V, A, np.ones(50), polytopes.TreeMeeting(not answer.hit, False, proof, (), {}), X)
+        verify_trees(V, A, np.ones(50), polytopes.TreeMeeting(not answer.hit, False, proof, None, {}), X)
 
 
 def test_refusals_say_what_to_do():
