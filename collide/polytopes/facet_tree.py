@@ -44,7 +44,7 @@ class Sizes(NamedTuple):
 
 
 #: By dimension: nets and leaves that numpy looks at in some ten microseconds.
-SIZES = {2: Sizes(0.5, 200, 200), 3: Sizes(0.5, 1000, 1000), 4: Sizes(0.5, 200, 1000), 5: Sizes(0.5, 64, 1500)}
+SIZES = {2: Sizes(0.5, 200, 200), 3: Sizes(0.5, 1000, 1000), 4: Sizes(0.5, 200, 2000), 5: Sizes(0.5, 64, 1500)}
 
 
 def sizes(d: int) -> Sizes:

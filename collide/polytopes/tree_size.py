@@ -21,8 +21,8 @@ _MODEL = {2: 200_000, 3: 60_000}
 _LARGE_MODEL = 30_000
 #: The least points, and the least corners of a leaf of the model.
 _SMALLEST, _SMALLEST_LEAF = 60, 12
-#: Cones drawn of the root, and of all other nodes; samples that are no nets are drawn again.
-_CONES, _CONES_BELOW = 60, 6
+#: Cones drawn of the root; a level below an eighth, at least one.
+_CONES = 64
 
 
 class TreeSize(NamedTuple):
@@ -139,7 +139,7 @@ class _Probe:
                 return None
             if child is not None:
                 weight = len(vertices) * len(cones) / n_cones
-                below = self.total(child, _CONES_BELOW)
+                below = self.total(child, max(n_cones // 8, 1))
                 n_bytes, nodes = n_bytes + weight * below.n_bytes, nodes + weight * below.nodes
                 depth = max(depth, below.depth)
         return _Total(n_bytes, nodes, depth)
