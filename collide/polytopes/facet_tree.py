@@ -182,9 +182,12 @@ class FacetTree:
         if len(corners) <= self.limits.leaf:
             return self._count(Node(len(facets), depth, leaf=corners.astype(np.int32)))
         node = self._count(Node(len(facets), depth, facets=facets))
-        wanted = math.ceil(_SIMPLICES_A_LEAF * (self.dimension - 1) * len(corners) / self.limits.leaf)
-        self._draw(node, min(max(wanted, _SMALLEST_NET), self.limits.net))
+        self._draw(node, self._net_for(len(corners)))
         return node
+
+    def _net_for(self, n_corners: int) -> int:
+        wanted = math.ceil(_SIMPLICES_A_LEAF * (self.dimension - 1) * n_corners / self.limits.leaf)
+        return min(max(wanted, _SMALLEST_NET), self.limits.net)
 
     def _count(self, node: Node) -> Node:
         self.n_nodes += 1
@@ -209,7 +212,9 @@ class FacetTree:
         planes = hull.planes.copy()
         planes[:, -1] = (planes[:, :-1] @ corners.T).max(axis=1)
         planes[:, -1] += 4.0 * rounding_errors(planes, self.reach)
-        node.rows, node.hull = net.astype(np.int32), Boundary(hull.facets.astype(np.int32), planes)
+        used, facets = np.unique(hull.facets, return_inverse=True)  # not points within flat faces
+        node.rows = net[used].astype(np.int32)
+        node.hull = Boundary(facets.reshape(hull.facets.shape).astype(np.int32), planes)
         node.cones, node.children = {}, {}
         node.n_draws += 1
         self.n_bytes += node.n_bytes
@@ -220,7 +225,7 @@ class FacetTree:
         if node.n_draws >= _MAX_DRAWS:
             raise UnsupportedQuery(f"{_MAX_DRAWS} samples of a hierarchical tree were no nets; ask polytopes.meets")
         self.n_redrawn += 1
-        self._draw(node, 2 * max(len(node.rows) // self.dimension, _SMALLEST_NET))
+        self._draw(node, self._net_for(len(np.unique(self.facets[node.facets]))) << node.n_draws)
 
     def _check_memory(self) -> None:
         if self.n_bytes > self.memory:

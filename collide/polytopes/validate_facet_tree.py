@@ -41,6 +41,8 @@ def _children(tree: FacetTree, node: Node, F: np.ndarray, whole: bool) -> list[t
     net = whole_numbers(tree.points[node.rows])
     for plane in planes:
         assert not _is_beyond(net, plane).any(), "a point of a net is outside the net's hull"
+    used = np.unique(node.hull.facets)
+    assert np.array_equal(used, np.arange(len(node.rows))), "a net has points that are no corners of its hull"
     beyond = {int(row): _is_beyond(corners, planes[row]) for row in everything}
     local = np.searchsorted(rows, tree.facets[F])
     if whole:
