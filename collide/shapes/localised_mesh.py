@@ -40,8 +40,8 @@ def localised_mesh(mesh: Mesh, stretch: float, order: int, max_facets: int, prog
     before = mesh.locality(progress=progress)
     if order >= before.distinct:
         raise InvalidArgument(
-            f"Mesh.localised: order must be less than the {before.distinct} distinct vertices of the mesh, got {order}: "
-            "no vertex has so many others"
+            f"Mesh.localised: order must be less than the {before.distinct} distinct vertices of the mesh, "
+            f"got {order}: no vertex has so many others"
         )
     survey = mesh.survey
     rows = np.flatnonzero(survey.flags & COLLAPSED == 0)
@@ -88,7 +88,8 @@ def _gave_up(crowded, facet: int, stretch: float, order: int, max_facets: int) -
     why = f"more than max_facets = {max_facets}" if many else "new vertices came ever nearer to each other"
     return InvalidArgument(
         f"Mesh.localised: σ_{order} ≤ {stretch:g} was not reached: {why}, with {crowded.n_facets} facets and "
-        f"σ_{order} = {crowded.stretch:.4g}. Edges crowd in facet {facet}, near its corner {crowded.vertex}: more of them "
-        "than a stretch allows side by side, or at one vertex (docs/locality.md). Allow a greater stretch or order"
+        f"σ_{order} = {crowded.stretch:.4g}. Edges crowd in facet {facet}, near its corner {crowded.vertex}: "
+        "more of them than a stretch allows side by side, or at one vertex (docs/locality.md). "
+        "Allow a greater stretch or order"
     )
 
