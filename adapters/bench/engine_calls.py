@@ -91,8 +91,8 @@ def rapier_call(peer: Any, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) -
     colliders, reach = [world.colliders.get(handle) for handle in handles], rapier_peer.farthest(A, X_WA, B, X_WB)
 
     def call() -> None:
-        for collider, place in zip(colliders, places):
-            collider.position = place
+        for placed, place in zip(colliders, places):
+            placed.position = place
         rapier_peer.step(world, reach)
 
     return call
