@@ -11,6 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from collide.adapters.peers import mujoco_peer, rapier_peer
+from collide.adapters.peers.cgal_peer import meets
+from collide.adapters.peers.distance3d_peer import collider, flavoured
+from collide.adapters.peers.drake_peer import scene_of
+from collide.shapes import Mesh
+
 Call = Callable[[], Any]
 WHAT_IS_TIMED = {
     "mujoco": "mj_kinematics and mj_collision, with :distance mj_geomDistance: the model and its data are kept",
@@ -29,11 +35,9 @@ def mujoco_call(peer: Any, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) -
     """Both bodies are placed by mj_kinematics at every call."""
     import mujoco
 
-    from collide.adapters.peers.mujoco_peer import farthest
-
     peer.ask(A, X_WA, B, X_WB)
     model = peer.model(((A, X_WA), (B, X_WB)))
-    data, fromto, limit = mujoco.MjData(model), np.zeros(6), farthest(A, X_WA, B, X_WB)
+    data, fromto, limit = mujoco.MjData(model), np.zeros(6), mujoco_peer.farthest(A, X_WA, B, X_WB)
     place, collide, distance = mujoco.mj_kinematics, mujoco.mj_collision, mujoco.mj_geomDistance
     if peer.values.get("distance"):
         return lambda: (place(model, data), distance(model, data, 0, 1, limit, fromto))
@@ -42,7 +46,6 @@ def mujoco_call(peer: Any, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) -
 
 def drake_call(peer: Any, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) -> Call:
     """The poses are an input of the SceneGraph that is set anew."""
-    from collide.adapters.peers.drake_peer import scene_of
 
     peer.ask(A, X_WA, B, X_WB)
     scene, context, poses, frames, ids = scene_of(A, X_WA, B, X_WB)
@@ -78,28 +81,25 @@ def trimesh_call(peer: Any, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) 
 
 def rapier_call(peer: Any, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) -> Call:
     """A world of two colliders; casts are asked of the peer as they are."""
-    from collide.adapters.peers.rapier_peer import farthest, isometry, step, world_of
-    from collide.shapes import Mesh
 
     peer.ask(A, X_WA, B, X_WB)
     if peer.values.get("cast") or any(isinstance(part[2], Mesh) for part in (A, B)):
         return lambda: peer.ask(A, X_WA, B, X_WB)
     X_WA, X_WB = X_WA @ A[1], X_WB @ B[1]
-    places = isometry(X_WA), isometry(X_WB)
-    world, handles = world_of((A[0], places[0]), (B[0], places[1]))
-    colliders, reach = [world.colliders.get(handle) for handle in handles], farthest(A, X_WA, B, X_WB)
+    places = rapier_peer.isometry(X_WA), rapier_peer.isometry(X_WB)
+    world, handles = rapier_peer.world_of((A[0], places[0]), (B[0], places[1]))
+    colliders, reach = [world.colliders.get(handle) for handle in handles], rapier_peer.farthest(A, X_WA, B, X_WB)
 
     def call() -> None:
-        for collider, place in zip(colliders, places):
-            collider.position = place
-        step(world, reach)
+        for placed, place in zip(colliders, places):
+            placed.position = place
+        rapier_peer.step(world, reach)
 
     return call
 
 
 def distance3d_call(peer: Any, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) -> Call:
     """Its functions take colliders with their poses inside."""
-    from collide.adapters.peers.distance3d_peer import collider, flavoured
 
     a, b, flavour = collider(A, X_WA), collider(B, X_WB), peer.values.get("flavour", "jolt")
     return lambda: flavoured(flavour, a, b)
@@ -113,7 +113,6 @@ def newton_call(peer: Any, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) -
 
 def cgal_call(peer: Any, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) -> Call:
     """Meshes in world coordinates."""
-    from collide.adapters.peers.cgal_peer import meets
 
     a, b = peer.placed(A, X_WA), peer.placed(B, X_WB)
     return lambda: meets(a, b)

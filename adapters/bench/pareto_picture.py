@@ -27,7 +27,7 @@ _COLOURS = (
     "#00CED1",
 )  # fmt: skip
 #: Engines in a panel from which on it is drawn larger, to keep room for names.
-MANY = 14
+CROWDED = 14
 _MARKERS = "osD^vP*Xh"
 
 
@@ -52,7 +52,7 @@ def draw(points: list[Point], places: list[Path], stamp: dict[str, str]) -> list
     kinds = list(dict.fromkeys(point.kind for point in points))
     columns = min(len(kinds), 3)
     lines = -(-len(kinds) // columns)
-    stretch = 1.0 if len({point.engine for point in points}) < MANY else 1.45
+    stretch = 1.0 if len({point.engine for point in points}) < CROWDED else 1.45
     size = 5.4 * stretch * columns, 4.6 * stretch * lines + 0.9
     figure = Figure(figsize=size, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)

@@ -21,7 +21,7 @@ from collide.errors import UnsupportedQuery
 from collide.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
 
 #: Contacts of a pair that there is room for.
-_ROOM = 64
+_MAX_CONTACTS = 64
 
 
 class NewtonPeer(PairwisePeer):
@@ -130,10 +130,10 @@ def launched(pair: PlacedPair):
     meshes = [geometry[2] for geometry in pair.geometries]
     boxes = np.repeat(pair.boxes, 3).reshape(2, 3)
     contacts = {
-        "contact_pair": wp.zeros(_ROOM, dtype=wp.vec2i, device="cpu"),
-        "contact_position": wp.zeros(_ROOM, dtype=wp.vec3, device="cpu"),
-        "contact_normal": wp.zeros(_ROOM, dtype=wp.vec3, device="cpu"),
-        "contact_penetration": wp.zeros(_ROOM, dtype=float, device="cpu"),
+        "contact_pair": wp.zeros(_MAX_CONTACTS, dtype=wp.vec2i, device="cpu"),
+        "contact_position": wp.zeros(_MAX_CONTACTS, dtype=wp.vec3, device="cpu"),
+        "contact_normal": wp.zeros(_MAX_CONTACTS, dtype=wp.vec3, device="cpu"),
+        "contact_penetration": wp.zeros(_MAX_CONTACTS, dtype=float, device="cpu"),
         "contact_count": wp.zeros(1, dtype=int, device="cpu"),
     }
     arguments = {

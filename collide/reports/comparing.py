@@ -70,12 +70,12 @@ def _engine_tables(data: dict, headers: list[str], rows: list[list[str]], width:
     """One column per engine: fifteen counts fit below one another, not beside; further tables where lines are full."""
     skipped = {summary["engine"]: summary["skipped"] for summary in data["summaries"] if summary["skipped"]}
     groups: list[list[list[str]]] = [[]]
-    free = room = width - _MARGIN - max(map(width_of, headers))
+    free = full = width - _MARGIN - max(map(width_of, headers))
     for row in (row for row in rows if row[0] not in skipped):
         needed = _MARGIN + max(map(width_of, row))
         if groups[-1] and needed > free:
             groups.append([])
-            free = room
+            free = full
         groups[-1].append(row)
         free -= needed
     notes = [f"{name} was not asked: {why}" for name, why in skipped.items()]
