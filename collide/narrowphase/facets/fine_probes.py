@@ -92,7 +92,7 @@ def move_probe(nodes, node, frame, probe, moved):
 
 @kernel(inline=True)
 def probe_of_node(nodes, node, frame, probe, workspace):
-    """A probe from a tree's centre as a node's boxes are compared with it; ``workspace`` holds it where it must move."""
+    """A probe from a tree's centre as a node's boxes are compared with it; ``workspace`` holds one that must move."""
     if nodes.header[HAS_ORIGINS] == 0:
         return probe
     move_probe(nodes, node, frame, probe, workspace)
