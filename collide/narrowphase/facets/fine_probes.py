@@ -91,12 +91,12 @@ def move_probe(nodes, node, frame, probe, moved):
 
 
 @kernel(inline=True)
-def probe_of_node(nodes, node, frame, probe, room):
-    """A probe from a tree's centre as a node's boxes are compared with it; ``room`` for another where it must move."""
+def probe_of_node(nodes, node, frame, probe, workspace):
+    """A probe from a tree's centre as a node's boxes are compared with it; ``workspace`` holds one that must move."""
     if nodes.header[HAS_ORIGINS] == 0:
         return probe
-    move_probe(nodes, node, frame, probe, room)
-    return room
+    move_probe(nodes, node, frame, probe, workspace)
+    return workspace
 
 
 @kernel
