@@ -261,7 +261,8 @@ def test_a_picometre_beside_a_kilometre():
     for r, n_min in ((union, 20), (left, 20)):
         assert r.mesh.solid and edges_balance(r.mesh) and len(r.mesh.faces) >= n_min and r.moved < 1e-27
         assert r.mesh.vertices.max() == 1000.0 and 0 < np.abs(r.mesh.vertices)[r.mesh.vertices != 0].min() <= 1e-12
-    far = collide.boolean(big, speck, I, collide.pose((500.0, 3.0, -2.0), rpy=(0.2, 0.1, 0.7)), "union")
+    dust = collide.Box((1e-15,) * 3)
+    far = collide.boolean(big, dust, I, collide.pose((500.0, 300.0, -200.0), rpy=(0.2, 0.1, 0.7)), "union")
     assert far.mesh.solid and edges_balance(far.mesh) and far.n_collapsed + far.n_thin > 0
     assert far.mesh.report.volume == pytest.approx(1e9, rel=1e-12)
 
