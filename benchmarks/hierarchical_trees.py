@@ -7,8 +7,8 @@
 Families: points on a unit sphere (``ball``), on the moment curve (``curve``), integers within a ball (``lattice``).
 ``sizes`` builds whole trees, predicts them first, and fits depth and bytes; what is predicted to take more than
 --memory is a row with the prediction alone. ``poses`` asks about n points against as many half-spaces tangent to a
-sphere, at random rotations near touching; every answer is compared with `polytopes.meets` or, with ``certificate=True``,
-the exact search over all rows. ``walk`` asks `collide.walk` about the same bodies in space. Rows go to
+sphere, at random rotations near touching; every answer is compared with `polytopes.meets` and, where they differ, with
+``certificate=True``, the exact search over all rows. ``walk`` asks `collide.walk` about the same bodies in space. Rows go to
 ``benchmarks/results/hierarchical-trees-<part>.csv``.
 """
 
@@ -229,7 +229,8 @@ def beside_walk(n: int, count: int) -> dict:
         hits, unlike = hits + tree.hit, unlike + (bool(walk.hit[0]) != tree.hit)
         rows.append((
             tree.counters["origin_rounds"] + tree.counters["rounds"], tree.counters["simplices_read"],
-            tree.counters["net_rows"], middle - start, int(walk.rows["rounds"][0]), int(walk.rows["tests"][0]), end - middle,
+            tree.counters["net_rows"], middle - start,
+            int(walk.rows["rounds"][0]), int(walk.rows["tests"][0]), end - middle,
         ))  # fmt: skip
     names = (
         "tree_rounds", "tree_cones", "tree_rows", "tree_ms", "walk_rounds", "walk_tests", "walk_ms"

@@ -48,7 +48,7 @@ def exact_planes(points: np.ndarray, facets: np.ndarray, within: np.ndarray) -> 
 
 
 def nearby_planes(points: np.ndarray, facets: np.ndarray, within: np.ndarray, reach: float):
-    """The same in doubles: planes with max |a| = 1, how far heights a·x − b at points may be off, where that is nothing.
+    """The same in doubles: planes with max |a| = 1, how far heights a·x − b may be off, where that is nothing.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ _UNIT = 2.0**-53
 FLAT = "a hierarchical tree needs a body with interior; ask polytopes.meets of flat ones"
 #: Samples drawn for one node before it gives up.
 _MAX_DRAWS = 12
-#: Simplices of the smallest net; how many a net has, times d − 1, for each leaf that the corners of its node would fill.
+#: Simplices of the smallest net; how many a net has, times d − 1, for each leaf that its node's corners would fill.
 _SMALLEST_NET, _SIMPLICES_A_LEAF = 12, 6.0
 #: What Python takes for a node beside its arrays.
 _BYTES_A_NODE = 600

@@ -1,4 +1,4 @@
-"""Where a ray from inside leaves the hull of points: a linear program of d variables, by the simplex method, in doubles."""
+"""Where a ray from inside leaves the hull of points: a linear program of d variables, by the simplex method."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def verify_boundary(points: ArrayLike, boundary: HullBoundary) -> None:
         a = [(-1) ** k * _determinant(np.delete(simplex[1:] - simplex[0], k, axis=1).tolist()) for k in range(d)]
         _check(any(a), "a simplex is flat")
         heights = every @ np.array(a, dtype=object) - sum(x * y for x, y in zip(a, simplex[0]))
-        _check(heights.max() <= 0 or heights.min() >= 0, "a simplex is not on the boundary: it has points on both sides")
+        _check(heights.max() <= 0 or heights.min() >= 0, "a simplex is not on the boundary: points on both sides")
         on_plane = sum(x * int(y) for x, y in zip(a, middle)) == d * sum(x * int(y) for x, y in zip(a, simplex[0]))
         n_holding += on_plane and _holds(simplex, middle, a)
     _check(n_holding == 1, "the middle of the first simplex is in others too")

@@ -13,7 +13,13 @@ from collide import polytopes
 from collide.certificates.certificate import CertificateRefused
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.polytopes import (
-    HierarchicalTree, hull_boundary, tree_size, trees_meet, verify_boundary, verify_exclusion, verify_trees,
+    HierarchicalTree,
+    hull_boundary,
+    tree_size,
+    trees_meet,
+    verify_boundary,
+    verify_exclusion,
+    verify_trees,
 )  # fmt: skip
 from collide.polytopes.boundary_hull import boundary_hull
 from collide.polytopes.facet_tree import FacetTree, Sizes
@@ -162,8 +168,10 @@ def _lattice(n, d):
 
 
 WHOLE = [
-    ("ball", 2, 300, Sizes(0.5, 10, 20)), ("curve", 2, 300, Sizes(0.5, 10, 20)), ("lattice", 2, 4000, Sizes(0.6, 10, 16)),
-    ("ball", 3, 120, Sizes(0.7, 16, 60)), ("curve", 3, 120, Sizes(0.7, 16, 60)), ("lattice", 3, 2000, Sizes(0.7, 16, 60)),
+    ("ball", 2, 300, Sizes(0.5, 10, 20)), ("curve", 2, 300, Sizes(0.5, 10, 20)),
+    ("lattice", 2, 4000, Sizes(0.6, 10, 16)),
+    ("ball", 3, 120, Sizes(0.7, 16, 60)), ("curve", 3, 120, Sizes(0.7, 16, 60)),
+    ("lattice", 3, 2000, Sizes(0.7, 16, 60)),
     ("ball", 4, 100, Sizes(0.8, 24, 80)), ("ball", 5, 50, Sizes(0.9, 14, 48)),
 ]  # fmt: skip
 
@@ -171,7 +179,7 @@ WHOLE = [
 @pytest.mark.parametrize(("family", "d", "n", "limits"), WHOLE)
 def test_whole_trees_are_validated_and_their_bytes_were_predicted(family, d, n, limits):
     rng = np.random.default_rng([n, d, 0])
-    points = {"ball": lambda: _ball(rng, n, d), "curve": lambda: _curve(n, d), "lattice": lambda: _lattice(n, d)}[family]()
+    points = _ball(rng, n, d) if family == "ball" else {"curve": _curve, "lattice": _lattice}[family](n, d)
     body = HierarchicalTree(points, whole=True, limits=limits)
     size = body.size
     assert validate_facet_tree(body.tree, whole=True) == size.nodes
@@ -204,11 +212,11 @@ def test_sizes_are_predicted_from_a_sample(monkeypatch):
     monkeypatch.setattr(tree_size, "_LARGE_MODEL", 3000)
     curve, limits = _curve(1500, 4), Sizes(0.5, 200, 1000)
     assert tree_size.predicted_simplices(as_grid(curve).whole) == pytest.approx(1500 * 1497 // 2, rel=0.05)
-    with pytest.raises(UnsupportedQuery, match="boundary is predicted to have 1,[0-9,]* simplices, [0-9,]* bytes"):
+    with pytest.raises(UnsupportedQuery, match=r"boundary is predicted to have 1,[0-9,]* simplices, [0-9,]* bytes"):
         HierarchicalTree(curve, memory=1 << 27, limits=limits)
-    with pytest.raises(UnsupportedQuery, match="whole tree is predicted to take [0-9,]* bytes"):
+    with pytest.raises(UnsupportedQuery, match=r"whole tree is predicted to take [0-9,]* bytes"):
         HierarchicalTree(curve, memory=1 << 27, whole=True, limits=limits)
-    with pytest.raises(UnsupportedQuery, match="after .* of 1,500 points the boundary has"):
+    with pytest.raises(UnsupportedQuery, match=r"after .* of 1,500 points the boundary has"):
         FacetTree(as_grid(curve).whole, 1 << 19, limits)
     assert [tree_size.most_simplices(n, d) for d, n in ((2, 9), (3, 9), (4, 9), (4, 5), (5, 6))] == [9, 14, 27, 5, 6]
 
