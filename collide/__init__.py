@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     )
     from collide.shapes.tessellation import tessellate
     from collide.solids.boolean import BooleanResult, boolean
+    from collide.solids.combine import combine
     from collide.solids.overlap_volume import OverlapVolume, overlap_volume
     from collide.surface_queries.contains import contains
     from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
@@ -114,6 +115,7 @@ _HOMES = {
     ),
     "collide.shapes.tessellation": ("tessellate",),
     "collide.solids.boolean": ("BooleanResult", "boolean"),
+    "collide.solids.combine": ("combine",),
     "collide.solids.overlap_volume": ("OverlapVolume", "overlap_volume"),
     "collide.sweeps.configurations": ("DrawnConfigurations",),
     "collide.sweeps.pair_proposal": ("LinkPair", "Proposal", "propose_disabled_pairs"),
@@ -140,7 +142,7 @@ __all__ = [
     "InvalidShape", "LinkPair", "Mesh", "MissingExtra", "OverlapVolume", "Overlay", "PairResult", "Proposal", "RayHits",
     "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
     "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits",
-    "WorldResult", "boolean", "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include",
+    "WorldResult", "boolean", "certify", "collide", "combine", "contacts", "contains", "distance", "facet_pairs", "get_include",
     "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses_in_motion",
     "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "self_overlapping_cells", "shape_cast",
     "sweep", "tessellate", "time_of_impact", "verify", "walk",
