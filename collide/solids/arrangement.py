@@ -76,7 +76,7 @@ def arrange(operands: list[Operand], limits: Limits = UNLIMITED) -> Arrangement:
     cuts = FacetCuts(facets, points, unclear, crossings.pairs[drawn], ids[drawn], exactly, limits)
     pieces, of = [], []
     for f in limits.watched("cutting facets", sorted(cuts.corners_of)):
-        made = _cut_facet(cuts, f)
+        made = cut_facet(cuts, f)
         pieces += made
         of += [f] * len(made)
     is_cut = np.zeros(len(facets.corners), dtype=bool)
@@ -160,7 +160,7 @@ def crossings_of(mesh) -> np.ndarray:
     return self_hits(mesh.tree)[0]
 
 
-def _cut_facet(cuts: FacetCuts, f: int) -> list[tuple[int, int, int]]:
+def cut_facet(cuts: FacetCuts, f: int) -> list[tuple[int, int, int]]:
     """Triangles, with the facet's front, between the segments on it."""
     points = cuts.points
     normal = cuts.facets.normal(f)
