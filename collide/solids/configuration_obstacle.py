@@ -17,6 +17,7 @@ from collide.solids.cell_points import CellPoints
 from collide.solids.convolution import ExactSurface, Pieces, convolution, exact_surface
 from collide.solids.exact_facets import ExactFacets, arrangement_of_facets
 from collide.solids.limits import UNLIMITED, Limits
+from collide.solids.planar_obstacle import PlanarObstacle, planar_obstacle
 from collide.solids.rounded_mesh import rounded_mesh
 from collide.solids.solid_operands import solid_operand
 from collide.solids.translated_solids import TranslatedSolids
@@ -59,9 +60,8 @@ class ExactObstacle(NamedTuple):
 
 
 def configuration_obstacle(
-    A: Shape, B: Shape, R=None, *, check_poses: bool = True, progress=None, time_limit: float | None = None,
-    memory: int | None = None,
-) -> ConfigurationObstacle:  # fmt: skip
+    A, B, R=None, *, check_poses: bool = True, progress=None, time_limit: float | None = None, memory: int | None = None
+) -> ConfigurationObstacle | PlanarObstacle:
     """All x at which A meets R B + x, as one solid: the Minkowski sum of A and −R B, decided exactly.
 
     A stands at the pose I; B's pose is (R, x). A body B that moves without turning is free of A just where the point x
@@ -93,6 +93,9 @@ def configuration_obstacle(
     O(N log N + k) are looked at for k that meet; N is O(n²), a few n for solids that are nearly convex. J. Erickson,
     "Local polyhedra and geometric graphs" (2005), theorem 7.2: Θ(n⁴) vertices up to log² n for local polyhedra.
     """
+    if not isinstance(A, Shape) and not isinstance(B, Shape):
+        with Limits("configuration_obstacle", progress, time_limit, memory) as limits:
+            return planar_obstacle(A, B, R, limits, check_poses)
     rotation = np.eye(3) if R is None else np.asarray(R)
     if rotation.shape != (3, 3):
         raise InvalidArgument(f"configuration_obstacle: R must be a (3, 3) rotation, got shape {rotation.shape}")
