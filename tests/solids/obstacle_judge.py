@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 from mesh_shapes import block_ring, box, bumpy_sphere
-from naive_triangles import as_integers, triangles_meet, winding, world_points
+from naive_triangles import triangles_meet, winding, world_points
 from solid_judge import exact_corners
 from solid_membership import as_doubles, windings
 
@@ -143,7 +144,8 @@ def meet_in_fractions(A, B, R, x) -> bool:
     """Whether A and R B + x have a point in common: facets by pairs, and one vertex of each in the other."""
     in_a = world_points(A.vertices, np.eye(4))
     in_b = [[c + s for c, s in zip(p, x)] for p in world_points(B.vertices, pose_of(R))]
-    points_a, points_b = as_integers(in_a, in_b)
+    whole = math.lcm(*(c.denominator for p in [*in_a, *in_b] for c in p))
+    points_a, points_b = ([[int(c * whole) for c in p] for p in some] for some in (in_a, in_b))
     facets_a = [[points_a[v] for v in face] for face in A.faces.tolist()]
     facets_b = [[points_b[v] for v in face] for face in B.faces.tolist()]
     if any(triangles_meet(P, Q) for P in facets_a for Q in facets_b):
