@@ -62,27 +62,28 @@ class ExactObstacle(NamedTuple):
 def configuration_obstacle(
     A, B, R=None, *, check_poses: bool = True, progress=None, time_limit: float | None = None, memory: int | None = None
 ) -> ConfigurationObstacle | PlanarObstacle:
-    """All x at which A meets R B + x, as one solid: the Minkowski sum of A and −R B, decided exactly.
+    """All x at which A meets R B + x: the Minkowski sum of A and −R B as one solid, or polygon, decided exactly.
 
     A stands at the pose I; B's pose is (R, x). A body B that moves without turning is free of A just where the point x
     is outside.
 
     Parameters
     ----------
-    A, B : solids with facets, as for `boolean`, whose facets do not cross, two at every edge.
-    R : (3, 3) rotation of B; None for none.
+    A, B : solids with facets, as for `boolean`, whose facets do not cross, two at every edge. In the plane lists of
+        rings (k, 2) [m]: outer ones counter-clockwise, holes clockwise, that touch nowhere.
+    R : (3, 3) rotation of B, (2, 2) in the plane; None for none.
     check_poses : refuse matrices that are no rotation.
     progress, time_limit, memory : as of `boolean`.
 
     Returns
     -------
-    ConfigurationObstacle. Which x belong is exact on the numbers given; vertices are rounded once, by ``moved`` at
+    ConfigurationObstacle; PlanarObstacle in the plane. Which x belong is exact on the numbers given; vertices are rounded once, by ``moved`` at
     most. It is a closed set: on its border the bodies touch. Positions that only touch, hemmed in on all sides, belong.
 
     Raises
     ------
     InvalidArgument : a surface without an inside; facets that cross, edges of more than two facets and facets without
-        area, by number; InvalidPose : R is no rotation; UnsupportedQuery : curved shapes, unions and half-spaces, and a
+        area, by number; rings that touch, cross or run the wrong way; InvalidPose : R is no rotation; UnsupportedQuery : curved shapes, unions and half-spaces, and a
         limit that is reached.
 
     Notes
@@ -93,7 +94,9 @@ def configuration_obstacle(
     O(N log N + k) are looked at for k that meet; N is O(n²), a few n for solids that are nearly convex. J. Erickson,
     "Local polyhedra and geometric graphs" (2005), theorem 7.2: Θ(n⁴) vertices up to log² n for local polyhedra.
     """
-    if not isinstance(A, Shape) and not isinstance(B, Shape):
+    if isinstance(A, Shape) != isinstance(B, Shape):
+        raise InvalidArgument("configuration_obstacle: A and B must be two solids or two polygons, got one of each")
+    if not isinstance(A, Shape):
         with Limits("configuration_obstacle", progress, time_limit, memory) as limits:
             return planar_obstacle(A, B, R, limits, check_poses)
     rotation = np.eye(3) if R is None else np.asarray(R)

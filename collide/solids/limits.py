@@ -16,6 +16,8 @@ from collide.errors import InvalidArgument, UnsupportedQuery, brief
 #: Bytes that a meeting pair of facets takes while it is cut exactly, with its share of points, segments and triangles:
 #: `python benchmarks/combined_solids.py --memory` measures it.
 BYTES_PER_PAIR = 6000
+#: The same of a pair of segments in the plane.
+BYTES_PER_CROSSING = 2500
 #: Seconds between two reports.
 _REPORTS = 0.5
 _Item = TypeVar("_Item")

@@ -16,7 +16,7 @@ import numpy as np
 
 from collide.errors import CollideError
 from collide.solids.facet_edges import components
-from collide.solids.limits import UNLIMITED, Limits
+from collide.solids.limits import BYTES_PER_CROSSING, UNLIMITED, Limits
 
 PlanePoint = tuple[int, int, int]
 Vector = tuple[int, int]
@@ -42,8 +42,9 @@ class PlaneArrangement:
         self._near = [(float(x), float(y)) for x, y in points]
         self._splits: dict[int, set[int]] = defaultdict(set)
         self.segments = segments
-        self.n_pairs = 0
-        for a, b in limits.watched("crossing segments", list(self._close_pairs())):
+        pairs = list(self._close_pairs())
+        limits.check_memory(BYTES_PER_CROSSING * len(pairs), f"{len(pairs):,} pairs of segments to be crossed")
+        for a, b in limits.watched("crossing segments", pairs):
             self._cross(a, b)
         self._join_pieces(limits)
         self.near = np.array(self._near).reshape(-1, 2)
@@ -72,7 +73,6 @@ class PlaneArrangement:
             yield from np.stack([a, b], axis=1)[~apart].tolist()
 
     def _cross(self, a: int, b: int) -> None:
-        self.n_pairs += 1
         s, t = self.segments[a].tolist(), self.segments[b].tolist()
         p, q, u, v = (self.points[k] for k in (*s, *t))
         at_u, at_v, at_p, at_q = (
