@@ -60,8 +60,8 @@ class BooleanResult(NamedTuple):
 
 
 def boolean(
-    A: Shape, B: Shape, X_WA, X_WB, op: str, *, check_poses: bool = True, progress=None, time_limit: float | None = None,
-    memory: int | None = None,
+    A: Shape, B: Shape, X_WA, X_WB, op: str, *, check_poses: bool = True, progress=None,
+    time_limit: float | None = None, memory: int | None = None,
 ) -> BooleanResult:  # fmt: skip
     """Union, intersection or difference of two posed solids, as a mesh: decided exactly on the poses as given.
 

@@ -34,7 +34,7 @@ class CellPoints:
         corners = [points.exact(p) for p in sheets.triangles[row].tolist()]
         w = corners[0][3] * corners[1][3] * corners[2][3]
         at: Point = tuple(sum(c[k] * (w // c[3]) for c in corners) for k in range(3))  # type: ignore[assignment]
-        middle = reduced(*at, 3 * w)
+        middle = reduced(at[0], at[1], at[2], 3 * w)
         n = points.facets.normal(int(sheets.facet[row]))
         ahead = n if side == 0 else (-n[0], -n[1], -n[2])
         size = int(max(self.high[row] - self.low[row])) + 1
@@ -43,16 +43,17 @@ class CellPoints:
             # middle + ahead · size / (longest · 2^halvings)
             below = longest << halvings
             x, y, z, v = (c * below for c in middle)
-            end = reduced(*(c + size * d * middle[3] for c, d in zip((x, y, z), ahead)), v)
+            far = [c + size * d * middle[3] for c, d in zip((x, y, z), ahead)]
+            end = reduced(far[0], far[1], far[2], v)
             if not any(self._between(middle, end, k) for k in self._close(middle, end, row)):
                 return end
         raise CollideError("no point is found within a cell of an arrangement; please report it")
 
     def _close(self, a: Rational, b: Rational, row: int) -> list[int]:
         ends = np.array([[x / p[3] for x in p[:3]] for p in (a, b)])
-        found = ((self.low <= ends.max(axis=0)) & (self.high >= ends.min(axis=0))).all(axis=1)
-        found[row] = False
-        return np.flatnonzero(found).tolist()
+        near_rows = ((self.low <= ends.max(axis=0)) & (self.high >= ends.min(axis=0))).all(axis=1)
+        near_rows[row] = False
+        return np.flatnonzero(near_rows).tolist()
 
     def _between(self, a: Rational, b: Rational, row: int) -> bool:
         """Whether a sheet may meet a segment; where it is certain that it does not, False."""

@@ -46,8 +46,8 @@ def combine(
 
     Returns
     -------
-    BooleanResult; ``body`` has rows of ``shapes``. The order of the bodies changes no bit of the mesh: where surfaces of
-    several lie on one another, the facet is told of one of them that does not depend on it, and ``before`` and ``behind``
+    BooleanResult; ``body`` has rows of ``shapes``. The order of the bodies changes no bit of the mesh: where surfaces
+    of several lie on one another, the facet is that of one of them whatever their order, and ``before`` and ``behind``
     show all.
 
     Raises
@@ -117,7 +117,9 @@ def _asked(caller: str, rule: MembershipRule, patterns: np.ndarray) -> np.ndarra
                 f"{caller}: the rule raised {type(error).__name__} of {held}: {brief(str(error))}"
             ) from error
         if not isinstance(answer, (bool, np.bool_)):
-            raise InvalidArgument(f"{caller}: the rule must answer True or False, of {held} it answered {brief(answer)}")
+            raise InvalidArgument(
+                f"{caller}: the rule must answer True or False, of {held} it answered {brief(answer)}"
+            )
         answers.append(bool(answer))
     return np.array(answers)
 
@@ -126,7 +128,7 @@ def _canonical_order(operands: list[Operand]) -> np.ndarray:
     """(r,) rows of the bodies in an order that depends on what they are alone, equal ones by their places."""
     keys = []
     for operand in operands:
-        digest = hashlib.sha256(np.ascontiguousarray(operand.X))
+        digest = hashlib.sha256(np.ascontiguousarray(operand.X).tobytes())
         for array in (operand.mesh.vertices, operand.mesh.faces):
             digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
         keys.append(digest.digest())

@@ -27,8 +27,8 @@ class ConfigurationObstacle(NamedTuple):
     """The positions x [m] at which A meets R B + x.
 
     mesh : the solid of them.
-    facets : (k, 2) int64, of every facet of the mesh a facet of A and one of B that touch at its positions: the one that
-        does, or one of those around the vertex or the edge that does.
+    facets : (k, 2) int64, of every facet of the mesh a facet of A and one of B that touch at its positions: the one
+        that does, or one of those around the vertex or the edge that does.
     moved : no vertex was moved farther by rounding it to doubles [m].
     n_collapsed, n_thin : triangles and shells of which rounding left nothing; they are not in the mesh.
     n_pieces, n_cells, n_asked : triangles of the convolution, cells of their arrangement, and those of which the bodies
@@ -77,14 +77,16 @@ def configuration_obstacle(
 
     Returns
     -------
-    ConfigurationObstacle; PlanarObstacle in the plane. Which x belong is exact on the numbers given; vertices are rounded once, by ``moved`` at
-    most. It is a closed set: on its border the bodies touch. Positions that only touch, hemmed in on all sides, belong.
+    ConfigurationObstacle; PlanarObstacle in the plane. Which x belong is exact on the numbers given; vertices are
+    rounded once, by ``moved`` at most. It is a closed set: on its border the bodies touch. Positions that only touch,
+    hemmed in on all sides, belong.
 
     Raises
     ------
     InvalidArgument : a surface without an inside; facets that cross, edges of more than two facets and facets without
-        area, by number; rings that touch, cross or run the wrong way; InvalidPose : R is no rotation; UnsupportedQuery : curved shapes, unions and half-spaces, and a
-        limit that is reached.
+        area, by number; rings that touch, cross or run the wrong way.
+    InvalidPose : R is no rotation.
+    UnsupportedQuery : curved shapes, unions and half-spaces, and a limit that is reached.
 
     Notes
     -----
@@ -92,7 +94,8 @@ def configuration_obstacle(
     exact arrangement of these has a winding number in each cell that is the Euler characteristic of A ∩ (R B + x):
     where it is not 0, the bodies meet; where it is 0, they are asked themselves at a point of the cell. For N pieces
     O(N log N + k) are looked at for k that meet; N is O(n²), a few n for solids that are nearly convex. J. Erickson,
-    "Local polyhedra and geometric graphs" (2005), theorem 7.2: Θ(n⁴) vertices up to log² n for local polyhedra.
+    "Local polyhedra and geometric graphs" (2005), theorems 7.1 and 7.2: Θ(n³) corners in the plane and Θ(n⁴) vertices
+    in space, up to logarithms, for local polygons and polyhedra. docs/configuration_obstacles.md has figures.
     """
     if isinstance(A, Shape) != isinstance(B, Shape):
         raise InvalidArgument("configuration_obstacle: A and B must be two solids or two polygons, got one of each")
@@ -109,7 +112,9 @@ def configuration_obstacle(
         triangles, sheets = exact.arrangement.boundary(exact.keep)
         made = rounded_mesh(exact.arrangement.points, triangles)
     if made.mesh is None:
-        raise InvalidArgument("configuration_obstacle: rounding leaves nothing of it: A and B are too small for doubles")
+        raise InvalidArgument(
+            "configuration_obstacle: rounding leaves nothing of it: A and B are too small for doubles"
+        )
     facets = exact.facets[exact.arrangement.sheets.facet[sheets[made.rows]]]
     moved = float(np.sqrt(np.square(0.5 * np.spacing(np.abs(made.mesh.vertices))).sum(axis=1).max()))
     return ConfigurationObstacle(
@@ -156,6 +161,7 @@ def _surfaces(A: Shape, B: Shape, X: np.ndarray, check: bool):
 
 def _checked_faces(name: str, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """(rows of the facets of a mesh that are more than an edge, their corners)."""
+
     def refuse(what: str, rows) -> InvalidArgument:
         some = ", ".join(str(row) for row in np.asarray(rows).ravel()[:6].tolist())
         return InvalidArgument(f"configuration_obstacle: {name} has {what}: facets {some}")
@@ -171,9 +177,9 @@ def _checked_faces(name: str, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     faces = mesh.survey.corners[rows].astype(np.int64)
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     _, which, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    many = np.flatnonzero(counts[which.ravel()] != 2)
-    if len(many):
-        raise refuse("an edge with more than two facets; move the parts that touch there apart", rows[many // 3])
+    n_wrong = np.flatnonzero(counts[which.ravel()] != 2)
+    if len(n_wrong):
+        raise refuse("an edge with more than two facets; move the parts that touch there apart", rows[n_wrong // 3])
     return rows, faces
 
 
@@ -202,8 +208,8 @@ def _left_over(faces: np.ndarray) -> np.ndarray:
     total = np.bincount(which, weights=sense).astype(np.int64)
     order = np.lexsort((np.arange(len(faces)), -sense * np.sign(total[which]), which))
     place = np.arange(len(faces)) - np.searchsorted(which[order], which[order])
-    left = order[place < np.abs(total[which[order]])]
-    return np.sort(left)
+    remaining = order[place < np.abs(total[which[order]])]
+    return np.sort(remaining)
 
 
 def _has_area(points: list[Point], face: list[int]) -> bool:

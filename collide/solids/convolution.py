@@ -116,7 +116,7 @@ def _generic(vectors: list[Point], seed: int) -> Point:
 
 
 def _signs(normals: list[Point], along: list[Point], shear: _Shear, at_normals: bool = False) -> np.ndarray:
-    """(n, m) int8: signs of n · g, never 0.   at_normals : the normals, not the vectors g, are the sheared surface's."""
+    """(n, m) int8: signs of n · g, never 0.   at_normals : the normals, not the g, are the sheared surface's."""
     n = np.array([leading_digits(x) for x in normals])
     g = np.array([leading_digits(x) for x in along])
     near = n @ g.T

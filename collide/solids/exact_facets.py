@@ -94,18 +94,20 @@ def close_pairs(facets: ExactFacets) -> np.ndarray:
     order = np.argsort(low[:, 0], kind="stable")
     last = np.searchsorted(low[order, 0], high[order, 0], side="right")
     counts = last - np.arange(len(order)) - 1
-    found = []
+    pairs = []
     start = 0
     while start < len(order):
         stop = start + max(int(np.searchsorted(np.cumsum(counts[start:]), _CHUNK)), 1)
         rows = np.repeat(np.arange(start, min(stop, len(order))), counts[start:stop])
-        within = np.arange(len(rows)) - np.repeat(np.cumsum(counts[start:stop]) - counts[start:stop], counts[start:stop])
+        within = np.arange(len(rows)) - np.repeat(
+            np.cumsum(counts[start:stop]) - counts[start:stop], counts[start:stop]
+        )
         a, b = order[rows], order[rows + 1 + within]
         meet = ((low[a, 1:] <= high[b, 1:]) & (low[b, 1:] <= high[a, 1:])).all(axis=1)
         a, b = a[meet], b[meet]
-        found.append(np.stack([a, b], axis=1)[~_apart(corners[a], corners[b], slack)])
+        pairs.append(np.stack([a, b], axis=1)[~_apart(corners[a], corners[b], slack)])
         start = stop
-    return np.concatenate(found) if found else np.zeros((0, 2), dtype=np.int64)
+    return np.concatenate(pairs) if pairs else np.zeros((0, 2), dtype=np.int64)
 
 
 def _apart(A: np.ndarray, B: np.ndarray, slack: float) -> np.ndarray:
@@ -113,8 +115,8 @@ def _apart(A: np.ndarray, B: np.ndarray, slack: float) -> np.ndarray:
     error = np.full(len(A), slack)
     apart = np.zeros(len(A), dtype=bool)
     with np.errstate(all="ignore"):
-        for P, Q in ((A, B), (B, A)):
-            _, sides, limit = sides_of_planes(P, Q, error)
+        for T, other_corners in ((A, B), (B, A)):
+            _, sides, limit = sides_of_planes(T, other_corners, error)
             apart |= (sides > limit[:, None]).all(axis=1) | (sides < -limit[:, None]).all(axis=1)
     return apart
 

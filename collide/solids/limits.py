@@ -40,10 +40,10 @@ class Limits:
         self.caller, self.progress, self.time_limit, self.memory = caller, progress, time_limit, memory
         self._rename: Callable[[str], object] | None = None
         self._stack = ExitStack()
-        self._start = self._told = time.monotonic()
+        self._start = self._reported = time.monotonic()
 
-    def __enter__(self) -> Limits:
-        self._start = self._told = time.monotonic()
+    def __enter__(self) -> Limits:  # noqa: PYI034 - typing.Self is of Python 3.11
+        self._start = self._reported = time.monotonic()
         if self.progress is not None:
             self._rename = self._stack.enter_context(self.progress(self.caller))
         return self
@@ -65,8 +65,8 @@ class Limits:
             now = time.monotonic()
             if self.time_limit is not None and now - self._start > self.time_limit:
                 self._check_time(label, done, len(items), began)
-            if self._rename is not None and now - self._told > _REPORTS:
-                self._told = now
+            if self._rename is not None and now - self._reported > _REPORTS:
+                self._reported = now
                 self._rename(f"{self.caller}: {label}, {100 * done // len(items)} %")
             yield item
 
@@ -74,20 +74,20 @@ class Limits:
         """Refuse work that would take more."""
         if self.memory is not None and bytes_needed > self.memory:
             raise UnsupportedQuery(
-                f"{self.caller}: {of} would take about {bytes_needed:,} bytes, more than memory={self.memory:,}; raise it, or "
-                "ask of coarser solids"
+                f"{self.caller}: {of} would take about {bytes_needed:,} bytes, more than memory={self.memory:,}; "
+                "raise it, or ask of coarser solids"
             )
 
     def _check_time(self, label: str, done: int, total: int, began: float | None = None) -> None:
         now = time.monotonic()
         if self.time_limit is None or now - self._start <= self.time_limit:
             return
-        told = ""
+        status = ""
         if done and began is not None:
-            told = f" ({done} of {total}: this part would take about {(now - began) * total / done:.3g} s)"
+            status = f" ({done} of {total}: this part would take about {(now - began) * total / done:.3g} s)"
         raise UnsupportedQuery(
-            f"{self.caller}: not done after time_limit={self.time_limit:g} s, while {label}{told}; raise it, or ask of "
-            "coarser solids"
+            f"{self.caller}: not done after time_limit={self.time_limit:g} s, while {label}{status}; raise it, "
+            "or ask of coarser solids"
         )
 
 

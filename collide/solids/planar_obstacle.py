@@ -8,6 +8,7 @@ chains that wind around x as often as the Euler characteristic of A ∩ (R B + x
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -23,8 +24,8 @@ class PlanarObstacle(NamedTuple):
 
     rings : the borders, (k, 2) each: outer ones counter-clockwise, holes clockwise; corners that are none are left out.
     moved : no corner was moved farther by rounding it to doubles [m].
-    n_pieces, n_corners, n_faces, n_asked : edges of the convolution, points of their arrangement, its faces, and those of
-        which the polygons themselves were asked.
+    n_pieces, n_corners, n_faces, n_asked : edges of the convolution, points of their arrangement, its faces, and those
+        of which the polygons themselves were asked.
     """
 
     rings: list[np.ndarray]
@@ -41,7 +42,7 @@ class PlanarObstacle(NamedTuple):
 
 
 class ExactPolygon(NamedTuple):
-    """A polygon with holes in integers.   points : by id.   before, after : of every point the one before and after it."""
+    """A polygon with holes in integers.   points : by id.   before, after : of every point its neighbours."""
 
     points: list[Vector]
     before: list[int]
@@ -74,7 +75,9 @@ def planar_obstacle(A, B, R, limits: Limits, check: bool = True) -> PlanarObstac
         if changed.sum() > 2:
             rings.append(corners[changed])
     if not rings:
-        raise InvalidArgument("configuration_obstacle: rounding leaves nothing of it: A and B are too small for doubles")
+        raise InvalidArgument(
+            "configuration_obstacle: rounding leaves nothing of it: A and B are too small for doubles"
+        )
     largest = np.concatenate(rings)
     moved = float(np.sqrt(np.square(0.5 * np.spacing(np.abs(largest))).sum(axis=1).max()))
     return PlanarObstacle(rings, moved, exact.n_pieces, len(arrangement.points), len(exact.keep), exact.n_asked)
@@ -86,21 +89,21 @@ def exact_planar_obstacle(A, B, R, limits: Limits = UNLIMITED, check: bool = Tru
     rotation = np.eye(2) if R is None else np.asarray(R, dtype=np.float64)
     if rotation.shape != (2, 2) or not np.isfinite(rotation).all():
         raise InvalidArgument(f"configuration_obstacle: R of polygons must be a (2, 2) rotation, got {brief(R)}")
-    turn = rotation @ rotation.T - np.eye(2)
-    if check and (np.abs(turn).max() > 1e-9 or np.linalg.det(rotation) < 0.0):
-        raise InvalidPose(f"configuration_obstacle: R must be a rotation: R Rᵀ − I is {np.abs(turn).max():.3g}")
+    off = rotation @ rotation.T - np.eye(2)
+    if check and (np.abs(off).max() > 1e-9 or np.linalg.det(rotation) < 0.0):
+        raise InvalidPose(f"configuration_obstacle: R must be a rotation: R Rᵀ − I is {np.abs(off).max():.3g}")
     a, grid_a = _exact_rings("A", A, np.eye(2))
     b, grid_b = _exact_rings("B", B, -rotation)
     grid = min(grid_a, grid_b)
-    P, Q = (_polygon(name, rings, g - grid) for name, rings, g in (("A", a, grid_a), ("B", b, grid_b)))
-    points, segments = _convolution(P, Q)
+    A, B = (_polygon(name, rings, g - grid) for name, rings, g in (("A", a, grid_a), ("B", b, grid_b)))
+    points, segments = _convolution(A, B)
     arrangement = PlaneArrangement(points, segments, limits)
     keep = arrangement.winding != 0
     asked: list[int] = []
-    if P.n_rings > 1 or Q.n_rings > 1:
+    if A.n_rings > 1 or B.n_rings > 1:
         asked = np.flatnonzero(~keep).tolist()
         for face in limits.watched("asking the polygons themselves", asked):
-            keep[face] = polygons_meet_at(P, Q, arrangement.point_within(face))
+            keep[face] = polygons_meet_at(A, B, arrangement.point_within(face))
     return ExactPlanarObstacle(arrangement, keep, grid, len(segments), len(asked))
 
 
@@ -110,13 +113,13 @@ def border_rings(arrangement: PlaneArrangement, keep: np.ndarray) -> list[list[i
     border = inside & ~inside[np.arange(len(inside)) ^ 1]
     onward = arrangement.onward
     starts = arrangement.edges.ravel()
-    left = set(np.flatnonzero(border).tolist())
+    remaining = set(np.flatnonzero(border).tolist())
     rings = []
-    while left:
-        h = first = min(left)
+    while remaining:
+        h = first = min(remaining)
         ring = []
         while True:
-            left.discard(h)
+            remaining.discard(h)
             n = int(onward[h])
             while not border[n]:
                 n = int(onward[n ^ 1])
@@ -130,36 +133,36 @@ def border_rings(arrangement: PlaneArrangement, keep: np.ndarray) -> list[list[i
     return rings
 
 
-def polygons_meet_at(P: ExactPolygon, Q: ExactPolygon, x: PlanePoint) -> bool:
-    """Whether P has a point in common with x − Q."""
+def polygons_meet_at(A: ExactPolygon, B: ExactPolygon, x: PlanePoint) -> bool:
+    """Whether A has a point in common with x − B."""
     w = x[2]
-    p = [(a * w, b * w) for a, b in P.points]
-    q = [(x[0] - a * w, x[1] - b * w) for a, b in Q.points]
+    p = [(a * w, b * w) for a, b in A.points]
+    q = [(x[0] - a * w, x[1] - b * w) for a, b in B.points]
     low, high = [], []
-    for points, after in ((p, P.after), (q, Q.after)):
+    for points, after in ((p, A.after), (q, B.after)):
         near = np.array([[float(c) for c in v] for v in points])
         low.append(np.minimum(near, near[after]))
         high.append(np.maximum(near, near[after]))
     slack = 2.0**-48 * max(float(np.abs(bound).max()) for bound in (*low, *high))
     apart = (low[0][:, None] > high[1][None] + slack) | (low[1][None] > high[0][:, None] + slack)
     for i, j in np.argwhere(~apart.any(axis=2)).tolist():
-        if _segments_meet(p[i], p[P.after[i]], q[j], q[Q.after[j]]):
+        if _segments_meet(p[i], p[A.after[i]], q[j], q[B.after[j]]):
             return True
-    return any(_holds(q, Q.after, v) for v in p) or any(_holds(p, P.after, v) for v in q)
+    return any(_holds(q, B.after, v) for v in p) or any(_holds(p, A.after, v) for v in q)
 
 
 # --- the convolution --------------------------------------------------------------------------------------------------
 
 
-def _convolution(P: ExactPolygon, Q: ExactPolygon) -> tuple[list[Vector], np.ndarray]:
-    """(points, directed segments (k, 2) of them): edges and corners whose normals agree, turned round where the corner is
-    reflex. Parallel edges are told apart as if Q were turned by an infinitely small angle."""
-    along_p, along_q = P.along(), Q.along()
+def _convolution(A: ExactPolygon, B: ExactPolygon) -> tuple[list[Vector], np.ndarray]:
+    """(points, directed segments (k, 2) of them): edges and corners whose normals agree, run back where the corner is
+    reflex. Parallel edges are told apart as if B were turned by an infinitely small angle."""
+    along_p, along_q = A.along(), B.along()
     turns = _turn_signs(along_p, along_q)
-    at_q = _corner_counts(Q, along_q, -turns[:, Q.before], turns)
-    at_p = _corner_counts(P, along_p, turns[P.before].T, -turns.T)
+    at_q = _corner_counts(B, along_q, -turns[:, B.before], turns)
+    at_p = _corner_counts(A, along_p, turns[A.before].T, -turns.T)
     pieces = []
-    for k, (edges, counts) in enumerate(((P, at_q), (Q, at_p))):
+    for k, (edges, counts) in enumerate(((A, at_q), (B, at_p))):
         e, v = np.nonzero(counts)
         ends = np.stack([e, np.array(edges.after)[e]], axis=1)
         ends = np.where(counts[e, v][:, None] < 0, ends[:, ::-1], ends)
@@ -169,7 +172,7 @@ def _convolution(P: ExactPolygon, Q: ExactPolygon) -> tuple[list[Vector], np.nda
     ids: dict[Vector, int] = {}
     of_pair = np.array(
         [
-            ids.setdefault((P.points[i][0] + Q.points[j][0], P.points[i][1] + Q.points[j][1]), len(ids))
+            ids.setdefault((A.points[i][0] + B.points[j][0], A.points[i][1] + B.points[j][1]), len(ids))
             for i, j in pairs.tolist()
         ]
     )
@@ -188,14 +191,15 @@ def _turn_signs(e: list[Vector], g: list[Vector]) -> np.ndarray:
     return signs
 
 
-def _corner_counts(Q: ExactPolygon, along: list[Vector], after_into: np.ndarray, before_out: np.ndarray) -> np.ndarray:
-    """(edges, corners of Q) int8: 1 where an edge's direction is between those at a convex corner, −1 at a reflex one.
+def _corner_counts(B: ExactPolygon, along: list[Vector], after_into: np.ndarray, before_out: np.ndarray) -> np.ndarray:
+    """(edges, corners of B) int8: 1 where an edge's direction is between those at a convex corner, −1 at a reflex one.
 
-    after_into : signs of (the edge into each corner) × (each direction).   before_out : of direction × (the edge out of it).
+    after_into : signs of (the edge into each corner) × (each direction).
+    before_out : of (each direction) × (the edge out of it).
     """
-    turn = np.array([_sign(along[i], along[k]) for k, i in enumerate(Q.before)], dtype=np.int8)
-    between = (after_into == turn) & (before_out == turn)
-    return np.where(between, turn, 0).astype(np.int8)
+    bend = np.array([_sign(along[i], along[k]) for k, i in enumerate(B.before)], dtype=np.int8)
+    between = (after_into == bend) & (before_out == bend)
+    return np.where(between, bend, 0).astype(np.int8)
 
 
 def _sign(a: Vector, b: Vector) -> int:
@@ -211,7 +215,9 @@ def _exact_rings(name: str, rings, R: np.ndarray) -> tuple[list[list[Vector]], i
     if isinstance(rings, np.ndarray) and rings.ndim == 2:
         rings = [rings]
     if not isinstance(rings, Sequence) or not len(rings):
-        raise InvalidArgument(f"configuration_obstacle: {name} must be a solid or a list of rings (k, 2), got {brief(rings)}")
+        raise InvalidArgument(
+            f"configuration_obstacle: {name} must be a solid or a list of rings (k, 2), got {brief(rings)}"
+        )
     out = []
     for k, ring in enumerate(rings):
         try:
@@ -228,7 +234,7 @@ def _exact_rings(name: str, rings, R: np.ndarray) -> tuple[list[list[Vector]], i
     a, b, c, d = turn
     placed = [(a * x + b * y, c * x + d * y) for x, y in zip(flat[0::2], flat[1::2])]
     ends = np.cumsum([0] + [len(ring) for ring in out]).tolist()
-    return [placed[i:j] for i, j in zip(ends, ends[1:])], grid + turn_grid
+    return [placed[i:j] for i, j in pairwise(ends)], grid + turn_grid
 
 
 def _polygon(name: str, rings: list[list[Vector]], shift: int) -> ExactPolygon:
@@ -247,13 +253,14 @@ def _polygon(name: str, rings: list[list[Vector]], shift: int) -> ExactPolygon:
         arrangement = PlaneArrangement(points, np.stack([np.arange(len(points)), after], axis=1))
     if arrangement is None or len(arrangement.points) > len(points) or len(arrangement.edges) < len(points):
         raise InvalidArgument(
-            f"configuration_obstacle: edges of {name} touch or cross, or corners are in one place: give rings that do not"
+            f"configuration_obstacle: edges of {name} touch or cross, or corners are in one place; give "
+            "rings that do not"
         )
     wrong = sorted(set(arrangement.winding.tolist()) - {0, 1})
     if wrong or len(arrangement._splits):
         raise InvalidArgument(
-            f"configuration_obstacle: the rings of {name} wind {wrong[0] if wrong else 0} times around a part of the plane: "
-            "outer rings must be counter-clockwise, holes clockwise"
+            f"configuration_obstacle: the rings of {name} wind {wrong[0] if wrong else 0} times around a part of the "
+            "plane: outer rings must be counter-clockwise, holes clockwise"
         )
     return ExactPolygon(points, before, after, len(rings))
 

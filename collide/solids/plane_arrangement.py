@@ -32,8 +32,9 @@ class PlaneArrangement:
     points : exact points by id, the given ones first.   near : the same, rounded (n, 2).
     edges : (e, 2) ids of pieces of segments, each once, none crossed by another.   counts : (e,) how many segments run
     along it, less those that run back, never 0.   along : of every edge the direction of its segment, in integers.
-    face : (2 e,) the face on the left of half-edges: 2 k runs along edge k, 2 k + 1 back.   onward : (2 e,) the half-edge
-    after it around its face.   winding : (faces,) int64. A face with holes has a number for each ring of its border.
+    face : (2 e,) the face on the left of half-edges: 2 k runs along edge k, 2 k + 1 back.   onward : (2 e,) the
+    half-edge after it around its face.   winding : (faces,) int64. A face with holes has a number for each ring of its
+    border.
     """
 
     def __init__(self, points: list[Vector], segments: np.ndarray, limits: Limits = UNLIMITED):
@@ -63,9 +64,9 @@ class PlaneArrangement:
         """Pairs of segments that cross, or may touch or lie on one another."""
         ends = np.array(self._near)[self.segments]
         for a, b in _box_pairs(ends.min(axis=1), ends.max(axis=1)):
-            P, Q = ends[a], ends[b]
-            at_q = [_sides(P[:, 0], P[:, 1], Q[:, k]) for k in range(2)]
-            at_p = [_sides(Q[:, 0], Q[:, 1], P[:, k]) for k in range(2)]
+            first, second = ends[a], ends[b]
+            at_q = [_sides(first[:, 0], first[:, 1], second[:, k]) for k in range(2)]
+            at_p = [_sides(second[:, 0], second[:, 1], first[:, k]) for k in range(2)]
             apart = (at_q[0] * at_q[1] > 0) | (at_p[0] * at_p[1] > 0)
             s, t = self.segments[a], self.segments[b]
             joined = (s[:, :, None] == t[:, None, :]).any(axis=(1, 2))
@@ -79,9 +80,9 @@ class PlaneArrangement:
             self.side_of(u, p, q), self.side_of(v, p, q), self.side_of(p, u, v),
             self.side_of(q, u, v),
         )  # fmt: skip
-        for side, point, other, ends in ((at_u, t[0], a, s), (at_v, t[1], a, s), (at_p, s[0], b, t), (at_q, s[1], b, t)):
+        for side, point, row, ends in ((at_u, t[0], a, s), (at_v, t[1], a, s), (at_p, s[0], b, t), (at_q, s[1], b, t)):
             if side == 0 and point not in ends and self._between(point, *ends):
-                self._splits[other].add(point)
+                self._splits[row].add(point)
         if at_u * at_v < 0 and at_p * at_q < 0:
             d = (q[0] - p[0], q[1] - p[1])
             e = (v[0] - u[0], v[1] - u[1])
@@ -119,10 +120,10 @@ class PlaneArrangement:
                 else:
                     counts[j, i] -= 1
                     along[j, i] = (-d[0], -d[1])
-        left = [edge for edge, count in counts.items() if count]
-        self.edges = np.array(left, dtype=np.int64).reshape(-1, 2)
-        self.counts = np.array([counts[edge] for edge in left], dtype=np.int64)
-        self.along = [along[edge] for edge in left]
+        remaining = [edge for edge, count in counts.items() if count]
+        self.edges = np.array(remaining, dtype=np.int64).reshape(-1, 2)
+        self.counts = np.array([counts[edge] for edge in remaining], dtype=np.int64)
+        self.along = [along[edge] for edge in remaining]
 
     def _in_order(self, s: int, d: Vector) -> list[int]:
         """The points that split a segment, in its direction."""
@@ -172,8 +173,8 @@ class PlaneArrangement:
     def _wind(self) -> None:
         n_faces = int(self.face.max(initial=-1)) + 1
         beyond: list[list[tuple[int, int]]] = [[] for _ in range(n_faces)]
-        left, right = self.face[0::2].tolist(), self.face[1::2].tolist()
-        for a, b, count in zip(left, right, self.counts.tolist()):
+        sides = self.face[0::2].tolist(), self.face[1::2].tolist()
+        for a, b, count in zip(*sides, self.counts.tolist()):
             beyond[a].append((b, -count))
             beyond[b].append((a, count))
         part = components(n_faces, self.face[0::2], self.face[1::2])
@@ -185,7 +186,10 @@ class PlaneArrangement:
             lowest = min(self.near[points, 0])
             first = min(
                 (p for p in points if self.near[p, 0] == lowest),
-                key=lambda p: (Fraction(self.points[p][0], self.points[p][2]), Fraction(self.points[p][1], self.points[p][2])),
+                key=lambda p: (
+                    Fraction(self.points[p][0], self.points[p][2]),
+                    Fraction(self.points[p][1], self.points[p][2]),
+                ),
             )
             start = int(self.face[self.out[first][-1]])
             self.winding[start], known[start] = self.winding_at(self.points[first], of_edge != name), True
@@ -224,21 +228,25 @@ class PlaneArrangement:
         longest = max(abs(x), abs(y))
         for halvings in range(8, 1 << 14, 24):
             below = longest << halvings
-            end = (middle[0] * below - size * y * middle[2], middle[1] * below + size * x * middle[2], middle[2] * below)
+            end = (
+                middle[0] * below - size * y * middle[2],
+                middle[1] * below + size * x * middle[2],
+                middle[2] * below,
+            )
             if not self._crossed(middle, end, k):
                 return end
         raise CollideError("no point is found within a face of an arrangement; please report it")
 
-    def _crossed(self, a: PlanePoint, b: PlanePoint, own: int) -> bool:
+    def _crossed(self, a: PlanePoint, b: PlanePoint, edge: int) -> bool:
         """Whether edges other than one meet a segment."""
         near = np.array([[p[0] / p[2], p[1] / p[2]] for p in (a, b)])
         slack = 2.0**-48 * np.abs(self.near).max()
         ends = self.near[self.edges]
-        found = (ends.min(axis=1) <= near.max(axis=0) + slack) & (ends.max(axis=1) >= near.min(axis=0) - slack)
-        for k in np.flatnonzero(found.all(axis=1)).tolist():
+        is_near = (ends.min(axis=1) <= near.max(axis=0) + slack) & (ends.max(axis=1) >= near.min(axis=0) - slack)
+        for k in np.flatnonzero(is_near.all(axis=1)).tolist():
             p, q = (self.points[v] for v in self.edges[k].tolist())
-            one, other = self.side_of(p, a, b), self.side_of(q, a, b)
-            if k != own and one * other <= 0 and self.side_of(a, p, q) * self.side_of(b, p, q) <= 0:
+            at_p, at_q = self.side_of(p, a, b), self.side_of(q, a, b)
+            if k != edge and at_p * at_q <= 0 and self.side_of(a, p, q) * self.side_of(b, p, q) <= 0:
                 return True
         return False
 

@@ -51,7 +51,7 @@ def _holds(points: list[Point], faces: list[list[int]], p: Point) -> bool:
 
 
 def _passage(a: Point, b: Point) -> int:
-    """How an edge, seen along x, crosses the half-line y > 0: 1 upwards, −1 downwards; points at z = 0 count as below."""
+    """How an edge, seen along x, crosses the half-line y > 0: 1 upwards, −1 downwards; z = 0 counts as below."""
     up_a, up_b = a[2] > 0, b[2] > 0
     if up_a == up_b:
         return 0

@@ -14,8 +14,9 @@ from collide.solids.solid_operands import solid_operand
 
 
 class ManyVerdict(NamedTuple):
-    """wrong : descriptions of points judged otherwise.   n_points, n_in, n_near : points judged, of which the rule keeps,
-    of which within 1e-9 of the size of a surface.   adds_up : volumes of the rule and of its opposite make the union's."""
+    """wrong : descriptions of points judged otherwise.   n_points, n_in, n_near : points judged, of which the rule
+    keeps, and within 1e-9 of the size of a surface.   adds_up : volumes of the rule and of its opposite make the
+    union's."""
 
     wrong: list[str]
     n_points: int
@@ -94,5 +95,3 @@ def same_bits(a, b) -> bool:
     same = [np.array_equal(x.view(np.uint8), y.view(np.uint8)) for x, y in (
         (a.mesh.vertices, b.mesh.vertices), (a.mesh.faces, b.mesh.faces))]  # fmt: skip
     return all(same)
-
-

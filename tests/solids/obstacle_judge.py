@@ -97,8 +97,8 @@ def pose_of(R, x=(0.0, 0.0, 0.0)) -> np.ndarray:
 
 
 def judge_obstacle(A, B, R, n_points: int, n_exact: int, seed: int) -> ObstacleVerdict:
-    """n_points positions that are doubles: half around, half within 1e-9 of a facet; n_exact of each: an ulp or so off a
-    facet, and on one, in fractions."""
+    """n_points positions that are doubles: half around, half within 1e-9 of a facet; n_exact of each: an ulp or so off
+    a facet, and on one, in fractions."""
     rng = np.random.default_rng(seed)
     exact = exact_obstacle(A, B, pose_of(R))
     arrangement = exact.arrangement
@@ -109,7 +109,7 @@ def judge_obstacle(A, B, R, n_points: int, n_exact: int, seed: int) -> ObstacleV
     rows = rng.integers(len(border), size=n_points // 2 + n_exact)
     near = (triangles[rows] * rng.dirichlet(np.ones(3), len(rows))[:, :, None]).sum(axis=1)
     offset = rng.normal(size=near.shape) * 10.0 ** rng.uniform(-12, -9, (len(near), 1))
-    offset[: n_exact] = rng.integers(-1, 2, (n_exact, 3)) * np.spacing(np.abs(near[: n_exact]))
+    offset[:n_exact] = rng.integers(-1, 2, (n_exact, 3)) * np.spacing(np.abs(near[:n_exact]))
     points = np.concatenate([far, near + offset])
     X = np.array([pose_of(R, x) for x in points])
     meets = collide.collide(A, B, np.eye(4), X)

@@ -66,8 +66,8 @@ def comb(n: int, spacing: float, tooth: float, at: float) -> list[np.ndarray]:
 
 
 def combs(n: int):
-    """A, B, R with A − R B as in figure 10 of the paper, for even n: n spikes of the middle bundle, each of which n² teeth
-    cut through."""
+    """A, B, R with A − R B as in figure 10 of the paper, for even n: n spikes of the middle bundle, each of which n²
+    teeth cut through."""
     second = 1.0 + 1.0 / n
     at = 0.5 * (1.0 / (32 * n) + 1.0 / (4 * n) - 0.5 * (1.0 + second))
     return comb(n, 8.0, 1.0, at), comb(n, 8.0 + 1.0 / (16 * n**2), second, at), HALF_TURN
@@ -90,8 +90,8 @@ def cases(seed: int = 0) -> dict:
 
 
 class PlanarVerdict(NamedTuple):
-    """wrong : positions judged otherwise.   n_points, n_in, n_on : positions, of which the polygons meet; of which on an
-    edge of the obstacle."""
+    """wrong : positions judged otherwise.   n_points, n_in, n_on : positions, of which the polygons meet; of which on
+    an edge of the obstacle."""
 
     wrong: list[str]
     n_points: int
@@ -112,9 +112,16 @@ def judge_planar(A, B, R, n_points: int, n_on: int, seed: int) -> PlanarVerdict:
     rows = rng.integers(len(edges), size=n_points // 2)
     share = rng.random((len(rows), 1))
     beside = near[rows, 0] * share + near[rows, 1] * (1 - share)
-    beside += rng.normal(size=beside.shape) * 10.0 ** rng.uniform(-12, -9, (len(beside), 1)) * (rng.random((len(beside), 1)) < 0.5)
+    beside += (
+        rng.normal(size=beside.shape)
+        * 10.0 ** rng.uniform(-12, -9, (len(beside), 1))
+        * (rng.random((len(beside), 1)) < 0.5)
+    )
     beside += np.spacing(np.abs(beside)) * rng.integers(-1, 2, beside.shape)
-    points = [[Fraction(c) for c in p] for p in np.concatenate([rng.uniform(low - 0.1, high + 0.1, (len(rows), 2)), beside]).tolist()]
+    points = [
+        [Fraction(c) for c in p]
+        for p in np.concatenate([rng.uniform(low - 0.1, high + 0.1, (len(rows), 2)), beside]).tolist()
+    ]
     for row in rng.integers(len(edges), size=n_on).tolist():
         i, j = rng.integers(0, 5, 2).tolist()
         points.append([(i * a + (j + 1) * b) / (i + j + 1) for a, b in zip(*edges[row])])
@@ -125,7 +132,9 @@ def judge_planar(A, B, R, n_points: int, n_on: int, seed: int) -> PlanarVerdict:
         number = winding(rings, x)
         n_in += meet
         if number not in (None, 0, 1) or meet != (number != 0) or (k >= 2 * len(rows) and not meet):
-            wrong.append(f"at {[float(c) for c in x]} they {'meet' if meet else 'are apart'}, the border winds {number} times")
+            wrong.append(
+                f"at {[float(c) for c in x]} they {'meet' if meet else 'are apart'}, the border winds {number} times"
+            )
     return PlanarVerdict(wrong, len(points), n_in, n_on)
 
 
@@ -179,4 +188,5 @@ def winding(rings, x) -> int | None:
 
 
 def snippet_planar(name: str, n_points: int, n_on: int, seed: int) -> str:
-    return f"from planar_obstacle_judge import *; print(judge_planar(*cases({seed})[{name!r}], {n_points}, {n_on}, {seed}))"
+    asked = f"*cases({seed})[{name!r}], {n_points}, {n_on}, {seed}"
+    return f"from planar_obstacle_judge import *; print(judge_planar({asked}))"

@@ -76,12 +76,14 @@ def test_of_two_it_is_the_boolean():
         many, two = collide.combine([A, B], [I, X], rule), collide.boolean(A, B, I, X, op)
         assert many.mesh.report.volume == pytest.approx(two.mesh.report.volume, rel=1e-12)
         assert sorted(map(tuple, many.mesh.vertices.tolist())) == sorted(map(tuple, two.mesh.vertices.tolist()))
-        assert Counter(zip(many.body.tolist(), many.facet.tolist())) == Counter(zip(two.body.tolist(), two.facet.tolist()))
+        assert Counter(zip(many.body.tolist(), many.facet.tolist())) == Counter(
+            zip(two.body.tolist(), two.facet.tolist())
+        )
 
 
 def test_before_and_behind_tell_what_holds_both_sides():
     boxes = [collide.Box((2, 2, 2)), collide.Box((1, 1, 1)), collide.Box((1, 1, 1))]
-    r = collide.combine(boxes, [I, I, collide.pose((1.5, 0, 0))], lambda bits: bits[0] and not bits[1] or bits[2])
+    r = collide.combine(boxes, [I, I, collide.pose((1.5, 0, 0))], lambda bits: (bits[0] and not bits[1]) or bits[2])
     assert r.mesh.report.volume == 8 - 1 + 1
     at_cavity = r.body == 1
     assert (r.behind[at_cavity] == [True, False, False]).all() and (r.before[at_cavity] == [True, True, False]).all()
@@ -114,7 +116,7 @@ def test_bad_rules_and_lists():
     ]:  # fmt: skip
         with pytest.raises(InvalidArgument, match=words):
             collide.combine(shapes, poses, rule)
-    with pytest.raises(InvalidArgument, match="3 shapes need as many poses, .* got 2"):
+    with pytest.raises(InvalidArgument, match=r"3 shapes need as many poses, .* got 2"):
         collide.combine(shapes, poses[:2], "union")
     for nothing in ([], b, None):
         with pytest.raises(InvalidArgument, match="one or more solids"):
@@ -142,13 +144,17 @@ def test_rules_are_asked_once_for_each_combination():
 
 def hard_pair():
     """Two solids with some hundred pairs of facets that are cut exactly."""
-    A = collide.combine([collide.Mesh(*bumpy_sphere(60, k)) for k in range(2)], [I, collide.pose((0.4, 0, 0))], "union").mesh
+    A = collide.combine(
+        [collide.Mesh(*bumpy_sphere(60, k)) for k in range(2)], [I, collide.pose((0.4, 0, 0))], "union"
+    ).mesh
     return [A, A, A], [I, collide.pose((0.1, 0.2, 0.3)), collide.pose((0.3, 0.2, 0.1), rpy=(0.1, 0, 0))]
 
 
 def test_limits_are_kept_and_say_what_it_would_take():
     shapes, poses = hard_pair()
-    with pytest.raises(UnsupportedQuery, match=r"pairs of facets .* would take about [\d,]+ bytes, more than memory=10,000"):
+    with pytest.raises(
+        UnsupportedQuery, match=r"pairs of facets .* would take about [\d,]+ bytes, more than memory=10,000"
+    ):
         collide.combine(shapes, poses, "union", memory=10_000)
     with pytest.raises(UnsupportedQuery, match="not done after time_limit=1e-06 s, while"):
         collide.boolean(*shapes[:2], *poses[:2], "union", time_limit=1e-6)
@@ -194,7 +200,13 @@ def test_progress_is_told_and_what_is_cancelled_leaves_nothing(monkeypatch):
         return about
 
     assert same_bits(collide.combine(shapes, poses, "at least 2", progress=progress()), expected)
-    parts = ["finding facets that meet", "drawing what facets share", "crossing segments", "cutting facets", "cells apart"]
+    parts = [
+        "finding facets that meet",
+        "drawing what facets share",
+        "crossing segments",
+        "cutting facets",
+        "cells apart",
+    ]
     assert all(any(part in label for label in labels) for part in parts) and any("50 %" in label for label in labels)
     for part in [*parts, "crossing segments, ", "cutting facets, "]:
         with pytest.raises(KeyboardInterrupt):

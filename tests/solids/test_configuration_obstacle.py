@@ -16,7 +16,9 @@ from collide.solids import convolution as convolution_module
 I = np.eye(4)
 
 
-@pytest.mark.parametrize("name", [name for name in cases() if name not in ("rings", "turned boxes", "cells 1", "bumpy")])
+@pytest.mark.parametrize(
+    "name", [name for name in cases() if name not in ("rings", "turned boxes", "cells 1", "bumpy")]
+)
 def test_positions_are_where_the_bodies_meet(name):
     """Around, within 1e-9 of facets, an ulp off, and on them, where they touch."""
     v = judge_obstacle(*cases()[name], 60, 1, 1)
@@ -25,7 +27,7 @@ def test_positions_are_where_the_bodies_meet(name):
 
 
 def test_two_tetrahedra_have_facets_that_no_copy_has():
-    """Facets edge + edge lie on none of the planes of the copies p + B and A + q, which theorem 7.2's proof arranges."""
+    """Facets edge + edge lie in no plane of the copies p + B and A + q, which theorem 7.2's proof arranges."""
     A = collide.Mesh(*TETRAHEDRON)
     r = collide.configuration_obstacle(A, A, TURNED)
     sums = (A.vertices[:, None] - (A.vertices @ TURNED.T)[None]).reshape(-1, 3)
@@ -49,7 +51,7 @@ def test_the_mesh_is_what_was_decided_but_for_rounding():
     exact = module.exact_obstacle(A, B, pose_of(R))
     triangles, _ = exact.arrangement.boundary(exact.keep)
     points = exact.arrangement.points
-    grid = 2.0 ** exact.arrangement.facets.grid
+    grid = 2.0**exact.arrangement.facets.grid
     near = np.array([points.near(p) for p in np.unique(triangles).tolist()]) * grid
     gaps = np.abs(near[:, None] - r.mesh.vertices[None]).max(axis=2)
     assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) <= r.moved + 1e-15

@@ -54,7 +54,7 @@ def test_areas_and_rings():
 
 def test_it_is_a_slice_of_the_one_in_space():
     """Prisms over the polygons: the obstacle of heights 1 and 1 has volume area · 2."""
-    A, B, R = letter_u(), letter_u()[0][[0, 3, 4, 5]], turned_by(0.4)
+    A, B, R = letter_u(), np.array([(0.0, 0.0), (2.0, 0.0), (0.5, 0.5), (0.0, 2.0)]), turned_by(0.4)
     X = np.eye(3)
     X[:2, :2] = R
     volume = obstacle(_prism(A[0]), _prism(B), X).mesh.report.volume
@@ -128,7 +128,8 @@ def test_faults_are_noticed(monkeypatch):
         return np.maximum(right(*args), 0)
 
     for fault_name, fault, name in (
-        ("_corner_counts", convex_alone, "letters"), ("polygons_meet_at", lambda P, Q, x: False, "a frame and a larger square"),
+        ("_corner_counts", convex_alone, "letters"),
+        ("polygons_meet_at", lambda P, Q, x: False, "a frame and a larger square"),
     ):  # fmt: skip
         with monkeypatch.context() as patch:
             patch.setattr(module, fault_name, fault)
