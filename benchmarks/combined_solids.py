@@ -1,4 +1,4 @@
-"""One solid of many and configuration obstacles: how many vertices arrangements have, by kind, beside established engines.
+"""One solid of many and configuration obstacles: vertices of arrangements by kind, times beside established engines.
 
     python benchmarks/combined_solids.py
     # three minutes; needs manifold3d, pyclipper and shapely for the columns of peers, which are left out without them
@@ -17,6 +17,7 @@ import importlib
 import sys
 import time
 import tracemalloc
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -145,12 +146,13 @@ def robot() -> None:
         shape = body.shape
         solid = isinstance(shape, collide.Mesh) and shape.solid
         n_meshes += solid
-        shapes.append(shape if solid else collide.ConvexHull(np.asarray(collide.tessellate(shape, 1e-3)[0])))
+        shapes.append(shape if solid else collide.ConvexHull(np.asarray(collide.tessellate(shape, tolerance=1e-3)[0])))
         poses.append(body.X_WB)
     seconds, made = timed(lambda: collide.combine(shapes, poses, "union"))
     r = made.mesh.report
     print(
-        f"{len(shapes)} links, {n_meshes} of them solid meshes as they are, the others hulls: {len(made.mesh.faces)} facets, "
+        f"{len(shapes)} links, {n_meshes} of them solid meshes as they are, the others hulls: "
+        f"{len(made.mesh.faces)} facets, "
         f"{r.shells} shells, {1e3 * r.volume:.4f} l, {len(made.self_collisions)} crossings, {seconds:.1f} s"
     )
 
@@ -161,7 +163,8 @@ def space() -> None:
     for n, m in [(20, 20), (50, 20), (50, 50), (100, 50), (200, 50)]:
         A, B = collide.Mesh(*bumpy_sphere(n, 0)), collide.Mesh(*bumpy_sphere(m, 1))
         seconds, r = timed(lambda A=A, B=B: collide.configuration_obstacle(A, B, TURNED))
-        row = f"{len(A.faces):8d} {len(B.faces):6d} {r.n_pieces:7d} {r.n_cells:7d} {r.n_asked:6d} {len(r.mesh.faces):7d} {seconds:6.1f}"
+        row = f"{len(A.faces):8d} {len(B.faces):6d} {r.n_pieces:7d} {r.n_cells:7d} {r.n_asked:6d}"
+        row += f" {len(r.mesh.faces):7d} {seconds:6.1f}"
         if package:
             first = manifold_of(package, A.vertices, A.faces)
             second = manifold_of(package, -B.vertices @ TURNED.T, B.faces[:, ::-1])
@@ -188,11 +191,10 @@ def plane() -> None:
         row = f"{n:7d} {n:6d} {r.n_pieces:8d} {r.n_corners:7d} {seconds:7.2f}"
         reflected = -B @ R.T
         if clipper and n <= 250:  # its time grows as n⁴
-            scale = 2.0**40
-            theirs, area = timed(lambda: _by_clipper(clipper, A, reflected, scale))
+            theirs, area = timed(partial(_by_clipper, clipper, A, reflected, 2.0**40))
             row += f" {theirs:10.2f} {abs(area - r.area) / r.area:9.1e}"
         if shapely and n <= 500:
-            theirs, area = timed(lambda: _by_shapely(shapely, A, reflected))
+            theirs, area = timed(partial(_by_shapely, shapely, A, reflected))
             row += f" {theirs:10.2f} {abs(area - r.area) / r.area:9.1e}"
         print(row, flush=True)
 
