@@ -111,7 +111,7 @@ def memory() -> None:
 
 def manifold_of(package, vertices, faces):
     mesh = package.Mesh64(
-        vert_properties=np.ascontiguousarray(vertices), tri_verts=np.ascontiguousarray(faces, dtype=np.uint64)
+        vert_properties=np.array(vertices), tri_verts=np.array(faces, dtype=np.uint64)
     )
     return package.Manifold(mesh)
 

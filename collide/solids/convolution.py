@@ -19,7 +19,7 @@ import numpy as np
 
 from collide.errors import CollideError
 from collide.numerics.exact_points import Point, cross, inner, leading_digits, minus
-from collide.solids.facet_edges import components
+from collide.solids.joined_parts import components
 
 #: Inner products of two vectors with components below 1, each rounded: off by less than this.
 _ERROR = 2.0**-48

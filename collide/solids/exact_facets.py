@@ -12,6 +12,7 @@ from typing import cast
 import numpy as np
 
 from collide.numerics.exact_points import Point
+from collide.shapes.mesh import Mesh
 from collide.solids.arrangement import Arrangement, cut_facet
 from collide.solids.cells import cells_of, merged_sheets
 from collide.solids.cut_points import CutPoints
@@ -33,13 +34,20 @@ class ExactFacets(PlacedFacets):
 
     def __init__(self, points: list[Point], faces: np.ndarray, grid: int):
         rounded = np.array([[_double(x, grid) for x in p] for p in points]).reshape(-1, 3)
-        body = SimpleNamespace(mesh=SimpleNamespace(vertices=rounded), X=np.eye(4))
+        mesh = Mesh(rounded, faces, solid=False)
+        body = SimpleNamespace(mesh=mesh, body=SimpleNamespace(tree=mesh.tree), X=np.eye(4))
         n = len(faces)
         none = np.full((1, 2), -1, dtype=np.int64)
         edges = FacetEdges(
-            np.arange(n), np.arange(n), faces, np.zeros((n, 3), dtype=np.int64), none, np.zeros((2, 0), dtype=np.int32),
-            np.arange(n, dtype=np.int32), grid,
-        )  # fmt: skip
+            np.arange(n),
+            np.arange(n),
+            faces,
+            np.zeros((n, 3), dtype=np.int64),
+            none,
+            np.zeros((2, 0), dtype=np.int32),
+            np.zeros(0, dtype=np.int64),
+            grid,
+        )
         self.operands = [cast(Operand, body)]
         self.poses = np.eye(4)[None]
         self.edges = [edges]

@@ -71,8 +71,7 @@ def overlap_volume(
         arrangement = arrange(operands, limits)
     holds = arrangement.holds()
     triangles, rows = arrangement.boundary(holds[:, 0] & holds[:, 1])
-    volume = enclosed(arrangement.points, triangles)
-    size, _ = areas(arrangement.points, triangles)
+    volume, size = enclosed(arrangement.points, triangles)
     steps = arrangement.sheets.steps[rows] != 0
     patch, places = _patch(arrangement, holds)
     centroid = volume.centroid if len(triangles) else mean_point(patch, places)

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from collide.errors import CollideError
-from collide.solids.facet_edges import components
+from collide.solids.joined_parts import components
 from collide.solids.limits import BYTES_PER_CROSSING, UNLIMITED, Limits
 
 PlanePoint = tuple[int, int, int]

@@ -7,7 +7,7 @@ import numpy as np
 from collide.numerics.exact_points import Point, cross, inner, minus
 from collide.solids.convolution import ExactSurface
 from collide.solids.cut_points import Rational
-from collide.solids.facet_edges import components
+from collide.solids.joined_parts import components
 from collide.surface_queries.overlay import common_piece
 
 
