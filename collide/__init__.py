@@ -41,6 +41,9 @@ if TYPE_CHECKING:
     from collide.kernels.library import library_path as get_library
     from collide.motion.impact_query import moved_poses, poses_in_motion, time_of_impact
     from collide.motion.impact_rows import TimeOfImpact
+    from collide.partitions.cell_records import CellPlanes, ConvexCells
+    from collide.partitions.portals import Portals
+    from collide.partitions.space_partition import Located, PartitionSize, SpacePartition
     from collide.polytopes.convex_polygon import ConvexPolygon
     from collide.query import collide, distance
     from collide.results import How, PairResult, WorldResult
@@ -105,6 +108,9 @@ _HOMES = {
     "collide.motion.impact_query": ("moved_poses", "poses_in_motion", "time_of_impact"),
     "collide.motion.impact_rows": ("TimeOfImpact",),
     "collide.polytopes.convex_polygon": ("ConvexPolygon",),
+    "collide.partitions.cell_records": ("CellPlanes", "ConvexCells"),
+    "collide.partitions.portals": ("Portals",),
+    "collide.partitions.space_partition": ("Located", "PartitionSize", "SpacePartition"),
     "collide.query": ("collide", "distance"),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robots.certified_edges": ("CertifiedEdges",),
@@ -140,12 +146,13 @@ _RENAMED = {
 }
 
 __all__ = [
-    "BooleanResult", "Box", "Capsule", "CellOverlaps", "Certificate", "CertificateRefused", "CertifiedEdges",
-    "CollideError", "Compound", "Cone", "ConfigurationObstacle", "Contacts", "ConvexHull", "ConvexPolygon", "Cylinder",
-    "DrawnConfigurations", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument",
-    "InvalidPose", "InvalidShape", "LinkPair", "Mesh", "MissingExtra", "OverlapVolume", "Overlay", "PairResult",
-    "PlanarObstacle", "Proposal", "RayHits", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions",
-    "Shape", "ShapeCasts", "ShapeSet", "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody",
+    "BooleanResult", "Box", "Capsule", "CellOverlaps", "CellPlanes", "Certificate", "CertificateRefused",
+    "CertifiedEdges", "CollideError", "Compound", "Cone", "ConfigurationObstacle", "Contacts", "ConvexCells",
+    "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs", "HPolytope",
+    "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
+    "MissingExtra", "OverlapVolume", "Overlay", "PairResult", "PartitionSize", "PlanarObstacle", "Portals", "Proposal",
+    "RayHits", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts",
+    "ShapeSet", "SpacePartition", "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody",
     "UnsupportedQuery", "World", "WorldHits", "WorldResult", "boolean", "certify", "collide", "combine",
     "configuration_obstacle", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library",
     "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses_in_motion",

@@ -166,6 +166,10 @@ ROOMS = {
         "errors", "argument_checks", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",
         "surface_queries", "kernels",
     },
+    "partitions": {  # labels of cells come from the winding numbers of meshes, and points on facets from exact tests
+        "errors", "argument_checks", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",
+        "surface_queries",
+    },
     "hierarchies": {
         "errors",
         "fork_safe_lock",
