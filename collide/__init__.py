@@ -69,7 +69,10 @@ if TYPE_CHECKING:
     )
     from collide.shapes.tessellation import tessellate
     from collide.solids.boolean import BooleanResult, boolean
+    from collide.solids.combine import combine
+    from collide.solids.configuration_obstacle import ConfigurationObstacle, configuration_obstacle
     from collide.solids.overlap_volume import OverlapVolume, overlap_volume
+    from collide.solids.planar_obstacle import PlanarObstacle
     from collide.surface_queries.contains import contains
     from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
     from collide.surface_queries.overlay import Overlay, overlay
@@ -120,7 +123,10 @@ _HOMES = {
     ),
     "collide.shapes.tessellation": ("tessellate",),
     "collide.solids.boolean": ("BooleanResult", "boolean"),
+    "collide.solids.combine": ("combine",),
+    "collide.solids.configuration_obstacle": ("ConfigurationObstacle", "configuration_obstacle"),
     "collide.solids.overlap_volume": ("OverlapVolume", "overlap_volume"),
+    "collide.solids.planar_obstacle": ("PlanarObstacle",),
     "collide.sweeps.configurations": ("DrawnConfigurations",),
     "collide.sweeps.pair_proposal": ("LinkPair", "Proposal", "propose_disabled_pairs"),
     "collide.sweeps.sweep": ("sweep",),
@@ -141,13 +147,14 @@ _RENAMED = {
 
 __all__ = [
     "BooleanResult", "Box", "Capsule", "CellOverlaps", "CellPlanes", "Certificate", "CertificateRefused",
-    "CertifiedEdges", "CollideError", "Compound", "Cone", "Contacts", "ConvexCells", "ConvexHull", "ConvexPolygon",
-    "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How",
-    "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh", "MissingExtra", "OverlapVolume",
-    "Overlay", "PairResult", "PartitionSize", "Portals", "Proposal", "RayHits", "Robot", "RobotChecker",
-    "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "SpacePartition", "Sphere",
-    "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult",
-    "boolean", "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library",
+    "CertifiedEdges", "CollideError", "Compound", "Cone", "ConfigurationObstacle", "Contacts", "ConvexCells",
+    "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs", "HPolytope",
+    "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
+    "MissingExtra", "OverlapVolume", "Overlay", "PairResult", "PartitionSize", "PlanarObstacle", "Portals", "Proposal",
+    "RayHits", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts",
+    "ShapeSet", "SpacePartition", "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody",
+    "UnsupportedQuery", "World", "WorldHits", "WorldResult", "boolean", "certify", "collide", "combine",
+    "configuration_obstacle", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library",
     "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses_in_motion",
     "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "self_overlapping_cells", "shape_cast",
     "sweep", "tessellate", "time_of_impact", "verify", "walk",

@@ -19,6 +19,7 @@ from collide.solids.cells import Cells, cells_of, merged_sheets
 from collide.solids.crossing_pairs import crossing_pairs
 from collide.solids.cut_points import CutPoints, axis_of
 from collide.solids.facet_cuts import FacetCuts, segment
+from collide.solids.limits import BYTES_PER_PAIR, UNLIMITED, Limits
 from collide.solids.placed_facets import Operand, PlacedFacets
 from collide.solids.split_facets import split_facets
 from collide.solids.sweep_triangulation import triangulate
@@ -57,8 +58,9 @@ class Arrangement(NamedTuple):
         return triangles, rows
 
 
-def arrange(operands: list[Operand]) -> Arrangement:
+def arrange(operands: list[Operand], limits: Limits = UNLIMITED) -> Arrangement:
     """The arrangement of one or more solids at their poses."""
+    limits.stage("finding facets that meet")
     facets = PlacedFacets(operands)
     points = CutPoints(facets)
     pairs = meeting_pairs(facets)
@@ -69,10 +71,12 @@ def arrange(operands: list[Operand]) -> Arrangement:
     drawn = np.isin(crossings.pairs, exactly).any(axis=1)
     keys = pair_keys(facets, crossings.pairs)
     unclear = pairs[~np.isin(pair_keys(facets, pairs), keys)]
-    cuts = FacetCuts(facets, points, unclear, crossings.pairs[drawn], ids[drawn], exactly)
+    n_exact = len(unclear) + int(drawn.sum())
+    limits.check_memory(BYTES_PER_PAIR * n_exact, f"{n_exact:,} pairs of facets to be cut exactly")
+    cuts = FacetCuts(facets, points, unclear, crossings.pairs[drawn], ids[drawn], exactly, limits)
     pieces, of = [], []
-    for f in sorted(cuts.corners_of):
-        made = _cut_facet(cuts, f)
+    for f in limits.watched("cutting facets", sorted(cuts.corners_of)):
+        made = cut_facet(cuts, f)
         pieces += made
         of += [f] * len(made)
     is_cut = np.zeros(len(facets.corners), dtype=bool)
@@ -81,6 +85,7 @@ def arrange(operands: list[Operand]) -> Arrangement:
     body = facets.body[of_piece]
     merged = merged_sheets(np.array(pieces, dtype=np.int64).reshape(-1, 3), of_piece, body, len(operands))
     sheets = _all_sheets(facets, np.flatnonzero(~is_cut), triangles, of_triangle, merged)
+    limits.stage("telling cells apart")
     cells = cells_of(sheets, points, is_cut, crossings.pairs, ids)
     return Arrangement(facets, points, sheets, cells, len(pairs), int(is_cut.sum()))
 
@@ -158,7 +163,7 @@ def crossings_of(mesh) -> np.ndarray:
     return self_hits(mesh.tree)[0]
 
 
-def _cut_facet(cuts: FacetCuts, f: int) -> list[tuple[int, int, int]]:
+def cut_facet(cuts: FacetCuts, f: int) -> list[tuple[int, int, int]]:
     """Triangles, with the facet's front, between the segments on it."""
     points = cuts.points
     normal = cuts.facets.normal(f)

@@ -13,6 +13,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from collide.solids.cut_points import CutPoints, Rational, axis_of, reduced
+from collide.solids.limits import UNLIMITED, Limits
 from collide.solids.placed_facets import PlacedFacets
 from collide.surface_queries.overlay import common_piece
 
@@ -31,7 +32,7 @@ class FacetCuts:
 
     def __init__(
         self, facets: PlacedFacets, points: CutPoints, pairs: np.ndarray, crossings: np.ndarray, ids: np.ndarray,
-        rows: np.ndarray,
+        rows: np.ndarray, limits: Limits = UNLIMITED,
     ):  # fmt: skip
         self.facets, self.points = facets, points
         self.corners_of: dict[int, tuple[int, int, int]] = {}
@@ -49,9 +50,9 @@ class FacetCuts:
             self._start(f)
         for f, g, p, q in np.column_stack([crossings, ids]).tolist():
             self._put_piece(f, g, [points.place_of(p), points.place_of(q)])
-        for f, g in pairs.tolist():
+        for f, g in limits.watched("drawing what facets share", pairs.tolist()):
             self._draw(f, g)
-        for f in self._pieces:
+        for f in limits.watched("crossing segments", self._pieces):
             self._cross_segments(f)
         self._split_thin_edges()
         while self._changed:

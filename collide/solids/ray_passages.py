@@ -54,7 +54,7 @@ def _placed(X, i, x, y, z):
 @kernel
 def _box_is_beside(tree, ref, unit, X, points, k, axis, slack):
     """Whether the box behind a reference may meet ray k, from its point upwards along an axis."""
-    box = box_at(tree.boxes, ref)
+    box = box_at(tree, ref)
     centre, half = box.centre, box.half
     if half.x < 0.0:
         return False
