@@ -8,8 +8,8 @@ Families: points on a unit sphere (``ball``), on the moment curve (``curve``), i
 ``sizes`` builds whole trees, predicts them first, and fits depth and bytes; what is predicted to take more than
 --memory is a row with the prediction alone. ``poses`` asks about n points against as many half-spaces tangent to a
 sphere, at random rotations near touching; every answer is compared with `polytopes.meets` and, where they differ, with
-``certificate=True``, the exact search over all rows. ``walk`` asks `collide.walk` about the same bodies in space. Rows go to
-``benchmarks/results/hierarchical-trees-<part>.csv``.
+``certificate=True``, the exact search over all rows. ``walk`` asks `collide.walk` about the same bodies in space. Rows
+go to ``benchmarks/results/hierarchical-trees-<part>.csv``.
 """
 
 from __future__ import annotations
