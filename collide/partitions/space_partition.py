@@ -185,8 +185,17 @@ class SpacePartition:
     def cells(self, box=None) -> ConvexCells:
         """All cells within a box.
 
-        box : (low, high), two corners [m], low < high; the mesh's own box where None. Cells outside of it are left out,
-            others are clipped by it: cells at the rim have no end.
+        Parameters
+        ----------
+        box : (low, high), two corners [m], low < high; the mesh's own box where None.
+
+        Returns
+        -------
+        ConvexCells. Cells outside of the box are left out, others clipped by it: cells at the rim have no end.
+
+        Raises
+        ------
+        InvalidArgument : a box that is none.
         """
         low, high = self._box("cells", box)
         whole = np.zeros(len(self._tree.plane), dtype=bool)
@@ -231,7 +240,13 @@ class SpacePartition:
     def portals(self, cells: ConvexCells) -> Portals:
         """Where cells of this partition open into one another: the graph of a planner.
 
+        Parameters
+        ----------
         cells : of `cells` or `convex_pieces` of this partition.
+
+        Raises
+        ------
+        InvalidArgument : cells of another partition.
 
         Returns
         -------
