@@ -17,7 +17,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 
 from collide import cli_arguments as arguments
-from collide import cli_bench, cli_compare, cli_fuzz, cli_pages, cli_scenes, cli_srdf, cli_sweep, cli_view
+from collide import cli_bench, cli_compare, cli_fuzz, cli_locality, cli_pages, cli_scenes, cli_srdf, cli_sweep, cli_view
 from collide.cli_files import check_place, copy_scene, first_words, print_lines, write_json, write_text
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
 from collide.reports.number_format import count
@@ -239,39 +239,6 @@ def _stress(args) -> int:
     return YES if args.engine == "collide" and (table.wrong or table.failed) else FREE
 
 
-def _locality(args) -> int:
-    from collide.hierarchies.tree_figures import tree_figures
-    from collide.reports import locality_report as locality
-    from collide.reports import terminal
-    from collide.scenes.loaders.triangles import read_meshes
-
-    if args.plot:
-        locality.check_plot(args.plot)
-    progress = _progress(args.quiet)
-    measured = []
-    for place in args.meshes:
-        with progress(f"reading {place}"):
-            meshes = read_meshes(place)
-        for name, mesh in meshes:
-
-            def about(label: str, name=name):
-                return progress(f"{name}: {label}")
-
-            measures = mesh.locality(repeated=args.repeated, progress=about)
-            with progress(f"{name}: building trees"):
-                measured.append(locality.Measured(name, place, measures, tree_figures(mesh)))
-    if args.plot:
-        with progress("drawing"):
-            locality.plot(measured, args.plot)
-    if args.json:
-        write_json(locality.to_dict(measured, args.repeated).items(), args.json)
-    if args.json != "-" and not args.quiet:
-        for k, table in enumerate(locality.tables(measured)):
-            terminal.write_text("\n" if k else "")
-            terminal.show_table(table)
-    return FREE
-
-
 def _scenes(args) -> int:
     if args.copy:
         print(copy_scene(args.copy, args.force))
@@ -309,7 +276,8 @@ def _write_reports(made: list, place: str | None) -> None:
 
 
 _COMMANDS: dict[str, Callable] = {
-    "report": _report, "check": _check, "stress": _stress, "locality": _locality,
+    "report": _report, "check": _check, "stress": _stress,
+    "locality": lambda args: cli_locality.run(args, _progress(args.quiet)),
     "scenes": _scenes, "doctor": _doctor,
     "bench": lambda args: cli_bench.run(args, _progress(getattr(args, "quiet", True))),
     "compare": lambda args: FREE if cli_compare.run(args, _progress(args.quiet)) else YES,

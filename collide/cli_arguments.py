@@ -17,6 +17,7 @@ from collide import (
     cli_compare,
     cli_engines,
     cli_fuzz,
+    cli_locality,
     cli_numbers,
     cli_pages,
     cli_srdf,
@@ -137,28 +138,6 @@ code with the engine.
 
 exit status: 0 no answer of collide's is wrong, 1 one is, 2 error"""
 
-_LOCALITY = """examples:
-  collide locality bunny.ply
-  collide locality teapot.ply dragon.ply.gz --plot stretches.png
-  collide locality part.stl --json - | jq '.meshes[].local_stretch'
-
-How fast meshes can be tested for collision is bounded by how local they are
-(Erickson, "Local polyhedra and geometric graphs", 2003):
-  global stretch   longest edge over shortest
-  local stretch    longest edge at a vertex, over the distance to its nearest
-                   other vertex; of order k: to its k-th nearest
-Each is given for its worst vertex, and as a distribution: one bad vertex does
-not slow a mesh down, long edges packed closely together do. --plot draws how
-many vertices have which stretch: pip install 'collide-robotics[plots]' first.
-The last table is about the trees: the one that queries walk, and the graded
-box-tree that the paper's bounds are proven for, its outliers and its bounds.
-docs/locality.md explains the numbers and what to do about large ones.
-
-Vertices with equal coordinates are one vertex. Vertices that no facet uses
-count as neighbours.
-
-exit status: 0 measured, 2 error"""
-
 _SCENES = """examples:
   collide scenes
   collide scenes --copy workcell             to ./workcell.json, for editing
@@ -187,7 +166,9 @@ def parser() -> argparse.ArgumentParser:
     cli_fuzz.add_arguments(fuzz, cli_engines.engines)
     bench = _add(commands, "bench", "run time against error, and against size", cli_bench.EPILOG)
     cli_bench.add_arguments(bench, cli_engines.engines)
-    _add_locality(commands)
+    locality = _add(commands, "locality", "how local are these meshes?", cli_locality.EPILOG)
+    cli_locality.add_arguments(locality)
+    _output_arguments(locality)
     _add_scenes(commands)
     cli_srdf.add_arguments(_add(commands, "srdf", "which links of a robot can collide at all?", cli_srdf.EPILOG))
     sweep = _add(commands, "sweep", "millions of configurations, to files", cli_sweep.EPILOG)
@@ -208,17 +189,6 @@ def _add_stress(commands) -> None:
     parser.add_argument("--engine", type=cli_engines.one_engine, default="collide", metavar="E",
                         help="whom to ask, such as coal or coal:nesterov; help lists them (collide)")
     parser.add_argument("--save", metavar="FILE", help="write every refuted answer with a snippet that repeats it")
-    _output_arguments(parser)
-
-
-def _add_locality(commands) -> None:
-    parser = _add(commands, "locality", "how local are these meshes?", _LOCALITY)
-    parser.add_argument(
-        "meshes", nargs="+", metavar="MESH", help="a mesh file: PLY, STL, OBJ, OFF, DAE, GLB, glTF; .gz too"
-    )
-    parser.add_argument("--plot", metavar="FILE", help="draw the distributions: a .png, .svg or .pdf file")
-    parser.add_argument("--repeated", action="store_true",
-                        help="count vertices with equal coordinates one by one, as Table 1 of the paper does")
     _output_arguments(parser)
 
 

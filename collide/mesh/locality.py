@@ -90,13 +90,14 @@ class Locality:
         return math.ceil(math.log2(self.distinct) + math.log2(self.global_stretch))
 
 
-def _quiet(_label: str) -> AbstractContextManager:
+def quiet(_label: str) -> AbstractContextManager:
+    """Progress that nobody watches."""
     return nullcontext()
 
 
 def locality(
     vertices: np.ndarray, faces: np.ndarray, *, repeated: bool = False,
-    progress: Callable[[str], AbstractContextManager] = _quiet,
+    progress: Callable[[str], AbstractContextManager] = quiet,
 ) -> Locality:  # fmt: skip
     """Stretches of a triangle mesh.
 

@@ -1,4 +1,4 @@
-"""Distances from each point of a cloud to its nearest others: a k-d tree with a tight box a node.
+"""Distances from each point of a cloud, or others, to the nearest ones: a k-d tree with a tight box a node.
 
 J. L. Bentley, "Multidimensional binary search trees used for associative searching" (1975); halved at the
 median of the longest side of the box (Friedman, Bentley, Finkel 1977). The tree is implicit: on level l
@@ -20,6 +20,8 @@ _LEAF = 8
 CHUNK = 1 << 15
 #: Neighbours of a point at most.
 MAX_NEIGHBOURS = 32
+#: The first query's place in the tree where queries are no points of it.
+_FOREIGN = -1
 
 
 class PointTree:
@@ -43,11 +45,23 @@ class PointTree:
         n = len(self.points)
         for first in range(0, n, CHUNK):
             last = min(first + CHUNK, n)
-            squares = np.empty((last - first, k))
-            nearest_squares(
-                address_of(self.points), n, self.levels, address_of(self.boxes), first, last, k, address_of(squares)
-            )
+            squares, _ = self._search(self.points[first:last], k, first)
             yield self.order[first:last], squares
+
+    def nearest_to(self, queries: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
+        """The squared distances (m, k) from queries (m, 3) to their k nearest points, ascending, and the numbers (m, k)
+        of these; infinite and −1 where there are not as many. O(log n) a query where points are spread evenly."""
+        squares, places = self._search(np.array(queries, dtype=np.float64, order="C"), k, _FOREIGN)
+        return squares, np.where(places < 0, -1, self.order[places])
+
+    def _search(self, queries: np.ndarray, k: int, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """(m, k) squares and places in the tree; queries are its points ``first`` … and left out, or `_FOREIGN`."""
+        squares, places = np.empty((len(queries), k)), np.empty((len(queries), k), dtype=np.int64)
+        nearest_points(
+            address_of(self.points), len(self.points), self.levels, address_of(self.boxes), address_of(queries),
+            len(queries), first, k, address_of(squares), address_of(places),
+        )  # fmt: skip
+        return squares, places
 
 
 @kernel
@@ -134,31 +148,40 @@ def _square_to_box(boxes, node, x):
 
 
 @kernel
-def _insert_leaf(points, low, high, point, x, squares, at, k):
-    """Put points low … high − 1 but for point, which is x, into the k nearest, ascending."""
+def _insert_leaf(points, low, high, left_out, x, squares, places, at, k):
+    """Put points low … high − 1 but for ``left_out`` into the k nearest to x, ascending."""
     for i in range(low, high):
-        if i != point:
+        if i != left_out:
             d = sub(vec3_at(points, 3 * i), x)
             square = dot(d, d)
             if square < squares[at + k - 1]:
                 j = at + k - 1
                 while j > at and squares[j - 1] > square:
                     squares[j] = squares[j - 1]
+                    places[j] = places[j - 1]
                     j -= 1
                 squares[j] = square
+                places[j] = i
 
 
-@entry("void(int64, int64, int64, int64, int64, int64, int64, int64)")
-def nearest_squares(points_at, n, levels, boxes_at, first, last, k, squares_at):
-    """Squared distances of points first … last − 1, in the tree's order, to their k nearest others."""
+@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
+def nearest_points(points_at, n, levels, boxes_at, queries_at, n_queries, first, k, squares_at, places_at):
+    """Squared distances of queries to their k nearest points, and the places of these in the tree's order.
+
+    first : the place of query 0, where queries are points of the tree in its order: each is left out of its own; −1.
+    """
     points = view_f64(points_at, 3 * n)
     boxes = view_f64(boxes_at, 12 << levels)
-    squares = view_f64(squares_at, k * (last - first))
-    for point in range(first, last):
-        at = k * (point - first)
+    queries = view_f64(queries_at, 3 * n_queries)
+    squares = view_f64(squares_at, k * n_queries)
+    places = view_i64(places_at, k * n_queries)
+    for query in range(n_queries):
+        at = k * query
+        left_out = first + query if first >= 0 else -1
         for j in range(k):
             squares[at + j] = np.inf
-        x = vec3_at(points, 3 * point)
+            places[at + j] = -1
+        x = vec3_at(queries, 3 * query)
         # Depth first, the nearer child first: level by level the path is the bits of `node`, and a bit of
         # `done` says whether the sibling of the node there has been visited.
         node = 1
@@ -168,7 +191,8 @@ def nearest_squares(points_at, n, levels, boxes_at, first, last, k, squares_at):
             if _square_to_box(boxes, node, x) < squares[at + k - 1]:
                 if level == levels:
                     i = node - (1 << level)
-                    _insert_leaf(points, (n * i) >> level, (n * (i + 1)) >> level, point, x, squares, at, k)
+                    low, high = (n * i) >> level, (n * (i + 1)) >> level
+                    _insert_leaf(points, low, high, left_out, x, squares, places, at, k)
                 else:
                     to_left = _square_to_box(boxes, 2 * node, x)
                     to_right = _square_to_box(boxes, 2 * node + 1, x)

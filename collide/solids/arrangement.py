@@ -53,7 +53,7 @@ class Arrangement(NamedTuple):
         rows = np.flatnonzero(before != behind)
         triangles = self.sheets.triangles[rows]
         turned = before[rows]
-        triangles[turned] = triangles[turned][:, ::-1]
+        triangles[turned] = triangles[turned, ::-1]
         return triangles, rows
 
 
@@ -104,9 +104,9 @@ def _clear_crossings(facets: PlacedFacets, points: CutPoints, pairs: np.ndarray)
     exactly[pairs[of_one]] = True
     exactly[pairs[exactly[pairs].any(axis=1)]] = True
     exactly[pairs[~of_one][~proven]] = True
-    two_sided = np.concatenate([edges.sides[:, 0] >= 0 for edges in facets.edges])
     rows = np.unique(crossings.pairs)
-    exactly[rows[~two_sided[facets.edge[rows]].all(axis=1)]] = True
+    two_sided = facets.beside(facets.edge[rows].ravel())[:, 0].reshape(-1, 3) >= 0
+    exactly[rows[~two_sided.all(axis=1)]] = True
     keys, first, ends = np.unique(
         crossings.edge * len(facets.corners) + crossings.facet, return_index=True, return_inverse=True
     )
@@ -127,13 +127,16 @@ def _all_sheets(
     facets: PlacedFacets, whole: np.ndarray, triangles: np.ndarray, of: np.ndarray, merged: Sheets
 ) -> Sheets:
     """Whole facets first, then those split by paths, then merged ones."""
-    rows = np.concatenate([whole, of])
+    rows = np.concatenate([whole, of, merged.facet])
+    n = len(whole) + len(of)
     steps = np.zeros((len(rows), len(facets.operands)), dtype=np.int8)
-    steps[np.arange(len(rows)), facets.body[rows]] = 1
-    return Sheets(
-        np.concatenate([facets.corners[whole], triangles, merged.triangles]), np.concatenate([rows, merged.facet]),
-        np.concatenate([steps, merged.steps]),
-    )  # fmt: skip
+    for k in range(len(facets.operands)):
+        steps[:n, k] = facets.body[rows[:n]] == k
+    steps[n:] = merged.steps
+    corners = np.empty((len(rows), 3), dtype=np.int64)
+    np.take(facets.corners, whole, axis=0, out=corners[: len(whole)], mode="clip")
+    corners[len(whole) : n], corners[n:] = triangles, merged.triangles
+    return Sheets(corners, rows, steps)
 
 
 def meeting_pairs(facets: PlacedFacets) -> np.ndarray:

@@ -140,18 +140,20 @@ class FacetCuts:
         """Segments and points of a facet that may lie within them, by doubles."""
         segments, points = list(self.segments_of[f]), list(self.points_of[f])
         near = np.array([self.points.near(p) for p in points])[:, (u, v)]
-        ends = np.array([[self.points.near(p) for p in s] for s in segments])[:, :, (u, v)]
+        row = {p: k for k, p in enumerate(points)}
+        ends = np.array([(row[p], row[q]) for p, q in segments])
+        a, b = near[ends[:, 0], None], near[ends[:, 1], None]
         with np.errstate(all="ignore"):
-            for k, s in enumerate(segments):
-                a, b = ends[k]
-                inside = ((near >= ends[k].min(axis=0)) & (near <= ends[k].max(axis=0))).all(axis=1)
-                e, w = b - a, near - a
-                height = np.abs(e[0] * w[:, 1] - e[1] * w[:, 0])
-                size = np.maximum(np.abs(e).max(), np.abs(w).max(axis=1))
-                limit = 2.0**-47 * size * (np.abs(a).max() + size)
-                for row in np.flatnonzero(inside & ~(height > limit)).tolist():
-                    if points[row] not in s and points[row] not in self.splits[s]:
-                        yield s, points[row]
+            inside = ((near >= np.minimum(a, b)) & (near <= np.maximum(a, b))).all(axis=2)
+            inside[np.arange(len(segments))[:, None], ends] = False
+            k, p = np.nonzero(inside)
+            a, e, w = a[k, 0], (b - a)[k, 0], near[p] - a[k, 0]
+            height = np.abs(e[:, 0] * w[:, 1] - e[:, 1] * w[:, 0])
+            size = np.maximum(np.abs(e).max(axis=1), np.abs(w).max(axis=1))
+            near_enough = ~(height > 2.0**-47 * size * (np.abs(a).max(axis=1) + size))
+        for i, j in zip(k[near_enough].tolist(), p[near_enough].tolist()):
+            if points[j] not in self.splits[segments[i]]:
+                yield segments[i], points[j]
 
     def _lies_within(self, p: int, s: Segment, u: int, v: int) -> bool:
         """Whether a point of the facet's plane lies on a segment, other than its ends."""
@@ -195,5 +197,3 @@ def _line(p: Rational, q: Rational, u: int, v: int) -> tuple[int, int, int]:
         p[3] * q[u] - p[u] * q[3],
         p[u] * q[v] - p[v] * q[u],
     )
-
-
