@@ -45,8 +45,10 @@ class ConvexCells:
 
     Parameters
     ----------
-    inside : (leaves,) bool, of all leaves.   facets : numbers in the mesh of the facets with an area.
-    parts : blocks of cells, in order.   source : what the cells were made from.
+    inside : (leaves,) bool, of all leaves.
+    facets : (n,) int64, numbers in the mesh of the facets with an area.
+    parts : blocks of cells, in order.
+    source : what the cells were made from.
 
     Attributes
     ----------
