@@ -40,7 +40,7 @@ def row(name: str, mesh: collide.Mesh, **arguments) -> collide.SpacePartition:
     print(
         f"| {name} | {n:,} | {s.kappa} | {s.cells:,} | {s.cells / n:.2f} | {s.cells / (n * np.log2(n)):.3f} "
         f"| {s.cells / n**2:.5f} | {s.depth}, {s.mean_depth:.1f} | {s.depth / np.log2(n):.2f} | {s.first_cells:,} "
-        f"| {s.most_facets}, {s.pieces / s.first_cells:.1f} | {s.integers:,}, {s.fractions} | {seconds:.2f} |",
+        f"| {s.max_facets}, {s.pieces / s.first_cells:.1f} | {s.integers:,}, {s.fractions} | {seconds:.2f} |",
         flush=True,
     )
     return partition
@@ -65,12 +65,12 @@ def fit(sizes: list[tuple[int, int, int]]) -> None:
 
 def sizes(largest: int) -> None:
     head()
-    found = []
+    results = []
     for n in (1000, 3000, 10_000, 30_000, 100_000):
         if n <= largest:
             s = row(f"bumpy sphere, {n:,}", sphere(n)).size
-            found.append((s.facets, s.cells, s.depth))
-    fit(found)
+            results.append((s.facets, s.cells, s.depth))
+    fit(results)
     head()
     for seed in range(5):
         row(f"seed {seed}", sphere(3000), seed=seed)
@@ -80,12 +80,12 @@ def sizes(largest: int) -> None:
 
 def scans() -> None:
     head()
-    found = []
+    results = []
     for name, mesh in scan_meshes():
         if len(mesh.faces) <= 120_000:
             s = row(name, mesh).size
-            found.append((s.facets, s.cells, s.depth))
-    fit(found)
+            results.append((s.facets, s.cells, s.depth))
+    fit(results)
 
 
 def scan_meshes():
@@ -129,11 +129,11 @@ def worst() -> None:
         ("accordions", "strings", (10, 20, 40, 80)),
     ):
         head()
-        found = []
+        results = []
         for value in values:
             s = row(f"{family} {value}", pair_of(family, **{name: value})).size
-            found.append((s.facets, s.cells, s.depth))
-        fit(found)
+            results.append((s.facets, s.cells, s.depth))
+        fit(results)
 
 
 def hard_points(mesh: collide.Mesh, partition: collide.SpacePartition, n: int, seed: int = 0) -> np.ndarray:
@@ -162,14 +162,14 @@ def points(runs: int) -> None:
     for name, mesh in cases:
         partition = collide.SpacePartition(mesh)
         every = hard_points(mesh, partition, 100_000)
-        found = partition.locate(every)
-        wrong = int((found.inside != collide.contains(mesh, np.eye(4), every)).sum())
+        results = partition.locate(every)
+        wrong = int((results.inside != collide.contains(mesh, np.eye(4), every)).sum())
         timed = every[: len(every) // 3]
         tasks = (lambda p=partition, q=timed: p.locate(q), lambda m=mesh, q=timed: collide.contains(m, np.eye(4), q))
         times = np.array([[_ns(task, len(timed)) for task in tasks] for _ in range(runs)])
         mine, theirs = np.median(times, axis=0)
-        print(f"| {name}, {len(mesh.faces):,} facets | {len(every):,} | {found.inside.sum():,} "
-              f"| {found.boundary.sum():,} | {wrong} | {mine:.0f} | {theirs:.0f} |", flush=True)  # fmt: skip
+        print(f"| {name}, {len(mesh.faces):,} facets | {len(every):,} | {results.inside.sum():,} "
+              f"| {results.boundary.sum():,} | {wrong} | {mine:.0f} | {theirs:.0f} |", flush=True)  # fmt: skip
 
 
 def _ns(task, n: int) -> float:
@@ -189,9 +189,10 @@ def pieces() -> None:
     for name, mesh in cases:
         volume = mesh.report.volume
         start = time.process_time()
-        own = collide.SpacePartition(mesh).convex_pieces()
+        exact_pieces = collide.SpacePartition(mesh).convex_pieces()
         seconds = time.process_time() - start
-        text = f"| {name} | {volume:.6f} | {len(own):,} | {own.volumes.sum() / volume - 1:.1e} | {seconds:.2f} "
+        text = f"| {name} | {volume:.6f} | {len(exact_pieces):,} "
+        text += f"| {exact_pieces.volumes.sum() / volume - 1:.1e} | {seconds:.2f} "
         print(text + coacd_columns(mesh, volume), flush=True)
 
 
@@ -225,7 +226,7 @@ def clutter_table() -> None:
     for name, mesh in cases:
         c = clutter(mesh, 200)
         n = len(mesh.faces)
-        print(f"| {name} | {n:,} | {c.most} | {c.mean:.1f} | {c.most / np.log2(n):.2f} |", flush=True)
+        print(f"| {name} | {n:,} | {c.max_facets} | {c.mean:.1f} | {c.max_facets / np.log2(n):.2f} |", flush=True)
 
 
 def main() -> None:

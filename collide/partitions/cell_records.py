@@ -43,6 +43,13 @@ class CellSource(NamedTuple):
 class ConvexCells:
     """Convex polytopes that share no inner points.
 
+    Parameters
+    ----------
+    inside : (leaves,) bool, of all leaves.
+    facets : (n,) int64, numbers in the mesh of the facets with an area.
+    parts : blocks of cells, in order.
+    source : what the cells were made from.
+
     Attributes
     ----------
     cell : (k,) int64, the leaf of the partition each is, or the first of several that it is made of.
@@ -90,7 +97,16 @@ class ConvexCells:
         return np.bincount(cell, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, minlength=len(self))
 
     def rows_of(self, leaves) -> np.ndarray:
-        """(k,) int64: the rows that hold leaves of the partition, as `locate` names them; −1 where none does."""
+        """The rows of the cells that hold leaves of the partition.
+
+        Parameters
+        ----------
+        leaves : (k,) int, as `locate` names them.
+
+        Returns
+        -------
+        (k,) int64; −1 where none of the cells does.
+        """
         leaves = np.asarray(leaves, dtype=np.int64).reshape(-1)
         if not len(self):
             return np.full(len(leaves), -1)
@@ -103,17 +119,56 @@ class ConvexCells:
         return np.where((self.cell[row] <= leaves) & (leaves <= last[row]), row, -1)
 
     def corners(self, i: int) -> np.ndarray:
-        """(n, 3) the corners of cell i [m], rounded."""
+        """The corners of a cell, rounded.
+
+        Parameters
+        ----------
+        i : number of the cell.
+
+        Returns
+        -------
+        (n, 3) float64 [m].
+
+        Raises
+        ------
+        InvalidArgument : no such cell.
+        """
         i = self._row(i)
         loops = self.loops[self.loop_starts[self.face_starts[i]] : self.loop_starts[self.face_starts[i + 1]]]
         return self.vertices[np.unique(loops)]
 
     def hull(self, i: int) -> ConvexHull:
-        """Cell i as a shape: the hull of its rounded corners."""
+        """A cell as a shape: the hull of its rounded corners.
+
+        Parameters
+        ----------
+        i : number of the cell.
+
+        Returns
+        -------
+        ConvexHull.
+
+        Raises
+        ------
+        InvalidArgument : no such cell.
+        """
         return ConvexHull(self.corners(i))
 
     def planes(self, i: int) -> CellPlanes:
-        """The planes of cell i, exact and rounded."""
+        """The planes of a cell, exact and rounded.
+
+        Parameters
+        ----------
+        i : number of the cell.
+
+        Returns
+        -------
+        CellPlanes.
+
+        Raises
+        ------
+        InvalidArgument : no such cell.
+        """
         i = self._row(i)
         rows = np.arange(self.face_starts[i], self.face_starts[i + 1])
         normals, offsets = np.zeros((len(rows), 3)), np.zeros(len(rows))

@@ -16,11 +16,11 @@ _AXES = np.eye(3)
 class Clutter(NamedTuple):
     """What cubes without a corner of a facet's box inside them meet.
 
-    most, mean : facets, at most and on average, over the cubes looked at. The clutter factor κ is at least ``most``.
+    max_facets, mean : facets, at most and on average, over the cubes looked at; κ is at least ``max_facets``.
     cubes : how many were looked at.
     """
 
-    most: int
+    max_facets: int
     mean: float
     cubes: int
 

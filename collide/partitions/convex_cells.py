@@ -58,8 +58,8 @@ def _block(tree: FinishedTree, whole: np.ndarray, wanted: np.ndarray, low, high)
         ended = some & ~inner
         if ended.any():
             done.append((first[ended], _of_cells(faces, ended)))
-        kept = some & inner
-        place, faces = _cut_cells(vertices, edges, _of_cells(faces, kept), cut[kept], tree.plane[cut[kept]])
+        selected = some & inner
+        place, faces = _cut_cells(vertices, edges, _of_cells(faces, selected), cut[selected], tree.plane[cut[selected]])
     if not done:
         nothing = np.zeros(0, dtype=np.int64)
         return CellBlock(nothing, Polygons(*(nothing,) * 5), vertices, edges)
@@ -73,10 +73,10 @@ def _block(tree: FinishedTree, whole: np.ndarray, wanted: np.ndarray, low, high)
     return CellBlock(leaf[order], faces[np.argsort(faces.cell, kind="stable")], vertices, edges)
 
 
-def _of_cells(faces: Polygons, kept: np.ndarray) -> Polygons:
+def _of_cells(faces: Polygons, selected: np.ndarray) -> Polygons:
     """The faces of some of the cells, which are numbered anew."""
-    number = np.cumsum(kept) - 1
-    faces = faces[kept[faces.cell]]
+    number = np.cumsum(selected) - 1
+    faces = faces[selected[faces.cell]]
     return faces._replace(cell=number[faces.cell])
 
 
@@ -113,10 +113,10 @@ def _cut_cells(vertices, edges, faces: Polygons, cuts: np.ndarray, planes: np.nd
     through = has.all(axis=0)
     rows, owner = edge_rows(faces)
     groups = []
-    for side, mine, other, pieces in ((0, cut.below, cut.above, cut.minus), (1, cut.above, cut.below, cut.plus)):
+    for side, mine, opposite, pieces in ((0, cut.below, cut.above, cut.minus), (1, cut.above, cut.below, cut.plus)):
         # Faces in the plane itself belong to the cell that stays whole; faces cut in two leave pieces.
-        whole = np.flatnonzero(~other & (mine | has[side, faces.cell]) & (mine | ~through[faces.cell]))
-        _rename_edges_in_planes(edges, faces, rows, owner, cut.sign, mine & ~other & through[faces.cell], planes)
+        whole = np.flatnonzero(~opposite & (mine | has[side, faces.cell]) & (mine | ~through[faces.cell]))
+        _rename_edges_in_planes(edges, faces, rows, owner, cut.sign, mine & ~opposite & through[faces.cell], planes)
         group = joined(faces[whole], pieces)
         caps = _caps(edges, group[through[group.cell]], planes, 2 * side - 1)
         group = joined(group, caps)
@@ -140,12 +140,12 @@ def _caps(edges: Edges, faces: Polygons, planes: np.ndarray, side: int) -> Polyg
     following = rows + 1
     ends = np.cumsum(faces.count)
     following[ends - 1] = faces.begin
-    found = np.flatnonzero(edges.carrier.rows[rows] == planes[faces.cell[owner]])
-    cell = faces.cell[owner[found]]
+    cap_edges = np.flatnonzero(edges.carrier.rows[rows] == planes[faces.cell[owner]])
+    cell = faces.cell[owner[cap_edges]]
     # The face runs along them the other way round.
-    tail, head = edges.vertex.rows[following[found]], edges.vertex.rows[rows[found]]
+    tail, head = edges.vertex.rows[following[cap_edges]], edges.vertex.rows[rows[cap_edges]]
     order = np.lexsort((tail, cell))
-    cell, tail, head, carrier = cell[order], tail[order], head[order], faces.plane[owner[found]][order]
+    cell, tail, head, carrier = cell[order], tail[order], head[order], faces.plane[owner[cap_edges]][order]
     next_ = np.searchsorted((cell << 32) + tail, (cell << 32) + head)
     first = np.flatnonzero(np.append(True, np.diff(cell) != 0)) if len(cell) else np.zeros(0, dtype=np.int64)
     count = np.diff(np.append(first, len(cell)))

@@ -92,14 +92,14 @@ def cut_polygons(vertices: Vertices, edges: Edges, polygons: Polygons, planes: n
     both = np.flatnonzero(below & above)
     number = np.full(len(planes), -1)
     number[both] = np.arange(len(both))
-    kept = number[owner] >= 0
+    selected = number[owner] >= 0
     if len(both) == 0:
         nothing = polygons[both]
         return Cut(below, above, both, nothing, nothing, sides.sign)
-    rows, owner, vertex = rows[kept], number[owner[kept]], vertex[kept]
+    rows, owner, vertex = rows[selected], number[owner[selected]], vertex[selected]
     part = polygons[both]
-    minus, plus = _halves(
-        vertices, edges, part, planes[both], rows, owner, vertex, Sides(*(column[kept] for column in sides)), shared
+    minus, plus = _split_in_two(
+        vertices, edges, part, planes[both], rows, owner, vertex, Sides(*(column[selected] for column in sides)), shared
     )
     return Cut(below, above, both, minus, plus, sides.sign)
 
@@ -114,7 +114,7 @@ def _sides(vertices: Vertices, vertex: np.ndarray, planes: np.ndarray, shared: b
     return Sides(*(column[back] for column in asked))
 
 
-def _halves(vertices, edges, polygons, planes, rows, owner, vertex, sides, shared) -> tuple[Polygons, Polygons]:
+def _split_in_two(vertices, edges, polygons, planes, rows, owner, vertex, sides, shared) -> tuple[Polygons, Polygons]:
     following = np.arange(1, len(rows) + 1)
     ends = np.cumsum(polygons.count)
     following[ends - 1] = ends - polygons.count
@@ -126,7 +126,7 @@ def _halves(vertices, edges, polygons, planes, rows, owner, vertex, sides, share
         Sides(*(column[crossing] for column in sides)), Sides(*(column[following[crossing]] for column in sides)),
         shared,
     )  # fmt: skip
-    halves = []
+    parts = []
     for side in (-1, 1):
         here, there = sign * side, sign[following] * side
         # A vertex of this side begins its edge, or where the polygon leaves this side at it, an edge in the plane.
@@ -138,8 +138,8 @@ def _halves(vertices, edges, polygons, planes, rows, owner, vertex, sides, share
         count = np.bincount(whose, minlength=len(planes))
         pairs = (np.stack(two, axis=1).ravel()[emit] for two in ((vertex, new), (first, second)))
         begin = edges.add(*pairs)
-        halves.append(polygons._replace(begin=begin[0] + np.cumsum(count) - count, count=count))
-    return halves[0], halves[1]
+        parts.append(polygons._replace(begin=begin[0] + np.cumsum(count) - count, count=count))
+    return parts[0], parts[1]
 
 
 def _new_vertices(vertices, polygons, planes, owner, tail, head, carrier, at_tail, at_head, shared) -> np.ndarray:
@@ -149,9 +149,9 @@ def _new_vertices(vertices, polygons, planes, owner, tail, head, carrier, at_tai
     if shared:
         low, high = np.minimum(names[:, 0], carrier), np.maximum(names[:, 0], carrier)
         keys = np.stack((polygons.cell[owner], low, high), axis=1)
-        _, one, back = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        names, tail, head = names[one], tail[one], head[one]
-        at_tail, at_head = (Sides(*(column[one] for column in at)) for at in (at_tail, at_head))
+        _, first_of, back = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        names, tail, head = names[first_of], tail[first_of], head[first_of]
+        at_tail, at_head = (Sides(*(column[first_of] for column in at)) for at in (at_tail, at_head))
     a, b = (np.maximum(at.height * at.sign, 0.0) for at in (at_tail, at_head))
     sum_ = a + b
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

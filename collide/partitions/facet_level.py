@@ -24,7 +24,7 @@ def cut_along_facets(
     """Cut every cell that polygons lie in, along their planes, until none is left."""
     polygons = polygons[np.argsort(polygons.cell, kind="stable")]
     ends = np.flatnonzero(np.append(np.diff(polygons.cell) != 0, True)) + 1
-    kept = tree.other_bytes
+    bytes_before = tree.other_bytes
     begin, n_vertices, n_edges = 0, vertices.xyz.n, edges.vertex.n
     while begin < len(polygons.cell):
         end = int(ends[np.searchsorted(ends, min(begin + _AT_ONCE, len(polygons.cell)))])
@@ -32,10 +32,10 @@ def cut_along_facets(
             active = polygons[begin:end]
             while len(active.cell):
                 active = _round(tree, vertices, edges, active, rng)
-                tree.other_bytes = kept + (vertices.xyz.n - n_vertices) * 56 + (edges.vertex.n - n_edges) * 16
+                tree.other_bytes = bytes_before + (vertices.xyz.n - n_vertices) * 56 + (edges.vertex.n - n_edges) * 16
         vertices.cut_back(n_vertices)
         edges.cut_back(n_edges)
-        tree.other_bytes = kept
+        tree.other_bytes = bytes_before
         begin = end
 
 
@@ -52,15 +52,15 @@ def _round(tree, vertices, edges, polygons: Polygons, rng) -> Polygons:
     cut = cut_polygons(vertices, edges, rest, planes[cell])
     flat = ~(cut.below | cut.above)
     tree.hold(cuts[cell[flat]], rest.plane[flat])
-    one = np.flatnonzero(cut.below ^ cut.above)
-    side = cuts[cell[one]]
-    halves = cuts[cell[cut.both]]
-    left = joined(
-        rest[one]._replace(cell=2 * side + 1 + cut.above[one]),
-        cut.minus._replace(cell=2 * halves + 1),
-        cut.plus._replace(cell=2 * halves + 2),
+    on_one_side = np.flatnonzero(cut.below ^ cut.above)
+    side = cuts[cell[on_one_side]]
+    split_cuts = cuts[cell[cut.both]]
+    remaining = joined(
+        rest[on_one_side]._replace(cell=2 * side + 1 + cut.above[on_one_side]),
+        cut.minus._replace(cell=2 * split_cuts + 1),
+        cut.plus._replace(cell=2 * split_cuts + 2),
     )
-    return left[np.argsort(left.cell, kind="stable")]
+    return remaining[np.argsort(remaining.cell, kind="stable")]
 
 
 def _groups(cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -74,9 +74,9 @@ def _pivots(vertices, edges, polygons, rng, first, cell) -> np.ndarray:
     n = vertices.planes.n
     rows, owner = edge_rows(polygons)
     carrier = edges.carrier.rows[rows]
-    own = (carrier >= n) & (carrier < 4 * n)
+    of_edge = (carrier >= n) & (carrier < 4 * n)
     bounded = np.zeros(len(cell), dtype=bool)
-    bounded[owner[own]] = True
+    bounded[owner[of_edge]] = True
     return np.lexsort((rng.random(len(cell)) + bounded, cell))[first]
 
 

@@ -111,10 +111,12 @@ class FinishedTree:
     def _sides(self, points: np.ndarray, cut: np.ndarray) -> np.ndarray:
         height, bound = self.planes.heights(points, np.zeros(len(points)), cut)
         sign = (height > bound).astype(np.int8) - (height < -bound).astype(np.int8)
-        left = np.flatnonzero(np.abs(height) <= bound)
-        left = left[cut[left] < 4 * self.planes.n]  # next to an axis-parallel plane doubles are exact
-        if len(left):
-            sign[left] = signs_of(exact_points(self.planes, points[left]), self.planes.coefficients(cut[left]))
+        remaining = np.flatnonzero(np.abs(height) <= bound)
+        remaining = remaining[cut[remaining] < 4 * self.planes.n]  # next to an axis-parallel plane doubles are exact
+        if len(remaining):
+            sign[remaining] = signs_of(
+                exact_points(self.planes, points[remaining]), self.planes.coefficients(cut[remaining])
+            )
         return sign
 
 

@@ -12,12 +12,12 @@ class GrowingRows:
     """
 
     def __init__(self, dtype, *shape: int):
-        self._room = np.zeros((1024, *shape), dtype=dtype)
+        self._storage = np.zeros((1024, *shape), dtype=dtype)
         self.n = 0
 
     @property
     def rows(self) -> np.ndarray:
-        return self._room[: self.n]
+        return self._storage[: self.n]
 
     @property
     def n_bytes(self) -> int:
@@ -27,11 +27,11 @@ class GrowingRows:
     def add(self, rows: np.ndarray) -> np.ndarray:
         """Add rows; returns their numbers."""
         end = self.n + len(rows)
-        if end > len(self._room):
-            room = np.zeros((max(end, 2 * len(self._room)), *self._room.shape[1:]), dtype=self._room.dtype)
-            room[: self.n] = self.rows
-            self._room = room
-        self._room[self.n : end] = rows
+        if end > len(self._storage):
+            storage = np.zeros((max(end, 2 * len(self._storage)), *self._storage.shape[1:]), dtype=self._storage.dtype)
+            storage[: self.n] = self.rows
+            self._storage = storage
+        self._storage[self.n : end] = rows
         begin, self.n = self.n, end
         return np.arange(begin, end)
 

@@ -27,18 +27,18 @@ def leaves_inside(tree: FinishedTree, mesh: Mesh, seats: np.ndarray, middles: np
     seats : (cuts, 4), of `PartitionTree`.   middles : (places of the first level, 3), a point of each.
     """
     inside = np.zeros(tree.n_leaves, dtype=bool)
-    left = np.arange(tree.n_leaves)
+    remaining = np.arange(tree.n_leaves)
     for step in _STEPS:
-        points = _candidates(tree, seats, middles, left, step)
-        good = _strictly_in(tree, points, left)
-        inside[left[good]] = _winds(mesh, points[good])
-        left = left[~good]
-        if len(left) == 0:
+        points = _candidates(tree, seats, middles, remaining, step)
+        good = _strictly_in(tree, points, remaining)
+        inside[remaining[good]] = _winds(mesh, points[good])
+        remaining = remaining[~good]
+        if len(remaining) == 0:
             return inside, 0
     n_fractions = 0
     low, high = tree.planes.vertices.min(axis=0), tree.planes.vertices.max(axis=0)  # all inside is within
     facet_boxes = _FacetBoxes(tree.planes)
-    for block in cell_blocks(tree, left, low, high):
+    for block in cell_blocks(tree, remaining, low, high):
         n_fractions += _label_block(tree, mesh, block, inside, facet_boxes)
     return inside, n_fractions
 
@@ -55,12 +55,12 @@ def _label_block(tree: FinishedTree, mesh: Mesh, block: CellBlock, inside: np.nd
     points /= count[:, None]
     good = _strictly_in(tree, points, block.leaf)
     inside[block.leaf[good]] = _winds(mesh, points[good])
-    left = np.flatnonzero(~good)
+    remaining = np.flatnonzero(~good)
     starts = np.cumsum(count) - count
-    for k in left.tolist():
+    for k in remaining.tolist():
         corners = used[pairs[starts[k] : starts[k] + count[k], 1]]
         inside[block.leaf[k]] = _winds_around_cell(block, k, corners, facets)
-    return len(left)
+    return len(remaining)
 
 
 def _strictly_in(tree: FinishedTree, points: np.ndarray, leaves: np.ndarray) -> np.ndarray:

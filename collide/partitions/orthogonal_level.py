@@ -32,8 +32,8 @@ class OrthogonalLevel:
     polygons : pieces of facets, `cell` the place.
     """
 
-    def __init__(self, tree: PartitionTree, vertices: Vertices, edges: Edges, kappa: int, few: int):
-        self.tree, self.vertices, self.edges, self.kappa, self.few = tree, vertices, edges, kappa, few
+    def __init__(self, tree: PartitionTree, vertices: Vertices, edges: Edges, kappa: int, n_spared: int):
+        self.tree, self.vertices, self.edges, self.kappa, self.n_spared = tree, vertices, edges, kappa, n_spared
         self.low, self.high = GrowingRows(float, 3), GrowingRows(float, 3)
         planes = vertices.planes
         n = planes.n
@@ -69,7 +69,7 @@ class OrthogonalLevel:
         low, high = self.low.rows[cells], self.high.rows[cells]
         middle = low + 0.5 * (high - low)
         wide = ((low < middle) & (middle < high)).all(axis=1)
-        return cells[(guards > self.kappa) & (facets > self.few) & wide]
+        return cells[(guards > self.kappa) & (facets > self.n_spared) & wide]
 
     def _cut_once(self, cells: np.ndarray) -> np.ndarray:
         """Cut cells once along each axis; returns the places below, of those cells that are cubes."""
@@ -152,12 +152,12 @@ class OrthogonalLevel:
         cell[rows] = 2 * cuts[at] + 1 + cut.above
         flat = ~(cut.below | cut.above)
         self.tree.hold(cuts[at[flat]], self.polygons.plane[rows[flat]])
-        kept = np.ones(len(cell), dtype=bool)
-        kept[rows[flat | (cut.below & cut.above)]] = False
-        halves = cuts[at[cut.both]]
-        pieces = joined(cut.minus._replace(cell=2 * halves + 1), cut.plus._replace(cell=2 * halves + 2))
-        self.polygons = joined(self.polygons._replace(cell=cell)[kept], pieces)
-        self.boxes = np.concatenate((self.boxes[kept], self._boxes_of(pieces)))
+        remaining = np.ones(len(cell), dtype=bool)
+        remaining[rows[flat | (cut.below & cut.above)]] = False
+        split_cuts = cuts[at[cut.both]]
+        pieces = joined(cut.minus._replace(cell=2 * split_cuts + 1), cut.plus._replace(cell=2 * split_cuts + 2))
+        self.polygons = joined(self.polygons._replace(cell=cell)[remaining], pieces)
+        self.boxes = np.concatenate((self.boxes[remaining], self._boxes_of(pieces)))
 
     def _boxes_of(self, polygons: Polygons) -> np.ndarray:
         """(k, 2, 3) boxes around polygons, rounding counted in."""

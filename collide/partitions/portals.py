@@ -50,21 +50,21 @@ def portals_of_block(tree: FinishedTree, block: CellBlock, whole: np.ndarray) ->
         above = made.above.copy()
         flat = np.flatnonzero(~(made.above | made.below))
         above[flat] = _runs_against(planes, faces.plane[flat], tree.plane[cut[flat]])
-        one = np.flatnonzero(~(made.above & made.below))
+        on_one_side = np.flatnonzero(~(made.above & made.below))
         both = cut[made.both]
-        place = np.concatenate((2 * cut[one] + 1 + above[one], 2 * both + 1, 2 * both + 2))
-        faces = joined(faces[one], made.minus, made.plus)
+        place = np.concatenate((2 * cut[on_one_side] + 1 + above[on_one_side], 2 * both + 1, 2 * both + 2))
+        faces = joined(faces[on_one_side], made.minus, made.plus)
     if not done:
         return (*(np.zeros(0, dtype=np.int64),) * 2, np.zeros((0, 3)), np.zeros(0))
     return tuple(np.concatenate(columns) for columns in zip(*done))
 
 
-def _runs_against(planes: Planes, plane: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _runs_against(planes: Planes, plane: np.ndarray, cut_plane: np.ndarray) -> np.ndarray:
     """Of planes at one place, which have normals that point the other way; exact."""
     against = np.zeros(len(plane), dtype=bool)
-    rows = np.flatnonzero(plane != other)
+    rows = np.flatnonzero(plane != cut_plane)
     if len(rows):
-        a, b = planes.coefficients(plane[rows]), planes.coefficients(other[rows])
+        a, b = planes.coefficients(plane[rows]), planes.coefficients(cut_plane[rows])
         against[rows] = ((a[:, :3] * b[:, :3]).sum(axis=1) < 0).astype(bool)
     return against
 

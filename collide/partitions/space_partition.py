@@ -31,7 +31,7 @@ from collide.surface_queries.contains import thin_facets
 from collide.transforms import LARGEST
 
 #: What a first-level cell may hold without being cut: corners of facets' boxes, and facets.
-_KAPPA, _FEW = 64, 4
+_KAPPA, _N_SPARED = 64, 4
 _POINT = ConvexHull(np.zeros((1, 3)))
 
 
@@ -54,7 +54,7 @@ class PartitionSize(NamedTuple):
     facets, thin : those with an area, and those without, which cut nothing.
     cells, inside : leaves, and leaves inside the solid.   cuts : one fewer than leaves.
     first_cells, pieces : cells of the first level that facets meet, and pieces of facets in them.
-    most_facets : in one cell of the first level.   kappa : corners of facets' boxes that such a cell may hold.
+    max_facets : in one cell of the first level.   kappa : corners of facets' boxes that such a cell may hold.
     depth, mean_depth : cuts above a leaf, at most and on average.
     integers : signs that integers decided.   fractions : leaves told inside or outside by a rational point.
     """
@@ -66,7 +66,7 @@ class PartitionSize(NamedTuple):
     cuts: int
     first_cells: int
     pieces: int
-    most_facets: int
+    max_facets: int
     kappa: int
     depth: int
     mean_depth: float
@@ -120,7 +120,7 @@ class SpacePartition:
         self._facets = np.flatnonzero(~without_area(mesh.vertices, np.ascontiguousarray(corners, dtype=np.int32)))
         planes = Planes(mesh.vertices, corners[self._facets])
         grown, vertices, edges = PartitionTree(memory), Vertices(planes), Edges()
-        level = OrthogonalLevel(grown, vertices, edges, kappa, _FEW)
+        level = OrthogonalLevel(grown, vertices, edges, kappa, _N_SPARED)
         level.grow(progress)
         facets_in = np.bincount(level.polygons.cell)
         facets_in = facets_in[facets_in > 0]
@@ -164,8 +164,8 @@ class SpacePartition:
         np.minimum.at(cell, touched.point[best], touched.leaf[best])
         inside = some.copy()
         inside[self._on_facets_outside(points, touched, some)] = True
-        found = Located(inside, inside & ~all_, cell)
-        return Located(*(column[0] for column in found)) if single else found
+        answer = Located(inside, inside & ~all_, cell)
+        return Located(*(column[0] for column in answer)) if single else answer
 
     def _on_facets_outside(self, points: np.ndarray, touched, some: np.ndarray) -> np.ndarray:
         """Rows of points that only cells outside touch, and that lie on a facet: one with nothing behind it."""
@@ -185,8 +185,17 @@ class SpacePartition:
     def cells(self, box=None) -> ConvexCells:
         """All cells within a box.
 
-        box : (low, high), two corners [m], low < high; the mesh's own box where None. Cells outside of it are left out,
-            others are clipped by it: cells at the rim have no end.
+        Parameters
+        ----------
+        box : (low, high), two corners [m], low < high; the mesh's own box where None.
+
+        Returns
+        -------
+        ConvexCells. Cells outside of the box are left out, others clipped by it: cells at the rim have no end.
+
+        Raises
+        ------
+        InvalidArgument : a box that is none.
         """
         low, high = self._box("cells", box)
         whole = np.zeros(len(self._tree.plane), dtype=bool)
@@ -231,7 +240,13 @@ class SpacePartition:
     def portals(self, cells: ConvexCells) -> Portals:
         """Where cells of this partition open into one another: the graph of a planner.
 
+        Parameters
+        ----------
         cells : of `cells` or `convex_pieces` of this partition.
+
+        Raises
+        ------
+        InvalidArgument : cells of another partition.
 
         Returns
         -------
@@ -243,12 +258,12 @@ class SpacePartition:
         tree, leaves, low, high, whole = cells.source
         row = np.full(tree.n_leaves, -1)
         row[cells.cell] = np.arange(len(cells))
-        found = [portals_of_block(tree, block, whole) for block in cell_blocks(tree, leaves, low, high, whole)]
-        if not found:
+        answer = [portals_of_block(tree, block, whole) for block in cell_blocks(tree, leaves, low, high, whole)]
+        if not answer:
             return Portals(np.zeros((0, 2), dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
-        one, other, middle, area = (np.concatenate(columns) for columns in zip(*found))
-        both = row[other] >= 0
-        pairs = np.stack((row[one[both]], row[other[both]]), axis=1)
+        near, far, middle, area = (np.concatenate(columns) for columns in zip(*answer))
+        both = row[far] >= 0
+        pairs = np.stack((row[near[both]], row[far[both]]), axis=1)
         return Portals(np.sort(pairs, axis=1), middle[both], area[both])
 
     def _made(self, leaves: np.ndarray, low, high, whole) -> ConvexCells:

@@ -52,11 +52,11 @@ class Vertices:
         """Where vertices (k,) lie of planes (k,): doubles with a bound; by their names; in integers."""
         height, bound = self.planes.heights(self.xyz.rows[vertex], self.error.rows[vertex], cut)
         sign = (height > bound).astype(np.int8) - (height < -bound).astype(np.int8)
-        left = np.flatnonzero(np.abs(height) <= bound)
-        if len(left):
-            left = left[~self._on_by_name(vertex[left], cut[left])]
-        if len(left):
-            sign[left] = self._exact_signs(vertex[left], cut[left])
+        remaining = np.flatnonzero(np.abs(height) <= bound)
+        if len(remaining):
+            remaining = remaining[~self._on_by_name(vertex[remaining], cut[remaining])]
+        if len(remaining):
+            sign[remaining] = self._exact_signs(vertex[remaining], cut[remaining])
         return Sides(sign, height, bound)
 
     def _on_by_name(self, vertex: np.ndarray, cut: np.ndarray) -> np.ndarray:
