@@ -14,10 +14,10 @@ from typing import TypeVar
 from collide.errors import InvalidArgument, UnsupportedQuery, brief
 
 #: Bytes that a meeting pair of facets takes while it is cut exactly, with its share of points, segments and triangles:
-#: `python benchmarks/combined_solids.py --memory` measures it.
-BYTES_PER_PAIR = 6000
+#: `python benchmarks/combined_solids.py --only memory` measures it.
+BYTES_PER_PAIR = 1000
 #: The same of a pair of segments in the plane.
-BYTES_PER_CROSSING = 2500
+BYTES_PER_CROSSING = 500
 #: Seconds between two reports.
 _REPORTS = 0.5
 _Item = TypeVar("_Item")
