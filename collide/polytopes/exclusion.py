@@ -50,7 +50,18 @@ class HullBoundary(NamedTuple):
 
 
 def hull_boundary(body: HierarchicalTree) -> HullBoundary:
-    """The boundary that exclusions of a body are checked against."""
+    """The boundary that exclusions of a body are checked against.
+
+    Parameters
+    ----------
+    body : HierarchicalTree
+        Made from points.
+
+    Returns
+    -------
+    HullBoundary
+        Of the hull of its points.
+    """
     return HullBoundary(body.grid.whole.astype(np.int64), body.grid.centre, body.grid.unit, body.tree.facets)
 
 

@@ -107,6 +107,11 @@ class HierarchicalTree:
     def build(self) -> TreeSize:
         """Make all nodes that are not made yet; their number, depth and bytes.
 
+        Returns
+        -------
+        TreeSize
+            Of the whole tree.
+
         Raises
         ------
         UnsupportedQuery

@@ -392,11 +392,11 @@ def test_tests_a_round_do_not_grow_with_a_degree(kind):
         "degree doubling": lambda n: families.degree_doubling(round(np.log2(n / 3))),
         "moment curve": families.moment_curve,
     }[kind]  # fmt: skip
-    rng = rng_of("tests a round", kind)
+    rng, farthest = rng_of("tests a round", kind), 4.0 if kind == "prism" else 2.5  # it is longer
     means = []
     for n in (800, 6400):
         A, B = collide.ConvexHull(make(n)), collide.ConvexHull(make(n))
-        X_WA = np.array([turned(rng, rng.uniform(0.3, 2.5)) for _ in range(150)])
+        X_WA = np.array([turned(rng, rng.uniform(0.3, farthest)) for _ in range(150)])
         found = collide.walk(A, B, X_WA, EYE[None])
         assert 0.1 < found.hit.mean() < 0.9 and found.walked.all(), (kind, n, found.hit.mean())
         means.append(found.rows["tests"].sum() / found.rows["rounds"].sum())

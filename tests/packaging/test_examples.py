@@ -105,7 +105,7 @@ SHOWS = {
     ],
     "11_meshes_in_scenes": [
         "as it is: [('bracket', 'chip')]",
-        "shell is a surface of 18 facets without an inside (open edges",
+        "shell is a surface of 18 facets without an inside (open",
         "by hulls: [('bracket', 'pin'), ('bracket', 'chip')]",
     ],
 }
