@@ -276,7 +276,8 @@ def _write_reports(made: list, place: str | None) -> None:
 
 
 _COMMANDS: dict[str, Callable] = {
-    "report": _report, "check": _check, "stress": _stress, "locality": lambda args: cli_locality.run(args, _progress(args.quiet)),
+    "report": _report, "check": _check, "stress": _stress,
+    "locality": lambda args: cli_locality.run(args, _progress(args.quiet)),
     "scenes": _scenes, "doctor": _doctor,
     "bench": lambda args: cli_bench.run(args, _progress(getattr(args, "quiet", True))),
     "compare": lambda args: FREE if cli_compare.run(args, _progress(args.quiet)) else YES,
