@@ -180,10 +180,10 @@ def counted(pair: str, name: str, meshes, trees, X_WAs, X_WBs) -> list[dict]:
     """What the walks looked at, a row a question."""
     rows = []
     for question, ask in (("boolean", first_hits), ("all pairs", all_hits), ("distance", surface_distances)):
-        boxes, triangles, exact = ask(*trees, X_WAs, X_WBs).counters.mean(axis=0)
+        nodes, triangles, exact = ask(*trees, X_WAs, X_WBs).counters.mean(axis=0)
         rows.append({
             "meshes": pair, "facets": "/".join(str(len(m[1])) for m in meshes), "poses": name, "question": question,
-            "engine": "collide counters", "boxes": f"{boxes:.1f}", "triangles": f"{triangles:.1f}",
+            "engine": "collide counters", "nodes": f"{nodes:.1f}", "triangles": f"{triangles:.1f}",
             "exact": f"{exact:.2f}",
         })  # fmt: skip
     return rows

@@ -91,7 +91,7 @@ def families(first: tuple, second: tuple, names: tuple[str, ...]) -> list[Row]:
         rows.append({
             "family": family, "cells A": len(A.cells), "cells B": len(arguments[1].cells), "made s": round(made, 2),
             "trees s": round(trees, 2), **{f"{name} s": s for name, s in seconds.items()}, "pairs": len(result.pairs),
-            "pairs of boxes": int(result.counters[0, 1]), "in integers": int(result.counters[0, 2]),
+            "boxes meet": int(result.counters[0, 1]), "in integers": int(result.counters[0, 2]),
             "in fractions": int(result.counters[0, 3]), "sum of volumes": float(result.volumes.sum()),
             "memory MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024,
         })  # fmt: skip

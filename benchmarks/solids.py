@@ -1,4 +1,4 @@
-"""Booleans of two solids beside manifold3d: times, volumes, and pairs of boxes and facets tested.
+"""Booleans of two solids beside manifold3d: times, volumes, nodes compared with a box, and pairs of facets tested.
 
     python benchmarks/solids.py
     # some minutes; needs manifold3d; --sizes 1000 10000 100000, --runs N, --exact N pairs judged in fractions
@@ -68,13 +68,13 @@ def compare(n: int, runs: int) -> None:
             seconds, (made, volume) = processor_time(lambda sign=sign: asked(manifold_a, manifold_b, sign))
             theirs.append(seconds)
         volumes = processor_time(lambda: collide.overlap_volume(A, B, X, Y))[0]
-        boxes, tested = (int(x) for x in collide.facet_pairs(A, B, X, Y).counters[0, :2])
+        nodes, tested = (int(x) for x in collide.facet_pairs(A, B, X, Y).counters[0, :2])
         exact = r.mesh.report.volume
         our_time, peer_time = median(ours), median(theirs)
         print(
             f"{n:8d} {op:13s} {1e3 * our_time:8.1f} {1e3 * peer_time:8.1f} {peer_time / our_time:6.2f}"
             f" {1e3 * volumes:8.1f} {abs(volume - exact) / exact:9.1e} {len(r.mesh.faces):8d} {made.num_tri():8d}"
-            f" {len(r.self_collisions):5d} {r.n_meeting:7d} {r.n_cut:7d} {boxes:8d} {tested:8d}",
+            f" {len(r.self_collisions):5d} {r.n_meeting:7d} {r.n_cut:7d} {nodes:8d} {tested:8d}",
             flush=True,
         )  # fmt: skip
 

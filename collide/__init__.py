@@ -41,6 +41,9 @@ if TYPE_CHECKING:
     from collide.kernels.library import library_path as get_library
     from collide.motion.impact_query import moved_poses, poses_in_motion, time_of_impact
     from collide.motion.impact_rows import TimeOfImpact
+    from collide.partitions.cell_records import CellPlanes, ConvexCells
+    from collide.partitions.portals import Portals
+    from collide.partitions.space_partition import Located, PartitionSize, SpacePartition
     from collide.polytopes.convex_polygon import ConvexPolygon
     from collide.query import collide, distance
     from collide.results import How, PairResult, WorldResult
@@ -66,7 +69,10 @@ if TYPE_CHECKING:
     )
     from collide.shapes.tessellation import tessellate
     from collide.solids.boolean import BooleanResult, boolean
+    from collide.solids.combine import combine
+    from collide.solids.configuration_obstacle import ConfigurationObstacle, configuration_obstacle
     from collide.solids.overlap_volume import OverlapVolume, overlap_volume
+    from collide.solids.planar_obstacle import PlanarObstacle
     from collide.surface_queries.contains import contains
     from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
     from collide.surface_queries.overlay import Overlay, overlay
@@ -102,6 +108,9 @@ _HOMES = {
     "collide.motion.impact_query": ("moved_poses", "poses_in_motion", "time_of_impact"),
     "collide.motion.impact_rows": ("TimeOfImpact",),
     "collide.polytopes.convex_polygon": ("ConvexPolygon",),
+    "collide.partitions.cell_records": ("CellPlanes", "ConvexCells"),
+    "collide.partitions.portals": ("Portals",),
+    "collide.partitions.space_partition": ("Located", "PartitionSize", "SpacePartition"),
     "collide.query": ("collide", "distance"),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robots.certified_edges": ("CertifiedEdges",),
@@ -114,7 +123,10 @@ _HOMES = {
     ),
     "collide.shapes.tessellation": ("tessellate",),
     "collide.solids.boolean": ("BooleanResult", "boolean"),
+    "collide.solids.combine": ("combine",),
+    "collide.solids.configuration_obstacle": ("ConfigurationObstacle", "configuration_obstacle"),
     "collide.solids.overlap_volume": ("OverlapVolume", "overlap_volume"),
+    "collide.solids.planar_obstacle": ("PlanarObstacle",),
     "collide.sweeps.configurations": ("DrawnConfigurations",),
     "collide.sweeps.pair_proposal": ("LinkPair", "Proposal", "propose_disabled_pairs"),
     "collide.sweeps.sweep": ("sweep",),
@@ -134,14 +146,16 @@ _RENAMED = {
 }
 
 __all__ = [
-    "BooleanResult", "Box", "Capsule", "CellOverlaps", "Certificate", "CertificateRefused", "CertifiedEdges",
-    "CollideError", "Compound", "Cone", "Contacts", "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations",
-    "Ellipsoid", "FacetPairs", "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose",
-    "InvalidShape", "LinkPair", "Mesh", "MissingExtra", "OverlapVolume", "Overlay", "PairResult", "Proposal", "RayHits",
-    "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
-    "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits",
-    "WorldResult", "boolean", "certify", "collide", "contacts", "contains", "distance", "facet_pairs", "get_include",
-    "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses_in_motion",
+    "BooleanResult", "Box", "Capsule", "CellOverlaps", "CellPlanes", "Certificate", "CertificateRefused",
+    "CertifiedEdges", "CollideError", "Compound", "Cone", "ConfigurationObstacle", "Contacts", "ConvexCells",
+    "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs", "HPolytope",
+    "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
+    "MissingExtra", "OverlapVolume", "Overlay", "PairResult", "PartitionSize", "PlanarObstacle", "Portals", "Proposal",
+    "RayHits", "Robot", "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts",
+    "ShapeSet", "SpacePartition", "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody",
+    "UnsupportedQuery", "World", "WorldHits", "WorldResult", "boolean", "certify", "collide", "combine",
+    "configuration_obstacle", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library",
+    "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses_in_motion",
     "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "self_overlapping_cells", "shape_cast",
     "sweep", "tessellate", "time_of_impact", "verify", "walk",
 ]

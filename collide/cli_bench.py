@@ -51,9 +51,10 @@ def add_arguments(parser: argparse.ArgumentParser, engines: Callable) -> None:
     pareto.add_argument("--cases", type=count, metavar="N", help="pairs of a class (60; with --quick 12)")
     scaling = actions.add_parser("scaling", help="run time and operations against size, with slopes")
     scaling.add_argument("--sizes", type=_sizes, metavar="N,N", help="vertices of each hull (8 to 32,768)")
-    for action, least in ((pareto, 3.0), (scaling, 2.0)):
+    libraries = "collide, coal, fcl, pybullet"
+    for action, least, default in ((pareto, 3.0, "all that are installed"), (scaling, 2.0, libraries)):
         action.add_argument("--engines", type=engines, metavar="NAMES",
-                            help="engines and settings, commas between (installed ones whose own call is timed)")
+                            help=f"engines and settings, commas between ({default})")
         action.add_argument("--minutes", type=minutes, metavar="M",
                             help=f"about how long to time ({least:g}; with --quick 0.2)")
         action.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds make other pairs (0)")
@@ -128,14 +129,14 @@ def _pareto(args: argparse.Namespace, progress: Callable) -> int:
 def _scaling(args: argparse.Namespace, progress: Callable) -> int:
     from collide.adapters.bench import scaling, scaling_picture
     from collide.adapters.bench.machine_stamp import machine_stamp, write_csv
-    from collide.adapters.bench.pareto import default_engines
+    from collide.adapters.bench.pareto import scaling_engines
     from collide.adapters.bench.pareto_picture import check_picture
 
     places, stamp = _prepared(args, "scaling", check_picture), machine_stamp()
     sizes = args.sizes or (scaling.SIZES[:5] if args.quick else scaling.SIZES)
     with progress("measuring") as rename:
         grown = scaling.measure(
-            args.engines or default_engines(), sizes, minutes=args.minutes or (0.2 if args.quick else 2.0),
+            args.engines or scaling_engines(), sizes, minutes=args.minutes or (0.2 if args.quick else 2.0),
             seed=args.seed, progress=_renamer(rename),
         )  # fmt: skip
     write_csv(places[0], [row for growth in grown for row in growth.rows()], stamp)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 
 from collide.reports.tables import wrapped
 
@@ -10,7 +11,7 @@ from collide.reports.tables import wrapped
 def engines(text: str) -> list[str]:
     """Names separated by commas; "all" is every other engine that is installed, "help" prints the list and ends."""
     if text.strip() == "help":
-        print("\n".join(listing()))
+        print("\n".join(listing(min(100, shutil.get_terminal_size().columns))))
         raise SystemExit(0)
     if text.strip() == "all":
         from collide.adapters.peers.protocol import installed

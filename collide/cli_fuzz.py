@@ -14,7 +14,7 @@ from collide.errors import InvalidArgument
 EPILOG = """examples:
   collide fuzz --engines coal --minutes 10
   collide fuzz --engines fcl,coal,pybullet --minutes 60 --seed 7 --save found
-  collide fuzz --engines fcl,coal,pybullet --minutes 60 --seed 7 --save found --resume
+  collide fuzz --engines fcl,coal,pybullet --save found --seed 7 --resume
   collide compare found/coal-false-miss-box-cylinder-shallow.json --engines coal
   collide fuzz --draw found/coal-*.json --picture plate.png
 

@@ -8,11 +8,11 @@
 #include <string.h>
 
 /* The header of a box-tree (collide/mesh/bvh.py), its numbers, and the most facets that it holds. */
-enum { NODES_AT, TRIANGLES_AT, IDS_AT, TREE_NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT, TREE_INTS };
+enum { NODES_AT, TRIANGLES_AT, IDS_AT, TREE_NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT, HAS_ORIGINS, TREE_INTS };
 enum { CENTRE = 0, CORNER = 3, BALL = 6, TREE_NUMBERS };
 static const size_t MAX_FACETS = (size_t)1 << 28;
 
-typedef char headers_fit[TREE_INTS == 9 && TREE_NUMBERS == 7 ? 1 : -1];
+typedef char headers_fit[TREE_INTS == 10 && TREE_NUMBERS == 7 ? 1 : -1];
 
 /* What `fill_tree` makes. */
 struct filled {
@@ -95,6 +95,7 @@ static void keep(const struct collide_kernels *kernels, struct arena *arena, con
     mesh->tree[TREE_NUMBERS_AT] = address_of(mesh->numbers);
     mesh->tree[N_NODES] = made->n_nodes;
     mesh->tree[N_FACETS] = n_facets;
+    mesh->tree[HAS_ORIGINS] = 0;
     kernels->fill_slabs(address_of(mesh->tree), mesh->tree[SLABS_AT], address_of(work));
 }
 

@@ -31,6 +31,8 @@ TOUCHING = 1e-12
 MIN_ROUNDS, MAX_ROUNDS = 3, 25
 #: How long an engine may take for one answer [s], and for one turn through a class.
 ANSWER_TIMEOUT, TURN_TIMEOUT = 3.0, 20.0
+#: Engines whose times are fitted against the size of hulls.
+LIBRARIES = ("collide", "coal", "fcl", "pybullet")
 #: The engine that ratios are taken against.
 REFERENCE = "collide"
 
@@ -95,6 +97,11 @@ def default_engines() -> list[str]:
     """
     names = [name for name, spec in ENGINES.items() if has_prepared_call(name) and not load_engine(spec).missing()]
     return [name for k, name in enumerate([*names[:1], BATCH, *names[1:]]) if k < 2 or name != BATCH]
+
+
+def scaling_engines() -> list[str]:
+    """Of those the collision libraries, which take hulls of any size as they are."""
+    return [name for name in default_engines() if name.partition(":")[0] in LIBRARIES]
 
 
 def check_engines(names: list[str]) -> None:

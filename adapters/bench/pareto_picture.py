@@ -21,8 +21,13 @@ FLOOR = 1e-18
 CEILING = 10.0
 #: Where points without any error stand: booleans alone.
 NO_ERROR = 1e3
-#: Okabe and Ito's colours, told apart by all; one an engine, settings by markers.
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6000", "#555555")
+#: Okabe and Ito's colours, told apart by all, and three more; one an engine, settings by markers.
+_COLOURS = (
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6000", "#555555", "#A020F0", "#8B0000",
+    "#00CED1",
+)  # fmt: skip
+#: Engines in a panel from which on it is drawn larger, to keep room for names.
+CROWDED = 14
 _MARKERS = "osD^vP*Xh"
 
 
@@ -47,7 +52,9 @@ def draw(points: list[Point], places: list[Path], stamp: dict[str, str]) -> list
     kinds = list(dict.fromkeys(point.kind for point in points))
     columns = min(len(kinds), 3)
     lines = -(-len(kinds) // columns)
-    figure = Figure(figsize=(5.4 * columns, 4.6 * lines + 0.9), layout="constrained", facecolor="white")
+    stretch = 1.0 if len({point.engine for point in points}) < CROWDED else 1.45
+    size = 5.4 * stretch * columns, 4.6 * stretch * lines + 0.9
+    figure = Figure(figsize=size, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     panels = figure.subplots(lines, columns, squeeze=False).ravel()
     styles = styles_of([point.engine for point in points])

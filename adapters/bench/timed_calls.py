@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 import collide
+from collide.adapters.bench import engine_calls
 from collide.adapters.peers.protocol import Peer
 from collide.adapters.peers.pybullet_peer import quaternion_xyzw
 from collide.errors import CollideError, UnsupportedQuery
@@ -29,6 +30,7 @@ WHAT_IS_TIMED = {
     "fcl": "fcl.distance and its result, which cannot be cleared: objects and request are kept",
     "fcl:indep": "fcl.collide with contacts and its result: objects and request are kept",
     "pybullet": "two poses set and getClosestPoints: bodies are kept, all else is handed over at each call",
+    **engine_calls.WHAT_IS_TIMED,
 }
 ADAPTER = "the adapter's ask: the engine's call with Python's work around it"
 
@@ -122,4 +124,9 @@ def _pybullet(peer: Any, A: Any, X_WA: np.ndarray, B: Any, X_WB: np.ndarray) -> 
     return call
 
 
-_CALLS: dict[str, Callable[..., Callable[[], Any]]] = {"coal": _coal, "fcl": _fcl, "pybullet": _pybullet}
+_CALLS: dict[str, Callable[..., Callable[[], Any]]] = {
+    "coal": _coal, "fcl": _fcl, "pybullet": _pybullet,
+    "mujoco": engine_calls.mujoco_call, "drake": engine_calls.drake_call, "trimesh": engine_calls.trimesh_call,
+    "rapier": engine_calls.rapier_call, "distance3d": engine_calls.distance3d_call,
+    "newton": engine_calls.newton_call, "cgal": engine_calls.cgal_call,
+}  # fmt: skip

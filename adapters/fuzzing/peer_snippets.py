@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from collide import distance
-from collide.adapters.fuzzing import library_snippets, simulator_snippets
+from collide.adapters.fuzzing import library_snippets, pair_snippets, simulator_snippets
 from collide.adapters.fuzzing.disagreements import WRONG_POINTS, Flaw
 from collide.adapters.fuzzing.fuzz_case import Case
 from collide.adapters.fuzzing.proofs import expected_text
@@ -26,6 +26,8 @@ FORMS: dict[str, Callable[[Asked], list[str]]] = {
     "fcl": library_snippets.fcl_lines, "coal": library_snippets.coal_lines, "trimesh": library_snippets.trimesh_lines,
     "pybullet": simulator_snippets.pybullet_lines, "mujoco": simulator_snippets.mujoco_lines,
     "drake": simulator_snippets.drake_lines, "rapier": simulator_snippets.rapier_lines,
+    "distance3d": pair_snippets.distance3d_lines, "newton": pair_snippets.newton_lines,
+    "cgal": pair_snippets.cgal_lines,
 }  # fmt: skip
 
 

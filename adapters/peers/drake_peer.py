@@ -77,7 +77,8 @@ class DrakePeer(PairwisePeer):
             raise
 
     def _asked(self, A, X_WA, B, X_WB) -> Reply:
-        _alive, query, ids = _scene(A, X_WA, B, X_WB)
+        scene, context, _poses, _frames, ids = scene_of(A, X_WA, B, X_WB)
+        query = scene.get_query_output_port().Eval(context)
         if self.values.get("penetration"):
             pairs = query.ComputePointPairPenetration()
             if not pairs:
@@ -96,8 +97,8 @@ class DrakePeer(PairwisePeer):
         return Reply(hit, pair.distance, tuple(-pair.nhat_BA_W), point_a, point_b)
 
 
-def _scene(A, X_WA: np.ndarray, B, X_WB: np.ndarray):
-    """What must stay alive, the query object of its two geometries, and their ids."""
+def scene_of(A, X_WA: np.ndarray, B, X_WB: np.ndarray):
+    """A SceneGraph of two geometries, its context, the port that takes their poses, the poses, and their ids."""
     from pydrake import geometry
 
     scene = geometry.SceneGraph()
@@ -111,8 +112,9 @@ def _scene(A, X_WA: np.ndarray, B, X_WB: np.ndarray):
         ids.append(scene.RegisterGeometry(source, frame, instance))
         frames.set_value(frame, X_WG)
     context = scene.CreateDefaultContext()
-    scene.get_source_pose_port(source).FixValue(context, frames)
-    return (scene, context), scene.get_query_output_port().Eval(context), tuple(ids)
+    poses = scene.get_source_pose_port(source)
+    poses.FixValue(context, frames)
+    return scene, context, poses, frames, tuple(ids)
 
 
 def rigid_transform(X: np.ndarray):

@@ -25,5 +25,12 @@ ENGINES = {
     "rapier": f"{_HERE}.rapier_peer:RapierPeer",
     "rapier:cast": f"{_HERE}.rapier_peer:RapierPeer:cast",
     "rapier:nonlinear": f"{_HERE}.rapier_peer:RapierPeer:nonlinear",
+    "distance3d": f"{_HERE}.distance3d_peer:Distance3dPeer",
+    "distance3d:original": f"{_HERE}.distance3d_peer:Distance3dPeer:original",
+    "distance3d:nesterov": f"{_HERE}.distance3d_peer:Distance3dPeer:nesterov",
+    "distance3d:epa": f"{_HERE}.distance3d_peer:Distance3dPeer:epa",
+    "distance3d:mpr": f"{_HERE}.distance3d_peer:Distance3dPeer:mpr",
+    "newton": f"{_HERE}.newton_peer:NewtonPeer",
+    "cgal": f"{_HERE}.cgal_peer:CgalPeer",
     "exact": f"{_HERE}.exact_peer:ExactPeer",
 }

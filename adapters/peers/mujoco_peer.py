@@ -79,12 +79,12 @@ class MujocoPeer(PairwisePeer):
 
         if A[0]["type"] == B[0]["type"] == mujoco.mjtGeom.mjGEOM_PLANE:
             raise UnsupportedQuery("MuJoCo has no contact of two planes")
-        model = self._model(((A, X_WA), (B, X_WB)))
+        model = self.model(((A, X_WA), (B, X_WB)))
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         if self.values.get("distance"):
             fromto = np.zeros(6)
-            distance = mujoco.mj_geomDistance(model, data, 0, 1, _farthest(A, X_WA, B, X_WB), fromto)
+            distance = mujoco.mj_geomDistance(model, data, 0, 1, farthest(A, X_WA, B, X_WB), fromto)
             point_a, point_b = fromto[:3], fromto[3:]
             return Reply(distance <= 0, distance, along(point_b - point_a, distance), tuple(point_a), tuple(point_b))
         mujoco.mj_collision(model, data)
@@ -96,7 +96,7 @@ class MujocoPeer(PairwisePeer):
         step_AB = normal * distance
         return Reply(True, float(distance), tuple(normal), tuple(middle - step_AB / 2), tuple(middle + step_AB / 2))
 
-    def _model(self, sides):
+    def model(self, sides):
         """A compiled model of two bodies at rest, with one explicit pair of geoms 0 and 1."""
         import mujoco
 
@@ -122,7 +122,7 @@ class MujocoPeer(PairwisePeer):
             raise UnsupportedQuery(f"MuJoCo compiles no such mesh: {str(error).splitlines()[0]}") from None
 
 
-def _farthest(A, X_WA: np.ndarray, B, X_WB: np.ndarray) -> float:
+def farthest(A, X_WA: np.ndarray, B, X_WB: np.ndarray) -> float:
     """A distance that the two bodies surely do not exceed [m]: libccd loses digits where it is larger."""
     reach = sum(
         float(np.sum(geom["size"]) if points is None else np.linalg.norm(points, axis=1).max())

@@ -45,7 +45,7 @@ class RapierPeer(PairwisePeer):
     cannot = _CANNOT
     settings = {
         "cast": Setting(
-            "cast_shape of B along its own manifold's normal: a hit starts in contact, a gap is a time of impact",
+            "cast_shape of B along its own manifold's normal: a hit starts in contact or at time 0, a gap is a time",
             {"cast": "cast_shape"}, cannot=(_NO_DEPTH, *_CANNOT),
         ),
         "nonlinear": Setting(
@@ -108,9 +108,9 @@ class RapierPeer(PairwisePeer):
             hit = _starts_in_contact(cast, A, B, places) if cast else _intersect(A, B, places)
             return Reply(hit, note="boolean only: no distance of meshes is asked of Rapier")
         if cast:
-            return _gap_by_cast(cast, A, B, places, _farthest(A, X_WA, B, X_WB))
+            return _gap_by_cast(cast, A, B, places, farthest(A, X_WA, B, X_WB))
         hit = _intersect(A, B, places)
-        deepest = _deepest(A, B, places, _farthest(A, X_WA, B, X_WB))
+        deepest = _deepest(A, B, places, farthest(A, X_WA, B, X_WB))
         if deepest is None:
             return Reply(hit, math.inf)  # that is what no contact within any distance says
         distance, normal, p_Aq, p_Bq = deepest
@@ -195,15 +195,18 @@ def _cast(kind: str, A, B, places, velocity, reach: float):
 
 def _starts_in_contact(kind: str, A, B, places) -> bool:
     """Whether a cast along z starts in contact, as Rapier says it."""
+    impact = _cast(kind, A, B, places, (0.0, 0.0, 1.0), 1e-30)
+    return bool(impact) and _is_contact(impact)
+
+
+def _is_contact(impact) -> bool:
+    """Whether a cast starts in contact: Rapier says so, or it meets at the time 0."""
     import rapier3d
 
-    impact = _cast(kind, A, B, places, (0.0, 0.0, 1.0), 1e-30)
-    return bool(impact) and impact[1] == rapier3d.ShapeCastStatus.PENETRATING_OR_WITHIN_TARGET_DIST
+    return impact[0] == 0.0 or impact[1] == rapier3d.ShapeCastStatus.PENETRATING_OR_WITHIN_TARGET_DIST
 
 
 def _gap_by_cast(kind: str, A, B, places, reach: float) -> Reply:
-    import rapier3d
-
     deepest = _deepest(A, B, places, reach)
     if deepest is None:
         raise UnsupportedQuery("no manifold, so no direction to cast along")
@@ -211,7 +214,7 @@ def _gap_by_cast(kind: str, A, B, places, reach: float) -> Reply:
     impact = _cast(kind, A, B, places, [-x for x in normal], reach)
     if impact is None:
         return Reply(False, math.inf, normal, note="cast towards each other, they never meet")
-    if impact[1] == rapier3d.ShapeCastStatus.PENETRATING_OR_WITHIN_TARGET_DIST:
+    if _is_contact(impact):
         return Reply(True, note="boolean only: the cast starts in contact")
     return Reply(False, float(impact[0]), normal)
 
@@ -222,7 +225,7 @@ def unit(vector) -> tuple:
     return tuple(np.asarray(vector) / length) if length > 0 else (math.nan,) * 3
 
 
-def _farthest(A, X_WA: np.ndarray, B, X_WB: np.ndarray) -> float:
+def farthest(A, X_WA: np.ndarray, B, X_WB: np.ndarray) -> float:
     """A distance that the two bodies surely do not exceed [m]; a half-space is as far as its plane."""
     between = float(np.linalg.norm(X_WA[:3, 3] - X_WB[:3, 3]))
     return 1.01 * (between + sum(rapier_reach(part) for _, _, part in (A, B)))

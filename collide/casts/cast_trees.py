@@ -16,7 +16,7 @@ from collide.casts.portal import BEHIND, HIT, MISS, OPEN, cast_line
 from collide.casts.silhouette import CAST_DOUBLES, CAST_INTEGERS, open_cast
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_SLOP, RADIUS, REACH
-from collide.mesh.bvh import CENTRE, EXPONENT, WIDTH, box_at, link_of, open_tree
+from collide.mesh.bvh import CENTRE, EXPONENT, NODE, WIDTH, box_at, link_of, open_tree
 from collide.mesh.bvh import REACH as TREE_REACH
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.gjk.minkowski_difference import POINT_OF_A, difference_point
@@ -198,10 +198,10 @@ def _inverted(x, step):
 @kernel(inline=True)
 def _entry_of(sweep, a, b, ref_a, ref_b, has_tree_a, best):
     """t at which the box of A behind a reference comes to that of B, from below; infinite for later than ``best``."""
-    box = box_at(b.boxes, ref_b)
+    box = box_at(b, ref_b)
     middle, half = sweep.middle, sweep.half
     if has_tree_a:
-        of_a = box_at(a.boxes, ref_a)
+        of_a = box_at(a, ref_a)
         rotation = sweep.rotation
         middle = add(sweep.shift, apply(rotation, of_a.centre))
         half = Vec3(
@@ -261,7 +261,7 @@ def _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top):
     link_b = link_of(b.links, ref_b)
     opens_a = link_a >= 0
     if opens_a and link_b >= 0:
-        of_a, of_b = box_at(a.boxes, ref_a).half, box_at(b.boxes, ref_b).half
+        of_a, of_b = box_at(a, ref_a).half, box_at(b, ref_b).half
         rotation = sweep.rotation
         size_a = dot(absolute(rotation.x), of_a) + dot(absolute(rotation.y), of_a) + dot(absolute(rotation.z), of_a)
         opens_a = size_a > of_b.x + of_b.y + of_b.z
@@ -269,9 +269,9 @@ def _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top):
     for slot in range(WIDTH):
         child_a = WIDTH * link_a + slot if opens_a else ref_a
         child_b = ref_b if opens_a else WIDTH * link_b + slot
-        tree = a.boxes if opens_a else b.boxes
-        child = child_a if opens_a else child_b
-        if not box_at(tree, child).half.x >= 0.0:
+        boxes = a.boxes if opens_a else b.boxes
+        node = link_a if opens_a else link_b
+        if not boxes[NODE * node + 3 * WIDTH + slot] >= 0.0:
             continue
         key = _entry_of(sweep, a, b, child_a, child_b, has_tree_a, best)
         if key < math.inf:

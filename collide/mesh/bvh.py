@@ -6,6 +6,10 @@ box, that of the whole mesh. A slot that is not used has a half length of −1e3
 
 Boxes are held relative to ``centre`` and in units of 2^exponent, rounded outwards: floats are then as good for
 a mesh of microns far from its origin as for one of kilometres. Triangles are the doubles given, unrounded.
+
+Where that is too coarse, since details are small beside the whole mesh (`fine_boxes.py`), the boxes of a tree are held
+relative to an *origin* of their node (``has_origins``). It stands in the lowest bytes of the node's half lengths, four
+for each coordinate, so that a node is as large as without.
 """
 
 from __future__ import annotations
@@ -18,7 +22,7 @@ import numpy as np
 
 from collide.fork_safe_lock import ForkSafeLock
 from collide.kernels import address_of, kernel, view_f32, view_f64, view_i32, view_i64
-from collide.numerics.vec3 import Vec3
+from collide.numerics.vec3 import Vec3, add
 
 #: Boxes of a node, and its words: six floats a box and a link.
 WIDTH = 8
@@ -27,14 +31,16 @@ NODE = 7 * WIDTH
 SLAB = 5 * WIDTH
 #: Half length of a slot that is not used.
 NOTHING = -1e30
+#: An origin is so many times a whole number of 32 bits along each axis.
+ORIGIN_STEP = 2.0**-30
 #: Triangles of a leaf at most: three bits of a link hold their number.
 MAX_LEAF = 7
 #: Facets of a mesh at most: a leaf's link holds its first triangle in 28 bits.
 MAX_FACETS = 1 << 28
 
 # Header that kernels read: integers, and the address of the numbers.
-NODES_AT, TRIANGLES_AT, IDS_AT, NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT = range(9)
-INTS = 9
+NODES_AT, TRIANGLES_AT, IDS_AT, NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT, HAS_ORIGINS = range(10)
+INTS = 10
 # Numbers: centre (3), largest |coordinate| of the triangles by axis (3), radius of a ball around the centre.
 CENTRE, REACH, RADIUS = 0, 3, 6
 NUMBERS = 7
@@ -49,22 +55,23 @@ class MeshTree:
     centre, exponent : what boxes are relative to [m], and their unit as a power of two.
     depth : nodes on the longest way down.
     address : of the header that kernels take; valid as long as this object lives.
+    has_origins : whether boxes are relative to an origin of their node.
     content : digest of triangles and their numbers: it orders the bodies of a pair.
     """
 
-    def __init__(self, nodes, triangles, ids, centre, exponent: int, depth: int):
+    def __init__(self, nodes, triangles, ids, centre, exponent: int, depth: int, has_origins: bool = False):
         self.nodes = np.ascontiguousarray(nodes, dtype=np.int32)
         self.triangles = np.ascontiguousarray(triangles, dtype=np.float64)
         self.ids = np.ascontiguousarray(ids, dtype=np.int32)
         self.centre = np.array(centre, dtype=np.float64)
-        self.exponent, self.depth = int(exponent), int(depth)
+        self.exponent, self.depth, self.has_origins = int(exponent), int(depth), bool(has_origins)
         self._check_structure()
         corners = np.abs(self.triangles).reshape(-1, 3)
         self.numbers = np.concatenate([self.centre, corners.max(axis=0), [self._radius()]])
         self.header = np.array(
             [
                 address_of(self.nodes), address_of(self.triangles), address_of(self.ids), address_of(self.numbers),
-                len(self.nodes), len(self.ids), self.depth, self.exponent, 0,
+                len(self.nodes), len(self.ids), self.depth, self.exponent, 0, self.has_origins,
             ],
             dtype=np.int64,
         )  # fmt: skip
@@ -75,7 +82,8 @@ class MeshTree:
             part.flags.writeable = False
 
     def __reduce__(self):
-        return MeshTree, (self.nodes, self.triangles, self.ids, self.centre, self.exponent, self.depth)
+        parts = self.nodes, self.triangles, self.ids, self.centre, self.exponent, self.depth, self.has_origins
+        return MeshTree, parts
 
     @property
     def content(self) -> bytes:
@@ -100,23 +108,31 @@ class MeshTree:
         parts = (self.nodes, self.triangles, self.ids, self.numbers, self.header, self._slabs)
         return sum(part.nbytes for part in parts if part is not None)
 
-    def boxes(self) -> tuple[np.ndarray, np.ndarray]:
-        """(centres, half lengths), both (k, 8, 3) float64, in the tree's units."""
-        floats = self.nodes[:, : 6 * WIDTH].view(np.float32).reshape(-1, 6, WIDTH).astype(np.float64)
-        return floats[:, :3].transpose(0, 2, 1), floats[:, 3:].transpose(0, 2, 1)
+    def boxes(self, nodes=slice(None)) -> tuple[np.ndarray, np.ndarray]:
+        """(centres, half lengths) of all nodes or of some, both (k, 8, 3) float64, in units, from the tree's centre."""
+        floats = self.nodes[nodes, : 6 * WIDTH].view(np.float32).reshape(-1, 6, WIDTH).astype(np.float64)
+        return floats[:, :3].transpose(0, 2, 1) + self.origins(nodes)[:, None], floats[:, 3:].transpose(0, 2, 1)
+
+    def origins(self, nodes=slice(None)) -> np.ndarray:
+        """(k, 3) what the boxes of all nodes or of some are relative to, in units, from the tree's centre."""
+        words = self.nodes[nodes, 3 * WIDTH : 6 * WIDTH].reshape(-1, 3, WIDTH)
+        if not self.has_origins:
+            return np.zeros(words.shape[:2])
+        low_bytes = (words[:, :, :4] & 0xFF).astype(np.uint8)
+        return np.ascontiguousarray(low_bytes).view("<i4")[:, :, 0] * ORIGIN_STEP
 
     def links(self) -> np.ndarray:
         """(k, 8) links; those of unused slots are 0."""
         return self.nodes[:, 6 * WIDTH :]
 
-    def used(self) -> np.ndarray:
-        """(k, 8) whether a slot holds a box."""
-        return self.nodes[:, 3 * WIDTH : 4 * WIDTH].copy().view(np.float32) > NOTHING / 2
+    def used(self, nodes=slice(None)) -> np.ndarray:
+        """(k, 8) whether a slot holds a box, of all nodes or of some."""
+        return self.nodes[nodes, 3 * WIDTH : 4 * WIDTH].copy().view(np.float32) > NOTHING / 2
 
     def _radius(self) -> float:
         """Of a ball around the centre that holds the box of the whole mesh."""
-        box = self.nodes[0, : 6 * WIDTH].view(np.float32)[::WIDTH].astype(np.float64)
-        return math.ldexp(math.hypot(*(abs(box[:3]) + box[3:])), self.exponent) * (1 + 2.0**-50)
+        centres, half_lengths = self.boxes([0])
+        return math.ldexp(math.hypot(*(abs(centres[0, 0]) + half_lengths[0, 0])), self.exponent) * (1 + 2.0**-50)
 
     def _check_structure(self) -> None:
         """Everything that a kernel relies on to stay inside the arrays and to come to an end."""
@@ -195,10 +211,30 @@ def float_column_at(values, at):
 
 
 @kernel(inline=True)
-def box_at(boxes, ref):
+def box_at(tree, ref):
     """The box behind a reference, which is the number of its node times 8 plus its slot."""
     at = NODE * (ref >> 3) + (ref & 7)
-    return Box(float_column_at(boxes, at), float_column_at(boxes, at + 3 * WIDTH))
+    boxes = tree.boxes
+    centre = Vec3(np.float64(boxes[at]), np.float64(boxes[at + WIDTH]), np.float64(boxes[at + 2 * WIDTH]))
+    if tree.header[HAS_ORIGINS] != 0:
+        centre = add(origin_of(tree.links, ref >> 3), centre)
+    return Box(centre, float_column_at(tree.boxes, at + 3 * WIDTH))
+
+
+@kernel
+def origin_of(links, node):
+    """What a node's boxes are relative to, from the tree's centre, in a tree that has origins."""
+    at = NODE * node + 3 * WIDTH
+    return Vec3(_number_in(links, at), _number_in(links, at + WIDTH), _number_in(links, at + 2 * WIDTH))
+
+
+@kernel
+def _number_in(words, at):
+    """The number in the lowest bytes of four words."""
+    number = 0
+    for k in range(4):
+        number |= (int(words[at + k]) & 0xFF) << (8 * k)
+    return ORIGIN_STEP * (number - ((number >> 31) << 32))
 
 
 @kernel(inline=True)

@@ -16,6 +16,7 @@ from collide.kernels import address_of, entry, kernel, view_f32, view_f64
 from collide.mesh.bvh import (
     CENTRE,
     EXPONENT,
+    HAS_ORIGINS,
     N_NODES,
     NODE,
     NOTHING,
@@ -25,6 +26,7 @@ from collide.mesh.bvh import (
     float_column_at,
     link_of,
     open_tree,
+    origin_of,
 )
 from collide.mesh.triangle import range_along, sum_of_normals
 from collide.numerics.vec3 import Vec3, add, divide, dot, max_abs, put_vec3, vec3_at
@@ -36,7 +38,7 @@ _OUTWARD, _SMALLEST = 2.0**-22, 2.0**-120
 def make_slabs(tree: MeshTree) -> np.ndarray:
     """(k, 40) float32: of each node's eight boxes the normals' x, y, z, and the slabs' middles and half widths.
 
-    In the units of the boxes and relative to the tree's centre; rounded outwards. O(m·depth).
+    In the units of the boxes and relative to what they are; rounded outwards. O(m·depth).
     """
     slabs = np.zeros((len(tree.nodes), SLAB), dtype=np.float32)
     work = np.empty(5 * len(tree.nodes))
@@ -62,7 +64,7 @@ def fill_slabs(header_at, slabs_at, work_at):
             total = add(total, normal)
             work[5 * node + 3] = min(work[5 * node + 3], float(first))
             work[5 * node + 4] = max(work[5 * node + 4], float(last))
-            _set_slab(tree, first, last, normal, slabs, SLAB * node + slot)
+            _set_slab(tree, node, first, last, normal, slabs, SLAB * node + slot)
         put_vec3(work, 5 * node, total)
 
 
@@ -78,7 +80,7 @@ def _normals_below(triangles, work, link):
 
 
 @kernel
-def _set_slab(tree, first, last, normal, slabs, at):
+def _set_slab(tree, node, first, last, normal, slabs, at):
     """The slab across a direction around a run of facets."""
     size = max_abs(normal)
     if not size > 1e-280:
@@ -93,6 +95,10 @@ def _set_slab(tree, first, last, normal, slabs, at):
     scale = math.ldexp(1.0, int(-tree.header[EXPONENT]))
     low *= scale
     high *= scale
+    if tree.header[HAS_ORIGINS] != 0:
+        height = dot(float_column_at(slabs, at), origin_of(tree.links, node))
+        low -= height
+        high -= height
     middle = np.float32(0.5 * (low + high))
     half = max(high - float(middle), float(middle) - low)
     slabs[at + 3 * WIDTH] = middle

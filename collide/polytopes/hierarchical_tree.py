@@ -1,11 +1,8 @@
-"""`HierarchicalTree` and `trees_meet`: preprocessed polytopes in R^d, asked whether they meet where they are."""
+"""`HierarchicalTree`: a polytope in R^d, by its points or its half-spaces, preprocessed for `trees_meet`."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,20 +10,18 @@ from numpy.typing import ArrayLike
 from collide.argument_checks import integer
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
-from collide.least_distance.input_rows import InputRows, read_halfspaces, read_points
+from collide.least_distance.input_rows import read_halfspaces, read_points
 from collide.least_distance.interior_point import interior_point
-from collide.least_distance.nearest_pair import nearest_pair
 from collide.least_distance.pair_proposals import Work
-from collide.polytopes.boundary_hull import BITS
-from collide.polytopes.exact_answers import make_meeting
-from collide.polytopes.facet_tree import FacetTree, Sizes
-from collide.polytopes.meeting import MeetingCertificate
+from collide.polytopes.exact_planes import BITS
+from collide.polytopes.facet_tree import FacetTree, Sizes, sizes
+from collide.polytopes.growing_hull import bytes_a_slot
 from collide.polytopes.recentred_polars import recentred_spaces
-from collide.polytopes.relative_pose import Rows, affine_map, as_doubles, homogeneous_integers, inverse, product
-from collide.polytopes.tree_walk import HIT, MISS, OPEN, Grid, Plane, Relative, TreeWalk
+from collide.polytopes.tree_size import TreeSize, most_simplices, predicted_simplices, predicted_size, size_of
+from collide.polytopes.tree_walk import Grid
+from collide.polytopes.whole_tree import build_whole
 
-_UNIT = 2.0**-53
-#: Bytes that the nodes of one tree may take, where nothing is said.
+#: Bytes that one tree may take, where nothing is said.
 MEMORY = 1 << 30
 
 
@@ -39,8 +34,10 @@ class HierarchicalTree:
         The body is their hull, which must have interior [any unit of length].
     normals, offsets : (m, d), (m,) array_like, float64, optional
         The body is {x : normals @ x ≤ offsets}, which must have interior; unbounded is allowed.
+    whole : bool
+        Whether to make all nodes now, as `build` does; else each is made when a query first comes to it.
     memory : int
-        The most bytes that the nodes of the tree may take.
+        The most bytes that the boundary and the nodes of the tree may take.
     limits : Sizes, optional
         ε, net and leaf; chosen by dimension.
 
@@ -52,20 +49,23 @@ class HierarchicalTree:
         What the tree's integers stand for.
     interior : (d,) float64 or None
         Of half-spaces, the point of which they are polars.
+    predicted : TreeSize or None
+        What `build` predicted.
 
     Raises
     ------
     InvalidArgument
         Where both or neither are given, or numbers are not finite, out of range or of the wrong shape.
     UnsupportedQuery
-        Where the body is flat or empty, or nodes would take more than ``memory``.
+        Where the body is flat or empty, or the tree takes more than ``memory``, or is predicted to.
 
     Notes
     -----
     L. Barba and S. Langerman, "Optimal detection of intersections between convex polyhedra" (2015), section 6. The
-    boundary is found at once: as many simplices as the hull has facets, up to n^⌊d/2⌋. Nodes are made when a query
-    first comes to them, and are the same whatever was asked before. All nodes together are n^(⌊d/2⌋ + δ) in the
-    paper, for n faces of all dimensions. Not for several threads at once.
+    boundary has as many simplices as the hull has facets, up to n^⌊d/2⌋; it is not needed where all points fit one
+    leaf. Where the upper bound theorem allows more than ``memory`` holds, their number is predicted first, and a
+    body beyond it is refused. All nodes together are n^(⌊d/2⌋ + δ) in the paper, for n faces of all dimensions.
+    Not for several threads at once.
     """
 
     def __init__(
@@ -74,6 +74,7 @@ class HierarchicalTree:
         *,
         normals: ArrayLike | None = None,
         offsets: ArrayLike | None = None,
+        whole: bool = False,
         memory: int = MEMORY,
         limits: Sizes | None = None,
     ):
@@ -94,7 +95,52 @@ class HierarchicalTree:
         if not 2 <= cloud.shape[1] <= 8:
             raise InvalidArgument(f"HierarchicalTree: 2 ≤ d ≤ 8, got d = {cloud.shape[1]}")
         self.grid = as_grid(cloud)
+        self.memory, self.limits = limit, limits
+        self.predicted: TreeSize | None = None
+        if whole:
+            self._refuse_beyond_memory()
+        self._refuse_large_boundary()
         self.tree = FacetTree(self.grid.whole, limit, limits)
+        if whole:
+            build_whole(self.tree)
+
+    def build(self) -> TreeSize:
+        """Make all nodes that are not made yet; their number, depth and bytes.
+
+        Raises
+        ------
+        UnsupportedQuery
+            Where the tree is predicted to take more than ``memory``, with the bytes predicted, or does.
+        """
+        self._refuse_beyond_memory()
+        build_whole(self.tree)
+        return self.size
+
+    @property
+    def size(self) -> TreeSize:
+        """What was made so far: simplices, nodes, levels, bytes."""
+        return size_of(self.tree)
+
+    def _refuse_beyond_memory(self) -> None:
+        self.predicted = predicted_size(self.grid.whole, self.limits)
+        if self.predicted.n_bytes > self.memory:
+            raise UnsupportedQuery(
+                f"HierarchicalTree: the whole tree is predicted to take {self.predicted.n_bytes:,} bytes "
+                f"({self.predicted.simplices:,} boundary simplices, {self.predicted.nodes:,} nodes), more than "
+                f"memory={self.memory:,}; raise it, or leave whole=False: nodes are then made as queries need them"
+            )
+
+    def _refuse_large_boundary(self) -> None:
+        n, d = self.grid.whole.shape
+        if n <= (self.limits or sizes(d)).leaf or most_simplices(n, d) * bytes_a_slot(d) <= self.memory:
+            return
+        simplices = predicted_simplices(self.grid.whole)
+        if simplices * bytes_a_slot(d) > self.memory:
+            raise UnsupportedQuery(
+                f"HierarchicalTree: the boundary is predicted to have {simplices:,} simplices, "
+                f"{simplices * bytes_a_slot(d):,} bytes while it grows, more than memory={self.memory:,}; raise it, "
+                "or ask polytopes.meets, which needs none"
+            )
 
     @property
     def dimension(self) -> int:
@@ -104,99 +150,6 @@ class HierarchicalTree:
     def __repr__(self) -> str:
         kind = "points" if self.points is not None else "half-spaces"
         return f"HierarchicalTree(<{len(self.grid.points)} {kind} in R^{self.dimension}, {self.tree.n_nodes} nodes>)"
-
-
-@dataclass(frozen=True)
-class TreeMeeting:
-    """Whether two preprocessed bodies meet.
-
-    Attributes
-    ----------
-    hit : bool
-        They have a point in common; touching is a hit.
-    settled : bool
-        Whether the trees left it open (within some 1e-13 of touching) and integers over all rows decided it.
-    certificate : MeetingCertificate or None
-        Where it was asked for: weights of the points and multipliers of the half-spaces, checked by `verify_trees`.
-    planes : tuple of Plane
-        Of a miss found by the trees, O(log n + log m) planes: each has the region on one side, and together they
-        leave out every point of the hull.
-    counters : mapping
-        ``origin_rounds``, ``rounds``, ``simplices_read``, ``net_rows``; of the certificate ``rows_read``.
-    """
-
-    hit: bool
-    settled: bool
-    certificate: MeetingCertificate | None
-    planes: tuple[Plane, ...]
-    counters: Mapping[str, int]
-
-    def __bool__(self) -> bool:
-        return self.hit
-
-
-def trees_meet(
-    A: HierarchicalTree,
-    B: HierarchicalTree,
-    X_WA: ArrayLike | None = None,
-    X_WB: ArrayLike | None = None,
-    *,
-    certificate: bool = True,
-) -> TreeMeeting:
-    """Whether two bodies meet, in O(log n + log m) rounds down their trees.
-
-    Parameters
-    ----------
-    A, B : HierarchicalTree
-        One of points, the other of half-spaces.
-    X_WA : (k, k) array_like, float64, optional
-    X_WB : (k, k) array_like, float64, optional
-        Their poses, k = d + 1: any invertible affine maps, entries taken as exact; the identity by default.
-    certificate : bool
-        Whether to make one: an exact search over all rows, begun with those that the trees found.
-
-    Returns
-    -------
-    TreeMeeting
-
-    Raises
-    ------
-    InvalidArgument
-        Where both are of points or both of half-spaces, or dimensions differ.
-    InvalidPose
-        Where a map is not finite, not affine or not invertible.
-    UnsupportedQuery
-        Where a tree would need more memory than it may take.
-    """
-    if A.points is None:
-        A, B, X_WA, X_WB = B, A, X_WB, X_WA
-    if A.points is None or B.points is not None:
-        raise InvalidArgument("trees_meet: one body must be made from points and the other from half-spaces")
-    if A.dimension != B.dimension:
-        raise InvalidArgument(f"trees_meet: A has {A.dimension} dimensions, B {B.dimension}: give both the same")
-    d = A.dimension
-    X_BA = product(inverse("X_WB", affine_map("X_WB", X_WB, d)), affine_map("X_WA", X_WA, d))
-    X_AB = inverse("X_WA", X_BA)
-    walk = TreeWalk(A.tree, B.tree, B.grid, relative_of(A, B, X_BA, X_AB)).run()
-    counters = {
-        "origin_rounds": walk.origin_rounds, "rounds": walk.rounds, "simplices_read": walk.simplices_read,
-        "net_rows": walk.net_rows,
-    }  # fmt: skip
-    planes = tuple(walk.planes) if walk.status == MISS else ()
-    if walk.status != OPEN and not certificate:
-        return TreeMeeting(walk.status == HIT, False, None, planes, counters)
-    rows = posed_rows(A, B, X_BA)
-    start = walk.points[-2 * (d + 1) :], walk.halfspaces[-2 * (d + 1) :]
-    pair = nearest_pair(rows.points, rows.halfspaces, Work(), start=start)
-    meeting = make_meeting(pair, rows, {})
-    if walk.status != OPEN and meeting.hit != (walk.status == HIT):
-        raise AssertionError(f"trees_meet: the trees say {walk.status}, the exact search hit={meeting.hit}")
-    counters["rows_read"] = rows.points.n_read + rows.halfspaces.n_read
-    proof = meeting.certificate if certificate else None
-    return TreeMeeting(meeting.hit, walk.status == OPEN, proof, planes, counters)
-
-
-# --- grids, poses -----------------------------------------------------------------------------------------------------
 
 
 def as_grid(points: np.ndarray) -> Grid:
@@ -222,49 +175,3 @@ def _polars(normals: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.nd
         if inside is not None and spaces is not None:
             return inside, spaces[1].points.values
     raise UnsupportedQuery("HierarchicalTree: the half-spaces have no interior in common; ask polytopes.meets")
-
-
-def relative_of(A: HierarchicalTree, B: HierarchicalTree, X_BA: Rows, X_AB: Rows) -> Relative:
-    """The relative pose on grids, with what rounding may do."""
-    d, grid, polar = A.dimension, A.grid, B.grid
-    assert B.interior is not None
-    inside = [Fraction(x) for x in B.interior.tolist()]
-    centre = [Fraction(x) for x in grid.centre.tolist()]
-    M = as_doubles(X_BA)[:d, :d]
-    a = np.array([
-        float(sum((x * y for x, y in zip(row, centre)), row[d]) - c) for row, c in zip(X_BA[:d], inside)
-    ])  # fmt: skip
-    unit = Fraction(grid.unit)
-    o = np.array([
-        float((sum((x * y for x, y in zip(row, inside)), row[d]) - c) / unit) for row, c in zip(X_AB[:d], centre)
-    ])  # fmt: skip
-    map_of_unit = M * grid.unit
-    size = float((np.abs(map_of_unit).sum(axis=1) * A.tree.reach + np.abs(a)).max())
-    shift = float(np.abs(map_of_unit).sum(axis=1).max())  # what a point is off by
-    largest = float(np.abs(polar.points).max())
-    eta = 4.0 * d * (size * (polar.unit + 16.0 * _UNIT * largest) + largest * (shift + 32.0 * d * _UNIT * size))
-    zeta = 64.0 * d * _UNIT * (float(np.abs(o).max()) + A.tree.reach) + 4.0 * d
-    return Relative(map_of_unit, a, o, eta, zeta)
-
-
-def posed_rows(A: HierarchicalTree, B: HierarchicalTree, X_BA: Rows) -> InputRows:
-    """All points in the frame of B and all half-spaces, with exact integers behind them."""
-    points, normals, offsets = A.points, B.normals, B.offsets
-    assert points is not None and normals is not None and offsets is not None
-    d, whole, doubles = A.dimension, homogeneous_integers(X_BA), as_doubles(X_BA)
-    values = points @ doubles[:d, :d].T + doubles[:d, d]
-    size = float((np.abs(points).max(axis=0) @ np.abs(doubles[:d, :d]).T + np.abs(doubles[:d, d])).max())
-    magnitude = float(np.abs(values).max()) or 1.0
-
-    def point(row: int) -> list[int]:
-        numerators, denominator = as_integers(points[row].tolist())
-        vector = [*numerators, denominator]
-        return [sum(x * y for x, y in zip(line, vector)) for line in whole]
-
-    def halfspace(row: int) -> list[int]:
-        return as_integers([*normals[row].tolist(), float(offsets[row])])[0]
-
-    error = (2 * d + 6) * _UNIT * max(size / magnitude, 1.0)
-    return InputRows(
-        HomogeneousRows(values, 1.0, point, error), HomogeneousRows(normals, offsets, halfspace), 0, normals
-    )

@@ -8,26 +8,14 @@ boundary, so that d half-spaces do for each of the text's d + 1.)
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 #: Normals spanning less than this, relative to their lengths, make no cone.
 _FLAT = 1e-13
 
 
-class Cones(NamedTuple):
-    """The cones at one vertex.
-
-    facets : (c, d) integers, rows of planes.   inverses : (c, d, d), g ↦ its coefficients in the d normals.
-    """
-
-    facets: np.ndarray
-    inverses: np.ndarray
-
-
-def cones_at(vertex: int, facets: np.ndarray, planes: np.ndarray) -> Cones:
-    """The normal cone at a vertex as simplicial cones.
+def cones_at(vertex: int, facets: np.ndarray, planes: np.ndarray) -> np.ndarray:
+    """The normal cone at a vertex as simplicial cones: (c, d) rows of planes.
 
     Parameters
     ----------
@@ -43,11 +31,15 @@ def cones_at(vertex: int, facets: np.ndarray, planes: np.ndarray) -> Cones:
     names = np.unique(local)
     others = np.searchsorted(names, local[local != vertex].reshape(len(local), -1))  # the link, with small numbers
     cones = at[simplices_of_dual(others)]
-    d = planes.shape[1] - 1
-    normals = planes[cones, :d]
+    normals = planes[cones, :-1]
     sizes = np.prod(np.linalg.norm(normals, axis=2), axis=1)
-    solid = np.abs(np.linalg.det(normals)) > _FLAT * sizes
-    return Cones(cones[solid], np.linalg.inv(normals[solid]).transpose(0, 2, 1))
+    return cones[np.abs(np.linalg.det(normals)) > _FLAT * sizes].astype(np.int32)
+
+
+def coefficients_in(cones: np.ndarray, planes: np.ndarray, g: np.ndarray) -> np.ndarray:
+    """(c, d): a vector as combinations of the normals of cones; all ≥ 0 in a cone that holds it."""
+    normals = planes[cones, :-1].transpose(0, 2, 1)
+    return np.linalg.solve(normals, np.broadcast_to(g[:, None], (len(cones), len(g), 1)))[:, :, 0]
 
 
 def simplices_of_dual(link: np.ndarray) -> np.ndarray:

@@ -23,6 +23,8 @@ import numpy as np
 from collide.least_distance.homogeneous_rows import HomogeneousRows
 from collide.least_distance.pair_proposals import Work, propose_pair
 from collide.polytopes.facet_tree import FacetTree, Node, apex_height
+from collide.polytopes.ray_exit import ray_exit
+from collide.polytopes.shell_cones import coefficients_in
 
 HIT, MISS, OPEN = "hit", "miss", "open"
 #: Coefficients above this are no less than 0 but for rounding, relative to the largest.
@@ -58,7 +60,7 @@ class Relative(NamedTuple):
 
 
 class Plane(NamedTuple):
-    """z = Σ multipliers·w of some rows of Q; R is in {x : ⟨z, x⟩ ≤ Σ multipliers}."""
+    """Σ multipliers·rows ≤ Σ multipliers·offsets: in a walk of rows w of Q, ⟨z, x⟩ ≤ Σ multipliers, which R is in."""
 
     rows: tuple[int, ...]
     multipliers: tuple[float, ...]
@@ -67,6 +69,7 @@ class Plane(NamedTuple):
 class Walk(NamedTuple):
     """status : HIT, MISS or OPEN.   planes : of a miss, those that leave out the boundary of P; else those so far.
 
+    origin_planes : (a, b) on the grid of P: the origin is beyond each, and every boundary simplex of P below one.
     origin_rounds : rounds on P's tree for the origin; rounds : those of two nets.
     points, halfspaces : rows that the nets' answers were made of.
     simplices_read : shell cones looked at.   net_rows : rows of nets that were looked at.
@@ -74,6 +77,7 @@ class Walk(NamedTuple):
 
     status: str
     planes: list[Plane]
+    origin_planes: list[tuple[float, ...]]
     origin_rounds: int
     rounds: int
     points: list[int]
@@ -99,6 +103,7 @@ class TreeWalk:
         self.hull_tree, self.polar_tree, self.polar_grid, self.relative = hull_tree, polar_tree, polar_grid, relative
         self.work = Work()
         self.planes: list[Plane] = []
+        self.origin_planes: list[tuple[float, ...]] = []
         self.points: list[int] = []
         self.halfspaces: list[int] = []
         self.origin_rounds = self.rounds = self.simplices_read = self.net_rows = 0
@@ -109,8 +114,8 @@ class TreeWalk:
         if status == MISS:
             status = self.compare()
         return Walk(
-            status, self.planes, self.origin_rounds, self.rounds, self.points, self.halfspaces, self.simplices_read,
-            self.net_rows,
+            status, self.planes, self.origin_planes, self.origin_rounds, self.rounds, self.points, self.halfspaces,
+            self.simplices_read, self.net_rows,
         )  # fmt: skip
 
     # --- the origin ---------------------------------------------------------------------------------------------------
@@ -118,32 +123,37 @@ class TreeWalk:
     def locate_origin(self) -> str:
         """HIT where the origin is in P, MISS where it is not.
 
-        A plane of a net's hull that the origin is beyond parts the net from the ray on which the origin leaves P's
-        first simplex. The ray is unbounded, so that it is not inside P: it meets P on the boundary, or not at all.
+        A plane that parts the origin from a net parts the net from the ray on which the origin goes away from a point
+        of the net. The ray is unbounded, so that it is not inside P: it meets P on the boundary, or not at all.
         """
         o, zeta, tree = self.relative.o, self.relative.zeta, self.hull_tree
-        centre = tree.points[tree.first].mean(axis=0)
+        ray = o - tree.centre
         node: Node | None = tree.root
         while node is not None:
             self.origin_rounds += 1
-            planes = node.hull.planes
-            self.net_rows += len(planes)
-            heights = planes[:, :-1] @ o - planes[:, -1]
-            if heights.max() < -zeta:
-                return HIT
-            depths = planes[:, -1] - planes[:, :-1] @ centre
-            plane = int(np.argmax(heights / np.maximum(depths, 1e-300)))
-            if heights[plane] <= 2.0 * zeta:
+            rows = np.concatenate((tree.first, node.rows))
+            self.net_rows += len(rows)
+            points = tree.points[rows]
+            leaving = ray_exit(points - tree.centre, np.arange(len(tree.first)), ray) if ray.any() else None
+            if leaving is None:
                 return OPEN
+            error = float(np.abs(leaving.weights @ (points[leaving.rows] - tree.centre) - ray).max()) + zeta
+            if error <= (1.0 - float(leaving.weights.sum())) * tree.inner_radius:
+                return HIT
+            a = leaving.normal / np.abs(leaving.normal).max()
+            top, height = float((points @ a).max()), float(a @ o)
+            if height - top <= 8.0 * zeta:
+                return OPEN
+            middle = (top + height) / 2.0
+            self.origin_planes.append((*a.tolist(), middle))
             if node.is_leaf:
                 return MISS
-            vertex = int(node.hull.facets[plane, 0])
-            cones = tree.cones(node, vertex)
-            self.simplices_read += len(cones.facets)
-            holds = np.flatnonzero((cones.facets == plane).any(axis=1))
-            if not len(holds):
+            child = self._go_down(tree, node, a, middle - zeta)
+            if isinstance(child, str):
                 return OPEN
-            node = tree.child(node, vertex, int(holds[0]))
+            if child is node:
+                self.origin_planes.pop()  # the net was drawn again
+            node = child
         return MISS
 
     # --- two nets -----------------------------------------------------------------------------------------------------
@@ -181,10 +191,10 @@ class TreeWalk:
                 q, w = child, self._polar(child)
 
     def _in_frame_of_region(self, node: Node) -> np.ndarray:
-        return node.corners @ self.relative.A.T + self.relative.a
+        return self.hull_tree.points[node.rows] @ self.relative.A.T + self.relative.a
 
     def _polar(self, node: Node) -> np.ndarray:
-        return self.polar_grid.centre + self.polar_grid.unit * node.corners
+        return self.polar_grid.centre + self.polar_grid.unit * self.polar_tree.points[node.rows]
 
     def _compare_nets(self, p: Node, q: Node, y, w, z, x) -> tuple[bool, np.ndarray] | None:
         """(True, z) where z parts the nets, (False, x) where x is in both, by more than η; else None."""
@@ -202,13 +212,13 @@ class TreeWalk:
             plane = multipliers / total
             z = plane @ w[proposal.halfspaces]
             if float((y @ z).min()) > 1.0 + 2.0 * eta:
-                rows = q.net[proposal.halfspaces].tolist()
+                rows = q.rows[proposal.halfspaces].tolist()
                 self.planes.append(Plane(tuple(rows), tuple(plane.tolist())))
-                self._remember(p.net[proposal.points].tolist(), rows)
+                self._remember(p.rows[proposal.points].tolist(), rows)
                 return True, z
         x = weights @ y[proposal.points]
         if float((w @ x).max()) < 1.0 - 2.0 * eta:
-            self._remember(p.net[proposal.points].tolist(), q.net[proposal.halfspaces].tolist())
+            self._remember(p.rows[proposal.points].tolist(), q.rows[proposal.halfspaces].tolist())
             return False, x
         return None
 
@@ -223,8 +233,8 @@ class TreeWalk:
             return OPEN
         vertex, cone, coefficients = at_cone
         cones = tree.cones(node, vertex)
-        self.simplices_read += len(cones.facets)
-        if apex_height(node, cones.facets[cone], g, coefficients, tree.reach) > height:
+        self.simplices_read += len(cones)
+        if apex_height(node, cones[cone], g, coefficients, tree.reach) > height:
             return OPEN
         return tree.child(node, vertex, cone)
 
@@ -241,11 +251,11 @@ def _coefficients(points, halfspaces, y: np.ndarray, u: np.ndarray) -> tuple[np.
 
 def find_cone(tree: FacetTree, node: Node, g: np.ndarray) -> tuple[int, int, np.ndarray] | None:
     """(vertex, cone, coefficients ≥ 0): the shell cone of a net's hull whose normals' cone holds g; None in doubt."""
-    vertex = int(np.argmax(node.corners @ g))
+    vertex = int(np.argmax(tree.points[node.rows] @ g))
     cones = tree.cones(node, vertex)
-    if not len(cones.facets):
+    if not len(cones):
         return None
-    coefficients = cones.inverses @ g
+    coefficients = coefficients_in(cones, node.hull.planes, g)
     least = coefficients.min(axis=1)
     cone = int(np.argmax(least))
     if least[cone] < _NEGATIVE * float(np.abs(coefficients[cone]).max()):
@@ -266,16 +276,16 @@ def extreme_row(tree: FacetTree, g: np.ndarray) -> tuple[int, int, int] | None:
     best, best_row, n_nodes, n_read = -np.inf, -1, 0, 0
     while node is not None:
         n_nodes += 1
-        heights = node.corners @ g
+        heights = tree.points[node.rows] @ g
         at = int(np.argmax(heights))
         if heights[at] > best:
-            best, best_row = float(heights[at]), int(node.net[at])
+            best, best_row = float(heights[at]), int(node.rows[at])
         if node.is_leaf:
             break
         at_cone = find_cone(tree, node, g)
         if at_cone is None:
             return None
         vertex, cone, _ = at_cone
-        n_read += len(tree.cones(node, vertex).facets)
+        n_read += len(tree.cones(node, vertex))
         node = tree.child(node, vertex, cone)
     return best_row, n_nodes, n_read

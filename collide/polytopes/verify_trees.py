@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collide.certificates.certificate import CertificateRefused
-from collide.polytopes.hierarchical_tree import TreeMeeting
+from collide.polytopes.trees_meet_query import TreeMeeting
 from collide.polytopes.verify_meeting import largest_value
 
 

@@ -6,9 +6,11 @@ Reads the plain data of `collide.adapters.peers.compare.Comparison.to_dict` and 
 from __future__ import annotations
 
 from collide.reports.number_format import brief_length, count, lengths
-from collide.reports.tables import Column, Line, Table, lay_out, missing_columns, table_lines, wrapped
+from collide.reports.tables import Column, Line, Table, lay_out, missing_columns, table_lines, width_of, wrapped
 
 SHORT = 12
+#: Blanks before a column of a table.
+_MARGIN = 2
 
 
 def render(comparison, *, everything: bool = False, width: int = 80, whole_names: bool = False) -> list[Line]:
@@ -21,7 +23,7 @@ def render(comparison, *, everything: bool = False, width: int = 80, whole_names
     data = comparison.to_dict()
     style = "colliding" if comparison.ours_wrong else "free"
     lines: list[Line] = [[(line, style)] for line in wrapped(verdict(data), width, hanging=2)]
-    tables = [_engine_table(data, *comparison.table()), *_dispute_tables(data, None if everything else SHORT)]
+    tables = [*_engine_tables(data, *comparison.table(), width), *_dispute_tables(data, None if everything else SHORT)]
     dropped: dict[str, None] = {}  # a set that keeps its order
     for table in tables:
         layout = lay_out(table, width, whole_names)
@@ -64,14 +66,26 @@ def _wrong_of(summary: dict) -> str:
     return f"{summary['engine']}: {', '.join(parts)}" if parts else ""
 
 
-def _engine_table(data: dict, headers: list[str], rows: list[list[str]]) -> Table:
-    """One column per engine: fifteen counts fit below one another, not beside."""
+def _engine_tables(data: dict, headers: list[str], rows: list[list[str]], width: int) -> list[Table]:
+    """One column per engine: fifteen counts fit below one another, not beside; further tables where lines are full."""
     skipped = {summary["engine"]: summary["skipped"] for summary in data["summaries"] if summary["skipped"]}
-    listed = [row for row in rows if row[0] not in skipped]
-    columns = [Column(headers[0], "label"), *(Column(row[0]) for row in listed)]
-    lines = [[header, *(row[k] or "-" for row in listed)] for k, header in enumerate(headers) if k]
+    groups: list[list[list[str]]] = [[]]
+    free = full = width - _MARGIN - max(map(width_of, headers))
+    for row in (row for row in rows if row[0] not in skipped):
+        needed = _MARGIN + max(map(width_of, row))
+        if groups[-1] and needed > free:
+            groups.append([])
+            free = full
+        groups[-1].append(row)
+        free -= needed
     notes = [f"{name} was not asked: {why}" for name, why in skipped.items()]
-    return Table("ENGINES  counts of pairs", columns, lines, notes=notes)
+    tables = []
+    for k, group in enumerate(groups):
+        columns = [Column(headers[0], "label"), *(Column(row[0]) for row in group)]
+        lines = [[header, *(row[i] or "-" for row in group)] for i, header in enumerate(headers) if i]
+        title = f"ENGINES  {'more of them' if k else 'counts of pairs'}"
+        tables.append(Table(title, columns, lines, notes=notes if group is groups[-1] else []))
+    return tables
 
 
 _TITLES = {

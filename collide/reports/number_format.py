@@ -46,6 +46,14 @@ def brief_length(metres: float) -> str:
     return f"{metres:.3g} m"
 
 
+def volume(cubic_metres: float) -> str:
+    """A volume inside a sentence: ``1.5 m³``, ``12.3 cm³``, ``0.4 mm³``."""
+    for unit, size in (("m³", 1.0), ("cm³", 1e-6), ("mm³", 1e-9)):
+        if cubic_metres >= 0.1 * size:
+            return f"{cubic_metres / size:.4g} {unit}"
+    return f"{cubic_metres / 1e-9:.4g} mm³"
+
+
 def lengths(values) -> list[str]:
     """A column of lengths, decimal points aligned, each with its own unit."""
     split = [_split(float(v)) for v in values]

@@ -11,19 +11,20 @@ import platform
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 
 import collide
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.kernels import mode
-from collide.reports import classes, proofs
+from collide.reports import classes, overlap_volumes, proofs
 from collide.reports import mesh_notes as meshes
 from collide.reports.number_format import brief_length, count
 from collide.reports.pair_classes import Pairs
 from collide.reports.progress import silent
 
-SCHEMA = "collide-report/3"
+SCHEMA = "collide-report/4"
 
 #: Why a pair that cannot be answered is not tested.
 UNANSWERED = "cannot be answered"
@@ -48,6 +49,7 @@ class Report:
     approximations: list[dict]
     unanswered: list[dict]
     skipped: list[dict]
+    overlaps: list[dict]
     proofs: list[dict]
     work: dict
     notes: list[str] = field(default_factory=list)
@@ -98,7 +100,8 @@ class Report:
         yield from (
             (name, getattr(self, name))
             for name in (
-                "meshes", "approximations", "unanswered", "skipped", "proofs", "work", "notes", "seconds", "versions",
+                "overlaps", "meshes", "approximations", "unanswered", "skipped", "proofs", "work", "notes", "seconds",
+                "versions",
             )
         )  # fmt: skip
         asked = {"trajectory": self.trajectory, "geometry": self.geometry}
@@ -160,6 +163,7 @@ def make(
         approximations=_approximations(scene),
         unanswered=unanswered,
         skipped=_skipped(stats),
+        overlaps=overlap_volumes.of_pairs(scene, chain(by_class[classes.COLLIDING], by_class[classes.SHALLOW])),
         proofs=_proofs(stats),
         work=_work(stats),
         notes=[str(note) for note in scene.notes],

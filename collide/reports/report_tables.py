@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from collide.reports.number_format import brief_length, coordinates, count, directions, lengths, widths
+from collide.reports.number_format import brief_length, coordinates, count, directions, lengths, volume, widths
 from collide.reports.pair_classes import Fold, Pair, Pairs
 from collide.reports.tables import Column, Table
 
@@ -40,7 +40,7 @@ def tables(report: Report, everything: bool, proofs: bool) -> list[Table]:
         title = "TOUCHING  gap and overlap below rounding"
         all_tables += [
             _pair_table(title, "touching", report.touching, "within", True, proofs),
-            _mesh_table(report), _approximation_table(report),
+            _overlap_table(report), _mesh_table(report), _approximation_table(report),
         ]  # fmt: skip
     all_tables.append(_line_table(report, everything, proofs))
     if proofs:
@@ -145,7 +145,7 @@ def _bracket(pair: Pair) -> float:
 def _line_table(report: Report, everything: bool, proofs: bool) -> Table:
     """What a person should know of, a line each; what has a table of its own is left out."""
     lines = [] if everything else [
-        ("touching", _touching_line(report)), ("meshes", _mesh_line(report)),
+        ("touching", _touching_line(report)), ("overlaps", _overlap_line(report)), ("meshes", _mesh_line(report)),
         ("stand-ins", _approximation_line(report)),
     ]  # fmt: skip
     lines += [] if proofs else [("never tested", _skip_line(report))]
@@ -167,6 +167,15 @@ def _touching_line(report: Report) -> str:
 
 def _and_more(named: list[str], more: bool) -> str:
     return ", ".join(named) + (", …" if more else "")
+
+
+def _overlap_line(report: Report) -> str:
+    entries = [entry for entry in report.overlaps if entry["volume"] > 0.0]
+    if not entries:
+        return ""
+    entries.sort(key=lambda entry: -entry["volume"])
+    named = [f"{volume(entry['volume'])} of {entry['a']} and {entry['b']}" for entry in entries[:_NAMED]]
+    return f"{count(len(entries), 'pair')} of solids with a volume in common: {_and_more(named, len(entries) > _NAMED)}"
 
 
 def _mesh_line(report: Report) -> str:
@@ -224,6 +233,15 @@ def _mesh_table(report: Report) -> Table:
         "MESHES  as they are, triangle by triangle",
         [Column("body", "name"), Column("taken as", "text")],
         [[entry["body"], entry["what"]] for entry in sorted(report.meshes, key=lambda entry: entry["solid"])],
+    )
+
+
+def _overlap_table(report: Report) -> Table:
+    unit, at = coordinates([entry["centroid"] for entry in report.overlaps])
+    columns = [Column("body A", "name"), Column("body B", "name"), Column("volume")]
+    return Table(
+        "OVERLAPS  what colliding solids have in common", [*columns, Column(f"centroid x y z [{unit}]", "label")],
+        [[entry["a"], entry["b"], volume(entry["volume"]), place] for entry, place in zip(report.overlaps, at)],
     )
 
 

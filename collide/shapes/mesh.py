@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from collide.hull import exact_hull
-    from collide.mesh import build_bvh, mesh_survey, scaled_bvh
+    from collide.mesh import build_bvh, fine_boxes, mesh_survey, scaled_bvh
     from collide.mesh import locality as local_stretch
     from collide.mesh.bvh import MeshTree
     from collide.mesh.locality import Locality
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 if not TYPE_CHECKING:
     exact_hull = lazy_module("collide.hull.exact_hull")
     build_bvh = lazy_module("collide.mesh.build_bvh")
+    fine_boxes = lazy_module("collide.mesh.fine_boxes")
     local_stretch = lazy_module("collide.mesh.locality")
     localised_mesh = lazy_module("collide.shapes.localised_mesh")
     mesh_survey = lazy_module("collide.mesh.mesh_survey")
@@ -129,7 +130,8 @@ class Mesh(Shape):
         if not hasattr(self, "_tree"):
             with log_duration("box-tree of a mesh of %d facets made", len(self.faces)):
                 if self._copied is None:
-                    self._store(_tree=build_bvh.build_mesh_tree(self.vertices, self.faces))
+                    tree = build_bvh.build_mesh_tree(self.vertices, self.faces)
+                    self._store(_tree=fine_boxes.with_origins_if_needed(tree))
                 else:
                     self._store(_tree=scaled_bvh.scaled_tree(self._copied.tree, self.vertices, self.faces, self.scale))
         return self._tree

@@ -70,10 +70,14 @@ def joined_sides(
 def _half_edges(sheets: Sheets, points: CutPoints, is_cut: np.ndarray) -> _HalfEdges:
     """Those of cut facets' sheets, and of whole facets at edges of cut ones or without exactly two facets."""
     facets, T = points.facets, sheets.triangles
-    n_whole = len(is_cut) - int(is_cut.sum())
-    marked = np.concatenate([edges.sides[:, 0] < 0 for edges in facets.edges])
-    marked[facets.edge[is_cut]] = True
-    of_whole = np.flatnonzero(marked[facets.edge[sheets.facet[:n_whole]]].ravel())
+    cut = np.flatnonzero(is_cut)
+    n_whole = len(is_cut) - len(cut)
+    edges = np.unique(facets.edge[cut])
+    beside = facets.beside(edges).ravel()
+    slot = np.argmax(facets.edge[beside] == np.repeat(edges, 2)[:, None], axis=1)
+    of_whole = np.concatenate([(3 * beside + slot)[beside >= 0], facets.odd_half_edges()])
+    facet = of_whole // 3
+    of_whole = (of_whole - 3 * np.searchsorted(cut, facet))[~is_cut[facet]]
     rows = np.concatenate([of_whole, np.arange(3 * n_whole, 3 * len(T))])
     sheet, slot = rows // 3, rows % 3
     starts, ends = T[sheet, slot], T[sheet, (slot + 1) % 3]

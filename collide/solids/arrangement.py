@@ -19,6 +19,7 @@ from collide.solids.cells import Cells, cells_of, merged_sheets
 from collide.solids.crossing_pairs import crossing_pairs
 from collide.solids.cut_points import CutPoints, axis_of
 from collide.solids.facet_cuts import FacetCuts, segment
+from collide.solids.limits import BYTES_PER_PAIR, UNLIMITED, Limits
 from collide.solids.placed_facets import Operand, PlacedFacets
 from collide.solids.split_facets import split_facets
 from collide.solids.sweep_triangulation import triangulate
@@ -53,12 +54,13 @@ class Arrangement(NamedTuple):
         rows = np.flatnonzero(before != behind)
         triangles = self.sheets.triangles[rows]
         turned = before[rows]
-        triangles[turned] = triangles[turned][:, ::-1]
+        triangles[turned] = triangles[turned, ::-1]
         return triangles, rows
 
 
-def arrange(operands: list[Operand]) -> Arrangement:
+def arrange(operands: list[Operand], limits: Limits = UNLIMITED) -> Arrangement:
     """The arrangement of one or more solids at their poses."""
+    limits.stage("finding facets that meet")
     facets = PlacedFacets(operands)
     points = CutPoints(facets)
     pairs = meeting_pairs(facets)
@@ -69,10 +71,12 @@ def arrange(operands: list[Operand]) -> Arrangement:
     drawn = np.isin(crossings.pairs, exactly).any(axis=1)
     keys = pair_keys(facets, crossings.pairs)
     unclear = pairs[~np.isin(pair_keys(facets, pairs), keys)]
-    cuts = FacetCuts(facets, points, unclear, crossings.pairs[drawn], ids[drawn], exactly)
+    n_exact = len(unclear) + int(drawn.sum())
+    limits.check_memory(BYTES_PER_PAIR * n_exact, f"{n_exact:,} pairs of facets to be cut exactly")
+    cuts = FacetCuts(facets, points, unclear, crossings.pairs[drawn], ids[drawn], exactly, limits)
     pieces, of = [], []
-    for f in sorted(cuts.corners_of):
-        made = _cut_facet(cuts, f)
+    for f in limits.watched("cutting facets", sorted(cuts.corners_of)):
+        made = cut_facet(cuts, f)
         pieces += made
         of += [f] * len(made)
     is_cut = np.zeros(len(facets.corners), dtype=bool)
@@ -81,6 +85,7 @@ def arrange(operands: list[Operand]) -> Arrangement:
     body = facets.body[of_piece]
     merged = merged_sheets(np.array(pieces, dtype=np.int64).reshape(-1, 3), of_piece, body, len(operands))
     sheets = _all_sheets(facets, np.flatnonzero(~is_cut), triangles, of_triangle, merged)
+    limits.stage("telling cells apart")
     cells = cells_of(sheets, points, is_cut, crossings.pairs, ids)
     return Arrangement(facets, points, sheets, cells, len(pairs), int(is_cut.sum()))
 
@@ -104,9 +109,9 @@ def _clear_crossings(facets: PlacedFacets, points: CutPoints, pairs: np.ndarray)
     exactly[pairs[of_one]] = True
     exactly[pairs[exactly[pairs].any(axis=1)]] = True
     exactly[pairs[~of_one][~proven]] = True
-    two_sided = np.concatenate([edges.sides[:, 0] >= 0 for edges in facets.edges])
     rows = np.unique(crossings.pairs)
-    exactly[rows[~two_sided[facets.edge[rows]].all(axis=1)]] = True
+    two_sided = facets.beside(facets.edge[rows].ravel())[:, 0].reshape(-1, 3) >= 0
+    exactly[rows[~two_sided.all(axis=1)]] = True
     keys, first, ends = np.unique(
         crossings.edge * len(facets.corners) + crossings.facet, return_index=True, return_inverse=True
     )
@@ -127,13 +132,16 @@ def _all_sheets(
     facets: PlacedFacets, whole: np.ndarray, triangles: np.ndarray, of: np.ndarray, merged: Sheets
 ) -> Sheets:
     """Whole facets first, then those split by paths, then merged ones."""
-    rows = np.concatenate([whole, of])
+    rows = np.concatenate([whole, of, merged.facet])
+    n = len(whole) + len(of)
     steps = np.zeros((len(rows), len(facets.operands)), dtype=np.int8)
-    steps[np.arange(len(rows)), facets.body[rows]] = 1
-    return Sheets(
-        np.concatenate([facets.corners[whole], triangles, merged.triangles]), np.concatenate([rows, merged.facet]),
-        np.concatenate([steps, merged.steps]),
-    )  # fmt: skip
+    for k in range(len(facets.operands)):
+        steps[:n, k] = facets.body[rows[:n]] == k
+    steps[n:] = merged.steps
+    corners = np.empty((len(rows), 3), dtype=np.int64)
+    np.take(facets.corners, whole, axis=0, out=corners[: len(whole)], mode="clip")
+    corners[len(whole) : n], corners[n:] = triangles, merged.triangles
+    return Sheets(corners, rows, steps)
 
 
 def meeting_pairs(facets: PlacedFacets) -> np.ndarray:
@@ -155,7 +163,7 @@ def crossings_of(mesh) -> np.ndarray:
     return self_hits(mesh.tree)[0]
 
 
-def _cut_facet(cuts: FacetCuts, f: int) -> list[tuple[int, int, int]]:
+def cut_facet(cuts: FacetCuts, f: int) -> list[tuple[int, int, int]]:
     """Triangles, with the facet's front, between the segments on it."""
     points = cuts.points
     normal = cuts.facets.normal(f)

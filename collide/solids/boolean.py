@@ -10,7 +10,8 @@ import numpy as np
 from collide.errors import InvalidArgument, brief
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
-from collide.solids.arrangement import arrange, crossings_of
+from collide.solids.arrangement import Arrangement, arrange, crossings_of
+from collide.solids.limits import Limits
 from collide.solids.rounded_mesh import rounded_mesh
 from collide.solids.solid_operands import solid_operand
 
@@ -24,11 +25,13 @@ OPERATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 
 
 class BooleanResult(NamedTuple):
-    """A boolean of two solids.
+    """A boolean of two solids, or of many (`combine`).
 
     mesh : the solid, vertices in the world W [m]; None where it has no points inside.
     body : (k,) int64, of every facet of the mesh whose facet it is part of: 0 of A, 1 of B (of both: of A).
     facet : (k,) int64, the number of that facet. Facets of convex shapes are numbered as in `facet_pairs`.
+    before, behind : (k, r) bool, which of the r bodies hold the points just outside each facet, and just inside: those
+        of which they differ have a surface there.
     moved : no vertex was moved farther than this by rounding it to doubles [m].
     n_collapsed, n_thin : triangles, and shells, so thin that rounding left nothing of them; they are not in the mesh.
     n_meeting, n_cut : pairs of facets that meet, and facets that were cut.
@@ -37,6 +40,8 @@ class BooleanResult(NamedTuple):
     mesh: Mesh | None
     body: np.ndarray
     facet: np.ndarray
+    before: np.ndarray
+    behind: np.ndarray
     moved: float
     n_collapsed: int
     n_thin: int
@@ -54,7 +59,10 @@ class BooleanResult(NamedTuple):
         return np.zeros((0, 2), dtype=np.int64) if self.mesh is None else crossings_of(self.mesh)
 
 
-def boolean(A: Shape, B: Shape, X_WA, X_WB, op: str, *, check_poses: bool = True) -> BooleanResult:
+def boolean(
+    A: Shape, B: Shape, X_WA, X_WB, op: str, *, check_poses: bool = True, progress=None,
+    time_limit: float | None = None, memory: int | None = None,
+) -> BooleanResult:  # fmt: skip
     """Union, intersection or difference of two posed solids, as a mesh: decided exactly on the poses as given.
 
     Parameters
@@ -64,6 +72,9 @@ def boolean(A: Shape, B: Shape, X_WA, X_WB, op: str, *, check_poses: bool = True
     X_WA, X_WB : (4, 4) poses in the world W [m].
     op : "union", "intersection", "difference" (A without B) or "symmetric_difference".
     check_poses : refuse matrices that are no rotation.
+    progress : callable, optional. Called with a label, gives a context manager that gives a function to change it.
+    time_limit, memory : the most seconds, and bytes, that it may take; None for no limit. What is stopped leaves
+        nothing behind.
 
     Returns
     -------
@@ -75,7 +86,7 @@ def boolean(A: Shape, B: Shape, X_WA, X_WB, op: str, *, check_poses: bool = True
     ------
     InvalidArgument : a surface without an inside, with its defects and facet numbers; an unknown operation.
     InvalidPose : matrices that are no pose.
-    UnsupportedQuery : curved shapes, unions and half-spaces, by name.
+    UnsupportedQuery : curved shapes, unions and half-spaces, by name; a limit that is reached, with what it would take.
 
     Notes
     -----
@@ -90,11 +101,22 @@ def boolean(A: Shape, B: Shape, X_WA, X_WB, op: str, *, check_poses: bool = True
     operands = [
         solid_operand("boolean", name, shape, X, check_poses) for name, shape, X in (("A", A, X_WA), ("B", B, X_WB))
     ]
-    arrangement = arrange(operands)
-    triangles, sheets = arrangement.boundary(rule(arrangement.holds()))
+    with Limits("boolean", progress, time_limit, memory) as limits:
+        arrangement = arrange(operands, limits)
+        return solid_of(arrangement, rule(arrangement.holds()))
+
+
+def solid_of(arrangement: Arrangement, keep: np.ndarray) -> BooleanResult:
+    """The cells of an arrangement to keep, (c,) bool, as one solid: rounded once."""
+    triangles, sheets = arrangement.boundary(keep)
     made = rounded_mesh(arrangement.points, triangles)
-    source = arrangement.sheets.facet[sheets[made.rows]]
+    rows = sheets[made.rows]
+    source = arrangement.sheets.facet[rows]
+    sides = arrangement.cells.sides[rows]
+    turned = keep[sides[:, 0]]
+    sides = np.where(turned[:, None], sides[:, ::-1], sides)
+    before, behind = (arrangement.holds()[sides[:, k]] for k in range(2))
     return BooleanResult(
-        made.mesh, arrangement.facets.body[source], arrangement.facets.number[source], made.moved, made.n_collapsed,
-        made.n_thin, arrangement.n_meeting, arrangement.n_cut,
+        made.mesh, arrangement.facets.body[source], arrangement.facets.number[source], before, behind, made.moved,
+        made.n_collapsed, made.n_thin, arrangement.n_meeting, arrangement.n_cut,
     )  # fmt: skip

@@ -14,7 +14,7 @@ from functools import cmp_to_key
 import numpy as np
 
 from collide.numerics.exact_points import Point, inner, minus
-from collide.solids.placed_facets import PlacedFacets
+from collide.solids.placed_facets import PlacedFacets, quotient
 
 Rational = tuple[int, int, int, int]
 #: A determinant of two differences of rounded coordinates below D, each off by a unit of M, the largest of them: its
@@ -32,7 +32,7 @@ class CutPoints:
         self._exact: dict[int, Rational] = {}
         self._near: dict[int, tuple[float, float, float]] = {}
         self.same_as: dict[int, int] = {}
-        self._piercings: dict[int, tuple[int, int, int]] = {}
+        self.pierced = np.zeros((0, 3), dtype=np.int64)
         self._next = self.n_vertices
 
     def __len__(self) -> int:
@@ -50,10 +50,15 @@ class CutPoints:
         return known
 
     def add_piercings(self, edges: np.ndarray, rows: np.ndarray) -> None:
-        """Points for the next ids, where edges (k, 2) of vertices go through facets (k,): worked out when asked for."""
-        ids = range(self._next, self._next + len(rows))
-        self._piercings.update(zip(ids, zip(*edges.T.tolist(), rows.tolist())))
+        """Points for the first ids after those of vertices, asked once: where edges (k, 2) of vertices go through
+        facets (k,). They are worked out when asked for."""
+        self.pierced = np.column_stack([edges, rows])
         self._next += len(rows)
+
+    def piercing(self, point: int) -> list[int]:
+        """The ends of the edge and the facet of such a point; of all others nothing."""
+        row = point - self.n_vertices
+        return self.pierced[row].tolist() if 0 <= row < len(self.pierced) else []
 
     def place_of(self, point: int) -> int:
         """The id of the place of such a point: where others work it out again, it is found by its coordinates."""
@@ -79,26 +84,24 @@ class CutPoints:
 
     def exact(self, point: int) -> Rational:
         if point not in self._exact:
-            piercing = self._piercings.get(point)
+            piercing = self.piercing(point)
             self._exact[point] = self._pierce(*piercing) if piercing else (*self.facets.exact(point), 1)
         return self._exact[point]
 
     def load(self, some: Iterable[int]) -> None:
         """The vertices behind points, worked out all at once: quicker than one by one."""
-        vertices: set[int] = set()
-        for point in some:
-            p, q, row = self._piercings.get(point, (point, point, -1))
-            vertices.update((p, q))
-            if row >= 0:
-                vertices.update(self.facets.corners[row].tolist())
-        self.facets.load(v for v in vertices if v < self.n_vertices)
+        ids = np.array(list(some), dtype=np.int64)
+        rows = ids[(ids >= self.n_vertices) & (ids < self.n_vertices + len(self.pierced))] - self.n_vertices
+        vertices = [ids[ids < self.n_vertices], self.pierced[rows, :2].ravel()]
+        vertices.append(self.facets.corners[self.pierced[rows, 2]].ravel())
+        self.facets.load(np.unique(np.concatenate(vertices)).tolist())
 
     def near(self, point: int) -> tuple[float, float, float]:
         """Coordinates less the origin, in units of the grid, rounded to the nearest doubles (scaled, if need be)."""
         known = self._near.get(point)
         if known is None:
             x, y, z, w = self.exact(point)
-            known = self._near[point] = _quotient(x, w), _quotient(y, w), _quotient(z, w)
+            known = self._near[point] = quotient(x, w), quotient(y, w), quotient(z, w)
         return known
 
     def side(self, a: int, b: int, c: int, u: int, v: int) -> int:
@@ -144,21 +147,7 @@ class CutPoints:
 
     def in_world(self, point: int) -> tuple[float, float, float]:
         """Coordinates in W, each rounded once to the nearest double [m]."""
-        x, y, z, w = self.exact(point)
-        (a, b, c), grid = self.facets.origin, self.facets.grid
-        up, down = max(grid, 0), max(-grid, 0)
-        unit = w << down
-        return (
-            _quotient((x + a * w) << up, unit), _quotient((y + b * w) << up, unit), _quotient((z + c * w) << up, unit)
-        )  # fmt: skip
-
-
-def _quotient(numerator: int, denominator: int) -> float:
-    """Correctly rounded; what is beyond all doubles is ± infinity."""
-    try:
-        return numerator / denominator
-    except OverflowError:
-        return math.inf if numerator > 0 else -math.inf
+        return self.facets.in_world(self.exact(point))
 
 
 def reduced(x: int, y: int, z: int, w: int) -> Rational:
@@ -174,4 +163,3 @@ def axis_of(normal: Point) -> tuple[int, int, int]:
     sizes = [abs(x) for x in normal]
     axis = sizes.index(max(sizes))
     return axis, (axis + 1) % 3, (axis + 2) % 3
-

@@ -13,6 +13,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from collide.solids.cut_points import CutPoints, Rational, axis_of, reduced
+from collide.solids.limits import UNLIMITED, Limits
 from collide.solids.placed_facets import PlacedFacets
 from collide.surface_queries.overlay import common_piece
 
@@ -31,7 +32,7 @@ class FacetCuts:
 
     def __init__(
         self, facets: PlacedFacets, points: CutPoints, pairs: np.ndarray, crossings: np.ndarray, ids: np.ndarray,
-        rows: np.ndarray,
+        rows: np.ndarray, limits: Limits = UNLIMITED,
     ):  # fmt: skip
         self.facets, self.points = facets, points
         self.corners_of: dict[int, tuple[int, int, int]] = {}
@@ -49,9 +50,9 @@ class FacetCuts:
             self._start(f)
         for f, g, p, q in np.column_stack([crossings, ids]).tolist():
             self._put_piece(f, g, [points.place_of(p), points.place_of(q)])
-        for f, g in pairs.tolist():
+        for f, g in limits.watched("drawing what facets share", pairs.tolist()):
             self._draw(f, g)
-        for f in self._pieces:
+        for f in limits.watched("crossing segments", self._pieces):
             self._cross_segments(f)
         self._split_thin_edges()
         while self._changed:
@@ -140,18 +141,20 @@ class FacetCuts:
         """Segments and points of a facet that may lie within them, by doubles."""
         segments, points = list(self.segments_of[f]), list(self.points_of[f])
         near = np.array([self.points.near(p) for p in points])[:, (u, v)]
-        ends = np.array([[self.points.near(p) for p in s] for s in segments])[:, :, (u, v)]
+        row = {p: k for k, p in enumerate(points)}
+        ends = np.array([(row[p], row[q]) for p, q in segments])
+        a, b = near[ends[:, 0], None], near[ends[:, 1], None]
         with np.errstate(all="ignore"):
-            for k, s in enumerate(segments):
-                a, b = ends[k]
-                inside = ((near >= ends[k].min(axis=0)) & (near <= ends[k].max(axis=0))).all(axis=1)
-                e, w = b - a, near - a
-                height = np.abs(e[0] * w[:, 1] - e[1] * w[:, 0])
-                size = np.maximum(np.abs(e).max(), np.abs(w).max(axis=1))
-                limit = 2.0**-47 * size * (np.abs(a).max() + size)
-                for row in np.flatnonzero(inside & ~(height > limit)).tolist():
-                    if points[row] not in s and points[row] not in self.splits[s]:
-                        yield s, points[row]
+            inside = ((near >= np.minimum(a, b)) & (near <= np.maximum(a, b))).all(axis=2)
+            inside[np.arange(len(segments))[:, None], ends] = False
+            k, p = np.nonzero(inside)
+            a, e, w = a[k, 0], (b - a)[k, 0], near[p] - a[k, 0]
+            height = np.abs(e[:, 0] * w[:, 1] - e[:, 1] * w[:, 0])
+            size = np.maximum(np.abs(e).max(axis=1), np.abs(w).max(axis=1))
+            near_enough = ~(height > 2.0**-47 * size * (np.abs(a).max(axis=1) + size))
+        for i, j in zip(k[near_enough].tolist(), p[near_enough].tolist()):
+            if points[j] not in self.splits[segments[i]]:
+                yield segments[i], points[j]
 
     def _lies_within(self, p: int, s: Segment, u: int, v: int) -> bool:
         """Whether a point of the facet's plane lies on a segment, other than its ends."""
@@ -195,5 +198,3 @@ def _line(p: Rational, q: Rational, u: int, v: int) -> tuple[int, int, int]:
         p[3] * q[u] - p[u] * q[3],
         p[u] * q[v] - p[v] * q[u],
     )
-
-

@@ -8,6 +8,7 @@ import numpy as np
 
 from collide.shapes.shape import Shape
 from collide.solids.arrangement import Arrangement, arrange
+from collide.solids.limits import Limits
 from collide.solids.solid_operands import solid_operand
 from collide.solids.triangle_sums import areas, enclosed, mean_point
 
@@ -35,7 +36,10 @@ class OverlapVolume(NamedTuple):
     n_cut: int
 
 
-def overlap_volume(A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True) -> OverlapVolume:
+def overlap_volume(
+    A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True, progress=None, time_limit: float | None = None,
+    memory: int | None = None,
+) -> OverlapVolume:  # fmt: skip
     """Volume, centroid and surfaces of the overlap of two posed solids; no mesh is made of it.
 
     Parameters
@@ -43,6 +47,7 @@ def overlap_volume(A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True) 
     A, B : solids with facets, as for `boolean`.
     X_WA, X_WB : (4, 4) poses in the world W [m].
     check_poses : refuse matrices that are no rotation.
+    progress, time_limit, memory : as of `boolean`.
 
     Returns
     -------
@@ -62,11 +67,11 @@ def overlap_volume(A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True) 
         solid_operand("overlap_volume", name, shape, X, check_poses)
         for name, shape, X in (("A", A, X_WA), ("B", B, X_WB))
     ]
-    arrangement = arrange(operands)
+    with Limits("overlap_volume", progress, time_limit, memory) as limits:
+        arrangement = arrange(operands, limits)
     holds = arrangement.holds()
     triangles, rows = arrangement.boundary(holds[:, 0] & holds[:, 1])
-    volume = enclosed(arrangement.points, triangles)
-    size, _ = areas(arrangement.points, triangles)
+    volume, size = enclosed(arrangement.points, triangles)
     steps = arrangement.sheets.steps[rows] != 0
     patch, places = _patch(arrangement, holds)
     centroid = volume.centroid if len(triangles) else mean_point(patch, places)

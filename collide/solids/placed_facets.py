@@ -6,12 +6,15 @@ and one origin on it near the bodies, so that the integers are as short as they 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from collide.lowering.facet_bodies import Body
+from collide.mesh.bvh import MeshTree
 from collide.mesh.mesh_survey import NO_AREA
 from collide.mesh.mesh_topology import COLLAPSED
 from collide.numerics.exact_points import Point, cross, minus, placed
@@ -60,6 +63,33 @@ class PlacedFacets:
         self._exact: dict[int, Point] = {}
         self._normals: dict[int, Point] = {}
 
+    @cached_property
+    def slack(self) -> float:
+        """More than the errors of coordinates in W, [m], that are worked out in doubles, and of their differences."""
+        # Sums of three products and a shift are off by less than six units of the sum of their sizes.
+        return 2.0**-48 * max(
+            float(np.abs(o.X[:3, :3]).sum() * np.abs(o.mesh.vertices).max() + np.abs(o.X[:3, 3]).max())
+            for o in self.operands
+        )
+
+    def tree_of(self, body: int) -> MeshTree:
+        """The box-tree of a body's facets, in its frame."""
+        return self.operands[body].body.tree
+
+    def beside(self, edges: np.ndarray) -> np.ndarray:
+        """(k, 2) the facets at edges of two; −1 at others."""
+        body = np.searchsorted(self.first_edge, edges, side="right") - 1
+        sides = np.empty((len(edges), 2), dtype=np.int64)
+        for k, of_body in enumerate(self.edges):
+            rows = np.flatnonzero(body == k)
+            two = of_body.sides[edges[rows] - self.first_edge[k]]
+            sides[rows] = np.where(two >= 0, two + self.first_facet[k], -1)
+        return sides
+
+    def odd_half_edges(self) -> np.ndarray:
+        """3 · facet + corner of all edges without exactly two facets."""
+        return np.concatenate([edges.odd + 3 * k for edges, k in zip(self.edges, self.first_facet.tolist())])
+
     def rows_of(self, body: int, numbers: np.ndarray) -> np.ndarray:
         """(k,) rows here of facets of a body by their own numbers; −1 for facets without area."""
         place = self.edges[body].place[numbers]
@@ -91,11 +121,29 @@ class PlacedFacets:
             n = self._normals[facet] = cross(minus(b, a), minus(c, a))
         return n
 
+    def in_world(self, point: tuple[int, int, int, int]) -> tuple[float, float, float]:
+        """A point x/w, y/w, z/w as exact coordinates are, in W, each rounded once to the nearest double [m]."""
+        x, y, z, w = point
+        a, b, c = self.origin
+        up, down = max(self.grid, 0), max(-self.grid, 0)
+        unit = w << down
+        return (
+            quotient((x + a * w) << up, unit), quotient((y + b * w) << up, unit), quotient((z + c * w) << up, unit)
+        )  # fmt: skip
+
     def _on_grid(self, points: list[Point], grid: int) -> list[Point]:
         shift = grid - self.grid
         if shift < 0:  # integers that end in zeros, all of them
             return [(x >> -shift, y >> -shift, z >> -shift) for x, y, z in points]
         return [(x << shift, y << shift, z << shift) for x, y, z in points]
+
+
+def quotient(numerator: int, denominator: int) -> float:
+    """Correctly rounded; what is beyond all doubles is ± infinity."""
+    try:
+        return numerator / denominator
+    except OverflowError:
+        return math.inf if numerator > 0 else -math.inf
 
 
 def _grid_of(X: np.ndarray, edges: FacetEdges) -> int:

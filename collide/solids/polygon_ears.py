@@ -1,109 +1,221 @@
-"""Simple polygons on facets as triangles, many at once: ears are clipped that doubles prove to be ears."""
+"""Parts of facets between paths, from step to step around each, as triangles: ears that doubles prove to be ears."""
 
 from __future__ import annotations
 
-import numpy as np
+from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
+from collide.numerics.vec3 import Vec3, cross, sub
 
-from collide.solids.placed_facets import PlacedFacets
-from collide.surface_queries.overlay import posed_corners
-
+#: Parts with more corners are left to the sweep.
+MAX_CORNERS = 40
+#: Doubles: of each corner two coordinates and its id, and room for one more.
+WORKSPACE = 3 * (MAX_CORNERS + 1)
 _U = 2.0**-53
 
 
-def clip_ears(
-    polygons: list[np.ndarray], rows: list[np.ndarray], facets: PlacedFacets, place: np.ndarray, error: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(triangles (t, 3) of point ids, their facets (t,), facets of polygons with no proven ear).
+@kernel
+def _corner(poses, X, local, v):
+    """Vertex v in W, rounded."""
+    x, y, z = local[3 * v], local[3 * v + 1], local[3 * v + 2]
+    return Vec3(
+        poses[X] * x + poses[X + 1] * y + poses[X + 2] * z + poses[X + 3],
+        poses[X + 4] * x + poses[X + 5] * y + poses[X + 6] * z + poses[X + 7],
+        poses[X + 8] * x + poses[X + 9] * y + poses[X + 10] * z + poses[X + 11],
+    )
 
-    polygons : point ids (k, m), counter-clockwise seen from the front, one array a length.   rows : their facets (k,).
-    place, error : of the points that are no vertices, in W.
+
+@kernel
+def _corner_error(poses, X, local, v):
+    """A bound of the errors of its coordinates."""
+    largest = 0.0
+    for i in range(3):
+        size = abs(poses[X + 4 * i + 3])
+        for j in range(3):
+            size += abs(poses[X + 4 * i + j] * local[3 * v + j])
+        largest = max(largest, size)
+    return 6.0 * _U * largest
+
+
+@kernel
+def _component(a, k):
+    return a.x if k == 0 else (a.y if k == 1 else a.z)
+
+
+@kernel
+def _look_at(facet, ids, m, place, n_vertices, u, v, seen):
+    """The points of a polygon seen along an axis, from the facet's first corner; how large the coordinates are.
+
+    facet : its three ids, and where these are.   seen : out, m pairs of coordinates.
     """
-    triangles, owners, failed = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)], []
-    waiting = {p.shape[1]: _Polygons(p, *_seen(p, f, facets, place, error), f) for p, f in zip(polygons, rows)}
-    for m in range(max(waiting, default=3), 2, -1):
-        if m not in waiting:
+    a, b, _, p, q, r = facet
+    largest = 0.0
+    for k in range(m):
+        point = int(ids[k])
+        if point >= n_vertices:
+            row = 3 * (point - n_vertices)
+            x = Vec3(place[row], place[row + 1], place[row + 2])
+        else:
+            x = p if point == a else (q if point == b else r)
+        w = sub(x, p)
+        seen[2 * k] = _component(w, u)
+        seen[2 * k + 1] = _component(w, v)
+        largest = max(largest, abs(w.x), abs(w.y), abs(w.z))
+    return largest
+
+
+@kernel
+def _area(seen, a, b, c):
+    e = seen[2 * b] - seen[2 * a]
+    f = seen[2 * b + 1] - seen[2 * a + 1]
+    g = seen[2 * c] - seen[2 * a]
+    h = seen[2 * c + 1] - seen[2 * a + 1]
+    return e * h - f * g
+
+
+@kernel
+def _square(seen, a, b):
+    e = seen[2 * b] - seen[2 * a]
+    f = seen[2 * b + 1] - seen[2 * a + 1]
+    return e * e + f * f
+
+
+@kernel
+def _is_empty(seen, m, i, j, k, limit):
+    """Whether all other points are proven to be outside the triangle of three."""
+    for p in range(m):
+        if (
+            p != i and p != j and p != k
+            and not (
+                _area(seen, i, j, p) < -limit or _area(seen, j, k, p) < -limit or _area(seen, k, i, p) < -limit
+            )
+        ):  # fmt: skip
+            return False
+    return True
+
+
+@kernel
+def _best_ear(seen, m, limit):
+    """The roundest ear that is proven to be one, −1 where none is."""
+    best, roundest = -1, 0.0
+    for j in range(m):
+        i = (j + m - 1) % m
+        k = (j + 1) % m
+        area = _area(seen, i, j, k)
+        if not area > limit:
             continue
-        group = waiting.pop(m)
-        ears, ear = group.clip()
-        failed.append(group.facet[~ears])
-        group, ear = group.some(ears), ear[ears]
-        k, before, after = np.arange(len(ear)), (ear - 1) % m, (ear + 1) % m
-        triangles.append(np.stack([group.ids[k, before], group.ids[k, ear], group.ids[k, after]], axis=1))
-        owners.append(group.facet)
-        if m > 3:
-            waiting[m - 1] = group.without(ear).joined(waiting.get(m - 1))
-    return np.concatenate(triangles), np.concatenate(owners), np.concatenate([np.zeros(0, dtype=np.int64), *failed])
+        roundness = area / (_square(seen, i, j) + _square(seen, j, k) + _square(seen, k, i))
+        if roundness > roundest and _is_empty(seen, m, i, j, k, limit):
+            best, roundest = j, roundness
+    return best
 
 
-def _seen(ids: np.ndarray, rows: np.ndarray, facets: PlacedFacets, place, error) -> tuple[np.ndarray, np.ndarray]:
-    """((k, m, 2) the polygons seen along an axis, turned the right way, (k,) bounds of the errors of coordinates)."""
-    corners, corner_error = posed_corners(facets.local[facets.corners[rows]], facets.poses[facets.body[rows]])
-    n_vertices = len(facets.local)
-    is_vertex = ids < n_vertices
-    points = np.empty((*ids.shape, 3))
-    of_vertex = ids[is_vertex]
-    points[~is_vertex] = place[ids[~is_vertex] - n_vertices]
-    bound = np.where(is_vertex, corner_error[:, None], 0.0)
-    bound[~is_vertex] = error[ids[~is_vertex] - n_vertices]
-    of_polygon = np.broadcast_to(rows[:, None], ids.shape)[is_vertex]
-    slot = np.argmax(facets.corners[of_polygon] == of_vertex[:, None], axis=1)
-    polygon = np.broadcast_to(np.arange(len(rows))[:, None], ids.shape)[is_vertex]
-    points[is_vertex] = corners[polygon, slot]
-    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    axis = np.argmax(np.abs(n), axis=1)
-    k = np.arange(len(rows))
-    u, v = np.where(n[k, axis] > 0, (axis + 1) % 3, (axis + 2) % 3), np.where(n[k, axis] > 0, axis + 2, axis + 1) % 3
-    relative = points - corners[:, :1]
-    seen = np.stack([relative[k, :, u], relative[k, :, v]], axis=2)
-    return seen, bound.max(axis=1) + corner_error + _U * np.abs(seen).max(axis=(1, 2))
+@kernel
+def _clip(ids, m, seen, error, triangles, count):
+    """Triangles of a polygon; the number of those there are then, −1 where an ear is not proven."""
+    size = 0.0
+    for k in range(m):
+        size = max(size, abs(seen[2 * k] - seen[0]), abs(seen[2 * k + 1] - seen[1]))
+    size = 2.0 * size
+    # Differences are off by 2E + 2u of themselves: determinants by 4 D (2 E + 2 u D) and 4 u D².
+    limit = 16.0 * size * (error + 2.0 * _U * size) + 1e-300
+    while m > 2:
+        j = _best_ear(seen, m, limit)
+        if j < 0:
+            return -1
+        triangles[3 * count] = ids[(j + m - 1) % m]
+        triangles[3 * count + 1] = ids[j]
+        triangles[3 * count + 2] = ids[(j + 1) % m]
+        count += 1
+        m -= 1
+        for k in range(j, m):
+            ids[k] = ids[k + 1]
+            seen[2 * k] = seen[2 * k + 2]
+            seen[2 * k + 1] = seen[2 * k + 3]
+    return count
 
 
-class _Polygons:
-    """k polygons of m corners: ids (k, m), coordinates (k, m, 2), bounds of their errors (k,), facets (k,)."""
-
-    def __init__(self, ids: np.ndarray, seen: np.ndarray, error: np.ndarray, facet: np.ndarray):
-        self.ids, self.seen, self.error, self.facet = ids, seen, error, facet
-
-    def some(self, rows: np.ndarray) -> _Polygons:
-        return _Polygons(self.ids[rows], self.seen[rows], self.error[rows], self.facet[rows])
-
-    def without(self, corner: np.ndarray) -> _Polygons:
-        """Each polygon without one of its corners."""
-        k, m = self.ids.shape
-        remaining = np.arange(m)[None] != corner[:, None]
-        seen = self.seen[remaining].reshape(k, m - 1, 2)
-        return _Polygons(self.ids[remaining].reshape(k, m - 1), seen, self.error, self.facet)
-
-    def joined(self, more: _Polygons | None) -> _Polygons:
-        if more is None:
-            return self
-        return _Polygons(*(np.concatenate(pair) for pair in zip(vars(self).values(), vars(more).values())))
-
-    def clip(self) -> tuple[np.ndarray, np.ndarray]:
-        """((k,) bool: whether an ear is proven, (k,) which corner is it: the roundest)."""
-        p, m = self.seen, self.ids.shape[1]
-        before, after = np.roll(p, 1, axis=1), np.roll(p, -1, axis=1)
-        size = np.abs(p - p[:, :1]).max(axis=(1, 2))
-        # Differences are off by 2E + 2u of themselves: determinants by 4 D (2 E + 2 u D) and 4 u D².
-        limit = 16.0 * size * (self.error + 2.0 * _U * size) + 1e-300
-        area = _area(before, p, after)
-        is_ear = area > limit[:, None]
-        if m > 3:
-            corners = (before, p, after)
-            outside = np.zeros((*self.ids.shape, m), dtype=bool)
-            for k in range(3):
-                a, b = corners[k][:, :, None], corners[(k + 1) % 3][:, :, None]
-                outside |= _area(a, b, p[:, None]) < -limit[:, None, None]
-            numbers = np.arange(m)
-            for step in (-1, 0, 1):
-                outside[:, numbers, (numbers + step) % m] = True
-            is_ear &= outside.all(axis=2)
-        longest = np.square(after - before).sum(axis=2) + np.square(p - before).sum(axis=2)
-        roundness = np.where(is_ear, area / (longest + np.square(after - p).sum(axis=2)), -1.0)
-        ear = np.argmax(roundness, axis=1)
-        return is_ear.any(axis=1), ear
+@kernel
+def _walk_around(following, points, rows, seen_step, head, ids):
+    """The corners of the part around which a step leads; how many, 0 where the way does not close as it should."""
+    m = 0
+    step = head
+    while True:
+        if m == MAX_CORNERS or rows[step] != rows[head] or seen_step[step] != 0:
+            return 0
+        ids[m] = points[step]
+        seen_step[step] = 1
+        m += 1
+        step = following[step]
+        if step == head:
+            return m
 
 
-def _area(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    e, f = b - a, c - a
-    return e[..., 0] * f[..., 1] - e[..., 1] * f[..., 0]
+@entry(
+    "int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, "
+    "int64, int64, int64, int64, int64)"
+)
+def clip_parts(
+    poses_at, n_bodies, local_at, n_vertices, corners_at, body_at, n_facets, place_at, error_at, n_points, following_at,
+    points_at, rows_at, n, n_border, seen_at, failed_at, triangles_at, owners_at, workspace_at,
+):  # fmt: skip
+    """How many triangles were made, those of facets that fail among them.
+
+    poses, local, corners, body : of `PlacedFacets`.   place, error : of the points that are no vertices, in W.
+    following : (n,) from each step the next around the same part; the first ``n_border`` are along borders.
+    points, rows : (n,) where a step starts, and its facet.   seen : (n,) uint8, 0 at first.
+    failed : (F,) uint8, set for facets with a ring of cuts, too many corners or no proven ear.
+    triangles, owners : out, (n, 3) ids of points and (n,) facets.   workspace : WORKSPACE doubles.
+    """
+    poses = view_f64(poses_at, 16 * n_bodies)
+    local = view_f64(local_at, 3 * n_vertices)
+    corners = view_i64(corners_at, 3 * n_facets)
+    body = view_i64(body_at, n_facets)
+    place = view_f64(place_at, 3 * n_points)
+    error = view_f64(error_at, n_points)
+    following = view_i64(following_at, n)
+    points = view_i64(points_at, n)
+    rows = view_i64(rows_at, n)
+    seen_step = view_u8(seen_at, n)
+    failed = view_u8(failed_at, n_facets)
+    triangles = view_i64(triangles_at, 3 * n)
+    owners = view_i64(owners_at, n)
+    seen = view_f64(workspace_at, 2 * (MAX_CORNERS + 1))
+    ids = view_i64(workspace_at + 16 * (MAX_CORNERS + 1), MAX_CORNERS + 1)
+    count = 0
+    for head in range(n_border):
+        f = rows[head]
+        if seen_step[head] != 0 or failed[f] != 0:
+            continue
+        m = _walk_around(following, points, rows, seen_step, head, ids)
+        if m < 3:
+            failed[f] = 1
+            continue
+        X = 16 * body[f]
+        a, b, c = int(corners[3 * f]), int(corners[3 * f + 1]), int(corners[3 * f + 2])
+        p, q, r = _corner(poses, X, local, a), _corner(poses, X, local, b), _corner(poses, X, local, c)
+        off = max(_corner_error(poses, X, local, a), _corner_error(poses, X, local, b))
+        off = max(off, _corner_error(poses, X, local, c))
+        bound = off
+        for k in range(m):
+            if ids[k] >= n_vertices:
+                bound = max(bound, error[ids[k] - n_vertices])
+        normal = cross(sub(q, p), sub(r, p))
+        axis = 0
+        for k in range(1, 3):
+            if abs(_component(normal, k)) > abs(_component(normal, axis)):
+                axis = k
+        u = (axis + 1) % 3
+        v = (axis + 2) % 3
+        if not _component(normal, axis) > 0.0:
+            u, v = v, u
+        largest = _look_at((a, b, c, p, q, r), ids, m, place, n_vertices, u, v, seen)
+        made = _clip(ids, m, seen, bound + off + _U * largest, triangles, count)
+        if made < 0:
+            failed[f] = 1
+            continue
+        for k in range(count, made):
+            owners[k] = f
+        count = made
+    for step in range(n_border, n):
+        if seen_step[step] == 0:
+            failed[rows[step]] = 1
+    return count

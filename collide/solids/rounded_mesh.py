@@ -1,4 +1,4 @@
-"""Points of an arrangement rounded to doubles, once, and the solid that triangles of such points enclose."""
+"""The solid that triangles of an arrangement enclose, their points rounded to doubles, once."""
 
 from __future__ import annotations
 
@@ -10,11 +10,7 @@ from collide.mesh.mesh_survey import EMPTY, INSIDE_OUT
 from collide.mesh.weld import weld
 from collide.shapes.mesh import Mesh
 from collide.solids.cut_points import CutPoints
-
-#: Products of smaller numbers are not split into two doubles without an error.
-_SMALLEST = 2.0**-480
-#: Three products and three sums in two doubles each are off by less than this share of their largest term.
-_TAIL = 2.0**-98
+from collide.solids.rounded_points import rounded_points
 
 
 class RoundedMesh(NamedTuple):
@@ -36,15 +32,14 @@ def rounded_mesh(points: CutPoints, triangles: np.ndarray) -> RoundedMesh:
     """The solid of triangles (k, 3) that close, vertices rounded to the nearest doubles of W."""
     ids, faces = used_points(triangles, len(points))
     vertices, moved = rounded_points(points, ids)
-    same = weld(vertices) if len(vertices) else np.zeros(0, dtype=np.int32)
-    corners = same[faces]
-    proper = np.flatnonzero(
-        (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
-    )
+    corners, proper = _welded(vertices, faces)
     rows, n_thin = proper, 0
     while len(rows):
-        used, compact = used_points(corners[rows], len(vertices))
-        mesh = Mesh(vertices[used], compact)
+        if len(rows) < len(faces) or corners is not faces:
+            used, compact = used_points(corners[rows], len(vertices))
+            mesh = Mesh(vertices[used], compact)
+        else:
+            mesh = Mesh(vertices, faces)
         if mesh.solid:
             return RoundedMesh(mesh, rows, moved, len(faces) - len(proper), n_thin)
         survey = mesh.survey
@@ -52,6 +47,16 @@ def rounded_mesh(points: CutPoints, triangles: np.ndarray) -> RoundedMesh:
         n_thin += len(np.unique(survey.shells[spoilt]))
         rows = rows[~spoilt] if spoilt.any() else rows[:0]
     return RoundedMesh(None, rows, moved, len(faces) - len(proper), n_thin)
+
+
+def _welded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(the faces with equal vertices named by the first, and those with three distinct corners)."""
+    same = weld(vertices) if len(vertices) else np.zeros(0, dtype=np.int32)
+    if (same == np.arange(len(same))).all():
+        return faces, np.arange(len(faces))
+    corners = same[faces]
+    a, b, c = corners.T
+    return corners, np.flatnonzero((a != b) & (b != c) & (c != a))
 
 
 def used_points(triangles: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -62,65 +67,3 @@ def used_points(triangles: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     place = np.empty(n, dtype=np.int32)
     place[ids] = np.arange(len(ids))
     return ids, place[triangles]
-
-
-def rounded_points(points: CutPoints, ids: np.ndarray) -> tuple[np.ndarray, float]:
-    """((k, 3) points in W, farther than which none was moved)."""
-    out = np.empty((len(ids), 3))
-    facets = points.facets
-    is_vertex = ids < points.n_vertices
-    vertices = ids[is_vertex]
-    n = len(vertices)
-    coordinates, off, proven = np.empty((n, 3)), np.empty(n), np.zeros(n, dtype=bool)
-    for k, operand in enumerate(facets.operands):
-        rows = np.flatnonzero(facets.body_of[vertices] == k)
-        coordinates[rows], off[rows], proven[rows] = placed_vertices(operand.X, facets.local[vertices[rows]])
-    out[is_vertex] = coordinates
-    moved = float(off[proven].max(initial=0.0))
-    open_rows = np.concatenate([np.flatnonzero(is_vertex)[~proven], np.flatnonzero(~is_vertex)])
-    points.load(ids[open_rows].tolist())
-    for row, point in zip(open_rows.tolist(), ids[open_rows].tolist()):
-        out[row] = points.in_world(point)
-    by_rounding = np.square(0.5 * np.spacing(np.abs(out[open_rows]))).sum(axis=1)
-    return out + 0.0, max(moved, float(np.sqrt(by_rounding.max(initial=0.0))))
-
-
-def placed_vertices(X: np.ndarray, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """((k, 3) R v + t rounded to the nearest doubles, (k,) how far that is off, (k,) bool: proven to be so)."""
-    shape = (len(vertices), 3)
-    total, tail, size = np.broadcast_to(X[:3, 3], shape).copy(), np.zeros(shape), np.zeros(shape)
-    size += np.abs(X[:3, 3])
-    exact = np.ones(len(vertices), dtype=bool)
-    for j in range(3):
-        factor = np.broadcast_to(X[:3, j], shape)
-        value = np.broadcast_to(vertices[:, j : j + 1], shape)
-        product, error = _two_product(factor, value)
-        exact &= ((product == 0.0) | (np.abs(product) > _SMALLEST)).all(axis=1)
-        exact &= ((factor == 0.0) | (value == 0.0) | (product != 0.0)).all(axis=1)
-        total, rest = _two_sum(total, product)
-        tail += rest + error
-        size += np.abs(product)
-    nearest = total + tail
-    off = (total - nearest) + tail
-    slack = _TAIL * size
-    proven = exact & ((nearest + (off + slack) == nearest) & (nearest + (off - slack) == nearest)).all(axis=1)
-    return nearest, np.sqrt(np.square(off).sum(axis=1)) * (1 + 2.0**-40), proven
-
-
-def _two_sum(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    s = a + b
-    back = s - a
-    return s, (a - (s - back)) + (b - back)
-
-
-def _two_product(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    product = a * b
-    (a_high, a_low), (b_high, b_low) = _split(a), _split(b)
-    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
-
-
-def _split(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Halves of the 53 bits of doubles (T. J. Dekker, 1971)."""
-    c = 134217729.0 * a
-    high = c - (c - a)
-    return high, a - high

@@ -13,8 +13,8 @@ from collide.solids.placed_facets import Operand
 from collide.transforms import as_poses
 
 
-def solid_operand(caller: str, name: str, shape, X, check: bool) -> Operand:
-    """A shape and its pose as the arrangement takes them.   name : "A"; its pose's is "X_WA".
+def solid_operand(caller: str, name: str, shape, X, check: bool, pose_name: str | None = None) -> Operand:
+    """A shape and its pose as the arrangement takes them.   name : "A"; its pose's is "X_WA" by default.
 
     Raises InvalidArgument for surfaces and flat hulls, with the facets to blame; InvalidPose; UnsupportedQuery for
     curved shapes, unions and half-spaces, by name.
@@ -25,9 +25,10 @@ def solid_operand(caller: str, name: str, shape, X, check: bool) -> Operand:
         raise UnsupportedQuery(f"{error}; Mesh(*collide.tessellate(shape, tolerance)[:2]) is one") from None
     if not body.solid:
         raise InvalidArgument(f"{caller}: {name} has no inside: {_why_not(shape)}")
-    poses = as_poses(X, f"X_W{name}", check=check)
+    pose_name = pose_name or f"X_W{name}"
+    poses = as_poses(X, pose_name, check=check)
     if len(poses) != 1:
-        raise InvalidArgument(f"{caller}: X_W{name} must be one (4, 4) pose, got {len(poses)}: ask pose by pose")
+        raise InvalidArgument(f"{caller}: {pose_name} must be one (4, 4) pose, got {len(poses)}: ask pose by pose")
     mesh = _unscaled(shape) if isinstance(shape, Mesh) else _as_mesh(shape)
     return Operand(body_of(mesh), mesh, poses[0])
 

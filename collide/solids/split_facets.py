@@ -11,13 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.kernels import address_of
 from collide.solids.crossing_pairs import CrossingPairs
 from collide.solids.placed_facets import PlacedFacets
-from collide.solids.polygon_ears import clip_ears
+from collide.solids.polygon_ears import WORKSPACE, clip_parts
 from collide.surface_queries.overlay import posed_corners
-
-#: Parts with more corners are left to the sweep.
-_MAX_CORNERS = 40
 
 
 class _Chains(NamedTuple):
@@ -60,19 +58,29 @@ def split_facets(
     chains, bad = _borders(facets, rows, facet, start, edge, at_border[0], place, error)
     following, unpaired = _ways_around(chains, facet, start, end, at_border, n_points)
     bad = np.union1d(bad, unpaired)
-    all_facets, all_points = np.concatenate([chains.facet, facet]), np.concatenate([chains.point, start])
-    heads, lengths = _rounds(following, len(chains.facet))
+    steps = np.concatenate([chains.facet, facet]), np.concatenate([chains.point, start])
     is_bad = np.zeros(len(facets.corners), dtype=bool)
     is_bad[bad] = True
-    is_bad[all_facets[heads[lengths <= 0]]] = True
-    good = (lengths > 0) & ~is_bad[all_facets[heads]]
-    polygons = _corners_of(following, heads[good], lengths[good])
-    triangles, polygon, failed = clip_ears(
-        [all_points[p] for p in polygons], [all_facets[p[:, 0]] for p in polygons], facets, place, error
-    )
-    is_bad[failed] = True
-    remaining = ~is_bad[polygon]
-    return triangles[remaining], polygon[remaining], rows[is_bad[rows]]
+    triangles, owners = _clipped(facets, following, len(chains.facet), *steps, place, error, is_bad)
+    remaining = ~is_bad[owners]
+    return triangles[remaining], owners[remaining], rows[is_bad[rows]]
+
+
+def _clipped(
+    facets: PlacedFacets, following: np.ndarray, n_border: int, rows: np.ndarray, points: np.ndarray,
+    place: np.ndarray, error: np.ndarray, is_bad: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """(triangles (t, 3), their facets (t,)) as of `polygon_ears.clip_parts`, which marks further facets as bad."""
+    n = len(following)
+    triangles, owners = np.empty((n, 3), dtype=np.int64), np.empty(n, dtype=np.int64)
+    seen, workspace = np.zeros(n, dtype=np.uint8), np.empty(WORKSPACE)
+    count = clip_parts(
+        address_of(facets.poses), len(facets.poses), address_of(facets.local), len(facets.local),
+        address_of(facets.corners), address_of(facets.body), len(facets.corners), address_of(place), address_of(error),
+        len(place), address_of(following), address_of(points), address_of(rows), n, n_border, address_of(seen),
+        address_of(is_bad.view(np.uint8)), address_of(triangles), address_of(owners), address_of(workspace),
+    )  # fmt: skip
+    return triangles[:count], owners[:count]
 
 
 def _borders(facets: PlacedFacets, rows, facet, start, edge, at_border, place, error) -> tuple[_Chains, np.ndarray]:
@@ -132,29 +140,3 @@ def _ways_around(chains: _Chains, facet, start, end, at_border, n_points) -> tup
     following[m:] = np.where(at_border[1], onward, m + np.where(onto == back, or_onto, onto))
     bad.append(facet[~at_border[1] & (count != 2)])
     return following, np.unique(np.concatenate(bad))
-
-
-def _rounds(following: np.ndarray, n_border: int) -> tuple[np.ndarray, np.ndarray]:
-    """(the first step of each round, its length); a length of 0 where it touches no border, −1 where it is too long."""
-    least, jump = np.arange(len(following)), following.copy()
-    for _ in range(int(_MAX_CORNERS).bit_length()):
-        least = np.minimum(least, least[jump])
-        jump = jump[jump]
-    closed = least == least[following]
-    heads, lengths = np.unique(least, return_counts=True)
-    broken = np.unique(least[~closed])
-    lengths[np.isin(heads, broken)] = -1
-    lengths[lengths > _MAX_CORNERS] = -1
-    lengths[heads >= n_border] = 0
-    return heads, lengths
-
-
-def _corners_of(following: np.ndarray, heads: np.ndarray, lengths: np.ndarray) -> list[np.ndarray]:
-    """The steps of rounds, (k, m) for every length m there is."""
-    polygons = []
-    for m in np.unique(lengths).tolist():
-        steps = [heads[lengths == m]]
-        for _ in range(m - 1):
-            steps.append(following[steps[-1]])
-        polygons.append(np.stack(steps, axis=1))
-    return polygons

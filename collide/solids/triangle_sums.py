@@ -1,4 +1,4 @@
-"""Volume, centroid and area within exact triangles: sums in doubles with a bound of their error, then in integers."""
+"""Volume, centroid and area within exact triangles: sums in doubles with a bound of their error, or in integers."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.kernels import address_of
 from collide.numerics.exact_points import Point, cross, inner, rounded
 from collide.solids.cut_points import CutPoints
-from collide.solids.rounded_mesh import rounded_points, used_points
+from collide.solids.rounded_mesh import used_points
+from collide.solids.rounded_points import rounded_points
+from collide.solids.sum_kernel import SUMS, sum_triangles
 
 #: Brackets of volumes wider than this share of them are worked out again in integers.
 _WIDEST = 2.0**-33
@@ -26,29 +29,27 @@ class Volume(NamedTuple):
     centroid: np.ndarray
 
 
-def enclosed(points: CutPoints, triangles: np.ndarray) -> Volume:
-    """What closed triangles (k, 3) of points of an arrangement enclose."""
+def enclosed(points: CutPoints, triangles: np.ndarray) -> tuple[Volume, np.ndarray]:
+    """(what closed triangles (k, 3) of points of an arrangement enclose, (k,) areas of them, rounded [m²])."""
     if not len(triangles):
-        return Volume(0.0, 0.0, 0.0, np.zeros(3))
+        return Volume(0.0, 0.0, 0.0, np.zeros(3)), np.zeros(0)
     ids, faces = used_points(triangles, len(points))
     corners, _ = rounded_points(points, ids)
-    start = corners[0]
-    corners = corners - start
+    start = corners[0].copy()
+    corners -= start
     # Each difference is off by the rounding of its ends, by less than those ends' last place, and its own.
-    error = 4.0 * _U * (np.abs(start).max() + np.abs(corners).max())
-    a, b, c = (corners[k] for k in faces.T)
-    e, f = b - a, c - a
-    six = (a * np.cross(e, f)).sum(axis=1)
-    # a · (e × f) with a off by δ, e and f by 2δ: 6 δ |e| |f| + 12 |a| δ (|e| + |f|), and 24 u |a| |e| |f| by rounding.
-    far, long_e, long_f = (np.abs(x).max(axis=1) + 2.0 * error for x in (a, e, f))
-    bound = float((6.0 * error * long_e * long_f + 12.0 * far * error * (long_e + long_f)).sum())
-    bound += float((24.0 * _U * far * long_e * long_f).sum()) + len(six) * _U * float(np.abs(six).sum())
-    volume = float(six.sum()) / 6.0
+    error = 4.0 * _U * float(np.abs(start).max() + np.abs(corners).max())
+    sums, areas = np.empty(SUMS), np.empty(len(faces))
+    sum_triangles(
+        address_of(corners), len(corners), address_of(faces), len(faces), error, address_of(sums), address_of(areas)
+    )
+    six, sizes, bound, *moments = sums.tolist()
+    bound += len(faces) * _U * sizes
+    volume = six / 6.0
     bound = bound * (1.0 + 1e-9) / 6.0 + 4.0 * _U * abs(volume)
-    middle = start + ((a + b + c) * six[:, None]).sum(axis=0) / (4.0 * six.sum()) if six.sum() > 0.0 else start
     if bound <= _WIDEST * volume:
-        return Volume(volume, volume - bound, volume + bound, middle)
-    return _exactly(points, triangles)
+        return Volume(volume, volume - bound, volume + bound, start + np.array(moments) / (4.0 * six)), areas
+    return _exactly(points, triangles), areas
 
 
 def _exactly(points: CutPoints, triangles: np.ndarray) -> Volume:

@@ -18,7 +18,8 @@ class FacetPairs(NamedTuple):
 
     pairs : (k, 2) int64 facet numbers of A and of B; those of a pose stand together, sorted.
     starts : (N + 1,) int64: the pairs of pose i are rows starts[i] to starts[i + 1].
-    counters : (N, 3) int64: pairs of boxes looked at, pairs of facets tested, and of these decided in integers.
+    counters : (N, 3) int64: nodes compared with a box (one against up to eight), pairs of facets tested, and of these
+        decided in integers.
     """
 
     pairs: np.ndarray
@@ -30,7 +31,7 @@ class SelfCollisions(NamedTuple):
     """Pairs of facets of one mesh that share more than corners and edges they have in common.
 
     pairs : (k, 2) int64 facet numbers, the smaller first, sorted.
-    counters : (3,) int64: pairs of boxes looked at, pairs of facets tested, and of these decided in integers.
+    counters : (3,) int64: nodes compared with a box, pairs of facets tested, and of these decided in integers.
     """
 
     pairs: np.ndarray

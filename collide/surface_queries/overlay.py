@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from functools import cmp_to_key
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -219,7 +220,7 @@ def common_piece(A: list[Point], B: list[Point]) -> list[_Rational]:
     """
     if cross(minus(A[1], A[0]), minus(A[2], A[0])) == (0, 0, 0) != cross(minus(B[1], B[0]), minus(B[2], B[0])):
         A, B = B, A
-    piece = _distinct([(*p, 1) for p in A])
+    piece = list(dict.fromkeys((*p, 1) for p in A))
     if len(piece) == 3 and cross(minus(A[1], A[0]), minus(A[2], A[0])) == (0, 0, 0):
         piece = _ends(piece)
     for side in _half_spaces(B):
@@ -263,7 +264,7 @@ def _cut(piece: list[_Rational], side: _Side) -> list[_Rational]:
         if s * t < 0:
             # Both heights are over their own w: weights |t| and |s| of the homogeneous points meet at height 0.
             remaining.append(_reduced(*(abs(t) * x + abs(s) * y for x, y in zip(p, q))))
-    return _distinct(remaining)
+    return list(dict.fromkeys(remaining))
 
 
 def _reduced(x: int, y: int, z: int, w: int) -> _Rational:
@@ -271,32 +272,39 @@ def _reduced(x: int, y: int, z: int, w: int) -> _Rational:
     return x // common, y // common, z // common, w // common
 
 
-def _distinct(piece: list[_Rational]) -> list[_Rational]:
-    return list(dict.fromkeys(_reduced(*p) for p in piece))
-
-
 def _ends(piece: list[_Rational]) -> list[_Rational]:
     """The ends of points on one line, in the order of their coordinates."""
-    order = sorted(piece, key=lambda p: [Fraction(v, p[3]) for v in p[:3]])
-    return _distinct([order[0], order[-1]])
+    order = sorted(piece, key=_by_coordinates)
+    return list(dict.fromkeys((order[0], order[-1])))
+
+
+def _compare(p: _Rational, q: _Rational) -> int:
+    """−1, 0 or 1 as p comes before q by coordinates, is q, or comes after it."""
+    for x, y in zip(p[:3], q[:3]):
+        difference = x * q[3] - y * p[3]
+        if difference:
+            return -1 if difference < 0 else 1
+    return 0
+
+
+_by_coordinates = cmp_to_key(_compare)
 
 
 def _without_flat_corners(piece: list[_Rational]) -> list[_Rational]:
     """The polygon's true corners, first the least; of points on one line the ends."""
     if len(piece) < 3:
         return _ends(piece) if len(piece) == 2 else piece
-    points = [[Fraction(v, p[3]) for v in p[:3]] for p in piece]
-    count = len(piece)
-    true = []
-    for k in range(count):
-        e = [x - y for x, y in zip(points[k], points[k - 1])]
-        f = [x - y for x, y in zip(points[(k + 1) % count], points[k])]
-        if any(cross(e, f)):  # type: ignore[arg-type]
-            true.append(k)
+    sides = [_along(piece[k - 1], p) for k, p in enumerate(piece)]
+    true = [p for p, e, f in zip(piece, sides, [*sides[1:], sides[0]]) if cross(e, f) != (0, 0, 0)]
     if len(true) < 3:
         return _ends(piece)
-    first = min(range(len(true)), key=lambda k: points[true[k]])
-    return [piece[true[(first + k) % len(true)]] for k in range(len(true))]
+    first = true.index(min(true, key=_by_coordinates))
+    return true[first:] + true[:first]
+
+
+def _along(p: _Rational, q: _Rational) -> Point:
+    """A vector along q − p."""
+    return q[0] * p[3] - p[0] * q[3], q[1] * p[3] - p[1] * q[3], q[2] * p[3] - p[2] * q[3]
 
 
 def _rounded_piece(piece: list[_Rational], exponent: int) -> tuple[np.ndarray, float]:

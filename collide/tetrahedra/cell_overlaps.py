@@ -31,8 +31,8 @@ class CellOverlaps(NamedTuple):
         is rounded once, which is all of them unless ``settle=False``. None unless asked for.
     centroids : (k, 3) in W [m] of what each pair shares, off by at most 4 units in the last place of the largest
         coordinate of its cells in W; None unless asked for.
-    counters : (N, 4) int64: steps of eight boxes each, pairs of cells whose boxes meet, pairs decided in integers,
-        volumes worked out in fractions.
+    counters : (N, 4) int64: nodes compared with the box of a cell, pairs of cells whose boxes meet, pairs decided in
+        integers, volumes worked out in fractions.
     """
 
     pairs: np.ndarray

@@ -93,8 +93,8 @@ def overlap_cells(
 ):
     """Pairs of cells order[begin] … order[end − 1] of A; returns where it stopped for lack of space for pairs.
 
-    A cell's pairs are all there or none. counts : pairs; then, added to what stands there, steps of eight boxes, and
-    pairs of cells whose boxes meet.
+    A cell's pairs are all there or none. counts : pairs; then, added to what stands there, nodes compared with the box
+    of a cell, and pairs of cells whose boxes meet.
     """
     header = view_i64(job_at, JOB)
     order = view_i32(header[ORDER_AT], header[N_CELLS_A])

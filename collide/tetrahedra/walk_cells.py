@@ -22,7 +22,7 @@ _QUERY_ERROR = 2.0**-45
 
 
 class Walked(NamedTuple):
-    """Pairs (k, 2) int64, what the kernel knows of each (k,), its answers in W, and counters: steps, pairs of boxes.
+    """Pairs (k, 2) int64, what the kernel knows of each (k,), its answers in W, and counters: nodes, boxes that meet.
 
     answers : (k, 5) volumes, errors and centroids; (k, 2) without centroids, (k, 0) without volumes.
     """

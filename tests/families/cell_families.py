@@ -14,11 +14,12 @@ from collide import TetMesh, pose
 def quiet(vertices, cells) -> TetMesh:
     """A TetMesh whose turned cells are not remarked upon."""
     log = logging.getLogger("collide")
-    level, log.level = log.level, logging.ERROR
+    level = log.level
+    log.setLevel(logging.ERROR)
     try:
         return TetMesh(vertices, cells)
     finally:
-        log.level = level
+        log.setLevel(level)  # not `log.level = `: loggers remember what they would say
 
 
 def soup(corners) -> TetMesh:

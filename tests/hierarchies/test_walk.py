@@ -10,8 +10,10 @@ import threading
 from fractions import Fraction
 from pathlib import Path
 
+import hierarchy_families as families
 import numpy as np
 import pytest
+from naive import rng_of
 
 import collide
 from collide.adapters.peers import exact
@@ -380,6 +382,25 @@ def test_rounds_grow_with_the_logarithm():
         assert (a_round > 0).all() and a_round.mean() < 12 and a_round.max() < 40, "a round is O(1)"
         most.append(int(found.rows["rounds"].max()))
     assert most[2] <= 12 + 3.5 * 2 * np.log2(3000) and most[2] < 2.5 * most[1]
+
+
+@pytest.mark.parametrize("kind", ["bipyramid", "cone", "prism", "degree doubling", "moment curve"])
+def test_tests_a_round_do_not_grow_with_a_degree(kind):
+    """Bodies with a vertex or a facet of degree n: a mean of a few tests a round, at eight times the vertices too."""
+    make = {
+        "bipyramid": families.bipyramid, "cone": families.cone, "prism": lambda n: families.prism(n // 2),
+        "degree doubling": lambda n: families.degree_doubling(round(np.log2(n / 3))),
+        "moment curve": families.moment_curve,
+    }[kind]  # fmt: skip
+    rng = rng_of("tests a round", kind)
+    means = []
+    for n in (800, 6400):
+        A, B = collide.ConvexHull(make(n)), collide.ConvexHull(make(n))
+        X_WA = np.array([turned(rng, rng.uniform(0.3, 2.5)) for _ in range(150)])
+        found = collide.walk(A, B, X_WA, EYE[None])
+        assert 0.1 < found.hit.mean() < 0.9 and found.walked.all(), (kind, n, found.hit.mean())
+        means.append(found.rows["tests"].sum() / found.rows["rounds"].sum())
+    assert max(means) < 12.0 and means[1] < 1.25 * means[0], (kind, means)
 
 
 def test_same_bits_single_batch_and_from_threads():

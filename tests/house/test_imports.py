@@ -164,6 +164,10 @@ ROOMS = {
     },
     "solids": {
         "errors", "argument_checks", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",
+        "surface_queries", "kernels",
+    },
+    "partitions": {  # labels of cells come from the winding numbers of meshes, and points on facets from exact tests
+        "errors", "argument_checks", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",
         "surface_queries",
     },
     "hierarchies": {
@@ -287,7 +291,7 @@ ROOMS = {
         "world",
     },
     "sweeps": {"errors", "argument_checks", "query", "shapes", "robots", "world", "reports", "whole_file", ""},
-    "reports": {"errors", "lowering", "results", "shapes", "cache_folder", "kernels", ""},
+    "reports": {"errors", "lowering", "results", "shapes", "solids", "cache_folder", "kernels", ""},
     "pages": {"errors", "contact", "lowering", "reports", "results", "shapes", "whole_file"},
     "cli_files": {"errors", "reports"},
     "cli_scenes": {"errors", "reports"},

@@ -97,11 +97,12 @@ def test_a_folder_in_the_place_of_a_file_is_said_and_done_without(folder, caplog
 
 @pytest.mark.parametrize("how", ["full disk", "no file", "a file of that name", "no name", "read-only"])
 def test_a_kernel_that_cannot_be_kept_is_said_and_used(folder, caplog, monkeypatch, how):
-    def full(handle, mode):
-        os.close(handle)
-        if Path("/dev/full").exists():
-            return open("/dev/full", mode)  # the error comes when it is closed
-        raise OSError(errno.ENOSPC, "No space left on device")
+    make = os.open
+
+    def full(_place, flags, _mode):
+        if not Path("/dev/full").exists():
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return make("/dev/full", flags & ~(os.O_CREAT | os.O_EXCL))  # the error comes when it is closed
 
     def refuse(number):
         def none(*_given, **_named):
@@ -110,14 +111,14 @@ def test_a_kernel_that_cannot_be_kept_is_said_and_used(folder, caplog, monkeypat
         return none
 
     if how == "full disk":
-        monkeypatch.setattr(object_cache.os, "fdopen", full)
+        monkeypatch.setattr(os, "open", full)
     elif how == "a file of that name":
         folder.parent.mkdir(parents=True)
         folder.write_text("no folder")
     elif how == "no file":
-        monkeypatch.setattr(object_cache.tempfile, "mkstemp", refuse(errno.EDQUOT))
+        monkeypatch.setattr(os, "open", refuse(errno.EDQUOT))
     elif how == "no name":
-        monkeypatch.setattr(object_cache.os, "replace", refuse(errno.EIO))
+        monkeypatch.setattr(os, "replace", refuse(errno.EIO))
     else:
         monkeypatch.setattr(Path, "mkdir", refuse(errno.EROFS))  # as root nothing is
     assert not came_from_disk() and not came_from_disk()
@@ -132,7 +133,7 @@ def test_an_interrupt_while_a_kernel_is_kept_leaves_no_half_file(folder, monkeyp
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(object_cache.os, "replace", interrupted)
+        patch.setattr(os, "replace", interrupted)
         with pytest.raises(KeyboardInterrupt):
             came_from_disk()
     assert not list(folder.iterdir())

@@ -13,6 +13,7 @@ from naive import rng_of
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import SLAB, WIDTH, MeshTree
 from collide.mesh.bvh_slabs import make_slabs
+from collide.mesh.fine_boxes import with_origins
 
 FAMILIES = {
     "box": lambda rng: box(), "sphere": lambda rng: bumpy_sphere(200), "soup": lambda rng: soup(rng, 60),
@@ -30,9 +31,10 @@ def below(tree: MeshTree, link: int) -> list[int]:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_slabs_hold_their_facets_and_little_more(family):
+@pytest.mark.parametrize("make", [lambda tree: tree, with_origins], ids=["plain", "origins"])
+def test_slabs_hold_their_facets_and_little_more(family, make):
     vertices, faces = FAMILIES[family](rng_of("slabs", family))
-    tree = build_mesh_tree(vertices, faces)
+    tree = make(build_mesh_tree(vertices, faces))
     slabs = make_slabs(tree)
     assert slabs.shape == (len(tree.nodes), SLAB) and slabs.dtype == np.float32
     unit, centre = Fraction(2) ** tree.exponent, [Fraction(x) for x in tree.centre.tolist()]
@@ -41,7 +43,11 @@ def test_slabs_hold_their_facets_and_little_more(family):
         facets = below(tree, int(tree.links()[node, slot]))
         corners = tree.triangles[facets].reshape(-1, 3)
         *n, middle, half = (Fraction(float(slabs[node, WIDTH * k + slot])) for k in range(5))
-        heights = [sum(a * (Fraction(x) - c) for a, x, c in zip(n, point, centre)) / unit for point in corners.tolist()]
+        origin = [Fraction(x) for x in tree.origins()[node].tolist()]
+        heights = [
+            sum(a * ((Fraction(x) - c) / unit - o) for a, x, c, o in zip(n, point, centre, origin))
+            for point in corners.tolist()
+        ]
         assert max(abs(h - middle) for h in heights) <= half, (family, node, slot)
         spread = (max(heights) - min(heights)) / 2
         assert half <= spread * (1 + Fraction(1, 10**6)) + Fraction(1, 10**6), (family, node, slot)

@@ -35,7 +35,7 @@ def test_figures_keep_their_bounds(name):
 
 
 def counts(A, B) -> tuple[int, int]:
-    """(pairs of boxes looked at, pairs of facets found) for bodies as they stand."""
+    """(nodes compared with a box, pairs of facets found) for bodies as they stand."""
     found = all_hits(A.tree, B.tree, np.eye(4), np.eye(4))
     return int(found.counters[0, 0]), len(found.pairs)
 

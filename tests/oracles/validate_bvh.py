@@ -17,7 +17,7 @@ def validate_mesh_tree(tree: MeshTree, vertices: np.ndarray, faces: np.ndarray) 
     corners = np.asarray(vertices, dtype=float)[np.asarray(faces)[tree.ids]]
     assert np.array_equal(corners.reshape(-1, 9), tree.triangles), "triangles are not those of the facets"
     first, last = _ranges(tree)
-    centres, half_lengths = tree.boxes()
+    (centres, half_lengths), origins = tree.boxes(), tree.origins()
     slabs = make_slabs(tree).reshape(-1, 5, 8).astype(float)
     scaled = (corners - tree.centre) * 2.0**-tree.exponent
     rounding = 4e-16 * (1.0 + np.abs(corners).max() * 2.0**-tree.exponent)
@@ -25,7 +25,7 @@ def validate_mesh_tree(tree: MeshTree, vertices: np.ndarray, faces: np.ndarray) 
         points = scaled[first[node, slot] : last[node, slot]].reshape(-1, 3)
         off = np.abs(points - centres[node, slot]) - half_lengths[node, slot]
         assert (off <= rounding).all(), f"box {slot} of node {node} does not hold what is below it"
-        heights = (points * slabs[node, :3, slot]).sum(axis=1)
+        heights = ((points - origins[node]) * slabs[node, :3, slot]).sum(axis=1)
         off = np.abs(heights - slabs[node, 3, slot]) - slabs[node, 4, slot]
         assert (off <= 4 * rounding).all(), f"slab {slot} of node {node} does not hold what is below it"
 

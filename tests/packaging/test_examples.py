@@ -19,6 +19,7 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 NEEDS = {
     "06_compare_with_fcl": "fcl", "13_mujoco_pit": "mujoco", "11_meshes_in_scenes": "trimesh",
     "14_programs_for_python_fcl": "trimesh", "16_pybullet_arm": "pybullet", "17_newton_solver": "newton",
+    "29_record_and_compare": "pybullet",
     **dict.fromkeys(("18_certified_planning", "19_nearest_obstacles", "20_reachable_positions"), "yaml"),
 }
 #: What hosts print when they are imported.
@@ -43,7 +44,13 @@ SHOWS = {
         "sum to its volume in fractions: True",
     ],
     "26_bezier_regions": ["region 0: entered at 0.000, left at 0.361", "region 2: never entered", "proven outside)"],
+    "29_record_and_compare": [
+        "fcl-wrong-depth-box-box-touching: .json, .md, .py", "coal-false-miss-cylinder-cylinder",
+        "pybullet: 1 pair recorded",
+    ],
+    "31_free_space_cells": ["35 convex cells, 56.490 m³ of 60 m³", "a path through 10 portals", "0 of 1100 points"],
     "27_solids": ["solid: True", "0 facets cross", "clash: 0.7200 mm³", "at rest: volume 0.0, patch 625.00 cm²"],
+    "30_base_as_a_point": ["an obstacle of ", "a path of 4.81 m in 44 steps", "steps that hit: 0 of 44"],
     "18_certified_planning": ["nodes; a path", "motions are proven free", "of it in collision checks"],
     "19_nearest_obstacles": ["in something, gaps up to", "collide, depths up to", "nearest in"],
     "21_look_at_a_world": ["13 bodies at http://127.0.0.1:", "no longer live"],

@@ -146,7 +146,7 @@ def test_engine_alone_needs_numpy(metadata):
 def test_wheel_is_of_its_platform_and_of_every_python(wheel_file):
     """cp310-abi3: one wheel for Python 3.10 and all that come after it."""
     assert "-cp310-abi3-" in wheel_file.name
-    assert wheel_file.stat().st_size < 4_000_000
+    assert wheel_file.stat().st_size < 5_000_000  # half of it machine code; debugging symbols alone would be more
 
 
 def test_wheel_has_the_library_and_what_c_programs_need(wheel):

@@ -65,7 +65,7 @@ def report_of(name: str, clearance: float = 0.5, **classes) -> dict:
     """A report with pairs by class, and every other field filled."""
     pairs = {key: classes.get(key, []) for key in CLASSES}
     return {
-        "schema": "collide-report/3",
+        "schema": "collide-report/4",
         "verdict": {
             "text": f"verdict of {name}", "collides": bool(pairs["colliding"]), **{k: len(v) for k, v in pairs.items()},
         },

@@ -35,7 +35,8 @@ def test_patches_stand_where_boxes_meet():
         assert corners == {(-0.2, -0.5), (-0.2, 0.5), (0.8, -0.5), (0.8, 0.5)}
         assert [p[2] for p in patch["points"]] == pytest.approx([z] * 4, abs=1e-9)
         assert patch["depths"] == pytest.approx([depth] * 4, abs=1e-9) and np.abs(patch["normal"]).tolist() == [0, 0, 1]
-        assert entry["overlap"] is None and "state" not in entry
+        volume = pytest.approx(depth * 1.0, abs=1e-12)
+        assert entry["overlap"] == {"volume": volume, "certified": True} and "state" not in entry
     assert about["pairs"] == about["of"] == 2 and "volumes" in about["note"]
 
 

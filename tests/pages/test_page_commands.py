@@ -114,7 +114,7 @@ def test_places_are_refused_before_the_work(scene, tmp_path, capsys, place, comp
 def test_places_that_cannot_be_written(scene, tmp_path, capsys):
     folder = tmp_path / "closed"
     folder.mkdir()
-    place = folder / ("x" * 250 + ".html")
+    place = folder / ("x" * 251 + ".html")
     assert cli.main(["report", scene, "--quiet", "--html", str(place)]) == 2
     assert "too long" in capsys.readouterr().err and not any(folder.iterdir())
 

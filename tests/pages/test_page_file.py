@@ -168,10 +168,11 @@ def test_links_keep_leading_to_their_file(tmp_path):
 
 
 def test_places_that_cannot_be_written_are_named(tmp_path):
-    for place in (tmp_path / "none" / "page.html", tmp_path / ("x" * 250 + ".html")):
+    for place in (tmp_path / "none" / "page.html", tmp_path / ("x" * 251 + ".html")):
         with pytest.raises(OSError) as error:
             write_page(["a"], str(place))
         assert error.value.filename == str(place)
+    write_page(["a"], str(tmp_path / ("x" * 250 + ".html")))  # the longest name that file systems have
 
 
 def test_devices_are_written_to_as_they_are():

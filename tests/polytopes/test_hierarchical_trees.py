@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 import numpy as np
@@ -11,9 +12,18 @@ import rational_simplex
 from collide import polytopes
 from collide.certificates.certificate import CertificateRefused
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
-from collide.polytopes import HierarchicalTree, trees_meet, verify_trees
+from collide.polytopes import (
+    HierarchicalTree,
+    hull_boundary,
+    tree_size,
+    trees_meet,
+    verify_boundary,
+    verify_exclusion,
+    verify_trees,
+)  # fmt: skip
 from collide.polytopes.boundary_hull import boundary_hull
-from collide.polytopes.facet_tree import Sizes
+from collide.polytopes.facet_tree import FacetTree, Sizes
+from collide.polytopes.hierarchical_tree import as_grid
 from collide.polytopes.tree_walk import extreme_row
 from collide.polytopes.validate_facet_tree import validate_facet_tree
 
@@ -74,23 +84,141 @@ def test_every_answer_is_proven_and_every_set_recomputed(d, n):
     assert validate_facet_tree(R.tree) >= 1
 
 
-def test_planes_of_a_miss_leave_out_the_hull():
-    rng = np.random.default_rng(5)
-    V, A = _ball(rng, 400, 3), _ball(rng, 400, 3)
-    P, R = HierarchicalTree(V), HierarchicalTree(normals=A, offsets=np.ones(400))
-    most = misses = 0
-    for _ in range(20):
-        X = _pose(rng, 3, rng.uniform(1.97, 2.1))
-        answer = trees_meet(P, R, X, certificate=False)
-        if answer.hit or not answer.planes:
+def _nearly_touching(rng, V, A, d):
+    """A pose of the points at which they are 1e-4 from the half-spaces, offsets 1; None where they overlap."""
+    X = _pose(rng, d, rng.uniform(1.9, 2.3))
+    apart = polytopes.meets(V @ X[:d, :d].T + X[:d, d], A, np.ones(len(A)))
+    if apart.hit:
+        return None
+    X[:d, d] += (apart.distance - 1e-4) * apart.normal
+    return X
+
+
+@pytest.mark.parametrize(("d", "n", "limits"), [
+    (2, 200, Sizes(0.6, 12, 12)), (3, 150, Sizes(0.7, 12, 30)), (4, 40, Sizes(0.8, 8, 20)), (5, 20, Sizes(0.8, 6, 14)),
+])  # fmt: skip
+def test_planes_of_a_miss_leave_out_the_hull(d, n, limits):
+    """O(log n) planes, substituted in fractions by a reader who has checked the boundary once."""
+    rng = np.random.default_rng([5, d])
+    V, A, b = _ball(rng, n, d) + 0.3, _ball(rng, n, d), np.ones(n)
+    P, R = HierarchicalTree(V, limits=limits), HierarchicalTree(normals=A, offsets=b, limits=limits)
+    boundary = hull_boundary(P)
+    verify_boundary(V, boundary)
+    most = misses = needed = 0
+    for _ in range(10):
+        X = _nearly_touching(rng, V, A, d)
+        if X is None:
             continue
-        misses, most = misses + 1, max(most, len(answer.planes))
-        assert R.interior is not None
-        w = A / (1.0 - A @ R.interior)[:, None]
-        z = np.array([np.array(plane.multipliers) @ w[list(plane.rows)] for plane in answer.planes])
-        points = V @ X[:3, :3].T + X[:3, 3] - R.interior
-        assert not polytopes.meets(points, z, np.ones(len(z))).hit
-    assert misses >= 5 and 2 <= most <= 12
+        answer = trees_meet(P, R, X, certificate=False)
+        proof = answer.exclusion
+        assert proof is not None and not answer.hit
+        verify_exclusion(boundary, A, b, answer, X)
+        misses, most = misses + 1, max(most, len(proof.planes) + len(proof.ray_planes))
+        mutants = [
+            proof._replace(planes=()), proof._replace(ray_planes=()), proof._replace(ray=tuple(-x for x in proof.ray)),
+            proof._replace(outside=(X @ np.append(V.mean(axis=0), 1.0))[:d].tolist()),
+            proof._replace(planes=(proof.planes[0]._replace(multipliers=(-1.0,) * len(proof.planes[0].rows)),)),
+        ]  # fmt: skip
+        for mutant in mutants:
+            with pytest.raises(CertificateRefused):
+                verify_exclusion(boundary, A, b, polytopes.TreeMeeting(False, False, None, mutant, {}), X)
+        for k in range(len(proof.planes)):
+            mutant = proof._replace(planes=proof.planes[:k] + proof.planes[k + 1 :])
+            try:
+                verify_exclusion(boundary, A, b, polytopes.TreeMeeting(False, False, None, mutant, {}), X)
+            except CertificateRefused:
+                needed += 1
+        u = np.array([np.array(plane.multipliers) @ A[list(plane.rows)] for plane in proof.planes])
+        c = np.array([np.array(plane.multipliers) @ b[list(plane.rows)] for plane in proof.planes])
+        assert not polytopes.meets(V @ X[:d, :d].T + X[:d, d], u, c).hit
+    assert misses >= 4 and needed >= 1 and 2 <= most <= 24, (misses, needed, most)
+
+
+def test_a_boundary_that_is_none_is_refused():
+    rng = np.random.default_rng(2)
+    V = _ball(rng, 40, 3)
+    boundary = hull_boundary(HierarchicalTree(V))
+    verify_boundary(V, boundary)
+    grid = np.array(np.meshgrid(*[np.arange(3.0)] * 3)).reshape(3, -1).T
+    verify_boundary(grid, hull_boundary(HierarchicalTree(grid)))  # flat faces in several simplices
+    facets, whole = boundary.facets, boundary.whole.copy()
+    whole[0] += 3
+    for mutant, reason in (
+        (boundary._replace(facets=facets[1:]), "nothing beyond it"),
+        (boundary._replace(facets=np.concatenate((facets, facets[:1]))), "in others too"),
+        (boundary._replace(facets=np.concatenate((facets, [[0, 1, 2]]))), "both sides|flat"),
+        (boundary._replace(whole=whole), "a unit from its place"),
+    ):
+        with pytest.raises(CertificateRefused, match=reason):
+            verify_boundary(V, mutant)
+
+
+# --- whole trees ------------------------------------------------------------------------------------------------------
+
+
+def _curve(n, d):
+    t = np.linspace(-1.0, 1.0, n)
+    return np.stack([t**k for k in range(1, d + 1)], axis=1)
+
+
+def _lattice(n, d):
+    k = math.ceil(n ** (1.0 / d)) // 2 + 2
+    grid = np.array(np.meshgrid(*[np.arange(-k, k + 1.0)] * d)).reshape(d, -1).T
+    return grid[np.argsort((grid * grid).sum(axis=1), kind="stable")[:n]]
+
+
+WHOLE = [
+    ("ball", 2, 300, Sizes(0.5, 10, 20)), ("curve", 2, 300, Sizes(0.5, 10, 20)),
+    ("lattice", 2, 4000, Sizes(0.6, 10, 16)),
+    ("ball", 3, 120, Sizes(0.7, 16, 60)), ("curve", 3, 120, Sizes(0.7, 16, 60)),
+    ("lattice", 3, 2000, Sizes(0.7, 16, 60)),
+    ("ball", 4, 100, Sizes(0.8, 24, 80)), ("ball", 5, 50, Sizes(0.9, 14, 48)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("family", "d", "n", "limits"), WHOLE)
+def test_whole_trees_are_validated_and_their_bytes_were_predicted(family, d, n, limits):
+    rng = np.random.default_rng([n, d, 0])
+    points = _ball(rng, n, d) if family == "ball" else {"curve": _curve, "lattice": _lattice}[family](n, d)
+    body = HierarchicalTree(points, whole=True, limits=limits)
+    size = body.size
+    assert validate_facet_tree(body.tree, whole=True) == size.nodes
+    assert body.predicted is not None
+    assert family == "lattice" or body.predicted.simplices == pytest.approx(size.simplices, rel=0.1)
+    assert size.n_bytes / 4 <= body.predicted.n_bytes <= 4 * size.n_bytes, (body.predicted, size)
+    assert size.depth >= 2
+    assert body.build() == size  # nothing is made twice
+    with pytest.raises(UnsupportedQuery, match=f"predicted to take {body.predicted.n_bytes:,} bytes"):
+        HierarchicalTree(points, whole=True, limits=limits, memory=body.predicted.n_bytes - 1)
+
+
+def test_the_polar_side_is_validated_and_answers_are_those_of_nodes_made_when_needed():
+    rng = np.random.default_rng(6)
+    limits, A, V = Sizes(0.7, 12, 50), _ball(rng, 120, 3), _ball(rng, 120, 3)
+    R = HierarchicalTree(normals=A, offsets=np.ones(120), limits=limits, whole=True)
+    P = HierarchicalTree(V, limits=limits, whole=True)
+    assert validate_facet_tree(R.tree, whole=True) == R.size.nodes > 20
+    before, hits = (P.size, R.size), 0
+    for _ in range(20):
+        X = _pose(rng, 3, rng.uniform(1.5, 2.4))
+        answer = trees_meet(P, R, X)
+        verify_trees(V, A, np.ones(120), answer, X)
+        hits += answer.hit
+    assert 4 <= hits <= 16 and (P.size, R.size) == before
+
+
+def test_sizes_are_predicted_from_a_sample(monkeypatch):
+    """A boundary of a million simplices is told from samples of 60 and 120 points, and refused unseen."""
+    monkeypatch.setattr(tree_size, "_LARGE_MODEL", 3000)
+    curve, limits = _curve(1500, 4), Sizes(0.5, 200, 1000)
+    assert tree_size.predicted_simplices(as_grid(curve).whole) == pytest.approx(1500 * 1497 // 2, rel=0.05)
+    with pytest.raises(UnsupportedQuery, match=r"boundary is predicted to have 1,[0-9,]* simplices, [0-9,]* bytes"):
+        HierarchicalTree(curve, memory=1 << 27, limits=limits)
+    with pytest.raises(UnsupportedQuery, match=r"whole tree is predicted to take [0-9,]* bytes"):
+        HierarchicalTree(curve, memory=1 << 27, whole=True, limits=limits)
+    with pytest.raises(UnsupportedQuery, match=r"after .* of 1,500 points the boundary has"):
+        FacetTree(as_grid(curve).whole, 1 << 19, limits)
+    assert [tree_size.most_simplices(n, d) for d, n in ((2, 9), (3, 9), (4, 9), (4, 5), (5, 6))] == [9, 14, 27, 5, 6]
 
 
 def test_touching_is_a_hit_and_is_settled_in_integers():
@@ -192,25 +320,28 @@ def test_planes_that_leave_out_every_face_may_hold_a_point_of_the_hull():
 def test_mutants_are_noticed():
     rng = np.random.default_rng(9)
     V, A = _ball(rng, 300, 3), _ball(rng, 50, 3)
-    P, R = HierarchicalTree(V), HierarchicalTree(normals=A, offsets=np.ones(50))
+    P = HierarchicalTree(V, limits=Sizes(0.6, 24, 40))
+    R = HierarchicalTree(normals=A, offsets=np.ones(50), limits=Sizes(0.6, 24, 40))
     X = _pose(rng, 3, 2.02)
     answer = trees_meet(P, R, X)
     child = next(node for node in P.tree.root.children.values() if node is not None)
-    kept = child.facets
-    child.facets = kept[1:]
-    with pytest.raises(AssertionError, match="outside its shell cone"):
-        validate_facet_tree(P.tree)
-    child.facets = kept
+    for name in ("facets", "rows", "n_facets", "depth"):
+        value = getattr(child, name)
+        if len(np.atleast_1d(value)):
+            setattr(child, name, value[1:] if isinstance(value, np.ndarray) else value + 1)
+            with pytest.raises(AssertionError):
+                validate_facet_tree(P.tree)
+            setattr(child, name, value)
     validate_facet_tree(P.tree)
     proof = answer.certificate
     assert proof is not None
     numbers = "weights" if answer.hit else "multipliers"
     changed = (-getattr(proof, numbers)[0], *getattr(proof, numbers)[1:])
-    forged = polytopes.TreeMeeting(answer.hit, False, proof._replace(**{numbers: changed}), (), {})
+    forged = polytopes.TreeMeeting(answer.hit, False, proof._replace(**{numbers: changed}), None, {})
     with pytest.raises(CertificateRefused):
         verify_trees(V, A, np.ones(50), forged, X)
     with pytest.raises(CertificateRefused):
-        verify_trees(V, A, np.ones(50), polytopes.TreeMeeting(not answer.hit, False, proof, (), {}), X)
+        verify_trees(V, A, np.ones(50), polytopes.TreeMeeting(not answer.hit, False, proof, None, {}), X)
 
 
 def test_refusals_say_what_to_do():

@@ -99,3 +99,16 @@ def test_no_line_is_wider_than_the_terminal(width):
     disputes = [dispute(), dispute("left out", hit=None, distance=None)]
     lines = text_of(comparing.render(comparison(disputes), width=width))
     assert max(map(len, lines)) <= width, max(lines, key=len)
+
+
+def test_many_engines_stand_in_several_tables():
+    names = [f"engine{k}:setting" for k in range(9)]
+    rows = [["collide", "0.1.0", "30 of 30", "", "", "0"]]
+    rows += [[name, "1.0", "30 of 30", "28", "2", "1"] for name in names]
+    data = comparison().to_dict() | {"summaries": [summary(row[0]) for row in rows]}
+    asked = SimpleNamespace(to_dict=lambda: data, table=lambda: (HEADERS, rows), ours_wrong=0)
+    lines = text_of(comparing.render(asked, width=80))
+    assert max(map(len, lines)) <= 80, max(lines, key=len)
+    assert sum(line.startswith("ENGINES") for line in lines) >= 3
+    heads = [word for line in lines if line.startswith("  engine  ") for word in line.split()[1:]]
+    assert heads == ["collide", *names], "each once, in the order asked"

@@ -15,7 +15,7 @@ from solid_judge import judge, snippet, solids_of
 
 import collide
 from collide.errors import CollideError, InvalidArgument, InvalidPose, UnsupportedQuery
-from collide.solids import around_edges, cells, facet_cuts
+from collide.solids import around_edges, facet_cuts, rays, split_facets
 
 I = np.eye(4)
 OPERATIONS = ("union", "intersection", "difference", "symmetric_difference")
@@ -212,11 +212,69 @@ def test_bad_input():
             collide.boolean(shape, b, I, I, "union")
 
 
+def one_sided():
+    """A Möbius band of three tetrahedra's width: every edge but its border's has two facets."""
+    angle = np.arange(6) * np.pi / 3
+    outward = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(6)])
+    tilt = np.cos(angle / 2)[:, None] * outward + np.column_stack([np.zeros((6, 2)), np.sin(angle / 2)])
+    vertices = np.concatenate([3 * outward - tilt, 3 * outward + tilt])
+    faces = []
+    for k in range(6):
+        a, b, c, d = k, 6 + k, (k + 1) % 6, 6 + (k + 1) % 6
+        if k == 5:
+            c, d = d, c
+        faces += [[a, b, c], [c, b, d]]
+    return vertices, np.array(faces)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "words"),
+    [
+        ((box()[0], box()[1][:-1]), r"A has no inside: .*open edges.*facet"),
+        (one_sided(), r"A has no inside: .*one.sided.*facet"),
+        (turned_over(box()), r"A has no inside: .*inside.out.*facet"),
+        ((box()[0], np.vstack([box()[1][:1, ::-1], box()[1][1:]])), r"A has no inside: .*turned over.*facet 0"),
+    ],
+)
+def test_meshes_without_an_inside_are_refused_with_their_facets(mesh, words):
+    for ask in (collide.overlap_volume, lambda *pair: collide.boolean(*pair, "union")):
+        with pytest.raises(InvalidArgument, match=words):
+            ask(collide.Mesh(*mesh), collide.Box((1, 1, 1)), I, I)
+
+
+def test_meshes_that_cross_themselves_follow_their_winding():
+    """Two boxes that cross count as one, whatever is asked; a box inside-out in part is a cavity there."""
+    crossed = collide.Mesh(*joined(box((0, 0, 0), (2, 2, 2)), box((1, 1, 1), (3, 3, 3))))
+    slab = collide.Box((10, 10, 2))
+    common = collide.boolean(crossed, slab, I, collide.pose((0, 0, 2)), "intersection").mesh  # 1 ≤ z ≤ 3
+    assert common.report.volume == pytest.approx(4 + 8 - 1, abs=1e-12) and edges_balance(common)
+    assert collide.overlap_volume(crossed, slab, I, collide.pose((0, 0, 2))).volume == pytest.approx(11.0, abs=1e-12)
+
+
+def test_a_picometre_beside_a_kilometre():
+    """Facets of 1e-12 m on one of 1 km, added to it and taken off; shells of which rounding leaves nothing are told."""
+    big, speck = collide.Box((1000, 1000, 1000)), collide.Box((1e-12,) * 3)
+    at_corner = collide.pose((0, 0, 0))
+    corner_box = collide.Mesh(*box((0, 0, 0), (1000, 1000, 1000)))
+    union = collide.boolean(corner_box, speck, I, at_corner, "union")
+    left = collide.boolean(corner_box, speck, I, at_corner, "difference")
+    for r, n_min in ((union, 20), (left, 20)):
+        assert r.mesh.solid and edges_balance(r.mesh) and len(r.mesh.faces) >= n_min and r.moved < 1e-27
+        assert r.mesh.vertices.max() == 1000.0 and 0 < np.abs(r.mesh.vertices)[r.mesh.vertices != 0].min() <= 1e-12
+    dust = collide.Box((1e-15,) * 3)
+    far = collide.boolean(big, dust, I, collide.pose((500.0, 300.0, -200.0), rpy=(0.2, 0.1, 0.7)), "union")
+    assert far.mesh.solid and edges_balance(far.mesh) and far.n_collapsed + far.n_thin > 0
+    assert far.mesh.report.volume == pytest.approx(1e9, rel=1e-12)
+
+
 def test_faults_are_noticed(monkeypatch):
     """Wrong orders around edges, crossings left out, steps of one body dropped: refused, or judged wrong."""
 
     def around_backwards(sheets, points, low, high, sheet, upward, right=around_edges.around_edge):
         return right(sheets, points, low, high, sheet, upward)[::-1]
+
+    def without_an_ear(*arguments, right=split_facets.clip_parts):
+        return max(right(*arguments) - 1, 0)
 
     def noticed(family, seed) -> bool:
         try:
@@ -229,9 +287,11 @@ def test_faults_are_noticed(monkeypatch):
         (around_edges, "around_edge", around_backwards),
         (facet_cuts.FacetCuts, "_cross_segments", lambda self, f: None),
         (facet_cuts.FacetCuts, "_lies_within", lambda self, p, s, u, v: False),
-        (cells._Rays, "_passage", lambda self, f, p, axis, u, v: 0),
+        (rays, "count_passages", lambda tree, X, points, axes, slack: (0, np.zeros((0, 2), dtype=np.int64))),
+        (split_facets, "clip_parts", without_an_ear),
     ]
     for owner, name, fault in faults:
         with monkeypatch.context() as patch:
             patch.setattr(owner, name, fault)
-            assert any(noticed(family, 1) for family in ("random shells", "boxes", "turned grid shells")), name
+            families = ("random shells", "boxes", "turned grid shells", "smooth")
+            assert any(noticed(family, 1) for family in families), name

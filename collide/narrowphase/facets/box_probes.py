@@ -12,26 +12,27 @@ import numpy as np
 
 from collide.kernels import kernel
 from collide.mesh.box_overlap import PROBE
-from collide.mesh.bvh import CENTRE, EXPONENT, Box, box_at
-from collide.mesh.triangle import Triangle, normal_of, range_along, sum_of_normals, triangle_at
+from collide.mesh.bvh import CENTRE, EXPONENT, HAS_ORIGINS, box_at
+from collide.mesh.triangle import normal_of, range_along, sum_of_normals
 from collide.narrowphase.facets.filtered_triangles import TINY
+from collide.narrowphase.facets.fine_probes import set_fine_prism, set_fine_probe
 from collide.narrowphase.facets.posed_surfaces import FRAME_SIZE, FRAMES
-from collide.numerics.vec3 import Vec3, absolute, add, cross, divide, dot, max_abs, scale, sub, vec3_at
+from collide.narrowphase.facets.probe_parts import (
+    SLAB_AT,
+    box_of_triangle,
+    clear_slab,
+    put_floats,
+    triangle_in_units,
+    unit_of,
+)
+from collide.numerics.vec3 import absolute, add, cross, divide, dot, max_abs, sub, vec3_at
 
 _FLOAT_ERROR = 2.0**-19
-#: Where the slab of a probe stands: its normal (3), its middle and its half width.
-_SLAB = 12
 
 
 @kernel(inline=True)
-def set_probe(placing, which, boxes, ref, probe):
-    """Make the box behind a reference the probe.   which : 0 for a box of A, 1 for one of B."""
-    _set_box(placing, which, box_at(boxes, ref), probe)
-
-
-@kernel(inline=True)
-def _set_box(placing, which, box, probe):
-    """Make a box of A or B the probe."""
+def set_box(placing, which, box, probe):
+    """Make a box the probe.   which : 0 for a box of A, 1 for one of B."""
     to_probe = FRAMES + FRAME_SIZE * which
     to_node = FRAMES + FRAME_SIZE * (1 - which)
     for i in range(3):
@@ -43,16 +44,15 @@ def _set_box(placing, which, box, probe):
 
 
 @kernel(inline=True)
-def put_floats(floats, at, a):
-    floats[at] = np.float32(a.x)
-    floats[at + 1] = np.float32(a.y)
-    floats[at + 2] = np.float32(a.z)
+def set_node_probe(placing, which, tree, ref, link, nodes, node, probe):
+    """Make a box the probe of a node of the other tree, with a slab around its facets where it holds a leaf.
 
-
-@kernel(inline=True)
-def set_node_probe(placing, which, tree, ref, link, probe):
-    """Make a box the probe, with a slab around its facets where it holds a leaf."""
-    set_probe(placing, which, tree.boxes, ref, probe)
+    tree, ref, link : of the box.   nodes, node : the other tree and its node.
+    """
+    if nodes.header[HAS_ORIGINS] != 0:
+        set_fine_probe(placing, which, tree, ref, link, nodes, node, probe)
+        return
+    set_box(placing, which, box_at(tree, ref), probe)
     if link < 0:
         _set_slab(placing, which, tree, ~link, probe)
     else:
@@ -60,30 +60,26 @@ def set_node_probe(placing, which, tree, ref, link, probe):
 
 
 @kernel
-def set_prism(placing, which, tree, facet, probe):
+def set_prism(placing, which, tree, facet, nodes, node, probe):
     """Make a facet the probe: its box, the slab along its plane, and a half-space along each edge.
 
     A large triangle across its axes fills little of its box, whose finer neighbours in the other tree only this culls.
     """
-    unit = math.ldexp(1.0, int(-tree.header[EXPONENT]))
-    centre = vec3_at(tree.numbers, CENTRE)
-    corners = triangle_at(tree.triangles, 9 * facet)
-    p = scale(unit, sub(corners.p, centre))
-    q = scale(unit, sub(corners.q, centre))
-    r = scale(unit, sub(corners.r, centre))
-    triangle = Triangle(p, q, r)
-    low = Vec3(min(p.x, q.x, r.x), min(p.y, q.y, r.y), min(p.z, q.z, r.z))
-    high = Vec3(max(p.x, q.x, r.x), max(p.y, q.y, r.y), max(p.z, q.z, r.z))
-    _set_box(placing, which, Box(scale(0.5, add(low, high)), scale(0.5, sub(high, low))), probe)
-    n = _unit(normal_of(triangle))
-    middle, reach = _set_line(placing, which, n, probe, _SLAB)
+    if nodes.header[HAS_ORIGINS] != 0:
+        set_fine_prism(placing, which, tree, facet, nodes, node, probe)
+        return
+    triangle = triangle_in_units(tree, facet)
+    p, q, r = triangle
+    set_box(placing, which, box_of_triangle(triangle), probe)
+    n = unit_of(normal_of(triangle))
+    middle, reach = _set_line(placing, which, n, probe, SLAB_AT)
     low_n = min(dot(n, p), dot(n, q), dot(n, r))
     high_n = max(dot(n, p), dot(n, q), dot(n, r))
-    probe[_SLAB + 3] = np.float32(middle - 0.5 * (low_n + high_n))
-    probe[_SLAB + 4] = np.float32(reach + 0.5 * (high_n - low_n) + _FLOAT_ERROR * abs(middle))
-    _set_edge(placing, which, _unit(cross(sub(q, p), n)), triangle, probe, PROBE)
-    _set_edge(placing, which, _unit(cross(sub(r, q), n)), triangle, probe, PROBE + 4)
-    _set_edge(placing, which, _unit(cross(n, sub(r, p))), triangle, probe, PROBE + 8)
+    probe[SLAB_AT + 3] = np.float32(middle - 0.5 * (low_n + high_n))
+    probe[SLAB_AT + 4] = np.float32(reach + 0.5 * (high_n - low_n) + _FLOAT_ERROR * abs(middle))
+    _set_edge(placing, which, unit_of(cross(sub(q, p), n)), triangle, probe, PROBE)
+    _set_edge(placing, which, unit_of(cross(sub(r, q), n)), triangle, probe, PROBE + 4)
+    _set_edge(placing, which, unit_of(cross(n, sub(r, p))), triangle, probe, PROBE + 8)
 
 
 @kernel(inline=True)
@@ -115,15 +111,6 @@ def _set_direction(placing, to_probe, n, reach, probe, at):
     return reach
 
 
-@kernel(inline=True)
-def _unit(n):
-    """Scaled so that its largest component is 1; 0 where it is next to nothing."""
-    size = max_abs(n)
-    if not size > TINY:
-        return Vec3(0.0, 0.0, 0.0)
-    return divide(n, size)
-
-
 @kernel
 def _set_slab(placing, which, tree, run, probe):
     """Add the slab around a leaf's facets to the probe of its box.
@@ -144,11 +131,5 @@ def _set_slab(placing, which, tree, run, probe):
     middle = dot(n, vec3_at(placing, to_probe + 9)) - 0.5 * (low + high) * unit
     # What rounding can do to the frame, to heights and to the sums of floats.
     reach = 0.5 * (high - low) * unit + _FLOAT_ERROR * (3.0 + abs(middle)) + 2.0**-110
-    probe[_SLAB + 3] = np.float32(middle)
-    probe[_SLAB + 4] = np.float32(_set_direction(placing, to_probe, n, reach, probe, _SLAB))
-
-
-@kernel(inline=True)
-def clear_slab(probe):
-    for k in range(_SLAB, PROBE):
-        probe[k] = np.float32(0.0)
+    probe[SLAB_AT + 3] = np.float32(middle)
+    probe[SLAB_AT + 4] = np.float32(_set_direction(placing, to_probe, n, reach, probe, SLAB_AT))

@@ -12,7 +12,18 @@ from typing import Any, NamedTuple
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import BLOCK
 from collide.lowering.shape_table import INTS, KIND, NUMBERS, PARAMS, POSE, RADIUS, REACH, SLOP
-from collide.mesh.bvh import CENTRE, EXPONENT, NODE, NOTHING, WIDTH, TreeView, float_column_at, link_of, open_tree
+from collide.mesh.bvh import (
+    CENTRE,
+    EXPONENT,
+    NODE,
+    NOTHING,
+    WIDTH,
+    TreeView,
+    box_at,
+    float_column_at,
+    link_of,
+    open_tree,
+)
 from collide.mesh.bvh import REACH as TREE_REACH
 from collide.narrowphase.bounds import PROMISE_CURVED
 from collide.narrowphase.fallback_searches import lay_row_apart
@@ -201,7 +212,7 @@ def _push_children(walk, nearest, node, top):
         half = float_column_at(tree.boxes, at + 3 * WIDTH)
         if not half.x > NOTHING / 2:
             continue
-        centre = float_column_at(tree.boxes, at)
+        centre = box_at(tree, WIDTH * node + slot).centre
         centre = Vec3(middle.x + unit * centre.x, middle.y + unit * centre.y, middle.z + unit * centre.z)
         bound = _gap_of_box(walk, nearest, centre, scale(unit, half))
         if bound > nearest.upper:

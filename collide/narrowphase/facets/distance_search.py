@@ -8,18 +8,31 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import kernel
-from collide.mesh.bvh import CENTRE, EXPONENT, REACH, SLAB, WIDTH, box_at, float_column_at
+from collide.mesh.bvh import (
+    CENTRE,
+    EXPONENT,
+    HAS_ORIGINS,
+    REACH,
+    SLAB,
+    WIDTH,
+    box_at,
+    float_column_at,
+    origin_of,
+)
 from collide.mesh.triangle import range_along
-from collide.narrowphase.facets.box_probes import put_floats, set_probe
+from collide.narrowphase.facets.box_probes import set_box
+from collide.narrowphase.facets.fine_probes import move_probe
 from collide.narrowphase.facets.posed_surfaces import INVERSE_A, INVERSE_B, MAX_UNIT_EXPONENT, UNITS, rotate_by_pose
 from collide.narrowphase.facets.posed_trees import PosedTrees
+from collide.narrowphase.facets.probe_parts import put_floats
 from collide.numerics.vec3 import Vec3, absolute, add, divide, dot, max_abs, neg, put_vec3, scale, sub, vec3_at
 
 # A row of results, doubles: distance, proven bounds, points on A and on B and the direction between them in the world.
 DISTANCE, LOWER, UPPER, POINT_A, POINT_B, NORMAL = 0, 1, 2, 3, 6, 9
 RESULT = 12
-# And integers: facet of A, facet of B, whether the surfaces meet; boxes, triangles and exact decisions.
-FACET_A, FACET_B, MEETS, BOXES, TRIANGLES, EXACT = range(6)
+# And integers: facet of A, facet of B, whether the surfaces meet; nodes compared with a box, pairs of triangles, exact
+# decisions.
+FACET_A, FACET_B, MEETS, NODES, TRIANGLES, EXACT = range(6)
 MARKS = 6
 
 # What changes on the way, doubles ("near"): the direction from A to B (3) and, in units of A's boxes, its products with
@@ -180,12 +193,15 @@ def gap_of_box(g, tree, slabs, unit, ref, link):
     if link < 0:
         first = ~link >> 3
         return unit * range_along(g, tree.triangles, first, first + (~link & 7), vec3_at(tree.numbers, CENTRE))[0]
-    box = box_at(tree.boxes, ref)
+    box = box_at(tree, ref)
     plain = dot(g, box.centre) - dot(absolute(g), box.half)
     at = SLAB * (ref >> 3) + (ref & 7)
     n = float_column_at(slabs, at)
     share = dot(g, n)
-    thin = share * float(slabs[at + 3 * WIDTH]) - abs(share) * float(slabs[at + 4 * WIDTH])
+    middle = float(slabs[at + 3 * WIDTH])
+    if tree.header[HAS_ORIGINS] != 0:
+        middle += dot(n, origin_of(tree.links, ref >> 3))
+    thin = share * middle - abs(share) * float(slabs[at + 4 * WIDTH])
     rest = sub(g, scale(share, n))
     thin += dot(rest, box.centre) - dot(absolute(rest), box.half)
     return max(plain, thin)
@@ -198,14 +214,19 @@ def is_beyond_bound(near, pair):
 
 
 @kernel(inline=True)
-def set_near_probe(query, which, tree, ref, gap):
-    """`set_probe`, and what distances need besides.   gap : `gap_of_box` of the box."""
+def set_near_probe(query, which, tree, ref, gap, nodes, node):
+    """Make a box the probe of a node of the other tree, with what distances need.   gap : `gap_of_box` of the box."""
     near, probe = query.near, query.trees.probe
-    set_probe(query.trees.placing, which, tree.boxes, ref, probe)
+    set_box(query.trees.placing, which, box_at(tree, ref), probe)
     probe_scales = AXIS_SCALES_A if which == 0 else AXIS_SCALES_B
     node_scales = AXIS_SCALES_B if which == 0 else AXIS_SCALES_A
     put_floats(probe, 12, vec3_at(near, node_scales))
     put_floats(probe, 15, vec3_at(near, probe_scales))
     probe[18] = np.float32(near[LINE_SCALE_A if which == 0 else LINE_SCALE_B])
     put_floats(probe, 19, vec3_at(near, ALONG_B) if which == 0 else neg(vec3_at(near, ALONG_A)))
-    probe[22] = np.float32(near[OFFSET] + gap)
+    offset = near[OFFSET] + gap
+    if nodes.header[HAS_ORIGINS] != 0:
+        move_probe(nodes, node, query.trees.frame_a if which == 0 else query.trees.frame_b, probe, probe)
+        direction = vec3_at(near, ALONG_B) if which == 0 else neg(vec3_at(near, ALONG_A))
+        offset += dot(direction, origin_of(nodes.links, node))
+    probe[22] = np.float32(offset)

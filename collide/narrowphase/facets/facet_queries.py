@@ -35,7 +35,8 @@ class SurfacePairs(NamedTuple):
 
     pairs : (k, 2) int64 facet numbers of A and of B, those of a pose sorted.
     starts : (N + 1,) int64, where the pairs of each pose begin and end.
-    counters : (N, 3) int64: pairs of boxes looked at, triangles tested, of them decided exactly.
+    counters : (N, 3) int64: nodes compared with a box (one against up to eight), pairs of triangles tested, of them
+        decided exactly.
     """
 
     pairs: np.ndarray
@@ -52,7 +53,7 @@ class SurfaceDistances(NamedTuple):
         and 0 where they meet.
     facets : (N, 2) int64 facet numbers of A and of B; −1 where everything is proven farther than the limit.
     meets : (N,) bool, decided exactly.
-    counters : (N, 3) int64: pairs of boxes looked at, of triangles, decided exactly.
+    counters : (N, 3) int64: nodes compared with a box, pairs of triangles, of them decided exactly.
     """
 
     distance: np.ndarray
@@ -256,7 +257,7 @@ def self_hits(tree: MeshTree) -> tuple[np.ndarray, np.ndarray]:
 
 
 def facets_on_rays(A: MeshTree, X_WA, rays_T: np.ndarray, first_only: bool) -> tuple[np.ndarray, np.ndarray]:
-    """(hits (k, rays.HIT), counters (N, 3): boxes, triangles and exact decisions) of N rays, each ray's together.
+    """(hits (k, rays.HIT), counters (N, 3): nodes, triangles, exact decisions) of N rays, each ray's together.
 
     X_WA : (4, 4) or (N, 4, 4).   rays_T : (N, rays.RAY) as `rays.cast_rays` takes them, t in units of T.
     first_only : only facets that may be the first of their ray, by brackets; all that are met otherwise.

@@ -54,14 +54,12 @@ def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray):
     pose, at = poses, np.zeros(len(poses), dtype=np.int64)
     runs = []
     while len(at):
-        nodes = tree.nodes[at]
-        floats = nodes[:, : 6 * WIDTH].view(np.float32).reshape(-1, 6, WIDTH).astype(np.float64)
-        half_lengths = floats[:, 3:].transpose(0, 2, 1)
+        centres, half_lengths = tree.boxes(at)
         used = half_lengths[:, :, 0] > NOTHING / 2
         pose = np.repeat(pose, WIDTH).reshape(-1, WIDTH)[used]
         link = links[at][used].astype(np.int64)
         scale = np.ldexp(1.0, tree.exponent)
-        centres = tree.centre + floats[:, :3].transpose(0, 2, 1)[used] * scale
+        centres = tree.centre + centres[used] * scale
         near = ~(spans.of_boxes(pose, centres, half_lengths[used] * scale) > upper[pose])
         pose, link = pose[near], link[near]
         leaf = link < 0

@@ -17,12 +17,12 @@ from collide.narrowphase.facets.exact_corners import B_LOCAL_AT, CORNERS, STATE,
 from collide.narrowphase.facets.exact_triangles import ExactCall, ask_exactly
 from collide.narrowphase.facets.posed_surfaces import PLACING, Extent, extent_of, place, put_in_frame_of_a
 
-# Counters, integers: boxes compared, triangles tested, of them decided exactly.
-BOXES, TRIANGLES, EXACT = range(3)
+# Counters, integers: nodes compared with the segment, triangles tested, of them decided exactly.
+NODES, TRIANGLES, EXACT = range(3)
 COUNTERS = 3
 #: Doubles and floats of workspace.
 SEGMENT_DOUBLES = PLACING + CORNERS + NUMBERS
-SEGMENT_FLOATS = 2 * FRAME + PROBE
+SEGMENT_FLOATS = 2 * FRAME + 2 * PROBE
 
 
 class PosedSegment(NamedTuple):
@@ -31,6 +31,7 @@ class PosedSegment(NamedTuple):
     XA, XB : poses of the tree and of the segment's frame, 16 doubles each.
     ends : both ends in that frame, and one of them again (9).   numbers : the segment's, as of a tree (`mesh/bvh.py`).
     placing, corners, frame_a, frame_b, probe, exact : as in `posed_trees.PosedTrees`; corners 3 and 4 are the ends.
+    moved : room for the probe of a node that has an origin.
     """
 
     tree: TreeView
@@ -43,6 +44,7 @@ class PosedSegment(NamedTuple):
     frame_a: np.ndarray
     frame_b: np.ndarray
     probe: np.ndarray
+    moved: np.ndarray
     exact: ExactCall
     counters: np.ndarray
 
@@ -56,6 +58,7 @@ def open_segment(tree, XA_at, XB_at, doubles_at, floats_at, integers_at, exact_a
         tree, view_f64(XA_at, 16), view_f64(XB_at, 16), view_f64(corners_at + 8 * B_LOCAL_AT, 9),
         view_f64(corners_at + 8 * CORNERS, NUMBERS), view_f64(doubles_at, PLACING), view_f64(corners_at, CORNERS),
         view_f32(floats_at, FRAME), view_f32(floats_at + 4 * FRAME, FRAME), view_f32(floats_at + 8 * FRAME, PROBE),
+        view_f32(floats_at + 8 * FRAME + 4 * PROBE, PROBE),
         ExactCall(exact_at, corners_at, doubles_at, integers_at, XA_at, XB_at), view_i64(counters_at, COUNTERS),
     )  # fmt: skip
 

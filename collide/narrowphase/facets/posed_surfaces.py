@@ -29,15 +29,17 @@ ERROR, N_ERROR = 24, 25
 PLAIN = 26
 #: Unit of A's boxes over that of B's.
 UNITS = 27
-#: For probes of A's boxes [0] and of B's [1]: the matrix from the other tree's boxes to their own (9), shift (3), and
-#: the bound of what rounding adds to a half length (3).
-FRAMES, FRAME_SIZE = 28, 15
+#: For probes of A's boxes [0] and of B's [1]: the matrix from the other tree's boxes to their own (9), shift (3), the
+#: bound of what rounding adds to a half length (3), and that without the rounding to floats (3).
+FRAMES, FRAME_SIZE = 28, 18
 # Inverses of both matrices (9 each), each followed by a bound of the largest row sum of |C R − I|.
-INVERSE_A, INVERSE_B = 58, 68
-PLACING = 78
+INVERSE_A, INVERSE_B = 64, 74
+PLACING = 84
 
 _U = 2.0**-53
 _FLOAT_ERROR = 2.0**-19
+#: What sums of doubles round of a probe, of the terms; a tree's origins and facets are as good.
+_DOUBLE_ERROR = 2.0**-47
 #: Boxes of a tree stay within this, in its units.
 _EXTENT = 1.001
 #: Added to half lengths: products of floats may vanish.
@@ -234,6 +236,7 @@ def _set_frame(probe, node, placing, matrix, error, at, frame):
         for i in range(3):
             placing[at + 9 + i] = 0.0
             placing[at + 12 + i] = 1e30
+            placing[at + 15 + i] = 1e30
         return
     units = math.ldexp(1.0, int(node.exponent - probe.exponent))
     scale = math.ldexp(1.0, int(-probe.exponent))
@@ -252,8 +255,10 @@ def _set_frame(probe, node, placing, matrix, error, at, frame):
             frame[3 * i + j] = np.float32(entry * units)
         moved *= scale
         placing[at + 9 + i] = moved
-        rounding = _FLOAT_ERROR * (abs(moved) + spread + _EXTENT) + _TINY
-        placing[at + 12 + i] = rounding + 2.0 * scale * (error + 8.0 * _U * size)
+        terms = abs(moved) + spread + _EXTENT
+        of_pose = 2.0 * scale * (error + 8.0 * _U * size)
+        placing[at + 12 + i] = _FLOAT_ERROR * terms + _TINY + of_pose
+        placing[at + 15 + i] = _DOUBLE_ERROR * terms + _TINY + of_pose
 
 
 @kernel(inline=True)

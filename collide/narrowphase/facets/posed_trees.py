@@ -86,11 +86,11 @@ def make_open_larger(widen_probe: Callable) -> Callable:
         trees = query.trees
         A, B, placing, probe = trees.A, trees.B, trees.placing, trees.probe
         if opens_b(A, B, pair, placing[UNITS]):
-            set_node_probe(placing, 0, A, pair.a, pair.link_a, probe)
+            set_node_probe(placing, 0, A, pair.a, pair.link_a, B, pair.link_b, probe)
             widen_probe(query, 0, probe)
             mask = boxes_meeting(B.boxes, NODE * pair.link_b, trees.frame_a, probe)
             return push_children(stack, top, mask, word_of(pair.a, WIDTH * pair.link_b), OF_B)
-        set_node_probe(placing, 1, B, pair.b, pair.link_b, probe)
+        set_node_probe(placing, 1, B, pair.b, pair.link_b, A, pair.link_a, probe)
         widen_probe(query, 1, probe)
         mask = boxes_meeting(A.boxes, NODE * pair.link_a, trees.frame_b, probe)
         return push_children(stack, top, mask, word_of(WIDTH * pair.link_a, pair.b), OF_A)

@@ -8,7 +8,6 @@ from typing import NamedTuple
 from collide.kernels import kernel
 from collide.mesh.bvh import CENTRE, EXPONENT
 from collide.mesh.triangle import normal_of, triangle_at
-from collide.narrowphase.facets.box_probes import clear_slab, put_floats
 from collide.narrowphase.facets.filtered_triangles import (
     AMBIGUOUS,
     APART,
@@ -19,6 +18,7 @@ from collide.narrowphase.facets.filtered_triangles import (
     sign_error,
 )
 from collide.narrowphase.facets.posed_surfaces import ERROR, M
+from collide.narrowphase.facets.probe_parts import clear_slab, put_floats
 from collide.numerics.vec3 import (
     Vec3,
     absolute,

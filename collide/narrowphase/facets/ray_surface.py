@@ -24,9 +24,10 @@ from collide.mesh.box_overlap import boxes_meeting
 from collide.mesh.bvh import CENTRE, NODE, REACH, WIDTH, box_at, open_tree
 from collide.narrowphase.facets.exact_triangles import MEET
 from collide.narrowphase.facets.filtered_triangles import AMBIGUOUS, APART
+from collide.narrowphase.facets.fine_probes import probe_of_node
 from collide.narrowphase.facets.posed_segment import (
-    BOXES,
     COUNTERS,
+    NODES,
     SEGMENT_DOUBLES,
     SEGMENT_FLOATS,
     TRIANGLES,
@@ -148,12 +149,13 @@ def _visit_leaf(query, pair):
 def _open_box(query, pair, stack, top):
     """Push the children that the ray may meet, the one that begins first on top."""
     keys, segment = query.keys, query.segment
-    segment.counters[BOXES] += 1
-    mask = boxes_meeting(segment.tree.boxes, NODE * pair.link_a, segment.frame_b, segment.probe)
+    segment.counters[NODES] += 1
+    probe = probe_of_node(segment.tree, pair.link_a, segment.frame_b, segment.probe, segment.moved)
+    mask = boxes_meeting(segment.tree.boxes, NODE * pair.link_a, segment.frame_b, probe)
     base = top
     for slot in range(WIDTH):
         if (mask >> slot) & 1:
-            box = box_at(segment.tree.boxes, WIDTH * pair.link_a + slot)
+            box = box_at(segment.tree, WIDTH * pair.link_a + slot)
             key = dot(query.along, box.centre) - dot(absolute(query.along), box.half)
             at = top
             while at > base and keys[at - 1] < key:

@@ -16,9 +16,8 @@ import numpy as np
 
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.mesh.box_overlap import FRAME, PROBE, boxes_meeting
-from collide.mesh.bvh import EXPONENT, N_FACETS, NODE, WIDTH, box_at, box_size, open_tree
+from collide.mesh.bvh import EXPONENT, HAS_ORIGINS, N_FACETS, NODE, WIDTH, box_at, box_size, open_tree, origin_of
 from collide.mesh.triangle import Triangle, normal_of, put_triangle, triangle_at
-from collide.narrowphase.facets.box_probes import put_floats
 from collide.narrowphase.facets.exact_corners import B_LOCAL_AT, CORNERS
 from collide.narrowphase.facets.exact_triangles import MEET, OVERLAP, ask_exactly
 from collide.narrowphase.facets.filtered_triangles import (
@@ -32,13 +31,14 @@ from collide.narrowphase.facets.filtered_triangles import (
 )
 from collide.narrowphase.facets.posed_surfaces import FRAMES, PLACING
 from collide.narrowphase.facets.posed_trees import MAX_FACET_PAIRS, PosedTrees, pose_trees
+from collide.narrowphase.facets.probe_parts import put_floats
 from collide.narrowphase.facets.traversal import OF_B, make_traversal, opens_b, pair_of_trees, push_children, word_of
 from collide.numerics.vec3 import Vec3, add, cross, dot, equal_at, max_abs, put_vec3, sub, vec3_at
 
 #: Doubles and floats of workspace: a placing, corners, and a pose that moves nothing.
 DOUBLES, FLOATS = PLACING + CORNERS + 16, 2 * FRAME + PROBE
-# Counters, integers: pairs of boxes compared, pairs of triangles tested, of them decided exactly.
-BOXES, TRIANGLES, EXACT = range(3)
+# Counters, integers: nodes compared with a box, pairs of triangles tested, of them decided exactly.
+NODES, TRIANGLES, EXACT = range(3)
 #: Doubles of a facet's plane: a normal (3), and the largest component of an edge, squared.
 PLANE = 4
 # Progress, integers: the stack's height, the facet pairs found.
@@ -328,9 +328,12 @@ def _children_meeting(query, ref, node):
     """Mask of the boxes of a node that the one behind a reference meets: in one tree only its own axes separate."""
     trees = query.trees
     probe = trees.probe
-    query.counters[BOXES] += 1
-    box = box_at(trees.A.boxes, ref)
-    put_floats(probe, 0, box.centre)
+    query.counters[NODES] += 1
+    box = box_at(trees.A, ref)
+    centre = box.centre
+    if trees.A.header[HAS_ORIGINS] != 0:
+        centre = sub(centre, origin_of(trees.A.links, node))
+    put_floats(probe, 0, centre)
     put_floats(probe, 3, add(box.half, vec3_at(trees.placing, FRAMES + 12)))
     return boxes_meeting(trees.A.boxes, NODE * node, trees.frame_a, probe)
 

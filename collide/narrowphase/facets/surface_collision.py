@@ -26,8 +26,9 @@ from collide.narrowphase.facets.posed_trees import (
 )
 from collide.narrowphase.facets.traversal import OF_A, OF_B, BoxPair, make_traversal, push_children, word_of
 
-# Counters, a row of integers a pose: pairs of boxes compared, pairs of triangles tested, of them decided exactly.
-BOXES, TRIANGLES, EXACT = range(3)
+# Counters, a row of integers a pose: nodes compared with a box or a triangle, one against the eight of a node; pairs of
+# triangles tested; of them decided exactly.
+NODES, TRIANGLES, EXACT = range(3)
 COUNTERS = 3
 
 #: Doubles and floats of workspace; integers are `exact_triangles.INTEGERS`.
@@ -105,7 +106,7 @@ def _visit_leaves(query, pair):
 
 @kernel(inline=True)
 def _widen_nothing(query, _which, _probe):
-    query.counters[BOXES] += 1
+    query.counters[NODES] += 1
 
 
 _open_larger = make_open_larger(_widen_nothing)
@@ -119,15 +120,15 @@ def _open_pair(query, pair, stack, top):
     units = placing[UNITS]
     if link_a < 0 and (a & _TRIANGLE or box_size(A.boxes, a) * units > _LARGE * box_size(B.boxes, b)):
         for t in range(~link_a >> 3, (~link_a >> 3) + (~link_a & 7)):
-            query.counters[BOXES] += 1
-            set_prism(placing, 0, A, t, probe)
+            query.counters[NODES] += 1
+            set_prism(placing, 0, A, t, B, link_b, probe)
             mask = boxes_meeting_prism(B.boxes, NODE * link_b, trees.frame_a, probe)
             top = push_children(stack, top, mask, word_of(_TRIANGLE | t, WIDTH * link_b), OF_B)
         return top
     if link_b < 0 and (b & _TRIANGLE or box_size(B.boxes, b) > _LARGE * units * box_size(A.boxes, a)):
         for t in range(~link_b >> 3, (~link_b >> 3) + (~link_b & 7)):
-            query.counters[BOXES] += 1
-            set_prism(placing, 1, B, t, probe)
+            query.counters[NODES] += 1
+            set_prism(placing, 1, B, t, A, link_a, probe)
             mask = boxes_meeting_prism(A.boxes, NODE * link_a, trees.frame_b, probe)
             top = push_children(stack, top, mask, word_of(WIDTH * link_a, _TRIANGLE | t), OF_A)
         return top

@@ -22,7 +22,6 @@ from collide.narrowphase.facets.distance_search import (
     ALONG_B,
     BEST,
     BOUND,
-    BOXES,
     DIRECTION,
     DISTANCE,
     EXACT,
@@ -38,6 +37,7 @@ from collide.narrowphase.facets.distance_search import (
     MEETS,
     NEAR,
     NEW,
+    NODES,
     NORMAL,
     OF_A_AT,
     POINT_A,
@@ -111,14 +111,14 @@ def _open_pair(query, pair, stack, top):
     A, B = trees.A, trees.B
     if is_beyond_bound(query.near, pair):
         return top
-    query.marks[BOXES] += 1
+    query.marks[NODES] += 1
     if opens_b(A, B, pair, trees.placing[UNITS]):
-        set_near_probe(query, 0, A, pair.a, pair.gap_a)
         node = pair.link_b
+        set_near_probe(query, 0, A, pair.a, pair.gap_a, B, node)
         boxes_nearest(B.boxes, NODE * node, query.slabs_b, SLAB * node, trees.frame_a, trees.probe, query.gaps)
         return _push_nearest(query, stack, top, word_of(pair.a, WIDTH * node), OF_B)
-    set_near_probe(query, 1, B, pair.b, pair.gap_b)
     node = pair.link_a
+    set_near_probe(query, 1, B, pair.b, pair.gap_b, A, node)
     boxes_nearest(A.boxes, NODE * node, query.slabs_a, SLAB * node, trees.frame_b, trees.probe, query.gaps)
     return _push_nearest(query, stack, top, word_of(WIDTH * node, pair.b), OF_A)
 

@@ -17,13 +17,14 @@ import numpy as np
 
 from collide.kernels import entry, kernel, view_f32, view_f64, view_i64
 from collide.mesh.box_overlap import boxes_meeting
-from collide.mesh.bvh import CENTRE, EXPONENT, NODE, REACH, WIDTH, open_tree
-from collide.narrowphase.facets.box_probes import clear_slab, set_probe
+from collide.mesh.bvh import CENTRE, EXPONENT, NODE, REACH, WIDTH, Box, float_column_at, open_tree
+from collide.narrowphase.facets.box_probes import set_box
 from collide.narrowphase.facets.exact_triangles import BACK, BY, FROM, PASS, THROUGH, UNCLEAR
 from collide.narrowphase.facets.filtered_triangles import AMBIGUOUS, APART, segment_against_triangle
+from collide.narrowphase.facets.fine_probes import probe_of_node
 from collide.narrowphase.facets.posed_segment import (
-    BOXES,
     COUNTERS,
+    NODES,
     SEGMENT_DOUBLES,
     SEGMENT_FLOATS,
     TRIANGLES,
@@ -33,6 +34,7 @@ from collide.narrowphase.facets.posed_segment import (
     place_segment,
 )
 from collide.narrowphase.facets.posed_surfaces import ERROR, INVERSE_B
+from collide.narrowphase.facets.probe_parts import clear_slab
 from collide.narrowphase.facets.traversal import OF_B, any_pair, box_of_tree, make_traversal, push_children
 
 OUTSIDE, ON_SURFACE, INSIDE, UNDECIDED, SINGULAR = range(5)
@@ -146,8 +148,9 @@ def _visit_leaf(query, pair):
 @kernel(inline=True)
 def _open_box(query, pair, stack, top):
     segment = query.segment
-    segment.counters[BOXES] += 1
-    mask = boxes_meeting(segment.tree.boxes, NODE * pair.link_a, segment.frame_b, segment.probe)
+    segment.counters[NODES] += 1
+    probe = probe_of_node(segment.tree, pair.link_a, segment.frame_b, segment.probe, segment.moved)
+    mask = boxes_meeting(segment.tree.boxes, NODE * pair.link_a, segment.frame_b, probe)
     return push_children(stack, top, mask, WIDTH * pair.link_a, OF_B)
 
 
@@ -208,7 +211,8 @@ def points_inside(
         for attempt in range(TRIES):
             _set_ends(segment, x, attempt)
             place_segment(segment, _set_box(segment, node))
-            set_probe(segment.placing, 1, node, 0, segment.probe)
+            box = Box(float_column_at(node, 0), float_column_at(node, 3 * WIDTH))
+            set_box(segment.placing, 1, box, segment.probe)
             clear_slab(segment.probe)
             answers[k] = _winding(_Query(segment, passed), stack)
             if answers[k] != UNDECIDED:

@@ -17,6 +17,7 @@ from collide.kernels.plain import code_of
 from collide.mesh.box_overlap import FRAME, PRISM, PROBE, boxes_meeting, boxes_meeting_prism
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import NODE, WIDTH, MeshTree, open_tree
+from collide.mesh.fine_boxes import with_origins
 from collide.narrowphase.facets.box_probes import set_node_probe, set_prism
 from collide.narrowphase.facets.exact_corners import CORNERS
 from collide.narrowphase.facets.exact_triangles import INTEGERS, decide_exactly
@@ -59,6 +60,11 @@ def run_of(link: int) -> range:
 traverse = make_traversal(any_pair, pair_of_trees, visit, make_open_larger(lambda query, which, probe: None))
 
 
+def built(vertices, faces, with_origin: int) -> MeshTree:
+    tree = build_mesh_tree(vertices, faces)
+    return with_origins(tree) if with_origin else tree
+
+
 def posed_meshes(rng, k: int):
     """Two small meshes: soups, one of them scaled or with one facet as large as all of the other; spheres."""
     a, b = soup(rng, 40, 1.2, 0.4), soup(rng, 30, 1.2, 0.4)
@@ -78,7 +84,7 @@ def test_the_traversal_comes_to_every_pair_that_meets():
     looked = all_pairs = found = 0
     for k in range(18):
         (va, fa), (vb, fb), X, Y = posed_meshes(rng, k)
-        A, B = build_mesh_tree(va, fa), build_mesh_tree(vb, fb)
+        A, B = built(va, fa, k & 1), built(vb, fb, k & 2)
         w = Workspace(A, B, X, Y)
         assert w.invertible
         query, stack = Query(w.trees, []), np.zeros(WIDTH * (A.depth + B.depth + 2), dtype=np.int64)
@@ -119,8 +125,9 @@ def test_probes_keep_what_meets_and_prisms_are_the_sharper_ones():
     kept = {"box": 0, "leaf": 0, "prism": 0, "true": 0}
     for k in range(8):
         (va, fa), (vb, fb), X, Y = posed_meshes(rng, k) if k < 5 else bits_at_corners(rng)
-        A, B = build_mesh_tree(va, fa), build_mesh_tree(vb, fb)
-        trees = Workspace(A, B, X, Y).trees
+        A, B = built(va, fa, k & 2), built(vb, fb, k & 4)
+        kept_alive = Workspace(A, B, X, Y)
+        trees = kept_alive.trees
         place_of_a, place_of_b = np.argsort(A.ids), np.argsort(B.ids)
         meeting = {(int(place_of_a[i]), int(place_of_b[j])) for i, j in facet_pairs(va, fa, X, vb, fb, Y)}
         below = {
@@ -129,13 +136,13 @@ def test_probes_keep_what_meets_and_prisms_are_the_sharper_ones():
         leaves = [(WIDTH * node + slot, int(B.links()[node, slot])) for node, slot in zip(*np.nonzero(B.used()))]
         for ref, link in ((ref, link) for ref, link in leaves if link < 0):
             for node in range(len(A.nodes)):
-                set_node_probe(trees.placing, 1, trees.B, ref, link, trees.probe)
+                set_node_probe(trees.placing, 1, trees.B, ref, link, trees.A, node, trees.probe)
                 leaf = boxes_meeting(trees.A.boxes, NODE * node, trees.frame_b, trees.probe[:PROBE])
-                set_node_probe(trees.placing, 1, trees.B, ref, 0, trees.probe)  # as of a node: no slab
+                set_node_probe(trees.placing, 1, trees.B, ref, 0, trees.A, node, trees.probe)  # as of a node: no slab
                 box = boxes_meeting(trees.A.boxes, NODE * node, trees.frame_b, trees.probe[:PROBE])
                 prism = 0
                 for b in run_of(~link):
-                    set_prism(trees.placing, 1, trees.B, b, trees.probe)
+                    set_prism(trees.placing, 1, trees.B, b, trees.A, node, trees.probe)
                     prism |= boxes_meeting_prism(trees.A.boxes, NODE * node, trees.frame_b, trees.probe)
                 need = sum(
                     1 << slot
