@@ -1,6 +1,6 @@
-"""Meshes made local: facets of boxes n × n × 1 and of cylinders, CAD parts before and after, and whether it pays.
+"""Meshes made local: facets that boxes n × n × 1 and cylinders take, CAD parts before and after, does it pay?
 
-    python benchmarks/localised.py                 # two minutes; --parts growth cylinders parts picture, --files 20
+    python benchmarks/localised.py   # two minutes; --parts growth cylinders parts picture, --files 20
 
 * growth: facets of the box n × n × 1, n = 2 … 2^20, with a + b · log2 n fitted.
 * cylinders: facets of cylinders of n sides beside the estimate that is made before the first cut.
@@ -44,8 +44,8 @@ def growth() -> None:
         n = 2.0**k
         made = Mesh(*surfaces.box((0, 0, 0), (n, n, 1.0))).localised()
         counts.append(len(made.mesh.faces))
-        old, new = made.before.local_stretches[0], made.after.local_stretches[0]
-        print(f"2^{k:<2} × 2^{k:<2} × 1: σ {old:11.6g} → {new:5.3f}, "
+        before, after = made.before.local_stretches[0], made.after.local_stretches[0]
+        print(f"2^{k:<2} × 2^{k:<2} × 1: σ {before:11.6g} → {after:5.3f}, "
               f"{counts[-1]:5} facets, moved {made.moved:g}", flush=True)  # fmt: skip
     slope, start = np.polyfit(np.arange(1, 21), counts, 1)
     over = max((count - 12) / k for k, count in enumerate(counts, 1))
@@ -66,7 +66,7 @@ def cylinder(sides: int) -> tuple[np.ndarray, np.ndarray]:
             if len({a, b, c}) == 3:
                 faces += [(a, b, c), (sides + c, sides + b, sides + a)]
         low, high = low + 1, high - 1
-    return np.concatenate([rim, rim + np.array((0, 0, 1))]), np.array(faces)
+    return np.concatenate([rim, rim + np.array([0.0, 0.0, 1.0])]), np.array(faces)
 
 
 def cylinders() -> None:
@@ -74,8 +74,8 @@ def cylinders() -> None:
         vertices, faces = cylinder(sides)
         ends = edges_of(faces, np.arange(len(faces))).ends
         for stretch in (10.0, 20.0):
-            told = predicted_facets(vertices, ends, len(faces), stretch, 1)
-            text = f"{sides:5} sides, {len(faces):6} facets, σ ≤ {stretch:g}: estimated {told:9}"
+            estimate = predicted_facets(vertices, ends, len(faces), stretch, 1)
+            text = f"{sides:5} sides, {len(faces):6} facets, σ ≤ {stretch:g}: estimated {estimate:9}"
             if sides <= 256:
                 made = len(Mesh(vertices, faces).localised(stretch).mesh.faces)
                 text += f", made {made:6}, {made / sides**2:.3f} n²"
@@ -89,15 +89,15 @@ def parts(files: int) -> None:
         print("pybullet_data is not installed (pip install 'collide-robotics[peers]'): left out")
         return
     root = Path(pybullet_data.getDataPath())
-    kinds = (".stl", ".obj", ".dae")
-    places = sorted(p for p in root.rglob("*") if p.suffix.lower() in kinds and "random" not in str(p))
+    suffixes = (".stl", ".obj", ".dae")
+    places = sorted(p for p in root.rglob("*") if p.suffix.lower() in suffixes and "random" not in str(p))
     np.random.default_rng(1).shuffle(places)
     rows = []
     for place in places:
         if len(rows) == files:
             break
         try:
-            surface = read_meshes(place)[0][1]
+            _, surface = read_meshes(place)[0]
             if MIN_FACETS <= len(surface.faces) <= MAX_FACETS:
                 rows.append(part(str(place.relative_to(root)), Mesh(surface.vertices, surface.faces)))
         except CollideError as error:
@@ -114,8 +114,7 @@ def part(name: str, mesh: Mesh) -> dict | None:
     """Ratios after over before of what queries cost in all; None where σ ≤ 10 is not had."""
     before = mesh.locality()
     text = f"{name[-44:]:44} {len(mesh.faces):5} facets Σ {before.global_stretch:9.4g} "
-    text += f"σ {before.local_stretches[0]:9.4g} "
-    text += f"σ10 {before.local_stretches[9]:6.3g} →"
+    text += f"σ {before.local_stretches[0]:9.4g} σ10 {before.local_stretches[9]:6.3g} →"
     try:
         made = mesh.localised(max_facets=GROWTH * len(mesh.faces) + 1000)
     except CollideError as error:

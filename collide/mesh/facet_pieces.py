@@ -84,16 +84,16 @@ class Pieces:
         off /= weights.sum(axis=1, keepdims=True)
         return float(np.sqrt(np.square(off).sum(axis=1).max()) * (1 + 2.0**-40))
 
-    def cut(self, edges: Edges, chosen: np.ndarray, shares: np.ndarray) -> np.ndarray:
-        """Cut edges at shares of their length, at most one a piece; returns which of ``chosen`` could be cut.
+    def cut(self, edges: Edges, cut_rows: np.ndarray, shares: np.ndarray) -> np.ndarray:
+        """Cut edges at shares of their length, at most one a piece; returns which of ``cut_rows`` could be cut.
 
         One cannot where rounding of the weights would turn a piece over: edges within facets alone, of thin pieces.
         """
-        side = edges.sides[chosen]
+        side = edges.sides[cut_rows]
         facet = self.source[side[:, 0] // 3]
-        ends = self.weights_in(edges.ends[chosen], facet[:, None])
+        ends = self.weights_in(edges.ends[cut_rows], facet[:, None])
         weights = (1.0 - shares)[:, None] * ends[:, 0] + shares[:, None] * ends[:, 1]
-        possible = edges.fixed[chosen].copy()
+        possible = edges.fixed[cut_rows].copy()
         within = np.flatnonzero(~possible)
         upright = np.ones(len(within), dtype=bool)
         for k in range(2):
@@ -104,12 +104,12 @@ class Pieces:
                 half[np.arange(len(within)), replaced] = weights[within]
                 upright &= _is_upright(half)
         possible[within] = upright
-        self._add(edges, chosen[possible], facet[possible], weights[possible])
+        self._add(edges, cut_rows[possible], facet[possible], weights[possible])
         return possible
 
-    def _add(self, edges: Edges, chosen: np.ndarray, facet: np.ndarray, weights: np.ndarray) -> None:
+    def _add(self, edges: Edges, cut_rows: np.ndarray, facet: np.ndarray, weights: np.ndarray) -> None:
         names = np.full(len(edges.ends), -1)
-        names[chosen] = np.arange(len(chosen)) + len(self.points)
+        names[cut_rows] = np.arange(len(cut_rows)) + len(self.points)
         places = self.place(facet, weights)
         self.points = np.concatenate([self.points, places])
         self.hosts = np.concatenate([self.hosts, self.corners[facet]])
@@ -128,10 +128,10 @@ class Pieces:
         for _ in range(_MAX_FLIPS):
             edges = edges_of(faces, source)
             side = edges.sides[~edges.fixed]
-            chosen, new = self._to_flip(faces, source, side)
-            if not len(chosen):
+            flipped, new = self._to_flip(faces, source, side)
+            if not len(flipped):
                 break
-            faces[side[chosen] // 3] = new
+            faces[side[flipped] // 3] = new
         self.faces[rows] = faces
 
     def _to_flip(self, faces: np.ndarray, source: np.ndarray, side: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

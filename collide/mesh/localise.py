@@ -72,8 +72,8 @@ def localise(pieces: Pieces, distinct: np.ndarray, stretch: float, order: int, m
             near = nearest[pieces.n_old :] < floor[pieces.hosts[pieces.n_old :]].min(axis=1)
             if near.any() or len(pieces.faces) > max_facets:
                 _give_up(pieces, edges, lengths / nearer)
-            chosen = _longest(edges, lengths, long)
-            cut = _cut(pieces, rows, edges, chosen, lengths)
+            cut_rows = _longest(edges, lengths, long)
+            cut = _cut(pieces, rows, edges, cut_rows, lengths)
             if not len(cut):
                 _give_up(pieces, edges, lengths / nearer)
             touched[:] = False
@@ -85,8 +85,8 @@ def _nearest(pieces: Pieces, rows: np.ndarray, order: int) -> np.ndarray:
     """(n,) the distance of every point to its ``order``-th nearest other; infinite where there are not as many."""
     exponent = 500 - int(np.frexp(np.abs(pieces.points).max())[1])
     out = np.full(len(pieces.points), np.inf)
-    for found, squares in PointTree(np.ldexp(pieces.points[rows], exponent)).nearest(order):
-        out[rows[found]] = np.ldexp(np.sqrt(squares[:, order - 1]), -exponent)
+    for places, squares in PointTree(np.ldexp(pieces.points[rows], exponent)).nearest(order):
+        out[rows[places]] = np.ldexp(np.sqrt(squares[:, order - 1]), -exponent)
     return out
 
 
@@ -98,27 +98,27 @@ def _longest(edges: Edges, lengths: np.ndarray, long: np.ndarray) -> np.ndarray:
     beaten = np.zeros(len(lengths), dtype=bool)
     ranks = rank[edges.edge_of]
     beaten[edges.edge_of[ranks != ranks.max(axis=1, keepdims=True)]] = True
-    chosen = np.flatnonzero(long & ~beaten)
-    return chosen[np.argsort(-rank[chosen])]
+    cut_rows = np.flatnonzero(long & ~beaten)
+    return cut_rows[np.argsort(-rank[cut_rows])]
 
 
-def _cut(pieces: Pieces, rows: np.ndarray, edges: Edges, chosen: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Cut the chosen edges but those whose best places are too near each other; returns those that were cut."""
+def _cut(pieces: Pieces, rows: np.ndarray, edges: Edges, cut_rows: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Cut these edges but those whose best places are too near each other; returns those that were cut."""
     exponent = 500 - int(np.frexp(np.abs(pieces.points).max())[1])
-    ends = np.ldexp(pieces.points[edges.ends[chosen]], exponent)
-    scaled = np.ldexp(lengths[chosen], exponent)
+    ends = np.ldexp(pieces.points[edges.ends[cut_rows]], exponent)
+    scaled = np.ldexp(lengths[cut_rows], exponent)
     known = np.ldexp(pieces.points[rows], exponent)
-    open_rows, taken, shares = np.arange(len(chosen)), [], []
+    open_rows, taken, shares = np.arange(len(cut_rows)), [], []
     for _ in range(_CHOICES):
         if not len(open_rows):
             break
-        places, share, room = _best_places(PointTree(known), ends[open_rows], scaled[open_rows])
-        free = (room > 0.0) & ~_has_rival(places, np.minimum(room, _FAR_ENOUGH * scaled[open_rows]))
+        places, share, clearance = _best_places(PointTree(known), ends[open_rows], scaled[open_rows])
+        free = (clearance > 0.0) & ~_has_rival(places, np.minimum(clearance, _FAR_ENOUGH * scaled[open_rows]))
         taken.append(open_rows[free])
         shares.append(share[free])
         known = np.concatenate([known, places[free]])
         open_rows = open_rows[~free]
-    which = chosen[np.concatenate(taken)]
+    which = cut_rows[np.concatenate(taken)]
     possible = pieces.cut(edges, which, np.concatenate(shares))
     return which[possible]
 
@@ -128,18 +128,18 @@ def _best_places(tree: PointTree, ends: np.ndarray, lengths: np.ndarray) -> tupl
     share)."""
     places = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * _SHARES[None, :, None]
     squares, _ = tree.nearest_to(places.reshape(-1, 3), 1)
-    room = np.sqrt(squares).reshape(places.shape[:2]) / np.maximum(_SHARES, 1.0 - _SHARES)
-    good = room >= np.minimum(_FAR_ENOUGH * lengths, 0.999 * room.max(axis=1))[:, None]
+    clearance = np.sqrt(squares).reshape(places.shape[:2]) / np.maximum(_SHARES, 1.0 - _SHARES)
+    good = clearance >= np.minimum(_FAR_ENOUGH * lengths, 0.999 * clearance.max(axis=1))[:, None]
     best = np.where(good, np.abs(_SHARES - 0.5), np.inf).argmin(axis=1)
     rows = np.arange(len(places))
-    return places[rows, best], _SHARES[best], room[rows, best]
+    return places[rows, best], _SHARES[best], clearance[rows, best]
 
 
-def _has_rival(places: np.ndarray, room: np.ndarray) -> np.ndarray:
-    """Whether an earlier place is nearer to each than its room."""
+def _has_rival(places: np.ndarray, clearance: np.ndarray) -> np.ndarray:
+    """Whether an earlier place is nearer to each than its clearance."""
     n = min(_RIVALS + 1, len(places))
     squares, ids = PointTree(places).nearest_to(places, n)
-    near = np.sqrt(squares) < 0.99 * room[:, None]
+    near = np.sqrt(squares) < 0.99 * clearance[:, None]
     return (near & (ids >= 0) & (ids < np.arange(len(places))[:, None])).any(axis=1)
 
 

@@ -28,7 +28,7 @@ def predicted_facets(points: np.ndarray, ends: np.ndarray, n_facets: int, stretc
     low = np.minimum(a, b).min(axis=0)
     a, b = a - low, b - low
     lengths = np.sqrt(np.square(b - a).sum(axis=1))
-    few = _EDGES_A_STRETCH * stretch * np.sqrt(order)
+    max_uncut = _EDGES_A_STRETCH * stretch * np.sqrt(order)
     pieces, width = 0.0, float(lengths.max())
     for level in range(_MAX_LEVELS):
         long = np.flatnonzero(lengths >= width)
@@ -36,8 +36,8 @@ def predicted_facets(points: np.ndarray, ends: np.ndarray, n_facets: int, stretc
         if level > 2 and steps.sum() > _MAX_CUBES:
             break
         counts = _edges_in_cubes(a[long] / width, b[long] / width, steps.astype(np.int64))
-        pieces = max(pieces, float(np.square(counts[counts > few].astype(np.float64)).sum() / few))
-        if len(long) == len(lengths) and counts.max() <= few:
+        pieces = max(pieces, float(np.square(counts[counts > max_uncut].astype(np.float64)).sum() / max_uncut))
+        if len(long) == len(lengths) and counts.max() <= max_uncut:
             break
         width /= 2.0
     return max(n_facets, int(pieces / _EDGES_A_FACET))

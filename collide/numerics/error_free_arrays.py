@@ -15,11 +15,11 @@ def array_sum(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def array_product(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """a·b exactly unless it leaves the range of doubles, as rounded products and their errors."""
     product = a * b
-    (a_high, a_low), (b_high, b_low) = _halves(a), _halves(b)
+    (a_high, a_low), (b_high, b_low) = _split(a), _split(b)
     return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
 
 
-def _halves(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _split(a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     wide = 134217729.0 * a  # 2²⁷ + 1
     high = wide - (wide - a)
     return high, a - high

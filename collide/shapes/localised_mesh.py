@@ -40,8 +40,8 @@ def localised_mesh(mesh: Mesh, stretch: float, order: int, max_facets: int, prog
     before = mesh.locality(progress=progress)
     if order >= before.distinct:
         raise InvalidArgument(
-            f"Mesh.localised: order must be less than the {before.distinct} distinct vertices of the mesh, "
-            f"got {order}: no vertex has so many others"
+            f"Mesh.localised: order must be less than the {before.distinct} distinct vertices of the mesh, got "
+            f"{order}: no vertex has so many others"
         )
     survey = mesh.survey
     rows = np.flatnonzero(survey.flags & COLLAPSED == 0)
@@ -84,12 +84,12 @@ def _refuse_too_many(mesh: Mesh, corners: np.ndarray, stretch: float, order: int
 
 
 def _gave_up(crowded, facet: int, stretch: float, order: int, max_facets: int) -> InvalidArgument:
-    many = crowded.n_facets > max_facets
-    why = f"more than max_facets = {max_facets}" if many else "new vertices came ever nearer to each other"
+    why = "new vertices came ever nearer to each other"
+    if crowded.n_facets > max_facets:
+        why = f"more than max_facets = {max_facets}"
     return InvalidArgument(
         f"Mesh.localised: σ_{order} ≤ {stretch:g} was not reached: {why}, with {crowded.n_facets} facets and "
-        f"σ_{order} = {crowded.stretch:.4g}. Edges crowd in facet {facet}, near its corner {crowded.vertex}: "
-        "more of them than a stretch allows side by side, or at one vertex (docs/locality.md). "
-        "Allow a greater stretch or order"
+        f"σ_{order} = {crowded.stretch:.4g}. Edges crowd in facet {facet}, near its corner {crowded.vertex}: more of "
+        "them than a stretch allows side by side, or at one vertex (docs/locality.md). Allow a greater stretch or order"
     )
 

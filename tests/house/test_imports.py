@@ -304,13 +304,14 @@ ROOMS = {
     "cli_compare": {"cli_files", "cli_pages", "cli_scenes", "errors", "reports", "whole_file", ""},
     "cli_engines": {"reports"},
     "cli_fuzz": {"cli_files", "cli_numbers", "errors", "reports"},
+    "cli_locality": {"cli_files", "errors", "hierarchies", "reports"},
     "cli_arguments": {
-        "cli_bench", "cli_compare", "cli_engines", "cli_fuzz", "cli_numbers", "cli_pages", "cli_srdf", "cli_sweep",
-        "cli_view", "errors", "reports", "",
+        "cli_bench", "cli_compare", "cli_engines", "cli_fuzz", "cli_locality", "cli_numbers", "cli_pages", "cli_srdf",
+        "cli_sweep", "cli_view", "errors", "reports", "",
     },
     "cli": {
-        "cli_arguments", "cli_bench", "cli_compare", "cli_files", "cli_fuzz", "cli_pages", "cli_scenes", "cli_srdf",
-        "cli_sweep", "cli_view", "errors", "reports", "",
+        "cli_arguments", "cli_bench", "cli_compare", "cli_files", "cli_fuzz", "cli_locality", "cli_pages", "cli_scenes",
+        "cli_srdf", "cli_sweep", "cli_view", "errors", "reports", "",
     },
     "__main__": {"cli"},
 }
@@ -326,6 +327,7 @@ LATE = {
     "cli_files": {"scenes"},
     "cli_engines": {"adapters"},
     "cli_fuzz": {"adapters"},
+    "cli_locality": {"scenes"},
     "cli_pages": {"scenes"},
     "cli_scenes": {"scenes"},
     "cli_srdf": {"scenes"},

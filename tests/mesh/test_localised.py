@@ -41,7 +41,7 @@ def cylinder(sides: int) -> tuple[np.ndarray, np.ndarray]:
             if len({a, b, c}) == 3:
                 faces += [(a, b, c), (sides + c, sides + b, sides + a)]
         low, high = low + 1, high - 1
-    return np.concatenate([rim, rim + np.array((0, 0, 1))]), np.array(faces)
+    return np.concatenate([rim, rim + np.array([0.0, 0.0, 1.0])]), np.array(faces)
 
 
 def fractions_of(points) -> list[tuple[Fraction, ...]]:
