@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -64,12 +65,12 @@ def _block(tree: FinishedTree, whole: np.ndarray, wanted: np.ndarray, low, high)
         nothing = np.zeros(0, dtype=np.int64)
         return CellBlock(nothing, Polygons(*(nothing,) * 5), vertices, edges)
     begins = np.cumsum([0] + [len(leaf) for leaf, _ in done])
-    faces = joined(*(part._replace(cell=part.cell + begin) for begin, (_, part) in zip(begins, done)))
+    faces = joined(*(replace(part, cell=part.cell + begin) for begin, (_, part) in zip(begins, done)))
     leaf = np.concatenate([leaf for leaf, _ in done])
     order = np.argsort(leaf)
     rank = np.empty(len(leaf), dtype=np.int64)
     rank[order] = np.arange(len(leaf))
-    faces = faces._replace(cell=rank[faces.cell])
+    faces = replace(faces, cell=rank[faces.cell])
     return CellBlock(leaf[order], faces[np.argsort(faces.cell, kind="stable")], vertices, edges)
 
 
@@ -77,7 +78,7 @@ def _of_cells(faces: Polygons, selected: np.ndarray) -> Polygons:
     """The faces of some of the cells, which are numbered anew."""
     number = np.cumsum(selected) - 1
     faces = faces[selected[faces.cell]]
-    return faces._replace(cell=number[faces.cell])
+    return replace(faces, cell=number[faces.cell])
 
 
 def _box(vertices: Vertices, edges: Edges, low: np.ndarray, high: np.ndarray) -> Polygons:
@@ -110,7 +111,7 @@ def _cut_cells(vertices, edges, faces: Polygons, cuts: np.ndarray, planes: np.nd
     has = np.zeros((2, n), dtype=bool)
     has[0, faces.cell[cut.below]] = True
     has[1, faces.cell[cut.above]] = True
-    through = has.all(axis=0)
+    through = np.all(has, axis=0)
     rows, owner = edge_rows(faces)
     groups = []
     for side, mine, opposite, pieces in ((0, cut.below, cut.above, cut.minus), (1, cut.above, cut.below, cut.plus)):
@@ -120,7 +121,7 @@ def _cut_cells(vertices, edges, faces: Polygons, cuts: np.ndarray, planes: np.nd
         group = joined(faces[whole], pieces)
         caps = _caps(edges, group[through[group.cell]], planes, 2 * side - 1)
         group = joined(group, caps)
-        groups.append(group._replace(cell=side * n + group.cell))
+        groups.append(replace(group, cell=side * n + group.cell))
     places = np.concatenate((2 * cuts + 1, 2 * cuts + 2))
     return places[has.ravel()], _of_cells(joined(*groups), has.ravel())
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,8 @@ from collide.partitions.growing_rows import GrowingRows
 from collide.partitions.vertices import Sides, Vertices
 
 
-class Polygons(NamedTuple):
+@dataclass(frozen=True)
+class Polygons:
     """Convex polygons, pieces of facets or faces of cells, (k,) int64 each.
 
     plane : number of the plane.   cell : the cell it lies in.   begin, count : its edges, rows of `Edges`.
@@ -23,13 +25,16 @@ class Polygons(NamedTuple):
     count: np.ndarray
     side: np.ndarray
 
-    def __getitem__(self, rows) -> Polygons:  # type: ignore[override]
-        return Polygons(*(column[rows] for column in self))
+    def __getitem__(self, rows) -> Polygons:
+        return Polygons(*(column[rows] for column in self.columns()))
+
+    def columns(self) -> tuple[np.ndarray, ...]:
+        return self.plane, self.cell, self.begin, self.count, self.side
 
 
 def joined(*groups: Polygons) -> Polygons:
     """The polygons of several groups, one after another."""
-    return Polygons(*(np.concatenate(columns) for columns in zip(*groups)))
+    return Polygons(*(np.concatenate(columns) for columns in zip(*(group.columns() for group in groups))))
 
 
 class Edges:
@@ -138,7 +143,7 @@ def _split_in_two(vertices, edges, polygons, planes, rows, owner, vertex, sides,
         count = np.bincount(whose, minlength=len(planes))
         pairs = (np.stack(two, axis=1).ravel()[emit] for two in ((vertex, new), (first, second)))
         begin = edges.add(*pairs)
-        parts.append(polygons._replace(begin=begin[0] + np.cumsum(count) - count, count=count))
+        parts.append(replace(polygons, begin=begin[0] + np.cumsum(count) - count, count=count))
     return parts[0], parts[1]
 
 

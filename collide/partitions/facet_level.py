@@ -8,6 +8,8 @@ a facet passes.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from collide.partitions.cut_polygons import Edges, Polygons, cut_polygons, edge_rows, joined
@@ -56,9 +58,9 @@ def _round(tree, vertices, edges, polygons: Polygons, rng) -> Polygons:
     side = cuts[cell[on_one_side]]
     split_cuts = cuts[cell[cut.both]]
     remaining = joined(
-        rest[on_one_side]._replace(cell=2 * side + 1 + cut.above[on_one_side]),
-        cut.minus._replace(cell=2 * split_cuts + 1),
-        cut.plus._replace(cell=2 * split_cuts + 2),
+        replace(rest[on_one_side], cell=2 * side + 1 + cut.above[on_one_side]),
+        replace(cut.minus, cell=2 * split_cuts + 1),
+        replace(cut.plus, cell=2 * split_cuts + 2),
     )
     return remaining[np.argsort(remaining.cell, kind="stable")]
 

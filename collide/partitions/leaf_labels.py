@@ -51,8 +51,8 @@ def _label_block(tree: FinishedTree, mesh: Mesh, block: CellBlock, inside: np.nd
     pairs = np.unique(np.stack((cell, np.ravel(vertex)), axis=1), axis=0)
     xyz, _ = block.vertices.rounded(used)
     count = np.bincount(pairs[:, 0], minlength=len(block.leaf))
-    points = np.stack([np.bincount(pairs[:, 0], xyz[pairs[:, 1], k], len(count)) for k in range(3)], axis=1)
-    points /= count[:, None]
+    sums = np.stack([np.bincount(pairs[:, 0], xyz[pairs[:, 1], k], len(count)) for k in range(3)], axis=1)
+    points = sums / count[:, None]
     good = _strictly_in(tree, points, block.leaf)
     inside[block.leaf[good]] = _winds(mesh, points[good])
     remaining = np.flatnonzero(~good)

@@ -8,6 +8,7 @@ but κ is cut off instead, so that empty levels cost nothing. Beyond the lemma, 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -146,7 +147,7 @@ class OrthogonalLevel:
         close = ~(over | under)
         rows, at = of_cut[close], at[close]
         if len(rows) == 0:
-            self.polygons = self.polygons._replace(cell=cell)
+            self.polygons = replace(self.polygons, cell=cell)
             return
         cut = cut_polygons(self.vertices, self.edges, self.polygons[rows], planes[at])
         cell[rows] = 2 * cuts[at] + 1 + cut.above
@@ -155,8 +156,8 @@ class OrthogonalLevel:
         remaining = np.ones(len(cell), dtype=bool)
         remaining[rows[flat | (cut.below & cut.above)]] = False
         split_cuts = cuts[at[cut.both]]
-        pieces = joined(cut.minus._replace(cell=2 * split_cuts + 1), cut.plus._replace(cell=2 * split_cuts + 2))
-        self.polygons = joined(self.polygons._replace(cell=cell)[remaining], pieces)
+        pieces = joined(replace(cut.minus, cell=2 * split_cuts + 1), replace(cut.plus, cell=2 * split_cuts + 2))
+        self.polygons = joined(replace(self.polygons, cell=cell)[remaining], pieces)
         self.boxes = np.concatenate((self.boxes[remaining], self._boxes_of(pieces)))
 
     def _boxes_of(self, polygons: Polygons) -> np.ndarray:

@@ -24,7 +24,8 @@ class PartitionTree:
     def __init__(self, memory: int):
         self.memory, self.other_bytes, self.prediction = memory, 0, ""
         self.plane, self.below = GrowingRows(np.int64), GrowingRows(np.int64)
-        self.seat, self.held = GrowingRows(float, 4), []
+        self.seat = GrowingRows(float, 4)
+        self.held: list[tuple[np.ndarray, np.ndarray]] = []
         self.below.add(np.array([EMPTY]))
 
     def cut(self, places: np.ndarray, planes: np.ndarray, seats: np.ndarray | None = None) -> np.ndarray:

@@ -72,7 +72,7 @@ class Planes:
         k = cut[rows] - 4 * self.n
         height[rows] = points[rows, self.axis.rows[k]] - self.value.rows[k]
         bound[rows] = errors[rows]
-        rows = np.flatnonzero(~on_axis) if len(rows) else slice(None)
+        rows = np.flatnonzero(~on_axis)
         f = cut[rows]
         d = points[rows] - self.origin[f]
         normal, permanent, e = self.normal[f], self.permanent[f], errors[rows]

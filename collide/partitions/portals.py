@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +36,7 @@ def portals_of_block(tree: FinishedTree, block: CellBlock, whole: np.ndarray) ->
     faces = block.faces[(block.faces.side > 0) & (block.faces.plane < n_tree_planes)]
     owner = block.leaf[faces.cell]
     # `cell` is the row of the face from now on, and follows its pieces down.
-    faces = faces._replace(cell=np.arange(len(owner)))
+    faces = replace(faces, cell=np.arange(len(owner)))
     place = np.zeros(len(owner), dtype=np.int64)
     planes, done = vertices.planes, []
     while len(place):

@@ -23,7 +23,8 @@ def render(comparison, *, everything: bool = False, width: int = 80, whole_names
     data = comparison.to_dict()
     style = "colliding" if comparison.ours_wrong else "free"
     lines: list[Line] = [[(line, style)] for line in wrapped(verdict(data), width, hanging=2)]
-    tables = [*_engine_tables(data, *comparison.table(), width), *_dispute_tables(data, None if everything else SHORT)]
+    headers, rows = comparison.table()
+    tables = [*_engine_tables(data, headers, rows, width), *_dispute_tables(data, None if everything else SHORT)]
     dropped: dict[str, None] = {}  # a set that keeps its order
     for table in tables:
         layout = lay_out(table, width, whole_names)

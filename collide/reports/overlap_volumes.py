@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from itertools import islice
-
 from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.lowering.facet_bodies import has_facets
 from collide.reports.mesh_notes import meshes_of
-from collide.reports.pair_classes import Pair
+from collide.reports.pair_classes import Pairs
 from collide.solids.overlap_volume import overlap_volume
 
 #: Pairs looked at, and facets of their meshes, each pair with its own: a second, and a fraction of one.
@@ -16,15 +14,15 @@ MAX_FACETS = 300_000
 _NUMBERS = ("volume", "lower", "upper", "area_a", "area_b", "patch_area", "flush_area")
 
 
-def of_pairs(scene, pairs: Iterable[Pair]) -> list[dict]:
+def of_pairs(scene, *groups: Pairs) -> list[dict]:
     """Plain data of each pair that has a volume to tell, in the order of the pairs, which are a scene's.
 
     Bodies that are no solids with facets (curved shapes, surfaces, unions) are left out, and what is beyond the limits.
     """
     entries: list[dict] = []
     remaining = MAX_FACETS
-    bodies = {body.name: body for body in scene.bodies}
-    for pair in islice(pairs, MAX_PAIRS):
+    bodies = {body.name: body for body in scene.bodies if _is_polyhedral(body.shape)}
+    for pair in [pair for pairs in groups for pair in pairs.among(bodies)[:MAX_PAIRS]][:MAX_PAIRS]:
         A, B = bodies[pair.a], bodies[pair.b]
         remaining -= sum(len(mesh.faces) for body in (A, B) for mesh in meshes_of(body.shape))
         if remaining < 0:
@@ -33,6 +31,10 @@ def of_pairs(scene, pairs: Iterable[Pair]) -> list[dict]:
         if overlap is not None:
             entries.append({"a": pair.a, "b": pair.b, **overlap})
     return entries
+
+
+def _is_polyhedral(shape) -> bool:
+    return has_facets(shape) and not getattr(shape, "radius", 0.0)
 
 
 def of_bodies(A, B) -> dict | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -80,6 +80,13 @@ class Pairs(Sequence):
         rank = _ranks(self._names)
         a, b = (rank[self._rows[side][self._order]] for side in ("a", "b"))
         return Pairs(self._rows, self._order[np.lexsort((b, a))], self._names, self._approximated)
+
+    def among(self, bodies: Container[str]) -> Pairs:
+        """The pairs both of whose bodies are among these names, in their order."""
+        chosen = np.zeros(max(self._names, default=-1) + 1, dtype=bool)
+        chosen[[identity for identity, name in self._names.items() if name in bodies]] = True
+        both = chosen[self._rows["a"][self._order]] & chosen[self._rows["b"][self._order]]
+        return Pairs(self._rows, self._order[both], self._names, self._approximated)
 
     def __len__(self) -> int:
         return len(self._order)

@@ -11,7 +11,6 @@ import platform
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from itertools import chain
 
 import numpy as np
 
@@ -163,7 +162,7 @@ def make(
         approximations=_approximations(scene),
         unanswered=unanswered,
         skipped=_skipped(stats),
-        overlaps=overlap_volumes.of_pairs(scene, chain(by_class[classes.COLLIDING], by_class[classes.SHALLOW])),
+        overlaps=overlap_volumes.of_pairs(scene, by_class[classes.COLLIDING], by_class[classes.SHALLOW]),
         proofs=_proofs(stats),
         work=_work(stats),
         notes=[str(note) for note in scene.notes],

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 from importlib import resources
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import collide
-from collide.reports import report, report_tables
+from collide.reports import overlap_volumes, report, report_tables
 from collide.scenes import Scene, SceneBody
 
 
@@ -55,14 +54,17 @@ def test_json_is_as_its_schema_says():
 
 
 def test_no_more_pairs_are_looked_at_than_it_says(monkeypatch):
-    from collide.reports import overlap_volumes
-
     box = collide.Box((1, 1, 1))
-    scene = SimpleNamespace(bodies=[SimpleNamespace(name=name, shape=box, X_WB=np.eye(4)) for name in "ab"])
-    pairs = [SimpleNamespace(a="a", b="b")] * 5
+    mesh = collide.Mesh(*collide.tessellate(box, tolerance=1e-3)[:2])
+
+    def overlaps(*shapes):
+        bodies = [SceneBody(f"body {k}", shape, collide.pose((0.1 * k, 0, 0))) for k, shape in enumerate(shapes)]
+        return report.make(Scene("heap", bodies)).overlaps
+
+    balls = [collide.Sphere(0.5)] * 10
+    assert len(overlaps(*balls, box, box, box)) == 3
     monkeypatch.setattr(overlap_volumes, "MAX_PAIRS", 3)
-    assert len(overlap_volumes.of_pairs(scene, pairs)) == 3
-    mesh = collide.Mesh(*collide.tessellate(box, tolerance=1e-3))
-    scene.bodies[0].shape = mesh
+    assert len(overlaps(box, box, box, box)) == 3
+    assert len(overlaps(*balls, box, box, box)) == 3, "pairs without a volume take no one's place"
     monkeypatch.setattr(overlap_volumes, "MAX_FACETS", 2 * len(mesh.faces))
-    assert len(overlap_volumes.of_pairs(scene, pairs)) == 2
+    assert len(overlaps(mesh, box, box)) == 3 and len(overlaps(mesh, mesh, box)) == 1
