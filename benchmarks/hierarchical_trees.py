@@ -34,7 +34,7 @@ SIZES = {
     2: (1000, 10_000, 100_000, 1_000_000), 3: (3000, 10_000, 30_000, 100_000), 4: (3000, 5000, 10_000), 5: (1700, 2000),
 }  # fmt: skip
 #: Points of the bodies that are posed, with nets of at most 24 simplices and leaves of at most 48 corners.
-POSED = {2: (100, 1000, 10_000, 100_000), 3: (100, 1000, 10_000), 4: (100, 300, 1000), 5: (60, 120, 240)}
+SIZES_ASKED = {2: (100, 1000, 10_000, 100_000), 3: (100, 1000, 10_000), 4: (100, 300, 1000), 5: (60, 120, 240)}
 SMALL = Sizes(0.5, 24, 48)
 
 
@@ -138,7 +138,7 @@ def near_pose(rng, points: np.ndarray, d: int) -> np.ndarray:
     return X
 
 
-def posed(family: str, d: int, n: int, count: int, limits: Sizes | None) -> dict:
+def asked_about(family: str, d: int, n: int, count: int, limits: Sizes | None) -> dict:
     """A row: answers against the judge, rounds, cones."""
     rng = np.random.default_rng([d, n])
     points, normals, offsets = FAMILIES[family](n, d), ball(n, d, 1), np.ones(n)
@@ -267,11 +267,11 @@ def main() -> None:
     if args.part == "walk":
         cases = [("ball", 3)]
     for family, d in cases:
-        for n in args.sizes or (SIZES if args.part == "sizes" else POSED)[d]:
+        for n in args.sizes or (SIZES if args.part == "sizes" else SIZES_ASKED)[d]:
             if args.part == "sizes":
                 row = whole_tree(family, d, n, args.memory)
             elif args.part == "poses":
-                row = posed(family, d, n, args.count, None if args.large else SMALL)
+                row = asked_about(family, d, n, args.count, None if args.large else SMALL)
             else:
                 row = beside_walk(n, args.count)
             keys = [name for name in ("family", "d", "n") if name in row]

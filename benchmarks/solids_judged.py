@@ -62,15 +62,15 @@ def is_balanced(mesh) -> bool:
 
 def near_one_plane(A, B, X, Y) -> bool:
     """Whether a facet of one solid is nearly in the plane of one of the other that it nearly reaches."""
-    corners = [mesh.vertices[mesh.faces] @ P[:3, :3].T + P[:3, 3] for mesh, P in ((A, X), (B, Y))]
+    corners = [mesh.vertices[mesh.faces] @ X_W[:3, :3].T + X_W[:3, 3] for mesh, X_W in ((A, X), (B, Y))]
     reach = NEAR * max(float(np.ptp(c.reshape(-1, 3), axis=0).max()) for c in corners)
     (low_a, high_a), (low_b, high_b) = ((c.min(axis=1) - reach, c.max(axis=1) + reach) for c in corners)
     a, b = np.nonzero(((low_a[:, None] <= high_b) & (low_b <= high_a[:, None])).all(axis=2))
-    for (P, p), (Q, q) in (((corners[0], a), (corners[1], b)), ((corners[1], b), (corners[0], a))):
-        n = np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0])
+    for (ours, p), (others, q) in (((corners[0], a), (corners[1], b)), ((corners[1], b), (corners[0], a))):
+        n = np.cross(ours[:, 1] - ours[:, 0], ours[:, 2] - ours[:, 0])
         with np.errstate(all="ignore"):
             n = n / np.sqrt(np.square(n).sum(axis=1))[:, None]
-        heights = ((Q[q] - P[p, :1]) * n[p][:, None]).sum(axis=2)
+        heights = ((others[q] - ours[p, :1]) * n[p][:, None]).sum(axis=2)
         if (~(np.abs(heights).max(axis=1) > reach)).any():
             return True
     return False
@@ -79,7 +79,9 @@ def near_one_plane(A, B, X, Y) -> bool:
 def beside_manifold(A, B, X, Y) -> Counter:
     if len(crossings_of(A)) or len(crossings_of(B)):
         return Counter({"crossing itself": 1})
-    first, second = (manifold_of(mesh.vertices @ P[:3, :3].T + P[:3, 3], mesh.faces) for mesh, P in ((A, X), (B, Y)))
+    first, second = (
+        manifold_of(mesh.vertices @ X_W[:3, :3].T + X_W[:3, 3], mesh.faces) for mesh, X_W in ((A, X), (B, Y))
+    )
     if first.is_empty() or second.is_empty():
         return Counter({"not taken": 1})
     kind = "flush" if near_one_plane(A, B, X, Y) else "clear"

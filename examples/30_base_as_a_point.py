@@ -10,15 +10,15 @@ import collide
 # Two walls with a door each, and a pillar; the base is an L, and keeps its heading.
 walls = [(-2.5, 0.6, 1.8), (2.1, 0.6, 2.6), (-2.1, 2, 2.6), (2.5, 2, 1.8), (0, 1.3, 0.2)]
 poses = [collide.pose((x, y, 0)) for x, y, _ in walls]
-room = collide.combine([collide.Box((w, 0.2, 1)) for _, _, w in walls], poses, "union").mesh
+walls_as_one = collide.combine([collide.Box((w, 0.2, 1)) for _, _, w in walls], poses, "union").mesh
 corners = np.array([(0, 0), (0.6, 0), (0.6, 0.25), (0.25, 0.25), (0.25, 0.6), (0, 0.6)]) - 0.2
 ears = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)])
 k = np.arange(6)
 sides = [np.stack([k, (k + 1) % 6, (k + 1) % 6 + 6], axis=1), np.stack([k, (k + 1) % 6 + 6, k + 6], axis=1)]
 heights = [np.column_stack([corners, np.full(6, z)]) for z in (-0.25, 0.25)]
 base = collide.Mesh(np.concatenate(heights), np.concatenate([ears[:, ::-1], ears + 6, *sides]))
-obstacle = collide.configuration_obstacle(room, base, collide.pose((0, 0, 0), rpy=(0, 0, 0.5))[:3, :3])
-print(f"{len(room.faces)} and {len(base.faces)} facets: an obstacle of {len(obstacle.mesh.faces)} facets")
+obstacle = collide.configuration_obstacle(walls_as_one, base, collide.pose((0, 0, 0), rpy=(0, 0, 0.5))[:3, :3])
+print(f"{len(walls_as_one.faces)} and {len(base.faces)} facets: an obstacle of {len(obstacle.mesh.faces)} facets")
 
 # The shortest path of a point on a grid: a step is free where its segment meets no facet and starts outside.
 start, goal, step = np.array((-5, -6, 0)), np.array((5, 38, 0)), 0.1
@@ -45,5 +45,5 @@ print(f"a path of {cost[tuple(goal)]:.2f} m in {len(path) - 1} steps, {len(cost)
 
 # The bodies themselves: not one step hits, by certified motion.
 poses = [collide.pose(np.multiply(n, step), rpy=(0, 0, 0.5)) for n in path]
-hits = [collide.time_of_impact(room, base, np.eye(4), np.eye(4), a, b).hit for a, b in pairwise(poses)]
+hits = [collide.time_of_impact(walls_as_one, base, np.eye(4), np.eye(4), a, b).hit for a, b in pairwise(poses)]
 print(f"steps that hit: {sum(map(bool, hits))} of {len(hits)}")

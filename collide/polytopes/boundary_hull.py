@@ -31,7 +31,7 @@ class Boundary(NamedTuple):
     planes: np.ndarray
 
 
-def boundary_hull(points: np.ndarray, with_planes: bool = True, most: int | None = None) -> Boundary | None:
+def boundary_hull(points: np.ndarray, with_planes: bool = True, max_simplices: int | None = None) -> Boundary | None:
     """The boundary of the hull, or None where the points lie in one hyperplane.
 
     Parameters
@@ -40,7 +40,7 @@ def boundary_hull(points: np.ndarray, with_planes: bool = True, most: int | None
         Integers of at most `BITS` bits, d ≥ 2; doubled, inner and coplanar ones are allowed.
     with_planes : bool
         Whether the half-spaces are wanted; else they are missing.
-    most : int, optional
+    max_simplices : int, optional
         In d > 3, the most simplices that there may be at any time.
 
     Returns
@@ -51,7 +51,7 @@ def boundary_hull(points: np.ndarray, with_planes: bool = True, most: int | None
     Raises
     ------
     BoundaryTooLarge
-        Where there were more than ``most``.
+        Where there were more than ``max_simplices``.
     """
     n, d = points.shape
     corners = first_simplex(points)
@@ -63,7 +63,7 @@ def boundary_hull(points: np.ndarray, with_planes: bool = True, most: int | None
     elif d == 3 and n >= _N_KERNEL:
         facets = np.sort(np.asarray(convex_hull(points).facets, dtype=np.int64), axis=1)
     else:
-        facets = grown_facets(points, corners, most)
+        facets = grown_facets(points, corners, max_simplices)
     if not with_planes:
         return Boundary(facets, np.empty((0, d + 1)))
     return Boundary(facets, rounded_planes(exact_planes(points, facets, whole_numbers(points[corners]).sum(axis=0))))

@@ -151,7 +151,7 @@ class FacetTree:
         if self._facets is None:
             d = self.dimension
             try:
-                hull = boundary_hull(self.points, with_planes=False, most=self.memory // bytes_a_slot(d))
+                hull = boundary_hull(self.points, with_planes=False, max_simplices=self.memory // bytes_a_slot(d))
             except BoundaryTooLarge as large:
                 raise UnsupportedQuery(
                     f"HierarchicalTree: after {large.n_points:,} of {len(self.points):,} points the boundary has "

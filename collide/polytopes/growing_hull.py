@@ -25,7 +25,7 @@ class BoundaryTooLarge(Exception):
         self.n_facets, self.n_points = n_facets, n_points
 
 
-def grown_facets(points: np.ndarray, corners: np.ndarray, most: int | None = None) -> np.ndarray:
+def grown_facets(points: np.ndarray, corners: np.ndarray, max_simplices: int | None = None) -> np.ndarray:
     """The simplices that cover the boundary, (f, d) rows of points, ascending in each.
 
     Parameters
@@ -34,13 +34,13 @@ def grown_facets(points: np.ndarray, corners: np.ndarray, most: int | None = Non
         Integers.
     corners : (d + 1,) integers
         Rows that span R^d.
-    most : int, optional
+    max_simplices : int, optional
         Beyond so many simplices `BoundaryTooLarge` is raised.
     """
     growing = _Growing(points, corners)
     for k, row in enumerate(growing.order.tolist(), len(corners)):
         growing.insert(row)
-        if most is not None and growing.size > most:
+        if max_simplices is not None and growing.size > max_simplices:
             raise BoundaryTooLarge(growing.size, k)
     return growing.facets[: growing.size][growing.facets[: growing.size, 0] >= 0]
 

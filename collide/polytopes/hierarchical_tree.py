@@ -17,7 +17,7 @@ from collide.polytopes.exact_planes import BITS
 from collide.polytopes.facet_tree import FacetTree, Sizes, sizes
 from collide.polytopes.growing_hull import bytes_a_slot
 from collide.polytopes.recentred_polars import recentred_spaces
-from collide.polytopes.tree_size import TreeSize, most_simplices, predicted_simplices, predicted_size, size_of
+from collide.polytopes.tree_size import TreeSize, max_simplices, predicted_simplices, predicted_size, size_of
 from collide.polytopes.tree_walk import Grid
 from collide.polytopes.whole_tree import build_whole
 
@@ -137,7 +137,7 @@ class HierarchicalTree:
 
     def _refuse_large_boundary(self) -> None:
         n, d = self.grid.whole.shape
-        if n <= (self.limits or sizes(d)).leaf or most_simplices(n, d) * bytes_a_slot(d) <= self.memory:
+        if n <= (self.limits or sizes(d)).leaf or max_simplices(n, d) * bytes_a_slot(d) <= self.memory:
             return
         simplices = predicted_simplices(self.grid.whole)
         if simplices * bytes_a_slot(d) > self.memory:

@@ -45,7 +45,7 @@ def size_of(tree: FacetTree) -> TreeSize:
     return TreeSize(tree.root.n_facets, len(nodes), max(node.depth for node in nodes), tree.n_bytes)
 
 
-def most_simplices(n: int, d: int) -> int:
+def max_simplices(n: int, d: int) -> int:
     """Facets of the cyclic polytope, which has the most (McMullen 1970, the upper bound theorem)."""
     k = d // 2
     if d % 2 == 0:
@@ -62,8 +62,8 @@ class _Growth(NamedTuple):
     factors: tuple[float, float]
 
 
-def growth_of(points: np.ndarray, most: int) -> _Growth:
-    """How the boundary grows, from samples that are doubled as long as they have at most ``most`` simplices."""
+def growth_of(points: np.ndarray, limit: int) -> _Growth:
+    """How the boundary grows, from samples that are doubled as long as they have at most ``limit`` simplices."""
     n, d = points.shape
     order = np.random.default_rng(n).permutation(n)
     count, before = min(n, _SMALLEST), (0, 0)
@@ -74,13 +74,13 @@ def growth_of(points: np.ndarray, most: int) -> _Growth:
             raise UnsupportedQuery(FLAT)
         numbers = (len(hull.facets), len(np.unique(hull.facets))) if hull is not None else (0, 0)
         rates = [math.log2(now / old) if old else 1.0 for now, old in zip(numbers, before)]
-        if count == n or (hull is not None and before[0] and numbers[0] * 2.0 ** rates[0] > most):
+        if count == n or (hull is not None and before[0] and numbers[0] * 2.0 ** rates[0] > limit):
             break
         before, count = numbers, min(n, 2 * count)
     if count == n:
         return _Growth(sample, *numbers, (1.0, 1.0))
     scale = n / count
-    simplices = min(numbers[0] * scale ** rates[0], most_simplices(n, d))
+    simplices = min(numbers[0] * scale ** rates[0], max_simplices(n, d))
     corners = min(numbers[1] * scale ** rates[1], n)
     return _Growth(sample, *numbers, (simplices / numbers[0], corners / numbers[1]))
 

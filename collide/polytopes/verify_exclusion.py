@@ -137,9 +137,9 @@ def _combined(rows, multipliers, a: np.ndarray, b: np.ndarray, d: int) -> tuple[
 
 def _relative(M_P: list[list[Fraction]], M_R: list[list[Fraction]], d: int) -> list[list[Fraction]]:
     """(d, d + 1): from the frame of the points to that of the half-spaces."""
-    left = [line[:d] for line in M_R[:d]]
-    columns = [_solve(left, [line[k] for line in M_P[:d]]) for k in range(d)]
-    columns.append(_solve(left, [p[d] - r[d] for p, r in zip(M_P[:d], M_R[:d])]))
+    matrix = [line[:d] for line in M_R[:d]]
+    columns = [_solve(matrix, [line[k] for line in M_P[:d]]) for k in range(d)]
+    columns.append(_solve(matrix, [p[d] - r[d] for p, r in zip(M_P[:d], M_R[:d])]))
     return [[column[i] for column in columns] for i in range(d)]
 
 

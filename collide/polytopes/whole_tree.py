@@ -24,11 +24,11 @@ def _make_children(tree: FacetTree, node: Node) -> bool:
     corners = corners.reshape(node.n_facets, -1)
     beyond = _beyond_planes(tree, node, tree.points[rows], corners)
     has_facet, has_corner = np.zeros(node.n_facets, dtype=bool), np.zeros(len(rows), dtype=bool)
-    most = tree.limits.epsilon * node.n_facets
+    max_outside = tree.limits.epsilon * node.n_facets
     for vertex in np.unique(node.hull.facets).tolist():
         for cone, planes in enumerate(tree.cones(node, vertex).tolist()):
             outside = _members(np.concatenate([beyond[plane] for plane in planes]), has_facet)
-            if len(outside) > most:
+            if len(outside) > max_outside:
                 return False
             if (vertex, cone) not in node.children:  # else made by an earlier query
                 at = _members(corners[outside].ravel(), has_corner)

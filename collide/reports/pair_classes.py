@@ -83,9 +83,9 @@ class Pairs(Sequence):
 
     def among(self, bodies: Container[str]) -> Pairs:
         """The pairs both of whose bodies are among these names, in their order."""
-        chosen = np.zeros(max(self._names, default=-1) + 1, dtype=bool)
-        chosen[[identity for identity, name in self._names.items() if name in bodies]] = True
-        both = chosen[self._rows["a"][self._order]] & chosen[self._rows["b"][self._order]]
+        is_among = np.zeros(max(self._names, default=-1) + 1, dtype=bool)
+        is_among[[identity for identity, name in self._names.items() if name in bodies]] = True
+        both = is_among[self._rows["a"][self._order]] & is_among[self._rows["b"][self._order]]
         return Pairs(self._rows, self._order[both], self._names, self._approximated)
 
     def __len__(self) -> int:

@@ -230,8 +230,8 @@ def _exact_rings(name: str, rings, R: np.ndarray) -> tuple[list[list[Vector]], i
             )
         out.append(corners)
     flat, grid = integers(np.concatenate(out))
-    turn, turn_grid = integers(R)
-    a, b, c, d = turn
+    rotation, turn_grid = integers(R)
+    a, b, c, d = rotation
     placed = [(a * x + b * y, c * x + d * y) for x, y in zip(flat[0::2], flat[1::2])]
     ends = np.cumsum([0] + [len(ring) for ring in out]).tolist()
     return [placed[i:j] for i, j in pairwise(ends)], grid + turn_grid

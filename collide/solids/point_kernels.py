@@ -15,7 +15,7 @@ _TAIL = 2.0**-98
 #: More than what underflows in any of it.
 _UNDERFLOW = 2.0**-1060
 #: Sizes whose third powers, and what is lost of them, doubles hold.
-_LEAST, _MOST = 2.0**-240, 2.0**240
+_LEAST, _LARGEST = 2.0**-240, 2.0**240
 
 
 @kernel
@@ -133,7 +133,7 @@ def round_piercings(poses_at, n_bodies, local_at, body_of_at, n_vertices, vertic
         L = max(_largest(u), _largest(v))
         F = max(L, _largest(of_a), _largest(of_b))
         delta = 4.0 * error + 2.0**-103 * F
-        if not (_LEAST < L and F < _MOST and delta < L and height_a.high * height_b.high < 0.0):
+        if not (_LEAST < L and F < _LARGEST and delta < L and height_a.high * height_b.high < 0.0):
             continue
         of_normal = 8.0 * L * delta + 2.0**-98 * L * L
         of_height = 8.0 * (L * L * delta + F * of_normal) + 2.0**-96 * L * L * F

@@ -31,15 +31,15 @@ def count_passages(
     axes = np.ascontiguousarray(axes, dtype=np.int64)
     totals = np.empty(len(axes), dtype=np.int64)
     stack = np.empty(WIDTH * (tree.depth + 2), dtype=np.int64)
-    left = np.empty((64 + 4 * len(axes), 2), dtype=np.int64)
+    remaining = np.empty((64 + 4 * len(axes), 2), dtype=np.int64)
     while True:
         count = pass_facets(
             tree.address, address_of(X), address_of(points), address_of(axes), len(axes), float(slack),
-            address_of(totals), address_of(left), len(left), address_of(stack), len(stack),
+            address_of(totals), address_of(remaining), len(remaining), address_of(stack), len(stack),
         )  # fmt: skip
-        if count <= len(left):
-            return totals, left[:count]
-        left = np.empty((count, 2), dtype=np.int64)
+        if count <= len(remaining):
+            return totals, remaining[:count]
+        remaining = np.empty((count, 2), dtype=np.int64)
 
 
 # --- kernels ------------------------------------------------------------------------------------
@@ -118,7 +118,7 @@ def pass_facets(
     points = view_f64(points_at, 3 * n)
     axes = view_i64(axes_at, n)
     totals = view_i64(totals_at, n)
-    left = view_i64(left_at, 2 * capacity)
+    remaining = view_i64(left_at, 2 * capacity)
     stack = view_i64(stack_at, n_stack)
     unit = math.ldexp(1.0, int(tree.header[EXPONENT]))
     count = 0
@@ -143,7 +143,7 @@ def pass_facets(
                     totals[k] += passage
                     continue
                 if count < capacity:
-                    left[2 * count] = k
-                    left[2 * count + 1] = tree.ids[a]
+                    remaining[2 * count] = k
+                    remaining[2 * count + 1] = tree.ids[a]
                 count += 1
     return count

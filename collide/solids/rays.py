@@ -11,7 +11,7 @@ from collide.solids.cut_points import CutPoints, Rational
 from collide.solids.placed_facets import PlacedFacets
 from collide.solids.ray_passages import count_passages
 
-_MOST_TRIES = 64
+_MAX_TRIES = 64
 
 
 def shoot(sheets: Sheets, points: CutPoints, rows: np.ndarray, sides: np.ndarray) -> list[tuple[int, np.ndarray]]:
@@ -27,7 +27,7 @@ def shoot(sheets: Sheets, points: CutPoints, rows: np.ndarray, sides: np.ndarray
     upwards = np.array([n[axis] > 0 for n, axis in zip(normals, axes.tolist())])
     winding = np.zeros((len(rows), len(facets.operands)), dtype=np.int64)
     waiting = np.arange(len(rows))
-    for attempt in range(_MOST_TRIES):
+    for attempt in range(_MAX_TRIES):
         if not len(waiting):
             break
         weights = np.random.default_rng(attempt).integers(1, 1 << 10, (len(waiting), 3))
@@ -61,9 +61,9 @@ def _windings(facets: PlacedFacets, starts: list[Rational], axes: np.ndarray) ->
     winding = np.zeros((len(starts), len(facets.operands)), dtype=np.int64)
     is_unclear = np.zeros(len(starts), dtype=bool)
     for k, operand in enumerate(facets.operands):
-        winding[:, k], left = count_passages(facets.tree_of(k), operand.X, places, axes, facets.slack)
-        left_rows = facets.rows_of(k, left[:, 1])
-        for ray, f in zip(left[left_rows >= 0, 0].tolist(), left_rows[left_rows >= 0].tolist()):
+        winding[:, k], remaining = count_passages(facets.tree_of(k), operand.X, places, axes, facets.slack)
+        remaining_rows = facets.rows_of(k, remaining[:, 1])
+        for ray, f in zip(remaining[remaining_rows >= 0, 0].tolist(), remaining_rows[remaining_rows >= 0].tolist()):
             passage = _passage(facets, f, starts[ray], int(axes[ray]))
             if passage is None:
                 is_unclear[ray] = True

@@ -19,11 +19,11 @@ def rounded_points(points: CutPoints, ids: np.ndarray) -> tuple[np.ndarray, floa
     places[rows], off[rows], proven[rows] = _rounded_vertices(facets, ids[rows])
     rows = np.flatnonzero(~is_vertex & (ids < points.n_vertices + len(points.pierced)))
     places[rows], off[rows], proven[rows] = _rounded_piercings(facets, points.pierced[ids[rows] - points.n_vertices])
-    left = np.flatnonzero(~proven)
-    points.load(ids[left])
-    for row, point in zip(left.tolist(), ids[left].tolist()):
+    remaining = np.flatnonzero(~proven)
+    points.load(ids[remaining])
+    for row, point in zip(remaining.tolist(), ids[remaining].tolist()):
         places[row] = points.in_world(point)
-    off[left] = np.sqrt(np.square(0.5 * np.spacing(np.abs(places[left]))).sum(axis=1))
+    off[remaining] = np.sqrt(np.square(0.5 * np.spacing(np.abs(places[remaining]))).sum(axis=1))
     return places + 0.0, float(off.max(initial=0.0))
 
 

@@ -218,7 +218,7 @@ def test_sizes_are_predicted_from_a_sample(monkeypatch):
         HierarchicalTree(curve, memory=1 << 27, whole=True, limits=limits)
     with pytest.raises(UnsupportedQuery, match=r"after .* of 1,500 points the boundary has"):
         FacetTree(as_grid(curve).whole, 1 << 19, limits)
-    assert [tree_size.most_simplices(n, d) for d, n in ((2, 9), (3, 9), (4, 9), (4, 5), (5, 6))] == [9, 14, 27, 5, 6]
+    assert [tree_size.max_simplices(n, d) for d, n in ((2, 9), (3, 9), (4, 9), (4, 5), (5, 6))] == [9, 14, 27, 5, 6]
 
 
 def test_touching_is_a_hit_and_is_settled_in_integers():
