@@ -12,7 +12,8 @@ enum { NODES_AT, TRIANGLES_AT, IDS_AT, TREE_NUMBERS_AT, N_NODES, N_FACETS, DEPTH
 enum { CENTRE = 0, CORNER = 3, BALL = 6, TREE_NUMBERS };
 static const size_t MAX_FACETS = (size_t)1 << 28;
 
-typedef char headers_fit[TREE_INTS == 10 && TREE_NUMBERS == 7 ? 1 : -1];
+typedef char headers_fit[sizeof ((struct collide_mesh *)0)->tree == TREE_INTS * sizeof(int64_t) &&
+                                 sizeof ((struct collide_mesh *)0)->numbers == TREE_NUMBERS * sizeof(double) ? 1 : -1];
 
 /* What `fill_tree` makes. */
 struct filled {
