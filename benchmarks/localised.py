@@ -52,26 +52,9 @@ def growth() -> None:
     print(f"facets ≈ {start:.0f} + {slope:.1f} log2 n; at most 12 + {over:.1f} log2 n")
 
 
-def cylinder(sides: int) -> tuple[np.ndarray, np.ndarray]:
-    """Radius and height 1; caps in strips, so that no vertex has many edges."""
-    angles = 2 * np.pi * np.arange(sides) / sides
-    rim = np.stack([np.cos(angles), np.sin(angles), np.zeros(sides)], axis=1)
-    faces = []
-    for i in range(sides):
-        j = (i + 1) % sides
-        faces += [(i, j, sides + i), (j, sides + j, sides + i)]
-    low, high = 0, sides - 1
-    while high - low > 1:
-        for a, b, c in ((low, high, low + 1), (low + 1, high, high - 1)):
-            if len({a, b, c}) == 3:
-                faces += [(a, b, c), (sides + c, sides + b, sides + a)]
-        low, high = low + 1, high - 1
-    return np.concatenate([rim, rim + np.array([0.0, 0.0, 1.0])]), np.array(faces)
-
-
 def cylinders() -> None:
     for sides in (32, 64, 128, 256, 1024, 8192):
-        vertices, faces = cylinder(sides)
+        vertices, faces = surfaces.striped_cylinder(sides)
         ends = edges_of(faces, np.arange(len(faces))).ends
         for stretch in (10.0, 20.0):
             estimate = predicted_facets(vertices, ends, len(faces), stretch, 1)

@@ -64,6 +64,23 @@ def ball(rings=5, sides=9) -> tuple[np.ndarray, np.ndarray]:
     return np.array(points), np.array(facets)
 
 
+def striped_cylinder(sides: int) -> tuple[np.ndarray, np.ndarray]:
+    """Radius and height 1; caps cut into strips, so that no vertex has many edges."""
+    angles = 2 * np.pi * np.arange(sides) / sides
+    rim = np.stack([np.cos(angles), np.sin(angles), np.zeros(sides)], axis=1)
+    faces = []
+    for i in range(sides):
+        j = (i + 1) % sides
+        faces += [(i, j, sides + i), (j, sides + j, sides + i)]
+    low, high = 0, sides - 1
+    while high - low > 1:
+        for a, b, c in ((low, high, low + 1), (low + 1, high, high - 1)):
+            if len({a, b, c}) == 3:
+                faces += [(a, b, c), (sides + c, sides + b, sides + a)]
+        low, high = low + 1, high - 1
+    return np.concatenate([rim, rim + np.array([0.0, 0.0, 1.0])]), np.array(faces)
+
+
 def joined(*surfaces) -> tuple[np.ndarray, np.ndarray]:
     """Several surfaces as one mesh."""
     points, facets, n = [], [], 0

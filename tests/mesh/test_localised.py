@@ -27,23 +27,6 @@ def pizza_box(n: float, height: float = 1.0, depth: float | None = None):
     return surfaces.box((0, 0, 0), (n, n if depth is None else depth, height))
 
 
-def cylinder(sides: int) -> tuple[np.ndarray, np.ndarray]:
-    """Radius and height 1; caps cut into strips, so that no vertex has many edges."""
-    angles = 2 * np.pi * np.arange(sides) / sides
-    rim = np.stack([np.cos(angles), np.sin(angles), np.zeros(sides)], axis=1)
-    faces = []
-    for i in range(sides):
-        j = (i + 1) % sides
-        faces += [(i, j, sides + i), (j, sides + j, sides + i)]
-    low, high = 0, sides - 1
-    while high - low > 1:
-        for a, b, c in ((low, high, low + 1), (low + 1, high, high - 1)):
-            if len({a, b, c}) == 3:
-                faces += [(a, b, c), (sides + c, sides + b, sides + a)]
-        low, high = low + 1, high - 1
-    return np.concatenate([rim, rim + np.array([0.0, 0.0, 1.0])]), np.array(faces)
-
-
 def fractions_of(points) -> list[tuple[Fraction, ...]]:
     return [tuple(map(Fraction, p)) for p in np.asarray(points).tolist()]
 
@@ -159,7 +142,7 @@ def test_random_boxes_and_prisms():
 
 def test_pieces_tile_their_facets_exactly_in_weights():
     """In fractions: determinants of the pieces' weights are positive and add up to the facet's."""
-    for vertices, faces in (pizza_box(300.0, 0.7, 40.3), cylinder(64)):
+    for vertices, faces in (pizza_box(300.0, 0.7, 40.3), surfaces.striped_cylinder(64)):
         pieces = Pieces(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64))
         localise.localise(pieces, np.arange(len(vertices)), 10.0, 1, 5000, quiet)
         total = [Fraction(0)] * len(faces)
@@ -183,14 +166,14 @@ def test_a_cylinder_takes_the_square_of_its_sides():
     """Section 8: at least n²/log n. The estimate is within a factor of 1.5 where it was not fitted, too."""
     counts = {}
     for sides in (48, 96):
-        vertices, faces = cylinder(sides)
+        vertices, faces = surfaces.striped_cylinder(sides)
         made = collide.Mesh(vertices, faces).localised()
         counts[sides] = len(made.mesh.faces)
         ends = edges_of(faces, np.arange(len(faces))).ends
         assert 1 / 1.5 < predicted_facets(vertices, ends, len(faces), 10.0, 1) / counts[sides] < 1.5
     assert counts[96] > 3 * counts[48]
     with pytest.raises(collide.InvalidArgument, match=r"about 1\d{7} facets would be needed .* max_facets = 200000"):
-        collide.Mesh(*cylinder(8192)).localised()
+        collide.Mesh(*surfaces.striped_cylinder(8192)).localised()
 
 
 def test_what_cannot_be_had_is_refused():
