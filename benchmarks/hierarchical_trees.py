@@ -164,19 +164,20 @@ def asked_about(family: str, d: int, n: int, count: int, limits: Sizes | None) -
         "family": family, "d": d, "n": n, "poses": count, "hits": hits, "wrong": wrong, "settled": settled,
         "rounds_mean": round(statistics.mean(rounds), 2), "rounds_most": max(rounds), "planes_most": max(planes),
         "cones_read_mean": round(statistics.mean(cones), 1), "cones_read_most": max(cones),
-        "nodes": A.tree.n_nodes + B.tree.n_nodes, "redrawn": A.tree.n_redrawn + B.tree.n_redrawn,
+        "nodes": A.tree.n_nodes + B.tree.n_nodes, "depth": max(A.size.depth, B.size.depth),
+        "redrawn": A.tree.n_redrawn + B.tree.n_redrawn,
         "megabytes": round((A.tree.n_bytes + B.tree.n_bytes) / 1e6, 2),
         "median_ms": round(1e3 * statistics.median(times), 2), "meets_ms": round(1e3 * statistics.median(judged), 2),
     }  # fmt: skip
 
 
 def fit_poses(rows: list[dict]) -> None:
-    """Print rounds and cones over log n + log m."""
+    """Print depth, rounds and cones over log n + log m."""
     for (family, d), group in itertools.groupby(rows, key=lambda row: (row["family"], row["d"])):
         sizes = list(group)
         if len(sizes) >= 2:
             log_nm = [2.0 * np.log(row["n"]) for row in sizes]
-            for name in ("rounds_mean", "cones_read_mean"):
+            for name in ("depth", "rounds_mean", "cones_read_mean"):
                 a, b, off = fitted(log_nm, [row[name] for row in sizes])
                 print(f"{family} d={d}: {name} {a:.2f} + {b:.2f} (log n + log m), off by at most {off:.2f}")
 
@@ -193,8 +194,8 @@ def plot_poses(rows: list[dict], path: Path) -> None:
         for family, d in dict.fromkeys((row["family"], row["d"]) for row in rows):
             group = [row for row in rows if row["family"] == family and row["d"] == d]
             style = {"ball": "o-", "curve": "^--", "lattice": "s:"}[family]
-            axis.plot([2 * np.log(row["n"]) for row in group], [row[name] for row in group], style, color=f"C{d - 2}",
-                      label=f"{family}, d = {d}")  # fmt: skip
+            log_nm, counts = [2 * np.log(row["n"]) for row in group], [row[name] or np.nan for row in group]
+            axis.plot(log_nm, counts, style, color=f"C{d - 2}", label=f"{family}, d = {d}")
         axis.set_xlabel("log n + log m")
         axis.set_title(name.replace("_", " "))
         axis.grid(alpha=0.3)

@@ -42,15 +42,18 @@ def _pose(rng, d, distance):
     return X
 
 
-@pytest.mark.parametrize("d", [2, 3, 4])
-def test_answers_are_those_of_the_rational_simplex(d):
+@pytest.mark.parametrize("family", ["ball and lattice", "curve"])
+@pytest.mark.parametrize("d", [2, 3, 4, 5])
+def test_answers_are_those_of_the_rational_simplex(d, family):
     rng = np.random.default_rng([24, d])
-    n, hits, cases = {2: 14, 3: 12, 4: 10}[d], 0, 0
-    A = _ball(rng, n, d)
-    A = np.vstack((A, np.eye(d), -np.eye(d)))
+    n, hits, cases = {2: 14, 3: 12, 4: 10, 5: 9}[d], 0, 0
+    A = np.vstack((_ball(rng, n, d), np.eye(d), -np.eye(d)))
     R = HierarchicalTree(normals=A, offsets=np.ones(len(A)), limits=SMALL)
     for k in range(10):
-        V = rng.integers(-2, 3, (n, d)).astype(float) if k % 2 else _ball(rng, n, d)
+        if family == "curve":
+            V = _curve(n, d)
+        else:
+            V = rng.integers(-2, 3, (n, d)).astype(float) if k % 2 else _ball(rng, n, d)
         if np.linalg.matrix_rank(V[1:] - V[0]) < d:
             continue
         P = HierarchicalTree(V, limits=SMALL)
