@@ -64,23 +64,25 @@ def arrange(operands: list[Operand], limits: Limits = UNLIMITED) -> Arrangement:
     facets = PlacedFacets(operands)
     points = CutPoints(facets)
     pairs = meeting_pairs(facets)
-    crossings, ids, exactly = _clear_crossings(facets, points, pairs)
-    by_paths = np.setdiff1d(crossings.pairs, exactly)
-    triangles, of_triangle, rest = split_facets(facets, crossings, ids, by_paths)
-    exactly = np.union1d(exactly, rest)
-    drawn = np.isin(crossings.pairs, exactly).any(axis=1)
-    keys = pair_keys(facets, crossings.pairs)
-    unclear = pairs[~np.isin(pair_keys(facets, pairs), keys)]
+    crossings, ids, is_clear, exactly = _clear_crossings(facets, points, pairs)
+    by_paths = np.zeros(len(facets.corners), dtype=bool)
+    by_paths[crossings.pairs] = True
+    by_paths &= ~exactly
+    triangles, of_triangle, rest = split_facets(facets, crossings, ids, np.flatnonzero(by_paths))
+    exactly[rest] = True
+    drawn = exactly[crossings.pairs].any(axis=1)
+    unclear = pairs[~is_clear]
     n_exact = len(unclear) + int(drawn.sum())
     limits.check_memory(BYTES_PER_PAIR * n_exact, f"{n_exact:,} pairs of facets to be cut exactly")
-    cuts = FacetCuts(facets, points, unclear, crossings.pairs[drawn], ids[drawn], exactly, limits)
+    rows = np.flatnonzero(exactly)
+    cuts = FacetCuts(facets, points, unclear, crossings.pairs[drawn], ids[drawn], rows, limits)
     pieces, of = [], []
     for f in limits.watched("cutting facets", sorted(cuts.corners_of)):
         made = cut_facet(cuts, f)
         pieces += made
         of += [f] * len(made)
-    is_cut = np.zeros(len(facets.corners), dtype=bool)
-    is_cut[by_paths] = is_cut[list(cuts.corners_of)] = True
+    is_cut = by_paths
+    is_cut[list(cuts.corners_of)] = True
     of_piece = np.array(of, dtype=np.int64)
     body = facets.body[of_piece]
     merged = merged_sheets(np.array(pieces, dtype=np.int64).reshape(-1, 3), of_piece, body, len(operands))
@@ -90,13 +92,9 @@ def arrange(operands: list[Operand], limits: Limits = UNLIMITED) -> Arrangement:
     return Arrangement(facets, points, sheets, cells, len(pairs), int(is_cut.sum()))
 
 
-def pair_keys(facets: PlacedFacets, pairs: np.ndarray) -> np.ndarray:
-    """(k,) one number for each pair of rows."""
-    return pairs[:, 0] * len(facets.corners) + pairs[:, 1]
-
-
 def _clear_crossings(facets: PlacedFacets, points: CutPoints, pairs: np.ndarray):
-    """(clear crossings of two bodies, ids (k, 2) of their ends, facets that have to be cut exactly).
+    """(clear crossings of two bodies, ids (k, 2) of their ends, which of the pairs they are (k,) bool, facets that have
+    to be cut exactly (F,) bool).
 
     Ends are points in one place where the same edge pierces the same facet. That holds of two bodies; facets that cross
     their own body's, and those that meet them, are cut exactly, as are all facets of three bodies and more.
@@ -125,7 +123,9 @@ def _clear_crossings(facets: PlacedFacets, points: CutPoints, pairs: np.ndarray)
     k = np.arange(len(owner))
     start = len(points)
     points.add_piercings(np.stack([corners[k, slot], corners[k, (slot + 1) % 3]], axis=1), facet)
-    return crossings, start + ends.reshape(-1, 2), np.flatnonzero(exactly)
+    is_clear = ~of_one
+    is_clear[is_clear] = proven
+    return crossings, start + ends.reshape(-1, 2), is_clear, exactly
 
 
 def _all_sheets(

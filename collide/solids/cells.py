@@ -35,6 +35,8 @@ def merged_sheets(triangles: np.ndarray, facet: np.ndarray, body: np.ndarray, r:
 
     The first of those that coincide gives the front.
     """
+    if not len(triangles):
+        return Sheets(triangles, facet, np.zeros((0, r), dtype=np.int8))
     order = np.sort(triangles, axis=1)
     _, first, group = np.unique(order, axis=0, return_index=True, return_inverse=True)
     sense = _turns(triangles) * _turns(triangles[first])[group.ravel()]

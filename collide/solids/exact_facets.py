@@ -20,7 +20,7 @@ from collide.solids.facet_cuts import FacetCuts
 from collide.solids.facet_edges import FacetEdges
 from collide.solids.limits import BYTES_PER_PAIR, UNLIMITED, Limits
 from collide.solids.placed_facets import Operand, PlacedFacets
-from collide.surface_queries.overlay import common_piece, sides_of_planes
+from collide.surface_queries.overlay import common_piece
 
 #: Pairs of boxes looked at together.
 _CHUNK = 1 << 21
@@ -124,9 +124,26 @@ def _apart(A: np.ndarray, B: np.ndarray, slack: float) -> np.ndarray:
     apart = np.zeros(len(A), dtype=bool)
     with np.errstate(all="ignore"):
         for T, other_corners in ((A, B), (B, A)):
-            _, sides, limit = sides_of_planes(T, other_corners, error)
+            _, sides, limit = _sides_of_planes(T, other_corners, error)
             apart |= (sides > limit[:, None]).all(axis=1) | (sides < -limit[:, None]).all(axis=1)
     return apart
+
+
+def _sides_of_planes(T: np.ndarray, points: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(normals of T, heights of points (k, 3, 3) over T's plane times the normal's length, bounds of their errors).
+
+    As in `narrowphase/facets/filtered_triangles.py`, all corners off by E: edges by f = 2E + 2uL, components of normals
+    by 4Lf + 2f² + 3uL², heights by 3 D times that, 3·(2L² + …)·(2E + 2uD), and 4u of the terms: below 40 L D f' with
+    the larger of both f.
+    """
+    u, v = T[:, 1] - T[:, 0], T[:, 2] - T[:, 0]
+    n = np.cross(u, v)
+    w = points - T[:, :1]
+    edge = np.maximum(np.abs(u), np.abs(v)).max(axis=1)
+    far = np.maximum(np.abs(w).max(axis=(1, 2)), edge)
+    f = 2.0 * error + 4.0 * 2.0**-53 * far
+    limit = 40.0 * edge * far * f + 12.0 * far * f * f + 60.0 * 2.0**-53 * edge * edge * far + 1e-260
+    return n, (w * n[:, None]).sum(axis=2), limit
 
 
 def _double(x: int, grid: int) -> float:

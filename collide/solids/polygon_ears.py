@@ -3,41 +3,14 @@
 from __future__ import annotations
 
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
-from collide.numerics.vec3 import Vec3, cross, sub
+from collide.numerics.vec3 import Vec3, component, cross, sub
+from collide.surface_queries.facet_crossings import corner_error, posed_corner
 
 #: Parts with more corners are left to the sweep.
 MAX_CORNERS = 40
 #: Doubles: of each corner two coordinates and its id, and room for one more.
 WORKSPACE = 3 * (MAX_CORNERS + 1)
 _U = 2.0**-53
-
-
-@kernel
-def _corner(poses, X, local, v):
-    """Vertex v in W, rounded."""
-    x, y, z = local[3 * v], local[3 * v + 1], local[3 * v + 2]
-    return Vec3(
-        poses[X] * x + poses[X + 1] * y + poses[X + 2] * z + poses[X + 3],
-        poses[X + 4] * x + poses[X + 5] * y + poses[X + 6] * z + poses[X + 7],
-        poses[X + 8] * x + poses[X + 9] * y + poses[X + 10] * z + poses[X + 11],
-    )
-
-
-@kernel
-def _corner_error(poses, X, local, v):
-    """A bound of the errors of its coordinates."""
-    largest = 0.0
-    for i in range(3):
-        size = abs(poses[X + 4 * i + 3])
-        for j in range(3):
-            size += abs(poses[X + 4 * i + j] * local[3 * v + j])
-        largest = max(largest, size)
-    return 6.0 * _U * largest
-
-
-@kernel
-def _component(a, k):
-    return a.x if k == 0 else (a.y if k == 1 else a.z)
 
 
 @kernel
@@ -56,8 +29,8 @@ def _look_at(facet, ids, m, place, n_vertices, u, v, seen):
         else:
             x = p if point == a else (q if point == b else r)
         w = sub(x, p)
-        seen[2 * k] = _component(w, u)
-        seen[2 * k + 1] = _component(w, v)
+        seen[2 * k] = component(w, u)
+        seen[2 * k + 1] = component(w, v)
         largest = max(largest, abs(w.x), abs(w.y), abs(w.z))
     return largest
 
@@ -191,9 +164,9 @@ def clip_parts(
             continue
         X = 16 * body[f]
         a, b, c = int(corners[3 * f]), int(corners[3 * f + 1]), int(corners[3 * f + 2])
-        p, q, r = _corner(poses, X, local, a), _corner(poses, X, local, b), _corner(poses, X, local, c)
-        off = max(_corner_error(poses, X, local, a), _corner_error(poses, X, local, b))
-        off = max(off, _corner_error(poses, X, local, c))
+        p, q, r = posed_corner(poses, X, local, a), posed_corner(poses, X, local, b), posed_corner(poses, X, local, c)
+        off = max(corner_error(poses, X, local, a), corner_error(poses, X, local, b))
+        off = max(off, corner_error(poses, X, local, c))
         bound = off
         for k in range(m):
             if ids[k] >= n_vertices:
@@ -201,11 +174,11 @@ def clip_parts(
         normal = cross(sub(q, p), sub(r, p))
         axis = 0
         for k in range(1, 3):
-            if abs(_component(normal, k)) > abs(_component(normal, axis)):
+            if abs(component(normal, k)) > abs(component(normal, axis)):
                 axis = k
         u = (axis + 1) % 3
         v = (axis + 2) % 3
-        if not _component(normal, axis) > 0.0:
+        if not component(normal, axis) > 0.0:
             u, v = v, u
         largest = _look_at((a, b, c, p, q, r), ids, m, place, n_vertices, u, v, seen)
         made = _clip(ids, m, seen, bound + off + _U * largest, triangles, count)

@@ -15,7 +15,6 @@ from collide.kernels import address_of
 from collide.solids.crossing_pairs import CrossingPairs
 from collide.solids.placed_facets import PlacedFacets
 from collide.solids.polygon_ears import WORKSPACE, clip_parts
-from collide.surface_queries.overlay import posed_corners
 
 
 class _Chains(NamedTuple):
@@ -87,7 +86,7 @@ def _borders(facets: PlacedFacets, rows, facet, start, edge, at_border, place, e
     """(the borders of facets, those on which the order of points is not proven)."""
     f, p = facet[at_border], start[at_border]
     slot = np.argmax(facets.edge[f] == edge[at_border][:, None], axis=1)
-    corners, corner_error = posed_corners(facets.local[facets.corners[f]], facets.poses[facets.body[f]])
+    corners, corner_error = _posed_corners(facets.local[facets.corners[f]], facets.poses[facets.body[f]])
     k = np.arange(len(f))
     a, b = corners[k, slot], corners[k, (slot + 1) % 3]
     rows_of = p - len(facets.local)
@@ -107,6 +106,14 @@ def _borders(facets: PlacedFacets, rows, facet, start, edge, at_border, place, e
     last = np.flatnonzero(np.append(at[1:] != at[:-1], True)) if len(at) else np.zeros(0, dtype=np.int64)
     following[last] = np.append(0, last[:-1] + 1) if len(last) else last
     return _Chains(at, points, following, ~np.isfinite(height)), np.unique(at[1:][tight])
+
+
+def _posed_corners(T: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """((k, 3, 3) corners in W, (k,) bound of the error of a coordinate)."""
+    terms = X[:, None, :3, :3] * T[:, :, None, :]
+    shift = X[:, None, :3, 3]
+    size = np.abs(terms).sum(axis=3) + np.abs(shift)
+    return terms.sum(axis=3) + shift, 6.0 * 2.0**-53 * size.max(axis=(1, 2))
 
 
 def _ways_around(chains: _Chains, facet, start, end, at_border, n_points) -> tuple[np.ndarray, np.ndarray]:

@@ -21,12 +21,10 @@ from collide.narrowphase.facets.facet_queries import all_hits
 from collide.numerics.exact_points import Point, cross, inner, minus, on_one_grid, placed, rounded
 from collide.shapes.shape import Shape
 from collide.surface_queries.checked_arguments import two_bodies
+from collide.surface_queries.facet_crossings import facet_crossings
 
 #: What a pair of facets shares.
 POINT, SEGMENT, POLYGON = 1, 2, 3
-#: Ends worked out in doubles are this good, in units of the largest coordinate of the pair in W.
-_PROMISE = 2.0**-40
-_U = 2.0**-53
 
 
 class Overlay(NamedTuple):
@@ -84,7 +82,8 @@ def overlay(A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True) -> Over
     hits = all_hits(body_a.tree, body_b.tree, X_WA, X_WB)
     pose = np.repeat(np.arange(len(X_WA)), np.diff(hits.starts))
     facets_a, facets_b = FacetCorners(body_a.tree)[hits.pairs[:, 0]], FacetCorners(body_b.tree)[hits.pairs[:, 1]]
-    ends, proven = _crossing_segments(facets_a, facets_b, X_WA[pose], X_WB[pose])
+    crossings = facet_crossings(facets_a, facets_b, X_WA[pose], X_WB[pose])
+    ends, proven = crossings.place, crossings.is_segment
     kind = np.where(proven, SEGMENT, 0).astype(np.int8)
     counts = np.where(proven, 2, 0)
     size = np.where(proven, np.sqrt(np.square(ends[:, 1] - ends[:, 0]).sum(axis=1)), 0.0)
@@ -103,109 +102,7 @@ def overlay(A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True) -> Over
     return Overlay(hits.pairs, hits.starts.copy(), kind, corners, starts, size)
 
 
-# --- pairs that doubles settle ------------------------------------------------------------------
-
-
-def _crossing_segments(A: np.ndarray, B: np.ndarray, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray]:
-    """Of facets A and B (k, 3, 3): ((k, 2, 3) ends of the common segments in W, (k,) bool: proven and within the
-    bound).
-    """
-    with np.errstate(all="ignore"):
-        return _crossings(A, B, X_WA, X_WB)
-
-
-def _crossings(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray]:
-    A, error_a = posed_corners(A, X_WA)
-    B, error_b = posed_corners(B, X_WB)
-    error = np.maximum(error_a, error_b)  # (k,) of every coordinate
-    largest = np.maximum(np.abs(A).max(axis=(1, 2)), np.abs(B).max(axis=(1, 2)))
-    n, sides_b, limit_b = sides_of_planes(A, B, error)
-    m, sides_a, limit_a = sides_of_planes(B, A, error)
-    proven = (np.abs(sides_b) > limit_b[:, None]).all(axis=1) & (np.abs(sides_a) > limit_a[:, None]).all(axis=1)
-    proven &= (np.abs(np.sign(sides_b).sum(axis=1)) == 1) & (np.abs(np.sign(sides_a).sum(axis=1)) == 1)
-    on_a, error_on_a = plane_crossings(A, sides_a, limit_a, error)
-    on_b, error_on_b = plane_crossings(B, sides_b, limit_b, error)
-    off = np.maximum(error_on_a, error_on_b)
-    along = np.cross(n, m)
-    along /= np.abs(along).max(axis=1, keepdims=True)
-    # Heights along a direction near that of the common line: off by 6 times the points' error, all differences
-    # included.
-    points = np.concatenate([on_a, on_b], axis=1)
-    points = points - points[:, :1]
-    heights = (points * along[:, None]).sum(axis=2)
-    # How far apart points are that are one by their heights: no farther than 2½ times that, where the longer of both
-    # pieces rises by half its length at least. Any direction puts points of one line in order.
-    lengths = np.abs(points[:, 1::2] - points[:, ::2]).max(axis=2)
-    rises = np.abs(heights[:, 1::2] - heights[:, ::2])
-    steep = ((rises >= 0.5 * lengths) & (lengths > 64.0 * off[:, None])).any(axis=1)
-    low_a, high_a = _in_order(on_a, heights[:, :2])
-    low_b, high_b = _in_order(on_b, heights[:, 2:])
-    h = np.sort(heights[:, :2], axis=1), np.sort(heights[:, 2:], axis=1)
-    start = np.where((h[0][:, 0] > h[1][:, 0])[:, None], low_a, low_b)
-    end = np.where((h[0][:, 1] < h[1][:, 1])[:, None], high_a, high_b)
-    overlap = np.minimum(h[0][:, 1], h[1][:, 1]) - np.maximum(h[0][:, 0], h[1][:, 0])
-    slack = 16.0 * off + 64.0 * _U * largest
-    proven &= steep & (overlap > slack)
-    proven &= 16.0 * off <= _PROMISE * largest
-    return np.stack([start, end], axis=1), proven
-
-
-def posed_corners(T: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """((k, 3, 3) corners in W, (k,) bound of the error of a coordinate)."""
-    terms = X[:, None, :3, :3] * T[:, :, None, :]
-    shift = X[:, None, :3, 3]
-    size = np.abs(terms).sum(axis=3) + np.abs(shift)
-    return terms.sum(axis=3) + shift, 6.0 * _U * size.max(axis=(1, 2))
-
-
-def sides_of_planes(T: np.ndarray, points: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(normals of T, heights of points (k, 3, 3) over T's plane times the normal's length, bounds of their errors).
-
-    As in `narrowphase/facets/filtered_triangles.py`, all corners off by E: edges by f = 2E + 2uL, components of normals
-    by 4Lf + 2f² + 3uL², heights by 3 D times that, 3·(2L² + …)·(2E + 2uD), and 4u of the terms: below 40 L D f' with
-    the larger of both f.
-    """
-    u, v = T[:, 1] - T[:, 0], T[:, 2] - T[:, 0]
-    n = np.cross(u, v)
-    w = points - T[:, :1]
-    edge = np.maximum(np.abs(u), np.abs(v)).max(axis=1)
-    far = np.maximum(np.abs(w).max(axis=(1, 2)), edge)
-    f = 2.0 * error + 4.0 * _U * far
-    limit = 40.0 * edge * far * f + 12.0 * far * f * f + 60.0 * _U * edge * edge * far + 1e-260
-    return n, (w * n[:, None]).sum(axis=2), limit
-
-
-def plane_crossings(
-    T: np.ndarray, sides: np.ndarray, limit: np.ndarray, error: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """((k, 2, 3) where the two sides of T from its lonely corner cross the other's plane, (k,) bound of their errors).
-
-    A point a + (b − a) s / (s − t) is off by |b − a| · δ(s / (s − t)) ≤ |b − a| · 2 δ / (|s − t| − 2δ), and by E and
-    rounding.
-    """
-    rows = np.arange(len(T))
-    signs = np.sign(sides)
-    lonely = np.argmax(signs == -np.sign(signs.sum(axis=1))[:, None], axis=1)
-    a, s = T[rows, lonely], sides[rows, lonely]
-    points, bound = [], np.zeros(len(T))
-    for step in (1, 2):
-        b, t = T[rows, (lonely + step) % 3], sides[rows, (lonely + step) % 3]
-        edge = b - a
-        share = s / (s - t)
-        points.append(a + edge * share[:, None])
-        slope = np.abs(s - t)
-        off = np.abs(edge).max(axis=1) * (2.0 * limit / (slope - 2.0 * limit) + 8.0 * _U)
-        off = np.where(slope > 4.0 * limit, off, np.inf)
-        bound = np.maximum(bound, off + 4.0 * error + 4.0 * _U * np.abs(T).max(axis=(1, 2)))
-    return np.stack(points, axis=1), bound
-
-
-def _in_order(points: np.ndarray, heights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    turned = (heights[:, 0] > heights[:, 1])[:, None]
-    return np.where(turned, points[:, 1], points[:, 0]), np.where(turned, points[:, 0], points[:, 1])
-
-
-# --- all others, in integers --------------------------------------------------------------------
+# --- what doubles leave open, in integers --------------------------------------------------------------------
 
 #: A point as x, y, z over a common w > 0.
 _Rational = tuple[int, int, int, int]
