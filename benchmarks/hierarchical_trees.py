@@ -1,7 +1,8 @@
 """Hierarchical trees in R^d: whole trees and their predicted sizes, poses beside the exact search, the walk in space.
 
     python benchmarks/hierarchical_trees.py sizes --plot docs/pictures/hierarchical-trees-bytes.png
-    python benchmarks/hierarchical_trees.py poses --count 10000 --plot docs/pictures/hierarchical-trees-rounds.png
+    python benchmarks/hierarchical_trees.py poses --plot docs/pictures/hierarchical-trees-rounds.png
+    python benchmarks/hierarchical_trees.py poses --add --count 10000 --families ball --dimensions 2 --sizes 1000
     python benchmarks/hierarchical_trees.py walk
 
 Families: points on a unit sphere (``ball``), on the moment curve (``curve``), integers within a ball (``lattice``).
