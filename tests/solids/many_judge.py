@@ -12,6 +12,13 @@ from solid_membership import as_doubles, windings
 from collide.solids.arrangement import arrange
 from collide.solids.solid_operands import solid_operand
 
+#: Families and how many solids, so that every number from 2 to 8 occurs.
+CASES = [
+    ("smooth", 2), ("boxes", 8), ("cavities", 6), ("rings", 3), ("touching boxes", 5), ("random shells", 3),
+    ("grid shells", 4), ("turned grid shells", 4), ("identical shells", 7), ("degenerate shells", 7),
+    ("touching shells", 3), ("scaled shells", 4),
+]  # fmt: skip
+
 
 class ManyVerdict(NamedTuple):
     """wrong : descriptions of points judged otherwise.   n_points, n_in, n_near : points judged, of which the rule

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from many_judge import judge_many, many_solids, random_table, same_bits, snippet_many
+from many_judge import CASES, judge_many, many_solids, random_table, same_bits, snippet_many
 from mesh_shapes import bumpy_sphere
 
 import collide
@@ -16,12 +16,6 @@ from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.solids import limits as limits_module
 
 I = np.eye(4)
-#: Families and how many solids, so that every number from 2 to 8 occurs.
-CASES = [
-    ("smooth", 2), ("boxes", 8), ("cavities", 6), ("rings", 3), ("touching boxes", 5), ("random shells", 3),
-    ("grid shells", 4), ("turned grid shells", 4), ("identical shells", 7), ("degenerate shells", 7),
-    ("touching shells", 3), ("scaled shells", 4),
-]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
