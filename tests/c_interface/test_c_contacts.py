@@ -100,7 +100,7 @@ def test_single_calls_have_pythons_bits():
     assert not wrong, f"{len(wrong)} differ, the first: {wrong[0]}"
     counts = [len(rows) for rows in answers() if rows is not None]
     assert sum(n > 3 for n in counts) >= 100 and sum(n == 0 for n in counts) >= 70, "few manifolds, or few gaps"
-    assert sum(rows is None for rows in answers()) >= 3
+    assert sum(rows is None for rows in answers()) >= 2
 
 
 def test_four_threads_at_once_have_pythons_bits():

@@ -14,7 +14,7 @@ from mesh_shapes import block_ring, box, bumpy_sphere
 from collide import InvalidShape, Mesh
 
 BASES = {"bumpy sphere": bumpy_sphere(120), "ring": block_ring(), "box": box()}
-#: Meshes of every sort, of which those of at most 2,000 facets are taken: soups, open ones, several parts, STL, OBJ and Collada.
+#: Meshes of every sort: soups, open ones, several parts, STL, OBJ and Collada. Those of at most 2,000 facets are taken.
 SAMPLE = (
     "duck.obj", "cube.obj", "plane.obj", "torus/torus_textured.obj", "teddy2_VHACD_CHs.obj", "sphere_smooth.obj",
     "random_urdfs/000/000.obj",
