@@ -3,8 +3,13 @@ another kind than this process has are skipped."""
 
 from __future__ import annotations
 
+import gc
+import os
 import sys
 from pathlib import Path
+
+# Tests run in processes, one a core: threads of BLAS would only wait for each other, and cost a core while they do.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import pytest
 
@@ -28,9 +33,23 @@ SKIPPED = {
 
 def pytest_configure(config: pytest.Config) -> None:
     """Machine code divides by zero and overflows without a word; as Python, with numpy's numbers, kernels are
-    warned."""
+    warned. Files are handed to processes in order of their names: in order of their numbers of tests, which is the
+    default, a long file of few tests would be the last, and all but one process would wait for it."""
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
     if PLAIN_PYTHON:
         config.addinivalue_line("filterwarnings", "ignore::RuntimeWarning")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session: pytest.Session):
+    """What is made while tests are collected stays: looking through it for garbage again and again would take a third
+    of the time."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
 
 
 def pytest_report_header() -> str:

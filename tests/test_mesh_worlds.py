@@ -59,7 +59,7 @@ def test_worlds_answer_as_all_pairs_do_while_bodies_move():
     rng = rng_of("mesh worlds")
     world = build(rng, 24, 1.6)
     near = hits = 0
-    for _ in range(3):
+    for _ in range(2):
         for limit in (0.0, 0.4):
             counted = check(world, limit)
             near, hits = near + counted[0], hits + counted[1]
@@ -67,7 +67,7 @@ def test_worlds_answer_as_all_pairs_do_while_bodies_move():
         world.set_poses(moved, np.stack([random_pose(rng, 1.6) for _ in moved]))
         world.set_pose(world.ids[0], random_pose(rng, 1.0))
         world.remove(world.ids[-1])
-    assert 60 < near and 30 < hits, (near, hits)
+    assert 40 < near and 20 < hits, (near, hits)
     for i, j, row in naive.brute_force(world, 0.0):
         if row is None or row["hit"]:
             world.allow(i, j, reason="settled")

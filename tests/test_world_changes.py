@@ -1,5 +1,5 @@
 """A World under any order of changes: added to, removed from, moved, filtered, with margins, asleep. Every answer is
-that of balls in numpy, which share no code with the engine; a hundred thousand changes leave no drift and no leak.
+that of balls in numpy, which share no code with the engine; forty thousand changes leave no drift and no leak.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ class Model:
 @pytest.mark.parametrize("seed", range(4))
 def test_any_order_of_changes_equals_brute_force(seed):
     model, hits, tested = Model(seed), 0, 0
-    for _ in range(400):
+    for _ in range(200):
         for _ in range(int(model.rng.integers(1, 6))):
             model.change()
         found = model.check()
@@ -166,17 +166,17 @@ def test_any_order_of_changes_equals_brute_force(seed):
     assert set(model.done) == set(KINDS)
 
 
-def test_a_hundred_thousand_changes_leave_no_drift_and_no_leak():
+def test_forty_thousand_changes_leave_no_drift_and_no_leak():
     model, held = Model(99), []
     for _ in range(10):
-        for _ in range(200):
+        for _ in range(80):
             for _ in range(50):
                 model.change()
             model.world.collides()
         model.check()
         gc.collect()
         held.append((sys.getallocatedblocks(), model.world._pack().nbytes))
-    assert model.step >= 100_000
+    assert model.step >= 40_000
     (blocks, nbytes), (blocks_after, nbytes_after) = np.max(held[2:5], axis=0), np.min(held[7:], axis=0)
     assert blocks_after < blocks + 2000 and nbytes_after < 1.5 * nbytes, held
     fresh = collide.World()

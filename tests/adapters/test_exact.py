@@ -223,7 +223,7 @@ FAMILIES = {
 }
 
 
-def cases(family, count=150):
+def cases(family, count=80):
     rng = np.random.default_rng([ord(letter) for letter in family])
     return [FAMILIES[family](rng) for _ in range(count)]
 

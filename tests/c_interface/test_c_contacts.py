@@ -42,7 +42,7 @@ def drawn() -> list[tuple]:
     """(what is said of it, A, B, X_WA, X_WB, margin, max_contacts): all kinds, and bodies that rest on each other."""
     random = np.random.default_rng(81)
     cases = []
-    for number in range(1500):
+    for number in range(700):
         k = soak_pairs.draw(82, number, 1e4, CONVEX)
         margin = float(random.choice([0.0, 1e-3, 0.1, 10.0]))
         cases.append((f"draw(82, {number})", k.A, k.B, k.X_WA, k.X_WB, margin, int(random.choice([1, 2, 4, 8, 99]))))
@@ -99,8 +99,8 @@ def test_single_calls_have_pythons_bits():
     wrong = differences()
     assert not wrong, f"{len(wrong)} differ, the first: {wrong[0]}"
     counts = [len(rows) for rows in answers() if rows is not None]
-    assert sum(n > 3 for n in counts) >= 150 and sum(n == 0 for n in counts) >= 150, "few manifolds, or few gaps"
-    assert sum(rows is None for rows in answers()) >= 3
+    assert sum(n > 3 for n in counts) >= 100 and sum(n == 0 for n in counts) >= 70, "few manifolds, or few gaps"
+    assert sum(rows is None for rows in answers()) >= 2
 
 
 def test_four_threads_at_once_have_pythons_bits():

@@ -24,7 +24,7 @@ FACETED = ("solid", "surface", "solid", "surface", "box", "capsule", "sphere", "
 
 def test_meshes_have_pythons_bits_or_are_left_to_python():
     asker, told = c.Asker(), Counter()
-    for number in range(2000):
+    for number in range(900):
         case = soak_pairs.draw(77, number, 1e4, FACETED)
         if not (case.A.meshed or case.B.meshed):
             continue
@@ -44,8 +44,8 @@ def test_meshes_have_pythons_bits_or_are_left_to_python():
             told[status, wanted, status_of_gap] += 1
     answered = sum(count for (status, _, _), count in told.items() if status == c.OK)
     gaps = sum(count for (status, hit, gap), count in told.items() if gap == c.OK)
-    assert answered > 0.95 * sum(told.values()) and answered > 1500, told
-    assert gaps > 800 and gaps > 0.8 * sum(count for (_, hit, _), count in told.items() if not hit), told
+    assert answered > 0.95 * sum(told.values()) and answered > 650, told
+    assert gaps > 350 and gaps > 0.8 * sum(count for (_, hit, _), count in told.items() if not hit), told
 
 
 def _surfaces() -> list:
@@ -62,7 +62,7 @@ def test_what_is_a_solid_is_what_python_takes_for_one():
     random, told = np.random.default_rng(78), Counter()
     asker, probe = c.Asker(), collide.Box(0.01, 0.01, 0.01)
     own = c.CMesh(probe)
-    for number in range(600):
+    for number in range(300):
         spoilt = mesh_corruptions.spoil(random, *_surfaces()[number % 7], mesh_corruptions.KINDS[number % 15])
         for asked, solid in ((c.SOLID_IF_CLOSED, None), (c.SOLID, True), (c.SURFACE, False)):
             try:
@@ -82,14 +82,14 @@ def test_what_is_a_solid_is_what_python_takes_for_one():
                 said = asker.meshes_meet(made, own, np.eye(4), c.identity_at(*where))
                 wanted = collide.collide(mesh, probe, np.eye(4), c.identity_at(*where))
                 assert said in ((c.OK, wanted), (c.UNSUPPORTED, False)), (number, spoilt.kind, asked)
-    assert told[c.SOLID_IF_CLOSED, c.OK, True] > 50 and told[c.SOLID_IF_CLOSED, c.OK, False] > 50, told
-    assert told[c.SOLID, c.INVALID_SHAPE, False] > 50, told
+    assert told[c.SOLID_IF_CLOSED, c.OK, True] > 25 and told[c.SOLID_IF_CLOSED, c.OK, False] > 25, told
+    assert told[c.SOLID, c.INVALID_SHAPE, False] > 25, told
 
 
 def test_cavities_are_what_python_takes_for_them():
     """A large box and others on a coarse grid, some turned inside out: within it and each other, touching, crossing."""
     random, told = np.random.default_rng(79), Counter()
-    for number in range(1500):
+    for number in range(500):
         boxes = []
         for k in range(int(random.integers(2, 6))):
             low = random.integers(0, 4, 3) if k else np.zeros(3)
@@ -103,7 +103,7 @@ def test_cavities_are_what_python_takes_for_them():
         solid = collide.Mesh(vertices, faces).solid
         assert status == (c.OK if solid else c.INVALID_SHAPE), number
         told[solid] += any(turned for *_, turned in boxes)
-    assert told[True] > 500 and told[False] > 100, told
+    assert told[True] > 150 and told[False] > 30, told
 
 
 def test_height_fields_are_meshes_to_c():

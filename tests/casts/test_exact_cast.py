@@ -15,7 +15,7 @@ from collide.casts.exact_cast import cast_exactly
 def test_solids_are_those_of_their_facets():
     rng = rng_of("exact casts")
     outcomes = []
-    while len(outcomes) < 120:
+    while len(outcomes) < 60:
         A, B = (rng.integers(-3, 4, size=(4, 3)).tolist() for _ in range(2))
         A = [[x + s for x, s in zip(a, shift)] for shift in [rng.integers(-5, 6, size=3).tolist()] for a in A]
         d = rng.integers(-2, 3, size=3).tolist()
@@ -38,7 +38,7 @@ def test_solids_are_those_of_their_facets():
                 n = contact.normal
                 assert sum(x * y for x, y in zip(n, d)) > 0
         outcomes.append("miss" if truth is None else "start" if truth == 0 else "hit")
-    assert min(outcomes.count(kind) for kind in ("miss", "start", "hit")) > 8, outcomes
+    assert min(outcomes.count(kind) for kind in ("miss", "start", "hit")) > 4, outcomes
 
 
 @pytest.mark.parametrize(

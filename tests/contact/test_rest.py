@@ -71,7 +71,7 @@ def sag(load: float, contacts: int, inverse_mass: float) -> float:
     return load / contacts * inverse_mass / OMEGA**2
 
 
-@pytest.mark.parametrize(("turned", "seconds", "rest"), [(0.3, 10.0, 5.0), (0.0, 7.0, 1.5)], ids=["turned", "in line"])
+@pytest.mark.parametrize(("turned", "seconds", "rest"), [(0.3, 6.0, 1.5), (0.0, 7.0, 1.5)], ids=["turned", "in line"])
 def test_a_stack_of_ten_boxes(turned, seconds, rest):
     """Boxes turned against each other rest on up to 8 corners each; equal ones in line on 4, each at an edge or a
     vertex of the other, which takes longer to find its rest."""
@@ -111,12 +111,12 @@ def test_a_box_slides_down_a_slope_and_stops():
     X_WB = X_WP @ collide.pose((0, 0, 0.05), rpy=(0, 0, 0.4))
     downhill = X_WP[:3, 0]
     body = stepper.add(collide.Box(size), X_WB, 1.0, box_inertia(1, size), [*(speed * downhill), 0, 0, 0])
-    steps = run(stepper, 10.0)
+    steps = run(stepper, 6.0)
     slid = (stepper.X[body, :3, 3] - X_WB[:3, 3]) @ X_WP[:3, :3]
     wanted = speed**2 / (2 * 9.81 * (0.5 * np.cos(angle) - np.sin(angle)))
     # Stepping is off by a substep's speed once, and the box may turn a little, as more weight is on its lower edge.
     assert abs(slid[0] - wanted) < 0.02 * wanted and abs(slid[1]) < 0.02 * wanted, (slid, wanted)
-    check_steady(steps[-480:])
+    check_steady(steps[-240:])
     assert len(steps[-1].keys) == 4
 
 
@@ -128,7 +128,7 @@ def test_a_tilted_box_falls_slides_and_stops(ground):
     stepper.add(*ground)
     X_WB = collide.pose((-0.5, 0, 0.12), rpy=(0.3, 0.2, 0.5))
     body = stepper.add(collide.Box(size), X_WB, 1.0, box_inertia(1, size), [1.0, 0.2, 0, 0, 0, 0])
-    steps = run(stepper, 10.0)
+    steps = run(stepper, 6.0)
     assert abs(stepper.X[body, 2, 2]) > 1 - 1e-6 and abs(stepper.X[body, 2, 3] - 0.05) < 1e-3
     slid = np.linalg.norm(stepper.X[body, :2, 3] - X_WB[:2, 3])
     assert 0.03 < slid < 1.04 / (2 * 9.81 * 0.5) + 0.1, slid  # v²/2μg, and what it tumbles
@@ -153,7 +153,7 @@ def test_round_bodies_lie_on_their_sides(name, ground):
     stepper.add(*ground)
     body = stepper.add(shape, collide.pose((0, 0, 0.1), rpy=(np.pi / 2, 0, 0.3)), 1.0, inertia)
     start = stepper.X[body].copy()
-    steps = run(stepper, 10.0)
+    steps = run(stepper, 6.0)
     check_steady(steps, speed=0.1, moved=1e-3, places=1e-3)  # from the first step on
     check_steady(steps[60:], speed=1e-6, moved=1e-6, places=1e-6)
     ends = steps[-1].contacts["point_b"]
@@ -171,8 +171,8 @@ def test_a_cylinder_stands(ground, tilt):
     shape, inertia = ROUND["cylinder"]
     X_WB = collide.pose((0, 0, 0.25 + 0.1 * np.sin(tilt)), rpy=(tilt, 0.4 * tilt, 0.3))
     body = stepper.add(shape, X_WB, 1.0, inertia)
-    steps = run(stepper, 10.0)
-    check_steady(steps[-300:], speed=1e-6, moved=1e-6, places=1e-6)
+    steps = run(stepper, 6.0)
+    check_steady(steps[-60:], speed=1e-6, moved=1e-6, places=1e-6)
     assert len(steps[-1].keys) == 8 and stepper.X[body, 2, 2] > 1 - 1e-9
     assert abs(stepper.X[body, 2, 3] - 0.25) < 1e-4
 
@@ -185,8 +185,8 @@ def test_a_prism_of_twelve_sides_rests_on_all_its_corners():
     stepper = Stepper(margin=0.01, max_contacts=12)
     stepper.add(FLOOR, X_FLOOR)
     stepper.add(prism, collide.pose((0, 0, 0.103), rpy=(0.02, 0.01, 0.3)), 1.0, rod_inertia(1, 0.15, 0.2))
-    steps = run(stepper, 10.0)
-    check_steady(steps[-480:], speed=1e-6, moved=1e-6, places=1e-6)
+    steps = run(stepper, 6.0)
+    check_steady(steps[-240:], speed=1e-6, moved=1e-6, places=1e-6)
     assert len(steps[-1].keys) == 12
 
 
@@ -199,7 +199,7 @@ def test_a_body_rests_on_a_mesh(cells, is_mesh):
     stepper = Stepper()
     stepper.add(collide.Mesh(*table(cells)), EYE)
     body = stepper.add(shape, collide.pose((0.03, 0.02, 0.15), rpy=(0, 0, 0.2)), 2.0, box_inertia(2, size))
-    steps = run(stepper, 10.0)
+    steps = run(stepper, 6.0)
     check_steady(steps[60:], speed=1e-5, moved=1e-6, places=1e-6)
     assert np.abs(steps[-1].contacts["normal"] - (0, 0, 1)).max() < 1e-6
     assert abs(stepper.X[body, 2, 3] - 0.15) < sag(2 * 9.81, 4, 7.0)

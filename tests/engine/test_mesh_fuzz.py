@@ -113,7 +113,7 @@ def moved(X, shift):
 def test_everything_about_hard_pairs(part):
     rng = np.random.default_rng([77, part])
     told, within, gaps, ways_out, open_ones = [], 0, 0, 0, 0
-    for case in range(45):
+    for case in range(30):
         scale = float(rng.choice([1, 1, 1, 1e-9, 1e8, 1 / 3]))
         ratio = float(rng.choice([1, 1, 1, 0.5, 1e-3, 1e-9, 3.0]))
         (va, fa), (vb, fb) = any_mesh(rng, scale), any_mesh(rng, scale * ratio)

@@ -113,14 +113,14 @@ def test_booleans_are_exact():
     told: list[bool] = []
     within = 0
     for A, B in PAIRS:
-        for X, Y in poses(rng, 6):
+        for X, Y in poses(rng, 3):
             want = truth(A, B, X, Y)
             assert collide.collide(A[0], B[0], X, Y) == want, snippet(A, B, X, Y)
             assert collide.collide(B[0], A[0], Y, X) == want, snippet(A, B, X, Y)
             within += want and not facet_pairs(*A[1:3], X, *B[1:3], Y)
             told.append(want)
     assert 0.2 < np.mean(told) < 0.9, np.mean(told)
-    assert within > 30, within
+    assert within > 15, within
 
 
 def test_distances_are_bracketed_and_overlaps_come_apart():

@@ -89,7 +89,7 @@ def test_normals_points_and_margins_beside_rounding(seed):
     shapes = pool(rng)
     names = list(shapes)
     apart = within = beyond = 0
-    for _ in range(90):
+    for _ in range(50):
         a, b = (names[k] for k in rng.integers(0, len(names), size=2))
         A, B = shapes[a], shapes[b]
         X_WA, X_WB = pose(rng), pose(rng)
@@ -109,7 +109,7 @@ def test_normals_points_and_margins_beside_rounding(seed):
             beyond += r.lower > margin
             assert rows or r.upper > margin, f"no contact though proven within {margin!r}: {told}"
             assert not rows or r.lower <= margin, f"a contact though proven beyond {margin!r}: {told}"
-    assert apart > 20 and within > 60 and beyond > 40
+    assert apart > 11 and within > 33 and beyond > 22
 
 
 @pytest.mark.parametrize("kind", ("Cylinder", "Cone"))

@@ -36,7 +36,7 @@ def pair(kind: str, rng) -> tuple[np.ndarray, np.ndarray]:
 def test_equal_to_the_oracle_with_all_invariants(kind):
     rng = np.random.default_rng([6, len(kind)])
     seen, hits, walks = Counter(), 0, 0
-    for k in range(72):
+    for k in range(40):
         P, R = pair(kind, rng)
         found = reference.walk(reference.exact(P), reference.exact(R), **OPTIONS[k % 4])
         if found is None:
@@ -47,7 +47,7 @@ def test_equal_to_the_oracle_with_all_invariants(kind):
         assert found.missing == 0
         seen.update((r.space, r.case) for r in found.rounds)
         hits, walks = hits + truth, walks + 1
-    assert walks > 40 and 0.15 < hits / walks < 0.85
+    assert walks > 22 and 0.15 < hits / walks < 0.85
     assert {(space, case) for space in ("primal", "polar") for case in ("1", "2.1", "2.2")} <= set(
         seen
     ) or kind == "flush", seen
@@ -55,10 +55,10 @@ def test_equal_to_the_oracle_with_all_invariants(kind):
 
 def test_larger_bodies_go_deep():
     rng = np.random.default_rng(3)
-    for k in range(6):
+    for k in range(3):
         P, R = rng.standard_normal((40, 3)), rng.standard_normal((40, 3))
         P = P / np.linalg.norm(P, axis=1)[:, None] + 1.1 * rng.standard_normal(3)
-        found = reference.walk(reference.exact(P), reference.exact(R), check=k < 2)
+        found = reference.walk(reference.exact(P), reference.exact(R), check=k < 1)
         assert found is not None and min(len(found.P), len(found.Q)) >= 5
         assert found.hit == exact.hit(P, EYE, NOWHERE, R, EYE, NOWHERE), snippet(P, R)
 
@@ -112,7 +112,7 @@ def test_a_level_with_vertices_of_its_own_has_no_neighbours_to_scan():
     """
     rng = np.random.default_rng(9)
     met = 0
-    for _ in range(60):
+    for _ in range(32):
         P, R = pair("apart or not", rng)
         points, moved_R = reference.exact(P), reference.exact(R)
         if len(reference._spanning(moved_R, range(len(moved_R)))) < 4:
@@ -131,4 +131,4 @@ def test_a_level_with_vertices_of_its_own_has_no_neighbours_to_scan():
         found = reference.Walk(levels, reference.hierarchy(reference.polar(moved_R)), early=True)
         assert found.hit == exact.hit(P, EYE, NOWHERE, R, EYE, NOWHERE), snippet(P, R)
         met += found.missing
-    assert met > 5
+    assert met > 2

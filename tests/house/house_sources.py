@@ -64,7 +64,7 @@ def imports(file: Path) -> list[tuple[str, bool, int]]:
             module = node.module or ""
             inner = [f"{module}.{alias.name}" for alias in node.names]
             found.extend((name if name in known else module, late, node.lineno) for name in inner)
-        elif isinstance(node, ast.Call) and ast.unparse(node.func) == "lazy_module":
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "lazy_module":
             found.append((ast.literal_eval(node.args[0]), late, node.lineno))
         elif isinstance(node, ast.If) and is_type_checking(node.test):
             return  # never run
@@ -77,7 +77,10 @@ def imports(file: Path) -> list[tuple[str, bool, int]]:
 
 
 def is_type_checking(test: ast.expr) -> bool:
-    return ast.unparse(test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+    return isinstance(test, (ast.Name, ast.Attribute)) and ast.unparse(test) in (
+        "TYPE_CHECKING",
+        "typing.TYPE_CHECKING",
+    )
 
 
 def foreign(file: Path) -> list[tuple[str, bool, int]]:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import ast
-import io
 import re
-import tokenize
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -29,28 +27,40 @@ class Source(NamedTuple):
     names: set[str]
 
 
+#: Comments and strings, each whole: what is between them is code.
+_COMMENT_OR_STRING = re.compile(
+    r"""\#[^\n]*|(?:\b[rRbBuUfF]{1,2})?(?:\"{3}(?:\\.|[^\\])*?\"{3}|\'{3}(?:\\.|[^\\])*?\'{3}"""
+    r"""|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*')""",
+    re.DOTALL,
+)
+
+
 def read_source(text: str) -> Source:
     docstrings = set()
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node, clean=False):
-            docstrings.add((node.body[0].lineno, node.body[0].col_offset))
+            docstrings.add(node.body[0].lineno)
     prose: list[tuple[int, str]] = []
-    names: set[str] = set()
-    comment_ends = 0
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        line = token.start[0]
-        if token.type == tokenize.COMMENT:
-            words = token.string.lstrip("#: ")
+    code: list[str] = []
+    comment_ends, line, end = 0, 1, 0
+    for found in _COMMENT_OR_STRING.finditer(text):
+        between, string = text[end : found.start()], found.group()
+        code.append(between)
+        line, end = line + between.count("\n"), found.end()
+        if string[0] == "#":
+            words = string.lstrip("#: ")
             if comment_ends == line - 1 and prose:  # back quotes may close on the next line
                 prose[-1] = prose[-1][0], f"{prose[-1][1]} {words}"
             else:
                 prose.append((line, words))
             comment_ends = line
-        elif token.type == tokenize.STRING and token.start in docstrings:
-            prose.append((line, token.string))
-        elif token.type in (tokenize.NAME, tokenize.STRING):
-            names.update(re.findall(r"[A-Za-z_]\w*", token.string))
-    return Source(prose, names)
+        elif line in docstrings and not text[text.rfind("\n", 0, found.start()) + 1 : found.start()].strip():
+            prose.append((line, string))
+        else:
+            code.append(string)
+        line += string.count("\n")
+    code.append(text[end:])
+    return Source(prose, set(re.findall(r"\b[A-Za-z_]\w*", "\n".join(code))))
 
 
 @cache

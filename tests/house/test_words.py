@@ -136,6 +136,7 @@ def arguments(node: ast.FunctionDef | ast.Lambda) -> list[ast.arg]:
     return [*given.posonlyargs, *given.args, *given.kwonlyargs, *filter(None, (given.vararg, given.kwarg))]
 
 
+@cache
 def better(name: str) -> str | None:
     """What to write instead of a name, None where it is a good one."""
     plain = re.sub(r"\d+$", "", name.strip("_"))

@@ -14,7 +14,7 @@ from mesh_shapes import block_ring, box, bumpy_sphere
 from collide import InvalidShape, Mesh
 
 BASES = {"bumpy sphere": bumpy_sphere(120), "ring": block_ring(), "box": box()}
-#: Small and middling meshes of every sort: soups, open ones, several parts, STL, OBJ and Collada.
+#: Meshes of every sort: soups, open ones, several parts, STL, OBJ and Collada. Those of at most 2,000 facets are taken.
 SAMPLE = (
     "duck.obj", "cube.obj", "plane.obj", "torus/torus_textured.obj", "teddy2_VHACD_CHs.obj", "sphere_smooth.obj",
     "random_urdfs/000/000.obj",
@@ -38,10 +38,10 @@ def judged(name: str, vertices, faces, k: int, kind: str) -> corruptions.Said:
 def test_corruptions_of_small_meshes(kind):
     outcomes = Counter()
     for name, (vertices, faces) in BASES.items():
-        for k in range(10):
+        for k in range(6):
             outcomes[judged(f"{name} {kind}", vertices, faces, k, kind).outcome] += 1
     refused = kind in ("NaN vertices", "ids out of range")
-    assert outcomes["refused"] == (30 if refused else 0), outcomes
+    assert outcomes["refused"] == (18 if refused else 0), outcomes
     assert refused or (outcomes["apart"] >= 3 and outcomes["hit"] >= 3), outcomes
 
 
@@ -54,15 +54,15 @@ def test_meshes_of_pybullet_data():
     for name in SAMPLE:
         if not (root / name).is_file():
             continue
-        found += 1
         parts = [(v, f) for _, v, f in read_triangles(root / name)[0] if len(f)]
         starts = np.cumsum([0, *(len(v) for v, _ in parts)])
         vertices, faces = (
             np.concatenate([v for v, _ in parts]),
             np.concatenate([f + s for (_, f), s in zip(parts, starts)]),
         )
-        if len(faces) > 6000:
+        if len(faces) > 2000:
             continue
+        found += 1
         for k in range(PER_MESH):
             kind = corruptions.KINDS[k % len(corruptions.KINDS)]
             said = judged(name, vertices, faces, k, kind)

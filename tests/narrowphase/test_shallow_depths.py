@@ -73,7 +73,7 @@ def judge(case: Case, r, *, matrices: bool = False) -> None:
 @pytest.mark.parametrize("kinds", PAIRS)
 def test_the_bracket_holds(kinds):
     rng, seen = rng_of("shallow depths", kinds), Counter()
-    while seen["asked"] < 40:
+    while seen["asked"] < 20:
         case = overlapping(kinds, rng, 10.0 ** rng.uniform(-7, -1.5))
         with naive.reproducible(case):
             r = collide.distance(*case)

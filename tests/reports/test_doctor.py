@@ -20,6 +20,13 @@ def test_a_sound_installation_is_called_sound(tmp_path):
     assert max(map(len, lines)) <= 80 and any("kernels" in line for line in lines)
 
 
+@pytest.fixture()
+def no_hosts(monkeypatch):
+    """Hosts are asked in processes of their own, which takes seconds: `test_a_sound_installation_is_called_sound`."""
+    monkeypatch.setattr(doctor, "_hosts", list)
+
+
+@pytest.mark.usefixtures("no_hosts")
 def test_a_wrong_answer_and_a_crash_are_findings(monkeypatch):
     import collide
 
@@ -35,6 +42,7 @@ def test_a_wrong_answer_and_a_crash_are_findings(monkeypatch):
     assert examination.verdict() == "BROKEN: 2 findings: wrong, crash"
 
 
+@pytest.mark.usefixtures("no_hosts")
 def test_how_kernels_run_is_told(monkeypatch):
     from collide.kernels import library, mode
 
@@ -52,6 +60,7 @@ def test_how_kernels_run_is_told(monkeypatch):
     assert mode.WHY in told["kernels"].answer and "library" not in told
 
 
+@pytest.mark.usefixtures("no_hosts")
 def test_a_cache_that_cannot_be_written_is_worth_knowing(monkeypatch, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("a file where a folder should be")
@@ -60,6 +69,7 @@ def test_a_cache_that_cannot_be_written_is_worth_knowing(monkeypatch, tmp_path):
     assert caches and all(check.passed is None and "COLLIDE_CACHE_DIR" in check.answer for check in caches)
 
 
+@pytest.mark.usefixtures("no_hosts")
 @pytest.mark.skipif(not TRUST, reason="modes of files say nothing here")
 def test_a_cache_of_kernels_that_others_may_write_is_worth_knowing(monkeypatch, tmp_path):
     from collide.kernels import mode

@@ -129,16 +129,16 @@ def test_pieces_are_those_of_brute_force(name):
     make, _ = FAMILIES[name]
     rng = np.random.default_rng(list(FAMILIES).index(name) + 90)
     kinds = np.zeros(4, dtype=int)
-    for _ in range(7):
+    for _ in range(4):
         A, B, X, Y = make(rng)
         A, B = (A[0], A[1][:8]), (B[0], B[1][:8])
         kinds += check(A, B, X, Y)
     least = {
-        "grid": (5, 5, 1),
-        "flat": (0, 0, 5),
-        "identical": (0, 5, 5),
-        "degenerate": (5, 1, 0),
-        "touching": (5, 0, 0),
+        "grid": (3, 3, 1),
+        "flat": (0, 0, 3),
+        "identical": (0, 3, 3),
+        "degenerate": (3, 1, 0),
+        "touching": (3, 0, 0),
     }
     assert (kinds[1:] >= least.get(name, (0, 1, 0))).all(), kinds
 
@@ -219,7 +219,7 @@ def test_facet_pairs_are_those_of_brute_force():
     rng = np.random.default_rng(33)
     total = met = 0
     for name in ("grid", "random", "flat", "degenerate"):
-        for _ in range(4):
+        for _ in range(2):
             A, B, X, Y = FAMILIES[name][0](rng)
             corners = [
                 [[p[v] for v in f] for f in m[1].tolist()] for m, Z in ((A, X), (B, Y)) for p in [world_points(m[0], Z)]

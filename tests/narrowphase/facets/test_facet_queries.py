@@ -48,7 +48,7 @@ def test_near_to_touching():
     (va, fa), (vb, fb) = bumpy_sphere(900, 1), bumpy_sphere(700, 2)
     A, B = build_mesh_tree(va, fa), build_mesh_tree(vb, fb)
     hits = cases = 0
-    for case in range(5):
+    for case in range(3):
         X, Y = random_pose(rng), random_pose(rng)
         away = rng.normal(size=3)
         Y[:3, 3] = X[:3, 3] + 3.0 * away / np.linalg.norm(away)
@@ -86,7 +86,7 @@ def test_large_facets_against_fine_ones():
     va, fa = bumpy_sphere(1500, 3)
     A = build_mesh_tree(va, fa)
     hits = cases = 0
-    for case in range(60):
+    for case in range(24):
         # A few triangles through, along and beside the fine surface, slivers and such without area among them.
         corners = rng.normal(size=(4, 3, 3)) * (1.2, 1.2, 1.2 * 10.0 ** rng.integers(-12, 1))
         corners[1, 2] = corners[1, 1] if case % 5 == 0 else corners[1, 1] + rng.normal(size=3) * 1e-6
@@ -106,7 +106,7 @@ def test_large_facets_against_fine_ones():
         assert found.counters[0, 1] < 30 * (len(want) + 8), told
         hits += len(want)
         cases += bool(want)
-    assert hits > 500 and 15 < cases < 55
+    assert hits > 200 and 6 < cases < 22
 
 
 def test_far_apart_or_not_a_matrix_that_mirrors_is_refused():

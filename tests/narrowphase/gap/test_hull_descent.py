@@ -67,10 +67,9 @@ def placed(R: np.ndarray, p) -> np.ndarray:
 def whole(points: np.ndarray, X: np.ndarray, bits: int = 400):
     """Posed points times 2^bits, as lists of Python integers."""
     one = 1 << bits // 2
-    exact = [[int(Fraction(c) * one) for c in row] for row in X[:3].tolist()]
-    given = [[int(Fraction(c) * one) for c in row] for row in points.tolist()]
-    assert all(Fraction(i, one) == Fraction(c) for row, own in zip(given, points.tolist()) for i, c in zip(row, own))
-    assert all(Fraction(i, one) == Fraction(c) for row, own in zip(exact, X[:3].tolist()) for i, c in zip(row, own))
+    of_pose, of_points = ([[c.as_integer_ratio() for c in row] for row in rows.tolist()] for rows in (X[:3], points))
+    assert all(one % denominator == 0 for rows in (of_pose, of_points) for row in rows for _, denominator in row)
+    exact, given = ([[i * (one // n) for i, n in row] for row in rows] for rows in (of_pose, of_points))
     return [tuple(r[0] * x + r[1] * y + r[2] * z + r[3] * one for r in exact) for x, y, z in given]
 
 
@@ -118,7 +117,7 @@ def squared_gap(A: np.ndarray, X_WA: np.ndarray, B: np.ndarray, X_WB: np.ndarray
     """The square of the distance of two hulls that are apart."""
     a, b = whole(A, X_WA, bits), whole(B, X_WB, bits)
     size = float(1 << 60)
-    rough_a, rough_b = (np.array([[float(Fraction(c, 1 << bits)) for c in p] for p in q]) for q in (a, b))
+    rough_a, rough_b = (np.array([[c / (1 << bits) for c in p] for p in q]) for q in (a, b))
     d = rough_a.mean(axis=0) - rough_b.mean(axis=0)
     simplex = [tuple(x - y for x, y in zip(a[(rough_a @ d).argmin()], b[(rough_b @ d).argmax()]))]
     while True:
