@@ -5,7 +5,8 @@
 
 Two bumpy spheres of as many facets stand in each other. Both engines get meshes that are made, and what they keep with
 them. Times are of the processor, of all threads, and of the clock, medians of runs in turns: manifold3d has threads,
-ours is one. "Judged" asks small solids whose facets lie in one plane, where manifold3d's volume is compared with the exact one; solids that cross themselves are left out.
+ours is one. "Judged" asks small solids whose facets lie in one plane, where manifold3d's volume is compared with the
+exact one; solids that cross themselves are left out.
 """
 
 from __future__ import annotations
