@@ -98,11 +98,12 @@ def scan_meshes():
         if path.suffix not in (".ply", ".obj", ".stl", ".off") or path.stat().st_size > 30e6:
             continue
         try:
-            mesh = collide.Mesh(*read_mesh(path)[:2])
+            parts = read_mesh(path).parts
         except collide.CollideError:
             continue
-        if mesh.solid and len(mesh.faces) >= 500:
-            meshes.append((path.stem, mesh))
+        for part in parts:
+            if part.closed and part.facets is not None and part.faces >= 500:
+                meshes.append((path.stem, collide.Mesh(part.points, part.facets, solid=True)))
     return sorted(meshes, key=lambda item: len(item[1].faces))
 
 
