@@ -21,7 +21,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "families
 from mesh_shapes import bumpy_sphere
 
 import collide
-from collide.mesh.build_bvh import build_mesh_tree
 from collide.narrowphase.facets.facet_queries import all_hits
 from collide.scenes.worst_cases import harpsicordia
 
@@ -30,14 +29,14 @@ NAMES = "meeting", "boxes", "tested"
 
 def spheres(n: int):
     """(trees of A and B, poses)."""
-    trees = [build_mesh_tree(*bumpy_sphere(n, seed)) for seed in (0, 1)]
+    trees = [collide.Mesh(*bumpy_sphere(n, seed), solid=False).tree for seed in (0, 1)]
     return *trees, np.eye(4), collide.pose((0.9, 0.3, 0.2), rpy=(0.3, 0.5, 0.7))
 
 
 def strings(n: int, spread: float | None):
     """Harpsicordia of about n facets: two facets a vertex."""
     A, B, _ = harpsicordia(n // 2, 10.0, spread)
-    return build_mesh_tree(A.vertices, A.faces), build_mesh_tree(B.vertices, B.faces), np.eye(4), np.eye(4)
+    return A.tree, B.tree, np.eye(4), np.eye(4)
 
 
 FAMILIES = {

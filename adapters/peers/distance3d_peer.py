@@ -50,8 +50,8 @@ class Distance3dPeer(PairwisePeer):
 
     def prepare(self) -> None:
         warnings.filterwarnings("ignore", module="distance3d")  # Numba's, about the speed of products
-        # What is compiled on the way is no part of a pair's time. Some of MPR and of Nesterov's GJK, 20 seconds of it, is
-        # compiled only when two kinds of bodies, or a hull, are asked about.
+        # What is compiled on the way is no part of a pair's time. Some of MPR and of Nesterov's GJK, 20 seconds of it,
+        # is compiled only when two kinds of bodies, or a hull, are asked about.
         hull = ConvexHull([(-1, -1, -1), (1, -1, 0), (0, 1, -1), (0, 0, 1)])
         bodies = (Sphere(1.0), Box((1, 1, 1)), Capsule(1.0, 1.0), Cylinder(1.0, 1.0), Ellipsoid((1, 1, 2)), hull)
         for A, B in itertools.product(bodies, bodies):
