@@ -1,6 +1,6 @@
 """Pairs of facets that clearly cross: which edge of one pierces the other at either end of the segment they share.
 
-Doubles prove it (`surface_queries/facet_crossings.py`). What such a pair shares ends inside an edge and
+Doubles prove it (`narrowphase/facets/facet_crossings.py`). What such a pair shares ends inside an edge and
 inside a facet on both sides, so that the edge and the facet are the point's name: two pairs have an end in common
 exactly where these are the same. All other pairs are left to `facet_cuts.py`.
 """
@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.narrowphase.facets.facet_crossings import facet_crossings
 from collide.solids.placed_facets import PlacedFacets
-from collide.surface_queries.facet_crossings import facet_crossings
 
 
 class CrossingPairs(NamedTuple):
@@ -33,10 +33,12 @@ def crossing_pairs(facets: PlacedFacets, pairs: np.ndarray) -> tuple[CrossingPai
     """(the pairs that clearly cross, which of the given they are (k,) bool)."""
     a, b = pairs.T
     corners = facets.local[facets.corners[a]], facets.local[facets.corners[b]]
-    found = facet_crossings(*corners, facets.poses[facets.body[a]], facets.poses[facets.body[b]])
-    clear = found.is_clear
-    pairs, slots = pairs[clear], found.slots[clear]
+    crossings = facet_crossings(*corners, facets.poses[facets.body[a]], facets.poses[facets.body[b]])
+    is_clear = crossings.is_clear
+    pairs, slots = pairs[is_clear], crossings.slots[is_clear]
     is_of_b = (slots >= 3).astype(np.int64)
     piercing = np.take_along_axis(pairs, is_of_b, axis=1)
     facet = np.take_along_axis(pairs, 1 - is_of_b, axis=1)
-    return CrossingPairs(pairs, facets.edge[piercing, slots % 3], facet, found.place[clear], found.error[clear]), clear
+    return CrossingPairs(
+        pairs, facets.edge[piercing, slots % 3], facet, crossings.place[is_clear], crossings.error[is_clear]
+    ), is_clear

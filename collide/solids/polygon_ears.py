@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
+from collide.narrowphase.facets.facet_crossings import corner_error, posed_corner
 from collide.numerics.vec3 import Vec3, component, cross, sub
-from collide.surface_queries.facet_crossings import corner_error, posed_corner
 
 #: Parts with more corners are left to the sweep.
 MAX_CORNERS = 40

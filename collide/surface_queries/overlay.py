@@ -16,12 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.narrowphase.facets.facet_crossings import facet_crossings
 from collide.narrowphase.facets.facet_geometry import FacetCorners
 from collide.narrowphase.facets.facet_queries import all_hits
 from collide.numerics.exact_points import Point, cross, inner, minus, on_one_grid, placed, rounded
 from collide.shapes.shape import Shape
 from collide.surface_queries.checked_arguments import two_bodies
-from collide.surface_queries.facet_crossings import facet_crossings
 
 #: What a pair of facets shares.
 POINT, SEGMENT, POLYGON = 1, 2, 3

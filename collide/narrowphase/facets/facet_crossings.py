@@ -38,11 +38,11 @@ class FacetCrossings(NamedTuple):
 def facet_crossings(A: np.ndarray, B: np.ndarray, X_WA: np.ndarray, X_WB: np.ndarray) -> FacetCrossings:
     """Crossings of facets by pairs.   A, B : (k, 3, 3) corners in their bodies' frames.   X_WA, X_WB : (k, 4, 4)."""
     k = len(A)
-    given = [np.ascontiguousarray(x, dtype=np.float64) for x in (A, B, X_WA, X_WB)]
+    arguments = [np.ascontiguousarray(x, dtype=np.float64) for x in (A, B, X_WA, X_WB)]
     is_segment, is_clear = np.zeros(k, dtype=np.uint8), np.zeros(k, dtype=np.uint8)
     slots, place, error = np.zeros((k, 2), dtype=np.int64), np.zeros((k, 2, 3)), np.zeros(k)
     cross_facets(
-        *map(address_of, given), k, *map(address_of, (is_segment, is_clear, slots, place, error))
+        *map(address_of, arguments), k, *map(address_of, (is_segment, is_clear, slots, place, error))
     )  # fmt: skip
     return FacetCrossings(is_segment.view(bool), is_clear.view(bool), slots, place, error)
 
@@ -74,7 +74,7 @@ def corner_error(poses, X, local, v):
 def _heights(p, n, edge, a, b, c, error):
     """(heights of three points over a plane through p times its normal's length, a bound of their errors).
 
-    As in `narrowphase/facets/filtered_triangles.py`, all corners off by E: edges by f = 2E + 2uL, components of normals
+    As in `filtered_triangles.py`, all corners off by E: edges by f = 2E + 2uL, components of normals
     by 4Lf + 2f² + 3uL², heights by 3 D times that, 3·(2L² + …)·(2E + 2uD), and 4u of the terms: below 40 L D f' with
     the larger of both f.
     """

@@ -8,10 +8,10 @@ import numpy as np
 from mesh_shapes import bumpy_sphere
 
 import collide
+from collide.narrowphase.facets.facet_crossings import PROMISE, facet_crossings
 from collide.narrowphase.facets.facet_geometry import FacetCorners
 from collide.narrowphase.facets.facet_queries import all_hits
 from collide.numerics.exact_points import on_one_grid, placed
-from collide.surface_queries.facet_crossings import PROMISE, facet_crossings
 from collide.surface_queries.overlay import common_piece
 
 
