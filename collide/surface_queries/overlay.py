@@ -102,7 +102,7 @@ def overlay(A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True) -> Over
     return Overlay(hits.pairs, hits.starts.copy(), kind, corners, starts, size)
 
 
-# --- what doubles leave open, in integers --------------------------------------------------------------------
+# --- what doubles leave open, in integers -----------------------------------------------------------
 
 #: A point as x, y, z over a common w > 0.
 _Rational = tuple[int, int, int, int]

@@ -193,7 +193,8 @@ def harms(length: int) -> dict:
 
     return {
         "empty": lambda content: b"", "cut in half": lambda content: content[: length // 2],
-        "longer": lambda content: content + b"\0", "a bit flipped": flipped,
+        "one byte short": lambda content: content[:-1], "longer": lambda content: content + b"\0",
+        "a bit flipped": flipped, "another bit flipped": flipped,
         "its head flipped": lambda content: b"\x7eELF" + content[4:],
     }  # fmt: skip
 
