@@ -233,6 +233,7 @@ def _write_about(place: Path, files: list[Path], made: dict) -> None:
         "#: Checksum of the kernels' sources (`sources.fingerprint`), and which files they are.\nSOURCES = "
         f"{made['sources']}\n"
         f"SOURCE_FILES = {made['source_files']!r}\n"
+        f"#: Hashes of the entries (`sources.entry_hashes`), by name.\nENTRIES = {made['hashes']!r}\n"
         f"#: Levels of processors.\nLEVELS = {tuple(made['objects'])!r}\n"
         f"#: Numba and LLVM, as they were.\nCOMPILER = {made['versions']!r}\n"
         f"#: Sizes and checksums of files.\nFILES = {known!r}\n",

@@ -71,6 +71,8 @@ class Compiled(NamedTuple):
     sources: int
     """`sources.fingerprint` of:"""
     source_files: tuple[str, ...]
+    hashes: dict[str, str]
+    """`sources.entry_hashes`."""
 
 
 def compile_kernels(out: Path, triple: str = "", levels: tuple[str, ...] = (), jobs: int | None = None) -> Compiled:
@@ -103,7 +105,10 @@ def compile_kernels(out: Path, triple: str = "", levels: tuple[str, ...] = (), j
         waiting = [pool.submit(_back, called, bitcode, level, triple, objects[level.name]) for level in missing]
         for one in waiting:
             one.result()
-    return Compiled(objects, described, sources.compiler_versions(), fingerprint, names)
+    hashes = sources.entry_hashes()
+    if strange := set(hashes) ^ set(called):
+        raise SystemExit(f"entries whose sources were not found, or the other way round: {', '.join(sorted(strange))}")
+    return Compiled(objects, described, sources.compiler_versions(), fingerprint, names, hashes)
 
 
 def _entries() -> list:
@@ -206,6 +211,7 @@ def main() -> None:
                     "versions": made.versions,
                     "sources": made.sources,
                     "source_files": made.source_files,
+                    "hashes": made.hashes,
                 }
             )
         )

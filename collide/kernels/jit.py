@@ -1,8 +1,8 @@
 """Kernels compiled at their first call, and kept on disk: for those who change them.
 
 The same front end and the same back end as of the library (`front_end.py`, `back_end.py`), for this very processor. An
-entry's machine code is an object file, kept under a hash of the sources that it can depend on: those of its own module
-and of all that this imports (`sources.py`). An edit makes stale what it touches.
+entry's machine code is an object file, kept under a hash of the code that it can depend on (`sources.py`). An edit makes
+stale what it touches; entries that no edit concerns are the library's, where there is one.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 import llvmlite.binding as llvm
 from numba.core import sigutils
 
-from collide.kernels import object_cache, sources
+from collide.kernels import library, object_cache, sources
 from collide.kernels.back_end import Target, host, machine_code
 from collide.kernels.front_end import Lowered, dispatcher, native_call
 from collide.log import log
@@ -123,20 +123,22 @@ def _say_once() -> None:
     )
 
 
-def entry(signature: str, *, nogil: bool = True) -> Callable[[Callable], Entry]:
-    def made(function: Callable) -> Entry:
+def entry(signature: str, *, nogil: bool = True) -> Callable[[Callable], Callable]:
+    def made(function: Callable) -> Callable:
+        if (ready := library.function_of(function)) is not None:
+            return ready
         entries.append(Entry(function, signature, nogil))
         return entries[-1]
 
     return made
 
 
-#: All that were defined, for the build.
+#: All that are compiled just in time, for the build.
 entries: list[Entry] = []
 
 
-def code_of(entry: Entry) -> int:
-    return entry.address
+def code_of(entry) -> int:
+    return entry.address if isinstance(entry, Entry) else library.code_of(entry)
 
 
 @cache

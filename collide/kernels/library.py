@@ -1,8 +1,8 @@
 """The library of kernels that was made when the package was built: looked at, loaded, and its functions.
 
-A library cut short ends the process when it is loaded, and one of other sources answers wrongly. So sizes and checksums
-of its files are compared with those that the build wrote down, and the sources with those that it was made from: a few
-milliseconds of a start.
+A library cut short ends the process when it is loaded, and a function of other sources answers wrongly. So sizes and
+checksums of its files are compared with those that the build wrote down, and the sources with those that it was made
+from: a few milliseconds of a start. Where sources were edited, the library serves the entries that no edit concerns.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module
 from typing import Any
 
@@ -22,6 +23,8 @@ LEVELS = ("v2", "v3", "v4", "arm64")
 level = ""
 #: The module of C, its functions those of the entries; None likewise.
 glue: Any = None
+#: Names of entries that were edited since the library was made: compiled just in time, though the others are in it.
+edited: frozenset[str] = frozenset()
 _UNBUILT = "this installation was built without compiled kernels, for want of a C compiler"
 
 
@@ -30,7 +33,7 @@ def load() -> str:
 
     Raises InvalidArgument where ``COLLIDE_CPU`` names no level, or one that is not to be had here.
     """
-    global glue, level
+    global edited, glue, level
     wanted = os.environ.get("COLLIDE_CPU", "")
     if wanted and wanted not in LEVELS:
         raise InvalidArgument(
@@ -39,8 +42,7 @@ def load() -> str:
     built = _built()
     if built is None:
         return _UNBUILT
-    if not _fits(built):
-        return "the sources of kernels differ from those that it was made from; `pip install -e .` makes it anew"
+    edited = _edited(built)
     for name, (size, checksum) in built.FILES.items():
         if why := _why_damaged(_path(name), size, checksum):
             return f"it is damaged, {why}; install collide-robotics again"
@@ -56,7 +58,13 @@ def load() -> str:
     except (ImportError, OSError) as error:
         return f"it cannot be loaded: {error}; install collide-robotics again"
     glue = functions
-    return ""
+    if not edited:
+        return ""
+    told = ", ".join(sorted(edited)[:3]) + (", …" if len(edited) > 3 else "")
+    return (
+        f"{len(edited)} of its {len(built.ENTRIES)} kernels were edited since it was made ({told}); "
+        "`pip install --no-build-isolation --no-deps -e .` makes them anew"
+    )
 
 
 def exists() -> bool:
@@ -120,15 +128,19 @@ def _built() -> Any:
     return built
 
 
-def _fits(built: Any) -> bool:
-    """Whether the library was made from the sources that are here. Where there are none, as in frozen programs, nobody
-    can have changed them."""
+def _edited(built: Any) -> frozenset[str]:
+    """Entries whose code is not what the library was made from, by name. Where there are no sources, as in frozen
+    programs, nobody can have changed them.
+
+    One checksum of all files' bytes, 2 ms, settles most starts; where it differs, the entries' own hashes do, a second.
+    """
     if not os.path.exists(os.path.join(sources.PACKAGE, "results.py")):
-        return True
-    try:
-        return sources.fingerprint(built.SOURCE_FILES) == built.SOURCES
-    except (AttributeError, OSError):
-        return False
+        return frozenset()
+    with suppress(OSError):
+        if sources.fingerprint(built.SOURCE_FILES) == built.SOURCES:
+            return frozenset()
+    hashes = sources.entry_hashes()
+    return frozenset(name for name, known in hashes.items() if built.ENTRIES.get(name) != known)
 
 
 def _library_of(files: dict) -> str:
@@ -153,7 +165,15 @@ def _why_damaged(path: str, size: int, checksum: int) -> str:
 
 def entry(_signature: str, *, nogil: bool = True) -> Callable[[Callable], Callable]:
     """As `collide.kernels.entry`: the library's function of that name."""
-    return lambda function: getattr(glue, function.__name__, None) or _Absent(function)
+    return lambda function: function_of(function) or _Absent(function)
+
+
+def function_of(function: Callable) -> Callable | None:
+    """The library's function that was made of an entry's source as it is; None where there is none."""
+    name = function.__name__
+    if glue is None or name in edited or not (function.__module__ or "").startswith("collide."):
+        return None
+    return getattr(glue, name, None)
 
 
 class _Absent:

@@ -1,8 +1,9 @@
 """How kernels run in this process, decided once, before the first of them is defined.
 
 COMPILED : in the library that was made when the package was built. Neither Numba nor LLVM is in the process.
-JUST_IN_TIME : compiled by Numba and LLVM at their first call, and kept on disk. For checkouts whose sources differ from
-    those of the library, for installations without one, and where ``COLLIDE_JIT=1`` asks for it.
+JUST_IN_TIME : compiled by Numba and LLVM at their first call, and kept on disk. For kernels that were edited since the
+    library was made, the others being its; for installations without one; and for all where ``COLLIDE_JIT=1`` asks for
+    it.
 PYTHON : as the Python that they are written in: ``NUMBA_DISABLE_JIT=1``, for coverage and debugging.
 """
 
@@ -34,7 +35,7 @@ def _choose_mode() -> tuple[str, str]:
     except ImportError as error:
         raise MissingExtra("numba", extra="jit", purpose=f"compile kernels at their first call ({why})") from error
     if not forced and library.exists():
-        log.warning("kernels of the library are not used: %s", why)
+        log.warning("kernels of the library are not%s used: %s", " all" if library.glue else "", why)
     return JUST_IN_TIME, why
 
 

@@ -1,7 +1,8 @@
 """Which sources a kernel's machine code depends on, and a number that changes with them.
 
-Kernels see constants of modules, so what an entry is made of is the text of its own module and of all modules that are
-imported there, and so on: read from the sources, nothing is imported for it.
+Kernels see constants of modules, so an entry is made of its own code and of every definition that this reaches, in its
+own module and in modules that are imported there, and so on: read from the sources, nothing is imported for it. A start
+compares one checksum of the files' bytes; where that differs, `entry_hashes` tells which entries an edit concerns.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import zlib
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 #: The installed package.
 PACKAGE = Path(__file__).parent.parent
@@ -28,11 +30,17 @@ def kernel_sources() -> tuple[str, ...]:
     import, and so on, and what makes code of them. Found by the build, which writes the list down: a start has no time
     to look."""
     files = set(COMPILER_SOURCES)
-    for path in sorted(PACKAGE.rglob("*.py")):
-        if b"\n@entry(" in path.read_bytes():
-            module = ".".join(("collide", *path.relative_to(PACKAGE).with_suffix("").parts))
-            files.update(map(_place_of, _reached(module)))
+    for path in _files_of_entries():
+        files.update(map(_place_of, _reached(_module_of(path))))
     return tuple(sorted(files))
+
+
+def _files_of_entries() -> list[Path]:
+    return [path for path in sorted(PACKAGE.rglob("*.py")) if b"\n@entry(" in path.read_bytes()]
+
+
+def _module_of(path: Path) -> str:
+    return ".".join(("collide", *path.relative_to(PACKAGE).with_suffix("").parts))
 
 
 def _place_of(module: str) -> str:
@@ -50,19 +58,143 @@ def fingerprint(names: tuple[str, ...]) -> int:
     return checksum
 
 
-def of_function(function: Callable) -> str:
-    """A hash of what a function's machine code can depend on: its own code, and the sources that its module reaches."""
-    import hashlib  # here: a start from the library need not load it
+def entry_hashes() -> dict[str, str]:
+    """A hash for each entry of the package, by name: what `of_function` says of each. Read from the sources alone.
 
-    digest = hashlib.sha256()
+    About a second: the build writes the hashes down, and a start looks only where the bytes of a source differ.
+    """
+    return {
+        name: _hash_of(module, (name,))
+        for module in map(_module_of, _files_of_entries())
+        for name, definition in _parsed(module).definitions.items()
+        if definition.is_entry
+    }
+
+
+def of_function(function: Callable) -> str:
+    """A hash of what a function's machine code can depend on: the function's own code and values, and every definition
+    of the package that can be reached from there, as a syntax tree without docstrings, comments and blank lines.
+
+    A definition is reached where its name stands in code that is reached, in a module that the function's module
+    imports, or these import: names alone decide, so that a name of another thing makes a hash change too often, never
+    too seldom.
+    """
+    module = function.__module__ or ""
+    known = _parsed(module).definitions
+    if known.get(function.__qualname__) and not function.__closure__:
+        return _hash_of(module, (function.__qualname__,))
     code = function.__code__
     cells = [_named(cell.cell_contents) for cell in function.__closure__ or ()]
     parts = code.co_code.hex(), code.co_names, _constants(code), function.__defaults__, cells
-    digest.update(repr((function.__qualname__, *parts)).encode())
-    for module in sorted(_reached(function.__module__ or "")):
-        digest.update(module.encode())
-        digest.update(_text(module))
-    return digest.hexdigest()
+    return _hash_of(module, tuple(known), repr((function.__qualname__, *parts)))
+
+
+def _hash_of(module: str, names: tuple[str, ...], told: str = "") -> str:
+    """Of the definitions of these names in a module, and of all that they reach."""
+    import hashlib  # here: a start from the library need not load it
+
+    modules = _reached(module)
+    parts = {*_compiler_parts(), *(_parsed(name).other for name in modules)}
+    waiting = {*names}.union(*(part.names for part in parts))
+    reached: set[str] = set()
+    while waiting:
+        reached.add(name := waiting.pop())
+        for place in modules:
+            if (found := _parsed(place).definitions.get(name)) is not None:
+                parts.add(found)
+                waiting |= found.names - reached
+    return hashlib.sha256((told + "".join(sorted(part.digest for part in parts))).encode()).hexdigest()
+
+
+class _Part(NamedTuple):
+    """A piece of a module."""
+
+    digest: str
+    names: frozenset[str] = frozenset()
+    """What stands in its code as a global name or an attribute, or is imported there."""
+    is_entry: bool = False
+
+
+class _Module(NamedTuple):
+    definitions: dict[str, _Part]
+    """Functions, classes, values and what is imported, each by the name that it has in the module."""
+    other: _Part
+    """All other statements of the module's own level: they may set whatever they want, so that they always count."""
+
+
+@cache
+def _compiler_parts() -> frozenset[_Part]:
+    """All of the files that make code of kernels."""
+    modules = (_parsed(f"collide.{name[:-3].replace('/', '.')}") for name in COMPILER_SOURCES)
+    return frozenset(_Part(part.digest) for known in modules for part in (known.other, *known.definitions.values()))
+
+
+@cache
+def _parsed(module: str) -> _Module:
+    nodes: dict[str, list[ast.stmt]] = {}
+    other = []
+    for node in _tree(module).body:
+        named = _names_set_by(node)
+        for name, statement in named:
+            nodes.setdefault(name, []).append(statement)
+        if not named:
+            other.append(node)
+    definitions = {name: _part(module, found) for name, found in nodes.items()}
+    return _Module(definitions, _part(module, other))
+
+
+def _tree(module: str) -> ast.Module:
+    try:
+        return ast.parse(_text(module))
+    except SyntaxError:  # something typed in by hand
+        return ast.parse("")
+
+
+def _part(module: str, nodes: list[ast.stmt]) -> _Part:
+    """Statements as Python compiles them: without comments, docstrings and places in the file."""
+    import hashlib
+
+    code = compile(ast.Module(nodes, []), module, "exec", dont_inherit=True, optimize=2)
+    told: list = [module]
+    names: set[str] = set()
+    waiting = [code]
+    while waiting:
+        current = waiting.pop()
+        names.update(current.co_names)
+        inner = [constant for constant in current.co_consts if hasattr(constant, "co_code")]
+        told += [current.co_name, current.co_code.hex(), current.co_names, current.co_varnames, current.co_freevars]
+        told += [
+            sorted(map(repr, value)) if isinstance(value, frozenset) else repr(value)
+            for value in current.co_consts if not hasattr(value, "co_code")
+        ]  # fmt: skip
+        waiting += inner
+    return _Part(
+        hashlib.sha256(repr(told).encode()).hexdigest(), frozenset(names), is_entry=any(map(_is_entry, nodes))
+    )
+
+
+def _names_set_by(node: ast.stmt) -> list[tuple[str, ast.stmt]]:
+    """Names that a statement of a module does nothing but set, and what sets each; [] for any other statement."""
+    if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+        return [(node.name, node)]
+    if isinstance(node, ast.Import):
+        # `import collide.a.b as c`: what stands behind c is found by the names of its attributes
+        return [((alias.asname or alias.name).split(".")[0], node) for alias in node.names]
+    if isinstance(node, ast.ImportFrom) and node.module != "__future__":
+        alone = (ast.copy_location(ast.ImportFrom(node.module, [alias], node.level), node) for alias in node.names)
+        return [(alias.asname or alias.name, one) for alias, one in zip(node.names, alone)]
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+    found = [inner for target in targets for inner in (target.elts if isinstance(target, ast.Tuple) else [target])]
+    return [(one.id, node) for one in found if isinstance(one, ast.Name)] if _all_names(found) else []
+
+
+def _all_names(targets: list[ast.expr]) -> bool:
+    return all(isinstance(target, ast.Name) for target in targets)
+
+
+def _is_entry(node: ast.stmt) -> bool:
+    decorators = getattr(node, "decorator_list", ())
+    return any(isinstance(one, ast.Call) and getattr(one.func, "id", "") == "entry" for one in decorators)
 
 
 def _named(value):
@@ -88,16 +220,16 @@ def _reached(module: str) -> set[str]:
 
 @cache
 def _imported(module: str) -> tuple[str, ...]:
-    try:
-        tree = ast.parse(_text(module))
-    except SyntaxError:  # something typed in by hand
-        return ()
-    imported = []
-    for node in ast.walk(tree):
+    imported, waiting = [], [*_tree(module).body]
+    while waiting:
+        node = waiting.pop()
         if isinstance(node, ast.Import):
             imported += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
             imported += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        for field in ("body", "orelse", "finalbody", "handlers", "cases"):
+            inner = getattr(node, field, ())
+            waiting += inner if isinstance(inner, list) else ()
     # `collide` itself imports everything, and no kernel takes anything from there.
     return tuple(name for name in imported if name.startswith("collide.") and _may_matter(name))
 
