@@ -84,6 +84,12 @@ def about() -> dict[str, str]:
     }  # fmt: skip
 
 
+def entries() -> tuple[str, ...]:
+    """Names of the kernels that it has; () where there is none."""
+    built = _built()
+    return () if built is None else tuple(built.ENTRIES)
+
+
 def library_path() -> str:
     """The file of libcollide, whether or not this process uses it.
 

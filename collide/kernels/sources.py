@@ -11,7 +11,7 @@ import ast
 import os
 import sys
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -93,17 +93,24 @@ def _hash_of(module: str, names: tuple[str, ...], told: str = "") -> str:
     """Of the definitions of these names in a module, and of all that they reach."""
     import hashlib  # here: a start from the library need not load it
 
+    parts = {*_compiler_parts(), *definitions_reached(module, names).values()}
+    return hashlib.sha256((told + "".join(sorted(part.digest for part in parts))).encode()).hexdigest()
+
+
+def definitions_reached(module: str, names: Iterable[str]) -> dict[tuple[str, str], _Part]:
+    """Definitions of the package that code of these names in a module can reach, by module and name; under "" what
+    stands in a module beside definitions, where any of them is reached or imported from there."""
     modules = _reached(module)
-    parts = {*_compiler_parts(), *(_parsed(name).other for name in modules)}
-    waiting = {*names}.union(*(part.names for part in parts))
-    reached: set[str] = set()
+    waiting, found, reached = {module, *names}, {}, set[str]()
     while waiting:
         reached.add(name := waiting.pop())
-        for place in modules:
-            if (found := _parsed(place).definitions.get(name)) is not None:
-                parts.add(found)
-                waiting |= found.names - reached
-    return hashlib.sha256((told + "".join(sorted(part.digest for part in parts))).encode()).hexdigest()
+        added = [(name, "")] if name in modules else []
+        added += [(place, name) for place in modules if name in _parsed(place).definitions]
+        added += [(place, "") for place, _ in added]
+        for place, one in added:
+            found[place, one] = part = _parsed(place).definitions[one] if one else _parsed(place).other
+            waiting |= part.names - reached
+    return found
 
 
 class _Part(NamedTuple):

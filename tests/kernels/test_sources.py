@@ -5,7 +5,6 @@ from __future__ import annotations
 import builtins
 import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -87,94 +86,110 @@ def test_the_checksum_reads_each_source_once_and_nothing_else(copy, monkeypatch)
 
 # --- the hash of one kernel -------------------------------------------------------------------------
 
-#: Hashes of two entries, before and after some files are edited, a group of them at once, by paths in the package.
-HASHES = """
-import json, os, sys
+
+def forget() -> None:
+    for known in (sources._parsed, sources._imported, sources._compiler_parts):
+        known.cache_clear()
+
+
+@pytest.fixture()
+def hashes(copy, monkeypatch):
+    """Hashes of all entries, from the sources as they are in the copy at the time of the call."""
+
+    def file_of(module: str) -> Path | None:
+        relative = Path(*module.split(".")[1:])
+        places = (copy / relative.with_suffix(".py"), copy / relative / "__init__.py")
+        return next((place for place in places if module.startswith("collide.") and place.is_file()), None)
+
+    def read() -> dict[str, str]:
+        forget()
+        return sources.entry_hashes()
+
+    monkeypatch.setattr(sources, "_file", file_of)
+    yield read
+    forget()
+
+
+def changed_by(hashes, file: Path, old: str, new: str) -> set[str]:
+    """Entries whose hash changes with an edit of a file."""
+    before = hashes()
+    text = file.read_text(encoding="utf-8")
+    assert text.count(old) == 1, f"{old!r} is {text.count(old)} times in {file.name}"
+    file.write_text(text.replace(old, new), encoding="utf-8")
+    after = hashes()
+    file.write_text(text, encoding="utf-8")
+    assert set(before) == set(after) and hashes() == before
+    return {name for name in before if before[name] != after[name]}
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "stale", "fresh"),
+    [
+        # a function that another calls, of another file
+        ("support/support_mapping.py", "    return k\n", "    return 0\n", {"bounding_boxes"}, {"build_mesh"}),
+        # a function that few call
+        ("contact/reduce_points.py", "    n_taken = 1\n", "    n_taken = 3\n", {"contacts_single"}, {"answer_pairs"}),
+        # a number of a module
+        ("numerics/double_double.py", "2.0**-102", "2.0**-101", {"bound_motions"}, {"bounding_boxes"}),
+        # what makes code of all
+        ("kernels/back_end.py", "speed_level=0", "speed_level=1", {"answer_pairs", "build_mesh"}, set()),
+        # where a name comes from
+        ("narrowphase/pair_kernel.py", "annotations\n", "annotations\nimport collide.casts\n", set(), {"answer_pairs"}),
+    ],
+)  # fmt: skip
+def test_an_edit_makes_stale_what_reaches_it_and_nothing_else(copy, hashes, name, old, new, stale, fresh):
+    changed = changed_by(hashes, copy / name, old, new)
+    assert stale <= changed and not fresh & changed
+
+
+#: Functions that an entry reaches as Python finds them: globals of functions, and what functions hold, by module and
+#: name; beside them what the sources say.
+REACHED = """
+import importlib, json
 from pathlib import Path
-from collide.broadphase.bounding_boxes import bounding_boxes
 from collide.kernels import PLAIN_PYTHON, sources
-from collide.narrowphase.pair_kernel import answer_pairs
 
 assert PLAIN_PYTHON, "entries are functions"
 
-def hashes():
-    return [sources.of_function(entry) for entry in (bounding_boxes, answer_pairs)]
+def inner(code):
+    yield code
+    for constant in code.co_consts:
+        if hasattr(constant, "co_code"):
+            yield from inner(constant)
 
-first, found = hashes(), {}
-for names in json.loads(sys.argv[1]):
-    content = {name: (sources.PACKAGE / name).read_bytes() for name in names}
-    for name in names:
-        (sources.PACKAGE / name).write_bytes(content[name] + b"\\n")
-    told = [one != two for one, two in zip(first, hashes())]
-    found.update({name: told for name in names})
-    for name in names:
-        (sources.PACKAGE / name).write_bytes(content[name])
-assert hashes() == first
-print(json.dumps([first, found]))
+def reached(entry):
+    found, waiting = set(), [entry]
+    while waiting:
+        function = waiting.pop()
+        module = getattr(function, "__module__", None) or ""
+        if not hasattr(function, "__code__") or not module.startswith("collide.") or function in found:
+            continue
+        found.add(function)
+        names = {name for code in inner(function.__code__) for name in code.co_names}
+        waiting += [function.__globals__[name] for name in names if name in function.__globals__]
+        waiting += [cell.cell_contents for cell in function.__closure__ or ()]
+    return found
+
+modules = [sources._module_of(path) for path in sources._files_of_entries()]
+missing, count = [], 0
+for module in modules:
+    for name in (name for name, part in sources._parsed(module).definitions.items() if part.is_entry):
+        told = {*sources.definitions_reached(module, (name,))}
+        for function in reached(getattr(importlib.import_module(module), name)):
+            count += 1
+            outermost = function.__module__, function.__qualname__.split(".")[0]
+            if not outermost[0].startswith("collide.kernels") and outermost not in told:
+                missing.append((name, *outermost))
+print(json.dumps([count, missing]))
 """
 
 
-def hashes(site: Path, groups: list[list[str]]) -> tuple[list[str], dict[str, list[bool]]]:
-    done = child(["-c", HASHES, json.dumps(groups)], environment(site, NUMBA_DISABLE_JIT="1"))
+def test_every_function_that_python_finds_from_an_entry_is_in_its_hash():
+    """Read from the sources alone, the hash must see what Python's own look-up of names sees."""
+    done = child(["-c", REACHED], environment(PACKAGE.parent, NUMBA_DISABLE_JIT="1"))
     assert done.returncode == 0, done.stderr[-3000:]
-    first, found = json.loads(done.stdout)
-    return first, found
-
-
-def imported_by(module: str) -> set[str]:
-    """Files of the package that Python loads for a module, by running it."""
-    code = f"import sys, {module}\nfor m in list(sys.modules.values()): print(getattr(m, '__file__', None))"
-    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(PACKAGE.parent)}
-    said = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=60, check=True
-    ).stdout
-    files = (Path(line) for line in said.splitlines() if line.endswith(".py"))
-    return {file.relative_to(PACKAGE).as_posix() for file in files if file.is_relative_to(PACKAGE)}
-
-
-def test_an_edit_of_what_a_kernel_imports_makes_it_stale_and_no_other_does(tmp_path):
-    site = copied(tmp_path / "site")
-    names = sorted(file.relative_to(site / "collide").as_posix() for file in (site / "collide").rglob("*.py"))
-    kernels = set(sources.kernel_sources())
-    others = [name for name in names if name not in kernels]
-    _, found = hashes(site, [*([name] for name in names if name in kernels), others])
-    assert len(others) > 100 and not any(found[others[0]]), "an edit of what is no source of any kernel"
-    boxes, pairs = ({name for name, stale in found.items() if stale[k]} for k in range(2))
-    assert {
-        "broadphase/bounding_boxes.py",
-        "support/support_mapping.py",
-        "support/block_scan.py",
-        "kernels/vectors.py",
-    } <= boxes
-    assert {"narrowphase/pair_kernel.py", "narrowphase/epa/prove_facets.py", "numerics/double_double.py"} <= pairs
-    assert not {"narrowphase/pair_kernel.py", "mesh/build_bvh.py"} & boxes
-    elsewhere = {
-        name
-        for name in names
-        if name.split("/")[0] in ("world.py", "query.py", "manifolds", "reports", "meshes", "cli.py")
-    }
-    assert not elsewhere & pairs
-    # `collide` itself, and rooms' own files, which import nothing that kernels use, may be missing; and what only
-    # decides how kernels run.
-    deciding = {f"kernels/{name}.py" for name in ("jit", "library", "mode", "plain", "sources", "object_cache")} | {
-        "errors.py",
-        "log.py",
-        "cache_folder.py",
-    }
-    for module, stale in (("collide.broadphase.bounding_boxes", boxes), ("collide.narrowphase.pair_kernel", pairs)):
-        missing = {name for name in imported_by(module) - stale - deciding if not name.endswith("__init__.py")}
-        assert not missing, f"{module} imports what its kernels' hash does not see: {sorted(missing)}"
-
-
-def test_hashes_are_those_of_any_copy_and_process(tmp_path):
-    """So that kernels kept on disk are found again; and an edit of a function beside counts, being of the same file."""
-    one, two = copied(tmp_path / "one"), copied(tmp_path / "two")
-    first, _ = hashes(one, [])
-    assert hashes(two, [])[0] == first
-    boxes = two / "collide" / "broadphase" / "bounding_boxes.py"
-    boxes.write_text(boxes.read_text(encoding="utf-8") + "\n\ndef beside():\n    return 0\n", encoding="utf-8")
-    edited, _ = hashes(two, [])
-    assert edited[0] != first[0]
+    count, missing = json.loads(done.stdout)
+    assert count > 3000 and not missing, missing[:10]
 
 
 def of_lines(k: int):
