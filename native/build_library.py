@@ -4,7 +4,7 @@ Where there is no C compiler, or it cannot link, the package is installed withou
 compiles kernels at their first call. ``COLLIDE_REQUIRE_COMPILED=1``, as for releases, makes that an error.
 
     COLLIDE_REQUIRE_COMPILED=1    no library, no installation
-    COLLIDE_LEVELS="v3"           only these levels of processors, for a faster build on one's own machine
+    COLLIDE_LEVELS="v3 v4"        these levels of processors, or "all", as for releases; by default this machine's alone
     COLLIDE_NO_LIBRARY=1          none, on purpose: a pure wheel
 """
 
@@ -17,9 +17,12 @@ import sys
 import sysconfig
 import tempfile
 import zlib
-from contextlib import suppress
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import backend
+import describe_kernels
+from compile_kernels import say
 from setuptools import Extension
 from setuptools.command.build_ext import build_ext
 
@@ -59,7 +62,7 @@ def why_not() -> str:
             "apt install gcc, dnf install gcc, xcode-select --install, or the Build Tools of Visual Studio"
         )
     if reason:
-        _say_loudly(
+        say(
             f"*** collide: NO COMPILED KERNELS: {reason}. The package will need numba, and compile kernels at their "
             "first call "
             "(half a minute). Install a C compiler, then collide-robotics again; `collide doctor` tells. ***"
@@ -111,8 +114,9 @@ class BuildLibrary(build_ext):
         library, module = place / "lib" / LIBRARY, Path(self.get_ext_fullpath(ext.name))
         for folder in (library.parent, module.parent):
             folder.mkdir(parents=True, exist_ok=True)
-        _say(f"linking {LIBRARY}")
-        self._link([*self._compiled(C_SOURCES, generated), *made["objects"].values()], library, _exported())
+        say(f"linking {LIBRARY}")
+        kernels = [file for files in made["objects"].values() for file in files]
+        self._link([*self._compiled(C_SOURCES, generated), *kernels], library, _exported())
         self._link(self._compiled(["python_module.c"], generated), module, ["PyInit__glue"], calls_python=True)
         self._write_interface(place)
         _write_about(place, [library, module], made)
@@ -189,18 +193,14 @@ class BuildLibrary(build_ext):
 
 
 def _compiled_kernels() -> dict:
-    """As `compile_kernels.compile_kernels` makes them, in a process of its own: it imports the package."""
+    """As they came with the source archive, or as `compile_kernels.compile_kernels` makes them, in a process of its
+    own: it imports the package."""
     import json
 
-    levels = os.environ.get("COLLIDE_LEVELS", "").split()
-    command = [
-        sys.executable,
-        str(NATIVE / "compile_kernels.py"),
-        "--out",
-        str(BUILD),
-        "--json",
-        *(["--levels", *levels] if levels else []),
-    ]
+    levels = os.environ.get("COLLIDE_LEVELS", "").strip()
+    if (ready := backend.emitted(levels)) is not None:
+        return ready
+    command = [sys.executable, str(NATIVE / "compile_kernels.py"), "--out", str(BUILD), "--levels", levels, "--json"]
     done = subprocess.run(command, stdout=subprocess.PIPE, check=False)
     if done.returncode:
         raise SystemExit("collide: kernels could not be compiled: see above")
@@ -208,9 +208,6 @@ def _compiled_kernels() -> dict:
 
 
 def _generate(folder: Path, entries, levels: list[str]) -> None:
-    sys.path.insert(0, str(NATIVE))
-    import describe_kernels
-
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "kernels.h").write_text(describe_kernels.table(entries, levels), encoding="utf-8")
     (folder / "entries.inc").write_text(describe_kernels.python_functions(entries), encoding="utf-8")
@@ -239,15 +236,3 @@ def _write_about(place: Path, files: list[Path], made: dict) -> None:
         f"#: Sizes and checksums of files.\nFILES = {known!r}\n",
         encoding="utf-8",
     )
-
-
-def _say_loudly(what: str) -> None:
-    """On stderr, and where that is not shown to anybody, as pip does, on the terminal itself."""
-    print(what, file=sys.stderr, flush=True)
-    if not sys.stderr.isatty():
-        with suppress(OSError), open("/dev/tty", "w", encoding="utf-8") as terminal:
-            terminal.write(f"\n{what}\n")
-
-
-def _say(what: str) -> None:
-    print(f"collide: {what} ...", file=sys.stderr, flush=True)

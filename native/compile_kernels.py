@@ -1,28 +1,27 @@
-"""Compile all kernels ahead of time: object files of the entries per processor level, and C text that names them.
+"""Compile kernels ahead of time: an object file for each link unit and level of processors.
 
-    python native/compile_kernels.py --out build/kernels
-    python native/compile_kernels.py --out build/kernels --levels v3          # one level only, for a try
-    python native/compile_kernels.py --out /tmp/arm --triple aarch64-unknown-linux-gnu
+    python native/compile_kernels.py                       # for this processor's level, into build/kernels
+    python native/compile_kernels.py --levels all          # for all levels of the platform, as releases have them
+    python native/compile_kernels.py --out arm --triple aarch64-unknown-linux-gnu
 
-Needs numba and llvmlite, no C compiler. The front end runs once, for all levels; its result is kept in the folder,
-under the
-checksum of what it was made from, and so are the object files: a second call does nothing. The same sources and
-    versions
-give the same bytes.
+Needs numba and llvmlite, no C compiler. Link units are compiled in parallel, each in a process of its own. Files are
+kept under a hash of the code that they are made from: a second call compiles the units that an edit concerns. The same
+sources and versions give the same bytes.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import importlib
 import json
+import multiprocessing
 import os
 import platform
 import sys
 import time
-import zlib
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -51,20 +50,69 @@ ARM = (Level("arm64", "generic"),)
 APPLE = (Level("arm64", "apple-m1"),)
 
 
-def levels_of(triple: str) -> tuple[Level, ...]:
-    """The levels of a platform. Raises SystemExit where there are none."""
+#: Link units, those that take longest first, and the beginnings of the names of their modules in `collide`: kernels
+#: that share what they call stand together.
+UNITS = {
+    "convex": ("narrowphase.",),
+    "contacts": ("contact.",),
+    "papers": ("hierarchies.", "polytopes.", "tetrahedra.", "least_distance."),
+    "facets": ("narrowphase.facets.",),
+    "motion": ("casts.", "motion."),
+    "exact": ("narrowphase.exact.",),
+    "worlds": ("broadphase.", "robots.", "support.", "numerics."),
+    "meshes": ("mesh.", "solids.", "hull."),
+}
+
+
+def unit_of(module: str) -> str:
+    """The link unit of an entry's module: that with the longest beginning of its name."""
+    name = module.removeprefix("collide.")
+    found = [(len(start), unit) for unit, starts in UNITS.items() for start in starts if name.startswith(start)]
+    if not found:
+        raise SystemExit(f"{module} defines an entry, and UNITS of native/compile_kernels.py has no link unit for it")
+    return max(found)[1]
+
+
+def levels_of(triple: str, wanted: str = "") -> tuple[Level, ...]:
+    """Levels of a platform. wanted : names, "all", or "" for that of this machine, where it is of the platform.
+
+    Raises SystemExit where there are none.
+    """
     machine = triple.split("-")[0]
     if machine in ("x86_64", "amd64"):
-        return X86
-    if machine in ("aarch64", "arm64"):
-        return APPLE if "apple" in triple else ARM
-    raise SystemExit(f"kernels cannot be compiled for {triple}: known are x86_64, aarch64 and arm64")
+        levels: tuple[Level, ...] = X86
+    elif machine in ("aarch64", "arm64"):
+        levels = APPLE if "apple" in triple else ARM
+    else:
+        raise SystemExit(f"kernels cannot be compiled for {triple}: known are x86_64, aarch64 and arm64")
+    names = [level.name for level in levels]
+    if wanted == "all" or (not wanted and machine != platform.machine().lower()):
+        return levels
+    chosen = wanted.replace(",", " ").split() or [_own_level(names)]
+    if strange := [name for name in chosen if name not in names]:
+        raise SystemExit(f"COLLIDE_LEVELS: {strange[0]!r} is no level of {machine}; it has {', '.join(names)}, and all")
+    return tuple(level for level in levels if level.name in chosen)
+
+
+def _own_level(names: list[str]) -> str:
+    """The best of these levels that this processor has, as `levels.h` decides it."""
+    if len(names) == 1:
+        return names[0]
+    import llvmlite.binding as llvm
+
+    has = llvm.get_host_cpu_features()
+    needs = {
+        "v4": ("avx512f", "avx512dq", "avx512cd", "avx512bw", "avx512vl"),
+        "v3": ("fma", "movbe", "avx", "f16c", "bmi", "avx2", "bmi2", "lzcnt"),
+    }
+    return next((name for name, features in needs.items() if all(has.get(one) for one in features)), "v2")
 
 
 class Compiled(NamedTuple):
     """What was made."""
 
-    objects: dict[str, Path]
+    objects: dict[str, list[Path]]
+    """By level."""
     entries: list[tuple[str, str, bool]]
     """(name, Numba's signature, whether Python's lock is let go), in the order of the table."""
     versions: str
@@ -75,42 +123,70 @@ class Compiled(NamedTuple):
     """`sources.entry_hashes`."""
 
 
-def compile_kernels(out: Path, triple: str = "", levels: tuple[str, ...] = (), jobs: int | None = None) -> Compiled:
-    """Object files of all entries in ``out``, made where they are not there yet."""
+def compile_kernels(out: Path, triple: str = "", levels: str = "", jobs: int | None = None) -> Compiled:
+    """Object files of all entries in ``out``, made where they are not there yet. levels : as in `levels_of`."""
     os.environ["COLLIDE_JIT"] = "1"  # whatever library lies in the checkout
     os.environ.pop("NUMBA_DISABLE_JIT", None)
     sys.path.insert(0, str(ROOT))
-    with told("importing the kernels"):
-        entries = _entries()
+    begun = time.perf_counter()
+    say("importing the kernels")
+    entries = _entries()
     import llvmlite.binding as llvm
 
     from collide.kernels import sources
 
     triple = triple or llvm.get_process_triple()
-    wanted = [level for level in levels_of(triple) if not levels or level.name in levels]
-    if not wanted:
-        raise SystemExit(f"--levels: none of {levels} is among {[level.name for level in levels_of(triple)]}")
-    names = sources.kernel_sources()
-    fingerprint, described = sources.fingerprint(names), _described(entries)
-    made_from = f"{fingerprint:08x} {sources.compiler_versions()} {zlib.crc32(Path(__file__).read_bytes()):08x}"
-    out.mkdir(parents=True, exist_ok=True)
-    bitcode = out / "kernels.bc"
-    _forget_others(out, made_from)
-    if not bitcode.exists():
-        _front(entries, bitcode)
-    called = [name for name, _, _ in described]
-    objects = {level.name: out / f"kernels-{triple}-{level.name}.o" for level in wanted}
-    missing = [level for level in wanted if not objects[level.name].exists()]
-    with ProcessPoolExecutor(jobs or min(len(missing) or 1, os.cpu_count() or 1)) as pool:
-        waiting = [pool.submit(_back, called, bitcode, level, triple, objects[level.name]) for level in missing]
-        for one in waiting:
-            one.result()
-    hashes = sources.entry_hashes()
-    if strange := set(hashes) ^ set(called):
+    chosen, names, hashes = levels_of(triple, levels), sources.kernel_sources(), sources.entry_hashes()
+    described = [(entry.__name__, entry.signature, entry.nogil) for entry in entries]
+    if strange := set(hashes) ^ {entry.__name__ for entry in entries}:
         raise SystemExit(f"entries whose sources were not found, or the other way round: {', '.join(sorted(strange))}")
-    return Compiled(objects, described, sources.compiler_versions(), fingerprint, names, hashes)
+    out.mkdir(parents=True, exist_ok=True)
+    tasks = [_Task(unit, triple, chosen, out, _made_from(unit, hashes, sources.compiler_versions())) for unit in UNITS]
+    missing = [task for task in tasks if not all(task.place(level).exists() for level in task.levels)]
+    if missing:
+        counts = f"{len(missing)} of {len(tasks)} link units for {', '.join(level.cpu for level in chosen)}"
+        say(f"compiling {counts}: {', '.join(task.unit for task in missing)} (about a minute for all on two cores)")
+        with multiprocessing.Pool(min(jobs or os.cpu_count() or 1, len(missing)), maxtasksperchild=1) as pool:
+            for done, (unit, seconds) in enumerate(pool.imap_unordered(_make, missing, chunksize=1), 1):
+                say(f"{done} of {len(missing)}: {unit}, {seconds:.0f} s")
+    _forget_others(out, tasks)
+    say(f"machine code of {len(entries)} kernels: {time.perf_counter() - begun:.0f} s")
+    objects = {level.name: [task.place(level) for task in tasks] for level in chosen}
+    return Compiled(objects, described, sources.compiler_versions(), sources.fingerprint(names), names, hashes)
 
 
+class _Task(NamedTuple):
+    """A link unit to be compiled."""
+
+    unit: str
+    triple: str
+    levels: tuple[Level, ...]
+    out: Path
+    made_from: str
+
+    def place(self, level: Level) -> Path:
+        return self.out / f"{self.unit}-{self.triple}-{level.name}-{self.made_from}.o"
+
+
+def _made_from(unit: str, hashes: dict[str, str], versions: str) -> str:
+    """A hash of all that a unit's machine code depends on."""
+    own = sorted((entry.__name__, entry.signature, hashes[entry.__name__]) for entry in _entries_of(unit))
+    return hashlib.sha256(repr((own, versions, X86, ARM, APPLE)).encode()).hexdigest()[:16]
+
+
+def _entries_of(unit: str) -> list:
+    return [entry for entry in _entries() if unit_of(entry.function.__module__) == unit]
+
+
+def _forget_others(out: Path, tasks: list[_Task]) -> None:
+    """Delete what was made from other sources, or by other versions."""
+    for task in tasks:
+        for file in (*out.glob(f"{task.unit}-*.o"), *out.glob(f"{task.unit}-*.bc")):
+            if not file.stem.endswith(task.made_from):
+                file.unlink()
+
+
+@cache
 def _entries() -> list:
     """All entries of the package, in the order of their modules' names and of the lines in them."""
     from collide.kernels import jit
@@ -130,22 +206,24 @@ def _entries() -> list:
     return entries
 
 
-def _described(entries) -> list[tuple[str, str, bool]]:
-    return [(entry.__name__, entry.signature, entry.nogil) for entry in entries]
+def _make(task: _Task) -> tuple[str, float]:
+    """Numba's part of a unit, kept for further levels, and LLVM's for each level. (unit, seconds)."""
+    from collide.kernels.back_end import Target, machine_code
+
+    begun = time.perf_counter()
+    bitcode = task.out / f"{task.unit}-{task.made_from}.bc"
+    if not bitcode.exists():
+        _write(bitcode, _lowered(task.unit))
+    names = [entry.__name__ for entry in _entries_of(task.unit)]
+    for level in task.levels:
+        if not task.place(level).exists():
+            target = Target(level.cpu, level.features, task.triple, level.function_passes)
+            code = machine_code(names, [bitcode.read_bytes()], target, prefix=f"collide_{level.name}_")
+            _write(task.place(level), code)
+    return task.unit, time.perf_counter() - begun
 
 
-def _forget_others(out: Path, made_from: str) -> None:
-    """Delete what was made from other sources, or by other versions."""
-    note = out / "made-from.txt"
-    if note.exists() and note.read_text(encoding="utf-8") == made_from:
-        return
-    for file in (*out.glob("kernels*.o"), *out.glob("kernels.bc")):
-        file.unlink()
-    note.write_text(made_from, encoding="utf-8")
-
-
-def _front(entries, bitcode: Path) -> None:
-    """Numba's part, once for all levels."""
+def _lowered(unit: str) -> bytes:
     import gc
 
     from collide.kernels.back_end import joined
@@ -153,20 +231,9 @@ def _front(entries, bitcode: Path) -> None:
 
     code = Lowered()
     gc.disable()  # hundreds of megabytes of syntax trees live to the end anyway
-    with told(f"lowering {len(entries)} entries") as tell:
-        for k, entry in enumerate(entries):
-            tell(f"lowering {len(entries)} entries: {k + 1}, {entry.__name__}")
-            code.add(entry.__name__, entry.function, entry.signature)
-    gc.enable()
-    _write(bitcode, joined(code.modules))
-
-
-def _back(names: list[str], bitcode: Path, level: Level, triple: str, place: Path) -> None:
-    from collide.kernels.back_end import Target, machine_code
-
-    target = Target(level.cpu, level.features, triple, level.function_passes)
-    with told(f"machine code for {level.cpu}"):
-        _write(place, machine_code(names, [bitcode.read_bytes()], target, prefix=f"collide_{level.name}_"))
+    for entry in _entries_of(unit):
+        code.add(entry.__name__, entry.function, entry.signature)
+    return joined(code.modules)
 
 
 def _write(place: Path, content: bytes) -> None:
@@ -175,49 +242,30 @@ def _write(place: Path, content: bytes) -> None:
     part.replace(place)
 
 
-@contextmanager
-def told(what: str):
-    """Say what begins, how it goes on where somebody looks, and how long it took."""
-    begun = time.perf_counter()
-    print(f"collide: {what} ...", file=sys.stderr, flush=True)
-
-    def tell(label: str) -> None:
-        if sys.stderr.isatty():
-            print(
-                f"\r\x1b[2Kcollide: {label} ({time.perf_counter() - begun:.0f} s)", end="", file=sys.stderr, flush=True
-            )
-
-    yield tell
-    end = "\r\x1b[2K" if sys.stderr.isatty() else ""
-    print(f"{end}collide: {what}: done in {time.perf_counter() - begun:.1f} s", file=sys.stderr, flush=True)
+def say(what: str) -> None:
+    """On stderr; and where that is no terminal, as under pip, which hides what builds say, on the terminal itself."""
+    print(f"collide: {what}", file=sys.stderr, flush=True)
+    if not sys.stderr.isatty():
+        with suppress(OSError), open("/dev/tty", "w", encoding="utf-8") as terminal:
+            terminal.write(f"\r\x1b[2Kcollide: {what}\n")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "kernels", help="folder of the object files")
     parser.add_argument("--triple", default="", help="LLVM's name of the platform, by default this one")
-    parser.add_argument("--levels", nargs="*", default=(), help="levels of the platform, by default all: v2 v3 v4")
-    parser.add_argument("--jobs", type=int, help="levels worked on at once, by default one a processor")
+    parser.add_argument("--levels", default="", help="v2, v3, v4, several of them, or all; by default this processor's")
+    parser.add_argument("--jobs", type=int, help="link units compiled at once, by default one a processor")
     parser.add_argument("--json", action="store_true", help="tell what was made as JSON")
     given = parser.parse_args()
-    made = compile_kernels(given.out, given.triple, tuple(given.levels), given.jobs)
+    made = compile_kernels(given.out, given.triple, given.levels, given.jobs)
     if given.json:
-        paths = {level: str(place) for level, place in made.objects.items()}
-        print(
-            json.dumps(
-                {
-                    "objects": paths,
-                    "entries": made.entries,
-                    "versions": made.versions,
-                    "sources": made.sources,
-                    "source_files": made.source_files,
-                    "hashes": made.hashes,
-                }
-            )
-        )
+        objects = {level: [str(place) for place in places] for level, places in made.objects.items()}
+        print(json.dumps({**made._asdict(), "objects": objects}))
         return
-    for level, place in made.objects.items():
-        print(f"{level}: {place}, {place.stat().st_size / 1e6:.2f} MB, {platform.machine()}")
+    for level, places in made.objects.items():
+        size = sum(place.stat().st_size for place in places)
+        print(f"{level}: {len(places)} files in {given.out}, {size / 1e6:.2f} MB")
 
 
 if __name__ == "__main__":

@@ -15,16 +15,17 @@ chosen=("$@")
     tests/narrowphase/facets/test_surface_distance.py tests/contact/test_mesh_contacts.py
 )
 if [ -z "${WHEEL:-}" ]; then
-    echo "building the wheel (two minutes)"
+    echo "building the wheel (a minute)"
     COLLIDE_REQUIRE_COMPILED=1 python -m pip wheel --quiet --no-deps --wheel-dir "$work" .
     WHEEL=$(echo "$work"/*.whl)
 fi
+WHEEL=$(realpath "$WHEEL")
 cp -r tests "$work/tests"
 echo "wheel: $(basename "$WHEEL"), $(stat -c %s "$WHEEL" 2>/dev/null || stat -f %z "$WHEEL") bytes"
 
 # Every python3.X on the path, and those of pyenv.
 found() {
-    for version in ${PYTHONS:-3.10 3.11 3.12 3.13 3.14}; do
+    for version in ${PYTHONS:-3.10 3.11 3.12 3.13 3.14 3.15}; do
         for candidate in "python$version" "${PYENV_ROOT:-$HOME/.pyenv}"/versions/"$version".*/bin/python; do
             if "$candidate" -c 'import sys; sys.exit("%d.%d" % sys.version_info[:2] != "'"$version"'")' 2>/dev/null; then
                 echo "$candidate"
@@ -33,15 +34,14 @@ found() {
         done
     done
 }
-failed=0
-for python in $(found); do
-    name=$("$python" -c 'import platform; print(platform.python_version())')
-    environment="$work/$name"
-    "$python" -m venv "$environment"
-    "$environment/bin/python" -m pip install --quiet --disable-pip-version-check "$WHEEL" pytest hypothesis
-    (
-        cd "$work"
-        "$environment/bin/python" - <<'PYTHON'
+# A process of its own for each Python: within `( … ) || …` a failing command would not end the commands after it.
+cat > "$work/one.sh" <<'SHELL'
+set -euo pipefail
+python=$1 environment=$2 wheel=$3
+shift 3
+"$python" -m venv "$environment"
+"$environment/bin/python" -m pip install --quiet --disable-pip-version-check "$wheel" pytest hypothesis
+"$environment/bin/python" - <<'PYTHON'
 import sys, time
 started = time.perf_counter()
 import collide
@@ -51,11 +51,19 @@ seconds = time.perf_counter() - started
 import numpy
 from collide.kernels import mode
 compilers = [name for name in sys.modules if name.startswith(("numba", "llvmlite"))]
-assert hit is False and not compilers, (hit, compilers)
-print(f"Python {sys.version.split()[0]}, numpy {numpy.__version__}: kernels {mode.told()}, import to first boolean {seconds:.3f} s")
+assert mode.MODE == mode.COMPILED and hit is False and not compilers, (mode.describe_mode(), hit, compilers)
+print(f"Python {sys.version.split()[0]}, numpy {numpy.__version__}: kernels {mode.describe_mode()}, "
+      f"import to first boolean {seconds:.3f} s")
 PYTHON
-        # Not `python -m pytest`: that would put this folder on the path.
-        "$environment/bin/pytest" -q --import-mode=importlib -p no:cacheprovider "${chosen[@]}" | tail -n 1
-    ) || failed=1
+# Not `python -m pytest`: that would put this folder on the path.
+"$environment/bin/pytest" -q --import-mode=importlib -p no:cacheprovider "$@" | tail -n 1
+SHELL
+tried=0 failed=()
+for python in $(found); do
+    name=$("$python" -c 'import platform; print(platform.python_version())')
+    (cd "$work" && exec bash one.sh "$python" "$work/$name" "$WHEEL" "${chosen[@]}") || failed+=("$name")
+    tried=$((tried + 1))
 done
-exit $failed
+if [ $tried = 0 ]; then echo "no Python of ${PYTHONS:-3.10 to 3.15} on this machine"; exit 1; fi
+if [ ${#failed[@]} -gt 0 ]; then echo "failed under Python ${failed[*]}"; exit 1; fi
+echo "passed under all $tried"

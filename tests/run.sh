@@ -10,6 +10,6 @@ tests=(python -m pytest -n auto --maxprocesses 4 --dist loadfile)
 status=0
 "${tests[@]}" "$@" || status=$?
 of_own=0
-COLLIDE_JIT=1 "${tests[@]}" -m own_kernels "$@" || of_own=$?
+COLLIDE_JIT=1 "${tests[@]}" -m "own_kernels and not slow" "$@" || of_own=$?
 if [[ $of_own == 5 && $# -gt 0 ]]; then of_own=0; fi # none among the tests that were named
 exit $((status ? status : of_own))

@@ -148,6 +148,7 @@ def test_entries_of_one_name_are_refused(monkeypatch):
 
     finish_rows.__module__ = "collide.somewhere_else"
     jit.entry("int64(int64, int64)")(finish_rows)
+    compile_kernels._entries.cache_clear()
     with pytest.raises(SystemExit, match="two entries have one name: finish_rows"):
         compile_kernels._entries()
 
