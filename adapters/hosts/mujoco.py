@@ -22,7 +22,7 @@ import numpy as np
 
 from collide import World
 from collide.adapters.hosts.mujoco_geoms import Model, ModelTables, geom_shapes
-from collide.adapters.hosts.mujoco_layout import OURS, Layout, N, host
+from collide.adapters.hosts.mujoco_layout import BOX, OURS, Layout, N, host
 from collide.adapters.hosts.mujoco_limits import max_contacts
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.kernels.library import library_path
@@ -56,7 +56,9 @@ def install(models: Any, mode: Literal["contacts", "cull"] = "contacts") -> Inst
     InvalidArgument : no model, or no such mode.
     InvalidShape : a geom whose numbers make no shape, by its name.
     MissingExtra : mujoco is not installed.
-    UnsupportedQuery : MuJoCo's version is not understood, or collide runs without its compiled library.
+    UnsupportedQuery : MuJoCo's version is not understood, or collide runs without its compiled library; or MuJoCo is
+        older than 3.6, and models are installed in the other mode: it drops some contacts of two boxes only while its
+        own function stands in the table, where "cull" leaves it and "contacts" cannot.
 
     Notes
     -----
@@ -89,6 +91,7 @@ class Installed:
         self._numbers: list[int] = []
         self.remaining: dict[tuple[int, int], str] = {}
         with _lock:
+            _refuse_both_modes(mode)
             self._add()
             _installed.append(self)
 
@@ -122,7 +125,7 @@ class Installed:
         library = _library()
         tables = [ModelTables(model, self._mode == "cull") for model in self._models]
         if not library.collide_mujoco_hooked():
-            _hook()
+            _hook(self._mode)
         try:
             for made in tables:
                 number = library.collide_mujoco_add(ctypes.byref(made.made))
@@ -169,12 +172,24 @@ def _library() -> ctypes.CDLL:
     return library
 
 
-def _hook() -> None:
+def _refuse_both_modes(mode: str) -> None:
+    others = {other._mode for other in _installed} - {mode}
+    if others and host().drops_of_boxes:
+        raise UnsupportedQuery(
+            f"install: mode {mode!r} while models are installed in mode {others.pop()!r}: MuJoCo "
+            f"{host().mujoco.__version__} drops some contacts of two boxes only while its own function stands in its "
+            "table, so that modes exclude each other; uninstall the others first, or use MuJoCo 3.6 or later"
+        )
+
+
+def _hook(mode: str) -> None:
     loaded = host()
     max_contacts((0, 0))  # a version that does not tell is refused here
     replaced = np.zeros((N, N), dtype=np.uint8)
     for i in OURS:
         replaced[i, [j for j in OURS if i <= j]] = 1
+    if mode == "cull" and loaded.drops_of_boxes:  # culling leaves two boxes to MuJoCo in any version: nothing is lost
+        replaced[BOX, BOX] = 0
     error = ctypes.cast(loaded.library.mju_error, ctypes.c_void_p)
     if _library().collide_mujoco_hook(ctypes.byref(loaded.layout), loaded.table, replaced.ctypes.data, error):
         # All our functions were overwritten by somebody since: begin again on what stands there now.
