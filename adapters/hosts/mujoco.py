@@ -27,7 +27,7 @@ from collide.adapters.hosts.mujoco_limits import max_contacts
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.kernels.library import library_path
 from collide.kernels.mode import COMPILED, MODE, WHY
-from collide.scenes.loaders.mjcf_pairs import filtered
+from collide.scenes.loaders.mjcf_pairs import REASONS, filtered
 
 MODES = ("contacts", "cull")
 _FLOOR = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
@@ -235,8 +235,8 @@ def world(model: Any, data: Any = None) -> World:
     Returns
     -------
     World : bodies named as the geoms, or "geom 7"; those that are fixed to the world are static. Pairs that MuJoCo
-    never tests are allowed: of one body, of a body and its parent, excluded, or by contype and conaffinity. Signed
-    distance fields are left out.
+    never tests are allowed: of one body, of a body and its parent, excluded, or by contype and conaffinity; all,
+    where the model's option turns contacts or constraints off. Signed distance fields are left out.
 
     Raises
     ------
@@ -253,7 +253,9 @@ def world(model: Any, data: Any = None) -> World:
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
     shapes, rows, _ = geom_shapes(model)
-    geoms = np.flatnonzero((rows >= 0) & ((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
+    collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    collides[[*model.pair_geom1.tolist(), *model.pair_geom2.tolist()]] = True
+    geoms = np.flatnonzero((rows >= 0) & collides)
     out = World()
     welded = model.body_weldid[model.geom_bodyid]
     for geom in geoms.tolist():
@@ -261,7 +263,8 @@ def world(model: Any, data: Any = None) -> World:
         X_WG[:3, :3], X_WG[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
         out.add(shapes[rows[geom]], X_WG, name=model.geom(geom).name or f"geom {geom}", static=bool(welded[geom] == 0))
     if len(geoms):
-        never = filtered(model, geoms) != 0
-        np.fill_diagonal(never, False)
-        out.allow(never, reason="never tested by MuJoCo")
+        codes = filtered(model, geoms)
+        np.fill_diagonal(codes, 0)
+        for code in np.unique(codes[codes > 0]).tolist():
+            out.allow(codes == code, reason=f"never tested by MuJoCo: {REASONS[code]}")
     return out
