@@ -241,5 +241,5 @@ def _drops_of_boxes(mujoco, table) -> bool:
         return found
 
     alone = counts()
-    with instead(table, index, lambda *asked: handed_on(*asked)):  # noqa: PLW0108 - another address is the point
+    with instead(table, index, lambda *asked: handed_on(*asked)):
         return counts() != alone

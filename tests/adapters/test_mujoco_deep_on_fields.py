@@ -1,4 +1,4 @@
-"""Bodies deep in height fields of MuJoCo, on collide: fields that are planes push as planes do, however small their cells.
+"""Bodies deep in height fields of MuJoCo, on collide: fields that are planes push as planes do, of cells of any size.
 
 Judges: supports written out here, and MuJoCo's own plane. Skipped where MuJoCo is not installed.
 """
@@ -118,7 +118,7 @@ def test_fields_that_are_planes_push_as_planes(kind):
 
 
 def test_faces_that_lie_level_have_all_their_corners():
-    """A box that is sunk into a level field by a fifth of its height to more than all of it: as deep at four corners."""
+    """A box sunk into a level field by a fifth of its height to more than all of it: as deep at four corners."""
     half = np.array([0.02, 0.03, 0.015])
     n_sunk = 0
     for n in (5, 21, 41, 81):
@@ -165,8 +165,8 @@ def test_balls_are_pushed_through_their_middle():
 
 @pytest.mark.parametrize("slope", [(0.0, 0.0), (0.05, -0.03)])
 def test_balls_that_are_dropped_do_as_on_a_plane(slope):
-    """From half a metre above, on cells of 2 to 0.5 cm, which the ball sinks into beyond its middle: for a second it moves as
-    on MuJoCo's own plane, which is installed nowhere.
+    """From half a metre above, on cells of 2 to 0.5 cm, which the ball sinks into beyond its middle: for a second it
+    moves as on MuJoCo's own plane, which is installed nowhere.
     """
     n_sunk = 0
     plane, N = model_of("sphere", 2, None, slope)
