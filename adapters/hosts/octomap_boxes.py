@@ -33,7 +33,7 @@ def octomap_file(data: bytes) -> OctomapFile:
     """The header of a whole file, read. Raises InvalidArgument, saying what is wrong with it."""
     if data.startswith(_FULL):
         raise InvalidArgument(
-            "OcTree: a file with probabilities (.ot) is not read; write the binary form (.bt), by octomap's writeBinary "
+            "OcTree: a file with probabilities (.ot) is not read; write the binary form (.bt) by octomap's writeBinary "
             "or convert_octree"
         )
     if not data.startswith(_BINARY):
