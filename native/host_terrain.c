@@ -116,9 +116,7 @@ static int are_linked(const struct terrain_facet *one, const struct terrain_face
     return 0;
 }
 
-/* Whether contacts that are known say all of a facet: it is apart along one of their normals; or it lies beside the facet of one, or on
-   its plane, and is no deeper along its normal. Then it may add points along that. */
-static int is_accounted_for(const struct task *task, const struct terrain_facet *facet)
+int is_accounted_for(const struct task *task, const struct terrain_facet *facet)
 {
     const struct terrain_space *own = task->own;
     double tolerance = task->tolerance;

@@ -29,12 +29,17 @@ static int keep_near(struct terrain_space *own, const struct terrain_facet *face
 
 int find_near(const struct terrain_pair *pair, const struct terrain_body *body, double margin, struct terrain_space *own)
 {
+    if (own != NULL) own->n_near = 0;
+    return add_near(pair, body, margin, own);
+}
+
+int add_near(const struct terrain_pair *pair, const struct terrain_body *body, double margin, struct terrain_space *own)
+{
     const struct terrain *terrain = pair->terrain;
     int64_t n_rows = terrain->n_rows - 1, n_columns = terrain->n_columns - 1, i, j, i_first, i_last, j_first, j_last;
     double length = sqrt(terrain->dx * terrain->dx + terrain->dy * terrain->dy), highest, lowest, needed;
     double diagonal[3] = {-terrain->dy / length, terrain->dx / length, 0.0};
     margin += 1e-9 * (body->reach + terrain->size[0] + terrain->size[1] + terrain->size[2] + terrain->size[3]);
-    if (own != NULL) own->n_near = 0;
     if (body->low[0] > terrain->size[0] + margin || body->high[0] < -terrain->size[0] - margin ||
         body->low[1] > terrain->size[1] + margin || body->high[1] < -terrain->size[1] - margin ||
         body->low[2] > terrain->size[2] + margin || body->high[2] < -terrain->size[3] - margin)

@@ -86,6 +86,8 @@ static inline void point_from_world(const double *X_WH, const double p[3], doubl
 /* host_terrain_near.c: facets that no direction tried there proves to be farther from the body than `margin`, into own->near; where own
    is NULL, 1 at the first of them. -1 where there is no memory. */
 int find_near(const struct terrain_pair *pair, const struct terrain_body *body, double margin, struct terrain_space *own);
+/* The same, behind those that are in own->near. */
+int add_near(const struct terrain_pair *pair, const struct terrain_body *body, double margin, struct terrain_space *own);
 
 /* host_terrain_prisms.c: have the second body, once a question, and the prism below a facet take their places in the workspace. */
 void take_body(const struct task *task);
@@ -96,6 +98,10 @@ int way_out_of_hull(const struct task *task, double n[3]);
 /* host_terrain.c: what a body shows along a normal over the facet that is taken. point_a, point_b : NULL, or nearest points, `distance`
    apart. */
 void add_manifold(const struct task *task, const double n[3], const double *point_a, const double *point_b, double distance);
+
+/* host_terrain.c: whether contacts that are known say all of a facet: it is apart along one of their normals; or it lies beside the facet
+   of one, or on its plane, and is no deeper along its normal. Then it may add points along that. */
+int is_accounted_for(const struct task *task, const struct terrain_facet *facet);
 
 /* host_terrain_deep.c: one more contact, where facets are hit that no contact accounts for. */
 void put_deep_contact(const struct task *task);

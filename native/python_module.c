@@ -125,6 +125,42 @@ static PyObject *prepared(PyObject *module, PyObject *arguments)
     return NULL;
 }
 
+/* --- functions of Python that are builtins ------------------------------------------------------------------------- */
+
+/* Methods that were made, by name, for as long as the process lives: there are as many as hosts have functions of ours. */
+struct made_method {
+    PyMethodDef method;
+    struct made_method *next;
+    char name[64];
+};
+static struct made_method *made_methods = NULL;
+
+static PyObject *call_self(PyObject *self, PyObject *values, PyObject *keywords) { return PyObject_Call(self, values, keywords); }
+
+/* builtin_of(name, function): the same function as one of C's, for hosts whose programs ask whether a function is a builtin. */
+static PyObject *builtin_of(PyObject *module, PyObject *arguments)
+{
+    const char *name;
+    PyObject *function;
+    struct made_method *made;
+    if (!PyArg_ParseTuple(arguments, "sO:builtin_of", &name, &function)) return NULL;
+    if (!PyCallable_Check(function) || strlen(name) >= sizeof made->name) {
+        PyErr_SetString(PyExc_TypeError, "builtin_of: a name of less than 64 bytes, and what can be called");
+        return NULL;
+    }
+    for (made = made_methods; made != NULL && strcmp(made->name, name) != 0; made = made->next) {}
+    if (made == NULL) {
+        if ((made = PyMem_Calloc(1, sizeof *made)) == NULL) return PyErr_NoMemory();
+        strcpy(made->name, name);
+        made->method.ml_name = made->name;
+        made->method.ml_meth = (PyCFunction)(void (*)(void))call_self;
+        made->method.ml_flags = METH_VARARGS | METH_KEYWORDS;
+        made->next = made_methods;
+        made_methods = made;
+    }
+    return PyCFunction_New(&made->method, function);
+}
+
 /* --- the module ---------------------------------------------------------------------------------------------------- */
 
 static PyObject *address_of(PyObject *module, PyObject *given)
@@ -202,6 +238,7 @@ static PyMethodDef methods[] = {
     {"prepared", prepared, METH_VARARGS, NULL},
     {"address_of", address_of, METH_O, NULL},
     {"code_of", code_of, METH_O, NULL},
+    {"builtin_of", builtin_of, METH_VARARGS, NULL},
     {NULL, NULL, 0, NULL},
 };
 

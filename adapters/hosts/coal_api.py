@@ -188,7 +188,7 @@ class MinkowskiDiff(_LowLevel):
 
 
 _this = sys.modules[__name__]
-_stand_in = StandIn({"coal": _this, "coal.coal_pywrap": _this, "hppfcl": _this, "hppfcl.hppfcl": _this})
+_stand_in = StandIn({"coal": _this, "coal.coal_pywrap": _this, "hppfcl": _this, "hppfcl.hppfcl": _this}, ("pinocchio",))
 
 
 def install() -> StandIn:
@@ -201,8 +201,8 @@ def install() -> StandIn:
 
     Notes
     -----
-    Modules that imported coal before keep it: a RuntimeWarning names them. Pinocchio hands out coal's own objects:
-    import it before, and use `collide.adapters.hosts.pinocchio` for its pairs.
+    Modules that imported coal before keep it: a RuntimeWarning names them. Pinocchio is built on coal's own objects: it
+    is imported with coal itself, before or after, and `collide.adapters.hosts.pinocchio` answers its pairs.
     """
     return _stand_in.install()
 

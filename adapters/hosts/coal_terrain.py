@@ -11,7 +11,7 @@ from collide.adapters.hosts.coal_containers import AABB, StdVec_Vec6
 from collide.adapters.hosts.coal_enums import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.coal_geometry import CollisionGeometry
 from collide.adapters.hosts.coal_meshes import BVHModelOBB, BVHModelOBBRSS, rows_of
-from collide.adapters.hosts.fcl_meshes import occupied_boxes
+from collide.adapters.hosts.octomap_boxes import occupied_boxes, octomap_file
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.scenes.loaders.mesh_file import read_mesh
 
@@ -200,12 +200,11 @@ class MeshLoader:
 
     def loadOctree(self, filename):
         """The `OcTree` of a binary octomap file (.bt). Raises InvalidArgument."""
-        head, mark, data = Path(filename).read_bytes().partition(b"\ndata\n")
-        fields = dict(line.split(None, 1) for line in head.decode("latin-1").splitlines() if " " in line.strip())
-        if not (mark and fields.get("id", "").strip() == "OcTree" and "res" in fields):
-            raise InvalidArgument(f"{filename} is no binary octomap: its header names no OcTree, res and data")
-        edge = float(fields["res"])
-        return OcTree(edge, occupied_boxes(edge, data))
+        try:
+            file = octomap_file(Path(filename).read_bytes())
+            return OcTree(file.edge, occupied_boxes(*file))
+        except InvalidArgument as error:
+            raise InvalidArgument(f"{filename}: {error}") from None
 
 
 class CachedMeshLoader(MeshLoader):

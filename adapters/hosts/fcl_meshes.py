@@ -12,6 +12,7 @@ import collide as engine
 from collide.adapters.hosts.fcl_geometry import CollisionGeometry
 from collide.adapters.hosts.fcl_requests import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.fcl_transform import shaped
+from collide.adapters.hosts.octomap_boxes import occupied_boxes, tree_of
 from collide.errors import InvalidArgument, UnsupportedQuery
 
 #: What python-fcl's model returns where calls come in a wrong order, and of none.
@@ -105,14 +106,16 @@ class BVHModel(CollisionGeometry):
 class OcTree(CollisionGeometry):
     """The occupied boxes of an octomap, a solid; free and unknown space is empty.
 
-    r : edge of the smallest box [m].   data : the tree in octomap's binary form: for every node two
-    bytes, two bits a child (nothing, free, occupied, or a node of its own), the first child lowest.
+    r : edge of the smallest box [m].   data : bytes, or numbers of them: the tree in octomap's binary form, for every
+    node two bytes, two bits a child (nothing, free, occupied, or a node of its own), the first child lowest; or a whole
+    file (.bt) of it, whose resolution r must be.
     """
 
     _node_type, _object_type = NODE_TYPE.GEOM_OCTREE, OBJECT_TYPE.OT_OCTREE
 
     def __init__(self, r, data):
-        boxes = occupied_boxes(float(r), bytes(data))
+        given = data if isinstance(data, bytes | bytearray | memoryview) else [int(value) & 255 for value in data]
+        boxes = occupied_boxes(*tree_of(float(r), bytes(given)))
         if not boxes:
             raise UnsupportedQuery("OcTree: data holds no occupied box; leave the object out")
         middles = np.array([middle for middle, _ in boxes])
@@ -130,38 +133,3 @@ class OcTree(CollisionGeometry):
     def _of_cells(self, cells: np.ndarray) -> engine.Compound:
         """The union of these boxes alone."""
         return engine.Compound([self._boxes[k] for k in cells.tolist()])
-
-
-#: Levels of an octomap, and what two bits of a child say: bit 0, then bit 1.
-_DEPTH = 16
-_OCCUPIED, _INNER = 2, 3
-
-
-def occupied_boxes(r: float, data: bytes) -> list[tuple[np.ndarray, float]]:
-    """(middle, edge) of the occupied leaves. Raises InvalidArgument where data ends too early."""
-    boxes_read: list[tuple[np.ndarray, float]] = []
-    at = 0
-
-    def read(middle: np.ndarray, depth: int) -> None:
-        nonlocal at
-        if at + 2 > len(data) or depth >= _DEPTH:
-            raise InvalidArgument(f"OcTree: data is no binary octomap: a node at byte {at} of {len(data)} is not there")
-        word = data[at] | data[at + 1] << 8
-        at += 2
-        edge = r * 2.0 ** (_DEPTH - depth - 1)
-        inner = []
-        for child in range(8):
-            state = word >> 2 * child & 3
-            corner = middle + 0.5 * edge * np.array([2 * (child >> k & 1) - 1 for k in range(3)])
-            if state == _OCCUPIED:
-                boxes_read.append((corner, edge))
-            elif state == _INNER:
-                inner.append(corner)
-        for corner in inner:
-            read(corner, depth + 1)
-
-    if not 0.0 < r < np.inf:
-        raise InvalidArgument(f"OcTree: r must be > 0 and finite [m], got {r}")
-    if data:
-        read(np.zeros(3), 0)
-    return boxes_read

@@ -22,12 +22,12 @@ import numpy as np
 
 from collide import World
 from collide.adapters.hosts.mujoco_geoms import Model, ModelTables, geom_shapes
-from collide.adapters.hosts.mujoco_layout import OURS, Layout, N, host
+from collide.adapters.hosts.mujoco_layout import BOX, OURS, Layout, N, host
 from collide.adapters.hosts.mujoco_limits import max_contacts
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.kernels.library import library_path
 from collide.kernels.mode import COMPILED, MODE, WHY
-from collide.scenes.loaders.mjcf_pairs import filtered
+from collide.scenes.loaders.mjcf_pairs import REASONS, filtered
 
 MODES = ("contacts", "cull")
 _FLOOR = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
@@ -56,7 +56,9 @@ def install(models: Any, mode: Literal["contacts", "cull"] = "contacts") -> Inst
     InvalidArgument : no model, or no such mode.
     InvalidShape : a geom whose numbers make no shape, by its name.
     MissingExtra : mujoco is not installed.
-    UnsupportedQuery : MuJoCo's version is not understood, or collide runs without its compiled library.
+    UnsupportedQuery : MuJoCo's version is not understood, or collide runs without its compiled library; or MuJoCo is
+        older than 3.6, and models are installed in the other mode: it drops some contacts of two boxes only while its
+        own function stands in the table, where "cull" leaves it and "contacts" cannot.
 
     Notes
     -----
@@ -89,6 +91,7 @@ class Installed:
         self._numbers: list[int] = []
         self.remaining: dict[tuple[int, int], str] = {}
         with _lock:
+            _refuse_both_modes(mode)
             self._add()
             _installed.append(self)
 
@@ -122,7 +125,7 @@ class Installed:
         library = _library()
         tables = [ModelTables(model, self._mode == "cull") for model in self._models]
         if not library.collide_mujoco_hooked():
-            _hook()
+            _hook(self._mode)
         try:
             for made in tables:
                 number = library.collide_mujoco_add(ctypes.byref(made.made))
@@ -169,12 +172,24 @@ def _library() -> ctypes.CDLL:
     return library
 
 
-def _hook() -> None:
+def _refuse_both_modes(mode: str) -> None:
+    others = {other._mode for other in _installed} - {mode}
+    if others and host().drops_of_boxes:
+        raise UnsupportedQuery(
+            f"install: mode {mode!r} while models are installed in mode {others.pop()!r}: MuJoCo "
+            f"{host().mujoco.__version__} drops some contacts of two boxes only while its own function stands in its "
+            "table, so that modes exclude each other; uninstall the others first, or use MuJoCo 3.6 or later"
+        )
+
+
+def _hook(mode: str) -> None:
     loaded = host()
     max_contacts((0, 0))  # a version that does not tell is refused here
     replaced = np.zeros((N, N), dtype=np.uint8)
     for i in OURS:
         replaced[i, [j for j in OURS if i <= j]] = 1
+    if mode == "cull" and loaded.drops_of_boxes:  # culling leaves two boxes to MuJoCo in any version: nothing is lost
+        replaced[BOX, BOX] = 0
     error = ctypes.cast(loaded.library.mju_error, ctypes.c_void_p)
     if _library().collide_mujoco_hook(ctypes.byref(loaded.layout), loaded.table, replaced.ctypes.data, error):
         # All our functions were overwritten by somebody since: begin again on what stands there now.
@@ -220,8 +235,8 @@ def world(model: Any, data: Any = None) -> World:
     Returns
     -------
     World : bodies named as the geoms, or "geom 7"; those that are fixed to the world are static. Pairs that MuJoCo
-    never tests are allowed: of one body, of a body and its parent, excluded, or by contype and conaffinity. Signed
-    distance fields are left out.
+    never tests are allowed: of one body, of a body and its parent, excluded, or by contype and conaffinity; all,
+    where the model's option turns contacts or constraints off. Signed distance fields are left out.
 
     Raises
     ------
@@ -238,7 +253,9 @@ def world(model: Any, data: Any = None) -> World:
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
     shapes, rows, _ = geom_shapes(model)
-    geoms = np.flatnonzero((rows >= 0) & ((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
+    collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    collides[[*model.pair_geom1.tolist(), *model.pair_geom2.tolist()]] = True
+    geoms = np.flatnonzero((rows >= 0) & collides)
     out = World()
     welded = model.body_weldid[model.geom_bodyid]
     for geom in geoms.tolist():
@@ -246,7 +263,8 @@ def world(model: Any, data: Any = None) -> World:
         X_WG[:3, :3], X_WG[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
         out.add(shapes[rows[geom]], X_WG, name=model.geom(geom).name or f"geom {geom}", static=bool(welded[geom] == 0))
     if len(geoms):
-        never = filtered(model, geoms) != 0
-        np.fill_diagonal(never, False)
-        out.allow(never, reason="never tested by MuJoCo")
+        codes = filtered(model, geoms)
+        np.fill_diagonal(codes, 0)
+        for code in np.unique(codes[codes > 0]).tolist():
+            out.allow(codes == code, reason=f"never tested by MuJoCo: {REASONS[code]}")
     return out

@@ -26,7 +26,7 @@ from collide.adapters.hosts.pinocchio_pairs import (
     meet,
     shapes_of,
 )
-from collide.errors import InvalidArgument, MissingExtra, UnsupportedQuery
+from collide.errors import InvalidArgument, MissingExtra
 
 #: How many pairs are asked together where the first collision ends it.
 _BLOCK = 64
@@ -124,19 +124,20 @@ def compute_distances(model, data, geom_model, geom_data, q) -> int:
 
     Notes
     -----
-    ``geom_data.distanceResults[k]`` becomes a new result with ``min_distance``, ``normal``, ``b1`` and ``b2``. Its
-    nearest points cannot be written: `distances` has them.
+    ``geom_data.distanceResults[k]`` becomes a new result with ``min_distance``, ``normal``, ``b1``, ``b2`` and nearest
+    points. The points have no setter: coal writes them as those of two balls of no size that stand there.
 
     Raises
     ------
     InvalidArgument, InvalidShape, UnsupportedQuery, MissingExtra : as of `compute_collisions`.
     """
     answer = distances(model, data, geom_model, geom_data, q)
-    coal, results = _coal(), geom_data.distanceResults
-    for k, distance, normal, b1, b2 in zip(
-        answer.pair.tolist(), answer.distance.tolist(), answer.normal, answer.part_1.tolist(), answer.part_2.tolist()
-    ):
-        result = coal.DistanceResult()
+    write, results = _PointWriter(_coal()), geom_data.distanceResults
+    for k, distance, normal, point_1, point_2, b1, b2 in zip(
+        answer.pair.tolist(), answer.distance.tolist(), answer.normal, answer.point_1, answer.point_2,
+        answer.part_1.tolist(), answer.part_2.tolist(),
+    ):  # fmt: skip
+        result = write(point_1, point_2)
         result.min_distance, result.normal, result.b1, result.b2 = distance, normal, b1, b2
         results[k] = result
     if not len(answer.pair):
@@ -247,11 +248,6 @@ def _pinocchio():
         import pinocchio
     except ImportError:
         raise MissingExtra("pin", extra="pinocchio", purpose="ask the pairs of a Pinocchio model") from None
-    if hasattr(pinocchio, "coal") and pinocchio.coal.__name__.startswith("collide."):
-        raise UnsupportedQuery(
-            "Pinocchio was imported while coal_api stood in for coal, and has no geometries without coal's own: import "
-            "pinocchio before coal_api.install(), in a new process"
-        )
     return pinocchio
 
 
@@ -287,6 +283,28 @@ def _add_contacts(coal, known: KnownPairs, geom_model, X, k: int, request, resul
             first, second, contact.b1, contact.b2, contact.pos, contact.normal, contact.penetration_depth
         ))  # fmt: skip
     result.distance_lower_bound = ours.distance_lower_bound
+
+
+class _PointWriter:
+    """Results of coal's with given nearest points: coal's own answer about two balls of a radius that no sum of doubles
+    notices.
+    """
+
+    def __init__(self, coal):
+        self._coal, self._ball, self._request = coal, coal.Sphere(1e-300), coal.DistanceRequest()
+        self._places = coal.Transform3s(), coal.Transform3s()
+
+    def __call__(self, point_1: np.ndarray, point_2: np.ndarray):
+        """A ``DistanceResult`` with these points; with none, as of pairs that reach to infinity, where they are not
+        finite.
+        """
+        result = self._coal.DistanceResult()
+        if np.isfinite(point_1).all() and np.isfinite(point_2).all():
+            first, second = self._places
+            first.setTranslation(point_1)
+            second.setTranslation(point_2)
+            self._coal.distance(self._ball, first, self._ball, second, self._request, result)
+        return result
 
 
 def _coal():

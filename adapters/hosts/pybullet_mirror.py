@@ -13,6 +13,7 @@ is the base. What only a solver knows (forces, directions of friction) is 0. doc
 from __future__ import annotations
 
 import functools
+import inspect
 import sys
 import warnings
 from collections.abc import Callable
@@ -30,6 +31,7 @@ from collide.adapters.hosts.bullet_arguments import (
 from collide.adapters.hosts.bullet_bodies import MARK
 from collide.adapters.hosts.bullet_mirror import MARGINS, Mirror, genuine_pybullet
 from collide.errors import CollideError, InvalidArgument
+from collide.kernels import library
 from collide.shapes import Shape
 
 __all__ = ["MARGINS", "QUESTIONS", "Mirror", "attach", "check", "install", "installed", "uninstall"]
@@ -40,7 +42,7 @@ QUESTIONS = ("getClosestPoints", "getContactPoints", "getOverlappingObjects", "r
 _CLIENT_AT = {
     "createCollisionShape": SHAPE_ARGUMENTS.index("physicsClientId"), "createMultiBody": len(BODY_ARGUMENTS) - 1,
     "loadURDF": 7, "loadSDF": 3, "loadMJCF": 3, "resetSimulation": 1, "disconnect": 0, "setCollisionFilterPair": 5,
-    "setCollisionFilterGroupMask": 4, "changeDynamics": 24, "setPhysicsEngineParameter": 99,
+    "setCollisionFilterGroupMask": 4, "changeDynamics": 24, "setPhysicsEngineParameter": 99, "connect": 99,
 }  # fmt: skip
 _CLIENT_AT_OF_QUESTIONS = dict(zip(QUESTIONS, (11, 4, 2, 4, 8)))
 #: Where flags stand among those of what loads bodies.
@@ -56,8 +58,8 @@ def attach(pybullet: Any = None, client: int | None = None, *, questions=QUESTIO
     Parameters
     ----------
     pybullet : the module, or a ``BulletClient``; pybullet itself if left out.
-    client : the client that calls without physicsClientId are about, and then the only one that is followed; for a
-        ``BulletClient`` its number. None: that which was connected through this module, or 0.
+    client : the client that calls without physicsClientId are about, and then the only one that is followed. None: 0,
+        as in pybullet, and all are followed; of a ``BulletClient`` its own.
     questions : names of `QUESTIONS` that collide answers; the others stay pybullet's.
     options : of `Mirror`: ``margins``, ``shapes``, ``contact_margin``.
 
@@ -69,12 +71,27 @@ def attach(pybullet: Any = None, client: int | None = None, *, questions=QUESTIO
 
     Raises
     ------
-    InvalidArgument : questions that are none.   MissingExtra : pybullet is not installed.
+    InvalidArgument : questions that are none; what is no pybullet.   MissingExtra : pybullet is not installed.
     """
     unknown = sorted(set(questions) - set(QUESTIONS))
     if unknown:
         raise InvalidArgument(f"attach: questions are among {', '.join(QUESTIONS)}, got {', '.join(unknown)}")
-    return _StandIn(genuine_pybullet() if pybullet is None else pybullet, client, tuple(questions), options)
+    if pybullet is None:
+        pybullet = genuine_pybullet()
+    elif client is None and not isinstance(pybullet, ModuleType):
+        client = _number_of(pybullet)
+    return _StandIn(pybullet, client, tuple(questions), options)
+
+
+def _number_of(bullet_client: Any) -> int:
+    """The client of a BulletClient, by the argument that it gives to every function of pybullet."""
+    number = getattr(getattr(bullet_client, "isConnected", None), "keywords", {}).get("physicsClientId")
+    if not isinstance(number, int):
+        raise InvalidArgument(
+            f"attach: pybullet must be the module or a BulletClient, got {type(bullet_client).__name__}, whose "
+            "functions have no physicsClientId of their own; say client="
+        )
+    return number
 
 
 def install(**options) -> _Installed:
@@ -90,7 +107,8 @@ def install(**options) -> _Installed:
 
     Notes
     -----
-    Modules that imported pybullet before keep it: a RuntimeWarning names them.
+    Modules that imported pybullet before keep it: a RuntimeWarning names them. Programs that make a ``BulletClient``
+    need collide's compiled library, for it gives its number to builtins alone: a RuntimeWarning says so without.
     """
     global _before, _stand_in
     if _stand_in is None:
@@ -106,6 +124,13 @@ def install(**options) -> _Installed:
         if holders:
             warnings.warn(
                 f"these modules hold pybullet already: {', '.join(holders)}; install() before they are imported",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+        if library.glue is None:
+            warnings.warn(
+                "collide runs without its compiled library: what it answers or watches of a BulletClient's calls is "
+                "about client 0; use attach(it) instead",
                 RuntimeWarning,
                 stacklevel=2,
             )
@@ -135,6 +160,11 @@ class _Installed:
         uninstall()
 
 
+def _as_builtin(name: str, function: Callable) -> Callable:
+    """pybullet's functions are builtins: programs that hold several clients give a client's number to these alone."""
+    return function if library.glue is None else library.glue.builtin_of(name, function)
+
+
 class _WatchedMirror(Mirror):
     """Told of bodies before it looks at them."""
 
@@ -150,16 +180,20 @@ class _StandIn(ModuleType):
         self.__all__ = [name for name in dir(pybullet) if not name.startswith("_")]
         self._client, self._options = client, options
         self._mirrors: dict[int, Mirror] = {}
-        self._connected: set[int] = set()
         self._shapes: dict[tuple[int, int], Shape] = {}
-        for name in questions:
-            setattr(self, name, self._answering(name))
-        for name in ("connect", *_CLIENT_AT):
-            setattr(self, name, self._watching(name))
-        self.getNumUserData, self.getUserDataInfo = self._n_user_data, self._user_data_info
+        made = {name: self._answering(name) for name in questions}
+        made |= {name: self._watching(name) for name in _CLIENT_AT}
+        made |= {"getNumUserData": self._n_user_data, "getUserDataInfo": self._user_data_info}
+        for name, function in made.items():
+            setattr(self, name, _as_builtin(name, function))
 
     def __getattr__(self, name: str):
-        return getattr(self.__wrapped__, name)
+        """pybullet's own, about this module's client: BulletClients give theirs by themselves, and 0 is the default."""
+        attribute = getattr(self.__wrapped__, name)
+        is_of_clients = name != "connect" and inspect.isbuiltin(attribute)
+        if self._client and is_of_clients and isinstance(self.__wrapped__, ModuleType):
+            return functools.partial(attribute, physicsClientId=self._client)
+        return attribute
 
     def __dir__(self):
         return sorted({*dir(self.__wrapped__), "mirror_of"})
@@ -180,13 +214,7 @@ class _StandIn(ModuleType):
         return self._mirrors[client]
 
     def _number(self, client: int | None) -> int:
-        if client is None:
-            client = self._client
-        if client is None and len(self._connected) > 1:
-            raise InvalidArgument(
-                "several clients are connected: say physicsClientId; for a BulletClient use attach(it, its number)"
-            )
-        return client if client is not None else next(iter(self._connected), 0)
+        return client if client is not None else self._client or 0
 
     def _answering(self, name: str) -> Callable:
         method, place = getattr(Mirror, name), _CLIENT_AT_OF_QUESTIONS[name]
@@ -210,13 +238,12 @@ class _StandIn(ModuleType):
         note = getattr(self, f"_note_{name}", None) or functools.partial(self._note_bodies, name)
 
         def watched(*values, **keywords):
-            # Looked up at the call: to look up a BulletClient's disconnect disconnects it.
-            result = getattr(self.__wrapped__, name)(*values, **keywords)
-            place = _CLIENT_AT.get(name, 0)
+            place = _CLIENT_AT[name]
             client = keywords.get("physicsClientId", values[place] if len(values) > place else None)
-            if name == "connect":
-                self._connected.add(result)
-            elif self._client is None or client in (None, self._client):
+            # Looked up at the call: to look up a BulletClient's disconnect disconnects it.
+            function = getattr(self.__wrapped__, name) if len(values) > place else self.__getattr__(name)
+            result = function(*values, **keywords)
+            if self._client is None or client in (None, self._client):
                 note(self._client if client is None else client, values, keywords, result)
             return result
 
@@ -244,12 +271,13 @@ class _StandIn(ModuleType):
 
     # --- what passes ----------------------------------------------------------------------------
 
-    def _note_connect(self, *_) -> None:
-        """Nothing more."""
+    def _note_connect(self, _client: int | None, _values: tuple, _keywords: dict, number: int) -> None:
+        """A number is given anew, or none is (-1): what was known of it is about a client that is gone."""
+        if number >= 0:
+            self._note_disconnect(number)
 
     def _note_disconnect(self, client: int | None, *_) -> None:
-        number = 0 if client is None else client
-        self._connected.discard(number)
+        number = self._number(client)
         self._note_resetSimulation(number)
         self._mirrors.pop(number, None)
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import PathFinder
 from types import ModuleType
 from typing import Any
 
@@ -15,14 +18,17 @@ class StandIn:
 
     modules : by the name that programs import. The first is the host's, the value of a ``with`` block; names of
         packages take the place of everything within them.
+    built_on : packages that are bindings of the host's own objects: while one is imported, imports find the host.
 
     Notes
     -----
-    Only ``sys.modules`` changes, and is put back. Modules that imported the host before keep it.
+    Only ``sys.modules`` changes, and ``sys.meta_path`` where packages are built on the host; both are put back. Modules
+    that imported the host before keep it.
     """
 
-    def __init__(self, modules: Mapping[str, ModuleType]):
+    def __init__(self, modules: Mapping[str, ModuleType], built_on: tuple[str, ...] = ()):
         self._modules = dict(modules)
+        self._finder = _FinderAside(self, built_on)
         #: What ``sys.modules`` held under the host's names; None while not installed.
         self._before: dict[str, ModuleType] | None = None
 
@@ -37,11 +43,8 @@ class StandIn:
         A RuntimeWarning names modules that hold the host already, or nothing in its place.
         """
         if self._before is None:
-            self._before = {name: sys.modules[name] for name in self._names()}
-            for name in self._before:
-                del sys.modules[name]
-            sys.modules.update(self._modules)
-            holders = self._holders(self._before)
+            before = self._take()
+            holders = self._holders(before)
             if holders:
                 host = next(iter(self._modules))
                 warnings.warn(
@@ -52,6 +55,26 @@ class StandIn:
                 )
         return self
 
+    def _take(self) -> dict[str, ModuleType]:
+        """Ours in; what was there."""
+        self._before = {name: sys.modules[name] for name in self._names()}
+        for name in self._before:
+            del sys.modules[name]
+        sys.modules.update(self._modules)
+        sys.meta_path.insert(0, self._finder)
+        return self._before
+
+    @contextmanager
+    def aside(self) -> Iterator[None]:
+        """Imports find the host itself within the block, where ours is installed."""
+        is_installed = self.installed
+        self.uninstall()
+        try:
+            yield
+        finally:
+            if is_installed:
+                self._take()
+
     def uninstall(self) -> None:
         """Put back what imports found before; modules that hold ours keep them."""
         if self._before is None:
@@ -59,6 +82,7 @@ class StandIn:
         for name in self._names():
             del sys.modules[name]
         sys.modules.update(self._before)
+        sys.meta_path.remove(self._finder)
         self._before = None
 
     def check(self, gap_of: Callable[[Any], float]) -> str:
@@ -104,3 +128,34 @@ class StandIn:
                 if held is not module and held is former:
                     names.add(name)
         return sorted(names)
+
+
+class _FinderAside(MetaPathFinder):
+    """Finds packages that are built on a host, to be imported while the stand-in is aside."""
+
+    def __init__(self, stand_in: StandIn, packages: tuple[str, ...]):
+        self._stand_in, self._packages = stand_in, packages
+
+    def find_spec(self, fullname, path=None, target=None):
+        if fullname.partition(".")[0] not in self._packages:
+            return None
+        spec = PathFinder.find_spec(fullname, path, target)
+        if spec is not None and spec.loader is not None:
+            spec.loader = _LoaderAside(self._stand_in, spec.loader)
+        return spec
+
+
+class _LoaderAside(Loader):
+    """Another loader, which does its work while the stand-in is aside, and is the module's afterwards."""
+
+    def __init__(self, stand_in: StandIn, loader: Loader):
+        self._stand_in, self._loader = stand_in, loader
+
+    def create_module(self, spec):
+        with self._stand_in.aside():
+            return self._loader.create_module(spec)
+
+    def exec_module(self, module):
+        module.__loader__ = module.__spec__.loader = self._loader
+        with self._stand_in.aside():
+            self._loader.exec_module(module)

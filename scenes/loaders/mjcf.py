@@ -24,7 +24,7 @@ from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders.mesh_shapes import Taken
 from collide.scenes.loaders.mjcf_geoms import FIELD, MESH, PLANE, SDF, mesh_shapes, pose_of, shape_of
 from collide.scenes.loaders.mjcf_links import link_tree, values_of
-from collide.scenes.loaders.mjcf_pairs import FILTERS, REASONS, filtered, groups_of, moves
+from collide.scenes.loaders.mjcf_pairs import FILTERS, REASONS, contacts_off, filtered, groups_of, moves
 from collide.scenes.loaders.srdf import Semantics, find_srdf, read_srdf
 from collide.scenes.loaders.xml_text import parse_xml
 from collide.transforms import pose
@@ -264,7 +264,8 @@ class _Reading:
             self.notes.append(f"{model.nflex} deformable bodies (flex) are NOT checked")
         if (model.geom_margin > 0).any() or (model.pair_margin > 0).any():
             self.notes.append("margins of geoms and pairs were left out: only bodies that touch collide")
-        if int(model.opt.disableflags) & int(mujoco.mjtDisableBit.mjDSBL_CONTACT):
-            self.notes.append("the model turns contacts off; here its geoms are tested all the same")
+        if off := contacts_off(model):
+            flags = " and ".join(f'<flag {name}="disable"/>' for name in off)
+            self.notes.append(f"the model turns contacts off by {flags}: its own pairs are NOT checked, as in MuJoCo")
         if not self.geometry:
             self.notes.append("no link has collision geometry: nothing of this robot is checked")

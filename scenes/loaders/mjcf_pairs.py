@@ -5,15 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 #: Why a pair is never tested, by the codes of `filtered`; 0: it is tested.
-REASONS = ("", "contype and conaffinity", "parent and child", "excluded", "neither moves", "one body")
+REASONS = (
+    "", "contype and conaffinity", "parent and child", "excluded", "contacts are off", "neither moves", "one body",
+)  # fmt: skip
 #: Reasons up to this one are filters; those after it follow from how bodies hang together.
-FILTERS = 3
+FILTERS, _OFF, _STILL, _ONE_BODY = 4, 4, 5, 6
+#: Flags that disable; with either MuJoCo tests nothing.
+_OF_CONTACTS = ("constraint", "contact")
 
 
 def filtered(model, geoms: np.ndarray) -> np.ndarray:
     """(n, n) uint8, why MuJoCo never tests a pair of these geoms, as `REASONS` has it; 0 where it does.
 
-    geoms : (n,) int numbers of geoms. O(n²). Pairs that the model names are tested, whatever the filters say.
+    geoms : (n,) int numbers of geoms. O(n²). Pairs that the model names are tested, whatever the filters say, but
+    where `contacts_off`: then nothing is.
     """
     import mujoco
 
@@ -37,12 +42,22 @@ def filtered(model, geoms: np.ndarray) -> np.ndarray:
             out[np.ix_(first, second)] = 3
             out[np.ix_(second, first)] = 3
     still = ~moves(model)[body]
-    out[still[:, None] & still[None, :]] = 4
-    out[weld[:, None] == weld[None, :]] = 5
+    out[still[:, None] & still[None, :]] = _STILL
+    out[weld[:, None] == weld[None, :]] = _ONE_BODY
     for a, b in named_pairs(model, geoms):
         out[a, b] = out[b, a] = 0
-    np.fill_diagonal(out, 5)
+    if contacts_off(model):
+        out[out <= FILTERS] = _OFF
+    np.fill_diagonal(out, _ONE_BODY)
     return out
+
+
+def contacts_off(model) -> tuple[str, ...]:
+    """The flags of a model's option that turn all its contacts off, as MJCF names them."""
+    import mujoco
+
+    set_ = int(model.opt.disableflags)
+    return tuple(name for name in _OF_CONTACTS if set_ & int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}")))
 
 
 def groups_of(model, geoms: np.ndarray) -> np.ndarray:

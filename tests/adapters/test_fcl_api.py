@@ -180,6 +180,80 @@ def test_octrees_are_their_occupied_boxes():
         fcl.OcTree(0.1, b"")
 
 
+def octomap_bytes(occupied, free, edge: float) -> tuple[bytes, bytes]:
+    """(nodes, a whole file) of octomap's binary form, of smallest boxes by three numbers from the middle each."""
+    cells = {tuple(key): state for keys, state in ((occupied, 2), (free, 1)) for key in np.asarray(keys).tolist()}
+    nodes, n_nodes = bytearray(), 1
+
+    def write(keys: list, level: int) -> None:
+        nonlocal n_nodes
+        of_child: dict[int, list] = {}
+        for key in keys:
+            child = sum(((key[axis] + 32768) >> level & 1) << axis for axis in range(3))
+            of_child.setdefault(child, []).append(key)
+        word = sum((cells[inside[0]] if level == 0 else 3) << 2 * child for child, inside in of_child.items())
+        nodes.extend((word & 255, word >> 8))
+        n_nodes += len(of_child)
+        for child in sorted(of_child) if level else ():
+            write(of_child[child], level - 1)
+
+    write(list(cells), 15)
+    comment = "(feel free to add / change comments, but leave the first line as it is!)"
+    head = f"# Octomap OcTree binary file\n# {comment}\n#\nid OcTree\nsize {n_nodes}\nres {edge}\ndata\n"
+    return bytes(nodes), head.encode() + bytes(nodes)
+
+
+def test_octomap_files_are_read():
+    """A whole file is its nodes: balls among occupied and free boxes as brute force has them, and as python-fcl has the
+    nodes, in a child process.
+    """
+    random, edge = np.random.default_rng(8), 0.1
+    cells = np.unique(random.integers(-5, 5, (300, 3)), axis=0)
+    random.shuffle(cells)
+    occupied, free = cells[:80], cells[80:]
+    nodes, file = octomap_bytes(occupied, free, edge)
+    trees = [fcl.OcTree(edge, data) for data in (nodes, file, bytearray(file), np.frombuffer(nodes, np.int8))]
+    centres, radius = random.uniform(-0.5, 0.5, (200, 3)), 0.05
+    low = occupied * edge
+    gaps = np.linalg.norm(np.maximum(0.0, np.maximum(low - centres[:, None], centres[:, None] - low - edge)), axis=2)
+    wanted = gaps.min(axis=1) < radius
+    for tree in trees:
+        assert len(tree._boxes) == len(occupied)
+        hits = [fcl.collide(at(tree, 0, 0, 0), at(fcl.Sphere(radius), *c)) for c in centres]
+        assert [bool(hit) for hit in hits] == wanted.tolist()
+    assert 20 < wanted.sum() < 180
+    if importlib.util.find_spec("fcl") is None:
+        return
+    code = (
+        "import sys, numpy as np, fcl; nodes = [b - 256 * (b > 127) for b in bytes.fromhex(sys.argv[1])]\n"
+        f"tree = fcl.CollisionObject(fcl.OcTree({edge}, nodes))\n"
+        f"ball = fcl.CollisionObject(fcl.Sphere({radius}))\n"
+        f"for c in {centres.tolist()}:\n  ball.setTranslation(np.array(c)); print(int(fcl.collide(tree, ball) > 0))\n"
+    )
+    code = code.replace("sys.argv[1]", repr(nodes.hex()))
+    assert [int(line) for line in child(code).split()] == wanted.astype(int).tolist()
+
+
+@pytest.mark.parametrize(
+    "change, match",
+    [
+        (lambda file: file + b"\n", "last node ends at byte"),
+        (lambda file: file[:-2], "is not there"),
+        (lambda file: file.replace(b"res 0.1", b"res 0.2"), r"r is 0.1 m.* have 0.2 m"),
+        (lambda file: file.replace(b"res 0.1", b"res x"), "header has id OcTree, size, res and data"),
+        (lambda file: file.replace(b"id OcTree", b"id ColorOcTree"), "header has id OcTree"),
+        (lambda file: file.replace(b"size ", b"size 9"), "nodes, and says that there are"),
+        (lambda file: file.replace(b"OcTree binary file", b"OcTree file", 1), r"\.ot.*binary form"),
+        (lambda file: file.replace(b"\ndata\n", b"\n"), "header has id OcTree"),
+    ],
+)
+def test_octomap_files_that_lie_are_refused(change, match):
+    _, file = octomap_bytes([[0, 0, 0], [5, 5, 5]], [[1, 0, 0]], 0.1)
+    fcl.OcTree(0.1, file)
+    with pytest.raises(InvalidArgument, match=match):
+        fcl.OcTree(0.1, change(file))
+
+
 def test_motions():
     a, b = at(fcl.Box(1, 1, 1), 0, 0, 0), at(fcl.Box(1, 1, 1), 2, 0, 0)
     result = fcl.ContinuousCollisionResult()

@@ -284,16 +284,69 @@ def test_joints_that_are_not_numbers():
         host.compute_collisions(arm, arm.createData(), geom_model, geom_model.createData(), q)
 
 
-def test_pinocchio_needs_coals_own():
-    code = """
-import coal  # without it Pinocchio itself cannot be imported there
+@pytest.mark.parametrize("first", ["", "import coal as former", "import pinocchio as former"])
+def test_pinocchio_has_coals_own_whatever_is_installed_first(first):
+    """While coal_api stands in for coal, Pinocchio finds coal itself, and programs find ours, then and afterwards."""
+    code = f"""
+import sys, warnings
+warnings.simplefilter("ignore", RuntimeWarning)
 from collide.adapters.hosts import coal_api, pinocchio as host
+{first}
+finders = list(sys.meta_path)
 with coal_api.install():
     import pinocchio
-try:
-    host.check()
-except Exception as error:
-    print(type(error).__name__, error)
+    import coal, hppfcl
+    assert coal is hppfcl is coal_api and pinocchio.coal is not coal_api
+    import pinocchio.utils
+    assert "pinocchio" in type(pinocchio.__loader__).__module__ + str(pinocchio.__spec__.origin)
+    print(host.check())
+assert sys.meta_path == finders and not coal_api.installed()
+import coal
+assert coal is pinocchio.coal
+print(host.check())
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
-    assert "UnsupportedQuery Pinocchio was imported while coal_api stood in" in done.stdout, done.stderr
+    assert done.stdout.splitlines() == ["a pair was read, answered and written back"] * 2, done.stderr
+
+
+def test_nearest_points_are_written():
+    """What coal says of its own result: the very points of `distances`, of pairs near and far, touching and deep."""
+    random = np.random.default_rng(6)
+    n_meet = 0
+    for scale in (1.0, 1e-3, 1e4):
+        model, data, geom_model, geom_data = balls(*(scale * random.normal(size=(6, 3))), (0, 0, 0), (1, 0, 0))
+        for request in geom_data.distanceRequests:
+            request.enable_signed_distance = True
+        q = np.zeros(0)
+        host.compute_distances(model, data, geom_model, geom_data, q)
+        answer = host.distances(model, data, geom_model, geom_data, q)
+        for k, result in enumerate(geom_data.distanceResults):
+            first, second = result.getNearestPoint1(), result.getNearestPoint2()
+            assert np.array_equal(first, answer.point_1[k]) and np.array_equal(second, answer.point_2[k])
+            assert result.min_distance == answer.distance[k] and np.array_equal(result.normal, answer.normal[k])
+            pair = geom_model.collisionPairs[k]
+            for point, g in ((first, pair.first), (second, pair.second)):
+                middle = geom_data.oMg[g].translation
+                assert np.linalg.norm(point - middle) == pytest.approx(0.5, abs=1e-9 * max(scale, 1.0))
+            n_meet += result.min_distance <= 0.0
+    assert n_meet > 10, n_meet
+
+
+@needs_arms
+@pytest.mark.parametrize("name", ARMS)
+def test_nearest_points_stand_as_pinocchios(name):
+    """On an arm: as far apart as the distance says, and within a millimetre of Pinocchio's where these are unique."""
+    arm = Arm(name)
+    theirs = arm.geom_model.createData()
+    n_near = n_gaps = 0
+    for q in arm.configurations(3, 17):
+        host.compute_distances(arm.model, arm.data, arm.geom_model, arm.geom_data, q)
+        pin.computeDistances(arm.model, arm.data, arm.geom_model, theirs, q)
+        for result, other in zip(arm.geom_data.distanceResults, theirs.distanceResults):
+            first, second = result.getNearestPoint1(), result.getNearestPoint2()
+            assert np.isfinite(first).all() and np.isfinite(second).all()
+            if result.min_distance > 1e-3:
+                n_gaps += 1
+                assert np.linalg.norm(second - first) == pytest.approx(result.min_distance, abs=1e-7)
+                n_near += np.linalg.norm(first - other.getNearestPoint1()) < 1e-3
+    assert n_gaps > 20 and n_near > n_gaps // 2, (n_near, n_gaps)

@@ -210,3 +210,46 @@ def test_errors_are_raised_by_whatever_asked(capfd):
             with pytest.raises(mujoco.FatalError, match=r"collide: geom 0 or 1 .* refresh\(\)"):
                 ask()
     mujoco.mj_forward(model, mujoco.MjData(model))  # MuJoCo's again
+
+
+#: Options of MuJoCo 4 that look ahead: contacts of bodies that will meet within a step, and barriers.
+AHEAD = {
+    "SPECULATIVE": '<option gravity="0 0 0"><flag speculative="enable"/></option>',
+    "IPC": '<option gravity="0 0 0" integrator="discrete"><flag ipc="enable"/></option>',
+}
+
+
+@pytest.mark.parametrize("flag", AHEAD)
+@pytest.mark.parametrize("kinds", [("plane", "sphere"), ("box", "box"), ("box", "ellipsoid"), ("mesh", "mesh")])
+def test_contacts_ahead_of_time_are_mujocos(flag, kinds):
+    """Of bodies that are apart and come fast: MuJoCo makes these itself, and asks its table besides. With collide they
+    have the same bits in either mode, and a body that overlaps has collide's contact.
+    """
+    if not hasattr(mujoco.mjtEnableBit, f"mjENBL_{flag}"):
+        pytest.skip(f"MuJoCo {mujoco.__version__} has no such flag")
+    forms = {"plane": 'size="1 1 1"', "sphere": 'size=".02"', "mesh": 'mesh="m"'}
+    first, second = (f'<geom type="{kind}" {forms.get(kind, """size=".02 .03 .015" """)}/>' for kind in kinds)
+    model = model_of(first + body(second, (0.003, 0.004, 0.4)), AHEAD[flag])
+
+    def found(z: float, speed: float) -> list:
+        data = mujoco.MjData(model)
+        data.qpos[2], data.qvel[2] = z, -speed
+        mujoco.mj_forward(model, data)
+        return [(c.dist, *c.pos, *c.frame) for c in data.contact]
+
+    ahead = found(0.4, 250.0)
+    assert (len(ahead) > 0) == (flag == "SPECULATIVE"), ahead
+    touching = found(0.01, 0.0)
+    for mode_of_hook in ("contacts", "cull"):
+        with install(model, mode_of_hook):
+            assert found(0.4, 250.0) == ahead
+            if mode_of_hook == "cull":
+                assert found(0.01, 0.0) == touching
+            else:
+                data = mujoco.MjData(model)
+                data.qpos[2] = 0.01
+                mujoco.mj_forward(model, data)
+                shapes, rows, _ = geom_shapes(model)
+                wanted = collide.contacts(shapes[rows[0]], shapes[rows[1]], matrix(data, 0), matrix(data, 1))
+                deepest = min(contact.dist for contact in data.contact)
+                assert deepest == pytest.approx(wanted.rows["distance"].min(), abs=1e-9)

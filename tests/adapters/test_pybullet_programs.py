@@ -14,6 +14,7 @@ import collide
 from collide.adapters.hosts import pybullet_mirror
 from collide.adapters.hosts.pybullet_mirror import Mirror, attach
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody, UnsupportedQuery
+from collide.kernels import library
 
 p = pytest.importorskip("pybullet", reason="pybullet is not installed: pip install 'collide-robotics[pybullet]'")
 from bullet_scenes import CORNERS, DATA, FACETS, body, sphere_of
@@ -83,8 +84,7 @@ def test_import_finds_ours_between_install_and_uninstall():
         assert abs(held.getClosestPoints(a, b, 9.0, physicsClientId=number)[0][8] - 1.998) < 1e-9
         assert q.rayTest is held.rayTest and q.getQuaternionFromEuler([0, 0, 0]) == (0, 0, 0, 1)
         other = q.connect(q.DIRECT)
-        with pytest.raises(InvalidArgument, match="say physicsClientId"):
-            q.getClosestPoints(a, b, 9.0)
+        assert len(q.getClosestPoints(a, b, 9.0)) == 1  # of client 0, as in pybullet
         assert len(q.getClosestPoints(a, b, 9.0, physicsClientId=number)) == 1
         with pytest.raises(UnknownBody):
             q.getClosestPoints(a, b, 9.0, physicsClientId=other)
@@ -135,13 +135,74 @@ def test_a_bullet_client_is_attached_by_its_number(client):
     wrapped = BulletClient(p.DIRECT)  # closes itself, and its number is not told otherwise
     number = wrapped._client
     assert number != client  # calls that said nothing would be about the other one
-    q = attach(wrapped, number)
+    q = attach(wrapped)
+    assert attach(wrapped, number).mirror_of().client == q.mirror_of().client == number
     for x in (0, 3):
         ball = q.createMultiBody(1, q.createCollisionShape(q.GEOM_MESH, vertices=CORNERS), basePosition=[x, 0, 0])
     assert abs(q.getClosestPoints(0, ball, 9.0)[0][8] - 2.0) < 1e-12
     assert q.rayTest([3, 0, 5], [3, 0, -5])[0][0] == ball and p.getNumBodies(client) == 0
     q.resetSimulation()
     assert len(q.mirror_of().world) == 0
+    q.disconnect()
+    with pytest.raises(InvalidArgument, match=r"must be the module or a BulletClient, got object.*say client="):
+        attach(object())
+
+
+#: Run as it is, and with `install()` before. A third client at least, in which nothing else is made.
+BULLET_CLIENTS = """
+import pybullet as p
+from pybullet_utils.bullet_client import BulletClient
+assert p.connect(p.SHARED_MEMORY) == -1
+p.connect(p.DIRECT)
+p.resetSimulation()
+clients = [BulletClient(p.DIRECT), BulletClient(p.DIRECT)]
+rows = []
+for k, client in enumerate(clients):
+    client.resetSimulation()
+    ball = client.createCollisionShape(client.GEOM_SPHERE, radius=0.5)
+    bodies = [client.createMultiBody(1, ball, basePosition=[(1 + k) * x, 0, 0]) for x in range(2 + k)]
+    client.addUserData(bodies[0], "colour", "red")
+    client.setCollisionFilterGroupMask(bodies[0], -1, 1, 1)
+    client.stepSimulation()
+for k, client in enumerate(clients):
+    rows.append([round(row[8], 9) for row in client.getClosestPoints(0, 1, 9.0)])
+    rows.append(sorted(row[0] for row in client.getOverlappingObjects([-9] * 3, [0.6, 9, 9])))
+    rows.append([hit[0] for hit in client.rayTestBatch([[0, 0, 9], [2, 0, 9]], [[0, 0, -9], [2, 0, -9]])])
+    rows.append([client.getNumUserData(0), client.getUserDataInfo(0, 0)[1:3], client.getNumBodies()])
+rows.append([p.getNumBodies(), p.getOverlappingObjects([-9] * 3, [9] * 3), p.getContactPoints()])
+clients[0].disconnect()
+rows.append([p.isConnected(0), p.isConnected(1), p.isConnected(2), clients[1].getNumBodies()])
+print(rows)
+"""
+INSTALLED = "from collide.adapters.hosts import pybullet_mirror as m; m.install(); import pybullet as q\n"
+OURS = "\nassert p is q and q.mirror_of(2).client == 2 and len(q.mirror_of(2).world) == 3"
+
+
+@pytest.mark.skipif(library.glue is None, reason="builtins are made by the compiled library")
+def test_bullet_clients_of_programs_reach_their_own_client():
+    """pybullet_utils gives a client's number to builtins alone. A connection that failed is no client."""
+    done = [
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.splitlines()[-1]
+        for code in (BULLET_CLIENTS, INSTALLED + BULLET_CLIENTS + OURS)
+    ]
+    assert done[0] == done[1] and "b'colour'" in done[0]
+
+
+def test_a_module_attached_to_a_client_is_about_that_client(client):
+    """Calls without physicsClientId, those that collide does not answer, too."""
+    number = p.connect(p.DIRECT)
+    q = attach(p, number)
+    assert number > client >= 0
+    ball = q.createMultiBody(1.0, q.createCollisionShape(q.GEOM_SPHERE, radius=0.2))
+    q.setGravity(0, 0, -10)
+    q.stepSimulation()
+    assert (q.getNumBodies(), p.getNumBodies(client)) == (1, 0)
+    assert q.getBasePositionAndOrientation(ball)[0][2] < 0.0 and q.rayTest([0, 0, 5], [0, 0, -5])[0][0] == ball
+    assert q.getNumBodies(physicsClientId=client) == 0 and q.connect(p.SHARED_MEMORY) == -1
+    q.disconnect()
+    assert not p.isConnected(number) and p.isConnected(client)
+    again = q.connect(p.DIRECT)
+    assert again == number and q.getNumBodies() == 0 and len(q.mirror_of().world) == 0
     q.disconnect()
 
 

@@ -13,6 +13,7 @@ from naive import rng_of
 from random_mjcf import mujoco_pairs, qpos_of, random_mjcf
 
 import collide
+from collide.adapters.hosts.mujoco import world
 from collide.errors import MissingExtra, SceneError
 from collide.robots.robot import Robot
 from collide.scenes import load
@@ -125,6 +126,29 @@ def test_tested_pairs_are_those_of_mujoco(tmp_path):
         filtered += "MuJoCo: contype and conaffinity" in reasons
         excluded += "MuJoCo: excluded" in reasons
     assert filtered >= 20 and excluded >= 15, (filtered, excluded)
+
+
+@pytest.mark.parametrize("flag", ["contact", "constraint", None])
+def test_contacts_that_a_model_turns_off_are_off(tmp_path, flag):
+    """Two balls in a floor and in each other, a named pair among them: no contact in MuJoCo, none here, and a note."""
+    off = f'<option><flag {flag}="disable"/></option>' if flag else ""
+    file = tmp_path / "off.xml"
+    file.write_text(
+        f'<mujoco>{off}<worldbody><geom name="floor" type="plane" size="1 1 1"/>'
+        '<body name="one" pos="0 0 .05"><freejoint/><geom name="a" size=".1"/></body>'
+        '<body name="two" pos="0 0 .12"><freejoint/><geom name="b" size=".1" contype="0" conaffinity="0"/></body>'
+        '</worldbody><contact><pair geom1="a" geom2="b"/></contact></mujoco>'
+    )
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    scene = load(file)
+    assert data.ncon == (0 if flag else 2)
+    assert len(scene.world().collisions()) == data.ncon
+    assert [pair[2] for pair in scene.allowed].count("MuJoCo: contacts are off") == (3 if flag else 0)
+    notes = [note for note in scene.robots["off"].notes if "turns contacts off" in note]
+    assert len(notes) == bool(flag) and all(f'<flag {flag}="disable"/>' in note for note in notes), notes
+    assert len(world(model, data).collisions()) == data.ncon
 
 
 def test_verdicts_are_those_of_mujoco(tmp_path):
