@@ -82,11 +82,11 @@ def _search(
             space.address, address_of(q_found), checker.robot.dof, done, len(found), limit, address_of(limits),
             address_of(found),
         )  # fmt: skip
-        pairs = space.open_pairs.copy()
         if some is not None:
             rows[some[first:done]] = open_pairs.nearer_of(rows[some[first:done]], found[first:done])
-            pairs[:, 0] = some[pairs[:, 0]]
-        if len(pairs):
+        if len(space.open_pairs):
+            pairs = space.open_pairs.copy()
+            pairs[:, 0] = pairs[:, 0] if some is None else some[pairs[:, 0]]
             asked = _measure_open(checker, rows, pairs, asked, q, limit)
     if some is not None:
         within[some] = limits

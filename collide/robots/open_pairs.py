@@ -6,6 +6,7 @@ unions of convex parts overlap, their deepest parts are asked for: kernels know 
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Sequence
 
@@ -13,8 +14,7 @@ import numpy as np
 
 from collide import query
 from collide.results import PAIR_DTYPE
-from collide.robots.check_tables import BodyAround, RobotBody, convex_parts_of
-from collide.robots.nearest_pairs import NONE
+from collide.robots.check_tables import BodyAround, RobotBody, without_meshes
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 
@@ -48,9 +48,7 @@ def distances(
         farthest = float(np.max(limit if np.ndim(limit) == 0 else limit[rows]))
         if padding + margin > 0.0:  # two sums, each rounded to the nearest: what is beyond is to be beyond the limit
             farthest = math.nextafter(math.nextafter(farthest + padding + margin, math.inf), math.inf)
-        within = query.distance(A, B, X_WA, X_WB, max_distance=farthest, check_poses=False).rows.copy()
-        if by_parts:
-            _take_deepest_parts(within, A, B, X_WA, np.broadcast_to(X_WB, X_WA.shape))
+        within = _rows_of(A, B, X_WA, X_WB, farthest, by_parts)
         if padding + margin > 0.0:
             _swell(within, padding + margin)
         within["point_a"] += padding * within["normal"]
@@ -87,21 +85,20 @@ def distances_of(rows: np.ndarray) -> np.ndarray:
     return np.where(rows["a"] >= 0, rows["distance"], np.inf)
 
 
-def _take_deepest_parts(rows: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> None:
-    """Of unions of convex parts that overlap, rows become those of the two parts that overlap deepest."""
+def _rows_of(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float, by_parts: bool) -> np.ndarray:
+    """Rows of two shapes at poses (k, 4, 4), as of `distances`."""
+    of_parts = (without_meshes(A), without_meshes(B)) if by_parts else (None, None)
+    if of_parts[0] is None or of_parts[1] is None:
+        return query.distance(A, B, X_WA, X_WB, max_distance=limit, check_poses=False).rows.copy()
+    A, B = of_parts
+    rows = query.distance(A, B, X_WA, X_WB, max_distance=limit, check_poses=False).rows.copy()
     overlap = np.flatnonzero(rows["distance"] < 0.0)
-    if not len(overlap) or convex_parts_of(A).is_bound or convex_parts_of(B).is_bound:
-        return
-    parts_a, parts_b = _parts_as_shapes(A), _parts_as_shapes(B)
-    if len(parts_a) * len(parts_b) == 1:
-        return
-    deepest = np.zeros(len(overlap), dtype=PAIR_DTYPE)
-    deepest["a"] = NONE
-    for P in parts_a:
-        for Q in parts_b:
-            asked = query.distance(P, Q, X_WA[overlap], X_WB[overlap], max_distance=0.0, check_poses=False).rows
-            deepest = nearer_of(deepest, asked)
-    rows[overlap] = deepest
+    pairs = [(P, Q) for P in _parts_as_shapes(A) for Q in _parts_as_shapes(B)]
+    if len(pairs) > 1 and len(overlap):
+        X_WA, X_WB = X_WA[overlap], np.broadcast_to(X_WB, X_WA.shape)[overlap]
+        deepest = [query.distance(*pair, X_WA, X_WB, max_distance=0.0, check_poses=False).rows for pair in pairs]
+        rows[overlap] = functools.reduce(nearer_of, deepest)
+    return rows
 
 
 def _parts_as_shapes(shape: Shape) -> list[Shape]:

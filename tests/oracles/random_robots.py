@@ -11,7 +11,12 @@ from naive import pose, random_pose, rotation, unit
 import collide
 from collide.robots.kinematic_tree import Joint, Mimic
 from collide.robots.robot import LinkShape, Robot
+from collide.scenes.loaders.resources import installed_folders
 
+#: Robots of example-robot-data; None where it is not installed.
+DEMO = next(
+    (robots for folder in installed_folders() if (robots := folder / "example-robot-data/robots").is_dir()), None
+)
 TYPES = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 
 
