@@ -242,12 +242,12 @@ def nearest_bodies(packed: PackedWorld, points: np.ndarray, limit: float, which:
     )  # fmt: skip
     order = np.lexsort((body, got["distance"], point))
     at = order[np.flatnonzero(np.diff(point[order], prepend=-1))]
-    at = at[~(got["lower"][at] > limit)]
     # Another body may be nearer where brackets overlap: what is proven is the least of both ends.
     starts = np.flatnonzero(np.diff(point, prepend=-1))
     lower, upper = np.full(n, np.inf), np.full(n, np.inf)
     lower[point[starts]] = np.minimum.reduceat(got["lower"], starts)
     upper[point[starts]] = np.minimum.reduceat(got["upper"], starts)
+    at = at[~(lower[point[at]] > limit)]
     row = point[at]
     for name in ("distance", "normal", "certified"):
         rows[name][row] = got[name][at]

@@ -54,7 +54,7 @@ def is_touching(lower, upper, rounding):
 
 
 def classify(rows: np.ndarray, rounding, *, clearance: float, min_depth: float) -> dict[str, np.ndarray]:
-    """Class -> indices of the rows in it, ascending; rows apart by more than the clearance are in none.
+    """Class -> indices of the rows in it, ascending; rows proven farther apart than the clearance are in none.
 
     rows : of `collide.results.PAIR_DTYPE`.   rounding : (n,) or a number [m].
     """
@@ -62,6 +62,6 @@ def classify(rows: np.ndarray, rounding, *, clearance: float, min_depth: float) 
     hit = rows["hit"] & ~touching
     # the depth is at most −lower: below min_depth only when that is proven
     shallow = hit & (-rows["lower"] < min_depth)
-    near = ~(rows["hit"] | touching | rows["beyond"]) & (rows["distance"] <= clearance)
+    near = ~(rows["hit"] | touching | rows["beyond"]) & (rows["lower"] <= clearance)
     masks = {COLLIDING: hit & ~shallow, SHALLOW: shallow, TOUCHING: touching, NEAR: near}
     return {name: np.flatnonzero(mask) for name, mask in masks.items()}

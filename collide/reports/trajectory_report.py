@@ -157,7 +157,7 @@ class Watch:
     """
 
     def __init__(self, scene, path: Path, clearance: float, min_depth: float, max_kept: int = 0):
-        self._max_kept, self._kept_rows = max_kept, list[np.ndarray]()
+        self._max_kept, self._kept = max_kept, list[tuple[np.ndarray, float]]()
         self.scene, self.path, self.clearance, self.min_depth = scene, path, clearance, min_depth
         self.moving = self._movers()
         fixed = [replace(body, static=body.name not in self.moving) for body in scene.bodies]
@@ -207,10 +207,10 @@ class Watch:
     def see(self, k: int, poses: np.ndarray) -> None:
         """Ask the World at sample k, and keep what is first, worst or nearest."""
         self._go_to(poses)
-        rows = self._near_rows()
+        rows, searched = self._near_rows()
         by_class = self._sorted(rows)
-        if k == len(self._kept_rows) < self._max_kept:
-            self._kept_rows.append(rows)
+        if k == len(self._kept) < self._max_kept:
+            self._kept.append((rows, searched))
         for name, indices in by_class.items():
             for row in rows[indices]:
                 self._keep(self.worst[name], k, row)
@@ -228,9 +228,9 @@ class Watch:
         """What is near at sample k, whose moving bodies are at these poses (m, 4, 4): kept, or asked once more."""
         self._go_to(poses)
         needed = max(self.clearance, self._largest_rounding())
-        rows = self._kept_rows[k] if k < len(self._kept_rows) else self._rows(needed)
+        rows, searched = self._kept[k] if k < len(self._kept) else (self._rows(needed), needed)
         apart = rows[~rows["beyond"]]
-        if not len(apart):  # the nearest pair is farther than any that was asked for
+        if not _least(rows) <= searched:  # the nearest pair may be farther than any that was asked for
             try:
                 apart = self.world.minimum().rows
             except UnsupportedQuery:  # a pair far away that the path never comes near
@@ -249,15 +249,20 @@ class Watch:
     def _largest_rounding(self) -> float:
         return float(classes.roundings(self.size, 0.0).max(initial=0.0))
 
-    def _near_rows(self) -> np.ndarray:
-        """Pairs as near as any seen so far, or within the clearance or rounding."""
+    def _near_rows(self) -> tuple[np.ndarray, float]:
+        """Pairs as near as any seen so far, or within the clearance or rounding, and how far was searched [m].
+
+        What a search does not name is farther apart than its limit, and a row may be, too: only its lower bound is
+        within. So a row whose distance is within the limit is the nearest, or none is known.
+        """
         needed = max(self.clearance, self._largest_rounding())
         if self.least is not None:
-            return self._rows(max(needed, float(self.least["order"])))
+            limit = max(needed, float(self.least["order"]))
+            return self._rows(limit), limit
         limit = max(needed, 0.01 * float(self.size.max(initial=0.0)))
-        while not len(rows := self._rows(limit)) and math.isfinite(limit):
+        while not _least(rows := self._rows(limit)) <= limit and math.isfinite(limit):
             limit = limit * 4 if limit < 4 * float(self.size.max(initial=0.0)) else math.inf
-        return rows
+        return rows, limit
 
     def _rows(self, limit: float) -> np.ndarray:
         """The World's answer; pairs that it cannot answer are told, once, and left out."""
@@ -332,6 +337,11 @@ class Watch:
             for robot, placement in self.scene.placements.items()
             for joint, value in zip(placement.robot.joint_names, self.path.configurations[robot][k])
         }
+
+
+def _least(rows: np.ndarray) -> float:
+    """The least distance of rows [m], infinite where there is none."""
+    return float(rows["distance"][~rows["beyond"]].min(initial=math.inf))
 
 
 def _finite(value) -> float | None:

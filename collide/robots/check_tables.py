@@ -162,24 +162,23 @@ def convex_parts_of(shape: Shape) -> _LinkParts:
 
     A solid mesh that is its own convex hull is that.
     """
-    if not shape.is_asked_whole:
-        return _LinkParts(list(parts_of(shape)), False)
-    if shape.is_region:
-        return _LinkParts(list(bounding_parts_of(shape)), True)
-    items = shape.items if isinstance(shape, Compound) else ((shape, np.eye(4)),)
-    hulls = [(_as_hull(item), X) for item, X in items]
-    if all(hull is not None for hull, _ in hulls):
-        return _LinkParts(list(parts_of(Compound(hulls))), False)  # type: ignore[arg-type]
-    return _LinkParts(list(bounding_parts_of(shape)), True)
+    same = without_meshes(shape)
+    return _LinkParts(list(bounding_parts_of(shape) if same is None else parts_of(same)), same is None)
 
 
-def _as_hull(shape: Shape) -> Shape | None:
-    """A shape without meshes that is the same set; None where there is none."""
-    if not shape.meshed:
-        return shape
+def without_meshes(shape: Shape) -> Shape | None:
+    """A shape of convex parts that is the same set; None where there is none."""
+    return _hulls_instead(shape) if shape.is_asked_whole else shape
+
+
+@kept_with_shape("_hulls_instead")
+def _hulls_instead(shape: Shape) -> Shape | None:
     if isinstance(shape, Mesh) and shape.solid and is_own_hull(shape.vertices, shape.faces):
         return ConvexHull(shape.vertices[np.unique(shape.faces)])
-    return None
+    if not isinstance(shape, Compound):
+        return None
+    items = [(without_meshes(item), X) for item, X in shape.items]
+    return None if any(item is None for item, _ in items) else Compound(items)
 
 
 def swollen(packed: PackedConvex, by: float) -> PackedConvex:

@@ -12,7 +12,7 @@ from collide.robots.check_scene import OPEN_LOWER
 from collide.robots.check_workspace import CheckWorkspace
 from collide.robots.checker_scene import CheckerScene
 from collide.robots.distance_gradients import distance_gradients
-from collide.robots.nearest_pairs import nearest_pairs
+from collide.robots.nearest_pairs import FIRST_LIMIT, GROWTH, NONE, nearest_pairs
 from collide.robots.robot_distances import NEAREST_DTYPE
 
 
@@ -36,12 +36,7 @@ def measure_piece(
     checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, out: np.ndarray, gradient: np.ndarray, limit: float
 ) -> None:
     """``out`` (n,) NEAREST_DTYPE and ``gradient`` (n, dof) become those of configurations q (n, dof)."""
-    rows = np.zeros(len(q), dtype=PAIR_DTYPE)
-    done = 0
-    while done < len(q):
-        done = nearest_pairs(space.address, address_of(q), checker.robot.dof, done, len(q), limit, address_of(rows))
-        if len(space.open_pairs):
-            _take_nearer(checker, rows, space.open_pairs.copy(), q, limit)
+    rows = _nearest_rows(checker, space, q, limit)
     distance_gradients(
         space.address, address_of(q), checker.robot.dof, len(q), address_of(checker.robot.moves), address_of(rows),
         address_of(gradient),
@@ -54,27 +49,86 @@ def measure_piece(
     out["lower"][far] = limit
 
 
-def _take_nearer(checker: CheckerScene, rows: np.ndarray, pairs: np.ndarray, q: np.ndarray, limit: float) -> None:
-    """Where a pair left to others is nearer than what a row tells, the row becomes its.
+def _nearest_rows(checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, limit: float) -> np.ndarray:
+    """(n,) rows of PAIR_DTYPE of the nearest pairs within the limit; ``a`` is NONE where there is no such pair.
+
+    Where a pair was left to others, and turned out to be farther than the kernel had searched, it searches once more:
+    as far as the nearest pair that is known.
+    """
+    rows, within = np.zeros(len(q), dtype=PAIR_DTYPE), np.full(len(q), min(FIRST_LIMIT, limit))
+    asked = _search(checker, space, q, within, rows, None, np.zeros((0, 3), dtype=np.int64), limit)
+    while len(asked):
+        known = open_pairs.distances_of(rows)
+        some = np.flatnonzero((known > within) & (within < limit))
+        if not len(some):
+            break
+        within[some] = np.where(np.isfinite(known), known, GROWTH * within)[some].clip(max=limit)
+        asked = _search(checker, space, q, within, rows, some, asked, limit)
+    return rows
+
+
+def _search(
+    checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, within: np.ndarray, rows: np.ndarray,
+    some: np.ndarray | None, asked: np.ndarray, limit: float,
+) -> np.ndarray:  # fmt: skip
+    """``rows`` (n,) take the nearest pairs of configurations q (n, dof), or some of them (k,), that are known within
+    limits ``within`` (n,), which become those searched; (m, 3) pairs left to others and asked so far.
+    """
+    found = rows if some is None else np.zeros(len(some), dtype=PAIR_DTYPE)
+    q_found, limits = (q, within) if some is None else (np.ascontiguousarray(q[some]), within[some])
+    done = 0
+    while done < len(found):
+        first, done = done, nearest_pairs(
+            space.address, address_of(q_found), checker.robot.dof, done, len(found), limit, address_of(limits),
+            address_of(found),
+        )  # fmt: skip
+        if some is not None:
+            rows[some[first:done]] = open_pairs.nearer_of(rows[some[first:done]], found[first:done])
+        if len(space.open_pairs):
+            pairs = space.open_pairs.copy()
+            pairs[:, 0] = pairs[:, 0] if some is None else some[pairs[:, 0]]
+            asked = _measure_open(checker, rows, pairs, asked, q, limit)
+    if some is not None:
+        within[some] = limits
+    return asked
+
+
+def _measure_open(
+    checker: CheckerScene, rows: np.ndarray, pairs: np.ndarray, asked: np.ndarray, q: np.ndarray, limit: float
+) -> np.ndarray:
+    """Where a pair left to others is nearer than what a row tells, the row becomes its; (k, 3) all pairs asked so far.
 
     Those that may be the nearest go first: what lies beyond them need not be measured.
     """
+    # A pair of bodies is left to others once for every two of their parts: the nearest of these speaks for it.
+    pairs = pairs[np.lexsort((pairs[:, OPEN_LOWER].view(np.float64), *pairs[:, 2::-1].T))]
+    is_new = (np.diff(pairs[:, :3], axis=0, prepend=-1) != 0).any(axis=1)
+    is_new[is_new] = ~_are_among(pairs[is_new, :3], asked)
+    pairs = np.ascontiguousarray(pairs[is_new])
     lowers = pairs[:, OPEN_LOWER].view(np.float64)
     while True:
-        known = np.where(rows["a"][pairs[:, 0]] >= 0, rows["distance"][pairs[:, 0]], np.inf)
-        may_be_nearer = lowers < known
+        may_be_nearer = lowers < open_pairs.distances_of(rows[pairs[:, 0]])
         pairs, lowers = pairs[may_be_nearer], lowers[may_be_nearer]
         if not len(pairs):
-            return
+            return asked
         order = np.lexsort((lowers, pairs[:, 0]))
         is_first = np.zeros(len(pairs), dtype=bool)
         is_first[order[np.flatnonzero(np.diff(pairs[order, 0], prepend=-1))]] = True
         numbered, X_WLs = _asked_poses(checker, pairs[is_first], q)
-        measured = open_pairs.distances(numbered, X_WLs, *_both(checker), limit=limit)
+        measured = open_pairs.distances(numbered, X_WLs, *_both(checker), limit=limit, by_parts=True)
+        measured["a"][measured["beyond"]] = NONE
         at = pairs[is_first, 0]
-        better = ~measured["beyond"] & ((rows["a"][at] < 0) | (measured["distance"] < rows["distance"][at]))
-        rows[at[better]] = measured[better]
+        rows[at] = open_pairs.nearer_of(rows[at], measured)
+        asked = np.concatenate([asked, pairs[is_first, :3]])
         pairs, lowers = pairs[~is_first], lowers[~is_first]
+
+
+def _are_among(pairs: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """(k,) bool: which rows of integers (k, 3) are among (m, 3)."""
+    if not len(others):
+        return np.zeros(len(pairs), dtype=bool)
+    numbers = np.unique(np.concatenate([pairs, others]), axis=0, return_inverse=True)[1].reshape(-1)
+    return np.isin(numbers[: len(pairs)], numbers[len(pairs) :])
 
 
 def _both(checker: CheckerScene) -> tuple:

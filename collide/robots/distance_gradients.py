@@ -2,6 +2,10 @@
 
 Moving with joint j, a point p of its child's subtree has velocity ω × (p − o) or along the axis; the distance of bodies
 that part changes by the normal times the difference of both witness points' velocities.
+
+A depth has a derivative where it is the least one of all directions. That of bodies that are not convex is the length
+of a translation that was found to part them; another may be shorter, and the next configuration may find it. Such rows
+are not certified, and no row that is not certified has a gradient.
 """
 
 from __future__ import annotations
@@ -10,7 +14,7 @@ import math
 
 from collide.kernels import entry, kernel, view_f64, view_u8
 from collide.lowering.shape_table import POSE
-from collide.narrowphase.rows import BODY_B, DISTANCE, NORMAL, POINT_A, POINT_B, ROW, view_row
+from collide.narrowphase.rows import BODY_B, CERTIFIED, DISTANCE, NORMAL, POINT_A, POINT_B, ROW, view_row
 from collide.numerics.vec3 import Vec3, cross, dot, neg, rotate, sub, vec3_at
 from collide.robots.check_configurations import begin_configuration
 from collide.robots.check_scene import BODY_INTS, LINK, N_LINKS, view_scene
@@ -36,7 +40,8 @@ from collide.robots.nearest_pairs import BODY_A, NONE
 
 @entry("void(int64, int64, int64, int64, int64, int64, int64)")
 def distance_gradients(header_at, q_at, dof, n, moves_at, rows_at, out_at):
-    """(n, dof) derivatives [m/rad or m/m] for the rows of `nearest_pairs`; NaN where there is none.
+    """(n, dof) derivatives [m/rad or m/m] for the rows of `nearest_pairs`; NaN where there is none, and
+    `RobotDistances.no_gradient` says why.
 
     moves : (joints, links) bytes, 1 where a joint moves a link.
     """
@@ -48,7 +53,8 @@ def distance_gradients(header_at, q_at, dof, n, moves_at, rows_at, out_at):
     moves = view_u8(moves_at, joints.n * n_links)
     for k in range(n):
         row = view_row(rows_at + ROW * k)
-        is_differentiable = row.words[BODY_A] != NONE and row.doubles[DISTANCE] != 0.0
+        is_known = row.words[BODY_A] != NONE and row.flags[CERTIFIED] != 0
+        is_differentiable = is_known and row.doubles[DISTANCE] != 0.0
         for j in range(dof):
             out[dof * k + j] = 0.0 if is_differentiable else math.nan
         if not is_differentiable:

@@ -1,6 +1,8 @@
 """The nearest pair of each configuration: signed distance, witness points, and which bodies they belong to.
 
-Limits that grow are tried one after another: what is near is met first, and bounds all that lies beyond it.
+Limits that grow are tried one after another: what is near is met first, and bounds all that lies beyond it. What a
+search within a limit does not name is farther apart than the limit. So a row whose distance is within the limit ends
+the search, and nothing else does: a pair that is left to others may turn out to be far away.
 """
 
 from __future__ import annotations
@@ -8,7 +10,17 @@ from __future__ import annotations
 import math
 
 from collide.kernels import entry, kernel, view_f64, view_i64
-from collide.narrowphase.rows import BEYOND, BODY_B, DISTANCE, LOWER, ROW, UPPER, is_undecided_or_refused, view_row
+from collide.narrowphase.rows import (
+    BEYOND,
+    BODY_B,
+    CERTIFIED,
+    DISTANCE,
+    LOWER,
+    ROW,
+    UPPER,
+    is_undecided_or_refused,
+    view_row,
+)
 from collide.numerics.vec3 import Vec3, sub
 from collide.robots.check_configurations import begin_configuration, leave_open
 from collide.robots.check_scene import (
@@ -33,7 +45,7 @@ from collide.robots.check_scene import (
 from collide.robots.part_pairs import ask, boxes_are_apart, is_bounded, middle, only_holds
 
 #: The first distance looked within [m], and by how much more each time.
-_FIRST_LIMIT, _GROWTH = 0.05, 8.0
+FIRST_LIMIT, GROWTH = 0.05, 8.0
 #: The largest that is tried before all pairs are.
 _LAST_LIMIT = 10.0
 #: `a` of a row where there is no pair.
@@ -41,29 +53,34 @@ NONE = -1
 BODY_A = BODY_B - 1
 
 
-@entry("int64(int64, int64, int64, int64, int64, float64, int64)")
-def nearest_pairs(header_at, q_at, dof, first, n, max_distance, rows_at):
+@entry("int64(int64, int64, int64, int64, int64, float64, int64, int64)")
+def nearest_pairs(header_at, q_at, dof, first, n, max_distance, limits_at, rows_at):
     """Rows of PAIR_DTYPE, zeroed, of configurations from ``first`` on, of n; returns the first one without.
 
-    A row's ``a`` is a body, or NONE where nothing is within max_distance [m]; ``b`` is another one, or −1 − the number
-    of a body around. Pairs left to others may be nearer.
+    limits : (n,) the limit [m] to begin with, at most max_distance; then the one searched last. Every tested pair that
+        is neither the row's nor left to others is farther apart than that, or at least as far as the row's.
+    A row's ``a`` is a body, or NONE where nothing is known within the limit; ``b`` is another one, or −1 − the number
+    of a body around. Pairs left to others may be nearer; where there are any, no larger limit is tried.
     """
     scene = view_scene(header_at)
     words = scene.words
     q = view_f64(q_at, dof * n)
+    limits = view_f64(limits_at, n)
     words[N_OPEN] = 0
     for k in range(first, n):
         n_open = words[N_OPEN]
         begin_configuration(scene, q, dof * k)
         row = view_row(rows_at + ROW * k)
-        limit = min(_FIRST_LIMIT, max_distance)
+        limit = limits[k]
         while True:
             words[N_OPEN] = n_open
             row.words[BODY_A] = NONE
             _find_nearest(scene, row, rows_at + ROW * k, k, limit)
-            if row.words[BODY_A] != NONE or words[N_OPEN] > n_open or limit >= max_distance:
+            is_settled = row.words[BODY_A] != NONE and row.doubles[DISTANCE] <= limit
+            if is_settled or words[N_OPEN] > n_open or limit >= max_distance:
                 break
-            limit = min(limit * _GROWTH, max_distance) if limit < _LAST_LIMIT else max_distance
+            limit = min(limit * GROWTH, max_distance) if limit < _LAST_LIMIT else max_distance
+        limits[k] = limit
         if words[N_OPEN] > words[OPEN_CAPACITY]:
             words[N_OPEN] = n_open
             return k
@@ -105,7 +122,8 @@ def _find_nearest(scene, row, row_at, number, limit):
 def _take_nearer(scene, p, q, a, b, number, row_at, limit):
     """Copy the row of two parts of bodies a and b if it is nearer; returns the limit from then on.
 
-    What is left open, or belongs to a part that only holds what is meant, is left to others where it may be nearer.
+    What is left open, or belongs to a part that only holds what is meant, is left to others where it may be nearer. A
+    rival, of which the brackets do not tell which of the two is nearer, widens the row's bracket.
     """
     within = max(limit, 0.0)
     d = Vec3(0.0, 0.0, 0.0)
@@ -123,11 +141,24 @@ def _take_nearer(scene, p, q, a, b, number, row_at, limit):
         leave_open(scene, number, a, b, row.doubles[LOWER])
         return limit
     out = view_row(row_at)
-    if out.words[BODY_A] != NONE and not row.doubles[DISTANCE] < out.doubles[DISTANCE]:
+    # The least distance of all is at least the least of the lower bounds, and at most the upper bound of any pair.
+    lower = row.doubles[LOWER]
+    is_certified = row.flags[CERTIFIED]
+    is_first = out.words[BODY_A] == NONE
+    if is_first or row.doubles[DISTANCE] < out.doubles[DISTANCE]:
+        if not is_first and out.doubles[LOWER] <= row.doubles[UPPER]:
+            lower = min(lower, out.doubles[LOWER])
+            is_certified &= out.flags[CERTIFIED]
+        _copy_row(scene, row_at)
+        out.words[BODY_A] = a
+        out.words[BODY_B] = b
+    elif lower <= out.doubles[UPPER]:
+        lower = min(lower, out.doubles[LOWER])
+        is_certified &= out.flags[CERTIFIED]
+    else:
         return limit
-    _copy_row(scene, row_at)
-    out.words[BODY_A] = a
-    out.words[BODY_B] = b
+    out.doubles[LOWER] = lower
+    out.flags[CERTIFIED] = is_certified
     return min(limit, out.doubles[UPPER]) if out.doubles[UPPER] > -math.inf else limit
 
 

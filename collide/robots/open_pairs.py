@@ -1,19 +1,22 @@
 """Pairs that the kernels of a checker leave to others: meshes that are not convex, and what doubles cannot tell.
 
-Each is asked of `collide.collide` or `collide.distance` at the poses of its links, bodies as they were given.
+Each is asked of `collide.collide` or `collide.distance` at the poses of its links, bodies as they were given. But where
+unions of convex parts overlap, their deepest parts are asked for: kernels know unions as their parts.
 """
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from collide import query
 from collide.results import PAIR_DTYPE
-from collide.robots.check_tables import BodyAround, RobotBody
-
-_IDENTITY = np.eye(4)[None]
+from collide.robots.check_tables import BodyAround, RobotBody, without_meshes
+from collide.shapes.compound import Compound
+from collide.shapes.shape import Shape
 
 
 def are_hits(
@@ -30,19 +33,24 @@ def are_hits(
 
 
 def distances(
-    pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround], *, limit
-) -> np.ndarray:
+    pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround], *, limit,
+    by_parts: bool = False,
+) -> np.ndarray:  # fmt: skip
     """(k,) rows of PAIR_DTYPE of such pairs, ``a`` and ``b`` as the pairs name bodies; ``beyond`` a limit [m].
 
-    limit : one of all, or (k,) of each, which may be exceeded.
-    Where a body is swollen, distances and its points are those of what it is swollen to.
+    limit : one of all, or (k,) of each, which may be exceeded.   by_parts : of unions of convex parts that overlap, the
+        deepest two parts; else a translation that separates the unions.
+    Where a body is swollen, its point is that of what it is swollen to, and the distance is that of the bodies less by
+    how much they are swollen: of convex bodies that is the signed distance of what they are swollen to.
     """
     out = np.zeros(len(pairs), dtype=PAIR_DTYPE)
     for rows, A, B, X_WA, X_WB, padding, margin in _batches(pairs, X_WLs, bodies, around):
-        farthest = float(np.max(limit if np.ndim(limit) == 0 else limit[rows])) + padding + margin
-        within = query.distance(A, B, X_WA, X_WB, max_distance=farthest, check_poses=False).rows.copy()
-        for field in ("distance", "lower", "upper"):
-            within[field] -= padding + margin
+        farthest = float(np.max(limit if np.ndim(limit) == 0 else limit[rows]))
+        if padding + margin > 0.0:  # two sums, each rounded to the nearest: what is beyond is to be beyond the limit
+            farthest = math.nextafter(math.nextafter(farthest + padding + margin, math.inf), math.inf)
+        within = _rows_of(A, B, X_WA, X_WB, farthest, by_parts)
+        if padding + margin > 0.0:
+            _swell(within, padding + margin)
         within["point_a"] += padding * within["normal"]
         within["point_b"] -= margin * within["normal"]
         if padding + margin > 0.0:
@@ -55,6 +63,60 @@ def distances(
         out[rows] = within
     out["a"], out["b"] = pairs[:, 1], pairs[:, 2]
     return out
+
+
+def nearer_of(mine: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(k,) of each two rows the nearer one, its bracket that of the least distance of both; ``a`` < 0 where none is.
+
+    Rivals, of which the brackets do not tell which is nearer, widen the bracket: the least distance is at least the
+    less of the lower bounds.
+    """
+    is_nearer = distances_of(other) < distances_of(mine)
+    is_rival = (mine["a"] >= 0) & (other["a"] >= 0)
+    is_rival &= np.where(is_nearer, mine["lower"] <= other["upper"], other["lower"] <= mine["upper"])
+    out = np.where(is_nearer, other, mine)
+    out["lower"][is_rival] = np.minimum(mine["lower"], other["lower"])[is_rival]
+    out["certified"][is_rival] = (mine["certified"] & other["certified"])[is_rival]
+    return out
+
+
+def distances_of(rows: np.ndarray) -> np.ndarray:
+    """(k,) distances [m], infinite where there is no pair."""
+    return np.where(rows["a"] >= 0, rows["distance"], np.inf)
+
+
+def _rows_of(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float, by_parts: bool) -> np.ndarray:
+    """Rows of two shapes at poses (k, 4, 4), as of `distances`."""
+    of_parts = (without_meshes(A), without_meshes(B)) if by_parts else (None, None)
+    if of_parts[0] is None or of_parts[1] is None:
+        return query.distance(A, B, X_WA, X_WB, max_distance=limit, check_poses=False).rows.copy()
+    A, B = of_parts
+    rows = query.distance(A, B, X_WA, X_WB, max_distance=limit, check_poses=False).rows.copy()
+    overlap = np.flatnonzero(rows["distance"] < 0.0)
+    pairs = [(P, Q) for P in _parts_as_shapes(A) for Q in _parts_as_shapes(B)]
+    if len(pairs) > 1 and len(overlap):
+        X_WA, X_WB = X_WA[overlap], np.broadcast_to(X_WB, X_WA.shape)[overlap]
+        deepest = [query.distance(*pair, X_WA, X_WB, max_distance=0.0, check_poses=False).rows for pair in pairs]
+        rows[overlap] = functools.reduce(nearer_of, deepest)
+    return rows
+
+
+def _parts_as_shapes(shape: Shape) -> list[Shape]:
+    """The items of a `Compound`, each where it stands in it, nested ones one by one; any other shape is its own."""
+    if not isinstance(shape, Compound):
+        return [shape]
+    return [Compound([(part, X)]) for item, X in shape.items for part in _parts_as_shapes(item)]
+
+
+def _swell(rows: np.ndarray, by: float) -> None:
+    """Take the swelling of both bodies [m], a sum that was rounded once, off distances; brackets stay proven."""
+    # Bodies that touch have no derivative of their distance, and are not to seem to have any.
+    rows["certified"] &= rows["distance"] != 0.0
+    rounding = 2.0**-53 * by  # of the sum; differences are rounded to the nearest, which is at most the next double
+    for field, outwards in (("lower", -math.inf), ("upper", math.inf)):
+        swollen = np.nextafter(rows[field] - by, outwards)
+        rows[field] = np.nextafter(swollen + math.copysign(rounding, outwards), outwards)
+    rows["distance"] -= by
 
 
 def _batches(

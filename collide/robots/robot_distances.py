@@ -15,6 +15,18 @@ NEAREST_DTYPE = np.dtype(
 )  # fmt: skip
 
 
+#: Why there is no gradient: what is the case, and what to do about it where there is anything to do.
+NO_GRADIENT = {
+    "beyond": "no tested pair is within max_distance",
+    "touching": "the bodies touch: distances have no derivative at 0",
+    "depth": (
+        "the bodies overlap and are not convex: their depth is known from above alone, and has no derivative; robots "
+        'and bodies of hulls have (meshes="hull")'
+    ),
+    "bracket": "the bracket of the distance is not certified",
+}
+
+
 class RobotDistances:
     """The nearest pair of each configuration; fields of `NEAREST_DTYPE` as attributes, arrays with a leading N.
 
@@ -25,9 +37,11 @@ class RobotDistances:
         the robot, towards B; ``point_a``, ``point_b`` (3,) in W [m]; ``hit``, ``certified``; ``beyond`` where nothing
         tested is within the ``max_distance`` asked: distance and upper are infinite then. ``a`` is the number of a
         body, −1 for none; ``b`` of another, or −1 − the number of one around.
+        Of bodies that are not convex and overlap, ``distance`` is minus the length of a translation that was found to
+        separate them, the bracket reaches up to 0, and ``certified`` is False.
     gradient : (N, dof) float64
-        How ``distance`` changes with each column of q [m/rad or m/m]; NaN where it has no derivative: touching, beyond.
-        Where two pairs are equally near, it is that of the pair named.
+        How ``distance`` changes with each column of q [m/rad or m/m]; NaN where no derivative is known: `no_gradient`
+        says why. Where two pairs are equally near, it is that of the pair named.
     bodies, around : sequence of str
         Names of what moves, and of what is around.
     """
@@ -44,6 +58,16 @@ class RobotDistances:
             for a, b in zip(self.rows["a"].tolist(), self.rows["b"].tolist())
         ]
 
+    @property
+    def no_gradient(self) -> list[str | None]:
+        """Why a configuration's gradient is NaN, in the words of `NO_GRADIENT`; None where there is a gradient.
+
+        Returns
+        -------
+        list of N str or None
+        """
+        return [_why_no_gradient(row) for row in self.rows]
+
     def __len__(self) -> int:
         return len(self.rows)
 
@@ -56,3 +80,11 @@ class RobotDistances:
         near = self.rows["distance"][~self.rows["beyond"]]
         least = f", least {near.min():.6g} m" if len(near) else ""
         return f"RobotDistances({len(self)} configurations, {int(self.rows['hit'].sum())} in collision{least})"
+
+
+def _why_no_gradient(row) -> str | None:
+    if row["beyond"]:
+        return NO_GRADIENT["beyond"]
+    if not row["certified"]:
+        return NO_GRADIENT["depth" if row["upper"] <= 0.0 and row["hit"] else "bracket"]
+    return NO_GRADIENT["touching"] if row["distance"] == 0.0 else None

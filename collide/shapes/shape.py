@@ -23,8 +23,9 @@ class Shape:
     """
 
     __slots__ = (
-        "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges", "_kind", "_laid_out",
-        "_moving", "_parts", "_pieces", "_prepared", "_serial", "_surface", "_topology", "_union", "_walk",
+        "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges", "_hulls_instead",
+        "_kind", "_laid_out", "_moving", "_parts", "_pieces", "_prepared", "_serial", "_surface", "_topology", "_union",
+        "_walk",
     )  # fmt: skip
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -32,6 +33,7 @@ class Shape:
     _bounds: tuple
     #: The same with meshes that are convex as what they are (`robots/check_tables.py`).
     _convex_parts: Any
+    _hulls_instead: Any
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
     _prepared: dict[int, Any]
     _serial: int

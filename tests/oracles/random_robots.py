@@ -1,4 +1,5 @@
-"""Seeded robots with joints of every kind, and where their links stand by a plain computation."""
+"""Seeded robots with joints of every kind, where their links stand by a plain computation, and which pairs of bodies a
+checker is to test, asked one by one."""
 
 from __future__ import annotations
 
@@ -10,7 +11,12 @@ from naive import pose, random_pose, rotation, unit
 import collide
 from collide.robots.kinematic_tree import Joint, Mimic
 from collide.robots.robot import LinkShape, Robot
+from collide.scenes.loaders.resources import installed_folders
 
+#: Robots of example-robot-data; None where it is not installed.
+DEMO = next(
+    (robots for folder in installed_folders() if (robots := folder / "example-robot-data/robots").is_dir()), None
+)
 TYPES = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 
 
@@ -110,3 +116,41 @@ def planar(joint: Joint, x: float, y: float, yaw: float) -> np.ndarray:
 def random_configurations(rng, robot: Robot, n: int) -> np.ndarray:
     low, high = np.maximum(robot.lower, -2.0), np.minimum(robot.upper, 2.0)
     return rng.uniform(low, high, (n, robot.dof))
+
+
+def slider(shape=None, **geometry) -> Robot:
+    """base -slide(x)-> cart."""
+    ball = [LinkShape(shape or collide.Sphere(0.1), np.eye(4), None, "test")]
+    joints = [Joint("slide", "prismatic", "base", "cart", np.eye(4), (1.0, 0, 0), -1.0, 1.0)]
+    return Robot("slider", ["base", "cart"], joints, {"cart": ball, **geometry})
+
+
+def pairs_to_test(checker) -> list[tuple]:
+    """(shape, link, shape, link or None, X_WB or None, name, name) of what is to be tested, found again from robot and
+    World."""
+    robot, world = checker.robot, checker.world
+    disabled = {frozenset(pair[:2]) for pair in robot.disabled_pairs}
+    links = [link for link in robot.links if link in robot.geometry]
+    shape = {link: collide.Compound([(e.shape, e.X_LG) for e in robot.geometry[link]]) for link in links}
+    pairs = []
+    for k, a in enumerate(links):
+        for b in links[k + 1 :]:
+            if frozenset((a, b)) not in disabled:
+                pairs.append((shape[a], a, shape[b], b, None))
+        for body in map(world.body, world.ids):
+            if not (body.static and a in robot.base_links):
+                pairs.append((shape[a], a, body.shape, body.name, body.X_WB))
+    return pairs
+
+
+def asked_one_by_one(checker, Q, ask):
+    """For each configuration, what ``ask`` says of every pair."""
+    robot = checker.robot
+    number = {link: k for k, link in enumerate(robot.links)}
+    answers = []
+    for X_WL in robot.link_poses(Q):
+        answers.append([
+            ask(A, B, X_WL[number[a]], X_WL[number[b]] if X_WB is None else X_WB)
+            for A, a, B, b, X_WB in pairs_to_test(checker)
+        ])
+    return answers

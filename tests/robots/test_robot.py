@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import site
 from pathlib import Path
 
 import numpy as np
 import pytest
+from random_robots import DEMO
 
 from collide.errors import InvalidArgument, InvalidPose, SceneError
 from collide.robots.kinematic_tree import Joint, Mimic
@@ -16,14 +16,6 @@ from collide.shapes import Sphere
 from collide.transforms import pose
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
-DEMO = next(
-    (
-        folder
-        for base in site.getsitepackages()
-        if (folder := Path(base) / "cmeel.prefix/share/example-robot-data/robots").is_dir()
-    ),
-    None,
-)
 
 
 def arm(**changes) -> Robot:

@@ -7,11 +7,17 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from naive import pose, random_pose, rng_of
-from random_robots import random_configurations, random_link_shape, random_robot
+from random_robots import (
+    asked_one_by_one,
+    pairs_to_test,
+    random_configurations,
+    random_link_shape,
+    random_robot,
+    slider,
+)
 
 import collide
 from collide.errors import InvalidArgument
-from collide.robots.kinematic_tree import Joint
 from collide.robots.robot import LinkShape, Robot
 
 BRICK = collide.Mesh(*collide.tessellate(collide.Box((0.2, 0.1, 0.15))))
@@ -32,37 +38,6 @@ def random_world(rng, n: int, meshes: bool = False) -> collide.World:
             shape = dented() if k % 2 else BRICK
         world.add(shape, random_pose(rng, 0.6), name=f"body{k}", static=bool(rng.random() < 0.5))
     return world
-
-
-def pairs_to_test(checker) -> list[tuple]:
-    """(shape, link, shape, link or None, X_WB or None, name, name) of what is to be tested, found again from robot and
-    World."""
-    robot, world = checker.robot, checker.world
-    disabled = {frozenset(pair[:2]) for pair in robot.disabled_pairs}
-    links = [link for link in robot.links if link in robot.geometry]
-    shape = {link: collide.Compound([(e.shape, e.X_LG) for e in robot.geometry[link]]) for link in links}
-    pairs = []
-    for k, a in enumerate(links):
-        for b in links[k + 1 :]:
-            if frozenset((a, b)) not in disabled:
-                pairs.append((shape[a], a, shape[b], b, None))
-        for body in map(world.body, world.ids):
-            if not (body.static and a in robot.base_links):
-                pairs.append((shape[a], a, body.shape, body.name, body.X_WB))
-    return pairs
-
-
-def asked_one_by_one(checker, Q, ask):
-    """For each configuration, what ``ask`` says of every pair."""
-    robot = checker.robot
-    number = {link: k for k, link in enumerate(robot.links)}
-    answers = []
-    for X_WL in robot.link_poses(Q):
-        answers.append([
-            ask(A, B, X_WL[number[a]], X_WL[number[b]] if X_WB is None else X_WB)
-            for A, a, B, b, X_WB in pairs_to_test(checker)
-        ])
-    return answers
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -111,13 +86,6 @@ def test_threads_pieces_and_single_rows_give_the_same():
     one, two = checker.distances(Q[:400]), checker.distances(Q[:400], threads=2)
     assert one.rows.tobytes() == two.rows.tobytes() and one.gradient.tobytes() == two.gradient.tobytes()
     assert len(checker.collides(np.zeros((0, robot.dof)))) == 0
-
-
-def slider(shape=None, **geometry) -> Robot:
-    """base -slide(x)-> cart."""
-    ball = [LinkShape(shape or collide.Sphere(0.1), np.eye(4), None, "test")]
-    joints = [Joint("slide", "prismatic", "base", "cart", np.eye(4), (1.0, 0, 0), -1.0, 1.0)]
-    return Robot("slider", ["base", "cart"], joints, {"cart": ball, **geometry})
 
 
 def test_padding_swells_against_the_surroundings_alone():
