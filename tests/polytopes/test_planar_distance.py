@@ -142,8 +142,8 @@ def test_polygons_a_hair_apart_have_a_positive_lower_bound():
             square = squared_distance(A[k].vertices, B[k].vertices, X_WA[k], X_WB[k])
             assert Fraction(float(r.lower[k])) ** 2 <= square <= Fraction(float(r.upper[k])) ** 2
             assert abs(np.hypot(*r.normal[k]) - 1.0) < 1e-14
-            tight += Fraction(float(r.lower[k])) ** 2 >= square * (1 - Fraction(1, 10**12))
-    assert tight > 60, "bounds across the nearest features are the gap to the last digits"
+            tight += Fraction(float(r.lower[k])) ** 2 >= square * (1 - Fraction(1, 10**6))
+    assert tight > 60, "bounds across the nearest features are the gap to six digits and more"
 
 
 def test_what_double_doubles_leave_open_the_line_that_parts_them_tells():
