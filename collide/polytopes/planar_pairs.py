@@ -10,7 +10,7 @@ from collide import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidPose
 from collide.kernels import address_of
 from collide.polytopes.convex_polygon import ConvexPolygon, planar_poses
-from collide.polytopes.planar_certificates import PlanarCertificate, certificate_of_row
+from collide.polytopes.planar_certificates import PlanarCertificate, certificate_of_row, gap_across
 from collide.polytopes.planar_distance import (
     DISTANCE,
     DISTANCE_ROW,
@@ -243,12 +243,18 @@ def polygon_distance(A, B, X_WA, X_WB, *, threads: int = 1) -> PolygonDistances:
     Whether they meet is decided exactly, first. A gap takes O(log n + log m) a round of GJK, a depth O(n + m): there a
     translation has to be tried along the normal of every edge. Polygons without area that meet have depth 0 where their
     Minkowski difference has none. Distances are doubles, off by at most 2⁻⁴⁶ (1.4e-14) of the pair's size.
+    Of polygons that are apart, ``lower`` and ``distance`` are positive, unless the gap is less than the least double.
     """
     threads = check_threads(threads)
     question = PolygonQuestion(A, B, X_WA, X_WB)
     table = np.zeros((question.n, ROW), dtype=np.int64)
     distances = np.zeros((question.n, DISTANCE_ROW))
     _answer(question, table, distances, threads)
+    for k in np.flatnonzero((table[:, HIT] == 0) & ~(distances[:, LOWER] > 0.0)).tolist():
+        certificate = certificate_of_row(*question.pair(k), table[k].tolist())
+        distances[k, LOWER] = gap_across(*question.pair(k), certificate)
+        distances[k, DISTANCE] = max(distances[k, DISTANCE], distances[k, LOWER])
+        distances[k, UPPER] = max(distances[k, UPPER], distances[k, DISTANCE])
     return PolygonDistances(question, table, distances)
 
 

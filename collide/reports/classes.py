@@ -53,6 +53,12 @@ def is_touching(lower, upper, rounding):
     return ((lower < 0.0) & (upper > 0.0)) | (np.maximum(-lower, upper) <= rounding)
 
 
+def proven_distances(rows: np.ndarray) -> np.ndarray:
+    """(n,) signed distances that pairs are ranked by [m]: of overlaps that are not certified only as deep as is proven,
+    the upper end of the bracket. A way out that happens to be long says nothing of how deep bodies are."""
+    return np.where(rows["hit"] & ~rows["certified"], rows["upper"], rows["distance"])
+
+
 def classify(rows: np.ndarray, rounding, *, clearance: float, min_depth: float) -> dict[str, np.ndarray]:
     """Class -> indices of the rows in it, ascending; rows proven farther apart than the clearance are in none.
 

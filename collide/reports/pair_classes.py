@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.reports import proofs
+from collide.reports.classes import proven_distances
 
 #: Rows made readable at a time where all of them are wanted.
 _CHUNK = 4096
@@ -68,11 +69,11 @@ class Pairs(Sequence):
 
     @classmethod
     def of(cls, result, indices: np.ndarray, names: Mapping[int, str], approximated: frozenset[str]) -> Pairs:
-        """The chosen rows of a `WorldResult`: deepest or nearest first, then by name."""
+        """The chosen rows of a `WorldResult`: those proven deepest or nearest first, then by distance, then by name."""
         rows = result.rows
         rank = _ranks(names)
         a, b = rank[rows["a"][indices]], rank[rows["b"][indices]]
-        order = indices[np.lexsort((b, a, rows["distance"][indices]))]
+        order = indices[np.lexsort((b, a, rows["distance"][indices], proven_distances(rows[indices])))]
         return cls(rows, order, names, approximated)
 
     def by_name(self) -> Pairs:

@@ -22,6 +22,8 @@ SHORT = 12
 #: A body that is in more pairs of a list than this has them told in one row.
 MAX_PAIRS_OF_BODY = 4
 _MARK = "≈ "
+#: A depth whose bracket is wider than this part of it is told by both ends.
+_WIDE = 0.1
 #: Bodies named in a line that tells a list.
 _NAMED = 3
 
@@ -57,12 +59,12 @@ def _pair_table(title: str, style: str, pairs: Pairs, measure: str, everything: 
         pairs.folded(MAX_PAIRS_OF_BODY, SHORT) if not everything else ([Fold(pair, "", 1) for pair in pairs], 0)
     )
     listed = [fold.pair for fold in folds]
-    unit, on_a = coordinates([pair.point_a for pair in listed])
+    unit, places = coordinates([_place(pair) for pair in listed])
     columns = [
         (Column("body A", "name"), [_marked(pair, pair.a) for pair in listed]),
         (Column("body B", "name"), [_marked(pair, pair.b) for pair in listed]),
-        (Column(measure), _at_most(listed, lengths([_measured(pair, measure) for pair in listed]))),
-        (Column(f"at x y z [{unit}]", "label", 1), on_a),
+        (Column(measure), depth_texts(listed) if measure == "depth" else lengths([_measured(pair, measure) for pair in listed])),
+        (Column(f"at x y z [{unit}]", "label", 1), places),
         (Column("normal A→B", "label", 2), directions([pair.normal for pair in listed])),
     ]
     if any(fold.size > 1 for fold in folds):
@@ -93,9 +95,12 @@ def _bracket_notes(pairs: list[Pair], measure: str, everything: bool) -> list[st
     """A line for each pair whose number is proven less tightly than promised."""
     if measure == "within":
         return []
-    wide = [pair for pair in pairs if not pair.certified and not _is_bound(pair)]
-    bounds = any(map(_is_bound, pairs))
-    notes = ["≤: a move that long along the normal parts the bodies, proven; a shorter one may do"] if bounds else []
+    wide = [pair for pair in pairs if not pair.certified and not _is_bound(pair) and not _is_range(pair)]
+    notes = []
+    if any(map(_is_bound, pairs)):
+        notes.append("≤: a move that long along the normal parts the bodies, proven; a shorter one may do")
+    if any(map(_is_range, pairs)):
+        notes.append("…: at least so deep, at most so deep, both proven; ranked by the first")
     notes += [
         f"{pair.a} and {pair.b}: {measure} known to {lengths([_bracket(pair)])[0].strip()} only, wider than promised"
         for pair in wide
@@ -110,8 +115,30 @@ def _is_bound(pair: Pair) -> bool:
     return pair.depth is not None and pair.upper == 0.0 and pair.depth > 0.0
 
 
-def _at_most(pairs: list[Pair], texts: list[str]) -> list[str]:
-    return [f"≤ {text}" if _is_bound(pair) else text for pair, text in zip(pairs, texts)]
+def _is_range(pair: Pair) -> bool:
+    """Whether a depth is known to lie between two lengths that are far from each other."""
+    return (
+        pair.depth is not None and not pair.certified and pair.upper is not None and pair.upper < 0.0
+        and _bracket(pair) > _WIDE * pair.depth
+    )  # fmt: skip
+
+
+def depth_texts(pairs: list[Pair]) -> list[str]:
+    """How deep pairs are: a length, ``≤ 5 mm`` where no more is known, ``2 mm … 5 mm`` where both ends are proven."""
+    texts = lengths([_measured(pair, "depth") for pair in pairs])
+    for k, pair in enumerate(pairs):
+        if _is_bound(pair):
+            texts[k] = f"≤ {texts[k]}"
+        elif _is_range(pair) and pair.upper is not None:
+            texts[k] = f"{brief_length(-pair.upper)} … {texts[k].strip()}"
+    return texts
+
+
+def _place(pair: Pair) -> list[float]:
+    """Where a pair is told to be: the point of A; of a depth that is a bound, the middle of the contact it goes through."""
+    if not (_is_bound(pair) or _is_range(pair)):
+        return pair.point_a
+    return [0.5 * (a + b) for a, b in zip(pair.point_a, pair.point_b)]
 
 
 def _verdict(pair: Pair) -> str:

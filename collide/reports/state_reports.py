@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from collide.reports import terminal
 from collide.reports.number_format import count, lengths
 from collide.reports.report import Report
+from collide.reports.report_tables import depth_texts
 from collide.reports.tables import Column, Line, Table, lay_out, table_lines, wrapped
 from collide.reports.trajectory_report import place, verdict
 
@@ -63,9 +64,9 @@ def _state_table(made: list[Stated]) -> Table:
     columns = [Column("state", "name"), Column("collisions"), Column("touching"), Column("near"), Column("deepest")]
     rows = []
     for label, _, report, _ in made:
-        deepest = [pair.depth if pair.depth is not None else float("inf") for pair in report.colliding[:1]]
+        deepest = depth_texts(report.colliding[:1])
         numbers = [str(len(pairs)) for pairs in (report.colliding, report.touching, report.near)]
-        rows.append([label, *numbers, lengths(deepest)[0].strip() if deepest else "-"])
+        rows.append([label, *numbers, deepest[0].strip() if deepest else "-"])
     return Table("STATES", columns, rows)
 
 

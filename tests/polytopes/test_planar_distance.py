@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from planar_families import FAMILIES, magnitudes, pose_at
@@ -111,3 +113,46 @@ def test_closed_forms():
     point = ConvexPolygon([(0.5, 0)])
     assert polygon_distance(square, point, planar_pose(), planar_pose()).distance == -0.5
     assert polygon_distance(point, point, planar_pose(), planar_pose()).distance == 0.0
+
+
+def test_polygons_a_hair_apart_have_a_positive_lower_bound():
+    """Vertices put on edges and on vertices, in doubles: what is apart exactly is proven so, within fractions."""
+    rng = np.random.default_rng(77)
+    A, B, X_WA, X_WB = [], [], [], []
+    for k in range(1500):
+        corners = rng.normal(size=(int(rng.integers(3, 8)), 2))
+        polygon, other = ConvexPolygon(corners), ConvexPolygon(rng.normal(size=(int(rng.integers(1, 6)), 2)))
+        X, Y = (pose_at(rng.normal(size=2), rng.uniform(0, 7)) for _ in "AB")
+        edge = (polygon.vertices[:2] if k % 3 else polygon.vertices[[0, 0]]) @ X[:2, :2].T + X[:2, 2]
+        out = np.array([edge[1, 1] - edge[0, 1], edge[0, 0] - edge[1, 0]]) if k % 3 else edge[0] - X[:2, 2]
+        turned = other.vertices @ Y[:2, :2].T
+        first = int(np.argmin(turned @ out))
+        Y[:2, 2] = edge[0] + rng.uniform() * (edge[1] - edge[0]) - turned[first]
+        A.append(polygon), B.append(other), X_WA.append(X), X_WB.append(Y)
+    X_WA, X_WB = np.array(X_WA), np.array(X_WB)
+    r = polygon_distance(A, B, X_WA, X_WB)
+    apart = np.flatnonzero(~r.hit)
+    hair = apart[r.distance[apart] < 1e-14]
+    assert len(hair) > 150, len(hair)
+    assert (r.lower[apart] > 0.0).all() and (r.distance[apart] >= r.lower[apart]).all()
+    assert (r.distance <= r.upper).all() and (r.lower <= r.distance).all()
+    tight = 0
+    for k in hair[:120].tolist():
+        with reproducing(AGAIN, A=A[k].vertices, B=B[k].vertices, X_WA=X_WA[k], X_WB=X_WB[k]):
+            square = squared_distance(A[k].vertices, B[k].vertices, X_WA[k], X_WB[k])
+            assert Fraction(float(r.lower[k])) ** 2 <= square <= Fraction(float(r.upper[k])) ** 2
+            assert abs(np.hypot(*r.normal[k]) - 1.0) < 1e-14
+            tight += Fraction(float(r.lower[k])) ** 2 >= square * (1 - Fraction(1, 10**6))
+    assert tight > 60, "bounds across the nearest features are the gap to six digits and more"
+
+
+def test_what_double_doubles_leave_open_the_line_that_parts_them_tells():
+    """A corner beside an edge of 2⁵³ m, both in integers: the gap is 2⁻⁵³ m, 2⁻¹⁰⁶ of the size."""
+    big = 2.0**52
+    edge = ConvexPolygon([(-big, -big + 1), (big, big - 1)])
+    # x (big − 1) − y big, over 2 big: the corner (big / 2, …) is off the line by a fraction of a unit
+    corner = ConvexPolygon([(big - 1, big - 2)])
+    r = polygon_distance(edge, corner, planar_pose(), planar_pose())
+    square = squared_distance(edge.vertices, corner.vertices, planar_pose(), planar_pose())
+    assert not r.hit and 0 < square < 1e-30
+    assert 0.0 < r.lower <= r.distance <= r.upper and Fraction(r.lower) ** 2 <= square <= Fraction(r.upper) ** 2

@@ -100,6 +100,34 @@ def test_every_row_is_in_the_class_its_proof_gives_it():
     assert not r.shallow and r.collides
 
 
+def test_depths_are_ranked_and_told_by_what_is_proven_of_them():
+    """A way out that happens to be long ranks nothing first: 0.2 m for certain, then 0.15 … 2.15 m, then ≤ 0.9 m."""
+    between, at_most = row(1, 3, -2.15, SIMPLEX, certified=False), row(1, 4, -0.9, SIMPLEX, certified=False)
+    between["upper"], at_most["upper"] = -0.15, 0.0
+    between["point_a"], between["point_b"] = (0.5, 0.0, 2.0), (0.5, 0.0, -0.15)
+    r = report.make(make_scene([between, at_most, row(0, 2, -0.2, SIMPLEX)]))
+    assert [p.depth for p in r.colliding] == [0.2, 2.15, 0.9]
+    page = text_of(terminal.render(r, everything=False, proofs=False, width=120, whole_names=True))
+    first = next(k for k, line in enumerate(page) if line.startswith("COLLIDING"))
+    rows = [" ".join(line.split()) for line in page[first:] if "panda/" in line][:3]
+    assert "200.000 mm" in rows[0] and "150 mm … 2150.000 mm" in rows[1] and "≤ 900.000 mm" in rows[2], page
+    assert "0.500 0.000 0.925" in rows[1], "the middle of the contact, not a metre beside it"
+    assert any("at least so deep, at most so deep, both proven" in line for line in page), page
+
+
+def test_an_l_and_a_ball_in_its_foot_are_five_centimetres_deep_in_a_report():
+    world = collide.World()
+    angle = collide.Compound(
+        [(collide.Box((4, 1, 0.3)), np.eye(4)), (collide.Box((0.3, 1, 2)), collide.pose((-1.85, 0, 1.15)))]
+    )
+    world.add(angle, name="angle")
+    world.add(Sphere(0.1), collide.pose((1.0, 0.0, 0.2)), name="ball")
+    world.add(collide.Box((1, 1, 0.1)), collide.pose((1.0, 0.0, -0.13)), name="plate")
+    r = report.make(SimpleNamespace(**{**vars(make_scene([], dict(enumerate(("angle", "ball", "plate"))))), "world": lambda: world}))
+    told = [(p.a, p.b, round(p.depth, 12), p.certified) for p in r.colliding]
+    assert told == [("angle", "plate", 0.07, True), ("angle", "ball", 0.05, True)]
+
+
 def test_shallow_needs_proof():
     """A collision is set aside only where even the deep end of its bracket is below the limit."""
     scene = make_scene([row(0, 1, -0.001, SIMPLEX), row(0, 2, -0.001, SIMPLEX, width=0.0018)])

@@ -176,8 +176,8 @@ def _least(rows: np.ndarray, limit: float, left_out: bool) -> np.ndarray:
 def _overlap(
     A: CompoundParts, B: CompoundParts, X_WA, X_WB, out: np.ndarray, meeting: np.ndarray, rows, depths: bool
 ) -> None:
-    """The row of two unions that meet, or may."""
-    row = meeting[0].copy()
+    """The row of two unions that meet, or may: at the parts that are proven deepest."""
+    row = meeting[np.lexsort((meeting["distance"], meeting["upper"]))[0]].copy()
     certain = row["how"] != UNDECIDED
     point = 0.5 * (row["point_a"] + row["point_b"])
     row["hit"], row["beyond"], row["certified"] = True, False, certain
@@ -191,7 +191,11 @@ def _overlap(
         row["normal"], row["certified"] = (0.0, 0.0, 1.0), False
     elif depths:
         length, bound, normal = _separating_translation(A, B, X_WA, X_WB, meeting)
-        row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
+        if certain:  # what separates the unions separates their deepest convex parts, too
+            row["upper"] = min(0.0, float(meeting["upper"].min()))
+        row["distance"], row["lower"] = min(0.0 - length, float(row["upper"])), 0.0 - bound
+        row["normal"] = normal + 0.0
+        length = -float(row["distance"])
         row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
         row["certified"] = bool(certain and bound == 0.0)
     out[0] = row

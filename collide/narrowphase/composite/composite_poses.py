@@ -320,7 +320,10 @@ def _separate_bodies_of(block, k, row_at):
         view_i64(block.header[INTS_AT], INTS * n_shapes), view_f64(block.header[NUMBERS_AT], NUMBERS * n_shapes),
         view_f64(block.header[POSES_AT], POSE * last), view_i64(block.header[SHAPE_OF_AT], last),
     )  # fmt: skip
-    separate_bodies(block.scores, SCORE * k, row_at, parts, A.part_rows, A.n_parts, B.part_rows, B.n_parts)
+    separate_bodies(
+        block.scores, SCORE * k, row_at, parts, A.part_rows, A.n_parts, B.part_rows, B.n_parts,
+        block.header[DOUBLES_AT],  # the narrowphase's workspace: its lists are answered
+    )  # fmt: skip
 
 
 #: How `answer_compounds` is called.

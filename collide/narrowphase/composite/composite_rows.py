@@ -1,9 +1,10 @@
 """One row a pair of bodies from rows of their parts.
 
 Apart, the distance of two unions is the least one of their parts. Overlapping, the smallest
-separating translation has no such formula; what is reported is a translation that separates the
-hulls of both bodies along the best of the parts' normals, which is a proven upper bound, beside
-the proven lower bound that each overlapping pair of parts must come apart.
+separating translation has no such formula. Proven of it are two bounds: each overlapping pair of
+parts must come apart, so it is at least as long as the depth of the deepest pair; and along the
+normals of overlapping parts and the axes of the deepest two the unions are clear from a length on
+(`clearing_translation.py`), the least of which is reported.
 """
 
 from __future__ import annotations
@@ -13,9 +14,10 @@ from typing import Any, NamedTuple
 
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.packed_convex import HALFSPACE, POINTS
-from collide.lowering.shape_table import INTS, KIND, NUMBERS, POSE, POSE_SLOP, RADIUS, REACH, SLOP
-from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
-from collide.narrowphase.posed_pair import posed_body, radius_of
+from collide.lowering.shape_table import INTS, KIND, NUMBERS, POSE, RADIUS, REACH
+from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
+from collide.narrowphase.composite.clearing_translation import Length, barred_length, clearing_length, longer
+from collide.narrowphase.posed_pair import in_order
 from collide.narrowphase.rows import (
     CERTIFIED,
     DISTANCE,
@@ -31,11 +33,12 @@ from collide.narrowphase.rows import (
     UPPER,
     view_row,
 )
-from collide.numerics.vec3 import add, dot, neg, norm1, put_vec3, rotate_back, scale, sub, vec3_at
-from collide.support.support_mapping import support
+from collide.numerics.vec3 import Vec3, add, neg, norm, norm1, put_vec3, scale, sub, vec3_at
 
-#: Normals of overlapping parts that are tried for a separating translation, deepest first.
+#: Normals of overlapping parts that are tried for a separating translation, deepest first; then axes, three of either
+#: frame, both ways.
 MAX_NORMALS = 8
+_N_AXES = 12
 
 # Doubles of a score, what is known of a pair of bodies from the rows so far: the least distance, the number of its row,
 # ends of the bracket, the least lower end of a row that is not certified, rounds, whether a row is a hit, the upper end
@@ -58,13 +61,12 @@ class PosedParts(NamedTuple):
     shape_of: Any
 
 
-class BodySize(NamedTuple):
-    """Size of a body seen from a point of the world [m], how far its points may be off besides, whether it is
-    curved."""
+class PairSize(NamedTuple):
+    """Size of two bodies [m], whether a part is curved, whether one is a half-space."""
 
     size: float
-    slop: float
     curved: bool
+    has_halfspace: bool
 
 
 # --- scores ---------------------------------------------------------------------------------------
@@ -171,10 +173,10 @@ def close_score(score, at, out_at):
 
 
 @kernel
-def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b):
-    """Replace distance, lower, normal and points by the best translation that separates both bodies.
+def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_at):
+    """Replace distance, lower, normal and points by the shortest translation found that separates both bodies.
 
-    parts : `PosedParts`.   first, n : each body's parts there.
+    parts : `PosedParts`.   first, n : each body's parts there.   work : CLEARING doubles of workspace.
 
     Against one half-space the row of the deepest part is the answer: there is one translation for all.
     """
@@ -182,40 +184,69 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b):
         return
     row = view_row(out_at)
     doubles = row.doubles
-    # Seen from between the bodies, whichever is A: where in the world the pair stands is no part of its size.
-    p_a = vec3_at(parts.poses, POSE * first_a + 9)
-    p_b = vec3_at(parts.poses, POSE * first_b + 9)
-    origin = add(scale(0.5, p_a), scale(0.5, p_b))
-    size_a = _size_of(parts, first_a, n_a, origin)
-    size_b = _size_of(parts, first_b, n_b, origin)
-    size = size_a.size + size_b.size
-    error = ERROR * size + (size_a.slop + size_b.slop)
-    best = math.inf
+    size = _size_of(parts, first_a, n_a, first_b, n_b)
+    promised = (PROMISE_CURVED if size.curved else PROMISE_STORED) * size.size
     upper = doubles[UPPER]
-    for k in range(int(score[at + _N_OVERLAPS])):
-        overlap = at + _DEEPEST + _OVERLAP * k
-        n = vec3_at(score, overlap + _VECTORS)
-        depth = _extent(parts, first_a, n_a, origin, n) + _extent(parts, first_b, n_b, origin, neg(n))
-        if depth + error < best:
-            best = depth + error
-            for j in range(9):
-                doubles[NORMAL + j] = score[overlap + _VECTORS + j]
-            row.words[PART_A] = int(score[overlap + _OF_A])
-            row.words[PART_B] = int(score[overlap + _OF_B])
-            doubles[DISTANCE] = min(-depth, upper)
-            doubles[LOWER] = -depth - error
-    if best == math.inf:
-        doubles[DISTANCE] = -math.inf
-        doubles[LOWER] = -math.inf
-    else:
-        # The points of the deepest parts fit that normal's own depth: their middle stays.
-        middle = scale(0.5, add(vec3_at(doubles, POINT_A), vec3_at(doubles, POINT_B)))
-        half = scale(0.5 * doubles[DISTANCE], vec3_at(doubles, NORMAL))
+    n_overlaps = int(score[at + _N_OVERLAPS])
+    n_directions = 0 if size.has_halfspace else n_overlaps + _N_AXES
+    best = Length(math.inf, math.inf)
+    chosen = 0
+    nhat = vec3_at(doubles, NORMAL)
+    deepest = score[at + _DEEPEST + _DISTANCE]
+    for k in range(n_directions):
+        tied = k < n_overlaps and score[at + _DEEPEST + _OVERLAP * k + _DISTANCE] == deepest
+        if not tied and best.proven + upper <= promised:
+            break  # no translation is shorter than −upper
+        n = vec3_at(score, at + _DEEPEST + _OVERLAP * k + _VECTORS)
+        if k >= n_overlaps:
+            n = _axis(score, at, parts, first_a, first_b, k - n_overlaps)
+        length = _way_past_overlaps(score, at, parts, first_a, first_b, n, best.proven, work_at)
+        if length.proven < best.proven:
+            length = clearing_length(parts, first_a, n_a, first_b, n_b, n, length, best.proven, work_at)
+        if length.proven < best.proven:
+            best = length
+            chosen = k if k < n_overlaps else 0
+            nhat = n
+    doubles[DISTANCE] = min(-best.value, upper)
+    doubles[LOWER] = -best.proven * (1 + 2.0**-50)  # the normal is a unit vector but for rounding
+    if best.proven < math.inf:
+        # The points of these parts fit their own depth: their middle stays.
+        overlap = at + _DEEPEST + _OVERLAP * chosen
+        row.words[PART_A] = int(score[overlap + _OF_A])
+        row.words[PART_B] = int(score[overlap + _OF_B])
+        middle = scale(0.5, add(vec3_at(score, overlap + _VECTORS + 3), vec3_at(score, overlap + _VECTORS + 6)))
+        half = scale(0.5 * doubles[DISTANCE], nhat)
+        put_vec3(doubles, NORMAL, nhat)
         put_vec3(doubles, POINT_A, sub(middle, half))
         put_vec3(doubles, POINT_B, add(middle, half))
-    promised = (PROMISE_CURVED if size_a.curved or size_b.curved else PROMISE_STORED) * size
     if not upper - doubles[LOWER] <= promised:
         row.flags[CERTIFIED] = 0
+
+
+@kernel
+def _way_past_overlaps(score, at, parts, first_a, first_b, n, limit, work_at):
+    """The `Length` along n to which the overlaps that are kept bar the way, or one of them does beyond the limit."""
+    length = Length(0.0, 0.0)
+    for k in range(int(score[at + _N_OVERLAPS])):
+        overlap = at + _DEEPEST + _OVERLAP * k
+        pa, pb = first_a + int(score[overlap + _OF_A]), first_b + int(score[overlap + _OF_B])
+        length = longer(length, barred_length(parts, pa, pb, n, work_at))
+        if not length.proven < limit:
+            break
+    return length
+
+
+@kernel
+def _axis(score, at, parts, first_a, first_b, k):
+    """Direction k of _N_AXES: along the frames of the deepest overlap's parts, both ways; of swapped bodies the same
+    against it."""
+    pa = first_a + int(score[at + _DEEPEST + _OF_A])
+    pb = first_b + int(score[at + _DEEPEST + _OF_B])
+    _, pa, _, pb, flip = in_order(parts.ints, parts.poses, parts.shape_of[pa], pa, parts.shape_of[pb], pb)
+    at_pose = POSE * (pa if k < 6 else pb) + k % 3
+    axis = Vec3(parts.poses[at_pose], parts.poses[at_pose + 3], parts.poses[at_pose + 6])
+    axis = scale(1.0 / norm(axis), axis)
+    return neg(axis) if (k % 6 < 3) == flip else axis
 
 
 @kernel(inline=True)
@@ -224,39 +255,32 @@ def _is_halfspace(parts, first, n):
 
 
 @kernel
-def _size_of(parts, first, n, origin):
-    """The `BodySize` of n parts, seen from a point of the world."""
-    size = 0.0
-    slop = 0.0
-    pose_slop = 0.0
-    curved = False
-    for part in range(first, first + n):
-        p = POSE * part
-        shape = parts.shape_of[part]
-        at = NUMBERS * shape
-        away = norm1(sub(vec3_at(parts.poses, p + 9), origin))
-        size = max(size, 2 * parts.numbers[at + REACH] + parts.numbers[at + RADIUS] + away)
-        slop = max(slop, parts.numbers[at + SLOP])
-        pose_slop = max(pose_slop, parts.poses[p + POSE_SLOP])
-        curved = curved or parts.ints[INTS * shape + KIND] != POINTS
-    return BodySize(size, slop + pose_slop, curved)
+def _size_of(parts, first_a, n_a, first_b, n_b):
+    """The `PairSize` of two bodies."""
+    # Seen from between the bodies, whichever is A: where in the world the pair stands is no part of its size.
+    p_a = vec3_at(parts.poses, POSE * first_a + 9)
+    p_b = vec3_at(parts.poses, POSE * first_b + 9)
+    origin = add(scale(0.5, p_a), scale(0.5, p_b))
+    of_a = _size_of_body(parts, first_a, n_a, origin)
+    of_b = _size_of_body(parts, first_b, n_b, origin)
+    return PairSize(of_a.size + of_b.size, of_a.curved or of_b.curved, of_a.has_halfspace or of_b.has_halfspace)
 
 
 @kernel
-def _extent(parts, first, n_parts, origin, n):
-    """How far a body reaches along n from a point of the world [m]."""
-    farthest = -math.inf
-    for part in range(first, first + n_parts):
-        body = posed_body(parts.ints, parts.shape_of[part], part)
-        if body.kind == HALFSPACE:
-            return math.inf  # bounded in one direction only, which a rounded normal never is
-        g = rotate_back(parts.poses, body.pose_at, n)
-        farthest_point = support(
-            body.kind, body.coords, body.padded, parts.numbers, body.params_at, body.tree, 0, -1, g
-        ).point
-        shift = dot(sub(vec3_at(parts.poses, body.pose_at + 9), origin), n)
-        farthest = max(farthest, dot(farthest_point, g) + shift + radius_of(parts, body))
-    return farthest
+def _size_of_body(parts, first, n, origin):
+    """The `PairSize` of n parts alone, seen from a point of the world."""
+    size = 0.0
+    curved = False
+    has_halfspace = False
+    for part in range(first, first + n):
+        shape = parts.shape_of[part]
+        at = NUMBERS * shape
+        away = norm1(sub(vec3_at(parts.poses, POSE * part + 9), origin))
+        size = max(size, 2 * parts.numbers[at + REACH] + parts.numbers[at + RADIUS] + away)
+        kind = parts.ints[INTS * shape + KIND]
+        curved = curved or kind != POINTS
+        has_halfspace = has_halfspace or kind == HALFSPACE
+    return PairSize(size, curved, has_halfspace)
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
@@ -265,7 +289,8 @@ def combine_rows(rows_at, starts_at, spans_at, n, ints_at, numbers_at, poses_at,
 
     starts : n + 1 numbers of rows, where each pair's begin and end.
     spans : first part and number of parts of A, and of B,
-    pair by pair.   ints, numbers, poses, shape_of : as in `answer_pairs`.   score : SCORE doubles.   out : zeroed rows.
+    pair by pair.   ints, numbers, poses, shape_of : as in `answer_pairs`.   score : SCORE + CLEARING doubles.
+    out : zeroed rows.
     """
     starts = view_i64(starts_at, n + 1)
     spans = view_i64(spans_at, 4 * n)
@@ -289,5 +314,5 @@ def combine_rows(rows_at, starts_at, spans_at, n, ints_at, numbers_at, poses_at,
                 view_i64(ints_at, INTS * n_shapes), view_f64(numbers_at, NUMBERS * n_shapes),
                 view_f64(poses_at, POSE * last), shape_of,
             )  # fmt: skip
-            separate_bodies(score, 0, out, parts, first_a, n_a, first_b, n_b)
+            separate_bodies(score, 0, out, parts, first_a, n_a, first_b, n_b, score_at + 8 * SCORE)
     return 0

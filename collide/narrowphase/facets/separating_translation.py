@@ -95,13 +95,19 @@ def shortened(
 
 
 def _separating(meet: Callable, X_WA, X_WB, steps: np.ndarray) -> np.ndarray:
-    """(k, 3): those of the translations (n, 3) that separate the bodies, as the poses they lead to really move them."""
-    if not len(steps):
-        return np.zeros((0, 3))
+    """(k, 3): those of the translations (n, 3) that separate the bodies, as the poses they lead to really move them.
+
+    Far from the world's origin a short step rounds to nothing: what is told of the bodies there is told of them as they
+    stand, and no direction can be read off it.
+    """
     moved = np.repeat(X_WB[None], len(steps), axis=0)
     moved[:, :3, 3] += steps
-    apart = ~meet(np.repeat(X_WA[None], len(steps), axis=0), moved)
-    return (moved[:, :3, 3] - X_WB[:3, 3])[apart]
+    really = moved[:, :3, 3] - X_WB[:3, 3]
+    moves = np.square(really).sum(axis=1) > 0.0
+    moved, really = moved[moves], really[moves]
+    if not len(moved):
+        return really
+    return really[~meet(np.repeat(X_WA[None], len(moved), axis=0), moved)]
 
 
 def _length(step: np.ndarray) -> tuple[float, float]:

@@ -70,3 +70,14 @@ def test_touching_bodies_need_nearly_nothing():
     for meet in (cubes_meet, balls_meet):
         found = shortened(meet, X_WA, X_WB, known, AXES, [])
         assert 0.0 < found.length <= 1e-13 and math.isfinite(found.bound) and parts(meet, X_WA, X_WB, found)
+
+
+def test_steps_that_round_to_nothing_tell_no_direction():
+    """At 1e6 m and beyond a step of 1e-12 m moves nothing; whatever is told of the bodies there, no number is NaN."""
+    for away in (1e6, 1e12):
+        X_WA, X_WB = pose(t=(away, away, away)), pose(t=(away, away, away))
+        for candidate in ([], [np.zeros(3)], [np.full(3, 1e-200)], [np.array([1e-13, 0.0, 0.0])]):
+            known = SeparatingTranslation(1e-12, 2e-12, np.array([0.0, 0.0, 1.0]))
+            found = shortened(lambda X, Y: np.zeros(len(Y), dtype=bool), X_WA, X_WB, known, AXES, candidate)
+            assert np.isfinite(found.normal).all() and abs(np.linalg.norm(found.normal) - 1.0) < 1e-12
+            assert 0.0 < found.length <= 1e-12 and found.length <= found.bound <= 2e-12

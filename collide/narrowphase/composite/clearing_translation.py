@@ -1,0 +1,237 @@
+"""Along a direction: how far a union of convex parts has to be moved until no part of it meets a part of the other.
+
+B moved by τ·n meets A only where τ·n lies in A ⊖ B of a pair of parts. A plane across m, above which no point of that set
+swept by both radii lies, h(m) = max m·w + r, proves the pair apart wherever τ·(m·n) > h(m) + error. So a pair bars the way
+from some length on, and up to a length that planes bound from above; the union is clear at the first length that no pair
+bars. Planes are those of GJK, seen from the point τ·n, which comes down along the line as planes are found (van den
+Bergen, "Ray casting against general convex objects with application to continuous collision detection", 2004). However the
+search goes, what planes prove holds.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from collide.kernels import kernel, view_f64
+from collide.lowering.packed_convex import POINTS
+from collide.narrowphase.bounds import ERROR
+from collide.narrowphase.gjk.minkowski_difference import NEAREST_POINT, POINT, POINT_OF_A, copy_coordinates
+from collide.narrowphase.gjk.simplex import across_simplex, nearest_of_all
+from collide.narrowphase.posed_pair import in_order, posed_pair, radius_of, reach_of_both, size_and_slop
+from collide.numerics.vec3 import (
+    Vec3,
+    add,
+    column_at,
+    dot,
+    neg,
+    norm,
+    put_vec3,
+    rotate,
+    rotate_back,
+    scale,
+    sub,
+    vec3_at,
+)
+from collide.support.support_mapping import settled_vertex, support
+
+#: Doubles of workspace: four points of A ⊖ B; their weights and the nearest point.
+_POINTS, _WEIGHTS = 4 * POINT, 7
+CLEARING = _POINTS + _WEIGHTS
+
+_ROUNDS = 48
+#: Planes less steep than this along the direction bound nothing.
+_LEAST_SLOPE = 2.0**-20
+#: The balls about the parts' frames are worked out in doubles.
+_UP = 1 + 2.0**-40
+
+
+class Length(NamedTuple):
+    """A length along a direction [m]: as computed, and with its error, proven."""
+
+    value: float
+    proven: float
+
+
+class _Simplex(NamedTuple):
+    """Views of points as of `minkowski_difference`, where POINT is as seen from τ·e and POINT_OF_A as seen from 0, and of
+    their weights with the nearest point."""
+
+    points: Any
+    weights: Any
+
+
+class _Line(NamedTuple):
+    """The line {τ·e} beside A ⊖ B of a pair of parts swept by a radius.   error : of a plane.   curved : a core is."""
+
+    e: Vec3
+    radius: float
+    error: float
+    curved: bool
+
+
+@kernel
+def clearing_length(parts, first_a, n_a, first_b, n_b, n, start, limit, work_at):
+    """The `Length` along the unit vector n that clears B of A, both infinite where it is not less than the limit.
+
+    parts : `PosedParts`.   first, n : each body's parts there, no half-space.   start : a `Length` to which the way is
+    barred, by `barred_length`.   work : CLEARING doubles of workspace.
+
+    A step goes to the farthest length that a pair barred so far is proven to bar at most: all between is barred too, so
+    that the order of pairs has no say. O(parts of A · parts of B) a step.
+    """
+    length = start
+    simplex = _simplex_at(work_at)
+    for _ in range(n_a * n_b + 1):
+        farthest = length
+        for pa in range(first_a, first_a + n_a):
+            for pb in range(first_b, first_b + n_b):
+                pair, line = _pair_and_line(parts, pa, pb, n)
+                if not _apart_at(pair, line, length.proven, simplex):
+                    farthest = longer(farthest, _bounded_by_planes(pair, line, simplex))
+                if not farthest.proven < limit:
+                    return Length(math.inf, math.inf)
+        if farthest.proven == length.proven:
+            return length
+        length = farthest
+    return Length(math.inf, math.inf)
+
+
+@kernel
+def barred_length(parts, pa, pb, n, work_at):
+    """The `Length` along n from which on two parts that meet are proven apart."""
+    pair, line = _pair_and_line(parts, pa, pb, n)
+    return _bounded_by_planes(pair, line, _simplex_at(work_at))
+
+
+@kernel(inline=True)
+def longer(a, b):
+    """The longer one of two `Length`."""
+    return b if b.proven > a.proven or (b.proven == a.proven and b.value > a.value) else a
+
+
+@kernel(inline=True)
+def _simplex_at(work_at):
+    return _Simplex(view_f64(work_at, _POINTS), view_f64(work_at + 8 * _POINTS, _WEIGHTS))
+
+
+@kernel
+def _pair_and_line(parts, pa, pb, n):
+    """Two parts as a `PosedPair`, and the `_Line` along which B of that pair is moved against A."""
+    ints, numbers, poses = parts.ints, parts.numbers, parts.poses
+    sa, pa, sb, pb, flip = in_order(ints, poses, parts.shape_of[pa], pa, parts.shape_of[pb], pb)
+    pair = posed_pair(ints, numbers, poses, sa, pa, sb, pb)
+    size, slop, _ = size_and_slop(numbers, poses, sa, pa, sb, pb)
+    radius = radius_of(pair, pair.A) + radius_of(pair, pair.B)
+    curved = pair.A.kind != POINTS or pair.B.kind != POINTS
+    return pair, _Line(neg(n) if flip else n, radius, ERROR * size + slop, curved)
+
+
+@kernel
+def _apart_at(pair, line, tau, simplex):
+    """Whether a ball or a plane is found that parts τ·e from A ⊖ B."""
+    x = scale(tau, line.e)
+    error = line.error + 2.0**-49 * tau
+    m = add(x, pair.t)
+    if norm(m) > (reach_of_both(pair) + line.radius) * _UP + error:
+        return True  # all of A ⊖ B lies within both reaches of −t
+    if not norm(m) > 0.0:
+        m = line.e
+    n_points = 0
+    square = math.inf
+    for _ in range(_ROUNDS):
+        m = scale(1.0 / norm(m), m)
+        w = _farthest(pair, m)
+        if dot(x, m) - (dot(w, m) + line.radius) > error:
+            return True
+        n_points = _take_point(simplex, n_points, w)
+        n_points, nearer = _nearest_to(simplex, n_points, x)
+        if not line.radius * line.radius < nearer < square:
+            return False
+        square = nearer
+        m = _direction(simplex, n_points, line.curved)
+        if not norm(m) > 0.0:
+            return False
+    return False
+
+
+@kernel
+def _bounded_by_planes(pair, line, simplex):
+    """The `Length` from which on τ·e is proven to lie outside A ⊖ B."""
+    best = Length(math.inf, math.inf)
+    m = line.e
+    n_points = 0
+    x = Vec3(0.0, 0.0, 0.0)
+    square = math.inf
+    for _ in range(_ROUNDS):
+        m = scale(1.0 / norm(m), m)
+        w = _farthest(pair, m)
+        height = dot(w, m) + line.radius
+        slope = dot(m, line.e)
+        closer = False
+        if slope > _LEAST_SLOPE:
+            # The slope is off by 4u, of itself at most 4u / slope.
+            bound = (height + line.error) / slope
+            bound += abs(bound) * 2.0**-49 / slope
+            if bound < best.proven:
+                best = Length(height / slope, bound)
+                x = scale(bound, line.e)
+                closer = True
+        n_points = _take_point(simplex, n_points, w)
+        n_points, nearer = _nearest_to(simplex, n_points, x)
+        if not math.sqrt(nearer) > line.radius + line.error or not (closer or nearer < square):
+            break
+        square = nearer
+        m = _direction(simplex, n_points, line.curved)
+        if not norm(m) > 0.0:
+            break
+    return best
+
+
+@kernel
+def _farthest(pair, m):
+    """The point of A ⊖ B farthest along m."""
+    a = _farthest_of(pair, pair.A, m)
+    b = _farthest_of(pair, pair.B, neg(m))
+    return sub(sub(a, b), pair.t)
+
+
+@kernel
+def _farthest_of(pair, body, m):
+    """The point of a core farthest along m, in W's axes from its own origin; of a support tree, settled."""
+    g = rotate_back(pair.poses, body.pose_at, m)
+    found = support(body.kind, body.coords, body.padded, pair.numbers, body.params_at, body.tree, 0, -1, g)
+    point = found.point
+    if body.tree != 0:
+        vertex = settled_vertex(body.coords, body.padded, body.tree, found.id, g)
+        point = column_at(body.coords, body.padded, vertex)
+    return rotate(pair.poses, body.pose_at, point)
+
+
+@kernel(inline=True)
+def _take_point(simplex, n_points, w):
+    put_vec3(simplex.points, POINT * n_points + POINT_OF_A, w)
+    return n_points + 1
+
+
+@kernel
+def _nearest_to(simplex, n_points, x):
+    """(points that remain, squared distance) of the point nearest x in the simplex, kept as seen from x."""
+    points, weights = simplex
+    for k in range(n_points):
+        put_vec3(points, POINT * k, sub(vec3_at(points, POINT * k + POINT_OF_A), x))
+    square = nearest_of_all(points, n_points, weights, 15)
+    n_kept = 0
+    for k in range(n_points):
+        if weights[k] > 0.0:
+            if n_kept != k:
+                copy_coordinates(points, k, points, n_kept)
+            n_kept += 1
+    return n_kept, square
+
+
+@kernel(inline=True)
+def _direction(simplex, n_points, curved):
+    """From the simplex towards the point it is seen from; of polytopes across its edges, to full precision."""
+    v = vec3_at(simplex.weights, NEAREST_POINT)
+    return neg(v if curved else across_simplex(simplex.points, n_points, v))
