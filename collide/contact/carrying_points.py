@@ -15,31 +15,90 @@ from collide.kernels import kernel
 #: quarter of the slope before, down to a millionth, below which all slopes are as good.
 ON_WALL, PLAIN, STEEP = range(3)
 GENTLEST = STEEP + 10
+#: Of more points only the lowest of each cell of a grid over them are asked whether they may carry.
+MANY, _ACROSS = 256, 8
+CELLS = _ACROSS * _ACROSS
 #: Squares of slopes are good to this.
 _ROUNDING = 1.0 + 2.0**-40
 
 
 @kernel
 def mark_carrying(p, n, n_corners, tolerance, space):
-    """Set ``space.remaining`` of each of n points that is on no wall to its class.
+    """Set ``space.remaining`` of points that are on no wall to their classes.
 
+    Of more than MANY points only the lowest of each of CELLS cells are classed, the others count as PLAIN: each is
+    compared with all n, so that the work grows with n and not with its square.
     space.corners : of the hull, ``n_corners``; they are asked first, since most points are far above them.
     """
-    for i in range(n):
-        if space.remaining[i] != ON_WALL:
-            square = _slope_below(p, i, n, n_corners, tolerance, space)
-            kind, limit = PLAIN, 1.0
-            while kind < GENTLEST and 0.0 <= square <= _ROUNDING * limit:
-                kind += 1
-                limit *= 2.0**-4
-            space.remaining[i] = kind
+    if n <= MANY:
+        for i in range(n):
+            if space.remaining[i] != ON_WALL:
+                _mark(p, i, n, 1, n_corners, tolerance, space)
+        return
+    _find_lowest(p, n, space)
+    stride = _stride_of(n)
+    for c in range(CELLS):
+        if space.cells[c] >= 0:
+            _mark(p, space.cells[c], n, stride, n_corners, tolerance, space)
 
 
 @kernel
-def _slope_below(p, i, n, n_corners, tolerance, space):
+def _find_lowest(p, n, space):
+    """Put the lowest point on no wall of each cell of a grid over all points into ``space.cells``; −1 for none."""
+    low_u = low_v = math.inf
+    high_u = high_v = -math.inf
+    for i in range(n):
+        u, v = p[POINT * i], p[POINT * i + V]
+        low_u, high_u, low_v, high_v = min(low_u, u), max(high_u, u), min(low_v, v), max(high_v, v)
+    per_u, per_v = _per_cell(high_u - low_u), _per_cell(high_v - low_v)
+    for c in range(CELLS):
+        space.cells[c] = -1
+    for i in range(n):
+        if space.remaining[i] == ON_WALL:
+            continue
+        at = POINT * i
+        row, column = int(per_v * (p[at + V] - low_v)), int(per_u * (p[at] - low_u))
+        c = _ACROSS * min(row, _ACROSS - 1) + min(column, _ACROSS - 1)
+        if space.cells[c] < 0 or p[at + GAP] < p[POINT * space.cells[c] + GAP]:
+            space.cells[c] = i
+
+
+@kernel(inline=True)
+def _per_cell(width):
+    return _ACROSS / width if width > 1e-290 else 0.0
+
+
+@kernel
+def _stride_of(n):
+    """A number without common divisors with n, near n over the golden ratio: its multiples go through all n, neighbours
+    far from each other."""
+    stride = int(0.6180339887498949 * n)
+    while True:
+        a, b = n, stride
+        while b != 0:
+            a, b = b, a % b
+        if a == 1:
+            return stride
+        stride += 1
+
+
+@kernel
+def _mark(p, i, n, stride, n_corners, tolerance, space):
+    """Set the class of point i."""
+    square = _slope_below(p, i, n, stride, n_corners, tolerance, space)
+    kind, limit = PLAIN, 1.0
+    while kind < GENTLEST and 0.0 <= square <= _ROUNDING * limit:
+        kind += 1
+        limit *= 2.0**-4
+    space.remaining[i] = kind
+
+
+@kernel
+def _slope_below(p, i, n, stride, n_corners, tolerance, space):
     """The square of the slope of the gentlest plane through point i below all others; −1 where it is beyond 45°.
 
-    tolerance : so far above, where they are not in the same place [m].
+    tolerance : so far above, where they are not in the same place [m].   stride : 1, or the order in which the others
+    are looked at: the work grows with their number where neighbours come far from each other.
 
     Each point cuts a half-plane from the slopes (u, v). Where the gentlest slope that remains violates the next one,
     the gentlest of those that then remain is on its border (R. Seidel, "Small-dimensional linear programming and convex
@@ -47,8 +106,9 @@ def _slope_below(p, i, n, n_corners, tolerance, space):
     """
     at_i = POINT * i
     u = v = 0.0
+    walk = 0
     for k in range(n_corners + n):
-        j = _compared(space, k, n_corners)
+        j, walk = _next_compared(space, k, n, stride, n_corners, walk)
         at = POINT * j
         du, dv, rise = p[at] - p[at_i], p[at + V] - p[at_i + V], p[at + GAP] - p[at_i + GAP]
         if abs(du) <= tolerance and abs(dv) <= tolerance:
@@ -59,7 +119,9 @@ def _slope_below(p, i, n, n_corners, tolerance, space):
         if space.remaining[j] == ON_WALL or u * du + v * dv <= rise + 0.5 * tolerance:
             continue  # half of it is left to rounding, of points that are on the plane and asked again
         share = rise / (du * du + dv * dv)
-        low, high = _span_on_border(p, at_i, k, n_corners, tolerance, space, share * du, share * dv, -dv, du)
+        low, high = _span_on_border(
+            p, at_i, k, n, stride, n_corners, tolerance, space, share * du, share * dv, -dv, du
+        )
         if not low <= high:
             return -1.0
         step = min(max(0.0, low), high)
@@ -70,17 +132,23 @@ def _slope_below(p, i, n, n_corners, tolerance, space):
 
 
 @kernel(inline=True)
-def _compared(space, k, n_corners):
-    """The k-th of the points that one is compared with."""
-    return space.corners[k] if k < n_corners else k - n_corners
+def _next_compared(space, k, n, stride, n_corners, walk):
+    """(The k-th of the points that one is compared with, what ``walk``, 0 before the first, is for the next.)"""
+    if k < n_corners:
+        return space.corners[k], walk
+    further = walk + stride
+    return walk, further - n if further >= n else further
 
 
 @kernel
-def _span_on_border(p, at_i, n_before, n_corners, tolerance, space, base_u, base_v, along_u, along_v):
+def _span_on_border(
+    p, at_i, n_before, n, stride, n_corners, tolerance, space, base_u, base_v, along_u, along_v
+):  # fmt: skip
     """(low, high): for which t the slope base + t · along is left by the points before; low > high for none."""
     low, high = -math.inf, math.inf
+    walk = 0
     for k in range(n_before):
-        j = _compared(space, k, n_corners)
+        j, walk = _next_compared(space, k, n, stride, n_corners, walk)
         at = POINT * j
         du, dv = p[at] - p[at_i], p[at + V] - p[at_i + V]
         if space.remaining[j] == ON_WALL or (abs(du) <= tolerance and abs(dv) <= tolerance):
@@ -101,25 +169,32 @@ def choose_carrying(p, n, n_wanted, kinds, order):
     """Numbers of ``n_wanted`` of n > n_wanted points, ascending, the first among them.
 
     kinds : classes of the points; they are overwritten. Of the gentlest class first, one by one, the point farthest
-    from all that are taken.
+    from all that are taken. The work grows with n times ``n_wanted``: ``order`` holds the nearest taken one of each.
     """
     kinds[0] = -1
+    for i in range(n):
+        order[i] = 0
     for _ in range(n_wanted - 1):
         best, best_kind, farthest = -1, -1, -1.0
         for i in range(n):
             if kinds[i] < max(best_kind, 0):
                 continue
-            nearest = math.inf
-            for j in range(n):
-                if kinds[j] == -1:
-                    du, dv = p[POINT * i] - p[POINT * j], p[POINT * i + V] - p[POINT * j + V]
-                    nearest = min(nearest, du * du + dv * dv)
+            nearest = _square_apart(p, i, order[i])
             if kinds[i] > best_kind or nearest > farthest:
                 best, best_kind, farthest = i, kinds[i], nearest
         kinds[best] = -1
+        for i in range(n):
+            if _square_apart(p, i, best) < _square_apart(p, i, order[i]):
+                order[i] = best
     n_taken = 0
     for i in range(n):
         if kinds[i] == -1:
             order[n_taken] = i
             n_taken += 1
     return n_taken
+
+
+@kernel(inline=True)
+def _square_apart(p, i, j):
+    du, dv = p[POINT * i] - p[POINT * j], p[POINT * i + V] - p[POINT * j + V]
+    return du * du + dv * dv

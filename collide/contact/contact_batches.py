@@ -8,16 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.batches import answer_batch, of_one_set
+from collide.broadphase.box_tree import BoxTree
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.curved_contacts import curved_contacts
 from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.kinds import Kind, kind_of
-from collide.lowering.packed_convex import HALFSPACE
-from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_set_tables import tables_of
-from collide.narrowphase.composite.composite_parts import Part, compound_parts
+from collide.narrowphase.composite.composite_parts import CompoundParts, PartColumns, compound_parts
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import Method, method_of
 from collide.pair_arguments import pose_at
@@ -29,6 +28,8 @@ from collide.transforms import as_poses
 #: go together, or of compounds, which are taken apart.
 _OF_MESHES = {Method.FACETS: facet_contacts, Method.CURVED: curved_contacts, Method.HULL: halfspace_contacts}
 _CONVEX = frozenset((Method.CLOSED, Method.PLANE, Method.PLANES, Method.CONVEX))
+#: Boxes of parts that are made at once; of so few pairs of parts all are compared, of more through a box-tree.
+_BOXES_AT_ONCE, _FEW_PAIRS = 1 << 16, 256
 #: Contacts nearer to the margin than this part of the pair's size are judged by the bodies' distance.
 _ROUNDING = 2.0**-40
 
@@ -119,44 +120,77 @@ def _part_pairs(shapes, which, X_WA, X_WB, n: int, margin: float, singles: list[
             singles.append(shape)
         return numbers[id(shape)]
 
+    def numbered(parts: CompoundParts, some: np.ndarray) -> np.ndarray:
+        used, places = np.unique(some, return_inverse=True)
+        return np.array([number(parts.parts[k].shape) for k in used.tolist()], dtype=np.int64)[places]
+
     keys = np.zeros(n, dtype=np.int64) if which is None else which[:, 0] * len(shapes) + which[:, 1]
     of_keys: list[PartPairs] = []
     for key in np.unique(keys).tolist():
         poses = np.flatnonzero(keys == key)
-        shape_a, shape_b = (shapes[0], shapes[1]) if which is None else (shapes[k] for k in which[poses[0]])
+        A, B = (shapes[0], shapes[1]) if which is None else (shapes[k] for k in which[poses[0]])
         X_WAs, X_WBs = (np.broadcast_to(X, (n, 4, 4))[poses] for X in (X_WA, X_WB))
-        apart = np.sqrt(np.square(X_WBs[:, :3, 3] - X_WAs[:, :3, 3]).sum(axis=1))
-        placed_a, placed_b = (
-            [(part, part.at(X, _reach(opposite) + apart)) for part in compound_parts(shape).parts]
-            for shape, X, opposite in ((shape_a, X_WAs, shape_b), (shape_b, X_WBs, shape_a))
-        )
-        for i, (part_a, at_a) in enumerate(placed_a):
-            for j, (part_b, at_b) in enumerate(placed_b):
-                slack = at_a.slop + at_b.slop
-                near = _may_come_within(part_a, part_b, at_a.X, at_b.X, margin + slack)
-                some = poses[near]
-                of_keys.append(
-                    PartPairs(
-                        some, np.full(len(some), i), np.full(len(some), j), np.full(len(some), number(part_a.shape)),
-                        np.full(len(some), number(part_b.shape)), at_a.X[near], at_b.X[near], slack[near],
-                    )
-                )  # fmt: skip
+        near = _near_parts(compound_parts(A), compound_parts(B), X_WAs, X_WBs, margin)
+        numbers_a, numbers_b = numbered(compound_parts(A), near.part_a), numbered(compound_parts(B), near.part_b)
+        of_keys.append(PartPairs(poses[near.pair], near.part_a, near.part_b, numbers_a, numbers_b, *near[5:]))
     together = PartPairs(*(np.concatenate(columns) for columns in zip(*of_keys)))
     return together.take(np.lexsort((together.part_b, together.part_a, together.pair)))
 
 
-def _reach(shape: Shape) -> float:
-    return max(packed.reach + packed.radius + float(np.abs(X[:3, 3]).sum()) for packed, X in bounding_parts_of(shape))
+def _near_parts(A: CompoundParts, B: CompoundParts, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> PartPairs:
+    """Pairs of parts that may come within the margin at n poses (n, 4, 4), without numbers of shapes.
 
-
-def _may_come_within(part_a: Part, part_b: Part, X_WA, X_WB, limit: np.ndarray) -> np.ndarray:
-    """(m,) bool: whether balls around two parts come within a limit (m,)."""
-    a, b = part_a.bound, part_b.bound
-    if HALFSPACE in (a.kind, b.kind):
-        return np.ones(len(limit), dtype=bool)
+    Only parts whose boxes come near are posed. About a microsecond a part and pose, and half of one a pair of parts
+    that is near; of half-spaces all are.
+    """
     apart = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
-    reach = (1.0 + 1e-3) * (a.reach + b.reach) + a.radius + b.radius + a.slop + b.slop  # poses stretch by 1e-4 at most
-    return apart * (1.0 - 2.0**-40) <= reach + limit
+    pose, i, j = _boxes_near(A, B, X_WA, X_WB, margin)
+    at_a = A.placed(i, X_WA[pose], B.reach + apart[pose])
+    at_b = B.placed(j, X_WB[pose], A.reach + apart[pose])
+    slack = at_a.slop + at_b.slop
+    near = _may_come_within(A.columns, B.columns, i, j, at_a.X, at_b.X, margin + slack)
+    none = np.zeros(len(pose), dtype=np.int64)
+    return PartPairs(pose, i, j, none, none, at_a.X, at_b.X, slack).take(near)
+
+
+def _boxes_near(
+    A: CompoundParts, B: CompoundParts, X_WA: np.ndarray, X_WB: np.ndarray, margin: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(poses, parts of A, parts of B) whose boxes come within the margin, and a little farther.
+
+    Boxes hold the parts where their poses, rounded, put them, and all that the rounding may have moved them: what is
+    apart along an axis by more than the margin is farther apart than that. So many boxes are made at once that they
+    need little memory.
+    """
+    found = [np.zeros((3, 0), dtype=np.int64)]
+    step = max(1, _BOXES_AT_ONCE // (len(A.parts) + len(B.parts)))
+    for first in range(0, len(X_WA), step):
+        a, b = A.boxes(X_WA[first : first + step]), B.boxes(X_WB[first : first + step])
+        if len(A.parts) * len(B.parts) <= _FEW_PAIRS:
+            ends = a[:, :, None], b[:, None]
+            apart = np.maximum(ends[1][..., :3] - ends[0][..., 3:], ends[0][..., :3] - ends[1][..., 3:]).max(axis=3)
+            near = np.stack(np.nonzero(apart <= _outwards(a, b, margin)))
+            found.append(near + np.array([[first], [0], [0]]))
+            continue
+        for k, (boxes_a, boxes_b) in enumerate(zip(a, b), first):
+            met = BoxTree(boxes_b).boxes_met(boxes_a, _outwards(boxes_a, boxes_b, margin))
+            found.append(np.stack([np.full(len(met), k), *met.T]))
+    pose, i, j = np.concatenate(found, axis=1)
+    return pose, i, j
+
+
+def _outwards(a: np.ndarray, b: np.ndarray, margin: float) -> float:
+    """The margin, and more than rounding takes from a difference of two boxes' ends [m]."""
+    ends = np.concatenate([a.ravel(), b.ravel()])
+    return margin + 2.0**-40 * (margin + float(np.abs(ends[np.isfinite(ends)]).max(initial=0.0)))
+
+
+def _may_come_within(a: PartColumns, b: PartColumns, i, j, X_WA, X_WB, limit: np.ndarray) -> np.ndarray:
+    """(m,) bool: whether balls around two parts come within a limit (m,)."""
+    apart = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
+    stretched = (1.0 + 1e-3) * (a.reach[i] + b.reach[j])  # poses stretch by 1e-4 at most
+    reach = stretched + a.radius[i] + b.radius[j] + a.slop[i] + b.slop[j]
+    return (apart * (1.0 - 2.0**-40) <= reach + limit) | ~np.isnan(a.plane[i]) | ~np.isnan(b.plane[j])
 
 
 def _rows_of_parts(
@@ -243,5 +277,5 @@ def _some(X: np.ndarray, pairs: np.ndarray) -> np.ndarray:
 def _reaches(shapes, pairs: np.ndarray):
     """How far the shapes of some pairs reach from their origins [m]: a number, or one a pair."""
     if isinstance(shapes, Shape):
-        return _reach(shapes)
-    return np.array([_reach(shapes[k]) for k in pairs.tolist()])
+        return compound_parts(shapes).reach
+    return np.array([compound_parts(shapes[k]).reach for k in pairs.tolist()])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from collide.contact.carrying_points import CELLS
 from collide.contact.clip_polygons import Clipped
 from collide.contact.contact_facets import open_facets
 from collide.contact.contact_patches import DEEPEST, least_gap_of
@@ -78,7 +79,7 @@ def workspace_words(capacity: int, largest: int) -> int:
     """64-bit words the kernel works in, for so many facets, and faces of so many corners."""
     corners = 3 + largest + 8
     points = corners * capacity + 1
-    return POSE + 9 + 6 + 5 * largest + 2 * 3 * corners + (POINT + 2) * corners + 14 * capacity + 19 * points + 64
+    return POSE + 9 + 6 + 5 * largest + 2 * 3 * corners + (POINT + 2) * corners + 14 * capacity + 19 * points + CELLS + 64
 
 
 @kernel(inline=True)
@@ -159,9 +160,8 @@ def _open_task(header_at, first, n, margin, slack, out_at, capacity):
     order, at = _integers(at, n_points + 1)
     corners, at = _integers(at, n_points + 1)
     remaining, at = _integers(at, n_points + 1)
-    space = PatchSpace(
-        target, HullSpace(order, corners, remaining), near.origin, out_at, capacity, words[MAX_CONTACTS], margin + slack
-    )
+    hull = HullSpace(order, corners, remaining, view_i64(at, CELLS))
+    space = PatchSpace(target, hull, near.origin, out_at, capacity, words[MAX_CONTACTS], margin + slack)
     error = 8.0 * error + pair.numbers[SLOP] + slack
     return _Task(
         near, pair, words[FACES_AT], buffers_at, buffers_at + 24 * largest, largest, pair.numbers[RADIUS], error, space,

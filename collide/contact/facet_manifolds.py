@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from collide.contact.candidate_normals import MAX_NORMALS, N_WAYS, TRANSLATION_WORDS, open_translations
+from collide.contact.carrying_points import CELLS
 from collide.contact.clearing_length import CLEARING_WORDS, Clearing, clearing_length
 from collide.contact.contact_facets import open_facets
 from collide.contact.contact_pairs import (
@@ -79,7 +80,7 @@ CONTACT_HEADER = HEADER + 10
 DONE, ROWS_FULL, PAIRS_FULL, TOO_MANY, SINGULAR = range(5)
 #: Words of one set of points, a pair; of all that does not grow with them.
 _WORDS_OF_POINTS = MAX_POINTS * (POINT + 4)
-_FIXED_WORDS = TRANSLATION_WORDS + CLEARING_WORDS + 18 + 8
+_FIXED_WORDS = TRANSLATION_WORDS + CLEARING_WORDS + 18 + 8 + CELLS
 #: Integers that are kept of a pair while more are listed: those of the list, and its group.
 _KNOWN = INTS_OF_PAIR + 1
 
@@ -158,7 +159,11 @@ def _open_rows(task, max_contacts, out_at, capacity):
     target = _open_points(_after_pairs(task, _WORDS_OF_POINTS), task.capacity, seen_at)
     numbers_at = _after_pairs(task, 2 * _WORDS_OF_POINTS)
     n = MAX_POINTS * task.capacity
-    hull = HullSpace(view_i64(numbers_at, n), view_i64(numbers_at + 8 * n, n), view_i64(numbers_at + 16 * n, n))
+    cells_at = _fixed_at(task) + 8 * (_FIXED_WORDS - CELLS)
+    hull = HullSpace(
+        view_i64(numbers_at, n), view_i64(numbers_at + 8 * n, n), view_i64(numbers_at + 16 * n, n),
+        view_i64(cells_at, CELLS),
+    )  # fmt: skip
     X = view_f64(task.pair.XA_at, 16)
     return PatchSpace(target, hull, Vec3(X[3], X[7], X[11]), out_at, capacity, max_contacts, task.margin)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from collide.contact.carrying_points import STEEP, choose_carrying, mark_carrying
+from collide.contact.carrying_points import MANY, ON_WALL, PLAIN, STEEP, choose_carrying, mark_carrying
 from collide.contact.contact_points import copy_of_points
 from collide.contact.manifold_points import GAP, POINT, V
 from collide.contact.reduce_points import select_points
@@ -13,16 +13,20 @@ from collide.kernels import kernel
 
 #: Points are on a wall where they lie so many times as far above another as aside of it.
 _STEEP = 2.0
+#: What a corner is while others are compared that has been compared with all: on no wall.
+_NO_WALL = -1
 #: Directions in which extreme points are looked for before others are compared with them.
 _EXTREME = 8
 
 
 class HullSpace(NamedTuple):
-    """Views of numbers of points: those that are compared, a hull's corners, and whether a point is on no wall."""
+    """Views of numbers of points: those that are compared, a hull's corners, whether a point is on no wall, and the
+    lowest of each of CELLS cells."""
 
     order: Any
     corners: Any
     remaining: Any
+    cells: Any
 
 
 @kernel
@@ -34,48 +38,70 @@ def hull_of_patch(points, n, tolerance, space):
     """
     p = points.manifold.points
     for i in range(n):
-        space.remaining[i] = 1
+        space.remaining[i] = PLAIN
     n_order = _outer_points(p, n, tolerance, space)
     n_corners = _hull(p, n_order, tolerance, space)
     while _drop_walls(p, n, n_corners, tolerance, space):
-        n_order = 0
-        for i in range(n):
-            if space.remaining[i] != 0:
-                space.order[n_order] = i
-                n_order += 1
+        n_order = _standing_points(p, n, tolerance, space)
         n_corners = _hull(p, n_order, tolerance, space)
+    for i in range(n):
+        if space.remaining[i] == _NO_WALL:
+            space.remaining[i] = PLAIN
     return n_corners
 
 
 @kernel
+def _standing_points(p, n, tolerance, space):
+    """Put what may be corners of the hull of the points on no wall into ``space.order``; how many."""
+    if n > MANY:
+        return _outer_points(p, n, tolerance, space)
+    n_order = 0
+    for i in range(n):
+        if space.remaining[i] != ON_WALL:
+            space.order[n_order] = i
+            n_order += 1
+    return n_order
+
+
+@kernel
 def _drop_walls(p, n, n_corners, tolerance, space):
-    """Take corners that rise steeply from other points from what remains; whether there are any."""
+    """Take corners that rise steeply from other points from what remains; whether there are any.
+
+    Each point is compared with the others once: corners that are no walls are marked until the hull is known.
+    """
     lowest = math.inf
     for i in range(n):
         lowest = min(lowest, p[POINT * i + GAP])
     dropped = False
     for j in range(n_corners):
         k = POINT * space.corners[j]
-        if p[k + GAP] - lowest <= tolerance:
+        if p[k + GAP] - lowest <= tolerance or space.remaining[space.corners[j]] == _NO_WALL:
             continue
+        space.remaining[space.corners[j]] = _NO_WALL
         for i in range(n):
             rise = p[k + GAP] - p[POINT * i + GAP] - tolerance
             if rise <= 0.0:
                 continue
             du, dv = p[k] - p[POINT * i], p[k + V] - p[POINT * i + V]
             if rise * rise > _STEEP * _STEEP * (du * du + dv * dv):
-                space.remaining[space.corners[j]] = 0
+                space.remaining[space.corners[j]] = ON_WALL
                 dropped = True
                 break
     return dropped
 
 
 @kernel
-def _extreme_points(p, n, extreme):
-    """Put the numbers of points farthest in eight directions, counter-clockwise, none twice in a row; how many."""
+def _extreme_points(p, n, remaining, extreme):
+    """Put the numbers of points on no wall that are farthest in eight directions, counter-clockwise, none twice in a
+    row; how many."""
+    first = 0
+    while first < n - 1 and remaining[first] == ON_WALL:
+        first += 1
     for d in range(_EXTREME):
-        extreme[d] = 0
-    for i in range(1, n):
+        extreme[d] = first
+    for i in range(first + 1, n):
+        if remaining[i] == ON_WALL:
+            continue
         u, v = p[POINT * i], p[POINT * i + V]
         _farther(p, extreme, 0, 4, i, u, p[POINT * extreme[0]], p[POINT * extreme[4]])
         a, b = POINT * extreme[2], POINT * extreme[6]
@@ -103,16 +129,16 @@ def _farther(p, extreme, d, opposite, i, value, largest, least):
 
 @kernel
 def _outer_points(p, n, tolerance, space):
-    """Put what may be corners of the hull into ``space.order``; how many.
+    """Put what may be corners of the hull of the points on no wall into ``space.order``; how many.
 
     Points within the polygon of eight extreme ones, or on its sides, are none (S. G. Akl, G. T. Toussaint, "A fast
     convex hull algorithm", 1978); in the place of an extreme point the one of least gap counts.
     """
     extreme = space.corners
-    n_extreme = _extreme_points(p, n, extreme)
+    n_extreme = _extreme_points(p, n, space.remaining, extreme)
     n_order = 0
     for i in range(n):
-        if _is_outer(p, i, extreme, n_extreme, tolerance):
+        if space.remaining[i] != ON_WALL and _is_outer(p, i, extreme, n_extreme, tolerance):
             space.order[n_order] = i
             n_order += 1
     return n_order

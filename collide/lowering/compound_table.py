@@ -48,7 +48,9 @@ def lay_out(parts: Sequence[tuple[PackedConvex, np.ndarray]]) -> LaidOut:
     rows[:, TURNED] = (X != np.eye(4)).any(axis=(1, 2))
     rows[:, MEASURE] = [packed.reach for packed, _ in parts] + np.abs(X[:, :3, 3]).sum(axis=1)
     rows[:, SWEPT_RADIUS] = [packed.radius for packed, _ in parts]
-    balls = np.array([_ball_of(packed) for packed, _ in parts])
+    of_set = {id(packed): packed for packed, _ in parts}
+    ball_of = {key: _ball_of(packed) for key, packed in of_set.items()}
+    balls = np.array([ball_of[id(packed)] for packed, _ in parts])
     rows[:, CENTRE : CENTRE + 3] = (X[:, :3, :3] @ balls[:, :3, None])[:, :, 0] + X[:, :3, 3]
     # A matrix that passes for a rotation may lengthen a little.
     stretch = np.sqrt(np.abs(np.swapaxes(X[:, :3, :3], 1, 2) @ X[:, :3, :3]).sum(axis=2).max(axis=1))

@@ -174,7 +174,7 @@ def _alone(packed: PackedConvex) -> tuple[Part, ...]:
 
 def _placed(packed: PackedConvex, X_CS: np.ndarray, X_SP: np.ndarray) -> Part:
     """A part in the compound's frame, its slop grown by what the product of poses rounds."""
-    if np.array_equal(X_SP, IDENTITY):
+    if X_SP is IDENTITY or np.array_equal(X_SP, IDENTITY):
         return packed, X_CS
     X_CP = X_CS @ X_SP
     scale = packed.reach + np.abs(X_SP[:3, 3]).sum() + np.abs(X_CS[:3, 3]).max()

@@ -204,15 +204,17 @@ def _low_parts(terms: np.ndarray, rounded: np.ndarray) -> np.ndarray:
 
 
 def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(poses (n, 4, 4) of a part in the world, (n,) how far rounding may have moved its points [m]).
+    """(poses (n, 4, 4) of parts in the world, (n,) how far rounding may have moved their points [m]).
 
-    X_WB : (n, 4, 4) body poses.   X_BP : (4, 4) the part's pose in it.   reach : (n,) of its points from the part's
-    origin. The products are those of `pose_table`; 0 where they are exact, shifts and right angles among them.
+    X_WB : (n, 4, 4) body poses.   X_BP : (4, 4) the part's pose in it, or (n, 4, 4) of n parts.   reach : (n,) of its
+    points from the part's origin. The products are those of `pose_table`; 0 where they are exact, shifts and right
+    angles among them.
     """
+    is_body = (X_BP == np.eye(4)).all(axis=(-2, -1))
+    if is_body.all():
+        return X_WB, np.zeros(len(X_WB))
     out = np.zeros_like(X_WB)
     out[:, 3, 3] = 1.0
-    if np.array_equal(X_BP, np.eye(4)):
-        return X_WB, np.zeros(len(X_WB))
     exact = np.ones(len(X_WB), dtype=bool)
     for j in range(4):
         total = np.zeros((len(X_WB), 3))
@@ -220,7 +222,8 @@ def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[n
             if k == 3:
                 high, low = X_WB[:, :3, 3], np.zeros((len(X_WB), 3))
             else:
-                factor_a, factor = X_WB[:, :3, k], np.full((len(X_WB), 1), X_BP[k, j])
+                factor_a = X_WB[:, :3, k]
+                factor = np.broadcast_to(X_BP[..., k, j, None], (len(X_WB), 1))
                 high, low = _two_products(factor_a, factor)
                 exact &= ((np.abs(high) > SAFE_PRODUCT) | (factor_a == 0.0) | (factor == 0.0)).all(axis=1)
             sum_, low_term = total + high, total
@@ -230,9 +233,11 @@ def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[n
             total = sum_
         out[:, :3, j] = total
     stretch = np.maximum(1.0, np.abs(X_WB[:, :3, :3]).sum(axis=2).max(axis=1))
-    parts = reach + np.abs(X_BP[:3, 3]).sum()
+    parts = reach + np.abs(X_BP[..., :3, 3]).sum(axis=-1)
     slop = PRODUCT_SLOP * (stretch * parts + np.abs(X_WB[:, :3, 3]).max(axis=1))
-    return out, np.where(exact, 0.0, slop)
+    is_own = np.broadcast_to(is_body, len(X_WB))
+    out[is_own] = X_WB[is_own]
+    return out, np.where(exact | is_own, 0.0, slop)
 
 
 def _product(A: np.ndarray, B: np.ndarray) -> np.ndarray:

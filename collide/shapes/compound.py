@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.errors import InvalidPose, InvalidShape
+from collide.errors import InvalidShape
 from collide.shapes.shape import Shape
-from collide.transforms import as_poses
+from collide.transforms import as_pose
 
 
 class Compound(Shape):
@@ -32,9 +32,11 @@ class Compound(Shape):
     one where it has two, and less the more it has.
     """
 
-    __slots__ = ("items",)
-    _fields = __slots__
+    __slots__ = ("items", "meshed")
+    _fields = ("items",)
     items: tuple[tuple[Shape, np.ndarray], ...]
+    #: Whether a mesh is among the items, however deep.
+    meshed: bool
 
     def __init__(self, items):
         try:
@@ -43,17 +45,13 @@ class Compound(Shape):
             raise InvalidShape("Compound: items must be a sequence of (shape, pose) pairs") from None
         if not pairs:
             raise InvalidShape("Compound: items is empty; at least one (shape, pose) is needed")
-        self._store(items=tuple(_check_item(k, shape, X) for k, (shape, X) in enumerate(pairs)))
+        items = tuple(_check_item(k, shape, X) for k, (shape, X) in enumerate(pairs))
+        self._store(items=items, meshed=any(shape.meshed for shape, _ in items))
 
     @property
     def convex(self) -> bool:  # type: ignore[override]
         """True for a compound of one convex shape."""
         return len(self.items) == 1 and self.items[0][0].convex
-
-    @property
-    def meshed(self) -> bool:  # type: ignore[override]
-        """Whether a mesh is among the items, however deep."""
-        return any(shape.meshed for shape, _ in self.items)
 
     def __repr__(self) -> str:
         return f"Compound(<{len(self.items)} items>)"
@@ -70,9 +68,6 @@ def _check_item(k: int, shape, X) -> tuple[Shape, np.ndarray]:
             f"Compound: items[{k}] is an HPolytope with bounded=False; make it a body of its own, or close it by "
             "half-spaces far away and leave bounded=False out"
         )
-    X = as_poses(X, f"Compound: items[{k}] pose")
-    if len(X) != 1:
-        raise InvalidPose(f"Compound: items[{k}] pose must be one (4, 4) matrix, got {len(X)}")
-    X = X[0].copy()
+    X = as_pose(X, f"Compound: items[{k}] pose").copy()
     X.flags.writeable = False
     return shape, X

@@ -6,9 +6,11 @@ import itertools
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
 
-from collide.contact import contact_points, reduce_patch
-from collide.contact.carrying_points import GENTLEST, ON_WALL, STEEP, choose_carrying, mark_carrying
+from collide.contact import carrying_points, contact_points, reduce_patch
+from collide.contact.carrying_points import CELLS, GENTLEST, MANY, ON_WALL, STEEP, choose_carrying, mark_carrying
 from collide.contact.manifold_points import POINT, ManifoldPoints
 
 pytestmark = pytest.mark.plain_kernels
@@ -24,7 +26,7 @@ def patch(places: np.ndarray, gaps: np.ndarray) -> contact_points.PatchPoints:
 
 
 def space(n: int) -> reduce_patch.HullSpace:
-    return reduce_patch.HullSpace(*(np.zeros(n + 16, dtype=np.int64) for _ in range(3)))
+    return reduce_patch.HullSpace(*(np.zeros(max(n + 16, CELLS), dtype=np.int64) for _ in range(4)))
 
 
 def gentlest(places: np.ndarray, gaps: np.ndarray, i: int) -> float:
@@ -100,3 +102,61 @@ def test_of_one_class_the_farthest_are_chosen():
     kinds = np.array([GENTLEST, GENTLEST, GENTLEST, STEEP, GENTLEST])
     assert choose_carrying(points, 5, 3, kinds, order) == 3
     assert order[:3].tolist() == [0, 2, 4]
+
+
+@pytest.mark.parametrize("shape", ["bowl", "rough"])
+def test_of_many_points_few_are_asked_and_each_compared_with_all(shape, monkeypatch):
+    """More than MANY points: at most CELLS are asked whether they carry, whichever do so do it among all of them, the
+    deepest comes first, and what is kept spans as much as what is kept of all."""
+    rng = np.random.default_rng(5)
+    n = 2 * MANY
+    places = rng.uniform(-1, 1, (n, 2))
+    gaps = 0.1 * (places**2).sum(axis=1) if shape == "bowl" else 1e-3 * rng.normal(size=n)
+    asked, steps = [], [0]
+    slope_below, span_on_border = carrying_points._slope_below, carrying_points._span_on_border
+
+    def counted(p, i, *others):
+        asked.append(i)
+        return slope_below(p, i, *others)
+
+    def counted_steps(p, at_i, n_before, *others):
+        steps[0] += n_before
+        return span_on_border(p, at_i, n_before, *others)
+
+    monkeypatch.setattr(carrying_points, "_slope_below", counted)
+    monkeypatch.setattr(carrying_points, "_span_on_border", counted_steps)
+    points, of_hull, target = patch(places, gaps), space(n), patch(places, gaps)
+    kept = reduce_patch.reduce_patch(points, n, TOLERANCE, 8, target, of_hull)
+    chosen = target.pairs[of_hull.order[:kept]]
+    assert kept == 8 and chosen[0] == np.argmin(gaps)
+    assert len(asked) <= CELLS < MANY and len(set(asked)) == len(asked)
+    assert steps[0] <= 16 * n * len(asked)  # of n² / 2 in the order of a sweep
+    carrying = [i for i in asked if of_hull.remaining[i] >= STEEP]
+    assert len(carrying) > 4
+    for i in carrying[:6]:
+        away, rise = np.delete(places - places[i], i, axis=0), np.delete(gaps - gaps[i], i)
+        found = linprog([0, 0, 1], np.hstack([away, -np.ones((n - 1, 1))]), rise, bounds=[(-1, 1), (-1, 1), (0, None)])
+        assert found.fun < 2 * TOLERANCE, f"point {i} of seed 5, {shape}, does not carry: {found.fun}"
+    monkeypatch.setattr(carrying_points, "MANY", n)
+    of_all = target.pairs[of_hull.order[: reduce_patch.reduce_patch(points, n, TOLERANCE, 8, target, of_hull)]]
+    assert (np.ptp(places[chosen], axis=0) > 0.6 * np.ptp(places[of_all], axis=0)).all()
+
+
+def test_corners_are_compared_once_though_walls_fall_layer_by_layer():
+    """A pit with steep walls of many layers: the hull is that of its ground, as by all points that are on no wall."""
+    rng = np.random.default_rng(7)
+    angles, layers = rng.uniform(0, 2 * np.pi, 600), np.repeat(np.arange(20), 30)
+    radii = 1.0 + 0.001 * layers
+    wall = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
+    ground = rng.uniform(-0.5, 0.5, (200, 2))
+    places, gaps = np.concatenate([ground, wall]), np.concatenate([np.zeros(200), 0.1 + 5.0 * layers])
+    points, of_hull = patch(places, gaps), space(len(places))
+    n_corners = reduce_patch.hull_of_patch(points, len(places), TOLERANCE, of_hull)
+    apart = np.linalg.norm(places[:, None] - places, axis=2)
+    rise = gaps[:, None] - gaps
+    is_wall = ((rise > TOLERANCE) & (rise - TOLERANCE > 2.0 * apart)).any(axis=1)
+    assert is_wall[200:].mean() > 0.9
+    standing = np.flatnonzero(~is_wall)
+    expected = set(standing[ConvexHull(places[standing]).vertices].tolist())
+    assert set(of_hull.corners[:n_corners].tolist()) == expected
+    assert set(np.unique(of_hull.remaining[: len(places)]).tolist()) <= {ON_WALL, ON_WALL + 1}

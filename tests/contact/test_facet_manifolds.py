@@ -207,7 +207,7 @@ def test_hulls_of_patches_hold_their_points():
         points = contact_points.PatchPoints(
             ManifoldPoints(numbers, np.zeros(2 * n, dtype=np.int64)), np.zeros(n), np.arange(n), np.zeros(18)
         )
-        space = reduce_patch.HullSpace(*(np.zeros(n + 16, dtype=np.int64) for _ in range(3)))
+        space = reduce_patch.HullSpace(*(np.zeros(n + 80, dtype=np.int64) for _ in range(4)))
         tolerance = 1e-9
         m = reduce_patch.hull_of_patch(points, n, tolerance, space)
         corners = flat[space.corners[:m]]

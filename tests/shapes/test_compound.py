@@ -41,7 +41,7 @@ def test_order_and_poses_make_the_difference():
         ([], InvalidShape, "empty"), (7, InvalidShape, "sequence of"), ([BALL], InvalidShape, "sequence of"),
         ([(EYE, BALL)], InvalidShape, r"items\[0\] must start with a shape, got ndarray"),
         ([(BALL, EYE), (BALL, 2 * EYE)], InvalidPose, r"items\[1\] pose"),
-        ([(BALL, np.stack([EYE, EYE]))], InvalidPose, "one .*matrix, got 2"),
+        ([(BALL, np.stack([EYE, EYE]))], InvalidPose, "one .*pose, got 2"),
         ([(BALL, np.full((4, 4), np.nan))], InvalidPose, r"items\[0\]"),
     ],
 )  # fmt: skip
@@ -52,3 +52,20 @@ def test_what_is_no_compound(items, error, words):
 
 def test_half_spaces_may_be_parts():
     assert not Compound([(Halfspace((0, 0, 1), 0.0), EYE), (BALL, EYE)]).meshed
+
+
+def test_parts_are_looked_at_once():
+    """Whether a mesh is among many parts is known from when the compound was made."""
+    looked_at = []
+
+    class Watched(Sphere):
+        __slots__ = ()
+
+        @property
+        def meshed(self):
+            looked_at.append(1)
+            return False
+
+    many = Compound([(Watched(0.1), EYE) for _ in range(50)])
+    assert len(looked_at) == 50
+    assert not many.meshed and not many.is_asked_whole and len(looked_at) == 50

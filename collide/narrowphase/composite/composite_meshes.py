@@ -39,7 +39,7 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
             rows = convex_rows(A.convex, B.convex, X_WA[met], X_WB[met], limit=0.0)
             states[met[rows["how"] == UNDECIDED]] = OPEN
     gaps = _box_gaps(A, B, X_WA, X_WB)
-    for i, j in _mesh_pairs(A, B):
+    for i, j in _mesh_pairs(A, B, (gaps <= 0.0).any(axis=0)):
         remaining = np.flatnonzero((states != HIT) & (gaps[:, i, j] <= 0.0))
         if len(remaining):
             part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[remaining], X_WB[remaining])
@@ -48,12 +48,9 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
     return states
 
 
-def _mesh_pairs(A: CompoundParts, B: CompoundParts):
-    """Numbers of parts of which one at least is a mesh."""
-    for i, part_a in enumerate(A.parts):
-        for j, part_b in enumerate(B.parts):
-            if part_a.shape.meshed or part_b.shape.meshed:
-                yield i, j
+def _mesh_pairs(A: CompoundParts, B: CompoundParts, wanted: np.ndarray) -> list[list[int]]:
+    """Numbers of those parts of which one at least is a mesh, of the pairs (parts of A, parts of B) that are wanted."""
+    return np.argwhere(wanted & (A.columns.meshed[:, None] | B.columns.meshed)).tolist()
 
 
 def _parts_at(A: CompoundParts, B: CompoundParts, i: int, j: int, X_WA, X_WB):
@@ -66,9 +63,16 @@ def _parts_at(A: CompoundParts, B: CompoundParts, i: int, j: int, X_WA, X_WB):
 
 
 def _box_gaps(A: CompoundParts, B: CompoundParts, X_WA, X_WB) -> np.ndarray:
-    """(n, parts of A, parts of B) how far their boxes are apart along an axis, negative where they overlap."""
+    """(n, parts of A, parts of B) what the parts' distances are at least, by their boxes; not above 0 where these
+    overlap.
+
+    Along an axis boxes are apart by the difference of their ends, and altogether by the root of the sum of the squares:
+    no part reaches out of its box.
+    """
     a, b = A.boxes(X_WA)[:, :, None], B.boxes(X_WB)[:, None]
-    return np.maximum(b[..., :3] - a[..., 3:], a[..., :3] - b[..., 3:]).max(axis=3)
+    along = np.maximum(b[..., :3] - a[..., 3:], a[..., :3] - b[..., 3:])
+    largest, length = along.max(axis=3), np.sqrt(np.square(np.maximum(along, 0.0)).sum(axis=3)) * (1.0 - 2.0**-40)
+    return np.where(largest > 0.0, np.maximum(largest, length), largest)
 
 
 # --- rows ---------------------------------------------------------------------------------------
@@ -138,21 +142,54 @@ def _part_rows(
             rows[name] = side.numbers[rows[name]]
         take(rows, np.arange(n))
     gaps = _box_gaps(A, B, X_WA, X_WB)
-    pairs = list(_mesh_pairs(A, B))
-    for place, (i, j) in enumerate(pairs):
+    meshed = A.columns.meshed[:, None] | B.columns.meshed
+    left_out |= (meshed & (gaps > sight)).any(axis=(1, 2))
+
+    def rows_of(i: int, j: int, poses: np.ndarray) -> np.ndarray:
+        part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[poses], X_WB[poses])
+        rows = part_rows(part_a.shape, part_b.shape, PA, PB, limit)
+        for name, side, number in (("part_a", A, i), ("part_b", B, j)):
+            if len(side.parts) > 1 or side.shape is not side.parts[0].shape:
+                rows[name] = number
+        return rows
+
+    # What comes near is known at once from the pair whose boxes are nearest; then in the order of the parts.
+    known = _nearest_first(np.where(meshed, gaps, math.inf), sight, rows_of) if len(A.parts) * len(B.parts) > 1 else {}
+    for poses, rows in known.values():
+        upper[poses] = np.minimum(upper[poses], np.maximum(rows["upper"], 0.0))
+    last = np.argwhere(meshed)[-1].tolist()
+    wanted = (gaps <= np.minimum(upper, sight)[:, None, None]).any(axis=0)
+    wanted[tuple(last)] = True
+    for i, j in _mesh_pairs(A, B, wanted):
         far = gaps[:, i, j] > np.minimum(upper, sight)
-        if place + 1 == len(pairs):  # a pose keeps at least one row
+        if [i, j] == last:  # a pose keeps at least one row
             far &= np.array([bool(rows) for rows in asked], dtype=bool)
-        left_out |= far & (gaps[:, i, j] > sight)
         remaining = np.flatnonzero(~far & (planes | ~hit))
         if len(remaining):
-            part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[remaining], X_WB[remaining])
-            rows = part_rows(part_a.shape, part_b.shape, PA, PB, limit)
-            for name, side, number in (("part_a", A, i), ("part_b", B, j)):
-                if len(side.parts) > 1 or side.shape is not side.parts[0].shape:
-                    rows[name] = number
-            take(rows, remaining)
+            poses, rows = known.get((i, j), (remaining[:0], np.zeros(0, dtype=PAIR_DTYPE)))
+            is_known = np.isin(remaining, poses)
+            some = remaining[~is_known]
+            if len(some):
+                take(rows_of(i, j, some), some)
+            if is_known.any():
+                take(rows[np.isin(poses, remaining)], remaining[is_known])
     return [np.concatenate(rows) for rows in asked], left_out
+
+
+def _nearest_first(gaps: np.ndarray, sight: float, rows_of) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
+    """{(part of A, part of B): (poses, their rows)}: at each pose the pair whose boxes are nearest, if it is in sight.
+
+    gaps : (n, parts of A, parts of B), infinite of pairs that are not asked about here.
+    """
+    n = len(gaps)
+    nearest = gaps.reshape(n, -1).argmin(axis=1)
+    in_sight = gaps.reshape(n, -1)[np.arange(n), nearest] <= sight
+    found = {}
+    for which in np.unique(nearest[in_sight]).tolist():
+        poses = np.flatnonzero(in_sight & (nearest == which))
+        i, j = divmod(which, gaps.shape[2])
+        found[i, j] = poses, rows_of(i, j, poses)
+    return found
 
 
 def _least(rows: np.ndarray, limit: float, left_out: bool) -> np.ndarray:
@@ -210,8 +247,8 @@ def _separating_translation(
     normals = meeting["normal"][np.square(meeting["normal"]).sum(axis=1) > 0.5]
     directions = np.concatenate([normals, axes, -axes])
     best: SeparatingTranslation | None = None
-    for n in directions:
-        (a, error_a), (b, error_b) = A.extent(X_WA, n), B.extent(X_WB, -n)
+    (extents_a, error_a), (extents_b, error_b) = A.extents(X_WA, directions), B.extents(X_WB, -directions)
+    for n, a, b in zip(directions, extents_a.tolist(), extents_b.tolist()):
         depth, bound = max(a + b, 0.0), max(a + b + error_a + error_b, 0.0)
         if best is None or bound < best.bound:
             best = SeparatingTranslation(depth, bound, n)

@@ -15,7 +15,7 @@ from collide.lowering.extents import extent_of
 from collide.lowering.facet_bodies import PosesWithSlop
 from collide.lowering.packed_convex import HALFSPACE, PackedConvex
 from collide.lowering.parts import bounding_parts_of
-from collide.lowering.shape_table import ShapeTable, moved_pose, pose_table
+from collide.lowering.shape_table import REACH, ShapeTable, moved_pose, pose_table
 from collide.narrowphase.bounds import ERROR
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
@@ -43,16 +43,41 @@ class Part(NamedTuple):
 
         about : (n,) how far from it half-spaces are looked at [m].
         """
-        bound = self.bound
-        reach = np.full(len(X_WB), bound.reach) if bound.kind != HALFSPACE else about + abs(bound.params[3])
-        X, slop = moved_pose(X_WB, self.X, reach)
-        stretch = np.sqrt(np.square(X_WB[:, :3, :3]).sum(axis=(1, 2)))
-        return PosesWithSlop(X, slop + stretch * (self.rotation * reach + self.shift) * _UP)
+        return _placed(X_WB, self.X, _reach_of(self.bound, about), self.rotation, self.shift)
 
     @property
     def bound(self) -> PackedConvex:
         """A convex set that holds it, in its own frame."""
         return bounding_parts_of(self.shape)[0][0]
+
+
+def _reach_of(bound: PackedConvex, about: np.ndarray) -> np.ndarray:
+    """(n,) how far from its origin a part is looked at [m]."""
+    return np.full(len(about), bound.reach) if bound.kind != HALFSPACE else about + abs(bound.params[3])
+
+
+def _placed(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray, rotation, shift) -> PosesWithSlop:
+    """Poses in the world of a part, or of n parts, as `Part` describes them."""
+    X, slop = moved_pose(X_WB, X_BP, reach)
+    stretch = np.sqrt(np.square(X_WB[:, :3, :3]).sum(axis=(1, 2)))
+    return PosesWithSlop(X, slop + stretch * (rotation * reach + shift) * _UP)
+
+
+class PartColumns(NamedTuple):
+    """All parts of a union, a row each.
+
+    X : (k, 4, 4) poses.   rotation, shift : as of `Part`.   reach, radius, slop : of what holds them [m].
+    plane : |offset| of half-spaces, NaN of others [m].   meshed : bool.
+    """
+
+    X: np.ndarray
+    rotation: np.ndarray
+    shift: np.ndarray
+    reach: np.ndarray
+    radius: np.ndarray
+    slop: np.ndarray
+    plane: np.ndarray
+    meshed: np.ndarray
 
 
 class CompoundParts:
@@ -106,24 +131,62 @@ class CompoundParts:
         """Whether a half-space is among the parts."""
         return any(packed.kind == HALFSPACE for packed in self._bounds)
 
+    @cached_property
+    def columns(self) -> PartColumns:
+        """The parts, and what holds them."""
+        bounds = [part.bound for part in self.parts]
+        return PartColumns(
+            np.array([part.X for part in self.parts]), np.array([part.rotation for part in self.parts]),
+            np.array([part.shift for part in self.parts]), np.array([bound.reach for bound in bounds]),
+            np.array([bound.radius for bound in bounds]), np.array([bound.slop for bound in bounds]),
+            np.array([abs(bound.params[3]) if bound.kind == HALFSPACE else math.nan for bound in bounds]),
+            np.array([part.shape.meshed for part in self.parts]),
+        )  # fmt: skip
+
+    @cached_property
+    def reach(self) -> float:
+        """How far any part reaches from the origin, at most, half-spaces apart [m]."""
+        of_parts = zip(self._bounds, self._X_BP)
+        return max(packed.reach + packed.radius + float(np.abs(X[:3, 3]).sum()) for packed, X in of_parts)
+
+    @cached_property
+    def _table(self) -> ShapeTable:
+        return ShapeTable(self._bounds)
+
+    def placed(self, which: np.ndarray, X_WB: np.ndarray, about: np.ndarray) -> PosesWithSlop:
+        """Poses in the world of parts (m,) by number, of the union's poses (m, 4, 4); about : as of `Part.at`."""
+        columns = self.columns
+        plane = columns.plane[which]
+        reach = np.where(np.isnan(plane), columns.reach[which], about + plane)
+        return _placed(X_WB, columns.X[which], reach, columns.rotation[which], columns.shift[which])
+
     def boxes(self, X_WB: np.ndarray) -> np.ndarray:
         """(n, parts, 6) world boxes of the parts at n poses, low then high, rounded outwards."""
         n, k = len(X_WB), len(self._bounds)
         X_BP = np.tile(self._X_BP, (n, 1, 1))
-        reach = np.tile([packed.reach for packed in self._bounds], n)
+        reach = np.tile(self._table.numbers[:k, REACH], n)
         poses = pose_table(np.repeat(X_WB, k, axis=0), X_BP, reach)
-        return boxes_of(ShapeTable(self._bounds), poses.rows, np.tile(np.arange(k), n)).reshape(n, k, 6)
+        return boxes_of(self._table, poses.rows, np.tile(np.arange(k), n)).reshape(n, k, 6)
 
-    def extent(self, X_WB: np.ndarray, n: np.ndarray) -> tuple[float, float]:
-        """(what no product of its points with the unit vector n exceeds, error of that), at a pose (4, 4)."""
-        value, size, slop = -math.inf, 0.0, 0.0
-        for part in self.parts:
-            at_pose = part.at(X_WB[None], np.zeros(1))
-            X, packed = at_pose.X[0], part.bound
-            part_extent = extent_of(packed, X, n)
-            value, slop = max(value, part_extent), max(slop, float(at_pose.slop[0]) + packed.slop)
-            size = max(size, 2 * packed.reach + packed.radius + float(np.abs(X[:3, 3]).sum()))
-        return value, ERROR * size + slop
+    def extents(self, X_WB: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, float]:
+        """((d,) what no product of its points with each of d unit vectors exceeds, error of these), at a pose (4, 4).
+
+        No part reaches beyond the ball around its origin; poses stretch by 1e-4 at most. The farthest balls come first:
+        what a ball holds back from the largest value found is not worked out.
+        """
+        columns, k = self.columns, len(self.parts)
+        at_pose = self.placed(np.arange(k), np.broadcast_to(X_WB, (k, 4, 4)), np.zeros(k))
+        shift = at_pose.X[:, :3, 3]
+        size = 2 * columns.reach + columns.radius + np.abs(shift).sum(axis=1)
+        balls = directions @ shift.T + ((1.0 + 1e-3) * (columns.reach + columns.radius) + 2.0**-40 * size)
+        balls[:, ~np.isnan(columns.plane)] = math.inf
+        values = np.full(len(directions), -math.inf)
+        for d, (n, of_parts) in enumerate(zip(directions, balls)):
+            for part in np.argsort(-of_parts, kind="stable").tolist():
+                if of_parts[part] < values[d]:
+                    break
+                values[d] = max(values[d], extent_of(self.parts[part].bound, at_pose.X[part], n))
+        return values, ERROR * float(size.max()) + float((at_pose.slop + columns.slop).max())
 
 
 @kept_with_shape("_union")
@@ -132,24 +195,29 @@ def compound_parts(shape: Shape) -> CompoundParts:
     return CompoundParts(shape)
 
 
-def _leaves(shape: Shape, X: list[list[Fraction]] | None):
-    """Yields (single body, its exact pose in the outermost frame, rows of four)."""
+def _leaves(shape: Shape, X: np.ndarray | list[list[Fraction]] | None):
+    """Yields (single body, its exact pose in the outermost frame: rows of four, a matrix where it is one as given)."""
     if not isinstance(shape, Compound):
         yield shape, X
         return
     for item, X_CS in shape.items:
-        R_p = [[Fraction(v) for v in row] for row in X_CS.tolist()]
-        yield from _leaves(item, R_p if X is None else _times(X, R_p))
+        yield from _leaves(item, X_CS if X is None else _times(_exact(X), _exact(X_CS)))
+
+
+def _exact(X: np.ndarray | list[list[Fraction]]) -> list[list[Fraction]]:
+    return [[Fraction(v) for v in row] for row in X.tolist()] if isinstance(X, np.ndarray) else X
 
 
 def _times(X: list[list[Fraction]], Y: list[list[Fraction]]) -> list[list[Fraction]]:
     return [[sum((X[i][k] * Y[k][j] for k in range(4)), Fraction(0)) for j in range(4)] for i in range(4)]
 
 
-def _rounded(X: list[list[Fraction]] | None) -> tuple[np.ndarray, float, float]:
+def _rounded(X: np.ndarray | list[list[Fraction]] | None) -> tuple[np.ndarray, float, float]:
     """(pose rounded once, what that turns a metre by, what it shifts), the last two rounded upwards."""
     if X is None:
         return IDENTITY, 0.0, 0.0
+    if isinstance(X, np.ndarray):
+        return X + 0.0, 0.0, 0.0
     rounded = np.array([[float(v) for v in row] for row in X])
     lost = [[abs(v - Fraction(float(v))) for v in row[:4]] for row in X]
     lost_rotation = sum((v for row in lost for v in row[:3]), Fraction(0))

@@ -9,6 +9,8 @@ from mesh_shapes import bumpy_sphere
 from naive import extent_along, pose, random_pose, rng_of, unit
 
 import collide
+from collide.lowering.extents import extent_of
+from collide.narrowphase.composite import composite_parts
 from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
 
 MESH = collide.Mesh(*bumpy_sphere(30))
@@ -86,7 +88,7 @@ def test_boxes_balls_and_extents_hold_all_points():
             assert (box[:3] <= points.min(axis=0) - r).all() and (points.max(axis=0) + r <= box[3:]).all()
             assert np.linalg.norm(points - middle, axis=1).max() + r <= radius * (1 + 1e-12)
             reached.append((points @ n).max() + r)
-        value, error = union.extent(X_WB, n)
+        (value,), error = union.extents(X_WB, n[None])
         assert abs(value - max(reached)) <= error + 1e-13 and error < 1e-12
 
 
@@ -97,5 +99,36 @@ def test_swapped_keys_and_half_spaces():
     union = CompoundParts(collide.Compound([(plane, EYE), (ball, EYE)]))
     assert union.unbounded and union.ball is None and not A.unbounded
     n = unit([1.0, 2.0, 3.0])
-    value, error = A.extent(EYE, n)
+    (value,), error = A.extents(EYE, n[None])
     assert abs(value + extent_along(ball, EYE, -n)) <= error
+
+
+def test_extents_of_many_parts_ask_few_of_them(monkeypatch):
+    """Of 300 balls along a line the support values of those are worked out that others' do not exceed by their balls;
+    values are those of all parts."""
+    rng = rng_of("few supports")
+    places = np.linspace(0.0, 10.0, 300)
+    union = CompoundParts(collide.Compound([(collide.Sphere(0.02), pose(t=(x, 0.1 * np.sin(x), 0.0))) for x in places]))
+    directions, asked = np.array([unit(rng.normal(size=3)) for _ in range(20)]), []
+    monkeypatch.setattr(composite_parts, "extent_of", lambda *given: asked.append(1) or extent_of(*given))
+    X = random_pose(rng, 2.0)
+    values, error = union.extents(X, directions)
+    centres = np.array([part.X[:3, 3] for part in union.parts]) @ X[:3, :3].T + X[:3, 3]
+    assert np.abs(values - ((directions @ centres.T).max(axis=1) + 0.02)).max() <= error + 1e-12
+    assert len(asked) < 20 * 10
+
+
+def test_parts_are_placed_together_as_one_by_one():
+    """`placed` of many parts is `Part.at` of each, to the bit; identities and half-spaces among them."""
+    rng = rng_of("placed together")
+    for _ in range(10):
+        items = [(shape, EYE if k % 3 == 0 else random_pose(rng, 1.0)) for k, shape in enumerate(
+            (collide.Box((1, 1, 1)), collide.Sphere(0.2), collide.Halfspace((0, 0, 1), 0.25), collide.Cone(0.1, 0.3))
+        )]  # fmt: skip
+        union = CompoundParts(collide.Compound(items))
+        which = rng.integers(0, len(union.parts), 30)
+        X, about = np.array([random_pose(rng, 2.0) for _ in which]), rng.uniform(0, 3, 30)
+        placed = union.placed(which, X, about)
+        for k, part in enumerate(which.tolist()):
+            alone = union.parts[part].at(X[k : k + 1], about[k : k + 1])
+            assert placed.X[k].tobytes() == alone.X[0].tobytes() and placed.slop[k] == alone.slop[0]
