@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.broadphase.bounding_boxes import widened
 from collide.broadphase.box_tree import BoxTree
 from collide.casts.posed_parts import PosedParts
 from collide.errors import UnsupportedQuery
@@ -163,11 +164,7 @@ class PackedWorld:
         parts = self.parts
         is_whole = parts.all_of_one_part and len(bodies) == len(parts.boxes)
         boxes = parts.boxes if is_whole else parts.body_boxes(bodies)
-        if not self.has_margins:
-            return boxes
-        inflation = self._inflation[bodies, None]
-        inflation = inflation + (np.abs(boxes).max(axis=1, keepdims=True) + inflation) * 2.0**-50 * (inflation > 0.0)
-        return np.hstack([boxes[:, :3] - inflation, boxes[:, 3:] + inflation])
+        return widened(boxes, self._inflation[bodies]) if self.has_margins else boxes
 
     # --- what there is --------------------------------------------------------------------------
 

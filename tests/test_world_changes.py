@@ -216,3 +216,45 @@ def test_shapes_of_every_kind_under_changes_equal_asking_every_pair(seed):
             assert other is None or not naive.same_bits(row, other, fields), (seed, step, a, b)
         n_hits, n_rows = n_hits + int(rows["hit"].sum()), n_rows + len(rows)
     assert 0.2 < n_hits / n_rows < 0.98 and n_rows > 100
+
+
+ENDLESS = {
+    "half-space": collide.Halfspace((0, 0, 1), 0.0),
+    "region": collide.HPolytope([[0, 0, 1], [0.3, 0, 1]], [0.0, 0.1], bounded=False),
+    "slab": collide.HPolytope([[0, 0, 1], [0, 0, -1]], [0.0, 1.0], bounded=False),
+    "union with a half-space": collide.Compound([
+        (collide.Halfspace((0, 0, 1), 0.0), np.eye(4)), (collide.Sphere(0.2), pose(t=(0, 0, -1)))
+    ]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ENDLESS)
+@pytest.mark.parametrize("change", ["move", "margin and back", "pair margin and back", "remove", "add", "sleep"])
+def test_bodies_without_end_stay_found_whatever_changes_beside_margins(kind, change):
+    """A bound of ∞ and no margin of its own: 0 · ∞ once was the room its box was given, and the body was lost."""
+    world = collide.World()
+    ground, ball = world.add(ENDLESS[kind]), world.add(collide.Sphere(0.5), margin=0.1)
+    far = world.add(collide.Sphere(0.5), pose(t=(0, 0, 9)), margin=0.2)
+    assert world.collides()
+    if change == "move":
+        world.set_pose(ground, np.eye(4))
+    elif change == "margin and back":
+        world.set_margin(ground, 0.3)
+        world.collides()
+        world.set_margin(ground, 0.0)
+    elif change == "pair margin and back":
+        world.set_margin(ground, 0.3, partner=ball)
+        world.collides()
+        world.set_margin(ground, None, partner=ball)
+    elif change == "remove":
+        world.remove(far)
+    elif change == "add":
+        ground = world.add(ENDLESS[kind])
+        world.remove(0)
+    elif change == "sleep":
+        world.sleep([ground])
+    assert world.collides()
+    ends = sorted((ground, ball))
+    for rows in (world.collisions(), world.distances(0.05), world.minimum()):
+        assert [row.tolist() for row in (rows["a"], rows["b"])] == [ends[:1], ends[1:]], change
+    assert not np.isnan(world._pack().tree.boxes).any()

@@ -146,6 +146,20 @@ def boxes_of(table: ShapeTable, poses: np.ndarray, shape_of: np.ndarray) -> np.n
     return boxes
 
 
+def widened(boxes: np.ndarray, room: np.ndarray) -> np.ndarray:
+    """(n, 6) boxes with room (n,) [m] ≥ 0 on every side, rounded outwards; without room their own bits.
+
+    Each bound b is moved by r = room + (|b| + room)·2⁻⁵⁰. What fl computes is off by at most 2⁻⁵³ of each operand and
+    result, all of them ≤ |b| + 2·room, five times: fl(b − r) ≤ b − room and fl(b + r) ≥ b + room, so that the new box
+    holds all that is within ``room`` of the old one. A bound that is infinite stays as it is: r is infinite for that
+    bound alone, of b's own sign. (A single r from the largest |b| of a box would be infinite for all six, and
+    inf · 0, no number, without room.)
+    """
+    r = room[:, None] + (np.abs(boxes) + room[:, None]) * 2.0**-50
+    r[room == 0.0] = 0.0
+    return np.hstack([boxes[:, :3] - r[:, :3], boxes[:, 3:] + r[:, 3:]])
+
+
 def move_parts(
     table: ShapeTable, row_of: np.ndarray, moved: np.ndarray, X_new: np.ndarray, X_WBs: np.ndarray, poses: np.ndarray,
     boxes: np.ndarray,

@@ -36,8 +36,9 @@ _GROWN = 1.5
 #: these are at most one in so many.
 _MIN_PATHS, _SHARE_OF_PATHS = 64, 8
 _NO_WORK = {"trees made": 0, "nodes fitted": 0, "leaves changed": 0}
-#: A box that meets nothing.
+#: A box that meets nothing, and one that meets all others.
 _NOTHING = np.array([np.inf] * 3 + [-np.inf] * 3)
+_EVERYTHING = -_NOTHING
 
 
 class CachedPairs(NamedTuple):
@@ -68,7 +69,7 @@ class TreeOverBodies:
         n = len(boxes)
         fixed = np.zeros(n, dtype=bool) if fixed is None else np.array(fixed, dtype=bool)
         leaf_of, changed = np.full((2, n), -1)
-        columns = np.array(boxes, dtype=np.float64), fixed, np.ones(n, dtype=bool), _traits_of(fixed), leaf_of, changed
+        columns = np.array(_comparable(boxes), dtype=np.float64), fixed, np.ones(n, dtype=bool), _traits_of(fixed), leaf_of, changed
         self._columns = [GrowingRows(column) for column in columns]
         self._allowed = np.zeros(1, dtype=np.int64)
         self._header: np.ndarray | None = None
@@ -186,7 +187,7 @@ class TreeOverBodies:
         """Take boxes (k, 6) of bodies (k,) that moved. The tree is made anew where it has become much worse than it was
         when it was last: what is near in it is to be near in space.
         """
-        bodies, boxes = np.ascontiguousarray(bodies), np.ascontiguousarray(boxes)
+        bodies, boxes = np.ascontiguousarray(bodies), np.ascontiguousarray(_comparable(boxes))
         escaped = np.empty(len(bodies), dtype=np.int64)
         header = self.header()
         n = take_boxes(
@@ -220,7 +221,7 @@ class TreeOverBodies:
         """Add bodies (k,), numbered on from the last, with groups and masks. The last trees are made one with theirs
         where they are not much larger: each body is sorted O(log n) times in all.
         """
-        first, k = len(self.boxes), len(boxes)
+        first, k, boxes = len(self.boxes), len(boxes), _comparable(boxes)
         fixed = np.asarray(fixed, dtype=bool)
         traits = _traits_of(fixed)
         traits[:, GROUP], traits[:, MASK] = group, mask
@@ -324,6 +325,14 @@ class TreeOverBodies:
         cached = 0 if self._cached is None else self._cached.keys.nbytes
         columns = sum(column.nbytes for column in self._columns)
         return self.nodes.nbytes + self.links.nbytes + self._allowed.nbytes + columns + cached
+
+
+def _comparable(boxes: np.ndarray) -> np.ndarray:
+    """(k, 6) boxes of which none has a bound that is no number: such a box is everything. Walks leave out what does not
+    compare as near, and nothing compares with NaN: a body must rather be asked too often than be lost.
+    """
+    unknown = np.isnan(boxes).any(axis=1)
+    return np.where(unknown[:, None], _EVERYTHING, boxes) if unknown.any() else boxes
 
 
 def _traits_of(fixed: np.ndarray) -> np.ndarray:

@@ -224,8 +224,8 @@ class SingleContacts:
     """
 
     def __init__(self, pair: SinglePair):
-        self._pair = pair  # held, since kernels use its buffers
         table, header = pair.table, pair.header
+        self._held = table, pair.space  # kernels use their buffers; the pair itself holds this
         self._faces = face_table_of(table, ROUND)
         self._space = _Workspace()
         self._space.fit(self._faces.largest)

@@ -34,7 +34,7 @@ _MARGIN = 1e-12
 class Enclosure(NamedTuple):
     """A convex shape between two polytopes, in its own frame.
 
-    outer : the polytope around it, a solid body whose ``hull`` is the shape itself.
+    outer : the polytope around it, a solid body whose hull (`hull_of`) is the shape itself.
     inner : a polytope within the shape; None where none was found.
     packed : the shape as the convex engine reads it.
     """
@@ -60,7 +60,7 @@ def enclosure_of(shape: Shape) -> Enclosure:
 def _body(shape: Shape, points: np.ndarray, own_point: np.ndarray) -> Body:
     hull = convex_hull(points)
     tree = build_mesh_tree(points, hull.facets)
-    return made_body(shape, tree, True, 0.0, own_point, [shape])
+    return made_body(shape, tree, True, 0.0, own_point)
 
 
 def _polytopes(shape: Shape, packed: PackedConvex) -> tuple[np.ndarray, np.ndarray | None]:

@@ -7,7 +7,8 @@ capsule a segment and one. A cylinder, cone or ellipsoid has no facets: see `enc
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,25 +22,29 @@ from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import REACH, MeshTree
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
-from collide.shapes.shape import Shape, kept_with_shape
+from collide.shapes.shape import Shape, held_by, kept_with_shape
 
 
 class Body(NamedTuple):
     """A set in its own frame: facets, the points they enclose where it is solid, and a ball swept over all.
 
+    of : the shape, which keeps the body and is therefore held weakly.
     tree : the facets.   points : (k, 3), one of every part that hangs together.
     centre, reach : of a ball that holds the facets, the reach rounded upwards [m].
-    hull : the least convex shape that holds the set, once it has been asked for (`hull_of`); empty before.
     """
 
-    shape: Shape
+    of: Callable[[], Any]
     tree: MeshTree
     solid: bool
     radius: float
     points: np.ndarray
     centre: np.ndarray
     reach: float
-    hull: list[Shape]
+
+    @property
+    def shape(self) -> Any:
+        """The shape, for as long as somebody holds it."""
+        return self.of()
 
     @property
     def key(self) -> tuple:
@@ -111,9 +116,8 @@ def facet_body(shape, caller: str) -> Body:
 
 def hull_of(body: Body) -> Shape:
     """The hull of a mesh, without points inside; a convex shape itself."""
-    if not body.hull:
-        body.hull.append(body.shape.convex_hull)  # type: ignore[attr-defined]
-    return body.hull[0]
+    shape = body.shape
+    return shape.convex_hull if isinstance(shape, Mesh) else shape
 
 
 def reach_of(body: Body) -> float:
@@ -123,7 +127,7 @@ def reach_of(body: Body) -> float:
 
 
 def _of_mesh(mesh: Mesh) -> Body:
-    return made_body(mesh, mesh.tree, mesh.solid, 0.0, mesh.vertices[_one_of_each_part(mesh)], [])
+    return made_body(mesh, mesh.tree, mesh.solid, 0.0, mesh.vertices[_one_of_each_part(mesh)])
 
 
 def _one_of_each_part(mesh: Mesh) -> np.ndarray:
@@ -143,7 +147,7 @@ def _of_convex(shape: Shape) -> Body:
     packed = convex_set_of(shape)
     hull = convex_hull(packed.points)
     tree = build_mesh_tree(packed.points, _facets(packed.points, hull))
-    return made_body(shape, tree, hull.dimension == 3, packed.radius, packed.points[hull.vertices[:1]], [shape])
+    return made_body(shape, tree, hull.dimension == 3, packed.radius, packed.points[hull.vertices[:1]])
 
 
 def _facets(points: np.ndarray, hull) -> np.ndarray:
@@ -155,8 +159,8 @@ def _facets(points: np.ndarray, hull) -> np.ndarray:
     return np.array([[order[0], order[-1], order[-1]]])
 
 
-def made_body(shape: Shape, tree: MeshTree, solid: bool, radius: float, points: np.ndarray, hull: list[Shape]) -> Body:
+def made_body(shape: Shape, tree: MeshTree, solid: bool, radius: float, points: np.ndarray) -> Body:
     """A body over the facets of a tree; parameters as of `Body`."""
     corners = tree.triangles.reshape(-1, 3)
     reach = float(np.sqrt(np.square(corners - tree.centre).sum(axis=1).max())) * (1 + 1e-12)
-    return Body(shape, tree, solid, radius, np.ascontiguousarray(points), tree.centre, reach, hull)
+    return Body(held_by(shape, shape), tree, solid, radius, np.ascontiguousarray(points), tree.centre, reach)

@@ -92,7 +92,7 @@ class SinglePair:
     """Two shapes of one convex part each, ready for motions one at a time."""
 
     def __init__(self, bodies: _Bodies, a: int, b: int):
-        self._bodies = bodies
+        self._table, self._parts = bodies.table, bodies.parts  # the bodies hold this pair
         self._jobs = np.array([[0, bodies.first[a], bodies.first[a], bodies.first[b], bodies.first[b]]], dtype=np.int64)
         self._of_thread = local()
 
@@ -110,7 +110,7 @@ class SinglePair:
 
     def _prepare(self) -> _SingleSpace:
         here = np.eye(4)[None]
-        tables = Tables(self._bodies.table.addresses, len(self._bodies.table.packed), self._bodies.parts)
+        tables = Tables(self._table.addresses, len(self._table.packed), self._parts)
         header, row = header_of(tables, Motions(here, here, here, here, None, None)), free_rows(1)
         space = _SingleSpace(header, row, address_of(header), address_of(self._jobs), address_of(row))
         self._of_thread.space = space

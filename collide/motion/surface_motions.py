@@ -12,7 +12,7 @@ A half-space meets a mesh where it meets the mesh's hull.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,7 +39,7 @@ from collide.narrowphase.facets.near_facets import near_facets
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Sphere
-from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
+from collide.shapes.shape import IDENTITY, Shape, held_by, kept_with_shape
 from collide.transforms import SMALLEST
 
 #: So many pairs of facets at most are jobs of one span, and in proportion more where it is shorter than _SHORT: where
@@ -63,7 +63,7 @@ class Piece(NamedTuple):
     is_curved : whether it is such a polytope.   packed : as a convex set; None of meshes.
     """
 
-    shape: Shape
+    of: Callable[[], Any]
     X_CS: np.ndarray
     number: int
     reach: float
@@ -74,12 +74,16 @@ class Piece(NamedTuple):
     packed: PackedConvex | None
 
     @property
+    def shape(self) -> Any:
+        return self.of()
+
+    @property
     def is_mesh(self) -> bool:
         return self.packed is None
 
     def corners(self, facets: np.ndarray) -> np.ndarray:
         """(k, 3, 3) of a mesh's facets by their numbers."""
-        mesh: Any = self.shape
+        mesh = self.shape
         return mesh.vertices[mesh.faces[facets]]
 
 
@@ -87,7 +91,7 @@ class Piece(NamedTuple):
 def pieces_of(shape: Shape) -> tuple[Piece, ...]:
     """The meshes and convex shapes that a shape is made of."""
     flat = list(_flattened(shape, IDENTITY, 0.0))
-    return tuple(_piece(item, X, slop, k) for k, (item, X, slop) in enumerate(flat))
+    return tuple(_piece(item, held_by(shape, item), X, slop, k) for k, (item, X, slop) in enumerate(flat))
 
 
 def _flattened(shape: Shape, X: np.ndarray, slop: float) -> Iterator[tuple[Shape, np.ndarray, float]]:
@@ -110,18 +114,18 @@ def _extent(shape: Shape) -> float:
     return packed.reach + packed.radius
 
 
-def _piece(shape: Shape, X_CS: np.ndarray, slop: float, number: int) -> Piece:
+def _piece(shape: Shape, of: Callable[[], Any], X_CS: np.ndarray, slop: float, number: int) -> Piece:
     reach = _extent(shape) * (1 + 1e-12)
     if isinstance(shape, Mesh):
-        return Piece(shape, X_CS, number, reach, slop, body_of(shape).tree, 0.0, False, None)
+        return Piece(of, X_CS, number, reach, slop, body_of(shape).tree, 0.0, False, None)
     packed = convex_set_of(shape)
     if is_halfspace(shape):
-        return Piece(shape, X_CS, number, reach, slop, None, 0.0, False, packed)
+        return Piece(of, X_CS, number, reach, slop, None, 0.0, False, packed)
     if kind_of(shape) in WITH_FACETS:
         body = body_of(shape)
-        return Piece(shape, X_CS, number, reach, slop, body.tree, body.radius, False, packed)
+        return Piece(of, X_CS, number, reach, slop, body.tree, body.radius, False, packed)
     tree = enclosure_of(shape).outer.tree
-    return Piece(shape, X_CS, number, reach, slop, tree, _thickness(shape, tree), True, packed)
+    return Piece(of, X_CS, number, reach, slop, tree, _thickness(shape, tree), True, packed)
 
 
 def _thickness(shape: Shape, tree: MeshTree) -> float:
@@ -233,7 +237,7 @@ def _needs_facets(a: Piece, b: Piece) -> bool:
 
 def _convex_pieces(a: Piece, b: Piece, motions: Motions, tolerance: float, rows: np.ndarray) -> None:
     """Pieces that are convex, or a half-space and a mesh, for all motions."""
-    packed = [p.packed if p.packed is not None else convex_set_of(p.shape.convex_hull) for p in (a, b)]  # type: ignore[attr-defined]
+    packed = [p.packed if p.packed is not None else convex_set_of(p.shape.convex_hull) for p in (a, b)]
     table = ShapeTable([p._replace(slop=p.slop + piece.slop) for p, piece in zip(packed, (a, b))])
     table.build_trees(np.arange(2))
     n = len(rows)

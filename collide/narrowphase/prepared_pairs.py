@@ -1,9 +1,16 @@
-"""Pairs of shapes made ready for single calls: kept with A, by the number that B has."""
+"""Pairs of shapes made ready for single calls: kept with A, by the number that B has, for as long as both live.
+
+A pair goes with A, which holds it. It goes with B by a weak reference, which A holds as well: nothing outside of the two
+knows of it, and nothing that B's end calls holds A. What a pair itself holds of the shapes, their trees and tables, must
+not hold the shapes.
+"""
 
 from __future__ import annotations
 
 import itertools
 import weakref
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from collide.kernels import PLAIN_PYTHON
@@ -28,13 +35,26 @@ def single_calls_are_safe() -> bool:
 
 
 def keep_prepared(A: Shape, B: Shape, pair: Any, slot: str = "_prepared") -> None:
-    if not hasattr(A, slot):
-        A._store(**{slot: {}})
+    for name in (slot, "_partners"):
+        if not hasattr(A, name):
+            A._store(**{name: {}})
     if not hasattr(B, "_serial"):
         B._store(_serial=next(_serials))
     prepared, serial = getattr(A, slot), B._serial
-    # a list: other threads add and finalizers take
+    # a list: other threads add, and partners that go take
     for oldest in list(prepared)[: max(0, len(prepared) + 1 - _MAX_PARTNERS)]:
-        prepared.pop(oldest, None)
+        _forget(A, slot, oldest)
     prepared[serial] = pair
-    weakref.finalize(B, prepared.pop, serial, None)  # a partner that is gone is not held
+    A._partners[slot, serial] = weakref.ref(B, partial(_forget_of, weakref.ref(A), slot, serial))
+
+
+def _forget_of(A: Callable[[], Shape | None], slot: str, serial: int, _: Any) -> None:
+    """A partner is gone."""
+    shape = A()
+    if shape is not None:
+        _forget(shape, slot, serial)
+
+
+def _forget(A: Shape, slot: str, serial: int) -> None:
+    getattr(A, slot).pop(serial, None)
+    A._partners.pop((slot, serial), None)

@@ -10,6 +10,7 @@ import numpy as np
 from collide.kernels import address_of
 from collide.robots.certify_meshes import settle_meshes
 from collide.robots.certify_motions import certify_motions
+from collide.robots.check_tables import ENDLESS
 from collide.robots.check_workspace import CheckWorkspace, MotionWorkspace
 from collide.robots.checker_scene import CheckerScene
 from collide.robots.motion_bounds import OPEN_INTERVAL
@@ -164,7 +165,10 @@ def _motion_workspace(checker: CheckerScene, resolution: float) -> MotionWorkspa
     for k, (a, b) in enumerate(setting.self_pairs.tolist()):
         shared = set(paths[a]) & set(paths[b])
         between[k] = len(paths[a]) - len(shared), len(paths[b]) - len(shared)
-    reach = float(np.abs(setting.tables.body_boxes).sum(axis=1).max()) + float(np.abs(setting.base[9:]).sum())
+    # Where a body without end meets another of the robot, roundings are as large as the other reaches.
+    boxes = np.abs(setting.tables.body_boxes)
+    reach = float(boxes[boxes.max(axis=1) < ENDLESS].sum(axis=1).max(initial=0.0))
+    reach += float(np.abs(setting.base[9:]).sum())
     reach += float(np.abs(robot.joint_table.doubles[:, 9:12]).sum())
     return MotionWorkspace(
         [np.array([number[name] for name in path], dtype=np.int64) for path in paths], between, robot.dof,

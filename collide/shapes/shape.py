@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Callable
 from functools import wraps
 from typing import Any, TypeVar
@@ -24,8 +25,8 @@ class Shape:
 
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges", "_hulls_instead",
-        "_kind", "_laid_out", "_moving", "_parts", "_pieces", "_prepared", "_serial", "_surface", "_topology", "_union",
-        "_walk",
+        "_kind", "_laid_out", "_moving", "_partners", "_parts", "_pieces", "_prepared", "_serial", "_surface",
+        "_topology", "_union", "_walk",
     )  # fmt: skip
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -37,6 +38,8 @@ class Shape:
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
     _prepared: dict[int, Any]
     _serial: int
+    #: Weak references to those other shapes, by the slot and their number (`narrowphase/prepared_pairs.py`).
+    _partners: dict[tuple[str, int], Any]
     #: The same for times of impact (`motion/convex_motions.py`).
     _moving: dict[int, Any]
     #: Hierarchies for the walk of Barba and Langerman, made when it is first asked for (`hierarchy_queries.py`).
@@ -120,6 +123,14 @@ def kept_with_shape(slot: str) -> Callable[[Callable[[Any], T]], Callable[[Any],
         return of
 
     return decorate
+
+
+def held_by(owner: Shape, shape: Shape) -> Callable[[], Any]:
+    """How what is kept with ``owner`` refers to a shape: to the owner weakly, to others as they are.
+
+    A shape that referred to itself by what it keeps would stay, with its tables and trees, until cycles are looked for.
+    """
+    return weakref.ref(shape) if shape is owner else lambda: shape
 
 
 IDENTITY = np.eye(4)

@@ -11,7 +11,7 @@ from naive import pose, random_pose, rng_of
 from naive_triangles import world_points
 
 import collide
-from collide.broadphase.bounding_boxes import boxes_of
+from collide.broadphase.bounding_boxes import boxes_of, widened
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.world_parts import WorldParts
@@ -125,3 +125,20 @@ def test_bodies_that_are_moved_at_once_have_the_boxes_and_poses_of_new_ones():
         assert np.array_equal(parts.X_WBs, X_WBs)
         n_moved += len(moved)
     assert n_moved > 10
+
+
+def test_widened_boxes_hold_their_room_exactly_and_no_bound_is_ever_nan():
+    rng = rng_of("widened boxes")
+    for _ in range(300):
+        low = rng.normal(size=(8, 3)) * 10.0 ** rng.uniform(-12, 12, (8, 3))
+        boxes = np.hstack([low, low + np.abs(rng.normal(size=(8, 3))) * 10.0 ** rng.uniform(-12, 12, (8, 3))])
+        ends = rng.random((8, 6)) < 0.2
+        boxes[ends] = np.where(np.arange(6) < 3, -np.inf, np.inf)[np.nonzero(ends)[1]]
+        room = np.where(rng.random(8) < 0.4, 0.0, 10.0 ** rng.uniform(-15, 8, 8))
+        wide = widened(boxes, room)
+        assert not np.isnan(wide).any() and (np.isinf(wide) == ends).all(), (boxes, room)
+        assert wide[room == 0].tobytes() == boxes[room == 0].tobytes()
+        for k, axis in np.argwhere(~ends & (room > 0)[:, None]).tolist():
+            sign, b, r = (-1 if axis < 3 else 1), Fraction(boxes[k, axis]), Fraction(room[k])
+            out = sign * (Fraction(wide[k, axis]) - b) - r
+            assert 0 <= out <= (abs(b) + 2 * r) / 2**49, (boxes[k].tolist(), room[k])

@@ -315,3 +315,19 @@ def test_a_damaged_tree_is_noticed(what):
         tree.boxes[tree.links[leaves[3], BODY], 0] -= 1.0
     with pytest.raises(AssertionError, match=r"node|leaf|missing or doubled|body"):
         validate_box_tree(tree)
+
+
+def test_a_box_that_is_no_number_is_everything():
+    """However it comes into the tree: nothing compares with NaN, and a body that does not compare is lost."""
+    unit = np.array([0.0, 0, 0, 1, 1, 1])
+    lost = np.array([np.nan, 0, 0, np.inf, 1, 1])
+    apart = np.array([unit, unit + 5, lost])
+    made = BoxTree(apart)
+    appended = BoxTree(apart[:2])
+    appended.append(apart[2:], np.zeros(1, dtype=bool))
+    moved = BoxTree(np.array([unit, unit + 5, [-np.inf] * 3 + [np.inf] * 3]))
+    moved.move(np.array([2]), lost[None])
+    for tree in (made, appended, moved):
+        assert not np.isnan(tree.boxes).any()
+        assert tree.pairs(0.0).tolist() == [[0, 2], [1, 2]]
+        assert tree.touching(unit + 100, 0.0).tolist() == [2]

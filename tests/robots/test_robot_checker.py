@@ -371,3 +371,55 @@ def test_there_is_space_for_all_that_one_configuration_leaves_to_others():
     assert checker.collides([[0.0], [1.0]]).tolist() == [True, False]
     measured = checker.distances([[0.0], [0.9]])
     assert measured.hit.tolist() == [True, False] and 0.5 < measured.distance[1] < 0.9
+
+
+def _shape_that_may_have_no_end(rng, size: float) -> collide.Shape:
+    plane = collide.Halfspace((0, 0, 1) if rng.random() < 0.5 else rng.normal(size=3), -float(rng.uniform(0, 2)))
+    kind = rng.random()
+    if kind < 0.3:
+        return plane
+    if kind < 0.4:
+        return collide.Compound([(collide.Sphere(size), np.eye(4)), (plane, random_pose(rng, size))])
+    return random_link_shape(rng, size)
+
+
+@pytest.mark.parametrize("padding", [0.0, 0.03])
+def test_links_without_end_are_asked_like_others(padding):
+    """Half-spaces on links: a box of half sides ∞ times an axis of 0 once was no number, met nothing, and motions were
+    certified free through walls.
+    """
+    hits = free = told = 0
+    for seed in range(10):
+        rng = rng_of("links without end", seed)
+        types = ("prismatic", "fixed") if seed % 2 else ("revolute", "prismatic", "continuous")
+        robot = random_robot(rng, n_links=3, types=types, shape=_shape_that_may_have_no_end)
+        checker = collide.RobotChecker(robot, random_world(rng, 3), padding=padding)
+        Q = random_configurations(rng, robot, 12)
+        found = checker.collides(Q)
+        number = {link: k for k, link in enumerate(robot.links)}
+        for k, X_WL in enumerate(robot.link_poses(Q)):
+            expected = any(
+                collide.collide(
+                    A, B, X_WL[number[a]], X_WL[number[b]] if X_WB is None else X_WB,
+                    security_margin=0.0 if X_WB is None else padding,
+                ) for A, a, B, b, X_WB in pairs_to_test(checker)
+            )  # fmt: skip
+            assert found[k] == expected, f"seed {seed}, configuration {Q[k].tolist()}"
+        ends = Q + rng.normal(size=Q.shape) * 0.2
+        certified = checker.certify_edges(Q, ends)
+        for k in np.flatnonzero(certified.free).tolist():
+            path = Q[k] + np.linspace(0, 1, 40)[:, None] * (ends[k] - Q[k])
+            assert not checker.collides(path).any(), f"seed {seed}, edge {Q[k].tolist()} to {ends[k].tolist()}"
+        hits, free, told = hits + int(found.sum()), free + int(certified.free.sum()), told + len(Q)
+    assert 0.2 < hits / told < 0.9 and free > 10, (hits, free, told)
+
+
+def test_an_attached_half_space_meets_what_is_in_it():
+    base = Robot("one", ["base", "hand"], [Joint("j", "prismatic", "base", "hand", axis=np.array([0, 0, 1.0]))], {})
+    world = collide.World()
+    world.add(collide.Sphere(0.5), pose(t=(3, 4, 0)))
+    checker = collide.RobotChecker(base, world, attached=[("plate", "hand", collide.Halfspace((0, 0, 1), 0.0))])
+    assert checker.collides([[-1.0], [-0.25], [0.0], [9.0]]).tolist() == [False, True, True, True]
+    assert checker.distances([[-1.0]]).rows["distance"][0] == pytest.approx(0.5)
+    certified = checker.certify_edges([[-1.0], [-1.0], [-9.0]], [[-0.6], [1.0], [-0.501]])
+    assert certified.free.tolist() == [True, False, True]

@@ -12,7 +12,6 @@ import math
 
 import numpy as np
 
-from collide.lowering.facet_bodies import is_halfspace
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
 from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
@@ -100,7 +99,7 @@ def _rows_in_order(A: CompoundParts, B: CompoundParts, X_WA, X_WB, limit: float,
 
 
 def _rows(A: CompoundParts, B: CompoundParts, X_WA, X_WB, limit: float, depths: bool) -> np.ndarray:
-    planes = is_halfspace(A.shape) or is_halfspace(B.shape)
+    planes = A.is_halfspace or B.is_halfspace
     asked, left_out = _part_rows(A, B, X_WA, X_WB, limit, planes)
     out = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
     for k in range(len(X_WA)):
@@ -149,7 +148,7 @@ def _part_rows(
         part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[poses], X_WB[poses])
         rows = part_rows(part_a.shape, part_b.shape, PA, PB, limit)
         for name, side, number in (("part_a", A, i), ("part_b", B, j)):
-            if len(side.parts) > 1 or side.shape is not side.parts[0].shape:
+            if side.is_union:
                 rows[name] = number
         return rows
 

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Callable
 from fractions import Fraction
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.lowering.extents import extent_of
-from collide.lowering.facet_bodies import PosesWithSlop
+from collide.lowering.facet_bodies import PosesWithSlop, is_halfspace
 from collide.lowering.packed_convex import HALFSPACE, PackedConvex
 from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_table import REACH, ShapeTable, moved_pose, pose_table
 from collide.narrowphase.bounds import ERROR
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
-from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
+from collide.shapes.shape import IDENTITY, Shape, held_by, kept_with_shape
 
 #: Outside half-spaces: a rounded turn moves what is far away by more.
 _UP = 1 + 2.0**-40
@@ -28,15 +29,19 @@ _UP = 1 + 2.0**-40
 class Part(NamedTuple):
     """One body of a union.
 
-    shape : a mesh, or a convex shape.   X : (4, 4) its pose in the union's frame.
+    of : a mesh, or a convex shape (`held_by`).   X : (4, 4) its pose in the union's frame.
     rotation, shift : by how much, at most, rounding moved a point for each metre from the part's origin, and besides
         [m]: a pose within a pose is their exact product, rounded once.
     """
 
-    shape: Shape
+    of: Callable[[], Any]
     X: np.ndarray
     rotation: float
     shift: float
+
+    @property
+    def shape(self) -> Any:
+        return self.of()
 
     def at(self, X_WB: np.ndarray, about: np.ndarray) -> PosesWithSlop:
         """Its poses in the world, for poses (n, 4, 4) of the union.
@@ -83,24 +88,30 @@ class PartColumns(NamedTuple):
 class CompoundParts:
     """A shape as a union: of one part, where it is none.
 
-    parts : single bodies in the order of the items.   convex : those that are no meshes as one shape, None where there
-    are none; ``numbers`` of them among the parts.
+    parts : single bodies in the order of the items.   numbers : of those among them that are no meshes.
+    is_union, is_halfspace : whether the shape is a Compound, and whether it is a half-space.
     """
 
     def __init__(self, shape: Shape):
-        self.shape = shape
-        self.parts = [Part(s, *_rounded(X)) for s, X in _leaves(shape, None)]
+        self.parts = [Part(held_by(shape, s), *_rounded(X)) for s, X in _leaves(shape, None)]
+        self.is_union, self.is_halfspace = isinstance(shape, Compound), is_halfspace(shape)
+        # A height field has the bytes of the answers of its mesh.
+        self._name = Mesh.__name__ if isinstance(shape, Mesh) else type(shape).__name__
         self.numbers = np.array([k for k, part in enumerate(self.parts) if not part.shape.meshed], dtype=np.int64)
-        self.convex = _convex_part(shape)
+        convex = _convex_part(shape)
+        self._convex = None if convex is None else held_by(shape, convex)
         bounds = bounding_parts_of(shape)
         self._bounds, self._X_BP = [packed for packed, _ in bounds], np.array([X for _, X in bounds])
+
+    @property
+    def convex(self) -> Shape | None:
+        """The parts that are no meshes as one shape; None where there are none."""
+        return None if self._convex is None else self._convex()
 
     @cached_property
     def key(self) -> bytes:
         """Orders the bodies of a pair, so that swapped questions are worked out on the same numbers."""
-        # A height field has the bytes of the answers of its mesh.
-        name = Mesh.__name__ if isinstance(self.shape, Mesh) else type(self.shape).__name__
-        digest = hashlib.blake2b(name.encode(), digest_size=16)
+        digest = hashlib.blake2b(self._name.encode(), digest_size=16)
         for part in self.parts:
             shape = part.shape
             if isinstance(shape, Mesh):

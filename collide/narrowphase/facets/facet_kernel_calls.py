@@ -314,7 +314,7 @@ class SinglePair:
         space, n_stack = SinglePair._space, stack_of(A.tree, B.tree)
         if space is None or space.n_stack < n_stack:
             space = SinglePair._space = Workspace(max(512, n_stack))
-        self._held = A, B, space
+        self._held = A, B, space  # kernels use their buffers; bodies hold their shapes weakly
         self._has_slabs = A.radius + B.radius > 0.0
         if self._has_slabs:
             _make_slabs(A, B)
