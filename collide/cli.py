@@ -18,9 +18,10 @@ from contextlib import contextmanager
 
 from collide import cli_arguments as arguments
 from collide import cli_bench, cli_compare, cli_fuzz, cli_locality, cli_pages, cli_scenes, cli_srdf, cli_sweep, cli_view
-from collide.cli_files import check_place, copy_scene, first_words, print_lines, write_json, write_text
+from collide.cli_files import check_place, copy_scene, first_words, print_lines, write_json
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
 from collide.reports.number_format import count
+from collide.whole_file import write_whole
 
 _STARTED = time.perf_counter()
 
@@ -171,9 +172,9 @@ def _check(args) -> int:
     ]  # fmt: skip
     _write_reports(made, args.json)
     if args.write_baseline:
-        write_text(checking.baseline_text(checks), args.write_baseline)
+        write_whole(args.write_baseline, checking.baseline_text(checks))
     if args.junit:
-        write_text(junit.text(checks), args.junit)
+        write_whole(args.junit, junit.text(checks))
     if args.html:
         cli_pages.write_check(args, made, checks, progress)
     if _has_stdout(args):

@@ -13,6 +13,7 @@ from collide.adapters.hosts.coal_geometry import CollisionGeometry
 from collide.adapters.hosts.coal_meshes import BVHModelOBB, BVHModelOBBRSS, rows_of
 from collide.adapters.hosts.fcl_meshes import occupied_boxes
 from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.given_files import LARGEST_MESH, read_bytes
 from collide.scenes.loaders.mesh_file import read_mesh
 
 #: How far below the lowest height a bottom lies that is not below it, in parts of the field's size.
@@ -200,7 +201,7 @@ class MeshLoader:
 
     def loadOctree(self, filename):
         """The `OcTree` of a binary octomap file (.bt). Raises InvalidArgument."""
-        head, mark, data = Path(filename).read_bytes().partition(b"\ndata\n")
+        head, mark, data = read_bytes(Path(filename), LARGEST_MESH, "octree").partition(b"\ndata\n")
         fields = dict(line.split(None, 1) for line in head.decode("latin-1").splitlines() if " " in line.strip())
         if not (mark and fields.get("id", "").strip() == "OcTree" and "res" in fields):
             raise InvalidArgument(f"{filename} is no binary octomap: its header names no OcTree, res and data")
