@@ -187,6 +187,12 @@ def _check(args) -> int:
         return FREE
     if any(result.fails for result in checks):
         return YES
+    missing = made[0].report.missing_meshes
+    if missing and not args.allow_missing_meshes:
+        raise UnsupportedQuery(
+            f"whether the scene is free is not known: {count(len(missing), 'mesh is', 'meshes are')} missing and NOT "
+            "checked (--allow-missing-meshes takes the rest for the whole)"
+        )
     unanswered = [entry for result in checks for entry in result.unanswered]
     if unanswered:
         first = unanswered[0]
@@ -198,6 +204,8 @@ def _say_what_was_taken(report) -> None:
     """Free may mean less than it seems: what has no inside, and what stands in for something else."""
     surfaces = sorted({entry["body"] for entry in report.meshes if not entry["solid"]})
     others = sorted({entry["body"] for entry in report.approximations})
+    for entry in report.missing_meshes:
+        _say(f"not checked: {entry}")
     for bodies, what in ((surfaces, "surfaces without an inside"), (others, "not the shape the scene names")):
         if bodies:
             more = f" and {len(bodies) - 3} more" if len(bodies) > 3 else ""

@@ -1,4 +1,4 @@
-"""The cache of meshes: entries are this user's, under their own key, as they were written; links and forgeries are not."""
+"""The cache of meshes: what is taken from it is this user's, of its own key, as it was written, and no link."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def ball(tmp_path):
-    collide.Mesh(*collide.tessellate(collide.Sphere(1.0), tolerance=0.05)).save(tmp_path / "ball.ply")
+    vertices, faces = collide.tessellate(collide.Sphere(1.0), tolerance=0.05)
+    collide.Mesh(vertices, faces[:-1]).save(tmp_path / "ball.ply")
     return tmp_path / "ball.ply"
 
 
@@ -103,8 +104,6 @@ def test_entries_are_looked_at(folder, ball):
     size(ball)
     (entry,) = folder.glob("*.npz")
     right = entry.read_bytes()
-    huge = right.replace(b"(", b"(9999999999, ", 0)
-    at = right.index(b"'shape': (") + len(b"'shape': (")
     at = right.index(b"'shape': (", right.index(b"points0")) + len(b"'shape': (")
     comma = right.index(b",", at)
     header_end = right.index(b"\n", at)
@@ -112,7 +111,7 @@ def test_entries_are_looked_at(folder, ball):
     huge = right[:at] + grown[: header_end - at] + right[header_end:]
     bad = {"another key": forged(entry, 0.01, "0" * 64), "a huge count": huge, "empty": b"", "no zip": b"x" * 900,
            "cut": right[:-80]}  # fmt: skip
-    for k in range(60, len(right), len(right) // 40):
+    for k in range(60, len(right), len(right) // 20):
         bad[f"bit {k}"] = right[:k] + bytes([right[k] ^ 1]) + right[k + 1:]
     read = 0
     for name, blob in bad.items():
@@ -124,6 +123,6 @@ def test_entries_are_looked_at(folder, ball):
 
 def test_a_cache_folder_that_cannot_be(ball, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    for name in ("~nouser/x", "a\0b", str(ball), "/dev/null/x"):
-        monkeypatch.setattr("os.environ", {**os.environ, "COLLIDE_CACHE_DIR": name})
+    for name in ("~nouser/x", str(ball), "/dev/null/x"):
+        monkeypatch.setenv("COLLIDE_CACHE_DIR", name)
         assert size(ball) == 1.0
