@@ -18,7 +18,13 @@ __all__ = ["WorldViewer", "view"]
 _HOME = dict.fromkeys(__all__, "collide.adapters.live.world_viewer")
 
 
+#: Modules that are reached by name alone: ``collide.adapters.hosts.mujoco``.
+_MODULES = ("fuzzing", "hosts", "live", "peers")
+
+
 def __getattr__(name: str):
+    if name in _MODULES:
+        return import_module(f"collide.adapters.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'collide.adapters' has no attribute {name!r}")
     value = getattr(import_module(_HOME[name]), name)

@@ -161,8 +161,8 @@ __all__ = [
 ]
 
 
-#: Modules that are reached by name alone: ``collide.results.HOW``.
-_MODULES = ("errors", "polytopes", "results", "transforms")
+#: Modules that are reached by name alone: ``collide.results.HOW``, ``collide.scenes.load``.
+_MODULES = ("adapters", "errors", "polytopes", "results", "scenes", "transforms")
 
 if not TYPE_CHECKING:  # checkers are to know the names above, and no others
 

@@ -23,7 +23,8 @@ def cache_folder(*parts: str) -> Path:
     """
     folder_named = os.environ.get("COLLIDE_CACHE_DIR")
     if folder_named:
-        return Path(folder_named).expanduser().joinpath(*parts)
+        # "~name" of a user whom nobody knows stays as it is, as in a shell
+        return Path(os.path.expanduser(folder_named)).joinpath(*parts)
     home = Path(os.path.expanduser("~"))
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
@@ -39,6 +40,33 @@ def make_private(folder: Path) -> None:
     if not folder.is_dir():
         make_private(folder.parent)
         folder.mkdir(mode=0o700, exist_ok=True)
+
+
+def why_unusable(folder: Path) -> str | None:
+    """Why nothing is to be read from a folder or kept in it; None where all is well: it is then there."""
+    try:
+        why = why_distrusted(folder)
+        if why is None:
+            make_private(folder)
+            why = why_distrusted(folder)  # somebody else may have made it meanwhile
+        return why
+    except (OSError, RuntimeError, ValueError) as error:
+        return str(error)
+
+
+def read_own(file: Path) -> bytes:
+    """What a file holds that this user alone may write. No link is followed, and no pipe waited for.
+
+    Raises FileNotFoundError where nothing is there, PermissionError where somebody else may have written it, OSError.
+    """
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    with os.fdopen(os.open(file, flags), "rb") as opened:
+        status = os.fstat(opened.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise PermissionError(f"{file} is no file")
+        if TRUST and (status.st_uid != os.geteuid() or stat.S_IMODE(status.st_mode) & 0o022):
+            raise PermissionError(f"others may have written {file}")
+        return opened.read()
 
 
 def why_distrusted(folder: Path) -> str | None:

@@ -18,9 +18,10 @@ from contextlib import contextmanager
 
 from collide import cli_arguments as arguments
 from collide import cli_bench, cli_compare, cli_fuzz, cli_locality, cli_pages, cli_scenes, cli_srdf, cli_sweep, cli_view
-from collide.cli_files import check_place, copy_scene, first_words, print_lines, write_json, write_text
+from collide.cli_files import check_place, copy_scene, first_words, print_lines, write_json
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery
 from collide.reports.number_format import count
+from collide.whole_file import write_whole
 
 _STARTED = time.perf_counter()
 
@@ -171,9 +172,9 @@ def _check(args) -> int:
     ]  # fmt: skip
     _write_reports(made, args.json)
     if args.write_baseline:
-        write_text(checking.baseline_text(checks), args.write_baseline)
+        write_whole(args.write_baseline, checking.baseline_text(checks))
     if args.junit:
-        write_text(junit.text(checks), args.junit)
+        write_whole(args.junit, junit.text(checks))
     if args.html:
         cli_pages.write_check(args, made, checks, progress)
     if _has_stdout(args):
@@ -186,6 +187,12 @@ def _check(args) -> int:
         return FREE
     if any(result.fails for result in checks):
         return YES
+    missing = made[0].report.missing_meshes
+    if missing and not args.allow_missing_meshes:
+        raise UnsupportedQuery(
+            f"whether the scene is free is not known: {count(len(missing), 'mesh is', 'meshes are')} missing and NOT "
+            "checked (--allow-missing-meshes takes the rest for the whole)"
+        )
     unanswered = [entry for result in checks for entry in result.unanswered]
     if unanswered:
         first = unanswered[0]
@@ -197,6 +204,8 @@ def _say_what_was_taken(report) -> None:
     """Free may mean less than it seems: what has no inside, and what stands in for something else."""
     surfaces = sorted({entry["body"] for entry in report.meshes if not entry["solid"]})
     others = sorted({entry["body"] for entry in report.approximations})
+    for entry in report.missing_meshes:
+        _say(f"not checked: {entry}")
     for bodies, what in ((surfaces, "surfaces without an inside"), (others, "not the shape the scene names")):
         if bodies:
             more = f" and {len(bodies) - 3} more" if len(bodies) > 3 else ""

@@ -227,6 +227,8 @@ def _add_check(commands) -> None:
     _motion_arguments(parser)
     parser.add_argument("--min-depth", type=_length, default=0.0, metavar="D",
                         help="collisions proven less deep than this do not count: 0.001 (metres), 1mm")
+    parser.add_argument("--allow-missing-meshes", action="store_true",
+                        help="with --missing-meshes skip: free counts although what was skipped is not checked")
     parser.add_argument("--touching-is-collision", action="store_true",
                         help="count pairs that touch within rounding as collisions")
     _ignore_argument(parser)

@@ -7,6 +7,7 @@ import sys
 
 from collide.errors import InvalidArgument
 from collide.reports.number_format import count
+from collide.whole_file import whole_file, write_whole
 
 #: What is larger is read as a scene by no loader (`scenes/loaders/documents.py`), and need not be looked into.
 _LARGEST_SCENE = 256 * 2**20
@@ -14,7 +15,6 @@ _LARGEST_SCENE = 256 * 2**20
 
 def copy_scene(words: list[str], force: bool) -> str:
     """Copy a shipped scene's file; gives the path of the copy."""
-    import shutil
     from pathlib import Path
 
     from collide.scenes import path
@@ -29,7 +29,8 @@ def copy_scene(words: list[str], force: bool) -> str:
         raise InvalidArgument(f"{target} is no file: a scene is not copied there")
     if target.exists() and not force:
         raise InvalidArgument(f"{target} exists already: give another destination, or --force to overwrite it")
-    shutil.copyfile(source, target)
+    with whole_file(target) as copy:
+        copy.write(source.read_bytes())
     return str(target)
 
 
@@ -57,16 +58,7 @@ def write_json(items, place: str) -> None:
         for text in pieces(items, ascii_only=True):
             sys.stdout.write(text)
         return
-    write_text(pieces(items), place)
-
-
-def write_text(pieces, place: str) -> None:
-    """Pieces of text, one behind the other, to a file."""
-    try:
-        with open(place, "w", encoding="utf-8") as file:
-            file.writelines(pieces)
-    except OSError as error:  # a full disk is told without the file's name
-        raise OSError(error.errno, error.strerror, place) from None
+    write_whole(place, pieces(items))
 
 
 def check_place(option: str, place: str, suffix: str) -> None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
-from collide.cli_files import write_json, write_text
+from collide.cli_files import write_json
 from collide.errors import InvalidArgument
 
 EPILOG = """examples:
@@ -34,7 +33,7 @@ count as neighbours.
 
 exit status: 0 measured, 2 error"""
 
-_SUFFIXES = (".obj", ".stl")
+_SUFFIXES = (".obj", ".ply", ".stl")
 
 
 def add_arguments(parser) -> None:
@@ -45,7 +44,7 @@ def add_arguments(parser) -> None:
     parser.add_argument("--plot", metavar="FILE", help="draw the distributions: a .png, .svg or .pdf file")
     parser.add_argument("--repeated", action="store_true",
                         help="count vertices with equal coordinates one by one, as Table 1 of the paper does")
-    parser.add_argument("--localised", metavar="FILE", help="make the mesh local, and write it: an .obj or .stl file")
+    parser.add_argument("--localised", metavar="FILE", help="make the mesh local, and write it: .obj, .ply, .stl")
     parser.add_argument("--stretch", type=float, default=10.0, metavar="S",
                         help="with --localised: the largest local stretch, 3.2 or more (10)")
     parser.add_argument("--order", type=int, default=1, metavar="K",
@@ -63,7 +62,7 @@ def run(args, progress) -> int:
     if args.plot:
         locality_report.check_plot(args.plot)
     if args.localised and not args.localised.lower().endswith(_SUFFIXES):
-        raise InvalidArgument(f"--localised: {args.localised!r} must end in {' or '.join(_SUFFIXES)}")
+        raise InvalidArgument(f"--localised: {args.localised!r} must end in {', '.join(_SUFFIXES)}")
     meshes = []
     for place in args.meshes:
         with progress(f"reading {place}"):
@@ -101,25 +100,5 @@ def _localised(meshes: list, args, progress) -> tuple[str, str, Any]:
         return progress(f"{name}: {label}")
 
     made = mesh.localised(args.stretch, args.order, max_facets=args.max_facets, progress=about).mesh
-    write = _as_obj if args.localised.lower().endswith(".obj") else _as_stl
-    write_text(write(made), args.localised)
+    made.save(args.localised)
     return f"{name}, localised", args.localised, made
-
-
-def _as_obj(mesh) -> Iterator[str]:
-    """Text of all digits, so that reading it gives the same doubles."""
-    for x, y, z in mesh.vertices.tolist():
-        yield f"v {x!r} {y!r} {z!r}\n"
-    for a, b, c in (mesh.faces + 1).tolist():
-        yield f"f {a} {b} {c}\n"
-
-
-def _as_stl(mesh) -> Iterator[str]:
-    """STL as text, of all digits; normals are left to the reader."""
-    yield "solid localised\n"
-    for corners in mesh.vertices[mesh.faces].tolist():
-        yield "facet normal 0 0 0\nouter loop\n"
-        for x, y, z in corners:
-            yield f"vertex {x!r} {y!r} {z!r}\n"
-        yield "endloop\nendfacet\n"
-    yield "endsolid localised\n"

@@ -7,9 +7,10 @@ import os
 import sys
 from collections.abc import Callable
 
-from collide.cli_files import check_place, write_json, write_text
+from collide.cli_files import check_place, write_json
 from collide.cli_numbers import count, count_or_none
 from collide.errors import InvalidArgument
+from collide.whole_file import write_whole
 
 EPILOG = """examples:
   collide srdf robot.urdf --out robot.srdf
@@ -86,7 +87,7 @@ def run(args: argparse.Namespace, progress: Callable) -> bool:
     )
     comparison = None if theirs is None else compare_pairs(proposal, theirs)
     if args.out:
-        write_text([srdf_text(proposal, [text for _, text in carried])], args.out)
+        write_whole(args.out, srdf_text(proposal, [text for _, text in carried]))
     if args.json:
         write_json(to_dict(proposal, comparison, args.compare).items(), args.json)
     if args.json != "-" and not args.quiet:

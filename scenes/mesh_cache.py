@@ -3,6 +3,10 @@
 An entry is one ``.npz`` of plain arrays, named by a hash of everything it was made from: the bytes
 of the file, the options, and `VERSION`. It is a convenience: an entry that is missing, damaged or
 cannot be written is passed over, with a word at logging level DEBUG, and the work is done again.
+
+What stands in an entry is believed to be the mesh. So the folder must be one that nobody else may write in
+(`cache_folder.why_unusable`), entries are files of this user and no links, and hold the key that they were kept under
+and a digest of all.
 """
 
 from __future__ import annotations
@@ -11,18 +15,21 @@ import hashlib
 import io
 import json
 import logging
-import zipfile
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from collide.cache_folder import cache_folder
+from collide.cache_folder import cache_folder, read_own, why_unusable
+from collide.errors import InvalidShape
+from collide.shapes.shape_files import ANY, pack, unpack
 from collide.whole_file import whole_file
 
 #: Raised with every change in what a loader stores; old entries are then never read again.
-VERSION = 3
+VERSION = 4
+#: The array that holds the key.
+_KEY = "key"
 
 _log = logging.getLogger(__name__)
 
@@ -43,26 +50,50 @@ def key(contents: Iterable[bytes], options: Mapping[str, object]) -> str:
 
 def fetch(name: str) -> dict[str, np.ndarray] | None:
     """The arrays kept under a key, or None."""
+    folder = _folder()
+    if folder is None:
+        return None
     try:
         # Read whole before parsing: a file that shrinks meanwhile must not end in a half-read array.
-        blob = (directory() / f"{name}.npz").read_bytes()
-        with np.load(io.BytesIO(blob), allow_pickle=False) as entry:
-            return {field: entry[field] for field in entry.files}
+        blob = read_own(folder / f"{name}.npz")
+        arrays = unpack(io.BytesIO(blob), VERSION, name, lambda _: ANY, [_KEY])
+        if arrays.pop(_KEY).tobytes() != name.encode():
+            raise InvalidShape(f"{name} is the entry of another key")
+        return arrays
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, NotImplementedError) as error:
+    except (OSError, InvalidShape) as error:
         _log.debug("prepared input %s passed over: %s", name, error)
         return None
 
 
-def store(name: str, arrays: Mapping[str, Any]) -> bool:
-    """Keep arrays under a key; True when they were written. Readers see all of it or nothing."""
+def store(name: str, arrays: Mapping[str, np.ndarray]) -> bool:
+    """Keep arrays of numbers under a key; True when they were written. Readers see all of it or nothing."""
+    folder = _folder()
+    if folder is None:
+        return False
     try:
-        folder = directory()
-        folder.mkdir(parents=True, exist_ok=True)
         with whole_file(folder / f"{name}.npz", private=True) as file:
-            np.savez(file, **arrays)
+            pack(file, VERSION, {**arrays, _KEY: np.frombuffer(name.encode(), dtype=np.uint8)})
         return True
     except OSError as error:
         _log.debug("prepared input %s not kept: %s", name, error)
         return False
+
+
+def _folder() -> Path | None:
+    """`directory`, made where it is missing; None, and said once, where somebody else could put entries there."""
+    folder = directory()
+    why = why_unusable(folder)
+    if why is not None:
+        _say_once(
+            f"meshes that were read are neither kept in {folder} nor taken from there: {why}; set COLLIDE_CACHE_DIR to "
+            "a folder of your own."
+        )
+        return None
+    return folder
+
+
+@cache
+def _say_once(message: str) -> None:
+    _log.warning(message)

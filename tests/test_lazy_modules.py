@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 
 import pytest
@@ -30,3 +31,21 @@ def test_what_is_not_there_says_so(module_on_path):
         _ = lazy_module("loaded_late").question
     with pytest.raises(ModuleNotFoundError, match="no_such_module"):
         _ = lazy_module("no_such_module").answer
+
+
+def test_documented_names_work_after_import_collide():
+    """And `import collide` loads none of them: what is documented by a path is found when it is named."""
+    code = (
+        "import sys, collide\n"
+        "assert not [name for name in sys.modules if name.startswith(('collide.scenes', 'collide.adapters'))]\n"
+        "assert 'numpy' not in sys.modules\n"
+        "print(collide.scenes.load('workcell').name, collide.adapters.view.__name__, collide.adapters.peers.__name__)\n"
+        "print(collide.adapters.hosts.mujoco.install.__name__, collide.adapters.hosts.fcl_api.install.__name__)\n"
+        "for owner, name in ((collide, 'skenes'), (collide.adapters, 'vue'), (collide.adapters.hosts, 'mujoko')):\n"
+        "    try: getattr(owner, name)\n"
+        "    except AttributeError as error: print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[:2] == ["workcell view collide.adapters.peers", "install install"] and len(lines) == 5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 import platform
 import re
@@ -10,6 +11,7 @@ from importlib import metadata
 from pathlib import Path
 
 from collide.errors import CollideError
+from collide.whole_file import write_whole
 
 
 def machine_stamp() -> dict[str, str]:
@@ -44,7 +46,8 @@ def write_csv(place: Path, rows: list[dict], stamp: dict[str, str]) -> None:
     """Rows with the same keys, each followed by the stamp; a file that exists is overwritten."""
     if not rows:
         raise CollideError(f"{place.name}: there is nothing to write down: no engine was asked")
-    with place.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [*rows[0], *stamp], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows({**row, **stamp} for row in rows)
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, [*rows[0], *stamp], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({**row, **stamp} for row in rows)
+    write_whole(place, text.getvalue())

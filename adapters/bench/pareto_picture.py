@@ -14,6 +14,7 @@ from typing import Any
 from collide.adapters.bench.bench_classes import CLASSES
 from collide.adapters.bench.pareto import Point, quantile
 from collide.errors import InvalidArgument, MissingExtra
+from collide.whole_file import whole_file
 
 #: Errors of 0 and below are drawn here.
 FLOOR = 1e-18
@@ -68,7 +69,8 @@ def draw(points: list[Point], places: list[Path], stamp: dict[str, str]) -> list
         f"{stamp['cpu']}, {stamp['cores']} cores, load {stamp['load']}, Python {stamp['python']}", fontsize=11,
     )  # fmt: skip
     for place in places:
-        figure.savefig(place, dpi=110)
+        with whole_file(place) as file:
+            figure.savefig(file, dpi=110, format=Path(place).suffix[1:].lower())
     return marks
 
 

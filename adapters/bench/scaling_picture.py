@@ -7,6 +7,7 @@ from pathlib import Path
 
 from collide.adapters.bench.pareto_picture import check_picture, styles_of
 from collide.adapters.bench.scaling import OPERATIONS, Growth
+from collide.whole_file import whole_file
 
 
 def draw(grown: list[Growth], places: list[Path], stamp: dict[str, str]) -> None:
@@ -34,7 +35,8 @@ def draw(grown: list[Growth], places: list[Path], stamp: dict[str, str]) -> None
         f"{stamp['cpu']}, {stamp['cores']} cores, load {stamp['load']}", fontsize=10,
     )  # fmt: skip
     for place in places:
-        figure.savefig(place, dpi=110)
+        with whole_file(place) as file:
+            figure.savefig(file, dpi=110, format=Path(place).suffix[1:].lower())
 
 
 def _lines(panel, grown: list[Growth]) -> None:

@@ -21,6 +21,7 @@ from collide.adapters.fuzzing.issue_text import body_text
 from collide.adapters.peers.question import bounds
 from collide.errors import InvalidArgument, MissingExtra
 from collide.shapes import tessellation
+from collide.whole_file import whole_file
 
 #: A and B, told apart by everybody: Okabe and Ito.
 COLOURS = ("#0072B2", "#E69F00")
@@ -72,7 +73,8 @@ def draw_findings(files: Sequence[str | Path], picture: str | Path) -> int:
     figure.subplots_adjust(0.01, 0.31 / lines, 0.99, 1.0 - 0.03 / lines, wspace=0.04, hspace=0.46)
     for k, (finding, about) in enumerate(findings, 1):
         _panel(figure.add_subplot(lines, columns, k, projection="3d"), finding, about)
-    figure.savefig(picture, dpi=110)
+    with whole_file(picture) as file:
+        figure.savefig(file, dpi=110, format=Path(picture).suffix[1:].lower())
     return len(findings)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from collide.adapters.fuzzing.fuzz_case import Case, pair_case
 from collide.errors import InvalidPose, InvalidShape, SceneError
+from collide.given_files import read_bytes
 from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Shape, Sphere
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -60,10 +61,9 @@ def read_fcl_dumps(path: str | Path) -> list[FclDump]:
     ------
     SceneError
         Where the file holds no dump, or one whose shapes it does not give in full.
-    OSError
-        Where it cannot be read.
+        Also where it cannot be read, is no regular file, or is larger than a text that is read.
     """
-    return parse_fcl_dumps(Path(path).read_text(encoding="utf-8", errors="replace"), str(path))
+    return parse_fcl_dumps(read_bytes(Path(path)).decode("utf-8", errors="replace"), str(path))
 
 
 def parse_fcl_dumps(text: str, place: str = "the text") -> list[FclDump]:

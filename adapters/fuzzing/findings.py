@@ -20,6 +20,7 @@ from collide.adapters.fuzzing.simpler_cases import complexity
 from collide.adapters.peers.protocol import engine
 from collide.adapters.peers.question import Body
 from collide.errors import SceneError
+from collide.given_files import read_text
 from collide.scenes import load
 from collide.scenes.write_scene import document_text
 from collide.whole_file import write_whole
@@ -84,7 +85,7 @@ def load_finding(path: str | Path) -> tuple[Finding, dict[str, Any]]:
 
     Raises SceneError for a file that is no finding.
     """
-    about = json.loads(Path(path).read_text(encoding="utf-8")).get("about")
+    about = json.loads(read_text(Path(path))).get("about")
     if not isinstance(about, dict) or "flaw" not in about:
         raise SceneError(f"{path}: this scene is no finding: its 'about' has no 'flaw'")
     scene = load(path)

@@ -29,6 +29,7 @@ from collide.adapters.fuzzing.shrink import COSTLY, Shrunk, shrink
 from collide.adapters.peers.answers import HUNG
 from collide.adapters.peers.protocol import engine
 from collide.errors import InvalidArgument
+from collide.given_files import read_text
 from collide.whole_file import write_whole
 
 STATE = "fuzz.json"
@@ -204,7 +205,7 @@ def _opened(folder: Path, seed: int, names: list[str], resume: bool) -> FuzzRun:
         run.save()
         return run
     try:
-        state = json.loads(place.read_text(encoding="utf-8"))
+        state = json.loads(read_text(place))
         known = state.pop("format")
         run = FuzzRun(str(folder), **state)
     except (ValueError, TypeError, KeyError, AttributeError):

@@ -10,6 +10,7 @@ abort. Nothing is written to a host's files, and no server or window is opened.
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import NamedTuple
 
 
@@ -35,3 +36,11 @@ HOSTS = (
     Host("pybullet", "pybullet", True, "collide.adapters.hosts.pybullet_mirror", "attach(pybullet): answers are ours"),
     Host("Newton", "newton", True, "collide.adapters.hosts.newton", "Pipeline(model): contacts for solver.step"),
 )
+
+
+def __getattr__(name: str):
+    """The module of a host, imported when it is named: ``collide.adapters.hosts.mujoco``."""
+    module = f"{__name__}.{name}"
+    if module not in {host.module for host in HOSTS}:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return import_module(module)

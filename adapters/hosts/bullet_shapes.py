@@ -14,6 +14,7 @@ import numpy as np
 
 from collide.adapters.hosts.quaternion_poses import pose_of
 from collide.errors import CollideError, UnsupportedQuery
+from collide.given_files import LARGEST_MESH, read_bytes
 from collide.scenes.loaders.mesh_file import read_mesh
 from collide.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Halfspace, Mesh, Shape, Sphere
 
@@ -221,7 +222,7 @@ def obj_groups(path: Path) -> list[np.ndarray]:
     """
     vertices: list[list[float]] = []
     groups: list[set[int]] = [set()]
-    for line in path.read_text(errors="replace").splitlines():
+    for line in read_bytes(path, LARGEST_MESH, "mesh").decode(errors="replace").splitlines():
         words = line.split()
         if not words:
             continue

@@ -13,6 +13,7 @@ from collide.adapters.hosts.coal_geometry import CollisionGeometry
 from collide.adapters.hosts.coal_meshes import BVHModelOBB, BVHModelOBBRSS, rows_of
 from collide.adapters.hosts.octomap_boxes import occupied_boxes, octomap_file
 from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.given_files import LARGEST_MESH, read_bytes
 from collide.scenes.loaders.mesh_file import read_mesh
 
 #: How far below the lowest height a bottom lies that is not below it, in parts of the field's size.
@@ -201,7 +202,7 @@ class MeshLoader:
     def loadOctree(self, filename):
         """The `OcTree` of a binary octomap file (.bt). Raises InvalidArgument."""
         try:
-            file = octomap_file(Path(filename).read_bytes())
+            file = octomap_file(read_bytes(Path(filename), LARGEST_MESH, "octree"))
             return OcTree(file.edge, occupied_boxes(*file))
         except InvalidArgument as error:
             raise InvalidArgument(f"{filename}: {error}") from None

@@ -18,7 +18,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
 from decimal import Decimal
-from pathlib import Path
 from typing import NamedTuple
 
 import collide
@@ -28,6 +27,7 @@ from collide.adapters.peers.stress_truth import Truth, gap_along, truth
 from collide.errors import UnsupportedQuery
 from collide.results import HOW, UNDECIDED
 from collide.scenes.families import Case, MeshCase, generate, mesh_names, names
+from collide.whole_file import write_whole
 
 #: Cases that go to a peer at a time: a child process that dies often is not given up.
 BATCH = 50
@@ -190,7 +190,7 @@ class StressTable:
         """
         data = {"engine": self.engine, "version": self.version, "n": self.n, "seed": self.seed}
         text = json.dumps({**data, "findings": [asdict(f) for f in self.findings]}, indent=1, allow_nan=False)
-        Path(path).write_text(text + "\n", encoding="utf-8")
+        write_whole(path, text + "\n")
 
     def table(self) -> tuple[list[str], list[list[str]]]:
         """The table as text for printing, a row a family and one of totals.

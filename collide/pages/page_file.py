@@ -11,7 +11,6 @@ import base64
 import hashlib
 import html
 import json
-import os
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -19,7 +18,7 @@ from typing import NamedTuple
 
 from collide.errors import InvalidArgument, cut
 from collide.reports.json_text import pieces
-from collide.whole_file import whole_file
+from collide.whole_file import write_whole
 
 #: The page, its style and its script.
 VIEWER = Path(__file__).resolve().parent / "viewer"
@@ -156,15 +155,7 @@ def write_page(text: Iterable[str], place: str) -> None:
     if place == "-":
         _write_to_stdout(text)
         return
-    try:
-        if os.path.exists(place) and not os.path.isfile(place):
-            with open(place, "w", encoding="utf-8", newline="\n") as file:
-                file.writelines(text)
-        else:
-            with whole_file(place) as page:
-                page.writelines(piece.encode() for piece in text)
-    except OSError as error:  # a full disk is told without the file's name
-        raise OSError(error.errno, error.strerror, place) from None
+    write_whole(place, text)
 
 
 def _write_to_stdout(text: Iterable[str]) -> None:

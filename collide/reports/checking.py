@@ -10,9 +10,11 @@ import json
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple
 
-from collide.errors import InvalidArgument
+from collide.errors import InvalidArgument, SceneError
+from collide.given_files import read_text
 from collide.reports import trajectory_report as trajectory
 from collide.reports.number_format import brief_length, count
 from collide.reports.report import Report
@@ -172,8 +174,9 @@ def read_baseline(path) -> Baseline:
     Raises InvalidArgument where the file is neither, naming what is wrong with it.
     """
     try:
-        with open(path, encoding="utf-8") as file:
-            data = json.load(file)
+        data = json.loads(read_text(Path(path)))
+    except SceneError as error:
+        raise InvalidArgument(f"--baseline: {error}") from None
     except (ValueError, RecursionError) as error:
         raise InvalidArgument(f"--baseline: {path}: is not JSON: {error}") from None
     schema = data.get("schema") if isinstance(data, dict) else None

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from collide.errors import InvalidArgument, MissingExtra
 from collide.reports.tables import Column, Table
+from collide.whole_file import whole_file
 
 SCHEMA = "collide-locality/1"
 #: Orders that Table 1 of the paper prints; JSON has all ten.
@@ -145,7 +146,8 @@ def plot(measured: list[Measured], place: str) -> None:
     for panel, item in zip(panels, measured):
         _draw(panel, item)
     panels[-1].set_xlabel("local stretch")
-    figure.savefig(place, dpi=150)
+    with whole_file(place) as file:
+        figure.savefig(file, dpi=150, format=Path(place).suffix[1:].lower())
 
 
 def _draw(panel, item: Measured) -> None:

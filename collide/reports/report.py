@@ -52,6 +52,7 @@ class Report:
     proofs: list[dict]
     work: dict
     notes: list[str] = field(default_factory=list)
+    missing_meshes: list[str] = field(default_factory=list)
     seconds: dict[str, float] = field(default_factory=dict)
     versions: dict[str, str | None] = field(default_factory=dict)
     bodies: list[str] = field(default_factory=list)
@@ -77,6 +78,8 @@ class Report:
             parts.append(f"{count(len(self.unanswered), 'pair')} NOT ANSWERED")
         if self.query["ignored"]:
             parts.append(f"{len(self.query['ignored'])} ignored")
+        if self.missing_meshes:
+            parts.append(f"{count(len(self.missing_meshes), 'mesh', 'meshes')} missing, NOT CHECKED")
         excluded, total = self.pairs["excluded"], self.pairs["total"]
         pairs = count(total, "pair")
         parts.append(
@@ -99,8 +102,8 @@ class Report:
         yield from (
             (name, getattr(self, name))
             for name in (
-                "overlaps", "meshes", "approximations", "unanswered", "skipped", "proofs", "work", "notes", "seconds",
-                "versions",
+                "overlaps", "meshes", "approximations", "unanswered", "skipped", "proofs", "work", "notes",
+                "missing_meshes", "seconds", "versions",
             )
         )  # fmt: skip
         asked = {"trajectory": self.trajectory, "geometry": self.geometry}
@@ -166,6 +169,7 @@ def make(
         proofs=_proofs(stats),
         work=_work(stats),
         notes=[str(note) for note in scene.notes],
+        missing_meshes=[entry for robot in scene.robots.values() for entry in robot.missing_meshes],
         versions=versions(),
         bodies=[body.name for body in scene.bodies],
     )

@@ -26,6 +26,8 @@ _MARK = "≈ "
 _WIDE = 0.1
 #: Bodies named in a line that tells a list.
 _NAMED = 3
+#: Notes on the first page.
+_NOTES = 8
 
 
 def tables(report: Report, everything: bool, proofs: bool) -> list[Table]:
@@ -176,7 +178,7 @@ def _line_table(report: Report, everything: bool, proofs: bool) -> Table:
         ("stand-ins", _approximation_line(report)),
     ]  # fmt: skip
     lines += [] if proofs else [("never tested", _skip_line(report))]
-    lines += [] if everything else [("notes", _note_line(report))]
+    lines += [] if everything else _note_lines(report)
     title = "BESIDES" if everything else "BESIDES  --all lists them, --proofs tells how each answer is known"
     return Table(title, [Column("", "label"), Column("", "text")], [list(line) for line in lines if line[1]])
 
@@ -236,11 +238,11 @@ def _skip_line(report: Report) -> str:
     return f"{report.pairs['excluded']} of {count(report.pairs['total'], 'pair')}: {', '.join(reasons)}"
 
 
-def _note_line(report: Report) -> str:
-    notes = report.notes
-    if len(notes) < 2:
-        return "".join(notes)
-    return f"{len(notes)}: {notes[0]}; …"
+def _note_lines(report: Report) -> list[tuple[str, str]]:
+    """Each note on a line of its own, those of missing meshes first: any of them may be the one that matters."""
+    notes = list(dict.fromkeys([*report.missing_meshes, *report.notes]))
+    lines = notes if len(notes) <= _NOTES else [*notes[: _NOTES - 1], f"… and {len(notes) - _NOTES + 1} more (--all)"]
+    return [("notes" if k == 0 else "", line) for k, line in enumerate(lines)]
 
 
 # --- lists in full -------------------------------------------------------------------------------

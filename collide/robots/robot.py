@@ -75,6 +75,8 @@ class Robot:
         Named joint values [rad or m], ``{"ready": {"joint1": 0.0, ...}}``.
     notes : iterable of str
         What the person who loads the robot should know.
+    missing_meshes : iterable of str
+        Elements whose mesh was not found and which were left out on demand: nothing is known of collisions with them.
     sources : iterable of str
         The files read, the robot's own first.
 
@@ -113,12 +115,13 @@ class Robot:
         semantic_pairs: Iterable[tuple[str, str, str]] | None = None,
         states: Mapping[str, Mapping[str, float]] | None = None,
         notes: Iterable[str] = (),
+        missing_meshes: Iterable[str] = (),
         sources: Iterable[str] = (),
     ):
         self.name = name
         self.links = tuple(links)
         self._index = indices_of("link", self.links)
-        self.sources, self.prefix = list(sources), ""
+        self.sources, self.prefix, self.missing_meshes = list(sources), "", list(missing_meshes)
         self.place = ": ".join((*self.sources[:1], f"robot {cut(name)}"))
         checked = [checked_joint(joint, self._index) for joint in joints]
         indices_of("joint", [joint.name for joint in checked])
@@ -507,7 +510,7 @@ class Robot:
                 label: {prefix + joint: value for joint, value in values.items()}
                 for label, values in self.states.items()
             },
-            notes=self.notes, sources=self.sources,
+            notes=self.notes, missing_meshes=self.missing_meshes, sources=self.sources,
         )
         robot.prefix = prefix + self.prefix
         return robot

@@ -120,7 +120,13 @@ class ConvexHull(Shape):
         Parameters
         ----------
         path : str or Path
-            The file; one that exists is overwritten.
+            The file, ending in ``.npz`` or without a suffix; one that exists is replaced, by all of the new file or
+            not at all.
+
+        Raises
+        ------
+        InvalidShape
+            Where the suffix is another, and where the file cannot be written.
         """
         arrays = {"points": self.points, "radius": np.array(self.radius)}
         if self.faces is not None:

@@ -139,7 +139,13 @@ class HeightField(Mesh):
         Parameters
         ----------
         path : str or Path
-            The file; one that exists is overwritten.
+            The file, ending in ``.npz`` or without a suffix; one that exists is replaced, by all of the new file or
+            not at all.
+
+        Raises
+        ------
+        InvalidShape
+            Where the suffix is another, and where the file cannot be written.
         """
         arrays = {name: np.asarray(getattr(self, name)) for name in self._fields}
         write_arrays("HeightField", path, _FILE_FORMAT, arrays)

@@ -10,10 +10,11 @@ from collide import argument_checks as checks
 from collide.errors import InvalidShape
 from collide.lazy_modules import lazy_module
 from collide.log import log_duration
+from collide.shapes import mesh_formats
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh_report import MeshReport, make_report
 from collide.shapes.shape import Shape, facet_ids, positive, rows
-from collide.shapes.shape_files import Field, read_arrays, write_arrays
+from collide.shapes.shape_files import Field, read_arrays, refused_as_shape, shape_suffix, write_arrays
 from collide.transforms import SMALLEST
 
 if TYPE_CHECKING:
@@ -268,13 +269,26 @@ class Mesh(Shape):
         return localised_mesh.localised_mesh(self, stretch, order, max_facets, progress)
 
     def save(self, path) -> None:
-        """Write vertices, faces, ``solid`` and ``scale`` to an ``.npz`` file.
+        """Write the mesh to a file: all of it as ``.npz``, or its triangles in a form that other programs read.
 
         Parameters
         ----------
         path : str or Path
-            The file; one that exists is overwritten.
+            The file. ``.npz``, or no suffix: vertices, faces, ``solid`` and ``scale``, which `load` reads. ``.ply``,
+            ``.obj`` and ``.stl``: the triangles, which ``collide.scenes.load`` reads as the same doubles; STL is
+            binary where its numbers of 32 bits are the coordinates, else text. A file that exists is replaced, by all
+            of the new one or not at all.
+
+        Raises
+        ------
+        InvalidShape
+            Where the suffix is another, and where the file cannot be written.
         """
+        suffix = shape_suffix("Mesh", path, *mesh_formats.SUFFIXES)
+        if suffix in mesh_formats.SUFFIXES:
+            with refused_as_shape("Mesh.save", path):
+                mesh_formats.write_triangles(path, self.vertices, self.faces, suffix)
+            return
         arrays = {name: np.asarray(getattr(self.base, name)) for name in ("vertices", "faces")}
         arrays.update(solid=np.array(self.solid), scale=np.array(self.scale))
         write_arrays("Mesh", path, _FILE_FORMAT, arrays)

@@ -2,10 +2,9 @@
 everything.
 
 A file holds what a shape is made from and nothing that proofs rest on: hulls, trees and what is known of an inside are
-    worked
-out anew from it, so a file can describe another shape but not make the library lie about the one it describes. The
-digest tells damage; it is no signature. Before any array is read its header is held against what the format has, and
-its length against the file's: arrays are stored as they are, so a small file cannot ask for much memory.
+worked out anew from it, so a file can describe another shape but not make the library lie about the one it describes.
+The digest tells damage; it is no signature. Before any array is read its header is held against what the format has,
+and its length against the file's: arrays are stored as they are, so a small file cannot ask for much memory.
 """
 
 from __future__ import annotations
@@ -13,13 +12,16 @@ from __future__ import annotations
 import hashlib
 import math
 import struct
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import IO, TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from collide import argument_checks as checks
 from collide.errors import InvalidShape
+from collide.whole_file import whole_file
 
 if TYPE_CHECKING:
     import zipfile
@@ -35,18 +37,49 @@ class Field(NamedTuple):
 
 
 _STAMPS = {"format": Field("i", ()), "digest": Field("u1", (16,))}
+#: An array of numbers, of whatever shape.
+ANY = Field("", ())
 #: Bytes of a header, at most: ours have some 128.
 _LONGEST_HEADER = 1024
 
 
-def write_arrays(who: str, path, version: int, arrays: dict[str, np.ndarray]) -> None:
-    """Write arrays to a file. who : the class that asks, for messages."""
+def shape_suffix(who: str, path, *others: str) -> str:
+    """The suffix of a file that a shape is saved to, in small letters: ".npz", none, or one of the others.
+
+    who : the class that asks, for messages.
+    Raises InvalidShape for any other: a file named like a mesh would hold arrays that no mesh reader takes.
+    """
+    with refused_as_shape(f"{who}.save", path):
+        suffix = Path(path).suffix.lower()
+    if suffix not in ("", ".npz", *others):
+        known = ", ".join((".npz", *others))
+        remedy = "" if others else ". Triangles of any shape: Mesh(*collide.tessellate(shape)).save"
+        raise InvalidShape(f"{who}.save: {checks.describe(path)}: the suffix must be one of {known}{remedy}")
+    return suffix
+
+
+@contextmanager
+def refused_as_shape(what: str, path) -> Iterator[None]:
+    """What cannot be opened or written is told as the library's error. what : "Mesh.save", for messages."""
     try:
-        with Path(path).open("wb") as file:
-            np.savez(file, format=np.array(version), digest=_digest(arrays), **arrays)  # type: ignore[arg-type]
+        yield
+    except InvalidShape:
+        raise
     except (OSError, TypeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InvalidShape(f"{who}.save: {checks.describe(path)}: {reason}") from None
+        raise InvalidShape(f"{what}: {checks.describe(path)}: {reason}") from None
+
+
+def write_arrays(who: str, path, version: int, arrays: dict[str, np.ndarray]) -> None:
+    """Write arrays to a file, all of it or none. who : the class that asks, for messages."""
+    shape_suffix(who, path)
+    with refused_as_shape(f"{who}.save", path), whole_file(path) as file:
+        pack(file, version, arrays)
+
+
+def pack(file: IO[bytes], version: int, arrays: dict[str, np.ndarray]) -> None:
+    """Write arrays, the version of their format and their digest to a stream; `unpack` reads them."""
+    np.savez(file, format=np.array(version), digest=_digest(arrays), **arrays)  # type: ignore[arg-type]
 
 
 def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped: str) -> dict[str, np.ndarray]:
@@ -56,10 +89,7 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
     dropped : prefix of arrays that older files have besides; they count for the digest alone.
     Raises InvalidShape where the file is another one, of another version, or damaged.
     """
-    import zipfile  # here, and below: a start of the library need not load it
-
     named = f"{who}.load: {checks.describe(path) if not isinstance(path, (str, Path)) else path}"
-    complaint = f"{named} is of another format; save the shape again"
     try:
         if Path(path).exists() and not Path(path).is_file():
             raise InvalidShape(f"{named} is no regular file")
@@ -69,34 +99,55 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
                     f"{named} is no file that {who}.save wrote. Files of meshes (STL, OBJ, PLY, …) are read by "
                     "collide.scenes.load(path).bodies[0].shape"
                 )
-            with zipfile.ZipFile(file) as members:
-                arrays = {}
-                for member in members.infolist():
-                    name = member.filename.removesuffix(".npy")
-                    field = {**_STAMPS, **fields}.get(name)
-                    if name in arrays or (field is None and not name.startswith(dropped)):
-                        raise InvalidShape(complaint)
-                    arrays[name] = _read(members, member, field, complaint)
+            older = {True: ANY, False: None}
+            needed = [name for name, field in fields.items() if field.needed]
+            field_of = lambda name: fields.get(name, older[name.startswith(dropped)])
+            arrays = unpack(file, version, named, field_of, needed)
     except InvalidShape:
         raise
-    except OSError as error:
-        raise InvalidShape(f"{named}: {error.strerror or error}") from None
+    except (OSError, TypeError, ValueError) as error:
+        raise InvalidShape(f"{named}: {getattr(error, 'strerror', None) or error}") from None
+    return {name: array for name, array in arrays.items() if name in fields}
+
+
+def unpack(
+    file: IO[bytes], version: int, named: str, field_of: Callable[[str], Field | None], needed: Iterable[str] = ()
+) -> dict[str, np.ndarray]:
+    """The arrays that `pack` wrote, once every header fits its field and the file's length, and all their digest.
+
+    named : what is read, for messages.   field_of : the field of this name; None for what the format has not.
+    needed : names that must be there.
+    Raises InvalidShape where it is something else, of another version, or damaged.
+    """
+    import zipfile  # here, and below: a start of the library need not load it
+
+    complaint = f"{named} is of another format; save the shape again"
+    arrays: dict[str, np.ndarray] = {}
+    try:
+        with zipfile.ZipFile(file) as members:
+            for member in members.infolist():
+                name = member.filename.removesuffix(".npy")
+                field = _STAMPS.get(name) or field_of(name)
+                if name in arrays or field is None:
+                    raise InvalidShape(complaint)
+                arrays[name] = _read(members, member, field, complaint)
+    except InvalidShape:
+        raise
     except (
-        TypeError, AttributeError, ValueError, EOFError, KeyError, IndexError, OverflowError, MemoryError, RuntimeError,
-        SyntaxError, struct.error, zipfile.BadZipFile,
+        OSError, TypeError, AttributeError, ValueError, EOFError, KeyError, IndexError, OverflowError, MemoryError,
+        RuntimeError, SyntaxError, struct.error, zipfile.BadZipFile,
     ) as error:  # fmt: skip
-        raise InvalidShape(f"{named} is no file that {who}.save wrote ({error})") from None
-    missing = [name for name, field in {**_STAMPS, **fields}.items() if field.needed and name not in arrays]
-    if missing or int(arrays.pop("format")) != version:
+        raise InvalidShape(f"{named} is no file that collide wrote ({error})") from None
+    if not {*_STAMPS, *needed} <= arrays.keys() or int(arrays.pop("format")) != version:
         raise InvalidShape(complaint)
     digest = arrays.pop("digest")
     if not np.array_equal(digest, _digest(arrays)):
         raise InvalidShape(f"{named} is damaged: its contents do not fit their digest")
-    return {name: array for name, array in arrays.items() if name in fields}
+    return arrays
 
 
-def _read(members: zipfile.ZipFile, member: zipfile.ZipInfo, field: Field | None, complaint: str) -> np.ndarray:
-    """One array, once its header and its length are what they should be. field : None for any array of numbers."""
+def _read(members: zipfile.ZipFile, member: zipfile.ZipInfo, field: Field, complaint: str) -> np.ndarray:
+    """One array, once its header and its length are what they should be."""
     import zipfile
 
     if member.compress_type != zipfile.ZIP_STORED or member.flag_bits & 1 or not member.filename.endswith(".npy"):
@@ -106,7 +157,7 @@ def _read(members: zipfile.ZipFile, member: zipfile.ZipInfo, field: Field | None
             raise InvalidShape(complaint)
         shape, _, dtype = np.lib.format.read_array_header_1_0(file, max_header_size=_LONGEST_HEADER)
         begin = file.tell()
-    if field is None:
+    if field is ANY:
         known = dtype.kind in "iuf"
     else:
         known = f"{dtype.kind}{dtype.itemsize}".startswith(field.type) and len(shape) == len(field.shape)

@@ -13,7 +13,7 @@ from typing import Any
 
 from collide import __version__
 from collide.argument_checks import integer
-from collide.errors import InvalidArgument, SceneError
+from collide.errors import InvalidArgument, SceneError, brief
 from collide.sweeps.configurations import DrawnConfigurations, GivenConfigurations, as_configurations
 from collide.sweeps.content_digest import digest
 from collide.sweeps.dask_pool import DaskPool
@@ -24,6 +24,8 @@ from collide.sweeps.sweep_results import SweepResults, read_sweep
 
 #: Rows of a chunk where nobody says how many: small sweeps have chunks enough for many workers.
 _MIN_CHUNK, _MAX_CHUNK, _AIMED_CHUNKS = 500, 50_000, 64
+#: Of chunks, and of rows of one: numbers of chunks are listed, and the rows of a chunk are in memory.
+MAX_CHUNKS, MAX_CHUNK_ROWS = 1_000_000, 10_000_000
 #: How often it is looked whether the scene is still what it was [s].
 _LOOK_EVERY = 1.0
 
@@ -108,8 +110,17 @@ class SweepRun:
 
     def _chunk_rows(self, chunk: int | None) -> int:
         if chunk is not None:
-            return integer("chunk", chunk, 1)
-        return min(max(math.ceil(self.rows / _AIMED_CHUNKS), _MIN_CHUNK), _MAX_CHUNK)
+            rows = integer("chunk", chunk, 1)
+        else:
+            rows = min(max(-(-self.rows // _AIMED_CHUNKS), _MIN_CHUNK), _MAX_CHUNK)
+        if rows > MAX_CHUNK_ROWS:
+            raise InvalidArgument(f"chunk must be at most {MAX_CHUNK_ROWS:,} rows, which are in memory, got {rows:,}")
+        if self.rows > rows * MAX_CHUNKS:
+            raise InvalidArgument(
+                f"{brief(self.rows)} rows are more than {MAX_CHUNKS:,} chunks of {rows:,}: ask fewer, or take larger "
+                f"chunks, of at most {MAX_CHUNK_ROWS:,} rows (--chunk, chunk=)"
+            )
+        return rows
 
     def _manifest(self, about: dict[str, Any]) -> dict[str, Any]:
         question = self.question
@@ -118,7 +129,7 @@ class SweepRun:
             "schema": SCHEMA, "version": __version__, **about, "question": self.digest,
             "configurations": None if self.Q is None else self.Q.about(), "joints": joints,
             "columns": {"distances": question.distances, "values": question.values}, "rows": self.rows,
-            "chunk": self.chunk, "chunks": math.ceil(self.rows / self.chunk),
+            "chunk": self.chunk, "chunks": -(-self.rows // self.chunk),
         }  # fmt: skip
         return json.loads(json.dumps(manifest))
 
@@ -150,7 +161,7 @@ class SweepRun:
         pace, looked = _Pace(self.rows, self._rows_of(missing)), time.monotonic()
         rename(str(pace))
         for chunk, columns in pool.answers(map(self._chunk_of, missing)):
-            self.directory.write_chunk(chunk.number, columns)
+            self.directory.write_chunk(chunk.number, columns, self.manifest)
             rename(pace.after(chunk.stop - chunk.start))
             if time.monotonic() - looked > _LOOK_EVERY:
                 self._refuse_change(final=False)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from collide.errors import InvalidArgument, MissingExtra, SceneError, listing
+from collide.given_files import read_text
+from collide.log import log
 from collide.whole_file import whole_file
 
 #: Readers of Parquet leave out what begins with an underscore, so that the folder is one table to them.
 MANIFEST, LOCK, PARTIAL = "_sweep.json", "_sweep.lock", "_partial-"
-SCHEMA = "collide-sweep/1"
+SCHEMA = "collide-sweep/2"
 #: What of a manifest a second run must share, and how a difference is told.
 _COMPARED = {
     "schema": "it was written by another version of collide, in another form",
@@ -60,7 +64,7 @@ class SweepDirectory:
         """
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            file = open(self.path / LOCK, "a+b")  # noqa: SIM115 - closed below
+            file = _opened_lock(self.path / LOCK)
         except OSError as error:
             raise InvalidArgument(f"{self.path}: cannot be written to: {error.strerror}") from None
         with file:
@@ -108,37 +112,52 @@ class SweepDirectory:
                 )
         for leftover in self.path.glob(f"{PARTIAL}*"):  # of a run that was killed while it wrote
             leftover.unlink()
-        return [number for number in range(manifest["chunks"]) if self._is_complete(number, manifest)]
+        return [number for number, _ in self.tables(manifest)]
 
     def manifest(self) -> dict[str, Any]:
-        """What the sweep asks, as it began."""
+        """What the sweep asks, as it began. Raises SceneError where the folder has none, or it is another thing."""
         file = self.path / MANIFEST
-        try:
-            return json.loads(file.read_text(encoding="utf-8"))
-        except OSError:
-            raise SceneError("is no folder of a sweep: it has no manifest", path=self.path) from None
-        except ValueError as error:
-            raise SceneError(f"is not JSON: {error}; --restart begins anew", path=file) from None
-
-    def _is_complete(self, number: int, manifest: dict[str, Any]) -> bool:
-        """Files appear whole; what a disk or a person did to one later makes it missing, and it is made again."""
-        file = self.chunk_file(number)
         if not file.exists():
-            return False
-        pyarrow, parquet = parquet_module()
+            raise SceneError("is no folder of a sweep: it has no manifest", path=self.path)
         try:
-            rows = parquet.read_metadata(file).num_rows
-        except (pyarrow.ArrowException, OSError):
-            return False
-        return rows == min(manifest["chunk"], manifest["rows"] - number * manifest["chunk"])
+            manifest = json.loads(read_text(file))
+        except RecursionError:
+            manifest = None
+        except ValueError as error:
+            if isinstance(error, SceneError):
+                raise
+            raise SceneError(f"is not JSON: {error}; --restart begins anew", path=file) from None
+        if not _is_manifest(manifest):
+            raise SceneError(f"is no manifest of a sweep in the form {SCHEMA}; --restart begins anew", path=file)
+        return manifest
 
-    def write_chunk(self, number: int, columns: dict[str, Any]) -> None:
+    def tables(self, manifest: dict[str, Any]) -> Iterator[tuple[int, Any]]:
+        """(number, pyarrow.Table) of every chunk that is there whole, in their order.
+
+        Files appear whole. What a disk or a person did to one later makes it missing, and it is made again: a chunk is
+        known by what stands in it, its number, the digest of the sweep's manifest and that of its own columns.
+        """
+        pyarrow, parquet = parquet_module()
+        of_sweep = _digest_of(manifest)
+        for file in sorted(self.path.glob("chunk-*.parquet")):
+            number = _number_of(file)
+            if number is None or file != self.chunk_file(number) or not 0 <= number < manifest["chunks"]:
+                continue
+            try:
+                table = None if file.is_symlink() or not file.is_file() else parquet.read_table(file)
+            except (pyarrow.ArrowException, OSError, ValueError, MemoryError):
+                table = None
+            rows = min(manifest["chunk"], manifest["rows"] - number * manifest["chunk"])
+            if table is not None and table.num_rows == rows and _is_chunk(table, number, of_sweep):
+                yield number, table
+            else:
+                log.warning("%s is not the chunk that its name says, or damaged: it counts as missing", file)
+
+    def write_chunk(self, number: int, columns: dict[str, Any], manifest: dict[str, Any]) -> None:
         """Write a chunk: under another name first, to the disk, and then in one step under its own."""
         pyarrow, parquet = parquet_module()
-        table = pyarrow.table(
-            {name: _arrow_column(pyarrow, values) for name, values in columns.items()},
-            metadata={b"collide": SCHEMA.encode(), b"chunk": str(number).encode()},
-        )
+        table = pyarrow.table({name: _arrow_column(pyarrow, values) for name, values in columns.items()})
+        table = table.replace_schema_metadata(_stamp(table, number, _digest_of(manifest)))
         sink = pyarrow.BufferOutputStream()
         parquet.write_table(table, sink)
         _write_whole(self.chunk_file(number), sink.getvalue())
@@ -146,6 +165,62 @@ class SweepDirectory:
     def _remove_all(self) -> None:
         for file in [*self.path.glob("chunk-*.parquet"), *self.path.glob(f"{PARTIAL}*"), self.path / MANIFEST]:
             file.unlink(missing_ok=True)
+
+
+def _is_manifest(manifest: Any) -> bool:
+    """Whether it has what a summary needs, in the form of this version."""
+    if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA:
+        return False
+    counts = [manifest.get(key) for key in ("rows", "chunk", "chunks")]
+    if not all(type(count) is int and 0 < count < 2**62 for count in counts):
+        return False
+    columns, (rows, chunk, chunks) = manifest.get("columns"), counts
+    names = {"distances", "values"}
+    is_fine = isinstance(columns, dict) and columns.keys() == names and all(type(columns[k]) is bool for k in names)
+    return is_fine and chunks == -(-rows // chunk)
+
+
+def _digest_of(manifest: dict[str, Any]) -> bytes:
+    """Of all that a sweep asks: seed, rows, chunk, scene and robot."""
+    return hashlib.sha256(json.dumps(manifest, sort_keys=True).encode()).hexdigest()[:32].encode()
+
+
+def _number_of(file: Path) -> int | None:
+    digits = file.stem.removeprefix("chunk-")
+    return int(digits) if digits.isascii() and digits.isdigit() and len(digits) < 19 else None
+
+
+def _stamp(table: Any, number: int, of_sweep: bytes) -> dict[bytes, bytes]:
+    """What a chunk says of itself, beside its columns."""
+    return {
+        b"collide": SCHEMA.encode(), b"chunk": str(number).encode(), b"sweep": of_sweep,
+        b"content": _content_digest(table),
+    }  # fmt: skip
+
+
+def _is_chunk(table: Any, number: int, of_sweep: bytes) -> bool:
+    told = table.schema.metadata or {}
+    return {key: told.get(key) for key in (b"collide", b"chunk", b"sweep", b"content")} == _stamp(
+        table, number, of_sweep
+    )
+
+
+def _content_digest(table: Any) -> bytes:
+    """Of names and values of all columns, whatever pages and dictionaries a file has them in."""
+    pyarrow, _ = parquet_module()
+    digest = hashlib.sha256()
+    for name, column in zip(table.column_names, table.columns):
+        digest.update(f"{name} {len(column)}\n".encode())
+        digest.update(column.is_null().to_numpy().tobytes())
+        if pyarrow.types.is_dictionary(column.type) or pyarrow.types.is_string(column.type):
+            # encoded anew, in the order in which texts first appear
+            texts = column.cast(pyarrow.string()).combine_chunks().dictionary_encode()
+            column = texts.indices
+            digest.update(json.dumps(texts.dictionary.to_pylist()).encode())
+        if column.null_count:
+            column = column.fill_null(False if pyarrow.types.is_boolean(column.type) else 0)
+        digest.update(f"{column.type}\n".encode() + column.to_numpy(zero_copy_only=False).tobytes())
+    return digest.hexdigest()[:32].encode()
 
 
 def _arrow_column(pyarrow, values):
@@ -158,8 +233,16 @@ def _arrow_column(pyarrow, values):
 
 
 def _write_whole(file: Path, content) -> None:
-    with whole_file(file, durable=True, prefix=PARTIAL) as stream:
+    with whole_file(file, durable=True, follow=False, prefix=PARTIAL) as stream:
         stream.write(content)
+
+
+def _opened_lock(place: Path) -> Any:
+    """The file of the lock, made where it is missing; a link there is refused, for it would choose the file."""
+    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    if place.is_symlink() or (place.exists() and not place.is_file()):
+        raise InvalidArgument(f"{place} is a link or no file: remove it, or take another folder")
+    return open(os.open(place, flags, 0o666), "r+b")
 
 
 def _lock(file) -> bool:

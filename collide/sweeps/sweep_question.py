@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from collide.errors import CollideError, InvalidArgument, SceneError
+from collide.given_files import LARGEST_MESH, read_bytes
 from collide.robots.robot import Robot
 from collide.robots.robot_checker import RobotChecker
 from collide.sweeps.content_digest import digest
@@ -129,10 +130,7 @@ CHANGED = (
 
 def file_digest(path: str | Path) -> str:
     """Of the bytes of a file. Raises SceneError where it cannot be read."""
-    try:
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest()[:32]
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror}", path=path) from None
+    return hashlib.sha256(read_bytes(Path(path), LARGEST_MESH, "scene")).hexdigest()[:32]
 
 
 def _joined(values: list[Any]) -> Any:

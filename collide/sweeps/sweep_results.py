@@ -105,10 +105,11 @@ def read_sweep(folder: str | Path) -> SweepResults:
         Where pyarrow is not installed.
     """
     folder = Path(folder)
-    manifest = SweepDirectory(folder).manifest()
+    directory = SweepDirectory(folder)
+    manifest = directory.manifest()
     counts = _Counts(manifest["columns"]["distances"])
-    for file in sorted(folder.glob("chunk-*.parquet")):
-        counts.add(file)
+    for _, table in directory.tables(manifest):
+        counts.add(table)
     first = [*counts.no_answer, *counts.outside][:_MAX_NAMED]
     return SweepResults(
         folder, manifest["rows"], counts.done, counts.colliding, counts.done - counts.n_no_answer - counts.colliding,
@@ -120,16 +121,14 @@ class _Counts:
     """What a summary says, chunk by chunk: a sweep may be larger than memory."""
 
     def __init__(self, with_distances: bool):
-        self._columns = ["row", "collides", "note", *(["distance", "body_a", "body_b"] if with_distances else [])]
+        self._with_distances = with_distances
         self.done = self.colliding = self.n_no_answer = self.n_outside = 0
         self.no_answer: list[tuple[int, str]] = []
         self.outside: list[tuple[int, str]] = []
         self.least: tuple[float, int, str, str] | None = None
 
-    def add(self, file: Path) -> None:
+    def add(self, table: Any) -> None:
         """Count a chunk."""
-        _, parquet = parquet_module()
-        table = parquet.read_table(file, columns=self._columns)
         is_answer = ~table["collides"].is_null().to_numpy()
         has_note = ~table["note"].is_null().to_numpy()
         self.done += table.num_rows
@@ -139,7 +138,7 @@ class _Counts:
         for named, rows in ((self.no_answer, ~is_answer), (self.outside, is_answer & has_note)):
             for k in np.flatnonzero(rows)[: _MAX_NAMED - len(named)].tolist():
                 named.append((table["row"][k].as_py(), table["note"][k].as_py()))
-        if "distance" in self._columns:
+        if self._with_distances:
             self._look_for_least(table)
 
     def _look_for_least(self, table) -> None:
@@ -152,12 +151,15 @@ class _Counts:
 
 
 def _read(folder: Path, columns: list[str] | None) -> Any:
-    pyarrow, parquet = parquet_module()
-    files = sorted(folder.glob("chunk-*.parquet"))
-    if not files:
-        raise InvalidArgument(f"{folder}: no chunk is done yet")
+    pyarrow, _ = parquet_module()
+    directory = SweepDirectory(folder)
     wanted = None if columns is None else list(columns)
-    names = parquet.read_schema(files[0]).names
-    if wanted is not None and (strangers := [name for name in wanted if name not in names]):
-        raise InvalidArgument(f"{folder}: no column {listing(strangers)}; it has {listing(names)}")
-    return pyarrow.concat_tables([parquet.read_table(file, columns=wanted) for file in files]).unify_dictionaries()
+    tables = []
+    for _, table in directory.tables(directory.manifest()):
+        names = table.column_names
+        if wanted is not None and (strangers := [name for name in wanted if name not in names]):
+            raise InvalidArgument(f"{folder}: no column {listing(strangers)}; it has {listing(names)}")
+        tables.append((table if wanted is None else table.select(wanted)).replace_schema_metadata(None))
+    if not tables:
+        raise InvalidArgument(f"{folder}: no chunk is done yet")
+    return pyarrow.concat_tables(tables).unify_dictionaries()

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from collide.errors import SceneError, brief, listing
+from collide.given_files import starts_like_xml
 from collide.scenes.loaders.documents import read_document
 from collide.scenes.loaders.fields import Fields
-from collide.scenes.loaders.files import starts_like_xml
 from collide.scenes.loaders.moveit import ALLOWED, matrix_pairs
 from collide.scenes.loaders.srdf import read_srdf
 from collide.world import World

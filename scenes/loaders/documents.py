@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from collide.errors import MissingExtra, SceneError, brief
-from collide.scenes.loaders.files import DEEPEST, MAX_REPEATED, read_text
+from collide.given_files import read_text
+from collide.scenes.loaders.files import DEEPEST, MAX_REPEATED
 
 #: A double has 309 digits before the point; Python refuses to read integers of more than 4,300.
 _MAX_DIGITS = 400

@@ -1,24 +1,18 @@
-"""Files that users name: one place that opens them, and every limit on what is read out of them.
+"""Limits on what is read out of scene and mesh files; their bytes come from `collide.given_files`.
 
-A loader asks here for bytes. What is no file (a pipe, a device, a folder) is refused before it is opened, a packed
-file is unpacked piece by piece, and each refusal says the limit and what to do about it.
+A packed file is unpacked piece by piece, and each refusal says the limit and what to do about it.
 """
 
 from __future__ import annotations
 
 import gzip
-import os
-import stat
 import zlib
 from io import BytesIO
 from pathlib import Path
 
 from collide.errors import SceneError
+from collide.given_files import LARGEST_MESH, read_bytes
 
-#: Bytes of a description (a scene, a robot, joint values), and of all files that a scene includes together.
-LARGEST_TEXT = 256 * 2**20
-#: Bytes of a mesh file, unpacked.
-LARGEST_MESH = 512 * 2**20
 #: Lists and mappings inside one another, in YAML, JSON and the nodes of a mesh file.
 DEEPEST = 100
 #: Nodes that the aliases and merge keys of one YAML file may repeat, counted one by one.
@@ -31,45 +25,6 @@ MAX_NODES = 100_000
 MAX_PLACED = 50_000_000
 
 _PIECE = 2**20
-_KINDS = (
-    (stat.S_ISFIFO, "a named pipe"), (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"),
-    (stat.S_ISSOCK, "a socket"),
-)  # fmt: skip
-
-
-def read_bytes(path: Path, largest: int = LARGEST_TEXT, what: str = "description") -> bytes:
-    """The bytes of a regular file; SceneError where it is missing, something else, or larger than ``largest``."""
-    try:
-        _refuse_other_than_files(path, os.stat(path))
-        # Between the two looks a file may have become a pipe: opening one must not wait for its writer.
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-        with os.fdopen(handle, "rb") as file:
-            about = os.fstat(handle)
-            _refuse_other_than_files(path, about)
-            content = b"" if about.st_size > largest else file.read(largest + 1)
-            if about.st_size > largest or len(content) > largest:
-                raise SceneError(f"is larger than {largest >> 20} MiB, the most that is read of a {what}", path=path)
-            return content
-    except FileNotFoundError:
-        raise SceneError("no such file", path=path) from None
-    except ValueError as error:
-        if isinstance(error, SceneError):
-            raise
-        raise SceneError(f"is no name of a file: {error}", path=repr(str(path))) from None
-    except OSError as error:
-        raise SceneError(f"cannot be read: {error.strerror or error}", path=path) from None
-
-
-def read_text(path: Path) -> str:
-    """A file as UTF-8 text."""
-    return as_text(read_bytes(path), path)
-
-
-def as_text(content: bytes, path: Path) -> str:
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise SceneError(f"is not UTF-8 text (byte {error.start})", path=path) from None
 
 
 def read_mesh_bytes(path: Path) -> tuple[str, bytes]:
@@ -96,35 +51,3 @@ def _unpacked(content: bytes, path: Path) -> bytes:
     except (OSError, EOFError, zlib.error) as error:
         raise SceneError(f"is not a gzip file that can be unpacked: {error}", path=path) from None
     return bytes(unpacked)
-
-
-def starts_like_xml(path: Path) -> bool:
-    """Whether the first characters of a regular file are those of an element; False where it cannot be read."""
-    return head(path, 256).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
-
-
-def head(path: Path, count: int) -> bytes:
-    """The first bytes of a regular file; none where it cannot be read or is something else."""
-    try:
-        if not stat.S_ISREG(os.stat(path).st_mode):
-            return b""
-        with path.open("rb") as file:
-            return file.read(count)
-    except (OSError, ValueError):
-        return b""
-
-
-def is_file(path: Path) -> bool:
-    """Whether a regular file is there; False too for names that no file can have."""
-    try:
-        return stat.S_ISREG(os.stat(path).st_mode)
-    except (OSError, ValueError):
-        return False
-
-
-def _refuse_other_than_files(path: Path, about: os.stat_result) -> None:
-    if stat.S_ISDIR(about.st_mode):
-        raise SceneError("is a folder; name a file in it", path=path)
-    if not stat.S_ISREG(about.st_mode):
-        kind = next((name for test, name in _KINDS if test(about.st_mode)), "something else")
-        raise SceneError(f"is {kind}, not a file: write what it gives to a file first", path=path)

@@ -10,8 +10,8 @@ from urllib.parse import unquote
 import numpy as np
 
 from collide.errors import SceneError, brief
+from collide.given_files import LARGEST_MESH, read_bytes
 from collide.scenes.loaders.documents import read_json
-from collide.scenes.loaders.files import LARGEST_MESH, read_bytes
 from collide.scenes.loaders.polygons import refuse
 
 _JSON, _BIN = 0x4E4F534A, 0x004E4942

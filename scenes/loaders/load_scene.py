@@ -12,12 +12,12 @@ import numpy as np
 
 from collide import scenes
 from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, cut
+from collide.given_files import starts_like_xml
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody, free_name
 from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders import mjcf, moveit, scene_yaml, states, urdf
 from collide.scenes.loaders.documents import read_document
-from collide.scenes.loaders.files import starts_like_xml
 from collide.scenes.loaders.mesh_shapes import part_shape
 from collide.scenes.loaders.xml_text import parse_xml
 

@@ -177,7 +177,7 @@ def _decompose(vertices: np.ndarray, faces: np.ndarray, path: Path) -> list[np.n
 
 
 def _pack(file: MeshFile) -> dict[str, np.ndarray]:
-    """A mesh file as arrays; texts as one JSON string, since the cache holds no objects."""
+    """A mesh file as arrays; texts as the bytes of one JSON string, since the cache holds numbers alone."""
     about: dict[str, Any] = {"notes": file.notes, "parts": []}
     arrays: dict[str, np.ndarray] = {}
     for k, part in enumerate(file.parts):
@@ -194,12 +194,12 @@ def _pack(file: MeshFile) -> dict[str, np.ndarray]:
             arrays[f"facets{k}"] = part.facets
         for j, points in enumerate(part.pieces or []):
             arrays[f"piece{k}_{j}"] = points
-    arrays["about"] = np.array(json.dumps(about))
+    arrays["about"] = np.frombuffer(json.dumps(about).encode(), dtype=np.uint8)
     return arrays
 
 
 def _unpack(arrays: Mapping[str, np.ndarray]) -> MeshFile:
-    about = json.loads(str(arrays["about"]))
+    about = json.loads(arrays["about"].tobytes())
     parts = []
     for k, text in enumerate(about["parts"]):
         pieces = None if text["pieces"] is None else [_points(arrays[f"piece{k}_{j}"]) for j in range(text["pieces"])]

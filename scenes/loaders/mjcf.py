@@ -25,6 +25,7 @@ from collide.scenes.loaders.mesh_shapes import Taken
 from collide.scenes.loaders.mjcf_geoms import FIELD, MESH, PLANE, SDF, mesh_shapes, pose_of, shape_of
 from collide.scenes.loaders.mjcf_links import link_tree, values_of
 from collide.scenes.loaders.mjcf_pairs import FILTERS, REASONS, contacts_off, filtered, groups_of, moves
+from collide.scenes.loaders.mjcf_sources import check_mjcf
 from collide.scenes.loaders.srdf import Semantics, find_srdf, read_srdf
 from collide.scenes.loaders.xml_text import parse_xml
 from collide.transforms import pose
@@ -71,6 +72,7 @@ def load_mjcf(path, srdf=None, *, meshes: str = "mesh", seconds: dict[str, float
     root = parse_xml(path, [])
     if root.tag != "mujoco":
         raise SceneError("the outermost element of an MJCF file is <mujoco>", path=path, element=f"<{root.tag}>")
+    check_mjcf(path, root)
     name = root.get("model") or path.stem
     reading = _Reading(path, _compiled(path), meshes)
     file = reading.build(name, find_srdf(path, name, srdf))
@@ -105,7 +107,7 @@ def _compiled(path: Path) -> Any:
         raise MissingExtra("mujoco", extra="mujoco", purpose=f"read {path.name}, an MJCF model") from None
     try:
         return mujoco.MjModel.from_xml_path(str(path))
-    except (ValueError, mujoco.FatalError) as error:
+    except (ValueError, RuntimeError, MemoryError, OverflowError, mujoco.FatalError) as error:
         raise SceneError(f"MuJoCo refuses it: {cut(' '.join(str(error).split()), 400)}", path=path) from None
 
 

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from collide.errors import InvalidPose, InvalidShape, SceneError, brief, listing
+from collide.given_files import head
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders.documents import read_document
 from collide.scenes.loaders.fields import Fields, did_you_mean, placed
-from collide.scenes.loaders.files import head
 from collide.scenes.loaders.mesh_shapes import inline_shape
 from collide.scenes.loaders.robot_file import load_robot
 from collide.scenes.loaders.states import state_of

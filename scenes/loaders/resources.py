@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, urlsplit
 
 from collide.errors import SceneError, brief, cut
-from collide.scenes.loaders.files import is_file
+from collide.given_files import is_file
 
 
 class NotFound(SceneError):

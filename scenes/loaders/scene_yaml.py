@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from collide.errors import InvalidArgument, SceneError, brief, listing
+from collide.given_files import LARGEST_TEXT, read_text
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import mjcf, resources, shape_yaml, urdf
 from collide.scenes.loaders.documents import parse_document
 from collide.scenes.loaders.fields import Fields, did_you_mean, read_pose
-from collide.scenes.loaders.files import LARGEST_TEXT, MAX_INCLUDED, read_text
+from collide.scenes.loaders.files import MAX_INCLUDED
 from collide.scenes.loaders.mesh_file import OPTIONS, MeshFile, read_mesh
 from collide.scenes.loaders.robot_yaml import inline_robot
 from collide.scenes.loaders.states import state_of

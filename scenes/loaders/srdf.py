@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from collide.errors import SceneError, cut, listing
-from collide.scenes.loaders.files import is_file
+from collide.given_files import is_file
 from collide.scenes.loaders.xml_text import parse_xml
 
 #: Elements about collisions: what a proposal of disabled pairs replaces.

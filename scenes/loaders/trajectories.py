@@ -71,7 +71,10 @@ def _read_csv(path: Path) -> list[dict[str, float]]:
     if not lines:
         return []
     delimiter = next((mark for mark in ("\t", ";") if mark in lines[0]), ",")
-    header, *body = (list(map(str.strip, row)) for row in csv.reader(lines, delimiter=delimiter))
+    try:
+        header, *body = (list(map(str.strip, row)) for row in csv.reader(lines, delimiter=delimiter))
+    except csv.Error as error:  # a field of more than 131,072 characters, and what else is no table
+        raise SceneError(f"is no CSV: {error}", path=path) from None
     if len(set(header)) != len(header) or not all(header):
         raise SceneError(f"the first line must name every column once, got {brief(header)}", path=path)
     rows = []

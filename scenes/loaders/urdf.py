@@ -42,6 +42,7 @@ class Reading:
     package_path: tuple = ()
     missing_meshes: str = "error"
     notes: list[str] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
     mesh_files: dict[Path, mesh_loader.MeshFile] = field(default_factory=dict)
     seconds: float = 0.0
 
@@ -96,7 +97,7 @@ def _build(root: ET.Element, reading: Reading, srdf: Path | None) -> Robot:
             semantic_pairs=semantics.pairs if semantics else None,
             states=semantics.states if semantics else None,
             notes=[f"{reading.path.name}: {note}" for note in reading.notes] + (semantics.notes if semantics else []),
-            sources=sources,
+            missing_meshes=[f"{reading.path.name}: {note}" for note in reading.missing], sources=sources,
         )
     except SceneError as error:
         raise SceneError(error.what, path=reading.path, element=error.element) from None
@@ -272,7 +273,9 @@ def _mesh_shapes(element: ET.Element, link: str, place: str, reading: Reading) -
         file = resources.find(filename, reading.path, reading.package_path, element=place)
     except resources.NotFound as error:
         if reading.missing_meshes == "skip":
-            reading.notes.append(f"{place} has no collision mesh {cut(filename, 240)}: that link is NOT checked by it")
+            missing = f"{place} has no collision mesh {cut(filename, 240)}: that link is NOT checked by it"
+            reading.notes.append(missing)
+            reading.missing.append(missing)
             return []
         raise SceneError(
             f"{error.what}\n    (missing_meshes=\"skip\", --missing-meshes skip, loads the robot without it)",

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from collide.errors import CollideError, cut, listing
+from collide.given_files import starts_like_xml
 from collide.robots.robot import LinkShape, Robot
 from collide.scenes.description import Placement, Scene
-from collide.scenes.loaders.files import starts_like_xml
 from collide.scenes.loaders.urdf import Reading, link_shapes
 from collide.scenes.loaders.xml_text import parse_xml
 from collide.shapes.shape import Shape

@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from collide.errors import SceneError, listing
-from collide.scenes.loaders.files import read_bytes
+from collide.given_files import read_bytes
 
 
 def parse_xml(path: Path, notes: list[str]) -> ET.Element:

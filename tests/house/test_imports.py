@@ -21,6 +21,7 @@ ROOMS = {
     "errors": set(),
     "cache_folder": set(),
     "whole_file": set(),
+    "given_files": {"errors"},
     "log": set(),
     "lazy_modules": set(),
     "fork_safe_lock": set(),
@@ -37,6 +38,7 @@ ROOMS = {
     "mesh": {"errors", "fork_safe_lock", "kernels", "numerics", "log"},
     "shapes": {
         "errors", "argument_checks", "log", "transforms", "hull", "least_distance", "mesh", "support", "lazy_modules",
+        "whole_file",
     },
     "lowering": {
         "errors",
@@ -290,14 +292,19 @@ ROOMS = {
         "query",
         "world",
     },
-    "sweeps": {"errors", "argument_checks", "query", "shapes", "robots", "world", "reports", "whole_file", ""},
-    "reports": {"errors", "lowering", "results", "shapes", "solids", "cache_folder", "kernels", ""},
+    "sweeps": {
+        "errors", "argument_checks", "given_files", "log", "query", "shapes", "robots", "world", "reports",
+        "whole_file", "",
+    },
+    "reports": {
+        "errors", "lowering", "results", "shapes", "solids", "cache_folder", "given_files", "kernels", "whole_file", "",
+    },
     "pages": {"errors", "contact", "lowering", "reports", "results", "shapes", "whole_file"},
-    "cli_files": {"errors", "reports"},
+    "cli_files": {"errors", "reports", "whole_file"},
     "cli_scenes": {"errors", "reports"},
     "cli_pages": {"cli_files", "cli_scenes", "errors", "pages", "reports"},
     "cli_numbers": set(),
-    "cli_srdf": {"cli_files", "cli_numbers", "errors", "reports", "sweeps"},
+    "cli_srdf": {"cli_files", "cli_numbers", "errors", "reports", "sweeps", "whole_file"},
     "cli_sweep": {"cli_files", "cli_numbers", "errors", "reports", "sweeps"},
     "cli_view": {"cli_pages", "cli_scenes", "pages"},
     "cli_bench": {"cli_numbers", "errors", "reports"},
@@ -311,7 +318,7 @@ ROOMS = {
     },
     "cli": {
         "cli_arguments", "cli_bench", "cli_compare", "cli_files", "cli_fuzz", "cli_locality", "cli_pages", "cli_scenes",
-        "cli_srdf", "cli_sweep", "cli_view", "errors", "reports", "",
+        "cli_srdf", "cli_sweep", "cli_view", "errors", "reports", "whole_file", "",
     },
     "__main__": {"cli"},
 }

@@ -18,6 +18,7 @@ from random_robots import (
 
 import collide
 from collide.errors import InvalidArgument
+from collide.robots.kinematic_tree import Joint
 from collide.robots.robot import LinkShape, Robot
 
 BRICK = collide.Mesh(*collide.tessellate(collide.Box((0.2, 0.1, 0.15))))

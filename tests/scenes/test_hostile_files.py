@@ -639,3 +639,71 @@ def test_missing_yaml_is_told(tmp_path, monkeypatch):
     (tmp_path / "a.yaml").write_text("collide: 1")
     with pytest.raises(MissingExtra, match=r"pyyaml is needed to read a\.yaml"):
         load(tmp_path / "a.yaml")
+
+
+# --- what goes round the limits ---------------------------------------------------------------------
+
+
+def mjcf(asset: str = "", world: str = "") -> str:
+    return f"<mujoco><asset>{asset}</asset><worldbody>{world}<geom size='1'/></worldbody></mujoco>"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (mjcf('<hfield name="h" nrow="2000000000" ncol="2" size="1 1 1 1"/>'), "2000000000 × 2 samples, at most 16,777,216"),
+        (mjcf('<hfield name="h" nrow="1e400" ncol="2" size="1 1 1 1"/>'), "samples, at most"),
+        (mjcf(world='<replicate count="1000000" offset="1 0 0"><body><geom size="1"/></body></replicate>'), "copies, at most 10,000"),
+        (mjcf(world='<replicate count="200"><replicate count="200"><geom size="1"/></replicate></replicate>'), "copies, at most 10,000"),
+        (mjcf(world='<body><composite type="particle" count="300 300 300" spacing="1"><geom size=".1"/></composite></body>'), "copies, at most"),
+        (mjcf('<mesh name="m" file="pipe.stl"/>'), "pipe.stl: is a named pipe"),
+        ('<mujoco><compiler meshdir="sub"/><asset><mesh name="m" file="p.obj"/></asset></mujoco>', "p.obj: is a named pipe"),
+        ('<mujoco><include file="part.xml"/></mujoco>', "pipe.stl: is a named pipe"),
+        ('<mujoco><include file="pipe.xml"/></mujoco>', "pipe.xml: is a named pipe"),
+        (mjcf('<hfield name="h" file="zero.png" size="1 1 1 1"/>'), "zero.png: is a device"),
+        ('<mujoco><include file="round.xml"/></mujoco>', "includes more than"),
+    ],
+)  # fmt: skip
+def test_models_are_looked_at_before_mujoco_reads_them(tmp_path, text, words):
+    mujoco = pytest.importorskip("mujoco")
+    if not hasattr(os, "mkfifo"):
+        pytest.skip("no named pipes here")
+    (tmp_path / "sub").mkdir()
+    for name in ("pipe.stl", "pipe.xml", "sub/p.obj"):
+        os.mkfifo(tmp_path / name)
+    (tmp_path / "zero.png").symlink_to("/dev/zero")
+    (tmp_path / "part.xml").write_text(mjcf('<mesh name="m" file="pipe.stl"/>'))
+    (tmp_path / "round.xml").write_text('<mujoco><include file="round.xml"/></mujoco>')
+    (tmp_path / "a.xml").write_text(text)
+    with pytest.raises(SceneError, match=re.escape(words)), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mujoco.MjModel, "from_xml_path", lambda *_: pytest.fail("MuJoCo read it"))
+        load(tmp_path / "a.xml")
+
+
+def test_models_within_the_limits_are_read(tmp_path):
+    pytest.importorskip("mujoco")
+    (tmp_path / "part.xml").write_text("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    row = '<replicate count="30" offset="3 0 0"><body><freejoint/><geom size="1"/></body></replicate>'
+    (tmp_path / "a.xml").write_text(f"<mujoco><include file='part.xml'/><worldbody>{row}</worldbody></mujoco>")
+    assert len(load(tmp_path / "a.xml").bodies) == 31
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+@pytest.mark.parametrize("place", ["pipe", "/dev/zero", ".", "absent"])
+def test_options_that_name_files_have_the_same_limits(tmp_path, place, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    words = {"pipe": "is a named pipe", "/dev/zero": "is a device", ".": "is a folder", "absent": "no such file"}[place]
+    for command in (["check", "workcell", "--baseline", place], ["compare", "--from-fcl-error", place]):
+        assert main(command) == 2
+        assert f"{place}: {words}" in capsys.readouterr().err
+
+
+def test_deep_and_long_files_of_options(tmp_path, capsys):
+    (tmp_path / "known.json").write_text("[" * 200_000)
+    assert main(["check", "workcell", "--baseline", str(tmp_path / "known.json")]) == 2
+    assert "known.json: is not JSON" in capsys.readouterr().err
+    (tmp_path / "way.csv").write_text("a,b\n1," + "2" * 131_073 + "\n")
+    assert main(["check", "workcell", "--trajectory", str(tmp_path / "way.csv")]) == 2
+    said = capsys.readouterr().err
+    assert "way.csv: " in said and "bug" not in said and len(said) < 1000

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -337,3 +338,102 @@ def test_dask_worker_killed_midway(tmp_path, n_killed):
     assert written_before[0] < 17, "they were killed when most was done"
     if n_killed == 2:
         assert {line[2] for line in lines} - set(map(str, pids)), "workers took the place of those killed"
+
+
+# --- what others did to the folder ----------------------------------------------------------------
+
+
+def rewritten(file: Path, change) -> None:
+    """A chunk read, changed and written back with all that it says of itself, as a person with pandas would."""
+    from pyarrow import parquet
+
+    table = parquet.read_table(file)
+    parquet.write_table(change(table).replace_schema_metadata(table.schema.metadata), file)
+
+
+def flipped(table):
+    import pyarrow.compute
+
+    k = table.column_names.index("collides")
+    return table.set_column(k, "collides", pyarrow.compute.invert(table["collides"]))
+
+
+def test_chunks_are_known_by_what_is_in_them(tmp_path):
+    """Exchanged, copied, edited or damaged chunks, and those of another seed, count as missing and are made again."""
+    folder, other = tmp_path / "s", tmp_path / "other"
+    ask = {"workers": 0, "chunk": 100, "distances": True}
+    sweep(SlowChecker(), DrawnConfigurations(1000, 3), folder, **ask)
+    sweep(SlowChecker(), DrawnConfigurations(1000, 4), other, **ask)
+    right = {file.name: file.read_bytes() for file in folder.glob("chunk-*")}
+
+    def chunk(k: int, where: Path = folder) -> Path:
+        return where / f"chunk-{k:08d}.parquet"
+
+    chunk(0).write_bytes(right[chunk(1).name])  # a copy under another number
+    chunk(1).write_bytes(right["chunk-00000000.parquet"])  # so that both are exchanged
+    chunk(2).write_bytes(chunk(2, other).read_bytes())  # of another seed
+    rewritten(chunk(3), flipped)
+    rewritten(chunk(4), lambda table: table.take(list(range(99, -1, -1))))
+    rewritten(chunk(5), lambda table: table.drop_columns(["note"]))
+    damaged = bytearray(right[chunk(6).name])
+    damaged[40] ^= 4
+    chunk(6).write_bytes(bytes(damaged))
+    chunk(10).write_bytes(right[chunk(9).name])  # beyond the last
+    chunk(7).unlink()
+    chunk(7).symlink_to(chunk(7, other))
+    kept = read_sweep(folder)
+    assert kept.done == 200 and len(kept.table()) == 200
+    assert kept.table(["row"])["row"].to_pylist() == list(range(800, 1000))
+    with pytest.raises(InvalidArgument, match="800 rows have no answer"):
+        kept.collides()
+    elsewhere = chunk(7, other).read_bytes()
+    done = sweep(SlowChecker(), DrawnConfigurations(1000, 3), folder, **ask)
+    assert done.done == 1000 and np.array_equal(done.collides(), expected(1000))
+    assert all(chunk(k).read_bytes() == right[chunk(k).name] for k in range(10))
+    assert chunk(7, other).read_bytes() == elsewhere, "a link is replaced, what it names stays"
+
+
+BAD_MANIFESTS = ["[]", "null", '"a"', "3", "{}", "[" * 200_000, '{"rows": ' * 200_000, "\0", ""]
+
+
+@pytest.mark.parametrize("text", [*BAD_MANIFESTS, "rows", "negative", "columns", "chunks", "schema", "1e400"])
+def test_a_manifest_that_is_none_is_told_as_such(tmp_path, text):
+    folder = tmp_path / "s"
+    sweep(SlowChecker(), DrawnConfigurations(20, 3), folder, workers=0, chunk=10)
+    place = folder / "_sweep.json"
+    good = json.loads(place.read_text())
+    changes = {"rows": {"rows": []}, "negative": {"chunk": -10}, "columns": {"columns": 7}, "chunks": {"chunks": 10**9},
+               "schema": {"schema": "collide-sweep/1"}, "1e400": {"rows": 1e400}}  # fmt: skip
+    place.write_text(json.dumps(good | changes[text]) if text in changes else text)
+    for ask in (lambda: read_sweep(folder),
+                lambda: sweep(SlowChecker(), DrawnConfigurations(20, 3), folder, workers=0, chunk=10)):  # fmt: skip
+        with pytest.raises((SceneError, InvalidArgument), match=r"_sweep\.json.*(JSON|manifest)"):
+            ask()
+    assert sweep(SlowChecker(), DrawnConfigurations(20, 3), folder, workers=0, chunk=10, restart=True).done == 20
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
+def test_a_lock_that_is_a_link_is_refused(tmp_path):
+    folder = tmp_path / "s"
+    folder.mkdir()
+    for target in ("absent", "there"):
+        (tmp_path / "there").write_text("somebody's")
+        (folder / "_sweep.lock").symlink_to(tmp_path / target)
+        with pytest.raises(InvalidArgument, match=r"_sweep\.lock is a link or no file: remove it"):
+            sweep(SlowChecker(), DrawnConfigurations(20, 3), folder, workers=0)
+        assert not (tmp_path / "absent").exists() and (tmp_path / "there").read_text() == "somebody's"
+        (folder / "_sweep.lock").unlink()
+    os.mkfifo(folder / "_sweep.lock")
+    with pytest.raises(InvalidArgument, match="link or no file"):
+        sweep(SlowChecker(), DrawnConfigurations(20, 3), folder, workers=0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "chunk", "words"),
+    [(10**20, None, "more than 1,000,000 chunks of 50,000"), (10**400, None, "more than 1,000,000 chunks"),
+     (10**9, 100, "more than 1,000,000 chunks of 100"), (10, 10**12, "at most 10,000,000 rows")],
+)  # fmt: skip
+def test_more_rows_than_can_be_listed_are_refused_at_once(tmp_path, rows, chunk, words):
+    with pytest.raises(InvalidArgument, match=words):
+        sweep(SlowChecker(), DrawnConfigurations(rows, 3), tmp_path / "s", workers=0, chunk=chunk)
+    assert not (tmp_path / "s").exists()
