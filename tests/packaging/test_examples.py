@@ -186,8 +186,8 @@ GIVEN = {
 #: Pages whose Python is not run here, and where it is, or why it is not.
 ELSEWHERE = {
     "disabled-pairs": "tests/sweeps", "sweeps": "tests/sweeps", "engines": "tests/adapters",
-    "fuzzing": "tests/adapters", "hosts": "tests/adapters, one file a host", "overlays": "tests/tetrahedra", "pages": "tests/pages",
-    "report-schema": "tests/reports", "scene-format": "tests/scenes",
+    "fuzzing": "tests/adapters", "hosts": "tests/adapters, one file a host", "overlays": "tests/tetrahedra",
+    "pages": "tests/pages", "report-schema": "tests/reports", "scene-format": "tests/scenes",
 }
 _ARM = """<robot name="panda"><link name="base"/><link name="panda_hand"><collision><geometry><box size="0.1 0.1 0.1"/>
 </geometry></collision></link><joint name="turn" type="revolute"><parent link="base"/><child link="panda_hand"/>
