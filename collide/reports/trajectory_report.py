@@ -157,7 +157,7 @@ class Watch:
     """
 
     def __init__(self, scene, path: Path, clearance: float, min_depth: float, max_kept: int = 0):
-        self._max_kept, self._kept = max_kept, list[tuple[np.ndarray, float]]()
+        self._max_kept, self._searches = max_kept, list[tuple[np.ndarray, float]]()
         self.scene, self.path, self.clearance, self.min_depth = scene, path, clearance, min_depth
         self.moving = self._movers()
         fixed = [replace(body, static=body.name not in self.moving) for body in scene.bodies]
@@ -209,8 +209,8 @@ class Watch:
         self._go_to(poses)
         rows, searched = self._near_rows()
         by_class = self._sorted(rows)
-        if k == len(self._kept) < self._max_kept:
-            self._kept.append((rows, searched))
+        if k == len(self._searches) < self._max_kept:
+            self._searches.append((rows, searched))
         for name, indices in by_class.items():
             for row in rows[indices]:
                 self._keep(self.worst[name], k, row)
@@ -228,7 +228,7 @@ class Watch:
         """What is near at sample k, whose moving bodies are at these poses (m, 4, 4): kept, or asked once more."""
         self._go_to(poses)
         needed = max(self.clearance, self._largest_rounding())
-        rows, searched = self._kept[k] if k < len(self._kept) else (self._rows(needed), needed)
+        rows, searched = self._searches[k] if k < len(self._searches) else (self._rows(needed), needed)
         apart = rows[~rows["beyond"]]
         if not _least(rows) <= searched:  # the nearest pair may be farther than any that was asked for
             try:

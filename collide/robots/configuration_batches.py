@@ -74,16 +74,16 @@ def _search(
     """``rows`` (n,) take the nearest pairs of configurations q (n, dof), or some of them (k,), that are known within
     limits ``within`` (n,), which become those searched; (m, 3) pairs left to others and asked so far.
     """
-    found = rows if some is None else np.zeros(len(some), dtype=PAIR_DTYPE)
-    q_found, limits = (q, within) if some is None else (np.ascontiguousarray(q[some]), within[some])
+    nearest = rows if some is None else np.zeros(len(some), dtype=PAIR_DTYPE)
+    q_some, limits = (q, within) if some is None else (np.ascontiguousarray(q[some]), within[some])
     done = 0
-    while done < len(found):
+    while done < len(nearest):
         first, done = done, nearest_pairs(
-            space.address, address_of(q_found), checker.robot.dof, done, len(found), limit, address_of(limits),
-            address_of(found),
+            space.address, address_of(q_some), checker.robot.dof, done, len(nearest), limit, address_of(limits),
+            address_of(nearest),
         )  # fmt: skip
         if some is not None:
-            rows[some[first:done]] = open_pairs.nearer_of(rows[some[first:done]], found[first:done])
+            rows[some[first:done]] = open_pairs.nearer_of(rows[some[first:done]], nearest[first:done])
         if len(space.open_pairs):
             pairs = space.open_pairs.copy()
             pairs[:, 0] = pairs[:, 0] if some is None else some[pairs[:, 0]]

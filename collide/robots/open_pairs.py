@@ -7,6 +7,7 @@ unions of convex parts overlap, their deepest parts are asked for: kernels know 
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 
@@ -65,18 +66,18 @@ def distances(
     return out
 
 
-def nearer_of(mine: np.ndarray, other: np.ndarray) -> np.ndarray:
+def nearer_of(mine: np.ndarray, theirs: np.ndarray) -> np.ndarray:
     """(k,) of each two rows the nearer one, its bracket that of the least distance of both; ``a`` < 0 where none is.
 
     Rivals, of which the brackets do not tell which is nearer, widen the bracket: the least distance is at least the
     less of the lower bounds.
     """
-    is_nearer = distances_of(other) < distances_of(mine)
-    is_rival = (mine["a"] >= 0) & (other["a"] >= 0)
-    is_rival &= np.where(is_nearer, mine["lower"] <= other["upper"], other["lower"] <= mine["upper"])
-    out = np.where(is_nearer, other, mine)
-    out["lower"][is_rival] = np.minimum(mine["lower"], other["lower"])[is_rival]
-    out["certified"][is_rival] = (mine["certified"] & other["certified"])[is_rival]
+    is_nearer = distances_of(theirs) < distances_of(mine)
+    is_rival = (mine["a"] >= 0) & (theirs["a"] >= 0)
+    is_rival &= np.where(is_nearer, mine["lower"] <= theirs["upper"], theirs["lower"] <= mine["upper"])
+    out = np.where(is_nearer, theirs, mine)
+    out["lower"][is_rival] = np.minimum(mine["lower"], theirs["lower"])[is_rival]
+    out["certified"][is_rival] = (mine["certified"] & theirs["certified"])[is_rival]
     return out
 
 
@@ -93,7 +94,7 @@ def _rows_of(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: floa
     A, B = of_parts
     rows = query.distance(A, B, X_WA, X_WB, max_distance=limit, check_poses=False).rows.copy()
     overlap = np.flatnonzero(rows["distance"] < 0.0)
-    pairs = [(P, Q) for P in _parts_as_shapes(A) for Q in _parts_as_shapes(B)]
+    pairs = list(itertools.product(_parts_as_shapes(A), _parts_as_shapes(B)))
     if len(pairs) > 1 and len(overlap):
         X_WA, X_WB = X_WA[overlap], np.broadcast_to(X_WB, X_WA.shape)[overlap]
         deepest = [query.distance(*pair, X_WA, X_WB, max_distance=0.0, check_poses=False).rows for pair in pairs]

@@ -157,9 +157,72 @@ def test_every_example_is_known():
     assert {file.stem for file in EXAMPLES} == set(SHOWS)
 
 
-def test_python_in_the_readme_runs():
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL)
-    done = run("-c", "\n".join(blocks))
+#: What a page's Python takes as given: run before it, in a folder with the files of `_FILES`.
+GIVEN = {
+    "README": "",
+    "barba-langerman": "A = B = collide.ConvexHull(np.random.default_rng(0).normal(size=(60, 3)))\n"
+    "X_WA, X_WB = np.eye(4), collide.pose((1, 0, 0))",
+    "casts": "shape = A = B = collide.Box((1, 1, 1)); X_WA = X_WS = np.eye(4); X_WB = collide.pose((3, 0, 0))\n"
+    "origins_W = points_W = np.zeros((2, 3)); directions_W = [(1, 0, 0), (0, 1, 0)]; direction_W = (1, 0, 0)\n"
+    "world = collide.World(); world.add(B, X_WB)",
+    "configuration_obstacles": "",
+    "hierarchical_trees": "",
+    "life_of_a_query": "X_WA, X_WB = np.eye(4), collide.pose((1, 0, 0))\n"
+    "mesh = collide.Mesh(*collide.tessellate(collide.Sphere(0.5))[:2])",
+    "locality": "",
+    "meshes": "A = B = shape = mesh = collide.Mesh(*collide.tessellate(collide.Sphere(0.5))[:2])\n"
+    "X_WA, X_WB = np.eye(4), collide.pose((0.3, 0, 0))\n"
+    "points_W = origins_W = np.zeros((2, 3)); directions_W = [(1, 0, 0), (0, 1, 0)]",
+    "motion": "A = B = collide.Box((1, 1, 1)); X_WA0 = X_WA1 = np.eye(4); X_WB0 = collide.pose((3, 0, 0))\n"
+    "velocity, omega = (-3, 0, 0), (0, 0, 1.0)",
+    "partitions": "mesh = collide.Mesh(*collide.tessellate(collide.Box((1, 1, 1)))[:2]); points = np.zeros((2, 3))\n"
+    "low, high = (-2, -2, -2), (2, 2, 2)",
+    "planar": "from collide.polytopes import planar_pose\nX_WBs = np.array([planar_pose((x, 0)) for x in (1, 5)])",
+    "polytopes": "",
+    "robots": "X_LS = np.eye(4); world = collide.World(); Q = Q0 = np.zeros((2, 1)); Q1 = Q + 0.1; q = Q[0]",
+    "solids": "",
+    "worlds": "",
+}
+#: Pages whose Python is not run here, and where it is, or why it is not.
+ELSEWHERE = {
+    "disabled-pairs": "tests/sweeps", "sweeps": "tests/sweeps", "engines": "tests/adapters",
+    "fuzzing": "tests/adapters", "hosts": "tests/adapters, one file a host", "overlays": "tests/tetrahedra",
+    "pages": "tests/pages", "report-schema": "tests/reports", "scene-format": "tests/scenes",
+}
+_ARM = """<robot name="panda"><link name="base"/><link name="panda_hand"><collision><geometry><box size="0.1 0.1 0.1"/>
+</geometry></collision></link><joint name="turn" type="revolute"><parent link="base"/><child link="panda_hand"/>
+<origin xyz="0.5 0 0"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+_FILES = {
+    "panda.urdf": _ARM,
+    "scene.yaml": "collide: 1\nrobots:\n  - {urdf: panda.urdf}\nbodies:\n"
+    "  - {name: table, shape: {box: {size: [1, 1, 0.1]}}, pose: {xyz: [0, 0, -1]}}\n",
+    "arm.xml": '<mujoco><worldbody><body name="a"><joint name="turn"/><geom size="0.1"/></body></worldbody>'
+    '<keyframe><key name="home" qpos="0.5"/></keyframe></mujoco>',
+}
+
+
+def _python_of(page: Path) -> str:
+    return "\n".join(re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL))
+
+
+PAGES = {page.stem: page for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))) if _python_of(page)}
+
+
+def test_python_of_every_page_is_run_somewhere():
+    assert set(PAGES) == set(GIVEN) | set(ELSEWHERE) and not set(GIVEN) & set(ELSEWHERE)
+
+
+@pytest.mark.parametrize("name", GIVEN)
+def test_python_in_pages_runs(name, tmp_path):
+    """All of a page's Python, in order, in one interpreter, after what the page takes as given."""
+    needed = {"robots": ("yaml", "mujoco"), "README": ()}.get(name, ())
+    missing = [package for package in needed if find_spec(package) is None]
+    if missing:
+        pytest.skip(f"{', '.join(missing)} not installed")
+    for file, text in _FILES.items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    begin = f"import os, numpy as np, collide\nos.chdir({str(tmp_path)!r})"
+    done = run("-c", "\n".join((begin, GIVEN[name], _python_of(PAGES[name]))))
     assert done.returncode == 0, done.stderr
 
 
