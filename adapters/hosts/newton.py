@@ -152,8 +152,8 @@ class Pipeline:
         ----------
         state : of the model.
         contacts : ``newton.Contacts``, of `contacts` or of Newton's own pipeline; cleared first.
-        of_particles : further arguments of Newton's: ``soft_contact_margin``, ``soft_self_contact`` and ``dt``; without
-            particles they have no effect.
+        of_particles : further arguments of ``newton.CollisionPipeline.collide``, which are about particles and what
+            moves between steps; without particles they have no effect.
 
         Raises
         ------
