@@ -46,8 +46,8 @@ def time_pybullet(rounds: int) -> None:
     mirror, places = q.mirror_of(client), [p.getBasePositionAndOrientation(body, client) for body in balls]
 
     def moved() -> None:
-        for body, (place, turn) in zip(balls, places):
-            p.resetBasePositionAndOrientation(body, place, turn, client)
+        for body, (place, rotation) in zip(balls, places):
+            p.resetBasePositionAndOrientation(body, place, rotation, client)
         mirror.update()
 
     print("update of 102 bodies, none moved: {:.0f} µs".format(*medians(rounds, mirror.update)))

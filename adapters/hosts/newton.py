@@ -117,8 +117,8 @@ class Pipeline:
         for k, body in zip(self._shapes.tolist(), self._bodies.tolist()):
             label = f"{model.shape_label[k]} {k}" if getattr(model, "shape_label", None) else f"shape {k}"
             self.world.add(shapes[k], np.eye(4), name=label, static=body < 0)
-        given = model.shape_contact_pairs if shape_pairs_filtered is None else shape_pairs_filtered
-        pairs = np.empty((0, 2), int) if given is None else given.numpy()
+        listed = model.shape_contact_pairs if shape_pairs_filtered is None else shape_pairs_filtered
+        pairs = np.empty((0, 2), int) if listed is None else listed.numpy()
         self._allow_others(pairs)
         wanted = min(max(256, 8 * len(pairs)), 65_536)
         self.rigid_contact_max = wanted if rigid_contact_max is None else rigid_contact_max
