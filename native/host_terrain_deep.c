@@ -154,20 +154,20 @@ static int best_way_out(const struct task *task, struct way_out *best)
     resolve(task, NULL, t);
     for (n_checked = 0; n_checked < MAX_CHECKED; n_checked++) {
         double least = INFINITE, end[3];
-        int chosen = -1;
+        int soonest = -1;
         for (k = 0; k < ways.n; k++) {
             double more = ways.all[k].length - dot3(ways.all[k].n, t);
             if (more < least) {
                 least = more;
-                chosen = k;
+                soonest = k;
             }
         }
-        if (chosen < 0) break;
-        *best = ways.all[chosen];
+        if (soonest < 0) break;
+        *best = ways.all[soonest];
         memcpy(end, t, sizeof end);
         resolve(task, best, end);
         if (is_clear_at(task, end)) return least > task->tolerance;
-        ways.all[chosen].length = INFINITE;
+        ways.all[soonest].length = INFINITE;
     }
     *best = way_upwards(task);
     return 1;

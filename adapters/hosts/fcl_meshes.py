@@ -114,8 +114,8 @@ class OcTree(CollisionGeometry):
     _node_type, _object_type = NODE_TYPE.GEOM_OCTREE, OBJECT_TYPE.OT_OCTREE
 
     def __init__(self, r, data):
-        given = data if isinstance(data, bytes | bytearray | memoryview) else [int(value) & 255 for value in data]
-        boxes = occupied_boxes(*tree_of(float(r), bytes(given)))
+        values = data if isinstance(data, bytes | bytearray | memoryview) else [int(value) & 255 for value in data]
+        boxes = occupied_boxes(*tree_of(float(r), bytes(values)))
         if not boxes:
             raise UnsupportedQuery("OcTree: data holds no occupied box; leave the object out")
         middles = np.array([middle for middle, _ in boxes])

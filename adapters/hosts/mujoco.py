@@ -173,7 +173,7 @@ def _library() -> ctypes.CDLL:
 
 
 def _refuse_both_modes(mode: str) -> None:
-    others = {other._mode for other in _installed} - {mode}
+    others = {in_force._mode for in_force in _installed} - {mode}
     if others and host().drops_of_boxes:
         raise UnsupportedQuery(
             f"install: mode {mode!r} while models are installed in mode {others.pop()!r}: MuJoCo "

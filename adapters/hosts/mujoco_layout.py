@@ -233,12 +233,12 @@ def _drops_of_boxes(mujoco, table) -> bool:
     handed_on = _FUNCTION(table[index])
 
     def counts() -> list[int]:
-        found = []
+        numbers = []
         for place in places:
             data.qpos[7:10] = place
             mujoco.mj_fwdPosition(model, data)
-            found.append(int(data.ncon))
-        return found
+            numbers.append(int(data.ncon))
+        return numbers
 
     alone = counts()
     with instead(table, index, lambda *asked: handed_on(*asked)):

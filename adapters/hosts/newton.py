@@ -22,7 +22,19 @@ import numpy as np
 from collide import World
 from collide.adapters.hosts.quaternion_poses import poses_of
 from collide.errors import InvalidArgument, InvalidPose, MissingExtra, UnsupportedQuery
-from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Mesh, Shape, Sphere
+from collide.shapes import (
+    Box,
+    Capsule,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    Ellipsoid,
+    Halfspace,
+    HeightField,
+    Mesh,
+    Shape,
+    Sphere,
+)
 
 #: Arrays of a model that are read, and of its contacts that are written.
 _MODEL_FIELDS = (
@@ -35,6 +47,22 @@ _CONTACT_FIELDS = tuple(
         "count", "shape0", "shape1", "point0", "point1", "offset0", "offset1", "normal", "margin0", "margin1", "tids",
     )
 )  # fmt: skip
+#: Arguments of ``newton.CollisionPipeline`` about how it searches, which change no answer here.
+_OF_ITS_SEARCH = (
+    "broad_phase", "reduce_contacts", "max_triangle_pairs", "shape_pairs_max", "deterministic", "verify_buffers",
+    "contact_reduction_hashtable_size_factor", "publish_capacity", "contact_matching_pos_threshold",
+    "contact_matching_normal_dot_threshold",
+)  # fmt: skip
+#: Those about particles, which Newton's own pipeline answers.
+_OF_PARTICLES = (
+    "soft_contact_max", "soft_contact_gap", "soft_contact_margin", "enable_rigid_soft_full_surface_contact",
+)  # fmt: skip
+#: Those that ask for what is not done here, but for these values.
+_REFUSED_BUT = {
+    "body_pair_reduction": None, "narrow_phase": None, "sdf_hydroelastic_config": None, "contact_report": False,
+    "contact_matching": "disabled", "speculative_contact_gap_max": None, "dynamic_shape_scale": False,
+    "include_static_kinematic_pairs": True, "requires_grad": (None, False),
+}  # fmt: skip
 
 
 class Pipeline:
@@ -45,6 +73,10 @@ class Pipeline:
     model : ``newton.Model`` on the CPU.
     rigid_contact_max : how many contacts there is room for; None for 8 a pair of shapes, at least 256, at most 65,536.
     max_contacts : of each patch, ≥ 1.
+    shape_pairs_filtered : pairs in place of ``model.shape_contact_pairs``.
+    options : further arguments of ``newton.CollisionPipeline``. Those about its search (``broad_phase`` and the like)
+        have no effect. Of a model with particles those about soft contacts go to Newton's own pipeline, which makes
+        them; others have no particles to be about. What is not done here is refused by name.
 
     Attributes
     ----------
@@ -55,19 +87,24 @@ class Pipeline:
     ------
     InvalidArgument : no model.   InvalidShape : a shape whose numbers make none.
     MissingExtra : newton is not installed.
-    UnsupportedQuery : a model on another device than the CPU, or a Newton whose fields are others.
+    UnsupportedQuery : a model on another device than the CPU, a Newton whose fields are others, or an option that asks
+        for what is not done here.   TypeError : an argument that Newton has not, either.
 
     Notes
     -----
     Pairs are those of ``model.shape_contact_pairs``. Changing kinds, sizes or pairs of shapes needs another Pipeline.
     """
 
-    def __init__(self, model: Any, *, rigid_contact_max: int | None = None, max_contacts: int = 8):
+    def __init__(
+        self, model: Any, *, rigid_contact_max: int | None = None, max_contacts: int = 8,
+        shape_pairs_filtered: Any = None, **options: Any,
+    ):  # fmt: skip
         newton = _newton()
         if not isinstance(model, newton.Model):
             raise InvalidArgument(f"Pipeline: model must be a newton.Model, got {type(model).__name__}")
         _check_fields(newton, model, _MODEL_FIELDS)
         _check_device(model)
+        _check_options(options)
         self._newton, self._model, self._max_contacts = newton, model, max_contacts
         self.remaining: dict[int, str] = {}
         shapes = [self._shape(k) for k in range(model.shape_count)]
@@ -80,24 +117,43 @@ class Pipeline:
         for k, body in zip(self._shapes.tolist(), self._bodies.tolist()):
             label = f"{model.shape_label[k]} {k}" if getattr(model, "shape_label", None) else f"shape {k}"
             self.world.add(shapes[k], np.eye(4), name=label, static=body < 0)
-        pairs = model.shape_contact_pairs.numpy() if model.shape_contact_pairs is not None else np.empty((0, 2), int)
+        listed = model.shape_contact_pairs if shape_pairs_filtered is None else shape_pairs_filtered
+        pairs = np.empty((0, 2), int) if listed is None else listed.numpy()
         self._allow_others(pairs)
         wanted = min(max(256, 8 * len(pairs)), 65_536)
         self.rigid_contact_max = wanted if rigid_contact_max is None else rigid_contact_max
+        self._soft = self._soft_pipeline({name: options[name] for name in _OF_PARTICLES if name in options})
+
+    def _soft_pipeline(self, options: dict[str, Any]) -> Any:
+        """Newton's own, of no pair of shapes: it finds the contacts of particles. None without particles."""
+        if not self._model.particle_count:
+            return None
+        no_pairs = importlib.import_module("warp").empty(
+            0, dtype=self._model.shape_contact_pairs.dtype, device=self._model.device
+        )
+        return self._newton.CollisionPipeline(
+            self._model, broad_phase="explicit", shape_pairs_filtered=no_pairs,
+            rigid_contact_max=self.rigid_contact_max, **options,
+        )  # fmt: skip
 
     def contacts(self) -> Any:
         """A new ``newton.Contacts`` with room for this model's."""
-        contacts = self._newton.Contacts(self.rigid_contact_max, 0, device=self._model.device)
+        if self._soft is not None:
+            contacts = self._soft.contacts()
+        else:
+            contacts = self._newton.Contacts(self.rigid_contact_max, 0, device=self._model.device)
         _check_fields(self._newton, contacts, _CONTACT_FIELDS)
         return contacts
 
-    def collide(self, state: Any, contacts: Any) -> None:
+    def collide(self, state: Any, contacts: Any, **of_particles: Any) -> None:
         """Write the contacts of the bodies as they stand in a state.
 
         Parameters
         ----------
         state : of the model.
         contacts : ``newton.Contacts``, of `contacts` or of Newton's own pipeline; cleared first.
+        of_particles : further arguments of ``newton.CollisionPipeline.collide``, which are about particles and what
+            moves between steps; without particles they have no effect.
 
         Raises
         ------
@@ -122,7 +178,10 @@ class Pipeline:
                 f"Pipeline.collide: {len(rows)} contacts, but there is room for {capacity}; "
                 "make the Pipeline with rigid_contact_max"
             )
-        contacts.clear()
+        if self._soft is not None:
+            self._soft.collide(state, contacts, **of_particles)  # which clears them
+        else:
+            contacts.clear()
         self._write(contacts, rows, X_WB)
 
     # --- how it is done -------------------------------------------------------------------------
@@ -188,6 +247,8 @@ class Pipeline:
         if kind in (kinds.MESH, kinds.CONVEX_MESH) and source is not None:
             points = np.asarray(source.vertices, dtype=np.float64) * scale
             return ConvexHull(points) if kind == kinds.CONVEX_MESH else Mesh(points, _facets(source, scale))
+        if kind == kinds.HFIELD and source is not None and (scale > 0.0).all():
+            return _height_field(source, scale)
         self.remaining[k] = "planes with ends" if kind == kinds.PLANE else f"shapes of kind {kind.name}"
         warnings.warn(
             f"shape {k} is left out: {self.remaining[k]} are not taken over", RuntimeWarning, stacklevel=4
@@ -199,6 +260,27 @@ def _facets(source: Any, scale: np.ndarray) -> np.ndarray:
     """(m, 3) of a mesh, turned over where its scale mirrors it."""
     facets = np.asarray(source.indices, dtype=np.int64).reshape(-1, 3)
     return facets[:, ::-1] if scale.prod() < 0.0 else facets
+
+
+def _height_field(source: Any, scale: np.ndarray) -> HeightField:
+    """A ``newton.Heightfield`` as a solid: Newton's surface, cut along the same diagonals, and what is below."""
+    heights = source.min_z + np.asarray(source.data, dtype=np.float64) * (source.max_z - source.min_z)
+    n_rows, n_columns = heights.shape
+    cell = 2.0 * source.hx * scale[0] / (n_columns - 1), 2.0 * source.hy * scale[1] / (n_rows - 1)
+    return HeightField(scale[2] * heights, cell)
+
+
+def _check_options(options: dict[str, Any]) -> None:
+    for name, value in options.items():
+        if name in _OF_ITS_SEARCH or name in _OF_PARTICLES:
+            continue
+        if name not in _REFUSED_BUT:
+            raise TypeError(f"Pipeline: there is no argument {name!r}, nor has newton.CollisionPipeline 1.8 one")
+        harmless = _REFUSED_BUT[name]
+        if value != harmless and not (isinstance(harmless, tuple) and value in harmless):
+            raise UnsupportedQuery(
+                f"Pipeline: {name}={value!r} is not done here; leave it out, or take newton.CollisionPipeline"
+            )
 
 
 def _newton() -> Any:

@@ -170,6 +170,79 @@ def test_pairs_are_those_of_the_model():
     assert len(pipeline.world) == 5
 
 
+def test_height_fields_carry_balls_as_newtons_do():
+    """Hills, scaled and turned about: the nearest contact of each ball is as far as in Newton's own pipeline; a ball
+    that is dropped stays above.
+    """
+    random = np.random.default_rng(4)
+    x = np.linspace(0.0, 6.0, 25)
+    hills = np.sin(x)[:, None] * np.cos(0.7 * x)[None, :21]
+    field = newton.Heightfield(hills, nrow=25, ncol=21, hx=2.0, hy=3.0)
+    builder = newton.ModelBuilder()
+    turn = wp.quat(0.0, 0.0, float(np.sin(0.4)), float(np.cos(0.4)))
+    builder.add_shape_heightfield(
+        xform=wp.transform(wp.vec3(0.2, -0.1, 0.3), turn), heightfield=field, scale=wp.vec3(1.5, 1.0, 0.4)
+    )
+    for _ in range(60):
+        body = builder.add_body(xform=wp.transform(wp.vec3(*random.uniform([-2, -2, -0.2], [2, 2, 1.2])), turn))
+        builder.add_shape_sphere(body, radius=0.2, cfg=newton.ModelBuilder.ShapeConfig(gap=0.1))
+    model = builder.finalize(device="cpu")
+    state, answers = model.state(), []
+    for pipeline in (Pipeline(model), newton.CollisionPipeline(model)):
+        contacts = pipeline.contacts()
+        pipeline.collide(state, contacts)
+        n = int(contacts.rigid_contact_count.numpy()[0])
+        least: dict[int, float] = {}
+        sides = (contacts.rigid_contact_shape0.numpy()[:n], contacts.rigid_contact_shape1.numpy()[:n])
+        for pair, gap in zip(np.stack(sides, axis=1).tolist(), separations(model, contacts, state).tolist()):
+            if 0 in pair:
+                least[max(pair)] = min(gap, least.get(max(pair), np.inf))
+        answers.append(least)
+    ours, theirs = answers
+    shared = [k for k in ours if k in theirs and min(ours[k], theirs[k]) > -0.05]
+    assert len(shared) >= 10 and {k for k in theirs if theirs[k] < 0.05} <= set(ours), (ours, theirs)
+    assert max(abs(ours[k] - theirs[k]) for k in shared) < 2e-3, [(k, ours[k], theirs[k]) for k in shared]
+
+
+def test_arguments_of_newtons_pipeline_are_taken_or_refused_by_name():
+    builder = newton.ModelBuilder()
+    builder.add_ground_plane()
+    add(builder, "box", (0, 0, 0), (0, 0, 0, 1))
+    model = builder.finalize(device="cpu")
+    for mode_of_search in ("nxn", "sap", "explicit"):
+        pipeline = Pipeline(model, broad_phase=mode_of_search, soft_contact_gap=0.02, contact_matching="disabled")
+        contacts = pipeline.contacts()
+        pipeline.collide(model.state(), contacts, dt=0.01)
+        assert int(contacts.rigid_contact_count.numpy()[0]) > 0
+    none = Pipeline(model, shape_pairs_filtered=model.shape_contact_pairs[:0])
+    none.collide(model.state(), contacts)
+    assert int(contacts.rigid_contact_count.numpy()[0]) == 0
+    for name, value in (
+        ("contact_matching", "sticky"), ("speculative_contact_gap_max", 0.1), ("requires_grad", True),
+        ("include_static_kinematic_pairs", False), ("contact_report", True),
+    ):  # fmt: skip
+        with pytest.raises(UnsupportedQuery, match=f"{name}={value!r} is not done here; .*newton.CollisionPipeline"):
+            Pipeline(model, **{name: value})
+    with pytest.raises(TypeError, match="no argument 'broad_fase'"):
+        Pipeline(model, broad_fase="nxn")
+
+
+def test_particles_have_newtons_own_contacts():
+    """Particles above a box and in it, beside a box on the ground: soft contacts are Newton's, the others ours."""
+    builder = newton.ModelBuilder()
+    builder.add_ground_plane()
+    add(builder, "box", (0, 0, 0.1), (0, 0, 0, 1))
+    for place in ((0.05, -0.1, 0.3), (0.0, 0.0, 0.1), (3.0, 0.0, 0.004), (3.0, 0.0, 2.0)):
+        builder.add_particle(pos=wp.vec3(*place), vel=wp.vec3(0.0, 0.0, 0.0), mass=0.1, radius=0.02)
+    model = builder.finalize(device="cpu")
+    state, counts = model.state(), []
+    for pipeline in (Pipeline(model, soft_contact_gap=0.02), newton.CollisionPipeline(model, soft_contact_gap=0.02)):
+        contacts = pipeline.contacts()
+        pipeline.collide(state, contacts)
+        counts.append((int(contacts.soft_contact_count.numpy()[0]), int(contacts.rigid_contact_count.numpy()[0]) > 0))
+    assert counts[0] == counts[1] and counts[0][0] >= 2 and counts[0][1]
+
+
 def test_what_goes_wrong_is_named():
     builder = newton.ModelBuilder()
     builder.add_shape_plane(width=2.0, length=2.0)
