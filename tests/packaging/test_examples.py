@@ -165,11 +165,13 @@ PAGES = {
     "docs/hierarchical_trees.md": "",
     "docs/life_of_a_query.md": "X_WA, X_WB = np.eye(4), collide.pose((0.6, 0, 0))\nmesh = BALL",
     "docs/locality.md": "",
-    "docs/meshes.md": "shape = mesh = A = BALL\nB, X_WA, X_WB = collide.Box((1, 1, 1)), np.eye(4), collide.pose((0.6, 0, 0))\n"
+    "docs/meshes.md": "shape = mesh = A = BALL\n"
+    "B, X_WA, X_WB = collide.Box((1, 1, 1)), np.eye(4), collide.pose((0.6, 0, 0))\n"
     "points_W = origins_W = np.zeros((3, 3))\ndirections_W = np.eye(3)",
     "docs/overlays.md": "vertices, cells = np.vstack((np.zeros(3), np.eye(3))), [[0, 1, 2, 3]]\n"
     "B, X_WA, X_WB = collide.TetMesh(vertices, cells), np.eye(4), collide.pose((0.1, 0, 0))",
-    "docs/partitions.md": "mesh, points = BALL, np.random.default_rng(0).normal(size=(20, 3))\nlow, high = (-1, -1, -1), (1, 1, 1)",
+    "docs/partitions.md": "mesh, points = BALL, np.random.default_rng(0).normal(size=(20, 3))\n"
+    "low, high = (-1, -1, -1), (1, 1, 1)",
     "docs/planar.md": "from collide.polytopes import planar_pose\n"
     "X_WBs = np.array([planar_pose((x, 0.2), 0.3) for x in (0.5, 2, 4)])",
     "docs/polytopes.md": "",
