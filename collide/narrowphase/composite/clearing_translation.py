@@ -2,9 +2,9 @@
 
 B moved by τ·n meets A only where τ·n lies in A ⊖ B of a pair of parts. A plane across m, above which no point of that
 set swept by both radii lies, h(m) = max m·w + r, proves the pair apart wherever τ·(m·n) > h(m) + error. So a pair bars
-the way from some length on, and up to a length that planes bound from above; the union is clear at the first length that
-no pair bars. Planes are those of GJK, seen from the point τ·n, which comes down along the line as planes are found (van
-den Bergen, "Ray casting against general convex objects with application to continuous collision detection", 2004).
+the way from some length on, and up to a length that planes bound from above; the union is clear at the first length
+that no pair bars. Planes are those of GJK, seen from the point τ·n, which comes down along the line as planes are found
+(van den Bergen, "Ray casting against general convex objects with application to continuous collision detection", 2004).
 However the search goes, what planes prove holds.
 """
 
