@@ -61,11 +61,12 @@ def _pair_table(title: str, style: str, pairs: Pairs, measure: str, everything: 
         pairs.folded(MAX_PAIRS_OF_BODY, SHORT) if not everything else ([Fold(pair, "", 1) for pair in pairs], 0)
     )
     listed = [fold.pair for fold in folds]
+    texts = depth_texts(listed) if measure == "depth" else lengths([_measured(pair, measure) for pair in listed])
     unit, places = coordinates([_place(pair) for pair in listed])
     columns = [
         (Column("body A", "name"), [_marked(pair, pair.a) for pair in listed]),
         (Column("body B", "name"), [_marked(pair, pair.b) for pair in listed]),
-        (Column(measure), depth_texts(listed) if measure == "depth" else lengths([_measured(pair, measure) for pair in listed])),
+        (Column(measure), texts),
         (Column(f"at x y z [{unit}]", "label", 1), places),
         (Column("normal A→B", "label", 2), directions([pair.normal for pair in listed])),
     ]
@@ -137,7 +138,7 @@ def depth_texts(pairs: list[Pair]) -> list[str]:
 
 
 def _place(pair: Pair) -> list[float]:
-    """Where a pair is told to be: the point of A; of a depth that is a bound, the middle of the contact it goes through."""
+    """Where a pair is told to be: the point of A; of a depth that is a bound, the middle of the contact."""
     if not (_is_bound(pair) or _is_range(pair)):
         return pair.point_a
     return [0.5 * (a + b) for a, b in zip(pair.point_a, pair.point_b)]

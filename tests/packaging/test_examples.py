@@ -175,6 +175,8 @@ GIVEN = {
     "points_W = origins_W = np.zeros((2, 3)); directions_W = [(1, 0, 0), (0, 1, 0)]",
     "motion": "A = B = collide.Box((1, 1, 1)); X_WA0 = X_WA1 = np.eye(4); X_WB0 = collide.pose((3, 0, 0))\n"
     "velocity, omega = (-3, 0, 0), (0, 0, 1.0)",
+    "overlays": "vertices, cells = np.vstack((np.zeros(3), np.eye(3))), [[0, 1, 2, 3]]\n"
+    "B, X_WA, X_WB = collide.TetMesh(vertices, cells), np.eye(4), collide.pose((0.1, 0, 0))",
     "partitions": "mesh = collide.Mesh(*collide.tessellate(collide.Box((1, 1, 1)))[:2]); points = np.zeros((2, 3))\n"
     "low, high = (-2, -2, -2), (2, 2, 2)",
     "planar": "from collide.polytopes import planar_pose\nX_WBs = np.array([planar_pose((x, 0)) for x in (1, 5)])",
@@ -186,7 +188,7 @@ GIVEN = {
 #: Pages whose Python is not run here, and where it is, or why it is not.
 ELSEWHERE = {
     "disabled-pairs": "tests/sweeps", "sweeps": "tests/sweeps", "engines": "tests/adapters",
-    "fuzzing": "tests/adapters", "hosts": "tests/adapters, one file a host", "overlays": "tests/tetrahedra",
+    "fuzzing": "tests/adapters", "hosts": "tests/adapters, one file a host",
     "pages": "tests/pages", "report-schema": "tests/reports", "scene-format": "tests/scenes",
 }
 _ARM = """<robot name="panda"><link name="base"/><link name="panda_hand"><collision><geometry><box size="0.1 0.1 0.1"/>

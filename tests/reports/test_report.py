@@ -123,7 +123,9 @@ def test_an_l_and_a_ball_in_its_foot_are_five_centimetres_deep_in_a_report():
     world.add(angle, name="angle")
     world.add(Sphere(0.1), collide.pose((1.0, 0.0, 0.2)), name="ball")
     world.add(collide.Box((1, 1, 0.1)), collide.pose((1.0, 0.0, -0.13)), name="plate")
-    r = report.make(SimpleNamespace(**{**vars(make_scene([], dict(enumerate(("angle", "ball", "plate"))))), "world": lambda: world}))
+    scene = make_scene([], dict(enumerate(("angle", "ball", "plate"))))
+    scene.world = lambda: world
+    r = report.make(scene)
     told = [(p.a, p.b, round(p.depth, 12), p.certified) for p in r.colliding]
     assert told == [("angle", "plate", 0.07, True), ("angle", "ball", 0.05, True)]
 

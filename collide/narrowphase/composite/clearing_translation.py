@@ -1,11 +1,11 @@
 """Along a direction: how far a union of convex parts has to be moved until no part of it meets a part of the other.
 
-B moved by τ·n meets A only where τ·n lies in A ⊖ B of a pair of parts. A plane across m, above which no point of that set
-swept by both radii lies, h(m) = max m·w + r, proves the pair apart wherever τ·(m·n) > h(m) + error. So a pair bars the way
-from some length on, and up to a length that planes bound from above; the union is clear at the first length that no pair
-bars. Planes are those of GJK, seen from the point τ·n, which comes down along the line as planes are found (van den
-Bergen, "Ray casting against general convex objects with application to continuous collision detection", 2004). However the
-search goes, what planes prove holds.
+B moved by τ·n meets A only where τ·n lies in A ⊖ B of a pair of parts. A plane across m, above which no point of that
+set swept by both radii lies, h(m) = max m·w + r, proves the pair apart wherever τ·(m·n) > h(m) + error. So a pair bars
+the way from some length on, and up to a length that planes bound from above; the union is clear at the first length
+that no pair bars. Planes are those of GJK, seen from the point τ·n, which comes down along the line as planes are found
+(van den Bergen, "Ray casting against general convex objects with application to continuous collision detection", 2004).
+However the search goes, what planes prove holds.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ class Length(NamedTuple):
 
 
 class _Simplex(NamedTuple):
-    """Views of points as of `minkowski_difference`, where POINT is as seen from τ·e and POINT_OF_A as seen from 0, and of
-    their weights with the nearest point."""
+    """Views of points as of `minkowski_difference`, where POINT is as seen from τ·e and POINT_OF_A as seen from 0, and
+    of their weights with the nearest point."""
 
     points: Any
     weights: Any
@@ -200,10 +200,10 @@ def _farthest(pair, m):
 def _farthest_of(pair, body, m):
     """The point of a core farthest along m, in W's axes from its own origin; of a support tree, settled."""
     g = rotate_back(pair.poses, body.pose_at, m)
-    found = support(body.kind, body.coords, body.padded, pair.numbers, body.params_at, body.tree, 0, -1, g)
-    point = found.point
+    farthest = support(body.kind, body.coords, body.padded, pair.numbers, body.params_at, body.tree, 0, -1, g)
+    point = farthest.point
     if body.tree != 0:
-        vertex = settled_vertex(body.coords, body.padded, body.tree, found.id, g)
+        vertex = settled_vertex(body.coords, body.padded, body.tree, farthest.id, g)
         point = column_at(body.coords, body.padded, vertex)
     return rotate(pair.poses, body.pose_at, point)
 

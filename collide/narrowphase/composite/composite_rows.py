@@ -190,7 +190,7 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
     n_overlaps = int(score[at + _N_OVERLAPS])
     n_directions = 0 if size.has_halfspace else n_overlaps + _N_AXES
     best = Length(math.inf, math.inf)
-    chosen = 0
+    overlap_number = 0
     nhat = vec3_at(doubles, NORMAL)
     deepest = score[at + _DEEPEST + _DISTANCE]
     for k in range(n_directions):
@@ -205,13 +205,13 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
             length = clearing_length(parts, first_a, n_a, first_b, n_b, n, length, best.proven, work_at)
         if length.proven < best.proven:
             best = length
-            chosen = k if k < n_overlaps else 0
+            overlap_number = k if k < n_overlaps else 0
             nhat = n
     doubles[DISTANCE] = min(-best.value, upper)
     doubles[LOWER] = -best.proven * (1 + 2.0**-50)  # the normal is a unit vector but for rounding
     if best.proven < math.inf:
         # The points of these parts fit their own depth: their middle stays.
-        overlap = at + _DEEPEST + _OVERLAP * chosen
+        overlap = at + _DEEPEST + _OVERLAP * overlap_number
         row.words[PART_A] = int(score[overlap + _OF_A])
         row.words[PART_B] = int(score[overlap + _OF_B])
         middle = scale(0.5, add(vec3_at(score, overlap + _VECTORS + 3), vec3_at(score, overlap + _VECTORS + 6)))

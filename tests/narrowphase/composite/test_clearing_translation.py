@@ -58,7 +58,8 @@ def brackets(rng) -> list[collide.Shape]:
     far_wall = (collide.Box((thin, c, d)), pose(t=(a / 2, 0, d / 2)))
     lid = (collide.Box((a + thin, c, thin)), pose(t=(0, 0, b)))
     heap = [(collide.Box(rng.uniform(0.1, 1.0, 3)), random_pose(rng, 0.6)) for _ in range(int(rng.integers(2, 6)))]
-    return [collide.Compound(items) for items in ([foot, wall], [foot, wall, far_wall], [foot, wall, far_wall, lid], heap)]
+    u_shape = [foot, wall, far_wall]
+    return [collide.Compound(items) for items in ([foot, wall], u_shape, [*u_shape, lid], heap)]
 
 
 def test_a_ball_five_centimetres_into_the_foot_of_an_l_is_that_deep():
@@ -69,11 +70,11 @@ def test_a_ball_five_centimetres_into_the_foot_of_an_l_is_that_deep():
 
 
 def test_depths_of_unions_of_boxes_lie_in_their_brackets():
-    """No direction has a shorter way out than −upper; along the normal −lower is one, and nothing shorter than −distance."""
+    """No direction has a shorter way out than −upper; along the normal −lower is one, and none is shorter."""
     rng = rng_of("unions of boxes")
     seen: Counter = Counter()
     ratios = []
-    for k in range(160):
+    for k in range(100):
         kinds = brackets(rng)
         A = kinds[k % 4]
         B = collide.Box(rng.uniform(0.05, 0.8, 3)) if k % 3 == 0 else brackets(rng)[k // 4 % 4]
@@ -85,7 +86,7 @@ def test_depths_of_unions_of_boxes_lie_in_their_brackets():
             continue
         with naive.reproducible(case):
             slabs = slabs_of(case)
-            sampled = np.concatenate([rng.normal(size=(150, 3)), *(normals for normals, _ in slabs)])
+            sampled = np.concatenate([rng.normal(size=(60, 3)), *(normals for normals, _ in slabs)])
             shortest = min(first_clear(slabs, naive.unit(n)) for n in sampled)
             along = first_clear(slabs, r.normal)
             assert r.lower <= r.distance <= r.upper < 0.0
@@ -97,8 +98,8 @@ def test_depths_of_unions_of_boxes_lie_in_their_brackets():
             seen["certified"] += r.certified
             swapped = collide.distance(case.B, case.A, case.X_WB, case.X_WA)
             assert swapped.distance == r.distance and (swapped.normal == -r.normal).all()
-    # How near the least way out of 150 directions and all normals it comes.
-    assert seen["hits"] > 60 and seen["certified"] > 15, seen
+    # How near the least way out of 60 directions and all normals it comes.
+    assert seen["hits"] > 40 and seen["certified"] > 15, seen
     assert np.median(ratios) < 1.001 and np.mean(np.array(ratios) > 1.3) < 0.15, np.quantile(ratios, [0.5, 0.9, 1.0])
 
 

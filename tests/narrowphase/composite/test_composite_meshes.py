@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import naive
 import numpy as np
 import pytest
 from mesh_families import RIGHT_ANGLES
@@ -364,3 +365,30 @@ def test_curved_parts_inside_solids():
             r = collide.distance(union, mesh, X, EYE)
             assert r.hit == want == collide.collide(mesh, union, EYE, X) and r.how != 0
             assert want or (0.0 < r.lower and r.certified)
+
+
+def test_no_row_of_bodies_that_touch_far_from_the_origin_holds_nan():
+    """1e3 … 1e7 m away, brought to touch within rounding: every number of a row is one, of Worlds too."""
+    rng = rng_of("touching far away")
+    cube = collide.Mesh(*box())
+    hits = 0
+    for k in range(45):
+        kinds = {**naive.one_of_each(rng), "Mesh": cube, "Point": collide.ConvexHull([[0.0, 0.0, 0.0]])}
+        first, second = (kinds[str(name)] for name in rng.choice([n for n in kinds if n != "Halfspace"], 2))
+        A = collide.Compound([(cube, naive.pose(t=(4, 0, 0))), (first, np.eye(4))]) if k % 3 else first
+        X, Y = any_pose(rng, 1.0), any_pose(rng, 1.0)
+        X[:3, 3] += rng.normal(size=3) * 10.0 ** rng.uniform(3, 7)
+        Y[:3, 3] = X[:3, 3] + 0.3 * rng.normal(size=3)
+        for _ in range(3):
+            r = collide.distance(A, second, X, Y)
+            if not np.isfinite(r.distance):
+                break
+            Y[:3, 3] -= r.distance * r.normal
+        with naive.reproducible(naive.Case(A, second, X, Y)):
+            world = collide.World()
+            world.add(A, X), world.add(second, Y)
+            for rows in (collide.distance(A, second, X, Y).rows, world.distances(max_distance=0.1).rows):
+                for name in ("distance", "lower", "upper", "normal", "point_a", "point_b"):
+                    assert not np.isnan(rows[name]).any(), name
+            hits += r.hit
+    assert hits > 10, hits
