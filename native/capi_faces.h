@@ -30,6 +30,8 @@ struct making {
     const double *points; /* (n, 3) */
     int64_t n;
     double *units, *areas, tolerance; /* of triangles */
+    int64_t *longest;                 /* side of each: 0 from its first corner to its second */
+    unsigned char *wide;              /* whether each is no sliver */
     int64_t n_faces, n_corners;
     double *normals, *flatness; /* of faces */
     int64_t *triangles, *starts, *corners;

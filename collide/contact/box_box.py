@@ -276,11 +276,13 @@ def _put_face(F, G, face, t, error, exchanged, row):
     n = scale((1.0 if dot(a, t) >= 0.0 else -1.0) / math.sqrt(dot(a, a)), a)
     x, y, z = _end_of(G.x, G.half.x, n, error), _end_of(G.y, G.half.y, n, error), _end_of(G.z, G.half.z, n, error)
     p = _in_plane(add(t, add(add(x.corner, y.corner), z.corner)), e, f)
+    # Corners of other bodies' faces show where these overlap; a segment has no face, and its point is the corner's.
+    is_corner_over = (h_e > 0.0 and h_f > 0.0) or (abs(p.x) <= h_e + 4.0 * error and abs(p.y) <= h_f + 4.0 * error)
     # Middle of the edge or face, and half of its sides; of a corner these are 0.
     gx, gy, gz = _in_plane(x.side, e, f), _in_plane(y.side, e, f), _in_plane(z.side, e, f)
     p = Vec3(p.x + gx.x + gy.x + gz.x, p.y + gx.y + gy.y + gz.y, 0.0)
     slack = 4.0 * error
-    is_over = abs(p.x) + slack <= h_e + abs(gx.x) + abs(gy.x) + abs(gz.x)
+    is_over = is_corner_over and abs(p.x) + slack <= h_e + abs(gx.x) + abs(gy.x) + abs(gz.x)
     is_over = is_over and abs(p.y) + slack <= h_f + abs(gx.y) + abs(gy.y) + abs(gz.y)
     is_over = is_over and _is_met_across(gx, gy, gz, p, h_e, h_f, slack)
     is_over = is_over and _is_met_across(gy, gz, gx, p, h_e, h_f, slack)
@@ -320,9 +322,9 @@ def _is_met_across(side, second, third, p, h_e, h_f, slack):
 
 @kernel
 def _put_edges(A, B, edges, t, error, row):
-    """Normal and points of the row, from two edges; False where bodies are apart and other points are nearer.
+    """Normal and points of the row, from two edges; False where their nearest places may lie beyond an end.
 
-    t : from A's centre to B's.
+    t : from A's centre to B's. Products are good to the error, the places to that over the square of the sine.
     """
     a, b = _axis_of(A, edges.a), _axis_of(B, edges.b)
     c = cross(a, b)
@@ -333,15 +335,15 @@ def _put_edges(A, B, edges, t, error, row):
     q = add(sub(t, _farthest_corner(B, n)), scale(h_b * _sign(dot(b, n)), b))
     w = sub(q, p)
     along = dot(a, b)
-    square = 1.0 - along * along
+    square = dot(c, c)
     at_a = (dot(a, w) - along * dot(b, w)) / square
     at_b = (along * dot(a, w) - dot(b, w)) / square
-    is_within = abs(at_a) <= h_a - error / edges.sine and abs(at_b) <= h_b - error / edges.sine
-    on_a = add(add(p, scale(min(max(at_a, -h_a), h_a), a)), A.p)
+    off = error / square
+    on_a = add(add(p, scale(at_a, a)), A.p)
     put_vec3(row.doubles, NORMAL, add(n, Vec3(0.0, 0.0, 0.0)))
     put_vec3(row.doubles, POINT_A, on_a)
     put_vec3(row.doubles, POINT_B, add(on_a, scale(edges.gap, n)))
-    return is_within or edges.gap < 0.0
+    return abs(at_a) <= h_a - off and abs(at_b) <= h_b - off
 
 
 @kernel(inline=True)

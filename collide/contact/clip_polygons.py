@@ -12,6 +12,21 @@ from typing import Any, NamedTuple
 
 from collide.kernels import kernel
 
+#: Triangles, and other faces of less than this part of their length's square, are clipped at their tips, too.
+_THIN = 0.25
+
+
+class Tips(NamedTuple):
+    """The two corners of a triangle or a thin face farthest apart, else −1, and the unit vector from second to first.
+
+    Sides moved out by a tolerance meet far beyond a sharp tip: by the tolerance over the sine of half its angle.
+    """
+
+    first: int
+    second: int
+    du: float
+    dv: float
+
 
 class Clipped(NamedTuple):
     """A polygon in the making: view of u, v of each corner, and of the number of the side that begins there.
@@ -27,6 +42,42 @@ class Clipped(NamedTuple):
 def corner_of_b(face, k):
     """Which corner of B's face is number k anticlockwise along the normal of A: B's is seen from behind."""
     return face.n - 1 - k
+
+
+@kernel(inline=True)
+def _square_between(face, i, j):
+    du, dv = face.corners[3 * i] - face.corners[3 * j], face.corners[3 * i + 1] - face.corners[3 * j + 1]
+    return du * du + dv * dv
+
+
+@kernel(inline=True)
+def _farthest_from(face, corner):
+    farthest, square = corner, 0.0
+    for k in range(face.n):
+        away = _square_between(face, k, corner)
+        if away > square:
+            farthest, square = k, away
+    return farthest
+
+
+@kernel
+def _tips_of(face):
+    """The `Tips` of a face."""
+    area = 0.0
+    u0, v0 = face.corners[0], face.corners[1]
+    for k in range(1, face.n - 1):
+        u, v = face.corners[3 * k] - u0, face.corners[3 * k + 1] - v0
+        area += u * (face.corners[3 * k + 4] - v0) - v * (face.corners[3 * k + 3] - u0)
+    first = _farthest_from(face, 0)
+    second = _farthest_from(face, first)
+    square = _square_between(face, first, second)
+    if square == 0.0 or (face.n > 3 and abs(area) > _THIN * square):
+        return Tips(-1, -1, 0.0, 0.0)
+    length = math.sqrt(square)
+    return Tips(
+        first, second, (face.corners[3 * first] - face.corners[3 * second]) / length,
+        (face.corners[3 * first + 1] - face.corners[3 * second + 1]) / length,
+    )  # fmt: skip
 
 
 @kernel
@@ -54,6 +105,16 @@ def clip_polygons(face_a, face_b, tolerance, first, second):
         n = _clip_side(side, u, v, du / length, dv / length, tolerance, source, n, target)
         source, target = target, source
         in_second = not in_second
+        if n == 0:
+            return 0, in_second
+    tips = _tips_of(face_a)
+    if tips.first < 0:
+        return n, in_second
+    for k in range(2):  # back in the buffer it is in
+        tip, sense = (tips.first, 1.0) if k == 0 else (tips.second, -1.0)
+        u, v = face_a.corners[3 * tip], face_a.corners[3 * tip + 1]
+        n = _clip_side(tip, u, v, -sense * tips.dv, sense * tips.du, tolerance, source, n, target)
+        source, target = target, source
         if n == 0:
             break
     return n, in_second
@@ -97,10 +158,15 @@ def clip_segment(face, is_b, u0, v0, u1, v1, tolerance):
     low, high = 0.0, 1.0
     low_side, high_side = -1, -1
     sense = -1.0 if is_b else 1.0  # B's corners run clockwise here
-    for side in range(face.n):
-        following = 3 * (side + 1 if side + 1 < face.n else 0)
+    tips = _tips_of(face)
+    for k in range(face.n if tips.first < 0 else face.n + 2):
+        side = k if k < face.n else tips.first if k == face.n else tips.second
         u, v = face.corners[3 * side], face.corners[3 * side + 1]
-        du, dv = sense * (face.corners[following] - u), sense * (face.corners[following + 1] - v)
+        if k < face.n:
+            following = 3 * (side + 1 if side + 1 < face.n else 0)
+            du, dv = sense * (face.corners[following] - u), sense * (face.corners[following + 1] - v)
+        else:
+            du, dv = (-tips.dv, tips.du) if k == face.n else (tips.dv, -tips.du)
         length = math.sqrt(du * du + dv * dv)
         if length == 0.0:
             continue

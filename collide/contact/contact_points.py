@@ -182,6 +182,8 @@ def _crossings(pairs, k, A, B, view, points, n):
             outside_f = min(_ERRORS_OUTSIDE * error * long_e / abs(span), _FARTHEST_OUTSIDE)
             if of_e < -outside_e or of_e > 1.0 + outside_e or of_f < -outside_f or of_f > 1.0 + outside_f:
                 continue
+            # The place is on both edges: beyond an end of nearly parallel ones it were far along them.
+            of_e, of_f = min(max(of_e, 0.0), 1.0), min(max(of_f, 0.0), 1.0)
             h_a, h_b = seen[p + 2] + of_e * eh, seen[r + 2] + of_f * fh
             slack = 64.0 * error * (long_e + long_f) / abs(span)
             bound = 32.0 * error + slack * (abs(eh) + abs(fh))

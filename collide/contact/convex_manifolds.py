@@ -31,7 +31,7 @@ from collide.contact.manifold_points import (
     overlap_points,
 )
 from collide.contact.reduce_points import select_points
-from collide.contact.support_face import SupportFace, axes_across, seen_along, support_face
+from collide.contact.support_face import SupportFace, axes_across, seen_along, support_face, swept_face
 from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.shape_table import NUMBERS, POSE, POSE_SLOP, SLOP
@@ -120,30 +120,30 @@ def put_manifold(header_at, a, b, row, margin, max_contacts, out_at):
     of_b = support_face(
         pair, pair.B, header[FACES_AT], axes, -1.0, pair.t, largest, doubles + 24 * largest, integers + 16 * largest
     )
-    nearest_a = sub(_point(row, not flip), vec3_at(pair.poses, pair.A.pose_at + 9))
-    radius_a, radius_b = radius_of(pair, pair.A), radius_of(pair, pair.B)
-    nearest = seen_along(axes, sub(nearest_a, scale(radius_a, axes.nhat)))
+    of_b = swept_face(of_b, -1.0, radius_of(pair, pair.B), error)
+    nearest = seen_along(axes, sub(_point(row, not flip), vec3_at(pair.poses, pair.A.pose_at + 9)))
     if pair.A.kind == HALFSPACE:
         of_a = _plane_face(of_b, nearest)
     else:
         of_a = support_face(
             pair, pair.A, header[FACES_AT], axes, 1.0, Vec3(0.0, 0.0, 0.0), largest, doubles, integers
         )
+        of_a = swept_face(of_a, 1.0, radius_of(pair, pair.A), error)
     polygons, flags = doubles + 48 * largest, integers + 32 * largest
     first = Clipped(view_f64(polygons, 2 * n_max), view_i64(flags, n_max))
     second = Clipped(view_f64(polygons + 16 * n_max, 2 * n_max), view_i64(flags + 8 * n_max, n_max))
     manifold = ManifoldPoints(view_f64(polygons + 32 * n_max, POINT * n_max), view_i64(flags + 16 * n_max, 2 * n_max))
     order = view_i64(flags + 32 * n_max, n_max)
-    radius = radius_a + radius_b
     bound = _bound(error, of_a, of_b)
     if pair.A.kind == HALFSPACE:
         n = _points_on_plane(of_a, of_b, manifold)
     else:
-        n = overlap_points(of_a, of_b, 16.0 * error, first, second, manifold)
-    n = keep_near(manifold, n, margin + radius + bound)
-    core_distance = row.doubles[DISTANCE] + radius
-    bracket = max(row.doubles[UPPER] - row.doubles[DISTANCE], row.doubles[DISTANCE] - row.doubles[LOWER])
-    if least_gap(manifold, n) - bound > core_distance + bracket + _ERRORS * error:
+        n, off = overlap_points(of_a, of_b, 16.0 * error, margin, first, second, manifold)
+        bound += off
+    n = keep_near(manifold, n, margin + bound)
+    distance = row.doubles[DISTANCE]
+    bracket = max(row.doubles[UPPER] - distance, distance - row.doubles[LOWER])
+    if least_gap(manifold, n) - bound > distance + bracket + _ERRORS * error:
         k = _corner_near(manifold, n, nearest)
         if k < 0:  # put in front: the nearest points, where corners are farther apart
             for j in range(n):
@@ -154,12 +154,12 @@ def put_manifold(header_at, a, b, row, margin, max_contacts, out_at):
             manifold.features[1] = of_b.feature
         manifold.points[POINT * k] = nearest.x
         manifold.points[POINT * k + V] = nearest.y
-        manifold.points[POINT * k + POINT_GAP] = core_distance
-        manifold.points[POINT * k + HEIGHT] = nearest.z + 0.5 * core_distance
+        manifold.points[POINT * k + POINT_GAP] = distance
+        manifold.points[POINT * k + HEIGHT] = nearest.z + 0.5 * distance
         bound = max(bound, bracket)
     tolerance = max(_ERRORS * error, _SHARE * _extent(manifold, n))
     n = drop_repeated(manifold, n, bound, tolerance)
-    first_point = deepest_point(manifold, n, bound, tolerance)
+    first_point = deepest_point(manifold, n, bound)
     n = select_points(manifold, n, first_point, max_contacts, order)
     bound += 8.0 * error + pair.numbers[NUMBERS * pair.A.shape + SLOP] + pair.numbers[NUMBERS * pair.B.shape + SLOP]
     bound += pair.poses[pair.A.pose_at + POSE_SLOP] + pair.poses[pair.B.pose_at + POSE_SLOP]
@@ -207,7 +207,7 @@ def _bound(error, of_a, of_b):
 def _plane_face(of_b, nearest):
     """The face of a half-space: its plane, without corners."""
     return SupportFace(
-        0, -1, nearest.x, nearest.y, nearest.z, 0.0, 0.0, 0.0, of_b.corners, of_b.features, of_b.edges, -1
+        0, -1, nearest.x, nearest.y, nearest.z, 0.0, 0.0, 0.0, 0.0, of_b.corners, of_b.features, of_b.edges, -1
     )
 
 
@@ -256,14 +256,16 @@ def _extent(manifold, n):
 def _write_contact(contact_at, manifold, k, is_first, axes, pair, row, flip, bound):
     """One row, in the order in which A and B were asked for."""
     doubles, words = view_f64(contact_at, _CONTACT // 8), view_i32(contact_at, _CONTACT // 4)
-    radius_a, radius_b = radius_of(pair, pair.A), radius_of(pair, pair.B)
-    distance = manifold.points[POINT * k + POINT_GAP] - radius_a - radius_b
+    distance = manifold.points[POINT * k + POINT_GAP]
     lower, upper = distance - bound, distance + bound
-    if is_first and lower <= row.doubles[UPPER] and row.doubles[LOWER] <= upper:
+    if is_first:
         distance = row.doubles[DISTANCE]  # the deepest point of the manifold is that of the pair
         lower = min(lower, row.doubles[LOWER])
         upper = max(upper, row.doubles[UPPER])
-    height = manifold.points[POINT * k + HEIGHT] + 0.5 * (radius_a - radius_b)
+    else:  # none is deeper, but for what either is known by
+        distance = max(distance, row.doubles[DISTANCE])
+        upper = max(upper, distance)
+    height = manifold.points[POINT * k + HEIGHT]
     middle = add(
         add(scale(manifold.points[POINT * k], axes.e), scale(manifold.points[POINT * k + V], axes.f)),
         scale(height, axes.nhat),

@@ -188,7 +188,7 @@ def _empty_face(near):
     """No corners."""
     zero = np.int64(0)
     return SupportFace(
-        zero, zero, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, near.face, near.face_features, near.face_edges, np.int64(-1)
+        zero, zero, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, near.face, near.face_features, near.face_edges, np.int64(-1)
     )
 
 
@@ -223,8 +223,8 @@ def _face_of(near, k, axes):
             slope_u, slope_v = (e.z * f.y - f.z * e.y) / area, (e.x * f.z - f.x * e.z) / area
             spread = max(p.z, q.z, r.z) - min(p.z, q.z, r.z)
             face = SupportFace(
-                np.int64(3), np.int64(facet), p.x, p.y, p.z, slope_u, slope_v, 0.0, near.face, near.face_features,
-                near.face_edges, np.int64(4 * facet + FACE),
+                np.int64(3), np.int64(facet), p.x, p.y, p.z, slope_u, slope_v, 0.0, 0.0, near.face,
+                near.face_features, near.face_edges, np.int64(4 * facet + FACE),
             )  # fmt: skip
             return face, 32.0 * near.error + 64.0 * near.error * longest * spread / abs(area)
     return _edge_of(near, facet)
@@ -250,8 +250,8 @@ def _edge_of(near, facet):
     near.face_edges[0] = edge
     near.face_edges[1] = edge
     return SupportFace(
-        np.int64(2), np.int64(facet), p.x, p.y, p.z, 0.0, 0.0, 0.0, near.face, near.face_features, near.face_edges,
-        edge,
+        np.int64(2), np.int64(facet), p.x, p.y, p.z, 0.0, 0.0, 0.0, 0.0, near.face, near.face_features,
+        near.face_edges, edge,
     ), 32.0 * near.error  # fmt: skip
 
 
@@ -263,7 +263,8 @@ def _put_facet(near, k, of_set, look, n):
         return n
     bound += 2.0 * of_set.flatness
     if of_set.n > 1:
-        m = overlap_points(face, of_set, 16.0 * near.error, near.first, near.second, near.overlap)
+        m, off = overlap_points(face, of_set, 16.0 * near.error, -math.inf, near.first, near.second, near.overlap)
+        bound += off
     else:
         m = _vertex_over(face, of_set, 16.0 * near.error, near.overlap)
     points, overlap = near.points, near.overlap

@@ -7,15 +7,21 @@ from typing import Any, NamedTuple
 
 from collide.contact.clip_polygons import Clipped, clip_polygons, clip_segment, corner_of_b
 from collide.kernels import kernel
+from collide.numerics.vec3 import Vec3, vec3_at
 
 #: Doubles of a point: place across the normal, gap along it, height of the middle between both bodies.
 U, V, GAP, HEIGHT = range(4)
 POINT = 4
-#: Sines up to this are those of parallel lines: where these overlap they touch along a line, and each end lies off the
-#: other line by so much of its length at most.
+#: Sines up to this are those of parallel sharp lines: where these overlap they touch along a line, and each end lies
+#: off the other line by so much of its length at most.
 _PARALLEL = 2.0**-36
-#: Lines farther beside each other than this part of the shorter do not touch along it.
+#: Sharp lines farther beside each other than this part of the shorter do not touch along it.
 _BESIDE = 2.0**-20
+#: Sines up to this are those of lines along each other where a surface is round across one: it falls off from its line
+#: with the square of how far the other is beside it, and that is worked out.
+_ALONG = 2.0**-10
+#: Round surfaces are looked at down to 45°, as faces are: so far beside its line, in radii.
+_ASIDE = math.sqrt(0.5)
 
 
 class ManifoldPoints(NamedTuple):
@@ -47,20 +53,69 @@ def height_at(face, u, v):
     return face.h + face.slope_u * (u - face.u) + face.slope_v * (v - face.v)
 
 
-@kernel
-def overlap_points(face_a, face_b, tolerance, first, second, manifold):
-    """Put the corners of the overlap of two support faces, counter-clockwise; how many. None where one is a vertex.
+class Line(NamedTuple):
+    """An edge seen along the normal: its ends (u, v, h), and what is named there.
 
-    tolerance : corners so far outside count as inside [m].   first, second : room for polygons (`clip_polygons`).
+    round : as in `SupportFace`.
+    """
+
+    p: Vec3
+    q: Vec3
+    round: float
+    feature_p: int
+    feature_q: int
+    edge: int
+
+
+class SharedSpan(NamedTuple):
+    """What two edges share: parameters along A, and of B's edge those of A where it is 0 and 1; none where low > high.
+
+    off : how far places on both are apart, at most, where both are sharp [m].
+    """
+
+    low: float
+    high: float
+    begin: float
+    end: float
+    off: float
+
+
+@kernel(inline=True)
+def _line_of(edge):
+    """The `Line` of a `SupportFace` of two corners."""
+    return Line(
+        vec3_at(edge.corners, 0), vec3_at(edge.corners, 3), edge.round, edge.features[0], edge.features[1],
+        edge.edges[0],
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def _side_of(face, side):
+    """The `Line` of a side of a face."""
+    following = side + 1 if side + 1 < face.n else 0
+    return Line(
+        vec3_at(face.corners, 3 * side), vec3_at(face.corners, 3 * following), 0.0, face.features[side],
+        face.features[following], face.edges[side],
+    )  # fmt: skip
+
+
+@kernel
+def overlap_points(face_a, face_b, tolerance, max_gap, first, second, manifold):
+    """Put the corners of the overlap of two support faces, counter-clockwise; (how many, how far gaps are off by that
+    places on both are apart [m]). None where one is a vertex.
+
+    tolerance : corners so far outside count as inside [m].   max_gap : ends of a round line are looked for along the
+    sides of a face where both are within this gap [m].   first, second : room for polygons (`clip_polygons`).
     """
     if face_a.n < 2 or face_b.n < 2:
-        return 0
+        return 0, 0.0
     if face_a.n == 2 and face_b.n == 2:
-        return _overlap_of_edges(face_a, face_b, tolerance, manifold)
+        a, b = _line_of(face_a), _line_of(face_b)
+        return _put_shared(a, b, shared_span(a, b, tolerance), manifold)
     if face_a.n == 2:
-        return _edge_over_face(face_a, face_b, False, tolerance, manifold)
+        return _edge_over_face(face_a, face_b, False, tolerance, max_gap, manifold), 0.0
     if face_b.n == 2:
-        return _edge_over_face(face_b, face_a, True, tolerance, manifold)
+        return _edge_over_face(face_b, face_a, True, tolerance, max_gap, manifold), 0.0
     n, in_second = clip_polygons(face_a, face_b, tolerance, first, second)
     polygon = Clipped(second.points if in_second else first.points, second.sides if in_second else first.sides)
     before = polygon.sides[n - 1] if n > 0 else 0
@@ -68,7 +123,7 @@ def overlap_points(face_a, face_b, tolerance, first, second, manifold):
         side = polygon.sides[k]
         _put_corner(face_a, face_b, before, side, polygon.points[2 * k], polygon.points[2 * k + 1], manifold, k)
         before = side
-    return n
+    return n, 0.0
 
 
 @kernel
@@ -98,14 +153,13 @@ def _put_corner(face_a, face_b, before, side, u, v, manifold, k):
 
 
 @kernel
-def _edge_over_face(edge, face, is_edge_of_b, tolerance, manifold):
-    """The ends of what lies over a face of an edge; how many."""
+def _edge_over_face(edge, face, is_edge_of_b, tolerance, max_gap, manifold):
+    """The ends of what lies over a face of an edge, or, of a round one, along a side of the face; how many."""
     u0, v0 = edge.corners[0], edge.corners[1]
     u1, v1 = edge.corners[3], edge.corners[4]
     low, high, low_side, high_side = clip_segment(face, not is_edge_of_b, u0, v0, u1, v1, tolerance)
-    if low > high:
-        return 0
-    for k in range(2):
+    n = 0 if low > high else 2
+    for k in range(n):
         t, side = (low, low_side) if k == 0 else (high, high_side)
         u, v = u0 + t * (u1 - u0), v0 + t * (v1 - v0)
         h = edge.corners[2] + t * (edge.corners[5] - edge.corners[2])
@@ -115,43 +169,146 @@ def _edge_over_face(edge, face, is_edge_of_b, tolerance, manifold):
             _put(manifold, k, u, v, height_at(face, u, v), h, of_face, of_edge)
         else:
             _put(manifold, k, u, v, h, height_at(face, u, v), of_edge, of_face)
-    return 2
+    if edge.round > 0.0:
+        return _ends_beside(edge, face, is_edge_of_b, tolerance, max_gap, n, manifold)
+    return n
 
 
 @kernel
-def _overlap_of_edges(edge_a, edge_b, tolerance, manifold):
-    """The ends of what two parallel edges share; how many. Crossing ones have their nearest points and no more."""
-    u0, v0 = edge_a.corners[0], edge_a.corners[1]
-    du, dv = edge_a.corners[3] - u0, edge_a.corners[4] - v0
-    eu, ev = edge_b.corners[3] - edge_b.corners[0], edge_b.corners[4] - edge_b.corners[1]
+def _ends_beside(edge, face, is_edge_of_b, tolerance, max_gap, n, manifold):
+    """Put the ends of what a round edge shares with a side of a face, where that is longer than what lies over the face
+    within the gap; how many points there are, n before.
+
+    A capsule along an edge of a box, turned by a hair, lies over one face with one half, over another with the other.
+    """
+    line = _line_of(edge)
+    square = 0.0
+    if n == 2 and max(manifold.points[GAP], manifold.points[POINT + GAP]) <= max_gap:
+        square = _square(manifold.points, 0, 1)
+    longest = math.sqrt(square) + tolerance
+    best = -1
+    for side in range(face.n):
+        rim = _side_of(face, side)
+        a, b = (rim, line) if is_edge_of_b else (line, rim)
+        shared = shared_span(a, b, tolerance)
+        du, dv = a.q.x - a.p.x, a.q.y - a.p.y
+        length = (shared.high - shared.low) * math.sqrt(du * du + dv * dv)
+        if not length > longest:
+            continue
+        farthest = max(_point_at(a, b, shared, shared.low).gap, _point_at(a, b, shared, shared.high).gap)
+        if farthest <= max_gap:
+            best, longest = side, length
+    if best < 0:
+        return n
+    rim = _side_of(face, best)
+    a, b = (rim, line) if is_edge_of_b else (line, rim)
+    n, _ = _put_shared(a, b, shared_span(a, b, tolerance), manifold)
+    return n
+
+
+@kernel
+def shared_span(a, b, tolerance):
+    """The `SharedSpan` of two edges nearly parallel; crossing ones have their nearest points and no more."""
+    none = SharedSpan(1.0, 0.0, 0.0, 1.0, 0.0)
+    du, dv, eu, ev = a.q.x - a.p.x, a.q.y - a.p.y, b.q.x - b.p.x, b.q.y - b.p.y
     length_a, length_b = math.sqrt(du * du + dv * dv), math.sqrt(eu * eu + ev * ev)
     if length_a == 0.0 or length_b == 0.0:
-        return 0
-    if abs(du * ev - dv * eu) > _PARALLEL * length_a * length_b + tolerance * (length_a + length_b):
-        return 0
-    # The normal of curved bodies is good to 2⁻²⁶: seen along it, lines that touch may lie beside each other by as much.
-    beside = abs(du * (edge_b.corners[1] - v0) - dv * (edge_b.corners[0] - u0)) / length_a
-    if beside > _BESIDE * min(length_a, length_b) + tolerance:
-        return 0
+        return none
+    rounding = a.round + b.round
+    across = abs(du * ev - dv * eu)
+    if across > (_ALONG if rounding > 0.0 else _PARALLEL) * length_a * length_b + tolerance * (length_a + length_b):
+        return none
     square = length_a * length_a
-    at_0 = ((edge_b.corners[0] - u0) * du + (edge_b.corners[1] - v0) * dv) / square
-    at_1 = ((edge_b.corners[3] - u0) * du + (edge_b.corners[4] - v0) * dv) / square
-    first_b, last_b = (0, 1) if at_0 <= at_1 else (1, 0)
-    low_b, high_b = min(at_0, at_1), max(at_0, at_1)
-    low, high = max(0.0, low_b), min(1.0, high_b)
-    if low > high:
-        return 0
+    begin = ((b.p.x - a.p.x) * du + (b.p.y - a.p.y) * dv) / square
+    end = ((b.q.x - a.p.x) * du + (b.q.y - a.p.y) * dv) / square
+    if begin == end:
+        return none
+    low, high = max(0.0, min(begin, end)), min(1.0, max(begin, end))
+    # How far the lines are beside each other at both ends of what they share: linear in between.
+    beside_p = (du * (b.p.y - a.p.y) - dv * (b.p.x - a.p.x)) / length_a
+    beside_q = (du * (b.q.y - a.p.y) - dv * (b.q.x - a.p.x)) / length_a
+    at_low = beside_p + (low - begin) / (end - begin) * (beside_q - beside_p)
+    at_high = beside_p + (high - begin) / (end - begin) * (beside_q - beside_p)
+    off = max(abs(at_low), abs(at_high))
+    if rounding > 0.0:
+        # A place is beside A's line: square to it, and so beyond an end of B's by the sine of what is between.
+        slip = across / (square * length_b)
+        if min(begin, end) > 0.0:
+            low += slip * abs(at_low)
+        if max(begin, end) < 1.0:
+            high -= slip * abs(at_high)
+        return SharedSpan(low, high, begin, end, 0.0) if off <= _ASIDE * rounding else none
+    # The normal of curved bodies is good to 2⁻²⁶: seen along it, lines that touch may lie beside each other by as much.
+    if off > _BESIDE * min(length_a, length_b) + tolerance:
+        return none
+    return SharedSpan(low, high, begin, end, off)
+
+
+class PlaceBetween(NamedTuple):
+    """A place (u, v) between two edges, with the heights of both surfaces and the gap there."""
+
+    u: float
+    v: float
+    h_a: float
+    h_b: float
+    gap: float
+
+
+@kernel(inline=True)
+def _point_at(a, b, shared, t):
+    """The `PlaceBetween` at parameter t of A: of sharp edges on A, else between both, as their radii are."""
+    du, dv, dh = a.q.x - a.p.x, a.q.y - a.p.y, a.q.z - a.p.z
+    eu, ev, eh = b.q.x - b.p.x, b.q.y - b.p.y, b.q.z - b.p.z
+    s = min(max((t - shared.begin) / (shared.end - shared.begin), 0.0), 1.0)
+    u, v = a.p.x + t * du, a.p.y + t * dv
+    wu, wv = b.p.x + s * eu - u, b.p.y + s * ev - v
+    h_a, h_b = a.p.z + t * dh, b.p.z + s * eh
+    rounding = a.round + b.round
+    if rounding > 0.0:
+        share = a.round / rounding
+        u += share * wu
+        v += share * wv
+        h_a -= _fall(a.round, share * wu, share * wv, du, dv, dh)
+        h_b += _fall(b.round, (1.0 - share) * wu, (1.0 - share) * wv, eu, ev, eh)
+    return PlaceBetween(u, v, h_a, h_b, h_b - h_a)
+
+
+@kernel(inline=True)
+def _fall(radius, wu, wv, du, dv, dh):
+    """By how much a round surface falls off from its line at a place (wu, wv) beside it; (du, dv, dh) along the line.
+
+    With e the unit vector along the axis, w across nhat, and z the height over the axis, |w + z·nhat|² less the square
+    of its product with e is the squared radius: a·z² − 2·(e·nhat)·(w·e)·z + w² − (w·e)² = r², where a = 1 − (e·nhat)².
+    Of A w leads from its axis and z is above it, of B both are turned about.
+    """
+    if radius == 0.0:
+        return 0.0
+    square = du * du + dv * dv
+    length = math.sqrt(square + dh * dh)
+    along, rise = (wu * du + wv * dv) / length, dh / length
+    a = square / (length * length)
+    aside = a * (wu * wu + wv * wv) - along * along
+    level = a * radius * radius
+    return (aside / (math.sqrt(level) + math.sqrt(max(level - aside, 0.0))) - rise * along) / a
+
+
+@kernel
+def _put_shared(a, b, shared, manifold):
+    """Put the ends of what two edges share; (how many, how far gaps are off [m])."""
+    if shared.low > shared.high:
+        return 0, 0.0
+    low_b, high_b = min(shared.begin, shared.end), max(shared.begin, shared.end)
+    is_turned = shared.begin > shared.end
     for k in range(2):
-        t = low if k == 0 else high
-        u, v = u0 + t * du, v0 + t * dv
+        at = _point_at(a, b, shared, shared.low if k == 0 else shared.high)
         is_of_a = low_b <= 0.0 if k == 0 else high_b >= 1.0
-        feature_a = edge_a.features[k] if is_of_a else edge_a.edges[0]
-        feature_b = edge_b.edges[0] if is_of_a else edge_b.features[first_b if k == 0 else last_b]
-        _put(
-            manifold, k, u, v, edge_a.corners[2] + t * (edge_a.corners[5] - edge_a.corners[2]),
-            height_at(edge_b, u, v), feature_a, feature_b,
-        )  # fmt: skip
-    return 2
+        feature_a, feature_b = a.edge, b.edge
+        if is_of_a:
+            feature_a = a.feature_p if k == 0 else a.feature_q
+        else:
+            feature_b = b.feature_q if (k == 0) == is_turned else b.feature_p
+        _put(manifold, k, at.u, at.v, at.h_a, at.h_b, feature_a, feature_b)
+    return 2, shared.off
 
 
 @kernel(inline=True)
@@ -243,10 +400,10 @@ def _is_between(points, i, j, k):
 
 
 @kernel
-def deepest_point(manifold, n, error, tolerance):
-    """Which of n points is to come first: of those as deep as the deepest, but for rounding, the one of least u, v."""
+def deepest_point(manifold, n, error):
+    """Which of n points is to come first: of those as deep as the deepest, but for the error, that of least u, v."""
     points = manifold.points
-    known = least_gap(manifold, n) + 2.0 * error + tolerance
+    known = least_gap(manifold, n) + 2.0 * error
     best = -1
     for k in range(n):
         if points[POINT * k + GAP] > known:

@@ -33,6 +33,7 @@ from collide.lowering.hull_faces import (
     VERTEX_IDS_AT,
 )
 from collide.lowering.packed_convex import CONE, CYLINDER, POINTS
+from collide.narrowphase.posed_pair import reach_of
 from collide.numerics.vec3 import Vec3, add, column_at, cross, dot, norm, put_vec3, rotate, scale, sub, vec3_at
 from collide.support.support_mapping import curved_support, settled_vertex, support_vertex
 from collide.support.support_tree_query import extreme_vertex_listed
@@ -41,6 +42,10 @@ from collide.support.support_tree_query import extreme_vertex_listed
 _ACROSS = 0.7
 #: Corners of the polygon within a cylinder's end or a cone's base.
 ROUND = 8
+#: Corners are good to this part of the body's size: the direction of an edge is known to so much over its length.
+_BLUR = 2.0**-46
+#: Faces and edges whose direction is known worse than to this angle show no more than their nearest point when swept.
+_KNOWN = 2.0**-20
 #: Sines below this count as 0: a cylinder stands upright. At rest it tilts this way and that by less, and corners that
 #: went around with its lowest point would never let it rest.
 _UPRIGHT = 2.0**-20
@@ -65,7 +70,8 @@ class SupportFace(NamedTuple):
     n : of corners: 1 a vertex, 2 an edge, more a face, counter-clockwise seen from outside the body.
     triangle : of the hull, −1 where there is none.
     u, v, h : a point of the face's plane.   slope_u, slope_v : of the height h there; 0 but of faces.
-    flatness : how far the corners may be off that plane [m].
+    flatness : how far what the corners stand for may be off that plane, or off an edge between them [m].
+    round : radius of the body's surface across an edge, 0 where it is sharp [m].
     corners : view of the coordinates.   features, edges : of each corner, and of the edge from it to the next.
     feature : of the face as a whole.
     """
@@ -78,6 +84,7 @@ class SupportFace(NamedTuple):
     slope_u: float
     slope_v: float
     flatness: float
+    round: float
     corners: Any
     features: Any
     edges: Any
@@ -131,12 +138,18 @@ def support_face(pair, body, faces_at, axes, sign, shift, capacity, doubles_at, 
     facing = Vec3(dot(cofactors[0], direction), dot(cofactors[1], direction), dot(cofactors[2], direction))
     normal = Vec3(0.0, 0.0, 0.0)
     flatness = 0.0
+    rounding = 0.0
     triangle = np.int64(-1)
     feature = np.int64(-1)
     if body.kind == POINTS:
-        n, triangle, normal, flatness, feature = _hull_corners(body, faces_at, g, facing, corners, features, edges)
+        blur = _BLUR * reach_of(pair, body)
+        n, triangle, normal, flatness, feature = _hull_corners(
+            body, faces_at, g, facing, blur, corners, features, edges
+        )
     elif body.kind == CYLINDER or body.kind == CONE:
         n, normal, flatness = _round_corners(pair, body, g, corners, features, edges)
+        if body.kind == CYLINDER and n == 2:
+            rounding = pair.numbers[body.params_at]
     else:
         n = 1
         put_vec3(corners, 0, curved_support(body.kind, pair.numbers, body.params_at, g))
@@ -147,15 +160,64 @@ def support_face(pair, body, faces_at, axes, sign, shift, capacity, doubles_at, 
     base = vec3_at(corners, 0)
     if n < 3:
         return SupportFace(
-            n, triangle, base.x, base.y, base.z, 0.0, 0.0, flatness, corners, features, edges, feature
+            n, triangle, base.x, base.y, base.z, 0.0, 0.0, flatness, rounding, corners, features, edges, feature
         )
     N = add(
         add(scale(normal.x, cofactors[0]), scale(normal.y, cofactors[1])), scale(normal.z, cofactors[2])
     )
     N = seen_along(axes, N)
     return SupportFace(
-        n, triangle, base.x, base.y, base.z, -N.x / N.z, -N.y / N.z, flatness, corners, features, edges, feature
+        n, triangle, base.x, base.y, base.z, -N.x / N.z, -N.y / N.z, flatness, 0.0, corners, features, edges, feature
     )
+
+
+@kernel
+def swept_face(face, sign, radius, error):
+    """The `SupportFace` of a body swept by a ball, from that of its core: the same corners moved by the radius along
+    the normal of the face, of an edge along what of nhat is across it, of a vertex along nhat.
+
+    The corners lie on the surface then, however far the core leans.   sign : as in `support_face`.
+    error : of a coordinate [m]. By it, or by its flatness, the direction of an edge of length l is known to 2·error/l,
+    that of a face of area A whose longest side is l to 2·error·l/A; swept, it is off by so much of the radius.
+    """
+    if radius == 0.0 or face.n == 0:
+        return face
+    corners, n = face.corners, face.n
+    shift = Vec3(0.0, 0.0, sign)
+    unknown = 0.0
+    if n == 2:
+        e = sub(vec3_at(corners, 3), vec3_at(corners, 0))
+        square = dot(e, e)
+        unknown = 2.0 * error / math.sqrt(square) if square > 0.0 else 1.0
+        if unknown <= _KNOWN:
+            shift = sub(Vec3(0.0, 0.0, 1.0), scale(e.z / square, e))
+            shift = scale(sign / norm(shift), shift)
+    elif n > 2:
+        area, longest = _extent_of(corners, n)
+        unknown = 4.0 * (error + face.flatness) * longest / area if area > 0.0 else 1.0
+        shift = Vec3(-face.slope_u, -face.slope_v, 1.0)
+        shift = scale(sign / norm(shift), shift)
+    if unknown > _KNOWN:
+        n = np.int64(1)
+    for k in range(n):
+        put_vec3(corners, 3 * k, add(vec3_at(corners, 3 * k), scale(radius, shift)))
+    base = add(Vec3(face.u, face.v, face.h), scale(radius, shift))
+    return SupportFace(
+        n, face.triangle, base.x, base.y, base.z, face.slope_u, face.slope_v, face.flatness + unknown * radius,
+        radius if n == 2 else 0.0, corners, face.features, face.edges, face.feature,
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def _extent_of(corners, n):
+    """(twice the area of a polygon seen along the normal, the longest way from its first corner to another)."""
+    area, square = 0.0, 0.0
+    for k in range(1, n):
+        u, v = corners[3 * k] - corners[0], corners[3 * k + 1] - corners[1]
+        square = max(square, u * u + v * v)
+        if k + 1 < n:
+            area += u * (corners[3 * k + 4] - corners[1]) - v * (corners[3 * k + 3] - corners[0])
+    return abs(area), math.sqrt(square)
 
 
 @kernel(inline=True)
@@ -163,15 +225,22 @@ def _hull_vertex(body, row, g):
     """Id of a hull's vertex farthest in direction g of the body's own frame."""
     if body.tree != 0:
         listed = extreme_vertex_listed(body.tree, -1, g, view_i64(0, 0))
-        return settled_vertex(body.coords, body.padded, body.tree, listed.id, g)
+        vertex = settled_vertex(body.coords, body.padded, body.tree, listed.id, g)
+        fan_starts = view_i64(row[FAN_STARTS_AT], body.n + 1)
+        if fan_starts[vertex] < fan_starts[vertex + 1] or row[N_FACES] == 0:
+            return vertex  # else it lies within a face, or on an edge, but for rounding
     padded = row[PADDED]
     k = support_vertex(view_f64(row[COLUMNS_AT], 3 * padded), padded, g)
     return view_i64(row[VERTEX_IDS_AT], row[N_VERTICES])[k]
 
 
 @kernel(inline=True)
-def _hull_corners(body, faces_at, g, facing, corners, features, edges):
-    """Put the corners of a hull's support into the buffers; (their number, triangle, normal, flatness, feature)."""
+def _hull_corners(body, faces_at, g, facing, blur, corners, features, edges):
+    """Put the corners of a hull's support into the buffers; (their number, triangle, normal, flatness, feature).
+
+    blur : what an end of an edge may be off by rounding [m]: an edge is as steep as it is then, so that one between
+    points that are two but for rounding never goes before a long one.
+    """
     row = view_i64(faces_at + 8 * FACE_INTS * body.shape, FACE_INTS)
     n_faces = row[N_FACES]
     starts = view_i64(row[STARTS_AT], n_faces + 1)
@@ -203,13 +272,14 @@ def _hull_corners(body, faces_at, g, facing, corners, features, edges):
         flatness = view_f64(row[FLATNESS_AT], n_faces)[best]
         return n, triangles[best], vec3_at(normals, 3 * best), flatness, 4 * best + FACE
     best_edge = np.int64(-1)
-    least_steep = -_ACROSS * norm(g)
+    length = norm(g)
+    least_steep = -_ACROSS * length
     for k in range(fan_starts[vertex], fan_starts[vertex + 1]):
         at = fans[k]
         face = face_of[at]
         following = at + 1 if at + 1 < starts[face + 1] else starts[face]
         e = sub(column_at(body.coords, body.padded, loop[following]), p)
-        slope = dot(e, g) / norm(e)
+        slope = (dot(e, g) - blur * length) / norm(e)
         if slope > least_steep:
             least_steep = slope
             best_edge = at
@@ -228,7 +298,7 @@ def _hull_corners(body, faces_at, g, facing, corners, features, edges):
     features[1] = 4 * loop[following] + VERTEX
     edges[0] = 4 * loop_edges[best_edge] + EDGE
     edges[1] = edges[0]
-    return np.int64(2), triangles[face], zero, 0.0, edges[0]
+    return np.int64(2), triangles[face], zero, view_f64(row[FLATNESS_AT], n_faces)[face], edges[0]
 
 
 @kernel(inline=True)

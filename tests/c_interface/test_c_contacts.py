@@ -172,6 +172,12 @@ def clouds() -> dict[str, np.ndarray]:
         "point": np.ones((4, 3)), "alone": np.zeros((1, 3)),
         "triangle": np.eye(3), "pancake": random.normal(size=(80, 3)) * [1, 1, 1e-13],
     }  # fmt: skip
+    for number in range(40):  # slivers: hulls that are lines but for rounding, and points on edges
+        line = np.outer(random.uniform(-1, 1, int(random.integers(3, 9))), random.uniform(-1, 1, 3))
+        found[f"line {number}"] = line + random.integers(-2, 3, line.shape) * 10.0 ** random.uniform(-18, -11)
+        along = [[t, a, b] for t in random.uniform(-1, 1, 4) for a, b in ((1, 1), (-1, 1), (1, -1))]
+        cube = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3)
+        found[f"points on edges {number}"] = np.concatenate([cube, along]) @ rotated(random)[:3, :3].T
     for number in range(60):
         points = np.round(random.normal(size=(int(random.integers(4, 60)), 3)) * random.choice([1.0, 2.0, 5.0]))
         found[f"rounded {number}"] = points

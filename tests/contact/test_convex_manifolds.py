@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from contact_oracle import failures_of_convex
 from naive_triangles import cross, inner, minus, world_points
 
 import collide
@@ -220,3 +221,85 @@ def test_exchanging_the_bodies_exchanges_the_columns():
             assert np.array_equal(c.rows[f"{field}_a"], d.rows[f"{opposite}_b"]), seed
             assert np.array_equal(c.rows[f"{field}_b"], d.rows[f"{opposite}_a"]), seed
         assert np.array_equal(c.distance, d.distance) and np.array_equal(c.normal, 0.0 - d.normal)
+
+
+def judged(A, B, X_WA, X_WB, margin):
+    """Rows of contacts, which the judge finds right."""
+    rows = collide.contacts(A, B, X_WA, X_WB, margin=margin).rows
+    failures = failures_of_convex(A, B, X_WA, X_WB, margin, rows, collide.distance(A, B, X_WA, X_WB))
+    assert not failures, "; ".join(failures)
+    return rows
+
+
+_OFF = 1e-14 * np.array([[-1, -2, -1], [-2, -1, -1], [0, 2, -2], [-1, 1, -2]])
+#: A nearly collinear hull's normal leant by up to 2.5e-3: rows with false brackets, and a gap told as an overlap.
+NEEDLES = [
+    (collide.ConvexHull([[-0.4, 0.8, -0.6], [-0.3, 0.6, 0.5]]),
+     collide.ConvexHull(np.outer([-0.5, 0, -0.375, -0.125], [4, -8, 9]) / 8 + _OFF), EYE, 0.5, 0.3212176887586335),
+    (collide.Box((1, 1, 1)), collide.ConvexHull(np.outer([-0.2, 0.3, 0.7], [0.1, 0.7, 0.3])),
+     collide.pose((-0.5, 0.6, -0.3), rpy=(-1.1, 0, 1.3)), 0.2, 0.0494379204379737),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("A", "B", "X_WB", "margin", "gap"), NEEDLES)
+def test_hulls_that_are_lines_but_for_rounding_are_lines(A, B, X_WB, margin, gap):
+    rows = judged(A, B, EYE, X_WB, margin)
+    assert abs(rows["distance"][0] - gap) < 1e-15 and rows["lower"].min() > gap - 1e-12
+
+
+def test_no_row_of_a_sliver_lies_beyond_the_margin():
+    """Its flatness was added to the margin: a row lay 0.22 beyond 0."""
+    needle = collide.ConvexHull(np.outer([-0.7, 0.1, 0.9], [-3, -5, -4]) / 8)
+    X_WB = collide.pose((0, 0.21951219512195116, -0.724390243902439))
+    assert len(judged(needle, collide.Box((1, 1, 1)), EYE, X_WB, 0.0)) == 1
+
+
+def test_sides_of_a_sliver_end_at_its_tips():
+    """Moved out by a tolerance, the sides of a sharp triangle meet far beyond its tip: an edge had a row there."""
+    for width in (1e-3, 1e-6, 1e-9, 1e-12):
+        A = collide.ConvexHull([[0, 0, 0], [1, width, 0], [1, -width, 0]])
+        B = collide.ConvexHull([[-3e-15 / width, -1, 1e-3], [-3e-15 / width, 1, 1e-3]])
+        judged(A, B, EYE, EYE, 0.1)
+
+
+GROUNDS = [
+    collide.Halfspace((0, 0, 1), 0.0), collide.Box((4, 4, 1)),
+    collide.ConvexHull([[-2, -2, 0], [2, -2, 0], [0, 3, 0.0]]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("other", GROUNDS)
+def test_rows_of_swept_bodies_lie_on_their_surface(other):
+    """Moved by the radius along the normal, the second end of a capsule that leans by 0.7 lay 0.235 inside it."""
+    bodies = [
+        collide.Capsule(0.3, 1.0), collide.ConvexHull([[-0.5, 0, 0], [0.5, 0, 0], [0, 0.6, 0.1]], radius=0.2),
+        collide.ConvexHull(list(itertools.product((-0.3, 0.3), repeat=3)), radius=0.1),
+    ]  # fmt: skip
+    several = 0
+    for body, lean in itertools.product(bodies, (1e-9, 1e-4, 0.05, 0.3, 0.7)):
+        X_WB = collide.pose((0, 0.1, 1.0), rpy=(0.5 * np.pi + lean, 0.3 * lean, 0.4))
+        X_WB[2, 3] -= collide.distance(other, body, EYE, X_WB).distance + 1e-3
+        several += len(judged(other, body, EYE, X_WB, 1.5)) > 1
+    assert several >= 12, several
+
+
+def test_both_ends_of_a_line_along_an_edge_are_there():
+    """A capsule or a cylinder along an edge of a box or of its hull, turned by a hair about the normal: one half lies
+    over one face, the other over another."""
+    size, corners = np.array([1.0, 0.5, 0.5]), np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
+    beside = np.concatenate([corners, [[-0.1, 0.5, 0.5], [0.2, 0.5, 0.5]]]) * size
+    turned = collide.pose((0, 0, 0), rpy=(0.3, -1.1, 2.0))
+    for angle, lean, gap, body in itertools.product(
+        (0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-4), (-0.5, 0.0, 0.3), (-1e-3, 0.0, 1e-9),
+        (collide.Capsule(0.1, 0.6), collide.Cylinder(0.1, 0.6)),
+    ):  # fmt: skip
+        out = np.array([0.0, np.cos(np.pi / 4 + lean), np.sin(np.pi / 4 + lean)])
+        along = np.cos(angle) * np.eye(3)[0] + np.sin(angle) * np.cross(out, np.eye(3)[0])
+        X_WB = np.eye(4)
+        X_WB[:3, :3] = np.stack([out, np.cross(along, out), along], axis=1)
+        X_WB[:3, 3] = size * (0, 0.5, 0.5) + (0.1 + gap) * out
+        hull = collide.ConvexHull(beside @ turned[:3, :3].T)
+        for A, X in ((collide.Box(size), EYE), (hull, turned)):
+            rows = judged(A, body, EYE, X @ X_WB, 1e-6)
+            ends = rows["point_b"] @ (X[:3, :3] @ along)
+            assert abs(np.ptp(ends) - 0.6) < 1e-6, (angle, lean, gap, body, A, rows["distance"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -80,3 +81,53 @@ def test_flat_hulls_have_two_sides_and_segments_one_edge():
     segment = hull_faces(np.array([[0, 0, 0], [2, 2, 2], [1, 1, 1]], dtype=float))
     assert segment.corners.tolist() == [0, 1] and segment.vertex_ids.tolist() == [0, 1]
     assert hull_faces(np.ones((3, 3))).vertex_ids.tolist() in ([0], [1], [2])
+
+
+def nearly_collinear(rng) -> np.ndarray:
+    """Points of a line, off it by up to 1e-12 of its length by rounding or more."""
+    points = np.outer(rng.integers(-8, 9, int(rng.integers(3, 9))) / 8.0, rng.uniform(-1, 1, 3))
+    points += rng.integers(-2, 3, points.shape) * 10.0 ** rng.uniform(-18, -12)
+    return points + (np.arange(len(points)) == 0)[:, None] * rng.uniform(-1, 1, 3) * 1e-15
+
+
+def off_in_fractions(points, corners, normal) -> float:
+    p, *others = [[Fraction(x) for x in points[k].tolist()] for k in corners.tolist()]
+    n = [Fraction(x) for x in normal.tolist()]
+    return float(max(abs(sum((a - b) * c for a, b, c in zip(q, p, n))) for q in others))
+
+
+def test_normals_of_slivers_are_as_good_as_their_flatness_says():
+    """In fractions, corners of each face lie within its flatness of a plane across its normal; a hull without a face is
+    a segment, and all of its points lie as near to it."""
+    segments = planes = 0
+    for seed in range(400):
+        points = nearly_collinear(np.random.default_rng(seed))
+        size, faces = np.ptp(points, axis=0).max(), hull_faces(points)
+        if size < 0.1:
+            continue
+        rounding = 2.0**-50 * size
+        assert faces.flatness.max() <= 2.0**-43 * size, f"nearly_collinear(np.random.default_rng({seed}))"
+        for face, (i, j) in enumerate(itertools.pairwise(faces.starts)):
+            corners = faces.corners[i:j]
+            if faces.normals[face].any():
+                off = off_in_fractions(points, corners, faces.normals[face])
+                assert off <= 2.0 * faces.flatness[face] + rounding, (seed, off, faces.flatness[face])
+                planes += 1
+        if len(faces.starts) == 2:
+            p, q = points[faces.corners]
+            t = np.clip((points - p) @ (q - p) / ((q - p) @ (q - p)), 0, 1)
+            off = np.linalg.norm(points - p - t[:, None] * (q - p), axis=1).max()
+            assert off <= faces.flatness[0] + rounding and len(faces.corners) == 2, seed
+            segments += 1
+    assert segments > 100 and planes > 100, (segments, planes)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_points_on_edges_but_for_rounding_are_no_corners(seed):
+    rng = np.random.default_rng(seed)
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    extra = np.array([[t, a, b] for t in rng.uniform(-0.9, 0.9, 3) for a, b in ((1, 1), (-1, 1))])
+    points = np.concatenate([corners, extra, extra[:, [2, 0, 1]]]) @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    faces = hull_faces(points)
+    assert faces.vertex_ids.tolist() == list(range(8)) and np.diff(faces.starts).tolist() == [4] * 6
+    assert len(set(faces.edges.tolist())) == 12 and faces.flatness.max() < 1e-14
