@@ -225,7 +225,10 @@ def distance(
     Notes
     -----
     GJK for gaps, their last digits in double-doubles; EPA (van den Bergen 2001) for depths. Where a body is not convex,
-    an overlap is minus the length of a translation that is proven to separate the bodies.
+    an overlap is minus the length of a translation that is proven to separate the bodies, found by about a dozen
+    booleans. Beside a mesh, a union of k parts costs 0.3 to 1 ms for each pair of parts whose boxes overlap or come as
+    near as the nearest parts are; with depths a dozen times that, which ``signed=False`` leaves out. Curved shapes
+    within a mesh of n facets take O(n) where all its facets are near.
     """
     limit = checks.limit("max_distance", max_distance)
     answer = None if algorithm is None else named_algorithm("distance", algorithm)

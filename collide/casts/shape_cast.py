@@ -100,6 +100,11 @@ def shape_cast(
 
     Notes
     -----
+    Of unions every part of A is cast onto every part of B: about 0.5 µs a pair of convex parts that are not in each
+    other's way, some tenths of a millisecond a pair with a mesh that is.
+
+    Notes
+    -----
     A ray against the Minkowski difference of the two (G. van den Bergen, "Ray casting against general convex objects
     with application to continuous collision detection", 2004), its silhouette first, then the entry by refining a
     portal (Snethen's XenoCollide), with proven bounds; an exact linear program where doubles leave a cast of polytopes

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.batches import answer_batch, of_one_set
-from collide.broadphase.box_tree import BoxTree
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.curved_contacts import curved_contacts
@@ -16,7 +15,7 @@ from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.shape_set_tables import tables_of
-from collide.narrowphase.composite.composite_parts import CompoundParts, PartColumns, compound_parts
+from collide.narrowphase.composite.composite_parts import CompoundParts, PartColumns, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import Method, method_of
 from collide.pair_arguments import pose_at
@@ -28,8 +27,6 @@ from collide.transforms import as_poses
 #: go together, or of compounds, which are taken apart.
 _OF_MESHES = {Method.FACETS: facet_contacts, Method.CURVED: curved_contacts, Method.HULL: halfspace_contacts}
 _CONVEX = frozenset((Method.CLOSED, Method.PLANE, Method.PLANES, Method.CONVEX))
-#: Boxes of parts that are made at once; of so few pairs of parts all are compared, of more through a box-tree.
-_BOXES_AT_ONCE, _FEW_PAIRS = 1 << 16, 256
 #: Contacts nearer to the margin than this part of the pair's size are judged by the bodies' distance.
 _ROUNDING = 2.0**-40
 
@@ -144,45 +141,13 @@ def _near_parts(A: CompoundParts, B: CompoundParts, X_WA: np.ndarray, X_WB: np.n
     that is near; of half-spaces all are.
     """
     apart = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
-    pose, i, j = _boxes_near(A, B, X_WA, X_WB, margin)
+    pose, i, j = boxes_near(A, B, X_WA, X_WB, margin)
     at_a = A.placed(i, X_WA[pose], B.reach + apart[pose])
     at_b = B.placed(j, X_WB[pose], A.reach + apart[pose])
     slack = at_a.slop + at_b.slop
     near = _may_come_within(A.columns, B.columns, i, j, at_a.X, at_b.X, margin + slack)
     none = np.zeros(len(pose), dtype=np.int64)
     return PartPairs(pose, i, j, none, none, at_a.X, at_b.X, slack).take(near)
-
-
-def _boxes_near(
-    A: CompoundParts, B: CompoundParts, X_WA: np.ndarray, X_WB: np.ndarray, margin: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(poses, parts of A, parts of B) whose boxes come within the margin, and a little farther.
-
-    Boxes hold the parts where their poses, rounded, put them, and all that the rounding may have moved them: what is
-    apart along an axis by more than the margin is farther apart than that. So many boxes are made at once that they
-    need little memory.
-    """
-    found = [np.zeros((3, 0), dtype=np.int64)]
-    step = max(1, _BOXES_AT_ONCE // (len(A.parts) + len(B.parts)))
-    for first in range(0, len(X_WA), step):
-        a, b = A.boxes(X_WA[first : first + step]), B.boxes(X_WB[first : first + step])
-        if len(A.parts) * len(B.parts) <= _FEW_PAIRS:
-            ends = a[:, :, None], b[:, None]
-            apart = np.maximum(ends[1][..., :3] - ends[0][..., 3:], ends[0][..., :3] - ends[1][..., 3:]).max(axis=3)
-            near = np.stack(np.nonzero(apart <= _outwards(a, b, margin)))
-            found.append(near + np.array([[first], [0], [0]]))
-            continue
-        for k, (boxes_a, boxes_b) in enumerate(zip(a, b), first):
-            met = BoxTree(boxes_b).boxes_met(boxes_a, _outwards(boxes_a, boxes_b, margin))
-            found.append(np.stack([np.full(len(met), k), *met.T]))
-    pose, i, j = np.concatenate(found, axis=1)
-    return pose, i, j
-
-
-def _outwards(a: np.ndarray, b: np.ndarray, margin: float) -> float:
-    """The margin, and more than rounding takes from a difference of two boxes' ends [m]."""
-    ends = np.concatenate([a.ravel(), b.ravel()])
-    return margin + 2.0**-40 * (margin + float(np.abs(ends[np.isfinite(ends)]).max(initial=0.0)))
 
 
 def _may_come_within(a: PartColumns, b: PartColumns, i, j, X_WA, X_WB, limit: np.ndarray) -> np.ndarray:

@@ -79,7 +79,8 @@ def workspace_words(capacity: int, largest: int) -> int:
     """64-bit words the kernel works in, for so many facets, and faces of so many corners."""
     corners = 3 + largest + 8
     points = corners * capacity + 1
-    return POSE + 9 + 6 + 5 * largest + 2 * 3 * corners + (POINT + 2) * corners + 14 * capacity + 19 * points + CELLS + 64
+    of_face = 5 * largest + 2 * 3 * corners + (POINT + 2) * corners
+    return POSE + 9 + 6 + of_face + 14 * capacity + 19 * points + CELLS + 64
 
 
 @kernel(inline=True)

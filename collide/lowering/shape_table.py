@@ -222,8 +222,7 @@ def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[n
             if k == 3:
                 high, low = X_WB[:, :3, 3], np.zeros((len(X_WB), 3))
             else:
-                factor_a = X_WB[:, :3, k]
-                factor = np.broadcast_to(X_BP[..., k, j, None], (len(X_WB), 1))
+                factor_a, factor = X_WB[:, :3, k], X_BP[..., k, j, None]
                 high, low = _two_products(factor_a, factor)
                 exact &= ((np.abs(high) > SAFE_PRODUCT) | (factor_a == 0.0) | (factor == 0.0)).all(axis=1)
             sum_, low_term = total + high, total
@@ -235,9 +234,10 @@ def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[n
     stretch = np.maximum(1.0, np.abs(X_WB[:, :3, :3]).sum(axis=2).max(axis=1))
     parts = reach + np.abs(X_BP[..., :3, 3]).sum(axis=-1)
     slop = PRODUCT_SLOP * (stretch * parts + np.abs(X_WB[:, :3, 3]).max(axis=1))
-    is_own = np.broadcast_to(is_body, len(X_WB))
-    out[is_own] = X_WB[is_own]
-    return out, np.where(exact | is_own, 0.0, slop)
+    if X_BP.ndim == 3:
+        out[is_body] = X_WB[is_body]
+        exact |= is_body
+    return out, np.where(exact, 0.0, slop)
 
 
 def _product(A: np.ndarray, B: np.ndarray) -> np.ndarray:

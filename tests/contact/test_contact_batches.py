@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import collide
-from collide.contact import contact_batches
 from collide.narrowphase.composite import composite_meshes, composite_parts
 from collide.narrowphase.composite.composite_parts import CompoundParts
 
@@ -109,6 +108,6 @@ def test_boxes_near_are_all_pairs_within_the_margin(monkeypatch):
     a, b = A.boxes(X_WA)[:, :, None], B.boxes(X_WB)[:, None]
     apart = np.maximum(b[..., :3] - a[..., 3:], a[..., :3] - b[..., 3:]).max(axis=-1)
     for few in (0, 1 << 20):
-        monkeypatch.setattr(contact_batches, "_FEW_PAIRS", few)
-        found = set(zip(*(column.tolist() for column in contact_batches._boxes_near(A, B, X_WA, X_WB, 0.05))))
+        monkeypatch.setattr(composite_parts, "_FEW_PAIRS", few)
+        found = set(zip(*(column.tolist() for column in composite_parts.boxes_near(A, B, X_WA, X_WB, 0.05))))
         assert found == set(map(tuple, np.argwhere(apart <= 0.05).tolist())) and len(found) > 20

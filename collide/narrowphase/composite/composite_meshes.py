@@ -38,7 +38,7 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
             rows = convex_rows(A.convex, B.convex, X_WA[met], X_WB[met], limit=0.0)
             states[met[rows["how"] == UNDECIDED]] = OPEN
     gaps = _box_gaps(A, B, X_WA, X_WB)
-    for i, j in _mesh_pairs(A, B, (gaps <= 0.0).any(axis=0)):
+    for i, j in _mesh_pairs(A, B, np.any(gaps <= 0.0, axis=0)):
         remaining = np.flatnonzero((states != HIT) & (gaps[:, i, j] <= 0.0))
         if len(remaining):
             part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[remaining], X_WB[remaining])
@@ -157,7 +157,7 @@ def _part_rows(
     for poses, rows in known.values():
         upper[poses] = np.minimum(upper[poses], np.maximum(rows["upper"], 0.0))
     last = np.argwhere(meshed)[-1].tolist()
-    wanted = (gaps <= np.minimum(upper, sight)[:, None, None]).any(axis=0)
+    wanted = np.any(gaps <= np.minimum(upper, sight)[:, None, None], axis=0)
     wanted[tuple(last)] = True
     for i, j in _mesh_pairs(A, B, wanted):
         far = gaps[:, i, j] > np.minimum(upper, sight)
@@ -165,13 +165,13 @@ def _part_rows(
             far &= np.array([bool(rows) for rows in asked], dtype=bool)
         remaining = np.flatnonzero(~far & (planes | ~hit))
         if len(remaining):
-            poses, rows = known.get((i, j), (remaining[:0], np.zeros(0, dtype=PAIR_DTYPE)))
-            is_known = np.isin(remaining, poses)
-            some = remaining[~is_known]
-            if len(some):
-                take(rows_of(i, j, some), some)
-            if is_known.any():
-                take(rows[np.isin(poses, remaining)], remaining[is_known])
+            if (i, j) in known:
+                poses, rows = known[i, j]
+                some = np.isin(poses, remaining)
+                take(rows[some], poses[some])
+                remaining = np.setdiff1d(remaining, poses)
+            if len(remaining):
+                take(rows_of(i, j, remaining), remaining)
     return [np.concatenate(rows) for rows in asked], left_out
 
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
+from collide.broadphase.box_tree import BoxTree
 from collide.lowering.extents import extent_of
 from collide.lowering.facet_bodies import PosesWithSlop, is_halfspace
 from collide.lowering.packed_convex import HALFSPACE, PackedConvex
@@ -22,6 +23,8 @@ from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import IDENTITY, Shape, held_by, kept_with_shape
 
+#: Boxes of parts that are made at once; of so few pairs of parts all are compared, of more through a box-tree.
+_BOXES_AT_ONCE, _FEW_PAIRS = 1 << 16, 256
 #: Outside half-spaces: a rounded turn moves what is far away by more.
 _UP = 1 + 2.0**-40
 
@@ -204,6 +207,38 @@ class CompoundParts:
 def compound_parts(shape: Shape) -> CompoundParts:
     """The parts of a shape."""
     return CompoundParts(shape)
+
+
+def boxes_near(
+    A: CompoundParts, B: CompoundParts, X_WA: np.ndarray, X_WB: np.ndarray, margin: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(poses, parts of A, parts of B) whose boxes come within the margin, and a little farther.
+
+    Boxes hold the parts where their poses, rounded, put them, and all that the rounding may have moved them: what is
+    apart along an axis by more than the margin is farther apart than that. So many boxes are made at once that they
+    need little memory.
+    """
+    found = [np.zeros((3, 0), dtype=np.int64)]
+    step = max(1, _BOXES_AT_ONCE // (len(A.parts) + len(B.parts)))
+    for first in range(0, len(X_WA), step):
+        a, b = A.boxes(X_WA[first : first + step]), B.boxes(X_WB[first : first + step])
+        if len(A.parts) * len(B.parts) <= _FEW_PAIRS:
+            ends = a[:, :, None], b[:, None]
+            apart = np.maximum(ends[1][..., :3] - ends[0][..., 3:], ends[0][..., :3] - ends[1][..., 3:]).max(axis=3)
+            near = np.stack(np.nonzero(apart <= _outwards(a, b, margin)))
+            found.append(near + np.array([[first], [0], [0]]))
+            continue
+        for k, (boxes_a, boxes_b) in enumerate(zip(a, b), first):
+            met = BoxTree(boxes_b).boxes_met(boxes_a, _outwards(boxes_a, boxes_b, margin))
+            found.append(np.stack([np.full(len(met), k), *met.T]))
+    pose, i, j = np.concatenate(found, axis=1)
+    return pose, i, j
+
+
+def _outwards(a: np.ndarray, b: np.ndarray, margin: float) -> float:
+    """The margin, and more than rounding takes from a difference of two boxes' ends [m]."""
+    ends = np.concatenate([a.ravel(), b.ravel()])
+    return margin + 2.0**-40 * (margin + float(np.abs(ends[np.isfinite(ends)]).max(initial=0.0)))
 
 
 def _leaves(shape: Shape, X: np.ndarray | list[list[Fraction]] | None):
