@@ -258,9 +258,10 @@ def _row_number(k, count: int) -> int:
     try:
         return range(count)[k]
     except IndexError:
-        raise IndexError(f"there are results 0 … {count - 1}, not {k}" if count else "there are no results") from None
-    except TypeError:
-        raise InvalidArgument(f"a result is named by its number, got {k!r}") from None
+        told = f", not {k}" if abs(k) < 10**18 else ""
+        raise IndexError(f"there are results 0 … {count - 1}{told}" if count else "there are no results") from None
+    except (TypeError, ValueError):
+        raise InvalidArgument(f"a result is named by its number, got a {type(k).__name__}") from None
 
 
 class WorldResult:

@@ -184,12 +184,13 @@ class WorldScene:
         ------
         UnknownBody; InvalidArgument : the same body twice, or a matrix of another form.
         """
+        checks.text("World.allow: reason", reason)
         if b is None:
             matrix = checks.plain_array("World.allow: matrix", a, "(bodies, bodies)", InvalidArgument)
             self._allow_matrix(matrix, reason)
         else:
             pair = self._pair("World.allow", self._bodies.id_of(a), self._bodies.id_of(b))
-            self._allowed.setdefault(pair, str(reason))
+            self._allowed.setdefault(pair, reason)
             self._note_partners(pair)
         self._pairs_changed = True
 
@@ -213,7 +214,7 @@ class WorldScene:
             )
         ids = self.ids
         for i, j in np.argwhere(np.triu(matrix, 1)).tolist():
-            self._allowed.setdefault((ids[i], ids[j]), str(reason))
+            self._allowed.setdefault((ids[i], ids[j]), reason)
             self._note_partners((ids[i], ids[j]))
 
     def __len__(self) -> int:

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from collide import __version__
-from collide.argument_checks import integer
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, SceneError, brief
+from collide.robots.robot import Robot
 from collide.sweeps.configurations import DrawnConfigurations, GivenConfigurations, as_configurations
 from collide.sweeps.content_digest import digest
 from collide.sweeps.dask_pool import DaskPool
@@ -79,8 +80,12 @@ def sweep(
     MissingExtra
         Without pyarrow, and for Dask without distributed.
     """
+    if not isinstance(getattr(checker, "robot", None), Robot):
+        raise InvalidArgument(f"sweep: checker must be a RobotChecker, got {checks.describe(checker)}")
+    folder, restart = checks.file_path("sweep: folder", folder), checks.true_or_false("sweep: restart", restart)
     Q = as_configurations(configurations, checker.robot)
-    question = OneQuestion(checker, distances, values)
+    distances = checks.true_or_false("sweep: distances", distances)
+    question = OneQuestion(checker, distances, checks.true_or_false("sweep: values", values))
     run = SweepRun(question, 1, Q, folder, lambda final: question_digest(checker), chunk=chunk)
     return run.go(workers=workers, scheduler=scheduler, restart=restart, progress=progress)
 
@@ -110,11 +115,12 @@ class SweepRun:
 
     def _chunk_rows(self, chunk: int | None) -> int:
         if chunk is not None:
-            rows = integer("chunk", chunk, 1)
+            rows = checks.integer("chunk", chunk, 1)
         else:
             rows = min(max(-(-self.rows // _AIMED_CHUNKS), _MIN_CHUNK), _MAX_CHUNK)
         if rows > MAX_CHUNK_ROWS:
-            raise InvalidArgument(f"chunk must be at most {MAX_CHUNK_ROWS:,} rows, which are in memory, got {rows:,}")
+            most = f"{MAX_CHUNK_ROWS:,} rows, which are in memory"
+            raise InvalidArgument(f"chunk must be at most {most}, got {brief(rows)}")
         if self.rows > rows * MAX_CHUNKS:
             raise InvalidArgument(
                 f"{brief(self.rows)} rows are more than {MAX_CHUNKS:,} chunks of {rows:,}: ask fewer, or take larger "
@@ -140,7 +146,7 @@ class SweepRun:
         """Ask what is missing, and give everything."""
         parquet_module()
         if workers is not None:
-            integer("workers", workers, 0)
+            checks.integer("workers", workers, 0)
         with self.directory.locked(), (progress or _silent)("sweeping") as rename:
             done = set(self.directory.begin(self.manifest, restart))
             missing = [number for number in range(self.manifest["chunks"]) if number not in done]
