@@ -61,7 +61,8 @@ class WorldScene:
         ------
         InvalidArgument, InvalidPose : naming the argument and the value; nothing is added.
         """
-        margin = checked_margin("World.add: margin", margin) if margin != 0.0 else 0.0
+        if margin.__class__ is not float or margin != 0.0:
+            margin = checked_margin("World.add: margin", margin)
         return self._bodies.add(shape, X_WB, name, static, group, mask, margin)
 
     def remove(self, body: int | str) -> None:

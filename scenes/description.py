@@ -357,6 +357,11 @@ class Scene:
             Its ``X_WB``, ``owner`` and ``static`` are set here.
         X_LB : (4, 4) float64
             Pose of the body in the link's frame L [m].
+
+        Raises
+        ------
+        InvalidArgument, InvalidPose, SceneError
+            For a robot or link that is not there, a pose that is none, a name that is taken.
         """
         if checks.text(f"scene {self.name}: owner", owner) not in self.placements:
             raise InvalidArgument(

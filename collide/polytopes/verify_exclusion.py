@@ -99,7 +99,7 @@ def verify_exclusion(
     poses = [as_matrix(caller, name, X, d + 1) for name, X in (("X_WP", X_WP), ("X_WR", X_WR))]
     if answer.hit or proof is None:
         raise CertificateRefused("trees: the answer has no planes: it is a hit, or integers over all rows settled it")
-    map_RP = _relative(*poses, d)
+    map_RP = _relative(poses[0], poses[1], d)
     unit, centre = Fraction(boundary.unit), [Fraction(x) for x in boundary.centre.tolist()]
     outside = [Fraction(x) for x in proof.outside]
     is_left_out = np.zeros(len(boundary.facets), dtype=bool)

@@ -19,7 +19,7 @@ from collide.robots.robot_bodies import paths_to_root
 #: Before anything is proven, motions are asked at their ends and, so many times halved, in between.
 SAMPLED_HALVINGS = 2
 #: A motion that is sampled alone is halved at most so often: 2^30 samples take an hour.
-_MOST_HALVINGS = 30
+_MAX_HALVINGS = 30
 #: Roundings of forward kinematics, as a share of where links are and how far they reach.
 _ROUNDING = 2.0**-40
 
@@ -84,11 +84,11 @@ def sampled_collision(
     change = np.abs(q1 - q0).max(axis=1, initial=0.0)
     with np.errstate(over="ignore"):
         needed = np.minimum(np.ceil(np.log2(np.maximum(change / step, 1.0))), 2000.0).astype(np.int64)
-    if n_halvings is None and needed.max(initial=0) > _MOST_HALVINGS:
+    if n_halvings is None and needed.max(initial=0) > _MAX_HALVINGS:
         k = int(needed.argmax())
         raise InvalidArgument(
             f"RobotChecker: motion {k} changes a column by {change[k]:g} [rad or m]: in steps of {step:g} that is more "
-            f"than 2^{_MOST_HALVINGS} samples; take a larger resolution"
+            f"than 2^{_MAX_HALVINGS} samples; take a larger resolution"
         )
     if n_halvings is not None:
         needed = np.minimum(needed, n_halvings)

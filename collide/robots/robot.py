@@ -125,10 +125,10 @@ class Robot:
         self.sources, self.prefix = _texts("sources", sources), ""
         self.missing_meshes = _texts("missing_meshes", missing_meshes)
         self.place = ": ".join((*self.sources[:1], f"robot {cut(name)}"))
-        given = checks.listed_entries("Robot: joints", joints, "a sequence of Joint", SceneError)
-        for joint in given:
+        listed = checks.listed_entries("Robot: joints", joints, "a sequence of Joint", SceneError)
+        for joint in listed:
             checks.instance("Robot: joints", joint, Joint, "a sequence of Joint", SceneError)
-        checked = [checked_joint(joint, self._index) for joint in given]
+        checked = [checked_joint(joint, self._index) for joint in listed]
         indices_of("joint", [joint.name for joint in checked])
         broken = broken_mimics(checked)
         self.joints = tuple(replace(joint, mimic=None) if joint.name in broken else joint for joint in checked)
@@ -276,8 +276,9 @@ class Robot:
         list of str
             One note, or none.
         """
-        names = {checks.text("Robot.default_notes: names", name) for name in checks.listed_entries(
-            "Robot.default_notes: names", names, "names of columns")}  # fmt: skip
+        if not isinstance(names, (set, frozenset)):
+            names = checks.listed_entries("Robot.default_notes: names", names, "names of columns")
+        names = {checks.text("Robot.default_notes: names", name) for name in names}
         q = self._one_configuration("q", q)
         unset = [(name, value) for name, value in zip(self.joint_names, q) if name not in names]
         if not unset:
@@ -299,6 +300,11 @@ class Robot:
         -------
         float
             [rad or m].
+
+        Raises
+        ------
+        InvalidArgument
+            For a name that no such joint has, and for a q of another shape.
         """
         if checks.text("Robot.joint_value: name", name) not in self._drivers:
             raise InvalidArgument(
@@ -543,25 +549,25 @@ def _texts(field: str, values) -> list[str]:
 
 
 def _checked_geometry(geometry) -> dict[str, tuple[LinkShape, ...]]:
-    found = {}
+    checked = {}
     for link, elements in checks.mapping("Robot: geometry", geometry, "link → its LinkShapes", SceneError).items():
         what = f"Robot: geometry[{brief(link)}]"
         listed = checks.listed_entries(what, elements, "a sequence of LinkShape", SceneError)
         for element in listed:
             checks.instance(what, element, LinkShape, "a sequence of LinkShape", SceneError)
         if listed:
-            found[link] = tuple(listed)
-    return found
+            checked[link] = tuple(listed)
+    return checked
 
 
 def _checked_pairs(pairs) -> tuple[tuple[str, str, str], ...]:
     wanted = "(link, link, reason), three texts each"
-    found = [checks.listed_entries("Robot: semantic_pairs", pair, wanted, SceneError)
+    checked = [checks.listed_entries("Robot: semantic_pairs", pair, wanted, SceneError)
              for pair in checks.listed_entries("Robot: semantic_pairs", pairs, wanted, SceneError)]  # fmt: skip
-    for pair in found:
+    for pair in checked:
         if len(pair) != 3 or not all(isinstance(word, str) for word in pair):
             raise SceneError(f"Robot: semantic_pairs must be {wanted}, got {checks.describe(pair)}")
-    return tuple((a, b, reason) for a, b, reason in found)
+    return tuple((a, b, reason) for a, b, reason in checked)
 
 
 def _checked_states(states) -> dict[str, dict[str, float]]:

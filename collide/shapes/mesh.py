@@ -267,7 +267,8 @@ class Mesh(Shape):
         docs/locality.md says where it pays.
         """
         progress = progress or local_stretch.quiet
-        return localised_mesh.localised_mesh(self, stretch, order, max_facets, progress)
+        plain = self if type(self) is Mesh else Mesh(self.vertices, self.faces, solid=self.solid)
+        return localised_mesh.localised_mesh(plain, stretch, order, max_facets, progress)
 
     def save(self, path) -> None:
         """Write the mesh to a file: all of it as ``.npz``, or its triangles in a form that other programs read.

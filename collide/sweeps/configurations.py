@@ -52,6 +52,11 @@ class DrawnConfigurations:
         -------
         (rows, dof) float64
             [rad or m], columns as in `Robot.joint_names`.
+
+        Raises
+        ------
+        InvalidArgument
+            For what is no robot, and for more rows than memory holds.
         """
         checks.instance("DrawnConfigurations.of: robot", robot, Robot, "a collide.Robot")
         if self.rows * max(robot.dof, 1) > _MAX_DRAWN:

@@ -119,8 +119,9 @@ class SweepRun:
         else:
             rows = min(max(-(-self.rows // _AIMED_CHUNKS), _MIN_CHUNK), _MAX_CHUNK)
         if rows > MAX_CHUNK_ROWS:
-            most = f"{MAX_CHUNK_ROWS:,} rows, which are in memory"
-            raise InvalidArgument(f"chunk must be at most {most}, got {brief(rows)}")
+            raise InvalidArgument(
+                f"chunk must be at most {MAX_CHUNK_ROWS:,} rows, which are in memory, got {brief(rows)}"
+            )
         if self.rows > rows * MAX_CHUNKS:
             raise InvalidArgument(
                 f"{brief(self.rows)} rows are more than {MAX_CHUNKS:,} chunks of {rows:,}: ask fewer, or take larger "
