@@ -56,8 +56,8 @@ def generate(name: str, seed: int = 0, **size) -> Scene:
             f"no generated scene is called {brief(name)}{did_you_mean(name, _GENERATORS)}; "
             f"there are {', '.join(names())}"
         )
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise SceneError(f"seed must be a whole number ≥ 0, got {checks.describe(seed)}")
+    if not checks.is_integer(seed) or not 0 <= seed < 2**64:
+        raise SceneError(f"seed must be a whole number, 0 … 2^64 − 1, got {checks.describe(seed)}")
     make = _GENERATORS[name]
     known = [argument for argument in inspect.signature(make).parameters if argument != "rng"]
     for argument in size:

@@ -41,7 +41,7 @@ def test_good_arguments_are_good():
                 target.call()(**target.good())
             except Exception as error:  # noqa: BLE001 - whatever it is, the arguments are not good
                 refused[target.name] = error
-    assert not refused
+    assert not refused, list(refused)
 
 
 def test_bad_arguments_are_refused_by_name():

@@ -70,7 +70,7 @@ def _check(stretch, order, max_facets) -> tuple[float, int, int]:
         )
     order = checks.integer("Mesh.localised: order", order, 1)
     if order > locality.ORDERS:
-        raise InvalidArgument(f"Mesh.localised: order must be within 1 … {locality.ORDERS}, got {order}")
+        raise InvalidArgument(f"Mesh.localised: order must be within 1 … {locality.ORDERS}, got {checks.describe(order)}")
     return value, order, checks.integer("Mesh.localised: max_facets", max_facets, 1)
 
 

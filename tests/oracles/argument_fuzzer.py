@@ -210,7 +210,7 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
     "combine": lambda: {"shapes": [mesh(), BOX], "poses": [EYE, EYE], "rule": "union"},
     "configuration_obstacle": lambda: {"A": BOX, "B": mesh()},
     "contains": lambda: {"shape": BOX, "X_WA": EYE, "points_W": (0, 0, 0)},
-    "facet_pairs": lambda: {**PAIR, "A": mesh()},
+    "facet_pairs": lambda: {**PAIR, "A": mesh(), "B": BOX},
     "overlap_volume": lambda: {**PAIR, "A": mesh(), "B": BOX},
     "overlay": lambda: {**PAIR, "A": mesh(), "B": mesh()},
     "overlapping_cells": lambda: {**PAIR, "A": tetrahedron(), "B": tetrahedron()},
@@ -264,7 +264,8 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
         "boundary": polytopes.hull_boundary(tree()),
         "normals": planes()[0],
         "offsets": planes()[1],
-        "answer": polytopes.trees_meet(tree(), region()),
+        "answer": polytopes.trees_meet(tree(), region(), collide.pose((10, 0, 0))),
+        "X_WP": collide.pose((10, 0, 0)),
     },
     "polytopes.verify_polygons": lambda: {
         "A": polygon(),
