@@ -70,7 +70,8 @@ def _check(stretch, order, max_facets) -> tuple[float, int, int]:
         )
     order = checks.integer("Mesh.localised: order", order, 1)
     if order > locality.ORDERS:
-        raise InvalidArgument(f"Mesh.localised: order must be within 1 … {locality.ORDERS}, got {checks.describe(order)}")
+        got = checks.describe(order)
+        raise InvalidArgument(f"Mesh.localised: order must be within 1 … {locality.ORDERS}, got {got}")
     return value, order, checks.integer("Mesh.localised: max_facets", max_facets, 1)
 
 

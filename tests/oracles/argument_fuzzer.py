@@ -238,7 +238,7 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
         "X_WB0": collide.pose((3, 0, 0)),
         "X_WB1": EYE,
     },
-    "verify": lambda: {**PAIR, "r": collide.collide(**PAIR)},
+    "verify": lambda: {**PAIR, "r": collide.distance(**PAIR)},
     "get_include": dict,
     "get_library": dict,
     "pose": dict,
