@@ -25,7 +25,8 @@ from collide.sweeps.sweep_results import SweepResults, read_sweep
 
 #: Rows of a chunk where nobody says how many: small sweeps have chunks enough for many workers.
 _MIN_CHUNK, _MAX_CHUNK, _AIMED_CHUNKS = 500, 50_000, 64
-#: Of chunks, and of rows of one: numbers of chunks are listed, and the rows of a chunk are in memory.
+#: Of processes, of chunks, and of rows of one: numbers of chunks are listed, and the rows of a chunk are in memory.
+MAX_WORKERS = 10_000
 MAX_CHUNKS, MAX_CHUNK_ROWS = 1_000_000, 10_000_000
 #: How often it is looked whether the scene is still what it was [s].
 _LOOK_EVERY = 1.0
@@ -148,6 +149,8 @@ class SweepRun:
         parquet_module()
         if workers is not None:
             checks.integer("workers", workers, 0)
+            if workers > MAX_WORKERS:
+                raise InvalidArgument(f"workers must be at most {MAX_WORKERS:,} processes, got {brief(workers)}")
         with self.directory.locked(), (progress or _silent)("sweeping") as rename:
             done = set(self.directory.begin(self.manifest, restart))
             missing = [number for number in range(self.manifest["chunks"]) if number not in done]

@@ -89,6 +89,7 @@ def allow_pairs(world: World, path: str | Path, *, prefix: str = "") -> list[tup
     SceneError
         Naming file and element of what cannot be read, and where the file names none of the bodies.
     """
+    checks.instance("allow_pairs: world", world, World, "a collide.World")
     pairs = read_allowed_pairs(path, world.names.values(), prefix=prefix)
     for a, b, reason in pairs:
         world.allow(a, b, reason=reason)
