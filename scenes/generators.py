@@ -57,7 +57,7 @@ def generate(name: str, seed: int = 0, **size) -> Scene:
             f"there are {', '.join(names())}"
         )
     if not checks.is_integer(seed) or not 0 <= seed < 2**64:
-        raise SceneError(f"seed must be a whole number, 0 … 2^64 − 1, got {checks.describe(seed)}")
+        raise SceneError(f"seed must be a whole number ≥ 0 of at most 64 bits, got {checks.describe(seed)}")
     make = _GENERATORS[name]
     known = [argument for argument in inspect.signature(make).parameters if argument != "rng"]
     for argument in size:
