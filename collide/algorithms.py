@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 
-from collide.errors import InvalidArgument
+from collide.errors import InvalidArgument, brief
 
 #: The name of the default narrowphase.
 DEFAULT = "gjk"
@@ -32,6 +32,6 @@ def named_algorithm(query: str, name: object) -> Callable | None:
     place = _ALGORITHMS[query].get(name) if isinstance(name, str) else None
     if place is None:
         names = " or ".join(f'"{known}"' for known in (DEFAULT, *_ALGORITHMS[query]))
-        raise InvalidArgument(f"algorithm must be {names}, got {name!r}")
+        raise InvalidArgument(f"algorithm must be {names}, got {brief(name)}")
     module, function = place
     return getattr(import_module(module), function)

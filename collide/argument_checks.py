@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 import reprlib
 import sys
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -76,6 +79,56 @@ def integer(what: str, value: Any, least: int) -> int:
     return int(value)
 
 
+def checked_index(what: str, value: Any, count: int) -> int:
+    """A place among ``count``, from the end where it is negative, as 0 … count − 1. Raises InvalidArgument."""
+    if not is_integer(value) or not -count <= value < count:
+        raise InvalidArgument(f"{what} must be an integer, one of {count}: 0 … {count - 1}, got {describe(value)}")
+    return int(value) % count
+
+
+def true_or_false(what: str, value: Any) -> bool:
+    """True or False, also as 1 or 0 or numpy's; nothing whose truth is a guess. Raises InvalidArgument."""
+    if value.__class__ is bool:
+        return value
+    if isinstance(value, np.bool_) or (is_integer(value) and value in (0, 1)):
+        return bool(value)
+    raise InvalidArgument(f"{what} must be True or False, got {describe(value)}")
+
+
+def text(what: str, value: Any, error: type[CollideError] = InvalidArgument) -> str:
+    """A text. Raises ``error``."""
+    if not isinstance(value, str):
+        raise error(f"{what} must be a text, got {describe(value)}")
+    return value
+
+
+def instance(what: str, value: Any, kind: Any, example: str, error: type[CollideError] = InvalidArgument) -> Any:
+    """A value of a kind. example : how to come by one, for messages. Raises ``error``."""
+    if not isinstance(value, kind):
+        raise error(f"{what} must be {example}, got {describe(value)}")
+    return value
+
+
+def listed_entries(what: str, value: Any, wanted: str, error: type[CollideError] = InvalidArgument) -> list:
+    """The entries of whatever can be gone through but text, bytes and sets. wanted : for messages. Raises ``error``."""
+    if not isinstance(value, (str, bytes, bytearray, set, frozenset)):
+        with contextlib.suppress(TypeError):
+            return list(value)
+    raise error(f"{what} must be {wanted}, got {describe(value)}")
+
+
+def mapping(what: str, value: Any, wanted: str, error: type[CollideError] = InvalidArgument) -> Mapping:
+    """A mapping. wanted : for messages. Raises ``error``."""
+    return instance(what, value, Mapping, f"a mapping, {wanted}", error)
+
+
+def file_path(what: str, value: Any, error: type[CollideError] = InvalidArgument) -> Path:
+    """A path that files can have. Raises ``error``."""
+    if not isinstance(value, (str, os.PathLike)) or "\0" in str(value):
+        raise error(f"{what} must be the path of a file, a text or a pathlib.Path, got {describe(value)}")
+    return Path(value)
+
+
 def array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.ndarray:
     """Real numbers as a float64 array of whatever shape; the caller's own array where it is one already.
 
@@ -100,6 +153,16 @@ def array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.n
             f"{what}{where} must be a real number (all of it {wanted}), got {describe(numbers_given.ravel()[k])}"
         )
     return np.array(read, dtype=np.float64).reshape(numbers_given.shape)
+
+
+def whole_numbers(what: str, value: Any) -> np.ndarray:
+    """(n,) int64 numbers of things, from one or many. Raises InvalidArgument."""
+    read = plain_array(what, value, "(n,) integers", InvalidArgument)
+    if read.size == 0:
+        return np.zeros(0, dtype=np.int64)
+    if read.dtype.kind not in "iu" or read.ndim > 1 or (read.dtype.kind == "u" and (read > 2**63 - 1).any()):
+        raise InvalidArgument(f"{what} must be integers (n,) below 2**63, got {describe(value)}")
+    return read.astype(np.int64).reshape(-1)
 
 
 def vectors(caller: str, name: str, values) -> tuple[np.ndarray, bool]:

@@ -135,13 +135,14 @@ def collide(
 
 def _batched(A, B, X_WA, X_WB, check_poses: bool, threads: int):
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    hits = answer_batch(A, B, X_WA, X_WB, Question(True, check=check_poses), threads, prepare=True)
+    question = Question(True, check=checks.true_or_false("check_poses", check_poses))
+    hits = answer_batch(A, B, X_WA, X_WB, question, threads, prepare=True)
     return bool(hits[0]) if single else hits
 
 
 def _with_margin(A, B, X_WA, X_WB, margin: float, check_poses: bool, threads: int):
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
-    question = Question(False, margin, depths=False, check=check_poses)
+    question = Question(False, margin, depths=False, check=checks.true_or_false("check_poses", check_poses))
     rows = answer_batch(A, B, X_WA, X_WB, question, threads, prepare=True)
     hits = within(rows, margin, lambda k: (shape_at(A, k), shape_at(B, k), pose_at(X_WA, k), pose_at(X_WB, k)))
     return bool(hits[0]) if single else hits
@@ -161,7 +162,8 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
         raise InvalidArgument("axes must be contiguous, writeable and finite: it is read and updated in place")
     if len(axes) and np.abs(axes).max() > _LONGEST_AXIS:
         raise InvalidArgument(f"axes must not be longer than {_LONGEST_AXIS:g}: only their directions count")
-    hits = answer_batch(A, B, X_WA, X_WB, Question(True, check=check_poses, axes=axes), threads)
+    question = Question(True, check=checks.true_or_false("check_poses", check_poses), axes=axes)
+    hits = answer_batch(A, B, X_WA, X_WB, question, threads)
     return bool(hits[0]) if single else hits
 
 
@@ -231,6 +233,8 @@ def distance(
     within a mesh of n facets take O(n) where all its facets are near.
     """
     limit = checks.limit("max_distance", max_distance)
+    if signed.__class__ is not bool:
+        signed = checks.true_or_false("signed", signed)
     answer = None if algorithm is None else named_algorithm("distance", algorithm)
     if answer is not None:
         if limit != math.inf or check_threads(threads) != 1:
@@ -251,7 +255,7 @@ def distance(
         if finish_distances(rows, depths=signed):
             unbounded.append(True)
 
-    question = Question(False, limit, signed, check_poses)
+    question = Question(False, limit, signed, checks.true_or_false("check_poses", check_poses))
     rows = answer_batch(A, B, X_WA, X_WB, question, threads, prepare=True, finish=finish, pose_copies=pose_copies)
     if unbounded:
         k = int(np.argmax(np.isneginf(rows["distance"])))

@@ -256,11 +256,12 @@ def _questions_at(question: Question, rows: slice) -> Question:
 
 def _row_number(k, count: int) -> int:
     try:
-        return range(count)[k]
+        return range(count)[k + 0]
     except IndexError:
-        raise IndexError(f"there are results 0 … {count - 1}, not {k}" if count else "there are no results") from None
-    except TypeError:
-        raise InvalidArgument(f"a result is named by its number, got {k!r}") from None
+        where = f", not {k}" if abs(k) < 10**18 else ""
+        raise IndexError(f"there are results 0 … {count - 1}{where}" if count else "there are no results") from None
+    except (TypeError, ValueError):
+        raise InvalidArgument(f"a result is named by its number, got a {type(k).__name__}") from None
 
 
 class WorldResult:

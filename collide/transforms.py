@@ -161,6 +161,7 @@ def as_pose(X: PoseLike, name: str = "X_WA") -> np.ndarray:
 
 def poses_as_given(X: PoseLike, name: str, *, check: bool = True) -> tuple[np.ndarray, bool]:
     """(poses as `as_poses` gives them, whether a single one was given)."""
+    check = checks.true_or_false("check_poses", check)
     full = _from_tuple(X, name) if isinstance(X, tuple) else _from_object(X, name)
     if full.ndim not in (2, 3) or full.shape[-2:] != (4, 4):
         raise InvalidPose(f"{name} must have shape (4, 4) or (N, 4, 4), got {full.shape}")

@@ -110,7 +110,10 @@ class World(WorldPairs):
         InvalidArgument
         """
         margin = checks.limit("World.boxes_near: margin", margin)
-        corners = [np.asarray(corner, dtype=np.float64) for corner in (low_W, high_W)]
+        corners = [
+            checks.array(f"World.boxes_near: {name}", corner, "(3,)", InvalidArgument)
+            for name, corner in (("low_W", low_W), ("high_W", high_W))
+        ]
         if any(corner.shape != (3,) or np.isnan(corner).any() for corner in corners) or (corners[0] > corners[1]).any():
             raise InvalidArgument(
                 f"World.boxes_near: low_W and high_W must be corners (3,) of a box, low ≤ high, got "
@@ -170,6 +173,7 @@ class World(WorldPairs):
         limit = checks.limit("World.raycast: max_distance", max_distance, "")
         origins, directions, _ = cast_arguments.checked_rays("World.raycast", origins_W, directions_W)
         which = casts.checked_filter("World.raycast", group, mask)
+        all_hits = checks.true_or_false("World.raycast: all_hits", all_hits)
         rows, starts = casts.cast_rays(self._pack(), origins, directions, limit, all_hits, which)
         return self._hits(rows, starts)
 

@@ -255,7 +255,7 @@ class WorldBodies:
 
     def _rows_of(self, bodies: Iterable[int | str]) -> np.ndarray:
         if not (isinstance(bodies, np.ndarray) and bodies.ndim == 1 and bodies.dtype.kind in "iu"):
-            bodies = list(bodies)
+            bodies = checks.listed_entries("bodies", bodies, "a sequence of ids or names")
             if set(map(type, bodies)) - {int}:
                 bodies = [self.id_of(body) for body in bodies]
         n = self._next

@@ -61,7 +61,8 @@ class WorldScene:
         ------
         InvalidArgument, InvalidPose : naming the argument and the value; nothing is added.
         """
-        margin = checked_margin("World.add: margin", margin) if margin != 0.0 else 0.0
+        if margin.__class__ is not float or margin != 0.0:
+            margin = checked_margin("World.add: margin", margin)
         return self._bodies.add(shape, X_WB, name, static, group, mask, margin)
 
     def remove(self, body: int | str) -> None:
@@ -184,12 +185,13 @@ class WorldScene:
         ------
         UnknownBody; InvalidArgument : the same body twice, or a matrix of another form.
         """
+        checks.text("World.allow: reason", reason)
         if b is None:
             matrix = checks.plain_array("World.allow: matrix", a, "(bodies, bodies)", InvalidArgument)
             self._allow_matrix(matrix, reason)
         else:
             pair = self._pair("World.allow", self._bodies.id_of(a), self._bodies.id_of(b))
-            self._allowed.setdefault(pair, str(reason))
+            self._allowed.setdefault(pair, reason)
             self._note_partners(pair)
         self._pairs_changed = True
 
@@ -213,7 +215,7 @@ class WorldScene:
             )
         ids = self.ids
         for i, j in np.argwhere(np.triu(matrix, 1)).tolist():
-            self._allowed.setdefault((ids[i], ids[j]), str(reason))
+            self._allowed.setdefault((ids[i], ids[j]), reason)
             self._note_partners((ids[i], ids[j]))
 
     def __len__(self) -> int:

@@ -67,7 +67,7 @@ def path(name: str) -> Path:
     SceneError
         For an unknown name; the known ones are listed.
     """
-    for file in _assets().iterdir():
+    for file in _assets().iterdir() if isinstance(name, str) else ():
         if file.suffix in _SUFFIXES and file.stem == name:
             return file
     raise SceneError(f"no shipped scene is called {brief(name)}; there are {', '.join(shipped())}")

@@ -11,11 +11,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
 from collide.robots.robot import LinkShape, Robot
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
-from collide.transforms import as_poses
+from collide.transforms import as_pose, as_poses
 from collide.world import World
 
 
@@ -153,6 +154,7 @@ class Scene:
         InvalidArgument
             Where there is none; the names there are, are listed.
         """
+        checks.text(f"scene {self.name}: body", name)
         for body in self.bodies:
             if body.name == name:
                 return body
@@ -195,7 +197,8 @@ class Scene:
         InvalidArgument
             For an unknown state or joint; the known ones are listed.
         """
-        values = self._named_state(state) if isinstance(state, str) else dict(state)
+        values = self._named_state(state) if isinstance(state, str) else checks.mapping(
+            f"scene {self.name}: state", state, "joint → value, or the name of a state")  # fmt: skip
         shares = self.joint_shares(values)
         placements, notes = {}, []
         for name, placement in self.placements.items():
@@ -235,6 +238,7 @@ class Scene:
         InvalidArgument
             For a joint that no robot has; the known ones are listed.
         """
+        checks.mapping(f"scene {self.name}: values", values, "joint → value")
         shares: dict[str, dict[str, float]] = {name: {} for name in self.placements}
         owner = {
             joint: name
@@ -266,6 +270,9 @@ class Scene:
         SceneError
             Where the name is taken.
         """
+        checks.instance(f"scene {self.name}: body", body, SceneBody, "a SceneBody", SceneError)
+        checks.instance(f"scene {self.name}: shape of a body", body.shape, Shape, "a shape", SceneError)
+        checks.text(f"scene {self.name}: name of a body", body.name, SceneError)
         if len(self._sources) != len(self.bodies):  # the list was changed by hand
             self._sources = {known.name: known.source for known in self.bodies}
         if body.name in self._sources:
@@ -309,9 +316,14 @@ class Scene:
         Placement
             Its configuration, and which bodies its links carry.
         """
-        label = free_name(name or robot.name, dict.fromkeys(self.robots, 1))
-        q, notes = robot.configuration(values or {})
-        placement = Placement(robot, X_WR, q, frozenset(values or ()))
+        checks.instance(f"scene {self.name}: robot", robot, Robot, "a collide.Robot")
+        label = robot.name if name is None else checks.text(f"scene {self.name}: name of a robot", name)
+        label = free_name(label or robot.name, dict.fromkeys(self.robots, 1))
+        mobile = checks.true_or_false(f"scene {self.name}: mobile", mobile)
+        if allowed is not None:
+            allowed = checks.listed_entries(f"scene {self.name}: allowed", allowed, "(link, link, reason)")
+        q, notes = robot.configuration({} if values is None else values)
+        placement = Placement(robot, as_pose(X_WR, "X_WR"), q, frozenset(values or ()))
         notes += robot.default_notes(placement.set_columns, q)
         links: dict[str, SceneBody] = {}
         for link in robot.links:
@@ -324,7 +336,7 @@ class Scene:
         self.robots[label], self.placements[label] = robot, placement
         for body_name, X_WB in placement.body_poses().items():
             links[body_name].X_WB = X_WB
-        self.allowed += list(robot.disabled_pairs if allowed is None else allowed)
+        self.allowed += robot.disabled_pairs if allowed is None else allowed
         self.sources += [source for source in robot.sources if source not in self.sources]
         self.notes += robot.notes + notes
         self.state_notes += notes
@@ -345,8 +357,23 @@ class Scene:
             Its ``X_WB``, ``owner`` and ``static`` are set here.
         X_LB : (4, 4) float64
             Pose of the body in the link's frame L [m].
+
+        Raises
+        ------
+        InvalidArgument, InvalidPose, SceneError
+            For a robot or link that is not there, a pose that is none, a name that is taken.
         """
+        if checks.text(f"scene {self.name}: owner", owner) not in self.placements:
+            raise InvalidArgument(
+                f"scene {self.name}: no robot {brief(owner)}; it has {listing(self.placements) or 'none'}"
+            )
         placement = self.placements[owner]
+        if checks.text(f"scene {self.name}: link", link) not in placement.robot.links:
+            raise InvalidArgument(
+                f"scene {self.name}: robot {owner} has no link {brief(link)}; it has {listing(placement.robot.links)}"
+            )
+        checks.instance(f"scene {self.name}: body", body, SceneBody, "a SceneBody")
+        X_LB = as_pose(X_LB, "X_LB")
         placement.carried[body.name] = (link, X_LB)
         self.add(replace(body, X_WB=placement.body_poses()[body.name], owner=owner, static=False))
 

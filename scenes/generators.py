@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from collide.errors import SceneError
+from collide import argument_checks as checks
+from collide.errors import SceneError, brief
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import scene_yaml
 from collide.scenes.loaders.fields import did_you_mean
@@ -50,12 +51,13 @@ def generate(name: str, seed: int = 0, **size) -> Scene:
     SceneError
         For an unknown name, seed or argument, listing the known ones.
     """
-    if name not in _GENERATORS:
+    if checks.text("generate: name", name, SceneError) not in _GENERATORS:
         raise SceneError(
-            f"no generated scene is called {name!r}{did_you_mean(name, _GENERATORS)}; there are {', '.join(names())}"
+            f"no generated scene is called {brief(name)}{did_you_mean(name, _GENERATORS)}; "
+            f"there are {', '.join(names())}"
         )
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise SceneError(f"seed must be a whole number ≥ 0, got {seed!r}")
+    if not checks.is_integer(seed) or not 0 <= seed < 2**64:
+        raise SceneError(f"seed must be a whole number ≥ 0 of at most 64 bits, got {checks.describe(seed)}")
     make = _GENERATORS[name]
     known = [argument for argument in inspect.signature(make).parameters if argument != "rng"]
     for argument in size:
@@ -75,7 +77,7 @@ def names() -> list[str]:
 
 def _count(name: str, value: Any, least: int = 1) -> int:
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise SceneError(f"{name} must be a whole number ≥ {least}, got {value!r}")
+        raise SceneError(f"{name} must be a whole number ≥ {least}, got {checks.describe(value)}")
     return int(value)
 
 

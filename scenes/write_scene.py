@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, SceneError
 from collide.shapes import (
     Box,
@@ -56,7 +56,9 @@ def save(scene, path, *, about: str | Mapping[str, Any] | None = None) -> None:
     OSError
         Where it cannot be written.
     """
-    path = Path(path)
+    path = checks.file_path("save: path", path, SceneError)
+    if about is not None and not isinstance(about, str):
+        checks.mapping("save: about", about, "plain data, or a text", SceneError)
     if path.suffix.lower() != ".json":
         raise SceneError(f"a scene is written to a .json file, got {str(path)!r}")
     document = scene_document(*_bodies_and_allowed(scene), name=getattr(scene, "name", "") or path.stem, about=about)

@@ -76,6 +76,7 @@ def raycast(
     limit = checks.limit("raycast: max_distance", max_distance, "")
     X_WA, single_pose = poses_as_given(X_WA, "X_WA", check=check_poses)
     origins, directions, single = checked_rays("raycast", origins_W, directions_W, X_WA=len(X_WA))
+    all_hits = checks.true_or_false("raycast: all_hits", all_hits)
     events = surfaces_met(shape, X_WA, origins, directions, limit, every=all_hits)
     return as_hits(events, origins, directions, every=all_hits, single=single_pose and single and not all_hits)
 

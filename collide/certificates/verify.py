@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.certificates.certificate import APART, PLANE, TOGETHER, Certificate, CertificateRefused, read_certificates
 from collide.certificates.convex_proofs import flaw_of_normal, flaw_of_proof
 from collide.certificates.exact_parts import exact_parts
@@ -71,10 +72,11 @@ def check_question(caller: str, A, B, r) -> None:
         for shape in shapes:
             if not isinstance(shape, Shape):
                 raise InvalidArgument(
-                    f"{caller}: {name} must be a shape, for example collide.Box((1, 1, 1)), got {shape!r}"
+                    f"{caller}: {name} must be a shape, for example collide.Box((1, 1, 1)), "
+                    f"got {checks.describe(shape)}"
                 )
     if not (hasattr(r, "hit") and hasattr(r, "__len__")):
-        raise InvalidArgument(f"{caller}: r must be a result of distance, got {r!r}")
+        raise InvalidArgument(f"{caller}: r must be a result of distance, got {checks.describe(r)}")
 
 
 def _flaw_of_parts(A, B, X_WA, X_WB, certificates: Sequence[Certificate], claim: str) -> str | None:

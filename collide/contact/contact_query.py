@@ -93,7 +93,8 @@ def contacts(
         pass  # not prepared, or no pair of shapes: the long way answers, or says what is wrong
     X_WA, X_WB, _ = asked_poses(A, B, X_WA, X_WB)
     n = length_of(A, B, X_WA, X_WB)
-    rows, ends = contact_batch(A, B, X_WA, X_WB, n, margin, max_contacts, check=check_poses, threads=threads)
+    check = checks.true_or_false("check_poses", check_poses)
+    rows, ends = contact_batch(A, B, X_WA, X_WB, n, margin, max_contacts, check=check, threads=threads)
     prepare_contacts(A, B)
     return Contacts(rows, np.concatenate([[0], ends]).astype(np.int64))
 

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.batches import answer_batch
 from collide.certificates.certificate import VertexPair
 from collide.certificates.make_certificate import certificate_from_normal, certificate_from_pairs, certify
@@ -140,6 +141,7 @@ def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False) -> 
     for shape in (A, B):
         walk_body(shape)
     X_WA, X_WB, _, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
+    trace = checks.true_or_false("trace", trace)
     return walk_poses(A, B, X_WA, X_WB, lambda ids: ask_default(ids, True, 0.0), trace=trace)
 
 

@@ -90,7 +90,7 @@ def time_of_impact(
     """
     n_threads = check_threads(threads)
     width = _checked_tolerance(tolerance)
-    if check_poses and omega_WA is None and omega_WB is None:
+    if checks.true_or_false("check_poses", check_poses) and omega_WA is None and omega_WB is None:
         single_answer = single_impact(A, B, (X_WA0, X_WA1, X_WB0, X_WB1), width)
         if single_answer is not None:
             return single_answer

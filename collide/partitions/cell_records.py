@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.errors import InvalidArgument
+from collide import argument_checks as checks
 from collide.partitions.convex_cells import CellBlock
 from collide.partitions.cut_polygons import edge_rows
 from collide.partitions.finished_tree import FinishedTree
@@ -107,7 +107,7 @@ class ConvexCells:
         -------
         (k,) int64; −1 where none of the cells does.
         """
-        leaves = np.asarray(leaves, dtype=np.int64).reshape(-1)
+        leaves = checks.whole_numbers("ConvexCells.rows_of: leaves", leaves)
         if not len(self):
             return np.full(len(leaves), -1)
         tree, last = self.source.tree, self.cell.copy()
@@ -183,9 +183,7 @@ class ConvexCells:
         return CellPlanes(self.facet[rows], self.axis[rows], self.value[rows], self.side[rows], normals, offsets)
 
     def _row(self, i: int) -> int:
-        if not -len(self) <= i < len(self):
-            raise InvalidArgument(f"cell {i} of {len(self)}: ask for 0 … {len(self) - 1}")
-        return i % len(self)
+        return checks.checked_index("ConvexCells: i", i, len(self))
 
 
 class _Part(NamedTuple):

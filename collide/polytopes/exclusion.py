@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.polytopes.hierarchical_tree import HierarchicalTree
 from collide.polytopes.tree_walk import Plane, Walk
 
@@ -62,6 +63,7 @@ def hull_boundary(body: HierarchicalTree) -> HullBoundary:
     HullBoundary
         Of the hull of its points.
     """
+    checks.instance("hull_boundary: body", body, HierarchicalTree, "a HierarchicalTree")
     return HullBoundary(body.grid.whole.astype(np.int64), body.grid.centre, body.grid.unit, body.tree.facets)
 
 

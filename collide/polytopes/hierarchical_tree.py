@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collide.argument_checks import integer
+from collide.argument_checks import integer, true_or_false
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
 from collide.least_distance.input_rows import read_halfspaces, read_points
@@ -78,7 +78,7 @@ class HierarchicalTree:
         memory: int = MEMORY,
         limits: Sizes | None = None,
     ):
-        limit = integer("HierarchicalTree: memory", memory, 1)
+        limit, whole = integer("HierarchicalTree: memory", memory, 1), true_or_false("HierarchicalTree: whole", whole)
         self.points: np.ndarray | None = None
         self.normals: np.ndarray | None = None
         self.offsets: np.ndarray | None = None

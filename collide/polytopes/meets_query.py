@@ -7,7 +7,7 @@ from collections.abc import Callable
 from numpy.typing import ArrayLike
 
 from collide.argument_checks import integer
-from collide.errors import InvalidArgument
+from collide.errors import InvalidArgument, brief
 from collide.least_distance.input_rows import InputRows, input_rows
 from collide.least_distance.nearest_pair import NearestPair, nearest_pair
 from collide.least_distance.pair_proposals import Work
@@ -63,9 +63,10 @@ def meets(
     -----
     The sets are closed: touching is a hit. The numbers given are taken as exact; doubles propose and integers decide.
     """
-    if algorithm != "auto" and algorithm not in ALGORITHMS:
-        raise InvalidArgument(f"meets: algorithm must be auto or one of {', '.join(ALGORITHMS)}, got {algorithm!r}")
-    limit = None if work is None else integer("meets: work", work, 1)
+    if not isinstance(algorithm, str) or algorithm not in ("auto", *ALGORITHMS):
+        known = ", ".join(ALGORITHMS)
+        raise InvalidArgument(f"meets: algorithm must be auto or one of {known}, got {brief(algorithm)}")
+    limit = None if work is None else min(integer("meets: work", work, 1), 2**62)
     rows = input_rows(points, normals, offsets)
     log = Work(limit)
     pair = ALGORITHMS[AUTO if algorithm == "auto" else algorithm](rows, log)

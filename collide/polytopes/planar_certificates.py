@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.certificates.certificate import CertificateRefused
-from collide.polytopes.convex_polygon import ConvexPolygon
+from collide.polytopes.convex_polygon import ConvexPolygon, planar_poses
 from collide.polytopes.planar_layout import (
     HIT,
     HOW,
@@ -27,6 +27,7 @@ from collide.polytopes.planar_layout import (
     TANGENT,
     TWO_POINTS,
 )
+from collide.polytopes.verified_arguments import as_answer
 
 #: Coordinates in W [m].
 PlanarPoint = tuple[Fraction, Fraction]
@@ -78,6 +79,10 @@ def verify_polygons(A: ConvexPolygon, B: ConvexPolygon, X_WA, X_WB, certificate:
     -----
     O(1) of a hit; O(n + m) of a line, which every vertex is tried against.
     """
+    for name, polygon in (("A", A), ("B", B)):
+        as_answer("verify_polygons", name, polygon, ConvexPolygon)
+    X_WA, X_WB = (planar_poses(X, name)[0][0] for name, X in (("X_WA", X_WA), ("X_WB", X_WB)))
+    as_answer("verify_polygons", "certificate", certificate, PlanarCertificate)
     if certificate.hit:
         points = [
             _combination(polygon, np.asarray(X), weights, name)

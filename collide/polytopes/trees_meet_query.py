@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.least_distance.nearest_pair import nearest_pair
 from collide.least_distance.pair_proposals import Work
@@ -81,6 +82,9 @@ def trees_meet(
     UnsupportedQuery
         Where a tree would need more memory than it may take.
     """
+    for name, body in (("A", A), ("B", B)):
+        checks.instance(f"trees_meet: {name}", body, HierarchicalTree, "a HierarchicalTree")
+    certificate = checks.true_or_false("trees_meet: certificate", certificate)
     if A.points is None:
         A, B, X_WA, X_WB = B, A, X_WB, X_WA
     if A.points is None or B.points is not None:

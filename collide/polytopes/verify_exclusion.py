@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 from collide.certificates.certificate import CertificateRefused
 from collide.polytopes.exclusion import HullBoundary
 from collide.polytopes.trees_meet_query import TreeMeeting
-from collide.polytopes.verify_trees import _check, _fractions, _solve
+from collide.polytopes.verified_arguments import as_answer, as_halfspaces, as_matrix, as_points
+from collide.polytopes.verify_trees import _check, _solve
 
 
 def verify_boundary(points: ArrayLike, boundary: HullBoundary) -> None:
@@ -39,7 +40,8 @@ def verify_boundary(points: ArrayLike, boundary: HullBoundary) -> None:
     Each simplex lies in a hyperplane with all points on one side; every side of a simplex is a side of an even number;
     and the middle of the first is in no other. A cycle modulo 2 on a sphere that covers one point once covers it all.
     """
-    p, whole, facets = np.asarray(points, float), boundary.whole, boundary.facets
+    as_answer("verify_boundary", "boundary", boundary, HullBoundary)
+    p, whole, facets = as_points("verify_boundary", points), boundary.whole, boundary.facets
     d = p.shape[1]
     _check(whole.shape == p.shape and whole.dtype == np.int64, "the grid has no row for each point")
     unit = Fraction(boundary.unit)
@@ -90,11 +92,14 @@ def verify_exclusion(
     CertificateRefused
         With the reason, where the planes do not prove the miss.
     """
-    a, b = np.asarray(normals, float), np.asarray(offsets, float)
-    d, proof = boundary.whole.shape[1], answer.exclusion
+    caller = "verify_exclusion"
+    d = as_answer(caller, "boundary", boundary, HullBoundary).whole.shape[1]
+    proof = as_answer(caller, "answer", answer, TreeMeeting).exclusion
+    a, b = as_halfspaces(caller, normals, offsets, d)
+    poses = [as_matrix(caller, name, X, d + 1) for name, X in (("X_WP", X_WP), ("X_WR", X_WR))]
     if answer.hit or proof is None:
         raise CertificateRefused("trees: the answer has no planes: it is a hit, or integers over all rows settled it")
-    map_RP = _relative(_fractions(X_WP, d), _fractions(X_WR, d), d)
+    map_RP = _relative(poses[0], poses[1], d)
     unit, centre = Fraction(boundary.unit), [Fraction(x) for x in boundary.centre.tolist()]
     outside = [Fraction(x) for x in proof.outside]
     is_left_out = np.zeros(len(boundary.facets), dtype=bool)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from collide.certificates.certificate import CertificateRefused
 from collide.polytopes.meeting import Meeting, MeetingCertificate
+from collide.polytopes.verified_arguments import as_answer, as_halfspaces, as_points
 
 #: Rows turned into integers at a time.
 _BLOCK = 65_536
@@ -41,8 +42,9 @@ def verify(points: ArrayLike, normals: ArrayLike, offsets: ArrayLike, answer: Me
     the distance of Σ weights·points from its projection on the plane, which every half-space holds, bounds ``upper``.
     O((n + m) d) operations on integers, some microseconds a row.
     """
-    p, a, b = np.asarray(points, float), np.asarray(normals, float), np.asarray(offsets, float)
-    certificate = answer.certificate
+    p = as_points("verify", points)
+    a, b = as_halfspaces("verify", normals, offsets, p.shape[1])
+    certificate = as_answer("verify", "answer", answer, Meeting).certificate
     _check_form(certificate, len(p), len(a), p.shape[1])
     if certificate.kind == "common point":
         _check(answer.hit and answer.lower == answer.upper == answer.distance == 0.0, "a common point is a hit at 0")

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from collide.certificates.certificate import CertificateRefused
 from collide.polytopes.trees_meet_query import TreeMeeting
+from collide.polytopes.verified_arguments import as_answer, as_halfspaces, as_matrix, as_points
 from collide.polytopes.verify_meeting import largest_value
 
 
@@ -43,12 +44,13 @@ def verify_trees(
     A hit: at most d + 1 points with positive weights of sum 1, moved by X_WP, are moved by the inverse of X_WR into
     every half-space. A miss: at most d half-spaces with positive multipliers, u·x ≤ c of which every point exceeds.
     """
-    p, a, b = np.asarray(points, float), np.asarray(normals, float), np.asarray(offsets, float)
+    p = as_points("verify_trees", points)
     d = p.shape[1]
-    proof = answer.certificate
+    a, b = as_halfspaces("verify_trees", normals, offsets, d)
+    proof = as_answer("verify_trees", "answer", answer, TreeMeeting).certificate
     if proof is None:
         raise CertificateRefused("trees: the answer has no certificate: ask with certificate=True")
-    M_P, M_R = _fractions(X_WP, d), _fractions(X_WR, d)
+    M_P, M_R = (as_matrix("verify_trees", name, X, d + 1) for name, X in (("X_WP", X_WP), ("X_WR", X_WR)))
     if proof.kind == "common point":
         _check(answer.hit, "a common point is a hit")
         _check_rows(proof.points, proof.weights, len(p), d + 1)
@@ -82,11 +84,6 @@ def _check_rows(rows, numbers, count: int, max_rows: int) -> None:
     _check(0 < len(rows) == len(numbers) == len(set(rows)) <= max_rows, "rows and their numbers do not match")
     _check(all(type(row) is int and 0 <= row < count for row in rows), f"no such rows: {rows}")
     _check(all(isinstance(number, (int, Fraction)) and number > 0 for number in numbers), "a number is not > 0")
-
-
-def _fractions(X: ArrayLike | None, d: int) -> list[list[Fraction]]:
-    matrix = np.eye(d + 1) if X is None else np.asarray(X, float)
-    return [[Fraction(x) for x in row] for row in matrix.tolist()]
 
 
 def _solve(rows: list[list[Fraction]], right: list[Fraction]) -> list[Fraction]:

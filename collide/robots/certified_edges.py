@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from collide.errors import InvalidArgument
 from collide.kernels import address_of
 from collide.robots.certify_meshes import settle_meshes
 from collide.robots.certify_motions import certify_motions
@@ -18,6 +19,8 @@ from collide.robots.robot_bodies import paths_to_root
 
 #: Before anything is proven, motions are asked at their ends and, so many times halved, in between.
 SAMPLED_HALVINGS = 2
+#: A motion that is sampled alone is halved at most so often: 2^30 samples take an hour.
+_MAX_HALVINGS = 30
 #: Roundings of forward kinematics, as a share of where links are and how far they reach.
 _ROUNDING = 2.0**-40
 
@@ -80,7 +83,14 @@ def sampled_collision(
     """
     times = np.full(len(q0), np.nan)
     change = np.abs(q1 - q0).max(axis=1, initial=0.0)
-    needed = np.ceil(np.log2(np.maximum(change / step, 1.0))).astype(np.int64)
+    with np.errstate(over="ignore"):
+        needed = np.minimum(np.ceil(np.log2(np.maximum(change / step, 1.0))), 2000.0).astype(np.int64)
+    if n_halvings is None and needed.max(initial=0) > _MAX_HALVINGS:
+        k = int(needed.argmax())
+        raise InvalidArgument(
+            f"RobotChecker: motion {k} changes a column by {change[k]:g} [rad or m]: in steps of {step:g} that is more "
+            f"than 2^{_MAX_HALVINGS} samples; take a larger resolution"
+        )
     if n_halvings is not None:
         needed = np.minimum(needed, n_halvings)
     for level in range(-1, int(needed.max(initial=-1)) + 1):

@@ -16,7 +16,7 @@ from collide.robots.check_workspace import CheckWorkspace
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import bodies_around, filters_of, refuse_own_margins, robot_bodies
 from collide.threads import check_threads, pieces_of, share
-from collide.transforms import as_poses
+from collide.transforms import as_pose
 from collide.world import World
 
 #: A thread is handed at least so many configurations.
@@ -38,9 +38,11 @@ class CheckerScene:
         if world is not None and not isinstance(world, World):
             raise InvalidArgument(f"RobotChecker: world must be a collide.World, got {checks.describe(world)}")
         self.robot, self.world = robot, World() if world is None else world
-        self._X_WR = np.eye(4) if X_WR is None else as_poses(X_WR, "RobotChecker: X_WR")[0].copy()
+        self._X_WR = np.eye(4) if X_WR is None else as_pose(X_WR, "RobotChecker: X_WR").copy()
+        attached = checks.listed_entries("RobotChecker: attached", attached, "tuples (name, link, shape, X_LB)")
         self._bodies, self._objects = robot_bodies(robot, attached, padding)
-        self._asked, self._mobile = list(allowed), bool(mobile)
+        self._asked = checks.listed_entries("RobotChecker: allowed", allowed, "pairs of names")
+        self._mobile = checks.true_or_false("RobotChecker: mobile", mobile)
         self._seen: tuple | None = None
         self._spare: list[CheckWorkspace] = []
         self.prepare()
@@ -87,7 +89,11 @@ class CheckerScene:
         -------
         (str, str)
         """
-        return self.bodies[a], self.bodies[b] if b >= 0 else self.around[-1 - b]
+        bodies, around = self.bodies, self.around
+        a = checks.checked_index("RobotChecker.names_of: a", a, len(bodies))
+        if checks.is_integer(b) and b < 0:
+            return bodies[a], around[checks.checked_index("RobotChecker.names_of: −1 − b", -1 - b, len(around))]
+        return bodies[a], bodies[checks.checked_index("RobotChecker.names_of: b", b, len(bodies))]
 
     def link_poses(self, q) -> np.ndarray:
         """`Robot.link_poses` of the robot where it stands.

@@ -21,6 +21,7 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
 from collide.robots.forward_kinematics import joint_table, link_poses_of
 from collide.robots.kinematic_tree import (
@@ -35,7 +36,7 @@ from collide.robots.kinematic_tree import (
     tree_of,
 )
 from collide.shapes.shape import Shape
-from collide.transforms import LARGEST, as_poses
+from collide.transforms import LARGEST, as_pose
 
 #: Module and function that read robots from files: found when first needed, since the engine imports no loader.
 _LOADER = ("collide.scenes.loaders.robot_file", "load_robot")
@@ -118,12 +119,16 @@ class Robot:
         missing_meshes: Iterable[str] = (),
         sources: Iterable[str] = (),
     ):
-        self.name = name
-        self.links = tuple(links)
+        self.name = checks.text("Robot: name", name, SceneError)
+        self.links = tuple(_texts("links", links))
         self._index = indices_of("link", self.links)
-        self.sources, self.prefix, self.missing_meshes = list(sources), "", list(missing_meshes)
+        self.sources, self.prefix = _texts("sources", sources), ""
+        self.missing_meshes = _texts("missing_meshes", missing_meshes)
         self.place = ": ".join((*self.sources[:1], f"robot {cut(name)}"))
-        checked = [checked_joint(joint, self._index) for joint in joints]
+        listed = checks.listed_entries("Robot: joints", joints, "a sequence of Joint", SceneError)
+        for joint in listed:
+            checks.instance("Robot: joints", joint, Joint, "a sequence of Joint", SceneError)
+        checked = [checked_joint(joint, self._index) for joint in listed]
         indices_of("joint", [joint.name for joint in checked])
         broken = broken_mimics(checked)
         self.joints = tuple(replace(joint, mimic=None) if joint.name in broken else joint for joint in checked)
@@ -134,16 +139,16 @@ class Robot:
             self._order, self._index, self._columns, self._drivers, self.root, self.dof
         )
         self.moves = self._joint_moves()
-        self.geometry = {link: tuple(elements) for link, elements in (geometry or {}).items() if elements}
+        self.geometry = _checked_geometry({} if geometry is None else geometry)
         for link in self.geometry:
             if link not in self._index:
                 raise SceneError(f"unknown link; the robot has {listing(self.links)}", element=f'link "{cut(link)}"')
         self.rigid_clusters = rigid_clusters(self.links, self.joints)
         self.base_links = next(cluster for cluster in self.rigid_clusters if self.root in cluster)
-        self.semantic_pairs = None if semantic_pairs is None else tuple(semantic_pairs)
-        self.states = {label: dict(values) for label, values in (states or {}).items()}
+        self.semantic_pairs = None if semantic_pairs is None else _checked_pairs(semantic_pairs)
+        self.states = _checked_states({} if states is None else states)
         file = Path(self.sources[0]).name if self.sources else f"robot {cut(name)}"
-        self.notes = [*notes, *(f"{file}: {broken_note(joint, why)}" for joint, why in broken.items())]
+        self.notes = [*_texts("notes", notes), *(f"{file}: {broken_note(joint, why)}" for joint, why in broken.items())]
 
     @classmethod
     def load(cls, path, srdf=None, **options) -> Robot:
@@ -229,13 +234,14 @@ class Robot:
         InvalidArgument
             For unknown joints (the known ones are listed) and for values that are not finite numbers.
         """
-        q = self.default_configuration() if start is None else np.array(start, dtype=np.float64)
+        q = self.default_configuration() if start is None else self._one_configuration("start", start).copy()
+        values = checks.mapping("Robot.configuration: values", values, "joint → value")
         column = {name: k for k, name in enumerate(self.joint_names)}
         by_name = {joint.name: joint for joint in self.joints}
         followers: list[tuple[Joint, float]] = []
         notes: list[str] = []
         for name, raw in values.items():
-            value = _joint_value(name, raw)
+            value = _joint_value(checks.text("Robot.configuration: values: a joint", name), raw)
             if name in column:
                 q[column[name]] = value
             elif name not in by_name or by_name[name].type in ("planar", "floating"):
@@ -270,7 +276,10 @@ class Robot:
         list of str
             One note, or none.
         """
-        names = set(names)
+        if not isinstance(names, (set, frozenset)):
+            names = checks.listed_entries("Robot.default_notes: names", names, "names of columns")
+        names = {checks.text("Robot.default_notes: names", name) for name in names}
+        q = self._one_configuration("q", q)
         unset = [(name, value) for name, value in zip(self.joint_names, q) if name not in names]
         if not unset:
             return []
@@ -291,9 +300,32 @@ class Robot:
         -------
         float
             [rad or m].
+
+        Raises
+        ------
+        InvalidArgument
+            For a name that no such joint has, and for a q of another shape.
         """
+        if checks.text("Robot.joint_value: name", name) not in self._drivers:
+            raise InvalidArgument(
+                f"robot {self.name}: no joint {brief(name)} moves along one coordinate; there are "
+                f"{listing(self._drivers) or 'none'}"
+            )
+        return self._value_at(name, self._one_configuration("q", q))
+
+    def _value_at(self, name: str, q: np.ndarray) -> float:
         driver, multiplier, offset = self._drivers[name]
         return multiplier * float(q[self._columns[driver]]) + offset
+
+    def _one_configuration(self, what: str, q) -> np.ndarray:
+        """(dof,) float64, the caller's own where it is that already. Raises InvalidArgument."""
+        read = checks.array(f"robot {cut(self.name)}: {what}", q, f"({self.dof},)", InvalidArgument)
+        if read.shape != (self.dof,):
+            raise InvalidArgument(
+                f"robot {cut(self.name)}: {what} must have shape ({self.dof},), a value for each of "
+                f"{listing(self.joint_names) or 'no joints'}; got {read.shape}"
+            )
+        return read
 
     def limit_notes(self, q: np.ndarray) -> list[str]:
         """Notes about joints outside their limits.
@@ -308,11 +340,11 @@ class Robot:
         list of str
             One a joint.
         """
-        notes = []
+        notes, q = [], self._one_configuration("q", q)
         for joint in self.joints:
             if joint.type not in ("revolute", "prismatic"):
                 continue
-            value = self.joint_value(joint.name, q)
+            value = self._value_at(joint.name, q)
             slack = 1e-9 * max(1.0, abs(value))  # files print limits and values with rounded digits
             if not joint.lower - slack <= value <= joint.upper + slack:
                 unit = "rad" if joint.type == "revolute" else "m"
@@ -387,7 +419,7 @@ class Robot:
             Naming file, link and joint, where a link leaves the range of coordinates that poses may have.
         """
         q = np.ascontiguousarray(self.checked_configurations(q))
-        X_WLs = link_poses_of(self.joint_table, q, np.eye(4) if X_WR is None else as_poses(X_WR, "X_WR")[0])
+        X_WLs = link_poses_of(self.joint_table, q, np.eye(4) if X_WR is None else as_pose(X_WR, "X_WR"))
         within = np.abs(X_WLs[:, :, :3]) <= LARGEST
         if not within.all():
             self._refuse_pose(X_WLs, within, q)
@@ -423,12 +455,7 @@ class Robot:
         InvalidArgument
             For another number of columns; for values that are not finite, naming row and joint.
         """
-        try:
-            array = np.asarray(q, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            raise InvalidArgument(
-                f"q must be numbers of shape ({self.dof},) or (N, {self.dof}), got {brief(q)}"
-            ) from None
+        array = checks.array("q", q, f"({self.dof},) or (N, {self.dof})", InvalidArgument)
         if array.ndim not in (1, 2) or array.shape[-1] != self.dof:
             raise InvalidArgument(
                 f"q must have shape ({self.dof},) or (N, {self.dof}), one column for each of "
@@ -491,7 +518,7 @@ class Robot:
         Robot
             A new one; shapes are shared.
         """
-        if not prefix:
+        if not checks.text("Robot.renamed: prefix", prefix):
             return self
         robot = Robot(
             self.name,
@@ -514,6 +541,41 @@ class Robot:
         )
         robot.prefix = prefix + self.prefix
         return robot
+
+
+def _texts(field: str, values) -> list[str]:
+    what = f"Robot: {field}"
+    return [checks.text(what, value, SceneError) for value in checks.listed_entries(what, values, "texts", SceneError)]
+
+
+def _checked_geometry(geometry) -> dict[str, tuple[LinkShape, ...]]:
+    checked = {}
+    for link, elements in checks.mapping("Robot: geometry", geometry, "link → its LinkShapes", SceneError).items():
+        what = f"Robot: geometry[{brief(link)}]"
+        listed = checks.listed_entries(what, elements, "a sequence of LinkShape", SceneError)
+        for element in listed:
+            checks.instance(what, element, LinkShape, "a sequence of LinkShape", SceneError)
+        if listed:
+            checked[link] = tuple(listed)
+    return checked
+
+
+def _checked_pairs(pairs) -> tuple[tuple[str, str, str], ...]:
+    wanted = "(link, link, reason), three texts each"
+    checked = [checks.listed_entries("Robot: semantic_pairs", pair, wanted, SceneError)
+             for pair in checks.listed_entries("Robot: semantic_pairs", pairs, wanted, SceneError)]  # fmt: skip
+    for pair in checked:
+        if len(pair) != 3 or not all(isinstance(word, str) for word in pair):
+            raise SceneError(f"Robot: semantic_pairs must be {wanted}, got {checks.describe(pair)}")
+    return tuple((a, b, reason) for a, b, reason in checked)
+
+
+def _checked_states(states) -> dict[str, dict[str, float]]:
+    form = "name → {joint: value}"
+    return {
+        label: dict(checks.mapping(f"Robot: states[{brief(label)}]", values, form, SceneError))
+        for label, values in checks.mapping("Robot: states", states, form, SceneError).items()
+    }
 
 
 def _joint_value(name: str, value) -> float:

@@ -90,6 +90,12 @@ class RobotChecker(CheckerScene):
         InvalidArgument
             Where the scene has no such robot, or several and none is named.
         """
+        if not hasattr(scene, "placements"):
+            raise InvalidArgument(
+                f"RobotChecker.from_scene: scene must be what collide.scenes.load gives, got {checks.describe(scene)}"
+            )
+        if robot is not None:
+            checks.text("RobotChecker.from_scene: robot", robot)
         if robot is None and len(scene.placements) == 1:
             robot = next(iter(scene.placements))
         if robot not in scene.placements:

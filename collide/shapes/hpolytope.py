@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidShape
 from collide.hull.double_description import halfspace_vertices
 from collide.lazy_modules import lazy_module
@@ -78,7 +79,7 @@ class HPolytope(Shape):
         zero = ~normals.any(axis=1)
         if zero.any():
             raise InvalidShape(f"HPolytope: normals[{int(np.argmax(zero))}] is zero and names no half-space")
-        if not bounded:
+        if not checks.true_or_false("HPolytope: bounded", bounded):
             self._store(normals=normals, offsets=offsets, bounded=False)
             self._store(boundary_within=_boundary_within(normals, offsets))
             return

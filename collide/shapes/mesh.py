@@ -100,7 +100,7 @@ class Mesh(Shape):
         vertices = _check_vertices(vertices)
         faces = _check_faces(faces, len(vertices))
         if solid is not None and not isinstance(solid, (bool, np.bool_)):
-            raise InvalidShape(f"Mesh: solid must be True, False or None, got {solid!r}")
+            raise InvalidShape(f"Mesh: solid must be True, False or None, got {checks.describe(solid)}")
         self._store(vertices=vertices, faces=faces, scale=1.0, solid=False, _copied=None)
         if solid is not None and not solid:
             return
@@ -226,6 +226,7 @@ class Mesh(Shape):
         Geometry 31 (2005), sections 2.1 and 8.
         """
         options = {} if progress is None else {"progress": progress}
+        repeated = checks.true_or_false("Mesh.locality: repeated", repeated)
         return local_stretch.locality(self.vertices, self.faces, repeated=repeated, **options)
 
     def localised(
@@ -266,7 +267,8 @@ class Mesh(Shape):
         docs/locality.md says where it pays.
         """
         progress = progress or local_stretch.quiet
-        return localised_mesh.localised_mesh(self, stretch, order, max_facets, progress)
+        plain = self if type(self) is Mesh else Mesh(self.vertices, self.faces, solid=self.solid)
+        return localised_mesh.localised_mesh(plain, stretch, order, max_facets, progress)
 
     def save(self, path) -> None:
         """Write the mesh to a file: all of it as ``.npz``, or its triangles in a form that other programs read.

@@ -12,6 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
@@ -82,10 +83,14 @@ def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | No
         For a half-space, and an `HPolytope` with ``bounded=False``, without ``size``.
     """
     if not isinstance(shape, Shape):
-        raise InvalidArgument(f"tessellate: shape must be a shape, for example collide.Sphere(0.1), got {shape!r}")
+        raise InvalidArgument(
+            f"tessellate: shape must be a shape, for example collide.Sphere(0.1), got {checks.describe(shape)}"
+        )
     for name, value in (("tolerance", tolerance), ("size", size)):
-        if value is not None and not _is_length(value):
-            raise InvalidArgument(f"tessellate: {name} must be a finite length above 0 [m], got {value!r}")
+        if value is not None and not 0.0 < _length(value) < math.inf:
+            raise InvalidArgument(
+                f"tessellate: {name} must be a finite length above 0 [m], got {checks.describe(value)}"
+            )
     if isinstance(shape, Compound):
         return _together([(tessellate(part, tolerance=tolerance, size=size), X) for part, X in shape.items])
     if isinstance(shape, Halfspace):
@@ -100,8 +105,9 @@ def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | No
     raise UnsupportedQuery(f"tessellate: a {type(shape).__name__} has no triangles here")
 
 
-def _is_length(value) -> bool:
-    return not isinstance(value, bool) and isinstance(value, (int, float, np.number)) and 0 < float(value) < math.inf
+def _length(value) -> float:
+    read = None if isinstance(value, bool) else checks.number(value)
+    return math.nan if read is None else read
 
 
 def _together(parts: list[tuple[Tessellation, np.ndarray]]) -> Tessellation:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, brief
 from collide.shapes.shape import Shape
 from collide.solids.arrangement import arrange
@@ -80,9 +81,9 @@ def combine(
 def _operands(shapes, poses, check_poses: bool) -> list[Operand]:
     if isinstance(shapes, Shape) or not isinstance(shapes, Sequence) or not len(shapes):
         raise InvalidArgument(f"combine: shapes must be a list of one or more solids, got {brief(shapes)}")
-    if not hasattr(poses, "__len__") or len(poses) != len(shapes):
-        n_poses = len(poses) if hasattr(poses, "__len__") else brief(poses)
-        raise InvalidArgument(f"combine: {len(shapes)} shapes need as many poses, (r, 4, 4), got {n_poses}")
+    poses = checks.listed_entries("combine: poses", poses, f"a pose for each of {len(shapes)} shapes, (r, 4, 4)")
+    if len(poses) != len(shapes):
+        raise InvalidArgument(f"combine: {len(shapes)} shapes need as many poses, (r, 4, 4), got {len(poses)}")
     return [
         solid_operand("combine", f"shapes[{k}]", shape, X, check_poses, f"poses[{k}]")
         for k, (shape, X) in enumerate(zip(shapes, poses))

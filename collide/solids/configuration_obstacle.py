@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.mesh.mesh_survey import NO_AREA
 from collide.mesh.mesh_topology import COLLAPSED
@@ -102,7 +103,7 @@ def configuration_obstacle(
     if not isinstance(A, Shape):
         with Limits("configuration_obstacle", progress, time_limit, memory) as limits:
             return planar_obstacle(A, B, R, limits, check_poses)
-    rotation = np.eye(3) if R is None else np.asarray(R)
+    rotation = np.eye(3) if R is None else checks.array("configuration_obstacle: R", R, "(3, 3)", InvalidArgument)
     if rotation.shape != (3, 3):
         raise InvalidArgument(f"configuration_obstacle: R must be a (3, 3) rotation, got shape {rotation.shape}")
     X = np.eye(4)

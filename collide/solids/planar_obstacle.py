@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidPose, brief
 from collide.numerics.exact_points import integers
 from collide.solids.limits import UNLIMITED, Limits
@@ -86,7 +87,7 @@ def planar_obstacle(A, B, R, limits: Limits, check: bool = True) -> PlanarObstac
 def exact_planar_obstacle(A, B, R, limits: Limits = UNLIMITED, check: bool = True) -> ExactPlanarObstacle:
     """The same before rounding."""
     limits.stage("putting edges and corners together")
-    rotation = np.eye(2) if R is None else np.asarray(R, dtype=np.float64)
+    rotation = np.eye(2) if R is None else checks.array("configuration_obstacle: R", R, "(2, 2)", InvalidArgument)
     if rotation.shape != (2, 2) or not np.isfinite(rotation).all():
         raise InvalidArgument(f"configuration_obstacle: R of polygons must be a (2, 2) rotation, got {brief(R)}")
     off = rotation @ rotation.T - np.eye(2)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits, self_hits
 from collide.shapes.mesh import Mesh
@@ -76,6 +77,7 @@ def facet_pairs(A: Shape, B: Shape, X_WA, X_WB, *, first: bool = False, check_po
     O(n log n) pairs of boxes for local meshes (J. Erickson, "Local polyhedra and geometric graphs" (2005), theorem 3.6;
     counted in docs/locality.md), n² for any others at worst.
     """
+    first = checks.true_or_false("facet_pairs: first", first)
     body_a, body_b, X_WA, X_WB = two_bodies("facet_pairs", A, B, X_WA, X_WB, check_poses)
     return FacetPairs(*(first_hits if first else all_hits)(body_a.tree, body_b.tree, X_WA, X_WB))
 

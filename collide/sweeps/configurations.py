@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from collide.argument_checks import integer
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, MissingExtra, SceneError, brief, listing
 from collide.robots.robot import Robot
 from collide.sweeps.content_digest import digest
@@ -16,6 +16,8 @@ from collide.sweeps.random_configurations import random_configurations
 #: Endings of files of configurations.
 SUFFIXES = (".npy", ".csv", ".parquet")
 _DIGEST_ROWS = 1_000_000
+#: Numbers of one array of drawn configurations: 16 GiB.
+_MAX_DRAWN = 2**31
 
 
 class DrawnConfigurations:
@@ -35,8 +37,8 @@ class DrawnConfigurations:
     """
 
     def __init__(self, rows: int, seed: int = 0):
-        self.rows = integer("DrawnConfigurations: rows", rows, 1)
-        self.seed = integer("DrawnConfigurations: seed", seed, 0)
+        self.rows = checks.integer("DrawnConfigurations: rows", rows, 1)
+        self.seed = checks.integer("DrawnConfigurations: seed", seed, 0)
 
     def of(self, robot: Robot) -> np.ndarray:
         """All of them, for a robot.
@@ -50,7 +52,15 @@ class DrawnConfigurations:
         -------
         (rows, dof) float64
             [rad or m], columns as in `Robot.joint_names`.
+
+        Raises
+        ------
+        InvalidArgument
+            For what is no robot, and for more rows than memory holds.
         """
+        checks.instance("DrawnConfigurations.of: robot", robot, Robot, "a collide.Robot")
+        if self.rows * max(robot.dof, 1) > _MAX_DRAWN:
+            raise InvalidArgument(f"{checks.describe(self.rows)} rows are too many for memory: draw blocks")
         return random_configurations(robot, 0, self.rows, self.seed)
 
     def about(self) -> dict[str, Any]:
@@ -76,6 +86,7 @@ class DrawnConfigurations:
         DrawnBlock
             Small: the rows are drawn where it is asked for them.
         """
+        start, stop = checks.integer("block: start", start, 0), checks.integer("block: stop", stop, 0)
         return DrawnBlock(start, stop, self.seed)
 
 
@@ -132,10 +143,7 @@ def as_configurations(value, robot: Robot) -> DrawnConfigurations | GivenConfigu
         return value
     if isinstance(value, (str, Path)):
         return read_configurations(Path(value), robot)
-    try:
-        Q = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidArgument(f"configurations must be numbers of shape (N, {robot.dof}), got {brief(value)}") from None
+    Q = checks.array("configurations", value, f"(N, {robot.dof})", InvalidArgument)
     _check_width(Q, robot, "configurations")
     return GivenConfigurations(Q)
 

@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
-from collide.argument_checks import integer
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, brief
 from collide.robots.robot import Robot
 from collide.sweeps.link_bodies import LinkBody, link_bodies, link_poses, moving_columns, pair_gaps, pair_hits
@@ -21,6 +21,8 @@ from collide.sweeps.random_configurations import random_configurations, unlimite
 ADJACENT, DEFAULT, ALWAYS, NEVER = "Adjacent", "Default", "Always", "Never"
 #: Configurations whose poses are held at once.
 _BATCH = 2000
+#: Configurations of a proposal, at most: a thousand million, days.
+_MAX_SAMPLES = 10**9
 #: Configurations of which gaps are asked, to start the search from the nearest.
 _N_GAPS = 1000
 #: Quantile of the normal distribution for 95 % on one side.
@@ -111,7 +113,8 @@ class Proposal:
         LinkPair or None
             None where one of them has no collision geometry.
         """
-        return next((pair for pair in self.pairs if {pair.a, pair.b} == {a, b}), None)
+        wanted = {checks.text("Proposal.pair: a", a), checks.text("Proposal.pair: b", b)}
+        return next((pair for pair in self.pairs if {pair.a, pair.b} == wanted), None)
 
 
 def wilson_bounds(hits: int, samples: int) -> tuple[float, float]:
@@ -158,17 +161,23 @@ def propose_disabled_pairs(
     InvalidArgument
         For a robot without two links with geometry, and for numbers out of range.
     """
-    samples = integer("samples", samples, 1)
-    seed, rounds = integer("seed", seed, 0), integer("rounds", rounds, 0)
-    if not 0.5 <= always_share <= 1.0:
+    samples = checks.integer("samples", samples, 1)
+    seed, rounds = checks.integer("seed", seed, 0), checks.integer("rounds", rounds, 0)
+    checks.instance("propose_disabled_pairs: robot", robot, Robot, "a collide.Robot")
+    share = checks.number(always_share)
+    if share is None or not 0.5 <= share <= 1.0:
         raise InvalidArgument(f"always_share must be between 0.5 and 1, got {brief(always_share)}")
+    if samples > _MAX_SAMPLES:
+        raise InvalidArgument(f"samples must be at most {_MAX_SAMPLES:,}, got {checks.describe(samples)}")
+    if rounds > _MAX_SAMPLES:
+        raise InvalidArgument(f"rounds must be at most {_MAX_SAMPLES:,}, got {checks.describe(rounds)}")
     bodies = link_bodies(robot)
     if len(bodies) < 2:
         raise InvalidArgument(
             f"robot {robot.name}: {len(bodies)} of its links have collision geometry; pairs need two: "
             "look whether its meshes were read, and whether it has <collision> elements"
         )
-    proposal = Proposal(robot, samples, seed, rounds, always_share, notes=list(robot.notes))
+    proposal = Proposal(robot, samples, seed, rounds, share, notes=list(robot.notes))
     if still := unlimited_lengths(robot):
         proposal.notes.append(f"not drawn, for these are lengths without limits: {', '.join(still)}")
     with (progress or _silent)(f"{robot.name}: sampling") as rename:

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from collide import __version__
-from collide.argument_checks import integer
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, SceneError, brief
+from collide.robots.robot import Robot
 from collide.sweeps.configurations import DrawnConfigurations, GivenConfigurations, as_configurations
 from collide.sweeps.content_digest import digest
 from collide.sweeps.dask_pool import DaskPool
@@ -24,7 +25,8 @@ from collide.sweeps.sweep_results import SweepResults, read_sweep
 
 #: Rows of a chunk where nobody says how many: small sweeps have chunks enough for many workers.
 _MIN_CHUNK, _MAX_CHUNK, _AIMED_CHUNKS = 500, 50_000, 64
-#: Of chunks, and of rows of one: numbers of chunks are listed, and the rows of a chunk are in memory.
+#: Of processes, of chunks, and of rows of one: numbers of chunks are listed, and the rows of a chunk are in memory.
+MAX_WORKERS = 10_000
 MAX_CHUNKS, MAX_CHUNK_ROWS = 1_000_000, 10_000_000
 #: How often it is looked whether the scene is still what it was [s].
 _LOOK_EVERY = 1.0
@@ -79,8 +81,12 @@ def sweep(
     MissingExtra
         Without pyarrow, and for Dask without distributed.
     """
+    if not isinstance(getattr(checker, "robot", None), Robot):
+        raise InvalidArgument(f"sweep: checker must be a RobotChecker, got {checks.describe(checker)}")
+    folder, restart = checks.file_path("sweep: folder", folder), checks.true_or_false("sweep: restart", restart)
     Q = as_configurations(configurations, checker.robot)
-    question = OneQuestion(checker, distances, values)
+    distances = checks.true_or_false("sweep: distances", distances)
+    question = OneQuestion(checker, distances, checks.true_or_false("sweep: values", values))
     run = SweepRun(question, 1, Q, folder, lambda final: question_digest(checker), chunk=chunk)
     return run.go(workers=workers, scheduler=scheduler, restart=restart, progress=progress)
 
@@ -110,11 +116,13 @@ class SweepRun:
 
     def _chunk_rows(self, chunk: int | None) -> int:
         if chunk is not None:
-            rows = integer("chunk", chunk, 1)
+            rows = checks.integer("chunk", chunk, 1)
         else:
             rows = min(max(-(-self.rows // _AIMED_CHUNKS), _MIN_CHUNK), _MAX_CHUNK)
         if rows > MAX_CHUNK_ROWS:
-            raise InvalidArgument(f"chunk must be at most {MAX_CHUNK_ROWS:,} rows, which are in memory, got {rows:,}")
+            raise InvalidArgument(
+                f"chunk must be at most {MAX_CHUNK_ROWS:,} rows, which are in memory, got {brief(rows)}"
+            )
         if self.rows > rows * MAX_CHUNKS:
             raise InvalidArgument(
                 f"{brief(self.rows)} rows are more than {MAX_CHUNKS:,} chunks of {rows:,}: ask fewer, or take larger "
@@ -140,7 +148,9 @@ class SweepRun:
         """Ask what is missing, and give everything."""
         parquet_module()
         if workers is not None:
-            integer("workers", workers, 0)
+            checks.integer("workers", workers, 0)
+            if workers > MAX_WORKERS:
+                raise InvalidArgument(f"workers must be at most {MAX_WORKERS:,} processes, got {brief(workers)}")
         with self.directory.locked(), (progress or _silent)("sweeping") as rename:
             done = set(self.directory.begin(self.manifest, restart))
             missing = [number for number in range(self.manifest["chunks"]) if number not in done]

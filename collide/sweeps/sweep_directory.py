@@ -171,7 +171,7 @@ def _is_manifest(manifest: Any) -> bool:
     """Whether it has what a summary needs, in the form of this version."""
     if not isinstance(manifest, dict) or manifest.get("schema") != SCHEMA:
         return False
-    counts = [manifest.get(key) for key in ("rows", "chunk", "chunks")]
+    counts: list[Any] = [manifest.get(key) for key in ("rows", "chunk", "chunks")]
     if not all(type(count) is int and 0 < count < 2**62 for count in counts):
         return False
     columns, (rows, chunk, chunks) = manifest.get("columns"), counts
@@ -199,8 +199,8 @@ def _stamp(table: Any, number: int, of_sweep: bytes) -> dict[bytes, bytes]:
 
 
 def _is_chunk(table: Any, number: int, of_sweep: bytes) -> bool:
-    told = table.schema.metadata or {}
-    return {key: told.get(key) for key in (b"collide", b"chunk", b"sweep", b"content")} == _stamp(
+    stamp = table.schema.metadata or {}
+    return {key: stamp.get(key) for key in (b"collide", b"chunk", b"sweep", b"content")} == _stamp(
         table, number, of_sweep
     )
 

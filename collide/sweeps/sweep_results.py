@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, listing
 from collide.sweeps.sweep_directory import SweepDirectory, parquet_module
 
@@ -104,7 +105,7 @@ def read_sweep(folder: str | Path) -> SweepResults:
     MissingExtra
         Where pyarrow is not installed.
     """
-    folder = Path(folder)
+    folder = checks.file_path("read_sweep: folder", folder)
     directory = SweepDirectory(folder)
     manifest = directory.manifest()
     counts = _Counts(manifest["columns"]["distances"])

@@ -100,6 +100,10 @@ def overlapping_cells(
     for name, poses in (("X_WA", X_WA), ("X_WB", X_WB)):
         if not check_poses and any(determinant_of(X) == 0 for X in poses):
             raise InvalidPose(f"overlapping_cells: {name} has a matrix without an inverse: its cells have no volume")
+    volumes, centroids, settle = (
+        checks.true_or_false(f"overlapping_cells: {name}", value)
+        for name, value in (("volumes", volumes), ("centroids", centroids), ("settle", settle))
+    )
     flags = (VOLUMES if volumes or centroids else 0) | (CENTROIDS if centroids else 0)
     workers = check_threads(threads)
     parts = [_at_pose(A, B, X, Y, flags, settle, workers, progress) for X, Y in zip(X_WA, X_WB)]

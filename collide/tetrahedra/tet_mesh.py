@@ -155,7 +155,10 @@ class TetMesh:
         fractions.Fraction
             [m³]
         """
-        used = self.cells if cell is None else self.cells[cell : cell + 1]
+        used = self.cells
+        if cell is not None:
+            row = checks.checked_index("TetMesh.exact_volume: cell", cell, len(self.cells))
+            used = self.cells[row : row + 1]
         flat, grid = integers(self.vertices[used])
         points = list(zip(flat[0::3], flat[1::3], flat[2::3]))
         total = sum(exact_cells.determinant(points[k : k + 4]) for k in range(0, len(points), 4))

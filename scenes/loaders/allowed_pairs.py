@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from collide import argument_checks as checks
 from collide.errors import SceneError, brief, listing
 from collide.given_files import starts_like_xml
 from collide.scenes.loaders.documents import read_document
@@ -36,7 +37,8 @@ def read_allowed_pairs(path: str | Path, names: Iterable[str], *, prefix: str = 
     SceneError
         Naming file and element of what cannot be read, and where the file names none of the bodies.
     """
-    path, bodies = Path(path), list(names)
+    path, bodies = checks.file_path("allowed pairs: path", path, SceneError), list(names)
+    checks.text("allowed pairs: prefix", prefix)
     known = {name.removeprefix(prefix): name for name in bodies if name.startswith(prefix)}
     if starts_like_xml(path):
         pairs = read_srdf(path, list(known), []).pairs
@@ -87,6 +89,7 @@ def allow_pairs(world: World, path: str | Path, *, prefix: str = "") -> list[tup
     SceneError
         Naming file and element of what cannot be read, and where the file names none of the bodies.
     """
+    checks.instance("allow_pairs: world", world, World, "a collide.World")
     pairs = read_allowed_pairs(path, world.names.values(), prefix=prefix)
     for a, b, reason in pairs:
         world.allow(a, b, reason=reason)

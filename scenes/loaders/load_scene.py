@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide import scenes
 from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, cut
 from collide.given_files import starts_like_xml
@@ -101,11 +102,16 @@ def load(
 
 
 def _paths(package_path) -> list[Path]:
-    return [Path(package_path)] if isinstance(package_path, (str, Path)) else [Path(entry) for entry in package_path]
+    if isinstance(package_path, (str, Path)):
+        package_path = [package_path]
+    folders = checks.listed_entries("package_path", package_path, "a folder, or a sequence of folders", SceneError)
+    return [checks.file_path("package_path", folder, SceneError) for folder in folders]
 
 
 def _resolve(path) -> Path:
     """The file meant: a path, or the bare name of a shipped scene."""
+    if not isinstance(path, (str, Path)):
+        raise SceneError(f"a scene is a file or the name of a shipped scene, got {checks.describe(path)}")
     if not str(path):
         raise SceneError("the name of a scene is empty: give a file, or the name of a shipped scene")
     file = Path(path)

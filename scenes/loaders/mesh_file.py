@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidShape, MissingExtra, SceneError
 from collide.scenes import mesh_cache as cache
 from collide.scenes.loaders.mesh_parts import MeshFile, MeshPart, described, distinct
@@ -59,8 +60,8 @@ def _from_cache(entry: str) -> MeshFile | None:
 
 
 def check_meshes_option(meshes: str) -> None:
-    if meshes not in OPTIONS:
-        raise SceneError(f'meshes must be "mesh", "hull" or "pieces", got {meshes!r}')
+    if not isinstance(meshes, str) or meshes not in OPTIONS:
+        raise SceneError(f'meshes must be "mesh", "hull" or "pieces", got {checks.describe(meshes)}')
 
 
 def size_note(extent: float, what: str) -> str | None:

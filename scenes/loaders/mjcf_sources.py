@@ -62,8 +62,8 @@ def _with_includes(path: Path, root: ET.Element) -> Iterator[tuple[Path, ET.Elem
             if count > MAX_INCLUDED or depth >= DEEPEST:
                 raise SceneError(f"with this the model includes more than {MAX_INCLUDED:,} files", path=file)
             # MuJoCo looks beside the model, then beside the file that includes
-            found = [folder / name for folder in (path.parent, file.parent) if name and "\0" not in name]
-            target = next((place for place in found if os.path.exists(place)), None)
+            candidates = [folder / name for folder in (path.parent, file.parent) if name and "\0" not in name]
+            target = next((place for place in candidates if os.path.exists(place)), None)
             if target is not None:
                 waiting.append((target, parse_xml(target, []), depth + 1))
 

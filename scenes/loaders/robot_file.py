@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from collide import argument_checks as checks
+from collide.errors import SceneError
 from collide.robots.robot import Robot
 from collide.scenes.loaders import mjcf, urdf
 from collide.scenes.loaders.xml_text import parse_xml
@@ -18,6 +20,7 @@ def load_robot(
     MuJoCo looks for meshes itself, beside the file, and needs all of them: ``package_path`` and ``missing_meshes``
     are for URDFs.
     """
+    path = checks.file_path("Robot.load: path", path, SceneError)
     if is_mjcf(path):
         return mjcf.load_robot(path, srdf, meshes=meshes, seconds=seconds)
     return urdf.load_robot(

@@ -17,6 +17,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidPose, InvalidShape, SceneError, cut, listing
 from collide.robots.kinematic_tree import Joint, Mimic
 from collide.robots.robot import LinkShape, Robot
@@ -66,8 +67,8 @@ def load_robot(
     started = time.perf_counter()
     path = Path(path)
     mesh_loader.check_meshes_option(meshes)
-    if missing_meshes not in MISSING_MESHES:
-        raise SceneError(f'missing_meshes must be "error" or "skip", got {missing_meshes!r}')
+    if not isinstance(missing_meshes, str) or missing_meshes not in MISSING_MESHES:
+        raise SceneError(f'missing_meshes must be "error" or "skip", got {checks.describe(missing_meshes)}')
     reading = Reading(path, meshes, tuple(_as_paths(package_path)), missing_meshes)
     root = parse_xml(path, reading.notes)
     if root.tag != "robot":

@@ -68,7 +68,9 @@ ROOMS = {
         "results",
         "threads",
     },
-    "certificates": {"errors", "least_distance", "transforms", "numerics", "lowering", "results", "shapes"},
+    "certificates": {
+        "errors", "argument_checks", "least_distance", "transforms", "numerics", "lowering", "results", "shapes",
+    },
     "pair_arguments": {"errors", "argument_checks", "transforms", "shapes"},
     "batches": {"errors", "transforms", "shapes", "lowering", "narrowphase", "results", "threads"},
     "security_margin": {
@@ -174,6 +176,7 @@ ROOMS = {
     },
     "hierarchies": {
         "errors",
+        "argument_checks",
         "fork_safe_lock",
         "kernels",
         "transforms",

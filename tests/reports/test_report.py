@@ -80,7 +80,8 @@ def make_scene(rows=ROWS, names=NAMES):
               for name in names.values()]
     return SimpleNamespace(
         name="fake", bodies=bodies, allowed=[], notes=["joint panda_joint4 is at 0.1, outside [-3.07, -0.07]"],
-        sources=["scene.yaml"], robots={"panda": None}, states={}, seconds={"read": 0.01, "meshes": 0.2},
+        sources=["scene.yaml"], robots={"panda": SimpleNamespace(missing_meshes=[])}, states={},
+        seconds={"read": 0.01, "meshes": 0.2},
         world=lambda: world,
     )
 

@@ -162,7 +162,7 @@ def test_refused_values(values, message):
     [
         ([1.0], r"one column for each of turn, slide; got \(1,\)"),
         ([math.nan, 0], r"q\[0\], joint turn, is nan"),
-        ("up", "must be numbers"),
+        ("up", "must be real numbers"),
     ],
 )
 def test_refused_configurations(q, message):

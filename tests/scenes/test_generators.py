@@ -62,7 +62,7 @@ def test_a_stack_rests():
         ("clutter", {"m": 3}, "clutter has no argument 'm'.*; it has n, density, static"),
         ("clutter", {"n": 0}, "n must be a whole number ≥ 1, got 0"),
         ("clutter", {"density": 0}, "density must lie within"),
-        ("clutter", {"seed": -1}, "seed must be a whole number ≥ 0, got -1"),
+        ("clutter", {"seed": -1}, "seed must be a whole number ≥ 0 of at most 64 bits, got -1"),
         ("stack", {"layers": 1.5}, "layers must be a whole number"),
         ("stack", {"jitter": -1}, "jitter must lie within"),
         ("harpsicordia", {"n": 9}, "n must be a whole number ≥ 10, got 9"),

@@ -258,8 +258,8 @@ def test_files_that_change_while_they_are_asked(capsys, monkeypatch, tmp_path):
     scene = _slider_scene(tmp_path / "scene", 0.5)
     write_chunk = SweepDirectory.write_chunk
 
-    def write_and_change(directory, number, columns):
-        write_chunk(directory, number, columns)
+    def write_and_change(directory, number, columns, manifest):
+        write_chunk(directory, number, columns, manifest)
         if number == 2:
             scene.write_text(scene.read_text().replace("[0.5, 0, 0]", "[9.5, 0, 0]"))
 
