@@ -137,6 +137,7 @@ def compile_kernels(out: Path, triple: str = "", levels: str = "", jobs: int | N
 
     triple = triple or llvm.get_process_triple()
     chosen, names, hashes = levels_of(triple, levels), sources.kernel_sources(), sources.entry_hashes()
+    fingerprint = sources.fingerprint(names)  # now: of what is compiled, whatever is edited meanwhile
     described = [(entry.__name__, entry.signature, entry.nogil) for entry in entries]
     if strange := set(hashes) ^ {entry.__name__ for entry in entries}:
         raise SystemExit(f"entries whose sources were not found, or the other way round: {', '.join(sorted(strange))}")
@@ -152,7 +153,7 @@ def compile_kernels(out: Path, triple: str = "", levels: str = "", jobs: int | N
     _forget_others(out, tasks)
     say(f"machine code of {len(entries)} kernels: {time.perf_counter() - begun:.0f} s")
     objects = {level.name: [task.place(level) for task in tasks] for level in chosen}
-    return Compiled(objects, described, sources.compiler_versions(), sources.fingerprint(names), names, hashes)
+    return Compiled(objects, described, sources.compiler_versions(), fingerprint, names, hashes)
 
 
 class _Task(NamedTuple):

@@ -60,9 +60,9 @@ def load() -> str:
     glue = functions
     if not edited:
         return ""
-    told = ", ".join(sorted(edited)[:3]) + (", …" if len(edited) > 3 else "")
+    names = ", ".join(sorted(edited)[:3]) + (", …" if len(edited) > 3 else "")
     return (
-        f"{len(edited)} of its {len(built.ENTRIES)} kernels were edited since it was made ({told}); "
+        f"{len(edited)} of its {len(built.ENTRIES)} kernels were edited since it was made ({names}); "
         "`pip install --no-build-isolation --no-deps -e .` makes them anew"
     )
 

@@ -89,28 +89,38 @@ def of_function(function: Callable) -> str:
     return _hash_of(module, tuple(known), repr((function.__qualname__, *parts)))
 
 
-def _hash_of(module: str, names: tuple[str, ...], told: str = "") -> str:
+def _hash_of(module: str, names: tuple[str, ...], values: str = "") -> str:
     """Of the definitions of these names in a module, and of all that they reach."""
     import hashlib  # here: a start from the library need not load it
 
     parts = {*_compiler_parts(), *definitions_reached(module, names).values()}
-    return hashlib.sha256((told + "".join(sorted(part.digest for part in parts))).encode()).hexdigest()
+    return hashlib.sha256((values + "".join(sorted(part.digest for part in parts))).encode()).hexdigest()
 
 
 def definitions_reached(module: str, names: Iterable[str]) -> dict[tuple[str, str], _Part]:
     """Definitions of the package that code of these names in a module can reach, by module and name; under "" what
     stands in a module beside definitions, where any of them is reached or imported from there."""
-    modules = _reached(module)
-    waiting, found, reached = {module, *names}, {}, set[str]()
+    modules, known = _reached(module), _definitions_seen_by(module)
+    waiting, parts, reached = {module, *names}, {}, set[str]()
     while waiting:
         reached.add(name := waiting.pop())
-        added = [(name, "")] if name in modules else []
-        added += [(place, name) for place in modules if name in _parsed(place).definitions]
-        added += [(place, "") for place, _ in added]
-        for place, one in added:
-            found[place, one] = part = _parsed(place).definitions[one] if one else _parsed(place).other
-            waiting |= part.names - reached
-    return found
+        added = known.get(name, {})
+        places = {*added} | ({name} & modules)
+        parts |= {(place, name): part for place, part in added.items()}
+        parts |= {(place, ""): _parsed(place).rest for place in places}
+        waiting.update(*(part.names for part in added.values()), *(_parsed(place).rest.names for place in places))
+        waiting -= reached
+    return parts
+
+
+@cache
+def _definitions_seen_by(module: str) -> dict[str, dict[str, _Part]]:
+    """Definitions of a module and of those that it imports, by name and module."""
+    seen: dict[str, dict[str, _Part]] = {}
+    for place in _reached(module):
+        for name, part in _parsed(place).definitions.items():
+            seen.setdefault(name, {})[place] = part
+    return seen
 
 
 class _Part(NamedTuple):
@@ -125,29 +135,29 @@ class _Part(NamedTuple):
 class _Module(NamedTuple):
     definitions: dict[str, _Part]
     """Functions, classes, values and what is imported, each by the name that it has in the module."""
-    other: _Part
-    """All other statements of the module's own level: they may set whatever they want, so that they always count."""
+    rest: _Part
+    """All further statements of the module's own level: they may set whatever they want, so that they always count."""
 
 
 @cache
 def _compiler_parts() -> frozenset[_Part]:
     """All of the files that make code of kernels."""
     modules = (_parsed(f"collide.{name[:-3].replace('/', '.')}") for name in COMPILER_SOURCES)
-    return frozenset(_Part(part.digest) for known in modules for part in (known.other, *known.definitions.values()))
+    return frozenset(_Part(part.digest) for known in modules for part in (known.rest, *known.definitions.values()))
 
 
 @cache
 def _parsed(module: str) -> _Module:
     nodes: dict[str, list[ast.stmt]] = {}
-    other = []
+    rest = []
     for node in _tree(module).body:
         named = _names_set_by(node)
         for name, statement in named:
             nodes.setdefault(name, []).append(statement)
         if not named:
-            other.append(node)
+            rest.append(node)
     definitions = {name: _part(module, found) for name, found in nodes.items()}
-    return _Module(definitions, _part(module, other))
+    return _Module(definitions, _part(module, rest))
 
 
 def _tree(module: str) -> ast.Module:
@@ -162,21 +172,21 @@ def _part(module: str, nodes: list[ast.stmt]) -> _Part:
     import hashlib
 
     code = compile(ast.Module(nodes, []), module, "exec", dont_inherit=True, optimize=2)
-    told: list = [module]
+    content: list = [module]
     names: set[str] = set()
     waiting = [code]
     while waiting:
         current = waiting.pop()
         names.update(current.co_names)
         inner = [constant for constant in current.co_consts if hasattr(constant, "co_code")]
-        told += [current.co_name, current.co_code.hex(), current.co_names, current.co_varnames, current.co_freevars]
-        told += [
+        content += [current.co_name, current.co_code.hex(), current.co_names, current.co_varnames, current.co_freevars]
+        content += [
             sorted(map(repr, value)) if isinstance(value, frozenset) else repr(value)
             for value in current.co_consts if not hasattr(value, "co_code")
         ]  # fmt: skip
         waiting += inner
     return _Part(
-        hashlib.sha256(repr(told).encode()).hexdigest(), frozenset(names), is_entry=any(map(_is_entry, nodes))
+        hashlib.sha256(repr(content).encode()).hexdigest(), frozenset(names), is_entry=any(map(_is_entry, nodes))
     )
 
 
@@ -189,14 +199,10 @@ def _names_set_by(node: ast.stmt) -> list[tuple[str, ast.stmt]]:
         return [((alias.asname or alias.name).split(".")[0], node) for alias in node.names]
     if isinstance(node, ast.ImportFrom) and node.module != "__future__":
         alone = (ast.copy_location(ast.ImportFrom(node.module, [alias], node.level), node) for alias in node.names)
-        return [(alias.asname or alias.name, one) for alias, one in zip(node.names, alone)]
+        return [(alias.asname or alias.name, statement) for alias, statement in zip(node.names, alone)]
     targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
-    found = [inner for target in targets for inner in (target.elts if isinstance(target, ast.Tuple) else [target])]
-    return [(one.id, node) for one in found if isinstance(one, ast.Name)] if _all_names(found) else []
-
-
-def _all_names(targets: list[ast.expr]) -> bool:
-    return all(isinstance(target, ast.Name) for target in targets)
+    names = [inner for target in targets for inner in (target.elts if isinstance(target, ast.Tuple) else [target])]
+    return [(name.id, node) for name in names] if all(isinstance(name, ast.Name) for name in names) else []
 
 
 def _is_entry(node: ast.stmt) -> bool:

@@ -88,7 +88,7 @@ def test_the_checksum_reads_each_source_once_and_nothing_else(copy, monkeypatch)
 
 
 def forget() -> None:
-    for known in (sources._parsed, sources._imported, sources._compiler_parts):
+    for known in (sources._parsed, sources._imported, sources._compiler_parts, sources._definitions_seen_by):
         known.cache_clear()
 
 
