@@ -120,7 +120,7 @@ def body(name: str, ratio: float = 1.0) -> collide.Shape:
 
 def scaled(shape: collide.Shape, s: float) -> collide.Shape:
     if isinstance(shape, collide.Compound):
-        return collide.Compound([(scaled(part, s), collide.pose(s * X[:3, 3]) @ _turn(X)) for part, X in shape.items])
+        return collide.Compound([(scaled(part, s), collide.pose(s * X[:3, 3]) @ _rotation_of(X)) for part, X in shape.items])
     if isinstance(shape, collide.HeightField):
         return collide.HeightField(s * shape.heights, s * np.asarray(shape.cell), bottom=s * shape.bottom)
     if isinstance(shape, collide.Mesh):
@@ -134,7 +134,7 @@ def scaled(shape: collide.Shape, s: float) -> collide.Shape:
     return type(shape)(*(s * getattr(shape, field) for field in shape._fields))
 
 
-def _turn(X: np.ndarray) -> np.ndarray:
+def _rotation_of(X: np.ndarray) -> np.ndarray:
     R = X.copy()
     R[:3, 3] = 0.0
     return R

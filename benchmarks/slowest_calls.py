@@ -29,7 +29,7 @@ from collide.errors import CollideError
 #: No call on 10^5 facets or 1,000 parts is to take longer, building apart [ms].
 BAR = 50.0
 #: The worst that searches have met, of each class: "question A B ratio place".
-KEPT = (
+WORST = (
     "contacts ball:80000 box 1 deep", "contacts ball:80000 box 0.2 deep", "contacts boxes:1000 box 1 far",
     "contacts boxes:1000 balls:1000 1 deep", "contacts cans:1000 balls:1000 1 inside", "contacts meshes:100 box 1 deep",
     "collide meshes:1000 box 1 inside", "distance meshes:100 box 1 far", "distance meshes:100 box 1 deep",
@@ -58,18 +58,18 @@ def timed(case: str) -> tuple[float, float]:
 def cases(rng: random.Random, questions: list[str]) -> list[str]:
     """All there are, in random order."""
     bodies = all_bodies()
-    found = [
+    every = [
         f"{question} {A} {B} {ratio:g} {place}"
         for question, A, B, ratio, place in itertools.product(questions, bodies, bodies, RATIOS, PLACES)
         if question not in OF_ONE or B in ("sphere", A)
     ]
-    rng.shuffle(found)
-    return found
+    rng.shuffle(every)
+    return every
 
 
 def search(seconds: float, seed: int, questions: list[str]) -> None:
     """Ask cases in random order until the time is up, and print those above the bar, then the worst."""
-    found: list[tuple[float, float, str]] = []
+    slowest: list[tuple[float, float, str]] = []
     refused, started = 0, time.process_time()
     for case in cases(random.Random(seed), questions):
         if time.process_time() - started > seconds:
@@ -79,12 +79,12 @@ def search(seconds: float, seed: int, questions: list[str]) -> None:
         except CollideError:
             refused += 1
             continue
-        found.append((later, first, case))
+        slowest.append((later, first, case))
         if later > BAR:
             print(line(first, later, case), flush=True)
-    found.sort(reverse=True)
-    print(f"{len(found)} cases, {refused} refused; above {BAR:g} ms: {sum(later > BAR for later, *_ in found)}")
-    for later, first, case in found[:20]:
+    slowest.sort(reverse=True)
+    print(f"{len(slowest)} cases, {refused} refused; above {BAR:g} ms: {sum(later > BAR for later, *_ in slowest)}")
+    for later, first, case in slowest[:20]:
         print(line(first, later, case))
 
 
@@ -105,7 +105,7 @@ def main() -> None:
         search(asked.seconds, asked.seed, asked.questions.split(","))
         return
     rows = []
-    for case in asked.case or KEPT:
+    for case in asked.case or WORST:
         first, later = timed(case)
         print(line(first, later, case), flush=True)
         rows.append({"case": case, "first_ms": first, "later_ms": later, "bar_ms": BAR})

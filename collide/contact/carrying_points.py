@@ -16,7 +16,7 @@ from collide.kernels import kernel
 ON_WALL, PLAIN, STEEP = range(3)
 GENTLEST = STEEP + 10
 #: Of more points only the lowest of each cell of a grid over them are asked whether they may carry.
-MANY, _ACROSS = 256, 8
+MAX_CLASSED, _ACROSS = 256, 8
 CELLS = _ACROSS * _ACROSS
 #: Squares of slopes are good to this.
 _ROUNDING = 1.0 + 2.0**-40
@@ -26,11 +26,11 @@ _ROUNDING = 1.0 + 2.0**-40
 def mark_carrying(p, n, n_corners, tolerance, space):
     """Set ``space.remaining`` of points that are on no wall to their classes.
 
-    Of more than MANY points only the lowest of each of CELLS cells are classed, the others count as PLAIN: each is
+    Of more than MAX_CLASSED points only the lowest of each of CELLS cells are classed, the others count as PLAIN: each is
     compared with all n, so that the work grows with n and not with its square.
     space.corners : of the hull, ``n_corners``; they are asked first, since most points are far above them.
     """
-    if n <= MANY:
+    if n <= MAX_CLASSED:
         for i in range(n):
             if space.remaining[i] != ON_WALL:
                 _mark(p, i, n, 1, n_corners, tolerance, space)

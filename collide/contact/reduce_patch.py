@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from collide.contact.carrying_points import MANY, ON_WALL, PLAIN, STEEP, choose_carrying, mark_carrying
+from collide.contact.carrying_points import MAX_CLASSED, ON_WALL, PLAIN, STEEP, choose_carrying, mark_carrying
 from collide.contact.contact_points import copy_of_points
 from collide.contact.manifold_points import GAP, POINT, V
 from collide.contact.reduce_points import select_points
@@ -53,7 +53,7 @@ def hull_of_patch(points, n, tolerance, space):
 @kernel
 def _standing_points(p, n, tolerance, space):
     """Put what may be corners of the hull of the points on no wall into ``space.order``; how many."""
-    if n > MANY:
+    if n > MAX_CLASSED:
         return _outer_points(p, n, tolerance, space)
     n_order = 0
     for i in range(n):

@@ -156,7 +156,7 @@ def _parsed(module: str) -> _Module:
             nodes.setdefault(name, []).append(statement)
         if not named:
             rest.append(node)
-    definitions = {name: _part(module, found) for name, found in nodes.items()}
+    definitions = {name: _part(module, statements) for name, statements in nodes.items()}
     return _Module(definitions, _part(module, rest))
 
 
@@ -207,7 +207,7 @@ def _names_set_by(node: ast.stmt) -> list[tuple[str, ast.stmt]]:
 
 def _is_entry(node: ast.stmt) -> bool:
     decorators = getattr(node, "decorator_list", ())
-    return any(isinstance(one, ast.Call) and getattr(one.func, "id", "") == "entry" for one in decorators)
+    return any(isinstance(call, ast.Call) and getattr(call.func, "id", "") == "entry" for call in decorators)
 
 
 def _named(value):

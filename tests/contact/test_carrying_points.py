@@ -10,7 +10,15 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 from collide.contact import carrying_points, contact_points, reduce_patch
-from collide.contact.carrying_points import CELLS, GENTLEST, MANY, ON_WALL, STEEP, choose_carrying, mark_carrying
+from collide.contact.carrying_points import (
+    CELLS,
+    GENTLEST,
+    MAX_CLASSED,
+    ON_WALL,
+    STEEP,
+    choose_carrying,
+    mark_carrying,
+)
 from collide.contact.manifold_points import POINT, ManifoldPoints
 
 pytestmark = pytest.mark.plain_kernels
@@ -106,10 +114,10 @@ def test_of_one_class_the_farthest_are_chosen():
 
 @pytest.mark.parametrize("shape", ["bowl", "rough"])
 def test_of_many_points_few_are_asked_and_each_compared_with_all(shape, monkeypatch):
-    """More than MANY points: at most CELLS are asked whether they carry, whichever do so do it among all of them, the
+    """More than MAX_CLASSED points: at most CELLS are asked whether they carry, whichever do so do it among all of them, the
     deepest comes first, and what is kept spans as much as what is kept of all."""
     rng = np.random.default_rng(5)
-    n = 2 * MANY
+    n = 2 * MAX_CLASSED
     places = rng.uniform(-1, 1, (n, 2))
     gaps = 0.1 * (places**2).sum(axis=1) if shape == "bowl" else 1e-3 * rng.normal(size=n)
     asked, steps = [], [0]
@@ -129,7 +137,7 @@ def test_of_many_points_few_are_asked_and_each_compared_with_all(shape, monkeypa
     kept = reduce_patch.reduce_patch(points, n, TOLERANCE, 8, target, of_hull)
     chosen = target.pairs[of_hull.order[:kept]]
     assert kept == 8 and chosen[0] == np.argmin(gaps)
-    assert len(asked) <= CELLS < MANY and len(set(asked)) == len(asked)
+    assert len(asked) <= CELLS < MAX_CLASSED and len(set(asked)) == len(asked)
     assert steps[0] <= 16 * n * len(asked)  # of n² / 2 in the order of a sweep
     carrying = [i for i in asked if of_hull.remaining[i] >= STEEP]
     assert len(carrying) > 4
@@ -137,7 +145,7 @@ def test_of_many_points_few_are_asked_and_each_compared_with_all(shape, monkeypa
         away, rise = np.delete(places - places[i], i, axis=0), np.delete(gaps - gaps[i], i)
         found = linprog([0, 0, 1], np.hstack([away, -np.ones((n - 1, 1))]), rise, bounds=[(-1, 1), (-1, 1), (0, None)])
         assert found.fun < 2 * TOLERANCE, f"point {i} of seed 5, {shape}, does not carry: {found.fun}"
-    monkeypatch.setattr(carrying_points, "MANY", n)
+    monkeypatch.setattr(carrying_points, "MAX_CLASSED", n)
     of_all = target.pairs[of_hull.order[: reduce_patch.reduce_patch(points, n, TOLERANCE, 8, target, of_hull)]]
     assert (np.ptp(places[chosen], axis=0) > 0.6 * np.ptp(places[of_all], axis=0)).all()
 

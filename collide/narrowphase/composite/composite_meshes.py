@@ -183,12 +183,12 @@ def _nearest_first(gaps: np.ndarray, sight: float, rows_of) -> dict[tuple[int, i
     n = len(gaps)
     nearest = gaps.reshape(n, -1).argmin(axis=1)
     in_sight = gaps.reshape(n, -1)[np.arange(n), nearest] <= sight
-    found = {}
+    known = {}
     for which in np.unique(nearest[in_sight]).tolist():
         poses = np.flatnonzero(in_sight & (nearest == which))
         i, j = divmod(which, gaps.shape[2])
-        found[i, j] = poses, rows_of(i, j, poses)
-    return found
+        known[i, j] = poses, rows_of(i, j, poses)
+    return known
 
 
 def _least(rows: np.ndarray, limit: float, left_out: bool) -> np.ndarray:

@@ -24,7 +24,7 @@ from collide.shapes.mesh import Mesh
 from collide.shapes.shape import IDENTITY, Shape, held_by, kept_with_shape
 
 #: Boxes of parts that are made at once; of so few pairs of parts all are compared, of more through a box-tree.
-_BOXES_AT_ONCE, _FEW_PAIRS = 1 << 16, 256
+_BOXES_AT_ONCE, _MAX_PAIRS = 1 << 16, 256
 #: Outside half-spaces: a rounded turn moves what is far away by more.
 _UP = 1 + 2.0**-40
 
@@ -218,20 +218,20 @@ def boxes_near(
     apart along an axis by more than the margin is farther apart than that. So many boxes are made at once that they
     need little memory.
     """
-    found = [np.zeros((3, 0), dtype=np.int64)]
+    pairs = [np.zeros((3, 0), dtype=np.int64)]
     step = max(1, _BOXES_AT_ONCE // (len(A.parts) + len(B.parts)))
     for first in range(0, len(X_WA), step):
         a, b = A.boxes(X_WA[first : first + step]), B.boxes(X_WB[first : first + step])
-        if len(A.parts) * len(B.parts) <= _FEW_PAIRS:
+        if len(A.parts) * len(B.parts) <= _MAX_PAIRS:
             ends = a[:, :, None], b[:, None]
             apart = np.maximum(ends[1][..., :3] - ends[0][..., 3:], ends[0][..., :3] - ends[1][..., 3:]).max(axis=3)
             near = np.stack(np.nonzero(apart <= _outwards(a, b, margin)))
-            found.append(near + np.array([[first], [0], [0]]))
+            pairs.append(near + np.array([[first], [0], [0]]))
             continue
         for k, (boxes_a, boxes_b) in enumerate(zip(a, b), first):
             met = BoxTree(boxes_b).boxes_met(boxes_a, _outwards(boxes_a, boxes_b, margin))
-            found.append(np.stack([np.full(len(met), k), *met.T]))
-    pose, i, j = np.concatenate(found, axis=1)
+            pairs.append(np.stack([np.full(len(met), k), *met.T]))
+    pose, i, j = np.concatenate(pairs, axis=1)
     return pose, i, j
 
 
