@@ -49,10 +49,10 @@ def test_a_world_is_the_same_whenever_it_is_drawn():
 # --- wrong Worlds are noticed ----------------------------------------------------------------------
 
 
-def differing(make_world=collide.World, sorts: str = "collides collisions", seed: int = 4, worlds: int = 3) -> list[str]:
+def differing(make_world=collide.World, sorts: str = "collides collisions", worlds: int = 3, steps: int = 3) -> list[str]:
     tally = Tally()
     for number in range(worlds):
-        Model(seed, number, tally, make_world).run(3, sorts.split())
+        Model(4, number, tally, make_world).run(steps, sorts.split())
     return tally.differing
 
 
@@ -74,10 +74,10 @@ def test_boxes_of_nan_are_noticed(monkeypatch):
 
 def test_a_forgotten_filter_margin_or_limit_is_noticed(monkeypatch):
     monkeypatch.setattr(PackedWorld, "margins_of", lambda self, pairs: np.zeros(len(pairs)))
-    assert len(differing(worlds=8)) >= 3
+    assert len(differing(worlds=5, steps=12)) >= 3
     monkeypatch.undo()
     monkeypatch.setattr(PackedWorld, "_take_sleep", lambda self, before, roster: None)
-    assert len(differing(sorts="collides collisions distances", worlds=8)) >= 3
+    assert len(differing(sorts="collides collisions distances", worlds=5, steps=12)) >= 3
 
 
 class Hasty(collide.World):
