@@ -4,9 +4,9 @@
 
 Shapes of every kind of `soak_pairs.py` are made, asked in pairs, first and second, alone or beside one that stays, and
 dropped: booleans, distances, limits, margins, contacts, impacts, batches, sets, casts, rays, certificates, volumes,
-Worlds, checkers of robots, and the drop-ins for FCL and coal. Prints a memory curve: shapes so far, resident memory, and
-how many shapes there are. Ends with status 1 where a shape outlived its last user, or where, of the second half of the
-curve, memory grew by more than 1 MB. Python's search for cycles is off: what waits for it, a user's program pays for.
+Worlds, checkers of robots, and the drop-ins for FCL and coal. Prints a memory curve: shapes so far, resident memory,
+how many shapes outlived their users. Ends with status 1 where any did, or where, of the second half of the curve, memory
+grew by more than 1 MB. Python's search for cycles is off: what waits for it, a user's program pays for.
 """
 
 from __future__ import annotations
@@ -72,7 +72,8 @@ def drop_in(api) -> Callable:
         a, b = _as_host(api, A), _as_host(api, B)
         transform = api.Transform if api is fcl_api else api.Transform3s
         for t in ((0.0, 0.0, 0.0), (3.0, 0.1, 0.2)):
-            one, other = (api.CollisionObject(g, transform(np.eye(3), np.array(x))) for g, x in ((a, (0, 0, 0.0)), (b, t)))
+            one = api.CollisionObject(a, transform(np.eye(3), np.zeros(3)))
+            other = api.CollisionObject(b, transform(np.eye(3), np.array(t)))
             api.collide(one, other, api.CollisionRequest(), api.CollisionResult())
             api.distance(one, other, api.DistanceRequest(), api.DistanceResult())
 
@@ -125,7 +126,7 @@ USES: dict[str, Callable] = {
 
 
 class Sample(NamedTuple):
-    """shapes : so far.   resident : memory [bytes].   alive : shapes made here that there are, without those kept."""
+    """shapes : so far.   resident : memory [bytes].   alive : shapes so far that outlived their last user."""
 
     shapes: int
     resident: int
@@ -190,7 +191,8 @@ def main(arguments=None) -> int:
 
     def say(point: Sample) -> None:
         curve.append(point)
-        print(f"{point.shapes:8d} shapes  {point.resident / 2**20:8.1f} MB resident  {point.alive:6d} outlived", flush=True)
+        megabytes = point.resident / 2**20
+        print(f"{point.shapes:8d} shapes  {megabytes:8.1f} MB resident  {point.alive:6d} outlived", flush=True)
 
     survivors, answered, refused = drops(asked.shapes, asked.seed, uses, say)
     half = curve[len(curve) // 2 :]

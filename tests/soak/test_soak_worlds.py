@@ -20,7 +20,7 @@ QUESTIONS = int(os.environ.get("COLLIDE_SOAK_QUESTIONS", "250"))
 
 @pytest.fixture(scope="module")
 def soaked() -> Tally:
-    return soak(4, QUESTIONS, say=lambda line: None, steps=2)
+    return soak(9, QUESTIONS, say=lambda line: None, steps=2)
 
 
 def test_worlds_of_all_kinds_answer_as_their_pairs_do(soaked):
@@ -49,7 +49,9 @@ def test_a_world_is_the_same_whenever_it_is_drawn():
 # --- wrong Worlds are noticed ----------------------------------------------------------------------
 
 
-def differing(make_world=collide.World, sorts: str = "collides collisions", worlds: int = 3, steps: int = 3) -> list[str]:
+def differing(
+    make_world=collide.World, sorts: str = "collides collisions", worlds: int = 3, steps: int = 3
+) -> list[str]:
     tally = Tally()
     for number in range(worlds):
         Model(4, number, tally, make_world).run(steps, sorts.split())
