@@ -5,8 +5,8 @@
 Shapes of every kind of `soak_pairs.py` are made, asked in pairs, first and second, alone or beside one that stays, and
 dropped: booleans, distances, limits, margins, contacts, impacts, batches, sets, casts, rays, certificates, volumes,
 Worlds, checkers of robots, and the drop-ins for FCL and coal. Prints a memory curve: shapes so far, resident memory,
-how many shapes outlived their users. Ends with status 1 where any did, or where, of the second half of the curve, memory
-grew by more than 1 MB. Python's search for cycles is off: what waits for it, a user's program pays for.
+how many shapes outlived their users. Ends with status 1 where any did, or where memory grew by more than 1 MB in the
+second half of the curve. Python's search for cycles is off: what waits for it, a user's program pays for.
 """
 
 from __future__ import annotations
