@@ -146,17 +146,17 @@ def boxes_of(table: ShapeTable, poses: np.ndarray, shape_of: np.ndarray) -> np.n
     return boxes
 
 
-def widened(boxes: np.ndarray, room: np.ndarray) -> np.ndarray:
-    """(n, 6) boxes with room (n,) [m] ≥ 0 on every side, rounded outwards; without room their own bits.
+def widened(boxes: np.ndarray, margins: np.ndarray) -> np.ndarray:
+    """(n, 6) boxes with margins (n,) [m] ≥ 0 on every side, rounded outwards; without one their own bits.
 
-    Each bound b is moved by r = room + (|b| + room)·2⁻⁵⁰. What fl computes is off by at most 2⁻⁵³ of each operand and
-    result, all of them ≤ |b| + 2·room, five times: fl(b − r) ≤ b − room and fl(b + r) ≥ b + room, so that the new box
-    holds all that is within ``room`` of the old one. A bound that is infinite stays as it is: r is infinite for that
-    bound alone, of b's own sign. (A single r from the largest |b| of a box would be infinite for all six, and
-    inf · 0, no number, without room.)
+    Each bound b is moved by r = margin + (|b| + margin)·2⁻⁵⁰. Three sums round, by at most 2⁻⁵³ of |b| + 2·margin each,
+    which is less than a half of the added term: fl(b − r) ≤ b − margin and fl(b + r) ≥ b + margin, and the new box
+    holds every point within the margin of the old one. An infinite bound stays as it is: its own r is infinite and
+    moves it outwards. (A single r from the largest |b| of a box would be infinite for all six bounds, and inf · 0, no
+    number, without a margin.)
     """
-    r = room[:, None] + (np.abs(boxes) + room[:, None]) * 2.0**-50
-    r[room == 0.0] = 0.0
+    r = margins[:, None] + (np.abs(boxes) + margins[:, None]) * 2.0**-50
+    r[margins == 0.0] = 0.0
     return np.hstack([boxes[:, :3] - r[:, :3], boxes[:, 3:] + r[:, 3:]])
 
 

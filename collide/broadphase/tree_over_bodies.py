@@ -69,7 +69,8 @@ class TreeOverBodies:
         n = len(boxes)
         fixed = np.zeros(n, dtype=bool) if fixed is None else np.array(fixed, dtype=bool)
         leaf_of, changed = np.full((2, n), -1)
-        columns = np.array(_comparable(boxes), dtype=np.float64), fixed, np.ones(n, dtype=bool), _traits_of(fixed), leaf_of, changed
+        boxes = np.array(_comparable(boxes), dtype=np.float64)
+        columns = boxes, fixed, np.ones(n, dtype=bool), _traits_of(fixed), leaf_of, changed
         self._columns = [GrowingRows(column) for column in columns]
         self._allowed = np.zeros(1, dtype=np.int64)
         self._header: np.ndarray | None = None

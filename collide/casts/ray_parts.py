@@ -69,7 +69,10 @@ def parts_met(
     met = np.flatnonzero(rows[:, STATE] != MISSED)
     rows, asked, limits = rows[met], questions[met], limits[met]
     exact = np.zeros(len(rows), dtype=bool)
-    for k in np.flatnonzero(_are_open(rows, limits)).tolist():
+    is_open = _are_open(rows, limits)
+    if every:  # flat parts, and rays that touch: is it one place, or two?
+        is_open |= rows[:, FIRST_UPPER] >= rows[:, LAST_LOWER]
+    for k in np.flatnonzero(is_open).tolist():
         if _has_exact_numbers(parts, asked[k, 1]):
             exact[k] = True
             _settle(parts, asked[k], origins, directions.vectors, limits[k], rows[k])
@@ -177,6 +180,8 @@ def _settle(parts: PosedParts, asked, origins, vectors, limit: float, row: np.nd
         first, last = _chord_of_plane(parts, asked[1], origin, direction)
     else:
         first, last = _chord_of_points(parts, asked[1], origin, direction)
+        if first == last:  # one place, one wall
+            last = None
     row[STATE] = MET
     row[FIRST_SIDE] = row[LAST_SIDE] = -1.0 if parts.packed(asked[1]).kind != HALFSPACE else 0.0
     for value, t in ((FIRST, first), (LAST, last)):

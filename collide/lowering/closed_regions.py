@@ -22,6 +22,7 @@ import numpy as np
 from collide.errors import UnsupportedQuery
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of
+from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.shape import Shape
 from collide.transforms import LARGEST, ROTATION_TOLERANCE
@@ -73,7 +74,10 @@ def sizes_at(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, leeway: np.
     reach = reach_of(body)
     if not reach < math.inf:
         names = " and ".join(map(name_of, (A, B)))
-        raise UnsupportedQuery(f"{names}: neither has an end, which this query needs; collide() and distance() answer")
+        answered = "ask about the items of the Compound" if isinstance(body, Compound) else (
+            "collide() and distance() answer"
+        )
+        raise UnsupportedQuery(f"{names}: neither has an end, which this query needs; {answered}")
     apart = np.sqrt(np.square(X_WO[:, :3, 3] - X_WR[:, :3, 3]).sum(axis=1)) + leeway
     assert isinstance(region, HPolytope)
     return box_sizes(region, _stretch(X_WR) * (apart + _stretch(X_WO) * reach + region.boundary_within))

@@ -1,8 +1,8 @@
 """Pairs of shapes made ready for single calls: kept with A, by the number that B has, for as long as both live.
 
-A pair goes with A, which holds it. It goes with B by a weak reference, which A holds as well: nothing outside of the two
-knows of it, and nothing that B's end calls holds A. What a pair itself holds of the shapes, their trees and tables, must
-not hold the shapes.
+A pair goes with A, which holds it. It goes with B by a weak reference, which A holds as well: nothing outside of the
+two shapes knows of the pair, and what the end of B calls refers to A weakly. The trees and tables of shapes that a pair
+holds must not hold the shapes.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from collide.errors import InvalidArgument
 from collide.kernels import address_of
 from collide.robots.certify_meshes import settle_meshes
 from collide.robots.certify_motions import certify_motions
-from collide.robots.check_tables import ENDLESS
+from collide.robots.check_tables import UNBOUNDED_HALF
 from collide.robots.check_workspace import CheckWorkspace, MotionWorkspace
 from collide.robots.checker_scene import CheckerScene
 from collide.robots.motion_bounds import OPEN_INTERVAL
@@ -177,7 +177,7 @@ def _motion_workspace(checker: CheckerScene, resolution: float) -> MotionWorkspa
         between[k] = len(paths[a]) - len(shared), len(paths[b]) - len(shared)
     # Where a body without end meets another of the robot, roundings are as large as the other reaches.
     boxes = np.abs(setting.tables.body_boxes)
-    reach = float(boxes[boxes.max(axis=1) < ENDLESS].sum(axis=1).max(initial=0.0))
+    reach = float(boxes[boxes.max(axis=1) < UNBOUNDED_HALF].sum(axis=1).max(initial=0.0))
     reach += float(np.abs(setting.base[9:]).sum())
     reach += float(np.abs(robot.joint_table.doubles[:, 9:12]).sum())
     return MotionWorkspace(

@@ -28,7 +28,7 @@ _LEAST_SLACK = 2.0**-40
 #: Half a side [m] of the box of a body without end, in place of infinity: kernels turn boxes, and 0 · ∞ is no number. A
 #: row of a rotation has an entry of at least 0.5, so that a turned box still reaches 5e149 m, and nothing in the world
 #: is farther than 1e50 m; its square is finite.
-ENDLESS = 1e150
+UNBOUNDED_HALF = 1e150
 
 
 class RobotBody(NamedTuple):
@@ -226,13 +226,13 @@ def _curved_half(packed: PackedConvex) -> np.ndarray:
 
 def _body_boxes(rows: np.ndarray, parts: np.ndarray, part_boxes: np.ndarray, padded: int) -> np.ndarray:
     """(n, BOX) boxes of bodies in their links, around padded parts where there are such; of a body without end, half
-    sides of ENDLESS.
+    sides of UNBOUNDED_HALF.
     """
     out = np.empty((len(rows), BOX))
     for k, (_, first, count) in enumerate(rows.tolist()):
         which = slice(first + padded, first + padded + count)
         if np.isinf(part_boxes[which]).any():
-            out[k] = 0.0, 0.0, 0.0, ENDLESS, ENDLESS, ENDLESS
+            out[k] = 0.0, 0.0, 0.0, UNBOUNDED_HALF, UNBOUNDED_HALF, UNBOUNDED_HALF
             continue
         R, t = parts[which, :9].reshape(-1, 3, 3), parts[which, 9:12]
         centre = (R @ part_boxes[which, :3, None])[:, :, 0] + t

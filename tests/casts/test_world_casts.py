@@ -186,3 +186,23 @@ def test_poses_and_shapes_that_are_refused():
         world.shape_cast(collide.Sphere(1), -np.eye(4), (1, 0, 0))
     with pytest.raises(UnsupportedQuery, match="shape: Halfspace has no end"):
         world.shape_cast(collide.Halfspace((0, 0, 1), 0), np.eye(4), (1, 0, 0))
+
+
+def test_a_flat_part_is_one_wall_of_all_that_a_ray_meets():
+    """In a World as asked alone: the chord of a polygon has one end, not two that rounding sets apart."""
+    rng, hits = rng_of("walls of polygons"), 0
+    for k in range(60):
+        points = rng.normal(size=(int(rng.integers(3, 8)), 3))
+        points[:, 2] *= k % 3 == 0
+        polygon = collide.ConvexHull(points if len(points) > 3 else points * (1, 1, 0))
+        X_WB = random_pose(rng, 1.0) if k % 2 else np.eye(4)
+        origins = rng.normal(size=(20, 3)) * 3
+        directions = X_WB[:3, 3] + X_WB[:3, :3] @ np.append(rng.normal(size=2) * 0.3, 0.0) - origins
+        alone = collide.raycast(polygon, X_WB, origins, directions, all_hits=True)
+        world = collide.World()
+        world.add(polygon, X_WB)
+        rows = world.raycast(origins, directions, all_hits=True)
+        assert np.diff(rows.starts).tolist() == np.diff(alone.starts).tolist(), (k, points.tolist(), X_WB.tolist())
+        assert np.allclose(rows["distance"], alone.distance, rtol=1e-12, atol=0)
+        hits += len(rows)
+    assert hits > 500

@@ -19,6 +19,13 @@ KINDS = (
     "sphere", "box", "capsule", "hull", "swept hull", "flat hull", "h-polytope", "half-space",
     *CURVED, "compound", "solid", "surface", "mesh compound",
 )  # fmt: skip
+#: Kinds that only Worlds are soaked with: the oracle of pairs has none of them, or has them among the others.
+WORLD_KINDS = (
+    *KINDS, "point", "segment", "polygon", "height field", "region", "region with an end", "half-space compound",
+    "nested compound",
+)  # fmt: skip
+#: Those that have no end.
+ENDLESS = ("half-space", "region", "half-space compound")
 POSES = ("near", "equal origins", "inside", "anywhere", "one frame")
 
 
@@ -157,6 +164,10 @@ def _h_polytope(lengths, random):
     return collide.HPolytope(normals, offsets * random.uniform(0.6, 1.0, size=len(offsets)))
 
 
+def _with_no_corners(polytope):
+    return collide.HPolytope(polytope.normals, polytope.offsets, bounded=False)
+
+
 def _compound(lengths, random, kinds):
     items = []
     for _ in range(int(random.integers(1, 4))):
@@ -164,6 +175,29 @@ def _compound(lengths, random, kinds):
         X[:3, 3] = random.normal(size=3) * lengths.max() / 2
         items.append((shape(str(random.choice(kinds)), float(lengths.max()) * random.uniform(0.2, 1), random), X))
     return collide.Compound(items)
+
+
+def _region(lengths, random):
+    """One to three half-spaces that hold the origin: without end."""
+    normals = random.normal(size=(int(random.integers(1, 4)), 3))
+    if random.uniform() < 0.4:
+        normals = np.vstack([normals[:1], -normals[:1]])  # a slab
+    return collide.HPolytope(normals, random.uniform(0.1, 1, len(normals)) * lengths.max(), bounded=False)
+
+
+def _half_space_compound(lengths, random):
+    plane, ball = _MAKERS["half-space"](lengths, random), collide.Sphere(lengths.max() / 3)
+    return collide.Compound([(ball, rotation(random)), (plane, rotation(random))])
+
+
+def _nested_compound(lengths, random):
+    inner = _compound(lengths, random, (*_PLAIN, "solid", "surface"))
+    return collide.Compound([(inner, rotation(random)), (_compound(lengths / 2, random, _PLAIN), rotation(random))])
+
+
+def _height_field(lengths, random):
+    heights = random.uniform(0, 1, size=random.integers(2, 6, 2)) * lengths.min()
+    return collide.HeightField(heights, lengths.max() / max(heights.shape))
 
 
 def ball_facets(rings: int = 5, sides: int = 7):
@@ -252,6 +286,14 @@ _MAKERS = {
     "solid": _solid,
     "surface": _surface,
     "mesh compound": lambda L, random: _compound(L, random, (*_PLAIN, "solid", "solid", "surface")),
+    "point": lambda L, random: collide.ConvexHull(random.normal(size=(1, 3)) * L / 2),
+    "segment": lambda L, random: collide.ConvexHull(random.normal(size=(2, 3)) * L / 2),
+    "polygon": lambda L, random: collide.ConvexHull(random.normal(size=(7, 3)) * (L[0], L[1], 0.0) / 2),
+    "height field": _height_field,
+    "region": _region,
+    "region with an end": lambda L, random: _with_no_corners(_h_polytope(L, random)),
+    "half-space compound": _half_space_compound,
+    "nested compound": _nested_compound,
 }
 
 
