@@ -6,6 +6,7 @@ and whether they meet at ``upper`` is six comparisons, both in fractions of the 
 
 from __future__ import annotations
 
+import functools
 from fractions import Fraction
 
 import numpy as np
@@ -19,6 +20,7 @@ CORNER = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 BODIES = [CUBE, L, BAR, CORNER]
 
 
+@functools.cache
 def mesh_of(cells) -> collide.Mesh:
     """The surface of a union of unit cubes at integers, two triangles for each square of it."""
     corners: dict[tuple, int] = {}
@@ -101,7 +103,7 @@ def random_flight(rng) -> tuple[np.ndarray, np.ndarray]:
 def test_unions_of_cubes_in_fractions():
     rng = np.random.default_rng(31)
     n_flush = n_free = n_open = 0
-    for _ in range(80):
+    for _ in range(60):
         cells_a, cells_b = (BODIES[k] for k in rng.integers(len(BODIES), size=2))
         A, B = mesh_of(cells_a), mesh_of(cells_b)
         p0, p1 = random_flight(rng)
@@ -120,7 +122,7 @@ def test_unions_of_cubes_in_fractions():
             assert r.certified and r.queries <= slow(cells_a, cells_b), snippet
             n_flush += 1
         n_open += not r.certified
-    assert n_flush >= 20 and n_free >= 5 and n_open >= 5, (n_flush, n_free, n_open)
+    assert n_flush >= 15 and n_free >= 5 and n_open >= 5, (n_flush, n_free, n_open)
 
 
 def certain(A, B, *motion, truth: float, **options):
