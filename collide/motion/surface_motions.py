@@ -5,7 +5,8 @@ comes nearer the other than μ h / 2, μ a bound of the speed of one body seen f
 bounds, Mirtich 1996). Facets farther apart than that at the middle are free in all of the span (facets_within: a
 traversal of both trees). The others, if they are few, are jobs for `impact_jobs.py`, in this span alone; else the span
 is cut in two. Spans come in order of time, so the first one with a contact holds the first contact: bodies that are
-apart at the start first meet in their surfaces, and a surface is its facets.
+apart at the start first meet in their surfaces, and a surface is its facets. Where facets prove no meeting, as of
+bodies that come together flush, points inside do (`common_points.py`).
 
 A half-space meets a mesh where it meets the mesh's hull.
 """
@@ -27,7 +28,8 @@ from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.parts import convex_set_of
 from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.mesh.bvh import MeshTree
-from collide.motion.convex_impact import OPEN
+from collide.motion.common_points import CommonPoints, Placed
+from collide.motion.convex_impact import CONTACT, OPEN
 from collide.motion.convex_motions import JOBS_AT_ONCE, Motions, Tables, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
@@ -50,6 +52,8 @@ _SHORTEST = 2.0**-46
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
 _BALLS_OUTWARD = 1e-2
 _ULP = 2.0**-53
+#: Jobs of two meshes that are done before it is looked whether one came to nothing; twice as many each time.
+_JOBS_IN_TURN = 4
 
 
 class Piece(NamedTuple):
@@ -191,16 +195,10 @@ def _search_few(a: Piece, b: Piece, pairs: np.ndarray, motions: Motions, toleran
     near = np.flatnonzero(_come_near(motions, [(a, b)]))
     if not len(near):
         return
-    table, jobs, ids = _jobs(a, b, pairs)
-    parts, numbers = _parts(a, b), [np.full(len(ids), p.number) if of else ids for p, of in zip((a, b), is_part)]
-    before = _clear_parts(rows)
-    at_once = max(JOBS_AT_ONCE // len(jobs), 1)
+    job = _FacetJobs(a, b, pairs, is_part)
+    at_once = max(JOBS_AT_ONCE // len(pairs), 1)
     for first in range(0, len(near), at_once):
-        some = near[first : first + at_once]
-        these = np.tile(jobs, (len(some), 1))
-        these[:, 0] = np.repeat(some, len(jobs))
-        _do(table, len(table.ints), parts, motions, these, 0.0, 1.0, tolerance, rows)
-    _name_parts(rows, before, *numbers)
+        job.search(motions, near[first : first + at_once], (0.0, 1.0), tolerance, rows)
 
 
 def _come_near(motions: Motions, pieces: list[tuple[Piece, Piece]]) -> np.ndarray:
@@ -294,6 +292,11 @@ class _Spans:
         """The time in which balls about both bodies' origins meet; begin > end where they never do."""
         return tuple(self._describe(0.0, 1.0)[BEGIN : END + 1].tolist())
 
+    def placed(self, time: float) -> Placed:
+        """Where the pieces are at a time; of a span without a length the reach is what poses miss the motion by."""
+        out = self._describe(time, time)
+        return Placed(out[:16].reshape(4, 4).copy(), out[16:32].reshape(4, 4).copy(), float(out[REACH]))
+
     def near_facets(self, begin: float, end: float) -> np.ndarray | None:
         """(k, 2) facets that may meet in a span of time; None where there are too many to be looked at one by one."""
         out, max_pairs = self._describe(begin, end), _max_jobs(end - begin)
@@ -353,10 +356,58 @@ def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarr
             continue
         if len(near) == 0:
             continue
-        table, jobs, ids = _jobs(a, b, near)
-        before = _clear_parts(row)
-        _do(table, len(table.ints), spans.parts, motion, jobs, begin, end, tolerance, row)
-        _name_parts(row, before, *(np.full(len(ids), p.number) if of else ids for p, of in zip((a, b), is_part)))
+        _FacetJobs(a, b, near, is_part).search(motion, np.zeros(1, dtype=np.int64), (begin, end), tolerance, row)
+
+
+class _FacetJobs:
+    """Pairs of facets that are near, to be searched in motions of two pieces."""
+
+    def __init__(self, a: Piece, b: Piece, near: np.ndarray, is_part: tuple[bool, bool]):
+        """near : (k, 2) facets.   is_part : as of `_search`."""
+        self._a, self._b, self._near = a, b, near
+        self._table, self._jobs, ids = _jobs(a, b, near)
+        self._parts = _parts(a, b)
+        self._names = [np.full(len(ids), p.number) if of else ids for p, of in zip((a, b), is_part)]
+        self._points: CommonPoints | None = None
+
+    def search(self, motions: Motions, some: np.ndarray, span: tuple[float, float], tolerance: float, rows) -> None:
+        """Search motions, by their numbers (n,), in a span of time; ``rows`` keep the earliest found so far.
+
+        Beside solids, a job of two facets that are about to touch and are not proven to meet has points asked, before
+        all other such jobs look far ahead for a proof: from a meeting that is proven on none of them has to.
+        """
+        before, asked = _clear_parts(rows), rows["lower"].copy()
+        may_ask = self._a.is_mesh and self._b.is_mesh and any(_is_solid(p) for p in (self._a, self._b))
+        first, size = 0, _JOBS_IN_TURN if may_ask else len(self._jobs)
+        while first < len(self._jobs):
+            jobs = self._jobs[first : first + size]
+            these = np.tile(jobs, (len(some), 1))
+            these[:, 0] = np.repeat(some, len(jobs))
+            _do(self._table, len(self._table.ints), self._parts, motions, these, *span, tolerance, rows)
+            first, size = first + size, 2 * size
+            if may_ask:
+                lower, upper = rows["lower"][some], rows["upper"][some]
+                is_wide = (lower < asked[some]) & (lower < np.inf) & ~(upper <= lower + tolerance)
+                for k in some[is_wide].tolist():
+                    asked[k] = rows["lower"][k]
+                    self._ask_points(motions.picked(np.array([k])), rows[k : k + 1])
+        _name_parts(rows, before, *self._names)
+
+    def _ask_points(self, motion: Motions, row: np.ndarray) -> None:
+        """A row's upper bound becomes the first time found at which one body holds a point of the other."""
+        a, b = self._a, self._b
+        if self._points is None:
+            trees: list[Any] = [a.tree, b.tree]
+            corners = [p.corners(np.unique(column)) for p, column in zip((a, b), self._near.T)]
+            self._points = CommonPoints(trees, corners, [_is_solid(a), _is_solid(b)])
+        time = self._points.first_time(float(row["lower"][0]), _Spans(a, b, motion).placed)
+        if time < row["upper"][0]:
+            row["upper"], row["status"] = time, CONTACT
+
+
+def _is_solid(piece: Piece) -> bool:
+    shape: Any = piece.shape
+    return piece.is_mesh and shape.solid
 
 
 def _jobs(a: Piece, b: Piece, near: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray]:
