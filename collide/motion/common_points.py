@@ -28,10 +28,10 @@ from collide.narrowphase.facets.facet_queries import points_in_solid, surface_di
 from collide.narrowphase.facets.winding_numbers import INSIDE
 from collide.shapes.convex_hull import ConvexHull
 
-#: Times asked behind the last one that is free [unit time], the first few of them in one question: they are enough
-#: where bodies come together at some metres in unit time.
+#: Times asked behind the last one that is free [unit time]. The first few are enough where bodies come together at some
+#: thousandths of their size in unit time, or faster.
 _LATER = 2.0**-44 * 8.0 ** np.arange(15)
-_AT_FIRST = 3
+_AT_FIRST = 4
 #: So many facets of a body at most are asked for their centres.
 _MAX_CENTRES = 64
 _UNIT = 2.0**-53
@@ -55,20 +55,18 @@ class CommonPoints:
         self._trees, self._are_solid = trees, are_solid
         self._centres = [some[:: -(-len(some) // _MAX_CENTRES)].mean(axis=1) for some in corners]
 
-    def first_time(self, begin: float, place: Callable[[float], Placed]) -> float:
+    def first_time(self, begin: float, place: Callable[[float], Placed], far: bool) -> float:
         """The first of some times behind ``begin`` at which a centre is proven inside the other mesh, or infinity.
 
-        place : where both are at a time, 0 … 1.
+        place : where both are at a time, 0 … 1.   far : look far ahead; else next to ``begin`` only.
         """
-        times = np.unique(np.minimum(begin + _LATER, 1.0))
+        times = np.unique(np.minimum(begin + (_LATER if far else _LATER[:_AT_FIRST]), 1.0))
         times = times[times > begin]
-        for some in (times[:_AT_FIRST], times[_AT_FIRST:]):
-            placed = [place(time) for time in some.tolist()]
-            if placed:
-                proven = self._inside(placed, 0) | self._inside(placed, 1)
-                if proven.any():
-                    return float(some[proven.argmax()])
-        return np.inf
+        placed = [place(time) for time in times.tolist()]
+        if not placed:
+            return np.inf
+        proven = self._inside(placed, 0) | self._inside(placed, 1)
+        return float(times[proven.argmax()]) if proven.any() else np.inf
 
     def _inside(self, placed: list[Placed], side: int) -> np.ndarray:
         """(n,) bool: whether the mesh of a side is proven to hold a centre of the other one, placed n times."""

@@ -376,8 +376,9 @@ class _FacetJobs:
         Beside solids, a job of two facets that are about to touch and are not proven to meet has points asked, before
         all other such jobs look far ahead for a proof: from a meeting that is proven on none of them has to.
         """
-        before, asked = _clear_parts(rows), rows["lower"].copy()
+        before, known = _clear_parts(rows), rows["lower"].copy()
         may_ask = self._a.is_mesh and self._b.is_mesh and any(_is_solid(p) for p in (self._a, self._b))
+        asked = known.copy()
         first, size = 0, _JOBS_IN_TURN if may_ask else len(self._jobs)
         while first < len(self._jobs):
             jobs = self._jobs[first : first + size]
@@ -386,21 +387,22 @@ class _FacetJobs:
             _do(self._table, len(self._table.ints), self._parts, motions, these, *span, tolerance, rows)
             first, size = first + size, 2 * size
             if may_ask:
+                is_last = first >= len(self._jobs)
                 lower, upper = rows["lower"][some], rows["upper"][some]
-                is_wide = (lower < asked[some]) & (lower < np.inf) & ~(upper <= lower + tolerance)
-                for k in some[is_wide].tolist():
-                    asked[k] = rows["lower"][k]
-                    self._ask_points(motions.picked(np.array([k])), rows[k : k + 1])
+                is_open = (lower < (known if is_last else asked)[some]) & ~(upper <= lower + tolerance)
+                for k in some[is_open].tolist():
+                    self._ask_points(motions.picked(np.array([k])), rows[k : k + 1], far=is_last)
+                asked[some] = lower
         _name_parts(rows, before, *self._names)
 
-    def _ask_points(self, motion: Motions, row: np.ndarray) -> None:
+    def _ask_points(self, motion: Motions, row: np.ndarray, far: bool) -> None:
         """A row's upper bound becomes the first time found at which one body holds a point of the other."""
         a, b = self._a, self._b
         if self._points is None:
             trees: list[Any] = [a.tree, b.tree]
             corners = [p.corners(np.unique(column)) for p, column in zip((a, b), self._near.T)]
             self._points = CommonPoints(trees, corners, [_is_solid(a), _is_solid(b)])
-        time = self._points.first_time(float(row["lower"][0]), _Spans(a, b, motion).placed)
+        time = self._points.first_time(float(row["lower"][0]), _Spans(a, b, motion).placed, far)
         if time < row["upper"][0]:
             row["upper"], row["status"] = time, CONTACT
 
