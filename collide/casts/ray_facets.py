@@ -80,16 +80,15 @@ class _MetFacets:
             return
         order = np.lexsort((self.facet, self.t[:, 1], self.ray))
         ray, lower = self.ray[order], self.t[order, 1]
-        open_rays = set(self.ray[~self.narrow].tolist())
-        same = ray[1:] == ray[:-1]
-        # Brackets of one ray that overlap: what came before may reach as far as the largest end among them.
+        # Brackets of one ray that overlap: what came before may reach as far as the largest end among them. Exact are
+        # those, and wide ones, alone: the first hit has the same digits whether or not the others are looked for.
         ends = _running_ends(ray, self.t[order, 2])
-        open_rays.update(ray[1:][same & (lower[1:] <= ends[:-1])].tolist())
-        if not every:
-            open_rays.update(ray[1:][same].tolist())
+        begins = np.append(True, (ray[1:] != ray[:-1]) | (lower[1:] > ends[:-1]))[: len(ray)]
+        starts = np.append(np.flatnonzero(begins), len(ray))
+        is_open = (np.diff(starts) > 1) | np.logical_or.reduceat(np.append(~self.narrow[order], False), starts)[:-1]
         self.order = order
-        for k in sorted(open_rays):
-            begin, end = np.searchsorted(ray, [k, k + 1])
+        for k in np.flatnonzero(is_open).tolist():
+            begin, end = starts[k : k + 2].tolist()
             order[begin:end] = self._in_order(order[begin:end])
         if not every:
             remaining = order[self.keep[order]]
@@ -97,7 +96,7 @@ class _MetFacets:
             self.keep[remaining[is_later]] = False
 
     def _in_order(self, rows: np.ndarray) -> list[int]:
-        """The hits of one ray by their exact t, then by facet; those beyond the limit are dropped."""
+        """Hits of one ray by their exact t, then by facet; those beyond the limit are dropped."""
         k = int(self.ray[rows[0]])
         X = self.X_WA[k if len(self.X_WA) > 1 else 0]
         direction, direction_at = integers(self.rays[k, 3:6])

@@ -29,7 +29,7 @@ from collide.contact.contact_pairs import (
 )
 from collide.contact.contact_points import PatchPoints, View, copy_of_points, put_points
 from collide.contact.internal_edges import FLAT, is_local_minimum, snapped
-from collide.contact.manifold_points import GAP, HEIGHT, POINT, V
+from collide.contact.manifold_points import GAP, HEIGHT, NEAR, POINT, V
 from collide.contact.shallow_overlaps import STEP_ERRORS
 from collide.contact.support_face import FACE, axes_across, seen_along
 from collide.kernels import kernel
@@ -113,12 +113,12 @@ def cover_close(frame):
 
 
 @kernel
-def grow_patch(frame, first, axes, deepest):
+def grow_patch(frame, first, axes, deepest, swept):
     """Mark as REACHED the pairs linked with one that have points along a normal, −deepest ≤ gap ≤ reach; WANTED pairs
-    always belong to it. How many points.
+    always belong to it. How many points.   swept : as in `View`.
     """
     pairs, A, B = frame.pairs, frame.A, frame.B
-    view = View(axes, frame.error, -deepest - STEP_ERRORS * frame.error, frame.reach, False)
+    view = View(axes, frame.error, -deepest - STEP_ERRORS * frame.error, frame.reach, False, swept)
     number = begin_search(pairs)
     n = put_points(pairs, first, A, B, view, frame.points, 0)
     pairs.states[first] |= REACHED
@@ -167,6 +167,70 @@ def least_gap_of(points, n):
     return gap
 
 
+class NearestPoint(NamedTuple):
+    """Where a patch is nearest along its normal, and of which pair that is; as a point of `PatchPoints`."""
+
+    u: float
+    v: float
+    gap: float
+    height: float
+    error: float
+    pair: int
+    feature_a: int
+    feature_b: int
+
+
+@kernel
+def _least_point(points, n):
+    """The `NearestPoint` among n; of gap ∞ where there are none."""
+    p, least = points.manifold.points, 0
+    if n == 0:
+        return NearestPoint(0.0, 0.0, math.inf, 0.0, 0.0, 0, 0, 0)
+    for i in range(1, n):
+        if p[POINT * i + GAP] < p[POINT * least + GAP]:
+            least = i
+    at, features = POINT * least, points.manifold.features
+    return NearestPoint(
+        p[at], p[at + V], p[at + GAP], p[at + HEIGHT], points.errors[least], points.pairs[least], features[2 * least],
+        features[2 * least + 1],
+    )  # fmt: skip
+
+
+@kernel
+def put_nearest(points, n, nearest, radius):
+    """Put the nearest point in front of n others, none of which is as near, or, of bodies with a radius, into the place
+    of one beside it, keeping its features; how many points there are then.
+    """
+    p, features = points.manifold.points, points.manifold.features
+    k = _point_beside(points, n, nearest) if radius > 0.0 else -1
+    if k < 0:
+        for i in range(n):
+            copy_of_points(points, n - 1 - i, points, n - i)
+        k, n = 0, n + 1
+        features[0], features[1] = nearest.feature_a, nearest.feature_b
+        points.pairs[0] = nearest.pair
+    p[POINT * k], p[POINT * k + V] = nearest.u, nearest.v
+    p[POINT * k + GAP], p[POINT * k + HEIGHT] = nearest.gap, nearest.height
+    points.errors[k] = nearest.error
+    return n
+
+
+@kernel
+def _point_beside(points, n, nearest):
+    """Which of n points of the nearest one's own pair is so near to it, of all that they extend over, as to be the same
+    contact; −1 for none.
+    """
+    p = points.manifold.points
+    best, square, farthest = -1, math.inf, 0.0
+    for i in range(n):
+        du, dv = p[POINT * i] - nearest.u, p[POINT * i + V] - nearest.v
+        away = du * du + dv * dv
+        farthest = max(farthest, away)
+        if away < square and points.pairs[i] == nearest.pair:
+            best, square = i, away
+    return best if square <= NEAR * NEAR * farthest else -1
+
+
 # --- overlaps -----------------------------------------------------------------------------------
 
 
@@ -193,7 +257,12 @@ def next_seed(frame, first):
 def grow_overlap(frame, first, axes, length):
     """The patch around a WANTED pair, for a translation along ``axes`` of that length [m]."""
     pairs = frame.pairs
-    n = grow_patch(frame, first, axes, DEEPEST * length)
+    least = NearestPoint(0.0, 0.0, math.inf, 0.0, 0.0, 0, 0, 0)
+    if frame.A.radius + frame.B.radius > 0.0:
+        least = _least_point(frame.points, grow_patch(frame, first, axes, DEEPEST * length, False))
+    n = grow_patch(frame, first, axes, DEEPEST * length, True)
+    if least.gap < math.inf and least_gap_of(frame.points, n) > least.gap + least.error + STEP_ERRORS * frame.error:
+        n = put_nearest(frame.points, n, least, frame.A.radius + frame.B.radius)
     meets = False
     for i in range(pairs.search[N_REACHED]):
         k = pairs.queue[i]
@@ -352,23 +421,16 @@ def grow_gap(frame, first):
     """The patch around a local minimum."""
     pairs, points = frame.pairs, frame.points
     axes = axes_across(snapped(pairs, first))
-    n = grow_patch(frame, first, axes, 0.0)
+    n = grow_patch(frame, first, axes, 0.0, True)
     near = NUMBERS_OF_PAIR * first
     length = pairs.near[near + LENGTH]
     bound = max(length - pairs.near[near + LOWER], 4.0 * frame.error)
     # Where corners of the face are as near, the nearest points of its first pair add nothing.
     if least_gap_of(points, n) > length + bound + STEP_ERRORS * frame.error:
-        for i in range(n):
-            copy_of_points(points, n - 1 - i, points, n - i)
         a = seen_along(axes, vec3_at(pairs.near, near + POINT_A))
         b = seen_along(axes, vec3_at(pairs.near, near + POINT_B))
-        points.manifold.points[0] = b.x
-        points.manifold.points[V] = b.y
-        points.manifold.points[GAP] = length
-        points.manifold.points[HEIGHT] = 0.5 * (a.z + b.z)
-        points.errors[0] = bound
-        points.pairs[0] = first
-        points.manifold.features[0] = 4 * pairs.facets[INTS_OF_PAIR * first + FACET_A] + FACE
-        points.manifold.features[1] = 4 * pairs.facets[INTS_OF_PAIR * first + FACET_B] + FACE
-        n += 1
+        feature_a = 4 * pairs.facets[INTS_OF_PAIR * first + FACET_A] + FACE
+        feature_b = 4 * pairs.facets[INTS_OF_PAIR * first + FACET_B] + FACE
+        nearest = NearestPoint(b.x, b.y, length, 0.5 * (a.z + b.z), bound, first, feature_a, feature_b)
+        n = put_nearest(points, n, nearest, frame.A.radius + frame.B.radius)
     return Patch(axes, n, False)

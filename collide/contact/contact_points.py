@@ -11,11 +11,23 @@ import math
 from typing import Any, NamedTuple
 
 from collide.contact.contact_pairs import facing_a, facing_b
-from collide.contact.manifold_points import GAP, HEIGHT, POINT, ManifoldPoints, V
-from collide.contact.support_face import EDGE, FACE, VERTEX, seen_along
+from collide.contact.internal_edges import fan_allows
+from collide.contact.manifold_points import (
+    ALONG,
+    GAP,
+    HEIGHT,
+    POINT,
+    Line,
+    ManifoldPoints,
+    V,
+    features_of_end,
+    place_between,
+    shared_span,
+)
+from collide.contact.support_face import ACROSS, EDGE, FACE, KNOWN, VERTEX, seen_along
 from collide.kernels import kernel
 from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR
-from collide.numerics.vec3 import put_vec3, vec3_at
+from collide.numerics.vec3 import Vec3, add, norm, put_vec3, scale, sub, vec3_at
 
 #: A facet is looked at along n where its normal's cosine with it is above this.
 LEAST_COSINE = 2.0**-10
@@ -25,6 +37,12 @@ _ERRORS_OUTSIDE, _FARTHEST_OUTSIDE = 16.0, 2.0**-10
 #: Edges whose sine, seen along n, is below this are parallel: their ends show it. Edges and heights of facets that are
 #: shorter, seen so, than so many errors of a coordinate are none.
 _PARALLEL, _MIN_ERRORS = 2.0**-30, 256.0
+#: Of a radius: by so much a face or an edge within 45° of the normal is nearer along it than what supports the normal.
+_LEAN = 1.0 / ACROSS - 1.0
+#: Sines up to this are rounding of what supports a direction.
+_SUPPORTING = 2.0**-26
+#: Edges whose sine, seen along n, is below this cross at a place that is read from one of them.
+_NEARLY_PARALLEL = 2.0**-10
 
 
 class PatchPoints(NamedTuple):
@@ -44,7 +62,8 @@ class View(NamedTuple):
     """Along what, and within which gaps, points are looked for.
 
     axes : `ContactAxes`.   error : of a coordinate [m].   low, high : gaps [m], but for their errors.
-    any_side : facets count whichever way they face.
+    any_side : facets count whichever way they face.   swept : points of swept bodies are those of their surface; else
+    those of the core, moved along the normal.
     """
 
     axes: Any
@@ -52,6 +71,7 @@ class View(NamedTuple):
     low: float
     high: float
     any_side: bool
+    swept: bool
 
 
 @kernel
@@ -70,11 +90,113 @@ def put_points(pairs, k, A, B, view, points, n):
     least, largest = see_pair(pairs, k, view.axes, points.seen)
     if least > view.high + 32.0 * view.error or largest < view.low - 32.0 * view.error:
         return n
+    if not view.swept or A.radius + B.radius == 0.0:
+        return _put_overlap(pairs, k, A, B, 0.0, 0.0, view, over_a, over_b, points, n)
+    # Gaps stay those of the cores, less what their surfaces are nearer.
+    round_a, off_a = _sweep(pairs, k, 0, A, view, points.seen)
+    round_b, off_b = _sweep(pairs, k, 1, B, view, points.seen)
+    low = view.low - _LEAN * (A.radius + B.radius)
+    swept = View(view.axes, view.error, low, view.high, view.any_side, True)
+    n_after = _put_overlap(pairs, k, A, B, round_a, round_b, swept, over_a, over_b, points, n)
+    for i in range(n, n_after):
+        points.errors[i] += 2.0 * (off_a + off_b)
+    return n_after
+
+
+@kernel
+def _put_overlap(pairs, k, A, B, round_a, round_b, view, over_a, over_b, points, n):
+    """Append the corners of the overlap of a pair that is seen.
+
+    round_a, round_b : radii across the edges that bodies show, 0 of sharp ones and of faces [m].
+    """
     if over_a:
         n = _corners_over(pairs, k, A, view, points, n, False)
     if over_b:
         n = _corners_over(pairs, k, B, view, points, n, True)
-    return _crossings(pairs, k, A, B, view, points, n)
+    return _crossings(pairs, k, A, B, round_a, round_b, view, points, n)
+
+
+@kernel
+def _sweep(pairs, k, side, body, view, seen):
+    """Move the corners of a body's facet, seen along the normal, onto the surface of the body swept by its ball: as
+    `swept_face` does; (radius across the edge that is shown, else 0, how far the surface may be off that [m]).
+
+    They are moved by the radius along the facet's own normal, less the radius along nhat, so that gaps are those of
+    cores. Of a facet that is steep its least steep edge is shown, of a steep edge the corner in front: corners that are
+    not shown become NaN, and what is compared with NaN is over nothing.
+    """
+    radius = body.radius
+    if radius == 0.0:
+        return 0.0, 0.0
+    sign = 1.0 if side == 0 else -1.0
+    at = 9 * side
+    p, q, r = vec3_at(seen, at), vec3_at(seen, at + 3), vec3_at(seen, at + 6)
+    normal = scale(sign, seen_along(view.axes, vec3_at(pairs.normals, 6 * k + 3 * side)))
+    if normal.z < 0.0 and not body.solid:
+        normal = Vec3(-normal.x, -normal.y, -normal.z)
+    if normal.z >= ACROSS:
+        e, f = sub(q, p), sub(r, p)
+        area = abs(e.x * f.y - e.y * f.x)
+        longest = max(norm(e), norm(f), norm(sub(f, e)))
+        unknown = 4.0 * view.error * longest / area if area > 0.0 else 1.0
+        if unknown <= KNOWN:
+            step = scale(sign * radius, Vec3(normal.x, normal.y, normal.z - 1.0))
+            for i in range(3):
+                put_vec3(seen, at + 3 * i, add(vec3_at(seen, at + 3 * i), step))
+            return 0.0, unknown * radius
+    return _sweep_edge(pairs, k, side, body, view, seen)
+
+
+@kernel
+def _sweep_edge(pairs, k, side, body, view, seen):
+    """The same where no face is across the normal: of the least steep edge, or of the corner in front, that supports
+    what is across it: the diagonal of a face does not.
+    """
+    sign = 1.0 if side == 0 else -1.0
+    ids, at = 6 * k + 3 * side, 9 * side
+    least, best, front = ACROSS, -1, 0
+    shift = Vec3(0.0, 0.0, 0.0)
+    unknown = 0.0
+    for i in range(3):
+        j = (i + 1) % 3
+        p, q = vec3_at(seen, at + 3 * i), vec3_at(seen, at + 3 * j)
+        if sign * p.z > sign * seen[at + 3 * front + 2]:
+            front = i
+        e = sub(q, p)
+        length = norm(e)
+        if not (length > _MIN_ERRORS * view.error and 2.0 * view.error <= KNOWN * length):
+            continue
+        if not abs(e.z) < least * length:
+            continue
+        across = sub(Vec3(0.0, 0.0, sign), scale(sign * e.z / (length * length), e))
+        across = scale(1.0 / norm(across), across)
+        if _supports(pairs, k, side, body, view, i, pairs.ids[ids + j], across):
+            least, best, unknown, shift = abs(e.z) / length, i, 2.0 * view.error / length, across
+    other = (best + 1) % 3
+    if best < 0:
+        best = front
+        other = front
+        shift = Vec3(0.0, 0.0, sign)
+        if not _supports(pairs, k, side, body, view, front, -1, shift):
+            best, other = -1, -1
+    step = scale(body.radius, Vec3(shift.x, shift.y, shift.z - sign))
+    for i in range(3):
+        if i == best or i == other:
+            put_vec3(seen, at + 3 * i, add(vec3_at(seen, at + 3 * i), step))
+        else:
+            put_vec3(seen, at + 3 * i, Vec3(math.nan, math.nan, math.nan))
+    return (body.radius if other != best else 0.0), unknown * body.radius
+
+
+@kernel(inline=True)
+def _supports(pairs, k, side, body, view, first, end, direction):
+    """Whether a body lies behind corner ``first`` of its facet, or the edge from there to corner ``end`` of the body,
+    in a direction as seen.
+    """
+    axes = view.axes
+    u = add(add(scale(direction.x, axes.e), scale(direction.y, axes.f)), scale(direction.z, axes.nhat))
+    point = vec3_at(pairs.corners, 18 * k + 9 * side + 3 * first)
+    return fan_allows(body, pairs.ids[6 * k + 3 * side + first], end, point, u, _SUPPORTING)
 
 
 @kernel
@@ -153,8 +275,10 @@ def _corners_over(pairs, k, body, view, points, n, exchanged):
 
 
 @kernel
-def _crossings(pairs, k, A, B, view, points, n):
-    """Where edges of A's facet cross edges of B's, seen along the normal."""
+def _crossings(pairs, k, A, B, round_a, round_b, view, points, n):
+    """Where edges of A's facet cross edges of B's, seen along the normal; of a round edge along the rim of a surface
+    the ends of what both share.
+    """
     seen, error = points.seen, view.error
     facet_a, facet_b = pairs.facets[INTS_OF_PAIR * k + FACET_A], pairs.facets[INTS_OF_PAIR * k + FACET_B]
     for i in range(3):
@@ -168,6 +292,10 @@ def _crossings(pairs, k, A, B, view, points, n):
             fu, fv, fh = seen[s] - seen[r], seen[s + 1] - seen[r + 1], seen[s + 2] - seen[r + 2]
             wu, wv = seen[r] - seen[p], seen[r + 1] - seen[p + 1]
             span = eu * fv - ev * fu
+            is_round = round_a + round_b > 0.0
+            if is_round and _runs_along_rim(pairs, k, i, j, A, B, round_a, span, eu, ev, fu, fv):
+                n = _put_ends(pairs, k, i, j, A, B, round_a, round_b, view, points, n)
+                continue
             along_e, along_f = wu * fv - wv * fu, wu * ev - wv * eu
             # What is clearly outside is the rule: no roots and no quotients for it.
             size = abs(span) * (1.0 + _FARTHEST_OUTSIDE)
@@ -182,8 +310,8 @@ def _crossings(pairs, k, A, B, view, points, n):
             outside_f = min(_ERRORS_OUTSIDE * error * long_e / abs(span), _FARTHEST_OUTSIDE)
             if of_e < -outside_e or of_e > 1.0 + outside_e or of_f < -outside_f or of_f > 1.0 + outside_f:
                 continue
-            # The place is on both edges: beyond an end of nearly parallel ones it were far along them.
-            of_e, of_f = min(max(of_e, 0.0), 1.0), min(max(of_f, 0.0), 1.0)
+            if abs(span) < _NEARLY_PARALLEL * long_e * long_f:
+                of_e, of_f = _beside(of_e, eu, ev, fu, fv, wu, wv)
             h_a, h_b = seen[p + 2] + of_e * eh, seen[r + 2] + of_f * fh
             slack = 64.0 * error * (long_e + long_f) / abs(span)
             bound = 32.0 * error + slack * (abs(eh) + abs(fh))
@@ -193,6 +321,79 @@ def _crossings(pairs, k, A, B, view, points, n):
             points.manifold.features[2 * n] = 4 * int(A.edges[3 * facet_a + i]) + EDGE
             points.manifold.features[2 * n + 1] = 4 * int(B.edges[3 * facet_b + j]) + EDGE
             n += 1
+    return n
+
+
+@kernel(inline=True)
+def _beside(of_e, eu, ev, fu, fv, wu, wv):
+    """Parameters of the place on both edges nearest to that at ``of_e``: e and f seen along the normal, w from one's
+    begin to the other's.
+
+    Quotients by a small sine are off by an error over it, each by another: places read from both would be as far from
+    each other along the edges. Beside one of them the other is off by an error, wherever along it that is.
+    """
+    of_e = min(max(of_e, 0.0), 1.0)
+    of_f = ((of_e * eu - wu) * fu + (of_e * ev - wv) * fv) / (fu * fu + fv * fv)
+    if 0.0 <= of_f <= 1.0:
+        return of_e, of_f
+    of_f = min(max(of_f, 0.0), 1.0)
+    of_e = ((wu + of_f * fu) * eu + (wv + of_f * fv) * ev) / (eu * eu + ev * ev)
+    return min(max(of_e, 0.0), 1.0), of_f
+
+
+@kernel
+def _runs_along_rim(pairs, k, i, j, A, B, round_a, span, eu, ev, fu, fv):
+    """Whether edges i of A and j of B, a round one and the rim of a surface, run along each other."""
+    square = (eu * eu + ev * ev) * (fu * fu + fv * fv)
+    if not (square > 0.0 and span * span <= ALONG * ALONG * square):
+        return False
+    if round_a > 0.0:
+        return _is_rim(pairs, k, 1, j, B)
+    return _is_rim(pairs, k, 0, i, A)
+
+
+@kernel
+def _is_rim(pairs, k, side, edge, body):
+    """Whether an edge of a pair's facet is that of no other facet."""
+    p = pairs.ids[6 * k + 3 * side + edge]
+    q = pairs.ids[6 * k + 3 * side + (edge + 1) % 3]
+    n = 0
+    for at in range(int(body.fan_starts[p]), int(body.fan_starts[p + 1])):
+        corner = 3 * int(body.fans[at])
+        if body.corners[corner] == q or body.corners[corner + 1] == q or body.corners[corner + 2] == q:
+            n += 1
+    return n == 1
+
+
+@kernel
+def _line_seen(pairs, k, side, i, body, rounding, seen):
+    """The `Line` of edge i of A's or B's facet."""
+    facet = pairs.facets[INTS_OF_PAIR * k + FACET_A + side]
+    j = (i + 1) % 3
+    ids, at = 6 * k + 3 * side, 9 * side
+    return Line(
+        vec3_at(seen, at + 3 * i), vec3_at(seen, at + 3 * j), rounding, 4 * pairs.ids[ids + i] + VERTEX,
+        4 * pairs.ids[ids + j] + VERTEX, 4 * int(body.edges[3 * facet + i]) + EDGE,
+    )  # fmt: skip
+
+
+@kernel
+def _put_ends(pairs, k, i, j, A, B, round_a, round_b, view, points, n):
+    """Append the ends of what two edges share that run along each other; how many points there are then."""
+    a = _line_seen(pairs, k, 0, i, A, round_a, points.seen)
+    b = _line_seen(pairs, k, 1, j, B, round_b, points.seen)
+    shared = shared_span(a, b, 16.0 * view.error)
+    if shared.low > shared.high:
+        return n
+    for end in range(2):
+        at = place_between(a, b, shared, shared.low if end == 0 else shared.high)
+        if not _within(view, at.gap, 32.0 * view.error):
+            continue
+        _append(points, n, k, at.u, at.v, at.h_a, at.h_b, 32.0 * view.error)
+        feature_a, feature_b = features_of_end(a, b, shared, end)
+        points.manifold.features[2 * n] = feature_a
+        points.manifold.features[2 * n + 1] = feature_b
+        n += 1
     return n
 
 
@@ -208,7 +409,7 @@ def depth_along(pairs, k, A, B, view, points, enough):
         return max(-least, 0.0)
     n = _corners_over(pairs, k, A, view, points, 0, False)
     n = _corners_over(pairs, k, B, view, points, n, True)
-    n = _crossings(pairs, k, A, B, view, points, n)
+    n = _crossings(pairs, k, A, B, 0.0, 0.0, view, points, n)
     if n == 0:
         return max(-least, 0.0)
     gap = math.inf

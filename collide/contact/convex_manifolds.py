@@ -19,6 +19,7 @@ from collide.contact.manifold_points import (
 )
 from collide.contact.manifold_points import (
     HEIGHT,
+    NEAR,
     POINT,
     ManifoldPoints,
     V,
@@ -42,9 +43,6 @@ from collide.numerics.vec3 import Vec3, add, norm1, put_vec3, scale, sub, vec3_a
 
 #: Lengths up to so many errors of a coordinate, or up to this part of the manifold's size, are rounding.
 _ERRORS, _SHARE = 64.0, 2.0**-30
-#: Nearest points nearer to a corner than this part of the manifold's size take its place: a rim is a little outside its
-#: octagon, and two contacts so near would be one too many.
-_NEAR = 2.0**-8
 _U = 2.0**-53
 
 # Header: addresses of a `ShapeTable`'s integers and numbers, of the rows of a `HullFaceTable`, of two rows of poses and
@@ -235,7 +233,7 @@ def _corner_near(manifold, n, nearest):
         du, dv = manifold.points[POINT * k] - nearest.x, manifold.points[POINT * k + V] - nearest.y
         if du * du + dv * dv < square:
             closest, square = k, du * du + dv * dv
-    if closest < 0 or square > (_NEAR * _extent(manifold, n)) ** 2:
+    if closest < 0 or square > (NEAR * _extent(manifold, n)) ** 2:
         return -1
     return closest
 

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 from collide.contact.carrying_points import CELLS
 from collide.contact.clip_polygons import Clipped
 from collide.contact.contact_facets import open_facets
-from collide.contact.contact_patches import DEEPEST, least_gap_of
-from collide.contact.contact_points import PatchPoints, copy_of_points
+from collide.contact.contact_patches import DEEPEST, NearestPoint, least_gap_of, put_nearest
+from collide.contact.contact_points import PatchPoints
 from collide.contact.curved_patches import (
     COVERED,
     REACHED,
@@ -26,11 +26,11 @@ from collide.contact.curved_patches import (
     pose_facets,
     seed_of,
 )
-from collide.contact.manifold_points import GAP, HEIGHT, POINT, ManifoldPoints, V
+from collide.contact.manifold_points import POINT, ManifoldPoints
 from collide.contact.patch_rows import CONTACT, PatchSpace, RowsOf, choose_points, facet_of_row, put_row, widen_row
 from collide.contact.reduce_patch import HullSpace
 from collide.contact.shallow_overlaps import STEP_ERRORS
-from collide.contact.support_face import axes_across, seen_along, support_face
+from collide.contact.support_face import axes_across, seen_along, support_face, swept_face
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.packed_convex import CYLINDER
 from collide.lowering.shape_table import INTS, NUMBERS, POSE, RADIUS, REACH, SLOP
@@ -248,29 +248,22 @@ def _put_patch(task, k, nhat, feature, number, n_rows):
     row = view_row(near.rows_at + ROW * k)
     meets = row.flags[HIT] != 0
     axes = axes_across(nhat)
-    of_set = _support(task, axes)
+    of_set = _swept_support(task, axes)
     distance = row.doubles[DISTANCE]
-    deepest = DEEPEST * max(-distance, 0.0) if meets else 0.0
-    low = (task.radius if meets else 0.0) - deepest - STEP_ERRORS * near.error
-    look = Look(axes, low, task.space.margin + task.radius)
+    deepest = DEEPEST * max(-distance, 0.0) if meets else task.radius
+    look = Look(axes, -deepest - STEP_ERRORS * near.error, task.space.margin)
     n = grow_over(near, 1, of_set, look)
     bracket = max(row.doubles[UPPER] - distance, distance - row.doubles[LOWER])
-    if least_gap_of(points, n) - 4.0 * near.error > distance + task.radius + bracket + STEP_ERRORS * near.error:
+    if least_gap_of(points, n) - 4.0 * near.error > distance + bracket + STEP_ERRORS * near.error:
         # Put in front: the nearest points, where corners are farther apart.
-        for i in range(n):
-            copy_of_points(points, n - 1 - i, points, n - i)
         a = seen_along(axes, sub(vec3_at(row.doubles, POINT_A), near.origin))
-        points.manifold.points[0] = a.x
-        points.manifold.points[V] = a.y
-        points.manifold.points[GAP] = distance + task.radius
-        points.manifold.points[HEIGHT] = a.z + 0.5 * (distance + task.radius)
-        points.manifold.features[0] = feature
-        points.manifold.features[1] = of_set.features[0] if of_set.n == 1 else of_set.feature
-        points.errors[0] = max(bracket, 4.0 * near.error)
-        points.pairs[0] = k
-        n += 1
+        nearest = NearestPoint(
+            a.x, a.y, distance, a.z + 0.5 * distance, max(bracket, 4.0 * near.error), k, feature,
+            of_set.features[0] if of_set.n == 1 else of_set.feature,
+        )  # fmt: skip
+        n = put_nearest(points, n, nearest, task.radius)
     first = task.space.out + CONTACT * n_rows
-    n_rows = _put_rows(task, axes, of_set, n, meets, number, n_rows)
+    n_rows = _put_rows(task, axes, n, meets, number, n_rows)
     if n_rows > 0 and not meets and near.facets[k] == facet_of_row(first):
         widen_row(first, distance, row.doubles[LOWER], row.doubles[UPPER])
     return n_rows, 1
@@ -278,22 +271,28 @@ def _put_patch(task, k, nhat, feature, number, n_rows):
 
 @kernel(inline=True)
 def _support(task, axes):
-    """What of the set supports the normal."""
+    """What of the set's core supports the normal."""
     return support_face(
         task.pair, task.pair.B, task.faces, axes, -1.0, task.near.shift, task.largest, task.doubles, task.integers
     )
 
 
+@kernel(inline=True)
+def _swept_support(task, axes):
+    """What of the set supports the normal."""
+    return swept_face(_support(task, axes), -1.0, task.radius, task.near.error)
+
+
 @kernel
-def _put_rows(task, axes, of_set, n, meets, number, n_rows):
+def _put_rows(task, axes, n, meets, number, n_rows):
     """Append the rows of n points, and put facets into the patch; how many rows there are then."""
     near, space = task.near, task.space
     cover_facets(near, axes.nhat, number)
-    apart = _slab_length(task, axes.nhat, of_set) if meets else 0.0
-    n = choose_points(near.points, n, near.error, space.margin + task.radius, space)
+    apart = _slab_length(task, axes) if meets else 0.0
+    n = choose_points(near.points, n, near.error, space.margin, space)
     if n_rows + n > space.capacity:
         return -1
-    rows = RowsOf(axes, space.origin, 0.0, task.radius, task.error, meets, apart, number)
+    rows = RowsOf(axes, space.origin, 0.0, 0.0, task.error, meets, apart, number)
     for i in range(n):
         k = space.hull.order[i]
         facet = near.facets[space.target.pairs[k]]
@@ -302,12 +301,12 @@ def _put_rows(task, axes, of_set, n, meets, number, n_rows):
 
 
 @kernel
-def _slab_length(task, n, of_set):
-    """A length along a direction by which the set moved is proven to clear all REACHED facets [m]."""
-    lowest = math.inf
+def _slab_length(task, axes):
+    """A length along the normal by which the set moved is proven to clear all REACHED facets [m]."""
+    of_set, lowest = _support(task, axes), math.inf
     for i in range(of_set.n):
         lowest = min(lowest, of_set.corners[3 * i + 2])
-    overlap = highest_of(task.near, n) - lowest + task.radius + 2.0 * of_set.flatness
+    overlap = highest_of(task.near, axes.nhat) - lowest + task.radius + 2.0 * of_set.flatness
     return max(overlap, 0.0) + STEP_ERRORS * task.near.error + 2.0 * task.error
 
 
@@ -337,17 +336,17 @@ def _put_parted(task, n_meeting, n_rows):
         v = scale(1.0 / length, v)
         for side in range(1 if near.mesh.solid else 2):
             n = v if side == 0 else neg(v)
-            depth = _slab_length(task, n, _support(task, axes_across(n)))
+            depth = _slab_length(task, axes_across(n))
             if depth < best:
                 best, normal = depth, n
     if norm(normal) == 0.0:
         return n_rows, 0
     axes = axes_across(normal)
-    of_set = _support(task, axes)
+    of_set = _swept_support(task, axes)
     for k in range(n_meeting):
         near.queue[k] = k
-    low = task.radius - DEEPEST * best - STEP_ERRORS * near.error
-    n = grow_over(near, n_meeting, of_set, Look(axes, low, task.space.margin + task.radius))
+    low = -DEEPEST * best - STEP_ERRORS * near.error
+    n = grow_over(near, n_meeting, of_set, Look(axes, low, task.space.margin))
     if n == 0:
         return n_rows, 0
-    return _put_rows(task, axes, of_set, n, True, 0, n_rows), 1
+    return _put_rows(task, axes, n, True, 0, n_rows), 1

@@ -78,7 +78,7 @@ class NearFacets(NamedTuple):
 
 
 class Look(NamedTuple):
-    """Along what, and within which gaps of cores, points are looked for: axes, and two bounds [m]."""
+    """Along what, and within which gaps, points are looked for: axes, and two bounds [m]."""
 
     axes: Any
     low: float

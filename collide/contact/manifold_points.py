@@ -19,9 +19,12 @@ _PARALLEL = 2.0**-36
 _BESIDE = 2.0**-20
 #: Sines up to this are those of lines along each other where a surface is round across one: it falls off from its line
 #: with the square of how far the other is beside it, and that is worked out.
-_ALONG = 2.0**-10
+ALONG = 2.0**-10
 #: Round surfaces are looked at down to 45°, as faces are: so far beside its line, in radii.
 _ASIDE = math.sqrt(0.5)
+#: Nearest points nearer to a corner than this part of the manifold's size take its place: a rim is a little outside its
+#: octagon, and two contacts so near would be one too many.
+NEAR = 2.0**-8
 
 
 class ManifoldPoints(NamedTuple):
@@ -121,16 +124,38 @@ def overlap_points(face_a, face_b, tolerance, max_gap, first, second, manifold):
     before = polygon.sides[n - 1] if n > 0 else 0
     for k in range(n):
         side = polygon.sides[k]
-        _put_corner(face_a, face_b, before, side, polygon.points[2 * k], polygon.points[2 * k + 1], manifold, k)
+        u, v = polygon.points[2 * k], polygon.points[2 * k + 1]
+        _put_corner(face_a, face_b, before, side, u, v, tolerance, manifold, k)
         before = side
     return n, 0.0
 
 
+@kernel(inline=True)
+def _is_over(face_b, u, v, tolerance):
+    """Whether a place is over a face of B, or outside it by no more than the tolerance [m]."""
+    for k in range(face_b.n):
+        i, j = 3 * corner_of_b(face_b, k), 3 * corner_of_b(face_b, k + 1 if k + 1 < face_b.n else 0)
+        du, dv = face_b.corners[j] - face_b.corners[i], face_b.corners[j + 1] - face_b.corners[i + 1]
+        beside = du * (v - face_b.corners[i + 1]) - dv * (u - face_b.corners[i])
+        if beside < -tolerance * math.sqrt(du * du + dv * dv):
+            return False
+    return True
+
+
 @kernel
-def _put_corner(face_a, face_b, before, side, u, v, manifold, k):
-    """Point k, between two sides of the overlap (`Clipped`), at (u, v) unless it is a corner of one of the faces."""
+def _put_corner(face_a, face_b, before, side, u, v, tolerance, manifold, k):
+    """Point k, between two sides of the overlap (`Clipped`), at (u, v) unless it is a corner of one of the faces.
+
+    Between two sides of A is its corner, unless these are so nearly along each other that they meet, moved out by the
+    tolerance, far from it, and it is not over B.
+    """
     if before >= 0 and side >= 0:
         at = 3 * side
+        off = max(abs(face_a.corners[at] - u), abs(face_a.corners[at + 1] - v))
+        if off > 4.0 * tolerance and not _is_over(face_b, face_a.corners[at], face_a.corners[at + 1], tolerance):
+            h_a, h_b = height_at(face_a, u, v), height_at(face_b, u, v)
+            _put(manifold, k, u, v, h_a, h_b, face_a.edges[side], face_b.feature)
+            return
         u, v = face_a.corners[at], face_a.corners[at + 1]
         _put(
             manifold, k, u, v, face_a.corners[at + 2], height_at(face_b, u, v), face_a.features[side], face_b.feature
@@ -195,7 +220,7 @@ def _ends_beside(edge, face, is_edge_of_b, tolerance, max_gap, n, manifold):
         length = (shared.high - shared.low) * math.sqrt(du * du + dv * dv)
         if not length > longest:
             continue
-        farthest = max(_point_at(a, b, shared, shared.low).gap, _point_at(a, b, shared, shared.high).gap)
+        farthest = max(place_between(a, b, shared, shared.low).gap, place_between(a, b, shared, shared.high).gap)
         if farthest <= max_gap:
             best, longest = side, length
     if best < 0:
@@ -216,7 +241,7 @@ def shared_span(a, b, tolerance):
         return none
     rounding = a.round + b.round
     across = abs(du * ev - dv * eu)
-    if across > (_ALONG if rounding > 0.0 else _PARALLEL) * length_a * length_b + tolerance * (length_a + length_b):
+    if across > (ALONG if rounding > 0.0 else _PARALLEL) * length_a * length_b + tolerance * (length_a + length_b):
         return none
     square = length_a * length_a
     begin = ((b.p.x - a.p.x) * du + (b.p.y - a.p.y) * dv) / square
@@ -255,7 +280,7 @@ class PlaceBetween(NamedTuple):
 
 
 @kernel(inline=True)
-def _point_at(a, b, shared, t):
+def place_between(a, b, shared, t):
     """The `PlaceBetween` at parameter t of A: of sharp edges on A, else between both, as their radii are."""
     du, dv, dh = a.q.x - a.p.x, a.q.y - a.p.y, a.q.z - a.p.z
     eu, ev, eh = b.q.x - b.p.x, b.q.y - b.p.y, b.q.z - b.p.z
@@ -292,21 +317,26 @@ def _fall(radius, wu, wv, du, dv, dh):
     return (aside / (math.sqrt(level) + math.sqrt(max(level - aside, 0.0))) - rise * along) / a
 
 
+@kernel(inline=True)
+def features_of_end(a, b, shared, k):
+    """What of A and of B meets at end k of what two edges share: a corner of one, the edge of the other."""
+    if k == 0:
+        is_of_a = min(shared.begin, shared.end) <= 0.0
+    else:
+        is_of_a = max(shared.begin, shared.end) >= 1.0
+    if is_of_a:
+        return (a.feature_p if k == 0 else a.feature_q), b.edge
+    return a.edge, (b.feature_q if (k == 0) == (shared.begin > shared.end) else b.feature_p)
+
+
 @kernel
 def _put_shared(a, b, shared, manifold):
     """Put the ends of what two edges share; (how many, how far gaps are off [m])."""
     if shared.low > shared.high:
         return 0, 0.0
-    low_b, high_b = min(shared.begin, shared.end), max(shared.begin, shared.end)
-    is_turned = shared.begin > shared.end
     for k in range(2):
-        at = _point_at(a, b, shared, shared.low if k == 0 else shared.high)
-        is_of_a = low_b <= 0.0 if k == 0 else high_b >= 1.0
-        feature_a, feature_b = a.edge, b.edge
-        if is_of_a:
-            feature_a = a.feature_p if k == 0 else a.feature_q
-        else:
-            feature_b = b.feature_q if (k == 0) == is_turned else b.feature_p
+        at = place_between(a, b, shared, shared.low if k == 0 else shared.high)
+        feature_a, feature_b = features_of_end(a, b, shared, k)
         _put(manifold, k, at.u, at.v, at.h_a, at.h_b, feature_a, feature_b)
     return 2, shared.off
 

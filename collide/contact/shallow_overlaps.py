@@ -77,7 +77,7 @@ def separate_pairs(pairs, A, B, error, limit, translations, points):
 @kernel(inline=True)
 def any_side_view(axes, error):
     """A view along which depths are measured."""
-    return View(axes, error, -math.inf, math.inf, True)
+    return View(axes, error, -math.inf, math.inf, True, False)
 
 
 @kernel(inline=True)

@@ -39,13 +39,13 @@ from collide.support.support_mapping import curved_support, settled_vertex, supp
 from collide.support.support_tree_query import extreme_vertex_listed
 
 #: A face, or a line, is across the normal down to this cosine, or up to this sine.
-_ACROSS = 0.7
+ACROSS = 0.7
 #: Corners of the polygon within a cylinder's end or a cone's base.
 ROUND = 8
 #: Corners are good to this part of the body's size: the direction of an edge is known to so much over its length.
 _BLUR = 2.0**-46
 #: Faces and edges whose direction is known worse than to this angle show no more than their nearest point when swept.
-_KNOWN = 2.0**-20
+KNOWN = 2.0**-20
 #: Sines below this count as 0: a cylinder stands upright. At rest it tilts this way and that by less, and corners that
 #: went around with its lowest point would never let it rest.
 _UPRIGHT = 2.0**-20
@@ -189,7 +189,7 @@ def swept_face(face, sign, radius, error):
         e = sub(vec3_at(corners, 3), vec3_at(corners, 0))
         square = dot(e, e)
         unknown = 2.0 * error / math.sqrt(square) if square > 0.0 else 1.0
-        if unknown <= _KNOWN:
+        if unknown <= KNOWN:
             shift = sub(Vec3(0.0, 0.0, 1.0), scale(e.z / square, e))
             shift = scale(sign / norm(shift), shift)
     elif n > 2:
@@ -197,7 +197,7 @@ def swept_face(face, sign, radius, error):
         unknown = 4.0 * (error + face.flatness) * longest / area if area > 0.0 else 1.0
         shift = Vec3(-face.slope_u, -face.slope_v, 1.0)
         shift = scale(sign / norm(shift), shift)
-    if unknown > _KNOWN:
+    if unknown > KNOWN:
         n = np.int64(1)
     for k in range(n):
         put_vec3(corners, 3 * k, add(vec3_at(corners, 3 * k), scale(radius, shift)))
@@ -255,7 +255,7 @@ def _hull_corners(body, faces_at, g, facing, blur, corners, features, edges):
     vertex = _hull_vertex(body, row, g)
     p = column_at(body.coords, body.padded, vertex)
     best = np.int64(-1)
-    best_cosine = _ACROSS
+    best_cosine = ACROSS
     for k in range(fan_starts[vertex], fan_starts[vertex + 1]):
         face = face_of[fans[k]]
         cosine = dot(vec3_at(normals, 3 * face), facing)
@@ -273,7 +273,7 @@ def _hull_corners(body, faces_at, g, facing, blur, corners, features, edges):
         return n, triangles[best], vec3_at(normals, 3 * best), flatness, 4 * best + FACE
     best_edge = np.int64(-1)
     length = norm(g)
-    least_steep = -_ACROSS * length
+    least_steep = -ACROSS * length
     for k in range(fan_starts[vertex], fan_starts[vertex + 1]):
         at = fans[k]
         face = face_of[at]
@@ -317,7 +317,7 @@ def _round_corners(pair, body, g, corners, features, edges):
     up = g.z / length
     normal = Vec3(0.0, 0.0, 0.0)
     is_cone = body.kind == CONE
-    if -up >= _ACROSS or (up >= _ACROSS and not is_cone):
+    if -up >= ACROSS or (up >= ACROSS and not is_cone):
         z = half if up > 0.0 else -half
         _put_disc(x, y, radius, z, corners, features, edges)
         return np.int64(ROUND), Vec3(0.0, 0.0, 1.0 if up > 0.0 else -1.0), flatness
@@ -332,7 +332,7 @@ def _round_corners(pair, body, g, corners, features, edges):
         edges[k] = 4 * (ROUND + k) + CURVED
     line = sub(vec3_at(corners, 3), vec3_at(corners, 0))
     slope = dot(line, g) / (norm(line) * length)
-    if abs(slope) <= _ACROSS:
+    if abs(slope) <= ACROSS:
         return np.int64(2), normal, 0.0
     if slope > 0.0:
         put_vec3(corners, 0, vec3_at(corners, 3))

@@ -51,6 +51,17 @@ def gaps_along(P, Q, n) -> list[tuple[list[Fraction], Fraction]]:
     return found
 
 
+def gap_at(Q, p, n, tolerance) -> list[Fraction]:
+    """[what n is to be multiplied with to lead from a point to the facet Q], without it where it leads past Q."""
+    p, n = [Fraction(float(x)) for x in p], [Fraction(x) for x in n]
+    normal = cross(minus(Q[1], Q[0]), minus(Q[2], Q[0]))
+    slope = inner(normal, n)
+    if slope == 0:
+        return []
+    gap = inner(normal, minus(Q[0], p)) / slope
+    return [gap] if away_from(Q, [float(x + gap * d) for x, d in zip(p, n)]) < tolerance else []
+
+
 def away_from(P, p) -> float:
     """How far a point of doubles is from the triangle P, about: the least distance from its plane, edges and
     corners."""
@@ -89,6 +100,7 @@ def check_row(row, a, b, X_WA, X_WB, radii=(0.0, 0.0), nearest=False, tolerance=
         for place, g in gaps_along(P, Q, n.tolist())
         if max(abs(float(x) - y) for x, y in zip(place, core_a)) < tolerance
     ]
+    there += gap_at(Q, core_a, n.tolist(), tolerance)
     slack = Fraction(1, 2**48) * (1 + abs(low))  # the normal's own length
     if any(low - slack <= g <= high + slack for g in there):
         return
@@ -373,7 +385,8 @@ def failures_of_convex(A, B, X_WA, X_WB, margin, rows, r) -> list[str]:
 def _failures_of_gaps(a, b, n, rows, eta) -> list[str]:
     """Rows whose bracket is not how far two polytopes are apart along the normal, at places within rounding of it."""
     p = rows["point_a"].astype(LONG)
-    least = -b.exits(p, -n, eta) - a.exits(p, n, eta)
+    off = 4.0 * eta  # a place is good to 2⁻⁴⁴
+    least = -b.exits(p, -n, off) - a.exits(p, n, off)
     most = -b.exits(p, -n, -eta) - a.exits(p, n, -eta)
     bad = (rows["upper"] < least - 4 * eta) | (rows["lower"] > most + 4 * eta)
     return [

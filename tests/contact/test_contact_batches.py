@@ -108,6 +108,6 @@ def test_boxes_near_are_all_pairs_within_the_margin(monkeypatch):
     a, b = A.boxes(X_WA)[:, :, None], B.boxes(X_WB)[:, None]
     apart = np.maximum(b[..., :3] - a[..., 3:], a[..., :3] - b[..., 3:]).max(axis=-1)
     for few in (0, 1 << 20):
-        monkeypatch.setattr(composite_parts, "_FEW_PAIRS", few)
+        monkeypatch.setattr(composite_parts, "_MAX_PAIRS", few)
         found = set(zip(*(column.tolist() for column in composite_parts.boxes_near(A, B, X_WA, X_WB, 0.05))))
         assert found == set(map(tuple, np.argwhere(apart <= 0.05).tolist())) and len(found) > 20

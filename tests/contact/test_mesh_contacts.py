@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contact_oracle import check_row
+from contact_oracle import ConvexBody, check_row
 from contact_scenes import gripper, table, wedge, world_corners
 from mesh_shapes import block_ring, box
 from naive_triangles import facet_pairs
@@ -191,6 +191,63 @@ def test_swept_balls():
         capsule = collide.contacts(ground, collide.Capsule(0.125, 0.5), EYE, lying, margin=0.002)
         near(capsule.point_a, [(-0.15, 0.2, 0), (0.35, 0.2, 0)])
         assert np.abs(capsule.distance - height).max() < 1e-12
+
+
+def grid_of(n: int) -> collide.Mesh:
+    """An open square of side 2 across z, of n · n cells."""
+    k = np.linspace(-1.0, 1.0, n + 1)
+    cells = [(n + 1) * i + j for i in range(n) for j in range(n)]
+    faces = [f for c in cells for f in ((c, c + n + 1, c + n + 2), (c, c + n + 2, c + 1))]
+    return collide.Mesh([(x, y, 0.0) for x in k for y in k], faces, solid=False)
+
+
+def turned(axis, angle: float) -> np.ndarray:
+    axis = np.asarray(axis) / np.linalg.norm(axis)
+    return collide.pose(quat_wxyz=(np.cos(angle / 2), *(np.sin(angle / 2) * axis)))[:3, :3]
+
+
+SWEPT = {
+    "capsule": (collide.Capsule(0.3, 1.0), turned((0, 1, 0), np.pi / 2)),
+    "triangle": (collide.ConvexHull([(-0.4, -0.3, 0), (0.5, -0.2, 0), (0, 0.4, 0)], radius=0.2), np.eye(3)),
+    "box": (collide.ConvexHull(0.3 * np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T, radius=0.1), np.eye(3)),
+    "brick": (collide.ConvexHull(np.random.default_rng(2).normal(size=(30, 3)) * 0.4, radius=0.1), np.eye(3)),
+}
+
+
+@pytest.mark.parametrize("gap", [1e-3, -1e-3, -0.15])
+@pytest.mark.parametrize("name", SWEPT)
+def test_points_of_swept_bodies_that_lean_are_on_their_surface(name, gap):
+    """Corners moved by the radius along the contact's normal were up to radius · θ² / 2 inside, and more."""
+    ground, (B, R_B) = grid_of(3), SWEPT[name]
+    rng = np.random.default_rng(4)
+    rows = 0
+    for lean in [*10.0 ** rng.uniform(-4, -0.2, 12), 0.7, 0.78, 1.1]:
+        X = np.eye(4)
+        X[:3, :3] = turned((*rng.normal(size=2), 0), lean) @ R_B
+        X[:3, 3] = *rng.uniform(-0.2, 0.2, 2), 3.0
+        X[2, 3] -= collide.distance(ground, B, EYE, X).distance - gap
+        c = collide.contacts(ground, B, EYE, X, margin=0.5)
+        off = np.abs(ConvexBody(B, X).signed(c.rows["point_b"][c.rows["kind"] != TRANSLATION]).astype(float))
+        assert len(c.rows) and off.max(initial=0.0) < 1e-12, (B, X.tolist(), off)
+        assert abs(c.rows["distance"].min() - gap) < 1e-9 or gap < -1e-2, (B, X.tolist())
+        rows += len(c.rows)
+    assert rows >= 30
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_a_capsule_along_the_rim_of_a_surface_has_both_ends(n):
+    """One end over the facets, the other a hair beyond the rim: it fell off."""
+    ground, B = grid_of(n), collide.Capsule(0.2, 0.8)
+    R_B = turned((1, 0, 0), -np.pi / 2)
+    rng = np.random.default_rng(5)
+    for k in range(40):
+        turn = rng.choice([-1, 1]) * 10.0 ** rng.uniform(-12, -3.1)
+        X = np.eye(4)
+        X[:3, :3] = turned((0, 0, 1), turn) @ R_B
+        X[:3, 3] = 1.0 + rng.choice([0.0, 1e-6, -1e-6]), rng.uniform(-0.2, 0.2), 0.2 + 1e-5
+        c = collide.contacts(ground, B, EYE, X, margin=1e-3)
+        assert np.ptp(c.point_a[:, 1]) > 0.8 - 1e-3, (n, k, X.tolist(), c.rows)
+        assert np.abs(ConvexBody(B, X).signed(c.point_b)).max() < 1e-12
 
 
 def test_deep_inside_there_is_no_patch():

@@ -64,6 +64,6 @@ def test_repeated_and_collinear_points_go():
 
 def test_the_deepest_comes_first_and_ties_go_by_place():
     places = np.array([(1.0, 0), (0, 1), (-1, 0), (0, -1)])
-    assert deepest_point(manifold(places, np.array([0, -1.0, 0, 0])), 4, 1e-12, 1e-9) == 1
-    assert deepest_point(manifold(places, np.zeros(4)), 4, 1e-12, 1e-9) == 2
-    assert deepest_point(manifold(places, np.array([0, 0, 1e-13, 0])), 4, 1e-12, 1e-9) == 2
+    assert deepest_point(manifold(places, np.array([0, -1.0, 0, 0])), 4, 1e-12) == 1
+    assert deepest_point(manifold(places, np.zeros(4)), 4, 1e-12) == 2
+    assert deepest_point(manifold(places, np.array([0, 0, 1e-13, 0])), 4, 1e-12) == 2
