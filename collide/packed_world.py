@@ -316,7 +316,7 @@ class PackedWorld:
         a, b = pairs.T
         A, B = self.shapes[self.shape_of[a[0]]], self.shapes[self.shape_of[b[0]]]
         if A.is_region or B.is_region:
-            rows = rows_of_pair(A, B, self.X_WBs[a], self.X_WBs[b], limit)
+            rows = rows_of_pair(A, B, self.X_WBs[a], self.X_WBs[b], limit, depths=not boolean)
         elif boolean:
             rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
             states = mesh_batches.pair_states(A, B, self.X_WBs[a], self.X_WBs[b])

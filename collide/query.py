@@ -227,10 +227,10 @@ def distance(
     Notes
     -----
     GJK for gaps, their last digits in double-doubles; EPA (van den Bergen 2001) for depths. Where a body is not convex,
-    an overlap is minus the length of a translation that is proven to separate the bodies, found by about a dozen
-    booleans. Beside a mesh, a union of k parts costs 0.3 to 1 ms for each pair of parts whose boxes overlap or come as
-    near as the nearest parts are; with depths a dozen times that, which ``signed=False`` leaves out. Curved shapes
-    within a mesh of n facets take O(n) where all its facets are near.
+    an overlap is minus the length of a translation that is proven to separate the bodies, found by some
+    hundred booleans, which ``signed=False`` leaves out: seconds where a rounded body a million times as large as a mesh
+    of 10^5 facets holds it. Beside a mesh, a union costs 0.2 to 0.4 ms for each pair of parts whose boxes overlap or come
+    as near as the nearest parts are. Curved shapes within a mesh of n facets take O(n) where all its facets are near.
     """
     limit = checks.limit("max_distance", max_distance)
     if signed.__class__ is not bool:

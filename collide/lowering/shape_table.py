@@ -151,12 +151,13 @@ class PoseTable(NamedTuple):
 
 
 def pose_table(
-    X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray, has_pose: np.ndarray | None = None
+    X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray, has_pose: np.ndarray | None = None, *, terms: bool = True
 ) -> PoseTable:
     """Poses of k parts in the world.
 
     X_WB : (k, 4, 4) body poses.   X_BP : (k, 4, 4) the parts' poses in their bodies.   reach : (k,).
-    has_pose : (k,) whether X_BP is not the identity, where that is known.
+    has_pose : (k,) whether X_BP is not the identity, where that is known.   terms : False where only rounded poses and
+    their slops are read, as boxes do.
 
     A part without a pose of its own keeps the numbers given, bit by bit, and so does one of a body at
     the origin. Elsewhere the product is written out, so that a batch rounds as a single pose does.
@@ -182,10 +183,12 @@ def pose_table(
     stretch = np.maximum(1.0, np.abs(R).sum(axis=2).max(axis=1))  # of a matrix that need be no rotation
     parts = reach[needs_pose] + np.abs(X[:, :3, 3]).sum(axis=1)
     rows[needs_pose, POSE_SLOP] = PRODUCT_SLOP * (stretch * parts + np.abs(p).max(axis=1))
-    terms, exact = _terms(R, p, X)
+    if not terms:
+        return PoseTable(rows, NO_TERMS)
+    exact_terms, exact = _terms(R, p, X)
     rows[needs_pose[exact], POSE_TERMS] = np.arange(int(exact.sum()))
-    terms, rounded = terms[exact], rows[needs_pose[exact], :12]
-    return PoseTable(rows, np.hstack([terms.reshape(-1, LOW_PARTS), _low_parts(terms, rounded)]))
+    exact_terms, rounded = exact_terms[exact], rows[needs_pose[exact], :12]
+    return PoseTable(rows, np.hstack([exact_terms.reshape(-1, LOW_PARTS), _low_parts(exact_terms, rounded)]))
 
 
 def has_own_pose(X_BP: np.ndarray) -> np.ndarray:

@@ -85,7 +85,8 @@ def time_of_impact(
     -----
     Conservative advancement (Mirtich 1996; Zhang et al. 2006; Tang, Kim and Manocha 2009) along separating axes that
     are kept, with spans proven by the chord of a function of bounded curvature (`motion/kept_axis.py`); facets of
-    meshes are culled span by span with motion bounds. Convex pairs: 2 to 8 questions to GJK, some microseconds. Spins:
+    meshes are culled span by span with motion bounds: O(n) of n facets that come near, a few times over, seconds where
+    10^5 facets meet 10^5. Convex pairs: 2 to 8 questions to GJK, some microseconds. Spins:
     steps are about √(gap / (|ω|² reach)), so a pair of many turns takes some steps a turn.
     """
     n_threads = check_threads(threads)

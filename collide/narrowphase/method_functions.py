@@ -108,11 +108,14 @@ def answer_of(A: Shape, B: Shape) -> Answer:
     return _ANSWER_TABLE[kind_of(A)][kind_of(B)]
 
 
-def rows_of_pair(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
-    """Rows of `PAIR_DTYPE` of two shapes, whatever they are, at checked poses (n, 4, 4); limit [m] as of `distance`.
+def rows_of_pair(
+    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float, *, depths: bool = True
+) -> np.ndarray:
+    """Rows of `PAIR_DTYPE` of two shapes, whatever they are, at checked poses (n, 4, 4); limit [m] as of `distance`,
+    depths as of `Question`.
 
     Raises UnsupportedQuery.
     """
     rows = np.zeros(len(X_WA), dtype=PAIR_DTYPE)
-    answer_of(A, B).batch(rows, A, B, X_WA, X_WB, Question(False, limit))
+    answer_of(A, B).batch(rows, A, B, X_WA, X_WB, Question(False, limit, depths))
     return rows

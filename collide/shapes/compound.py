@@ -29,8 +29,8 @@ class Compound(Shape):
     -----
     Nested poses are multiplied out in float64, and every bracket accounts for the rounding. Against a convex shape or
     another compound only pairs of parts that come near are tested: a compound costs about as much as its parts one by
-    one where it has two, and less the more it has. Making one of k parts, and its first query, are O(k): 5 and 40 µs a
-    part. Contacts take some microseconds a part, and more of the pairs of parts whose boxes come near.
+    one where it has two, and less the more it has. Making one of k parts, and its first query, are O(k). Contacts
+    take O(k), and more of the pairs of parts whose boxes come near.
     """
 
     __slots__ = ("items", "meshed")

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from collide.lowering.enclosures import enclosure_of
+from collide.lowering.enclosures import Enclosure, enclosure_of
 from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of, is_halfspace
 from collide.lowering.kinds import WITH_FACETS, kind_of
 from collide.lowering.parts import bounding_parts_of
@@ -57,7 +57,26 @@ def _facet_states(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop) -> n
 def _curved_states(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
     if kind_of(A) not in WITH_FACETS:
         A, B, PA, PB = B, A, PB, PA
-    return settle_curved(body_of(A), enclosure_of(B), PA, PB).state
+    body, E = body_of(A), enclosure_of(B)
+    # What is apart from a polytope around the shape is apart, what meets one inside it meets the shape: facets are
+    # looked at one by one only between the two.
+    states = np.where(loose_states(body, E.outer, PA, PB) == APART, APART, OPEN)
+    for settle in (_meets_inner, _settled):
+        remaining = np.flatnonzero(states == OPEN)
+        if len(remaining):
+            states[remaining] = settle(body, E, PA.of(remaining), PB.of(remaining))
+    return states
+
+
+def _meets_inner(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
+    """(n,) HIT where a mesh meets the polytope inside a shape, else OPEN."""
+    if E.inner is None:
+        return np.full(len(PA.X), OPEN)
+    return np.where(loose_states(A, E.inner, PA, PB) == HIT, HIT, OPEN)
+
+
+def _settled(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
+    return settle_curved(A, E, PA, PB).state
 
 
 _STATES = {Method.HULL: _plane_states, Method.FACETS: _facet_states, Method.CURVED: _curved_states}

@@ -20,6 +20,9 @@ from collide.narrowphase.facets.separating_translation import SeparatingTranslat
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.shape import Shape
 
+#: Pairs of parts that trial booleans of a depth search ask about before boxes of all parts are made.
+_ASKED_FIRST = 8
+
 
 def compound_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones: bool = False) -> np.ndarray:
     """(n,) APART, HIT or OPEN.
@@ -37,14 +40,34 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
         if open_ones and len(met):
             rows = convex_rows(A.convex, B.convex, X_WA[met], X_WB[met], limit=0.0)
             states[met[rows["how"] == UNDECIDED]] = OPEN
-    gaps = _box_gaps(A, B, X_WA, X_WB)
-    for i, j in _mesh_pairs(A, B, np.any(gaps <= 0.0, axis=0)):
-        remaining = np.flatnonzero((states != HIT) & (gaps[:, i, j] <= 0.0))
-        if len(remaining):
-            part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[remaining], X_WB[remaining])
-            part_state = part_states(part_a.shape, part_b.shape, PA, PB)
-            states[remaining] = np.where(part_state == APART, states[remaining], part_state)
+    meshed = A.columns.meshed[:, None] | B.columns.meshed
+    # A hit among any parts is one of the unions. Poses of a depth search are much alike: the pairs whose boxes overlap
+    # the most at the first of them decide most of the others, and only what they leave open is asked about all parts.
+    first = np.flatnonzero(states != HIT)[:1]
+    if len(first) and len(X_WA) > 1 and meshed.size > _ASKED_FIRST:
+        gaps = np.where(meshed, _box_gaps(A, B, X_WA[first], X_WB[first])[0], math.inf)
+        deepest = np.argsort(gaps, axis=None, kind="stable")[:_ASKED_FIRST]
+        for i, j in zip(*(number.tolist() for number in np.unravel_index(deepest[gaps.flat[deepest] <= 0.0], gaps.shape))):
+            poses = np.flatnonzero(states != HIT)
+            if len(poses):
+                gaps_ij = _box_gaps(A, B, X_WA[poses], X_WB[poses], np.array([i]), np.array([j]))[:, 0, 0]
+                _take_states(A, B, i, j, poses[gaps_ij <= 0.0], X_WA, X_WB, states)
+            meshed[i, j] = False
+    poses = np.flatnonzero(states != HIT)
+    if len(poses):
+        gaps = _box_gaps(A, B, X_WA[poses], X_WB[poses])
+        for i, j in np.argwhere(meshed & np.any(gaps <= 0.0, axis=0)).tolist():
+            remaining = poses[gaps[:, i, j] <= 0.0]
+            _take_states(A, B, i, j, remaining[states[remaining] != HIT], X_WA, X_WB, states)
     return states
+
+
+def _take_states(A: CompoundParts, B: CompoundParts, i: int, j: int, poses, X_WA, X_WB, states: np.ndarray) -> None:
+    """Ask about one pair of parts at poses by number, and put what it tells of the unions into ``states`` (n,)."""
+    if len(poses):
+        part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[poses], X_WB[poses])
+        part_state = part_states(part_a.shape, part_b.shape, PA, PB)
+        states[poses] = np.where(part_state == APART, states[poses], part_state)
 
 
 def _mesh_pairs(A: CompoundParts, B: CompoundParts, wanted: np.ndarray) -> list[list[int]]:
@@ -61,14 +84,14 @@ def _parts_at(A: CompoundParts, B: CompoundParts, i: int, j: int, X_WA, X_WB):
     return part_a, part_b, part_a.at(X_WA, about), part_b.at(X_WB, about)
 
 
-def _box_gaps(A: CompoundParts, B: CompoundParts, X_WA, X_WB) -> np.ndarray:
+def _box_gaps(A: CompoundParts, B: CompoundParts, X_WA, X_WB, of_a=None, of_b=None) -> np.ndarray:
     """(n, parts of A, parts of B) what the parts' distances are at least, by their boxes; not above 0 where these
-    overlap.
+    overlap. of_a, of_b : numbers of the parts wanted; all without.
 
     Along an axis boxes are apart by the difference of their ends, and altogether by the root of the sum of the squares:
     no part reaches out of its box.
     """
-    a, b = A.boxes(X_WA)[:, :, None], B.boxes(X_WB)[:, None]
+    a, b = A.boxes(X_WA, of_a)[:, :, None], B.boxes(X_WB, of_b)[:, None]
     along = np.maximum(b[..., :3] - a[..., 3:], a[..., :3] - b[..., 3:])
     largest, length = along.max(axis=3), np.sqrt(np.square(np.maximum(along, 0.0)).sum(axis=3)) * (1.0 - 2.0**-40)
     return np.where(largest > 0.0, np.maximum(largest, length), largest)
@@ -144,8 +167,13 @@ def _part_rows(
     meshed = A.columns.meshed[:, None] | B.columns.meshed
     left_out |= (meshed & (gaps > sight)).any(axis=(1, 2))
 
+    placed = None if A.unbounded or B.unbounded else (A.placed_all(X_WA), B.placed_all(X_WB))
+
     def rows_of(i: int, j: int, poses: np.ndarray) -> np.ndarray:
-        part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[poses], X_WB[poses])
+        if placed is None:
+            part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[poses], X_WB[poses])
+        else:
+            part_a, part_b, PA, PB = A.parts[i], B.parts[j], placed[0][i].of(poses), placed[1][j].of(poses)
         rows = part_rows(part_a.shape, part_b.shape, PA, PB, limit)
         for name, side, number in (("part_a", A, i), ("part_b", B, j)):
             if side.is_union:

@@ -174,13 +174,22 @@ class CompoundParts:
         reach = np.where(np.isnan(plane), columns.reach[which], about + plane)
         return _placed(X_WB, columns.X[which], reach, columns.rotation[which], columns.shift[which])
 
-    def boxes(self, X_WB: np.ndarray) -> np.ndarray:
-        """(n, parts, 6) world boxes of the parts at n poses, low then high, rounded outwards."""
-        n, k = len(X_WB), len(self._bounds)
-        X_BP = np.tile(self._X_BP, (n, 1, 1))
-        reach = np.tile(self._table.numbers[:k, REACH], n)
-        poses = pose_table(np.repeat(X_WB, k, axis=0), X_BP, reach)
-        return boxes_of(self._table, poses.rows, np.tile(np.arange(k), n)).reshape(n, k, 6)
+    def placed_all(self, X_WB: np.ndarray) -> list[PosesWithSlop]:
+        """What `Part.at` gives of every part at n poses, worked out at once; of unions without half-spaces."""
+        n, k = len(X_WB), len(self.parts)
+        X, slop = self.placed(np.repeat(np.arange(k), n), np.tile(X_WB, (k, 1, 1)), np.zeros(k * n))
+        return [PosesWithSlop(*rows) for rows in zip(X.reshape(k, n, 4, 4), slop.reshape(k, n))]
+
+    def boxes(self, X_WB: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
+        """(n, parts, 6) world boxes of the parts, or of those by number, at n poses, low then high, rounded outwards."""
+        which = np.arange(len(self._bounds)) if which is None else which
+        if len(X_WB) > 1 and (X_WB[1:] == X_WB[0]).all():  # one body of a depth search stands still
+            return np.repeat(self.boxes(X_WB[:1], which), len(X_WB), axis=0)
+        n, k = len(X_WB), len(which)
+        X_BP = np.tile(self._X_BP[which], (n, 1, 1))
+        reach = np.tile(self._table.numbers[which, REACH], n)
+        poses = pose_table(np.repeat(X_WB, k, axis=0), X_BP, reach, terms=False)
+        return boxes_of(self._table, poses.rows, np.tile(which, n)).reshape(n, k, 6)
 
     def extents(self, X_WB: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, float]:
         """((d,) what no product of its points with each of d unit vectors exceeds, error of these), at a pose (4, 4).

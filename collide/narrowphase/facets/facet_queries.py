@@ -186,21 +186,18 @@ def facets_within(
     """
     X_WA, X_WB = (np.ascontiguousarray(X, dtype=np.float64) for X in (X_WA, X_WB))
     work = workspace(WIDTH * (A.depth + B.depth + 2))
-    capacity = 512
-    while True:
-        out = np.empty((capacity, near_pairs.NUMBERS_OF_PAIR))
-        marks = np.empty((capacity, near_pairs.INTS_OF_PAIR), dtype=np.int64)
-        count = near_pairs.list_near_pairs(
-            A.address, B.address, address_of(X_WA), address_of(X_WB), float(reach), address_of(out), address_of(marks),
-            capacity, *work.addresses, True,
-        )  # fmt: skip
-        if count == -SINGULAR:
-            raise not_invertible(0)
-        if count != -FULL:
-            break
-        if capacity >= max_pairs:
-            return None
-        capacity = min(4 * capacity, max(max_pairs, capacity + 1))
+    # Room for all at once: memory that nobody touches costs nothing, a second walk as much as the first.
+    capacity = max(512, max_pairs)
+    out = np.empty((capacity, near_pairs.NUMBERS_OF_PAIR))
+    marks = np.empty((capacity, near_pairs.INTS_OF_PAIR), dtype=np.int64)
+    count = near_pairs.list_near_pairs(
+        A.address, B.address, address_of(X_WA), address_of(X_WB), float(reach), address_of(out), address_of(marks),
+        capacity, *work.addresses, True,
+    )  # fmt: skip
+    if count == -SINGULAR:
+        raise not_invertible(0)
+    if count == -FULL:
+        return None
     order = np.lexsort((marks[:count, 1], marks[:count, 0]))
     out, marks = out[order], marks[order]
     return NearPairs(marks[:, :2], marks[:, 2] != 0, out[:, 0], out[:, 1], out[:, 2:5], out[:, 5:8])

@@ -20,6 +20,8 @@ from collide.narrowphase.facets.facet_queries import all_hits
 _HALVINGS, _AGAIN = 16, 3
 #: Then, in the best direction, so many lengths between the best and its half, so many times.
 _BETWEEN, _ROUNDS = 16, 3
+#: So few translations are tried at once.
+_FEWEST_TRIED = 16
 #: Pairs of facets whose normals are tried one by one.
 _FACETS = 3
 _UP = 1 + 2.0**-48
@@ -69,33 +71,41 @@ def shortened(
     vectors that are tried.   candidates : translations (3,) to be tried first.
     """
     best, bound, normal = known
-    tried = [(t, *_length(t)) for t in _separating(meet, X_WA, X_WB, np.array(candidates).reshape(-1, 3))]
+
+    def try_shorter(steps: np.ndarray) -> np.ndarray | None:
+        """The shortest of these translations (n, 3) that separates, if it is shorter than the best, which it becomes."""
+        nonlocal best, bound
+        shortest = _shortest_separating(meet, X_WA, X_WB, steps, best)
+        if shortest is not None:
+            best, bound = _length(shortest)
+        return shortest
+
     longest = bound
+    tried = np.array(candidates).reshape(-1, 3)
     for _ in range(_AGAIN):
         lengths = longest * 2.0 ** -np.arange(1, _HALVINGS + 1)
         steps = (directions[:, None] * lengths[None, :, None]).reshape(-1, 3)
-        tried += [(t, *_length(t)) for t in _separating(meet, X_WA, X_WB, steps)]
-        shortest = min(tried, key=lambda translation: translation[1], default=None)
-        if shortest is not None and shortest[1] < best:
-            best, bound, normal = shortest[1], shortest[2], shortest[0] / shortest[1]
+        for some in (tried, steps):
+            shortest = try_shorter(some)
+            normal = normal if shortest is None else shortest / best
         if best > 1.5 * lengths[-1]:
             break
-        longest = lengths[-1]
+        longest, tried = lengths[-1], tried[:0]
     low = 0.5 * best
     for _ in range(_ROUNDS):
         lengths = low + (best - low) * np.arange(1, _BETWEEN) / _BETWEEN
-        translations = _separating(meet, X_WA, X_WB, normal * lengths[:, None])
         step = (best - low) / _BETWEEN
-        if len(translations):
-            length, upper = min(map(_length, translations))
-            if length < best:
-                best, bound = length, upper
+        try_shorter(normal * lengths[:, None])
         low = max(low, best - step)
     return SeparatingTranslation(best, bound, normal)
 
 
-def _separating(meet: Callable, X_WA, X_WB, steps: np.ndarray) -> np.ndarray:
-    """(k, 3): those of the translations (n, 3) that separate the bodies, as the poses they lead to really move them.
+def _shortest_separating(meet: Callable, X_WA, X_WB, steps: np.ndarray, below: float) -> np.ndarray | None:
+    """The shortest of the translations (n, 3) that separates the bodies and is shorter than ``below`` [m], as the pose
+    it leads to really moves them; None where none does.
+
+    The shortest half is asked about first, then half of the rest: what is longer than a translation that separates is
+    not asked about. Those are the dear ones: bodies that are apart have to be proven apart everywhere.
 
     Far from the world's origin a short step rounds to nothing: what is told of the bodies there is told of them as they
     stand, and no direction can be read off it.
@@ -103,11 +113,16 @@ def _separating(meet: Callable, X_WA, X_WB, steps: np.ndarray) -> np.ndarray:
     moved = np.repeat(X_WB[None], len(steps), axis=0)
     moved[:, :3, 3] += steps
     really = moved[:, :3, 3] - X_WB[:3, 3]
-    moves = np.square(really).sum(axis=1) > 0.0
-    moved, really = moved[moves], really[moves]
-    if not len(moved):
-        return really
-    return really[~meet(np.repeat(X_WA[None], len(moved), axis=0), moved)]
+    squares = np.square(really).sum(axis=1)
+    order = np.argsort(squares, kind="stable")
+    order = order[(squares[order] > 0.0) & (np.sqrt(squares[order]) < below)]
+    while len(order):
+        some = order[: max(_FEWEST_TRIED, len(order) // 2)]
+        apart = some[~meet(np.repeat(X_WA[None], len(some), axis=0), moved[some])]
+        if len(apart):
+            return really[apart[0]]
+        order = order[len(some) :]
+    return None
 
 
 def _length(step: np.ndarray) -> tuple[float, float]:

@@ -14,6 +14,7 @@ from naive_triangles import as_integers, squared_distance, world_points
 
 import collide
 from collide.errors import InvalidPose
+from collide.narrowphase.facets import facets_within as near_pairs
 from collide.narrowphase.facets.facet_queries import facets_within
 
 FAMILIES = [random_case, grid_case, flat_case, turned_grid_case, degenerate_case, identical_case]
@@ -57,8 +58,12 @@ def test_against_all_pairs(family):
     assert listed > 60 and (outside > 60 or family is identical_case)
 
 
-def test_room_grows_and_nothing_is_lost():
+def test_nothing_is_lost_and_trees_are_walked_once(monkeypatch):
+    """Whatever the room: a second walk costs as much as the first."""
     from mesh_shapes import bumpy_sphere
+
+    walks, list_pairs = [], near_pairs.list_near_pairs
+    monkeypatch.setattr(near_pairs, "list_near_pairs", lambda *args: walks.append(1) or list_pairs(*args))
 
     given = bumpy_sphere(900, 3)
     mesh = collide.Mesh(*given)
@@ -68,6 +73,7 @@ def test_room_grows_and_nothing_is_lost():
     closer = facets_within(mesh.tree, mesh.tree, np.eye(4), collide.pose((0.01, 0, 0)), 0.1, 1 << 20)
     kept = near.lower <= 0.1
     assert np.array_equal(near.facets[kept], closer.facets) and np.array_equal(near.length[kept], closer.length)
+    assert len(walks) == 3
 
 
 def test_a_mirror_is_refused():
@@ -89,6 +95,7 @@ def test_very_unlike_sizes():
 CHILD = """
 import pickle, sys
 import collide
+from collide.narrowphase.facets import facets_within as near_pairs
 from collide.narrowphase.facets.facet_queries import facets_within
 found = []
 for a, b, X_WA, X_WB, reach in pickle.load(sys.stdin.buffer):

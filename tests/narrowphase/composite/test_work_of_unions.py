@@ -1,0 +1,87 @@
+"""How much work questions about unions with meshes are: parts that are posed, booleans that are asked; no time is
+measured."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from naive import rng_of
+
+import collide
+from collide.narrowphase.composite import composite_mesh_pairs, composite_meshes, composite_parts
+
+
+def meshes(n: int, size: float) -> collide.Compound:
+    """So many small closed meshes in a ball of a metre."""
+    rng = rng_of(f"meshes {n}")
+    faces = collide.tessellate(collide.Box((1.0, 1.0, 1.0))).faces
+    corners = collide.tessellate(collide.Box((size, size, size))).vertices
+    places = rng.normal(size=(n, 3))
+    places *= (0.5 * rng.uniform(0, 1, n) ** (1 / 3) / np.linalg.norm(places, axis=1))[:, None]
+    return collide.Compound(
+        [(collide.Mesh(corners, faces), collide.pose(p, rpy=r)) for p, r in zip(places, rng.uniform(-3, 3, (n, 3)))]
+    )
+
+
+def counted(monkeypatch, module, name: str, of) -> list[int]:
+    counts, function = [], getattr(module, name)
+
+    def recorded(*args, **options):
+        counts.append(of(*args))
+        return function(*args, **options)
+
+    monkeypatch.setattr(module, name, recorded)
+    return counts
+
+
+def test_trial_booleans_of_a_depth_pose_few_parts(monkeypatch):
+    """A depth asks about hundreds of poses; most are decided by the parts that overlap the most, and parts of the body
+    that stands still are placed once."""
+    union, box = meshes(200, 0.05), collide.Box((1.0, 0.8, 0.6))
+    X_WB = collide.pose((0.6, 0.1, 0.2), rpy=(-0.4, 0.7, 0.1))
+    counts = counted(monkeypatch, composite_parts, "boxes_of", lambda table, rows, which: len(which))
+    tried = counted(monkeypatch, composite_meshes, "_states", lambda A, B, X, Y, *_: len(X))
+    row = collide.distance(union, box, np.eye(4), X_WB)
+    assert row.hit and row.distance < 0.0 and sum(tried) > 200
+    assert sum(counts) < 0.4 * len(union.items) * sum(tried), (sum(counts), sum(tried))
+
+
+def test_most_trial_poses_of_curved_parts_are_decided_by_polytopes(monkeypatch):
+    """Facets of a mesh are gone through one by one only where a polytope around the curved part meets and one inside
+    does not."""
+    x, y = np.meshgrid(*[np.linspace(-0.5, 0.5, 21)] * 2)
+    terrain = collide.HeightField(0.05 * np.sin(9 * x) * np.cos(7 * y), (0.05, 0.05), bottom=-0.3)
+    cans = collide.Compound(
+        [(collide.Cylinder(0.1, 0.3), collide.pose((0.2 * k, 0.0, 0.0), rpy=(0.3 * k, 0.2, 0.1))) for k in range(3)]
+    )
+    asked = counted(monkeypatch, composite_mesh_pairs, "loose_states", lambda A, B, PA, PB: len(PA.X))
+    settled = counted(monkeypatch, composite_mesh_pairs, "settle_curved", lambda A, E, PA, PB: len(PA.X))
+    row = collide.distance(cans, terrain, collide.pose((0.1, 0.1, 0.0)), collide.pose(rpy=(0.1, 0.2, 0.3)))
+    assert row.hit and row.distance < 0.0
+    assert sum(asked) > 40 and sum(settled) < 0.2 * sum(asked), (sum(settled), sum(asked))
+
+
+def test_a_world_that_only_asks_whether_bodies_meet_searches_no_depth(monkeypatch):
+    union = meshes(20, 0.1)
+    region = collide.HPolytope(((1, 0, 0), (0, 1, 0), (0, 0, 1.0)), (0.3, 0.3, 0.3), bounded=False)
+    depths = counted(monkeypatch, composite_meshes, "shortened", lambda *args: 1)
+    world = collide.World()
+    world.add(union)
+    world.add(region, collide.pose((0.0, 0.0, 0.2), rpy=(0.1, 0.2, 0.3)))
+    assert world.collides() and not depths
+    assert len(world.collisions()) == 1 and depths
+
+
+@pytest.mark.parametrize("n", [1, 3])
+def test_parts_placed_at_once_stand_where_each_is_placed(n):
+    """Bit by bit, slops too; a part without a pose of its own among them."""
+    rng = rng_of("parts placed at once")
+    union = collide.Compound([*meshes(5, 0.1).items, (collide.Sphere(0.1), np.eye(4))])
+    parts = composite_parts.compound_parts(union)
+    X_WB = np.array([collide.pose(rng.normal(size=3), rpy=rng.uniform(-3, 3, 3)) for _ in range(n)])
+    moved = 0
+    for part, placed in zip(parts.parts, parts.placed_all(X_WB), strict=True):
+        one = part.at(X_WB, np.zeros(n))
+        assert (one.X == placed.X).all() and (one.slop == placed.slop).all()
+        moved += int((placed.slop > 0.0).sum())
+    assert moved >= 4 * n
