@@ -120,7 +120,8 @@ def body(name: str, ratio: float = 1.0) -> collide.Shape:
 
 def scaled(shape: collide.Shape, s: float) -> collide.Shape:
     if isinstance(shape, collide.Compound):
-        return collide.Compound([(scaled(part, s), collide.pose(s * X[:3, 3]) @ _rotation_of(X)) for part, X in shape.items])
+        items = [(scaled(part, s), collide.pose(s * X[:3, 3]) @ _rotation_of(X)) for part, X in shape.items]
+        return collide.Compound(items)
     if isinstance(shape, collide.HeightField):
         return collide.HeightField(s * shape.heights, s * np.asarray(shape.cell), bottom=s * shape.bottom)
     if isinstance(shape, collide.Mesh):

@@ -26,8 +26,8 @@ _ROUNDING = 1.0 + 2.0**-40
 def mark_carrying(p, n, n_corners, tolerance, space):
     """Set ``space.remaining`` of points that are on no wall to their classes.
 
-    Of more than MAX_CLASSED points only the lowest of each of CELLS cells are classed, the others count as PLAIN: each is
-    compared with all n, so that the work grows with n and not with its square.
+    Of more than MAX_CLASSED points only the lowest of each of CELLS cells are classed, the others count as PLAIN: each
+    is compared with all n, so that the work grows with n and not with its square.
     space.corners : of the hull, ``n_corners``; they are asked first, since most points are far above them.
     """
     if n <= MAX_CLASSED:

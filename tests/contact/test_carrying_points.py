@@ -114,8 +114,8 @@ def test_of_one_class_the_farthest_are_chosen():
 
 @pytest.mark.parametrize("shape", ["bowl", "rough"])
 def test_of_many_points_few_are_asked_and_each_compared_with_all(shape, monkeypatch):
-    """More than MAX_CLASSED points: at most CELLS are asked whether they carry, whichever do so do it among all of them, the
-    deepest comes first, and what is kept spans as much as what is kept of all."""
+    """More than MAX_CLASSED points: at most CELLS are asked whether they carry, whichever do so do it among all of
+    them, the deepest comes first, and what is kept spans as much as what is kept of all."""
     rng = np.random.default_rng(5)
     n = 2 * MAX_CLASSED
     places = rng.uniform(-1, 1, (n, 2))

@@ -189,7 +189,7 @@ def test_cells_carry_rounded_planes_and_hulls():
         planes, corners = pieces.planes(i), pieces.corners(i)
         assert (planes.normals @ corners.T <= planes.offsets[:, None] + 1e-12).all()
         assert np.isclose(pieces.hull(i).points.mean(axis=0), corners.mean(axis=0)).all()
-    with pytest.raises(InvalidArgument, match="cell"):
+    with pytest.raises(InvalidArgument, match="ConvexCells: i must be an integer, one of"):
         pieces.planes(len(pieces))
 
 

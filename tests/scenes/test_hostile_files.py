@@ -22,6 +22,7 @@ import pytest
 
 from collide.cli import main
 from collide.errors import CollideError, InvalidPose, MissingExtra, SceneError, brief, cut, listing
+from collide.given_files import LARGEST_TEXT
 from collide.robots.robot import Robot
 from collide.scenes import load
 from collide.scenes import mesh_cache as cache
@@ -225,7 +226,7 @@ def test_large_files_are_refused_unread(tmp_path):
     with (tmp_path / "large.stl").open("wb") as file:
         file.truncate(files.LARGEST_MESH + 1)
     with (tmp_path / "large.yaml").open("wb") as file:
-        file.truncate(files.LARGEST_TEXT + 1)
+        file.truncate(LARGEST_TEXT + 1)
     with pytest.raises(SceneError, match=r"large\.stl: is larger than 512 MiB, the most that is read of a mesh"):
         load(tmp_path / "large.stl")
     with pytest.raises(SceneError, match=r"large\.yaml: is larger than 256 MiB, the most that is read of a description"):

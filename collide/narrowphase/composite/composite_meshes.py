@@ -47,7 +47,8 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
     if len(first) and len(X_WA) > 1 and meshed.size > _ASKED_FIRST:
         gaps = np.where(meshed, _box_gaps(A, B, X_WA[first], X_WB[first])[0], math.inf)
         deepest = np.argsort(gaps, axis=None, kind="stable")[:_ASKED_FIRST]
-        for i, j in zip(*(number.tolist() for number in np.unravel_index(deepest[gaps.flat[deepest] <= 0.0], gaps.shape))):
+        meeting = np.unravel_index(deepest[gaps.flat[deepest] <= 0.0], gaps.shape)
+        for i, j in zip(*(number.tolist() for number in meeting)):
             poses = np.flatnonzero(states != HIT)
             if len(poses):
                 gaps_ij = _box_gaps(A, B, X_WA[poses], X_WB[poses], np.array([i]), np.array([j]))[:, 0, 0]

@@ -181,7 +181,7 @@ class CompoundParts:
         return [PosesWithSlop(*rows) for rows in zip(X.reshape(k, n, 4, 4), slop.reshape(k, n))]
 
     def boxes(self, X_WB: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
-        """(n, parts, 6) world boxes of the parts, or of those by number, at n poses, low then high, rounded outwards."""
+        """(n, parts, 6) world boxes of parts, or of those by number, at n poses, low then high, rounded outwards."""
         which = np.arange(len(self._bounds)) if which is None else which
         if len(X_WB) > 1 and (X_WB[1:] == X_WB[0]).all():  # one body of a depth search stands still
             return np.repeat(self.boxes(X_WB[:1], which), len(X_WB), axis=0)

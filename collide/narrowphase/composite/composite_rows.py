@@ -197,8 +197,9 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
         tied = k < n_overlaps and score[at + _DEEPEST + _OVERLAP * k + _DISTANCE] == deepest
         if not tied and best.proven + upper <= promised:
             break  # no translation is shorter than −upper
-        n = vec3_at(score, at + _DEEPEST + _OVERLAP * k + _VECTORS)
-        if k >= n_overlaps:
+        if k < n_overlaps:
+            n = vec3_at(score, at + _DEEPEST + _OVERLAP * k + _VECTORS)
+        else:
             n = _axis(score, at, parts, first_a, first_b, k - n_overlaps)
         length = _way_past_overlaps(score, at, parts, first_a, first_b, n, best.proven, work_at)
         if length.proven < best.proven:

@@ -73,7 +73,7 @@ def shortened(
     best, bound, normal = known
 
     def try_shorter(steps: np.ndarray) -> np.ndarray | None:
-        """The shortest of these translations (n, 3) that separates, if it is shorter than the best, which it becomes."""
+        """The shortest of these translations (n, 3) that separates, if shorter than the best, which it becomes."""
         nonlocal best, bound
         shortest = _shortest_separating(meet, X_WA, X_WB, steps, best)
         if shortest is not None:
