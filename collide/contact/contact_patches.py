@@ -113,12 +113,12 @@ def cover_close(frame):
 
 
 @kernel
-def grow_patch(frame, first, axes, deepest, swept):
+def grow_patch(frame, first, axes, deepest, on_surface):
     """Mark as REACHED the pairs linked with one that have points along a normal, −deepest ≤ gap ≤ reach; WANTED pairs
-    always belong to it. How many points.   swept : as in `View`.
+    always belong to it. How many points.   on_surface : as in `View`.
     """
     pairs, A, B = frame.pairs, frame.A, frame.B
-    view = View(axes, frame.error, -deepest - STEP_ERRORS * frame.error, frame.reach, False, swept)
+    view = View(axes, frame.error, -deepest - STEP_ERRORS * frame.error, frame.reach, False, on_surface)
     number = begin_search(pairs)
     n = put_points(pairs, first, A, B, view, frame.points, 0)
     pairs.states[first] |= REACHED

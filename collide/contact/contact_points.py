@@ -62,8 +62,8 @@ class View(NamedTuple):
     """Along what, and within which gaps, points are looked for.
 
     axes : `ContactAxes`.   error : of a coordinate [m].   low, high : gaps [m], but for their errors.
-    any_side : facets count whichever way they face.   swept : points of swept bodies are those of their surface; else
-    those of the core, moved along the normal.
+    any_side : facets count whichever way they face.   on_surface : points of swept bodies are those of their surface;
+    else those of the core, moved along the normal.
     """
 
     axes: Any
@@ -71,7 +71,7 @@ class View(NamedTuple):
     low: float
     high: float
     any_side: bool
-    swept: bool
+    on_surface: bool
 
 
 @kernel
@@ -90,14 +90,14 @@ def put_points(pairs, k, A, B, view, points, n):
     least, largest = see_pair(pairs, k, view.axes, points.seen)
     if least > view.high + 32.0 * view.error or largest < view.low - 32.0 * view.error:
         return n
-    if not view.swept or A.radius + B.radius == 0.0:
+    if not view.on_surface or A.radius + B.radius == 0.0:
         return _put_overlap(pairs, k, A, B, 0.0, 0.0, view, over_a, over_b, points, n)
     # Gaps stay those of the cores, less what their surfaces are nearer.
     round_a, off_a = _sweep(pairs, k, 0, A, view, points.seen)
     round_b, off_b = _sweep(pairs, k, 1, B, view, points.seen)
     low = view.low - _LEAN * (A.radius + B.radius)
-    swept = View(view.axes, view.error, low, view.high, view.any_side, True)
-    n_after = _put_overlap(pairs, k, A, B, round_a, round_b, swept, over_a, over_b, points, n)
+    outer = View(view.axes, view.error, low, view.high, view.any_side, True)
+    n_after = _put_overlap(pairs, k, A, B, round_a, round_b, outer, over_a, over_b, points, n)
     for i in range(n, n_after):
         points.errors[i] += 2.0 * (off_a + off_b)
     return n_after
@@ -172,20 +172,20 @@ def _sweep_edge(pairs, k, side, body, view, seen):
         across = scale(1.0 / norm(across), across)
         if _supports(pairs, k, side, body, view, i, pairs.ids[ids + j], across):
             least, best, unknown, shift = abs(e.z) / length, i, 2.0 * view.error / length, across
-    other = (best + 1) % 3
+    end = (best + 1) % 3
     if best < 0:
         best = front
-        other = front
+        end = front
         shift = Vec3(0.0, 0.0, sign)
         if not _supports(pairs, k, side, body, view, front, -1, shift):
-            best, other = -1, -1
+            best, end = -1, -1
     step = scale(body.radius, Vec3(shift.x, shift.y, shift.z - sign))
     for i in range(3):
-        if i == best or i == other:
+        if i == best or i == end:
             put_vec3(seen, at + 3 * i, add(vec3_at(seen, at + 3 * i), step))
         else:
             put_vec3(seen, at + 3 * i, Vec3(math.nan, math.nan, math.nan))
-    return (body.radius if other != best else 0.0), unknown * body.radius
+    return (body.radius if end != best else 0.0), unknown * body.radius
 
 
 @kernel(inline=True)

@@ -256,11 +256,13 @@ def _write_contact(contact_at, manifold, k, is_first, axes, pair, row, flip, bou
     doubles, words = view_f64(contact_at, _CONTACT // 8), view_i32(contact_at, _CONTACT // 4)
     distance = manifold.points[POINT * k + POINT_GAP]
     lower, upper = distance - bound, distance + bound
-    if is_first:
+    # A height field's facet is asked for its own points by a row that holds no distance: its bracket is empty.
+    is_known = row.doubles[DISTANCE] <= row.doubles[UPPER]
+    if is_first and is_known:
         distance = row.doubles[DISTANCE]  # the deepest point of the manifold is that of the pair
         lower = min(lower, row.doubles[LOWER])
         upper = max(upper, row.doubles[UPPER])
-    else:  # none is deeper, but for what either is known by
+    elif is_known:  # none is deeper, but for what either is known by
         distance = max(distance, row.doubles[DISTANCE])
         upper = max(upper, distance)
     height = manifold.points[POINT * k + HEIGHT]
