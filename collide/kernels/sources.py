@@ -101,7 +101,8 @@ def definitions_reached(module: str, names: Iterable[str]) -> dict[tuple[str, st
     """Definitions of the package that code of these names in a module can reach, by module and name; under "" what
     stands in a module beside definitions, where any of them is reached or imported from there."""
     modules, known = _reached(module), _definitions_seen_by(module)
-    waiting, parts, reached = {module, *names}, {}, set[str]()
+    parts: dict[tuple[str, str], _Part] = {}
+    waiting, reached = {module, *names}, set[str]()
     while waiting:
         reached.add(name := waiting.pop())
         added = known.get(name, {})
@@ -202,7 +203,8 @@ def _names_set_by(node: ast.stmt) -> list[tuple[str, ast.stmt]]:
         return [(alias.asname or alias.name, statement) for alias, statement in zip(node.names, alone)]
     targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
     names = [inner for target in targets for inner in (target.elts if isinstance(target, ast.Tuple) else [target])]
-    return [(name.id, node) for name in names] if all(isinstance(name, ast.Name) for name in names) else []
+    known = [name.id for name in names if isinstance(name, ast.Name)]
+    return [(name, node) for name in known] if len(known) == len(names) else []
 
 
 def _is_entry(node: ast.stmt) -> bool:

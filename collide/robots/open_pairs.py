@@ -88,10 +88,10 @@ def distances_of(rows: np.ndarray) -> np.ndarray:
 
 def _rows_of(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float, by_parts: bool) -> np.ndarray:
     """Rows of two shapes at poses (k, 4, 4), as of `distances`."""
-    of_parts = (without_meshes(A), without_meshes(B)) if by_parts else (None, None)
-    if of_parts[0] is None or of_parts[1] is None:
+    parts_a, parts_b = (without_meshes(A), without_meshes(B)) if by_parts else (None, None)
+    if parts_a is None or parts_b is None:
         return query.distance(A, B, X_WA, X_WB, max_distance=limit, check_poses=False).rows.copy()
-    A, B = of_parts
+    A, B = parts_a, parts_b
     rows = query.distance(A, B, X_WA, X_WB, max_distance=limit, check_poses=False).rows.copy()
     overlap = np.flatnonzero(rows["distance"] < 0.0)
     pairs = list(itertools.product(_parts_as_shapes(A), _parts_as_shapes(B)))
