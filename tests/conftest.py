@@ -18,7 +18,7 @@ from collide.kernels.mode import COMPILED, JUST_IN_TIME, MODE, PLAIN_PYTHON, WHY
 
 HERE = Path(__file__).resolve().parent
 sys.path.append(str(HERE))
-pytest_plugins = ["time_budget"]
+pytest_plugins = ["tiers", "time_budget"]
 #: Every module below this folder that is no test. They have one name each, for all their folders are on the path.
 HELPERS = sorted(file for file in HERE.glob("*/**/*.py") if not file.name.startswith("test_"))
 sys.path += sorted({str(file.parent) for file in HELPERS})

@@ -243,6 +243,7 @@ def test_wrong_arguments_are_named():
         collide.collide(box, box, EYE, np.tile(EYE, (3, 1, 1)), threads=0)
 
 
+@pytest.mark.slow
 def test_a_prepared_pair_is_never_taken_for_another():
     """Partners are looked up by id; one that is gone must not lend its id to a different shape."""
     A = collide.Box((1, 1, 1))

@@ -108,6 +108,7 @@ def test_statistics_are_worked_out_when_asked_for_and_are_those_of_the_question(
     assert stats["hits"] > 0 and sum(stats["skipped"].values()) + stats["narrowphase"] == stats["pairs"]
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda world: pickle.loads(pickle.dumps(world))])
 @pytest.mark.parametrize("asked", [False, True])
 def test_copies_of_a_world_are_worlds_of_their_own(copied, asked):

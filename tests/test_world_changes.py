@@ -154,6 +154,7 @@ class Model:
         assert sum(skipped.values()) + n_tested == stats["pairs"], self.snippet()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_any_order_of_changes_equals_brute_force(seed):
     model, hits, tested = Model(seed), 0, 0
@@ -166,6 +167,7 @@ def test_any_order_of_changes_equals_brute_force(seed):
     assert set(model.done) == set(KINDS)
 
 
+@pytest.mark.slow
 def test_forty_thousand_changes_leave_no_drift_and_no_leak():
     model, held = Model(99), []
     for _ in range(10):

@@ -1,7 +1,7 @@
-"""Processor time of each test: a limit that a tier of tests sets, and a file of all of them.
+"""Processor time of each test: a limit that a tier of tests sets, and a file of those that take long.
 
     python -m pytest --budget 2             a test that takes longer, and is not marked slow, fails and names itself
-    python -m pytest --durations-file F     seconds a test, with what it took the last time beside, as JSON
+    python -m pytest --durations-file F     seconds of the longest case of each function, those that grew are told
 
 Seconds are those of processors, of the process and of its children that ended: a machine that does other work besides
 changes them little.
@@ -22,14 +22,16 @@ except ImportError:  # Windows
 
 #: Name of the property that a report carries from a worker to the process that writes the file.
 PROPERTY = "processor seconds"
-#: A test is told as slower than the last time from this ratio and difference [s] on.
+#: A function is told as slower than the last time from this ratio and difference [s] on.
 SLOWER, BY = 1.5, 1.0
+#: What takes less [s] is not kept.
+SHORT = 0.2
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("processor time")
     group.addoption("--budget", type=float, metavar="SECONDS", help="a test of more fails, if it is not marked slow")
-    group.addoption("--durations-file", type=Path, metavar="FILE", help="keep seconds a test, told beside the last")
+    group.addoption("--durations-file", type=Path, metavar="FILE", help="keep seconds a function, told beside the last")
 
 
 def processor_seconds() -> float:
@@ -60,15 +62,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 class Durations:
-    """Gathers seconds of all tests in the process that reports come to, and writes them at the end."""
+    """Gathers seconds of all functions in the process that reports come to, and writes them at the end."""
 
     def __init__(self, file: Path):
         self.file, self.seconds = file, dict[str, float]()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.when == "call":
-            took = dict(report.user_properties).get(PROPERTY)
-            self.seconds |= {report.nodeid: round(took, 3)} if isinstance(took, float) else {}
+            function, took = report.nodeid.split("[")[0], dict(report.user_properties).get(PROPERTY)
+            if isinstance(took, float):
+                self.seconds[function] = max(round(took, 1), self.seconds.get(function, 0.0))
 
     def pytest_terminal_summary(self, terminalreporter) -> None:
         try:
@@ -77,11 +80,12 @@ class Durations:
             last = {}
         for line in slower_than(last, self.seconds):
             terminalreporter.write_line(line)
-        self.file.write_text(json.dumps({**last, **self.seconds}, indent=0, sort_keys=True) + "\n", encoding="utf-8")
+        kept = {name: seconds for name, seconds in {**last, **self.seconds}.items() if seconds >= SHORT}
+        self.file.write_text(json.dumps(kept, indent=0, sort_keys=True) + "\n", encoding="utf-8")
 
 
 def slower_than(last: dict[str, float], now: dict[str, float]) -> list[str]:
-    """Lines that tell of tests that took longer than the last time."""
+    """Lines that tell of functions that took longer than the last time."""
     found = [
         (seconds - last[name], name) for name, seconds in now.items()
         if name in last and seconds > SLOWER * last[name] and seconds > last[name] + BY

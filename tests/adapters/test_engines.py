@@ -175,6 +175,7 @@ def random_pairs(n: int, seed: int):
     return Question.from_pairs((shape(), shape(), place(), place()) for _ in range(n))
 
 
+@pytest.mark.many(5)
 @pytest.mark.parametrize("name", [name for name in ENGINES if name != "exact"])
 def test_random_pairs_agree_with_exact_arithmetic(name):
     question = random_pairs(200, seed=20)

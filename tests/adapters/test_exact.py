@@ -239,6 +239,7 @@ def signed_square(case):
     return -depth.depth_squared
 
 
+@pytest.mark.many(5)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_equals_brute_force_exactly(family):
     for case in cases(family):

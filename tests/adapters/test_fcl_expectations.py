@@ -38,6 +38,7 @@ def test_python_fcl_does_what_is_expected():
     child("import fcl\nfor function in expected.FCL:\n    function(fcl)\nprint('all held')")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not HAS["trimesh"], reason="trimesh is not installed")
 @pytest.mark.parametrize("engine", ["ours", "python-fcl"])
 def test_trimesh_does_what_is_expected(engine):

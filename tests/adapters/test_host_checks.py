@@ -66,6 +66,7 @@ def test_what_is_not_installed_is_not_asked(modules):
     assert check_hosts([not_needed])[0] == (None, True, "held")
 
 
+@pytest.mark.slow
 def test_hooks_hold():
     """Of every host that is installed here; one that is not needs a reason that names its extra."""
     for one, found in zip(HOSTS, check_hosts(HOSTS)):

@@ -122,6 +122,7 @@ def ask(name: str, cases):
     return engine(present(name)).answer(Question.from_pairs([(A, B, np.eye(4), X) for A, B, X, *_ in cases]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["collide", "exact", "fcl", "coal", "pybullet"])
 def test_closed_forms(name):
     table = ask(name, CASES.values())
@@ -137,6 +138,7 @@ def test_closed_forms(name):
             assert not row["has_distance"] and why in (NO_DEPTH, ""), f"{name}: {case}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["collide", "exact", "fcl", "coal", "pybullet"])
 def test_only_solids_have_an_inside(name):
     table = ask(name, INSIDE.values())

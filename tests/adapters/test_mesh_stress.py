@@ -46,6 +46,7 @@ def test_a_case_depends_on_family_seed_and_index_alone(name):
     assert not set(texts) & {json.dumps(case.to_dict()) for case in other}
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("name", mesh_names())
 def test_what_a_family_promises(name):
     cases = generate(name, 30, 1)

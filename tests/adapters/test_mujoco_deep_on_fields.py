@@ -82,6 +82,7 @@ def turned(random) -> np.ndarray:
     return q / np.linalg.norm(q)
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("kind", SIZES)
 def test_fields_that_are_planes_push_as_planes(kind):
     """From a tenth of a millimetre to five centimetres deep, cells of 10 cm to 5 mm: every normal is the plane's, the

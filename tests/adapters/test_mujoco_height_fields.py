@@ -113,6 +113,7 @@ def resolved(found: np.ndarray, rounds: int = 200) -> np.ndarray:
 # --- contacts -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_contacts_are_those_of_python(kind):
     """Shallow overlaps: as deep as `collide.contacts` has them, with its normal and place; or, where both have one
@@ -180,6 +181,7 @@ def deepest_of(prisms: list[np.ndarray], body: np.ndarray) -> float:
     return max((overlap_depth(Polytope(prism), polytope) for prism in near), default=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["box", "mesh"])
 def test_overlaps_are_those_of_all_axes(kind):
     """Up to two centimetres deep, cells of nine and of four: the deepest contact is no less deep than any prism by

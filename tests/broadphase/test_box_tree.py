@@ -179,6 +179,7 @@ def test_most_small_steps_change_no_node():
     assert 0 < tree.take_work()["leaves changed"] < 0.3 * 40 * 400
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("kind", ["uniform", "clusters", "all sizes", "a few huge", "flat"])
 @pytest.mark.parametrize("n", [60, 400])
 def test_pairs_are_kept_while_all_bodies_jitter(kind, n):

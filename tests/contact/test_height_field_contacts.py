@@ -131,6 +131,7 @@ def stepped(stepper: Stepper, seconds: float) -> list[Step]:
     return steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_bodies_that_fall_on_bumps_stay_there(seed):
     """A box and a tetrahedron, from above and askew: for two seconds they stay within a tenth of a millimetre, sink

@@ -71,6 +71,7 @@ def sag(load: float, contacts: int, inverse_mass: float) -> float:
     return load / contacts * inverse_mass / OMEGA**2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("turned", "seconds", "rest"), [(0.3, 6.0, 1.5), (0.0, 7.0, 1.5)], ids=["turned", "in line"])
 def test_a_stack_of_ten_boxes(turned, seconds, rest):
     """Boxes turned against each other rest on up to 8 corners each; equal ones in line on 4, each at an edge or a
@@ -144,6 +145,7 @@ ROUND = {
 }
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("ground", [(PLANE, EYE), (FLOOR, X_FLOOR), (MESH, EYE)], ids=["plane", "box", "mesh"])
 @pytest.mark.parametrize("name", list(ROUND))
 def test_round_bodies_lie_on_their_sides(name, ground):
@@ -190,6 +192,7 @@ def test_a_prism_of_twelve_sides_rests_on_all_its_corners():
     assert len(steps[-1].keys) == 12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cells", [1, 5])
 @pytest.mark.parametrize("is_mesh", [False, True])
 def test_a_body_rests_on_a_mesh(cells, is_mesh):

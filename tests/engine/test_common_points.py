@@ -41,6 +41,7 @@ def test_points_of_swept_bodies_are_on_both():
     assert hits > 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "family, worst", (("needles", 1e-9), ("plates", 1e-12), ("tiny_vs_huge", 1e-12), ("rand_pen", 1e-12))
 )

@@ -56,6 +56,7 @@ def shape_of(kind: str, rng) -> collide.Shape:
     return naive.one_of_each(rng)[kind]
 
 
+@pytest.mark.many(7)
 @pytest.mark.parametrize("kind_a", CURVED)
 @pytest.mark.parametrize("kind_b", ["Sphere", "Box", "Capsule", "ConvexHull", *CURVED])
 def test_between_the_polytopes_inside_and_around(kind_a, kind_b):

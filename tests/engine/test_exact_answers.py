@@ -177,6 +177,7 @@ def cases_of(family):
     return [generator(rng) for _ in range(count)]
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_bracket_holds_and_the_sign_is_right(family):
     hits = []

@@ -44,6 +44,7 @@ def one_by_one(made: list[tuple]) -> dict[tuple[int, int], object]:
     }  # fmt: skip
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("seed", range(N_SCENES))
 def test_worlds_name_the_nearest_and_all_within_a_distance(seed):
     made = bodies(seed)

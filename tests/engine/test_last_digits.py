@@ -57,6 +57,7 @@ def check(family: str, index: int, seed: int):
     return r, float(value)
 
 
+@pytest.mark.many(5)
 @pytest.mark.parametrize("family", names())
 def test_every_digit(family):
     signs = []

@@ -109,6 +109,7 @@ def moved(X, shift):
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", range(4))
 def test_everything_about_hard_pairs(part):
     rng = np.random.default_rng([77, part])

@@ -117,6 +117,7 @@ def bracket_holds(P, radius_a, Q, radius_b, X_WA, X_WB, r) -> bool:
     return Decimal(r.lower) - slack <= value <= Decimal(r.upper) + slack
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_points_of_overlaps(kind):
     rng = naive.rng_of("witness points", kind)

@@ -30,6 +30,7 @@ def largest_degrees(hierarchy) -> list[int]:
     return [int(hierarchy.degrees(level).max()) for level in range(hierarchy.depth)]
 
 
+@pytest.mark.many(5)
 @pytest.mark.parametrize("name", NAMES)
 def test_bound_and_shares(name):
     """Degrees in level 1 and above, and independent sets of a tenth of their level or more."""

@@ -29,6 +29,7 @@ def built(name: str, bound: int) -> tuple[np.ndarray, Hierarchy]:
     return points, build_hierarchy(points, convex_hull(points), bound)
 
 
+@pytest.mark.many(7)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("bound", [0, 12, DEGREE_BOUND])
 def test_families(name, bound):
@@ -37,6 +38,7 @@ def test_families(name, bound):
     validate_hierarchy(points, hierarchy, bounded_from=late)
 
 
+@pytest.mark.many(7)
 @pytest.mark.parametrize("name", NAMES)
 def test_polars(name):
     points = families(SIZE // 2)[name]
@@ -296,6 +298,7 @@ print(digest.hexdigest())
 """
 
 
+@pytest.mark.slow
 def test_kernels_run_as_plain_python_with_the_same_bits():
     """Built by compiled kernels and by the same source as plain Python: all arrays alike."""
     script = SCRIPT.format(folder=str(Path(__file__).parent))

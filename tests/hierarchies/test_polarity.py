@@ -207,6 +207,7 @@ def test_theorem_3_7_origin_outside_both_or_not(body, other):
     HITS["anywhere, meet"] = HITS.get("anywhere, meet", 0) + check_theorem(body, other)
 
 
+@pytest.mark.slow
 @SETTINGS
 @given(solids, points, solids)
 def test_theorem_3_7_origin_inside_q(body, shift, other):

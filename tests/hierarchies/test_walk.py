@@ -69,6 +69,7 @@ def roles(found: Walks, A, B, X_WA, X_WB):
 # --- equal to the oracle --------------------------------------------------------------------------
 
 
+@pytest.mark.many(7)
 @pytest.mark.parametrize("name", names())
 def test_equal_to_the_oracle_on_the_hard_families(name):
     """Both ways round, with the invariants of every round where the walk walked."""

@@ -428,6 +428,7 @@ assert min(sure) > 20, sure
 """
 
 
+@pytest.mark.slow
 def test_plain_python_builds_the_same_hulls():
     """Also where fans are searched by halving, and corners come in a shuffled order."""
     clouds = [*all_clouds(30, 0).values(), *list(all_clouds(100, 0).values())[::5]]

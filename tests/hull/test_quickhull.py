@@ -102,6 +102,7 @@ CLOUDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", CLOUDS)
 def test_steps(kind):
     rng = rng_of("quickhull", kind)

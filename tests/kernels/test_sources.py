@@ -122,6 +122,7 @@ def changed_by(hashes, file: Path, old: str, new: str) -> set[str]:
     return {name for name in before if before[name] != after[name]}
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize(
     ("name", "old", "new", "stale", "fresh"),
     [

@@ -34,6 +34,7 @@ def judged(name: str, vertices, faces, k: int, kind: str) -> corruptions.Said:
     return said
 
 
+@pytest.mark.many(7)
 @pytest.mark.parametrize("kind", corruptions.KINDS)
 def test_corruptions_of_small_meshes(kind):
     outcomes = Counter()
@@ -45,6 +46,7 @@ def test_corruptions_of_small_meshes(kind):
     assert refused or (outcomes["apart"] >= 3 and outcomes["hit"] >= 3), outcomes
 
 
+@pytest.mark.slow
 def test_meshes_of_pybullet_data():
     pybullet_data = pytest.importorskip("pybullet_data", reason="pybullet brings the meshes")
     pytest.importorskip("trimesh", reason="trimesh reads them")

@@ -178,6 +178,7 @@ def as_printed(text: str) -> float:
     return 1.5 * 10.0 ** -len(text.partition(".")[2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TABLE)
 def test_table_1(name):
     n, global_stretch, local = TABLE[name]
@@ -193,6 +194,7 @@ def test_table_1(name):
         assert abs(found.local_stretches[k - 1] - expected) <= as_printed(text), (name, k, found.local_stretches[k - 1])
 
 
+@pytest.mark.slow
 def test_the_dragon_by_the_papers_definition():
     """Repeated rows are one vertex: the heavy tail ends at the fifth neighbour."""
     found = collide.Mesh(*from_file("dragon_vrip.ply.gz"), solid=False).locality()

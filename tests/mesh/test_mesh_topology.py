@@ -509,6 +509,7 @@ def test_corruptions_are_answered_or_refused():
 # --- meshes that people use ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (SHARED / "data/meshes").is_dir(), reason="shared/data/meshes is not there")
 @pytest.mark.parametrize(
     ("name", "solid", "facets", "shells", "euler", "open_edges"),

@@ -57,6 +57,7 @@ def _package(folder: Path) -> None:
     shutil.copytree(ROOT / "scenes", folder / "collide" / "scenes", ignore=skip)
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("name", MUTATIONS)
 def test_mutation_is_noticed(name, tmp_path):
     file, old, new = MUTATIONS[name]

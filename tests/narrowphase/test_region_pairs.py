@@ -31,6 +31,7 @@ def partners(rng) -> dict[str, collide.Shape]:
     return shapes
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_as_closed_by_a_far_box(family):
     rng, seen = rng_of("region", family), {True: 0, False: 0}
@@ -83,6 +84,7 @@ def test_batches_sets_and_threads_give_the_same_bits():
     assert (hits == collide.collide(region, box, X_WA, X_WB, axes=axes)).all() and axes[~hits].any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_more", [0, 3, 90])
 def test_touching_is_decided_on_the_planes_as_given(n_more):
     """A vertex on a plane, one unit in the last place of an offset either side, as `polytopes.meets` has it."""

@@ -70,6 +70,7 @@ def judge(case: Case, r, *, matrices: bool = False) -> None:
         assert curved_oracle.away_from(body, X, p) <= 0.5 * (r.upper - r.lower) + 64 * ERROR * size
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("kinds", PAIRS)
 def test_the_bracket_holds(kinds):
     rng, seen = rng_of("shallow depths", kinds), Counter()

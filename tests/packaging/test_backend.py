@@ -88,6 +88,7 @@ def folder(native, tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_objects_of_the_archive_are_used_where_they_fit_and_no_compiler_is_asked_for(native, folder):
     backend, _ = native
     made = backend.emitted()

@@ -118,6 +118,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess:
     )  # fmt: skip
 
 
+@pytest.mark.many(7)
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
 def test_example_runs(file):
     needed = NEEDS.get(file.stem)
@@ -214,6 +215,7 @@ def test_python_of_every_page_is_run_somewhere():
     assert set(PAGES) == set(GIVEN) | set(ELSEWHERE) and not set(GIVEN) & set(ELSEWHERE)
 
 
+@pytest.mark.many(5)
 @pytest.mark.parametrize("name", GIVEN)
 def test_python_in_pages_runs(name, tmp_path):
     """All of a page's Python, in order, in one interpreter, after what the page takes as given."""

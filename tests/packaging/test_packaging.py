@@ -171,6 +171,7 @@ def test_library_leaves_nothing_open_but_the_c_library(wheel, tmp_path):
     assert str(ROOT).encode() not in Path(file).read_bytes()
 
 
+@pytest.mark.slow
 def test_same_sources_give_the_same_bytes(wheel_file, tmp_path):
     """Built again in another folder, from the same object files: C code, links and archive are reproducible. That the
     object files are, too, is the other half: test_kernels_compile_to_the_same_bytes."""

@@ -179,6 +179,7 @@ WHOLE = [
 ]  # fmt: skip
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize(("family", "d", "n", "limits"), WHOLE)
 def test_whole_trees_are_validated_and_their_bytes_were_predicted(family, d, n, limits):
     rng = np.random.default_rng([n, d, 0])

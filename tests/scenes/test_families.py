@@ -43,6 +43,7 @@ def test_the_27_come_first():
     assert names()[:27] == list(STANDARD) and len(set(names())) == len(names()) > 27
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("name", names())
 def test_a_case_depends_on_family_seed_and_index_alone(name):
     n = 2 if name in LARGE else 5
@@ -172,6 +173,7 @@ BOUNDS = {
 }
 
 
+@pytest.mark.many(7)
 @pytest.mark.parametrize("name", BOUNDS)
 def test_gaps_and_hit_rates(name):
     smallest, largest, fewest, most = BOUNDS[name]
@@ -183,6 +185,7 @@ def test_gaps_and_hit_rates(name):
     assert fewest <= np.mean([f.hit for f in found]) <= most
 
 
+@pytest.mark.slow
 def test_large_bodies_hit_and_miss():
     for name in ("spheres_big", "cyl1000", "bipyramids", "repeats"):
         hits = [truth(case).hit for case in generate(name, 10, 3)]

@@ -56,6 +56,7 @@ DEEP = {
 }  # fmt: skip
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("case", DEEP)
 def test_deep_nesting_is_refused(tmp_path, case):
     """In a process of its own: PyYAML's C code ended it by SIGSEGV."""
@@ -454,6 +455,7 @@ def beside(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["scene", "planning", "state"])
 def test_junk_in_every_place_of_a_document(beside, kind):
     """A scene that a World can be made of, or one error of ours; a sample of every place with every kind of junk."""

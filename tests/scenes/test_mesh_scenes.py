@@ -213,6 +213,7 @@ def test_exactly_convex_meshes_are_hulls(tmp_path):
     assert isinstance(load(tmp_path / "dented.obj").bodies[0].shape, ConvexHull) == supports_all(vertices, box.faces)
 
 
+@pytest.mark.slow
 def test_own_hulls_against_fractions():
     """Hulls whose vertices are moved by a few ulps, boxes cut into facets that are coplanar, and scaled ones."""
     rng = np.random.default_rng(0)

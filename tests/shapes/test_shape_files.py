@@ -112,6 +112,7 @@ def test_files_and_pickles_bring_shapes_back(kind, tmp_path):
     assert copy.copy(shape) is shape and copy.deepcopy([shape])[0] is shape
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("kind", SHAPES)
 def test_forged_arrays_are_refused_or_are_another_shape(kind, tmp_path):
     """Another shape is what its constructor makes of the numbers: the file adds nothing to it."""
@@ -152,6 +153,7 @@ def old_arrays(shape) -> dict[str, np.ndarray]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["mesh", "scaled mesh", "hull", "rounded hull"])
 def test_trees_of_older_files_are_not_believed(kind, tmp_path):
     shape = shapes()[kind]

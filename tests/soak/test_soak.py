@@ -24,6 +24,7 @@ FOUND = [
 ]
 
 
+@pytest.mark.slow
 def test_pairs_of_all_kinds_keep_every_promise():
     failures: list[str] = []
     truths: collections.Counter = collections.Counter()

@@ -13,6 +13,7 @@ import collide
 FOUND = [*((1, k) for k in (80, 135, 170, 308, 612, 689, 784, 805, 972, 1357, 2196, 9133)), (2, 2620), (2, 10339)]
 
 
+@pytest.mark.slow
 def test_rows_of_all_families_keep_every_promise():
     told: list[str] = []
     tally = soak_contacts.soak(3, range(660), say=told.append)

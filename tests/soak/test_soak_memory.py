@@ -29,6 +29,7 @@ def _blocks() -> int:
     return sys.getallocatedblocks()
 
 
+@pytest.mark.slow
 def test_no_shape_outlives_its_last_user_and_memory_stays():
     blocks: list[int] = []
     drops(SHAPES // 2, seed=6)  # what is made once

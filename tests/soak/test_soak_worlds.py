@@ -74,6 +74,7 @@ def test_boxes_of_nan_are_noticed(monkeypatch):
     assert len(lost) >= 5, lost
 
 
+@pytest.mark.slow
 def test_a_forgotten_filter_margin_or_limit_is_noticed(monkeypatch):
     monkeypatch.setattr(PackedWorld, "margins_of", lambda self, pairs: np.zeros(len(pairs)))
     assert len(differing(worlds=5, steps=12)) >= 3

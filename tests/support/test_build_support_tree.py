@@ -117,6 +117,7 @@ def test_a_vertex_of_many_neighbours_is_proven_by_few():
 # --- keeping and checking -----------------------------------------------------------------------
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("name", HULLS)
 def test_validation_passes(name):
     validate_support_tree(made(name)[2], samples=25)

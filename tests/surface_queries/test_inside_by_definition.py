@@ -57,6 +57,7 @@ def random_pose(rng):
     return pose(rng.uniform(-2, 2, 3), rpy=rng.uniform(-3, 3, 3))
 
 
+@pytest.mark.many(7)
 @pytest.mark.parametrize("name", SHAPES)
 def test_points_on_the_surface_of_a_part(name):
     """In unions, and unions of unions: the answer is that of exact fractions, and points moved well in or out

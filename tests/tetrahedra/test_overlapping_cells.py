@@ -77,6 +77,7 @@ def check_every_pair(name, A, B, X, Y) -> tuple[int, int, int]:
     return len(rows), touching, int(got.counters[0, 2:].max())
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("name", list(FAMILIES))
 def test_equal_to_fractions(name):
     hits = check_every_pair(name, *FAMILIES[name])

@@ -167,6 +167,7 @@ def test_slopes_of_powers(power):
     assert math.isnan(scaling.fitted_slope(sizes, [math.nan] * 4 + [1.0]))
 
 
+@pytest.mark.slow
 def test_scaling_counts_operations_and_times_engines():
     grown = {g.name: g for g in scaling.measure(["collide"], (8, 64), minutes=0.001)}
     assert 8 <= grown[scaling.OPERATIONS].values[0] <= grown[scaling.OPERATIONS].values[1]

@@ -26,6 +26,7 @@ def large_boxes(stubs, monkeypatch):
     monkeypatch.setattr(fuzz_run.fuzz, "__kwdefaults__", fuzz_run.fuzz.__kwdefaults__ | {"source": rounds})
 
 
+@pytest.mark.slow
 def test_fuzz_saves_and_goes_on(large_boxes, tmp_path, capsys):
     out, summary = tmp_path / "found", tmp_path / "fuzz.json"
     words = ("fuzz", "--engines", "large_boxes", "--rounds", 2, "--seed", 3, "--save", out)
@@ -66,6 +67,7 @@ def test_wrong_arguments(words, complaint, tmp_path, capsys):
     assert complaint in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_compare_saves_a_case_of_every_kind(stubs, tmp_path, capsys):
     world = World()
     for k, x in enumerate((0.0, 0.37, 0.81)):

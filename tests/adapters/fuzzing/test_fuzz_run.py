@@ -86,6 +86,7 @@ def test_the_simpler_of_two_is_kept(stubs, tmp_path):
         assert fingerprint(kept.case) == fingerprint(found.case) and kept.times == 6
 
 
+@pytest.mark.slow
 def test_going_on_gives_what_one_run_gives(stubs, tmp_path):
     fuzz(["large_boxes"], tmp_path / "whole", rounds=3, seed=1, source=boxes_and_spheres)
     for rounds in (1, 3):
@@ -105,6 +106,7 @@ fuzz(["large_boxes"], {folder!r}, seed=1, source=boxes_and_spheres)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="SIGKILL is POSIX's")
 def test_a_killed_run_goes_on_and_loses_one_round_at_most(stubs, tmp_path):
     folder = tmp_path / "killed"
@@ -220,6 +222,7 @@ def _told(labels: list[str]):
     return progress
 
 
+@pytest.mark.slow
 def test_what_is_not_shrunk_waits(stubs, tmp_path, monkeypatch):
     monkeypatch.setattr(fuzz_run, "SHRINK_AT_LEAST", -1000)
     run = fuzz(["large_boxes"], tmp_path, rounds=2, seed=4, source=boxes_and_spheres)

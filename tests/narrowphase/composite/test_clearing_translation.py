@@ -69,6 +69,7 @@ def test_a_ball_five_centimetres_into_the_foot_of_an_l_is_that_deep():
     assert r.normal == pytest.approx((0, 0, 1)) and 0.5 * (r.point_a + r.point_b) == pytest.approx((1.0, 0.2, 0.125))
 
 
+@pytest.mark.slow
 def test_depths_of_unions_of_boxes_lie_in_their_brackets():
     """No direction has a shorter way out than −upper; along the normal −lower is one, and none is shorter."""
     rng = rng_of("unions of boxes")

@@ -83,6 +83,7 @@ def grown(rng, cloud: str) -> Surface:
     return surface
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cloud", ["sphere", "needle", "cube"])
 def test_a_surface_passes_its_points(cloud):
     """A point of any facet is found, whichever is tried first; one off the surface by the facet that is nearest."""

@@ -19,6 +19,7 @@ from collide.narrowphase.gjk.minkowski_difference import POINT
 pytestmark = pytest.mark.plain_kernels
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cloud", CLOUDS)
 def test_surface_after_every_expansion(cloud):
     rng = rng_of("polytope surface", cloud)

@@ -54,6 +54,7 @@ def decided(case: Case, *, boolean: bool, rng):
     return bodies, answer, ids
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize("boolean", [True, False])
 @pytest.mark.parametrize("draw", [lattice_case, near_case, swept_case])
 def test_verdicts_are_exact(draw, boolean):

@@ -102,6 +102,7 @@ def snippet(name, shape, X, Y) -> str:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_between_the_polytopes_inside_and_around(kind):
     rng = rng_of("mesh", "between", kind)

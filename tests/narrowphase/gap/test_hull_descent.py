@@ -165,6 +165,7 @@ def pairs(kind_a: str, kind_b: str, turned: bool, n: int, seed: int):
         yield f"{kind_a}, {kind_b}, turned = {turned}, n = {n}, tilt {tilt}", A @ Q.T, X_WA, B @ S.T, X_WB
 
 
+@pytest.mark.many(3)
 @pytest.mark.parametrize(
     ("kind_a", "kind_b", "turned", "sizes"),
     [("cylinder", "cylinder", False, (40, 128, 512, 2048)), ("cylinder", "cylinder", True, (40, 128, 512, 2048)),
@@ -180,6 +181,7 @@ def test_gaps_across_caps(kind_a, kind_b, turned, sizes):
             assert r.certified, what
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [False, True])
 def test_gaps_across_caps_of_thousands(turned):
     for what, A, X_WA, B, X_WB in list(pairs("cylinder", "cylinder", turned, 8192, seed=4))[::4]:
@@ -188,6 +190,7 @@ def test_gaps_across_caps_of_thousands(turned):
         assert r.certified, what
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "turned"), [("cylinder", False), ("cylinder", True), ("plate", False), ("pyramids", True)]
 )

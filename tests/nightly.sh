@@ -1,0 +1,64 @@
+#!/usr/bin/env bash
+# Everything that takes long, in an hour and a half on two cores: every extra, all cases of all tests, other processors'
+# levels and other Pythons, soaks, a search for wrong answers of engines, faults planted in the code.
+#
+#   bash tests/nightly.sh                  all steps; logs and a table in build/nightly
+#   bash tests/nightly.sh tests soaks      these steps alone
+#
+# A step that fails does not keep the others from running; the script then ends with status 1. A test that is skipped is
+# a failure unless tests/skips.txt names the reason. Durations of functions are kept in tests/durations.json, and what
+# grew is told: the file belongs into a commit.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+steps=(install tests own matrix soaks faults site)
+chosen=("${@:-${steps[@]}}")
+log=build/nightly
+mkdir -p "$log"
+: > "$log/steps"
+seed=$((10#$(date +%y%j)))
+
+run() { # NAME COMMAND...: the command's output goes to a file, how it ended to the table
+    local begun=$SECONDS status=0
+    "${@:2}" > "$log/$1.log" 2>&1 || status=$?
+    printf '%-16s %5d s  %s\n' "$1" $((SECONDS - begun)) "$([ $status = 0 ] && echo passed || echo "failed: $log/$1.log")" |
+        tee -a "$log/steps"
+}
+tests=(python -m pytest -q -n auto --maxprocesses 4 --dist loadfile -rfE)
+
+install() {
+    if ! command -v chromium > /dev/null && [ "$(id -u)" = 0 ] && command -v apt-get > /dev/null; then
+        run chromium apt-get install -y --no-install-recommends chromium chromium-driver
+    fi
+    # kernels of all levels of this kind of processor
+    COLLIDE_LEVELS=all run install python -m pip install --disable-pip-version-check -e ".[all]"
+}
+tests() {
+    run tests "${tests[@]}" -m "" --skips tests/skips.txt --durations-file tests/durations.json
+    grep '^slower' "$log/tests.log" || true
+}
+own() {
+    local own
+    mapfile -t own < <(grep -rl --include='test_*.py' 'mark.own_kernels' tests)
+    COLLIDE_JIT=1 run own "${tests[@]}" -m own_kernels "${own[@]}"
+}
+matrix() { run matrix bash tests/matrix.sh; }
+soaks() {
+    { # one core
+        run soak-worlds python tests/soak/soak_worlds.py --questions 30000 --seed "$seed"
+        run soak-memory python tests/soak/soak_memory.py --shapes 30000 --seed "$seed"
+    } &
+    run soak-pairs python tests/soak/soak.py --minutes 6 --seed "$seed"
+    run soak-contacts python tests/soak/soak_contacts.py --pairs 20000 --seed "$seed"
+    run soak-motions python tests/soak/soak_motions.py --motions 5000 --seed "$seed"
+    wait
+    run fuzz collide fuzz --minutes 20 --seed "$seed" --save "$log/fuzz" --quiet
+}
+faults() { run faults python tests/mutants/planted_faults.py --faults 200 --seed 1; }
+site() { run site python -m sphinx -W -q -c docs . build/site; }
+
+for step in "${chosen[@]}"; do
+    [[ " ${steps[*]} " == *" $step "* ]] || { echo "no step $step: ${steps[*]}"; exit 2; }
+done
+for step in "${chosen[@]}"; do "$step"; done
+printf 'all %24d s\n' $SECONDS
+! grep -q failed "$log/steps"
