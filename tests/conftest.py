@@ -43,6 +43,21 @@ def pytest_configure(config: pytest.Config) -> None:
         config.addinivalue_line("filterwarnings", "ignore::RuntimeWarning")
 
 
+def pytest_xdist_make_scheduler(config: pytest.Config, log):
+    """A process a file, and for all files that read the sources of the house the same process: each source is parsed
+    once."""
+    if config.getoption("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class OfFiles(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.split("::")[0]
+            return "tests/house" if file.startswith("tests/house/") else file
+
+    return OfFiles(config, log)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection(session: pytest.Session):
     """What is made while tests are collected stays: looking through it for garbage again and again would take a third

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from house_sources import nodes
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("adapters", "benchmarks", "collide", "examples", "native", "scenes", "tests")
@@ -35,9 +36,9 @@ _COMMENT_OR_STRING = re.compile(
 )
 
 
-def read_source(text: str) -> Source:
-    docstrings = set()
-    for node in ast.walk(ast.parse(text)):
+def read_source(file: Path) -> Source:
+    text, docstrings = file.read_text(encoding="utf-8"), set()
+    for node in nodes(file):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)) and ast.get_docstring(node, clean=False):
             docstrings.add(node.body[0].lineno)
     prose: list[tuple[int, str]] = []
@@ -66,7 +67,7 @@ def read_source(text: str) -> Source:
 @cache
 def sources() -> dict[Path, Source]:
     files = (file for folder in FOLDERS for file in sorted((ROOT / folder).rglob("*.py")))
-    return {file: read_source(file.read_text(encoding="utf-8")) for file in files if file.name != "built.py"}
+    return {file: read_source(file) for file in files if file.name != "built.py"}
 
 
 @cache

@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from house_sources import nodes
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("collide", "adapters", "scenes", "benchmarks", "examples")
@@ -113,9 +114,9 @@ def files() -> list[Path]:
     return sorted(file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py") if file.name != "built.py")
 
 
-def identifiers(tree: ast.Module) -> Iterator[tuple[int, str]]:
+def identifiers(found: list[ast.AST]) -> Iterator[tuple[int, str]]:
     """(line, name) of everything that a file names."""
-    for node in ast.walk(tree):
+    for node in found:
         if isinstance(node, ast.FunctionDef):
             yield node.lineno, node.name
             # Python's own word for the second operand
@@ -156,7 +157,7 @@ def complaints() -> dict[tuple[str, str], list[str]]:
     wrong: dict[tuple[str, str], list[str]] = {}
     for file in files():
         place = file.relative_to(ROOT).as_posix()
-        named = [(1, file.stem), *identifiers(ast.parse(file.read_text(encoding="utf-8")))]
+        named = [(1, file.stem), *identifiers(nodes(file))]
         for line, name in named:
             if (word := better(name)) is not None:
                 wrong.setdefault((place, name), []).append(f"{place}:{line}: {name}: write {word}")

@@ -6,11 +6,11 @@
 
 A fault exchanges a comparison for its neighbour (``<`` for ``<=``, ``==`` for ``!=``, ``in`` for ``not in``), a sum
 for a difference, ``and`` for ``or``, or loses a ``not`` or a minus sign. Places are drawn over all rooms, of kernels
-none: those have mutants of their own. A copy of the package has the fault and is asked by the room's tests until one fails;
-a run that takes ten times as long as without a fault counts as noticed. What is not noticed is printed as a difference.
-Some faults change nothing that a caller can see, such as ``<`` for ``<=`` where both branches agree: those that were
-judged so, with a reason, are lines of `no_change.txt`, and do not count. Ends with status 1 where fewer than the share
-asked for were noticed, and where the tests fail without a fault.
+none: those have mutants of their own. A copy of the package has the fault and is asked by the room's tests until one
+fails; a run that takes ten times as long as without a fault counts as noticed. What is not noticed is printed as a
+difference. Some faults change nothing that a caller can see, such as ``<`` for ``<=`` where both branches agree:
+those that were judged so, with a reason, are lines of `no_change.txt`, and do not count. Ends with status 1 where
+fewer than the share asked for were noticed, and where the tests fail without a fault.
 """
 
 from __future__ import annotations
