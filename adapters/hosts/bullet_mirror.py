@@ -21,7 +21,7 @@ from collide.adapters.hosts.bullet_bodies import ClientBodies, Geom
 from collide.adapters.hosts.bullet_filters import CollisionFilters
 from collide.adapters.hosts.bullet_shapes import Collider
 from collide.adapters.hosts.quaternion_poses import pose_of, poses_of
-from collide.errors import InvalidArgument, MissingExtra, UnknownBody, UnsupportedQuery
+from collide.errors import InvalidArgument, MissingExtra, UnknownBody, UnsupportedQuery, brief
 from collide.shapes import Shape
 
 MARGINS = ("none", "bullet")
@@ -66,7 +66,8 @@ class Mirror:
         shapes: Mapping[tuple[int, int], Shape] | None = None, contact_margin: float | None = None,
     ) -> None:  # fmt: skip
         if margins not in MARGINS:
-            raise InvalidArgument(f"Mirror: margins must be one of {', '.join(map(repr, MARGINS))}, got {margins!r}")
+            known = ", ".join(map(repr, MARGINS))
+            raise InvalidArgument(f"Mirror: margins must be one of {known}, got {brief(margins)}")
         pybullet = genuine_pybullet()
         if not isinstance(client, int) or not pybullet.isConnected(client):
             raise InvalidArgument(
