@@ -534,11 +534,11 @@ def targets() -> tuple[list[Target], list[str]]:
             tried.append(Target(name, lambda value=value: value, GOOD[name]))
         elif name not in EXCUSED:
             unknown.append(name)
-    for name in GOOD:
+    for name, good in GOOD.items():
         if name.startswith("scenes.generate: "):  # each with sizes of its own
             sizes = inspect.signature(generators._GENERATORS[name.split()[-1]]).parameters.values()
             own = [size for size in sizes if size.name != "rng"]
-            tried.append(Target(name, lambda: scenes.generate, GOOD[name], own))
+            tried.append(Target(name, lambda: scenes.generate, good, own))
     return tried, unknown
 
 
@@ -665,7 +665,7 @@ def words_of(value: Any) -> list[str]:
         words += [value, str(Path(value))]
     elif (number := float_of(value)) is not None:
         words += [str(number), f"{number:g}"]
-    if isinstance(value, (list, tuple, dict, str)) and not value or isinstance(value, np.ndarray) and not value.size:
+    if (isinstance(value, np.ndarray) and not value.size) or (isinstance(value, (list, tuple, dict)) and not value):
         words += ["empty", "()", "[]"]
     for entry in [] if value is np.ma.masked else entries_of(value)[:24]:
         words += words_of(entry)
