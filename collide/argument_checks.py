@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-import reprlib
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from collide.errors import CollideError, InvalidArgument
+from collide.errors import CollideError, InvalidArgument, brief
 
 #: Array kinds that are read as they are; objects are read one by one.
 _REAL = "fiub"
@@ -26,19 +25,6 @@ _KINDS = {
     "c": "complex numbers", "m": "time spans", "M": "dates", "U": "text", "S": "bytes", "V": "records", "T": "text",
     "O": "objects",
 }  # fmt: skip
-_SHORT = reprlib.Repr()
-_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 80
-
-
-def describe(value: Any) -> str:
-    """A value as an error message shows it: short, numpy's numbers as numbers."""
-    with contextlib.suppress(Exception):  # whoever's __repr__ fails is told by type
-        return _SHORT.repr(value.item() if isinstance(value, (np.number, np.bool_)) else value)
-    return (
-        f"an integer of some {int(value.bit_length() * 0.30103)} digits"
-        if isinstance(value, int)
-        else f"a {type(value).__name__}"
-    )
 
 
 def number(value: Any) -> float | None:
@@ -63,8 +49,24 @@ def limit(what: str, value: Any, unit: str = " [m]") -> float:
         return value
     read = number(value)
     if read is None or not read >= 0.0 or (math.isinf(read) and value != read):
-        raise InvalidArgument(f"{what} must be a number ≥ 0{unit}, at most 1.8e308 or infinite, got {describe(value)}")
+        raise InvalidArgument(f"{what} must be a number ≥ 0{unit}, at most 1.8e308 or infinite, got {brief(value)}")
     return read
+
+
+def length(what: str, value: Any) -> float:
+    """A finite length ≥ 0 [m]. Raises InvalidArgument."""
+    read = number(value)
+    if read is None or not 0.0 <= read < math.inf:
+        raise InvalidArgument(f"{what} must be a number, finite and not negative [m], got {brief(value)}")
+    return read
+
+
+def number_within(what: str, value: Any, least: float, most: float, error: type[CollideError]) -> float:
+    """A number from ``least`` to ``most``, no True or False; −0 as 0. Raises ``error``."""
+    read = None if isinstance(value, (bool, np.bool_)) else number(value)
+    if read is None or not least <= read <= most:
+        raise error(f"{what} must lie within [{least:g}, {most:g}], got {brief(value)}")
+    return read + 0.0
 
 
 def is_integer(value: Any) -> bool:
@@ -72,17 +74,17 @@ def is_integer(value: Any) -> bool:
     return isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
 
 
-def integer(what: str, value: Any, least: int) -> int:
-    """An integer. Raises InvalidArgument."""
+def integer(what: str, value: Any, least: int, error: type[CollideError] = InvalidArgument) -> int:
+    """An integer. Raises ``error``."""
     if not is_integer(value) or value < least:
-        raise InvalidArgument(f"{what} must be an integer ≥ {least}, got {describe(value)}")
+        raise error(f"{what} must be an integer ≥ {least}, got {brief(value)}")
     return int(value)
 
 
 def checked_index(what: str, value: Any, count: int) -> int:
     """A place among ``count``, from the end where it is negative, as 0 … count − 1. Raises InvalidArgument."""
     if not is_integer(value) or not -count <= value < count:
-        raise InvalidArgument(f"{what} must be an integer, one of {count}: 0 … {count - 1}, got {describe(value)}")
+        raise InvalidArgument(f"{what} must be an integer, one of {count}: 0 … {count - 1}, got {brief(value)}")
     return int(value) % count
 
 
@@ -92,20 +94,20 @@ def true_or_false(what: str, value: Any) -> bool:
         return value
     if isinstance(value, np.bool_) or (is_integer(value) and value in (0, 1)):
         return bool(value)
-    raise InvalidArgument(f"{what} must be True or False, got {describe(value)}")
+    raise InvalidArgument(f"{what} must be True or False, got {brief(value)}")
 
 
 def text(what: str, value: Any, error: type[CollideError] = InvalidArgument) -> str:
     """A text. Raises ``error``."""
     if not isinstance(value, str):
-        raise error(f"{what} must be a text, got {describe(value)}")
+        raise error(f"{what} must be a text, got {brief(value)}")
     return value
 
 
 def instance(what: str, value: Any, kind: Any, example: str, error: type[CollideError] = InvalidArgument) -> Any:
     """A value of a kind. example : how to come by one, for messages. Raises ``error``."""
     if not isinstance(value, kind):
-        raise error(f"{what} must be {example}, got {describe(value)}")
+        raise error(f"{what} must be {example}, got {brief(value)}")
     return value
 
 
@@ -114,7 +116,7 @@ def listed_entries(what: str, value: Any, wanted: str, error: type[CollideError]
     if not isinstance(value, (str, bytes, bytearray, set, frozenset)):
         with contextlib.suppress(TypeError):
             return list(value)
-    raise error(f"{what} must be {wanted}, got {describe(value)}")
+    raise error(f"{what} must be {wanted}, got {brief(value)}")
 
 
 def mapping(what: str, value: Any, wanted: str, error: type[CollideError] = InvalidArgument) -> Mapping:
@@ -125,7 +127,7 @@ def mapping(what: str, value: Any, wanted: str, error: type[CollideError] = Inva
 def file_path(what: str, value: Any, error: type[CollideError] = InvalidArgument) -> Path:
     """A path that files can have. Raises ``error``."""
     if not isinstance(value, (str, os.PathLike)) or "\0" in str(value):
-        raise error(f"{what} must be the path of a file, a text or a pathlib.Path, got {describe(value)}")
+        raise error(f"{what} must be the path of a file, a text or a pathlib.Path, got {brief(value)}")
     return Path(value)
 
 
@@ -143,14 +145,14 @@ def array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.n
     if numbers_given.dtype.kind != "O":
         raise error(
             f"{what} must be real numbers {wanted}, got {_KINDS.get(numbers_given.dtype.kind, numbers_given.dtype)}: "
-            f"{describe(value)}"
+            f"{brief(value)}"
         )
     read = [number(entry) for entry in numbers_given.ravel().tolist()]
     if None in read:
         k = read.index(None)
         where = list(map(int, np.unravel_index(k, numbers_given.shape))) if numbers_given.ndim else ""
         raise error(
-            f"{what}{where} must be a real number (all of it {wanted}), got {describe(numbers_given.ravel()[k])}"
+            f"{what}{where} must be a real number (all of it {wanted}), got {brief(numbers_given.ravel()[k])}"
         )
     return np.array(read, dtype=np.float64).reshape(numbers_given.shape)
 
@@ -161,7 +163,7 @@ def whole_numbers(what: str, value: Any) -> np.ndarray:
     if read.size == 0:
         return np.zeros(0, dtype=np.int64)
     if read.dtype.kind not in "iu" or read.ndim > 1 or (read.dtype.kind == "u" and (read > 2**63 - 1).any()):
-        raise InvalidArgument(f"{what} must be integers (n,) below 2**63, got {describe(value)}")
+        raise InvalidArgument(f"{what} must be integers (n,) below 2**63, got {brief(value)}")
     return read.astype(np.int64).reshape(-1)
 
 
@@ -202,7 +204,7 @@ def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -
     except (TypeError, ValueError, OverflowError, RecursionError, MemoryError):
         # numpy's own words for rows of different lengths are long, and tell no more
         raise error(
-            f"{what} must be numbers of shape {wanted}, and no rows of different lengths, got {describe(value)}"
+            f"{what} must be numbers of shape {wanted}, and no rows of different lengths, got {brief(value)}"
         ) from None
 
 

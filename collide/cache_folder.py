@@ -6,7 +6,10 @@ import os
 import stat
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+
+from collide.log import log
 
 #: Whether files have owners and modes that say who may write them. On Windows they say nothing: there a user's folders
 #: are the user's by their access lists.
@@ -54,19 +57,45 @@ def why_unusable(folder: Path) -> str | None:
         return str(error)
 
 
+def own_folder(folder: Path, what: str, use: str) -> Path | None:
+    """A folder of the cache, made where it is missing; None, and said once, where somebody else could put files there.
+
+    what : is kept there and believed as it stands, for the line that says so: "compiled kernels".
+    use : what comes of doing without: "they are compiled again in every process".
+    """
+    why = why_unusable(folder)
+    if why is None:
+        return folder
+    say_once(
+        f"{what} cannot be kept in {folder}, nor taken from there: {why}; {use}. Set COLLIDE_CACHE_DIR to a folder of "
+        "your own that can be written."
+    )
+    return None
+
+
+@cache
+def say_once(message: str) -> None:
+    """A warning of the log, the first time that it is said in this process."""
+    log.warning(message)
+
+
 def read_own(file: Path) -> bytes:
     """What a file holds that this user alone may write. No link is followed, and no pipe waited for.
 
     Raises FileNotFoundError where nothing is there, PermissionError where somebody else may have written it, OSError.
     """
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-    with os.fdopen(os.open(file, flags), "rb") as opened:
-        status = os.fstat(opened.fileno())
+    descriptor = os.open(file, flags)
+    try:
+        status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
             raise PermissionError(f"{file} is no file")
         if TRUST and (status.st_uid != os.geteuid() or stat.S_IMODE(status.st_mode) & 0o022):
             raise PermissionError(f"others may have written {file}")
-        return opened.read()
+        with os.fdopen(descriptor, "rb", closefd=False) as opened:
+            return opened.read()
+    finally:
+        os.close(descriptor)  # of a folder, too, of which `os.fdopen` makes no stream and leaves it open
 
 
 def why_distrusted(folder: Path) -> str | None:

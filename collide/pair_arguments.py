@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidPose
-from collide.shapes.shape import Shape
+from collide.shapes.shape import Shape, checked_shape
 from collide.shapes.shape_set import Picked
 from collide.transforms import poses_as_given
 
@@ -31,9 +30,7 @@ def matched_counts(A, B, counts: dict[str, int]) -> tuple[int, bool]:
             counts[name] = len(side)
             single = False
         elif not isinstance(side, Shape) and not (A is None and B is None):
-            raise InvalidArgument(
-                f"{name} must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(side)}"
-            )
+            checked_shape(name, side)
     wanted = max(counts.values()) if min(counts.values()) else 0
     for name, count in counts.items():
         if count != wanted and (count != 1 or name in "AB"):

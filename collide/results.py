@@ -43,6 +43,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument
 
 if TYPE_CHECKING:
@@ -261,7 +262,7 @@ def _row_number(k, count: int) -> int:
         where = f", not {k}" if abs(k) < 10**18 else ""
         raise IndexError(f"there are results 0 … {count - 1}{where}" if count else "there are no results") from None
     except (TypeError, ValueError):
-        raise InvalidArgument(f"a result is named by its number, got a {type(k).__name__}") from None
+        raise InvalidArgument(f"k must be the number of a result, got {checks.brief(k)}") from None
 
 
 class WorldResult:

@@ -32,7 +32,7 @@ def checked_margin(name: str, value) -> float:
     """A margin [m] as given: 0, or of a size that a body may have. Raises InvalidArgument."""
     margin = checks.limit(name, value)
     if margin and not SMALLEST <= margin <= LARGEST:
-        raise InvalidArgument(f"{name} must be 0 or within [{SMALLEST:g}, {LARGEST:g}] m, got {checks.describe(value)}")
+        raise InvalidArgument(f"{name} must be 0 or within [{SMALLEST:g}, {LARGEST:g}] m, got {checks.brief(value)}")
     return margin
 
 

@@ -29,7 +29,8 @@ def check_threads(threads) -> int:
     number = checks.integer("threads", threads, 1)
     if number > _MAX_INT:
         raise InvalidArgument(
-            f"threads must be an integer from 1 to {_MAX_INT}; more than there are processors cannot help"
+            f"threads must be an integer from 1 to {_MAX_INT}, got {checks.brief(number)}; more than there are "
+            "processors cannot help"
         )
     return number
 

@@ -92,7 +92,7 @@ def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=Non
 def _finite(name: str, values, shape) -> np.ndarray:
     array = checks.array(f"pose: {name}", values, str(shape), InvalidPose)
     if array.shape != shape or not np.isfinite(array).all():
-        raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {checks.describe(values)}")
+        raise InvalidPose(f"pose: {name} must be {shape} finite numbers, got {checks.brief(values)}")
     return array
 
 
@@ -127,7 +127,7 @@ def _rotation_from_quaternion(q: np.ndarray) -> np.ndarray:
     )
 
 
-def as_poses(X: PoseLike, name: str = "X_WA", *, check: bool = True) -> np.ndarray:
+def as_poses(X: PoseLike, name: str = "X", *, check: bool = True) -> np.ndarray:
     """Poses as a C-contiguous float64 batch (N, 4, 4); a single pose gives N = 1.
 
     Parameters
@@ -146,22 +146,22 @@ def as_poses(X: PoseLike, name: str = "X_WA", *, check: bool = True) -> np.ndarr
     return poses_as_given(X, name, check=check)[0]
 
 
-def as_pose(X: PoseLike, name: str = "X_WA") -> np.ndarray:
+def as_pose(X: PoseLike, name: str = "X", *, check: bool = True) -> np.ndarray:
     """One pose as a float64 matrix (4, 4), the caller's own array where it is one already; checked as by `as_poses`.
 
     Raises InvalidPose. About 3 µs for a float64 array.
     """
     if type(X) is np.ndarray and X.shape == (4, 4) and X.dtype is _FLOAT64 and _is_surely_pose(*X.tolist()):
         return X
-    batch = as_poses(X, name)
+    batch = as_poses(X, name, check=check)
     if len(batch) != 1:
-        raise InvalidPose(f"{name} must be one (4, 4) pose, got {len(batch)}")
+        raise InvalidPose(f"{name} must be one (4, 4) pose, got {batch.shape}: ask pose by pose")
     return batch[0]
 
 
 def poses_as_given(X: PoseLike, name: str, *, check: bool = True) -> tuple[np.ndarray, bool]:
     """(poses as `as_poses` gives them, whether a single one was given)."""
-    check = checks.true_or_false("check_poses", check)
+    check = checks.true_or_false("check_poses: check", check)
     full = _from_tuple(X, name) if isinstance(X, tuple) else _from_object(X, name)
     if full.ndim not in (2, 3) or full.shape[-2:] != (4, 4):
         raise InvalidPose(f"{name} must have shape (4, 4) or (N, 4, 4), got {full.shape}")

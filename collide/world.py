@@ -12,7 +12,7 @@ from collide.certificates.make_certificate import certify
 from collide.errors import InvalidArgument
 from collide.lazy_modules import lazy_module
 from collide.results import PAIR_DTYPE, WorldResult
-from collide.shapes.shape import Shape
+from collide.shapes.shape import Shape, checked_shape
 from collide.threads import check_threads
 from collide.transforms import as_poses
 from collide.world_bodies import Body
@@ -71,7 +71,7 @@ class World(WorldPairs):
         shapes = [shape] if isinstance(shape, Shape) else list(shape) if isinstance(shape, (list, tuple)) else None
         if shapes is None or not all(isinstance(item, Shape) for item in shapes):
             raise InvalidArgument(
-                f"World.query: shape must be a shape or a list of shapes, got {checks.describe(shape)}"
+                f"World.query: shape must be a shape or a list of shapes, got {checks.brief(shape)}"
             )
         X_WS = as_poses(X_WS, "World.query: X_WS")
         n = len(X_WS)
@@ -117,7 +117,7 @@ class World(WorldPairs):
         if any(corner.shape != (3,) or np.isnan(corner).any() for corner in corners) or (corners[0] > corners[1]).any():
             raise InvalidArgument(
                 f"World.boxes_near: low_W and high_W must be corners (3,) of a box, low ≤ high, got "
-                f"{checks.describe(low_W)} and {checks.describe(high_W)}"
+                f"{checks.brief(low_W)} and {checks.brief(high_W)}"
             )
         packed = self._pack()
         if packed.tree is None:
@@ -201,8 +201,7 @@ class World(WorldPairs):
         InvalidArgument, InvalidPose, UnsupportedQuery : as of `collide.shape_cast`.
         """
         limit = checks.limit("World.shape_cast: max_distance", max_distance, "")
-        if not isinstance(shape, Shape):
-            raise InvalidArgument(f"World.shape_cast: shape must be a shape, got {checks.describe(shape)}")
+        checked_shape("World.shape_cast: shape", shape)
         X_WS = as_poses(X_WS, "World.shape_cast: X_WS")
         directions, _ = cast_arguments.checked_directions("World.shape_cast", "direction_W", direction_W, "a cast")
         n = checks.matched_count("World.shape_cast", X_WS=len(X_WS), direction_W=len(directions.vectors))

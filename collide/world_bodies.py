@@ -18,7 +18,7 @@ from collide import argument_checks as checks
 from collide.broadphase.growing_rows import GrowingRows
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody
 from collide.numerics.rigid_poses import are_rigid_matrices
-from collide.shapes.shape import Shape
+from collide.shapes.shape import Shape, checked_shape
 from collide.transforms import LARGEST, SAFE_TOLERANCE, as_pose, as_poses
 
 #: Groups and masks are bit sets of this many bits.
@@ -151,16 +151,13 @@ class WorldBodies:
         self, shape: Shape, X_WB, name: str | None, static: bool, group: int, mask: int, margin: float = 0.0
     ) -> int:
         """The id of a new body; arguments as of `World.add`. Raises InvalidArgument, InvalidPose."""
-        if not isinstance(shape, Shape):
-            raise InvalidArgument(
-                f"World.add: shape must be a shape, for example collide.Sphere(0.1), got {checks.describe(shape)}"
-            )
+        checked_shape("World.add: shape", shape, "collide.Sphere(0.1)")
         X_WB = _IDENTITY if X_WB is None else as_pose(X_WB, "World.add: X_WB")
         identity, row = self._next, len(self._ids)
         if name is None:
             name = f"body {identity}"
         elif not isinstance(name, str) or not name:
-            raise InvalidArgument(f"World.add: name must be a non-empty string, got {checks.describe(name)}")
+            raise InvalidArgument(f"World.add: name must be a non-empty string, got {checks.brief(name)}")
         if name in self._id_of:
             raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._id_of[name]})')
         flags = _flag("static", static), _bits("group", group), _bits("mask", mask)
@@ -214,8 +211,8 @@ class WorldBodies:
             self._made[identity] = body
         return body
 
-    def id_of(self, body: int | str) -> int:
-        """The id of a body by its id or name. Raises UnknownBody."""
+    def id_of(self, body: int | str, what: str = "body") -> int:
+        """The id of a body by its id or name. what : the argument's name, for messages. Raises UnknownBody."""
         if type(body) is int and body in self._row_of:
             return body
         if isinstance(body, str):
@@ -223,12 +220,13 @@ class WorldBodies:
                 return self._id_of[body]
             known = ", ".join(sorted(self._id_of)[:12]) or "none"
             raise UnknownBody(
-                f'no body is named "{body}"; there are: {known}{", …" if len(self._id_of) > 12 else ""}'
+                f"{what}: no body is named {checks.brief(body)}; there are: {known}"
+                f"{', …' if len(self._id_of) > 12 else ''}"
             )
         if not checks.is_integer(body):
-            raise UnknownBody(f"a body is named by its id or its name, got {checks.describe(body)}")
+            raise UnknownBody(f"{what} must be the id or the name of a body, got {checks.brief(body)}")
         if body not in self._row_of:
-            raise UnknownBody(f"no body has id {checks.describe(body)}; it may have been removed")
+            raise UnknownBody(f"{what}: no body has id {checks.brief(body)}; it may have been removed")
         return int(body)
 
     def name_of(self, identity: int) -> str:
@@ -242,7 +240,8 @@ class WorldBodies:
         if not _are_rigid_matrices(X_WBs):
             X_WBs = as_poses(X_WBs, "World.set_poses: X_WBs")
         if len(X_WBs) != len(rows):
-            raise InvalidPose(f"World.set_poses: {len(rows)} bodies but {len(X_WBs)} poses")
+            named = f"{len(rows)} bodies {checks.brief(bodies)}"
+            raise InvalidPose(f"World.set_poses: {named}, but X_WBs {X_WBs.shape} are {len(X_WBs)} poses")
         self._X_WBs[rows] = X_WBs
         self._moved[rows] = True
         self._made.clear()
@@ -257,14 +256,14 @@ class WorldBodies:
         if not (isinstance(bodies, np.ndarray) and bodies.ndim == 1 and bodies.dtype.kind in "iu"):
             bodies = checks.listed_entries("bodies", bodies, "a sequence of ids or names")
             if set(map(type, bodies)) - {int}:
-                bodies = [self.id_of(body) for body in bodies]
+                bodies = [self.id_of(body, "bodies") for body in bodies]
         n = self._next
         if len(self._row_of) == n == len(self._ids) and len(bodies):  # none was ever removed: ids are rows
             with contextlib.suppress(OverflowError):
                 rows = np.asarray(bodies, dtype=np.int64)
                 if 0 <= rows.min() and rows.max() < n:
                     return rows
-        return np.array([self._row_of[self.id_of(body)] for body in bodies], dtype=np.int64)
+        return np.array([self._row_of[self.id_of(body, "bodies")] for body in bodies], dtype=np.int64)
 
     def roster(self) -> Roster:
         """The bodies as they are now, poses apart. Rows are positions of it, until its generation is another."""
@@ -315,12 +314,12 @@ def _flag(field: str, value) -> bool:
         return value
     if isinstance(value, np.bool_) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
         return bool(value)
-    raise InvalidArgument(f"World.add: {field} must be True or False, got {checks.describe(value)}")
+    raise InvalidArgument(f"World.add: {field} must be True or False, got {checks.brief(value)}")
 
 
 def _bits(field: str, value) -> int:
     if not checks.is_integer(value) or not 0 <= int(value) < 2**_BITS:
         raise InvalidArgument(
-            f"World.add: {field} must be an integer of up to {_BITS} bits, got {checks.describe(value)}"
+            f"World.add: {field} must be an integer of up to {_BITS} bits, got {checks.brief(value)}"
         )
     return int(value)

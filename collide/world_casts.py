@@ -53,7 +53,7 @@ def checked_filter(caller: str, group, mask) -> Filter:
         if value is not None and (not checks.is_integer(value) or not 0 <= int(value) < 2**32):
             raise InvalidArgument(
                 f"{caller}: {name} must be an integer of up to 32 bits, or None for all bodies, "
-                f"got {checks.describe(value)}"
+                f"got {checks.brief(value)}"
             )
     return Filter(None if group is None else int(group), None if mask is None else int(mask))
 

@@ -164,7 +164,7 @@ class WorldScene:
                 raise InvalidArgument("World.set_margin: margin of a body must be a number [m], ≥ 0, got None")
             self._bodies.set_margin(identity, margin)
             return
-        pair = self._pair("World.set_margin", identity, self._bodies.id_of(partner))
+        pair = self._pair("World.set_margin", body=body, partner=partner)
         if margin is None:
             self._pair_margins.pop(pair, None)
         else:
@@ -187,18 +187,20 @@ class WorldScene:
         """
         checks.text("World.allow: reason", reason)
         if b is None:
-            matrix = checks.plain_array("World.allow: matrix", a, "(bodies, bodies)", InvalidArgument)
+            matrix = checks.plain_array("World.allow: a", a, "(bodies, bodies)", InvalidArgument)
             self._allow_matrix(matrix, reason)
         else:
-            pair = self._pair("World.allow", self._bodies.id_of(a), self._bodies.id_of(b))
+            pair = self._pair("World.allow", a=a, b=b)
             self._allowed.setdefault(pair, reason)
             self._note_partners(pair)
         self._pairs_changed = True
 
-    def _pair(self, caller: str, i: int, j: int) -> tuple[int, int]:
+    def _pair(self, caller: str, **named: int | str) -> tuple[int, int]:
+        """Ids of two bodies that arguments of these names give. Raises UnknownBody, InvalidArgument."""
+        i, j = (self._bodies.id_of(body, f"{caller}: {name}") for name, body in named.items())
         if i == j:
-            name = self._bodies.name_of(i)
-            raise InvalidArgument(f'{caller}: "{name}" twice; a body is never tested against itself')
+            twice = f'{" and ".join(named)} are the same body {i}, "{self._bodies.name_of(i)}"'
+            raise InvalidArgument(f"{caller}: {twice}; a body is never tested against itself")
         return min(i, j), max(i, j)
 
     def _note_partners(self, pair: tuple[int, int]) -> None:
@@ -210,7 +212,7 @@ class WorldScene:
         n = len(self)
         if matrix.shape != (n, n) or matrix.dtype != bool or (matrix != matrix.T).any():
             raise InvalidArgument(
-                f"World.allow: a matrix must be symmetric, boolean and ({n}, {n}) for the {n} bodies, "
+                f"World.allow: a without b must be a symmetric boolean matrix, ({n}, {n}) for the {n} bodies, "
                 f"got {matrix.dtype} {matrix.shape}"
             )
         ids = self.ids

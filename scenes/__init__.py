@@ -70,7 +70,7 @@ def path(name: str) -> Path:
     for file in _assets().iterdir() if isinstance(name, str) else ():
         if file.suffix in _SUFFIXES and file.stem == name:
             return file
-    raise SceneError(f"no shipped scene is called {brief(name)}; there are {', '.join(shipped())}")
+    raise SceneError(f"no shipped scene has the name {brief(name)}; there are {', '.join(shipped())}")
 
 
 def _assets() -> Path:

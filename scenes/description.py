@@ -154,12 +154,12 @@ class Scene:
         InvalidArgument
             Where there is none; the names there are, are listed.
         """
-        checks.text(f"scene {self.name}: body", name)
+        checks.text(f"scene {self.name}: name of a body", name)
         for body in self.bodies:
             if body.name == name:
                 return body
         raise InvalidArgument(
-            f"scene {self.name}: no body {brief(name)}; it has {listing(b.name for b in self.bodies)}"
+            f"scene {self.name}: no body has the name {brief(name)}; it has {listing(b.name for b in self.bodies)}"
         )
 
     def world(self) -> World:
@@ -249,7 +249,7 @@ class Scene:
             if joint not in owner:
                 known = listing(j for p in self.placements.values() for j in p.robot.joint_names)
                 raise InvalidArgument(
-                    f"scene {self.name}: unknown joint {brief(joint)}; "
+                    f"scene {self.name}: values of its state name an unknown joint {brief(joint)}; "
                     + (f"its robots have {known}" if known else "it has no robot with joints")
                 )
             shares[owner[joint]][joint] = value
@@ -365,7 +365,8 @@ class Scene:
         """
         if checks.text(f"scene {self.name}: owner", owner) not in self.placements:
             raise InvalidArgument(
-                f"scene {self.name}: no robot {brief(owner)}; it has {listing(self.placements) or 'none'}"
+                f"scene {self.name}: owner must be one of its robots, {listing(self.placements) or 'none'}, "
+                f"got {brief(owner)}"
             )
         placement = self.placements[owner]
         if checks.text(f"scene {self.name}: link", link) not in placement.robot.links:

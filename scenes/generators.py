@@ -24,7 +24,7 @@ from collide.errors import SceneError, brief
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import scene_yaml
 from collide.scenes.loaders.fields import did_you_mean
-from collide.scenes.worst_cases import accordion, below, chazelle, harpsicordia
+from collide.scenes.worst_cases import accordion, below, chazelle, count_of, harpsicordia
 from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, HPolytope, Mesh, Shape, Sphere
 from collide.transforms import pose
 
@@ -53,11 +53,11 @@ def generate(name: str, seed: int = 0, **size) -> Scene:
     """
     if checks.text("generate: name", name, SceneError) not in _GENERATORS:
         raise SceneError(
-            f"no generated scene is called {brief(name)}{did_you_mean(name, _GENERATORS)}; "
+            f"no generated scene has the name {brief(name)}{did_you_mean(name, _GENERATORS)}; "
             f"there are {', '.join(names())}"
         )
     if not checks.is_integer(seed) or not 0 <= seed < 2**64:
-        raise SceneError(f"seed must be a whole number ≥ 0 of at most 64 bits, got {checks.describe(seed)}")
+        raise SceneError(f"seed must be a whole number ≥ 0 of at most 64 bits, got {brief(seed)}")
     make = _GENERATORS[name]
     known = [argument for argument in inspect.signature(make).parameters if argument != "rng"]
     for argument in size:
@@ -66,19 +66,14 @@ def generate(name: str, seed: int = 0, **size) -> Scene:
                 f"{name} has no argument {argument!r}{did_you_mean(argument, known)}; it has {', '.join(known)}"
             )
     scene = make(np.random.default_rng(seed), **size)
-    scene.sources = [f"generate({', '.join([repr(name), f'seed={seed}', *(f'{k}={v!r}' for k, v in size.items())])})"]
+    given = [repr(name), f"seed={seed}", *(f"{k}={v!r}" for k, v in size.items())]
+    scene.sources = [f"generate({', '.join(given)})"]
     return scene
 
 
 def names() -> list[str]:
     """The generated scenes there are."""
     return sorted(_GENERATORS)
-
-
-def _count(name: str, value: Any, least: int = 1) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise SceneError(f"{name} must be a whole number ≥ {least}, got {checks.describe(value)}")
-    return int(value)
 
 
 # --- clutter ------------------------------------------------------------------------------------
@@ -90,11 +85,11 @@ def _clutter(rng: np.random.Generator, n: int = 100, density: float = 0.2, stati
     density : volume of the shapes' bounding balls over that of the cube; 0.2 leaves most apart.
     static : share of the bodies that stand still.
     """
-    n = _count("n", n)
-    if not 0 < density <= 100:
-        raise SceneError(f"density must lie within (0, 100], got {density!r}")
+    n = count_of("n", n)
+    share = checks.number_within("density", density, 1e-9, 100, SceneError)
+    static = checks.number_within("static", static, 0, 1, SceneError)
     reaches = 0.05 * np.exp(0.4 * rng.standard_normal(n))
-    edge = float((4 / 3 * math.pi * (reaches**3).sum() / density) ** (1 / 3))
+    edge = float((4 / 3 * math.pi * (reaches**3).sum() / share) ** (1 / 3))
     scene = Scene("clutter")
     for k, reach in enumerate(reaches):
         kind = list(_RANDOM_SHAPES)[int(rng.integers(len(_RANDOM_SHAPES)))]
@@ -147,9 +142,8 @@ def _stack(rng: np.random.Generator, layers: int = 6, wide: int = 4, jitter: flo
     vertical alone: bodies on top of each other touch within rounding, those beside each other are
     25 mm apart on average. jitter : largest shift along the wall [m] and turn [rad].
     """
-    layers, wide = _count("layers", layers), _count("wide", wide)
-    if not 0 <= jitter <= 1:
-        raise SceneError(f"jitter must lie within [0, 1], got {jitter!r}")
+    layers, wide = count_of("layers", layers), count_of("wide", wide)
+    jitter = checks.number_within("jitter", jitter, 0, 1, SceneError)
     size, pitch = np.array([0.25, 0.125, 0.125]), 0.275
     scene = Scene("stack")
     scene.add(
@@ -171,7 +165,7 @@ def _stack(rng: np.random.Generator, layers: int = 6, wide: int = 4, jitter: flo
 
 def _workcell(rng: np.random.Generator, parts: int = 16) -> Scene:
     """An arm of seven joints and a gripper over a bench with a fixture and scattered parts."""
-    return scene_yaml.build(workcell_document(rng, _count("parts", parts, 0)), "workcell")
+    return scene_yaml.build(workcell_document(rng, count_of("parts", parts, 0)), "workcell")
 
 
 def workcell_document(rng: np.random.Generator, parts: int = 16) -> dict[str, Any]:
@@ -394,10 +388,9 @@ def _chazelle(rng: np.random.Generator, strings: int = 40, gap: float = 0.0) -> 
 
 def _across_the_saddle(rng, name: str, upper: Mesh, lower: Mesh, meetings: int, gap) -> Scene:
     """Two bodies, vertices and facets in random order: nothing should depend on how a file lists them."""
-    if isinstance(gap, bool) or not isinstance(gap, (int, float)) or not abs(gap) <= 1:
-        raise SceneError(f"gap must lie within [-1, 1], got {gap!r}")
+    gap = checks.number_within("gap", gap, -1, 1, SceneError)
     scene = Scene(name)
-    for label, mesh, lift in (("upper", upper, float(gap)), ("lower", lower, 0.0)):
+    for label, mesh, lift in (("upper", upper, gap), ("lower", lower, 0.0)):
         scene.add(SceneBody(label, _shuffled(rng, mesh), pose((0.0, 0.0, lift)), source=f"{name}: {label}"))
     scene.notes.append(f"{name}: the surfaces are {gap:g} m apart at {meetings} places")
     return scene

@@ -5,7 +5,7 @@ of the file, the options, and `VERSION`. It is a convenience: an entry that is m
 cannot be written is passed over, with a word at logging level DEBUG, and the work is done again.
 
 What stands in an entry is believed to be the mesh. So the folder must be one that nobody else may write in
-(`cache_folder.why_unusable`), entries are files of this user and no links, and hold the key that they were kept under
+(`cache_folder.own_folder`), entries are files of this user and no links, and hold the key that they were kept under
 and a digest of all.
 """
 
@@ -16,12 +16,11 @@ import io
 import json
 import logging
 from collections.abc import Iterable, Mapping
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from collide.cache_folder import cache_folder, read_own, why_unusable
+from collide.cache_folder import cache_folder, own_folder, read_own
 from collide.errors import InvalidShape
 from collide.shapes.shape_files import ANY, pack, unpack
 from collide.whole_file import whole_file
@@ -82,18 +81,4 @@ def store(name: str, arrays: Mapping[str, np.ndarray]) -> bool:
 
 
 def _folder() -> Path | None:
-    """`directory`, made where it is missing; None, and said once, where somebody else could put entries there."""
-    folder = directory()
-    why = why_unusable(folder)
-    if why is not None:
-        _say_once(
-            f"meshes that were read are neither kept in {folder} nor taken from there: {why}; set COLLIDE_CACHE_DIR to "
-            "a folder of your own."
-        )
-        return None
-    return folder
-
-
-@cache
-def _say_once(message: str) -> None:
-    _log.warning(message)
+    return own_folder(directory(), "meshes that were read", "they are read anew in every process")

@@ -18,7 +18,8 @@ import math
 
 import numpy as np
 
-from collide.errors import SceneError
+from collide import argument_checks as checks
+from collide.errors import SceneError, brief
 from collide.shapes.mesh import Mesh
 
 #: The outline of a fold in its plane (y, z), for a string of length 1: the string's ends and two corners above.
@@ -32,6 +33,8 @@ _HOLE = ((0.0, 5 / 8), (11 / 32, 13 / 16), (-11 / 32, 13 / 16))
 _ANNULUS = ((0, 1, 4), (1, 5, 4), (1, 2, 5), (2, 6, 5), (2, 3, 6), (3, 0, 6), (0, 4, 6))
 #: Below this the annulus decides the stretch and not the strings' ends.
 LEAST_STRETCH = 6.0
+#: So many bodies or strings are more than any memory holds.
+_MOST = 10**7
 #: Longest edge of a fold over the shortest of its hole: a corner to the other, the lowest to the right.
 _TEMPLATE_STRETCH = 1.75 / math.hypot(11 / 32, 3 / 16)
 #: Significant bits of string lengths: products with their positions stay exact, and shifted copies too.
@@ -44,7 +47,7 @@ def harpsicordion(strings: int, stretch: float = 10.0) -> Mesh:
     strings : m ≥ 1.   stretch : the local stretch σ ≥ 6, kept to a few parts in a million; strings grow by
         σ / (σ − 2), so that Σ is 4.47 (σ / (σ − 2))^m. The shortest string has length 1.
     """
-    strings, ratio = _whole("strings", strings), _ratio(stretch)
+    strings, ratio = count_of("strings", strings), _ratio(stretch)
     lengths = [_short(ratio**k) for k in range(-1, strings)]
     step = 2.0 ** -(10 + (strings - 1).bit_length())
     return Mesh(*_folds(lengths, step), solid=True)
@@ -52,7 +55,7 @@ def harpsicordion(strings: int, stretch: float = 10.0) -> Mesh:
 
 def accordion(strings: int) -> Mesh:
     """An accordion above the saddle: ``strings`` of length 1 within x = ±1/4; σ is 3.5 to 7 times their number."""
-    strings = _whole("strings", strings)
+    strings = count_of("strings", strings)
     return Mesh(*_folds([1.0] * (strings + 1), 2.0 ** -(1 + (strings - 1).bit_length())), solid=True)
 
 
@@ -61,7 +64,7 @@ def chazelle(strings: int) -> Mesh:
 
     A block over −n ≤ x, y ≤ n whose underside is folded: the ridges lie on x = −n + 1, −n + 3, … n − 1.
     """
-    n = _whole("strings", strings)
+    n = count_of("strings", strings)
     half = float(n)
     high = half * half + half
     vertices: list[tuple] = []
@@ -104,13 +107,10 @@ def harpsicordia(n: int, stretch: float = 10.0, spread: float | None = None) -> 
     stretch : σ ≥ 6.   spread : the global stretch Σ to stay within; n where None, a polynomial in n as locality
         wants it. m ≈ ln(Σ / 4.47) / ln(σ / (σ − 2)) strings each make n m / 7 meetings, Ω(n σ log Σ).
     """
-    n = _whole("n", n, 10)
+    n = count_of("n", n, 10)
     ratio, spread = _ratio(stretch), n if spread is None else spread
     least = _TEMPLATE_STRETCH * ratio
-    if isinstance(spread, bool) or not isinstance(spread, (int, float)) or not least <= spread <= 1e18:
-        raise SceneError(
-            f"spread must lie within [{least:.4g}, 1e18] for strings of stretch {stretch:g}, got {spread!r}"
-        )
+    spread = checks.number_within(f"spread, for strings of stretch {stretch:g},", spread, least, 1e18, SceneError)
     strings = min(int(math.log(spread / _TEMPLATE_STRETCH) / math.log(ratio)), (n - 3) // 7)
     upper = harpsicordion(strings, stretch)
     copies = max(1, n // len(upper.vertices))
@@ -155,8 +155,7 @@ def _folds(lengths: list[float], step: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _ratio(stretch) -> float:
     """By how much strings grow: the ends of one lie σ times nearer to the last one's than it is long."""
-    if isinstance(stretch, bool) or not isinstance(stretch, (int, float)) or not LEAST_STRETCH <= stretch <= 1e5:
-        raise SceneError(f"stretch must lie within [{LEAST_STRETCH:g}, 1e5], got {stretch!r}")
+    stretch = checks.number_within("stretch", stretch, LEAST_STRETCH, 1e5, SceneError)
     return stretch / (stretch - 2.0)
 
 
@@ -168,7 +167,9 @@ def _short(length: float) -> float:
     return math.ldexp(round(math.ldexp(length, _BITS - exponent)), exponent - _BITS)
 
 
-def _whole(name: str, value, least: int = 1) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise SceneError(f"{name} must be a whole number ≥ {least}, got {value!r}")
-    return int(value)
+def count_of(name: str, value, least: int = 1) -> int:
+    """How many bodies, layers or strings a scene has. Raises SceneError."""
+    count = checks.integer(name, value, least, SceneError)
+    if count > _MOST:
+        raise SceneError(f"{name} must be at most {_MOST}, got {brief(value)}")
+    return count

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from collide import argument_checks as checks
-from collide.errors import InvalidArgument, SceneError
+from collide.errors import SceneError
+from collide.scenes.description import Scene
 from collide.shapes import (
     Box,
     Capsule,
@@ -30,6 +31,7 @@ from collide.shapes import (
     Sphere,
 )
 from collide.whole_file import write_whole
+from collide.world import World
 
 VERSION = 1
 #: Of groups and masks in scene files.
@@ -60,7 +62,7 @@ def save(scene, path, *, about: str | Mapping[str, Any] | None = None) -> None:
     if about is not None and not isinstance(about, str):
         checks.mapping("save: about", about, "plain data, or a text", SceneError)
     if path.suffix.lower() != ".json":
-        raise SceneError(f"a scene is written to a .json file, got {str(path)!r}")
+        raise SceneError(f"save: path must end in .json, got {checks.brief(str(path))}")
     document = scene_document(*_bodies_and_allowed(scene), name=getattr(scene, "name", "") or path.stem, about=about)
     write_whole(path, document_text(document))
 
@@ -121,10 +123,9 @@ _FORMS: tuple[tuple[type[Shape], str, dict[str, str]], ...] = (
 
 
 def _bodies_and_allowed(scene) -> tuple[list, list[tuple]]:
-    if hasattr(scene, "bodies"):
+    if isinstance(scene, Scene):
         return list(scene.bodies), list(scene.allowed)
-    if not hasattr(scene, "ids"):
-        raise InvalidArgument(f"save takes a Scene or a World, got {type(scene).__name__}")
+    checks.instance("save: scene", scene, World, "a Scene or a World")
     bodies = [scene.body(i) for i in scene.ids]
     names = {body.id: body.name for body in bodies}
     allowed = scene._allowed  # pairs of ids; the World shows them nowhere else

@@ -465,7 +465,7 @@ def test_unknown_bodies(who):
 def test_a_removed_body_is_unknown():
     world = world_of_three()
     world.remove("b")
-    with pytest.raises(UnknownBody, match='"b"'):
+    with pytest.raises(UnknownBody, match="body: no body is named 'b'"):
         world.remove("b")
     with pytest.raises(UnknownBody, match="removed"):
         world.body(1)
@@ -483,15 +483,15 @@ def test_other_arguments_of_a_world():
     for static in (np.ones(2), "yes", None):
         with pytest.raises(InvalidArgument, match=r"World\.add: static"):
             world.add(Sphere(1), static=static)
-    with pytest.raises(InvalidArgument, match="matrix"):
+    with pytest.raises(InvalidArgument, match=r"World\.allow: a must be .*\(bodies, bodies\)"):
         world.allow(RAGGED)
     with pytest.raises(InvalidArgument, match=r"World.add: shape"):
         world.add("ball")
     with pytest.raises(InvalidArgument, match=r"World.query: shape"):
         world.query(3, EYE)
-    with pytest.raises(InvalidArgument, match="twice"):
+    with pytest.raises(InvalidArgument, match="a and b are the same body"):
         world.allow("a", "a")
-    with pytest.raises(InvalidPose, match="2 bodies but 3 poses"):
+    with pytest.raises(InvalidPose, match=r"2 bodies .* are 3 poses"):
         world.set_poses(["a", "b"], [EYE] * 3)
     with pytest.raises(InvalidPose, match="one"):
         world.add(Sphere(1), [EYE] * 2)
@@ -501,7 +501,7 @@ def test_other_arguments_of_a_world():
     "matrix", [np.ones((2, 2), bool), np.ones((3, 3)), np.triu(np.ones((3, 3), bool)), np.ones(3, bool)]
 )
 def test_allowing_matrices_are_square_boolean_symmetric(matrix):
-    with pytest.raises(InvalidArgument, match="matrix must be symmetric, boolean and"):
+    with pytest.raises(InvalidArgument, match="must be a symmetric boolean matrix, "):
         world_of_three().allow(matrix)
 
 

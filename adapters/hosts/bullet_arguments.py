@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from collide.adapters.hosts.bullet_shapes import obj_groups
+from collide.adapters.hosts.host_numbers import shaped
 from collide.adapters.hosts.quaternion_poses import pose_of
 from collide.scenes.loaders.mesh_file import read_mesh
 from collide.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Halfspace, Mesh, Shape, Sphere
@@ -40,7 +41,7 @@ def shape_of_arguments(pybullet: Any, arguments: dict[str, Any]) -> Shape | None
     if kind == pybullet.GEOM_SPHERE:
         shape = Sphere(radius)
     elif kind == pybullet.GEOM_BOX:
-        shape = Box(2.0 * np.array(arguments.get("halfExtents", (1, 1, 1)), dtype=np.float64))
+        shape = Box(2.0 * shaped("halfExtents", arguments.get("halfExtents", (1, 1, 1)), (3,)))
     elif kind == pybullet.GEOM_CAPSULE:
         shape = Capsule(radius, height)
     elif kind == pybullet.GEOM_CYLINDER:
@@ -82,7 +83,7 @@ def inertial_frames(arguments: dict[str, Any]) -> dict[int, tuple[int, np.ndarra
 
 
 def _mesh(pybullet: Any, arguments: dict[str, Any]) -> Shape | None:
-    scale = np.array(arguments.get("meshScale", (1, 1, 1)), dtype=np.float64)
+    scale = shaped("meshScale", arguments.get("meshScale", (1, 1, 1)), (3,))
     concave = bool(arguments.get("flags", 0) & pybullet.GEOM_FORCE_CONCAVE_TRIMESH)
     if arguments.get("vertices") is not None and len(arguments["vertices"]):
         points = np.array(arguments["vertices"], dtype=np.float64) * scale

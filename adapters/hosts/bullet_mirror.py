@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from collide import World
+from collide import argument_checks as checks
 from collide.adapters.hosts.bullet_answers import (
     Tables,
     closest,
@@ -20,8 +21,9 @@ from collide.adapters.hosts.bullet_answers import (
 from collide.adapters.hosts.bullet_bodies import ClientBodies, Geom
 from collide.adapters.hosts.bullet_filters import CollisionFilters
 from collide.adapters.hosts.bullet_shapes import Collider
+from collide.adapters.hosts.host_numbers import real
 from collide.adapters.hosts.quaternion_poses import pose_of, poses_of
-from collide.errors import InvalidArgument, MissingExtra, UnknownBody, UnsupportedQuery
+from collide.errors import InvalidArgument, MissingExtra, UnknownBody, UnsupportedQuery, brief
 from collide.shapes import Shape
 
 MARGINS = ("none", "bullet")
@@ -66,7 +68,8 @@ class Mirror:
         shapes: Mapping[tuple[int, int], Shape] | None = None, contact_margin: float | None = None,
     ) -> None:  # fmt: skip
         if margins not in MARGINS:
-            raise InvalidArgument(f"Mirror: margins must be one of {', '.join(map(repr, MARGINS))}, got {margins!r}")
+            known = ", ".join(map(repr, MARGINS))
+            raise InvalidArgument(f"Mirror: margins must be one of {known}, got {brief(margins)}")
         pybullet = genuine_pybullet()
         if not isinstance(client, int) or not pybullet.isConnected(client):
             raise InvalidArgument(
@@ -185,7 +188,7 @@ class Mirror:
         """
         A, rows_a = self._side(bodyA, linkIndexA, collisionShapeA, collisionShapePositionA, collisionShapeOrientationA)
         B, rows_b = self._side(bodyB, linkIndexB, collisionShapeB, collisionShapePositionB, collisionShapeOrientationB)
-        return closest(A, rows_a, B, rows_b, float(distance))
+        return closest(A, rows_a, B, rows_b, real("distance", distance))
 
     def getContactPoints(
         self, bodyA=-1, bodyB=-1, linkIndexA=EVERY_LINK, linkIndexB=EVERY_LINK, physicsClientId=None
@@ -241,7 +244,8 @@ class Mirror:
             origins, ends = (points @ X[:3, :3].T + X[:3, 3] for points in (origins, ends))
         groups = np.array([self.filters.bits(geom)[0] for geom in self._tables.geoms], dtype=np.int64)
         passed = (groups & collisionFilterMask) == 0
-        return ray_hits(self.world, self._tables, origins, ends, passed, reportHitNumber, float(fractionEpsilon))
+        epsilon = real("fractionEpsilon", fractionEpsilon)
+        return ray_hits(self.world, self._tables, origins, ends, passed, reportHitNumber, epsilon)
 
     # --- how they are answered ------------------------------------------------------------------
 
@@ -334,14 +338,11 @@ def _matches(wanted: tuple, places: tuple) -> bool:
 
 def _vectors(name: str, values) -> np.ndarray:
     """(n, 3) finite float64."""
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.empty(0)
+    array = checks.array(name, values, "(n, 3)", InvalidArgument)
     if array.ndim == 1 and array.size:
         array = array[None]
     if array.size == 0 and isinstance(values, list | tuple | np.ndarray) and not len(values):
         return np.empty((0, 3))
     if array.ndim != 2 or array.shape[1] != 3 or not np.isfinite(array).all():
-        raise InvalidArgument(f"{name} must be finite positions of three numbers each, got {values!r:.80}")
+        raise InvalidArgument(f"{name} must be finite positions of three numbers each, got {brief(values)}")
     return array

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.adapters.hosts.fcl_transform import shaped
+from collide import argument_checks as checks
+from collide.adapters.hosts.host_numbers import of_kind, real, shaped, whole
 from collide.errors import InvalidArgument
 
 
@@ -81,7 +82,7 @@ class Triangle:
 
     def set(self, p1, p2, p3):
         """Rows of its corners."""
-        self._rows = (int(p1), int(p2), int(p3))
+        self._rows = (whole("p1", p1), whole("p2", p2), whole("p3", p3))
 
     @staticmethod
     def size():
@@ -105,7 +106,9 @@ class Triangle:
 
 def triangle_rows(triangles) -> np.ndarray:
     """(m, 3) int64 of a list of `Triangle`, or an array of integers. Raises InvalidArgument."""
-    rows = np.array([tuple(triangle) for triangle in triangles])
+    rows = checks.plain_array(
+        "triangles", [tuple(triangle) for triangle in triangles], "(m, 3)", InvalidArgument
+    )
     if not len(rows):
         return np.zeros((0, 3), dtype=np.int64)
     if rows.ndim != 2 or rows.shape[1] != 3 or rows.dtype.kind not in "iu":
@@ -140,6 +143,7 @@ class AABB:
 
     def overlap(self, other, overlapping_part=None):
         """Whether the boxes share a point; the box that they share goes into ``overlapping_part``."""
+        of_kind("other", other, AABB)
         low, high = np.maximum(self.min_, other.min_), np.minimum(self.max_, other.max_)
         meets = bool((low <= high).all())
         if meets and overlapping_part is not None:
@@ -148,6 +152,7 @@ class AABB:
 
     def distance(self, other):
         """Least distance to another box, 0 where they meet [m]."""
+        of_kind("other", other, AABB)
         apart = np.maximum(0.0, np.maximum(other.min_ - self.max_, self.min_ - other.max_))
         return float(np.linalg.norm(apart))
 
@@ -180,10 +185,11 @@ class AABB:
         times this less ``box`` gives, corner by corner, as in coal; returns itself.
         """
         if len(args) == 2:
-            box, ratio = args
+            box, ratio = of_kind("box", args[0], AABB), real("ratio", args[1])
             self.min_, self.max_ = ratio * self.min_ - box.min_, ratio * self.max_ - box.max_
         else:
-            self.min_, self.max_ = self.min_ - args[0], self.max_ + args[0]
+            delta = real("delta", args[0]) if np.isscalar(args[0]) else shaped("delta", args[0], (3,))
+            self.min_, self.max_ = self.min_ - delta, self.max_ + delta
         return self
 
     def __add__(self, other):
@@ -209,6 +215,7 @@ def _around(a: AABB, b: AABB) -> AABB:
 def translate(aabb, t):
     """The box moved by t (3,)."""
     box = AABB(aabb)
+    t = shaped("t", t, (3,))
     box.min_, box.max_ = box.min_ + t, box.max_ + t
     return box
 

@@ -16,8 +16,9 @@ from collide.adapters.hosts.coal_containers import AABB
 from collide.adapters.hosts.coal_enums import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.coal_inertia import MassProperties
 from collide.adapters.hosts.coal_transform import Transform3s, rotation_matrix
-from collide.adapters.hosts.fcl_transform import Transform, shaped
-from collide.errors import InvalidArgument
+from collide.adapters.hosts.fcl_transform import Transform
+from collide.adapters.hosts.host_numbers import real, shaped
+from collide.errors import InvalidArgument, brief
 from collide.shapes.shape import Shape
 
 
@@ -140,7 +141,7 @@ class ShapeBase(CollisionGeometry):
 
     def setSweptSphereRadius(self, radius):
         """radius : ≥ 0 [m]. Raises ValueError."""
-        radius = float(radius)
+        radius = real("setSweptSphereRadius: radius", radius)
         if not (math.isfinite(radius) and radius >= 0.0):
             raise InvalidArgument(f"setSweptSphereRadius: radius must be ≥ 0 and finite [m], got {radius}")
         corners = self._bounds() + np.array([[self._radius_swept], [-self._radius_swept]])
@@ -231,7 +232,7 @@ class _Round(ShapeBase, fcl_geometry._Round):
 
     @halfLength.setter
     def halfLength(self, value):
-        self.lz = 2.0 * float(value)
+        self.lz = 2.0 * real("halfLength", value)
 
 
 class Capsule(_Round, fcl_geometry.Capsule):
@@ -353,7 +354,7 @@ class CollisionObject(fcl_geometry.CollisionObject):
 def checked_geometry(name: str, value) -> CollisionGeometry:
     """A geometry as given. Raises TypeError."""
     if not isinstance(value, CollisionGeometry):
-        raise TypeError(f"{name} must be a CollisionGeometry of this module, such as Box(1, 1, 1), got {value!r:.80}")
+        raise TypeError(f"{name} must be a CollisionGeometry of this module, such as Box(1, 1, 1), got {brief(value)}")
     return value
 
 

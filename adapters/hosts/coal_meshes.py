@@ -11,7 +11,7 @@ from collide.adapters.hosts import coal_inertia
 from collide.adapters.hosts.coal_containers import StdVec_Vec3s, Triangle, triangle_rows
 from collide.adapters.hosts.coal_enums import NODE_TYPE, OBJECT_TYPE, BVHBuildState, BVHModelType
 from collide.adapters.hosts.coal_geometry import CollisionGeometry, ShapeBase
-from collide.adapters.hosts.fcl_transform import shaped
+from collide.adapters.hosts.host_numbers import row, rows_of_three, shaped
 from collide.errors import InvalidArgument
 from collide.shapes.shape import Shape
 
@@ -53,14 +53,15 @@ class ConvexBase(ShapeBase):
 
     def points(self, index=None):
         """All points, a copy (n, 3); one of them (3,) by its index."""
-        return self._points.copy() if index is None else self._points[index].copy()
+        return self._points.copy() if index is None else self._points[row("index", index, len(self._points))].copy()
 
     def point(self, index):
         """One of the points, a copy (3,)."""
-        return self._points[index].copy()
+        return self._points[row("index", index, len(self._points))].copy()
 
     def neighbors(self, i):
         """Rows of the points that share an edge with point i, a list."""
+        i = row("i", i, len(self._points))
         around = self._facets[(self._facets == i).any(axis=1)]
         return sorted(set(around.ravel().tolist()) - {i})
 
@@ -74,7 +75,7 @@ class ConvexBase(ShapeBase):
 
     def normal(self, index):
         """That of triangle ``index`` (3,)."""
-        return self.normals()[index]
+        return self.normals()[row("index", index, len(self._facets))]
 
     def offsets(self):
         """Offsets (m,) of the triangles' planes, {x : n·x + offset ≤ 0} [m]."""
@@ -82,7 +83,7 @@ class ConvexBase(ShapeBase):
 
     def offset(self, index):
         """That of triangle ``index`` [m]."""
-        return float(self.offsets()[index])
+        return float(self.offsets()[row("index", index, len(self._facets))])
 
     @property
     def num_normals_and_offsets(self):
@@ -118,7 +119,7 @@ class Convex(ConvexBase):
 
     def polygons(self, index):
         """`Triangle` of that number."""
-        return Triangle(*self._facets[index])
+        return Triangle(*self._facets[row("index", index, len(self._facets))])
 
 
 class BVHModelBase(CollisionGeometry):
@@ -334,10 +335,7 @@ class BVHModelOBB(BVHModelBase):
 
 def rows_of(name: str, points) -> np.ndarray:
     """Points (n, 3) of a list or an array, float64. Raises InvalidArgument."""
-    array = np.array(list(points) if isinstance(points, StdVec_Vec3s) else points, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != 3 or not len(array):
-        raise InvalidArgument(f"{name} must be points (n, 3), at least one, got shape {array.shape}")
-    return array
+    return rows_of_three(name, list(points) if isinstance(points, StdVec_Vec3s) else points)
 
 
 def check_rows(name: str, facets: np.ndarray, n_points: int) -> None:

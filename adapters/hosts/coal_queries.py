@@ -17,6 +17,7 @@ from collide.adapters.hosts.coal_geometry import CollisionGeometry, CollisionObj
 from collide.adapters.hosts.coal_nearest import Nearest, nearest
 from collide.adapters.hosts.coal_requests import Contact
 from collide.adapters.hosts.fcl_facets import contacts_of_facets
+from collide.adapters.hosts.host_numbers import real, whole
 from collide.errors import InvalidArgument
 
 #: How many contacts of two meshes are looked at where those are wanted that are deeper than something.
@@ -50,7 +51,8 @@ def collide(*args):
 
 def collide_posed(g1, X1, g2, X2, request, result) -> int:
     """The same of geometries at poses (4, 4)."""
-    limit, margin = int(request.num_max_contacts), float(request.security_margin)
+    limit = whole("num_max_contacts", request.num_max_contacts)
+    margin = real("security_margin", request.security_margin)
     if limit < 1:
         raise InvalidArgument(f"num_max_contacts must be at least 1, got {request.num_max_contacts}")
     if not math.isfinite(margin):

@@ -17,7 +17,7 @@ from collide.adapters.hosts.coal_enums import (
     GJKVariant,
 )
 from collide.adapters.hosts.coal_transform import Transform3s
-from collide.adapters.hosts.fcl_transform import shaped
+from collide.adapters.hosts.host_numbers import real, shaped, whole
 from collide.errors import InvalidArgument
 
 _MAX = sys.float_info.max
@@ -73,7 +73,7 @@ class CollisionRequest(QueryRequest):
 
     def __init__(self, flag=None, num_max_contacts=1):
         super().__init__()
-        self.num_max_contacts = int(num_max_contacts)
+        self.num_max_contacts = whole("num_max_contacts", num_max_contacts)
         self.enable_contact = flag is None or bool(flag & CollisionRequestFlag.CONTACT)
         self.enable_distance_lower_bound = flag is not None and bool(flag & CollisionRequestFlag.DISTANCE_LOWER_BOUND)
         self.security_margin = 0.0
@@ -100,11 +100,11 @@ class Contact:
     """
 
     def __init__(self, o1=None, o2=None, b1=-1, b2=-1, pos=None, normal=None, depth=_MAX):
-        self.o1, self.o2, self.b1, self.b2 = o1, o2, int(b1), int(b2)
+        self.o1, self.o2, self.b1, self.b2 = o1, o2, whole("b1", b1), whole("b2", b2)
         nothing = np.full(3, np.nan)
         self.pos = nothing if pos is None else shaped("pos", pos, (3,)).copy()
         self.normal = nothing.copy() if normal is None else shaped("normal", normal, (3,)).copy()
-        self.penetration_depth = float(depth)
+        self.penetration_depth = real("depth", depth)
         half = 0.5 * self.penetration_depth * self.normal if normal is not None else nothing
         #: The points (3,) of both surfaces.
         self.nearest_points = [self.pos - half, self.pos + half]
@@ -205,7 +205,7 @@ class ContactPatchRequest:
     def __init__(self, max_num_patch=1, num_samples_curved_shapes=12, patch_tolerance=1e-3):
         if isinstance(max_num_patch, CollisionRequest):
             max_num_patch = max_num_patch.num_max_contacts
-        self.max_num_patch = int(max_num_patch)
+        self.max_num_patch = whole("max_num_patch", max_num_patch)
         self.setNumSamplesCurvedShapes(num_samples_curved_shapes)
         self.setPatchTolerance(patch_tolerance)
 
@@ -215,7 +215,7 @@ class ContactPatchRequest:
 
     def setNumSamplesCurvedShapes(self, num):
         """Without effect."""
-        self._samples = max(3, int(num))
+        self._samples = max(3, whole("num", num))
 
     def getPatchTolerance(self):
         """[m]."""
@@ -223,9 +223,10 @@ class ContactPatchRequest:
 
     def setPatchTolerance(self, tol):
         """tol : [m]; at least 1e-12."""
-        if not math.isfinite(tol):
-            raise InvalidArgument(f"setPatchTolerance: tol must be finite [m], got {tol}")
-        self._tolerance = max(1e-12, float(tol))
+        tolerance = real("tol", tol)
+        if not math.isfinite(tolerance):
+            raise InvalidArgument(f"setPatchTolerance: tol must be finite [m], got {tolerance}")
+        self._tolerance = max(1e-12, tolerance)
 
 
 class ContactPatch:

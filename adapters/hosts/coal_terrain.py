@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 
 import collide as engine
+from collide import argument_checks as checks
 from collide.adapters.hosts.coal_containers import AABB, StdVec_Vec6
 from collide.adapters.hosts.coal_enums import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.coal_geometry import CollisionGeometry
 from collide.adapters.hosts.coal_meshes import BVHModelOBB, BVHModelOBBRSS, rows_of
+from collide.adapters.hosts.host_numbers import real
 from collide.adapters.hosts.octomap_boxes import occupied_boxes, octomap_file
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.given_files import LARGEST_MESH, read_bytes
@@ -37,13 +39,13 @@ class _HeightField(CollisionGeometry):
             args = (args[0]._dims[0], args[0]._dims[1], args[0]._heights, args[0]._min_height)
         if len(args) not in (3, 4):
             raise TypeError(f"{type(self).__name__}(x_dim, y_dim, heights, min_height=0)")
-        self._dims = np.array([float(args[0]), float(args[1])])
-        self._min_height = float(args[3]) if len(args) == 4 else 0.0
+        self._dims = np.array([real("x_dim", args[0]), real("y_dim", args[1])])
+        self._min_height = real("min_height", args[3]) if len(args) == 4 else 0.0
         self.updateHeights(args[2])
 
     def updateHeights(self, new_heights):
         """New heights, as many as before [m]."""
-        heights = np.array(new_heights, dtype=np.float64)
+        heights = np.array(checks.array("heights", new_heights, "(r, c)", InvalidArgument))
         if heights.ndim != 2 or min(heights.shape) < 2:
             raise InvalidArgument(f"heights must be (r, c) with r and c at least 2, got shape {heights.shape}")
         if "_heights" in vars(self) and self._heights.shape != heights.shape:
@@ -105,9 +107,9 @@ class OcTree(CollisionGeometry):
     _node_type, _object_type, _has_parts = NODE_TYPE.GEOM_OCTREE, OBJECT_TYPE.OT_OCTREE, True
 
     def __init__(self, resolution, boxes=()):
-        self._resolution = float(resolution)
+        self._resolution = real("OcTree: resolution", resolution)
         if not 0.0 < self._resolution < np.inf:
-            raise InvalidArgument(f"OcTree: resolution must be > 0 and finite [m], got {resolution}")
+            raise InvalidArgument(f"OcTree: resolution must be > 0 and finite [m], got {self._resolution}")
         self._free, self._occupied = 0.12, 0.7
         self._boxes = list(boxes)
         if self._boxes:
@@ -147,11 +149,11 @@ class OcTree(CollisionGeometry):
 
     def setOccupancyThres(self, threshold):
         """Without effect on queries."""
-        self._occupied = float(threshold)
+        self._occupied = real("threshold", threshold)
 
     def setFreeThres(self, threshold):
         """Without effect on queries."""
-        self._free = float(threshold)
+        self._free = real("threshold", threshold)
 
     @property
     def _shape(self):
@@ -169,7 +171,7 @@ def makeOctree(point_cloud, resolution):
 
     point_cloud : (n, 3) [m].   resolution : edge of a box [m].
     """
-    points, edge = rows_of("point_cloud", point_cloud), float(resolution)
+    points, edge = rows_of("point_cloud", point_cloud), real("resolution", resolution)
     OcTree(edge)  # says what is wrong with the edge
     numbers = np.unique(np.floor(points / edge), axis=0)
     if np.abs(numbers).max() > 2.0 ** (OCTREE_DEPTH - 1) - 1.0:
@@ -191,10 +193,10 @@ class MeshLoader:
 
     def load(self, filename, scale=(1.0, 1.0, 1.0)):
         """The triangles of all meshes in a file, one surface. Raises SceneError, MissingExtra."""
-        factors = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,))
+        factors = _factors(scale)
         model = self._model()
         model.beginModel()
-        for part in read_mesh(Path(filename)).parts:
+        for part in read_mesh(checks.file_path("filename", filename)).parts:
             model.addSubModel(part.points * factors, part.facets)
         model.endModel()
         return model
@@ -217,11 +219,19 @@ class CachedMeshLoader(MeshLoader):
 
     def load(self, filename, scale=(1.0, 1.0, 1.0)):
         """The triangles of all meshes in a file, one surface; the same object for the same file and scale."""
-        path = Path(filename)
+        path = checks.file_path("filename", filename)
         if not path.is_file():
             return super().load(filename, scale)  # says what is wrong
         changed = path.stat().st_mtime_ns
-        key = (path.resolve(), changed, tuple(np.broadcast_to(np.asarray(scale, dtype=float), (3,)).tolist()))
+        key = (path.resolve(), changed, tuple(_factors(scale).tolist()))
         if key not in self._known:
             self._known[key] = super().load(filename, scale)
         return self._known[key]
+
+
+def _factors(scale) -> np.ndarray:
+    """(3,) factors along x, y, z of one or three. Raises InvalidArgument."""
+    factors = checks.array("scale", scale, "() or (3,)", InvalidArgument)
+    if factors.shape not in ((), (3,)):
+        raise InvalidArgument(f"scale must be one number or three, got shape {factors.shape}")
+    return np.broadcast_to(factors, (3,))

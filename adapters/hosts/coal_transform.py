@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 
-from collide.adapters.hosts.fcl_transform import Transform, quaternion_of, rotation_of, shaped
+from collide import argument_checks as checks
+from collide.adapters.hosts.fcl_transform import Transform, quaternion_of, rotation_of
+from collide.adapters.hosts.host_numbers import of_kind, real, shaped
 from collide.errors import InvalidArgument
 
 
@@ -21,24 +23,24 @@ class Quaternion:
 
     def __init__(self, *args):
         if len(args) == 4:
-            self._xyzw = np.array([args[1], args[2], args[3], args[0]], dtype=np.float64)
+            self._xyzw = np.roll([real(name, value) for name, value in zip("wxyz", args)], -1)
         elif len(args) == 2:
             self._xyzw = _between(shaped("u", args[0], (3,)), shaped("v", args[1], (3,)))
         elif not args:
             self._xyzw = np.array([0.0, 0.0, 0.0, 1.0])
         elif len(args) == 1 and isinstance(args[0], Quaternion):
             self._xyzw = args[0]._xyzw.copy()
-        elif len(args) == 1 and np.shape(args[0]) == (4,):
-            self._xyzw = np.array(args[0], dtype=np.float64)
+        elif len(args) == 1 and _shape(args[0]) == (4,):
+            self._xyzw = shaped("coefficients", args[0], (4,)).copy()
         elif len(args) == 1:
             self._xyzw = np.roll(quaternion_of(rotation_matrix(args[0])), -1)
         else:
             raise TypeError("Quaternion(w, x, y, z), (coefficients x y z w), (R), (AngleAxis), (u, v) or ()")
 
-    x = property(lambda self: float(self._xyzw[0]), lambda self, v: self._xyzw.__setitem__(0, v), doc="Of i.")
-    y = property(lambda self: float(self._xyzw[1]), lambda self, v: self._xyzw.__setitem__(1, v), doc="Of j.")
-    z = property(lambda self: float(self._xyzw[2]), lambda self, v: self._xyzw.__setitem__(2, v), doc="Of k.")
-    w = property(lambda self: float(self._xyzw[3]), lambda self, v: self._xyzw.__setitem__(3, v), doc="The real part.")
+    x = property(lambda self: float(self._xyzw[0]), lambda self, v: self.__setitem__(0, v), doc="Of i.")
+    y = property(lambda self: float(self._xyzw[1]), lambda self, v: self.__setitem__(1, v), doc="Of j.")
+    z = property(lambda self: float(self._xyzw[2]), lambda self, v: self.__setitem__(2, v), doc="Of k.")
+    w = property(lambda self: float(self._xyzw[3]), lambda self, v: self.__setitem__(3, v), doc="The real part.")
 
     @staticmethod
     def Identity():
@@ -61,7 +63,7 @@ class Quaternion:
 
     def assign(self, quat):
         """Becomes ``quat``; returns itself."""
-        self._xyzw[:] = quat._xyzw
+        self._xyzw[:] = of_kind("quat", quat, Quaternion)._xyzw
         return self
 
     def coeffs(self):
@@ -99,16 +101,16 @@ class Quaternion:
 
     def dot(self, other):
         """Product of the coefficients, summed."""
-        return float(self._xyzw @ other._xyzw)
+        return float(self._xyzw @ of_kind("other", other, Quaternion)._xyzw)
 
     def angularDistance(self, other):
         """Angle between two rotations [rad]."""
-        d = (self.normalized() * other.normalized().conjugate())._xyzw
+        d = (self.normalized() * of_kind("other", other, Quaternion).normalized().conjugate())._xyzw
         return 2.0 * math.atan2(float(np.linalg.norm(d[:3])), abs(float(d[3])))
 
     def slerp(self, t, other):
         """The rotation at part t of the way to ``other``, at even speed."""
-        cosine = self.dot(other)
+        t, cosine = real("t", t), self.dot(other)
         end = other._xyzw if cosine >= 0.0 else -other._xyzw
         angle = math.acos(min(1.0, abs(cosine)))
         if angle < 1e-8:
@@ -118,6 +120,7 @@ class Quaternion:
 
     def isApprox(self, other, prec=1e-12):
         """Whether coefficients agree within ``prec`` of their length."""
+        of_kind("other", other, Quaternion)
         return bool(np.linalg.norm(self._xyzw - other._xyzw) <= prec * min(self.norm(), other.norm()))
 
     def matrix(self):
@@ -141,7 +144,7 @@ class Quaternion:
         return float(self._xyzw[k])
 
     def __setitem__(self, k, value):
-        self._xyzw[k] = value
+        self._xyzw[k] = real("a coefficient", value)
 
     def __len__(self):
         return 4
@@ -162,7 +165,7 @@ class AngleAxis:
 
     def __init__(self, *args):
         if len(args) == 2:
-            self.angle, self.axis = float(args[0]), args[1]
+            self.angle, self.axis = real("angle", args[0]), args[1]
         elif not args:
             self.angle, self.axis = 0.0, (1.0, 0.0, 0.0)
         elif isinstance(args[0], AngleAxis):
@@ -201,7 +204,7 @@ class AngleAxis:
 
     def isApprox(self, other, prec=1e-12):
         """Whether the two rotations agree within ``prec``."""
-        return bool(np.abs(self.matrix() - other.matrix()).max() <= prec)
+        return bool(np.abs(self.matrix() - of_kind("other", other, AngleAxis).matrix()).max() <= prec)
 
     def __mul__(self, other):
         if isinstance(other, (AngleAxis, Quaternion)):
@@ -233,9 +236,9 @@ class Transform3s(Transform):
             X[:3, :3], X[:3, 3] = rotation_matrix(args[0]), shaped("T", args[1], (3,))
         elif len(args) == 1 and isinstance(args[0], Transform):
             X[:] = args[0]._X
-        elif len(args) == 1 and np.shape(args[0]) == (3,):
-            X[:3, 3] = args[0]
-        elif len(args) == 1 and np.shape(args[0]) == (4, 4):
+        elif len(args) == 1 and _shape(args[0]) == (3,):
+            X[:3, 3] = shaped("T", args[0], (3,))
+        elif len(args) == 1 and _shape(args[0]) == (4, 4):
             X[:3] = shaped("X", args[0], (4, 4))[:3]
         elif len(args) == 1:
             X[:3, :3] = rotation_matrix(args[0])
@@ -281,7 +284,10 @@ class Transform3s(Transform):
 
     def transform(self, v):
         """The image (3,) of a point (3,), or (n, 3) of (n, 3)."""
-        return np.asarray(v, dtype=np.float64) @ self._X[:3, :3].T + self._X[:3, 3]
+        points = checks.array("v", v, "(3,) or (n, 3)", InvalidArgument)
+        if points.ndim not in (1, 2) or points.shape[-1] != 3:
+            raise InvalidArgument(f"v must be (3,) or (n, 3), got {points.shape}")
+        return points @ self._X[:3, :3].T + self._X[:3, 3]
 
     def inverse(self):
         """The way back."""
@@ -298,10 +304,10 @@ class Transform3s(Transform):
         return self.inverse() * other
 
     def __mul__(self, other):
-        return Transform3s(self._X @ other._X)
+        return Transform3s(self._X @ of_kind("other", other, Transform)._X)
 
     def __imul__(self, other):
-        self._X[:] = self._X @ other._X
+        self._X[:] = self._X @ of_kind("other", other, Transform)._X
         return self
 
     def __eq__(self, other):
@@ -320,10 +326,18 @@ def rotation_matrix(R) -> np.ndarray:
     """
     if hasattr(R, "matrix"):
         R = R.matrix()
-    array = np.asarray(R, dtype=np.float64)
+    array = checks.array("a rotation", R, "(3, 3)", InvalidArgument)
     if array.shape != (3, 3):
         raise InvalidArgument(f"a rotation is a matrix (3, 3) or a quaternion, got {type(R).__name__} {array.shape}")
     return array
+
+
+def _shape(value) -> tuple[int, ...] | None:
+    """The shape of what has one; None of ragged rows."""
+    try:
+        return np.shape(value)
+    except ValueError:
+        return None
 
 
 def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:

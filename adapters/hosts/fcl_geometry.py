@@ -12,8 +12,10 @@ from collections.abc import Callable
 import numpy as np
 
 import collide as engine
+from collide import argument_checks as checks
 from collide.adapters.hosts.fcl_requests import NODE_TYPE, OBJECT_TYPE
-from collide.adapters.hosts.fcl_transform import Transform, quaternion_of, rotation_of, shaped
+from collide.adapters.hosts.fcl_transform import Transform, quaternion_of, rotation_of
+from collide.adapters.hosts.host_numbers import real, rows_of_three, shaped, whole
 from collide.adapters.hosts.posed_objects import HostGeometry, HostObject
 from collide.errors import InvalidArgument
 from collide.shapes.shape import Shape
@@ -77,7 +79,7 @@ class Box(CollisionGeometry):
     _node_type = NODE_TYPE.GEOM_BOX
 
     def __init__(self, x, y, z):
-        self.side = np.array([float(x), float(y), float(z)])
+        self.side = np.array([real(name, length) for name, length in zip("xyz", (x, y, z))])
 
     @property
     def side(self):
@@ -108,7 +110,7 @@ class Sphere(CollisionGeometry):
 
     @radius.setter
     def radius(self, value):
-        radius = float(value)
+        radius = real("radius", value)
         shape = engine.Sphere(radius) if radius != 0.0 else engine.ConvexHull([[0.0, 0.0, 0.0]])
         self._become([[-radius] * 3, [radius] * 3], shape)
         self._radius = radius
@@ -120,7 +122,7 @@ class Ellipsoid(CollisionGeometry):
     _node_type = NODE_TYPE.GEOM_ELLIPSOID
 
     def __init__(self, a, b, c):
-        self.radii = np.array([float(a), float(b), float(c)])
+        self.radii = np.array([real(name, length) for name, length in zip("abc", (a, b, c))])
 
     @property
     def radii(self):
@@ -141,15 +143,16 @@ class _Round(CollisionGeometry):
     _has_caps = False
 
     def __init__(self, radius, lz):
-        self._make(float(radius), float(lz))
+        self._make(radius, lz)
 
-    def _make(self, radius: float, lz: float) -> None:
+    def _make(self, radius, lz) -> None:
+        radius, lz = real("radius", radius), real("lz", lz)
         half = np.array([radius, radius, 0.5 * lz + (radius if self._has_caps else 0.0)])
         self._become([-half, half], self._kind(radius, lz))
         self._radius, self._lz = radius, lz
 
-    radius = property(lambda self: self._radius, lambda self, value: self._make(float(value), self._lz), doc="[m].")
-    lz = property(lambda self: self._lz, lambda self, value: self._make(self._radius, float(value)), doc="[m].")
+    radius = property(lambda self: self._radius, lambda self, value: self._make(value, self._lz), doc="[m].")
+    lz = property(lambda self: self._lz, lambda self, value: self._make(self._radius, value), doc="[m].")
 
 
 class Capsule(_Round):
@@ -180,7 +183,7 @@ class Convex(CollisionGeometry):
     _node_type = NODE_TYPE.GEOM_CONVEX
 
     def __init__(self, vertices, num_faces, faces):
-        points = np.array(vertices, dtype=np.float64)
+        points = rows_of_three("vertices", vertices)
         self._become([points.min(axis=0), points.max(axis=0)], engine.ConvexHull(points))
         self._num_faces = _checked_faces(faces, num_faces, len(points))
 
@@ -192,13 +195,13 @@ class Convex(CollisionGeometry):
 
 def _checked_faces(faces, num_faces, n_points: int) -> int:
     """How many faces a flat list holds, each led by the number of its corners. Raises InvalidArgument."""
-    values = np.asarray(faces)
-    width = int(values[0]) + 1 if values.ndim == 1 and len(values) else 0
-    if width > 3 and len(values) == width * int(num_faces) and values.dtype.kind in "iu":  # as a rule all are alike
+    values, num_faces = checks.whole_numbers("Convex: faces", faces), whole("Convex: num_faces", num_faces)
+    width = int(values[0]) + 1 if len(values) else 0
+    if width > 3 and len(values) == width * num_faces:  # as a rule all are alike
         rows = values.reshape(-1, width)
         if (rows[:, 0] == width - 1).all() and rows[:, 1:].min() >= 0 and rows[:, 1:].max() < n_points:
             return len(rows)
-    flat, at, count = [int(k) for k in faces], 0, 0
+    flat, at, count = values.tolist(), 0, 0
     while at < len(flat):
         corners = flat[at + 1 : at + 1 + flat[at]]
         if flat[at] < 3 or len(corners) != flat[at] or not all(0 <= k < n_points for k in corners):
@@ -207,7 +210,7 @@ def _checked_faces(faces, num_faces, n_points: int) -> int:
                 f"number of its corners, and there are {n_points} vertices"
             )
         at, count = at + 1 + flat[at], count + 1
-    if count != int(num_faces):
+    if count != num_faces:
         raise InvalidArgument(f"Convex: num_faces is {num_faces}, but faces holds {count}")
     return count
 
@@ -219,7 +222,7 @@ class _Flat(CollisionGeometry):
         self._set(n, d)
 
     def _set(self, n, d) -> None:
-        n, d = shaped("n", n, (3,)), float(d)
+        n, d = shaped("n", n, (3,)), real("d", d)
         length = float(np.linalg.norm(n))
         if not 0.0 < length < np.inf:
             raise InvalidArgument(f"{type(self).__name__}: n must be finite and not 0, got {n.tolist()}")
@@ -264,7 +267,7 @@ class CollisionObject(HostObject):
         if geom is not None and not isinstance(geom, CollisionGeometry):
             raise TypeError(f"geom must be a CollisionGeometry, got {type(geom).__name__}")
         if geom is None or geom._node_type is None:
-            raise ValueError("CollisionObject needs a geometry, such as Box(1, 1, 1)")
+            raise InvalidArgument("CollisionObject needs a geometry, such as Box(1, 1, 1)")
         self._geometry = geom
         self._watchers = ()
         self._X = np.eye(4) if tf is None else _matrix(tf).copy()
@@ -283,8 +286,7 @@ class CollisionObject(HostObject):
 
     def setTranslation(self, vec):
         """vec : (3,) [m]."""
-        is_vector = vec.__class__ is np.ndarray and vec.shape == (3,)
-        self._X[:3, 3] = vec if is_vector else shaped("vec", vec, (3,))
+        self._X[:3, 3] = shaped("vec", vec, (3,))
         for moved in self._watchers:
             moved.add(self)
 

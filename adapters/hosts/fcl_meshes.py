@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 import collide as engine
+from collide import argument_checks as checks
 from collide.adapters.hosts.fcl_geometry import CollisionGeometry
 from collide.adapters.hosts.fcl_requests import NODE_TYPE, OBJECT_TYPE
-from collide.adapters.hosts.fcl_transform import shaped
+from collide.adapters.hosts.host_numbers import real, shaped
 from collide.adapters.hosts.octomap_boxes import occupied_boxes, tree_of
 from collide.errors import InvalidArgument, UnsupportedQuery
 
@@ -64,7 +65,8 @@ class BVHModel(CollisionGeometry):
 
     def addVertex(self, x, y, z):
         """Coordinates [m] of a vertex. Returns True."""
-        self._add(np.array([[x, y, z]], dtype=np.float64), np.zeros((0, 3), dtype=np.int64))
+        vertex = [real(name, value) for name, value in zip("xyz", (x, y, z))]
+        self._add(np.array([vertex]), np.zeros((0, 3), dtype=np.int64))
         return True
 
     def addTriangle(self, v1, v2, v3):
@@ -75,11 +77,12 @@ class BVHModel(CollisionGeometry):
 
     def addSubModel(self, verts, triangles):
         """verts : (n, 3) [m].   triangles : (m, 3) rows of verts.   Returns True."""
-        vertices, facets = np.array(verts, dtype=np.float64), np.array(triangles)
+        vertices = np.array(checks.array("verts", verts, "(n, 3)", InvalidArgument))
+        facets = checks.plain_array("triangles", triangles, "(m, 3)", InvalidArgument)
         if vertices.ndim != 2 or vertices.shape[1] != 3 or facets.ndim != 2 or facets.shape[1] != 3:
-            raise ValueError(f"verts must be (n, 3) and triangles (m, 3), got {vertices.shape} and {facets.shape}")
+            raise InvalidArgument(f"verts must be (n, 3) and triangles (m, 3), got {vertices.shape} and {facets.shape}")
         if facets.dtype.kind not in "iu" or (facets.size and not 0 <= facets.min() <= facets.max() < len(vertices)):
-            raise ValueError(f"triangles must be integers within 0 … {len(vertices) - 1}")
+            raise InvalidArgument(f"triangles must be integers within 0 … {len(vertices) - 1}")
         self._add(vertices, facets.astype(np.int64))
         return True
 
@@ -114,8 +117,9 @@ class OcTree(CollisionGeometry):
     _node_type, _object_type = NODE_TYPE.GEOM_OCTREE, OBJECT_TYPE.OT_OCTREE
 
     def __init__(self, r, data):
-        values = data if isinstance(data, bytes | bytearray | memoryview) else [int(value) & 255 for value in data]
-        boxes = occupied_boxes(*tree_of(float(r), bytes(values)))
+        is_bytes = isinstance(data, bytes | bytearray | memoryview)
+        values = data if is_bytes else (checks.whole_numbers("OcTree: data", data) & 255).tolist()
+        boxes = occupied_boxes(*tree_of(real("OcTree: r", r), bytes(values)))
         if not boxes:
             raise UnsupportedQuery("OcTree: data holds no occupied box; leave the object out")
         middles = np.array([middle for middle, _ in boxes])

@@ -20,6 +20,7 @@ from collide.adapters.hosts.fcl_requests import (
     ContinuousCollisionRequest,
 )
 from collide.adapters.hosts.fcl_transform import Transform
+from collide.adapters.hosts.host_numbers import whole
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.query import collide as hits
 
@@ -72,7 +73,7 @@ def collide(o1, o2, request=None, result=None):
 
 def checked_limit(request: CollisionRequest) -> int:
     """How many contacts are wanted. Raises OverflowError, and UnsupportedQuery where cost sources are."""
-    limit = int(request.num_max_contacts)
+    limit = whole("num_max_contacts", request.num_max_contacts)
     if limit < 0:
         raise OverflowError("num_max_contacts must not be negative")
     if request.enable_cost:

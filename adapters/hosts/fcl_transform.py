@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide import argument_checks as checks
+from collide.adapters.hosts.host_numbers import real, shaped
+from collide.errors import InvalidArgument
+
 
 class Transform:
     """A rigid transform, kept as one pose (4, 4).
@@ -23,12 +27,10 @@ class Transform:
             X[:] = args[0]._X
             return
         if len(args) == 2:
-            translation = np.array(args[1], dtype=float).squeeze()
-            if translation.shape != (3,):
-                raise ValueError("Translation must be (3,).")
-            X[:3, 3] = translation
+            translation = checks.array("translation", args[1], "(3,)", InvalidArgument)
+            X[:3, 3] = shaped("translation", translation.squeeze(), (3,))
         if args:
-            data = np.array(args[0])
+            data = checks.array("the first argument of Transform", args[0], "(3, 3), (4,) or (3,)", InvalidArgument)
             if data.shape == (3, 3):
                 X[:3, :3] = data
             elif data.shape == (4,):
@@ -36,7 +38,7 @@ class Transform:
             elif data.shape == (3,) and len(args) == 1:
                 X[:3, 3] = data
             else:
-                raise ValueError("Invalid input to Transform().")
+                raise InvalidArgument(f"Transform takes (3, 3), (4,) or (3,) numbers, got shape {data.shape}")
 
     def getRotation(self):
         """The rotation, a copy (3, 3)."""
@@ -63,20 +65,12 @@ class Transform:
         self._X[:3, :3] = rotation_of(shaped("q", q, (4,)))
 
 
-def shaped(name: str, value, shape: tuple) -> np.ndarray:
-    """Numbers of this shape, float64. Raises ValueError."""
-    array = np.asarray(value, dtype=np.float64)
-    if array.shape != shape:
-        raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
-    return array
-
-
 def rotation_of(q) -> np.ndarray:
     """The rotation (3, 3) of a quaternion (4,) w, x, y, z of any length but 0."""
-    w, x, y, z = (float(value) for value in q)
+    w, x, y, z = (real("a quaternion", value) for value in q)
     square = w * w + x * x + y * y + z * z
     if not 0.0 < square < np.inf:
-        raise ValueError(f"a quaternion w, x, y, z must be finite and not 0, got {[w, x, y, z]}")
+        raise InvalidArgument(f"a quaternion w, x, y, z must be finite and not 0, got {[w, x, y, z]}")
     s = 2.0 / square
     return np.array([
         [1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],

@@ -24,7 +24,7 @@ from collide import World
 from collide.adapters.hosts.mujoco_geoms import Model, ModelTables, geom_shapes
 from collide.adapters.hosts.mujoco_layout import BOX, OURS, Layout, N, host
 from collide.adapters.hosts.mujoco_limits import max_contacts
-from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.errors import InvalidArgument, UnsupportedQuery, brief
 from collide.kernels.library import library_path
 from collide.kernels.mode import COMPILED, MODE, WHY
 from collide.scenes.loaders.mjcf_pairs import REASONS, filtered
@@ -71,7 +71,7 @@ def install(models: Any, mode: Literal["contacts", "cull"] = "contacts") -> Inst
     or of the flag MULTICCD, call `Installed.refresh`. Heights of a field may change freely.
     """
     if mode not in MODES:
-        raise InvalidArgument(f"install: mode must be one of {', '.join(map(repr, MODES))}, got {mode!r}")
+        raise InvalidArgument(f"install: mode must be one of {', '.join(map(repr, MODES))}, got {brief(mode)}")
     mujoco = host().mujoco
     listed = [models] if isinstance(models, mujoco.MjModel) else list(models) if isinstance(models, Iterable) else []
     if not listed or not all(isinstance(model, mujoco.MjModel) for model in listed):

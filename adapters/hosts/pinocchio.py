@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 import collide as engine
+from collide import argument_checks as checks
 from collide.adapters.hosts.coal_nearest import nearest
 from collide.adapters.hosts.coal_queries import collide_posed
 from collide.adapters.hosts.coal_requests import CollisionResult
@@ -168,7 +169,7 @@ def collides(model, data, geom_model, geom_data, Q) -> np.ndarray:
     """
     pin = _pinocchio()
     check_models(model, data, geom_model, geom_data)
-    Q = np.asarray(Q, dtype=np.float64)
+    Q = checks.array("Q", Q, f"(N, {model.nq})", InvalidArgument)
     if Q.ndim != 2 or Q.shape[1] != model.nq:
         raise InvalidArgument(f"Q must have shape (N, {model.nq}), the model's nq, got {Q.shape}")
     known = known_pairs(geom_model)
@@ -235,7 +236,7 @@ def _asked(model, data, geom_model, geom_data, q) -> tuple[KnownPairs, np.ndarra
     pin = _pinocchio()
     check_models(model, data, geom_model, geom_data)
     if q is not None:
-        q = np.asarray(q, dtype=np.float64)
+        q = checks.array("q", q, f"({model.nq},)", InvalidArgument)
         if q.shape != (model.nq,):
             raise InvalidArgument(f"q must have shape ({model.nq},), the model's nq, got {q.shape}")
     X = _placements(pin, model, data, geom_model, geom_data, q)

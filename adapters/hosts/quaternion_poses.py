@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide.adapters.hosts.host_numbers import shaped
+
 
 def pose_of(position, quaternion) -> np.ndarray:
     """(4, 4) pose of a position and a quaternion x, y, z, w."""
-    return poses_of(np.array([[*position, *quaternion]], dtype=np.float64))[0]
+    return poses_of(np.append(shaped("position", position, (3,)), shaped("orientation", quaternion, (4,)))[None])[0]
 
 
 def poses_of(coordinates: np.ndarray) -> np.ndarray:

@@ -7,10 +7,11 @@ import html
 import math
 import webbrowser
 
+from collide import argument_checks as checks
 from collide.adapters.live.event_server import LiveServer
 from collide.adapters.live.page_state import Limits, WorldState
 from collide.adapters.live.scene_of_world import SceneOfWorld, scene_of_world
-from collide.errors import InvalidArgument
+from collide.errors import InvalidArgument, brief
 from collide.world import World
 
 
@@ -85,17 +86,17 @@ class WorldViewer:
         self, world: World, *, clearance: float = 0.0, min_depth: float = 0.0, title: str = "World", port: int = 0,
         rate: float = 30.0,
     ) -> None:  # fmt: skip
-        if not isinstance(world, World):
-            raise InvalidArgument(f"view: world must be a collide.World, got {type(world).__name__}")
-        self._world, self._title = world, str(title)
-        self._limits = Limits(_length("clearance", clearance), _length("min_depth", min_depth))
-        if not (isinstance(rate, (int, float)) and 0 < rate < math.inf):
-            raise InvalidArgument(f"view: rate must be a number of moments a second above 0, got {rate!r}")
-        if not isinstance(port, int) or isinstance(port, bool):
-            raise InvalidArgument(f"view: port must be an integer, 0 for one that is free, got {port!r}")
+        self._world = checks.instance("view: world", world, World, "a collide.World")
+        self._title = checks.text("view: title", title)
+        self._limits = Limits(checks.length("view: clearance", clearance), checks.length("view: min_depth", min_depth))
+        moments = checks.number(rate)
+        if moments is None or not 0 < moments < math.inf:
+            raise InvalidArgument(f"view: rate must be a number of moments a second above 0, got {brief(rate)}")
+        if checks.integer("view: port", port, 0) > 65535:
+            raise InvalidArgument(f"view: port must be within 0 … 65535, 0 for one that is free, got {brief(port)}")
         scene = scene_of_world(world, self._title)
         self._drawn = _what_is_drawn(scene)
-        self._server = LiveServer(WorldState(scene, 0, self._limits), port, rate)
+        self._server = LiveServer(WorldState(scene, 0, self._limits), int(port), moments)
         atexit.register(self.close)
 
     @property
@@ -161,9 +162,3 @@ class WorldViewer:
 def _what_is_drawn(scene: SceneOfWorld) -> list[tuple]:
     """What a page cannot change by moving bodies. Shapes are immutable, and held here: no other has the id of one."""
     return [(body.name, body.shape, body.static, body.group, body.mask) for body in scene.bodies]
-
-
-def _length(name: str, value: float) -> float:
-    if not (isinstance(value, (int, float)) and 0 <= value < math.inf):
-        raise InvalidArgument(f"view: {name} must be finite and not negative [m], got {value!r}")
-    return float(value)

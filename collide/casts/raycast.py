@@ -15,14 +15,13 @@ from collide.casts.ray_facets import facets_met
 from collide.casts.ray_hits import RayEvents, RayHits, as_hits, in_order, joined
 from collide.casts.ray_parts import parts_met
 from collide.casts.ray_planes import planes_met
-from collide.errors import InvalidArgument
 from collide.lowering.facet_bodies import body_of
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import moved_pose
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
-from collide.shapes.shape import IDENTITY, Shape
+from collide.shapes.shape import IDENTITY, Shape, checked_shape
 from collide.transforms import poses_as_given
 
 
@@ -69,10 +68,7 @@ def raycast(
     1.5 to 2.5 µs a ray through 2,000 to 200,000 facets, about O(log n) for well-shaped ones. Rays that doubles leave
     open of polytopes and meshes (through edges, along facets) take 0.1 ms a facet to some milliseconds.
     """
-    if not isinstance(shape, Shape):
-        raise InvalidArgument(
-            f"raycast: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}"
-        )
+    checked_shape("raycast: shape", shape)
     limit = checks.limit("raycast: max_distance", max_distance, "")
     X_WA, single_pose = poses_as_given(X_WA, "X_WA", check=check_poses)
     origins, directions, single = checked_rays("raycast", origins_W, directions_W, X_WA=len(X_WA))

@@ -34,7 +34,7 @@ from __future__ import annotations
 from operator import index
 from typing import Any, NamedTuple
 
-from collide.errors import CollideError
+from collide.errors import CollideError, brief
 
 APART, TOGETHER, INSIDE, PLANE = "apart", "together", "inside", "plane"
 #: Stands for a body that names no vertex: a half-space, or the solid that holds the other body's vertex.
@@ -70,7 +70,8 @@ def read_certificates(values) -> list[Certificate]:
         return [Certificate(kind, index(i), index(j), _read_rows(kind, rows)) for kind, i, j, rows in values]
     except (TypeError, ValueError):
         raise CertificateRefused(
-            "a certificate is rows of (kind, part, part, pairs of vertex numbers), all numbers whole"
+            "a certificate is rows of (kind, part, part, pairs of vertex numbers), all numbers whole, got "
+            f"{brief(values)}"
         ) from None
 
 

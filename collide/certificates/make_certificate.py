@@ -14,7 +14,7 @@ from collide.certificates.mesh_proofs import ProofBody, flaw_of_inside_proof
 from collide.certificates.nearest_to_origin import nearest_vertex_pairs
 from collide.certificates.region_proofs import RegionCertificate, make_region_certificate
 from collide.certificates.verify import check_question
-from collide.errors import InvalidArgument
+from collide.errors import InvalidArgument, brief
 from collide.lowering.packed_convex import HALFSPACE
 from collide.numerics.exact_points import inner
 from collide.results import UNDECIDED, PairResult, question_of_row
@@ -52,9 +52,10 @@ def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates
     if not isinstance(r, PairResult):
         raise InvalidArgument(f"certify: r must be a PairResult, got {type(r).__name__}")
     X_WA, X_WB = as_poses(X_WA, "X_WA", check=False), as_poses(X_WB, "X_WB", check=False)
-    for name, batch in (("A", shapes_a), ("B", shapes_b), ("X_WA", X_WA), ("X_WB", X_WB)):
+    sides = {"A": (A, shapes_a), "B": (B, shapes_b), "X_WA": (X_WA, X_WA), "X_WB": (X_WB, X_WB)}
+    for name, (given, batch) in sides.items():
         if len(batch) not in (1, len(r)):
-            raise InvalidArgument(f"certify: {len(r)} results, but {name} has {len(batch)}")
+            raise InvalidArgument(f"certify: {len(r)} results, but {name} has {len(batch)}: {brief(given)}")
     questions = (question_of_row((A, B, X_WA, X_WB), k) for k in range(len(r)))
     certificates = [certificate_of_row(*question, row) for question, row in zip(questions, r.rows)]
     return certificates[0] if r.is_single else certificates

@@ -13,7 +13,7 @@ from collide.certificates.exact_parts import exact_parts
 from collide.certificates.mesh_proofs import flaw_of_mesh_certificates
 from collide.certificates.region_proofs import flaw_of_region_certificate
 from collide.errors import InvalidArgument
-from collide.shapes.shape import Shape
+from collide.shapes.shape import checked_shape
 from collide.transforms import as_poses
 
 
@@ -46,7 +46,10 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     check_question("verify", [A], [B], r)
     X_WA, X_WB = as_poses(X_WA, "X_WA", check=False), as_poses(X_WB, "X_WB", check=False)
     if len(X_WA) != 1 or len(X_WB) != 1 or len(r) != 1:
-        raise InvalidArgument("verify: one pair at one pose each; index a batch first")
+        raise InvalidArgument(
+            f"verify: X_WA and X_WB must be one pose each and r one result, got {X_WA.shape}, {X_WB.shape} and "
+            f"{len(r)}; index a batch first"
+        )
     certificate = r.certificate if certificate is None else certificate
     if certificate is None:
         raise InvalidArgument(
@@ -70,13 +73,9 @@ def check_question(caller: str, A, B, r) -> None:
     """Raises InvalidArgument where a sequence A or B holds what is no shape, or r is no result."""
     for name, shapes in (("A", A), ("B", B)):
         for shape in shapes:
-            if not isinstance(shape, Shape):
-                raise InvalidArgument(
-                    f"{caller}: {name} must be a shape, for example collide.Box((1, 1, 1)), "
-                    f"got {checks.describe(shape)}"
-                )
+            checked_shape(f"{caller}: {name}", shape)
     if not (hasattr(r, "hit") and hasattr(r, "__len__")):
-        raise InvalidArgument(f"{caller}: r must be a result of distance, got {checks.describe(r)}")
+        raise InvalidArgument(f"{caller}: r must be a result of distance, got {checks.brief(r)}")
 
 
 def _flaw_of_parts(A, B, X_WA, X_WB, certificates: Sequence[Certificate], claim: str) -> str | None:

@@ -103,7 +103,7 @@ def check_margin(name: str, value) -> float:
     """A margin [m]."""
     number = checks.number(value)
     if number is None or not 0.0 <= number <= _LARGEST_MARGIN:
-        raise InvalidArgument(f"{name}: margin must be finite and ≥ 0 [m], got {checks.describe(value)}")
+        raise InvalidArgument(f"{name}: margin must be finite and ≥ 0 [m], got {checks.brief(value)}")
     return number
 
 

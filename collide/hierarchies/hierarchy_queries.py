@@ -28,7 +28,7 @@ from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.convex_kernel_calls import finish_distances, number_of_poses, settle_proposals
 from collide.pair_arguments import asked_poses, pose_batch
 from collide.results import PAIR_DTYPE, PairResult
-from collide.shapes.shape import Shape
+from collide.shapes.shape import Shape, checked_shape
 from collide.transforms import as_poses
 
 
@@ -100,8 +100,6 @@ class Walks:
 
 def walk_body(shape: Shape, algorithm: str = "barba-langerman") -> WalkBody:
     """What the walk keeps of a shape, made once. Raises UnsupportedQuery for all but polytopes."""
-    if not isinstance(shape, Shape):
-        raise InvalidArgument(f'algorithm="{algorithm}" takes two shapes, got {type(shape).__name__}')
     try:
         return shape._walk
     except AttributeError:
@@ -138,8 +136,8 @@ def walk(A, B, X_WA, X_WB, *, check_poses: bool = True, trace: bool = False) -> 
     Raises InvalidPose, InvalidArgument; UnsupportedQuery for other shapes. O(log n + log m) rounds a pose (L. Barba and
     S. Langerman, "Optimal detection of intersections between convex polyhedra", SODA 2015, Theorem 5.8).
     """
-    for shape in (A, B):
-        walk_body(shape)
+    for name, shape in (("A", A), ("B", B)):
+        walk_body(checked_shape(f"walk: {name}", shape))
     X_WA, X_WB, _, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
     trace = checks.true_or_false("trace", trace)
     return walk_poses(A, B, X_WA, X_WB, lambda ids: ask_default(ids, True, 0.0), trace=trace)
@@ -155,8 +153,8 @@ def collide_by_walk(A, B, X_WA, X_WB, check_poses: bool):
 def distance_by_descent(A, B, X_WA, X_WB, check_poses: bool, signed: bool) -> PairResult:
     """``distance(..., algorithm="dobkin-kirkpatrick")``: gaps down the hierarchies, depths by the default
     narrowphase."""
-    for shape in (A, B):
-        walk_body(shape, "dobkin-kirkpatrick")
+    for name, shape in (("A", A), ("B", B)):
+        walk_body(checked_shape(f"distance: {name}", shape), "dobkin-kirkpatrick")
     X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
     rows = rows_down_hierarchies(A, B, X_WA, X_WB, lambda ids: ask_default(ids, False, math.inf, signed))
     finish_distances(rows, depths=signed)

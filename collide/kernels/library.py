@@ -72,6 +72,14 @@ def exists() -> bool:
     return _built() is not None
 
 
+def fits_sources() -> bool:
+    """Whether the sources are, byte by byte, those that the library was made from. False where there is none."""
+    built = _built()
+    with suppress(OSError):  # a source that has moved since
+        return built is not None and sources.fingerprint(built.SOURCE_FILES) == built.SOURCES
+    return False
+
+
 def about() -> dict[str, str]:
     """What it was made from: ``level``, ``levels``, ``compiler``, ``sources`` (a hash), ``path``; {} where none is."""
     built = _built()
@@ -142,9 +150,8 @@ def _edited(built: Any) -> frozenset[str]:
     """
     if not os.path.exists(os.path.join(sources.PACKAGE, "results.py")):
         return frozenset()
-    with suppress(OSError):
-        if sources.fingerprint(built.SOURCE_FILES) == built.SOURCES:
-            return frozenset()
+    if fits_sources():
+        return frozenset()
     hashes = sources.entry_hashes()
     return frozenset(name for name, known in hashes.items() if built.ENTRIES.get(name) != known)
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collide.argument_checks import array, describe
-from collide.errors import InvalidArgument
+from collide.argument_checks import array
+from collide.errors import InvalidArgument, brief
 from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
 
 #: Dimensions answered: what integers do grows with d³, and the numbers of digits with d.
@@ -80,7 +80,7 @@ def read_points(points: ArrayLike) -> tuple[np.ndarray, float]:
             f"meets: points must be (n, d) with 1 ≤ d ≤ {MAX_DIMENSION}, got {read.shape}: project what has more"
         )
     if not len(read):
-        raise InvalidArgument("meets: no points: CH of nothing is empty; hand in at least one")
+        raise InvalidArgument(f"meets: points is empty, {read.shape}: CH of nothing is empty; hand in at least one")
     return np.ascontiguousarray(read), _largest("points", read)
 
 
@@ -93,9 +93,9 @@ def read_halfspaces(normals: ArrayLike, offsets: ArrayLike, d: int) -> tuple[np.
             f"meets: normals must be (m, d) with m ≥ 1, got {a.shape}: without half-spaces every point is inside"
         )
     if a.shape[1] != d:
-        raise InvalidArgument(f"meets: points have {d} coordinates, normals {a.shape[1]}: give both the same")
+        raise InvalidArgument(f"meets: points are (n, {d}), but normals {a.shape}: give both as many columns")
     if b.shape != (len(a),):
-        raise InvalidArgument(f"meets: offsets must be ({len(a)},), one a normal, got {b.shape}")
+        raise InvalidArgument(f"meets: offsets must be ({len(a)},), one a row of normals {a.shape}, got {b.shape}")
     _largest("normals", a)
     _largest("offsets", b)
     sizes, offset_sizes = np.abs(a[:, 0]), np.abs(b)
@@ -104,13 +104,13 @@ def read_halfspaces(normals: ArrayLike, offsets: ArrayLike, d: int) -> tuple[np.
     k = int(sizes.argmin())
     if sizes[k] < SMALLEST_NORMAL:
         complaint = "is zero and names no half-space" if sizes[k] == 0.0 else f"is shorter than {SMALLEST_NORMAL:g}"
-        raise InvalidArgument(f"meets: normals[{k}] {complaint}, got {describe(a[k].tolist())}")
+        raise InvalidArgument(f"meets: normals[{k}] {complaint}, got {brief(a[k].tolist())}")
     far = offset_sizes > LARGEST * np.minimum(sizes, 1.0)
     if far.any():
         k = int(np.argmax(far))
         raise InvalidArgument(
             f"meets: half-space {k} is farther than {LARGEST:g} from the origin: offset {b[k]:g}, normal "
-            f"{describe(a[k].tolist())}"
+            f"{brief(a[k].tolist())}"
         )
     return np.ascontiguousarray(a), np.ascontiguousarray(b), sizes
 

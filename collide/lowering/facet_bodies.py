@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as checks
-from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.errors import UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.kinds import WITH_FACETS, kind_of
 from collide.lowering.packed_convex import HALFSPACE
@@ -22,7 +21,7 @@ from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import REACH, MeshTree
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
-from collide.shapes.shape import Shape, held_by, kept_with_shape
+from collide.shapes.shape import Shape, checked_shape, held_by, kept_with_shape
 
 
 class Body(NamedTuple):
@@ -87,29 +86,25 @@ def body_of(shape: Shape) -> Body:
     return _of_mesh(shape) if isinstance(shape, Mesh) else _of_convex(shape)
 
 
-def facet_body(shape, caller: str) -> Body:
-    """The body of a shape that is facets and no more, for a question about facets.
+def facet_body(shape, what: str) -> Body:
+    """The body of a shape that is facets and no more, for a question about facets. what : "overlay: A", for messages.
 
     Raises InvalidArgument for what is no shape, UnsupportedQuery for curved shapes, unions and half-spaces, by name.
     """
-    if not isinstance(shape, Shape):
-        raise InvalidArgument(
-            f"{caller}: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}"
-        )
-    name = type(shape).__name__
+    name = type(checked_shape(what, shape)).__name__
     if is_halfspace(shape):
-        raise UnsupportedQuery(f"{caller}: {name} has no facets; a large Box can stand in")
+        raise UnsupportedQuery(f"{what}: {name} has no facets; a large Box can stand in")
     if isinstance(shape, Compound):
-        raise UnsupportedQuery(f"{caller}: {name} is a union; ask for each of its items")
+        raise UnsupportedQuery(f"{what}: {name} is a union; ask for each of its items")
     if not has_facets(shape):
         raise UnsupportedQuery(
-            f"{caller}: {name} has no facets of doubles: its surface is curved, or its corners are rounded; "
+            f"{what}: {name} has no facets of doubles: its surface is curved, or its corners are rounded; "
             "a ConvexHull around it, or a Mesh, can stand in"
         )
     body = body_of(shape)
     if body.radius > 0.0:
         raise UnsupportedQuery(
-            f"{caller}: {name} is rounded and has no facets; a Mesh or ConvexHull near it can stand in"
+            f"{what}: {name} is rounded and has no facets; a Mesh or ConvexHull near it can stand in"
         )
     return body
 

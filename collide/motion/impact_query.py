@@ -139,14 +139,15 @@ def poses_in_motion(
     array = checks.array("poses_in_motion: time", time, "() or (N,)", InvalidArgument)
     times = np.ascontiguousarray(array.reshape(-1))
     if array.ndim > 1 or not (np.isfinite(times).all() and (times >= 0.0).all() and (times <= 1.0).all()):
-        raise InvalidArgument(f"poses_in_motion: time must be numbers within 0 … 1, got {checks.describe(time)}")
+        raise InvalidArgument(f"poses_in_motion: time must be numbers within 0 … 1, got {checks.brief(time)}")
     counts = {"X_WA0": len(X0), "X_WA1": len(X1), "time": len(times)}
     if omega is not None:
         counts["omega_WA"] = len(omega)
     matched_counts(None, None, counts)
     placed, misfit = poses_at(X0, X1, omega, times)
     if misfit > _LARGEST_MISFIT:
-        raise InvalidArgument(_leads_elsewhere("omega_WA", "X_WA0", "X_WA1", omega is not None))
+        name = f"omega_WA {checks.brief(omega_WA)}"
+        raise InvalidArgument(_leads_elsewhere(name, "X_WA0", "X_WA1", omega is not None))
     return placed[0] if single0 and single1 and single_omega and array.ndim == 0 else placed
 
 
@@ -207,7 +208,7 @@ def _checked_tolerance(tolerance) -> float:
     if read is None or not least <= read <= largest:
         raise InvalidArgument(
             f"tolerance must be a width of the bracket within {least:g} … {largest:g}, in units of the motion's time, "
-            f"got {checks.describe(tolerance)}"
+            f"got {checks.brief(tolerance)}"
         )
     return read
 
@@ -240,6 +241,7 @@ def _checked_omega(omega, name: str) -> tuple[np.ndarray | None, bool]:
 
 
 def _leads_elsewhere(name: str, start: str, end: str, has_omega: bool) -> str:
+    """What poses lack that no motion joins. name : of the angular velocity, with its value where there is one."""
     if has_omega:
         return f"{name} does not turn {start} into the orientation of {end}; collide.moved_poses makes end poses"
     return f"no rotation turns {start} into {end}: both must be rotations to 1e-4"
@@ -389,7 +391,9 @@ def _refuse(question: _Question, rows: np.ndarray) -> None:
         motions = question.motions
         has_omega = motions.omega_WA is not None or motions.omega_WB is not None
         kind = InvalidArgument if has_omega else InvalidPose
-        where = _leads_elsewhere("omega_WA or omega_WB", "the first pose", "the second", has_omega)
+        given = (("omega_WA", motions.omega_WA), ("omega_WB", motions.omega_WB))
+        names = (f"{name} {omega[k % len(omega)].tolist()}" for name, omega in given if omega is not None)
+        where = _leads_elsewhere(" or ".join(names), "the first pose", "the second", has_omega)
         raise kind(f"motion {k}: {where}")
     raise UnsupportedQuery(
         f"motion {k}: a pair whose shapes and distance together measure less than {SMALLEST:g} m is out of range; "

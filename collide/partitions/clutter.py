@@ -44,7 +44,7 @@ def clutter(mesh: Mesh, cubes: int = 200, seed: int = 0) -> Clutter:
     graphs", lemma 5.1). O(n) a cube.
     """
     if not isinstance(mesh, Mesh):
-        raise InvalidArgument(f"clutter: mesh must be a collide.Mesh, got {checks.describe(mesh)}")
+        raise InvalidArgument(f"clutter: mesh must be a collide.Mesh, got {checks.brief(mesh)}")
     cubes, seed = checks.integer("clutter: cubes", cubes, 1), checks.integer("clutter: seed", seed, 0)
     rng = np.random.default_rng(seed)
     corners = mesh.vertices[mesh.faces]

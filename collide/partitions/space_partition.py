@@ -219,7 +219,7 @@ class SpacePartition:
         InvalidArgument : no box for free space, or one that is none.
         """
         if not isinstance(inside, (bool, np.bool_)):
-            raise InvalidArgument(f"convex_pieces: inside must be True or False, got {checks.describe(inside)}")
+            raise InvalidArgument(f"convex_pieces: inside must be True or False, got {checks.brief(inside)}")
         if box is None and not inside:
             raise InvalidArgument("convex_pieces: free space has no end; give box=(low, high), two corners of a box")
         low, high = self._box("convex_pieces", box)
@@ -254,7 +254,9 @@ class SpacePartition:
         that touch in an edge or a corner there is none.
         """
         if not isinstance(cells, ConvexCells) or cells.source.tree is not self._tree:
-            raise InvalidArgument("portals: cells must come from cells() or convex_pieces() of this partition")
+            raise InvalidArgument(
+                f"portals: cells must come from cells() or convex_pieces() of this partition, got {checks.brief(cells)}"
+            )
         tree, leaves, low, high, whole = cells.source
         row = np.full(tree.n_leaves, -1)
         row[cells.cell] = np.arange(len(cells))
@@ -279,7 +281,7 @@ class SpacePartition:
         if len(corners) != 2 or not (corners[0] < corners[1]).all() or np.abs(corners).max() > LARGEST:
             raise InvalidArgument(
                 f"{caller}: box must be (low, high), corners [m] with low < high within {LARGEST:g}, "
-                f"got {checks.describe(box)}"
+                f"got {checks.brief(box)}"
             )
         return corners[0], corners[1]
 
@@ -287,7 +289,7 @@ class SpacePartition:
 def _check_mesh(mesh) -> None:
     if not isinstance(mesh, Mesh):
         raise InvalidArgument(
-            f"SpacePartition: mesh must be a collide.Mesh, got {checks.describe(mesh)}; "
+            f"SpacePartition: mesh must be a collide.Mesh, got {checks.brief(mesh)}; "
             "collide.Mesh(*collide.tessellate(shape)[:2]) makes one of a shape"
         )
     if not mesh.solid:

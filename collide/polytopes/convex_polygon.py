@@ -116,8 +116,8 @@ def planar_pose(xy: ArrayLike = (0.0, 0.0), angle: float = 0.0) -> np.ndarray:
     radians = checks.number(angle)
     if position.shape != (2,) or radians is None or not np.isfinite(radians):
         raise InvalidPose(
-            f"planar_pose: xy must be (2,) and angle a finite number, got {checks.describe(xy)} and "
-            f"{checks.describe(angle)}"
+            f"planar_pose: xy must be (2,) and angle a finite number, got {checks.brief(xy)} and "
+            f"{checks.brief(angle)}"
         )
     c, s = np.cos(radians), np.sin(radians)
     X = np.array([[c, -s, position[0]], [s, c, position[1]], [0.0, 0.0, 1.0]])

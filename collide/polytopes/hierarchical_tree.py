@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collide.argument_checks import integer, true_or_false
-from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.errors import InvalidArgument, UnsupportedQuery, brief
 from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
 from collide.least_distance.input_rows import read_halfspaces, read_points
 from collide.least_distance.interior_point import interior_point
@@ -87,7 +87,11 @@ class HierarchicalTree:
             cloud, _ = read_points(points)
             self.points = cloud
         elif points is not None or normals is None or offsets is None:
-            raise InvalidArgument("HierarchicalTree: give either points, or normals with offsets")
+            given = {"points": points, "normals": normals, "offsets": offsets}
+            raise InvalidArgument(
+                "HierarchicalTree: give either points, or normals with offsets, got "
+                + ", ".join(f"{name} {brief(value)}" for name, value in given.items())
+            )
         else:
             shape = np.asarray(normals).shape
             self.normals, self.offsets, _ = read_halfspaces(normals, offsets, shape[1] if len(shape) == 2 else 0)

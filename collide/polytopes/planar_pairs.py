@@ -77,7 +77,7 @@ def _polygons(side, name: str):
         return list(side)
     raise InvalidArgument(
         f"{name} must be a ConvexPolygon or a list of them, for example collide.ConvexPolygon([(0, 0), (1, 0), (0, 1)])"
-        f", got {checks.describe(side)}"
+        f", got {checks.brief(side)}"
     )
 
 
@@ -131,7 +131,7 @@ class PolygonHits:
         """
         if not checks.is_integer(k) or not 0 <= k < len(self._rows):
             raise InvalidArgument(
-                f"certificate: k must be an integer from 0 to {len(self._rows) - 1}, got {checks.describe(k)}"
+                f"certificate: k must be an integer from 0 to {len(self._rows) - 1}, got {checks.brief(k)}"
             )
         return certificate_of_row(*self._question.pair(k), self._rows[k].tolist())
 

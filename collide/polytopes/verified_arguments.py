@@ -19,8 +19,8 @@ def as_points(caller: str, points: ArrayLike) -> np.ndarray:
 
 def as_halfspaces(caller: str, normals: ArrayLike, offsets: ArrayLike, d: int) -> tuple[np.ndarray, np.ndarray]:
     """(m, d) and (m,) finite float64, m at least 1. Raises InvalidArgument."""
-    a = _finite(f"{caller}: normals", normals, (None, d))
-    return a, _finite(f"{caller}: offsets", offsets, (len(a),))
+    a = _finite(f"{caller}: normals of points with {d} coordinates", normals, (None, d))
+    return a, _finite(f"{caller}: offsets of normals {a.shape}", offsets, (len(a),))
 
 
 def as_matrix(caller: str, name: str, X: ArrayLike | None, n: int) -> list[list[Fraction]]:
@@ -41,5 +41,5 @@ def _finite(what: str, value: ArrayLike, shape: tuple[int | None, ...]) -> np.nd
     if not fits or not read.size:
         raise InvalidArgument(f"{what} must have shape {wanted}, got {read.shape}")
     if not np.isfinite(read).all():
-        raise InvalidArgument(f"{what} must be finite, got {checks.describe(read[~np.isfinite(read)][0])}")
+        raise InvalidArgument(f"{what} must be finite, got {checks.brief(read[~np.isfinite(read)][0])}")
     return read

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import math
 import platform
 import time
 from collections.abc import Iterable, Iterator
@@ -15,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 import collide
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.kernels import mode
 from collide.reports import classes, overlap_volumes, proofs
@@ -134,7 +134,7 @@ def make(
     InvalidArgument : clearance or min_depth is negative or not finite; a body to ignore is not in the scene.
     CollideError : whatever the World refuses.
     """
-    clearance, min_depth = _length("clearance", clearance), _length("min_depth", min_depth)
+    clearance, min_depth = checks.length("clearance", clearance), checks.length("min_depth", min_depth)
     ignored = [_known_pair(scene, pair) for pair in ignore]
     if ignored:
         scene = without(scene, ignored)
@@ -205,16 +205,6 @@ def _ask(scene, limit: float):
     names = world.names
     unanswered = [{"a": names[a], "b": names[b], "why": why} for a, b, why in refused]
     return world, world.distances(max_distance=limit), unanswered
-
-
-def _length(name: str, value: float) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise InvalidArgument(f"{name} must be a number of metres, got {value!r}") from None
-    if not (math.isfinite(number) and number >= 0):
-        raise InvalidArgument(f"{name} must be finite and not negative [m], got {value!r}")
-    return number
 
 
 # --- everything around the pairs ----------------------------------------------------------------

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.errors import InvalidArgument, SceneError, UnsupportedQuery
+from collide.errors import InvalidArgument, SceneError, UnsupportedQuery, brief
 from collide.reports import classes
 from collide.reports.number_format import brief_length, count
 from collide.reports.progress import silent
@@ -51,7 +51,7 @@ def sample(scene, trajectory, resolution: float = RESOLUTION) -> Path:
     Raises InvalidArgument for a resolution that is not above 0, SceneError for joints that no robot has.
     """
     if not (math.isfinite(resolution) and resolution > 0):
-        raise InvalidArgument(f"resolution must be above 0 [rad or m], got {resolution!r}")
+        raise InvalidArgument(f"resolution must be above 0 [rad or m], got {brief(resolution)}")
     corners, notes = _corners(scene, trajectory)
     steps = np.max([np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0) for q in corners.values()], axis=0)
     if not steps.sum() / resolution <= MAX_SAMPLES:

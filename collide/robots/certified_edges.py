@@ -88,8 +88,8 @@ def sampled_collision(
     if n_halvings is None and needed.max(initial=0) > _MAX_HALVINGS:
         k = int(needed.argmax())
         raise InvalidArgument(
-            f"RobotChecker: motion {k} changes a column by {change[k]:g} [rad or m]: in steps of {step:g} that is more "
-            f"than 2^{_MAX_HALVINGS} samples; take a larger resolution"
+            f"RobotChecker: from Q0 to Q1, motion {k} changes a column by {change[k]:g} [rad or m]: in steps of "
+            f"{step:g} that is more than 2^{_MAX_HALVINGS} samples; take a larger resolution"
         )
     if n_halvings is not None:
         needed = np.minimum(needed, n_halvings)

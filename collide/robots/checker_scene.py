@@ -34,9 +34,9 @@ class CheckerScene:
         mobile: bool,
     ):  # fmt: skip
         if not isinstance(robot, Robot):
-            raise InvalidArgument(f"RobotChecker: robot must be a collide.Robot, got {checks.describe(robot)}")
+            raise InvalidArgument(f"RobotChecker: robot must be a collide.Robot, got {checks.brief(robot)}")
         if world is not None and not isinstance(world, World):
-            raise InvalidArgument(f"RobotChecker: world must be a collide.World, got {checks.describe(world)}")
+            raise InvalidArgument(f"RobotChecker: world must be a collide.World, got {checks.brief(world)}")
         self.robot, self.world = robot, World() if world is None else world
         self._X_WR = np.eye(4) if X_WR is None else as_pose(X_WR, "RobotChecker: X_WR").copy()
         attached = checks.listed_entries("RobotChecker: attached", attached, "tuples (name, link, shape, X_LB)")
@@ -92,7 +92,7 @@ class CheckerScene:
         bodies, around = self.bodies, self.around
         a = checks.checked_index("RobotChecker.names_of: a", a, len(bodies))
         if checks.is_integer(b) and b < 0:
-            return bodies[a], around[checks.checked_index("RobotChecker.names_of: −1 − b", -1 - b, len(around))]
+            return bodies[a], around[len(around) - 1 - checks.checked_index("RobotChecker.names_of: b", b, len(around))]
         return bodies[a], bodies[checks.checked_index("RobotChecker.names_of: b", b, len(bodies))]
 
     def link_poses(self, q) -> np.ndarray:

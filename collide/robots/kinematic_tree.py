@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.errors import SceneError, cut, listing
+from collide.errors import SceneError, brief, cut, listing
 from collide.transforms import as_poses
 
 #: Columns of ``q`` by joint type.
@@ -91,7 +91,7 @@ def checked_joint(joint: Joint, links: Mapping[str, int]) -> Joint:
 def tree_of(links: Sequence[str], joints: Sequence[Joint]) -> tuple[str, list[Joint]]:
     """The root link and the joints sorted so that parents come before children."""
     if not links:
-        raise SceneError("the robot has no links")
+        raise SceneError(f"the robot has no links, got {brief(links)}")
     above: dict[str, Joint] = {}
     for joint in joints:
         if joint.child in above:

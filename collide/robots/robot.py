@@ -246,7 +246,8 @@ class Robot:
                 q[column[name]] = value
             elif name not in by_name or by_name[name].type in ("planar", "floating"):
                 raise InvalidArgument(
-                    f"robot {self.name}: unknown joint {brief(name)}; it has {listing(self.joint_names) or 'no joints'}"
+                    f"robot {self.name}: values name an unknown joint {brief(name)}; it has "
+                    f"{listing(self.joint_names) or 'no joints'}"
                 )
             elif by_name[name].mimic is not None:
                 followers.append((by_name[name], value))
@@ -308,7 +309,7 @@ class Robot:
         """
         if checks.text("Robot.joint_value: name", name) not in self._drivers:
             raise InvalidArgument(
-                f"robot {self.name}: no joint {brief(name)} moves along one coordinate; there are "
+                f"robot {self.name}: no joint of the name {brief(name)} moves along one coordinate; there are "
                 f"{listing(self._drivers) or 'none'}"
             )
         return self._value_at(name, self._one_configuration("q", q))
@@ -438,13 +439,15 @@ class Robot:
             f'look at the origin of joint "{cut(joint.name)}"{follows} and at its value{value}'
         )
 
-    def checked_configurations(self, q) -> np.ndarray:
+    def checked_configurations(self, q, name: str = "q") -> np.ndarray:
         """Configurations as an array.
 
         Parameters
         ----------
         q : (dof,) or (N, dof) array_like
             [rad or m].
+        name : str
+            How messages call the argument.
 
         Returns
         -------
@@ -455,17 +458,18 @@ class Robot:
         InvalidArgument
             For another number of columns; for values that are not finite, naming row and joint.
         """
-        array = checks.array("q", q, f"({self.dof},) or (N, {self.dof})", InvalidArgument)
+        array = checks.array(name, q, f"({self.dof},) or (N, {self.dof})", InvalidArgument)
         if array.ndim not in (1, 2) or array.shape[-1] != self.dof:
             raise InvalidArgument(
-                f"q must have shape ({self.dof},) or (N, {self.dof}), one column for each of "
+                f"{name} must have shape ({self.dof},) or (N, {self.dof}), one column for each of "
                 f"{listing(self.joint_names) or 'no joints'}; got {array.shape}"
             )
         array = array if array.ndim == 2 else array[None]
         bad = np.argwhere(~np.isfinite(array))
         if len(bad):
             row, col = bad[0]
-            raise InvalidArgument(f"q[{row}], joint {self.joint_names[col]}, is {array[row, col]}: it must be finite")
+            joint = self.joint_names[col]
+            raise InvalidArgument(f"{name}[{row}], joint {joint}, is {array[row, col]}: it must be finite")
         return array
 
     # --- pairs -----------------------------------------------------------------------------------
@@ -566,7 +570,7 @@ def _checked_pairs(pairs) -> tuple[tuple[str, str, str], ...]:
              for pair in checks.listed_entries("Robot: semantic_pairs", pairs, wanted, SceneError)]  # fmt: skip
     for pair in checked:
         if len(pair) != 3 or not all(isinstance(word, str) for word in pair):
-            raise SceneError(f"Robot: semantic_pairs must be {wanted}, got {checks.describe(pair)}")
+            raise SceneError(f"Robot: semantic_pairs must be {wanted}, got {brief(pair)}")
     return tuple((a, b, reason) for a, b, reason in checked)
 
 

@@ -86,13 +86,13 @@ def _checked_object(robot: Robot, number: Mapping[str, int], values) -> Attached
             "attached must be objects (name, link, shape, X_LS, touch), the last two optional; got " + brief(values)
         ) from None
     if not isinstance(item.name, str) or not item.name:
-        raise InvalidArgument(f"attached: a name must be a non-empty string, got {checks.describe(item.name)}")
+        raise InvalidArgument(f"attached: a name must be a non-empty string, got {brief(item.name)}")
     if item.link not in number:
         raise InvalidArgument(
             f'attached "{cut(item.name)}": {robot.name} has no link {brief(item.link)}; it has {listing(robot.links)}'
         )
     if not isinstance(item.shape, Shape):
-        raise InvalidArgument(f'attached "{cut(item.name)}": not a shape but {checks.describe(item.shape)}')
+        raise InvalidArgument(f'attached "{cut(item.name)}": not a shape but {brief(item.shape)}')
     X_LS = np.eye(4) if item.X_LS is None else as_pose(item.X_LS, f'attached "{cut(item.name)}": X_LS').copy()
     return item._replace(X_LS=X_LS, touch=tuple([item.touch] if isinstance(item.touch, str) else item.touch))
 
@@ -110,7 +110,7 @@ def _padding_of(padding, names: set[str]) -> dict[str, float]:
 def _checked_padding(what: str, value) -> float:
     length = checks.number(value)
     if length is None or not 0.0 <= length < 1e6:
-        raise InvalidArgument(f"{what} must be a length [m], 0 or more, got {checks.describe(value)}")
+        raise InvalidArgument(f"{what} must be a length [m], 0 or more, got {brief(value)}")
     return length
 
 

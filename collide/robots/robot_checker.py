@@ -92,7 +92,7 @@ class RobotChecker(CheckerScene):
         """
         if not hasattr(scene, "placements"):
             raise InvalidArgument(
-                f"RobotChecker.from_scene: scene must be what collide.scenes.load gives, got {checks.describe(scene)}"
+                f"RobotChecker.from_scene: scene must be what collide.scenes.load gives, got {brief(scene)}"
             )
         if robot is not None:
             checks.text("RobotChecker.from_scene: robot", robot)
@@ -250,9 +250,10 @@ class RobotChecker(CheckerScene):
         InvalidArgument
             For anything but one configuration.
         """
-        q, is_single = self._configurations(q)
+        q, is_single = self._configurations(q, "q")
         if not is_single:
-            raise InvalidArgument(f"RobotChecker.explain: one configuration ({self.robot.dof},), got {q.shape}")
+            wanted = f"one configuration ({self.robot.dof},)"
+            raise InvalidArgument(f"RobotChecker.explain: q must be {wanted}, got {q.shape}")
         self.prepare()
         return ConfigurationReport.of(self, q[0])
 
@@ -270,18 +271,18 @@ class RobotChecker(CheckerScene):
         q, _ = self._configurations(Q)
         return self.robot.within_limits(q)
 
-    def _configurations(self, Q) -> tuple[np.ndarray, bool]:
+    def _configurations(self, Q, name: str = "Q") -> tuple[np.ndarray, bool]:
         """((N, dof) C-contiguous, whether a single one was given). Raises InvalidArgument."""
-        q = np.ascontiguousarray(self.robot.checked_configurations(Q))
+        q = np.ascontiguousarray(self.robot.checked_configurations(Q, name))
         return q, np.ndim(Q) == 1
 
     def _edges(self, Q0, Q1) -> tuple[np.ndarray, np.ndarray]:
-        q0, q1 = self._configurations(Q0)[0], self._configurations(Q1)[0]
+        q0, q1 = self._configurations(Q0, "Q0")[0], self._configurations(Q1, "Q1")[0]
         n = checks.matched_count("RobotChecker: edges", Q0=len(q0), Q1=len(q1))
         return tuple(np.ascontiguousarray(np.broadcast_to(q, (n, q.shape[1]))) for q in (q0, q1))  # type: ignore
 
 def _positive(what: str, value) -> float:
     number = checks.number(value)
     if number is None or not 0.0 < number < math.inf:
-        raise InvalidArgument(f"{what} must be a positive number [rad or m], got {checks.describe(value)}")
+        raise InvalidArgument(f"{what} must be a positive number [rad or m], got {brief(value)}")
     return number

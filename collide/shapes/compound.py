@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.errors import InvalidShape
+from collide.errors import InvalidShape, brief
 from collide.shapes.shape import Shape
 from collide.transforms import as_pose
 
@@ -43,9 +43,11 @@ class Compound(Shape):
         try:
             pairs = [(shape, X) for shape, X in items]
         except (TypeError, ValueError):
-            raise InvalidShape("Compound: items must be a sequence of (shape, pose) pairs") from None
+            raise InvalidShape(
+                f"Compound: items must be a sequence of (shape, pose) pairs, got {brief(items)}"
+            ) from None
         if not pairs:
-            raise InvalidShape("Compound: items is empty; at least one (shape, pose) is needed")
+            raise InvalidShape(f"Compound: items is empty, {brief(items)}; at least one (shape, pose) is needed")
         items = tuple(_check_item(k, shape, X) for k, (shape, X) in enumerate(pairs))
         self._store(items=items, meshed=any(shape.meshed for shape, _ in items))
 

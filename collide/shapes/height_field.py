@@ -119,13 +119,13 @@ class HeightField(Mesh):
         """
         numbers = checks.plain_array("HeightField.cells_of: facets", facets, "(…,) of int", InvalidArgument)
         if numbers.dtype.kind not in "iu" and numbers.size:
-            raise InvalidArgument(f"HeightField.cells_of: facets must be integers, got {checks.describe(facets)}")
+            raise InvalidArgument(f"HeightField.cells_of: facets must be integers, got {checks.brief(facets)}")
         numbers = numbers.astype(np.int64)
         outside = (numbers < -1) | (numbers >= len(self.faces))
         if outside.any():
             raise InvalidArgument(
-                f"HeightField.cells_of: facet {int(numbers[outside][0])} is none of 0 … {len(self.faces) - 1}, nor −1 "
-                "for none"
+                f"HeightField.cells_of: facets: {int(numbers[outside][0])} is none of 0 … {len(self.faces) - 1}, "
+                "nor −1 for none"
             )
         row_count, columns = self.heights.shape[0] - 1, self.heights.shape[1] - 1
         on_top = (numbers >= 0) & (numbers < 2 * row_count * columns)

@@ -75,7 +75,12 @@ class HPolytope(Shape):
 
     def __init__(self, normals: ArrayLike, offsets: ArrayLike, *, bounded: bool = True):
         normals = rows("HPolytope", "normals", normals, (None, 3))
-        offsets = rows("HPolytope", "offsets", offsets, (len(normals),))
+        offsets = rows("HPolytope", "offsets", offsets, (None,))
+        if len(offsets) != len(normals):
+            raise InvalidShape(
+                f"HPolytope: offsets must have shape ({len(normals)},), one for each row of normals {normals.shape}, "
+                f"got {offsets.shape}"
+            )
         zero = ~normals.any(axis=1)
         if zero.any():
             raise InvalidShape(f"HPolytope: normals[{int(np.argmax(zero))}] is zero and names no half-space")

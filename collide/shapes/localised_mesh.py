@@ -65,12 +65,12 @@ def _check(stretch, order, max_facets) -> tuple[float, int, int]:
     if value is None or not np.isfinite(value) or value < localise.LEAST_STRETCH:
         raise InvalidArgument(
             f"Mesh.localised: stretch must be a number of at least {localise.LEAST_STRETCH:g}, got "
-            f"{checks.describe(stretch)}: a cut leaves 5/16 of an "
+            f"{checks.brief(stretch)}: a cut leaves 5/16 of an "
             "edge or more, and below 16/5 it would stand nearer to the edge's ends than others do"
         )
     order = checks.integer("Mesh.localised: order", order, 1)
     if order > locality.ORDERS:
-        got = checks.describe(order)
+        got = checks.brief(order)
         raise InvalidArgument(f"Mesh.localised: order must be within 1 … {locality.ORDERS}, got {got}")
     return value, order, checks.integer("Mesh.localised: max_facets", max_facets, 1)
 

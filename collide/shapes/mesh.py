@@ -100,7 +100,7 @@ class Mesh(Shape):
         vertices = _check_vertices(vertices)
         faces = _check_faces(faces, len(vertices))
         if solid is not None and not isinstance(solid, (bool, np.bool_)):
-            raise InvalidShape(f"Mesh: solid must be True, False or None, got {checks.describe(solid)}")
+            raise InvalidShape(f"Mesh: solid must be True, False or None, got {checks.brief(solid)}")
         self._store(vertices=vertices, faces=faces, scale=1.0, solid=False, _copied=None)
         if solid is not None and not solid:
             return
@@ -350,8 +350,8 @@ def _vertices_and_faces(mesh) -> tuple[ArrayLike, ArrayLike]:
         return mesh.vertices, mesh.faces
     except AttributeError:
         raise InvalidShape(
-            f"Mesh: give vertices (n, 3) and faces (m, 3), or an object that has both, got {type(mesh).__name__} and "
-            "no faces"
+            f"Mesh: give vertices (n, 3) and faces (m, 3), or an object that has both, got {checks.brief(mesh)} and "
+            "faces None"
         ) from None
 
 

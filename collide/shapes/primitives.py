@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide.errors import InvalidShape
+from collide.errors import InvalidShape, brief
 from collide.shapes.shape import Shape, positive, rows, scalar, three_lengths
 
 if TYPE_CHECKING:
@@ -67,7 +67,10 @@ def _one_length(shape: str, length, height):
     """The length, under one of its two names."""
     if (length is None) == (height is None):
         got = "neither" if length is None else "both"
-        raise InvalidShape(f"{shape}: give one of length and height, two names of one number; got {got}")
+        raise InvalidShape(
+            f"{shape}: give one of length and height, two names of one number; got {got}: "
+            f"{brief(length)} and {brief(height)}"
+        )
     return height if length is None else length
 
 

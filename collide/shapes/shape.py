@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from collide import argument_checks as checks
-from collide.errors import InvalidShape
+from collide.errors import InvalidShape, brief
 from collide.transforms import LARGEST, SMALLEST
 
 T = TypeVar("T")
@@ -164,10 +164,10 @@ def positive(shape: str, field: str, value: Any, *, zero: bool = False) -> float
     if zero and number == 0.0:
         return 0.0
     if not number > 0:
-        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {checks.describe(value)}")
+        raise InvalidShape(f"{shape}: {field} must be {'≥ 0' if zero else '> 0'}, got {checks.brief(value)}")
     if not SMALLEST <= number <= LARGEST:
         raise InvalidShape(
-            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {checks.describe(value)}; scale the "
+            f"{shape}: {field} must lie within [{SMALLEST:g}, {LARGEST:g}] m, got {checks.brief(value)}; scale the "
             "scene"
         )
     return number
@@ -177,20 +177,26 @@ def scalar(shape: str, field: str, value: Any) -> float:
     """A finite real number."""
     number = checks.number(value)
     if number is None:
-        raise InvalidShape(f"{shape}: {field} must be a number, got {checks.describe(value)}")
+        raise InvalidShape(f"{shape}: {field} must be a number, got {checks.brief(value)}")
     if not math.isfinite(number):
-        raise InvalidShape(f"{shape}: {field} must be finite, got {checks.describe(value)}")
+        raise InvalidShape(f"{shape}: {field} must be finite, got {checks.brief(value)}")
     if abs(number) > LARGEST:
         raise InvalidShape(
-            f"{shape}: {field} must not exceed {LARGEST:g}, got {checks.describe(value)}; scale the scene"
+            f"{shape}: {field} must not exceed {LARGEST:g}, got {checks.brief(value)}; scale the scene"
         )
     return number
+
+
+def checked_shape(what: str, value: Any, example: str = "collide.Box((1, 1, 1))") -> Shape:
+    """A shape. what : "raycast: shape", for messages.   Raises InvalidArgument."""
+    return checks.instance(what, value, Shape, f"a shape, for example {example}")
 
 
 def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndarray:
     """Three lengths > 0 along x, y, z, given as one sequence or as three numbers."""
     if (y is None) != (z is None):
-        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got two")
+        given = brief((value, y, z))
+        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {given}")
     lengths = rows(shape, field, value if y is None else (value, y, z), (3,))
     for axis, length in zip("xyz", lengths):
         positive(shape, f"{field}.{axis}", length)

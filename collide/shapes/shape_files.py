@@ -14,7 +14,6 @@ import math
 import struct
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import IO, TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -49,12 +48,11 @@ def shape_suffix(who: str, path, *others: str) -> str:
     who : the class that asks, for messages.
     Raises InvalidShape for any other: a file named like a mesh would hold arrays that no mesh reader takes.
     """
-    with refused_as_shape(f"{who}.save", path):
-        suffix = Path(path).suffix.lower()
+    suffix = checks.file_path(f"{who}.save: path", path, InvalidShape).suffix.lower()
     if suffix not in ("", ".npz", *others):
         known = ", ".join((".npz", *others))
         remedy = "" if others else ". Triangles of any shape: Mesh(*collide.tessellate(shape)).save"
-        raise InvalidShape(f"{who}.save: {checks.describe(path)}: the suffix must be one of {known}{remedy}")
+        raise InvalidShape(f"{who}.save: {checks.brief(path)}: the suffix must be one of {known}{remedy}")
     return suffix
 
 
@@ -67,7 +65,7 @@ def refused_as_shape(what: str, path) -> Iterator[None]:
         raise
     except (OSError, TypeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InvalidShape(f"{what}: {checks.describe(path)}: {reason}") from None
+        raise InvalidShape(f"{what}: {checks.brief(path)}: {reason}") from None
 
 
 def write_arrays(who: str, path, version: int, arrays: dict[str, np.ndarray]) -> None:
@@ -89,11 +87,12 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
     dropped : prefix of arrays that older files have besides; they count for the digest alone.
     Raises InvalidShape where the file is another one, of another version, or damaged.
     """
-    named = f"{who}.load: {checks.describe(path) if not isinstance(path, (str, Path)) else path}"
+    path = checks.file_path(f"{who}.load: path", path, InvalidShape)
+    named = f"{who}.load: {path}"
     try:
-        if Path(path).exists() and not Path(path).is_file():
+        if path.exists() and not path.is_file():
             raise InvalidShape(f"{named} is no regular file")
-        with Path(path).open("rb") as file:
+        with path.open("rb") as file:
             if file.read(2) != b"PK":
                 raise InvalidShape(
                     f"{named} is no file that {who}.save wrote. Files of meshes (STL, OBJ, PLY, …) are read by "

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from collide import argument_checks as checks
-from collide.errors import InvalidArgument, InvalidShape
+from collide.errors import InvalidArgument, InvalidShape, brief
 from collide.shapes.shape import Shape
 
 
@@ -36,12 +36,12 @@ class ShapeSet:
         try:
             self.shapes = tuple(shapes)
         except TypeError:
-            raise InvalidShape(f"ShapeSet: shapes must be a sequence of shapes, got {type(shapes).__name__}") from None
+            raise InvalidShape(f"ShapeSet: shapes must be a sequence of shapes, got {brief(shapes)}") from None
         for k, shape in enumerate(self.shapes):
             if not isinstance(shape, Shape):
-                raise InvalidShape(f"ShapeSet: shapes[{k}] must be a shape, got {type(shape).__name__}")
+                raise InvalidShape(f"ShapeSet: shapes[{k}] must be a shape, got {brief(shape)}")
         if not self.shapes:
-            raise InvalidShape("ShapeSet: shapes is empty; at least one is needed")
+            raise InvalidShape(f"ShapeSet: shapes is empty, {brief(shapes)}; at least one is needed")
 
     def __len__(self) -> int:
         return len(self.shapes)

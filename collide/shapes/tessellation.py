@@ -18,7 +18,7 @@ from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
-from collide.shapes.shape import Shape
+from collide.shapes.shape import Shape, checked_shape
 
 #: Where no tolerance is given: this part of a shape's largest radius.
 _USUAL = 0.01
@@ -82,14 +82,11 @@ def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | No
     UnsupportedQuery
         For a half-space, and an `HPolytope` with ``bounded=False``, without ``size``.
     """
-    if not isinstance(shape, Shape):
-        raise InvalidArgument(
-            f"tessellate: shape must be a shape, for example collide.Sphere(0.1), got {checks.describe(shape)}"
-        )
+    checked_shape("tessellate: shape", shape, "collide.Sphere(0.1)")
     for name, value in (("tolerance", tolerance), ("size", size)):
         if value is not None and not 0.0 < _length(value) < math.inf:
             raise InvalidArgument(
-                f"tessellate: {name} must be a finite length above 0 [m], got {checks.describe(value)}"
+                f"tessellate: {name} must be a finite length above 0 [m], got {checks.brief(value)}"
             )
     if isinstance(shape, Compound):
         return _together([(tessellate(part, tolerance=tolerance, size=size), X) for part, X in shape.items])
@@ -180,7 +177,7 @@ def _swept_hull(points: np.ndarray, radius: float, tolerance: float | None) -> T
         # a corner of the sum has a facet's normal within an edge of its direction
         k, d = np.nonzero(heights >= heights.max(axis=0) - 2 * reach * edge)
         made.append(corners[k] + radius * some[d])
-        _refuse_more_than(sum(map(len, made)))
+        _refuse_more_than(sum(map(len, made)), tolerance)
     vertices, faces = _hull(np.unique(np.concatenate(made), axis=0))
     return Tessellation(vertices, faces, ball.deviation)
 
@@ -209,7 +206,6 @@ def _cone(shape: Cone, tolerance: float | None) -> Tessellation:
 def _ring(radius: float, tolerance: float | None) -> tuple[np.ndarray, float]:
     """Points on a circle (n, 2), and how far their polygon is off."""
     part = _part(radius, tolerance)
-    _refuse_more_than(math.pi / math.sqrt(2 * part))
     n = max(8, math.ceil(math.pi / math.acos(1.0 - part)) if part < 1 else 8)
     n += -n % 4  # the axes are met exactly
     angles = np.arange(n) * (2 * math.pi / n)
@@ -236,7 +232,7 @@ def _ball(radius: float, tolerance: float | None) -> Tessellation:
     while (sphere := _geodesic(cuts))[2] > part:
         # the deviation falls with the square of the cuts
         cuts = max(cuts + 2, 2 * math.floor(0.5 * cuts * math.sqrt(sphere[2] / part)))
-        _refuse_more_than(10 * cuts * cuts + 2)
+        _refuse_more_than(10 * cuts * cuts + 2, tolerance)
     directions, faces, off = sphere
     return Tessellation(radius * directions, faces, radius * off)
 
@@ -288,8 +284,11 @@ def _icosahedron() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _part(radius: float, tolerance: float | None) -> float:
-    """The tolerance as a part of a radius."""
-    return _USUAL if tolerance is None else float(tolerance) / radius
+    """The tolerance as a part of a radius. Raises InvalidArgument where a circle alone has too many corners."""
+    part = _USUAL if tolerance is None else float(tolerance) / radius
+    # n corners are off by π²/(2n²)
+    _refuse_more_than(math.pi / math.sqrt(2 * part) if part > 0.0 else math.inf, tolerance)
+    return part
 
 
 def _off(angle: float) -> float:
@@ -297,10 +296,10 @@ def _off(angle: float) -> float:
     return 2 * math.sin(angle / 2) ** 2
 
 
-def _refuse_more_than(vertices: float) -> None:
+def _refuse_more_than(vertices: float, tolerance: float | None) -> None:
     if vertices > MAX_VERTICES:
         raise InvalidArgument(
-            f"tessellate: the tolerance would take more than {MAX_VERTICES} vertices; give a larger one [m]"
+            f"tessellate: the tolerance {tolerance} m would take more than {MAX_VERTICES} vertices; give a larger one"
         )
 
 

@@ -83,7 +83,10 @@ def _operands(shapes, poses, check_poses: bool) -> list[Operand]:
         raise InvalidArgument(f"combine: shapes must be a list of one or more solids, got {brief(shapes)}")
     poses = checks.listed_entries("combine: poses", poses, f"a pose for each of {len(shapes)} shapes, (r, 4, 4)")
     if len(poses) != len(shapes):
-        raise InvalidArgument(f"combine: {len(shapes)} shapes need as many poses, (r, 4, 4), got {len(poses)}")
+        raise InvalidArgument(
+            f"combine: {len(shapes)} shapes need as many poses, (r, 4, 4), got {len(poses)}: shapes {brief(shapes)}, "
+            f"poses {brief(poses)}"
+        )
     return [
         solid_operand("combine", f"shapes[{k}]", shape, X, check_poses, f"poses[{k}]")
         for k, (shape, X) in enumerate(zip(shapes, poses))
@@ -115,11 +118,11 @@ def _asked(caller: str, rule: MembershipRule, patterns: np.ndarray) -> np.ndarra
             answer = rule(bits)
         except Exception as error:
             raise InvalidArgument(
-                f"{caller}: the rule raised {type(error).__name__} of {held}: {brief(str(error))}"
+                f"{caller}: rule {brief(rule)} raised {type(error).__name__} of {held}: {brief(str(error))}"
             ) from error
         if not isinstance(answer, (bool, np.bool_)):
             raise InvalidArgument(
-                f"{caller}: the rule must answer True or False, of {held} it answered {brief(answer)}"
+                f"{caller}: rule {brief(rule)} must answer True or False, of {held} it answered {brief(answer)}"
             )
         answers.append(bool(answer))
     return np.array(answers)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide import argument_checks as checks
-from collide.errors import InvalidArgument
+from collide.errors import InvalidArgument, brief
 from collide.mesh.mesh_survey import NO_AREA
 from collide.mesh.mesh_topology import COLLAPSED
 from collide.numerics.exact_points import Point, inner, on_one_grid, placed
@@ -99,7 +99,9 @@ def configuration_obstacle(
     in space, up to logarithms, for local polygons and polyhedra. docs/configuration_obstacles.md has figures.
     """
     if isinstance(A, Shape) != isinstance(B, Shape):
-        raise InvalidArgument("configuration_obstacle: A and B must be two solids or two polygons, got one of each")
+        raise InvalidArgument(
+            f"configuration_obstacle: A and B must be two solids or two polygons, got {brief(A)} and {brief(B)}"
+        )
     if not isinstance(A, Shape):
         with Limits("configuration_obstacle", progress, time_limit, memory) as limits:
             return planar_obstacle(A, B, R, limits, check_poses)

@@ -10,7 +10,7 @@ from collide.narrowphase.facets.facet_geometry import FacetCorners
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape, kept_with_shape
 from collide.solids.placed_facets import Operand
-from collide.transforms import as_poses
+from collide.transforms import as_pose
 
 
 def solid_operand(caller: str, name: str, shape, X, check: bool, pose_name: str | None = None) -> Operand:
@@ -20,17 +20,15 @@ def solid_operand(caller: str, name: str, shape, X, check: bool, pose_name: str 
     curved shapes, unions and half-spaces, by name.
     """
     try:
-        body = facet_body(shape, caller)
+        body = facet_body(shape, f"{caller}: {name}")
     except UnsupportedQuery as error:
         raise UnsupportedQuery(f"{error}; Mesh(*collide.tessellate(shape, tolerance)[:2]) is one") from None
     if not body.solid:
         raise InvalidArgument(f"{caller}: {name} has no inside: {_why_not(shape)}")
     pose_name = pose_name or f"X_W{name}"
-    poses = as_poses(X, pose_name, check=check)
-    if len(poses) != 1:
-        raise InvalidArgument(f"{caller}: {pose_name} must be one (4, 4) pose, got {len(poses)}: ask pose by pose")
+    X = as_pose(X, f"{caller}: {pose_name}", check=check)
     mesh = _unscaled(shape) if isinstance(shape, Mesh) else _as_mesh(shape)
-    return Operand(body_of(mesh), mesh, poses[0])
+    return Operand(body_of(mesh), mesh, X)
 
 
 def _why_not(shape: Shape) -> str:

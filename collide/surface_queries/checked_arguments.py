@@ -15,7 +15,7 @@ def two_bodies(caller: str, A, B, X_WA, X_WB, check: bool) -> tuple[Body, Body, 
 
     Raises InvalidArgument, InvalidPose; UnsupportedQuery for shapes without facets.
     """
-    body_a, body_b = facet_body(A, caller), facet_body(B, caller)
+    body_a, body_b = facet_body(A, f"{caller}: A"), facet_body(B, f"{caller}: B")
     if not (A.meshed or B.meshed):
         raise InvalidArgument(
             f"{caller}: {type(A).__name__} and {type(B).__name__}: one of them at least must be a Mesh; "

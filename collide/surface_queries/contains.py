@@ -14,7 +14,7 @@ import numpy as np
 from collide import argument_checks as checks
 from collide.batches import answer_batch
 from collide.casts.raycast import raycast
-from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.errors import UnsupportedQuery
 from collide.lowering.facet_bodies import body_of
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import MeshTree
@@ -27,7 +27,7 @@ from collide.numerics.exact_points import minus, on_one_grid, placed
 from collide.results import UNDECIDED as SIGN_OPEN
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh
-from collide.shapes.shape import Shape
+from collide.shapes.shape import Shape, checked_shape
 from collide.surface_queries.inside_by_definition import holds
 from collide.transforms import LARGEST, poses_as_given
 
@@ -61,10 +61,7 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
     About 1 µs a point for solids, O(log n) for well-shaped ones: hierarchical winding numbers along segments. What
     rounding leaves open is decided in integers.
     """
-    if not isinstance(shape, Shape):
-        raise InvalidArgument(
-            f"contains: shape must be a shape, for example collide.Box((1, 1, 1)), got {checks.describe(shape)}"
-        )
+    checked_shape("contains: shape", shape)
     points, single_point = checks.vectors("contains", "points_W", points_W)
     checks.refuse_rows("contains", "points_W", points, np.abs(points).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
     X_WA, single_pose = poses_as_given(X_WA, "X_WA", check=check_poses)

@@ -106,6 +106,6 @@ def self_collisions(mesh: Mesh) -> SelfCollisions:
     """
     if not isinstance(mesh, Mesh):
         raise InvalidArgument(
-            f"self_collisions takes a Mesh, got {type(mesh).__name__}: convex shapes do not cross themselves"
+            f"self_collisions: mesh must be a Mesh, got {checks.brief(mesh)}: convex shapes do not cross themselves"
         )
     return SelfCollisions(*self_hits(mesh.tree))

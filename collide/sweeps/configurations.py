@@ -60,7 +60,7 @@ class DrawnConfigurations:
         """
         checks.instance("DrawnConfigurations.of: robot", robot, Robot, "a collide.Robot")
         if self.rows * max(robot.dof, 1) > _MAX_DRAWN:
-            raise InvalidArgument(f"{checks.describe(self.rows)} rows are too many for memory: draw blocks")
+            raise InvalidArgument(f"{brief(self.rows)} rows are too many for memory: draw blocks")
         return random_configurations(robot, 0, self.rows, self.seed)
 
     def about(self) -> dict[str, Any]:
@@ -181,7 +181,7 @@ def read_configurations(path: Path, robot: Robot) -> GivenConfigurations:
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise SceneError(f"configurations are read from {', '.join(SUFFIXES)}", path=path)
+        raise SceneError(f"configurations are read from {', '.join(SUFFIXES)}, got {brief(path.name)}", path=path)
     if not path.is_file():
         raise SceneError("there is no such file", path=path)
     try:

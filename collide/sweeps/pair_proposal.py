@@ -168,9 +168,9 @@ def propose_disabled_pairs(
     if share is None or not 0.5 <= share <= 1.0:
         raise InvalidArgument(f"always_share must be between 0.5 and 1, got {brief(always_share)}")
     if samples > _MAX_SAMPLES:
-        raise InvalidArgument(f"samples must be at most {_MAX_SAMPLES:,}, got {checks.describe(samples)}")
+        raise InvalidArgument(f"samples must be at most {_MAX_SAMPLES:,}, got {brief(samples)}")
     if rounds > _MAX_SAMPLES:
-        raise InvalidArgument(f"rounds must be at most {_MAX_SAMPLES:,}, got {checks.describe(rounds)}")
+        raise InvalidArgument(f"rounds must be at most {_MAX_SAMPLES:,}, got {brief(rounds)}")
     bodies = link_bodies(robot)
     if len(bodies) < 2:
         raise InvalidArgument(

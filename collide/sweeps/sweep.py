@@ -82,7 +82,7 @@ def sweep(
         Without pyarrow, and for Dask without distributed.
     """
     if not isinstance(getattr(checker, "robot", None), Robot):
-        raise InvalidArgument(f"sweep: checker must be a RobotChecker, got {checks.describe(checker)}")
+        raise InvalidArgument(f"sweep: checker must be a RobotChecker, got {brief(checker)}")
     folder, restart = checks.file_path("sweep: folder", folder), checks.true_or_false("sweep: restart", restart)
     Q = as_configurations(configurations, checker.robot)
     distances = checks.true_or_false("sweep: distances", distances)
@@ -146,11 +146,11 @@ class SweepRun:
         progress: Callable | None = None,
     ) -> SweepResults:
         """Ask what is missing, and give everything."""
-        parquet_module()
         if workers is not None:
             checks.integer("workers", workers, 0)
             if workers > MAX_WORKERS:
                 raise InvalidArgument(f"workers must be at most {MAX_WORKERS:,} processes, got {brief(workers)}")
+        parquet_module()
         with self.directory.locked(), (progress or _silent)("sweeping") as rename:
             done = set(self.directory.begin(self.manifest, restart))
             missing = [number for number in range(self.manifest["chunks"]) if number not in done]

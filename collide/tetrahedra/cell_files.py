@@ -6,16 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import MissingExtra, SceneError
 
 
 def read_cells(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """(vertices (n, 3), cells (m, 4)) of a file. Raises SceneError, MissingExtra."""
+    path = checks.file_path("TetMesh.from_file: path", path, SceneError)
     try:
         import meshio
     except ImportError:
         raise MissingExtra("meshio", extra="tets", purpose="read files of tetrahedra") from None
-    if not Path(path).is_file():
+    if not path.is_file():
         raise SceneError("there is no such file", path=path)
     try:
         read = meshio.read(path)

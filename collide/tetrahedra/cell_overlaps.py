@@ -138,7 +138,7 @@ def self_overlapping_cells(mesh: TetMesh, *, threads: int = 1, progress: Callabl
     """
     if not isinstance(mesh, TetMesh):
         raise InvalidArgument(
-            f"self_overlapping_cells takes a TetMesh, got {type(mesh).__name__}; surfaces have self_collisions"
+            f"self_overlapping_cells: mesh must be a TetMesh, got {checks.brief(mesh)}; surfaces have self_collisions"
         )
     eye = np.eye(4)
     return _at_pose(mesh, mesh, eye, eye, WITH_ITSELF, True, check_threads(threads), progress).pairs

@@ -18,6 +18,7 @@ from zlib import crc32
 
 import numpy as np
 
+from collide import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.scenes.families import (
     box_cases,
@@ -78,8 +79,8 @@ def generate(name: str, n: int, seed: int = 0, **size) -> list:
     """
     family = _family(name)
     for argument, value in (("n", n), ("seed", seed)):
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
-            raise InvalidArgument(f"{argument} must be a whole number ≥ 0, got {value!r}")
+        if checks.integer(f"generate: {argument}", value, 0) >= 2**63:
+            raise InvalidArgument(f"generate: {argument} must be below 2**63, got {checks.brief(value)}")
     known = [p for p in inspect.signature(family).parameters if p not in ("rng", "index")]
     for argument in size:
         if argument not in known:
@@ -95,6 +96,6 @@ def _case(name: str, family: Callable, index: int, seed: int, size: dict):
 
 def _family(name: str) -> Callable:
     known = {**_FAMILIES, **_MESHES}
-    if name not in known:
-        raise InvalidArgument(f"no family is called {name!r}; there are {', '.join(known)}")
+    if checks.text("families: name", name) not in known:
+        raise InvalidArgument(f"no family has the name {checks.brief(name)}; there are {', '.join(known)}")
     return known[name]

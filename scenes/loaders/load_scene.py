@@ -12,7 +12,7 @@ import numpy as np
 
 from collide import argument_checks as checks
 from collide import scenes
-from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, cut
+from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, brief, cut
 from collide.given_files import starts_like_xml
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody, free_name
@@ -111,9 +111,9 @@ def _paths(package_path) -> list[Path]:
 def _resolve(path) -> Path:
     """The file meant: a path, or the bare name of a shipped scene."""
     if not isinstance(path, (str, Path)):
-        raise SceneError(f"a scene is a file or the name of a shipped scene, got {checks.describe(path)}")
+        raise SceneError(f"path must be a file or the name of a shipped scene, got {checks.brief(path)}")
     if not str(path):
-        raise SceneError("the name of a scene is empty: give a file, or the name of a shipped scene")
+        raise SceneError("path is '': give a file, or the name of a shipped scene")
     file = Path(path)
     if _exists(file):
         return file
@@ -208,9 +208,9 @@ def _load_document(path: Path, options: Options) -> Scene:
 
 def load_meshes(path: Path, options: Options) -> Scene:
     """One body for each mesh of a file, free to move, so that bodies of a file are tested too."""
-    scale = 1.0 if options.scale is None else options.scale
-    if isinstance(scale, bool) or not isinstance(scale, (int, float)) or not np.isfinite(scale) or scale == 0:
-        raise SceneError(f"scale must be a finite number other than 0, got {scale!r}")
+    scale = 1.0 if options.scale is None else checks.number(options.scale)
+    if scale is None or isinstance(options.scale, bool) or not np.isfinite(scale) or scale == 0:
+        raise SceneError(f"scale must be a finite number other than 0, got {brief(options.scale)}")
     started = time.perf_counter()
     file = mesh_loader.read_mesh(path, options.meshes)
     scene = Scene(path.stem, sources=[str(path)], notes=list(file.notes))

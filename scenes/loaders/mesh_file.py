@@ -61,7 +61,7 @@ def _from_cache(entry: str) -> MeshFile | None:
 
 def check_meshes_option(meshes: str) -> None:
     if not isinstance(meshes, str) or meshes not in OPTIONS:
-        raise SceneError(f'meshes must be "mesh", "hull" or "pieces", got {checks.describe(meshes)}')
+        raise SceneError(f'meshes must be "mesh", "hull" or "pieces", got {checks.brief(meshes)}')
 
 
 def size_note(extent: float, what: str) -> str | None:

@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from collide import argument_checks as checks
 from collide.errors import SceneError, cut, listing
 from collide.given_files import is_file
 from collide.scenes.loaders.xml_text import parse_xml
@@ -38,9 +39,10 @@ def find_srdf(robot: Path, robot_name: str | None, srdf) -> Path | None:
     if srdf is False:
         return None
     if srdf is not None:
-        if not is_file(Path(srdf)):
-            raise SceneError("no such file", path=srdf)
-        return Path(srdf)
+        path = checks.file_path("srdf", srdf, SceneError)
+        if not is_file(path):
+            raise SceneError("no such file", path=path)
+        return path
     for folder in (robot.parent, robot.resolve().parent.parent / "srdf"):
         for stem in dict.fromkeys(filter(None, (robot.stem, robot_name))):
             if is_file(folder / f"{stem}.srdf"):

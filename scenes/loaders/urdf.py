@@ -68,7 +68,7 @@ def load_robot(
     path = Path(path)
     mesh_loader.check_meshes_option(meshes)
     if not isinstance(missing_meshes, str) or missing_meshes not in MISSING_MESHES:
-        raise SceneError(f'missing_meshes must be "error" or "skip", got {checks.describe(missing_meshes)}')
+        raise SceneError(f'missing_meshes must be "error" or "skip", got {checks.brief(missing_meshes)}')
     reading = Reading(path, meshes, tuple(_as_paths(package_path)), missing_meshes)
     root = parse_xml(path, reading.notes)
     if root.tag != "robot":

@@ -11,6 +11,7 @@ from pathlib import Path
 import collide
 import collide.adapters
 import collide.scenes
+from collide.kernels import library
 
 PACKAGE = Path(collide.__file__).parent
 #: What the mode of a process depends on.
@@ -47,14 +48,6 @@ def child(given: list[str], env: dict[str, str], timeout: float = 300) -> subpro
 
 def why_no_library() -> str:
     """Why tests of the library have nothing to test here; empty where they have."""
-    try:
-        from collide.kernels import built
-    except ImportError:
+    if not library.exists():
         return "this installation was built without compiled kernels"
-    from collide.kernels import sources
-
-    try:
-        fits = sources.fingerprint(built.SOURCE_FILES) == built.SOURCES
-    except FileNotFoundError:  # a source has moved since
-        fits = False
-    return "" if fits else "kernels were edited since the library was built: build it again"
+    return "" if library.fits_sources() else "kernels were edited since the library was built: build it again"

@@ -16,7 +16,7 @@ from types import SimpleNamespace
 import pytest
 from naive import rng_of
 
-from collide.cache_folder import TRUST, make_private, why_distrusted
+from collide.cache_folder import TRUST, make_private, say_once, why_distrusted
 from collide.kernels import object_cache
 
 needs_modes = pytest.mark.skipif(not TRUST, reason="modes of files say nothing here")
@@ -35,7 +35,7 @@ def came_from_disk(name: str = "collide.a_kernel", key: str = "all it depends on
 def folder(tmp_path, monkeypatch, caplog) -> Path:
     """Where kernels are kept."""
     monkeypatch.setenv("COLLIDE_CACHE_DIR", str(tmp_path / "cache"))
-    object_cache.say_once.cache_clear()
+    say_once.cache_clear()
     return object_cache.kernel_folder()
 
 
@@ -99,9 +99,11 @@ def test_a_folder_in_the_place_of_a_file_is_said_and_done_without(folder, caplog
 def test_a_kernel_that_cannot_be_kept_is_said_and_used(folder, caplog, monkeypatch, how):
     make = os.open
 
-    def full(_place, flags, _mode):
-        if not Path("/dev/full").exists():
-            raise OSError(errno.ENOSPC, "No space left on device")
+    def full(place, flags, *mode):
+        if not flags & os.O_CREAT:
+            return make(place, flags, *mode)
+        if how == "no file" or not Path("/dev/full").exists():
+            raise OSError(errno.EDQUOT, os.strerror(errno.EDQUOT))
         return make("/dev/full", flags & ~(os.O_CREAT | os.O_EXCL))  # the error comes when it is closed
 
     def refuse(number):
@@ -110,13 +112,11 @@ def test_a_kernel_that_cannot_be_kept_is_said_and_used(folder, caplog, monkeypat
 
         return none
 
-    if how == "full disk":
+    if how in ("full disk", "no file"):
         monkeypatch.setattr(os, "open", full)
     elif how == "a file of that name":
         folder.parent.mkdir(parents=True)
         folder.write_text("no folder")
-    elif how == "no file":
-        monkeypatch.setattr(os, "open", refuse(errno.EDQUOT))
     elif how == "no name":
         monkeypatch.setattr(os, "replace", refuse(errno.EIO))
     else:
@@ -199,7 +199,7 @@ def test_what_others_may_write_is_not_run(folder, caplog, monkeypatch, tmp_path,
     assert not came_from_disk()
     assert came_from_disk() == (shared == "the file"), "kept anew where it may be, and nowhere else"
     if shared == "the file":
-        assert "others may have written it" in caplog.text
+        assert f"others may have written {file}" in caplog.text
         return
     (record,) = caplog.records
     told = record.getMessage()

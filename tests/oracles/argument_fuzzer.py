@@ -9,11 +9,14 @@ names the argument. What of the library is not reached must be excused by name (
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import inspect
 import io
 import os
 import random
+import re
+import shutil
 import signal
 import sys
 import tempfile
@@ -23,19 +26,23 @@ from decimal import Decimal
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import GeneratorType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 import collide
 import collide.scenes
-from collide import polytopes, scenes, transforms
+from collide import adapters, polytopes, scenes, shapes, transforms
+from collide.argument_checks import _KINDS
+from collide.argument_checks import number as float_of
+from collide.errors import brief
 from collide.robots.kinematic_tree import Joint
 from collide.robots.robot import LinkShape
+from collide.scenes import families, generators
 
 EYE = np.eye(4)
-MODULES: tuple[ModuleType, ...] = (collide, polytopes, scenes, transforms)
+MODULES: tuple[ModuleType, ...] = (collide, polytopes, scenes, transforms, shapes, adapters, families)
 #: Seconds that a call with a bad argument may take.
 LIMIT = 10.0
 
@@ -107,6 +114,22 @@ BAD: dict[str, str] = {
     "null": "'a\\0b'",
     "time span": "np.timedelta64(3, 's')",
     "records": "np.zeros(2, dtype=[('a', float)])",
+    "minus zero": "-0.0",
+    "subnormal": "5e-324",
+    "numpy nan": "np.float64('nan')",
+    "numpy single": "np.float32(-2.5)",
+    "numpy integer": "np.int64(-7)",
+    "numpy bool": "np.bool_(True)",
+    "numpy complex": "np.complex128(1j)",
+    "read-only": "fuzzer.read_only()",
+    "strided": "np.arange(24.0).reshape(4, 6)[::2, ::2]",
+    "backwards": "np.eye(4)[::-1]",
+    "single precision": "np.eye(4, dtype=np.float32) * 2",
+    "other byte order": "np.array([1.0, 2.0, 5.0], dtype='>f8')",
+    "nan in the middle": "np.array([[0.0, 1.0, 2.0], [3.0, float('nan'), 4.0]])",
+    "huge in the middle": "[1.0, 10**400, 0.0]",
+    "objects that are numbers": "np.array([1, 2.5, Fraction(1, 3)], dtype=object)",
+    "memory": "memoryview(b'abc')",
 }
 
 
@@ -128,6 +151,22 @@ def robot() -> collide.Robot:
 
 
 @cache
+def files() -> Path:
+    """A folder with a robot in URDF and its SRDF."""
+    folder = Path(tempfile.mkdtemp(prefix="collide-arguments-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    link = '<link name="{0}"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
+    joint = '<joint name="slide" type="prismatic"><parent link="base"/><child link="slider"/><axis xyz="1 0 0"/>'
+    limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    links = link.format("base") + link.format("slider")
+    (folder / "rail.urdf").write_text(f'<robot name="rail">{links}{joint}{limit}</robot>')
+    (folder / "rail.srdf").write_text(
+        '<robot name="rail"><disable_collisions link1="a" link2="b" reason="Never"/></robot>'
+    )
+    return folder
+
+
+@cache
 def checker() -> collide.RobotChecker:
     return collide.RobotChecker(robot(), world())
 
@@ -136,6 +175,12 @@ def world() -> collide.World:
     made = collide.World()
     made.add(collide.Box((1, 1, 1)), name="a")
     made.add(collide.Sphere(1.0), collide.pose((1, 0, 0)), name="b")
+    return made
+
+
+def read_only() -> np.ndarray:
+    made = np.full((4, 4), 2.0)
+    made.flags.writeable = False
     return made
 
 
@@ -280,12 +325,22 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
         "offsets": planes()[1],
         "answer": polytopes.trees_meet(tree(), region()),
     },
-    "scenes.allow_pairs": lambda: {"world": world(), "path": "absent.srdf"},
+    "scenes.allow_pairs": lambda: {"world": world(), "path": files() / "rail.srdf"},
     "scenes.generate": lambda: {"name": "clutter", "n": 3},
+    **{
+        f"scenes.generate: {name}": (lambda name=name: {"name": name})
+        for name in ("accordions", "chazelle", "clutter", "harpsicordia", "stack", "workcell")
+    },
     "scenes.load": lambda: {"path": "workcell"},
     "scenes.save": lambda: {"scene": scene(), "path": "s.json"},
     "scenes.Scene": lambda: {"name": "s"},
     "scenes.SceneBody": lambda: {"name": "a", "shape": BOX, "X_WB": EYE},
+    "adapters.WorldViewer": lambda: {"world": world()},
+    "adapters.view": lambda: {"world": world()},
+    "families.describe": lambda: {"name": "touch_ee"},
+    "families.generate": lambda: {"name": "touch_ee", "n": 1},
+    "families.mesh_names": dict,
+    "families.names": dict,
     "transforms.as_pose": lambda: {"X": EYE},
     "transforms.as_poses": lambda: {"X": EYE},
     "transforms.poses_as_given": lambda: {"X": EYE, "name": "X"},
@@ -341,6 +396,7 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "HPolytope.closed": lambda: {"size": 1.0},
     "HeightField.cells_of": lambda: {"facets": [0]},
     "Proposal.pair": lambda: {"a": "base", "b": "slider"},
+    "Robot.load": lambda: {"path": files() / "rail.urdf"},
     "Robot.configuration": lambda: {"values": {"slide": 0.1}},
     "Robot.joint_value": lambda: {"name": "slide", "q": [0.0]},
     "Robot.default_notes": lambda: {"names": ["slide"], "q": np.zeros(1)},
@@ -415,10 +471,23 @@ EXCUSED = {
     "scenes.SceneBody": "plain data, looked at where it is added",
     "SweepResults.table": "made by sweep: tests/sweeps asks it for wrong columns",
     "RobotChecker.in_pieces": "for methods of the class: it takes their functions",
+    "adapters.WorldViewer.close": "it has no arguments",
+    "adapters.WorldViewer.update": "of a page that is open: tests/adapters/live asks it",
+    "families.Body": "plain data", "families.Case": "plain data", "families.MeshCase": "plain data",
     "transforms.HasMatrix": "a description for type checkers",
 }
 #: Parameters that are called, or are the library's own: code of a caller may raise what it likes.
-CALLBACKS = {"progress", "scheduler", "options", "limits", "size", "how"}
+#: Errors that are about no argument: what a certificate fails to prove, and what is not installed.
+VERDICTS = (collide.CertificateRefused, collide.MissingExtra)
+#: Parameters that name files: messages about a file are about its path as it is given.
+FILES = {"path", "folder", "srdf", "package_path", "state"}
+#: Where the argument is fine and what is wrong stands within: what the message names instead.
+SAID_OTHERWISE = {
+    ("scenes.Scene.place_robot", "robot"): "the link that is in the scene already",
+    ("scenes.allow_pairs", "world"): "the file, which names none of its bodies",
+    ("polytopes.HierarchicalTree", "points"): "that the body is flat, or has another dimension than there are trees of",
+}
+CALLBACKS = {"browser", "progress", "scheduler", "options", "limits", "size", "how"}
 
 
 # --- what is tried ------------------------------------------------------------------------------
@@ -427,11 +496,11 @@ CALLBACKS = {"progress", "scheduler", "options", "limits", "size", "how"}
 class Target:
     """A callable with good arguments. name : as in GOOD and METHODS.   call : gives it; methods bind to an object."""
 
-    def __init__(self, name: str, call: Callable[[], Callable], good: Callable[[], dict[str, Any]]):
+    def __init__(self, name: str, call: Callable[[], Callable], good: Callable[[], dict[str, Any]], parameters=None):
         self.name, self.call, self.good = name, call, good
         self.parameters = [
             parameter
-            for parameter in inspect.signature(call()).parameters.values()
+            for parameter in parameters or inspect.signature(call()).parameters.values()
             if parameter.kind not in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL)
         ]
 
@@ -465,6 +534,11 @@ def targets() -> tuple[list[Target], list[str]]:
             tried.append(Target(name, lambda value=value: value, GOOD[name]))
         elif name not in EXCUSED:
             unknown.append(name)
+    for name, good in GOOD.items():
+        if name.startswith("scenes.generate: "):  # each with sizes of its own
+            sizes = inspect.signature(generators._GENERATORS[name.split()[-1]]).parameters.values()
+            own = [size for size in sizes if size.name != "rng"]
+            tried.append(Target(name, lambda: scenes.generate, good, own))
     return tried, unknown
 
 
@@ -496,19 +570,17 @@ def _methods(name: str, kind: type, unknown: list[str]) -> Iterator[Target]:
 # --- trying ---------------------------------------------------------------------------------------
 
 
-def cases(seed: int | None = None, share: float = 1.0, only: str = "") -> list[tuple[Target, str, str]]:
-    """(target, parameter, name of the bad value), all of them or a seeded share."""
-    found = [
+def cases(seed: int | None = None, each: int = 4, only: str = "") -> list[tuple[Target, str, str]]:
+    """(target, parameter, name of the bad value): all values of every parameter, or ``each`` of them, seeded."""
+    rng = random.Random(seed)
+    return [
         (target, parameter.name, bad)
         for target in targets()[0]
         if only in target.name
         for parameter in target.parameters
         if parameter.name not in CALLBACKS or target.name == "tessellate"
-        for bad in BAD
+        for bad in (BAD if seed is None else rng.sample(list(BAD), each))
     ]
-    if seed is None:
-        return found
-    return random.Random(seed).sample(found, int(len(found) * share))
 
 
 def snippet(target: Target, parameter: str, bad: str) -> str:
@@ -528,7 +600,7 @@ def complaint(target: Target, parameter: str, bad: str) -> tuple[str, str | None
             "Fraction": Fraction,
             "Decimal": Decimal,
             "math": math,
-            "fuzzer": SimpleNamespace(mesh=mesh, robot=robot),
+            "fuzzer": SimpleNamespace(mesh=mesh, robot=robot, read_only=read_only),
         },
     )
     arguments[parameter] = value
@@ -538,12 +610,17 @@ def complaint(target: Target, parameter: str, bad: str) -> tuple[str, str | None
     try:
         with limited(), warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
             warnings.simplefilter("ignore")
-            call(*positional, **arguments)
+            answer = call(*positional, **arguments)
+            if isinstance(answer, adapters.WorldViewer):
+                answer.close()
     except collide.CollideError as error:
         text = str(error)
         if len(text) > 5000:
             return "wrong", f"a message of {len(text)} characters"
-        return "refused", None
+        if isinstance(error, VERDICTS) or (target.name, parameter) in SAID_OTHERWISE:
+            return "refused", None
+        missing = unsaid(text, "" if isinstance(error, collide.UnsupportedQuery) else parameter, value)
+        return ("refused", None) if missing is None else ("wrong", f"{missing}: {text}")
     except IndexError as error:  # as of sequences, and documented
         return ("refused", None) if target.name == "WorldResult.pair" else ("wrong", str(error))
     except OSError as error:
@@ -561,6 +638,58 @@ def complaint(target: Target, parameter: str, bad: str) -> tuple[str, str | None
         except ValueError:  # an integer that Python does not write out
             return "wrong", type(error).__name__
     return "taken", None
+
+
+def unsaid(text: str, parameter: str, value: Any) -> str | None:
+    """What a message does not say: the argument's name, or the value."""
+    if parameter not in FILES and not re.search(rf"(?<!\w){re.escape(parameter)}(?!\w)", text):
+        return "the argument is not named"
+    if not any(re.search(rf"(?<!\w){re.escape(word)}(?!\w)", text) for word in words_of(value) if word):
+        return "the value is not shown"
+    return None
+
+
+def words_of(value: Any) -> list[str]:
+    """How a message may show a value: as it is written, by its type, its shape or its kind; of many, by an entry."""
+    words = [brief(value), brief([value])[1:-1], written(value)[:20].rstrip(), type(value).__name__]
+    with contextlib.suppress(ValueError):
+        words.append(str(np.shape(value)))
+    if isinstance(value, np.ma.MaskedArray) and value.ndim:
+        words.append("masked")
+    if isinstance(value, (np.ndarray, list)):
+        with contextlib.suppress(ValueError, OverflowError):
+            read = np.asarray(value)
+            words += [_KINDS.get(read.dtype.kind, ""), str(read.dtype), str(read.shape[1:])]
+            words += [f"(n, {read.shape[-1]})"] if read.ndim > 1 else []
+    elif isinstance(value, str):
+        words += [value, str(Path(value))]
+    elif (number := float_of(value)) is not None:
+        words += [str(number), f"{number:g}"]
+    if (isinstance(value, np.ndarray) and not value.size) or (isinstance(value, (list, tuple, dict)) and not value):
+        words += ["empty", "()", "[]"]
+    for entry in [] if value is np.ma.masked else entries_of(value)[:24]:
+        words += words_of(entry)
+    return words
+
+
+def entries_of(value: Any) -> list:
+    """What stands in a value, one level down."""
+    if isinstance(value, np.ndarray):
+        return list(value.ravel()) if value.ndim else [value.item()]
+    if isinstance(value, GeneratorType):
+        return [0, 1, 2]  # read already
+    if isinstance(value, dict) and value:
+        return [part for item in value.items() for part in item]
+    if isinstance(value, str):
+        return list(value) if len(value) > 1 else []
+    return list(value) if isinstance(value, (list, tuple, set, range, memoryview, bytes, np.void)) else []
+
+
+def written(value: Any) -> str:
+    try:
+        return repr(value)
+    except Exception:  # noqa: BLE001 - an integer that Python does not write out
+        return brief(value)
 
 
 class TookTooLong(BaseException):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import collide
+from collide.cache_folder import say_once
 from collide.scenes import load
 from collide.scenes import mesh_cache as cache
 from collide.shapes.shape_files import pack
@@ -20,7 +21,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("COLLIDE_CACHE_DIR", str(tmp_path / "cache"))
-    cache._say_once.cache_clear()
+    say_once.cache_clear()
     return tmp_path / "cache" / "scenes"
 
 
