@@ -25,6 +25,7 @@ ROOMS = {
     "log": set(),
     "lazy_modules": set(),
     "fork_safe_lock": set(),
+    "child_process": set(),
     "algorithms": {"errors"},
     "kernels": {"cache_folder", "errors", "log", "whole_file"},
     "argument_checks": {"errors"},
@@ -296,8 +297,8 @@ ROOMS = {
         "world",
     },
     "sweeps": {
-        "errors", "argument_checks", "given_files", "log", "query", "shapes", "robots", "world", "reports",
-        "whole_file", "",
+        "errors", "argument_checks", "child_process", "given_files", "log", "query", "shapes", "robots", "world",
+        "reports", "whole_file", "",
     },
     "reports": {
         "errors", "lowering", "results", "shapes", "solids", "cache_folder", "given_files", "kernels", "whole_file", "",
