@@ -33,7 +33,7 @@ ROOMS = {
     "transforms": {"errors", "argument_checks"},
     "results": {"errors"},
     "numerics": {"errors", "kernels"},
-    "least_distance": {"errors", "argument_checks", "kernels"},
+    "least_distance": {"errors", "argument_checks", "kernels", "numerics"},
     "hull": {"errors", "kernels", "least_distance", "numerics"},
     "support": {"errors", "fork_safe_lock", "kernels", "numerics", "hull", "log"},
     "mesh": {"errors", "fork_safe_lock", "kernels", "numerics", "log"},
