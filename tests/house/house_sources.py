@@ -64,13 +64,15 @@ def imports(file: Path) -> list[tuple[str, bool, int]]:
             module = node.module or ""
             inner = [f"{module}.{alias.name}" for alias in node.names]
             found.extend((name if name in known else module, late, node.lineno) for name in inner)
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "lazy_module":
-            found.append((ast.literal_eval(node.args[0]), late, node.lineno))
+        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.Call):
+            if isinstance(node.value.func, ast.Name) and node.value.func.id == "lazy_module":
+                found.append((ast.literal_eval(node.value.args[0]), late, node.lineno))
         elif isinstance(node, ast.If) and is_type_checking(node.test):
             return  # never run
-        inside = late or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
+        inside = late or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
         for child in ast.iter_child_nodes(node):
-            visit(child, inside)
+            if not isinstance(child, ast.expr):  # nine of ten nodes, in which nothing is imported
+                visit(child, inside)
 
     visit(tree(file), False)
     return found
@@ -114,7 +116,7 @@ def kernels(file: Path) -> list[ast.FunctionDef]:
 def guarded(file: Path, otherwise: bool = False) -> set[int]:
     """Lines of a file that run only where kernels are compiled just in time; otherwise : only where they are not."""
     found: set[int] = set()
-    for node in nodes(file):
+    for node in nodes(file) if GUARD in file.read_text(encoding="utf-8") else ():
         if isinstance(node, ast.If) and ast.unparse(node.test) in (GUARD, f"not {GUARD}"):
             branch = node.body if (ast.unparse(node.test) == GUARD) != otherwise else node.orelse
             found.update(

@@ -1,4 +1,8 @@
-"""The house's direction of flow, read from the sources themselves: the syntax tree says who imports whom."""
+"""The house's direction of flow, read from the sources themselves: the syntax tree says who imports whom.
+
+import-linter says less: layers that follow from `ROOMS` would allow 2,295 of the 4,830 pairs of rooms, where `ROOMS`
+allows 487, and its contracts tell neither imports inside functions nor those under `WITH_NUMBA` from others.
+"""
 
 from __future__ import annotations
 
@@ -460,16 +464,6 @@ def test_scenes_ask_no_engine():
         for file in sources("scenes")
         for module, _, line in imports(file)
         if module.startswith("collide.adapters") and module != "collide.adapters.peers.exact"
-    )
-
-
-def test_outer_rooms_have_one_name_each():
-    """``import scenes`` works from the repository's root and makes a second module of every file."""
-    none_of(
-        f"{shown(file)}:{line}: import collide.{module}"
-        for file in [*sources(), *sources("tests"), *sources("examples"), *sources("benchmarks")]
-        for module, _, line in imports(file)
-        if module.split(".")[0] in ("scenes", "adapters")
     )
 
 
