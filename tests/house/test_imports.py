@@ -198,8 +198,8 @@ ROOMS = {
         "pair_arguments",
     },
     "polytopes": {
-        "errors", "argument_checks", "certificates", "hull", "kernels", "least_distance", "numerics", "shapes",
-        "threads", "transforms",
+        "errors", "argument_checks", "certificates", "hull", "kernels", "least_distance", "numerics", "pair_arguments",
+        "shapes", "threads", "transforms",
     },
     "world_bodies": {"errors", "argument_checks", "transforms", "numerics", "shapes", "broadphase"},
     "world_hits": set(),
