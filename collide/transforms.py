@@ -168,12 +168,29 @@ def poses_as_given(X: PoseLike, name: str, *, check: bool = True) -> tuple[np.nd
     batch = np.ascontiguousarray(full.reshape(-1, 4, 4))
     if check and _are_surely_poses(batch):
         return batch, full.ndim == 2
-    _refuse(~np.isfinite(batch).all(axis=(1, 2)), batch, name, "has entries that are not finite")
-    _refuse((batch[:, 3] != (0, 0, 0, 1)).any(axis=1), batch, name, "must end in the row (0, 0, 0, 1)")
-    _refuse((np.abs(batch[:, :3]) > LARGEST).any(axis=(1, 2)), batch, name, f"exceeds {LARGEST:g}")
-    if check:
-        _check_rotations(batch, name)
+    refuse_no_pose(batch, name, check)
     return batch, full.ndim == 2
+
+
+def refuse_no_pose(batch: np.ndarray, name: str, check: bool = True, skip: str = " (check_poses=False skips this)"):
+    """Refuse what is no pose of space, (N, 4, 4), or of the plane, (N, 3, 3).
+
+    check : refuse what is no rotation.   skip : how the caller may skip that.
+    Raises InvalidPose, which names the argument, the entry of the batch and the value.
+    """
+    d = batch.shape[-1] - 1
+    last = (*(0,) * d, 1)
+    _refuse(~np.isfinite(batch).all(axis=(1, 2)), batch, name, "has entries that are not finite")
+    _refuse((batch[:, d] != last).any(axis=1), batch, name, f"must end in the row {last}")
+    _refuse((np.abs(batch[:, :d]) > LARGEST).any(axis=(1, 2)), batch, name, f"exceeds {LARGEST:g}")
+    if not check:
+        return
+    R = batch[:, :d, :d]
+    off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(d)).max(axis=(1, 2))
+    _refuse(
+        off > ROTATION_TOLERANCE, batch, name, f"is not a rotation: |RᵀR − I| exceeds {ROTATION_TOLERANCE:g}{skip}"
+    )
+    _refuse(np.linalg.det(R) <= 0, batch, name, "mirrors (determinant ≤ 0): a rigid pose must not")
 
 
 def _to_floats(X, name: str) -> np.ndarray:
@@ -201,17 +218,7 @@ def _from_tuple(X: tuple, name: str) -> np.ndarray:
     return full
 
 
-def _check_rotations(X: np.ndarray, name: str) -> None:
-    R = X[:, :3, :3]
-    off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2))
-    _refuse(
-        off > ROTATION_TOLERANCE, X, name,
-        f"is not a rotation: |RᵀR − I| exceeds {ROTATION_TOLERANCE:g} (check_poses=False skips this)",
-    )
-    _refuse(np.linalg.det(R) <= 0, X, name, "mirrors (determinant ≤ 0): a rigid pose must not")
-
-
-#: So far from a rotation a matrix may be that is accepted without the check by `_check_rotations`, which rounds
+#: So far from a rotation a matrix may be that is accepted without the check by `refuse_no_pose`, which rounds
 #: otherwise.
 SAFE_TOLERANCE = 0.5 * ROTATION_TOLERANCE
 #: Poses checked together: their entries stay in the cache.

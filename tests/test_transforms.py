@@ -9,6 +9,7 @@ import pytest
 
 import collide
 from collide import Box, InvalidPose, Sphere, distance, pose
+from collide.polytopes.convex_polygon import planar_poses
 from collide.transforms import as_poses
 
 EYE = np.eye(4)
@@ -99,3 +100,22 @@ def test_scipys_own():
     if hasattr(spatial, "RigidTransform"):
         X = spatial.RigidTransform.from_components([1, 2, 3], turn)
         assert np.array_equal(as_poses(X)[0], X.as_matrix())
+
+
+@pytest.mark.parametrize(
+    "entry, value, words",
+    [((0, 2), np.nan, "not finite"), ((2, 0), 1.0, "must end in the row"), ((0, 2), 2e50, "exceeds"),
+     ((0, 1), 2e-4, "is not a rotation"), ((0, 0), -1.0, "mirrors"), ((0, 1), 5e-5, None)],
+)  # fmt: skip
+def test_poses_of_the_plane_and_of_space_are_refused_alike(entry, value, words):
+    """The same defect in both, at the same place of a batch; the last is within the tolerance."""
+    plane, space = np.tile(np.eye(3), (3, 1, 1)), np.tile(np.eye(4), (3, 1, 1))
+    row, column = entry
+    plane[1, row, column] = value
+    space[1, row + (row == 2), column + (column == 2)] = value  # z is left as it is
+    for X, read in ((plane, planar_poses), (space, as_poses)):
+        if words is None:
+            read(X, "X_WA")
+            continue
+        with pytest.raises(InvalidPose, match=rf"X_WA\[1\] .*{words}"):
+            read(X, "X_WA")

@@ -1,29 +1,22 @@
 """Whether the hooks of hosts hold: each asked in a child process with a time limit, as `collide doctor` shows it.
 
-A crash, an abort or a hang of a host costs its line and no more. The child is
-``python -m collide.adapters.hosts.host_checks MODULE``.
+A crash, an abort or a hang of a host costs its line and no more.
 """
 
 from __future__ import annotations
 
-import json
-import signal
-import subprocess
-import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from importlib import import_module, metadata
 from typing import NamedTuple
 
 from collide.adapters.hosts import Host
+from collide.child_process import ChildProcess
 from collide.errors import MissingExtra, UnsupportedQuery
 
 #: How long all children together may take [s].
 LIMIT = 60.0
-#: The child's finding is the line of its output that begins so: what hosts print goes before it.
-_MARK = "HOST CHECK "
-#: How many characters of a dead child's last line of stderr are told.
-_LAST_WORDS = 160
 
 
 class HostFinding(NamedTuple):
@@ -64,28 +57,23 @@ def _version(package: str) -> str | None:
         return None
 
 
-def _child(host: Host) -> subprocess.Popen:
-    command = [sys.executable, "-m", __spec__.name, host.module]
-    return subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace"
-    )
+def _child(host: Host) -> ChildProcess:
+    return ChildProcess(f"{__name__}:report_answer", host.module)
 
 
-def _finding(child: subprocess.Popen, deadline: float) -> tuple[bool | None, str]:
-    try:  # a second is for reading what a child said that has ended in time
-        out, err = child.communicate(timeout=max(1.0, deadline - time.monotonic()))
-    except subprocess.TimeoutExpired:
-        child.kill()
-        child.communicate()
-        return False, "no answer within the time limit: it hangs"
-    replies = [line for line in out.splitlines() if line.startswith(_MARK)]
-    if replies:
-        passed, answer = json.loads(replies[-1][len(_MARK) :])
-        return passed, answer
-    words = (err.strip().splitlines() or ["nothing said"])[-1][-_LAST_WORDS:]
-    code = child.returncode
-    how = f"ended by {signal.Signals(-code).name}" if code < 0 else f"ended with status {code}"
-    return False, f"its process {how}: {words}"
+def _finding(child: ChildProcess, deadline: float) -> tuple[bool | None, str]:
+    with closing(child):
+        try:  # a second is for reading what a child said that has ended in time
+            return child.receive(max(1.0, deadline - time.monotonic()))
+        except TimeoutError:
+            return False, "no answer within the time limit: it hangs"
+        except EOFError:
+            return False, f"its {child.how_it_ended()}"
+
+
+def report_answer(requests: Iterator, send: Callable[[tuple[bool | None, str]], None], module: str) -> None:
+    """The child: send `answer_of`."""
+    send(answer_of(module))
 
 
 def answer_of(module: str) -> tuple[bool | None, str]:
@@ -102,7 +90,3 @@ def answer_of(module: str) -> tuple[bool | None, str]:
         return None, str(error)
     except Exception as error:  # noqa: BLE001 - told, whatever broke
         return False, f"{type(error).__name__}: {error}"
-
-
-if __name__ == "__main__":
-    print(_MARK + json.dumps(answer_of(sys.argv[1])), flush=True)

@@ -19,7 +19,8 @@ from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.shape_table import KIND
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_kernel_calls import run_pairs
-from collide.numerics.exact_points import inner, integers, rounded
+from collide.numerics.exact_points import integers, rounded
+from collide.numerics.exact_vectors import inner
 from collide.results import UNDECIDED
 
 __all__ = ["CastRows", "cast_parts"]

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from collide.numerics.exact_points import Point, inner, minus
+from collide.numerics.exact_points import Point
+from collide.numerics.exact_vectors import inner, minus
 
 _ARTIFICIAL, _T = -1, -2
 

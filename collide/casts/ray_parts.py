@@ -32,7 +32,8 @@ from collide.casts.ray_hits import RayEvents
 from collide.casts.rays_in_tree import TREE_RAY_DOUBLES, TREE_RAY_INTEGERS, parts_on_rays
 from collide.kernels import address_of
 from collide.lowering.packed_convex import HALFSPACE, POINTS
-from collide.numerics.exact_points import inner, integers, on_one_grid, rounded
+from collide.numerics.exact_points import integers, on_one_grid, rounded
+from collide.numerics.exact_vectors import inner
 
 #: Brackets wider than this, in units of t of the far side, are not certified.
 _MAX_WIDTH = 2.0**-36

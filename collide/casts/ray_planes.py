@@ -14,8 +14,9 @@ import numpy as np
 
 from collide.casts.directions import Directions
 from collide.casts.ray_hits import RayEvents
-from collide.least_distance.posed_sets import exact_dot, exact_pose, planes_at
+from collide.least_distance.posed_sets import exact_pose, planes_at
 from collide.numerics.exact_points import rounded
+from collide.numerics.exact_vectors import dot
 from collide.shapes.hpolytope import HPolytope
 
 #: What doubles are off, relative to the numbers that are added: far more than they can be.
@@ -86,7 +87,7 @@ def _span_of(region: HPolytope, X_WA: np.ndarray, origin: np.ndarray, direction:
     along = -1
     planes = planes_at(region.normals[rows], region.offsets[rows], exact_pose(X_WA))
     for row, (*normal, offset) in zip(rows.tolist(), planes):
-        height, rate = offset - exact_dot(normal, start), exact_dot(normal, step)
+        height, rate = offset - dot(normal, start), dot(normal, step)
         if rate == 0:
             if height < 0:
                 return None

@@ -12,8 +12,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from collide.least_distance.posed_sets import exact_dot, exact_pose, planes_at
+from collide.least_distance.posed_sets import exact_pose, planes_at
 from collide.lowering.closed_regions import reach_of
+from collide.numerics.exact_vectors import dot
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.shape import Shape
 
@@ -56,7 +57,7 @@ class Way:
         exact = [Fraction(v) for v in vector.tolist()]
         planes = planes_at(region.normals[rows], region.offsets[rows], exact_pose(X_WB))
         for row, (*normal, _) in zip(rows.tolist(), planes):
-            if exact_dot(normal, exact) >= 0:
+            if dot(normal, exact) >= 0:
                 self.misses = self.misses or bool(is_outside[row])
             else:
                 self.is_whole = False

@@ -9,7 +9,8 @@ from collide.certificates.certificate import VertexPair
 from collide.certificates.exact_parts import ExactPart, common_vertices
 from collide.certificates.nearest_to_origin import nearest_to_origin
 from collide.lowering.packed_convex import HALFSPACE, POINTS
-from collide.numerics.exact_points import Point, inner, minus
+from collide.numerics.exact_points import Point
+from collide.numerics.exact_vectors import inner, minus
 
 
 def flaw_of_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hit: bool) -> str | None:

@@ -9,7 +9,8 @@ import numpy as np
 
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex
 from collide.lowering.parts import parts_of
-from collide.numerics.exact_points import Point, cross, inner, moved, on_one_grid, placed
+from collide.numerics.exact_points import Point, moved, on_one_grid, placed
+from collide.numerics.exact_vectors import cross, inner
 
 IDENTITY = np.eye(4)
 

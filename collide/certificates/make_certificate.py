@@ -16,7 +16,7 @@ from collide.certificates.region_proofs import RegionCertificate, make_region_ce
 from collide.certificates.verify import check_question
 from collide.errors import InvalidArgument, brief
 from collide.lowering.packed_convex import HALFSPACE
-from collide.numerics.exact_points import inner
+from collide.numerics.exact_vectors import inner
 from collide.results import UNDECIDED, PairResult, question_of_row
 from collide.transforms import as_poses
 

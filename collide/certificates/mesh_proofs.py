@@ -12,7 +12,8 @@ from collide.certificates.exact_parts import IDENTITY, ExactPart, exact_part, ha
 from collide.certificates.winding_number import winding_number
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.parts import parts_of
-from collide.numerics.exact_points import minus, on_one_grid, placed
+from collide.numerics.exact_points import on_one_grid, placed
+from collide.numerics.exact_vectors import minus
 
 
 class ProofBody:

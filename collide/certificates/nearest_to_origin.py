@@ -7,7 +7,8 @@ from itertools import combinations
 from typing import NamedTuple
 
 from collide.certificates.certificate import VertexPair
-from collide.numerics.exact_points import Point, inner, minus
+from collide.numerics.exact_points import Point
+from collide.numerics.exact_vectors import determinant, inner, minus
 
 
 class NearestPoint(NamedTuple):
@@ -64,17 +65,11 @@ def _weights(points: Sequence[Point]) -> list[int] | None:
     base, edges = points[0], [minus(p, points[0]) for p in points[1:]]
     gram = [[inner(e, f) for f in edges] for e in edges]
     right = [-inner(e, base) for e in edges]
-    determinant = _determinant(gram)
-    if determinant == 0:
+    whole = determinant(gram)
+    if whole == 0:
         return None
     tail = [  # Cramer's rule
-        _determinant([[right[i] if c == k else row[c] for c in range(len(edges))] for i, row in enumerate(gram)])
+        determinant([[right[i] if c == k else row[c] for c in range(len(edges))] for i, row in enumerate(gram)])
         for k in range(len(edges))
     ]
-    return [determinant - sum(tail), *tail]
-
-
-def _determinant(m: list[list[int]]) -> int:
-    if not m:
-        return 1
-    return sum((-1) ** k * m[0][k] * _determinant([row[:k] + row[k + 1 :] for row in m[1:]]) for k in range(len(m)))
+    return [whole - sum(tail), *tail]

@@ -18,7 +18,6 @@ from collide.certificates.certificate import APART, TOGETHER, CertificateRefused
 from collide.lazy_modules import lazy_module
 from collide.least_distance.posed_sets import (
     ExactRow,
-    exact_dot,
     exact_pose,
     planes_at,
     planes_near,
@@ -28,7 +27,8 @@ from collide.least_distance.posed_sets import (
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.parts import convex_set_of
-from collide.numerics.exact_points import inner, integers
+from collide.numerics.exact_points import integers
+from collide.numerics.exact_vectors import dot, inner
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.shape import Shape
 
@@ -112,15 +112,15 @@ def flaw_of_region_certificate(A: Shape, B: Shape, X_WA, X_WB, certificate, clai
     if sum(weights) != 1:
         return "weights do not add up to 1"
     points = points_at(body.points[list(vertices)], exact_pose(X_WO))
-    if exact_dot(u, u) > Fraction(body.radius) ** 2:
+    if dot(u, u) > Fraction(body.radius) ** 2:
         return "the two points are farther apart than the radius"
     x = [_total(weights, (point[k] for point in points)) - u[k] for k in range(3)]
     return _flaw_of_point(region, point_seen_from(x, pose))
 
 
 def _flaw_of_plane(u: ExactRow, behind: Fraction, points: list[ExactRow], radius: Fraction) -> str | None:
-    least = min(exact_dot(u, point) for point in points) - behind
-    if least <= 0 or least * least <= radius * radius * exact_dot(u, u):
+    least = min(dot(u, point) for point in points) - behind
+    if least <= 0 or least * least <= radius * radius * dot(u, u):
         return "a vertex is not beyond the plane by more than the radius"
     return None
 

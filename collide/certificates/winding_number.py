@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from collide.numerics.exact_points import Point, cross, inner, minus
+from collide.numerics.exact_points import Point
+from collide.numerics.exact_vectors import cross, inner, minus
 
 #: Directions of the rays tried one after another, until one passes no edge and no corner.
 _DIRECTIONS: tuple[Point, ...] = (

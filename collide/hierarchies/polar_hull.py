@@ -27,6 +27,7 @@ from collide.hull.exact_hull import Hull, convex_hull
 from collide.kernels import address_of, entry, kernel, view_f64, view_i32
 from collide.numerics import double_double as dd
 from collide.numerics.error_free import DD, two_sum
+from collide.numerics.exact_vectors import cross, inner, minus
 
 #: How far a polar point may be drawn inside, as a part of it. A hull 10¹¹ times as wide as thick may need more.
 _MAX_DRAWN = 2.0**-10
@@ -147,9 +148,8 @@ def _polar_points(cloud: Cloud, spans: np.ndarray, origin: np.ndarray, extent: n
 def _from_fractions(corners: np.ndarray, origin: np.ndarray, extent: np.ndarray) -> np.ndarray:
     """One polar point, exactly, then drawn inside."""
     a, b, c = ([Fraction(x) - Fraction(o) for x, o in zip(row, origin.tolist())] for row in corners.tolist())
-    u, v = ([x - y for x, y in zip(p, a)] for p in (b, c))
-    n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-    d = sum(x * y for x, y in zip(n, a))
+    n = cross(minus(b, a), minus(c, a))
+    d = inner(n, a)
     q = [x / d for x in n]
     drawn = Fraction(2) ** -50 * sum(Fraction(s) * abs(x) for s, x in zip(extent.tolist(), q))
     if drawn > _MAX_DRAWN or max(map(abs, q)) > 2**1000:

@@ -20,6 +20,7 @@ from collide.hierarchies.polar_hull import polar_of_hull
 from collide.hierarchies.true_facets import Cloud, twins_of
 from collide.hull.exact_hull import Hull, convex_hull
 from collide.kernels import address_of
+from collide.numerics.exact_vectors import cross, inner, minus
 
 
 class WalkBody:
@@ -178,12 +179,11 @@ def _inner_radius(points: np.ndarray, facets: np.ndarray, origin: np.ndarray) ->
 def _exact_distance(corners: np.ndarray, origin: np.ndarray) -> float:
     """Distance from the origin to the plane of a facet, from rational numbers, rounded downwards."""
     a, b, c = ([Fraction(v) - Fraction(o) for v, o in zip(p, origin.tolist())] for p in corners.tolist())
-    e, f = ([x - y for x, y in zip(p, a)] for p in (b, c))
-    normal = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]]
-    height = sum(x * y for x, y in zip(a, normal))
+    normal = cross(minus(b, a), minus(c, a))
+    height = inner(a, normal)
     if height <= 0:
         return 0.0
-    return math.sqrt(float(height * height / sum(x * x for x in normal))) * (1 - 1e-12)
+    return math.sqrt(float(height * height / inner(normal, normal))) * (1 - 1e-12)
 
 
 #: Held while a hierarchy is built: one at a time, since that of 100,000 points takes seconds.

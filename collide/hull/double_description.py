@@ -15,6 +15,8 @@ from math import gcd
 
 import numpy as np
 
+from collide.numerics.exact_vectors import cross, dot, inner
+
 Row = tuple[int, int, int, int]
 
 
@@ -72,20 +74,13 @@ def _distinct(rows: list[Row]) -> list[Row]:
     return list(dict.fromkeys(row for row in rows if any(row)))
 
 
-def _dot(a: Row, b: Row) -> int:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-
-
 def _cross(a: Row, b: Row, c: Row) -> Row:
     """The vector orthogonal to three others in four dimensions."""
-    def minor(i, j, k):
-        return (
-            a[i] * (b[j] * c[k] - b[k] * c[j])
-            - a[j] * (b[i] * c[k] - b[k] * c[i])
-            + a[k] * (b[i] * c[j] - b[j] * c[i])
-        )
-
-    return _primitive((minor(1, 2, 3), -minor(0, 2, 3), minor(0, 1, 3), -minor(0, 1, 2)))
+    minors = []
+    for k in range(4):
+        u, v, w = (row[:k] + row[k + 1 :] for row in (a, b, c))
+        minors.append((-1) ** k * inner(u, cross(v, w)))
+    return _primitive(minors)
 
 
 def _independent_rows(rows: list[Row]) -> list[int] | None:
@@ -113,7 +108,7 @@ def _extreme_rays(rows: list[Row], start: list[int]) -> list[Row]:
     for apart in start:
         others = [k for k in start if k != apart]
         ray = _cross(*(rows[k] for k in others))
-        if _dot(rows[apart], ray) < 0:
+        if dot(rows[apart], ray) < 0:
             ray = tuple(-value for value in ray)  # type: ignore[assignment]
         rays.append((ray, sum(1 << k for k in others)))
     for k, row in enumerate(rows):
@@ -125,7 +120,7 @@ def _extreme_rays(rows: list[Row], start: list[int]) -> list[Row]:
 def _cut(rays: list[tuple[Row, int]], row: Row, bit: int) -> list[tuple[Row, int]]:
     on_plane, inside, outside = [], [], []
     for ray, tight in rays:
-        side = _dot(row, ray)
+        side = inner(row, ray) + row[3] * ray[3]
         if side > 0:
             inside.append((ray, tight, side))
             on_plane.append((ray, tight))
@@ -166,16 +161,16 @@ def _common_kernel(rows: list[Row]) -> np.ndarray:
     """A direction of space orthogonal to every normal, for rows of rank below four."""
     normals = [row[:3] for row in rows if any(row[:3])]
     for a, b in combinations(normals, 2):
-        cross = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-        if any(cross):
+        direction = cross(a, b)
+        if any(direction):
             break
     else:
         a = normals[0]
         k = min(range(3), key=lambda i: abs(a[i]))
         unit = [int(i == k) for i in range(3)]
-        cross = (a[1] * unit[2] - a[2] * unit[1], a[2] * unit[0] - a[0] * unit[2], a[0] * unit[1] - a[1] * unit[0])
-    largest = max(abs(c) for c in cross)
-    return np.array([float(Fraction(c, largest)) for c in cross])
+        direction = cross(a, unit)
+    largest = max(abs(c) for c in direction)
+    return np.array([float(Fraction(c, largest)) for c in direction])
 
 
 def _beyond(rows: list[Row]) -> float:

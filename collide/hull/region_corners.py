@@ -19,7 +19,7 @@ from collide.hull.exact_hull import convex_hull
 from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
 from collide.least_distance.interior_point import interior_point
 from collide.least_distance.pair_proposals import Work
-from collide.numerics.exact_points import cross, inner, minus
+from collide.numerics.exact_vectors import cross, inner, minus
 
 #: So many planes at most, the box's among them, go to double description; so many where the region is flat.
 _MAX_INTEGERS, _MAX_FLAT = 48, 400

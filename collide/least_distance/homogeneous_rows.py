@@ -8,13 +8,13 @@ the same rows read in the other sense.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from operator import mul
 from typing import NamedTuple
 
 import numpy as np
 
 from collide.kernels import address_of
 from collide.least_distance.row_products import BLOCK, RECORD, products_below
+from collide.numerics.exact_vectors import dot
 
 #: Half a unit in the last place of 1.
 _UNIT = 2.0**-53
@@ -154,11 +154,6 @@ class HomogeneousRows:
     def _signs(self, function: Sequence[int], rows: np.ndarray) -> np.ndarray:
         self.n_exact += len(rows)
         return np.array([dot(function, self.integers(row)) < 0 for row in rows.tolist()], dtype=bool)
-
-
-def dot(a: Sequence[int], b: Sequence[int], count: int | None = None) -> int:
-    """The inner product of two vectors of integers, or of their first ``count`` numbers."""
-    return sum(map(mul, a, b if count is None else b[:count]))
 
 
 def as_integers(numbers: Sequence[float]) -> tuple[list[int], int]:

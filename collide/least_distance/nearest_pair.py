@@ -18,8 +18,9 @@ import numpy as np
 
 from collide.errors import UnsupportedQuery
 from collide.least_distance.complementary_pivoting import decide_basis
-from collide.least_distance.homogeneous_rows import HomogeneousRows, Violations, dot
+from collide.least_distance.homogeneous_rows import HomogeneousRows, Violations
 from collide.least_distance.pair_proposals import Work, propose_from_samples
+from collide.numerics.exact_vectors import dot
 
 APART, MEETING, EMPTY = "apart", "meeting", "empty"
 #: Rows that violate the answer are added by so many a round.

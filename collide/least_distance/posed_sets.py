@@ -7,17 +7,14 @@ from fractions import Fraction
 
 import numpy as np
 
+from collide.numerics.exact_vectors import cross, dot
+
 #: Numbers of `ExactPose` are R row by row, then t, without rounding.
 ExactPose = Sequence[Fraction]
 #: Three coordinates, or a normal and an offset.
 ExactRow = list[Fraction]
 #: A half-space is left out that a ball is inside by more than this part of the numbers that say so.
 _MARGIN = 2.0**-40
-
-
-def exact_dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
-    """The inner product of two vectors of fractions."""
-    return sum((x * y for x, y in zip(a, b)), Fraction(0))
 
 
 def exact_pose(X: np.ndarray) -> list[Fraction]:
@@ -28,7 +25,7 @@ def exact_pose(X: np.ndarray) -> list[Fraction]:
 def points_at(points: np.ndarray, pose: ExactPose) -> list[ExactRow]:
     """Points (n, 3) at a pose."""
     return [
-        [exact_dot(pose[3 * i : 3 * i + 3], point) + pose[9 + i] for i in range(3)]
+        [dot(pose[3 * i : 3 * i + 3], point) + pose[9 + i] for i in range(3)]
         for point in ([Fraction(v) for v in row] for row in points.tolist())
     ]  # fmt: skip
 
@@ -36,12 +33,12 @@ def points_at(points: np.ndarray, pose: ExactPose) -> list[ExactRow]:
 def planes_at(normals: np.ndarray, offsets: np.ndarray, pose: ExactPose) -> list[ExactRow]:
     """Half-spaces at a pose: {x : n·x ≤ b} becomes n' = cof(R) n, b' = b det R + n'·t."""
     r = [pose[0:3], pose[3:6], pose[6:9]]
-    cofactors: list[ExactRow] = [_cross(r[1], r[2]), _cross(r[2], r[0]), _cross(r[0], r[1])]
-    determinant, t = exact_dot(r[0], cofactors[0]), pose[9:12]
+    cofactors = [cross(r[1], r[2]), cross(r[2], r[0]), cross(r[0], r[1])]
+    determinant, t = dot(r[0], cofactors[0]), pose[9:12]
     planes = []
     for *normal, offset in np.column_stack((normals, offsets)).tolist():
-        n = [exact_dot(row, [Fraction(v) for v in normal]) for row in cofactors]
-        planes.append([*n, Fraction(offset) * determinant + exact_dot(n, t)])
+        n = [dot(row, [Fraction(v) for v in normal]) for row in cofactors]
+        planes.append([*n, Fraction(offset) * determinant + dot(n, t)])
     return planes
 
 
@@ -64,8 +61,8 @@ def planes_near(
 def point_seen_from(point: Sequence[Fraction], pose: ExactPose) -> ExactRow:
     """A point of the world, in the frame that stands at a pose."""
     r = [pose[0:3], pose[3:6], pose[6:9]]
-    cofactors: list[ExactRow] = [_cross(r[1], r[2]), _cross(r[2], r[0]), _cross(r[0], r[1])]
-    determinant = exact_dot(r[0], cofactors[0])
+    cofactors = [cross(r[1], r[2]), cross(r[2], r[0]), cross(r[0], r[1])]
+    determinant = dot(r[0], cofactors[0])
     away = [x - t for x, t in zip(point, pose[9:12])]
     return [sum((cofactors[i][k] * away[i] for i in range(3)), Fraction(0)) / determinant for k in range(3)]
 
@@ -74,10 +71,6 @@ def planes_seen_from(planes: list[ExactRow], pose: ExactPose) -> list[ExactRow]:
     """Half-spaces of the world, in the frame that stands at a pose."""
     columns = [pose[0:9:3], pose[1:9:3], pose[2:9:3]]
     return [
-        [*(exact_dot(column, n) for column in columns), b - exact_dot(n, pose[9:12])]
+        [*(dot(column, n) for column in columns), b - dot(n, pose[9:12])]
         for *n, b in planes
     ]  # fmt: skip
-
-
-def _cross(a: ExactPose, b: ExactPose) -> ExactRow:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

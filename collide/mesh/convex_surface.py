@@ -12,6 +12,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from collide.numerics.exact_vectors import cross, inner, minus
+
 #: Facets times vertices looked at before it is left open; some 0.2 s.
 MAX_SIGNS = 20_000_000
 #: Signs worked out in integers before it is left open; some 0.2 s.
@@ -70,10 +72,9 @@ class _Exact:
         self.count += 1
         if f not in self._planes:
             a, b, c = (self._point(i) for i in self._facets[f].tolist())
-            (ux, uy, uz), (vx, vy, vz) = ([y - x for x, y in zip(a, end)] for end in (b, c))
-            self._planes[f] = a, (uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
+            self._planes[f] = a, cross(minus(b, a), minus(c, a))
         a, normal = self._planes[f]
-        return sum(n * (x - y) for n, x, y in zip(normal, self._point(v), a)) > 0
+        return inner(normal, minus(self._point(v), a)) > 0
 
     def _point(self, i: int) -> list[Fraction]:
         return [Fraction(x) for x in self._points[i].tolist()]

@@ -19,10 +19,11 @@ from collide.least_distance.interior_point import origin_point
 from collide.least_distance.nearest_pair import EMPTY, nearest_pair
 from collide.least_distance.pair_proposals import Work
 from collide.least_distance.posed_rows import rows_of_planes
-from collide.least_distance.posed_sets import ExactRow, exact_dot, exact_pose, planes_at, planes_seen_from
+from collide.least_distance.posed_sets import ExactRow, exact_pose, planes_at, planes_seen_from
 from collide.lowering.closed_regions import box_sizes, closed, closings
 from collide.narrowphase.bounds import PROMISE_STORED
 from collide.narrowphase.convex_batches import Question
+from collide.numerics.exact_vectors import dot
 from collide.results import EXACT, PAIR_DTYPE
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.primitives import Halfspace
@@ -106,7 +107,7 @@ def _planes_of(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
 
 def _through(plane: ExactRow, v: tuple[int, ...]) -> ExactRow:
     """The half-space behind a parallel plane through a point."""
-    return [*plane[:3], exact_dot(plane, [Fraction(x) for x in v])]
+    return [*plane[:3], dot(plane, [Fraction(x) for x in v])]
 
 
 def _gap_of(halfspaces: HomogeneousRows, n_first: int, X: np.ndarray) -> float:

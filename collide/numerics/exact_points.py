@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from fractions import Fraction
-from typing import TypeVar
 
 import numpy as np
 
+from collide.numerics.exact_vectors import cross, inner, minus
+
 #: Integer coordinates.
 Point = tuple[int, int, int]
-#: What differences and products are exact of.
-Exact = TypeVar("Exact", int, Fraction)
 
 
 def integers(values) -> tuple[list[int], int]:
@@ -52,18 +51,6 @@ def on_one_grid(*groups: tuple[list[Point], int]) -> tuple[list[list[Point]], in
     """The groups of `placed` on the finest of their grids, and its exponent."""
     low = min(grid for _, grid in groups)
     return [[(x << g, y << g, z << g) for x, y, z in points] for points, grid in groups for g in (grid - low,)], low
-
-
-def minus(a: tuple[Exact, Exact, Exact], b: tuple[Exact, Exact, Exact]) -> tuple[Exact, Exact, Exact]:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def cross(a: tuple[Exact, Exact, Exact], b: tuple[Exact, Exact, Exact]) -> tuple[Exact, Exact, Exact]:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def inner(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def leading_digits(vector: Point) -> tuple[float, float, float]:

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.hull.exact_hull import convex_hull
-from collide.polytopes.exact_planes import determinant, exact_planes, rounded_planes, whole_numbers
+from collide.numerics.exact_vectors import determinant
+from collide.polytopes.exact_planes import exact_planes, rounded_planes, whole_numbers
 from collide.polytopes.growing_hull import grown_facets
 from collide.polytopes.planar_hull import hull_of_points
 

@@ -10,7 +10,7 @@ from collide import argument_checks as checks
 from collide.errors import InvalidPose, InvalidShape
 from collide.polytopes import planar_hull
 from collide.shapes.shape import rows
-from collide.transforms import LARGEST, ROTATION_TOLERANCE, SMALLEST
+from collide.transforms import SMALLEST, refuse_no_pose
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -133,18 +133,5 @@ def planar_poses(X, name: str) -> tuple[np.ndarray, bool]:
     if read.ndim not in (2, 3) or read.shape[-2:] != (3, 3):
         raise InvalidPose(f"{name} must have shape (3, 3) or (N, 3, 3), a pose in the plane, got {read.shape}")
     poses = np.ascontiguousarray(read.reshape(-1, 3, 3))
-    _refuse(~np.isfinite(poses).all(axis=(1, 2)), poses, name, "has entries that are not finite")
-    _refuse((poses[:, 2] != (0, 0, 1)).any(axis=1), poses, name, "must end in the row (0, 0, 1)")
-    _refuse((np.abs(poses[:, :2]) > LARGEST).any(axis=(1, 2)), poses, name, f"exceeds {LARGEST:g}")
-    (a, b), (c, d) = poses[:, :2, :2].transpose(1, 2, 0)
-    off = np.maximum(np.maximum(np.abs(a * a + c * c - 1.0), np.abs(b * b + d * d - 1.0)), np.abs(a * b + c * d))
-    _refuse(off > ROTATION_TOLERANCE, poses, name, f"is not a rotation: |RᵀR − I| exceeds {ROTATION_TOLERANCE:g}")
-    _refuse(a * d - b * c <= 0, poses, name, "mirrors (determinant ≤ 0): a rigid pose must not")
+    refuse_no_pose(poses, name, skip="")
     return poses, read.ndim == 2
-
-
-def _refuse(bad: np.ndarray, poses: np.ndarray, name: str, complaint: str) -> None:
-    if bad.any():
-        k = int(np.argmax(bad))
-        where = f"{name}[{k}]" if len(poses) > 1 else name
-        raise InvalidPose(f"{where} {complaint}, got {poses[k].tolist()}")

@@ -11,21 +11,6 @@ BITS = 48
 _UNIT = 2.0**-53
 
 
-def determinant(rows: list[list[int]]) -> int:
-    """By fraction-free elimination (Bareiss 1968)."""
-    rows, sign, previous = [list(row) for row in rows], 1, 1
-    for k in range(len(rows) - 1):
-        pivot = next((i for i in range(k, len(rows)) if rows[i][k]), None)
-        if pivot is None:
-            return 0
-        if pivot != k:
-            rows[k], rows[pivot], sign = rows[pivot], rows[k], -sign
-        for i in range(k + 1, len(rows)):
-            rows[i] = [(x * rows[k][k] - y * rows[i][k]) // previous for x, y in zip(rows[i], rows[k])]
-        previous = rows[k][k]
-    return sign * rows[-1][-1]
-
-
 def exact_planes(points: np.ndarray, facets: np.ndarray, within: np.ndarray) -> np.ndarray:
     """(f, d + 1) integers (a, b), a·x ≤ b, of the hyperplanes through d points each.
 

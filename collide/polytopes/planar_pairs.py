@@ -7,8 +7,9 @@ from threading import local
 import numpy as np
 
 from collide import argument_checks as checks
-from collide.errors import InvalidArgument, InvalidPose
+from collide.errors import InvalidArgument
 from collide.kernels import address_of
+from collide.pair_arguments import matched_length
 from collide.polytopes.convex_polygon import ConvexPolygon, planar_poses
 from collide.polytopes.planar_certificates import PlanarCertificate, certificate_of_row, gap_across
 from collide.polytopes.planar_distance import (
@@ -47,12 +48,7 @@ class PolygonQuestion:
         counts = {name: len(side) for name, side in (("A", self.A), ("B", self.B)) if isinstance(side, list)}
         self.single = single_a and single_b and not counts
         counts |= {"X_WA": len(self.X_WA), "X_WB": len(self.X_WB)}
-        self.n = max(counts.values()) if min(counts.values()) else 0
-        for name, count in counts.items():
-            if count != self.n and (count != 1 or name in "AB"):
-                lengths = ", ".join(f"{argument} {n}" for argument, n in counts.items())
-                kind = InvalidPose if name.startswith("X") else InvalidArgument
-                raise kind(f"lengths do not match: {lengths}; batches must be equally long, or a single pose")
+        self.n = matched_length(counts)
 
     def pair(self, k: int) -> tuple[ConvexPolygon, ConvexPolygon, np.ndarray, np.ndarray]:
         """Polygons and poses (3, 3) of pair k."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
 from collide.least_distance.input_rows import InputRows
+from collide.numerics.exact_vectors import dot
 from collide.polytopes.hierarchical_tree import HierarchicalTree
 from collide.polytopes.relative_pose import Rows, as_doubles, homogeneous_integers
 from collide.polytopes.tree_walk import Relative
@@ -50,7 +51,7 @@ def posed_rows(A: HierarchicalTree, B: HierarchicalTree, X_BA: Rows) -> InputRow
     def point(row: int) -> list[int]:
         numerators, denominator = as_integers(points[row].tolist())
         vector = [*numerators, denominator]
-        return [sum(x * y for x, y in zip(line, vector)) for line in whole]
+        return [dot(line, vector) for line in whole]
 
     def halfspace(row: int) -> list[int]:
         return as_integers([*normals[row].tolist(), float(offsets[row])])[0]

@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers, dot
+from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
 from collide.least_distance.nearest_pair import MEETING, NearestPair
+from collide.numerics.exact_vectors import dot
 
 _UNIT = 2.0**-53
 #: Offsets from a centre below this, relative to what they are a difference of, are computed in integers.

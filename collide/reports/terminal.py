@@ -1,7 +1,8 @@
 """The report as a person reads it in a terminal: the verdict first, then what needs a person, proofs on request.
 
 One set of tables, two ways to draw it: with colours through `rich` where that is installed and the
-output is a terminal, as plain aligned text everywhere else.
+output is a terminal, as plain aligned text everywhere else. Tables and progress are laid out without `rich`: the
+command works where numpy alone is installed, and `rich` takes 34 to 71 ms to import.
 """
 
 from __future__ import annotations

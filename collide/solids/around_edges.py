@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import CollideError
-from collide.numerics.exact_points import Point, cross, inner
+from collide.numerics.exact_points import Point
+from collide.numerics.exact_vectors import cross, inner
 from collide.solids.cut_points import CutPoints
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from collide.errors import CollideError
-from collide.numerics.exact_points import Point, cross, inner, minus
+from collide.numerics.exact_points import Point
+from collide.numerics.exact_vectors import cross, inner, minus
 from collide.solids.arrangement import Arrangement
 from collide.solids.cut_points import Rational, reduced
 

@@ -10,7 +10,8 @@ from collide import argument_checks as checks
 from collide.errors import InvalidArgument, brief
 from collide.mesh.mesh_survey import NO_AREA
 from collide.mesh.mesh_topology import COLLAPSED
-from collide.numerics.exact_points import Point, inner, on_one_grid, placed
+from collide.numerics.exact_points import Point, on_one_grid, placed
+from collide.numerics.exact_vectors import inner
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
 from collide.solids.arrangement import Arrangement, crossings_of

@@ -18,7 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import CollideError
-from collide.numerics.exact_points import Point, cross, inner, leading_digits, minus
+from collide.numerics.exact_points import Point, leading_digits
+from collide.numerics.exact_vectors import cross, inner, minus
 from collide.solids.joined_parts import components
 
 #: Inner products of two vectors with components below 1, each rounded: off by less than this.

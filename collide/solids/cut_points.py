@@ -13,7 +13,8 @@ from functools import cmp_to_key
 
 import numpy as np
 
-from collide.numerics.exact_points import Point, inner, minus
+from collide.numerics.exact_points import Point
+from collide.numerics.exact_vectors import inner, minus
 from collide.solids.placed_facets import PlacedFacets, quotient
 
 Rational = tuple[int, int, int, int]

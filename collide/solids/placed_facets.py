@@ -17,7 +17,8 @@ from collide.lowering.facet_bodies import Body
 from collide.mesh.bvh import MeshTree
 from collide.mesh.mesh_survey import NO_AREA
 from collide.mesh.mesh_topology import COLLAPSED
-from collide.numerics.exact_points import Point, cross, minus, placed
+from collide.numerics.exact_points import Point, placed
+from collide.numerics.exact_vectors import cross, minus
 from collide.numerics.lowest_bits import NO_BITS, lowest_exponents
 from collide.shapes.mesh import Mesh
 from collide.solids.facet_edges import FacetEdges, facet_edges

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collide.errors import CollideError
-from collide.numerics.exact_points import inner
+from collide.numerics.exact_vectors import inner
 from collide.solids.around_edges import Sheets
 from collide.solids.cut_points import CutPoints, Rational
 from collide.solids.placed_facets import PlacedFacets

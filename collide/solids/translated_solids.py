@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.numerics.exact_points import Point, cross, inner, minus
+from collide.numerics.exact_points import Point
+from collide.numerics.exact_vectors import cross, inner, minus
 from collide.solids.convolution import ExactSurface
 from collide.solids.cut_points import Rational
 from collide.solids.joined_parts import components

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
-from collide.numerics.exact_points import Point, cross, inner, rounded
+from collide.numerics.exact_points import Point, rounded
+from collide.numerics.exact_vectors import cross, inner
 from collide.solids.cut_points import CutPoints
 from collide.solids.rounded_mesh import used_points
 from collide.solids.rounded_points import rounded_points

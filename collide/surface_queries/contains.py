@@ -23,7 +23,8 @@ from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.facets.facet_geometry import RAY_DIRECTIONS, FacetCorners, exact_point, ray_crossing
 from collide.narrowphase.facets.facet_queries import points_in_solid, surfaces_meet
 from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE, UNDECIDED
-from collide.numerics.exact_points import minus, on_one_grid, placed
+from collide.numerics.exact_points import on_one_grid, placed
+from collide.numerics.exact_vectors import minus
 from collide.results import UNDECIDED as SIGN_OPEN
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh

@@ -14,7 +14,7 @@ import numpy as np
 from collide.errors import UnsupportedQuery
 from collide.lowering.facet_bodies import body_of, has_facets
 from collide.narrowphase.facets.facet_geometry import RAY_DIRECTIONS, ray_crossing
-from collide.numerics.exact_points import cross, inner, minus
+from collide.numerics.exact_vectors import cross, inner, minus
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.primitives import Cone, Cylinder, Ellipsoid, Halfspace

@@ -19,7 +19,8 @@ import numpy as np
 from collide.narrowphase.facets.facet_crossings import facet_crossings
 from collide.narrowphase.facets.facet_geometry import FacetCorners
 from collide.narrowphase.facets.facet_queries import all_hits
-from collide.numerics.exact_points import Point, cross, inner, minus, on_one_grid, placed, rounded
+from collide.numerics.exact_points import Point, on_one_grid, placed, rounded
+from collide.numerics.exact_vectors import cross, inner, minus
 from collide.shapes.shape import Shape
 from collide.surface_queries.checked_arguments import two_bodies
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import NamedTuple
 
-from collide.numerics.exact_points import Point, cross, inner, minus
+from collide.numerics.exact_points import Point
+from collide.numerics.exact_vectors import cross, inner, minus
 
 #: Corners of a face, opposite to the corner of its number, counter-clockwise from there.
 _FACES = ((1, 3, 2), (0, 2, 3), (0, 3, 1), (0, 1, 2))

@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.numerics.exact_vectors import cross, inner
+
 #: Six errors of four terms, each below u of the terms' magnitudes, summed in doubles: 24 u² of these, u² = 2⁻¹⁰⁶.
 _WIDE_ERROR = 2.0**-101
 #: Where coordinates are at most 1: products of others are exact in two parts; rows of differences of others in kernels.
@@ -69,8 +71,8 @@ def place_corners(vertices_a: np.ndarray, vertices_b: np.ndarray, X_WA: np.ndarr
 
 def determinant_of(X: np.ndarray) -> Fraction:
     """Of the upper left (3, 3) of a pose, exactly."""
-    a, b, c, d, e, f, g, h, i = (Fraction(x) for x in X[:3, :3].ravel().tolist())
-    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    a, b, c = ([Fraction(x) for x in row] for row in X[:3, :3].tolist())
+    return inner(a, cross(b, c))
 
 
 def _reach(vertices: np.ndarray, X: np.ndarray) -> float:

@@ -7,6 +7,7 @@ from itertools import permutations, product
 import numpy as np
 
 from collide.scenes.families.case import Body
+from collide.transforms import pose
 
 #: Directions in which `random_hull` looks for vertices.
 _DIRECTIONS = np.random.default_rng(24).standard_normal((256, 3))
@@ -76,14 +77,7 @@ def direction(rng: np.random.Generator) -> np.ndarray:
 
 def rotation(rng: np.random.Generator) -> np.ndarray:
     """A uniform rotation, orthonormal to rounding."""
-    w, x, y, z = (q := rng.standard_normal(4)) / np.linalg.norm(q)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return pose(quat_wxyz=rng.standard_normal(4))[:3, :3]
 
 
 def rotation_about(axis: int, angle: float) -> np.ndarray:

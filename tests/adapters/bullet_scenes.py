@@ -6,6 +6,7 @@ import numpy as np
 import pybullet as p
 import pybullet_data
 import unit_cube
+from naive import unit
 
 DATA = pybullet_data.getDataPath()
 CORNERS, FACETS = unit_cube.CORNERS.tolist(), unit_cube.FACETS.ravel().tolist()
@@ -27,8 +28,7 @@ def body(
 
 
 def quaternion(random: np.random.Generator) -> list[float]:
-    q = random.normal(size=4)
-    return (q / np.linalg.norm(q)).tolist()
+    return unit(random.normal(size=4)).tolist()
 
 
 def rotation(q) -> np.ndarray:

@@ -14,7 +14,7 @@ import pytest
 
 from collide import Box, ConvexHull, Halfspace, InvalidArgument, MissingExtra, Sphere, pose
 from collide.adapters.peers import protocol
-from collide.adapters.peers.child import IsolatedPeer, last_words
+from collide.adapters.peers.child import IsolatedPeer
 from collide.adapters.peers.protocol import Question, engine
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
@@ -145,12 +145,6 @@ def test_any_engine_may_be_isolated():
     alone, apart = engine("exact").answer(question), engine("exact", isolated=True).answer(question)
     assert apart.rows["distance"].tolist() == alone.rows["distance"].tolist() == [-2, -3, -4]
     assert apart.engine == "exact" and apart.version == alone.version
-
-
-def test_last_words_are_one_line_without_folders():
-    assert last_words("terminate called\n  what():  bad\n input at /a/b-1/c.h:12\n") == "bad input at c.h:12"
-    assert last_words("noise\n" * 100 + "the end").endswith("noise the end")
-    assert last_words("") == ""
 
 
 def test_a_real_crash_of_fcl_costs_one_pair(monkeypatch, tmp_path):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import sys
 import time
 
 import pytest
@@ -29,7 +28,7 @@ CHECKS = {
 def modules(tmp_path, monkeypatch):
     for name, source in CHECKS.items():
         (tmp_path / f"trial_{name}.py").write_text(source + "\n")
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *filter(None, sys.path)]))
+    monkeypatch.syspath_prepend(tmp_path)
 
 
 def host(name: str, package: str = "numpy") -> Host:
@@ -45,10 +44,10 @@ def test_every_end_is_told(modules):
     assert found["unimportable"].passed is False and "no_such_module" in found["unimportable"].answer
     assert found["refusing"][1:] == (None, "version 99")
     assert found["lacking"].passed is None and "collide-robotics[h]" in found["lacking"].answer
-    assert found["leaving"].passed is False and "status 3" in found["leaving"].answer
+    assert found["leaving"].passed is False and "code 3" in found["leaving"].answer
     assert found["aborting"].passed is False
     if os.name == "posix":
-        assert found["aborting"].answer == "its process ended by SIGABRT: last words"
+        assert found["aborting"].answer == "its process aborted (SIGABRT): last words"
 
 
 def test_what_hangs_is_given_up(modules):

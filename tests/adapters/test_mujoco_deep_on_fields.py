@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from naive import unit
 
 from collide.adapters.hosts.mujoco import install
 from collide.kernels import mode
@@ -77,11 +78,6 @@ def put(model, data, q, p_WG) -> np.ndarray:
     return data.geom_xmat[1].reshape(3, 3)
 
 
-def turned(random) -> np.ndarray:
-    q = random.normal(size=4)
-    return q / np.linalg.norm(q)
-
-
 @pytest.mark.many(3)
 @pytest.mark.parametrize("kind", SIZES)
 def test_fields_that_are_planes_push_as_planes(kind):
@@ -96,7 +92,7 @@ def test_fields_that_are_planes_push_as_planes(kind):
             data = mujoco.MjData(model)
             for case in range(12):
                 depth = 10.0 ** random.uniform(-4.0, -1.3)
-                q = turned(random)
+                q = unit(random.normal(size=4))
                 p_WG = np.array([*random.uniform(-0.1, 0.1, 2), 0.0])
                 R_WB = put(model, data, q, p_WG)
                 lowest = N @ support(kind, model, R_WB, p_WG, -N) - N @ [0.0, 0.0, GROUND]

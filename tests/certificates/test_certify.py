@@ -13,7 +13,7 @@ import collide
 from collide.certificates.exact_parts import exact_parts
 from collide.certificates.nearest_to_origin import nearest_to_origin, nearest_vertex_pairs
 from collide.certificates.winding_number import winding_number
-from collide.numerics.exact_points import inner
+from collide.numerics.exact_vectors import inner
 
 EYE = np.eye(4)
 

@@ -7,6 +7,7 @@ import pytest
 from contact_oracle import ConvexBody, check_row
 from contact_scenes import gripper, table, wedge, world_corners
 from mesh_shapes import block_ring, box
+from naive import turn
 from naive_triangles import facet_pairs
 
 import collide
@@ -201,13 +202,8 @@ def grid_of(n: int) -> collide.Mesh:
     return collide.Mesh([(x, y, 0.0) for x in k for y in k], faces, solid=False)
 
 
-def turned(axis, angle: float) -> np.ndarray:
-    axis = np.asarray(axis) / np.linalg.norm(axis)
-    return collide.pose(quat_wxyz=(np.cos(angle / 2), *(np.sin(angle / 2) * axis)))[:3, :3]
-
-
 SWEPT = {
-    "capsule": (collide.Capsule(0.3, 1.0), turned((0, 1, 0), np.pi / 2)),
+    "capsule": (collide.Capsule(0.3, 1.0), turn((0, 1, 0), np.pi / 2)),
     "triangle": (collide.ConvexHull([(-0.4, -0.3, 0), (0.5, -0.2, 0), (0, 0.4, 0)], radius=0.2), np.eye(3)),
     "box": (collide.ConvexHull(0.3 * np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T, radius=0.1), np.eye(3)),
     "brick": (collide.ConvexHull(np.random.default_rng(2).normal(size=(30, 3)) * 0.4, radius=0.1), np.eye(3)),
@@ -223,7 +219,7 @@ def test_points_of_swept_bodies_that_lean_are_on_their_surface(name, gap):
     rows = 0
     for lean in [*10.0 ** rng.uniform(-4, -0.2, 12), 0.7, 0.78, 1.1]:
         X = np.eye(4)
-        X[:3, :3] = turned((*rng.normal(size=2), 0), lean) @ R_B
+        X[:3, :3] = turn((*rng.normal(size=2), 0), lean) @ R_B
         X[:3, 3] = *rng.uniform(-0.2, 0.2, 2), 3.0
         X[2, 3] -= collide.distance(ground, B, EYE, X).distance - gap
         c = collide.contacts(ground, B, EYE, X, margin=0.5)
@@ -238,12 +234,12 @@ def test_points_of_swept_bodies_that_lean_are_on_their_surface(name, gap):
 def test_a_capsule_along_the_rim_of_a_surface_has_both_ends(n):
     """One end over the facets, the other a hair beyond the rim: it fell off."""
     ground, B = grid_of(n), collide.Capsule(0.2, 0.8)
-    R_B = turned((1, 0, 0), -np.pi / 2)
+    R_B = turn((1, 0, 0), -np.pi / 2)
     rng = np.random.default_rng(5)
     for k in range(40):
-        turn = rng.choice([-1, 1]) * 10.0 ** rng.uniform(-12, -3.1)
+        angle = rng.choice([-1, 1]) * 10.0 ** rng.uniform(-12, -3.1)
         X = np.eye(4)
-        X[:3, :3] = turned((0, 0, 1), turn) @ R_B
+        X[:3, :3] = turn((0, 0, 1), angle) @ R_B
         X[:3, 3] = 1.0 + rng.choice([0.0, 1e-6, -1e-6]), rng.uniform(-0.2, 0.2), 0.2 + 1e-5
         c = collide.contacts(ground, B, EYE, X, margin=1e-3)
         assert np.ptp(c.point_a[:, 1]) > 0.8 - 1e-3, (n, k, X.tolist(), c.rows)

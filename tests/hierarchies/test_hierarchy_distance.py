@@ -19,6 +19,7 @@ from collide.hierarchies.hierarchy_distance import hierarchy_distance
 from collide.hierarchies.packed_hierarchy import PackedHierarchy
 from collide.hull.exact_hull import convex_hull
 from collide.scenes.families import generate
+from collide.scenes.families.ingredients import rotation
 
 SIZE = 200 if os.environ.get("NUMBA_DISABLE_JIT") != "1" else 40
 NAMES = list(families(40))
@@ -37,17 +38,6 @@ def packed(name: str, bound: int):
     return points, normals, offsets, PackedHierarchy(build_hierarchy(points, hull, bound))
 
 
-def turn(rng) -> np.ndarray:
-    w, x, y, z = (q := rng.normal(size=4)) / np.sqrt(np.square(q).sum())
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
 def times(rotation, points):
     return np.stack([(rotation[k] * points).sum(axis=-1) for k in range(3)], axis=-1)
 
@@ -62,12 +52,12 @@ def test_distances_are_proven(name, bound):
         points_b, normals_b, offsets_b, b = packed(other, bound)
         centre_b = points_b.mean(axis=0)
         for far in (0.0, 1.2, 1.7, 2.5, 9.0):
-            rotation = turn(rng)
+            turned = rotation(rng)
             direction = rng.normal(size=3)
-            shift = points.mean(axis=0) - times(rotation, centre_b)
+            shift = points.mean(axis=0) - times(turned, centre_b)
             shift += far * direction / np.sqrt(np.square(direction).sum())
-            snippet = (name, other, bound, rotation.tolist(), shift.tolist())
-            found = hierarchy_distance(a, b, rotation, shift)
+            snippet = (name, other, bound, turned.tolist(), shift.tolist())
+            found = hierarchy_distance(a, b, turned, shift)
             assert found.counters[0] < a.hierarchy.depth, snippet
             assert found.counters[1] <= a.hierarchy.depth * b.hierarchy.depth, snippet
             if far == 0.0:
@@ -75,12 +65,12 @@ def test_distances_are_proven(name, bound):
             if found.distance < 1e-9:
                 continue
             apart += 1
-            posed = times(rotation, points_b) + shift
+            posed = times(turned, points_b) + shift
             axis = (found.point_b - found.point_a) / found.distance
             gap = (posed * axis).sum(axis=1).min() - (points * axis).sum(axis=1).max()
             assert gap >= found.distance * (1 - 1e-9) - 1e-12, snippet
             assert ((normals * found.point_a).sum(axis=1) - offsets).max() < 1e-9, snippet
-            inside_b = times(rotation.T, found.point_b - shift)
+            inside_b = times(turned.T, found.point_b - shift)
             assert ((normals_b * inside_b).sum(axis=1) - offsets_b).max() < 1e-9 * (1 + np.abs(centre_b).max()), snippet
     assert apart >= 5
 
@@ -92,7 +82,7 @@ def test_levels_gone_down_grow_with_the_product_of_logarithms():
     for n in (256, 4096) if SIZE > 100 else (32, 128):
         body = PackedHierarchy(build_hierarchy(sphere(n), convex_hull(sphere(n))))
         counts = [
-            hierarchy_distance(body, body, turn(rng), 2.2 * d / np.sqrt(np.square(d).sum())).counters[1]
+            hierarchy_distance(body, body, rotation(rng), 2.2 * d / np.sqrt(np.square(d).sum())).counters[1]
             for d in rng.normal(size=(40, 3))
         ]
         mean.append(np.mean(counts))

@@ -24,6 +24,7 @@ from collide.hierarchies.validate_walk import validate_rounds
 from collide.hierarchies.walk import APART, LOST, MEETING
 from collide.lowering.parts import convex_set_of
 from collide.scenes.families import HULLS, generate, names
+from collide.scenes.families.ingredients import direction, rotation
 
 WALK = "barba-langerman"
 EYE = np.eye(4)
@@ -44,17 +45,7 @@ def shifted(x, y=0.0, z=0.0) -> np.ndarray:
 
 
 def turned(rng, shift: float) -> np.ndarray:
-    w, x, y, z = rng.standard_normal(4)
-    X = np.eye(4)
-    s = 2 / (w * w + x * x + y * y + z * z)
-    X[:3, :3] = [
-        [1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
-        [s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)],
-        [s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)],
-    ]
-    direction = rng.standard_normal(3)
-    X[:3, 3] = shift * direction / np.linalg.norm(direction)
-    return X
+    return collide.pose(R=rotation(rng), xyz=shift * direction(rng))
 
 
 def ball(rng, n: int, stretch=(1.0, 1.0, 1.0)) -> collide.ConvexHull:

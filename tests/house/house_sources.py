@@ -55,32 +55,27 @@ def modules() -> dict[str, Path]:
 def imports(file: Path) -> list[tuple[str, bool, int]]:
     """(module, whether inside a function, line) of every import; names that are modules count as such."""
     known, found = modules(), []
-    functions = lines_of(node for node in nodes(file) if isinstance(node, FUNCTIONS))
-    never_run = lines_of(node for node in nodes(file) if isinstance(node, ast.If) and is_type_checking(node.test))
-    for node in nodes(file):
-        if not isinstance(node, (ast.Import, ast.ImportFrom, ast.Call)) or node.lineno in never_run:
-            continue
+
+    def visit(node: ast.AST, late: bool) -> None:
         if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
+            found.extend((alias.name, late, node.lineno) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert not node.level, f"{shown(file)}:{node.lineno}: relative import; write the whole name"
             module = node.module or ""
             inner = [f"{module}.{alias.name}" for alias in node.names]
-            names = [name if name in known else module for name in inner]
-        elif isinstance(node.func, ast.Name) and node.func.id == "lazy_module":
-            names = [ast.literal_eval(node.args[0])]
-        else:
-            continue
-        found.extend((name, node.lineno in functions, node.lineno) for name in names)
-    return sorted(found, key=lambda one: one[2])
+            found.extend((name if name in known else module, late, node.lineno) for name in inner)
+        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.Call):
+            if isinstance(node.value.func, ast.Name) and node.value.func.id == "lazy_module":
+                found.append((ast.literal_eval(node.value.args[0]), late, node.lineno))
+        elif isinstance(node, ast.If) and is_type_checking(node.test):
+            return  # never run
+        inside = late or isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
+        for child in ast.iter_child_nodes(node):
+            if not isinstance(child, ast.expr):  # nine of ten nodes, in which nothing is imported
+                visit(child, inside)
 
-
-FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
-
-
-def lines_of(found: Iterable[ast.stmt | ast.expr]) -> set[int]:
-    """Lines within syntax trees, but for their first: of a function its body's."""
-    return {line for node in found for line in range(node.lineno + 1, (node.end_lineno or node.lineno) + 1)}
+    visit(tree(file), False)
+    return found
 
 
 def is_type_checking(test: ast.expr) -> bool:
@@ -121,7 +116,7 @@ def kernels(file: Path) -> list[ast.FunctionDef]:
 def guarded(file: Path, otherwise: bool = False) -> set[int]:
     """Lines of a file that run only where kernels are compiled just in time; otherwise : only where they are not."""
     found: set[int] = set()
-    for node in nodes(file):
+    for node in nodes(file) if GUARD in file.read_text(encoding="utf-8") else ():
         if isinstance(node, ast.If) and ast.unparse(node.test) in (GUARD, f"not {GUARD}"):
             branch = node.body if (ast.unparse(node.test) == GUARD) != otherwise else node.orelse
             found.update(

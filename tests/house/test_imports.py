@@ -1,4 +1,8 @@
-"""The house's direction of flow, read from the sources themselves: the syntax tree says who imports whom."""
+"""The house's direction of flow, read from the sources themselves: the syntax tree says who imports whom.
+
+import-linter says less: layers that follow from `ROOMS` would allow 2,295 of the 4,830 pairs of rooms, where `ROOMS`
+allows 487, and its contracts tell neither imports inside functions nor those under `WITH_NUMBA` from others.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +29,7 @@ ROOMS = {
     "log": set(),
     "lazy_modules": set(),
     "fork_safe_lock": set(),
+    "child_process": set(),
     "algorithms": {"errors"},
     "kernels": {"cache_folder", "errors", "log", "whole_file"},
     "argument_checks": {"errors"},
@@ -32,7 +37,7 @@ ROOMS = {
     "transforms": {"errors", "argument_checks"},
     "results": {"errors"},
     "numerics": {"errors", "kernels"},
-    "least_distance": {"errors", "argument_checks", "kernels"},
+    "least_distance": {"errors", "argument_checks", "kernels", "numerics"},
     "hull": {"errors", "kernels", "least_distance", "numerics"},
     "support": {"errors", "fork_safe_lock", "kernels", "numerics", "hull", "log"},
     "mesh": {"errors", "fork_safe_lock", "kernels", "numerics", "log"},
@@ -193,8 +198,8 @@ ROOMS = {
         "pair_arguments",
     },
     "polytopes": {
-        "errors", "argument_checks", "certificates", "hull", "kernels", "least_distance", "numerics", "shapes",
-        "threads", "transforms",
+        "errors", "argument_checks", "certificates", "hull", "kernels", "least_distance", "numerics", "pair_arguments",
+        "shapes", "threads", "transforms",
     },
     "world_bodies": {"errors", "argument_checks", "transforms", "numerics", "shapes", "broadphase"},
     "world_hits": set(),
@@ -296,8 +301,8 @@ ROOMS = {
         "world",
     },
     "sweeps": {
-        "errors", "argument_checks", "given_files", "log", "query", "shapes", "robots", "world", "reports",
-        "whole_file", "",
+        "errors", "argument_checks", "child_process", "given_files", "log", "query", "shapes", "robots", "world",
+        "reports", "whole_file", "",
     },
     "reports": {
         "errors", "lowering", "results", "shapes", "solids", "cache_folder", "given_files", "kernels", "whole_file", "",
@@ -459,16 +464,6 @@ def test_scenes_ask_no_engine():
         for file in sources("scenes")
         for module, _, line in imports(file)
         if module.startswith("collide.adapters") and module != "collide.adapters.peers.exact"
-    )
-
-
-def test_outer_rooms_have_one_name_each():
-    """``import scenes`` works from the repository's root and makes a second module of every file."""
-    none_of(
-        f"{shown(file)}:{line}: import collide.{module}"
-        for file in [*sources(), *sources("tests"), *sources("examples"), *sources("benchmarks")]
-        for module, _, line in imports(file)
-        if module.split(".")[0] in ("scenes", "adapters")
     )
 
 

@@ -12,6 +12,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from hierarchy_families import ring, turned
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,24 +20,6 @@ from collide.hull.exact_hull import Hull, convex_hull
 from collide.hull.validate_hull import validate_hull
 
 # --- clouds -------------------------------------------------------------------------------------
-
-
-def turned(points: np.ndarray) -> np.ndarray:
-    """Rotated by no special angle, rounded."""
-    w, x, y, z = np.array([0.3, -0.5, 0.7, 0.41]) / np.sqrt(0.3**2 + 0.5**2 + 0.7**2 + 0.41**2)
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    return np.asarray(points, dtype=float) @ rotation.T
-
-
-def ring(n: int, z: float = 0.0, radius: float = 1.0, phase: float = 0.0) -> np.ndarray:
-    angle = 2 * np.pi * np.arange(n) / n + phase
-    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(n, z)])
 
 
 def on_sphere(rng, n: int) -> np.ndarray:

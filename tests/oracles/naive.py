@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from contextlib import contextmanager
 from fractions import Fraction
-from itertools import permutations, product
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,17 +18,13 @@ import numpy as np
 import collide
 from collide.adapters.peers import exact
 from collide.results import FIELDS
+from collide.scenes.families.ingredients import EXACT_ROTATIONS
 
 ULP = 2.0**-52
 SHARED = Path(__file__).resolve().parents[3] / "shared"
+#: They move lattices onto lattices without rounding.
+LATTICE_ROTATIONS = EXACT_ROTATIONS
 
-#: The 24 rotations with entries 0 and ±1: they move lattices onto lattices without rounding.
-LATTICE_ROTATIONS = [
-    np.diag(signs)[list(order)]
-    for order in permutations(range(3))
-    for signs in product((1.0, -1.0), repeat=3)
-    if np.linalg.det(np.diag(signs)[list(order)]) > 0
-]
 
 
 class Case(NamedTuple):
@@ -266,6 +262,11 @@ def share(flags) -> float:
     """Which part of the flags is true."""
     flags = list(flags)
     return sum(map(bool, flags)) / len(flags)
+
+
+def turn(axis, angle: float) -> np.ndarray:
+    """(3, 3) of a turn by an angle [rad] about an axis of any length."""
+    return collide.pose(quat_wxyz=(math.cos(angle / 2), *(math.sin(angle / 2) * unit(axis))))[:3, :3]
 
 
 def unit(v) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 
+import naive
 import numpy as np
 import pytest
 
@@ -13,6 +14,7 @@ from collide import Box, Compound, Cylinder, Mesh, Sphere, pose
 from collide.reports import classes, report
 from collide.results import EXACT, PAIR_DTYPE, PLANE, SIMPLEX, UNDECIDED
 from collide.scenes import Scene, SceneBody
+from collide.scenes.families.ingredients import rotation
 
 
 def scene_of(*bodies) -> Scene:
@@ -27,26 +29,15 @@ def class_of(*bodies, clearance=0.05) -> str:
     return "".join(listed)
 
 
-def random_rotation(rng) -> np.ndarray:
-    q = rng.normal(size=4)
-    return collide.pose((0, 0, 0), quat_wxyz=q / np.linalg.norm(q))[:3, :3]
-
-
-def posed(R, t) -> np.ndarray:
-    X = np.eye(4)
-    X[:3, :3], X[:3, 3] = R, t
-    return X
-
-
 def test_parallel_faces_ten_millimetres_apart_never_touch():
     """Integers settle the last digits of such gaps; the report once read that as "below rounding"."""
     rng = np.random.default_rng(7)
     found, settled = Counter(), 0
     for case in range(300):
-        R = random_rotation(rng)
+        R = rotation(rng)
         A, B = Box(rng.uniform(0.02, 0.2, 3)), Box(rng.uniform(0.02, 0.2, 3))
         gap = np.array([0, 0, 0.5 * (A.size[2] + B.size[2]) + 0.01])
-        bodies = (A, posed(R, (0, 0, 0))), (B, posed(R, R @ gap))
+        bodies = (A, naive.pose(R, (0, 0, 0))), (B, naive.pose(R, R @ gap))
         settled += collide.distance(A, B, bodies[0][1], bodies[1][1]).how == EXACT
         found[class_of(*bodies)] += 1
         assert found["touching"] == 0, f"case {case}: {bodies}"
@@ -62,9 +53,9 @@ def test_fingers_nine_millimetres_apart_are_near_in_every_output():
         np.random.default_rng(3),
     )
     for _ in range(20):
-        R = random_rotation(rng)
+        R = rotation(rng)
         made = report.make(
-            scene_of((finger, posed(R, (0, 0, 0))), (finger, posed(R, R @ (0, 0.0205, 0)))), clearance=0.02
+            scene_of((finger, naive.pose(R, (0, 0, 0))), (finger, naive.pose(R, R @ (0, 0.0205, 0)))), clearance=0.02
         )
         data = made.to_dict()
         assert (len(data["near"]), data["verdict"]["near"], data["verdict"]["touching"]) == (1, 1, 0)

@@ -24,6 +24,7 @@ sys.path += [str(TESTS / "oracles"), str(TESTS / "contact")]
 
 import numpy as np
 from contact_oracle import ConvexBody, away_from, check_row, facet, failures_of_convex
+from naive import pose, turn
 from soak_pairs import ball_facets, source
 
 import collide
@@ -123,17 +124,6 @@ def _rotation(rng) -> np.ndarray:
     return collide.pose(quat_wxyz=rng.normal(size=4))[:3, :3]
 
 
-def _turn(axis, angle: float) -> np.ndarray:
-    axis = axis / np.linalg.norm(axis)
-    return collide.pose(quat_wxyz=(math.cos(angle / 2), *(math.sin(angle / 2) * axis)))[:3, :3]
-
-
-def _pose(R, p) -> np.ndarray:
-    X = np.eye(4)
-    X[:3, :3], X[:3, 3] = R, p
-    return X
-
-
 def _meet(A, B, X_WA, X_WB, gap: float, rng) -> None:
     """Move B along the normal of their distance until it is ``gap``; the judge needs no more of it than to be near."""
     try:
@@ -156,7 +146,7 @@ def _margin(rng) -> float:
 
 def _pair(kinds, seed, rng, spread=0.7) -> Case:
     A, B = (_one_of(kind, seed, rng) for kind in kinds)
-    X_WA, X_WB = _pose(_rotation(rng), rng.normal(size=3)), _pose(_rotation(rng), np.zeros(3))
+    X_WA, X_WB = pose(_rotation(rng), rng.normal(size=3)), pose(_rotation(rng), np.zeros(3))
     X_WB[:3, 3] = X_WA[:3, 3] + rng.normal(size=3) * spread
     return Case(kinds, A, B, X_WA, X_WB, _margin(rng))
 
@@ -195,7 +185,7 @@ def collinear(seed, rng) -> Case:
 def tilted(seed, rng) -> Case:
     """Frames parallel, or off it by 1e-16 … 0.1."""
     case = _pair(_kinds(rng), seed, rng)
-    case.X_WB[:3, :3] = _turn(rng.normal(size=3), 10.0 ** rng.uniform(-16, -1)) @ case.X_WA[:3, :3]
+    case.X_WB[:3, :3] = turn(rng.normal(size=3), 10.0 ** rng.uniform(-16, -1)) @ case.X_WA[:3, :3]
     _meet(*case[1:5], _gap(rng), rng)
     return case
 
@@ -205,7 +195,7 @@ def tiny_beside_huge(seed, rng) -> Case:
     A, B = (_one_of(kind, seed, rng) for kind in kinds)
     scale = 10.0 ** rng.uniform(1, 6)
     A = collide.Box(A.size * scale) if kinds[0] == "box" else collide.ConvexHull(A.points * scale)
-    X_WA, X_WB = _pose(_rotation(rng), rng.normal(size=3)), _pose(_rotation(rng), np.zeros(3))
+    X_WA, X_WB = pose(_rotation(rng), rng.normal(size=3)), pose(_rotation(rng), np.zeros(3))
     X_WB[:3, 3] = X_WA[:3, 3] + rng.normal(size=3) * scale
     _meet(A, B, X_WA, X_WB, _gap(rng), rng)
     return Case(kinds, A, B, X_WA, X_WB, _margin(rng) * float(rng.choice([1.0, scale])))
@@ -237,10 +227,9 @@ def along_edges(seed, rng) -> Case:
         corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, -1).T * size
         if rng.uniform() < 0.5:  # corners along the edge as well, rounded
             corners = np.concatenate([corners, [[t * size[0], size[1] / 2, size[2] / 2] for t in (-0.2, 0.1)]])
-            turn = _rotation(rng)
-            corners = corners @ turn.T
+            R0 = _rotation(rng)
+            corners = corners @ R0.T
             A, corners = collide.ConvexHull(corners), None
-            R0 = turn
         else:
             A, R0 = collide.ConvexHull(corners), np.eye(3)
     else:
@@ -256,12 +245,12 @@ def along_edges(seed, rng) -> Case:
     out = np.array([0.0, math.cos(math.pi / 4 + lean), math.sin(math.pi / 4 + lean)])
     along = np.array([1.0, 0, 0])
     side = np.cross(along, out)
-    turn = _turn(out, angle)  # about the direction that parts the two: both ends stay as near as may be
-    R = turn @ np.stack([out, side, along], axis=1)
+    swung = turn(out, angle)  # about the direction that parts the two: both ends stay as near as may be
+    R = swung @ np.stack([out, side, along], axis=1)
     gap = float(rng.choice([0.0, 1e-9, 1e-4, -1e-9, -1e-3]))
     p = np.array([rng.uniform(-0.2, 0.2), size[1] / 2, size[2] / 2]) + (radius + gap) * out
-    X_WA = _pose(_rotation(rng), rng.normal(size=3))
-    X_WB = X_WA @ _pose(R0, np.zeros(3)) @ _pose(R, p)
+    X_WA = pose(_rotation(rng), rng.normal(size=3))
+    X_WB = X_WA @ pose(R0, np.zeros(3)) @ pose(R, p)
     margin = max(gap, 0.0) + 1e-6
     return Case(("edge", which), A, B, X_WA, X_WB, margin, ends=2)
 
@@ -269,7 +258,7 @@ def along_edges(seed, rng) -> Case:
 def curved(seed, rng) -> Case:
     case = _pair(_kinds(rng, ("cylinder", "cone", "ellipsoid")), seed, rng)
     if rng.uniform() < 0.5:
-        case.X_WB[:3, :3] = _turn(rng.normal(size=3), 10.0 ** rng.uniform(-16, -1)) @ case.X_WA[:3, :3]
+        case.X_WB[:3, :3] = turn(rng.normal(size=3), 10.0 ** rng.uniform(-16, -1)) @ case.X_WA[:3, :3]
     _meet(*case[1:5], _gap(rng), rng)
     return case
 
@@ -280,7 +269,7 @@ def swept(seed, rng) -> Case:
     kinds = _kinds(rng, ("capsule", "rounded hull", "swept triangle"), others)
     case = _pair(kinds, seed, rng)
     if rng.uniform() < 0.7:
-        case.X_WB[:3, :3] = _turn(rng.normal(size=3), 10.0 ** rng.uniform(-6, 0)) @ case.X_WA[:3, :3]
+        case.X_WB[:3, :3] = turn(rng.normal(size=3), 10.0 ** rng.uniform(-6, 0)) @ case.X_WA[:3, :3]
     _meet(*case[1:5], _gap(rng), rng)
     return case._replace(margin=float(rng.choice([0.0, 1e-6, 1e-3, 0.3])))
 
@@ -297,10 +286,10 @@ def meshes(seed, rng) -> Case:
         A = collide.Mesh(grid, facets, solid=False)
     kind = str(rng.choice(["mesh", "box", "hull", "capsule", "sphere", "swept triangle"]))
     B = collide.Mesh(points * rng.uniform(0.2, 0.5, 3), faces) if kind == "mesh" else _one_of(kind, seed, rng)
-    X_WA, X_WB = _pose(_rotation(rng), rng.normal(size=3)), _pose(_rotation(rng), np.zeros(3))
+    X_WA, X_WB = pose(_rotation(rng), rng.normal(size=3)), pose(_rotation(rng), np.zeros(3))
     X_WB[:3, 3] = X_WA[:3, 3] + 3 * _rotation(rng)[0]
     if rng.uniform() < 0.5:
-        X_WB[:3, :3] = _turn(rng.normal(size=3), 10.0 ** rng.uniform(-12, -1)) @ X_WA[:3, :3]
+        X_WB[:3, :3] = turn(rng.normal(size=3), 10.0 ** rng.uniform(-12, -1)) @ X_WA[:3, :3]
     _meet(A, B, X_WA, X_WB, float(rng.choice([1e-3, 1e-6, 0.0, -1e-6, -1e-3])), rng)
     return Case(("mesh", kind), A, B, X_WA, X_WB, float(rng.choice([0.0, 2e-3])))
 

@@ -10,8 +10,10 @@ from typing import NamedTuple
 import curved_oracle
 import numpy as np
 from curved_cells import CONTEXT, vector
+from naive import turn
 
 import collide
+from collide.scenes.families.ingredients import direction
 
 CURVED = ("cylinder", "cone", "ellipsoid")
 MESHES = ("solid", "surface", "mesh compound")
@@ -53,7 +55,7 @@ def draw(seed: int, number: int, ratio: float, kinds: tuple[str, ...] = KINDS) -
     if random.uniform() < 0.3:
         X_WB[:3, :3] = X_WA[:3, :3]
     elif random.uniform() < 0.15:  # nearly parallel
-        X_WB[:3, :3] = _turn(random, 10.0 ** random.uniform(-12, -1)) @ X_WA[:3, :3]
+        X_WB[:3, :3] = turn(angle=10.0 ** random.uniform(-12, -1), axis=random.normal(size=3)) @ X_WA[:3, :3]
     X_WA[:3, 3] = random.normal(size=3) * sizes[0] * random.choice([0.0, 1.0, 1e3], p=[0.5, 0.4, 0.1])
     poses = str(random.choice(POSES, p=[0.62, 0.1, 0.1, 0.15, 0.03]))
     if poses == "one frame":
@@ -63,7 +65,7 @@ def draw(seed: int, number: int, ratio: float, kinds: tuple[str, ...] = KINDS) -
         _near(A, B, X_WA, X_WB, sizes, random)
     else:
         far = {"equal origins": 0.0, "inside": 0.3 * random.uniform(), "anywhere": 4.0 * random.uniform()}[poses]
-        X_WB[:3, 3] = X_WA[:3, 3] + far * max(sizes) * _unit(random)
+        X_WB[:3, 3] = X_WA[:3, 3] + far * max(sizes) * direction(random)
     return Case(number, which, poses, A, B, X_WA, X_WB)
 
 
@@ -83,19 +85,9 @@ def rotation(random) -> np.ndarray:
     return X
 
 
-def _turn(random, angle: float) -> np.ndarray:
-    half = _unit(random) * math.sin(angle / 2)
-    return collide.pose(quat_wxyz=(math.cos(angle / 2), *half))[:3, :3]
-
-
-def _unit(random) -> np.ndarray:
-    v = random.normal(size=3)
-    return v / np.linalg.norm(v)
-
-
 def _near(A, B, X_WA, X_WB, sizes, random) -> None:
     """Move B to where a direction puts it a gap, or an overlap, of 1e-16 … 10 sizes beside A."""
-    u = _unit(random) if random.uniform() < 0.6 else X_WA[:3, int(random.integers(3))] * random.choice([-1.0, 1.0])
+    u = direction(random) if random.uniform() < 0.6 else X_WA[:3, int(random.integers(3))] * random.choice([-1.0, 1.0])
     size = min(sizes) if random.uniform() < 0.6 else max(sizes)
     gap = size * 10.0 ** random.uniform(-16, 1) if random.uniform() < 0.7 else size * random.uniform(0.1, 1)
     gap *= random.choice([1.0, -1.0], p=[0.7, 0.3])
@@ -110,7 +102,7 @@ def _near(A, B, X_WA, X_WB, sizes, random) -> None:
     end_a, end_b = extreme(A, X_WA, u), extreme(B, X_WB, -u)
     X_WB[:3, 3] = end_a + gap * u - end_b
     if random.uniform() < 0.3:
-        side = np.cross(u, _unit(random))
+        side = np.cross(u, direction(random))
         X_WB[:3, 3] += side * min(sizes) * random.uniform()
 
 

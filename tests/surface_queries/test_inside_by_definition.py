@@ -11,6 +11,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import surfaces
+from naive import random_pose
 
 from collide import (
     Box,
@@ -53,10 +54,6 @@ def on_surface(name: str) -> np.ndarray:
     return np.array(point)
 
 
-def random_pose(rng):
-    return pose(rng.uniform(-2, 2, 3), rpy=rng.uniform(-3, 3, 3))
-
-
 @pytest.mark.many(7)
 @pytest.mark.parametrize("name", SHAPES)
 def test_points_on_the_surface_of_a_part(name):
@@ -65,7 +62,7 @@ def test_points_on_the_surface_of_a_part(name):
     shape, (rng, point) = SHAPES[name][0], (np.random.default_rng(sorted(SHAPES).index(name)), on_surface(name))
     inside = asked = 0
     for _ in range(12):
-        X, Y, Z = random_pose(rng), random_pose(rng), random_pose(rng)
+        X, Y, Z = random_pose(rng, 2.0), random_pose(rng, 2.0), random_pose(rng, 2.0)
         far = (Sphere(0.01), pose((50, 50, 50)))
         for union, poses in (
             (Compound([(shape, Y), far]), [X, Y]),

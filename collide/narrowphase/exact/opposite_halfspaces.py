@@ -14,7 +14,7 @@ import numpy as np
 
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.shape_table import PoseTable, ShapeTable
-from collide.numerics.exact_points import cross, inner
+from collide.numerics.exact_vectors import cross, inner
 from collide.results import EXACT
 
 _Vector = tuple[Fraction, Fraction, Fraction]

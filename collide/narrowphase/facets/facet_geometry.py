@@ -7,7 +7,8 @@ from typing import TypeVar
 import numpy as np
 
 from collide.mesh.bvh import MeshTree
-from collide.numerics.exact_points import Exact, Point, cross, inner, integers, leading_digits, minus, placed
+from collide.numerics.exact_points import Point, integers, leading_digits, placed
+from collide.numerics.exact_vectors import Exact, cross, inner, minus
 
 Vector = tuple[Exact, Exact, Exact]
 Direction = TypeVar("Direction", bound=tuple)

@@ -11,6 +11,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from naive import rotation
 
 import collide
 from collide.hull.exact_hull import convex_hull
@@ -41,11 +42,6 @@ def body(kind: str, n: int) -> np.ndarray:
         return np.concatenate([prism(n)[: n // 2], prism(n)[: n // 2] * 1.5 + (0, 0, 0.5), [[0, 0, 1.0]]])
     assert kind == "frustum"
     return prism(n) * np.where(np.arange(n)[:, None] < n // 2, (1.0, 1.0, 1.0), (0.4, 0.4, 1.0))
-
-
-def rotation(rng) -> np.ndarray:
-    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-    return q * np.sign(np.linalg.det(q))
 
 
 def tilted(angle: float, rng) -> np.ndarray:
