@@ -40,10 +40,6 @@ SCRATCH = KEYS + COUNTERS + RESULT + MARKS
 #: Cores of bodies with radii are looked for as far as the radii, and this much farther, so that a bracket decides.
 FARTHER = 1 + 1e-9
 
-#: Facets as near as radii that are this share of the smaller core are found sooner than facets that meet: boxes of
-#: floats about a core a million times as large as the other tell nothing of where they meet.
-_LARGE_RADIUS = 0.125
-
 
 class FacetBody(NamedTuple):
     """One body: its tree, whether it is solid, one point of every part (3 doubles each), the radius of its ball [m]."""
@@ -272,31 +268,20 @@ def gap_state(space, radius):
 
 
 @kernel
-def _swept_state(space, pair, radius):
-    """APART, HIT, OPEN or SINGULAR: whether surfaces come as near as the radii. Two facets that do are enough."""
-    if not measure(space, pair, radius * FARTHER, radius):
-        return SINGULAR
-    return gap_state(space, radius)
-
-
-@kernel
 def _bodies_state(space, pair):
     """APART, HIT, OPEN or SINGULAR."""
     radius = pair.A.radius + pair.B.radius
-    swept_first = radius > _LARGE_RADIUS * min(numbers_of(pair.A)[RADIUS], numbers_of(pair.B)[RADIUS])
-    if swept_first:
-        swept = _swept_state(space, pair, radius)
-        if swept == HIT or swept == SINGULAR:
-            return swept
     state = cores_state(space, pair, 0)
     if state != APART or radius == 0.0:
         return state
-    if not swept_first:
-        swept = _swept_state(space, pair, radius)
-    if swept == OPEN:  # whoever looks no farther than the radii may be left with a wider bracket
+    # Two facets as near as the radii are enough.
+    if not measure(space, pair, radius * FARTHER, radius):
+        return SINGULAR
+    state = gap_state(space, radius)
+    if state == OPEN:  # whoever looks no farther than the radii may be left with a wider bracket
         measure(space, pair, math.inf, radius)
-        return gap_state(space, radius)
-    return swept
+        state = gap_state(space, radius)
+    return state
 
 
 @kernel
