@@ -231,8 +231,11 @@ def result_of(space):
 
 
 @kernel
-def measure(space, pair, limit):
-    """The surfaces' distance into the scratch, looked for within the limit; False where a matrix places no mesh."""
+def measure(space, pair, limit, enough):
+    """The surfaces' distance into the scratch; False where a matrix places no mesh.
+
+    limit, enough : as of `near_surfaces`.
+    """
     result_at = space.scratch_at + 8 * (KEYS + COUNTERS)
     result, marks = result_of(space)
     while True:
@@ -241,9 +244,9 @@ def measure(space, pair, limit):
         done = _measure_surfaces(
             space.distances,
             (
-                pair.A.tree_at, pair.B.tree_at, pair.XA_at, 0, pair.XB_at, 0, 1, pair.same_tree, limit, result_at,
-                result_at + 8 * RESULT, space.stack_at, space.n_stack, space.heap_at, space.n_heap, space.doubles_at,
-                space.integers_at, space.exact,
+                pair.A.tree_at, pair.B.tree_at, pair.XA_at, 0, pair.XB_at, 0, 1, pair.same_tree, limit, enough,
+                result_at, result_at + 8 * RESULT, space.stack_at, space.n_stack, space.heap_at, space.n_heap,
+                space.doubles_at, space.integers_at, space.exact,
             ),
         )  # fmt: skip
         if done < 1:
@@ -271,11 +274,12 @@ def _bodies_state(space, pair):
     state = cores_state(space, pair, 0)
     if state != APART or radius == 0.0:
         return state
-    if not measure(space, pair, radius * FARTHER):
+    # Two facets as near as the radii are enough.
+    if not measure(space, pair, radius * FARTHER, radius):
         return SINGULAR
     state = gap_state(space, radius)
     if state == OPEN:  # whoever looks no farther than the radii may be left with a wider bracket
-        measure(space, pair, math.inf)
+        measure(space, pair, math.inf, radius)
         state = gap_state(space, radius)
     return state
 

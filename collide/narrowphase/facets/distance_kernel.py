@@ -35,7 +35,7 @@ from collide.narrowphase.facets.collide_kernel import (
     result_of,
 )
 from collide.narrowphase.facets.posed_surfaces import is_swapped_order
-from collide.narrowphase.facets.surface_distance import FACET_A, FACET_B, MARKS, RESULT
+from collide.narrowphase.facets.surface_distance import FACET_A, FACET_B, IN_FULL, MARKS, RESULT
 from collide.narrowphase.rows import ROW, blank_row, view_row
 from collide.numerics.vec3 import Vec3, add, dot, put_vec3, scale, sub, vec3_at
 from collide.results import EXACT, FORMULA, UNDECIDED
@@ -196,14 +196,14 @@ def _write_row(space, pair, limit, reach, depths, hull_at, exchanged, row_at):
         row, _, _ = blank_row(row_at)
         row[rows.POINT_A] = math.nan
         state = cores_state(space, pair, row_at + 8 * rows.POINT_A)
-        if state == SINGULAR or (state == APART and not measure(space, pair, reach)):
+        if state == SINGULAR or (state == APART and not measure(space, pair, reach, IN_FULL)):
             return ROW_SINGULAR
         if state == HIT:
             return _write_core_hit(space, pair, depths, row_at)
     lacks = _write_gap(space, pair, limit, hull_at, exchanged, row_at)
     state = gap_state(space, radius)
     if state == OPEN:  # a search no farther than the radii may have a bracket that is narrow enough
-        measure(space, pair, radius * FARTHER)
+        measure(space, pair, radius * FARTHER, IN_FULL)
         state = APART if gap_state(space, radius) == APART else OPEN
     _, _, flags = view_row(row_at)
     flags[rows.HOW] = UNDECIDED if state == OPEN else FORMULA
@@ -239,7 +239,7 @@ def _write_core_hit(space, pair, depths, row_at):
     flags[rows.HIT] = 1
     flags[rows.HOW] = EXACT
     if math.isnan(row[rows.POINT_A]):
-        measure(space, pair, math.inf)
+        measure(space, pair, math.inf, IN_FULL)
         result, marks = result_of(space)
         put_vec3(row, rows.POINT_A, vec3_at(result, surface_distance.POINT_A))
         words[rows.PART_A] = max(marks[FACET_A], 0)

@@ -38,12 +38,13 @@ MARKS = 6
 # What changes on the way, doubles ("near"): the direction from A to B (3) and, in units of A's boxes, its products with
 # A's boxes (3), with B's (3) and with the shift (1), less rounding; the least lengths in the world of a gap of 1 along
 # the axes of A's frame (3), of B's (3), along lines in A's frame and in B's; the best distance so far, also in units of
-# A's boxes; the least slab; the bound of the error of a world coordinate; the nearest points so far (6).
+# A's boxes; the least slab; the bound of the error of a world coordinate; the nearest points so far (6); the length of
+# which it is enough to know that the distance is no more.
 DIRECTION, ALONG_A, ALONG_B, OFFSET = 0, 3, 6, 9
 AXIS_SCALES_A, AXIS_SCALES_B, LINE_SCALE_A, LINE_SCALE_B = 10, 13, 16, 17
-BEST, BOUND, LEAST, WORLD_ERROR, POINTS = 18, 19, 20, 21, 22
+BEST, BOUND, LEAST, WORLD_ERROR, POINTS, ENOUGH = 18, 19, 20, 21, 22, 28
 # Then a pair of triangles in world axes (18), points of it (6), and up to seven triangles of A (63).
-TRIANGLES_AT, NEW, OF_A_AT = 28, 46, 52
+TRIANGLES_AT, NEW, OF_A_AT = 29, 47, 53
 # And integers: pairs on the heap, pairs of leaves met, of them since the best distance got better.
 INTS = OF_A_AT + 9 * 7
 HEAP_SIZE, LEAVES, LEAVES_WITHOUT_IMPROVEMENT = range(3)
@@ -88,8 +89,8 @@ class DistanceQuery(NamedTuple):
 
 
 @kernel
-def prepare(query, limit):
-    """Start a pair of poses.   limit : nothing farther than this is looked for."""
+def prepare(query, limit, enough):
+    """Start a pair of poses.   limit, enough : as of `near_surfaces`."""
     trees, near, marks = query.trees, query.near, query.marks
     A, B, XA, XB = trees.A, trees.B, trees.XA, trees.XB
     _set_scales(trees.placing, INVERSE_A, near, AXIS_SCALES_A, LINE_SCALE_A, 1.0)
@@ -105,6 +106,7 @@ def prepare(query, limit):
     near[BEST] = limit
     near[BOUND] = limit * query.unit_a
     near[LEAST] = math.inf
+    near[ENOUGH] = enough
     marks[FACET_A] = -1
     marks[FACET_B] = -1
     for k in range(3):
@@ -182,6 +184,12 @@ def set_direction(query, direction):
     offset *= query.unit_a
     rounding = _FLOAT_ERROR * (abs(offset) + 1.001 * spread) + 2.0**-110 + 32.0 * U * query.unit_a * terms
     near[OFFSET] = offset - rounding
+
+
+@kernel(inline=True)
+def upper_bound(near):
+    """Of the surfaces' distance, by the nearest points so far."""
+    return near[BEST] + 4.0 * near[WORLD_ERROR]
 
 
 # --- boxes --------------------------------------------------------------------------------------

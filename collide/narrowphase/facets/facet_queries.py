@@ -168,8 +168,8 @@ def _near(A: MeshTree, B: MeshTree, X_WA, X_WB, n: int, limit: float) -> tuple[n
     work = workspace(stack_of(A, B))
     done = distances.near_surfaces(
         A.address, B.address, address_of(X_WA), step(X_WA), address_of(X_WB), step(X_WB), n, A.content == B.content,
-        float(limit), address_of(results), address_of(marks), *work.addresses[:2], work.heap_address, HEAP,
-        *work.addresses[2:],
+        float(limit), distances.IN_FULL, address_of(results), address_of(marks), *work.addresses[:2],
+        work.heap_address, HEAP, *work.addresses[2:],
     )  # fmt: skip
     if done < n:
         raise not_invertible(done)

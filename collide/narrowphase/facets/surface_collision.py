@@ -1,7 +1,8 @@
 """Two posed surfaces: whether they meet, and every pair of facets that does.
 
 The traversal goes depth first and opens the larger box. A leaf much larger than the box that it is compared with
-becomes its triangles. Leaves end in pairs of triangles, which are tested in doubles with error bounds and exactly where
+becomes its triangles; boxes that floats of its tree's size cannot tell apart are compared with them in doubles
+(`small_boxes.py`). Leaves end in pairs of triangles, which are tested in doubles with error bounds and exactly where
 these leave it open. The order is fixed, so the first pair found is, too.
 """
 
@@ -24,6 +25,7 @@ from collide.narrowphase.facets.posed_trees import (
     make_open_larger,
     pose_trees,
 )
+from collide.narrowphase.facets.small_boxes import is_small, without_missed
 from collide.narrowphase.facets.traversal import OF_A, OF_B, BoxPair, make_traversal, push_children, word_of
 
 # Counters, a row of integers a pose: nodes compared with a box or a triangle, one against the eight of a node; pairs of
@@ -123,6 +125,8 @@ def _open_pair(query, pair, stack, top):
             query.counters[NODES] += 1
             set_prism(placing, 0, A, t, B, link_b, probe)
             mask = boxes_meeting_prism(B.boxes, NODE * link_b, trees.frame_a, probe)
+            if is_small(box_size(B.boxes, b), units):
+                mask = without_missed(placing, 0, A, t, B, link_b, mask)
             top = push_children(stack, top, mask, word_of(_TRIANGLE | t, WIDTH * link_b), OF_B)
         return top
     if link_b < 0 and (b & _TRIANGLE or box_size(B.boxes, b) > _LARGE * units * box_size(A.boxes, a)):
@@ -130,6 +134,8 @@ def _open_pair(query, pair, stack, top):
             query.counters[NODES] += 1
             set_prism(placing, 1, B, t, A, link_a, probe)
             mask = boxes_meeting_prism(A.boxes, NODE * link_a, trees.frame_b, probe)
+            if is_small(box_size(A.boxes, a) * units, 1.0):
+                mask = without_missed(placing, 1, B, t, A, link_a, mask)
             top = push_children(stack, top, mask, word_of(WIDTH * link_a, _TRIANGLE | t), OF_A)
         return top
     return _open_larger(query, pair, stack, top)

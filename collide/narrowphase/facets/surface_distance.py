@@ -24,6 +24,7 @@ from collide.narrowphase.facets.distance_search import (
     BOUND,
     DIRECTION,
     DISTANCE,
+    ENOUGH,
     EXACT,
     FACET_A,
     FACET_B,
@@ -54,6 +55,7 @@ from collide.narrowphase.facets.distance_search import (
     prepare,
     set_direction,
     set_near_probe,
+    upper_bound,
 )
 from collide.narrowphase.facets.exact_corners import CORNERS
 from collide.narrowphase.facets.pair_heap import pop_heap, push_heap
@@ -76,6 +78,9 @@ _DEPTH_FIRST_LEAVES, _MAX_LEAVES_WITHOUT_IMPROVEMENT = 4, 16
 
 #: Points nearer than so many times the error of a coordinate give no direction: it may be off by one over that.
 _DIRECTION_RATIO = 2.0**26
+
+#: No UPPER is so small: the distance is searched to the end.
+IN_FULL = -1.0
 
 DOUBLES = PLACING + CORNERS + NEAR
 FLOATS = 2 * FRAME + NEAR_PROBE + 2 * WIDTH
@@ -168,7 +173,8 @@ def _next_pair(query, stack, top):
 
 @kernel(inline=True)
 def _visit_leaves(query, pair):
-    """Compare the facets of two leaves with the best distance so far; True where two of them meet."""
+    """Compare the facets of two leaves with the best distance so far; True where two of them meet, or are so near that
+    it is enough."""
     trees, near, ints = query.trees, query.near, query.ints
     if is_beyond_bound(near, pair):
         return False
@@ -187,6 +193,8 @@ def _visit_leaves(query, pair):
                 query.marks[MEETS] = 1
                 return True
     if near[BEST] < best:
+        if upper_bound(near) <= near[ENOUGH]:
+            return True
         ints[LEAVES_WITHOUT_IMPROVEMENT] = 0
         near[BOUND] = near[BEST] * query.unit_a
         set_direction(query, sub(vec3_at(near, POINTS + 3), vec3_at(near, POINTS)))
@@ -284,8 +292,10 @@ def _put_result(query, swapped, limit, out):
     length = 0.0 if meets else near[BEST]
     error = 0.0 if meets else 4.0 * near[WORLD_ERROR]
     out[DISTANCE] = length
-    out[LOWER] = 0.0 if meets else max(0.0, min(near[LEAST], length - error if has_points else limit))
     out[UPPER] = length + error if has_points else math.inf
+    # Where the search ended early, facets that were not looked at may be nearer.
+    unseen_nearer = meets or (has_points and out[UPPER] <= near[ENOUGH])
+    out[LOWER] = 0.0 if unseen_nearer else max(0.0, min(near[LEAST], length - error if has_points else limit))
     point_a = vec3_at(near, POINTS)
     point_b = vec3_at(near, POINTS + 3)
     if meets:
@@ -303,20 +313,21 @@ def _put_result(query, swapped, limit, out):
 
 #: Of `near_surfaces`.
 SIGNATURE = (
-    "int64(int64, int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64, int64, int64,"
-    " int64, int64, int64)"
+    "int64(int64, int64, int64, int64, int64, int64, int64, boolean, float64, float64, int64, int64, int64, int64,"
+    " int64, int64, int64, int64, int64)"
 )
 
 
 @entry(SIGNATURE)
 def near_surfaces(
-    header_a_at, header_b_at, XA_at, step_a, XB_at, step_b, n, same_tree, limit, results_at, marks_at, stack_at,
-    n_stack, heap_at, n_heap, doubles_at, integers_at, exact_at,
+    header_a_at, header_b_at, XA_at, step_a, XB_at, step_b, n, same_tree, limit, enough, results_at, marks_at,
+    stack_at, n_stack, heap_at, n_heap, doubles_at, integers_at, exact_at,
 ):  # fmt: skip
     """Distances of two surfaces at n pairs of poses; returns how many were done (fewer: that matrix is singular).
 
     Arguments are flat: entries are called by address, from C too.
     limit : nothing farther than this is looked for; where nothing is found, facets are −1 and LOWER is it.
+    enough : a search ends at an UPPER of no more than this, LOWER being 0 then; IN_FULL at none.
     results, marks : RESULT doubles and MARKS integers, zeros at first, a pose.   stack : 2·n_stack words and 8 more.
     """
     A = open_tree(header_a_at)
@@ -343,7 +354,7 @@ def near_surfaces(
             view_f64(stack_at + 8 * n_stack, n_stack), view_i64(heap_at, n_heap),
             view_f64(heap_at + 8 * n_heap, n_heap), n_heap, view_i64(marks_at + 8 * MARKS * k, MARKS),
         )  # fmt: skip
-        prepare(query, limit)
+        prepare(query, limit, enough)
         stack[0] = 0
         query.bounds[0] = 0.0
         query.marks[MEETS] = 0

@@ -10,8 +10,21 @@ from mesh_families import FAMILIES, random_pose, soup
 from mesh_shapes import bumpy_sphere
 from naive_triangles import surface_distance
 
+from collide.kernels import address_of
 from collide.mesh.build_bvh import build_mesh_tree
-from collide.narrowphase.facets.facet_queries import surface_distances
+from collide.mesh.bvh_slabs import make_slabs
+from collide.narrowphase.facets.facet_queries import HEAP, stack_of, surface_distances, workspace
+from collide.narrowphase.facets.surface_distance import (
+    DISTANCE,
+    IN_FULL,
+    LOWER,
+    MARKS,
+    NODES,
+    RESULT,
+    TRIANGLES,
+    UPPER,
+    near_surfaces,
+)
 
 
 def spread_apart(rng, case):
@@ -108,3 +121,42 @@ def test_nothing_near_is_left_out():
         least = min(surface_distances(a, b, X, Y).distance[0] for a in ones_a for b in ones_b)
         assert r.lower[0] <= least <= r.upper[0] and abs(r.distance[0] - least) <= 1e-14 * (1 + least)
         assert not r.meets[0]
+
+
+def near(A, B, X, Y, limit: float, enough: float) -> tuple[np.ndarray, np.ndarray]:
+    """(results, marks) of one pair of poses."""
+    for tree in (A, B):
+        tree.need_slabs(make_slabs)
+    work, results, marks = workspace(stack_of(A, B)), np.zeros(RESULT), np.zeros(MARKS, dtype=np.int64)
+    X, Y = (np.ascontiguousarray(Z, dtype=np.float64) for Z in (X, Y))
+    done = near_surfaces(
+        A.address, B.address, address_of(X), 0, address_of(Y), 0, 1, False, limit, enough, address_of(results),
+        address_of(marks), *work.addresses[:2], work.heap_address, HEAP, *work.addresses[2:],
+    )  # fmt: skip
+    assert done == 1
+    return results, marks
+
+
+def test_a_search_ends_as_soon_as_what_it_found_is_enough():
+    """Then it looked at a few facets, whatever the size of the bodies; where nothing is near enough, the result is that
+    of a search to the end, bit by bit."""
+    rng = np.random.default_rng(21)
+    ended = asked = 0
+    for n in (60, 600, 2400):
+        A, B = build_mesh_tree(*bumpy_sphere(n, 1)), build_mesh_tree(*bumpy_sphere(n, 2))
+        for away in (2.5, 4.0):
+            X, Y = random_pose(rng), random_pose(rng)
+            Y[:3, 3] = X[:3, 3] + away * X[:3, 0]
+            full, marks = near(A, B, X, Y, np.inf, IN_FULL)
+            for share in (0.5, 0.999, 1.0 + 1e-12, 1.02, 1.5, 30.0):
+                enough = share * full[DISTANCE]
+                found, looked_at = near(A, B, X, Y, np.inf, enough)
+                asked += 1
+                if full[UPPER] <= enough:
+                    ended += 1
+                    assert full[LOWER] <= found[DISTANCE] <= found[UPPER] <= enough and found[LOWER] == 0.0
+                    assert looked_at[TRIANGLES] <= marks[TRIANGLES]
+                else:
+                    assert np.array_equal(found, full) and np.array_equal(looked_at, marks)
+            assert looked_at[TRIANGLES] <= 64 and looked_at[NODES] <= 16, (n, away, looked_at.tolist())
+    assert 0.4 * asked < ended < 0.9 * asked, (ended, asked)
