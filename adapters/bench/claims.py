@@ -31,7 +31,7 @@ from collide.adapters.bench.pareto_picture import check_picture
 from collide.adapters.bench.turns import race
 from collide.errors import CollideError, InvalidArgument
 from collide.reports import terminal
-from collide.reports.tables import Column, Table
+from collide.reports.tables import Column, Table, lay_out
 from collide.whole_file import write_whole
 
 RESULTS = FOLDER / "results"
@@ -168,18 +168,19 @@ def _seconds(started: float) -> str:
     return f"{time.perf_counter() - started:.0f} s"
 
 
-def show(claim: Claim, rows: list[Row]) -> None:
+def show(claim: Claim, rows: list[Row], keys: list[str]) -> None:
     """The table, its notes, and how many bars are met."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
     same = {key: str(rows[0].get(key, "")) for key in columns if len({str(row.get(key, "")) for row in rows}) == 1}
     if len(rows) > 2:
         columns = [key for key in columns if key not in same or isinstance(rows[0].get(key), float)]
-    spare = {f"least_{claim.unit}": 2, f"largest_{claim.unit}": 3, "turns": 4}
     texts = {key for key in columns if any(isinstance(row.get(key), str) and row[key] for row in rows)}
+    needed = {*keys, "engine", f"median_{claim.unit}", "ratio", "bar", "verdict"}
     heads = [
-        Column(key.replace("_us", "_µs").replace("_", " "), "label" if key in texts else "number", spare.get(key, 0))
-        for key in columns
-    ]
+        Column(key.replace("_us", "_µs").replace("_", " "), "label" if key in texts else "number",
+               0 if key in needed else k + 1)
+        for k, key in enumerate(columns)
+    ]  # fmt: skip
     notes = [*(claim.notes(rows) if claim.notes else ())]
     if len(rows) > 2 and (everywhere := [f"{key} {same[key]}" for key in same if key not in columns and same[key]]):
         notes.append(f"in all rows: {', '.join(everywhere)}")
@@ -188,7 +189,10 @@ def show(claim: Claim, rows: list[Row]) -> None:
         names = ("; missed: " + ", ".join(_case_name(row) for row in missed)) if missed else ""
         notes.append(f"bars met: {len(judged) - len(missed)} of {len(judged)}{names}")
     cells = [[_cell(row.get(key, "")) for key in columns] for row in rows]
-    terminal.show_table(Table(f"{claim.name.upper()}  {claim.sentence}", heads, cells, notes=notes))
+    table = Table(f"{claim.name.upper()}  {claim.sentence}", heads, cells, notes=notes)
+    if dropped := lay_out(table, terminal.output_width(sys.stdout)[0]).dropped:
+        notes.append(f"no room at this width, in the CSV alone: {', '.join(dropped)}")
+    terminal.show_table(table)
     terminal.write_text("\n")
 
 
@@ -270,7 +274,7 @@ def _main(parser: argparse.ArgumentParser, claims: list[Claim], options: Options
         if not rows:
             say(f"{claim.name}: nothing was measured")
             continue
-        show(claim, rows)
+        show(claim, rows, keys)
         if not (options.quick or options.no_csv):
             print(f"written to {write(claim, rows, keys, stamp, bool(options.only)).relative_to(FOLDER.parent)}")
         if claim.panels and options.plot:
