@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from collide.adapters.bench.child_contestant import InChild
+from collide.adapters.bench.claims import installed
 from collide.adapters.bench.turns import Seconds
 from collide.adapters.peers.coal_peer import CoalPeer
 from collide.adapters.peers.fcl_peer import FclPeer
@@ -141,3 +142,17 @@ class _FclLoop:
         started = time.process_time()
         values = [ask(a, b, request, result()) for a, b in self._pairs]  # results accumulate: each pair has its own
         return time.process_time() - started, np.array(values, dtype=float)
+
+
+def mesh_loops(question: str, asked: tuple, kinds=("OBBRSS", "OBB")) -> tuple[dict, dict]:
+    """(loops, engines) by name of what is installed, about (A, B, X_WAs, X_WBs), surfaces; fcl is to be closed."""
+    A, B, Xs, Ys = asked
+    engines: dict = {}
+    for name in installed(coal="coal", fcl="fcl"):
+        lists = [A] * len(Xs), [B] * len(Xs), Xs, Ys
+        if name == "coal":
+            engines |= {f"coal {kind}": CoalLoop(*lists, coal_model(kind)) for kind in kinds
+                        if not (kind == "OBB" and question == "distance")}  # fmt: skip
+        else:
+            engines[name] = FclLoop(*lists)
+    return {name: engine.loop(question) for name, engine in engines.items()}, engines
