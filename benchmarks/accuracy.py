@@ -5,8 +5,10 @@
     python benchmarks/accuracy.py --table time --plot accuracy.png
     python benchmarks/accuracy.py --plot accuracy.png                 # what docs/accuracy.md shows
 
-families   the hard pairs of `collide.scenes.families` against exact arithmetic with 60 digits: the largest error of
-           every engine, what collide leaves uncertified, brackets that miss (which ends the run), and the share and cost of
+The hard pairs of `collide.scenes.families` against exact arithmetic with 60 digits: the largest error of every
+engine, what collide leaves uncertified, brackets that miss (which ends the run), and its paths' shares and costs.
+`accuracy_time.py` has errors against time, and brackets of curved pairs.
+
 Errors are parts of the exact gap or depth, so 1 is an answer with no right digit. Where the exact value is 0 they are
 parts of the size L of the smaller body, and so is the excess of a normal: what a translation along it would have to be
 longer than the shortest one.

@@ -3,7 +3,7 @@
     python benchmarks/accuracy_time.py --plot accuracy.png       # what docs/accuracy.md shows
 
 time    hulls of 8, 128 and 2,048 vertices at relative gaps and depths of 1e-1 to 1e-12, placed by collide's own
-        distances: the error of every engine setting, as a part of the exact value, against µs a call, of the first pairs
+        distances: the error of every engine setting, as a part of the exact value, against µs a call
 curved  bracket widths of cylinders, cones and ellipsoids in units of the size S of docs/conventions.md, for random
         shapes in four kinds of pose (`curved_pairs.py`)
 """

@@ -8,11 +8,11 @@ fall from a grid. The terrain is a rough height field of 9 cm cells, over which 
 "Falling" are the steps after the first tenth of a second, "resting" those after four hundred steps that are damped,
 until next to nothing moves. Robots are URDF models of example-robot-data, dropped on a floor, or on such a terrain.
 
-All contestants step from the same saved state; ms. "step" is processor time, "collision" what MuJoCo's own timer says of
-the collision within these steps. Pits are solved by conjugate gradients: Newton, the default, takes a second a step where
-a thousand bodies lie on each other, and collisions are no part of that. Checked: culled steps have the bits of MuJoCo's
-own. Then what becomes of bodies at rest in a second: how much energy is gained or lost [J/kg], the greatest speed
-[m/s, rad/s], and the deepest contact [mm].
+All contestants step from the same saved state; ms. "step" is processor time, "collision" what MuJoCo's own timer says
+of the collision within these steps. Pits are solved by conjugate gradients: Newton, the default, takes a second a step
+where a thousand bodies lie on each other, and collisions are no part of that. Checked: culled steps have the bits of
+MuJoCo's own. Then what becomes of bodies at rest in a second: how much energy is gained or lost [J/kg], the greatest
+speed [m/s, rad/s], and the deepest contact [mm].
 """
 
 from __future__ import annotations

@@ -4,10 +4,10 @@
     python benchmarks/robots.py --table clutter
     python benchmarks/robots.py --quick               # half a minute; no file
 
-clutter    µs a configuration: a Panda (9 hulls, 8 boxes of fingers; meshes of example-robot-data) over a table with 10, 50
-           and 200 boxes and hulls, at random configurations, whether anything collides. Ours stops at the first hit and
-           proves both verdicts; MuJoCo makes all contacts, Pinocchio stops at the first hit: pair by pair, and through
-           its broadphase manager. One thread each. Bars are µs that ours is to stay below
+clutter    µs a configuration: a Panda (9 hulls, 8 boxes of fingers; meshes of example-robot-data) over a table with 10,
+           50 and 200 boxes and hulls, at random configurations, whether anything collides. Ours stops at the first hit
+           and proves both verdicts; MuJoCo makes all contacts, Pinocchio stops at the first hit: pair by pair, and
+           through its broadphase manager. One thread each. Bars are µs that ours is to stay below
 batches    µs a configuration of ours by the size of the batch, in the same scenes, and of distances with gradients
 motions    scenes of MotionBenchMaker (from ../shared/data): µs a random configuration, a motion of 32 samples, and a
            motion proven free or hit, with the share that stays open. Motions begin at random free configurations and
