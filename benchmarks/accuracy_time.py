@@ -88,11 +88,11 @@ def curved_cases(options: Options):
     return ({"a": a, "b": b, "where": where} for a, b in PAIRS[: 2 if options.quick else None] for where in POSES)
 
 
-SHOWN = ("collide", "coal default", "coal 1e-9", "coal 1e-12", "fcl")
+DRAWN = ("collide", "coal default", "coal 1e-9", "coal 1e-12", "fcl")
 CLAIMS = [
     Claim("time", "µs a pair, and errors", time_cases, against_time, turns=7, file="accuracy-time", panels=tuple(
               Panel(f"{side}s, {n:,} vertices: largest relative error", "level", "max_error", "engine", "xy",
-                    lambda row, n=n, side=side: (row["n"], row["side"]) == (n, side) and row["engine"] in SHOWN,
+                    lambda row, n=n, side=side: (row["n"], row["side"]) == (n, side) and row["engine"] in DRAWN,
                     x_label="gap or depth, as a part of the length", floor=2e-17)
               for side in ("gap", "depth") for n in (8, 128, 2048))),
     Claim("curved", "brackets in units of S", curved_cases, curved, file="accuracy-curved", panels=tuple(

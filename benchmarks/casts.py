@@ -44,12 +44,12 @@ def bullet_rays(bodies: list, origins: np.ndarray, motions: np.ndarray) -> tuple
         body, X_SB, *_ = peer.build(shape)
         X = X @ X_SB
         pybullet.resetBasePositionAndOrientation(body, X[:3, 3].tolist(), quaternion_xyzw(X[:3, :3]), client)
-    starts, ends, most = origins.tolist(), (origins + motions).tolist(), pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE
+    starts, ends, max_rays = origins.tolist(), (origins + motions).tolist(), pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE
 
     def ask() -> np.ndarray:
         fractions: list[float] = []
-        for k in range(0, len(starts), most):
-            replies = pybullet.rayTestBatch(starts[k : k + most], ends[k : k + most], 1, physicsClientId=client)
+        for k in range(0, len(starts), max_rays):
+            replies = pybullet.rayTestBatch(starts[k : k + max_rays], ends[k : k + max_rays], 1, physicsClientId=client)
             fractions += [np.inf if reply[0] < 0 else reply[2] for reply in replies]
         return np.array(fractions)
 

@@ -1,9 +1,10 @@
-"""Single calls of pybullet and coal beside the same calls of collide.
+"""Single calls of pybullet, coal and Pinocchio beside the same calls of collide.
 
     python benchmarks/host_calls.py
 
 pybullet through `attach`, in a client of a floor, 100 balls that rest on it, and a hull. coal: shapes that are apart
-and that meet, with the default request for contacts. µs by the clock; engines that are not installed are left out.
+and that meet, with the default request for contacts. Pinocchio: robots at random configurations. µs by the clock;
+engines that are not installed are left out.
 """
 
 from __future__ import annotations
@@ -13,6 +14,10 @@ from functools import cache, partial
 from importlib import import_module
 
 import numpy as np
+from inputs import use_tests
+
+use_tests("differential")
+import pinocchio_robots
 
 from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
 from collide.adapters.peers.hull_facets import triangulate
@@ -105,11 +110,36 @@ def coal_cases(options: Options):
     return grid(shapes=shapes, where=("apart", "meeting"), question=questions)
 
 
+def of_pinocchio(options: Options, robot: str, question: str) -> Race:
+    """µs a configuration: all pairs with results, or whether any collides, ours of all configurations in one call."""
+    import pinocchio as pin
+
+    from collide.adapters.hosts import pinocchio as host
+
+    model, geom_model = pinocchio_robots.load(robot)
+    data, ours, theirs = model.createData(), geom_model.createData(), geom_model.createData()
+    low, high = np.maximum(model.lowerPositionLimit, -3.0), np.minimum(model.upperPositionLimit, 3.0)
+    Q = np.random.default_rng(22).uniform(low, high, (10 if options.quick else 100, model.nq))
+    first = question == "any"
+    tasks = {"collide": lambda: [host.compute_collisions(model, data, geom_model, ours, q) for q in Q],
+             "pinocchio": lambda: [pin.computeCollisions(model, data, geom_model, theirs, q, first) for q in Q]}
+    if first:
+        tasks["collide"] = lambda: host.collides(model, data, geom_model, ours, Q)
+    return Race(tasks, len(Q))
+
+
+def pinocchio_cases(options: Options):
+    present = installed(pinocchio="pinocchio") and pinocchio_robots.robots_folder()
+    return grid(robot=list(pinocchio_robots.ROBOTS)[: 1 if options.quick else None] if present else (),
+                question=("all pairs", "any"))  # fmt: skip
+
+
 claim = partial(Claim, turns=40, seconds=3.0, clock=time.perf_counter)
 CLAIMS = [
     claim("pybullet", "µs a call", lambda o: grid(call=client() if installed(pybullet="pybullet") else ()),
           lambda o, call: Race(client()[call]), file="host-calls-pybullet"),
     claim("coal", "µs a call", coal_cases, of_coal, file="host-calls-coal"),
+    claim("pinocchio", "µs a configuration", pinocchio_cases, of_pinocchio, file="host-calls-pinocchio"),
 ]  # fmt: skip
 
 

@@ -124,7 +124,8 @@ def cost_ratios(old: Mesh, new: Mesh) -> dict[str, float]:
             total[name] += int(ask(body.tree, body.tree, X, Y).counters[0, :2].sum())
     X_WBs = poses(rng, BOOLEANS, 0.0)
     X_WBs[:, :3, 3] = 0.5 * rng.standard_normal((BOOLEANS, 3))
-    taken = race({str(k): lambda b=b: collide.collide(b, b, np.eye(4), X_WBs) for k, b in enumerate(bodies)}, most=5)
+    tasks = {str(k): lambda b=b: collide.collide(b, b, np.eye(4), X_WBs) for k, b in enumerate(bodies)}
+    taken = race(tasks, max_turns=5)
     for total, seconds in zip(totals, taken.values()):
         total["us"] = 1e6 * float(np.median(seconds)) / BOOLEANS
     return {name: totals[1][name] / totals[0][name] for name in totals[0]}

@@ -60,9 +60,9 @@ def pairs(options: Options, meshes: str, where: str, question: str) -> Race:
         loops, engines = mesh_loops("build", asked, ())
         return Race(tasks | loops, columns={"facets": facets}, close=lambda: [e.close() for e in engines.values()])
     ask, n, repeated = QUESTIONS[question], float(len(Xs)), OVER if question == "boolean" else 1
-    many = [np.tile(X, (repeated, 1, 1)) for X in (Xs, Ys)]
+    repeated_poses = [np.tile(X, (repeated, 1, 1)) for X in (Xs, Ys)]
     loops, engines = mesh_loops(question, asked)
-    tasks = {"collide": partial(ask, A.tree, B.tree, *many)} | loops
+    tasks = {"collide": partial(ask, A.tree, B.tree, *repeated_poses)} | loops
     per, beside = dict.fromkeys(tasks, n) | {"collide": n * repeated}, {}
     if question == "boolean":
         tasks["collide single"], per["collide single"] = lambda: [collide.collide(A, B, *X) for X in zip(Xs, Ys)], n

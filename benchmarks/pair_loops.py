@@ -134,8 +134,8 @@ class _FclLoop:
                 self._peer.build(shape)
             return time.process_time() - started, np.empty(0)
         if question in ("boolean", "all pairs"):
-            most = 1 if question == "boolean" else MAX_PAIRS
-            ask, request, result = fcl.collide, fcl.CollisionRequest(most, False), fcl.CollisionResult
+            max_contacts = 1 if question == "boolean" else MAX_PAIRS
+            ask, request, result = fcl.collide, fcl.CollisionRequest(max_contacts, False), fcl.CollisionResult
         else:
             request = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=question == "signed")
             ask, result = fcl.distance, fcl.DistanceResult

@@ -57,7 +57,7 @@ class Scene:
         started = time.process_time()
         self.ids = np.array([self.world.add(self.shapes[k % len(self.shapes)], X) for k, X in enumerate(self.X)])
         self.us_to_add = (time.process_time() - started) / n * 1e6
-        self.few = np.sort(rng.choice(n, max(1, n // 100), replace=False))
+        self.sparse = np.sort(rng.choice(n, max(1, n // 100), replace=False))
 
     def move(self, some: slice | np.ndarray = slice(None)) -> float:
         """Seconds of telling where bodies are now."""
@@ -74,8 +74,8 @@ class Scene:
         ask()
         return Seconds(time.process_time() - started)
 
-    def few_moved(self) -> Seconds:
-        spent, started = self.move(self.few), time.process_time()
+    def sparse_moved(self) -> Seconds:
+        spent, started = self.move(self.sparse), time.process_time()
         self.world.collides()
         return Seconds(spent + time.process_time() - started)
 
@@ -100,7 +100,7 @@ def measure(options: Options, layout: str, bodies: int) -> Race:
     tasks = {"move": lambda: Seconds(scene.move())}
     for task in ("collides", "collisions", "contacts"):
         tasks[task] = partial(scene.asked, getattr(world, task))
-    tasks |= {"few moved": scene.few_moved, "come and go": scene.come_and_go, "minimum": world.minimum}
+    tasks |= {"few moved": scene.sparse_moved, "come and go": scene.come_and_go, "minimum": world.minimum}
     scene.move()
     about = {"hits": len(world.collisions()), "bytes_per_body": world.stats["bytes_per_body"]}
     return Race(tasks | {"all asleep": scene.asleep}, columns=about | {"us_to_add": scene.us_to_add})

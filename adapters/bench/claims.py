@@ -124,9 +124,9 @@ def rows_of(claim: Claim, case: Row, race_or_rows: Race | Iterable[Row], options
         return [case | row for row in race_or_rows]
     asked = race_or_rows
     try:
-        most = options.repeats or (QUICK_TURNS if options.quick else claim.turns)
+        max_turns = options.repeats or (QUICK_TURNS if options.quick else claim.turns)
         seconds = QUICK_SECONDS if options.quick else claim.seconds
-        taken = race(asked.tasks, clock=claim.clock, least=min(3, most), most=most, seconds=seconds)
+        taken = race(asked.tasks, clock=claim.clock, min_turns=min(3, max_turns), max_turns=max_turns, seconds=seconds)
     finally:
         asked.close()
     scale, rows, ours = UNITS[claim.unit], [], float("nan")

@@ -47,8 +47,8 @@ class Panel(NamedTuple):
 
 def value(row: Row, figure: Figure) -> float:
     """A column, or a function of it; NaN where there is none."""
-    found = figure(row) if callable(figure) else row.get(figure, "")
-    return float(found) if found not in ("", None) else math.nan
+    number = figure(row) if callable(figure) else row.get(figure, "")
+    return float(number) if number not in ("", None) else math.nan
 
 
 def line_fit(x: Any, y: Any) -> Fit:

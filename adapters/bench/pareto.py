@@ -194,8 +194,8 @@ def _time(
     """Fill in the times: rounds in which every engine takes its turn, the first one another each time."""
     running = [asked for asked in zip(points, timers, answered) if asked[2].any()]
     taken: dict[str, list[np.ndarray]] = {point.engine: [] for point, _, _ in running}
-    for turn in turns(running, MIN_ROUNDS, MAX_ROUNDS, seconds):
-        for point, timer, rows in turn:
+    for contestants in turns(running, MIN_ROUNDS, MAX_ROUNDS, seconds):
+        for point, timer, rows in contestants:
             times = np.full(len(rows), math.nan)
             times[rows] = timer.seconds(group)
             taken[point.engine].append(times)

@@ -113,8 +113,8 @@ def _times(engines: list[str], n: int, seed: int, seconds: float) -> dict[str, f
     timers = [EngineTimer(name, ENGINES[engine_of(name)], [pairs], TURN_TIMEOUT) for name in engines]
     taken: dict[str, list[np.ndarray]] = {name: [] for name in engines}
     try:
-        for turn in turns(timers, MIN_ROUNDS, MAX_ROUNDS, seconds):
-            for timer in turn:
+        for contestants in turns(timers, MIN_ROUNDS, MAX_ROUNDS, seconds):
+            for timer in contestants:
                 taken[timer.name].append(timer.seconds(0))
     finally:
         for timer in timers:

@@ -16,11 +16,13 @@ class Seconds(float):
     """What a task gives that has measured itself, as one in another process does; NaN where its engine died."""
 
 
-def turns(contestants: Sequence[Contestant], least: int, most: int, seconds: float) -> Iterator[list[Contestant]]:
-    """All contestants of each turn, the first one another each time, until time is up and `least` turns are over."""
+def turns(
+    contestants: Sequence[Contestant], min_turns: int, max_turns: int, seconds: float
+) -> Iterator[list[Contestant]]:
+    """All contestants of each turn, the first one another each time, until time is up and `min_turns` are over."""
     started = time.perf_counter()
-    for k in range(most if contestants else 0):
-        if k >= least and time.perf_counter() - started > seconds:
+    for k in range(max_turns if contestants else 0):
+        if k >= min_turns and time.perf_counter() - started > seconds:
             return
         first = k % len(contestants)
         yield [*contestants[first:], *contestants[:first]]
@@ -45,13 +47,13 @@ def repeats_of(call: Any) -> int:
 
 
 def race(
-    tasks: dict[str, Callable[[], Any]], *, clock: Callable[[], float] = time.process_time, least: int = 3,
-    most: int = 9, seconds: float = 20.0,
+    tasks: dict[str, Callable[[], Any]], *, clock: Callable[[], float] = time.process_time, min_turns: int = 3,
+    max_turns: int = 9, seconds: float = 20.0,
 ) -> dict[str, list[float]]:
     """Seconds of every task's call, a turn each, after one that fills caches.
 
     tasks : name → a call; what gives `Seconds` is asked once a turn, and says itself how long that took.
-    least, most : turns.   seconds : after how long no further turn begins.
+    min_turns, max_turns : how many.   seconds : after how long no further turn begins.
     """
     taken: dict[str, list[float]] = {name: [] for name in tasks}
     asked = {name: isinstance(task(), Seconds) for name, task in tasks.items()}
@@ -59,7 +61,7 @@ def race(
     gc.collect()
     gc.disable()  # collections would fall to whoever makes more results
     try:
-        for names in turns(list(tasks), least, most, seconds):
+        for names in turns(list(tasks), min_turns, max_turns, seconds):
             for name in names:
                 task = tasks[name]
                 taken[name].append(float(task()) if asked[name] else mean_seconds(task, repeats[name], clock))

@@ -6,35 +6,17 @@ All pairs of geometries that do not hang on one joint; each side writes into res
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 pin = pytest.importorskip("pinocchio", reason="pinocchio is not installed")
 from curved_oracle import bracket
+from pinocchio_robots import ROBOTS, load, robots_folder
 from samples import sizes, told
 
 from collide.adapters.hosts import pinocchio as host
 from collide.adapters.hosts.pinocchio_geometry import geometry_of
-from collide.scenes.loaders.resources import installed_folders
-
-ROBOTS = {
-    "Panda": "panda_description/urdf/panda.urdf",
-    "UR5": "ur_description/urdf/ur5_robot.urdf",
-    "Z1": "z1_description/urdf/z1.urdf",
-    "Allegro hand": "allegro_hand_description/urdf/allegro_right_hand.urdf",
-    "ANYmal B": "anymal_b_simple_description/robots/anymal.urdf",
-}
-
-
-def load(path: Path):
-    """(model, geometry model) with all pairs of geometries on different joints."""
-    model = pin.buildModelFromUrdf(str(path))
-    folders = [str(path.parents[4])]
-    geom_model = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.COLLISION, package_dirs=folders)
-    geom_model.addAllCollisionPairs()
-    return model, geom_model
 
 
 def judge(geom_model, geom_data, k: int, hit: bool) -> str:
@@ -53,11 +35,10 @@ def judge(geom_model, geom_data, k: int, hit: bool) -> str:
 @sizes(2, 1000)
 def test_pairs_that_differ_are_judged_in_our_favour(n):
     """n configurations a robot."""
-    folder = next((f for f in installed_folders() if (f / "example-robot-data").is_dir()), None)
-    if folder is None:
+    if robots_folder() is None:
         pytest.skip("example-robot-data is not installed")
-    for name, file in ROBOTS.items():
-        model, geom_model = load(folder / "example-robot-data/robots" / file)
+    for name in ROBOTS:
+        model, geom_model = load(name)
         data, ours, theirs = model.createData(), geom_model.createData(), geom_model.createData()
         low, high = np.maximum(model.lowerPositionLimit, -3.0), np.minimum(model.upperPositionLimit, 3.0)
         counts: Counter = Counter()

@@ -14,6 +14,7 @@ from collections import Counter
 
 import numpy as np
 from manifold_solids import OPERATIONS, asked, manifold_of
+from many_judge import CASES, judge_many
 from samples import sizes, told
 from solid_families import SOLIDS
 from solid_judge import arrangement_of, exact_corners, judge, six_volumes, snippet, solids_of
@@ -89,11 +90,11 @@ def beside_manifold(A, B, X, Y) -> Counter:
 def test_solids_are_put_where_winding_numbers_put_them(n):
     """n pairs of each family."""
     has_manifold = importlib.util.find_spec("manifold3d") is not None
-    for family in list(SOLIDS)[:: 4 if n == 1 else 1]:
+    for family in list(SOLIDS)[:: 7 if n == 1 else 1]:
         seen: Counter = Counter()
         for seed in range(n):
             pair = solids_of(family, seed)
-            verdict = judge(*pair, 40 if n == 1 else 200, seed)
+            verdict = judge(*pair, 20 if n == 1 else 200, seed)
             assert not verdict.wrong and verdict.adds_up, f"{snippet(family, seed)}: {verdict.wrong}"
             seen.update({"pairs": 1, "points": verdict.n_points})
             seen.update(results_of(*pair))
@@ -101,3 +102,13 @@ def test_solids_are_put_where_winding_numbers_put_them(n):
                 seen.update(beside_manifold(*pair))
         told(family, seen)
         assert seen["results"] == 4 * n and not seen["not closed"], (family, seen)
+
+
+@sizes(1, 20)
+def test_sets_of_solids_are_put_where_five_rules_put_them(n):
+    """n sets of 2 to 8 solids of each family."""
+    for family, r in CASES[:: 12 if n == 1 else 1]:
+        verdicts = [judge_many(family, seed, r, 20 if n == 1 else 200) for seed in range(n)]
+        assert not any(v.wrong or not v.adds_up for v in verdicts), [(family, r, v.wrong) for v in verdicts]
+        counts = {name: sum(getattr(v, f"n_{name}") for v in verdicts) for name in ("points", "near")}
+        told(f"{family}, {r} solids", Counter(counts))
