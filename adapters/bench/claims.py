@@ -22,7 +22,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from collide.adapters.bench.benchmark_scripts import FOLDER
 from collide.adapters.bench.growth import Panel, draw
@@ -121,7 +121,7 @@ def say(text: str) -> None:
 def rows_of(claim: Claim, case: Row, race_or_rows: Race | Iterable[Row], options: Options) -> list[Row]:
     """The rows of one case: of a race the median, least and largest of each contestant's turns."""
     if not isinstance(race_or_rows, Race):
-        return [case | row for row in race_or_rows]
+        return [case | row for row in cast("Iterable[Row]", race_or_rows)]
     asked = race_or_rows
     try:
         max_turns = options.repeats or (QUICK_TURNS if options.quick else claim.turns)
@@ -130,13 +130,14 @@ def rows_of(claim: Claim, case: Row, race_or_rows: Race | Iterable[Row], options
     finally:
         asked.close()
     scale, rows, ours = UNITS[claim.unit], [], float("nan")
-    for k, (name, times) in enumerate(taken.items()):
+    for number, (name, times) in enumerate(taken.items()):
         per = asked.per[name] if isinstance(asked.per, dict) else asked.per
         each = [seconds * scale / per for seconds in times]
         median = statistics.median(each)
-        ours = ours if k else median
-        row = {"engine": name, "turns": len(each), f"median_{claim.unit}": median, f"least_{claim.unit}": min(each),
-               f"largest_{claim.unit}": max(each), "ratio": median / ours if ours else float("nan")}  # fmt: skip
+        ours = ours if number else median
+        figures = {"median": median, "least": min(each), "largest": max(each)}
+        row: Row = {"engine": name, "turns": len(each), **{f"{k}_{claim.unit}": v for k, v in figures.items()}}
+        row["ratio"] = median / ours if ours else float("nan")
         if asked.bars:
             row |= {"bar": "", "verdict": ""}
         if name in asked.bars:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.adapters.bench.engine_timer import EngineTimer
+from collide.adapters.bench.growth import Panel
 from collide.adapters.bench.pareto import check_engines, engine_of, number, over_rounds, quantile
 from collide.adapters.bench.timed_calls import Pair
 from collide.adapters.bench.turns import turns
@@ -30,6 +31,13 @@ POSES, DIRECTIONS, TURN_TIMEOUT = 12, 2000, 60.0
 #: What operations are called in place of an engine.
 OPERATIONS = "support query"
 MIN_ROUNDS, MAX_ROUNDS = 3, 9
+#: Two panels of a picture; slopes of lines stand in the table.
+PANELS = (
+    Panel("µs a signed distance", "n", "value", "what", "xy", lambda row: row["what"] != OPERATIONS,
+          x_label="vertices of each hull"),
+    Panel("vertices looked at", "n", "value", "what", "xy", lambda row: row["what"] == OPERATIONS,
+          x_label="vertices of each hull"),
+)  # fmt: skip
 
 
 class Growth(NamedTuple):

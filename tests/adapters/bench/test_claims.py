@@ -171,7 +171,7 @@ def test_scripts_are_short_and_have_claims():
 
 
 def test_what_scripts_import_is_there():
-    """A name that a part no longer has ends a script when it starts: those of parts and of the package are looked up."""
+    """A name that a part no longer has would end a script when it starts: parts and the package are looked up."""
     for name in SCRIPTS:
         for node in ast.walk(ast.parse((FOLDER / f"{name}.py").read_text(encoding="utf-8"))):
             if not isinstance(node, ast.ImportFrom) or node.module == "__future__":
