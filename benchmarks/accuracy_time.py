@@ -1,8 +1,11 @@
-"""Error against time, for `benchmarks/accuracy.py`: hulls of points on a sphere, gaps and depths 1e-1 to 1e-12.
+"""Error against time of hulls at chosen gaps and depths, and the brackets of curved pairs.
 
-Every pair is placed by collide's own distances, B moved along the normal; the truth of each pose as it then stands is
-exact arithmetic's. All poses are timed, the first few are judged. Ours is one batch call; coal and python-fcl are
-Python loops over objects that are ready, coal at each of a row of tolerances. Engines take turns.
+    python benchmarks/accuracy_time.py --plot accuracy.png       # what docs/accuracy.md shows
+
+time    hulls of 8, 128 and 2,048 vertices at relative gaps and depths of 1e-1 to 1e-12, placed by collide's own
+        distances: the error of every engine setting, as a part of the exact value, against µs a call
+curved  bracket widths of cylinders, cones and ellipsoids in units of the size S of docs/conventions.md, for random
+        shapes in four kinds of pose (`curved_pairs.py`)
 """
 
 from __future__ import annotations
@@ -11,120 +14,92 @@ import statistics
 from decimal import Decimal
 
 import numpy as np
-from convex import aligned, log, say, seconds_of
-from convex_peers import Coal, Fcl
-from convex_shapes import LENGTH, Solid, rotations
+from convex_shapes import LENGTH, hull
+from curved_pairs import PAIRS, POSES, widths
+from inputs import poses
+from pair_loops import CoalLoop, FclLoop
 
+import collide
+from collide.adapters.bench.claims import Claim, Options, Race, Row, grid, installed, main
+from collide.adapters.bench.growth import Panel
 from collide.adapters.peers import exact
 
-#: Gaps and depths, as parts of the bodies' length.
+#: Gaps and depths, as parts of the bodies' length; coal's tolerances, None its default.
 LEVELS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
-SIDES = {"gap": 1.0, "depth": -1.0}
-#: coal's tolerances; None is its default.
-TOLERANCES = (None, *(10.0**-k for k in range(3, 13)))
-_EYE = np.eye(4)
-#: Steps of placing; a depth may find a nearer way out on the way.
-_STEPS = 12
-#: How long a task is run for one time of it [s].
-_STEADY = 3e-3
+TOLERANCES = {"default": None, **{f"1e-{k}": 10.0**-k for k in range(3, 13)}}
 
 
 def placed(A, B, target: float, count: int, random) -> np.ndarray:
-    """(N, 4, 4) poses of B at about this signed distance [m], each along a direction and in a turn of its own."""
-    from collide import distance
-
-    X = np.tile(_EYE, (count, 1, 1))
-    X[:, :3, :3] = rotations(random.normal(size=(count, 4)))
-    directions = random.normal(size=(count, 3))
-    X[:, :3, 3] = directions * (1.2 * LENGTH / np.sqrt(np.square(directions).sum(axis=1)))[:, None]
-    for _ in range(_STEPS):
-        result = distance(A, B, _EYE, X)
+    """(N, 4, 4) poses of B at about this signed distance [m]; a depth may find a nearer way out on the way."""
+    X = poses(random, count, 1.2 * LENGTH, 1.2 * LENGTH)
+    for _ in range(12):
+        result = collide.distance(A, B, np.eye(4), X)
         X[:, :3, 3] += (target - result.distance)[:, None] * result.normal
     return X
 
 
-def truths(A, B, X: np.ndarray) -> list[Decimal]:
-    return [
-        exact.signed_distance(A.points, _EYE[:3, :3], _EYE[:3, 3], B.points, X_WB[:3, :3], X_WB[:3, 3]) for X_WB in X
-    ]
-
-
-def error_against_time(sizes: tuple[int, ...], engines: list[str], quick: bool) -> list[dict]:
-    """A row an engine setting, size and level: µs a pair and the errors relative to the exact value."""
-    rows = []
-    for n in sizes:
-        A, B = (Solid("sphere", n, seed) for seed in range(2))
-        count, judged = (60, 6) if quick else (200 if n < 1000 else 100, 20 if n < 1000 else 6)
-        for side, sign in SIDES.items():
-            for level in LEVELS:
-                random = np.random.default_rng([n, round(-np.log10(level)), int(sign + 1)])
-                X = placed(A.shape, B.shape, sign * level * LENGTH, count, random)
-                exactly = truths(A.shape, B.shape, X[:judged])
-                rows += _level(n, side, level, (A, B), X, exactly, engines, 3 if quick else 7)
-            say(f"n = {n}: {side}s")
-    return rows
-
-
-def _level(n, side, level, solids, X, exactly, engines, repeats) -> list[dict]:
-    from collide import distance
-
-    A, B = (solid.shape for solid in solids)
-    which = np.tile([0, 1], (len(X), 1))
-    tasks: dict = {("collide", "signed"): lambda: distance(A, B, _EYE, X)}
-    answers = {("collide", "signed"): distance(A, B, _EYE, X).distance}
+def against_time(options: Options, n: int, side: str, level: float) -> Race:
+    """µs a pair and the errors relative to the exact value, of every engine setting."""
+    A, B, count = hull("sphere", n, 0), hull("sphere", n, 1), 60 if options.quick else 200 if n < 1000 else 100
+    sign = 1.0 if side == "gap" else -1.0
+    X = placed(A, B, sign * level * LENGTH, count, np.random.default_rng([n, round(-np.log10(level)), side == "gap"]))
+    eye, judged = np.eye(4), 6 if options.quick or n > 1000 else 20
+    here = A.points, eye[:3, :3], eye[:3, 3], B.points
+    truths = [exact.signed_distance(*here, Y[:3, :3], Y[:3, 3]) for Y in X[:judged]]
+    tasks: dict = {"collide": lambda: collide.distance(A, B, eye, X)}
+    answers = {"collide": collide.distance(A, B, eye, X).distance}
     if side == "gap":
-        tasks["collide", "unsigned"] = lambda: distance(A, B, _EYE, X, signed=False)
-        answers["collide", "unsigned"] = distance(A, B, _EYE, X, signed=False).distance
-    if "coal" in engines:
-        coal = Coal(list(solids), which, X)
-        for tolerance in TOLERANCES:
-            name = "coal", "default" if tolerance is None else f"{tolerance:.0e}"
-            tasks[name] = coal.loop("signed", tolerance)
-            answers[name] = coal.answers("signed", tolerance)
-    fcl = Fcl(list(solids), which, X) if "fcl" in engines else None
-    times: dict = {name: [] for name in tasks}
-    for _ in range(repeats):
-        for name, task in tasks.items():
-            times[name].append(steady_seconds(task))
-        if fcl:
-            times.setdefault(("fcl", "default"), []).append(fcl.seconds("signed"))
-    if fcl:
-        answers["fcl", "default"] = fcl.answers("signed")
-        fcl.close()
-    rows = []
-    for (engine, setting), taken in times.items():
-        errors = [float(abs(Decimal(float(d)) - t) / abs(t)) for d, t in zip(answers[engine, setting], exactly)]
-        us = [seconds / len(X) * 1e6 for seconds in taken]
-        rows.append({
-            "n": n, "side": side, "level": f"{level:.0e}", "engine": engine, "setting": setting, "runs": len(us),
-            "median_us": statistics.median(us), "min_us": min(us), "judged": len(errors),
-            "max_error": f"{max(errors):.2e}", "median_error": f"{statistics.median(errors):.2e}",
-        })  # fmt: skip
-    return rows
+        tasks["collide unsigned"] = lambda: collide.distance(A, B, eye, X, signed=False)
+        answers["collide unsigned"] = tasks["collide unsigned"]().distance
+    lists, close = ([A] * count, [B] * count, np.tile(eye, (count, 1, 1)), X), bool
+    for name in installed(coal="coal", fcl="fcl"):
+        if name == "coal":
+            coal = CoalLoop(*lists)
+            for setting, tolerance in TOLERANCES.items():
+                tasks[f"coal {setting}"] = coal.loop("signed", tolerance)
+                answers[f"coal {setting}"] = coal.answers("signed", tolerance)
+        else:
+            fcl = FclLoop(*lists)
+            tasks["fcl"], answers["fcl"], close = fcl.loop("signed"), fcl.answers("signed"), fcl.close
+    errors = {name: [float(abs(Decimal(float(d)) - t) / abs(t)) for d, t in zip(values, truths)]
+              for name, values in answers.items()}  # fmt: skip
+    beside = {name: {"max_error": max(e), "median_error": statistics.median(e)} for name, e in errors.items()}
+    return Race(tasks, count, {"judged": judged}, beside, close=close)
 
 
-def steady_seconds(task) -> float:
-    """Of the fastest of some milliseconds of runs, after one that fills the caches."""
-    runs = max(1, round(_STEADY / seconds_of(task)))
-    return min(seconds_of(task) for _ in range(runs))
+def curved(options: Options, a: str, b: str, where: str) -> list[Row]:
+    """The largest brackets over all seeds."""
+    seeds, count = (1, 50) if options.quick else (4, 1000)
+    some = [widths(a, b, where, count, seed) for seed in range(100, 100 + seeds)]
+    width, hits, certified = (np.concatenate([getattr(w, name) for w in some]) for name in some[0]._fields[:3])
+    row: Row = {"gaps": int((~hits).sum()), "depths": int(hits.sum()), "us": min(w.us for w in some)}
+    for name, of in (("gap", width[~hits]), ("depth", width[hits]), ("depth_certified", width[hits & certified])):
+        row[f"{name}_width"] = float(of.max()) if len(of) else ""
+        row[f"{name}_width_median"] = float(np.median(of)) if len(of) else ""
+    return [row | {"uncertified": int((~certified).sum())}]
 
 
-def show_time(rows: list[dict]) -> None:
-    """For every size and level, our largest error and time beside coal's default, its best setting, and python-fcl."""
-    by_key = {(r["n"], r["side"], r["level"], r["engine"], r["setting"]): r for r in rows}
-    settings = [("collide", "signed"), ("coal", "default"), ("coal", "1e-09"), ("coal", "1e-12"), ("fcl", "default")]
-    settings = [s for s in settings if any((r["engine"], r["setting"]) == s for r in rows)]
-    lines = [["n", "side", "level", *(cell for e, s in settings for cell in (f"{e} {s}", "µs"))]]
-    for n, side, level in dict.fromkeys((r["n"], r["side"], r["level"]) for r in rows):
-        line = [f"{n:,}", side, level]
-        for setting in settings:
-            r = by_key[(n, side, level, *setting)]
-            line += [r["max_error"], f"{r['min_us']:.2f}"]
-        lines.append(line)
-    aligned("largest error relative to the exact value, and µs a pair", lines)
-    slower = [
-        (n, side, level) for n, side, level, e, s in by_key
-        if (e, s) == ("coal", "1e-09") and by_key[n, side, level, e, s]["min_us"]
-        < by_key[n, side, level, "collide", "signed"]["min_us"]
-    ]  # fmt: skip
-    log(f"cells in which coal at tolerance 1e-9 is faster: {len(slower)} {slower or ''}".rstrip())
+def time_cases(options: Options):
+    sizes, levels = (8, 128, 2048), LEVELS[:: 4 if options.quick else 1]
+    return grid(n=sizes[: 2 if options.quick else 3], side=("gap", "depth"), level=levels)
+
+
+def curved_cases(options: Options):
+    return ({"a": a, "b": b, "where": where} for a, b in PAIRS[: 2 if options.quick else None] for where in POSES)
+
+
+DRAWN = ("collide", "coal default", "coal 1e-9", "coal 1e-12", "fcl")
+CLAIMS = [
+    Claim("time", "µs a pair, and errors", time_cases, against_time, turns=7, file="accuracy-time", panels=tuple(
+              Panel(f"{side}s, {n:,} vertices: largest relative error", "level", "max_error", "engine", "xy",
+                    lambda row, n=n, side=side: (row["n"], row["side"]) == (n, side) and row["engine"] in DRAWN,
+                    x_label="gap or depth, as a part of the length", floor=2e-17)
+              for side in ("gap", "depth") for n in (8, 128, 2048))),
+    Claim("curved", "brackets in units of S", curved_cases, curved, file="accuracy-curved", panels=tuple(
+              Panel(f"largest bracket of a {side}, in units of S", "us", f"{side}_width", "where", "xy", style="o",
+                    x_label="µs a pair") for side in ("gap", "depth"))),
+]  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(__doc__, CLAIMS)

@@ -2,8 +2,8 @@
 
     python benchmarks/c_interface.py
 
-Compiles a loop in C against the installed library with the system's compiler ($CC, else cc). ns a call, the least of
-several rounds; both ask the same pairs at the same poses.
+Compiles a loop in C against the installed library with the compiler $CC, else cc. ns of the processor a call;
+both ask the same pairs at the same poses.
 """
 
 from __future__ import annotations
@@ -11,14 +11,17 @@ from __future__ import annotations
 import os
 import subprocess
 import tempfile
-import time
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+from inputs import ball, poses
 
 import collide
+from collide.adapters.bench.claims import Claim, Options, Race, grid, main
+from collide.adapters.bench.turns import Seconds
 
-POSES, ROUNDS = 64, 15
+POSES = 64
 LOOP = r"""
 #include <collide.h>
 #include <math.h>
@@ -66,52 +69,44 @@ int main(int count, char **given)
 """
 
 
-def poses() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+@cache
+def pairs() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(7)
-    X = np.zeros((2, POSES, 4, 4))
-    X[:, :, 3, 3] = 1.0
-    X[:, :, :3, :3] = np.linalg.qr(rng.normal(size=(2, POSES, 3, 3)))[0]
-    X[:, :, :3, 2] *= np.linalg.det(X[:, :, :3, :3])[..., None]
-    X[1, :, :3, 3] = 1.5 * rng.normal(size=(POSES, 3))
-    points = rng.normal(size=(128, 3))
-    return X[0], X[1], points / np.linalg.norm(points, axis=1)[:, None]
+    X, Y = poses(rng, POSES, 0.0), poses(rng, POSES, 0.0)
+    Y[:, :3, 3] = 1.5 * rng.normal(size=(POSES, 3))
+    return X, Y, ball(128)
 
 
-def in_c(folder: Path, X_WA, X_WB, points) -> list[list[float]]:
-    source, program, data = folder / "loop.c", folder / "loop", folder / "poses"
-    source.write_text(LOOP, encoding="utf-8")
-    data.write_bytes(X_WA.tobytes() + X_WB.tobytes() + points.tobytes())
-    library = Path(collide.get_library())
-    command = [os.environ.get("CC", "cc"), "-O2", f"-I{collide.get_include()}", str(source), "-o", str(program)]
-    subprocess.run([*command, str(library), f"-Wl,-rpath,{library.parent}", "-lm"], check=True)
-    output = subprocess.run([str(program), str(data)], check=True, capture_output=True, text=True).stdout
+@cache
+def in_c() -> list[list[float]]:
+    """ns a boolean and a distance, of boxes and of hulls, the least of 15 rounds."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        source, program, data = folder / "loop.c", folder / "loop", folder / "poses"
+        source.write_text(LOOP, encoding="utf-8")
+        data.write_bytes(b"".join(array.tobytes() for array in pairs()))
+        library = Path(collide.get_library())
+        command = [os.environ.get("CC", "cc"), "-O2", f"-I{collide.get_include()}", str(source), "-o", str(program)]
+        subprocess.run([*command, str(library), f"-Wl,-rpath,{library.parent}", "-lm"], check=True)
+        output = subprocess.run([str(program), str(data)], check=True, capture_output=True, text=True).stdout
     return [[float(number) for number in line.split()] for line in output.splitlines()]
 
 
-def in_python(shape, X_WA, X_WB) -> list[float]:
-    pairs, answers = list(zip(X_WA, X_WB)) * 20, []
-    for ask in (collide.collide, collide.distance):
-        best = float("inf")
-        for _ in range(ROUNDS):
-            start = time.process_time()
-            for A, B in pairs:
-                ask(shape, shape, A, B)
-            best = min(best, time.process_time() - start)
-        answers.append(best / len(pairs) * 1e9)
-    return answers
+def measure(options: Options, shapes: str, question: str) -> Race:
+    X, Y, points = pairs()
+    shape = collide.Box((1, 1.2, 0.8)) if shapes == "two boxes" else collide.ConvexHull(points)
+    ask, asked = getattr(collide, question), list(zip(X, Y))
+    ns = in_c()[shapes != "two boxes"][question == "distance"]
+    tasks = {"C": lambda: Seconds(ns * 1e-9 * POSES), "Python": lambda: [ask(shape, shape, *at) for at in asked]}
+    return Race(tasks, POSES)
 
 
-def main() -> None:
-    X_WA, X_WB, points = poses()
-    with tempfile.TemporaryDirectory() as folder:
-        c = in_c(Path(folder), X_WA, X_WB, points)
-    print(f"{'ns a call':20} {'C boolean':>10} {'Python':>8} {'C distance':>11} {'Python':>8}")
-    for (boolean, distance), (name, shape) in zip(
-        c, (("two boxes", collide.Box((1, 1.2, 0.8))), ("hulls of 128", collide.ConvexHull(points)))
-    ):
-        python_seconds = in_python(shape, X_WA, X_WB)
-        print(f"{name:20} {boolean:10.0f} {python_seconds[0]:8.0f} {distance:11.0f} {python_seconds[1]:8.0f}")
+def cases(options: Options):
+    return grid(shapes=("two boxes", "hulls of 128"), question=("collide", "distance"))
+
+
+CLAIMS = [Claim("c_interface", "ns a call", cases, measure, unit="ns", turns=15)]
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS)

@@ -5,58 +5,36 @@
 
 Compounds of random boxes against a box, and against each other (every part against every part), at poses of which about
 half overlap ("near") or few do ("far"). Parts stand where the compound has them: their poses are multiplied out
-beforehand. Both
-are asked in turn, and the medians of their times compared: a ratio of 1 is the sum of the parts.
+beforehand. µs of the processor a pose; × is the parts' time by the compound's: at 1 it is the sum of the parts.
 """
 
 from __future__ import annotations
 
-import csv
-import gc
 import itertools
-import statistics
-import sys
-import time
-from functools import partial
-from pathlib import Path
+from collections.abc import Callable
+from functools import cache, partial
 
 import numpy as np
+from inputs import poses
 
 import collide
+from collide.adapters.bench.claims import Claim, Options, Race, grid, main
 
-ROOT = Path(__file__).resolve().parents[1]
-REPEATS = 15
 SPREAD = {"near": 0.8, "far": 3.0}
-QUESTIONS = {
-    "collide": collide.collide,
-    "distance": collide.distance,
-    "gap": lambda *asked, **named: collide.distance(*asked, signed=False, **named),
-}
-HEADER = ["interface", "question", "poses", "parts", "batch", "compound_us", "parts_us", "ratio"]
+QUESTIONS: dict[str, Callable] = {
+    "collide": collide.collide, "distance": collide.distance, "gap": partial(collide.distance, signed=False),
+}  # fmt: skip
+BOX = collide.Box((0.5, 0.5, 0.5))
 
 
-def random_poses(rng, n: int, spread: float) -> np.ndarray:
-    return np.array([collide.pose(rng.uniform(-spread, spread, 3), rpy=rng.uniform(-3, 3, 3)) for _ in range(n)])
+@cache
+def compound(parts: int, seed: int = 0) -> collide.Compound:
+    rng = np.random.default_rng([parts, seed])
+    return collide.Compound([(collide.Box(rng.uniform(0.2, 0.6, 3)), X) for X in poses(rng, parts, 0.7)])
 
 
-def compound(rng, parts: int) -> collide.Compound:
-    return collide.Compound(
-        [(collide.Box(rng.uniform(0.2, 0.6, 3)), random_poses(rng, 1, 0.7)[0]) for _ in range(parts)]
-    )
-
-
-def compared(whole, parts, poses: int) -> list[str]:
-    """[µs a pose of the compound, of its parts, their ratio], asked in turn."""
-    times: tuple[list[float], list[float]] = ([], [])
-    gc.disable()  # as `timeit` does: collections would fall to whoever makes more results
-    for _ in range(REPEATS + 1):
-        for question, taken in zip((whole, parts), times):
-            started = time.perf_counter()
-            question()
-            taken.append((time.perf_counter() - started) / poses * 1e6)
-    gc.enable()
-    median_a, median_b = (statistics.median(taken[1:]) for taken in times)
-    return [f"{median_a:.3f}", f"{median_b:.3f}", f"{median_a / median_b:.2f}"]
+def parts_of(shape) -> list[tuple]:
+    return list(shape.items) if isinstance(shape, collide.Compound) else [(shape, np.eye(4))]
 
 
 def pairs_of(A: collide.Compound, B, X_WA: np.ndarray, X_WB: np.ndarray) -> list[tuple]:
@@ -65,89 +43,57 @@ def pairs_of(A: collide.Compound, B, X_WA: np.ndarray, X_WB: np.ndarray) -> list
     return [(shape_a, shape_b, X, Y) for (shape_a, X), (shape_b, Y) in itertools.product(parts_a, parts_b)]
 
 
-def parts_of(shape) -> list[tuple]:
-    return list(shape.items) if isinstance(shape, collide.Compound) else [(shape, np.eye(4))]
-
-
-def one_by_one(ask, pairs: list[tuple], **named) -> None:
+def one_by_one(ask: Callable, pairs: list[tuple], **named) -> None:
     for pair in pairs:
         ask(*pair, **named)
 
 
-def batches(rng, counts, sizes):
-    box = collide.Box((0.5, 0.5, 0.5))
-    for parts, (name, spread) in itertools.product(counts, SPREAD.items()):
-        A = compound(rng, parts)
-        for n in sizes:
-            X = random_poses(rng, n, spread), random_poses(rng, n, spread)
-            pairs = pairs_of(A, box, *X)
-            for what, ask in QUESTIONS.items():
-                yield [
-                    "batch",
-                    what,
-                    name,
-                    parts,
-                    n,
-                    *compared(partial(ask, A, box, *X), partial(one_by_one, ask, pairs), n),
-                ]
+def picked(rng, n: int, parts: int, X: np.ndarray, as_set: bool) -> tuple:
+    """(compounds, one a pose of eight, and a box; the same, part by part): of a ShapeSet, or listed."""
+    library, which = [compound(parts, seed) for seed in range(8)], rng.integers(0, 8, n)
+    X_WPs = [np.array([x @ library[c].items[k][1] for x, c in zip(X, which)]) for k in range(parts)]
+    if not as_set:
+        whole = [library[c] for c in which], BOX
+        return whole, [([library[c].items[k][0] for c in which], BOX, x) for k, x in enumerate(X_WPs)]
+    shapes = collide.ShapeSet([*library, BOX, *(shape for S in library for shape, _ in S.items)])
+    boxes = shapes[np.full(n, 8)]
+    return (shapes[which], boxes), [(shapes[9 + parts * which + k], boxes, x) for k, x in enumerate(X_WPs)]
 
 
-def singles(rng, counts, n: int):
-    box = collide.Box((0.5, 0.5, 0.5))
-    for parts, (name, spread) in itertools.product(counts, SPREAD.items()):
-        A = compound(rng, parts)
-        asked = list(zip(random_poses(rng, n, spread), random_poses(rng, n, spread)))
-        whole = [(A, box, *X) for X in asked]
-        pairs = [pair for X in asked for pair in pairs_of(A, box, *X)]
-        for what, ask in QUESTIONS.items():
-            measured = compared(partial(one_by_one, ask, whole), partial(one_by_one, ask, pairs), n)
-            yield ["single", what, name, parts, 1, *measured]
+def measure(options: Options, interface: str, question: str, where: str, parts: int, batch: int) -> Race:
+    rng, ask, A = np.random.default_rng(batch), QUESTIONS[question], compound(parts)
+    n = 50 if interface == "single" else batch
+    X, Y = poses(rng, n, SPREAD[where]), poses(rng, n, SPREAD[where])
+    named = {"threads": 2} if interface == "threads=2" else {}
+    if interface == "single":
+        pairs = [pair for at in zip(X, Y) for pair in pairs_of(A, BOX, *at)]
+        return Race({"compound": partial(one_by_one, ask, [(A, BOX, *at) for at in zip(X, Y)]),
+                     "parts": partial(one_by_one, ask, pairs)}, n)  # fmt: skip
+    if interface in ("ShapeSet", "list"):
+        whole, each = picked(rng, n, parts, X, interface == "ShapeSet")
+        whole, pairs = (*whole, X, Y), [(S, B, x, Y) for S, B, x in each]
+    else:
+        B = compound(parts, 1) if interface == "both" else BOX
+        whole, pairs = (A, B, X, Y), pairs_of(A, B, X, Y)
+    return Race({"compound": partial(ask, *whole, **named), "parts": partial(one_by_one, ask, pairs, **named)}, n)
 
 
-def others(rng, parts: int, n: int):
-    """Compound against Compound, two threads, a ShapeSet, a list."""
-    box, A, B = collide.Box((0.5, 0.5, 0.5)), compound(rng, parts), compound(rng, parts)
-    library = [compound(rng, parts) for _ in range(8)]
-    corners = rng.integers(0, 8, n)
-    shapes = collide.ShapeSet([*library, box, *(shape for S in library for shape, _ in S.items)])
-    boxes = shapes[np.full(n, len(library))]
-    for name, spread in SPREAD.items():
-        X_WA, X_WB = random_poses(rng, n, spread), random_poses(rng, n, spread)
-        X_WPs = [np.array([X @ library[c].items[k][1] for X, c in zip(X_WA, corners)]) for k in range(parts)]
-        picked = [(shapes[len(library) + 1 + parts * corners + k], boxes, X, X_WB) for k, X in enumerate(X_WPs)]
-        listed = [([library[c].items[k][0] for c in corners], box, X, X_WB) for k, X in enumerate(X_WPs)]
-        cases = {
-            "both": ((A, B, X_WA, X_WB), pairs_of(A, B, X_WA, X_WB), {}),
-            "threads=2": ((A, box, X_WA, X_WB), pairs_of(A, box, X_WA, X_WB), {"threads": 2}),
-            "ShapeSet": ((shapes[corners], boxes, X_WA, X_WB), picked, {}),
-            "list": (([library[c] for c in corners], box, X_WA, X_WB), listed, {}),
-        }
-        for (interface, (whole, pairs, named)), (what, ask) in itertools.product(cases.items(), QUESTIONS.items()):
-            measured = compared(partial(ask, *whole, **named), partial(one_by_one, ask, pairs, **named), n)
-            yield [interface, what, name, parts, n, *measured]
+def cases(options: Options):
+    counts, sizes = ((2, 4), (1, 100)) if options.quick else ((1, 2, 4, 16, 64), (1, 10, 100, 1000, 10_000))
+    yield from grid(interface=["single"], question=QUESTIONS, where=SPREAD, parts=counts, batch=[1])
+    yield from grid(interface=["batch"], question=QUESTIONS, where=SPREAD, parts=counts, batch=sizes)
+    several, n = ("both", "threads=2", "ShapeSet", "list"), 1000 if options.quick else 5000
+    yield from grid(interface=several, question=QUESTIONS, where=SPREAD, parts=[4], batch=[n])
 
 
-def main(quick: bool) -> None:
-    rng = np.random.default_rng(0)
-    counts = (2, 4) if quick else (1, 2, 4, 16, 64)
-    measured = [HEADER]
-    print("  ".join(f"{cell:>11}" for cell in HEADER))
-    for row in itertools.chain(
-        singles(rng, counts, 50), batches(rng, counts, (1, 10, 100) if quick else (1, 10, 100, 1000, 10000)),
-        others(rng, 4, 1000 if quick else 5000),
-    ):  # fmt: skip
-        measured.append([str(cell) for cell in row])
-        print("  ".join(f"{cell:>11}" for cell in measured[-1]), flush=True)
-    ratios = np.array([float(row[-1]) for row in measured[1:]])
-    print(
-        f"\nmedian ratio {np.median(ratios):.2f}, largest {ratios.max():.2f}, above 1.2: {int((ratios > 1.2).sum())} "
-        f"of {len(ratios)}"
-    )
-    target = ROOT / "benchmarks" / "results" / "compounds.csv"
-    target.parent.mkdir(exist_ok=True)
-    with target.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows(measured)
+def notes(rows):
+    ratios = np.array([1 / row["ratio"] for row in rows if row["engine"] == "parts"])
+    yield f"a compound's time by its parts': median {np.median(ratios):.2f}, largest {ratios.max():.2f}, above 1.2: " \
+          f"{int((ratios > 1.2).sum())}"  # fmt: skip
+
+
+CLAIMS = [Claim("compounds", "µs a pose", cases, measure, turns=15, seconds=3.0, notes=notes)]
 
 
 if __name__ == "__main__":
-    main("--quick" in sys.argv[1:])
+    main(__doc__, CLAIMS)

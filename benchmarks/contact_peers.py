@@ -1,4 +1,4 @@
-"""coal, Bullet and MuJoCo as `contacts.py` and `contact_agreement.py` ask them for manifolds of many posed pairs.
+"""coal, Bullet and MuJoCo asked for manifolds of many posed pairs, by `contacts.py` and by the tests of agreement.
 
 Each is made of two lists of shapes and of poses, and has
 
@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide import Box, Capsule, ConvexHull, Cylinder, Mesh, Shape, Sphere
+from collide import Box, Capsule, Cylinder, Shape, Sphere
 from collide.adapters.peers.coal_peer import CoalPeer
-from collide.adapters.peers.pybullet_peer import PybulletPeer, quaternion_xyzw
+from collide.adapters.peers.pybullet_peer import collision_shape, quaternion_xyzw
 
 #: How far apart pairs stand in Bullet's world [m].
 _SPACING = 100.0
@@ -96,8 +96,7 @@ class BulletContacts:
         import pybullet
 
         self.pybullet, self.margin = pybullet, margin
-        self.peer = PybulletPeer()
-        self.client = self.peer._client = pybullet.connect(pybullet.DIRECT)
+        self.client = pybullet.connect(pybullet.DIRECT)
         self.pairs, self.shift = [], []
         shapes: dict[int, int] = {}
         for k, (A, B, X, Y) in enumerate(zip(As, Bs, X_WAs, X_WBs)):
@@ -139,22 +138,7 @@ class BulletContacts:
 
 def bullet_shape(pybullet, shape: Shape, client: int) -> int:
     """The number of a collision shape."""
-    kind: dict = {}
-    if isinstance(shape, Sphere):
-        kind = {"shapeType": pybullet.GEOM_SPHERE, "radius": shape.radius}
-    elif isinstance(shape, Box):
-        kind = {"shapeType": pybullet.GEOM_BOX, "halfExtents": (shape.size / 2).tolist()}
-    elif isinstance(shape, Capsule | Cylinder):
-        of = pybullet.GEOM_CAPSULE if isinstance(shape, Capsule) else pybullet.GEOM_CYLINDER
-        kind = {"shapeType": of, "radius": shape.radius, "height": shape.length}
-    elif isinstance(shape, ConvexHull):
-        kind = {"shapeType": pybullet.GEOM_MESH, "vertices": shape.points.tolist()}
-    elif isinstance(shape, Mesh):
-        kind = {
-            "shapeType": pybullet.GEOM_MESH, "vertices": shape.vertices.tolist(),
-            "indices": shape.faces.ravel().tolist(), "flags": pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
-        }  # fmt: skip
-    return pybullet.createCollisionShape(**kind, physicsClientId=client)
+    return pybullet.createCollisionShape(**collision_shape(pybullet, shape)[0], physicsClientId=client)
 
 
 class MujocoContacts:
@@ -229,16 +213,3 @@ def qpos_of(X: np.ndarray) -> np.ndarray:
     """(7,) of a free joint: place, quaternion with the scalar first."""
     x, y, z, w = quaternion_xyzw(X[:3, :3])
     return np.array([*X[:3, 3], w, x, y, z])
-
-
-def installed(classes) -> list:
-    """Those of some engines whose package is here."""
-    packages = {CoalContacts: "coal", BulletContacts: "pybullet", MujocoContacts: "mujoco"}
-    present = []
-    for engine in classes:
-        try:
-            __import__(packages[engine])
-            present.append(engine)
-        except ImportError:
-            print(f"{packages[engine]} is not installed: left out")
-    return present

@@ -1,7 +1,7 @@
 """Contact manifolds beside coal's, Bullet's and MuJoCo's: pairs, single calls, batches, meshes, a world at rest.
 
-    python benchmarks/contacts.py                   # four minutes; prints tables and writes results/contacts_*.csv
-    python benchmarks/contacts.py --table world     # one of pairs, single, batches, meshes, world; no file
+    python benchmarks/contacts.py                   # four minutes
+    python benchmarks/contacts.py --table world
     python benchmarks/contacts.py --quick           # a minute; no file
 
 pairs    µs a pair. Bodies rest on a box or a hull, sunk by 0.1 mm ("touching") or 1 mm above with a margin of 2 mm
@@ -13,34 +13,23 @@ meshes   µs a pair: a box on a rough ground of 100,352 facets, and two bunnies 
          thousandth of their size. coal's contacts there are pairs of facets; MuJoCo has no meshes that are not convex
 world    ms a step of 5,000 bodies at rest in ten pits (`contact_worlds.py`): move, then find all contacts
 
-Engines take turns; medians of their turns, CPU time; × is theirs divided by ours. Checked first, and printed: how many
-contacts a pair everyone finds; whoever finds none at all of bodies that touch is not quicker but wrong.
+CPU time. Checked first, and told: how many contacts a pair everyone finds; whoever finds none at all of bodies that
+touch is not quicker but wrong. Bars are medians that ours is to stay below.
 """
 
 from __future__ import annotations
 
-import argparse
-import gc
-import statistics
-import sys
-import time
 from collections.abc import Callable
-from functools import partial
-from importlib import metadata
-from pathlib import Path
+from functools import cache, partial
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
-from contact_peers import BulletContacts, CoalContacts, MujocoContacts, installed
+from contact_peers import BulletContacts, CoalContacts, MujocoContacts
 from contact_worlds import WORLDS, OurWorld, Pits
-from convex import aligned, log, say, write
-from startup import machine
+from inputs import mesh, meshes_here
 
 import collide
+from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
 
-TABLES = ("pairs", "single", "batches", "meshes", "world")
-#: µs a pair (ms a step in "world") that ours is to stay below.
 BARS = {
     ("pairs", "box on box", "touching"): 1.0, ("pairs", "hull 48 on hull 48", "touching"): 1.5,
     ("pairs", "box on box", "apart"): 0.3, ("pairs", "hull 48 on hull 48", "apart"): 0.3,
@@ -49,8 +38,7 @@ BARS = {
 }  # fmt: skip
 BOX = collide.Box((0.4, 0.3, 0.2))
 #: Sunk so far, or above by so much, within the margin [m].
-SUNK, ABOVE, MARGIN = 1e-4, 1e-3, 2e-3
-Tasks = dict[str, Callable[[], object]]
+STATES = {"touching": (-1e-4, 0.0), "apart": (1e-3, 2e-3)}
 
 
 def hull(seed: int) -> collide.ConvexHull:
@@ -83,99 +71,48 @@ def resting(n: int, height: float, lying: bool, seed: int) -> np.ndarray:
     ])  # fmt: skip
 
 
-def medians(tasks: Tasks, seconds: float, least: int = 5) -> dict[str, list[float]]:
-    """CPU seconds of every task, turn after turn, until the time is up; the first turn does not count."""
-    taken: dict[str, list[float]] = {name: [] for name in tasks}
-    gc.disable()
-    started, round_number = time.perf_counter(), 0
-    while round_number <= least or time.perf_counter() - started < seconds:
-        for name, task in tasks.items():
-            before = time.process_time()
-            task()
-            if round_number:
-                taken[name].append(time.process_time() - before)
-        round_number += 1
-    gc.enable()
-    return taken
-
-
-def rows_of(table: str, case: str, state: str, taken: dict[str, list[float]], per: float, contacts: dict) -> list[dict]:
-    """Rows of one comparison. per : what a second is divided by."""
-    ours = statistics.median(taken["collide"])
-    return [
-        {
-            "table": table, "case": case, "state": state, "engine": engine, "turns": len(times),
-            "median": statistics.median(times) * per, "min": min(times) * per, "max": max(times) * per,
-            "ratio": round(statistics.median(times) / ours, 2), "contacts": contacts.get(engine, ""),
-            "bar": BARS.get((table, case, state), "") if engine == "collide" else "",
-        }
-        for engine, times in taken.items()
-    ]  # fmt: skip
-
-
 def per_pair(manifolds) -> float:
     """Contacts a pair."""
     return round(sum(len(m.distance) for m in manifolds) / len(manifolds), 2)
 
 
-def peers_of(As, Bs, Xs, Ys, margin: float, patches: bool) -> list:
-    made: list = []
-    for engine in installed([CoalContacts, BulletContacts, MujocoContacts]):
-        made.append(engine(As, Bs, Xs, Ys, margin))
-        if engine is CoalContacts and patches:
-            made.append(CoalContacts(As, Bs, Xs, Ys, margin, patches=True))
-    return made
+def bars(*key: str) -> dict[str, float]:
+    return {"collide": BARS[key]} if key in BARS else {}
 
 
-def states() -> dict[str, tuple[float, float]]:
-    """Name to (how far apart, margin) [m]."""
-    return {"touching": (-SUNK, 0.0), "apart": (ABOVE, MARGIN)}
+def pairs(options: Options, case: str, state: str) -> Race:
+    (A, B, height, lying), (gap, margin), n = cases()[case], STATES[state], 100 if options.quick else 400
+    Ys = resting(n, height + gap, lying, seed=n)
+    ours = partial(collide.contacts, A, B, np.eye(4), Ys, margin=margin)
+    tasks, beside, lists = {"collide": ours}, {"collide": {"contacts": len(ours()) / n}}, ([A] * n, [B] * n)
+    kinds = {"coal": CoalContacts, "coal + patch": partial(CoalContacts, patches=True), "bullet": BulletContacts,
+             "mujoco": MujocoContacts}  # fmt: skip
+    packages = {"coal": "coal", "coal + patch": "coal", "bullet": "pybullet", "mujoco": "mujoco"}
+    for name in installed(**packages):
+        peer = kinds[name](*lists, np.tile(np.eye(4), (n, 1, 1)), Ys, margin)
+        beside[name], tasks[name] = {"contacts": per_pair(peer.manifolds())}, peer.detect
+    return Race(tasks, n, beside=beside, bars=bars("pairs", case, state))
 
 
-def pairs_table(n: int, seconds: float) -> list[dict]:
-    rows = []
-    for name, (A, B, height, lying) in cases().items():
-        for state, (gap, margin) in states().items():
-            Ys = resting(n, height + gap, lying, seed=n)
-            ours = partial(collide.contacts, A, B, np.eye(4), Ys, margin=margin)
-            tasks: Tasks = {"collide": ours}
-            contacts = {"collide": round(len(ours()) / n, 2)}
-            for peer in peers_of([A] * n, [B] * n, np.tile(np.eye(4), (n, 1, 1)), Ys, margin, patches=True):
-                contacts[peer.name] = per_pair(peer.manifolds())
-                tasks[peer.name] = peer.detect
-            rows += rows_of("pairs", name, state, medians(tasks, seconds), 1e6 / n, contacts)
-    return rows
+def single(options: Options, case: str, state: str) -> Race:
+    (A, B, height, lying), (gap, margin) = cases()[case], STATES[state]
+    X, Y = np.eye(4), resting(1, height + gap, lying, seed=3)[0]
+    tasks: dict[str, Callable] = {"collide": partial(collide.contacts, A, B, X, Y, margin=margin)}
+    kinds = {"coal": CoalContacts, "bullet": BulletContacts, "mujoco": MujocoContacts}
+    for name in installed(coal="coal", bullet="pybullet", mujoco="mujoco"):
+        peer = kinds[name]([A], [B], [X], [Y], margin)
+        tasks[name] = peer.closest_points if name == "bullet" else peer.detect
+    return Race(tasks, bars=bars("single", case, state))
 
 
-def single_table(calls: int, seconds: float) -> list[dict]:
-    def repeated(task: Callable[[], object]) -> Callable[[], None]:
-        def run() -> None:
-            for _ in range(calls):
-                task()
-
-        return run
-
-    rows = []
-    for name, (A, B, height, lying) in cases().items():
-        for state, (gap, margin) in states().items():
-            X, Y = np.eye(4), resting(1, height + gap, lying, seed=3)[0]
-            tasks: Tasks = {"collide": repeated(partial(collide.contacts, A, B, X, Y, margin=margin))}
-            for peer in peers_of([A], [B], [X], [Y], margin, patches=False):
-                tasks[peer.name] = repeated(peer.closest_points if isinstance(peer, BulletContacts) else peer.detect)
-            rows += rows_of("single", name, state, medians(tasks, seconds), 1e6 / calls, {})
-    return rows
-
-
-def batches_table(sizes: tuple[int, ...], seconds: float) -> list[dict]:
+def batches(options: Options, poses: int) -> Race:
     A, B, height, lying = cases()["box on box"]
-    rows = []
-    for n in sizes:
-        Ys = resting(n, height - SUNK, lying, seed=n)
-        tasks: Tasks = {"collide": partial(collide.contacts, A, B, np.eye(4), Ys)}
-        if installed([CoalContacts]):
-            tasks["coal"] = CoalContacts([A] * n, [B] * n, np.tile(np.eye(4), (n, 1, 1)), Ys, 0.0).detect
-        rows += rows_of("batches", "box on box", f"{n} poses", medians(tasks, seconds), 1e6 / n, {})
-    return rows
+    Ys = resting(poses, height + STATES["touching"][0], lying, seed=poses)
+    tasks: dict[str, Callable] = {"collide": partial(collide.contacts, A, B, np.eye(4), Ys)}
+    if installed(coal="coal"):
+        lists = [A] * poses, [B] * poses, np.tile(np.eye(4), (poses, 1, 1)), Ys
+        tasks["coal"] = CoalContacts(*lists, 0.0).detect
+    return Race(tasks, poses)
 
 
 def ground(cells: int = 224, size: float = 4.0) -> collide.Mesh:
@@ -206,102 +143,67 @@ def sunk_poses(A, B, n: int, depth: float, seed: int, spread: float) -> np.ndarr
     return np.array(placed)
 
 
-def meshes_table(n: int, seconds: float) -> list[dict]:
-    asked = {"box on ground": (ground(), collide.Box((0.1, 0.08, 0.06)), 2e-4, 1.5)}
-    try:
-        from meshes import mesh
-
-        bunny = collide.Mesh(*mesh("bunny"), solid=False)
-        asked["bunny on bunny"] = bunny, bunny, 1e-3, 0.1
-    except (ImportError, OSError) as error:
-        say(f"left out: bunnies ({error})")
-    rows = []
-    for name, (A, B, depth, spread) in asked.items():
-        Ys = sunk_poses(A, B, n, depth, 1, spread)
-        Xs = np.tile(np.eye(4), (n, 1, 1))
-        ours = partial(collide.contacts, A, B, np.eye(4), Ys)
-        tasks: Tasks = {"collide": ours}
-        contacts = {"collide": round(len(ours()) / n, 2)}
-        for engine in installed([CoalContacts] if isinstance(B, collide.Mesh) else [CoalContacts, BulletContacts]):
-            limits = {"max_contacts": 1 << 20} if engine is CoalContacts else {}
-            peer = engine([A] * n, [B] * n, Xs, Ys, 0.0, **limits)
-            contacts[peer.name] = per_pair(peer.manifolds())
-            tasks[peer.name] = peer.detect
-        rows += rows_of("meshes", name, "touching", medians(tasks, seconds, least=3), 1e6 / n, contacts)
-    return rows
+def meshes(options: Options, case: str) -> Race:
+    n = 10 if options.quick else 40
+    if case == "bunny on bunny":
+        A = B = collide.Mesh(*mesh("bunny"), solid=False)
+        Ys = sunk_poses(A, B, n, 1e-3, 1, 0.1)
+    else:
+        A, B = ground(), collide.Box((0.1, 0.08, 0.06))
+        Ys = sunk_poses(A, B, n, 2e-4, 1, 1.5)
+    ours = partial(collide.contacts, A, B, np.eye(4), Ys)
+    tasks, beside = {"collide": ours}, {"collide": {"contacts": len(ours()) / n}}
+    kinds = {"coal": partial(CoalContacts, max_contacts=1 << 20), "bullet": BulletContacts}
+    peers = {"coal": "coal"} | ({} if case == "bunny on bunny" else {"bullet": "pybullet"})
+    for name in installed(**peers):
+        peer = kinds[name]([A] * n, [B] * n, np.tile(np.eye(4), (n, 1, 1)), Ys, 0.0)
+        beside[name], tasks[name] = {"contacts": per_pair(peer.manifolds())}, peer.detect
+    return Race(tasks, n, beside=beside, bars=bars("meshes", case, "touching"))
 
 
-def world_table(bodies: int, seconds: float) -> list[dict]:
-    try:
-        pits = Pits(bodies)
-    except ImportError:
-        say("left out: the world at rest (pybullet, which settles it, is not installed)")
-        return []
-    worlds: list = [OurWorld(pits)]
-    for package, engine in WORLDS.items():
-        try:
-            worlds.append(engine(pits))
-        except ImportError:
-            print(f"{package} is not installed: left out")
-    tasks: Tasks = {f"{w.name} {task}": getattr(w, task) for w in worlds for task in ("move", "detect")}
-    taken = medians(tasks, seconds, least=5)
-    contacts = {}
-    for w in worlds:
-        n_pairs, n_contacts = w.counts()
-        contacts[w.name] = n_contacts
-        say(f"{w.name}: {n_pairs} pairs within {1e3 * 2e-3:g} mm, {n_contacts} contacts")
-    rows = []
-    for state, task in (("move", "move"), ("contacts", "detect")):
-        of_task = {w.name: taken[f"{w.name} {task}"] for w in worlds}
-        rows += rows_of("world", f"{bodies} bodies", state, of_task, 1e3, contacts if state == "contacts" else {})
-    return rows
+@cache
+def worlds(bodies: int) -> dict:
+    pits = Pits(bodies)
+    made = {"collide": OurWorld(pits)}
+    return made | {name: WORLDS[name](pits) for name in installed(coal="coal", pybullet="pybullet", mujoco="mujoco")}
 
 
-def show(rows: list[dict]) -> None:
-    columns = ("case", "state", "engine", "median", "min", "max", "ratio", "contacts", "bar")
-    for table in dict.fromkeys(row["table"] for row in rows):
-        lines = [list(columns)]
-        for row in rows:
-            if row["table"] == table:
-                cells = [(row[c], c) for c in columns]
-                lines.append([f"{v:.3f}" if isinstance(v, float) and c != "ratio" else str(v) for v, c in cells])
-        aligned(f"{table}: {'ms a step' if table == 'world' else 'µs a pair'}", lines)
+def world(options: Options, bodies: int, task: str) -> Race:
+    """Contacts are asked for after a move, which is timed with them."""
+    made = worlds(bodies)
+    for of in made.values():
+        of.move()
+        of.detect()
+    beside = {name: dict(zip(("pairs", "contacts"), of.counts())) for name, of in made.items()}
+
+    def step(of) -> None:
+        of.move()
+        of.detect()
+
+    tasks = {name: of.move if task == "move" else partial(step, of) for name, of in made.items()}
+    return Race(tasks, beside=beside, bars=bars("world", f"{bodies} bodies", task))
 
 
-def versions() -> dict[str, str]:
-    """Of the peers."""
-    numbers = {}
-    for name in ("coal", "pybullet", "mujoco"):
-        try:
-            numbers[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            numbers[name] = "absent"
-    return numbers
+def pair_cases(options: Options):
+    return grid(case=list(cases())[: 2 if options.quick else None], state=STATES)
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--table", choices=[*TABLES, "all"], default="all", help="which table (default: all)")
-    parser.add_argument("--quick", action="store_true", help="fewer turns, 1,000 bodies, no CSV")
-    parser.add_argument("--no-csv", action="store_true", help="print the tables alone")
-    options = parser.parse_args()
-    n, seconds = (100, 0.2) if options.quick else (400, 2.0)
-    measures: dict[str, Callable[[], list[dict]]] = {
-        "pairs": partial(pairs_table, n, seconds), "single": partial(single_table, 1000, 0.5 * seconds),
-        "batches": partial(batches_table, (1, 10, 100, 1000, 10_000), seconds),
-        "meshes": partial(meshes_table, 10 if options.quick else 40, 4 * seconds),
-        "world": partial(world_table, 1000 if options.quick else 5000, 15 * seconds),
-    }  # fmt: skip
-    rows: list[dict] = []
-    for table in TABLES if options.table == "all" else (options.table,):
-        say(table)
-        measured = measures[table]()
-        show(measured)
-        rows += measured
-    if options.table == "all" and not (options.quick or options.no_csv):
-        log(f"written: {write('contacts', rows, machine() | versions()).name}")
-    return 0
+def world_cases(options: Options):
+    bodies = (1000 if options.quick else 5000,) if installed(pybullet="pybullet") else ()  # which settles them
+    return grid(bodies=bodies, task=("move", "contacts"))
+
+
+SIZES = (1, 10, 100, 1000, 10_000)
+claim = partial(Claim, bar="median")
+CLAIMS = [
+    claim("pairs", "µs a pair", pair_cases, pairs, file="contacts-pairs"),
+    claim("single", "µs a call", pair_cases, single, file="contacts-single"),
+    claim("batches", "µs a pair in batches", lambda o: grid(poses=SIZES), batches, file="contacts-batches"),
+    claim("meshes", "µs a pair", lambda o: grid(case=["box on ground", *(f"{m} on {m}" for m in meshes_here("bunny"))]),
+          meshes, turns=5, file="contacts-meshes"),
+    claim("world", "ms a step", world_cases, world, unit="ms", file="contacts-world"),
+]  # fmt: skip
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main(__doc__, CLAIMS)

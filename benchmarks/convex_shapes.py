@@ -1,20 +1,20 @@
-"""Shapes and poses of `benchmarks/convex.py`: round, long, flat and prismatic hulls, placed at chosen distances.
+"""Shapes and poses of `convex.py`: round, long, flat and prismatic hulls, placed at chosen distances.
 
-Points are drawn with a fixed seed and shifted to their mean, so that the origin lies inside every hull. A
-linear map keeps a hull's faces, so ellipsoids and pancakes take theirs from the sphere; the faces of prisms
-are written down, since Qhull takes time quadratic in the corners of a cap (32 s at n = 32,768).
-
-Two bodies are placed along the line of their centres. Signed distance is convex along that line, so a
-bracketed secant finds the place of any distance wanted.
+Two bodies are placed along the line of their centres: signed distance is convex along that line, so a bracketed secant
+finds the place of any distance wanted. The faces of prisms are written down, since Qhull takes time quadratic in the
+corners of a cap (32 s at n = 32,768).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from inputs import ball, directions, poses
+
+import collide
 
 #: Semi-axes that the unit sphere is stretched to; the longest is 1.
 STRETCH = {"sphere": (1.0, 1.0, 1.0), "ellipsoid": (0.1, 0.3, 1.0), "pancake": (1.0, 1.0, 0.02)}
@@ -22,57 +22,32 @@ STRETCH = {"sphere": (1.0, 1.0, 1.0), "ellipsoid": (0.1, 0.3, 1.0), "pancake": (
 CLASSES = ("separated", "near", "overlap")
 #: What all shapes measure from end to end, about; gaps and depths are parts of it.
 LENGTH = 2.0
-_EYE = np.eye(4)[None]
 #: Hulls of this many points on a sphere hold a ball of radius 0.9; EPA on concentric ones is slow, and not needed.
 ROUND_ENOUGH = 512
 
 
-class Solid:
-    """One hull: ``points`` (n, 3), and ``faces`` (m, 3) counterclockwise from outside, worked out when asked for."""
-
-    def __init__(self, kind: str, n: int, seed: int):
-        import collide
-
-        self.kind, self.n = kind, n
-        if kind == "cylinder":
-            points = prism(n // 2)
-        else:
-            self._sphere = np.random.default_rng([seed, n]).normal(size=(n, 3))
-            self._sphere /= np.sqrt(np.square(self._sphere).sum(axis=1))[:, None]
-            points = self._sphere * STRETCH[kind]
-        self.points = points - points.mean(axis=0)
-        self.shape = collide.ConvexHull(self.points)
-
-    @cached_property
-    def faces(self) -> np.ndarray:
-        if self.kind == "cylinder":
-            return prism_faces(self.n // 2)
-        from scipy.spatial import ConvexHull
-
-        hull = ConvexHull(self._sphere)
-        assert len(hull.vertices) == self.n, "every point on a sphere is a corner of the hull"
-        p, q, r = (self._sphere[hull.simplices[:, k]] for k in range(3))
-        inwards = (np.cross(q - p, r - p) * hull.equations[:, :3]).sum(axis=1) < 0
-        faces = hull.simplices.copy()
-        faces[inwards] = faces[inwards][:, ::-1]
-        return faces
+def hull(kind: str, n: int, seed: int) -> collide.ConvexHull:
+    """A hull of n points, their mean at the origin."""
+    points = prism(n // 2) if kind == "cylinder" else ball(n, seed) * STRETCH[kind]
+    return collide.ConvexHull(points - points.mean(axis=0))
 
 
 def prism(corners: int) -> np.ndarray:
     """Two regular polygons of radius √½ at heights ±√½: as long as the other shapes from end to end."""
-    if corners < 3:
-        raise SystemExit("a cylinder needs at least 6 points")
     angle = np.arange(corners) * (2 * np.pi / corners)
     ring = np.column_stack([np.cos(angle), np.sin(angle), np.ones(corners)]) * np.sqrt(0.5)
     return np.concatenate([ring * (1.0, 1.0, -1.0), ring])
 
 
-def prism_faces(corners: int) -> np.ndarray:
-    """Faces of `prism`; arcs of the caps are halved again and again.
+def coal_prism(shape: collide.ConvexHull):
+    """coal's geometry of a `prism`; arcs of the caps are halved again and again.
 
-    A fan gives coal a vertex of 255 or more neighbours, which it refuses; zigzag strips make its walk from
-    vertex to vertex long (43 instead of 11 µs a boolean at n = 8,192). Halving is the kindest cut found.
+    A fan gives coal a vertex of 255 or more neighbours, which it refuses; zigzag strips make its walk from vertex to
+    vertex long (43 instead of 11 µs a boolean at n = 8,192). Halving is the kindest cut found.
     """
+    import coal
+
+    corners = len(shape.points) // 2
     cap, arcs = [], [(0, corners - 1)]
     while arcs:
         first, last = arcs.pop()
@@ -80,20 +55,23 @@ def prism_faces(corners: int) -> np.ndarray:
             middle = (first + last) // 2
             cap.append((first, middle, last))
             arcs += [(first, middle), (middle, last)]
-    top = np.array(cap) + corners
     k = np.arange(corners)
     after = (k + 1) % corners
     sides = [np.column_stack([k, after, after + corners]), np.column_stack([k, after + corners, k + corners])]
-    return np.concatenate([np.array(cap)[:, ::-1], top, *sides])
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    points.extend(list(shape.points))
+    faces = np.concatenate([np.array(cap)[:, ::-1], np.array(cap) + corners, *sides])
+    triangles.extend([coal.Triangle(*face) for face in faces.tolist()])
+    return coal.Convex(points, triangles)
 
 
 class Scene(NamedTuple):
-    """Pairs at poses: pair k is solid ``which[k, 0]`` at the origin and ``which[k, 1]`` at ``X_WBs[k]``.
+    """Pairs at poses: pair k is shape ``which[k, 0]`` at the origin and ``which[k, 1]`` at ``X_WBs[k]``.
 
     which : (N, 2).   X_WBs : (N, 4, 4).   labels : (N,) indices into `CLASSES`.   distances : (N,) ours, signed.
     """
 
-    solids: list[Solid]
+    shapes: list[collide.ConvexHull]
     which: np.ndarray
     X_WBs: np.ndarray
     labels: np.ndarray
@@ -102,63 +80,51 @@ class Scene(NamedTuple):
     def only(self, indices: np.ndarray) -> Scene:
         return self._replace(**{f: getattr(self, f)[indices] for f in ("which", "X_WBs", "labels", "distances")})
 
+    @property
+    def pairs(self) -> tuple[list, list, np.ndarray, np.ndarray]:
+        """(As, Bs, X_WAs, X_WBs), as peers are asked."""
+        As, Bs = ([self.shapes[k] for k in side.tolist()] for side in self.which.T)
+        return As, Bs, np.tile(np.eye(4), (len(As), 1, 1)), self.X_WBs
 
-class WorldSolids:
-    """collide's batch over a scene of many shapes: a pair of them at every pose."""
-
-    def __init__(self, solids: list[Solid]):
-        import collide
-
-        self._set = collide.ShapeSet([solid.shape for solid in solids])
-
-    def hits(self, which: np.ndarray, X_WBs: np.ndarray) -> np.ndarray:
-        import collide
-
-        return collide.collide(self._set[which[:, 0]], self._set[which[:, 1]], _EYE, X_WBs)
-
-    def rows(self, which: np.ndarray, X_WBs: np.ndarray, signed: bool = True) -> np.ndarray:
-        import collide
-
-        return collide.distance(self._set[which[:, 0]], self._set[which[:, 1]], _EYE, X_WBs, signed=signed).rows
+    def question(self) -> tuple:
+        """(A, B, X_WA, X_WBs), as collide is asked: one pair of shapes, or a set that rows pick from."""
+        if len(self.shapes) == 2:
+            return *self.shapes, np.eye(4), self.X_WBs
+        shapes = collide.ShapeSet(self.shapes)
+        return shapes[self.which[:, 0]], shapes[self.which[:, 1]], np.eye(4)[None], self.X_WBs
 
 
-def scene(kind: str, n: int, poses: int, shapes: int = 2) -> Scene:
-    """``poses`` pairs of each class, shuffled; two solids, or random pairs of ``shapes`` different ones."""
+@cache
+def scene(kind: str, n: int, count: int, shapes: int = 2) -> Scene:
+    """``count`` pairs of each class, shuffled; two hulls, or random pairs of ``shapes`` different ones."""
     random = np.random.default_rng([n, shapes, sum(map(ord, kind))])
-    solids = [Solid(kind, n, seed) for seed in range(shapes)]
-    count = poses * len(CLASSES)
-    which = np.tile([0, 1], (count, 1))
+    hulls = [hull(kind, n, seed) for seed in range(shapes)]
+    total = count * len(CLASSES)
+    which = np.tile([0, 1], (total, 1))
     if shapes > 2:
-        which = np.array([random.permutation(shapes)[:2] for _ in range(count)])
-    labels = random.permutation(np.repeat(np.arange(len(CLASSES)), poses))
-    directions = random.normal(size=(count, 3))
-    directions /= np.sqrt(np.square(directions).sum(axis=1))[:, None]
-    X = np.tile(np.eye(4), (count, 1, 1))
-    X[:, :3, :3] = rotations(random.normal(size=(count, 4)))
-    in_world = WorldSolids(solids)
+        which = np.array([random.permutation(shapes)[:2] for _ in range(total)])
+    labels = random.permutation(np.repeat(np.arange(len(CLASSES)), count))
+    towards, X = directions(random, total), poses(random, total, 0.0)
+    made = Scene(hulls, which, X, labels, np.zeros(total))
 
     def signed(rows: np.ndarray, along: np.ndarray) -> np.ndarray:
         at = X[rows]
-        at[:, :3, 3] = directions[rows] * along[:, None]
-        return in_world.rows(which[rows], at)["distance"]
+        at[:, :3, 3] = towards[rows] * along[:, None]
+        return collide.distance(*made.only(rows)._replace(X_WBs=at).question()).distance
 
-    everything = np.arange(count)
+    everything = np.arange(total)
     if kind == "sphere" and n >= ROUND_ENOUGH:
-        deepest = np.full(count, -0.9 * LENGTH)
+        deepest = np.full(total, -0.9 * LENGTH)
     else:
-        deepest = signed(everything, np.zeros(count))
-    targets = wanted(labels, deepest, random)
-    along, distances = place(signed, targets, deepest)
-    X[:, :3, 3] = directions * along[:, None]
-    return Scene(solids, which, X, labels, distances)
+        deepest = signed(everything, np.zeros(total))
+    along, distances = place(signed, wanted(labels, deepest, random), deepest)
+    X[:, :3, 3] = towards * along[:, None]
+    return made._replace(distances=distances)
 
 
 def wanted(labels: np.ndarray, deepest: np.ndarray, random) -> np.ndarray:
-    """Signed distances by class: a gap of 0.05 to 1 lengths, ±1 % of a length, a depth of 5 to 50 %.
-
-    A depth is a part of the depth with the centres in one place where that is less than the length:
-    a flat shape has no deeper.
-    """
+    """Signed distances by class: a gap of 0.05 to 1 lengths, ±1 % of a length, a depth of 5 to 50 %, of the depth with
+    the centres in one place where that is less than the length."""
     n = len(labels)
     apart = random.uniform(0.05, 1.0, n) * LENGTH
     near = np.maximum(random.uniform(-0.01, 0.01, n) * LENGTH, 0.5 * deepest)
@@ -190,14 +156,3 @@ def place(signed: Callable, targets: np.ndarray, deepest: np.ndarray) -> tuple[n
         if not len(open_rows):
             return along, values
     raise AssertionError(f"{len(open_rows)} of {n} poses found no place")
-
-
-def rotations(quaternions: np.ndarray) -> np.ndarray:
-    """(N, 3, 3) from quaternions (N, 4) of any length."""
-    w, x, y, z = (quaternions / np.sqrt(np.square(quaternions).sum(axis=1))[:, None]).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)

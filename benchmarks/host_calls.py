@@ -1,41 +1,36 @@
-"""Single calls of pybullet and coal beside the same calls of collide: medians, both in turns.
+"""Single calls of pybullet, coal and Pinocchio beside the same calls of collide.
 
-    python benchmarks/host_calls.py [--rounds 400]
+    python benchmarks/host_calls.py
 
 pybullet through `attach`, in a client of a floor, 100 balls that rest on it, and a hull. coal: shapes that are apart
-and that meet, with the default request for contacts. Engines that are not installed are left out.
+and that meet, with the default request for contacts. Pinocchio: robots at random configurations. µs by the clock;
+engines that are not installed are left out.
 """
 
 from __future__ import annotations
 
-import argparse
-import statistics
 import time
-from collections.abc import Callable
+from functools import cache, partial
 from importlib import import_module
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from inputs import use_tests
+
+use_tests("differential")
+import pinocchio_robots
+
+from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
+from collide.adapters.peers.hull_facets import triangulate
 
 
-def medians(rounds: int, *calls: Callable[[], object]) -> list[float]:
-    """Of each call [µs], asked in turns."""
-    taken: list[list[float]] = [[] for _ in calls]
-    for _ in range(rounds):
-        for call, times in zip(calls, taken):
-            start = time.perf_counter()
-            call()
-            times.append(1e6 * (time.perf_counter() - start))
-    return [statistics.median(times) for times in taken]
-
-
-def time_pybullet(rounds: int) -> None:
+@cache
+def client() -> dict:
+    """What is asked of a module by name, of pybullet and of its mirror, which is attached to the client."""
     p = import_module("pybullet")
     from collide.adapters.hosts.pybullet_mirror import attach
 
-    client = p.connect(p.DIRECT)
-    q = attach(p, client)
-    random = np.random.default_rng(0)
+    number = p.connect(p.DIRECT)
+    q, random = attach(p, number), np.random.default_rng(0)
     q.createMultiBody(0.0, q.createCollisionShape(p.GEOM_PLANE))
     ball = q.createCollisionShape(p.GEOM_SPHERE, radius=0.2)
     balls = [q.createMultiBody(1.0, ball, basePosition=[*random.uniform(-4, 4, 2), 0.2]) for _ in range(100)]
@@ -43,87 +38,110 @@ def time_pybullet(rounds: int) -> None:
     shape = q.createCollisionShape(p.GEOM_MESH, vertices=corners)
     hull = q.createMultiBody(1.0, shape, basePosition=[0.0, 0.0, 0.3])
     q.stepSimulation()
-    mirror, places = q.mirror_of(client), [p.getBasePositionAndOrientation(body, client) for body in balls]
+    mirror, places = q.mirror_of(number), [p.getBasePositionAndOrientation(body, number) for body in balls]
 
     def moved() -> None:
         for body, (place, rotation) in zip(balls, places):
-            p.resetBasePositionAndOrientation(body, place, rotation, client)
+            p.resetBasePositionAndOrientation(body, place, rotation, number)
         mirror.update()
 
-    print("update of 102 bodies, none moved: {:.0f} µs".format(*medians(rounds, mirror.update)))
-    print("set by resetBasePositionAndOrientation, 100, and update: {:.0f} µs".format(*medians(rounds // 4, moved)))
     ends = [[x, y, 5.0] for x, y in random.uniform(-4, 4, (100, 2))], [[0.0, 0.0, -1.0]] * 100
-    about = {
-        "getClosestPoints of two bodies": lambda m: m.getClosestPoints(balls[0], hull, 9.0, physicsClientId=client),
-        "getClosestPoints of a body and a shape": lambda m: m.getClosestPoints(
-            balls[0], -1, 9.0, collisionShapeB=shape, collisionShapePositionB=[0, 0, 1],
-            collisionShapeOrientationB=[0, 0, 0, 1], physicsClientId=client,
-        ),
-        "getContactPoints of two bodies": lambda m: m.getContactPoints(balls[0], hull, physicsClientId=client),
-        "getContactPoints of all": lambda m: m.getContactPoints(physicsClientId=client),
-        "rayTest": lambda m: m.rayTest(ends[0][0], ends[1][0], physicsClientId=client),
-        "rayTestBatch of 100": lambda m: m.rayTestBatch(*ends, physicsClientId=client),
+    of_shape = {"collisionShapeB": shape, "collisionShapePositionB": [0, 0, 1],
+                "collisionShapeOrientationB": [0, 0, 0, 1]}  # fmt: skip
+    questions = {
+        "closest points of two bodies": ("getClosestPoints", (balls[0], hull, 9.0), {}),
+        "closest points of a body and a shape": ("getClosestPoints", (balls[0], -1, 9.0), of_shape),
+        "contacts of two bodies": ("getContactPoints", (balls[0], hull), {}),
+        "contacts of all": ("getContactPoints", (), {}), "a ray": ("rayTest", (ends[0][0], ends[1][0]), {}),
+        "a batch of 100 rays": ("rayTestBatch", ends, {}),
     }  # fmt: skip
-    for name, ask in about.items():
-        theirs, ours = medians(rounds, lambda: ask(p), lambda: ask(q))  # noqa: B023
-        print(f"{name}: pybullet {theirs:.1f} µs, attach {ours:.1f} µs")
-    p.disconnect(client)
+    calls: dict = {"update of 102 bodies": {"collide": mirror.update}, "100 reset, and update": {"collide": moved}}
+    for name, (method, positional, named) in questions.items():
+        named = named | {"physicsClientId": number}
+        calls[name] = {engine: partial(getattr(module, method), *positional, **named)
+                       for engine, module in (("collide", q), ("pybullet", p))}  # fmt: skip
+    return calls
 
 
-def time_coal(rounds: int) -> None:
-    coal = import_module("coal")
-    from collide.adapters.hosts import coal_api
-
+def sphere_points() -> np.ndarray:
     turns = np.arange(500) + 0.5
     height, angle = 1.0 - turns / 250.0, np.pi * (1.0 + 5.0**0.5) * turns
     across = np.sqrt(1.0 - height**2)
-    points = 0.5 * np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
-    facets = ConvexHull(points).simplices
-
-    def ball_mesh(module):
-        model = module.BVHModelOBBRSS()
-        model.beginModel(len(facets), len(points))
-        model.addVertices(points)
-        model.addTriangles(facets)
-        model.endModel()
-        return model
-
-    shapes = {
-        "two boxes": lambda m: (m.Box(1, 1, 1), m.Box(1, 1, 1)),
-        "ball and box": lambda m: (m.Sphere(0.5), m.Box(1, 1, 1)),
-        "two balls of 996 triangles": lambda m: (ball_mesh(m), ball_mesh(m)),
-    }
-    for name, make in shapes.items():
-        for where, away in (("apart", 1.5), ("meeting", 0.9)):
-            row = []
-            for ask in ("collide", "distance"):
-                calls = []
-                for module in (coal, coal_api):
-                    ask_it = getattr(module, ask)
-                    request = module.CollisionRequest() if ask == "collide" else module.DistanceRequest()
-                    result = module.CollisionResult() if ask == "collide" else module.DistanceResult()
-                    a, b = make(module)
-                    X, Y = module.Transform3s(), module.Transform3s(np.eye(3), np.array([away, 0.05, 0.02]))
-
-                    def call(f=ask_it, a=a, b=b, X=X, Y=Y, request=request, result=result):
-                        result.clear()
-                        f(a, X, b, Y, request, result)
-
-                    calls.append(call)
-                row.append("{}: coal {:.1f} µs, here {:.1f} µs".format(ask, *medians(rounds, *calls)))
-            print(f"{name}, {where}: {'; '.join(row)}")
+    return 0.5 * np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=400)
-    rounds = parser.parse_args().rounds
-    for time_host in (time_pybullet, time_coal):
-        try:
-            time_host(rounds)
-        except ImportError as error:
-            print(f"left out: {error}")
+def ball_mesh(module):
+    points, facets = triangulate(sphere_points())
+    model = module.BVHModelOBBRSS()
+    model.beginModel(len(facets), len(points))
+    model.addVertices(points)
+    model.addTriangles(facets)
+    model.endModel()
+    return model
+
+
+SHAPES = {
+    "two boxes": lambda m: (m.Box(1, 1, 1), m.Box(1, 1, 1)), "ball and box": lambda m: (m.Sphere(0.5), m.Box(1, 1, 1)),
+    "two balls of 996 triangles": lambda m: (ball_mesh(m), ball_mesh(m)),
+}  # fmt: skip
+
+
+def of_coal(options: Options, shapes: str, where: str, question: str) -> Race:
+    from collide.adapters.hosts import coal_api
+
+    tasks = {}
+    for name, module in (("collide", coal_api), ("coal", import_module("coal"))):
+        kind = "Collision" if question == "collide" else "Distance"
+        request, result = getattr(module, f"{kind}Request")(), getattr(module, f"{kind}Result")()
+        a, b = SHAPES[shapes](module)
+        away = 1.5 if where == "apart" else 0.9
+        asked = a, module.Transform3s(), b, module.Transform3s(np.eye(3), np.array([away, 0.05, 0.02])), request, result
+
+        def call(ask=getattr(module, question), asked=asked) -> None:  # noqa: B008
+            asked[-1].clear()
+            ask(*asked)
+
+        tasks[name] = call
+    return Race(tasks)
+
+
+def coal_cases(options: Options):
+    shapes, questions = SHAPES if installed(coal="coal") else (), ("collide", "distance")
+    return grid(shapes=shapes, where=("apart", "meeting"), question=questions)
+
+
+def of_pinocchio(options: Options, robot: str, question: str) -> Race:
+    """µs a configuration: all pairs with results, or whether any collides, ours of all configurations in one call."""
+    import pinocchio as pin
+
+    from collide.adapters.hosts import pinocchio as host
+
+    model, geom_model = pinocchio_robots.load(robot)
+    data, ours, theirs = model.createData(), geom_model.createData(), geom_model.createData()
+    low, high = np.maximum(model.lowerPositionLimit, -3.0), np.minimum(model.upperPositionLimit, 3.0)
+    Q = np.random.default_rng(22).uniform(low, high, (10 if options.quick else 100, model.nq))
+    first = question == "any"
+    tasks = {"collide": lambda: [host.compute_collisions(model, data, geom_model, ours, q) for q in Q],
+             "pinocchio": lambda: [pin.computeCollisions(model, data, geom_model, theirs, q, first) for q in Q]}
+    if first:
+        tasks["collide"] = lambda: host.collides(model, data, geom_model, ours, Q)
+    return Race(tasks, len(Q))
+
+
+def pinocchio_cases(options: Options):
+    present = installed(pinocchio="pinocchio") and pinocchio_robots.robots_folder()
+    return grid(robot=list(pinocchio_robots.ROBOTS)[: 1 if options.quick else None] if present else (),
+                question=("all pairs", "any"))  # fmt: skip
+
+
+claim = partial(Claim, turns=40, seconds=3.0, clock=time.perf_counter)
+CLAIMS = [
+    claim("pybullet", "µs a call", lambda o: grid(call=client() if installed(pybullet="pybullet") else ()),
+          lambda o, call: Race(client()[call]), file="host-calls-pybullet"),
+    claim("coal", "µs a call", coal_cases, of_coal, file="host-calls-coal"),
+    claim("pinocchio", "µs a configuration", pinocchio_cases, of_pinocchio, file="host-calls-pinocchio"),
+]  # fmt: skip
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS)

@@ -1,7 +1,7 @@
 """Other engines' continuous collision, asked about motions: each in a process of its own, for some abort.
 
 A motion is two pairs of ends; `ask` returns times of contact, −1 where an engine says that a motion is free, and the
-seconds of the questions alone: shapes, transforms and requests are made beforehand.
+seconds of the processor for the questions alone: shapes, transforms and requests are made beforehand.
 
 fcl : python-fcl, continuousCollide by conservative advancement, motions linear with constant angular velocity, as ours;
     tolerance 1e-4, its own default. In about half of all processes it says 0 to every motion of this kind; such a
@@ -13,7 +13,6 @@ coal has none any more (coal#421), MuJoCo none.
 
 from __future__ import annotations
 
-import multiprocessing
 import time
 from typing import Any, NamedTuple
 
@@ -72,13 +71,13 @@ class Fcl:
 
     def ask(self) -> tuple[np.ndarray, float]:
         times = np.full(len(self.motions), -1.0)
-        begin = time.perf_counter()
+        begin = time.process_time()
         for k, (a0, a1, b0, b1) in enumerate(self.motions):
             result = self.fcl.ContinuousCollisionResult()
             self.fcl.continuousCollide(a0, a1, b0, b1, self.request, result)
             if result.is_collide:
                 times[k] = result.time_of_contact
-        return times, time.perf_counter() - begin
+        return times, time.process_time() - begin
 
 
 class Bullet:
@@ -129,54 +128,12 @@ class Bullet:
 
     def ask(self) -> tuple[np.ndarray, float]:
         times = np.full(len(self.motions), -1.0)
-        begin = time.perf_counter()
+        begin = time.process_time()
         for k, (start, end) in enumerate(self.motions):
             result = self.world.sweep_test_closest(self.shape, start, end, self.mask, 0.0)
             if result.has_hit():
                 times[k] = result.hit_fraction
-        return times, time.perf_counter() - begin
+        return times, time.process_time() - begin
 
 
 PEERS = {"fcl": Fcl, "bullet": Bullet}
-MODULES = {"fcl": "fcl", "bullet": "panda3d.bullet"}
-
-
-def sane_process(name: str, question: Question) -> tuple[PeerProcess, int]:
-    """(A process whose engine does not say 0 to everything, how many did before it; the last one after 12)."""
-    for k in range(12):
-        process = PeerProcess(name, question)
-        answer = process.ask()
-        if answer is None or answer[0].any():
-            break
-        if k < 11:
-            process.close()
-    return process, k
-
-
-class PeerProcess:
-    """An engine and its motions in a process of its own."""
-
-    def __init__(self, name: str, question: Question):
-        context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(name, question, theirs), daemon=True)
-        self._process.start()
-        theirs.close()
-
-    def ask(self, seconds: float = 120.0) -> tuple[np.ndarray, float] | None:
-        """What the engine answers, and its seconds; None where its process died or takes too long."""
-        try:
-            self._pipe.send(True)
-            return self._pipe.recv() if self._pipe.poll(seconds) else None
-        except (EOFError, OSError):
-            return None
-
-    def close(self) -> None:
-        self._process.kill()
-        self._process.join()
-
-
-def _serve(name: str, question: Question, pipe) -> None:
-    engine = PEERS[name](question)
-    while pipe.recv():
-        pipe.send(engine.ask())

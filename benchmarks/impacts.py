@@ -3,9 +3,8 @@
     python benchmarks/impacts.py [--quick]      # minutes; needs python-fcl, and panda3d for Bullet, for their columns
 
 Random motions that start apart: two boxes, two hulls of 48 vertices, thin rods, a box and a mesh, and needles that fly
-through thin plates. Engines take turns; times are medians of the turns, a motion, ratios are of medians. Ours is one
-call of a batch (and "single": a call a motion); peers are loops over requests made beforehand, each in a process of
-its own (`impact_peers.py`).
+through thin plates. µs of the processor a motion. Ours is one call of a batch (and "single": a call a motion); peers
+are loops over requests made beforehand, each in a process of its own (`impact_peers.py`).
 
 All are judged by dense sampling and subdivision (`tests/oracles/motion_oracle.py`), in the very same motions. "missed":
 said to be free where there is a contact deeper than a hundredth of a millionth of the bodies' size. "late": such a
@@ -15,28 +14,23 @@ thousandth of their size apart.
 
 from __future__ import annotations
 
-import argparse
-import csv
-import importlib
-import statistics
-import sys
-import time
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from inputs import use_tests
 
-TESTS = Path(__file__).resolve().parents[1] / "tests"
-sys.path[:0] = [str(Path(__file__).parent), str(TESTS / "oracles"), str(TESTS / "families")]
+use_tests("oracles", "families")
 import impact_peers
 import motion_oracle as oracle
 import motions
 
 import collide
+from collide.adapters.bench.child_contestant import InChild
+from collide.adapters.bench.claims import Claim, Options, Race, installed, main
+from collide.adapters.bench.turns import Seconds
 
-RESULTS = Path(__file__).parent / "results"
 SEED = 21
 #: In unit time, and in sizes of the bodies.
 _LATE, _DEEP, _APART = 1e-3, 1e-8, 1e-3
@@ -115,39 +109,7 @@ SCENES = {
 }
 
 
-class Ours:
-    """collide, in this process."""
-
-    def __init__(self, group: motions.Group):
-        self.group = group
-
-    def ask(self) -> tuple[np.ndarray, float]:
-        begin = time.perf_counter()
-        r = collide.time_of_impact(self.group.A, self.group.B, *self.group.poses)
-        return np.where(r.hit, r.time, -1.0), time.perf_counter() - begin
-
-    def close(self) -> None:
-        pass
-
-
-class OursSingle(Ours):
-    """A call a motion."""
-
-    def ask(self) -> tuple[np.ndarray, float]:
-        ask, (A, B) = collide.time_of_impact, self.group[1:3]
-        ends = list(zip(*self.group.poses))
-        begin = time.perf_counter()
-        answers = [ask(A, B, *X) for X in ends]
-        return np.array([r.time if r.hit else -1.0 for r in answers]), time.perf_counter() - begin
-
-
-class Verdict(NamedTuple):
-    missed: int
-    late: int
-    made_up: int
-
-
-def verdict(group: motions.Group, times: np.ndarray, least: np.ndarray) -> Verdict:
+def verdict(group: motions.Group, times: np.ndarray, least: np.ndarray) -> dict:
     """What the judge says of answers.   least : gap of each motion in all of its time [m]."""
     lower = np.where(times < 0.0, 1.0, np.maximum(times - _LATE, 0.0))
     deep = _DEEP * group.size + motions.resolution(group)
@@ -155,74 +117,57 @@ def verdict(group: motions.Group, times: np.ndarray, least: np.ndarray) -> Verdi
     seen |= oracle.subdivide(group.gap, *group.motions(), lower, group.speeds(), 1e-4 * group.size, deep).missed
     free = times < 0.0
     made_up = ~free & (least > _APART * group.size)
-    return Verdict(int((seen & free).sum()), int((seen & ~free).sum()), int(made_up.sum()))
+    return {"missed": int((seen & free).sum()), "late": int((seen & ~free).sum()), "made_up": int(made_up.sum())}
 
 
-def measure(name: str, scene: Scene, n: int, turns: int, peers: list[str]) -> list[list]:
-    """Rows of the table: a scene's engines."""
-    n = max(int(n * scene.share), 50)
-    group = scene.make(3 * n)
-    group = started_apart(resting(group) if scene.rests else group, n)
-    question = impact_peers.Question(group.A, group.B, group.poses)
-    engines: dict = {"collide": Ours(group), "collide, single": OursSingle(group)}
-    states = dict.fromkeys(engines, "")
-    for peer in peers:
-        if peer != "bullet" or scene.rests:
-            engines[peer], n_zero = impact_peers.sane_process(peer, question)
-            states[peer] = f"{n_zero} processes said 0 to all" if n_zero else ""
-    answers = {engine: asked.ask() for engine, asked in engines.items()}
-    seconds: dict[str, list[float]] = {engine: [] for engine in engines}
-    for _ in range(turns):
-        for engine, asked in engines.items():
-            answer = asked.ask() if answers[engine] is not None else None
-            if answer is not None:
-                seconds[engine].append(answer[1])
-    ones = np.ones(n)
-    least = oracle.judge(group.gap, *group.motions(), ones, ones, samples=128).least
-    rows = []
-    for engine, answer in answers.items():
-        engines[engine].close()
-        if answer is None or not seconds[engine]:
-            rows.append([name, n, engine, "died or took minutes", "", "", "", "", "", ""])
+def measure(options: Options, scene: str, n: int) -> Race:
+    of = SCENES[scene]
+    group = of.make(3 * n)
+    group = started_apart(resting(group) if of.rests else group, n)
+    A, B = group.A, group.B
+
+    def ours() -> np.ndarray:
+        r = collide.time_of_impact(A, B, *group.poses)
+        return np.where(r.hit, r.time, -1.0)
+
+    ends = list(zip(*group.poses))
+    tasks: dict = {"collide": ours, "collide, single": lambda: [collide.time_of_impact(A, B, *X) for X in ends]}
+    answers, beside, children = {"collide": ours()}, {}, []
+    for peer in installed(fcl="fcl", bullet="panda3d"):
+        if peer == "bullet" and not of.rests:
             continue
-        spent = statistics.median(seconds[engine]) / n * 1e6
-        ratio = spent / (statistics.median(seconds["collide"]) / n * 1e6)
-        judged = verdict(group, answer[0], least)
-        hits = int((answer[0] >= 0.0).sum())
-        rows.append([name, n, engine, states[engine], hits, f"{spent:.2f}", f"{ratio:.2f}", *judged])
-    return rows
+        child, first, n_zero = sane_process(peer, impact_peers.Question(A, B, group.poses))
+        children.append(child)
+        state = "died or took minutes" if first is None else f"{n_zero} processes said 0 to all" if n_zero else ""
+        beside[peer] = {"state": state}
+        if first is not None:
+            answers[peer] = first[0]
+            tasks[peer] = lambda child=child: Seconds((child.call("ask") or (0, np.nan))[1])
+    least = oracle.judge(group.gap, *group.motions(), np.ones(n), np.ones(n), samples=128).least
+    for name, times in answers.items():
+        hits = {"hits": int((times >= 0.0).sum())}
+        beside[name] = beside.get(name, {}) | hits | verdict(group, times, least)
+    return Race(tasks, n, beside=beside, close=lambda: [child.close() for child in children])
 
 
-COLUMNS = ["motions", "n", "engine", "state", "hits", "µs a motion", "times collide's", "missed", "late", "made up"]
-_WIDTHS = (36, 6, 15, 27, 6, 9, 9, 6, 6, 6)
+def sane_process(peer: str, question: impact_peers.Question) -> tuple:
+    """(child, its answer, how many before it said 0 to everything): the last one after 12."""
+    for k in range(12):
+        child = InChild(impact_peers.PEERS[peer], question)
+        answer = child.call("ask")
+        if answer is None or answer[0].any() or k == 11:
+            break
+        child.close()
+    return child, answer, k
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="fewer motions, fewer turns, no file")
-    parser.add_argument("--only", help="scenes whose names contain this")
-    arguments = parser.parse_args()
-    n, turns = (300, 2) if arguments.quick else (3000, 7)
-    peers = []
-    for peer, module in impact_peers.MODULES.items():
-        try:
-            importlib.import_module(module)
-            peers.append(peer)
-        except ImportError:
-            print(f"{module} is not installed: its rows are left out")
-    rows = []
-    for name, scene in SCENES.items():
-        if arguments.only and arguments.only not in name:
-            continue
-        for row in measure(name, scene, n, turns, peers):
-            rows.append(row)
-            print("  ".join(f"{cell!s:>{width}}" for cell, width in zip(row, _WIDTHS)), flush=True)
-    if not (arguments.quick or arguments.only):
-        with (RESULTS / "impacts.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(COLUMNS)
-            writer.writerows(rows)
+def cases(options: Options):
+    n = 300 if options.quick else 3000
+    return [{"scene": name, "n": max(int(n * scene.share), 50)} for name, scene in SCENES.items()]
+
+
+CLAIMS = [Claim("impacts", "µs a motion", cases, measure, turns=7, seconds=120.0, everywhere=True)]
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS)

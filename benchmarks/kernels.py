@@ -2,22 +2,25 @@
 
     python benchmarks/kernels.py --against ../older/.venv/bin/python       # this one and an older version
     python benchmarks/kernels.py --levels v2 v3 v4                         # the levels of this one's library
-    python benchmarks/kernels.py --against … --rounds 3 --only boxes
+    python benchmarks/kernels.py --against … --repeats 3 --holding boxes
 
 Each figure is CPU time of the process: ns a pair in batches, ns a call of single ones. A process answers each case
 many times and tells the best; the processes of all contestants take turns, and their medians are compared. The
-answers' bytes are hashed: contestants that differ in a bit are told.
+answers' bytes are hashed: contestants that differ in a bit are told. The first contestant is that of --against.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
+from functools import cache
+
+from collide.adapters.bench.claims import Claim, Options, Race, main
+from collide.adapters.bench.turns import Seconds
+from collide.errors import CollideError
 
 #: What every process runs: {case: [ns, hash]} on stdout.
 WORK = r'''
@@ -112,7 +115,9 @@ for name, A, B in (("boxes", box, box), ("hulls of 128", ball(128), ball(128)), 
     cases[f"single, {name}: distance"] = singles(collide.distance)
 told = {}
 for name, (ask, count) in cases.items():
-    if only in name:
+    if only == "names":
+        told[name] = None
+    elif only == name:
         ns, answer = best(ask, count)
         told[name] = ns, hashed(answer)
 print(json.dumps(told))
@@ -121,49 +126,42 @@ print(json.dumps(told))
 
 def run(python: str, level: str, only: str) -> dict:
     environment = {**os.environ, **({"COLLIDE_CPU": level} if level else {})}
-    done = subprocess.run(
-        [python, "-c", WORK, only], cwd=tempfile.gettempdir(), env=environment, capture_output=True, text=True,
-        check=False
-    )
+    done = subprocess.run([python, "-c", WORK, only], cwd=tempfile.gettempdir(), env=environment, capture_output=True,
+                          text=True, check=False)  # fmt: skip
     if done.returncode:
-        raise SystemExit(done.stderr)
+        raise CollideError(f"{python} failed: {done.stderr}")
     return json.loads(done.stdout)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--against", metavar="PYTHON", help="an interpreter that has another version of collide installed"
-    )
+@cache
+def names() -> list[str]:
+    return list(run(sys.executable, "", "names"))
+
+
+def measure(options: Options, case: str) -> Race:
+    contestants = {level or "this": (sys.executable, level) for level in options.levels}
+    if options.against:
+        contestants = {"other": (options.against, "")} | contestants
+    bits = {name: run(*contestant, case)[case][1] for name, contestant in contestants.items()}
+    first = next(iter(bits.values()))
+    beside = {name: {"bits": "the same" if answer == first else "OTHER"} for name, answer in bits.items()}
+    return Race({
+        name: lambda of=contestant: Seconds(run(*of, case)[case][0] * 1e-9) for name, contestant in contestants.items()
+    }, beside=beside)  # fmt: skip
+
+
+def cases(options: Options):
+    return [{"case": name} for name in names() if options.holding in name]
+
+
+def arguments(parser) -> None:
+    parser.add_argument("--against", metavar="PYTHON", help="an interpreter with another version of collide installed")
     parser.add_argument("--levels", nargs="*", default=[""], help="levels of this one's library, by default the best")
-    parser.add_argument("--rounds", type=int, default=5, help="processes of each contestant (default: 5)")
-    parser.add_argument("--only", default="", help="cases whose names hold this")
-    args = parser.parse_args()
-    contestants = [(sys.executable, level) for level in args.levels] + ([(args.against, "")] if args.against else [])
-    names = [level or "this" for level in args.levels] + (["other"] if args.against else [])
-    runs_by_contestant: list[list[dict]] = [[] for _ in contestants]
-    for round_ in range(args.rounds):
-        for k, contestant in enumerate(contestants):
-            runs_by_contestant[k].append(run(*contestant, args.only))
-        print(f"round {round_ + 1} of {args.rounds}", file=sys.stderr, flush=True)
-    print(
-        "ns a pair: median of the processes (their spread), × against the last column by medians and by least times\n"
-    )
-    print(f"{'case':34}", *(f"{name:>27}" for name in names))
-    for case in runs_by_contestant[0][0]:
-        medians = [statistics.median(by_case[case][0] for by_case in runs) for runs in runs_by_contestant]
-        spreads = [
-            (max(by_case[case][0] for by_case in runs) / min(by_case[case][0] for by_case in runs) - 1) * 100
-            for runs in runs_by_contestant
-        ]
-        least = [min(by_case[case][0] for by_case in runs) for runs in runs_by_contestant]
-        cells = [
-            f"{m:7.0f} ±{s:2.0f} % ×{m / medians[-1]:5.2f} ×{b / least[-1]:5.2f}"
-            for m, s, b in zip(medians, spreads, least)
-        ]
-        bits = {by_case[case][1] for runs in runs_by_contestant for by_case in runs}
-        print(f"{case:34}", *(f"{cell:>27}" for cell in cells), "" if len(bits) == 1 else "  OTHER BITS")
+    parser.add_argument("--holding", default="", metavar="TEXT", help="cases whose names hold this")
+
+
+CLAIMS = [Claim("kernels", "ns a pair, or a call", cases, measure, unit="ns", turns=5, seconds=600.0)]
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS, arguments)

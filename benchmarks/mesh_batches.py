@@ -1,36 +1,32 @@
-"""Batches of mesh pairs beside coal's loop: what a call and a pose cost, from 1 pose to 12,000.
+"""Batches of mesh pairs beside coal's loop: what a call and a pose cost, from 1 pose to 12,000; making meshes.
 
-    python benchmarks/mesh_batches.py            # some minutes; prints a table and writes results/mesh_batches_*.csv
-    python benchmarks/mesh_batches.py --quick    # fewer repeats, no file
+    python benchmarks/mesh_batches.py                   # some minutes
+    python benchmarks/mesh_batches.py --table making    # a minute
 
-A torus of 2304 facets against itself, a box and a sphere; poses far apart (none within the limit), mixed or near (some
-overlap, some are a little apart). Asked are booleans, and gaps no farther than a limit of a hundredth of the size.
-coal (OBBRSS) is asked in a loop over transforms and requests made beforehand. Both take turns; compared are medians.
+batches   a torus of 2304 facets against itself, a box and a sphere; poses far apart (none within the limit), mixed or
+          near (some overlap, some are a little apart). Booleans, and gaps no farther than a limit of a hundredth of the
+          size; coal (OBBRSS) in a loop. µs a pose of the processor
+making    `Mesh` as it comes (welding, defects, shells, volumes), the same as loose triangles the way an STL has them,
+          taken as a surface without a look, read from a pickle, and `Mesh.locality`; ms
 """
 
 from __future__ import annotations
 
-import csv
-import gc
-import os
-import platform
-import statistics
-import sys
-import time
+import pickle
 from functools import partial
-from pathlib import Path
 
 import numpy as np
+from inputs import MESHES, poses
+from pair_loops import CoalLoop
 
 import collide
-from collide.adapters.peers.coal_peer import CoalPeer
+from collide import Mesh
+from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
+from collide.scenes.loaders.triangles import read_meshes
+from collide.scenes.worst_cases import harpsicordia
 
-RESULTS = Path(__file__).resolve().parent / "results"
-SIZES = (1, 12, 120, 1200, 12000)
-#: Distances of the bodies' middles, in radii of the torus.
-SPREADS = {"far": (4.0, 40.0), "mixed": (1.0, 8.0), "near": (0.5, 2.0)}
-LIMIT = 0.02
-HEADER = ["pair", "question", "poses", "n", "collide_us", "coal_us", "ratio", "collide_us_a_pose", "hits"]
+#: Distances of the bodies' middles, in radii of the torus; and how far gaps are asked for.
+SPREADS, LIMIT = {"far": (4.0, 40.0), "mixed": (1.0, 8.0), "near": (0.5, 2.0)}, 0.02
 
 
 def torus(major: float = 0.7, minor: float = 0.3, n: int = 48, m: int = 24) -> collide.Mesh:
@@ -44,82 +40,57 @@ def torus(major: float = 0.7, minor: float = 0.3, n: int = 48, m: int = 24) -> c
     return collide.Mesh(vertices, faces)
 
 
-def poses(rng: np.random.Generator, n: int, spread: tuple[float, float]) -> np.ndarray:
-    """(n, 4, 4) random rotations, at distances from the origin within the spread."""
-    q = rng.normal(size=(n, 4))
-    w, x, y, z = (q / np.linalg.norm(q, axis=1)[:, None]).T
-    X = np.tile(np.eye(4), (n, 1, 1))
-    X[:, 0, :3] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=1)
-    X[:, 1, :3] = np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=1)
-    X[:, 2, :3] = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1)
-    way = rng.normal(size=(n, 3))
-    X[:, :3, 3] = way / np.linalg.norm(way, axis=1)[:, None] * rng.uniform(*spread, (n, 1))
-    return X
+def batches(options: Options, partner: str, where: str, n: int, question: str) -> Race:
+    rng, A = np.random.default_rng(n), torus()
+    B = {"torus": A, "box": collide.Box((1, 1, 1)), "sphere": collide.Sphere(0.6)}[partner]
+    X, Y = poses(rng, n, 0.0), poses(rng, n, *SPREADS[where])
+    ask = partial(collide.collide, A, B, X, Y)
+    tasks = {"collide": ask}
+    if question == "distance":  # coal as far as the limit: a security margin that no pair of facets within it escapes
+        tasks["collide"] = partial(collide.distance, A, B, X, Y, max_distance=LIMIT, signed=False)
+    if installed(coal="coal"):
+        margin = LIMIT if question == "distance" else 0.0
+        tasks["coal"] = CoalLoop([A] * n, [B] * n, X, Y).loop("boolean", margin=margin)
+    return Race(tasks, n, {"hits": int(np.count_nonzero(ask()))})
 
 
-class Coal:
-    """The same pair as coal knows it, at poses made ready."""
-
-    def __init__(self, A: collide.Mesh, B: collide.Shape, X_WA: np.ndarray, X_WB: np.ndarray):
-        import coal
-
-        peer = CoalPeer()
-        self._coal, self._A, self._B = coal, peer.build(A), peer.build(B)
-        self._poses = [tuple(coal.Transform3s(X[:3, :3], X[:3, 3]) for X in pair) for pair in zip(X_WA, X_WB)]
-
-    def ask(self, question: str) -> None:
-        coal, A, B = self._coal, self._A, self._B
-        request = coal.CollisionRequest()
-        request.break_distance, request.enable_contact, request.num_max_contacts = 0.0, False, 1
-        if question == "distance":  # as far as the limit: a security margin that no pair of facets within it escapes
-            request.security_margin = LIMIT
-        for X_WA, X_WB in self._poses:
-            coal.collide(A, X_WA, B, X_WB, request, coal.CollisionResult())
+def batch_cases(options: Options):
+    sizes = (1, 12, 120) if options.quick else (1, 12, 120, 1200, 12_000)
+    return grid(partner=("torus", "box", "sphere"), where=SPREADS, n=sizes, question=("boolean", "distance"))
 
 
-def medians(repeats: int, *asks) -> list[float]:
-    """Median seconds of questions asked in turn."""
-    times: list[list[float]] = [[] for _ in asks]
-    gc.disable()
-    for _ in range(repeats + 1):
-        for ask, taken in zip(asks, times):
-            started = time.perf_counter()
-            ask()
-            taken.append(time.perf_counter() - started)
-    gc.enable()
-    return [statistics.median(taken[1:]) for taken in times]
+FILES = ("teapot_1177.ply", "env.obj", "bunny_35947.ply", "dragon_vrip_res2.ply.gz", "dragon_vrip.ply.gz")
 
 
-def main() -> None:
-    quick = "--quick" in sys.argv
-    mesh = torus()
-    partners = {"torus": mesh, "box": collide.Box((1, 1, 1)), "sphere": collide.Sphere(0.6)}
-    rows = []
-    print("  ".join(f"{name:>17}" for name in HEADER))
-    for name, partner in partners.items():
-        for kind, spread in SPREADS.items():
-            for n in SIZES:
-                rng = np.random.default_rng(n)
-                X_WA, X_WB = poses(rng, n, (0.0, 0.0)), poses(rng, n, spread)
-                peer = Coal(mesh, partner, X_WA, X_WB)
-                pair = mesh, partner, X_WA, X_WB
-                questions = {
-                    "boolean": partial(collide.collide, *pair),
-                    "distance": partial(collide.distance, *pair, max_distance=LIMIT, signed=False),
-                }
-                for question, ask in questions.items():
-                    repeats = max(5, (40 if quick else 400) // (1 + n // 30))
-                    ours, theirs = medians(repeats, ask, partial(peer.ask, question))
-                    hits = int(np.count_nonzero(collide.collide(*pair)))
-                    row = [name, question, kind, n, ours * 1e6, theirs * 1e6, theirs / ours, ours * 1e6 / n, hits]
-                    rows.append([f"{value:.3f}" if isinstance(value, float) else value for value in row])
-                    print("  ".join(f"{value:>17}" for value in rows[-1]), flush=True)
-    if not quick:
-        cpu = platform.processor() or platform.machine()
-        file = RESULTS / f"mesh_batches_{cpu}_{len(os.sched_getaffinity(0))}.csv"
-        with file.open("w", newline="", encoding="utf-8") as out:
-            csv.writer(out).writerows([HEADER, *rows])
+def making(options: Options, source: str) -> Race:
+    if source.startswith("harpsicordia"):
+        made = harpsicordia(int(source.split()[1]))[0]
+    else:
+        made = read_meshes(MESHES / source)[0][1]
+    vertices, faces = np.asarray(made.vertices), np.asarray(made.faces)
+    whole = Mesh(vertices, faces)
+    pickled, locality = pickle.dumps(whole), whole.locality()
+    corners, ids = vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
+    columns = {"facets": len(faces), "solid": whole.solid, "shells": whole.report.shells,
+               "σ": locality.local_stretches[0], "σ10": locality.local_stretches[9], "Σ": locality.global_stretch}
+    return Race({
+        "mesh": lambda: Mesh(vertices, faces), "soup": lambda: Mesh(corners, ids),
+        "surface": lambda: Mesh(vertices, faces, solid=False), "unpickle": lambda: pickle.loads(pickled),
+        "locality": whole.locality,
+    }, columns=columns)  # fmt: skip
+
+
+def making_cases(options: Options):
+    some = slice(1 if options.quick else None)
+    files = [name for name in FILES if (MESHES / name).is_file()][some]
+    return grid(source=[*files, *(f"harpsicordia {n}" for n in (1_000, 10_000, 100_000)[some])])
+
+
+CLAIMS = [
+    Claim("batches", "µs a pose in batches", batch_cases, batches, turns=40, seconds=5.0, file="mesh-batches"),
+    Claim("making", "ms of making meshes", making_cases, making, unit="ms", file="mesh-shapes", asked_for=True),
+]
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS)

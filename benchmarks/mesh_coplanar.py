@@ -1,27 +1,20 @@
 """Facets in one plane, and on one another: all pairs of facets where doubles tell little, beside coal.
 
-    python benchmarks/mesh_coplanar.py       # two minutes; --no-csv
+    python benchmarks/mesh_coplanar.py       # two minutes
 
 Equal meshes in equal poses, turned and not; meshes whose vertices are rounded to a grid, one moved by a cell; flat
 grids of 32,768 facets in one plane. The share of pairs of facets that needed more than doubles is told, and how many
-pairs coal finds. Times are the fastest of three, engines in turn.
+pairs coal finds. ms of the processor.
 """
 
 from __future__ import annotations
 
-import argparse
-import csv
-import sys
-import time
-from pathlib import Path
-
 import numpy as np
+from inputs import mesh, meshes_here, rotation
+from pair_loops import CoalLoop, coal_model
 
-sys.path.insert(0, str(Path(__file__).parent))
-from mesh_peers import MANY
-from meshes import DATA, RESULTS, mesh, rotation
-
-from collide.mesh.build_bvh import build_mesh_tree
+from collide import Mesh
+from collide.adapters.bench.claims import Claim, Options, Race, installed, main
 from collide.narrowphase.facets.facet_queries import all_hits
 
 #: Cells of a unit along each axis, of vertices rounded and of the flat grids.
@@ -46,83 +39,48 @@ def moved(x: float = 0.0, y: float = 0.0, angle: float = 0.0) -> np.ndarray:
     return X
 
 
-def cases():
-    """(name, mesh A, mesh B, X_WA, X_WB)."""
-    turned = np.eye(4)
+def coplanar_pair(case: str) -> tuple:
+    name, _, how = case.partition(", ")
+    X, Y, turned = np.eye(4), np.eye(4), np.eye(4)
     turned[:3, :3] = rotation(np.random.default_rng(1))
-    for name in ("teapot", "bunny", "dragon 203k") if DATA.is_dir() else ():
-        vertices, faces = mesh(name)
-        yield f"{name}, equal", (vertices, faces), (vertices, faces), np.eye(4), np.eye(4)
-        yield f"{name}, equal, turned", (vertices, faces), (vertices, faces), turned, turned
-        rounded = np.round(vertices * CELLS) / CELLS
-        yield f"{name} rounded, moved by a cell", (rounded, faces), (rounded, faces), np.eye(4), moved(1 / CELLS)
-    grid = flat_grid(GRID)
     half = moved(0.5 / GRID, 0.25 / GRID)
-    yield "grids on each other", grid, grid, np.eye(4), np.eye(4)
-    yield "grids, half a cell moved", grid, grid, np.eye(4), half
-    yield "grids, turned in their plane", grid, grid, np.eye(4), moved(angle=0.3)
-    yield "grids, both turned out of it", grid, grid, turned, turned @ half
+    if name == "grids":
+        vertices, faces = flat_grid(GRID)
+        X, Y = {"on each other": (X, Y), "half a cell moved": (X, half), "turned in their plane": (X, moved(angle=0.3)),
+                "turned out of it": (turned, turned @ half)}[how]  # fmt: skip
+    else:
+        vertices, faces = mesh(name)
+        if how == "rounded and moved":
+            vertices, Y = np.round(vertices * CELLS) / CELLS, moved(1 / CELLS)
+        elif how == "turned":
+            X = Y = turned
+    made = Mesh(vertices, faces, solid=False)
+    return made, made, X[None], Y[None]
 
 
-def fastest(task, turns: int = 3) -> float:
-    taken = []
-    for _ in range(turns):
-        started = time.perf_counter()
-        task()
-        taken.append(time.perf_counter() - started)
-    return 1e3 * min(taken)
+def coplanar(options: Options, case: str) -> Race:
+    A, B, X, Y = coplanar_pair(case)
+    hits = all_hits(A.tree, B.tree, X, Y)
+    _, tested, exact = hits.counters[0].tolist()
+    tasks, beside = {"collide": lambda: all_hits(A.tree, B.tree, X, Y)}, {}
+    if installed(coal="coal"):
+        coal = CoalLoop([A], [B], X, Y, coal_model("OBB"))
+        tasks["coal"] = coal.loop("all pairs")
+        beside["coal"] = {"pairs_of_coal": int(coal.answers("all pairs")[0])}
+    columns = {"pairs": len(hits.pairs), "tested": tested, "exact_share": exact / max(tested, 1)}
+    return Race(tasks, columns=columns, beside=beside)
 
 
-def coal_model(vertices, faces):
-    import coal
-
-    model = coal.BVHModelOBB()
-    model.beginModel(len(faces), len(vertices))
-    model.addVertices(vertices)
-    model.addTriangles(faces)
-    model.endModel()
-    return model
+def coplanar_cases(options: Options):
+    names = () if options.quick else meshes_here("teapot", "bunny", "dragon 203k")
+    for name in names:
+        yield from ({"case": f"{name}, {how}"} for how in ("equal", "turned", "rounded and moved"))
+    flat = ("on each other", "half a cell moved", "turned in their plane", "turned out of it")
+    yield from ({"case": f"grids, {how}"} for how in flat)
 
 
-def measured(name, A, B, X_WA, X_WB) -> dict:
-    import coal
-
-    trees, models = [build_mesh_tree(*m) for m in (A, B)], [coal_model(*m) for m in (A, B)]
-    places = [coal.Transform3s(np.array(X[:3, :3]), np.array(X[:3, 3])) for X in (X_WA, X_WB)]
-    request = coal.CollisionRequest()
-    request.break_distance, request.enable_contact, request.num_max_contacts = 0.0, False, MANY
-
-    def ask_coal():
-        result = coal.CollisionResult()
-        coal.collide(models[0], places[0], models[1], places[1], request, result)
-        return result.numContacts()
-
-    hits = all_hits(*trees, X_WA, X_WB)
-    _, triangles, exact = hits.counters[0].tolist()
-    pairs_of_coal = ask_coal()
-    ours, theirs = fastest(lambda: all_hits(*trees, X_WA, X_WB)), fastest(ask_coal)
-    return {
-        "case": name, "pairs": len(hits.pairs), "pairs_of_coal": pairs_of_coal, "tested": triangles,
-        "exact_share": f"{exact / max(triangles, 1):.4f}", "ms": f"{ours:.2f}", "coal_ms": f"{theirs:.2f}",
-        "ratio": f"{theirs / ours:.2f}", "us_a_test": f"{1e3 * ours / max(triangles, 1):.3f}",
-    }  # fmt: skip
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--no-csv", action="store_true")
-    options = parser.parse_args()
-    rows = []
-    for case in cases():
-        rows.append(measured(*case))
-        print("  ".join(f"{key} {value}" for key, value in rows[-1].items()), flush=True)
-    if not options.no_csv:
-        with open(RESULTS / "mesh-coplanar.csv", "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
-    return 0
+CLAIMS = [Claim("mesh-coplanar", "ms of all pairs of facets", coplanar_cases, coplanar, unit="ms", turns=3)]
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main(__doc__, CLAIMS)

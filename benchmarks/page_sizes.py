@@ -1,30 +1,27 @@
 """How large pages are, and how long they take to write beside the report that they show.
 
     python benchmarks/page_sizes.py                # a minute
-    python benchmarks/page_sizes.py --runs 5
     python benchmarks/page_sizes.py --open         # and in a headless Chromium, which draws in software (selenium)
 
 Scenes: both shipped ones with what their robots look like, 1,000 meshes of 524 facets each, no two of them the same,
-1,000 bodies that share one mesh, and one mesh of 500,000 facets, which is drawn with fewer. ``report`` is the time of
-the report itself, ``page`` of drawing, contacts and writing after it; medians. With ``--open``: seconds from asking for
-the page until it is ready, and until its first picture stands; milliseconds a picture while the camera moves, at 1,280
-by 800 pixels; draw calls and triangles of a picture.
+1,000 bodies that share one mesh, and one mesh of 500,000 facets, which is drawn with fewer. "report" is the time of the
+report itself, "page" of drawing, contacts and writing after it; s. With ``--open``: seconds from asking for the page
+until it is ready, and until its first picture stands; milliseconds a picture while the camera moves, at 1,280 by 800
+pixels; draw calls and triangles of a picture.
 """
 
 from __future__ import annotations
 
-import argparse
 import shutil
-import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from collide import Cylinder, Mesh, Sphere, pose, tessellate
-from collide.errors import CollideError
+from collide.adapters.bench.claims import Claim, Options, Race, grid, main
 from collide.pages.page_file import page_pieces, write_page
 from collide.pages.report_page import report_blocks
 from collide.reports import report
@@ -83,8 +80,8 @@ return [window.collideViewer.measures(), first, times[5]];
 """
 
 
-def opened(place: Path) -> tuple[float, float, float, int, int]:
-    """(ready [s], first picture [s], a picture [ms], draw calls, triangles) in a headless browser."""
+def opened(place: Path) -> dict:
+    """Ready and first picture [s], a picture [ms], draw calls, triangles, in a headless browser."""
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
     from selenium.webdriver.support.ui import WebDriverWait
@@ -100,58 +97,40 @@ def opened(place: Path) -> tuple[float, float, float, int, int]:
         measures, first, picture = driver.execute_script(_ROTATION)
     finally:
         driver.quit()
-    return measures["opened"] / 1e3, first / 1e3, picture, measures["calls"], measures["triangles"]
+    return {"ready_s": measures["opened"] / 1e3, "first_s": first / 1e3, "picture_ms": picture,
+            "draw_calls": measures["calls"], "triangles": measures["triangles"]}  # fmt: skip
 
 
-def measured(scene: Scene, runs: int, look: bool) -> tuple[float, float, int, int, int, tuple]:
-    """Seconds of the report and of its page, bytes, facets in the scene's shapes before and in the page, `opened`."""
-    of_report, of_page = [], []
-    with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder, "page.html")
-        for _ in range(runs):
-            start = time.perf_counter()
-            made = report.make(scene, clearance=CLEARANCE)
-            middle = time.perf_counter()
-            looks = visual_shapes(scene)
-            blocks = report_blocks([Stated("", scene, made)], looks.shapes, looks.notes)
-            write_page(page_pieces(scene.name, blocks), str(place))
-            of_report.append(middle - start)
-            of_page.append(time.perf_counter() - middle)
-        size = place.stat().st_size
-        seen = opened(place) if look else ()
-    shapes = next(block.data["shapes"] for block in blocks if block.id == "drawing")
-    before = sum(shape["simplified_from"] or shape["triangle_count"] for shape in shapes)
-    drawn = sum(shape["triangle_count"] for shape in shapes)
-    return statistics.median(of_report), statistics.median(of_page), size, before, drawn, seen
+def measure(options: Options, scene: str) -> Race:
+    of, folder = SCENES[scene](), tempfile.TemporaryDirectory()
+    place, made = Path(folder.name, "page.html"), report.make(SCENES[scene](), clearance=CLEARANCE)
+
+    def page() -> list:
+        looks = visual_shapes(of)
+        blocks = report_blocks([Stated("", of, made)], looks.shapes, looks.notes)
+        write_page(page_pieces(of.name, blocks), str(place))
+        return blocks
+
+    shapes = next(block.data["shapes"] for block in page() if block.id == "drawing")
+    columns = {
+        "bodies": len(of.bodies), "MB": place.stat().st_size / 1e6,
+        "facets": sum(shape["simplified_from"] or shape["triangle_count"] for shape in shapes),
+        "drawn": sum(shape["triangle_count"] for shape in shapes),
+    } | (opened(place) if options.open else {})  # fmt: skip
+    tasks = {"report": lambda: report.make(of, clearance=CLEARANCE), "page": page}
+    return Race(tasks, columns=columns, close=folder.cleanup)
 
 
-def rows(runs: int, look: bool) -> Iterator[str]:
-    for name, build in SCENES.items():
-        try:
-            scene = build()
-        except CollideError as error:
-            yield f"| {name} | {error} |"
-            continue
-        of_report, of_page, size, before, drawn, seen = measured(scene, runs, look)
-        row = f"| {name} | {len(scene.bodies)} | {before:,} | {drawn:,} "
-        row += f"| {of_report:.2f} | {of_page:.2f} | {size / 1e6:.1f} |"
-        if look:
-            ready, first, picture, calls, triangles = seen
-            row += f" {ready:.2f} | {first:.2f} | {picture:.0f} | {calls} | {triangles:,} |"
-        yield row
+def cases(options: Options):
+    return grid(scene=list(SCENES)[: 1 if options.quick else None])
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=3, help="of which the median is printed (3)")
+def arguments(parser) -> None:
     parser.add_argument("--open", action="store_true", help="open each in a headless Chromium as well")
-    args = parser.parse_args()
-    more = " ready [s] | first picture [s] | a picture [ms] | draw calls | triangles |" if args.open else ""
-    print("| scene | bodies | facets | drawn | report [s] | page [s] | MB |" + more)
-    print("| --- |" + " ---: |" * (11 if args.open else 6))
-    for row in rows(args.runs, args.open):
-        print(row, flush=True)
+
+
+CLAIMS = [Claim("page_sizes", "s of reports and pages", cases, measure, unit="s", turns=3, clock=time.perf_counter)]
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS, arguments)

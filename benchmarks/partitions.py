@@ -1,100 +1,74 @@
 """Space partitions: how large they get, how quickly points are located, and convex pieces beside coacd's.
 
-    python benchmarks/partitions.py --part sizes      cells over n log n and depth, 10^3 to 10^5 facets; seeds; kappa
-    python benchmarks/partitions.py --part scans      the same of meshes in shared/data, reduced or whole
-    python benchmarks/partitions.py --part worst      harpsicordia beside Chazelle's polyhedra and accordions
-    python benchmarks/partitions.py --part points     10^5 points a mesh, as `contains` has them, and ns a point
-    python benchmarks/partitions.py --part pieces     convex pieces beside coacd's: how many, volumes
-    python benchmarks/partitions.py --part clutter    facets that cubes without guards meet
+    python benchmarks/partitions.py                      # "sizes": cells over n log n and depth, 10^3 to 10^5 facets
+    python benchmarks/partitions.py --table settings     # seeds; kappa
+    python benchmarks/partitions.py --table scans        # the same of meshes in shared/data, reduced or whole
+    python benchmarks/partitions.py --table worst        # harpsicordia beside Chazelle's polyhedra and accordions
+    python benchmarks/partitions.py --table points       # 10^5 points a mesh, as `contains` has them, and ns a point
+    python benchmarks/partitions.py --table pieces       # convex pieces beside coacd's: how many, volumes
+    python benchmarks/partitions.py --table clutter      # facets that cubes without guards meet
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 import time
-from pathlib import Path
+from functools import partial
 
 import numpy as np
+from inputs import SHARED, use_tests
+
+use_tests("families", "oracles")
+from mesh_shapes import block_ring, bumpy_sphere
 
 import collide
+from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
+from collide.adapters.bench.growth import groups, line_fit, power_of
 from collide.partitions.clutter import clutter
 from collide.scenes import generate
-
-ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT / "tests" / "families"), str(ROOT / "tests" / "oracles")]
-from mesh_shapes import block_ring, bumpy_sphere
 
 
 def sphere(n: int, seed: int = 0) -> collide.Mesh:
     return collide.Mesh(*bumpy_sphere(n, seed), solid=True)
 
 
-def row(name: str, mesh: collide.Mesh, **arguments) -> collide.SpacePartition:
-    """One line about a partition."""
+def partition_of(mesh: collide.Mesh, **arguments) -> dict:
     start = time.process_time()
-    partition = collide.SpacePartition(mesh, **arguments)
-    seconds = time.process_time() - start
-    s = partition.size
-    n = s.facets
-    print(
-        f"| {name} | {n:,} | {s.kappa} | {s.cells:,} | {s.cells / n:.2f} | {s.cells / (n * np.log2(n)):.3f} "
-        f"| {s.cells / n**2:.5f} | {s.depth}, {s.mean_depth:.1f} | {s.depth / np.log2(n):.2f} | {s.first_cells:,} "
-        f"| {s.max_facets}, {s.pieces / s.first_cells:.1f} | {s.integers:,}, {s.fractions} | {seconds:.2f} |",
-        flush=True,
-    )
-    return partition
+    s = collide.SpacePartition(mesh, **arguments).size
+    seconds, n = time.process_time() - start, s.facets
+    return {
+        "facets": n, "cells": s.cells, "cells_a_facet": s.cells / n, "over_nlogn": s.cells / (n * np.log2(n)),
+        "over_n2": s.cells / n**2, "depth": s.depth, "mean_depth": s.mean_depth, "over_log_n": s.depth / np.log2(n),
+        "first_cells": s.first_cells, "most_in_one": s.max_facets, "mean_in_one": s.pieces / s.first_cells,
+        "integers": s.integers, "fractions": s.fractions, "s": seconds, "kappa": s.kappa,
+    }  # fmt: skip
 
 
-def head() -> None:
-    print(
-        "| mesh | facets n | kappa | cells | / n | / n log2 n | / n² | depth, mean | / log2 n | first level "
-        "| facets in one, mean | integers, fractions | s |\n" + "|---" * 13 + "|"
-    )
+def growth_notes(rows, by: str = "family"):
+    for (family,), some in groups(rows, by):
+        if len(some) > 2:
+            n, ratio = [row["facets"] for row in some], np.array([row["over_nlogn"] for row in some])
+            fit = line_fit(np.log2(n), [row["depth"] for row in some])
+            yield (f"{family or 'all'}: cells n^{power_of(n, [row['cells'] for row in some]):.3f}; over n log2 n from "
+                   f"{ratio.min():.3f} to {ratio.max():.3f}, a factor of {ratio.max() / ratio.min():.2f}; depth "
+                   f"{fit.start:.1f} + {fit.slope:.2f} log2 n")  # fmt: skip
 
 
-def fit(sizes: list[tuple[int, int, int]]) -> None:
-    """sizes : (facets, cells, depth)."""
-    n, cells, depth = np.array(sizes, dtype=float).T
-    power = np.polyfit(np.log(n), np.log(cells), 1)[0]
-    b, a = np.polyfit(np.log2(n), depth, 1)
-    ratio = cells / (n * np.log2(n))
-    print(f"\ncells: n^{power:.3f}; over n log2 n from {ratio.min():.3f} to {ratio.max():.3f}, a factor of "
-          f"{ratio.max() / ratio.min():.2f}; depth: {a:.1f} + {b:.2f} log2 n\n")  # fmt: skip
+def settings(options: Options, facets: int, **arguments) -> list[dict]:
+    return [partition_of(sphere(facets), **arguments)]
 
 
-def sizes(largest: int) -> None:
-    head()
-    results = []
-    for n in (1000, 3000, 10_000, 30_000, 100_000):
-        if n <= largest:
-            s = row(f"bumpy sphere, {n:,}", sphere(n)).size
-            results.append((s.facets, s.cells, s.depth))
-    fit(results)
-    head()
-    for seed in range(5):
-        row(f"seed {seed}", sphere(3000), seed=seed)
-    for kappa in (8, 16, 32, 64, 128, 256, 1024):
-        row("bumpy sphere", sphere(10_000), kappa=kappa)
+def setting_cases(options: Options):
+    n = 10 if options.quick else 1
+    yield from grid(facets=[3000 // n], seed=range(5))
+    yield from grid(facets=[10_000 // n], kappa=(8, 16, 32, 64, 128, 256, 1024))
 
 
-def scans() -> None:
-    head()
-    results = []
-    for name, mesh in scan_meshes():
-        if len(mesh.faces) <= 120_000:
-            s = row(name, mesh).size
-            results.append((s.facets, s.cells, s.depth))
-    fit(results)
-
-
-def scan_meshes():
-    """Solid meshes of shared/data, by size."""
+def scan_cases(options: Options):
+    """Solid meshes of shared/data, by size, up to 120,000 facets."""
     from collide.scenes.loaders.mesh_file import read_mesh
 
-    folder = next((p for p in (ROOT.parent / "shared", ROOT / "shared") if p.exists()), None)
     meshes = []
-    for path in sorted((folder / "data").rglob("*")) if folder else []:
+    for path in sorted(SHARED.rglob("*")) if SHARED.is_dir() else []:
         if path.suffix not in (".ply", ".obj", ".stl", ".off") or path.stat().st_size > 30e6:
             continue
         try:
@@ -104,7 +78,13 @@ def scan_meshes():
         for part in parts:
             if part.closed and part.facets is not None and part.faces >= 500:
                 meshes.append((path.stem, collide.Mesh(part.points, part.facets, solid=True)))
-    return sorted(meshes, key=lambda item: len(item[1].faces))
+    for name, mesh in sorted(meshes, key=lambda item: len(item[1].faces))[: 2 if options.quick else None]:
+        if len(mesh.faces) <= 120_000:
+            SCANS[name] = mesh
+            yield {"scan": name}
+
+
+SCANS: dict[str, collide.Mesh] = {}
 
 
 def joined(*meshes) -> collide.Mesh:
@@ -123,18 +103,9 @@ def pair_of(family: str, **arguments) -> collide.Mesh:
     return joined(*parts)
 
 
-def worst() -> None:
-    for family, name, values in (
-        ("harpsicordia", "n", (150, 500, 1500)),
-        ("chazelle", "strings", (10, 20, 40, 80)),
-        ("accordions", "strings", (10, 20, 40, 80)),
-    ):
-        head()
-        results = []
-        for value in values:
-            s = row(f"{family} {value}", pair_of(family, **{name: value})).size
-            results.append((s.facets, s.cells, s.depth))
-        fit(results)
+#: Family → (its size's name, sizes).
+WORST = {"harpsicordia": ("n", (150, 500, 1500)), "chazelle": ("strings", (10, 20, 40, 80)),
+         "accordions": ("strings", (10, 20, 40, 80))}  # fmt: skip
 
 
 def hard_points(mesh: collide.Mesh, partition: collide.SpacePartition, n: int, seed: int = 0) -> np.ndarray:
@@ -156,92 +127,75 @@ def hard_points(mesh: collide.Mesh, partition: collide.SpacePartition, n: int, s
     return np.concatenate((rng.uniform(low, high, (n - 2 * k, 3)), on, off))
 
 
-def points(runs: int) -> None:
-    print("| mesh | points | inside | on the boundary | differ from `contains` | ns a point: `locate` | `contains` |")
-    print("|---" * 7 + "|")
-    cases = [("bumpy sphere", sphere(n)) for n in (1000, 10_000)] + [("square ring", collide.Mesh(*block_ring()))]
-    for name, mesh in cases:
-        partition = collide.SpacePartition(mesh)
-        every = hard_points(mesh, partition, 100_000)
-        results = partition.locate(every)
-        wrong = int((results.inside != collide.contains(mesh, np.eye(4), every)).sum())
-        timed = every[: len(every) // 3]
-        tasks = (lambda p=partition, q=timed: p.locate(q), lambda m=mesh, q=timed: collide.contains(m, np.eye(4), q))
-        times = np.array([[_ns(task, len(timed)) for task in tasks] for _ in range(runs)])
-        mine, theirs = np.median(times, axis=0)
-        print(f"| {name}, {len(mesh.faces):,} facets | {len(every):,} | {results.inside.sum():,} "
-              f"| {results.boundary.sum():,} | {wrong} | {mine:.0f} | {theirs:.0f} |", flush=True)  # fmt: skip
+MESHES = {"bumpy sphere, 1,000": lambda: sphere(1000), "bumpy sphere, 3,000": lambda: sphere(3000),
+          "bumpy sphere, 10,000": lambda: sphere(10_000),
+          "square ring": lambda: collide.Mesh(*block_ring())}  # fmt: skip
 
 
-def _ns(task, n: int) -> float:
-    start = time.process_time()
-    task()
-    return 1e9 * (time.process_time() - start) / n
+def points(options: Options, mesh: str) -> Race:
+    made = MESHES[mesh]()
+    partition = collide.SpacePartition(made)
+    every = hard_points(made, partition, 9_999 if options.quick else 99_999)
+    results, some = partition.locate(every), every[: len(every) // 3]
+    wrong = int((results.inside != collide.contains(made, np.eye(4), every)).sum())
+    tasks = {"locate": lambda: partition.locate(some), "contains": lambda: collide.contains(made, np.eye(4), some)}
+    return Race(tasks, len(some), {"points": len(every), "inside": int(results.inside.sum()), "differ": wrong,
+                                   "on_boundary": int(results.boundary.sum())})  # fmt: skip
 
 
-def pieces() -> None:
-    print("| mesh | volume | pieces | their volume, relative error | s | coacd: pieces | volume of hulls, error "
-          "| overlaps counted twice | s |")  # fmt: skip
-    print("|---" * 9 + "|")
-    cases = [
-        ("square ring", collide.Mesh(*block_ring())), ("bumpy sphere, 1,000", sphere(1000)),
-        ("bumpy sphere, 3,000", sphere(3000)),
-    ]  # fmt: skip
-    for name, mesh in cases:
-        volume = mesh.report.volume
-        start = time.process_time()
-        exact_pieces = collide.SpacePartition(mesh).convex_pieces()
-        seconds = time.process_time() - start
-        text = f"| {name} | {volume:.6f} | {len(exact_pieces):,} "
-        text += f"| {exact_pieces.volumes.sum() / volume - 1:.1e} | {seconds:.2f} "
-        print(text + coacd_columns(mesh, volume), flush=True)
+def pieces(options: Options, mesh: str) -> list[dict]:
+    """Exact pieces, and coacd's: points of a box that hulls put wrongly, or that are in several of them."""
+    made = MESHES[mesh]()
+    volume, start = made.report.volume, time.process_time()
+    parts = collide.SpacePartition(made).convex_pieces()
+    row = {"volume": volume, "pieces": len(parts), "s": time.process_time() - start,
+           "volume_off": float(parts.volumes.sum() / volume - 1)}  # fmt: skip
+    if not installed(coacd="coacd"):
+        return [row]
+    import coacd
 
-
-def coacd_columns(mesh: collide.Mesh, volume: float) -> str:
-    try:
-        import coacd
-    except ImportError:
-        return "| pip install coacd | | | |"
     coacd.set_log_level("error")
     start = time.process_time()
-    parts = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces), seed=0)
-    seconds = time.process_time() - start
-    hulls = [collide.ConvexHull(vertices) for vertices, _ in parts]
-    rng = np.random.default_rng(0)
-    low, high = mesh.vertices.min(axis=0) - 0.05, mesh.vertices.max(axis=0) + 0.05
-    points = rng.uniform(low, high, (20_000, 3))
-    times_held = sum(collide.contains(hull, np.eye(4), points).astype(int) for hull in hulls)
-    inside = collide.contains(mesh, np.eye(4), points)
-    cell = np.prod(high - low) / len(points)
-    wrong = ((times_held > 0) != inside).sum() * cell / volume
-    twice = np.maximum(times_held - 1, 0).sum() * cell / volume
-    return f"| {len(parts)} | {wrong:.1e} put wrongly, of 20,000 points | {twice:.1e} | {seconds:.2f} |"
+    hulls = [collide.ConvexHull(v) for v, _ in coacd.run_coacd(coacd.Mesh(made.vertices, made.faces), seed=0)]
+    row |= {"coacd_pieces": len(hulls), "coacd_s": time.process_time() - start}
+    low, high = made.vertices.min(axis=0) - 0.05, made.vertices.max(axis=0) + 0.05
+    spots = np.random.default_rng(0).uniform(low, high, (20_000, 3))
+    held = sum(collide.contains(hull, np.eye(4), spots).astype(int) for hull in hulls)
+    cell = np.prod(high - low) / len(spots) / volume
+    wrong = ((held > 0) != collide.contains(made, np.eye(4), spots)).sum()
+    twice = np.maximum(held - 1, 0).sum()
+    return [row | {"coacd_put_wrongly": float(wrong * cell), "coacd_twice": float(twice * cell)}]
 
 
-def clutter_table() -> None:
-    print("| mesh | facets | most in a cube without guards | mean | most / log2 n |")
-    print("|---" * 5 + "|")
-    cases = [(f"bumpy sphere {n:,}", sphere(n)) for n in (1000, 10_000, 100_000)]
-    cases += [(f"harpsicordia {n:,}", pair_of("harpsicordia", n=n)) for n in (1000, 10_000)]
-    cases += [(f"chazelle, {n} strings", pair_of("chazelle", strings=n)) for n in (10, 40, 160)]
-    for name, mesh in cases:
-        c = clutter(mesh, 200)
-        n = len(mesh.faces)
-        print(f"| {name} | {n:,} | {c.max_facets} | {c.mean:.1f} | {c.max_facets / np.log2(n):.2f} |", flush=True)
+def cluttered(options: Options, family: str, size: int) -> list[dict]:
+    mesh = sphere(size) if family == "bumpy sphere" else pair_of(family, **{WORST[family][0]: size})
+    c, n = clutter(mesh, 200), len(mesh.faces)
+    return [{"facets": n, "most": c.max_facets, "mean": c.mean, "most_over_log_n": c.max_facets / np.log2(n)}]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--part", choices=("sizes", "scans", "worst", "points", "pieces", "clutter"), default="sizes")
-    parser.add_argument("--largest", type=int, default=100_000, help="facets of the largest mesh")
-    parser.add_argument("--runs", type=int, default=5)
-    args = parser.parse_args()
-    parts = {
-        "sizes": lambda: sizes(args.largest), "scans": scans, "worst": worst, "points": lambda: points(args.runs),
-        "pieces": pieces, "clutter": clutter_table,
-    }  # fmt: skip
-    parts[args.part]()
+def sized(*families: tuple[str, tuple[int, ...]]):
+    return lambda o: ({"family": name, "size": n} for name, ns in families for n in ns[: 1 if o.quick else 9])
+
+
+SPHERES = ("bumpy sphere", (1000, 3000, 10_000, 30_000, 100_000))
+asked = partial(Claim, everywhere=True, asked_for=True)
+CLAIMS = [
+    Claim("sizes", "partitions of bumpy spheres", sized(SPHERES), lambda o, family, size: [partition_of(sphere(size))],
+          notes=growth_notes, everywhere=True, file="partitions-sizes"),
+    asked("settings", "seeds and kappas", setting_cases, settings, file="partitions-settings"),
+    asked("scans", "scans", scan_cases, lambda o, scan: [partition_of(SCANS[scan])], file="partitions-scans",
+          notes=lambda rows: growth_notes(rows, "none")),
+    asked("worst", "worst cases", sized(*((name, sizes) for name, (_, sizes) in WORST.items())),
+          lambda o, family, size: [partition_of(pair_of(family, **{WORST[family][0]: size}))], notes=growth_notes,
+          file="partitions-worst"),
+    asked("points", "ns a point", lambda o: grid(mesh=[*MESHES][: 1 if o.quick else 4]), points, unit="ns", turns=5,
+          file="partitions-points"),
+    asked("pieces", "convex pieces", lambda o: grid(mesh=[*MESHES][: 1 if o.quick else 4]), pieces,
+          file="partitions-pieces"),
+    asked("clutter", "facets in a cube without guards", sized(("bumpy sphere", (1000, 10_000, 100_000)), (
+          "harpsicordia", (1000, 10_000)), ("chazelle", (10, 40, 160))), cluttered, file="partitions-clutter"),
+]  # fmt: skip
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS)

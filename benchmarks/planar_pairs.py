@@ -5,8 +5,7 @@
 
 Round polygons of n corners each in random poses: "random", their origins 1.2 to 2.6 radii apart; "near", within 1 % of
 touching; "touching", a corner on a corner in numbers that need no rounding, in a third of the pairs one unit in the
-last place apart. One polygon against itself in all poses of a batch, one thread each; contestants take turns, times
-are medians over the turns in µs of the processor a pair, × is theirs divided by ours.
+last place apart. One polygon against itself in all poses of a batch, one thread each; µs of the processor a pair.
 
 shapely has no poses: A is prepared and stays where it is, and "placed" has B's corners moved ahead of time, which is
 not counted; "shapely" moves them and makes the polygons in its time. Box2D takes up to 16 corners, one call a pair, in
@@ -16,21 +15,15 @@ counts answers unlike ours, each of which was proven by a certificate that was c
 
 from __future__ import annotations
 
-import argparse
-import csv
-import os
-import platform
-import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
 import collide
+from collide.adapters.bench.claims import Claim, Options, Race, check, grid, installed, main
 from collide.polytopes import planar_pose, polygon_distance, polygons_meet, verify_polygons
 
-RESULTS = Path(__file__).parent / "results"
-Row = dict[str, object]
+PAIRS = ("random", "near", "touching")
 
 
 def round_polygon(n: int, rng: np.random.Generator) -> np.ndarray:
@@ -59,10 +52,8 @@ def in_space(X: np.ndarray) -> np.ndarray:
 
 
 def shapely_tasks(A: np.ndarray, B: np.ndarray, X: np.ndarray) -> dict[str, Callable[[], np.ndarray]]:
-    try:
-        import shapely
-    except ImportError:
-        return {}
+    import shapely
+
     prepared = shapely.Polygon(A)
     shapely.prepare(prepared)
 
@@ -77,12 +68,8 @@ def shapely_tasks(A: np.ndarray, B: np.ndarray, X: np.ndarray) -> dict[str, Call
 
 
 def box2d_tasks(A: np.ndarray, B: np.ndarray, X: np.ndarray) -> dict[str, Callable[[], np.ndarray]]:
-    try:
-        import Box2D
-    except ImportError:
-        return {}
-    if len(A) > 16:
-        return {}
+    import Box2D
+
     shapes = [Box2D.b2PolygonShape(vertices=corners.tolist()) for corners in (A, B)]
     here = Box2D.b2Transform()
     here.Set((0, 0), 0)
@@ -95,96 +82,52 @@ def box2d_tasks(A: np.ndarray, B: np.ndarray, X: np.ndarray) -> dict[str, Callab
     return {"Box2D": lambda: np.array([overlap(shapes[0], 0, shapes[1], 0, here, there) for there in places])}
 
 
-def medians(tasks: dict[str, Callable[[], object]], turns: int) -> dict[str, float]:
-    """Median seconds of the processor for each, taking turns."""
-    times: dict[str, list[float]] = {name: [] for name in tasks}
-    for _ in range(turns):
-        for name, task in tasks.items():
-            started = time.process_time()
-            task()
-            times[name].append(time.process_time() - started)
-    return {name: float(np.median(values)) for name, values in times.items()}
-
-
-def compare(n: int, kind: str, count: int, turns: int) -> list[Row]:
-    """One case: all contestants on the same pairs."""
-    rng = np.random.default_rng(n)
-    corners = round_polygon(n, rng)
-    mirrored = -corners if kind == "touching" else corners
-    A, B = collide.ConvexPolygon(corners), collide.ConvexPolygon(mirrored)
-    X = poses(kind, corners, count, rng)
+def compared(options: Options, corners: int, pairs: str) -> Race:
+    """All contestants on the same pairs."""
+    count = max((2000 if options.quick else 20_000) // max(corners // 64, 1), 200)
+    rng = np.random.default_rng(corners)
+    outline = round_polygon(corners, rng)
+    A, B = collide.ConvexPolygon(outline), collide.ConvexPolygon(-outline if pairs == "touching" else outline)
+    X = poses(pairs, outline, count, rng)
     hulls = [collide.ConvexHull(np.c_[p.vertices, np.zeros(len(p.vertices))]) for p in (A, B)]
     spatial = in_space(X)
     tasks: dict[str, Callable[[], np.ndarray]] = {
         "collide": lambda: polygons_meet(A, B, np.eye(3), X).hit,
         "flat hull": lambda: collide.collide(*hulls, np.eye(4), spatial),
-        **shapely_tasks(A.vertices, B.vertices, X),
-        **box2d_tasks(A.vertices, B.vertices, X),
     }
-    answers = {name: np.asarray(task()) for name, task in tasks.items()}
-    ours = polygons_meet(A, B, np.eye(3), X)
+    peers = installed(shapely="shapely", Box2D="Box2D")
+    tasks |= shapely_tasks(A.vertices, B.vertices, X) if "shapely" in peers else {}
+    tasks |= box2d_tasks(A.vertices, B.vertices, X) if "Box2D" in peers and corners <= 16 else {}
+    ours, answers = polygons_meet(A, B, np.eye(3), X), {name: np.asarray(task()) for name, task in tasks.items()}
     for k in np.flatnonzero(np.any([answer != ours.hit for answer in answers.values()], axis=0)):
         verify_polygons(A, B, np.eye(3), X[k], ours.certificate(int(k)))
+    beside = {name: {"wrong": int((answer != ours.hit).sum())} for name, answer in answers.items()}
     tasks["distance"] = lambda: polygon_distance(A, B, np.eye(3), X).distance
-    seconds = medians(tasks, turns)
-    rows: list[Row] = []
-    for name, total in seconds.items():
-        wrong = int((answers[name] != ours.hit).sum()) if name in answers else ""
-        ratio = total / seconds["collide"]
-        rows.append(
-            {"corners": n, "pairs": kind, "engine": name, "us_a_pair": f"{total / count * 1e6:.3f}",
-             "ratio": f"{ratio:.2f}", "wrong": wrong, "of": count, "hits": f"{ours.hit.mean():.2f}"}
-        )  # fmt: skip
-        print(f"{n:6} {kind:9} {name:16} {total / count * 1e6:9.3f} µs, {ratio:7.2f} ×, wrong {wrong}", flush=True)
-    return rows
+    return Race(tasks, count, {"of": count, "hits": float(ours.hit.mean())}, beside)
 
 
-def rounds(sizes: list[int], count: int) -> list[Row]:
+def rounds(options: Options, n: int, pairs: str) -> list[dict]:
     """The most rounds and vertices read beside their bounds."""
-    rows: list[Row] = []
-    for n in sizes:
-        rng = np.random.default_rng(n)
-        corners = round_polygon(n, rng)
-        polygon = collide.ConvexPolygon(corners)
-        m = len(polygon.vertices)
-        for kind in ("random", "near", "touching"):
-            other_way = collide.ConvexPolygon(-corners) if kind == "touching" else polygon
-            r = polygons_meet(polygon, other_way, np.eye(3), poses(kind, corners, count, rng))
-            bound = 2 * np.log2(m)
-            assert (r.rounds <= bound + 6).all() and (r.vertices_read <= 12 * bound + 60).all()
-            rows.append({"corners": m, "pairs": kind, "mean_rounds": f"{r.rounds.mean():.2f}",
-                         "max_rounds": int(r.rounds.max()), "bound_rounds": f"{bound + 6:.1f}",
-                         "mean_read": f"{r.vertices_read.mean():.1f}", "max_read": int(r.vertices_read.max()),
-                         "bound_read": f"{12 * bound + 60:.0f}"})  # fmt: skip
-            print(*(f"{key} {value}," for key, value in rows[-1].items()), flush=True)
-    return rows
+    rng = np.random.default_rng(n)
+    outline = round_polygon(n, rng)
+    A, B = collide.ConvexPolygon(outline), collide.ConvexPolygon(-outline if pairs == "touching" else outline)
+    r = polygons_meet(A, B, np.eye(3), poses(pairs, outline, 2000 if options.quick else 20_000, rng))
+    bound = 2 * np.log2(len(A.vertices))
+    check(bool((r.rounds <= bound + 6).all() and (r.vertices_read <= 12 * bound + 60).all()), f"bounds at {n} {pairs}")
+    return [{"corners": len(A.vertices), "mean_rounds": float(r.rounds.mean()), "max_rounds": int(r.rounds.max()),
+             "bound_rounds": bound + 6, "mean_read": float(r.vertices_read.mean()),
+             "max_read": int(r.vertices_read.max()), "bound_read": 12 * bound + 60}]  # fmt: skip
 
 
-def write(name: str, rows: list[Row]) -> None:
-    path = RESULTS / f"{name}.csv"
-    about = f"{platform.processor() or platform.machine()}, {len(os.sched_getaffinity(0))} cores"
-    with path.open("w", newline="") as file:
-        table = csv.DictWriter(file, [*rows[0], "machine"])
-        table.writeheader()
-        table.writerows([{**row, "machine": about} for row in rows])
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer pairs and turns, no CSV")
-    options = parser.parse_args()
-    count, turns = (2_000, 3) if options.quick else (20_000, 5)
-    print("rounds and vertices read")
-    counted = rounds([10, 1000, 10**5] if options.quick else [10, 100, 1000, 10**4, 10**5, 10**6], count)
-    print("µs a pair")
-    timed = []
-    for n in (4, 16, 128) if options.quick else (4, 8, 16, 128, 1024, 8192):
-        for kind in ("random", "near", "touching"):
-            timed += compare(n, kind, max(count // max(n // 64, 1), 200), turns)
-    if not options.quick:
-        write("planar-rounds", counted)
-        write("planar-pairs", timed)
+CLAIMS = [
+    Claim("rounds", "rounds and vertices read", lambda o: grid(
+        n=(10, 1000, 10**5) if o.quick else (10, 100, 1000, 10**4, 10**5, 10**6), pairs=PAIRS), rounds,
+          file="planar-rounds", everywhere=True),
+    Claim("pairs", "µs a pair of polygons", lambda o: grid(
+        corners=(4, 16, 128) if o.quick else (4, 8, 16, 128, 1024, 8192), pairs=PAIRS), compared, turns=5,
+          file="planar-pairs", everywhere=True),
+]  # fmt: skip
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS)

@@ -7,7 +7,6 @@ daqp and proxsuite, whose matrices are dense, one of n + d. Drake has `HPolyhedr
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -178,12 +177,3 @@ PEERS: dict[str, tuple[str, Callable[[Question], bool], int]] = {
     "clarabel": ("clarabel", _clarabel, 10**6), "osqp": ("osqp", _osqp, 10**6),
     "proxsuite": ("proxsuite", _proxsuite, 1000), "Drake": ("pydrake", _drake, 10**6),
 }  # fmt: skip
-
-
-def is_installed(module: str) -> bool:
-    """Whether a module can be imported."""
-    try:
-        importlib.import_module(module)
-    except ImportError:
-        return False
-    return True

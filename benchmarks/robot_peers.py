@@ -1,10 +1,48 @@
-"""MuJoCo and Pinocchio asked whether configurations of a robot collide, from the same shapes at the same places."""
+"""A robot among obstacles, and MuJoCo and Pinocchio asked whether its configurations collide, from the same shapes."""
 
 from __future__ import annotations
 
 import numpy as np
 
 import collide
+from collide.errors import CollideError
+from collide.scenes.loaders.resources import installed_folders
+
+PANDA = "example-robot-data/robots/panda_description/urdf/panda.urdf"
+
+
+def panda() -> tuple[collide.Robot, str]:
+    folder = next((f for f in installed_folders() if (f / "example-robot-data").is_dir()), None)
+    if folder is None:
+        raise CollideError("this needs robots of example-robot-data: pip install example-robot-data")
+    path = folder / PANDA
+    srdf = path.parents[1] / "srdf" / "panda.srdf"
+    return collide.Robot.load(path, srdf=srdf, meshes="hull", package_path=[folder]), str(path)
+
+
+def clutter(n: int, seed: int = 0) -> collide.World:
+    """A table and n boxes and hulls around a robot, none within 0.25 m of its axis."""
+    rng = np.random.default_rng([seed, n])
+    world = collide.World()
+    world.add(collide.Box((2.0, 2.0, 0.04)), collide.pose((0, 0, -0.05)), name="table", static=True)
+    k = 0
+    while k < n:
+        p = rng.uniform((-0.9, -0.9, 0.0), (0.9, 0.9, 1.1))
+        if np.hypot(p[0], p[1]) < 0.25:
+            continue
+        size = rng.uniform(0.02, 0.07)
+        points = rng.normal(size=(32, 3))
+        points *= size / np.linalg.norm(points, axis=1)[:, None]
+        shape = collide.Box(2 * size * rng.uniform(0.5, 1.0, 3)) if k % 2 else collide.ConvexHull(points)
+        X = collide.pose(p, rpy=rng.uniform(-3.1, 3.1, 3))
+        world.add(shape, X, name=f"obstacle{k}", static=True)
+        k += 1
+    return world
+
+
+def at_random(robot: collide.Robot, n: int, seed: int = 5) -> np.ndarray:
+    low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+    return np.random.default_rng(seed).uniform(low, high, (n, robot.dof))
 
 
 def rotation_quaternion(R: np.ndarray) -> np.ndarray:

@@ -20,10 +20,10 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from convex import write
 from slowest_bodies import OF_ONE, PLACES, QUESTIONS, RATIOS, all_bodies, body, placed
-from startup import machine
 
+from collide.adapters.bench.claims import RESULTS
+from collide.adapters.bench.machine_stamp import file_name, machine_stamp, write_csv
 from collide.errors import CollideError
 
 #: No call on 10^5 facets or 1,000 parts is to take longer, building apart [ms].
@@ -108,9 +108,10 @@ def main() -> None:
     for case in asked.case or WORST:
         first, later = timed(case)
         print(line(first, later, case), flush=True)
-        rows.append({"case": case, "first_ms": first, "later_ms": later, "bar_ms": BAR})
+        rows.append({"case": case, "first_ms": f"{first:.4f}", "later_ms": f"{later:.4f}", "bar_ms": BAR})
     if not (asked.case or asked.no_csv):
-        print(write("slowest-calls", rows, machine()))
+        stamp = machine_stamp()
+        write_csv(RESULTS / file_name("slowest-calls", stamp), rows, stamp)
 
 
 if __name__ == "__main__":

@@ -1,83 +1,64 @@
 """What an arrangement of two local meshes has to cut, and what is looked at for it, counted up to 10⁶ facets.
 
-    python benchmarks/solids_growth.py
-    # two minutes; --largest 100000
+    python benchmarks/solids_growth.py          # two minutes
 
 Bumpy spheres in each other, whose facets meet along a curve, and harpsicordia, local by proof, with Σ = n and with
-Σ ≤ 1000. A line a size: pairs of facets that meet, pairs of boxes looked at, pairs of facets tested; per meeting and
-over n log2 n. Below each family the exponents e of n^e fitted, and c of c n log2 n with the largest factor that any
-size is off it. Counts are the same on every machine.
+Σ ≤ 1000: pairs of facets that meet, boxes looked at, pairs of facets tested; per meeting and over n log2 n. Below, the
+exponents e of n^e fitted, and c of c n log2 n with the largest factor that any size is off it. Counts are the same on
+every machine.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
-from pathlib import Path
-
 import numpy as np
+from inputs import use_tests
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "families"))
+use_tests("families")
 from mesh_shapes import bumpy_sphere
 
 import collide
+from collide.adapters.bench.claims import Claim, Options, grid, main
+from collide.adapters.bench.growth import groups, power_of
 from collide.narrowphase.facets.facet_queries import all_hits
 from collide.scenes.worst_cases import harpsicordia
 
-NAMES = "meeting", "boxes", "tested"
+FAMILIES = {"bumpy spheres": None, "harpsicordia, Σ = n": None, "harpsicordia, Σ ≤ 1000": 1000.0}
+COUNTS = "meeting", "boxes", "tested"
 
 
-def spheres(n: int):
-    """(trees of A and B, poses)."""
-    trees = [collide.Mesh(*bumpy_sphere(n, seed), solid=False).tree for seed in (0, 1)]
-    return *trees, np.eye(4), collide.pose((0.9, 0.3, 0.2), rpy=(0.3, 0.5, 0.7))
+def measure(options: Options, family: str, size: int) -> list[dict]:
+    Y = np.eye(4)
+    if family == "bumpy spheres":
+        A, B = (collide.Mesh(*bumpy_sphere(size, seed), solid=False) for seed in (0, 1))
+        Y = collide.pose((0.9, 0.3, 0.2), rpy=(0.3, 0.5, 0.7))
+    else:  # of two facets a vertex
+        A, B, _ = harpsicordia(size // 2, 10.0, FAMILIES[family])
+    hits = all_hits(A.tree, B.tree, np.eye(4), Y)
+    n, counts = len(A.faces), dict(zip(COUNTS, (len(hits.pairs), *hits.counters[0, :2].tolist())))
+    return [{
+        "facets": n, **counts, "boxes_a_meeting": counts["boxes"] / counts["meeting"],
+        "tested_a_meeting": counts["tested"] / counts["meeting"],
+        **{f"{name}_over_nlogn": count / (n * np.log2(n)) for name, count in counts.items()},
+    }]  # fmt: skip
 
 
-def strings(n: int, spread: float | None):
-    """Harpsicordia of about n facets: two facets a vertex."""
-    A, B, _ = harpsicordia(n // 2, 10.0, spread)
-    return A.tree, B.tree, np.eye(4), np.eye(4)
-
-
-FAMILIES = {
-    "bumpy spheres": spheres,
-    "harpsicordia, Σ = n": lambda n: strings(n, None),
-    "harpsicordia, Σ ≤ 1000": lambda n: strings(n, 1000.0),
-}
-
-
-def counted(case) -> np.ndarray:
-    """(facets, meeting, boxes, tested)."""
-    A, B, X, Y = case
-    hits = all_hits(A, B, X, Y)
-    return np.array([len(A.ids), len(hits.pairs), *hits.counters[0, :2]], dtype=float)
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--largest", type=int, default=1_000_000)
-    largest = parser.parse_args().largest
-    sizes = [10**k * m for k in range(3, 7) for m in (1, 3) if 10**k * m <= largest]
-    print(f"{'family':24s}{'facets':>9s}" + "".join(f"{name:>10s}" for name in NAMES)
-          + "  boxes, tested a meeting   meeting, boxes, tested over n log2 n")  # fmt: skip
-    for family, make in FAMILIES.items():
-        rows = []
-        for size in sizes:
-            row = counted(make(size))
-            rows.append(row)
-            n, meeting, boxes, tested = row
-            over = row[1:] / (n * np.log2(n))
-            print(f"{family:24s}{n:9.0f}{meeting:10.0f}{boxes:10.0f}{tested:10.0f}{boxes / meeting:13.1f}"
-                  f"{tested / meeting:12.1f}   " + "".join(f"{x:10.4f}" for x in over), flush=True)  # fmt: skip
-        table = np.array(rows)
-        n = table[:, 0]
-        for k, name in enumerate(NAMES, 1):
-            exponent = np.polyfit(np.log(n), np.log(table[:, k]), 1)[0]
-            c = table[:, k] / (n * np.log2(n))
+def notes(rows):
+    for (family,), some in groups(rows, "family"):
+        for name in COUNTS:
+            c = np.array([row[f"{name}_over_nlogn"] for row in some])
             middle = float(np.exp(np.log(c).mean()))
+            e = power_of([row["facets"] for row in some], [row[name] for row in some])
             off = float(np.exp(np.abs(np.log(c / middle)).max()))
-            print(f"    {name:8s} n^{exponent:.2f};  c n log2 n: c = {middle:.4f}, off by {off:.2f} at most")
+            yield f"{family}: {name} n^{e:.2f}; {middle:.4f} n log2 n, off by {off:.2f} at most"
+
+
+def cases(options: Options):
+    return grid(family=FAMILIES, size=[10**k * m for k in range(3, 4 if options.quick else 6) for m in (1, 3)]
+                + ([] if options.quick else [10**6]))  # fmt: skip
+
+
+CLAIMS = [Claim("solids_growth", "what is looked at", cases, measure, everywhere=True, notes=notes)]
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS)

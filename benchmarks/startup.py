@@ -1,32 +1,29 @@
 """How long a user waits, and how much memory it takes: start-up, first answers, reports.
 
     python benchmarks/startup.py                 # everything; a few minutes
-    python benchmarks/startup.py --runs 1 --cold-runs 1 --no-csv
+    python benchmarks/startup.py --repeats 1 --no-csv
     python benchmarks/startup.py --against ../older/.venv/bin/python      # another installation, in turns with this one
 
 Each case runs in processes of its own. Cold means an empty cache folder: meshes are read, and kernels compiled where
-    they come
-in no library. Warm means a folder that one run has filled. Wall time is taken from outside, the interpreter's own start
-included; peak memory is the process's largest resident set.
+they come in no library. Warm means a folder that one run has filled. Wall time is taken from outside, the interpreter's
+own start included; peak memory is the process's largest resident set.
 """
 
 from __future__ import annotations
 
-import argparse
-import csv
 import os
-import platform
-import re
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from importlib import metadata
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-RESULTS = Path(__file__).resolve().parent / "results"
+from collide.adapters.bench.claims import Claim, Options, Race, grid, main, say
+from collide.adapters.bench.turns import Seconds
+from collide.errors import CollideError
 
 
 class Case(NamedTuple):
@@ -57,150 +54,67 @@ CASES = (
 )
 
 
-class Run(NamedTuple):
-    seconds: float
-    peak: float
-    """Largest resident set [MiB], NaN where the system does not tell."""
+#: A process that is small itself, or its own memory would be its child's largest: wall seconds and peak of a command.
+LAUNCHER = """
+import os, subprocess, sys, time
+started = time.perf_counter()
+process = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL)
+_, status, usage = os.wait4(process.pid, 0)
+print(time.perf_counter() - started, usage.ru_maxrss)
+sys.exit(os.waitstatus_to_exitcode(status))
+"""
 
 
-def run(case: Case, cache: str, python: str) -> Run:
-    """One process from start to end; its output is thrown away."""
-    environment = {**os.environ, "COLLIDE_CACHE_DIR": cache}
-    command = [python, *case.arguments]
-    started = time.perf_counter()
-    # Away from the checkout, so that the installed package is what is measured.
-    with subprocess.Popen(
-        command, cwd=cache, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
-    ) as process:
-        assert process.stderr is not None
-        complaint = process.stderr.read()
-        peak = _wait(process)
-        seconds = time.perf_counter() - started
-    if process.returncode:
-        raise SystemExit(f"{case.name} failed:\n{complaint.decode(errors='replace')}")
-    return Run(seconds, peak)
+class Runs:
+    """Processes of one interpreter, from start to end; their output is thrown away."""
+
+    def __init__(self, case: Case, python: str, is_cold: bool):
+        self.case, self.python, self.is_cold, self.peak = case, python, is_cold, 0.0
+        self.folder, self.count = tempfile.TemporaryDirectory(), 0
+        self()
+
+    def __call__(self) -> Seconds:
+        """Seconds of one; where the cache is to be cold, in a folder of its own."""
+        self.count += self.is_cold
+        cache = Path(self.folder.name, str(self.count))
+        cache.mkdir(mode=0o700, exist_ok=True)
+        environment = {**os.environ, "COLLIDE_CACHE_DIR": str(cache)}
+        # Away from the checkout, so that the installed package is what is measured.
+        command = [sys.executable, "-S", "-c", LAUNCHER, self.python, *self.case.arguments]
+        done = subprocess.run(command, cwd=cache, env=environment, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise CollideError(f"{self.case.name} failed:\n{done.stderr}")
+        seconds, peak = map(float, done.stdout.split())
+        self.peak = max(self.peak, peak / (2**20 if sys.platform == "darwin" else 2**10))
+        return Seconds(seconds)
 
 
-def _wait(process: subprocess.Popen) -> float:
-    """Wait for a process and tell its peak memory [MiB]."""
-    if not hasattr(os, "wait4"):
-        process.wait()
-        return float("nan")
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    return usage.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+def measure(options: Options, case: str, cache: str) -> Race:
+    pythons = {"this": sys.executable} | ({"other": options.against} if options.against else {})
+    of = next(known for known in CASES if known.name == case)
+    runs = {name: Runs(of, python, cache == "cold") for name, python in pythons.items()}
+    beside: dict = {name: {"peak_MiB": run.peak} for name, run in runs.items()}
+    return Race(dict(runs), beside=beside, close=lambda: [run.folder.cleanup() for run in runs.values()])
 
 
-def measure(case: Case, runs: int, cold_runs: int, pythons: list[str]) -> dict[tuple[str, str], list[Run]]:
-    """Runs of a case by interpreter and by the state of the cache: "-" where it does not matter, else "cold" and
-    "warm".
-
-    Interpreters take turns, so that what else the machine does meets all of them.
-    """
-    taken: dict[tuple[str, str], list[Run]] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        last = {python: folder for python in pythons}
-        for k in range(cold_runs if case.cached else 1):
-            for j, python in enumerate(pythons):
-                last[python] = fresh = str(Path(folder) / f"{j}-{k}")
-                Path(fresh).mkdir(mode=0o700)
-                first = run(case, fresh, python)  # where the cache does not matter, this fills the file system's
-                if case.cached:
-                    taken.setdefault((python, "cold"), []).append(first)
-        for _ in range(runs):
-            for python in pythons:
-                taken.setdefault((python, "warm" if case.cached else "-"), []).append(run(case, last[python], python))
-    return taken
+def cases(options: Options, state: str):
+    for case in CASES[: 4 if options.quick else None]:
+        if case.needs and find_spec(case.needs.replace("-", "_")) is None:
+            say(f"left out: {case.name} ({case.needs} is not installed)")
+        elif case.cached or state == "warm":
+            yield from grid(case=[case.name], cache=[state if case.cached else "-"])
 
 
-def machine() -> dict[str, str]:
-    """What the numbers depend on, without the machine's name."""
-    versions = {name: metadata.version(package) for name, package in
-                (("collide", "collide-robotics"), ("numpy", "numpy"))}  # fmt: skip
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return {
-        "cpu": _cpu(),
-        "cores": str(cores),
-        "system": platform.system(),
-        "python": platform.python_version(),
-        **versions,
-    }
+def arguments(parser) -> None:
+    parser.add_argument("--against", metavar="PYTHON", help="an interpreter with another version of collide installed")
 
 
-def _cpu() -> str:
-    try:
-        models = re.findall(r"^model name\s*:\s*(.+)$", Path("/proc/cpuinfo").read_text(), flags=re.MULTILINE)
-    except OSError:
-        models = []
-    return models[0] if models else platform.processor() or platform.machine()
-
-
-def _installed(distribution: str) -> bool:
-    try:
-        metadata.version(distribution)
-    except metadata.PackageNotFoundError:
-        return False
-    return True
-
-
-def rows(runs: int, cold_runs: int, pythons: list[str], only: str) -> list[dict[str, str]]:
-    """One row per case and state of the cache; cases whose package is missing are left out, with a word."""
-    rows = []
-    for case in [case for case in CASES if only in case.name]:
-        if case.needs and not _installed(case.needs):
-            print(f"left out: {case.name} ({case.needs} is not installed)", file=sys.stderr)
-            continue
-        for (python, state), taken in measure(case, runs, cold_runs, pythons).items():
-            seconds = [run_k.seconds for run_k in taken]
-            rows.append({
-                "case": case.name, "of": "this" if python == sys.executable else "other", "cache": state,
-                "runs": str(len(taken)),
-                "median_s": f"{statistics.median(seconds):.3f}", "min_s": f"{min(seconds):.3f}",
-                "max_s": f"{max(seconds):.3f}", "peak_MiB": f"{max(run_k.peak for run_k in taken):.0f}",
-            })  # fmt: skip
-    return rows
-
-
-def show(table: list[dict[str, str]]) -> None:
-    widths = {key: max(len(key), *(len(row[key]) for row in table)) for key in table[0]}
-    for line in [{key: key for key in widths}, *table]:
-        left_columns = {"case", "of", "cache"}
-        print(
-            "  ".join(line[k].ljust(w) if k in left_columns else line[k].rjust(w) for k, w in widths.items()).rstrip()
-        )
-
-
-def write(table: list[dict[str, str]], about: dict[str, str]) -> Path:
-    """The CSV of this kind of machine; a later run on it takes its place."""
-    slug = re.sub(r"[^a-z0-9]+", "-", about["cpu"].lower()).strip("-")
-    RESULTS.mkdir(exist_ok=True)
-    place = RESULTS / f"startup_{slug}_{about['cores']}-cores.csv"
-    with place.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [*table[0], *about], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows({**row, **about} for row in table)
-    return place
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=7, help="runs of each case, of the warm ones too (default: 7)")
-    parser.add_argument("--cold-runs", type=int, default=3, help="runs with an empty cache (default: 3)")
-    parser.add_argument(
-        "--against", metavar="PYTHON", help="an interpreter that has another version of collide installed"
-    )
-    parser.add_argument("--only", default="", help="cases whose names hold this")
-    parser.add_argument("--no-csv", action="store_true", help="print the table alone")
-    args = parser.parse_args()
-    if min(args.runs, args.cold_runs) < 1:
-        parser.error("at least one run of each kind is needed")
-    about = machine()
-    print(", ".join(f"{name} {value}" for name, value in about.items()))
-    table = rows(args.runs, args.cold_runs, [sys.executable, *([args.against] if args.against else [])], args.only)
-    show(table)
-    if not args.no_csv:
-        print("written to", write(table, about).relative_to(RESULTS.parent.parent))
+wall = partial(Claim, measure=measure, unit="s", clock=time.perf_counter, seconds=600.0)
+CLAIMS = [
+    wall("warm", "s of whole processes", partial(cases, state="warm"), turns=7, file="startup"),
+    wall("cold", "s of whole processes, an empty cache", partial(cases, state="cold"), turns=3, file="startup-cold"),
+]
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS, arguments)

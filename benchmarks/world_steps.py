@@ -5,37 +5,28 @@
 Boxes and hulls of 12 points, a tenth to a third of a metre. "random": in a cube, a third of them hit something;
 "sparse": the same, far enough apart that no two hit; "pit": in layers on a static floor between static walls, each a
 millimetre from its neighbours. In a step all move by up to a centimetre (in the pit, a tenth of a millimetre), unless
-said.
+said. Milliseconds of the processor:
 
     move              `set_poses`
     collides          a boolean, after such a step
-    collisions        hitting pairs with depths
-    contacts          manifolds
+    collisions        hitting pairs with depths, after such a step
+    contacts          manifolds, after such a step
     few moved         one body in a hundred moves, then `collides`
     come and go       ten bodies are removed and ten added, then `collides`
     minimum           the nearest pair
     all asleep        nothing moves, all sleep: `collides`
-
-Milliseconds of CPU time of this process; medians.
 """
 
 from __future__ import annotations
 
-import argparse
-import statistics
-import sys
 import time
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
-from convex import write
-from startup import machine
 
 import collide
-
-SIZES = (100, 1000, 5000, 20_000)
-LAYOUTS = ("random", "sparse", "pit")
-REPEATS = 11
+from collide.adapters.bench.claims import Claim, Options, Race, grid, main
+from collide.adapters.bench.turns import Seconds
 
 
 class Scene:
@@ -66,80 +57,62 @@ class Scene:
         started = time.process_time()
         self.ids = np.array([self.world.add(self.shapes[k % len(self.shapes)], X) for k, X in enumerate(self.X)])
         self.us_to_add = (time.process_time() - started) / n * 1e6
+        self.sparse = np.sort(rng.choice(n, max(1, n // 100), replace=False))
 
-    def jittered(self, some: slice | np.ndarray) -> np.ndarray:
+    def move(self, some: slice | np.ndarray = slice(None)) -> float:
+        """Seconds of telling where bodies are now."""
         X = self.X[some].copy()
         X[:, :3, 3] += self.rng.uniform(-self.step, self.step, (len(X), 3))
-        return X
+        started = time.process_time()
+        self.world.set_poses(self.ids[some], X)
+        return time.process_time() - started
 
-    def move(self, some: slice | np.ndarray = slice(None)) -> None:
-        self.world.set_poses(self.ids[some], self.moved)
+    def asked(self, ask) -> Seconds:
+        """After all have moved."""
+        self.move()
+        started = time.process_time()
+        ask()
+        return Seconds(time.process_time() - started)
+
+    def sparse_moved(self) -> Seconds:
+        spent, started = self.move(self.sparse), time.process_time()
+        self.world.collides()
+        return Seconds(spent + time.process_time() - started)
 
     def come_and_go(self) -> None:
         for k in self.rng.choice(len(self.ids), 10, replace=False).tolist():
             self.world.remove(int(self.ids[k]))
             self.ids[k] = self.world.add(self.shapes[k % len(self.shapes)], self.X[k])
+        self.world.collides()
+
+    def asleep(self) -> Seconds:
+        self.world.sleep(self.world.ids)
+        started = time.process_time()
+        self.world.collides()
+        spent = time.process_time() - started
+        self.world.wake(self.world.ids)
+        return Seconds(spent)
 
 
-def cpu_ms(task: Callable[[], object]) -> float:
-    started = time.process_time()
-    task()
-    return (time.process_time() - started) * 1e3
+def measure(options: Options, layout: str, bodies: int) -> Race:
+    scene = Scene(layout, bodies)
+    world = scene.world
+    tasks = {"move": lambda: Seconds(scene.move())}
+    for task in ("collides", "collisions", "contacts"):
+        tasks[task] = partial(scene.asked, getattr(world, task))
+    tasks |= {"few moved": scene.sparse_moved, "come and go": scene.come_and_go, "minimum": world.minimum}
+    scene.move()
+    about = {"hits": len(world.collisions()), "bytes_per_body": world.stats["bytes_per_body"]}
+    return Race(tasks | {"all asleep": scene.asleep}, columns=about | {"us_to_add": scene.us_to_add})
 
 
-def measure(layout: str, n: int) -> list[dict]:
-    scene = Scene(layout, n)
-    world, sparse = scene.world, np.sort(scene.rng.choice(n, max(1, n // 100), replace=False))
-    times: dict[str, list[float]] = {}
-
-    def note(task: str, call: Callable[[], object]) -> None:
-        times.setdefault(task, []).append(cpu_ms(call))
-
-    for _ in range(REPEATS):
-        for task in ("collides", "collisions", "contacts"):
-            scene.moved = scene.jittered(slice(None))
-            note("move", scene.move)
-            note(task, getattr(world, task))
-    hits = len(world.collisions())
-    bytes_per_body = world.stats["bytes_per_body"]
-    for _ in range(REPEATS):
-        scene.moved = scene.jittered(sparse)
-        note("few moved", lambda: (scene.move(sparse), world.collides()))
-    for _ in range(REPEATS):
-        note("come and go", lambda: (scene.come_and_go(), world.collides()))
-    for _ in range(3):
-        note("minimum", world.minimum)
-    world.sleep(world.ids)
-    for _ in range(REPEATS):
-        note("all asleep", world.collides)
-    shared = {"layout": layout, "bodies": n, "hits": hits, "bytes_per_body": bytes_per_body}
-    rows = [shared | {"task": "add (µs a body)", "median": round(scene.us_to_add, 2), "min": "", "max": ""}]
-    return rows + [
-        shared
-        | {"task": task, "median": round(statistics.median(values), 4), "min": round(min(values), 4)}
-        | {"max": round(max(values), 4)}
-        for task, values in times.items()
-    ]
+def cases(options: Options):
+    sizes = (100, 1000) if options.quick else (100, 1000, 5000, 20_000)
+    return grid(layout=("random", "sparse", "pit"), bodies=sizes)
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sizes", type=int, nargs="+", default=SIZES)
-    parser.add_argument("--layouts", nargs="+", default=LAYOUTS, choices=LAYOUTS)
-    parser.add_argument("--no-csv", action="store_true", help="keep the results as they are")
-    options = parser.parse_args()
-    rows = []
-    for layout in options.layouts:
-        for n in options.sizes:
-            measured = measure(layout, n)
-            rows += measured
-            figures = "  ".join(f"{row['task']} {row['median']}" for row in measured)
-            first = measured[0]
-            print(f"{layout:<7}{n:>7}  {first['hits']:>6} hits  {first['bytes_per_body']} B a body  {figures}")
-    if not options.no_csv:
-        write("world_steps", rows, machine())
-    return 0
+CLAIMS = [Claim("world_steps", "ms a step; × against telling where bodies are", cases, measure, unit="ms", turns=11)]
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main(__doc__, CLAIMS)

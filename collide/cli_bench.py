@@ -127,7 +127,7 @@ def _pareto(args: argparse.Namespace, progress: Callable) -> int:
 
 
 def _scaling(args: argparse.Namespace, progress: Callable) -> int:
-    from collide.adapters.bench import scaling, scaling_picture
+    from collide.adapters.bench import growth, scaling
     from collide.adapters.bench.machine_stamp import machine_stamp, write_csv
     from collide.adapters.bench.pareto import scaling_engines
     from collide.adapters.bench.pareto_picture import check_picture
@@ -140,8 +140,8 @@ def _scaling(args: argparse.Namespace, progress: Callable) -> int:
             seed=args.seed, progress=_renamer(rename),
         )  # fmt: skip
     write_csv(places[0], [row for growth in grown for row in growth.rows()], stamp)
-    if places[1:]:
-        scaling_picture.draw(grown, places[1:], stamp)
+    for place in places[1:]:
+        growth.draw([row for of in grown for row in of.rows()], scaling.PANELS, place)
     if not args.quiet:
         rows = [
             {"what": g.name, "unit": g.unit, "slope": f"{g.slope:.2f}",

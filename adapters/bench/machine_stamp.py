@@ -42,6 +42,14 @@ def _collide() -> str:
         return "unknown"
 
 
+def file_name(name: str, stamp: dict[str, str]) -> str:
+    """Of a CSV: with the kind of machine, so that a later run on it takes its place; without a stamp the name alone."""
+    if not stamp:
+        return f"{name}.csv"
+    cpu = re.sub(r"[^a-z0-9]+", "-", stamp["cpu"].lower()).strip("-")
+    return f"{name}_{cpu}_{stamp['cores']}-cores.csv"
+
+
 def write_csv(place: Path, rows: list[dict], stamp: dict[str, str]) -> None:
     """Rows with the same keys, each followed by the stamp; a file that exists is overwritten."""
     if not rows:

@@ -10,7 +10,6 @@ in exact arithmetic. What was answered is then timed, `timed_calls.py`, in round
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -20,6 +19,7 @@ import numpy as np
 from collide.adapters.bench.bench_classes import cases_of, check_classes
 from collide.adapters.bench.engine_timer import BATCH, EngineTimer
 from collide.adapters.bench.timed_calls import has_prepared_call, what_is_timed
+from collide.adapters.bench.turns import turns
 from collide.adapters.peers.answers import counted
 from collide.adapters.peers.protocol import ENGINES, Question, Table, check_names, engine, load_engine
 from collide.adapters.peers.stress_truth import Truth, truth
@@ -194,11 +194,8 @@ def _time(
     """Fill in the times: rounds in which every engine takes its turn, the first one another each time."""
     running = [asked for asked in zip(points, timers, answered) if asked[2].any()]
     taken: dict[str, list[np.ndarray]] = {point.engine: [] for point, _, _ in running}
-    started = time.perf_counter()
-    for r in range(MAX_ROUNDS if running else 0):
-        if r >= MIN_ROUNDS and time.perf_counter() - started > seconds:
-            break
-        for point, timer, rows in running[r % len(running) :] + running[: r % len(running)]:
+    for contestants in turns(running, MIN_ROUNDS, MAX_ROUNDS, seconds):
+        for point, timer, rows in contestants:
             times = np.full(len(rows), math.nan)
             times[rows] = timer.seconds(group)
             taken[point.engine].append(times)

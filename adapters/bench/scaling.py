@@ -8,15 +8,16 @@ over the upper half of the sizes: 0 does not grow, 1 grows as n.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from collide.adapters.bench.engine_timer import EngineTimer
+from collide.adapters.bench.growth import Panel
 from collide.adapters.bench.pareto import check_engines, engine_of, number, over_rounds, quantile
 from collide.adapters.bench.timed_calls import Pair
+from collide.adapters.bench.turns import turns
 from collide.adapters.peers.protocol import ENGINES
 from collide.hull.exact_hull import convex_hull
 from collide.scenes.families.ingredients import direction, rotation
@@ -30,6 +31,13 @@ POSES, DIRECTIONS, TURN_TIMEOUT = 12, 2000, 60.0
 #: What operations are called in place of an engine.
 OPERATIONS = "support query"
 MIN_ROUNDS, MAX_ROUNDS = 3, 9
+#: Two panels of a picture; slopes of lines stand in the table.
+PANELS = (
+    Panel("µs a signed distance", "n", "value", "what", "xy", lambda row: row["what"] != OPERATIONS,
+          x_label="vertices of each hull"),
+    Panel("vertices looked at", "n", "value", "what", "xy", lambda row: row["what"] == OPERATIONS,
+          x_label="vertices of each hull"),
+)  # fmt: skip
 
 
 class Growth(NamedTuple):
@@ -112,12 +120,9 @@ def _times(engines: list[str], n: int, seed: int, seconds: float) -> dict[str, f
         pairs.append((A, B, X_WA, X_WB))
     timers = [EngineTimer(name, ENGINES[engine_of(name)], [pairs], TURN_TIMEOUT) for name in engines]
     taken: dict[str, list[np.ndarray]] = {name: [] for name in engines}
-    started = time.perf_counter()
     try:
-        for r in range(MAX_ROUNDS):
-            if r >= MIN_ROUNDS and time.perf_counter() - started > seconds:
-                break
-            for timer in timers[r % len(timers) :] + timers[: r % len(timers)]:
+        for contestants in turns(timers, MIN_ROUNDS, MAX_ROUNDS, seconds):
+            for timer in contestants:
                 taken[timer.name].append(timer.seconds(0))
     finally:
         for timer in timers:

@@ -77,7 +77,7 @@ class PybulletPeer(PairwisePeer):
             X_PB[:3, 3] = normal * part.offset / np.linalg.norm(part.normal)
             kind, reach = {"shapeType": pybullet.GEOM_PLANE, "planeNormal": normal.tolist()}, np.inf
         else:
-            kind, reach = _collision_shape(pybullet, part)
+            kind, reach = collision_shape(pybullet, part)
         shape = pybullet.createCollisionShape(**kind, physicsClientId=self._client)
         if shape < 0:
             raise CollideError(f"pybullet made no collision shape of {part!r}")
@@ -111,7 +111,7 @@ class PybulletPeer(PairwisePeer):
         return Reply(nearest[8] <= 0, nearest[8], normal, nearest[5], nearest[6])
 
 
-def _collision_shape(pybullet, part: Shape) -> tuple[dict, float]:
+def collision_shape(pybullet, part: Shape) -> tuple[dict, float]:
     """Arguments of createCollisionShape, and how far the part reaches from its origin [m]."""
     if isinstance(part, Sphere):
         return {"shapeType": pybullet.GEOM_SPHERE, "radius": part.radius}, part.radius

@@ -10,8 +10,6 @@ import math
 import pickle
 import subprocess
 import sys
-from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +19,6 @@ from collide import InvalidArgument, InvalidShape, UnsupportedQuery
 from collide.adapters.hosts import coal_api as coal
 
 needs_coal = pytest.mark.skipif(importlib.util.find_spec("coal") is None, reason="coal is not installed")
-BENCHMARKS = str(Path(__file__).resolve().parents[2] / "benchmarks")
 
 
 def surface(vertices=CORNERS, facets=FACETS):
@@ -663,24 +660,3 @@ def test_bad_input_is_named():
     for base in (coal.CollisionGeometry, coal.ShapeBase, coal.BVHModelBase, coal.BroadPhaseCollisionManager):
         with pytest.raises(RuntimeError, match="cannot be instantiated"):
             base()
-
-
-# --- beside coal --------------------------------------------------------------------------------
-
-
-@needs_coal
-def test_agreement_with_coal():
-    """The benchmark's calls, a few of them; what differs is judged in decimals."""
-    sys.path.insert(0, BENCHMARKS)
-    import coal_agreement
-
-    n, seed = 600, 2206
-    code = f"import json, coal, coal_agreement\nprint(json.dumps(coal_agreement.answers(coal, {n}, {seed})))"
-    theirs = json.loads(child(f"import sys\nsys.path.insert(0, {BENCHMARKS!r})\n{code}"))[0]
-    ours = coal_agreement.answers(coal, n, seed)[0]
-    counts: Counter = Counter()
-    for pair, mine, reply in zip(coal_agreement.pairs(n, seed), ours, theirs):
-        coal_agreement.compare(pair, mine, coal_agreement.Reply(*reply), counts)
-    assert 0.3 * n < sum(reply.hit for reply in ours) < 0.7 * n
-    assert not [key for key in counts if key[1] in ("OURS WRONG", "both wrong")], counts
-    assert sum(count for key, count in counts.items()) < 0.2 * n, counts

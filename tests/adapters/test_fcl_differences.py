@@ -197,7 +197,7 @@ print(json.dumps(bool(np.any(np.array(values) != 0.0))))
     assert ours(code) is False
 
 
-#: Calls of benchmarks/host_agreement.py: (A, B, where they stand), of which python-fcl says that they are apart.
+#: Calls of tests/differential/host_pairs.py: (A, B, where they stand), of which python-fcl says that they are apart.
 TOUCHING = {
     "a cone on a cube's wall": (
         "hull(np.array([1.0, 1.0, 0.75]))", (-0.5, -0.5, -0.5), "fcl.Cone(0.5, 0.5)", (0.5, -0.25, -0.25),

@@ -1,7 +1,11 @@
-"""Bad meshes: a seeded sample of what benchmarks/mesh_corruptions.py does to every mesh of pybullet_data."""
+"""Bad meshes: each kind of corruption of each mesh is refused with the row to blame, or answered rightly.
+
+    COLLIDE_CORRUPTIONS=200 python -m pytest tests/mesh/test_corrupted_meshes.py -m slow -s    # an hour or two
+"""
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from pathlib import Path
 from zlib import crc32
@@ -12,6 +16,7 @@ import pytest
 from mesh_shapes import block_ring, box, bumpy_sphere
 
 from collide import InvalidShape, Mesh
+from collide.errors import CollideError
 
 BASES = {"bumpy sphere": bumpy_sphere(120), "ring": block_ring(), "box": box()}
 #: Meshes of every sort: soups, open ones, several parts, STL, OBJ and Collada. Those of at most 2,000 facets are taken.
@@ -46,22 +51,45 @@ def test_corruptions_of_small_meshes(kind):
     assert refused or (outcomes["apart"] >= 3 and outcomes["hit"] >= 3), outcomes
 
 
+def whole(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """All triangles of a file as one mesh."""
+    from collide.scenes.loaders.triangles import read_triangles
+
+    parts = [(v, f) for _, v, f in read_triangles(path)[0] if len(f)]
+    starts = np.cumsum([0, *(len(v) for v, _ in parts)])
+    vertices = np.concatenate([np.empty((0, 3)), *(v for v, _ in parts)])
+    return vertices, np.concatenate([np.empty((0, 3), int), *(f + s for (_, f), s in zip(parts, starts))])
+
+
+@pytest.mark.slow
+def test_every_mesh_of_pybullet_data():
+    """All files, the mesh as it is and so many corruptions of each."""
+    pybullet_data = pytest.importorskip("pybullet_data", reason="pybullet brings the meshes")
+    pytest.importorskip("trimesh", reason="trimesh reads them")
+    root, outcomes, each = Path(pybullet_data.getDataPath()), Counter(), int(os.environ.get("COLLIDE_CORRUPTIONS", "2"))
+    for path in sorted(p for p in root.rglob("*") if p.suffix.lower() in (".obj", ".stl", ".dae")):
+        name = path.relative_to(root).as_posix()
+        try:
+            vertices, faces = whole(path)
+        except CollideError as error:
+            print(f"{name}: {error}")
+            continue
+        for k in range(each + 1 if len(faces) else 0):
+            kind = corruptions.KINDS[0 if k == 0 else 1 + k % (len(corruptions.KINDS) - 1)]
+            outcomes[judged(name, vertices, faces, k, kind).outcome] += 1
+    print(outcomes)
+    assert outcomes["hit"] and outcomes["apart"]
+
+
 @pytest.mark.slow
 def test_meshes_of_pybullet_data():
     pybullet_data = pytest.importorskip("pybullet_data", reason="pybullet brings the meshes")
     pytest.importorskip("trimesh", reason="trimesh reads them")
-    from collide.scenes.loaders.triangles import read_triangles
-
     root, outcomes, solids, found = Path(pybullet_data.getDataPath()), Counter(), Counter(), 0
     for name in SAMPLE:
         if not (root / name).is_file():
             continue
-        parts = [(v, f) for _, v, f in read_triangles(root / name)[0] if len(f)]
-        starts = np.cumsum([0, *(len(v) for v, _ in parts)])
-        vertices, faces = (
-            np.concatenate([v for v, _ in parts]),
-            np.concatenate([f + s for (_, f), s in zip(parts, starts)]),
-        )
+        vertices, faces = whole(root / name)
         if len(faces) > 2000:
             continue
         found += 1

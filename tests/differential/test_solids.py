@@ -1,39 +1,29 @@
 """Pairs of solids of every family: judged by points and volumes in fractions, results looked at, manifold3d beside.
 
-    python benchmarks/solids_judged.py
-    # 3,003 pairs, 20 minutes; --pairs 20 of each family, --points 200, --families boxes rings; needs manifold3d
-
-A line a family: pairs; points put elsewhere than the solids' own winding numbers put them, and pairs whose volumes do
-not add up in fractions; results, those that are no closed solid, those with facets that cross after rounding, and how
-many pairs of facets; triangles of which rounding left nothing. Of manifold3d: volumes asked, and off by more than 1e-9
-of the solids', once where facets of both come within 1e-6 of one plane, once where none do; solids it does not take,
-pairs left out because a solid crosses itself.
+A line a family: points put elsewhere than the solids' own winding numbers put them, and pairs whose volumes do not
+add up in fractions (none may be); results, those that are no closed solid (none), those with facets that cross after
+rounding, and how many pairs of facets; triangles of which rounding left nothing. Of manifold3d: volumes asked, and
+off by more than 1e-9 of the solids', once where facets of both come within 1e-6 of one plane, once where none do;
+solids it does not take, pairs left out because a solid crosses itself.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
+import importlib.util
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
-
-TESTS = Path(__file__).resolve().parents[1] / "tests"
-sys.path[:0] = [str(TESTS / folder) for folder in ("families", "oracles", "solids")]
+from manifold_solids import OPERATIONS, asked, manifold_of
+from many_judge import CASES, judge_many
+from samples import sizes, told
 from solid_families import SOLIDS
 from solid_judge import arrangement_of, exact_corners, judge, six_volumes, snippet, solids_of
-from solids import asked, manifold_of
 
 import collide
 from collide.solids.arrangement import crossings_of
 
 #: Facets are near one plane where all corners of one are this near the other's, in sizes of the solids.
 NEAR = 1e-6
-COLUMNS = (
-    "pairs", "wrong points", "not adding up", "results", "not closed", "crossing", "crossings", "collapsed",
-    "asked, flush", "wrong, flush", "asked, clear", "wrong, clear", "not taken", "crossing itself",
-)  # fmt: skip
 
 
 def results_of(A, B, X, Y) -> Counter:
@@ -89,36 +79,36 @@ def beside_manifold(A, B, X, Y) -> Counter:
     held = arrangement.holds()
     size = float(first.volume() + second.volume())
     seen: Counter = Counter()
-    for sign, keep in (("+", held.any(axis=1)), ("^", held.all(axis=1)), ("-", held[:, 0] & ~held[:, 1])):
+    for op, keep in zip(OPERATIONS, (held.any(axis=1), held.all(axis=1), held[:, 0] & ~held[:, 1])):
         exact = float(six_volumes(exact_corners(arrangement, arrangement.boundary(keep)[0], [0, 0, 0])) / 6)
         seen[f"asked, {kind}"] += 1
-        seen[f"wrong, {kind}"] += abs(asked(first, second, sign)[1] - exact) > 1e-9 * size
+        seen[f"wrong, {kind}"] += abs(asked(first, second, op)[1] - exact) > 1e-9 * size
     return seen
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pairs", type=int, default=231)
-    parser.add_argument("--first", type=int, default=0, help="the first seed")
-    parser.add_argument("--points", type=int, default=200)
-    parser.add_argument("--families", nargs="*", default=list(SOLIDS), choices=list(SOLIDS))
-    arguments = parser.parse_args()
-    print(f"{'family':20s}" + "".join(f"{name:>16s}" for name in COLUMNS))
-    total: Counter = Counter()
-    for family in arguments.families:
+@sizes(1, 231)
+def test_solids_are_put_where_winding_numbers_put_them(n):
+    """n pairs of each family."""
+    has_manifold = importlib.util.find_spec("manifold3d") is not None
+    for family in list(SOLIDS)[:: 7 if n == 1 else 1]:
         seen: Counter = Counter()
-        for seed in range(arguments.first, arguments.first + arguments.pairs):
+        for seed in range(n):
             pair = solids_of(family, seed)
-            verdict = judge(*pair, arguments.points, seed)
-            if verdict.wrong or not verdict.adds_up:
-                print(f"WRONG: {snippet(family, seed)}", flush=True)
-            seen.update({"pairs": 1, "wrong points": len(verdict.wrong), "not adding up": int(not verdict.adds_up)})
+            verdict = judge(*pair, 20 if n == 1 else 200, seed)
+            assert not verdict.wrong and verdict.adds_up, f"{snippet(family, seed)}: {verdict.wrong}"
+            seen.update({"pairs": 1, "points": verdict.n_points})
             seen.update(results_of(*pair))
-            seen.update(beside_manifold(*pair))
-        total.update(seen)
-        print(f"{family:20s}" + "".join(f"{seen[name]:16d}" for name in COLUMNS), flush=True)
-    print(f"{'all':20s}" + "".join(f"{total[name]:16d}" for name in COLUMNS), flush=True)
+            if has_manifold:
+                seen.update(beside_manifold(*pair))
+        told(family, seen)
+        assert seen["results"] == 4 * n and not seen["not closed"], (family, seen)
 
 
-if __name__ == "__main__":
-    main()
+@sizes(1, 20)
+def test_sets_of_solids_are_put_where_five_rules_put_them(n):
+    """n sets of 2 to 8 solids of each family."""
+    for family, r in CASES[:: 12 if n == 1 else 1]:
+        verdicts = [judge_many(family, seed, r, 20 if n == 1 else 200) for seed in range(n)]
+        assert not any(v.wrong or not v.adds_up for v in verdicts), [(family, r, v.wrong) for v in verdicts]
+        counts = {name: sum(getattr(v, f"n_{name}") for v in verdicts) for name in ("points", "near")}
+        told(f"{family}, {r} solids", Counter(counts))

@@ -1,6 +1,6 @@
 """The picture of docs/partitions.md: free space among pillars as convex cells, from above, and a path through portals.
 
-    python benchmarks/partition_pictures.py           # needs matplotlib; writes docs/pictures/partitions.png
+    python docs/pictures/partition_pictures.py           # needs matplotlib; writes docs/pictures/partitions.png
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-FILE = Path(__file__).parent.parent / "docs" / "pictures" / "partitions.png"
+FILE = Path(__file__).parent / "partitions.png"
 LOW, HIGH = np.zeros(3), np.array([8.0, 5.0, 1.0])
 START, GOAL = np.array([0.4, 0.4, 0.5]), np.array([7.6, 4.6, 0.5])
 RED, BODY = "#c0504d", "#4a4a4a"

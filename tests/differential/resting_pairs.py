@@ -1,4 +1,4 @@
-"""Resting pairs for `contact_agreement.py`, and what is true of two convex bodies along a line: numpy, no engine.
+"""Resting pairs for `test_contacts.py`, and what is true of two convex bodies along a line: numpy, no engine.
 
 Supports, intervals of lines and distances to surfaces are those of the closed forms of a box, sphere, capsule and
 cylinder, and of the half-spaces of a hull (Qhull's).

@@ -1,9 +1,9 @@
-"""Bracket widths of cylinders, cones and ellipsoids, for `benchmarks/accuracy.py`: random shapes in four kinds of pose.
+"""Pairs of cylinders, cones and ellipsoids, for `accuracy.py`: random shapes in four kinds of pose, and their brackets.
 
-A width is told in units of S, the size of a pair in docs/conventions.md. Shapes are drawn anew for every pose, their
-lengths within a factor of 20 of each other. Poses: "random"; "aligned", all frames' axes parallel or at right angles,
-no origin on an axis of the other; "one axis", the two z axes on one line; "nearly", tilted and shifted off that line by
-1e-12 to 0.1.
+A width is in units of S, the size of a pair in docs/conventions.md. Shapes are drawn anew for every pose, their lengths
+within a factor of 20 of each other. Poses: "random"; "aligned", all frames' axes parallel or at right angles, no origin
+on an axis of the other; "one axis", the two z axes on one line; "nearly", tilted and shifted off that line by 1e-12 to
+0.1.
 """
 
 from __future__ import annotations
@@ -12,6 +12,10 @@ import time
 from typing import NamedTuple
 
 import numpy as np
+from inputs import directions
+from inputs import rotation as random_rotation
+
+import collide
 
 CURVED = ("cylinder", "cone", "ellipsoid")
 OTHERS = ("sphere", "capsule", "box", "hull", "half-space")
@@ -39,7 +43,6 @@ def length(random) -> float:
 
 
 def shape(kind: str, random):
-    import collide
 
     a, b, c = (length(random) for _ in range(3))
     if kind == "sphere":
@@ -73,12 +76,6 @@ def reach(body) -> float:
     return 0.0 if kind == "Halfspace" else float(np.hypot(body.radius, body.length / 2))
 
 
-def rotation(random) -> np.ndarray:
-    q, r = np.linalg.qr(random.normal(size=(3, 3)))
-    q = q * np.sign(np.diag(r))
-    return q * np.sign(np.linalg.det(q))
-
-
 def _turned(axis: np.ndarray, angle: float) -> np.ndarray:
     """Rodrigues' rotation about a unit axis."""
     x, y, z = axis
@@ -89,12 +86,11 @@ def _turned(axis: np.ndarray, angle: float) -> np.ndarray:
 def poses(kind: str, both: float, random) -> tuple[np.ndarray, np.ndarray]:
     """(X_WA, X_WB) of two bodies whose reaches add up to ``both`` [m]; about half of them overlap."""
     X_WA, X_AB = np.eye(4), np.eye(4)
-    X_WA[:3, :3], X_WA[:3, 3] = rotation(random), random.normal(size=3)
+    X_WA[:3, :3], X_WA[:3, 3] = random_rotation(random), random.normal(size=3)
     step = random.uniform(0.0, 1.1) * both
     if kind == "random":
-        X_AB[:3, :3] = rotation(random)
-        direction = random.normal(size=3)
-        X_AB[:3, 3] = direction * (step / np.sqrt(np.square(direction).sum()))
+        X_AB[:3, :3] = random_rotation(random)
+        X_AB[:3, 3] = directions(random, 1)[0] * step
     elif kind == "aligned":
         X_WA[:3, :3] = np.eye(3)
         X_AB[:3, :3] = np.eye(3)[random.permutation(3)] * random.choice([-1.0, 1.0], 3)
@@ -113,7 +109,6 @@ def poses(kind: str, both: float, random) -> tuple[np.ndarray, np.ndarray]:
 
 def widths(a: str, b: str, kind: str, count: int, seed: int) -> Widths:
     """Brackets of ``count`` random pairs of two kinds of shape, in one kind of pose."""
-    import collide
 
     random = np.random.default_rng([seed, *map(ord, a + b + kind)])
     A, B, X_WA, X_WB = [], [], np.empty((count, 4, 4)), np.empty((count, 4, 4))

@@ -1,6 +1,6 @@
 """The rest picture of docs/contacts.md: bodies as in `tests/contact/test_rest.py` for ten seconds, by its stepper.
 
-    python benchmarks/contact_rest_pictures.py      # half a minute; needs matplotlib; writes docs/pictures/rest.png
+    python docs/pictures/contact_rest_pictures.py      # half a minute; needs matplotlib; writes docs/pictures/rest.png
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "contact"), str(ROOT / "tests" / "oracles"), str(ROOT / "tests" / "mesh")]
 from contact_scenes import table
 from stepper import Step, Stepper

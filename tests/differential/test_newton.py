@@ -1,28 +1,22 @@
 """Contacts of random pairs by Newton's own pipeline and by collide's: verdicts and separations, judged.
 
-python benchmarks/newton_agreement.py [--calls 10000] [--seed 22]
-
-Each call is a pair of bodies near each other; 200 pairs of a model are asked at once, kept apart by their groups. A
-verdict is whether the least separation is below 0. Where it differs from the proven sign by more than single precision,
-it is wrong; rationals have the last word for boxes and hulls, the tests' oracle in decimals for others. Poses are those
-that Newton's state holds.
+200 pairs of a model are asked at once, kept apart by their groups. A verdict is whether the least separation is below
+0; it is wrong where it differs from the proven sign by more than single precision. Rationals have the last word for
+boxes and hulls, the oracle in decimals for others. Poses are those that Newton's state holds.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
-import time
 from collections import Counter
-from pathlib import Path
 
-import newton
 import numpy as np
-import warp as wp
+import pytest
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).resolve().parents[1] / "tests" / "oracles")]
+newton = pytest.importorskip("newton", reason="newton is not installed")
+import warp as wp
 from curved_oracle import bracket
-from host_agreement import CORNERS, FACETS
+from host_pairs import CORNERS, FACETS
+from samples import sizes, told
 
 import collide
 from collide.adapters.hosts.newton import Pipeline
@@ -84,55 +78,32 @@ def verdict(shapes: list, poses: list, gap: float, who: str) -> str | None:
     return "OURS WRONG: proven sign" if truth == (gap < 0.0) else f"{who} wrong"
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--calls", type=int, default=10000)
-    parser.add_argument("--seed", type=int, default=22)
-    arguments = parser.parse_args()
+@sizes(200, 10_000)
+def test_verdicts_and_separations_are_right(n):
     wp.config.quiet = True
-    random = np.random.default_rng(arguments.seed)
-    verdicts: Counter = Counter()
-    off: dict[str, list[float]] = {"Newton": [], "collide": []}
-    spent, n_hits, missed = np.zeros(2), 0, []
+    random, verdicts, off, n_hits = np.random.default_rng(22), Counter(), {"Newton": [], "collide": []}, 0
     model, kinds = model_of(random)
     pipelines = newton.CollisionPipeline(model), Pipeline(model, rigid_contact_max=20_000)
     state, buffers = model.state(), [pipeline.contacts() for pipeline in pipelines]
     world = pipelines[1].world
-    for _ in range(arguments.calls // N_PAIRS):
-        q = random.normal(size=(2 * N_PAIRS, 4))
-        places = random.uniform(-0.5, 0.5, (2 * N_PAIRS, 3))
+    for _ in range(max(1, n // N_PAIRS)):
+        q, places = random.normal(size=(2 * N_PAIRS, 4)), random.uniform(-0.5, 0.5, (2 * N_PAIRS, 3))
         state.body_q.numpy()[:] = np.hstack([places, q / np.linalg.norm(q, axis=1)[:, None]])
-        gaps = []
-        for k, (pipeline, contacts) in enumerate(zip(pipelines, buffers)):
+        for pipeline, contacts in zip(pipelines, buffers):
             pipeline.collide(state, contacts)
-            begin = time.perf_counter()
-            pipeline.collide(state, contacts)
-            spent[k] += time.perf_counter() - begin
-        X_WB = np.array([world.body(k).X_WB for k in range(2 * N_PAIRS)])
         gaps = [least_separations(model, state, contacts) for contacts in buffers]
         for pair in range(N_PAIRS):
-            shapes = [world.body(2 * pair + k).shape for k in (0, 1)]
-            poses = [X_WB[2 * pair], X_WB[2 * pair + 1]]
+            bodies = [world.body(2 * pair + k) for k in (0, 1)]
+            shapes, poses = [body.shape for body in bodies], [body.X_WB for body in bodies]
             truth = collide.distance(*shapes, *poses)
             n_hits += truth.upper < 0.0
             for who, gap in zip(off, (gaps[0][pair], gaps[1][pair])):
                 wrong = verdict(shapes, poses, gap, who)
+                assert not wrong or wrong == "Newton wrong", f"{shapes}, {poses}: {gap}, {wrong}"
                 if wrong:
                     verdicts["–".join(sorted(kinds[pair])), wrong] += 1
-                    missed.append((gap, truth.distance))
                 elif 0.0 < truth.lower < 0.5:
                     off[who].append(abs(gap - truth.distance))
-    n = arguments.calls // N_PAIRS * N_PAIRS
-    print(f"{n} pairs, {n_hits} overlap; wrong verdicts:")
-    for (both, wrong), count in sorted(verdicts.items()):
-        print(f"  {both:22} {wrong:26} {count}")
-    if missed:
-        (low, true_low), (high, true_high) = np.min(missed, axis=0), np.max(missed, axis=0)
-        print(f"said to be {low:.1e} to {high:.1e} m apart, and are {true_low:.3f} to {true_high:.3f} m")
-    for who, differences in off.items():
-        print(f"gaps of {who}: median off by {np.median(differences):.1e} m, greatest {np.max(differences):.1e} m")
-    print(f"a pair: Newton {1e6 * spent[0] / n:.2f} µs, collide {1e6 * spent[1] / n:.2f} µs")
-
-
-if __name__ == "__main__":
-    main()
+    told(f"{n} pairs of Newton, {n_hits} overlap; wrong verdicts", verdicts)
+    print({who: f"gaps off by at most {max(differences):.1e} m" for who, differences in off.items()})
+    assert n_hits > 0.05 * n and len(off["collide"]) > 0.1 * n and max(off["collide"]) < 1e-6

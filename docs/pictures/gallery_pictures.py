@@ -1,8 +1,8 @@
 """The pictures of docs/gallery.md: each scene's page in a headless browser, its 3D view as a small PNG.
 
-    python benchmarks/gallery_pictures.py                 # all of them, to docs/pictures/gallery-NAME.png
-    python benchmarks/gallery_pictures.py ring stack      # these alone
-    python benchmarks/gallery_pictures.py ring --pages .  # its page to look at, ring.html, and no picture
+    python docs/pictures/gallery_pictures.py                 # all of them, to docs/pictures/gallery-NAME.png
+    python docs/pictures/gallery_pictures.py ring stack      # these alone
+    python docs/pictures/gallery_pictures.py ring --pages .  # its page to look at, ring.html, and no picture
 
 Needs Chromium with its driver, and: pip install ".[demo]" selenium pillow
 """
@@ -31,7 +31,7 @@ from collide.reports import report
 from collide.reports.state_reports import Stated
 from collide.scenes import generate
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "docs" / "pictures"
 WIDTH, LARGEST = 720, 60_000
 FLAGS = (

@@ -1,6 +1,6 @@
 """Pictures of docs/barba-langerman.md, drawn from the hierarchies and from a traced query.
 
-    python benchmarks/walk_pictures.py           # needs matplotlib; writes docs/pictures/walk_*.png
+    python docs/pictures/walk_pictures.py           # needs matplotlib; writes docs/pictures/walk_*.png
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-FOLDER = Path(__file__).parent.parent / "docs" / "pictures"
+FOLDER = Path(__file__).parent
 BLUE, RED, GREY, GREEN = "#3b6ea5", "#c0504d", "#9a9a9a", "#4f8a4f"
 LIGHT = np.array([0.4, -0.5, 0.77])
 

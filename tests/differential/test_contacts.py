@@ -1,7 +1,4 @@
-"""MuJoCo's and Bullet's manifolds beside ours on 10,000 resting pairs; where they differ, who is right.
-
-    python benchmarks/contact_agreement.py      # some minutes; prints tables, writes results/contact-agreement_*.csv
-    python benchmarks/contact_agreement.py --pairs 900 --judge 40 --no-csv
+"""MuJoCo's and Bullet's manifolds beside ours on resting pairs; where they differ, who is right.
 
 Boxes, hulls, cylinders standing and lying, capsules and spheres rest on boxes, hulls and cylinders, level or tilted by
 up to a hundredth, sunk or above by up to a millimetre (`resting_pairs.py`); all are asked with a margin of 2 mm. Of
@@ -13,30 +10,29 @@ holds     shares of pairs whose contacts carry B: its middle stands over them, u
           where it stands over what is within the margin
 area      that the contacts span, as a part of what is within the margin, where that is a face (median)
 depth     how far the deepest contact is off the truth [m]; normal: how much less the bodies are apart along it than
-          along the best [m]; surface: how far its points are off the bodies' surfaces [m]; medians and largest
+          along the best [m]; surface: how far its points are off the bodies' surfaces [m]; largest
 
 The truth of depths and normals: pairs on which the three agree to 1e-6 m count as right. The others are judged by
-`tests/oracles/curved_oracle.py`, which proves a bracket of the signed distance in decimals of 80 digits and shares no
-code with any of them; a draw of them where they are many. What is within the margin is found along a grid of lines.
+the oracle, which proves a bracket of the signed distance in decimals of 80 digits. What is within the margin is found
+along a grid of lines.
 """
 
 from __future__ import annotations
 
-import argparse
+import importlib.util
 import sys
-import time
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).resolve().parents[1] / "tests" / "oracles")]
-from contact_peers import BulletContacts, Manifold, MujocoContacts, installed, manifold_of
-from convex import aligned, log, say, write
+pytest.importorskip("scipy", reason="Qhull spans areas")
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
+from contact_peers import BulletContacts, Manifold, MujocoContacts, manifold_of
 from curved_oracle import bracket
 from resting_pairs import Pair, interval, off_surface, resting_pairs, separation, support
+from samples import sizes
 from scipy.spatial import ConvexHull, QhullError
-from startup import machine
 
 import collide
 
@@ -45,10 +41,9 @@ MARGIN = 2e-3
 AGREE = 1e-6
 #: Pairs asked at once; lines of the grid a side.
 CHUNK, GRID = 450, 32
-
-
-class Scores(dict):
-    """What is measured of one manifold; NaN where it does not apply."""
+PEERS = [peer for package, peer in (("mujoco", MujocoContacts), ("pybullet", BulletContacts))
+         if importlib.util.find_spec(package)]  # fmt: skip
+pytestmark = pytest.mark.skipif(not PEERS, reason="neither mujoco nor pybullet is installed")
 
 
 def ask(pairs: list[Pair]) -> dict[str, list[Manifold]]:
@@ -58,7 +53,7 @@ def ask(pairs: list[Pair]) -> dict[str, list[Manifold]]:
     c = collide.contacts(As, Bs, X_WAs, X_WBs, margin=MARGIN)
     ours = [manifold_of(r.point, r.normal, r.distance) for r in (c[k] for k in range(len(pairs)))]
     manifolds_of = {"collide": ours}
-    for engine in installed([MujocoContacts, BulletContacts]):
+    for engine in PEERS:
         manifolds_of[engine.name] = []
         for begin in range(0, len(pairs), CHUNK):
             some = slice(begin, begin + CHUNK)
@@ -123,16 +118,17 @@ class Region:
         return holds, area / self.area if self.area > 0.05 * self.size**2 else np.nan
 
 
-def score(pair: Pair, m: Manifold, region: Region) -> Scores:
+def score(pair: Pair, m: Manifold, region: Region) -> dict:
     if not len(m.distance):
-        return Scores(found=0.0, points=0.0, holds=0.0 if region.holds else np.nan, area=np.nan, surface=np.nan)
+        holds = 0.0 if region.holds else np.nan
+        return {"found": 0.0, "points": 0.0, "holds": holds, "area": np.nan, "surface": np.nan}
     holds, area = region.score(m)
     half = 0.5 * m.distance[:, None] * m.normal
     surface = max(
         off_surface(shape, X, points).max()
         for shape, X, points in ((pair.A, pair.X_WA, m.point - half), (pair.B, pair.X_WB, m.point + half))
     )
-    return Scores(found=1.0, points=float(len(m.distance)), holds=holds, area=area, surface=surface)
+    return {"found": 1.0, "points": float(len(m.distance)), "holds": holds, "area": area, "surface": surface}
 
 
 def deepest(m: Manifold) -> tuple[float, np.ndarray]:
@@ -165,81 +161,32 @@ def verdict(pair: Pair, m: Manifold, truth: float) -> tuple[float, float]:
     return abs(depth - truth), truth - separation(pair, n)
 
 
-def judged(pairs: list[Pair], manifolds_of: dict[str, list[Manifold]], max_judged: int) -> tuple[dict, dict, Counter]:
-    """{(engine, k): (error, loss)}, what was judged {k: truth}, and how many differ by kind of top."""
-    differing = [k for k, pair in enumerate(pairs) if differ(pair, [manifolds_of[name][k] for name in manifolds_of])]
-    counts = Counter(pairs[k].kind[0] for k in differing)
-    drawn = differing
-    if len(differing) > max_judged:
-        drawn = sorted(np.random.default_rng(1).choice(differing, max_judged, replace=False).tolist())
-    started, truths = time.perf_counter(), {}
-    for k in drawn:
-        truths[k] = truth_of(pairs[k], [manifolds_of[name][k] for name in manifolds_of])
-    say(f"{len(differing)} of {len(pairs)} pairs differ; {len(drawn)} judged in {time.perf_counter() - started:.0f} s")
-    errors = {(name, k): verdict(pairs[k], manifolds_of[name][k], truths[k]) for name in manifolds_of for k in drawn}
-    return errors, truths, counts
-
-
-def summary(rows: list[Scores], key: str, of) -> float:
-    values = np.array([row[key] for row in rows if not np.isnan(row[key])])
-    return float(of(values)) if len(values) else np.nan
-
-
-def table_rows(pairs: list[Pair], scores: dict, errors: dict, truths: dict, counts: Counter) -> list[dict]:
-    rows = []
-    for top in dict.fromkeys(pair.kind[0] for pair in pairs):
-        of_top = [k for k, pair in enumerate(pairs) if pair.kind[0] == top]
-        judged_here = [k for k in of_top if k in truths and not np.isnan(truths[k])]
-        for name in scores:
-            some = [scores[name][k] for k in of_top]
-            pairs_of = np.array([errors[name, k] for k in judged_here]).reshape(-1, 2)
-            depth, normal = pairs_of.T
-            rows.append({
-                "top": top, "engine": name, "pairs": len(of_top), "found": summary(some, "found", np.mean),
-                "points": summary(some, "points", np.mean), "holds": summary(some, "holds", np.mean),
-                "area": summary(some, "area", np.median), "surface_median": summary(some, "surface", np.median),
-                "surface_max": summary(some, "surface", np.max), "differ": counts[top], "judged": len(judged_here),
-                "right": int(((depth <= AGREE) & (normal <= AGREE)).sum()),
-                "depth_wrong": int((depth > AGREE).sum()), "normal_wrong": int((normal > AGREE).sum()),
-                "depth_max": float(depth[np.isfinite(depth)].max(initial=0.0)),
-                "normal_max": float(normal[np.isfinite(normal)].max(initial=0.0)),
-            })  # fmt: skip
-    return rows
-
-
-def show(rows: list[dict]) -> None:
-    def cell(value) -> str:
-        return value if isinstance(value, str) else f"{value:,}" if isinstance(value, int) else f"{value:.3g}"
-
-    aligned("contacts of resting pairs", [list(rows[0]), *([cell(v) for v in row.values()] for row in rows)])
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pairs", type=int, default=10_000, help="how many (default: 10,000)")
-    parser.add_argument("--judge", type=int, default=10_000, help="how many that differ are judged (default: all)")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--no-csv", action="store_true", help="print the tables alone")
-    options = parser.parse_args()
-    pairs = resting_pairs(options.pairs, options.seed)
-    manifolds_of = ask(pairs)
-    scores: dict[str, list[Scores]] = {name: [] for name in manifolds_of}
+@sizes(180, 10_000)
+def test_depths_normals_and_what_carries_are_ours(n):
+    pairs = resting_pairs(n, 0)
+    manifolds_of, scores, errors, n_differ = ask(pairs), {}, {}, 0
     for k, pair in enumerate(pairs):
-        normals = [deepest(some[k])[1] for some in manifolds_of.values() if len(some[k].distance)] or [pair.X_WA[:3, 2]]
+        some = {name: manifolds[k] for name, manifolds in manifolds_of.items()}
+        normals = [deepest(m)[1] for m in some.values() if len(m.distance)] or [pair.X_WA[:3, 2]]
         region = Region(pair, max(normals, key=lambda n, pair=pair: separation(pair, n)))
-        for name in manifolds_of:
-            scores[name].append(score(pair, manifolds_of[name][k], region))
-    errors, truths, counts = judged(pairs, manifolds_of, options.judge)
-    rows = table_rows(pairs, scores, errors, truths, counts)
-    show(rows)
-    worst = [k for (name, k), both in errors.items() if name == "collide" and max(both) > AGREE]
-    for k in worst[:10]:
-        log(f"ours is wrong: resting_pairs({k + 1}, {options.seed})[-1], {pairs[k].kind}, {errors['collide', k]}")
-    if not options.no_csv:
-        texts = [{key: f"{v:.4g}" if isinstance(v, float) else v for key, v in row.items()} for row in rows]
-        log(f"written: {write('contact-agreement', texts, machine()).name}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        differs = differ(pair, list(some.values()))
+        truth = truth_of(pair, list(some.values())) if differs else np.nan
+        n_differ += differs
+        for name, m in some.items():
+            scores.setdefault((pair.kind[0], name), []).append(score(pair, m, region))
+            if not np.isnan(truth):
+                off = verdict(pair, m, truth)
+                errors.setdefault((pair.kind[0], name), []).append(off)
+                assert name != "collide" or max(off) <= AGREE, f"resting_pairs({n}, 0)[{k}]: {pair.kind}, off by {off}"
+    print(f"\n{n} resting pairs, {n_differ} differ")
+    for (top, name), rows in scores.items():
+        means = {key: np.nanmean([row[key] for row in rows]) for key in ("found", "points", "holds")}
+        means["surface"] = np.nanmax([row["surface"] for row in rows])
+        areas = [row["area"] for row in rows if not np.isnan(row["area"])]
+        means["area"] = np.median(areas) if areas else np.nan
+        off = np.array(errors.get((top, name), [])).reshape(-1, 2)
+        wrong = dict(zip(("depth wrong", "normal wrong"), (off > AGREE).sum(axis=0).tolist()))
+        print(top, name, {key: f"{value:.3g}" for key, value in means.items()}, wrong)
+        if name == "collide":
+            assert means["surface"] < 1e-9 and means["holds"] > 0.75, (top, means)
+    assert n_differ >= 0.02 * n

@@ -1,6 +1,6 @@
 """The picture of docs/contacts.md: manifolds of pairs that rest on each other, as `collide.contacts` gives them.
 
-    python benchmarks/contact_pictures.py           # needs matplotlib; writes docs/pictures/contacts.png
+    python docs/pictures/contact_pictures.py           # needs matplotlib; writes docs/pictures/contacts.png
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-FILE = Path(__file__).parent.parent / "docs" / "pictures" / "contacts.png"
+FILE = Path(__file__).parent / "contacts.png"
 BLUE, RED, GREY = "#3b6ea5", "#c0504d", "#7a7a7a"
 LIGHT = np.array([0.4, -0.5, 0.77])
 #: Bodies are asked at rest, sunk by so much, and B is drawn lifted by so much [m], so that the contacts can be seen.

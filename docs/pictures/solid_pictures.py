@@ -1,6 +1,6 @@
 """The picture of a clash in docs/solids.md: two solids, what they have in common, and one without the other.
 
-    python benchmarks/solid_pictures.py
+    python docs/pictures/solid_pictures.py
     # needs matplotlib; --out FOLDER, docs/pictures by default
 """
 
@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "families"))
 from mesh_shapes import bumpy_sphere
 
