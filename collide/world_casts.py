@@ -14,6 +14,7 @@ from collide.broadphase.boxes_ahead import SWEEP, bodies_ahead
 from collide.casts.cast_batches import cast_batch
 from collide.casts.convex_casts import CastRows
 from collide.casts.directions import Directions
+from collide.casts.items_ahead import nearest_first
 from collide.casts.posed_parts import PosedParts, posed_parts
 from collide.casts.ray_hits import RayEvents, first_of_each, joined
 from collide.casts.ray_parts import candidate_parts, parts_met
@@ -164,7 +165,7 @@ def cast_shape(
         return cast_batch(shape, shapes, X_WS[cast], packed.X_WBs[body], of_some, questions[cast, 9])
 
     best, answers = np.full(n, np.inf), []
-    for some in _nearest_first(pairs[:, 0], bounds, best):
+    for some in nearest_first(pairs[:, 0], bounds, best):
         got = answer(some)
         np.minimum.at(best, pairs[some, 0], np.where(got.hit & got.proven, got.t[:, 2], np.inf))
         answers.append((some, got))
@@ -178,20 +179,6 @@ def _boxes_around(shape: Shape, X_WS: np.ndarray) -> np.ndarray:
     parts = posed_parts(list(bounding_parts_of(shape)), X_WS)
     boxes = boxes_of(parts.table, parts.poses.rows, parts.shape_of).reshape(len(X_WS), -1, 6)
     return np.hstack([boxes[:, :, :3].min(axis=1), boxes[:, :, 3:].max(axis=1)])
-
-
-def _nearest_first(owner: np.ndarray, bounds: np.ndarray, best: np.ndarray):
-    """Numbers of pairs, of every owner its next 1, 2, 4, … by bound, as long as they may be nearer than its best.
-
-    best : (n,) upper bounds, brought up to date by the caller between rounds.
-    """
-    rank = np.arange(len(owner)) - np.searchsorted(owner, owner)
-    begin, size = 0, 1
-    while len(rank) and begin <= rank.max():
-        some = np.flatnonzero((rank >= begin) & (rank < begin + size) & (bounds <= best[owner]))
-        if len(some):
-            yield some
-        begin, size = begin + size, 2 * size
 
 
 def _take_first(rows: np.ndarray, pairs: np.ndarray, answers, directions: Directions) -> None:

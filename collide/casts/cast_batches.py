@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from collide.batches import answer_batch
-from collide.casts.convex_casts import CastRows, Marks, PairRows, answer_questions, cast_parts, first_contacts
+from collide.broadphase.bounding_boxes import boxes_of
+from collide.casts.convex_casts import CastRows, PairRows, answer_questions, first_contacts, joined
 from collide.casts.directions import Directions
+from collide.casts.items_ahead import FEW_PAIRS, rows_ahead
 from collide.casts.leaves import Leaf, leaves_of
 from collide.casts.mesh_casts import cast_leaves
-from collide.casts.posed_parts import part_pairs
+from collide.casts.posed_parts import PosedSides, posed_sides
 from collide.casts.region_casts import Way, are_proven, are_to_be_asked_again, limits_of
 from collide.lowering.closed_regions import closed_shapes
+from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import Question
 from collide.results import UNDECIDED
 from collide.shapes.compound import Compound
@@ -35,7 +40,7 @@ def cast_batch(
         return _with_regions(sides, X_WA, X_WB, directions, limits, onto_region)
     meshed = np.array([a.meshed or b.meshed for a, b in zip(*sides)], dtype=bool)
     if not meshed.any():
-        return cast_parts(part_pairs(A, B, X_WA, X_WB, n), directions.vectors, limits, n)
+        return _cast_parts(posed_sides(A, B, X_WA, X_WB, n), directions.vectors, limits)
     X_WA, X_WB = (np.broadcast_to(X, (n, 4, 4)) for X in (X_WA, X_WB))
     numbers: dict[tuple[int, int], list[int]] = {}
     for k, (a, b) in enumerate(zip(*sides)):
@@ -45,8 +50,8 @@ def cast_batch(
         poses = np.ascontiguousarray(X_WA[some]), np.ascontiguousarray(X_WB[some])
         vectors, limit = np.ascontiguousarray(directions.vectors[some]), limits[some]
         if key == (-1, -1):
-            pairs = part_pairs([sides[0][k] for k in some], [sides[1][k] for k in some], *poses, len(some))
-            answers.append(cast_parts(pairs, vectors, limit, len(some)))
+            parts = posed_sides([sides[0][k] for k in some], [sides[1][k] for k in some], *poses, len(some))
+            answers.append(_cast_parts(parts, vectors, limit))
         else:
             answers.append(_cast_meshed(sides[0][some[0]], sides[1][some[0]], *poses, vectors, limit))
     order = np.argsort(np.concatenate(list(numbers.values())), kind="stable")
@@ -94,28 +99,71 @@ class _Starts(NamedTuple):
     point: np.ndarray
 
 
+#: Pairs of convex parts of a cast that are asked in one kernel before any is ruled out.
+_PARTS_TOGETHER = 32
+
+
+def _cast_parts(sides: PosedSides, vectors: np.ndarray, limits: np.ndarray) -> CastRows:
+    """First contacts of n casts of unions of convex parts."""
+    n_pairs = sides.counts.prod(axis=1)
+    rows = [answer_questions(sides.all_pairs(np.flatnonzero(n_pairs <= FEW_PAIRS)), vectors, limits)]
+    many = np.flatnonzero(n_pairs > FEW_PAIRS)
+    if len(many):
+        boxes = boxes_of(sides.parts.table, sides.parts.poses.rows, sides.parts.shape_of)
+
+        def boxes_of_cast(cast: int) -> tuple[np.ndarray, np.ndarray]:
+            a, b = (boxes[first : first + count] for first, count in zip(sides.first[cast], sides.counts[cast]))
+            return a, b
+
+        def answer(owner: np.ndarray, item_a: np.ndarray, item_b: np.ndarray) -> PairRows:
+            return answer_questions(sides.pairs(owner, item_a, item_b), vectors, limits)
+
+        rows += rows_ahead(many, boxes_of_cast, vectors, limits, answer, _PARTS_TOGETHER)
+    return first_contacts(joined(rows), len(limits))
+
+
 def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np.ndarray) -> CastRows:
     """The same of two shapes of which one is a mesh or holds one."""
-    n = len(limits)
     starts = _starts(A, B, X_WA, X_WB)
     ahead = np.flatnonzero(~starts.hit)
-    parts = []
-    for i, leaf_a in enumerate(leaves_of(A)):
-        for j, leaf_b in enumerate(leaves_of(B)):
-            pair = leaf_a, leaf_b, X_WA[ahead], X_WB[ahead], vectors[ahead], limits[ahead]
-            part = cast_leaves(*pair) if leaf_a.shape.meshed or leaf_b.shape.meshed else _cast_convex(*pair)
-            k = len(part.owner)
-            parts.append(part._replace(owner=ahead[part.owner], item_a=np.full(k, i), item_b=np.full(k, j)))
-    rows = np.concatenate([part.rows for part in parts])
-    marks = Marks._make(np.concatenate(columns) for columns in zip(*(part.marks for part in parts)))
-    columns = [np.concatenate([getattr(part, name) for part in parts]) for name in ("owner", "item_a", "item_b")]
-    out = first_contacts(PairRows(rows, marks, *columns), n)
+    leaves_a, leaves_b = leaves_of(A), leaves_of(B)
+
+    def answer(owner: np.ndarray, item_a: np.ndarray, item_b: np.ndarray) -> PairRows:
+        found = []
+        for key in np.unique(item_a * len(leaves_b) + item_b).tolist():
+            i, j = divmod(key, len(leaves_b))
+            casts = owner[(item_a == i) & (item_b == j)]
+            pair = leaves_a[i], leaves_b[j], X_WA[casts], X_WB[casts], vectors[casts], limits[casts]
+            rows = cast_leaves(*pair) if leaves_a[i].shape.meshed or leaves_b[j].shape.meshed else _cast_convex(*pair)
+            k = len(rows.owner)
+            found.append(rows._replace(owner=casts[rows.owner], item_a=np.full(k, i), item_b=np.full(k, j)))
+        return joined(found)
+
+    n_pairs = len(leaves_a) * len(leaves_b)
+    if n_pairs <= FEW_PAIRS:
+        owner, pair = np.repeat(ahead, n_pairs), np.tile(np.arange(n_pairs), len(ahead))
+        rows = [answer(owner, *np.divmod(pair, len(leaves_b)))]
+    else:
+        of_a, of_b = _boxes_at(A), _boxes_at(B)
+        rows = list(rows_ahead(ahead, lambda k: (of_a(X_WA[k]), of_b(X_WB[k])), vectors, limits, answer, 1))
+    out = first_contacts(joined(rows), len(limits))
     hit = starts.hit
     out.hit[hit], out.at_start[hit], out.t[hit] = True, True, 0.0
     out.proven[hit], out.certified[hit] = starts.proven[hit], starts.proven[hit]
     out.normal[hit], out.point[hit] = starts.normal[hit], starts.point[hit]
     out.item_a[hit] = out.item_b[hit] = 0
     return out
+
+
+def _boxes_at(shape: Shape) -> Callable[[np.ndarray], np.ndarray]:
+    """The boxes (leaves, 6) of a union's leaves by its pose (4, 4), made once of a body that stands still."""
+    parts = compound_parts(shape)
+
+    @lru_cache(maxsize=1)
+    def boxes(pose: bytes) -> np.ndarray:
+        return parts.boxes(np.frombuffer(pose).reshape(1, 4, 4))[0]
+
+    return lambda X: boxes(X.tobytes())
 
 
 def _starts(A: Shape, B: Shape, X_WA, X_WB) -> _Starts:
@@ -132,5 +180,5 @@ def _starts(A: Shape, B: Shape, X_WA, X_WB) -> _Starts:
 def _cast_convex(leaf_a: Leaf, leaf_b: Leaf, X_WA, X_WB, vectors: np.ndarray, limits: np.ndarray) -> PairRows:
     """Rows of two convex items of unions."""
     A, B = Compound([(leaf_a.shape, leaf_a.X)]), Compound([(leaf_b.shape, leaf_b.X)])
-    pairs = part_pairs(A, B, X_WA, X_WB, len(limits))
+    pairs = posed_sides(A, B, X_WA, X_WB, len(limits)).all_pairs(np.arange(len(limits)))
     return answer_questions(pairs, vectors, limits)

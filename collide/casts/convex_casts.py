@@ -23,8 +23,6 @@ from collide.numerics.exact_points import integers, rounded
 from collide.numerics.exact_vectors import inner
 from collide.results import UNDECIDED
 
-__all__ = ["CastRows", "cast_parts"]
-
 
 class CastRows(NamedTuple):
     """Answers of n questions.
@@ -81,16 +79,11 @@ def workspace() -> tuple[int, int]:
     return _workspace.addresses
 
 
-def cast_parts(pairs: PartPairs, directions: np.ndarray, limits: np.ndarray, n: int) -> CastRows:
-    """The first contacts of n questions over their pairs of parts.
+def answer_questions(pairs: PartPairs, directions: np.ndarray, limits: np.ndarray) -> PairRows:
+    """Rows of all pairs of parts.
 
     directions : (n, 3), the largest component below 1 and at least ½.   limits : (n,) of t.
     """
-    return first_contacts(answer_questions(pairs, directions, limits), n)
-
-
-def answer_questions(pairs: PartPairs, directions: np.ndarray, limits: np.ndarray) -> PairRows:
-    """Rows of all pairs of parts; arguments as of `cast_parts`."""
     questions = np.empty((len(pairs.owner), QUESTION))
     questions[:, :3], questions[:, 3] = directions[pairs.owner], limits[pairs.owner]
     rows, marks = answer_part_pairs(pairs.parts, pairs.pairs, questions)
@@ -222,6 +215,15 @@ def _settle_plane(parts: PosedParts, pair, question, row) -> None:
     row[TOUCHING : TOUCHING + 3] = [
         float(v * scale + t * Fraction(d)) for v, d in zip(lowest, question[:3].tolist())
     ]  # fmt: skip
+
+
+def joined(some: list[PairRows]) -> PairRows:
+    """Rows of all, in order."""
+    nothing = np.zeros(0, dtype=np.int64)
+    some = [PairRows(np.zeros((0, CAST_ROW)), Marks(*np.zeros((3, 0), dtype=bool)), nothing, nothing, nothing), *some]
+    marks = Marks._make(np.concatenate(columns) for columns in zip(*(pairs.marks for pairs in some)))
+    numbers = (np.concatenate([getattr(pairs, name) for pairs in some]) for name in ("owner", "item_a", "item_b"))
+    return PairRows(np.concatenate([pairs.rows for pairs in some]), marks, *numbers)
 
 
 def first_contacts(pairs: PairRows, n: int) -> CastRows:

@@ -73,8 +73,32 @@ class _Side(NamedTuple):
     counts: np.ndarray
 
 
-def part_pairs(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int) -> PartPairs:
-    """All pairs of parts of A and B, question by question.
+class PosedSides(NamedTuple):
+    """Parts of both sides of n questions.
+
+    parts : of A's side, then of B's.   first, counts : (n, 2) where the parts of A and of B of each question begin, and
+    how many they are.
+    """
+
+    parts: PosedParts
+    first: np.ndarray
+    counts: np.ndarray
+
+    def all_pairs(self, some: np.ndarray) -> PartPairs:
+        """Every pair of parts of questions, by their numbers, question by question."""
+        n_pairs = self.counts[some].prod(axis=1)
+        owner = np.repeat(some, n_pairs)
+        within = np.arange(len(owner)) - np.repeat(np.cumsum(n_pairs) - n_pairs, n_pairs)
+        return self.pairs(owner, *np.divmod(within, np.maximum(self.counts[owner, 1], 1)))
+
+    def pairs(self, owner: np.ndarray, item_a: np.ndarray, item_b: np.ndarray) -> PartPairs:
+        """Pairs of parts by question and numbers in their own bodies."""
+        pairs = np.ascontiguousarray(self.first[owner] + np.stack([item_a, item_b], axis=1))
+        return PartPairs(self.parts, pairs, owner, item_a, item_b)
+
+
+def posed_sides(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int) -> PosedSides:
+    """Parts of A and B in n questions.
 
     A, B : a shape, or n of them.   X_WA, X_WB : (n, 4, 4), or (1, 4, 4) for all.
     """
@@ -96,15 +120,11 @@ def part_pairs(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int) -> PartPairs:
     table.build_trees(shape_of)
     reach = table.numbers[shape_of, REACH]
     poses = pose_table(body_poses, part_poses, reach, has_own_pose(part_poses))
-    parts = PosedParts(table, poses, shape_of, body_poses, part_poses)
-    n_pairs = side_a.counts * side_b.counts
-    owner = np.repeat(np.arange(n), n_pairs)
-    within = np.arange(len(owner)) - np.repeat(np.cumsum(n_pairs) - n_pairs, n_pairs)
-    item_a, item_b = np.divmod(within, np.maximum(side_b.counts[owner], 1))
-    pairs = np.stack(
-        [side_a.first[owner] + item_a, len(side_a.shape_of) + side_b.first[owner] + item_b], axis=1
-    )  # fmt: skip
-    return PartPairs(parts, np.ascontiguousarray(pairs), owner, item_a, item_b)
+    return PosedSides(
+        PosedParts(table, poses, shape_of, body_poses, part_poses),
+        np.stack([side_a.first, len(side_a.shape_of) + side_b.first], axis=1),
+        np.stack([side_a.counts, side_b.counts], axis=1),
+    )
 
 
 def _side(shapes, X: np.ndarray, n: int, row_of) -> _Side:

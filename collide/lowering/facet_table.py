@@ -10,8 +10,8 @@ import numpy as np
 
 from collide.kernels import address_of
 from collide.lowering.packed_convex import BLOCK, POINTS, PackedConvex, pack_points
-from collide.lowering.prepared_structures import coarse_address
-from collide.lowering.shape_table import ADDRESS, INTS, LOWEST, NUMBERS, PARAMS, REACH
+from collide.lowering.prepared_structures import coarse_address, may_have_tree, support_tree_of
+from collide.lowering.shape_table import ADDRESS, INTS, LOWEST, NUMBERS, PARAMS, REACH, TREE
 from collide.numerics.lowest_bits import lowest_exponents
 
 _FACET = pack_points(np.zeros((1, 3)))
@@ -52,4 +52,7 @@ class FacetTable(Facets):
         self.packed = [_FACET] * k + [packed]
 
     def build_trees(self, rows: np.ndarray) -> None:
-        """Shapes asked about here are scanned: none is large enough for a support tree."""
+        """Have the support tree of the convex set, if it is large enough for one; triangles are scanned."""
+        packed = self.packed[-1]
+        if may_have_tree(packed):
+            self.ints[-1, TREE] = support_tree_of(packed).address

@@ -37,7 +37,7 @@ from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, descri
 from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.facets.facet_queries import facets_within
 from collide.narrowphase.facets.mesh_batches import pair_rows
-from collide.narrowphase.facets.near_facets import near_facets
+from collide.narrowphase.facets.near_facets import few_near_facets
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Sphere
@@ -47,6 +47,10 @@ from collide.transforms import SMALLEST
 #: So many pairs of facets at most are jobs of one span, and in proportion more where it is shorter than _SHORT: where
 #: flat and finely cut surfaces come together at once, no span is short enough for few.
 _MAX_JOBS, _SHORT, _MAX_JOBS_OF_ALL = 96, 2.0**-6, 1 << 20
+#: A span is cut to this part of it at least, and to so many times as long as is known to be free before it.
+_LARGEST_CUT, _FREE_TIMES = 16, 4.0
+#: So much of the time that is known to be free is left out: jobs begin where the bodies are still apart.
+_SHARE_OF_FREE = 7 / 8
 #: Spans shorter than this are not cut any more.
 _SHORTEST = 2.0**-46
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
@@ -84,6 +88,11 @@ class Piece(NamedTuple):
     @property
     def is_mesh(self) -> bool:
         return self.packed is None
+
+    @property
+    def has_many_facets(self) -> bool:
+        """Whether it is a hull of which a single facet of a mesh may be near more facets than are jobs of a span."""
+        return not (self.is_mesh or self.is_curved or self.tree is None) and len(self.tree.ids) > _MAX_JOBS
 
     def corners(self, facets: np.ndarray) -> np.ndarray:
         """(k, 3, 3) of a mesh's facets by their numbers."""
@@ -184,9 +193,10 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 
 def _all_facets(a: Piece, b: Piece) -> np.ndarray | None:
     """(k, 2) all pairs of facets, a convex piece counting as one, where they are so few that no span need be cut."""
-    ids = [np.unique(p.tree.ids) if p.is_mesh else np.zeros(1, dtype=np.int64) for p in (a, b)]  # type: ignore[union-attr]
+    ids: list[Any] = [p.tree.ids if p.is_mesh else np.zeros(1, dtype=np.int64) for p in (a, b)]  # type: ignore[union-attr]
     if len(ids[0]) * len(ids[1]) > _MAX_JOBS:
         return None
+    ids = [np.unique(of) for of in ids]
     return np.stack(np.meshgrid(*ids, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
@@ -280,7 +290,7 @@ class _Spans:
         self.a, self.b = a, b
         self.parts, self.reaches = _parts(a, b), np.array([a.reach, b.reach, a.slop + b.slop])
         self._work, self._out = np.zeros(WORKSPACE), np.zeros(OUT)
-        self._held = motion
+        self._held, self._normal = motion, np.zeros((1, 3))
         addresses = [0 if X is None else address_of(X) for X in motion]
         self._header = np.array([*addresses, address_of(self.parts), address_of(self.reaches)], dtype=np.int64)
 
@@ -297,35 +307,66 @@ class _Spans:
         out = self._describe(time, time)
         return Placed(out[:16].reshape(4, 4).copy(), out[16:32].reshape(4, 4).copy(), float(out[REACH]))
 
-    def near_facets(self, begin: float, end: float) -> np.ndarray | None:
-        """(k, 2) facets that may meet in a span of time; None where there are too many to be looked at one by one."""
-        out, max_pairs = self._describe(begin, end), _max_jobs(end - begin)
-        if (self.a.is_curved or self.b.is_curved) and out[REACH] < self.a.radius + self.b.radius:
-            return self._near_curved(out, max_pairs)
+    def near_facets(self, begin: float, end: float, most: int) -> np.ndarray | None:
+        """(k, 2) facets that may meet in a span of time; None where there are more than ``most``."""
+        out = self._describe(begin, end)
+        convex = None if self.a.is_mesh and self.b.is_mesh else self.b if self.a.is_mesh else self.a
+        if convex is not None and (convex.has_many_facets or (convex.is_curved and out[REACH] < convex.radius)):
+            return self._near_convex(convex, out, most)
         X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
         reach = float(out[REACH]) + self.a.radius + self.b.radius
-        near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, max_pairs)  # type: ignore[arg-type]
-        return None if near is None or len(near.facets) > max_pairs < _MAX_JOBS_OF_ALL else near.facets
+        near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, most)  # type: ignore[arg-type]
+        return None if near is None or len(near.facets) > most < _MAX_JOBS_OF_ALL else near.facets
 
-    def _near_curved(self, out: np.ndarray, max_pairs: int) -> np.ndarray | None:
-        """The same where the polytope around a curved piece is farther from it than anything moves in the span.
+    def _near_convex(self, convex: Piece, out: np.ndarray, most: int) -> np.ndarray | None:
+        """The same of a mesh and a convex piece as a whole: where the polytope around a curved one is farther from it
+        than anything moves in the span, and where a facet of the mesh may be near more facets of a hull than can be
+        jobs.
 
-        The distance says whether anything is near at all, its normal which facets may be.
+        Planes between the two say which facets are near, those along the normal that is known too. Of a curved piece
+        the distance tells it, and whether anything is near at all; of a large hull the last `cut` does: any direction
+        is right.
         """
         matrices, reach = (out[:16].reshape(1, 4, 4), out[16:32].reshape(1, 4, 4)), float(out[REACH])
         side = 0 if self.a.is_mesh else 1
-        mesh, curved = (self.a, self.b) if side == 0 else (self.b, self.a)
+        mesh: Any = self.a if side == 0 else self.b
         X_M, X_C = matrices[side].copy(), matrices[1 - side].copy()
-        row = pair_rows(mesh.shape, curved.shape, X_M, X_C, limit=reach, depths=False)[0]
-        if row["lower"] > reach:
-            return np.zeros((0, 2), dtype=np.int64)
-        tree: Any = mesh.tree
-        near = near_facets(tree, curved.packed, as_given(X_M), as_given(X_C), row["normal"][None], np.array([reach]))  # type: ignore[arg-type]
-        if len(near.place) > max_pairs < _MAX_JOBS_OF_ALL:
+        if convex.is_curved:
+            row = pair_rows(mesh.shape, convex.shape, X_M, X_C, limit=reach, depths=False)[0]
+            if row["lower"] > reach:
+                return np.zeros((0, 2), dtype=np.int64)
+            self._take_normal(row)
+        at = as_given(X_M), as_given(X_C), self._normal
+        near = few_near_facets(mesh.tree, convex.packed, *at, reach, most)  # type: ignore[arg-type]
+        if near is None:
             return None
         facets = np.zeros((len(near.place), 2), dtype=np.int64)
-        facets[:, side] = tree.ids[near.place]
+        facets[:, side] = mesh.tree.ids[near.place]
         return facets
+
+    def _take_normal(self, row: np.void) -> None:
+        """The normal of a row becomes the one known, if it has any: of bodies that overlap it has none."""
+        if row["normal"].any():
+            self._normal = row["normal"][None].copy()
+
+    def cut(self, begin: float, end: float) -> tuple[float, float, bool]:
+        """(begin, end of the part of a span to be looked at first, whether it is shorter than by its scale alone).
+
+        No contact is before the begin: distances shrink by μ in unit time at most (conservative advancement, Mirtich
+        1996). The scale is the time in which the smaller body may move by its own size.
+        """
+        reach, half = float(self._describe(begin, end)[REACH]), 0.5 * (end - begin)
+        at = self.placed(begin)
+        shapes = (self.a, self.b) if self.a.is_mesh else (self.b, self.a)
+        X = (at.X_A, at.X_B) if self.a.is_mesh else (at.X_B, at.X_A)
+        row = pair_rows(*(piece.shape for piece in shapes), *(x[None] for x in X), limit=np.inf, depths=False)[0]
+        self._take_normal(row)
+        free = min(max((float(row["lower"]) - at.error) / reach * half * _SHARE_OF_FREE, 0.0), end - begin)
+        rest = end - begin - free
+        scale = min(self.a.reach, self.b.reach) / reach * half
+        is_long = rest > 2.0 * scale
+        length = max(scale if is_long else rest / _LARGEST_CUT, _FREE_TIMES * free, _SHORTEST)
+        return begin + free, begin + free + min(length, 0.5 * rest), not is_long
 
 
 def _max_jobs(span: float) -> int:
@@ -339,24 +380,23 @@ def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarr
     """
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
-    spans_to_do = [(begin, end)] if begin <= end else []
+    spans_to_do = [(begin, end, _max_jobs(end - begin))] if begin <= end else []
     while spans_to_do:
-        begin, end = spans_to_do.pop()
+        begin, end, most = spans_to_do.pop()
         end = min(end, float(row["upper"][0]))
         if begin > end:
             continue
-        near = spans.near_facets(begin, end)
-        if near is None:
-            middle = 0.5 * (begin + end)
-            if end - begin < _SHORTEST:  # more facets together than can be looked at: open from here on
-                if begin < row["lower"][0]:
-                    row["lower"], row["status"] = begin, OPEN
-                continue
-            spans_to_do += [(middle, end), (begin, middle)]
-            continue
-        if len(near) == 0:
-            continue
-        _FacetJobs(a, b, near, is_part).search(motion, np.zeros(1, dtype=np.int64), (begin, end), tolerance, row)
+        is_shortest = end - begin < _SHORTEST
+        near = spans.near_facets(begin, end, _MAX_JOBS_OF_ALL if is_shortest else most)
+        if near is None and is_shortest:  # more facets together than can be looked at: open from here on
+            if begin < row["lower"][0]:
+                row["lower"], row["status"] = begin, OPEN
+        elif near is None:
+            begin, middle, is_shorter = spans.cut(begin, end)
+            spans_to_do += [(middle, end, most), (begin, middle, min(most << is_shorter, _MAX_JOBS_OF_ALL))]
+        elif len(near):
+            jobs = _FacetJobs(a, b, near, is_part)
+            jobs.search(motion, np.zeros(1, dtype=np.int64), (begin, end), tolerance, row)
 
 
 class _FacetJobs:
@@ -431,6 +471,7 @@ def _jobs(a: Piece, b: Piece, near: np.ndarray) -> tuple[Any, np.ndarray, np.nda
         table = FacetTable(mesh.corners(facets), convex.packed)  # type: ignore[arg-type]
         table.numbers[:-1, SLOP] = mesh.slop
         table.numbers[-1, SLOP] += convex.slop
+        table.build_trees(np.array([len(facets)]))
         ids = np.append(facets, 0)
         of_mesh, of_convex = np.arange(len(facets)), np.full(len(facets), len(facets))
         rows_a, rows_b = (of_mesh, of_convex) if a.is_mesh else (of_convex, of_mesh)

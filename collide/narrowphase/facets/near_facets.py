@@ -9,12 +9,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide.broadphase.bounding_boxes import boxes_of
 from collide.lowering.facet_bodies import PosesWithSlop
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, POINTS, PackedConvex
+from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.mesh.bvh import NOTHING, REACH, WIDTH, MeshTree, leaf_runs
 
 #: More boxes at once are walked in two parts of the poses.
 _MAX_BOXES = 1 << 16
+#: Of more points the farthest is looked for by the support tree.
+_MANY_POINTS = 2048
 #: Of the largest numbers met, what rounding takes off a gap; unit vectors are this much shorter than 1.
 _ROUNDING, _SHORTER = 2.0**-46, 1 - 2.0**-40
 
@@ -36,6 +40,18 @@ class Facets:
         return np.arange(len(self.pose)) - np.repeat(starts, counts)
 
 
+def few_near_facets(
+    tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: float, most: int
+) -> Facets | None:
+    """`near_facets` at one pair of poses; None where more than about ``most`` are near, after few of them."""
+    blocks: list = []
+    for block in _walk(tree, _Spans(tree, packed, A, B, along), np.array([upper]), np.zeros(1, dtype=np.int64), most):
+        blocks.append(block)
+        if sum(len(places) for _, places, _ in blocks) > most:
+            return None
+    return Facets(*(np.concatenate(column) for column in zip(*blocks))) if blocks else None
+
+
 def near_facets(
     tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: np.ndarray
 ) -> Facets:
@@ -48,8 +64,11 @@ def near_facets(
     return Facets(*(np.concatenate(column) for column in zip(*blocks)))
 
 
-def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray):
-    """Yields (pose, place, bound) of the facets that may be near enough, block by block."""
+def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, most: int | None = None):
+    """Yields (pose, place, bound) of the facets that may be near enough, block by block.
+
+    most : nothing where more boxes than so many are near, of which each holds a facet.
+    """
     links = tree.links()
     pose, at = poses, np.zeros(len(poses), dtype=np.int64)
     runs = []
@@ -64,6 +83,8 @@ def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray):
         pose, link = pose[near], link[near]
         leaf = link < 0
         runs.append((pose[leaf], link[leaf]))
+        if most is not None and len(pose) - len(runs[-1][0]) + sum(len(run) for run, _ in runs) > most:
+            return
         pose, at = pose[~leaf], link[~leaf]
         if len(at) * WIDTH > _MAX_BOXES and len(poses) > 1:
             half = len(poses) // 2
@@ -132,6 +153,8 @@ def _worth(D: np.ndarray) -> np.ndarray:
 def _support(packed: PackedConvex, g: np.ndarray) -> np.ndarray:
     """(…,) support values of a core along g (…, 3)."""
     p = packed.params
+    if packed.kind == POINTS and len(packed.points) > _MANY_POINTS:
+        return _support_by_tree(packed, g)
     if packed.kind == POINTS:
         return _dot(g[:, :, None], packed.points).max(axis=-1)
     if packed.kind == ELLIPSOID:
@@ -142,6 +165,19 @@ def _support(packed: PackedConvex, g: np.ndarray) -> np.ndarray:
         return round_part + p[1] * np.abs(g[..., 2])
     assert packed.kind == CONE
     return np.maximum(p[1] * g[..., 2], round_part - p[1] * g[..., 2])
+
+
+def _support_by_tree(packed: PackedConvex, g: np.ndarray) -> np.ndarray:
+    """The same of many points, from above: high ends of boxes whose axes are the directions, three at a time."""
+    table, which = ShapeTable([packed]), np.zeros(-(-g[..., 0].size // 3), dtype=np.int64)
+    table.build_trees(which)
+    X = np.tile(np.eye(4), (len(which), 1, 1))
+    rows = X[:, :3, :3].reshape(-1, 3).copy()
+    rows[: g[..., 0].size] = g.reshape(-1, 3)
+    X[:, :3, :3] = rows.reshape(-1, 3, 3)
+    poses = pose_table(X, np.tile(np.eye(4), (len(X), 1, 1)), np.full(len(X), packed.reach), terms=False)
+    highs = boxes_of(table, poses.rows, which)[:, 3:].reshape(-1)[: g[..., 0].size]
+    return highs.reshape(g.shape[:-1]) - packed.radius
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from naive import rng_of
+from naive import random_pose, rng_of
 
 import collide
 from collide.narrowphase.composite import composite_mesh_pairs, composite_meshes, composite_parts
@@ -59,6 +59,43 @@ def test_most_trial_poses_of_curved_parts_are_decided_by_polytopes(monkeypatch):
     row = collide.distance(cans, terrain, collide.pose((0.1, 0.1, 0.0)), collide.pose(rpy=(0.1, 0.2, 0.3)))
     assert row.hit and row.distance < 0.0
     assert sum(asked) > 40 and sum(settled) < 0.2 * sum(asked), (sum(settled), sum(asked))
+
+
+def large_slab(size: float) -> collide.Mesh:
+    corners, faces = collide.tessellate(collide.Box((size, size, 0.1 * size)))[:2]
+    return collide.Mesh(corners, faces)
+
+
+def test_parts_before_a_large_face_are_told_apart_along_its_normal(monkeypatch):
+    """The world's boxes of a large, turned body tell none of a small union's parts from the others."""
+    union, slab = meshes(200, 0.05), large_slab(1e4)
+    X_WB = collide.pose(5e3 * np.array([0.6, 0.48, 0.64]), rpy=(-0.4, 0.7, 0.1))
+    asked = counted(monkeypatch, composite_meshes, "part_rows", lambda A, B, X, Y, limit: len(X.X))
+    row = collide.distance(union, slab, np.eye(4), X_WB)
+    assert not row.hit and row.certified and row.distance > 0.0
+    assert 0 < sum(asked) < 40, sum(asked)
+
+
+@pytest.mark.parametrize("size", [0.3, 3.0, 1e3, 1e6])
+def test_parts_left_out_along_a_normal_are_no_nearer(size):
+    """The distance of a union is the least one of its parts asked one by one; with a limit, too."""
+    rng = rng_of(f"parts along a normal {size}")
+    limited = 0
+    for seed in range(6):
+        union, slab = meshes(30, 0.05 + 0.01 * seed), large_slab(size)
+        X_WA, X_WB = random_pose(rng, 1.0), random_pose(rng, 1.0)
+        n = rng.normal(size=3)
+        X_WB[:3, 3] = X_WA[:3, 3] + (2.0 + size) * n / np.linalg.norm(n)
+        each = [collide.distance(collide.Compound([item]), slab, X_WA, X_WB) for item in union.items]
+        least = min(row.distance for row in each)
+        row = collide.distance(union, slab, X_WA, X_WB)
+        assert row.distance == least and row.certified and not row.hit
+        assert row.lower == min(part.lower for part in each) and row.upper == min(part.upper for part in each)
+        for limit in (0.999 * least, 1.001 * least):
+            within = collide.distance(union, slab, X_WA, X_WB, max_distance=limit)
+            assert within.beyond == (limit < least) and (within.beyond or within.distance == least)
+            limited += within.beyond
+    assert limited == 6
 
 
 def test_a_world_that_only_asks_whether_bodies_meet_searches_no_depth(monkeypatch):

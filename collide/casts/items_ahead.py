@@ -1,0 +1,84 @@
+"""Pairs of items of two unions that a cast may come to: by their boxes, the nearest first.
+
+No item reaches out of its box, so a cast comes to a pair of items no sooner than the box of one, moved, comes to that
+of the other. Pairs are asked in the order of these bounds, until they exceed what is proven of a nearer contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from collide.broadphase.box_tree import BoxTree
+from collide.broadphase.boxes_ahead import SWEEP, bodies_ahead
+from collide.casts.cast_pairs import STATUS, UPPER
+from collide.casts.convex_casts import PairRows
+from collide.casts.portal import HIT
+
+#: Of so few pairs of items all are asked: quicker than a tree.
+FEW_PAIRS = 64
+#: Pairs of items that are listed at once: so many casts at once need little memory.
+_LISTED_AT_ONCE = 1 << 16
+
+#: Rows of casts by their numbers, items of A and items of B, (k,) each; a miss may be left out.
+Answer = Callable[[np.ndarray, np.ndarray, np.ndarray], PairRows]
+
+
+def rows_ahead(
+    casts: np.ndarray, boxes_of: Callable[[int], tuple[np.ndarray, np.ndarray]], vectors: np.ndarray,
+    limits: np.ndarray, answer: Answer, first: int,
+) -> Iterator[PairRows]:  # fmt: skip
+    """Rows of pairs of items of unions, all that may be first contacts among them.
+
+    casts : (k,) numbers of casts, of whose pairs only those are asked that they may come to first.
+    boxes_of : of the items of A and of B in a cast, (m, 6) each.   vectors, limits : (n, 3) and (n,), of all casts.
+    first : pairs of a cast that are asked together before any is ruled out.
+    """
+    for owner, pairs, bounds in _listed(casts, boxes_of, vectors, limits):
+        best = limits.copy()
+        for some in nearest_first(owner, bounds, best, first):
+            found = answer(owner[some], *pairs[some].T)
+            proven = found.marks.proven & (found.rows[:, STATUS] == HIT)
+            np.minimum.at(best, found.owner[proven], found.rows[proven, UPPER])
+            yield found
+
+
+def nearest_first(owner: np.ndarray, bounds: np.ndarray, best: np.ndarray, first: int = 1) -> Iterator[np.ndarray]:
+    """Numbers of pairs, of every owner its next ``first``, then twice as many each time, as long as they may be nearer
+    than its best.
+
+    owner : (k,) ascending.   bounds : (k,) from below, ascending among those of an owner.
+    best : (n,) from above, brought up to date by the caller between rounds.
+    """
+    rank = np.arange(len(owner)) - np.searchsorted(owner, owner)
+    begin, size = 0, first
+    while len(rank) and begin <= rank.max():
+        some = np.flatnonzero((rank >= begin) & (rank < begin + size) & (bounds <= best[owner]))
+        if len(some):
+            yield some
+        begin, size = begin + size, 2 * size
+
+
+def _listed(casts: np.ndarray, boxes_of, vectors: np.ndarray, limits: np.ndarray):
+    """Yields (casts (k,) ascending, items of A and of B (k, 2), bounds (k,) of t from below), some casts at a time."""
+    tree, blocks, count = BoxTree(np.zeros((0, 6))), [], 0
+    for cast in casts.tolist():
+        boxes_a, boxes_b = boxes_of(cast)
+        if not np.array_equal(boxes_b, tree.boxes):
+            tree = BoxTree(boxes_b)
+        pairs, bounds = _pairs_ahead(boxes_a, tree, vectors[cast], limits[cast])
+        blocks.append((np.full(len(pairs), cast), pairs, bounds))
+        count += len(pairs)
+        if count >= _LISTED_AT_ONCE or cast == casts[-1]:
+            yield tuple(np.concatenate(column) for column in zip(*blocks))
+            blocks, count = [], 0
+
+
+def _pairs_ahead(boxes_a: np.ndarray, tree: BoxTree, vector: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
+    """((k, 2) items of A and of B whose boxes meet as A's are moved, (k,) bounds of t from below), by bound."""
+    sweeps = np.empty((len(boxes_a), SWEEP))
+    sweeps[:, :6], sweeps[:, 6:9], sweeps[:, 9] = boxes_a, vector, limit
+    pairs, bounds = bodies_ahead(tree, sweeps)
+    order = np.argsort(bounds, kind="stable")
+    return pairs[order], bounds[order]

@@ -1,0 +1,126 @@
+"""`shape_cast` of unions with many items: the answer is that of all pairs of items, few of which are asked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from naive import random_pose, rng_of
+from reproduction import reproducing
+
+import collide
+from collide.casts import cast_batches, convex_casts
+
+AGAIN = (
+    "import collide, numpy as np\n"
+    "from test_casts_of_unions import clutter\n"
+    "A, B = clutter({kinds_a!r}, {a}, {seed!r}), clutter({kinds_b!r}, {b}, {seed!r})\n"
+    "print(collide.shape_cast(A, np.array({X}), {d}, B, np.eye(4), max_distance={limit}))"
+)
+
+CORNERS, FACES = collide.tessellate(collide.Box((1.0, 1.0, 1.0)))[:2]
+MAKERS = {
+    "box": lambda w: collide.Box((w, 0.8 * w, 0.6 * w)), "sphere": lambda w: collide.Sphere(0.5 * w),
+    "can": lambda w: collide.Cylinder(0.4 * w, w), "capsule": lambda w: collide.Capsule(0.2 * w, 0.6 * w),
+    "mesh": lambda w: collide.Mesh(w * CORNERS, FACES),
+}  # fmt: skip
+
+
+def clutter(kinds: tuple[str, ...], n: int, seed: str) -> collide.Compound:
+    """So many small shapes spread over a ball of a metre, kinds in turn."""
+    rng = rng_of(f"{kinds} {n} {seed}")
+    places = rng.normal(size=(n, 3))
+    places *= (0.5 * rng.uniform(0, 1, n) ** (1 / 3) / np.linalg.norm(places, axis=1))[:, None]
+    poses = [collide.pose(p, rpy=r) for p, r in zip(places, rng.uniform(-3, 3, (n, 3)))]
+    return collide.Compound([(MAKERS[kinds[k % len(kinds)]](0.5 / n ** (1 / 3)), X) for k, X in enumerate(poses)])
+
+
+def by_all_pairs(A: collide.Compound, B: collide.Compound, X, d, limit: float):
+    """((items of A, items of B) t of the first contact of every pair of items, infinite of none; the casts)."""
+    ones_a, ones_b = ([collide.Compound([item]) for item in union.items] for union in (A, B))
+    n, m = len(ones_a), len(ones_b)
+    a, b = np.divmod(np.arange(n * m), m)
+    casts = collide.shape_cast(
+        [ones_a[k] for k in a], X, d, [ones_b[k] for k in b], np.eye(4), max_distance=limit
+    )  # fmt: skip
+    return casts.distance.reshape(n, m), casts
+
+
+@pytest.mark.parametrize(
+    ("kinds_a", "a", "kinds_b", "b"),
+    [
+        (("box", "sphere"), 12, ("box", "can", "capsule"), 15),
+        (("can",), 1, ("box", "sphere"), 90),
+        (("mesh",), 9, ("box", "can", "mesh"), 9),
+        (("sphere", "box"), 20, ("mesh",), 4),
+    ],
+)
+def test_the_first_contact_is_that_of_all_pairs_of_items(kinds_a, a, kinds_b, b):
+    """Bit by bit: distance, normal and point, items; bodies that graze, miss, stop before, or overlap at the start."""
+    outcomes: list[str] = []
+    for seed in map(str, range(4 if "mesh" in kinds_a + kinds_b else 12)):  # pairs with a mesh are asked one by one
+        rng = rng_of(f"casts of unions {kinds_a} {kinds_b} {seed}")
+        A, B = clutter(kinds_a, a, seed), clutter(kinds_b, b, seed)
+        d = rng.normal(size=3)
+        d /= np.linalg.norm(d)
+        X = random_pose(rng, 1.0)
+        X[:3, 3] = rng.uniform(-0.6, 0.6, 3) - rng.choice([0.3, 2.0]) * d
+        limit = float(rng.choice([np.inf, 2.0, 1.6]))
+        with reproducing(AGAIN, kinds_a=kinds_a, a=a, kinds_b=kinds_b, b=b, seed=seed, X=X, d=tuple(d), limit=limit):
+            r = collide.shape_cast(A, X, d, B, np.eye(4), max_distance=limit)
+            t, all_casts = by_all_pairs(A, B, X, d, limit)
+            assert r.hit == np.isfinite(t).any() and r.certified
+            assert r.distance == t.min() and r.at_start == (t.min() == 0.0)
+            outcomes.append("miss" if not r.hit else "start" if r.at_start else "hit")
+            if not r.hit:
+                continue
+            assert r.upper == np.where(all_casts.hit, all_casts.upper, np.inf).min()
+            assert r.lower == all_casts.lower[all_casts.hit].min()
+            if not r.at_start:
+                first = int(t.argmin())
+                assert (r.item_a, r.item_b) == divmod(first, t.shape[1])
+                assert np.array_equal(r.point, all_casts.point[first])
+                assert np.array_equal(r.normal, all_casts.normal[first])
+    assert 2 <= outcomes.count("hit") < len(outcomes), outcomes
+
+
+def test_a_batch_of_casts_of_unions_is_the_casts_one_by_one():
+    """One body stands still, both move, or shapes differ from cast to cast: large unions, small ones, single bodies."""
+    rng = rng_of("batches of casts of unions")
+    unions = [clutter(("box", "sphere"), n, "of a batch") for n in (1, 30, 12)]
+    n = 24
+    X = np.array([random_pose(rng, 1.0) for _ in range(n)])
+    X[:, :3, 3] = rng.normal(size=(n, 3))
+    moving = [unions[k] for k in rng.integers(0, 3, n)]
+    for A, B, X_WB in ((moving, unions[1], np.eye(4)), (unions[1], moving, X[::-1].copy())):
+        d = X_WB[..., :3, 3] - X[:, :3, 3] + rng.normal(size=(n, 3)) * 0.3
+        together = collide.shape_cast(A, X, d, B, X_WB)
+        for k in range(n):
+            A_k, B_k = (side if isinstance(side, collide.Shape) else side[k] for side in (A, B))
+            one = collide.shape_cast(A_k, X[k], d[k], B_k, X_WB if X_WB.ndim == 2 else X_WB[k])
+            for name, value in zip(one._fields, one):
+                assert np.array_equal(getattr(together, name)[k], value), (k, name)
+        assert 8 <= together.hit.sum() < n
+
+
+def test_casts_of_unions_ask_few_pairs_of_parts(monkeypatch):
+    """Of 200 × 200 convex parts."""
+    asked = []
+    answer = convex_casts.answer_part_pairs
+    monkeypatch.setattr(
+        convex_casts, "answer_part_pairs", lambda *args: (asked.append(len(args[1])), answer(*args))[1]
+    )  # fmt: skip
+    A, B = clutter(("can",), 200, "moves"), clutter(("box",), 200, "stands")
+    r = collide.shape_cast(A, collide.pose((-5.0, 0.1, 0.0)), (1, 0, 0), B, np.eye(4))
+    assert r.hit and 0 < sum(asked) < 200, asked
+
+
+def test_casts_onto_many_meshes_walk_few_of_them(monkeypatch):
+    walked = []
+    cast = cast_batches.cast_leaves
+    monkeypatch.setattr(cast_batches, "cast_leaves", lambda *args: (walked.append(len(args[2])), cast(*args))[1])
+    union = clutter(("mesh",), 300, "stands")
+    far = collide.shape_cast(collide.Cylinder(0.1, 0.3), collide.pose((-5.0, 0.1, 0.0)), (1, 0, 0), union, np.eye(4))
+    assert far.hit and 0 < sum(walked) < 30, walked
+    walked.clear()
+    inside = collide.shape_cast(collide.Cylinder(0.4, 0.8), np.eye(4), (1, 0, 0), union, np.eye(4))
+    assert inside.at_start and not walked
