@@ -123,6 +123,20 @@ def _pose_facet(pairs, k, side, body):
         put_vec3(pairs.normals, 6 * k + 3 * side, Vec3(0.0, 0.0, 0.0))
 
 
+@kernel
+def move_pair(pairs, k, to):
+    """Make a pair that is posed number ``to``, which was not looked for in a search yet."""
+    for i in range(NUMBERS_OF_PAIR):
+        pairs.near[NUMBERS_OF_PAIR * to + i] = pairs.near[NUMBERS_OF_PAIR * k + i]
+    for i in range(INTS_OF_PAIR):
+        pairs.facets[INTS_OF_PAIR * to + i] = pairs.facets[INTS_OF_PAIR * k + i]
+    for i in range(18):
+        pairs.corners[18 * to + i] = pairs.corners[18 * k + i]
+    for i in range(6):
+        pairs.normals[6 * to + i] = pairs.normals[6 * k + i]
+        pairs.ids[6 * to + i] = pairs.ids[6 * k + i]
+
+
 @kernel(inline=True)
 def pair_meets(pairs, k):
     return pairs.facets[INTS_OF_PAIR * k + MEETS] != 0

@@ -27,7 +27,7 @@ from collide.contact.contact_pairs import (
     facing_b,
     pair_meets,
 )
-from collide.contact.contact_points import PatchPoints, View, copy_of_points, put_points
+from collide.contact.contact_points import PatchPoints, View, copy_of_points, may_share_points, put_points
 from collide.contact.internal_edges import FLAT, is_local_minimum, snapped
 from collide.contact.manifold_points import GAP, HEIGHT, NEAR, POINT, V
 from collide.contact.shallow_overlaps import STEP_ERRORS
@@ -118,7 +118,7 @@ def grow_patch(frame, first, axes, deepest, on_surface):
     always belong to it. How many points.   on_surface : as in `View`.
     """
     pairs, A, B = frame.pairs, frame.A, frame.B
-    view = View(axes, frame.error, -deepest - STEP_ERRORS * frame.error, frame.reach, False, on_surface)
+    view = _overlap_view(frame, axes, deepest, on_surface)
     number = begin_search(pairs)
     n = put_points(pairs, first, A, B, view, frame.points, 0)
     pairs.states[first] |= REACHED
@@ -149,6 +149,22 @@ def grow_patch(frame, first, axes, deepest, on_surface):
                     end += 1
     pairs.search[N_REACHED] = end
     return n
+
+
+@kernel
+def may_be_reached(frame, k, axes, length):
+    """Whether a pair that starts no patch may be in one of a translation along ``axes`` of that length [m]."""
+    if not _is_along(frame, k, axes.nhat):
+        return False
+    view = _overlap_view(frame, axes, DEEPEST * length, True)
+    over_a, over_b = may_share_points(frame.pairs, k, frame.A, frame.B, view, frame.points.seen)
+    return over_a or over_b
+
+
+@kernel(inline=True)
+def _overlap_view(frame, axes, deepest, on_surface):
+    """Gaps from −deepest to the reach, seen along ``axes``."""
+    return View(axes, frame.error, -deepest - STEP_ERRORS * frame.error, frame.reach, False, on_surface)
 
 
 @kernel(inline=True)

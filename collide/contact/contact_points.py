@@ -34,6 +34,7 @@ LEAST_COSINE = 2.0**-10
 #: Barycentric coordinates and edge parameters may be as far outside as rounding moves them, in so many errors of a
 #: coordinate: no corner may be lost. Never farther than this share.
 _ERRORS_OUTSIDE, _FARTHEST_OUTSIDE = 16.0, 2.0**-10
+_BETWEEN_SHADOWS = 2.0**-6
 #: Edges whose sine, seen along n, is below this are parallel: their ends show it. Edges and heights of facets that are
 #: shorter, seen so, than so many errors of a coordinate are none.
 _PARALLEL, _MIN_ERRORS = 2.0**-30, 256.0
@@ -80,15 +81,8 @@ def put_points(pairs, k, A, B, view, points, n):
 
     Facets that look the wrong way have none.
     """
-    toward_b = facing_a(pairs, k, view.axes.nhat, A)
-    toward_a = facing_b(pairs, k, view.axes.nhat, B)
-    over_a, over_b = toward_b > LEAST_COSINE, toward_a > LEAST_COSINE
-    if view.any_side:
-        over_a = over_b = True
-    elif toward_b < -LEAST_COSINE or toward_a < -LEAST_COSINE or not (over_a or over_b):
-        return n
-    least, largest = see_pair(pairs, k, view.axes, points.seen)
-    if least > view.high + 32.0 * view.error or largest < view.low - 32.0 * view.error:
+    over_a, over_b = may_share_points(pairs, k, A, B, view, points.seen)
+    if not (over_a or over_b):
         return n
     if not view.on_surface or A.radius + B.radius == 0.0:
         return _put_overlap(pairs, k, A, B, 0.0, 0.0, view, over_a, over_b, points, n)
@@ -101,6 +95,38 @@ def put_points(pairs, k, A, B, view, points, n):
     for i in range(n, n_after):
         points.errors[i] += 2.0 * (off_a + off_b)
     return n_after
+
+
+@kernel
+def may_share_points(pairs, k, A, B, view, seen):
+    """(whether corners over A's facet, over B's are to be looked for), neither where a pair has no points in a view;
+    its corners as seen where one is.
+
+    Points lie in both shadows, or off them by `_FARTHEST_OUTSIDE` and rounding: of lengths above 256 errors that is
+    below 2⁻⁸ of a facet for each of its three coordinates.
+    """
+    toward_b = facing_a(pairs, k, view.axes.nhat, A)
+    toward_a = facing_b(pairs, k, view.axes.nhat, B)
+    over_a, over_b = toward_b > LEAST_COSINE, toward_a > LEAST_COSINE
+    if view.any_side:
+        over_a = over_b = True
+    elif toward_b < -LEAST_COSINE or toward_a < -LEAST_COSINE or not (over_a or over_b):
+        return False, False
+    least, largest = see_pair(pairs, k, view.axes, seen)
+    if least > view.high + 32.0 * view.error or largest < view.low - 32.0 * view.error:
+        return False, False
+    if A.radius + B.radius == 0.0 and (_shadows_apart(seen, 0) or _shadows_apart(seen, 1)):
+        return False, False
+    return over_a, over_b
+
+
+@kernel(inline=True)
+def _shadows_apart(seen, axis):
+    """Whether the shadows of two facets are apart along an axis, by more than points may lie outside them."""
+    a, b, c = seen[axis], seen[axis + 3], seen[axis + 6]
+    p, q, r = seen[axis + 9], seen[axis + 12], seen[axis + 15]
+    low_a, high_a, low_b, high_b = min(a, b, c), max(a, b, c), min(p, q, r), max(p, q, r)
+    return max(low_b - high_a, low_a - high_b) > _BETWEEN_SHADOWS * (high_a - low_a + high_b - low_b)
 
 
 @kernel

@@ -17,6 +17,7 @@ from collide.contact.contact_pairs import (
     WORDS_OF_PAIRS,
     clear_table,
     link_pairs,
+    move_pair,
     open_pairs,
     pose_pairs,
     slot_of,
@@ -31,6 +32,7 @@ from collide.contact.contact_patches import (
     grow_overlap,
     least_gap_of,
     mark_touching,
+    may_be_reached,
     need_nearest,
     next_minimum,
     next_seed,
@@ -83,6 +85,8 @@ _WORDS_OF_POINTS = MAX_POINTS * (POINT + 4)
 _FIXED_WORDS = TRANSLATION_WORDS + CLEARING_WORDS + 18 + 8 + CELLS
 #: Integers that are kept of a pair while more are listed: those of the list, and its group.
 _KNOWN = INTS_OF_PAIR + 1
+#: Pairs are compared one by one with translations where these are no more.
+_MOST_WAYS = 8
 
 
 def workspace_words(capacity: int) -> int:
@@ -288,7 +292,7 @@ def _put_contacts(task, rows, first):
         for i in range(ways.counts[N_WAYS]):
             farthest = max(farthest, DEEPEST * ways.lengths[i])
         if farthest > reach:
-            status, frame = _list_wider(task, frame, farthest)
+            status, frame = _list_wider(task, frame, ways, farthest)
             if status == TOO_MANY:
                 return DONE, first, True
             if status != DONE:
@@ -309,8 +313,8 @@ def _inside(task):
 
 
 @kernel
-def _list_wider(task, frame, reach):
-    """(status, frame) with the pairs within a larger reach as well.
+def _list_wider(task, frame, ways, reach):
+    """(status, frame) with the pairs within a larger reach as well that a patch of a translation may reach.
 
     What is known of those listed before stays; the others are not measured: all that meet, or are within the margin,
     are among the first.
@@ -335,17 +339,37 @@ def _list_wider(task, frame, reach):
         slot = slot_of(pairs.table, mask, key)
         pairs.table[2 * slot] = key
         pairs.table[2 * slot + 1] = i
+    n_kept = 0
     for k in range(n):
         key = pairs.facets[INTS_OF_PAIR * k + FACET_A] * n_facets_b + pairs.facets[INTS_OF_PAIR * k + FACET_B]
         slot = slot_of(pairs.table, mask, key)
-        if pairs.table[2 * slot] == key:
+        is_known = pairs.table[2 * slot] == key
+        if not (is_known or _may_be_in_a_patch(frame, ways, k)):
+            continue
+        if n_kept < k:
+            move_pair(pairs, k, n_kept)
+        if is_known:
             i = pairs.table[2 * slot + 1]
             for j in range(NUMBERS_OF_PAIR):
-                pairs.near[NUMBERS_OF_PAIR * k + j] = numbers[NUMBERS_OF_PAIR * i + j]
-            pairs.facets[INTS_OF_PAIR * k + MEETS] = integers[_KNOWN * i + MEETS]
-            pairs.groups[k] = integers[_KNOWN * i + INTS_OF_PAIR]
+                pairs.near[NUMBERS_OF_PAIR * n_kept + j] = numbers[NUMBERS_OF_PAIR * i + j]
+            pairs.facets[INTS_OF_PAIR * n_kept + MEETS] = integers[_KNOWN * i + MEETS]
+            pairs.groups[n_kept] = integers[_KNOWN * i + INTS_OF_PAIR]
+        n_kept += 1
+    pairs = open_pairs(task.words_at, task.capacity, n_kept)
     link_pairs(pairs, frame.B.n_corners)
-    return DONE, frame
+    return DONE, ContactFrame(pairs, frame.A, frame.B, frame.error, frame.reach, frame.points)
+
+
+@kernel
+def _may_be_in_a_patch(frame, ways, k):
+    """Whether a pair that was not listed at first may be in the patch of a translation."""
+    n_ways = ways.counts[N_WAYS]
+    if n_ways > _MOST_WAYS:
+        return True
+    for i in range(n_ways):
+        if may_be_reached(frame, k, axes_across(vec3_at(ways.ways, 3 * i)), ways.lengths[i]):
+            return True
+    return False
 
 
 @kernel
