@@ -27,7 +27,7 @@ from collide.contact.contact_pairs import (
     facing_b,
     pair_meets,
 )
-from collide.contact.contact_points import PatchPoints, View, copy_of_points, put_points
+from collide.contact.contact_points import PatchPoints, View, copy_of_points, put_ends_along, put_points
 from collide.contact.internal_edges import FLAT, is_local_minimum, snapped
 from collide.contact.manifold_points import GAP, HEIGHT, NEAR, POINT, V
 from collide.contact.shallow_overlaps import STEP_ERRORS
@@ -139,10 +139,11 @@ def grow_patch(frame, first, axes, deepest, on_surface):
                     continue
                 pairs.tried[linked] = number
                 is_seed = pairs.states[linked] & WANTED != 0
-                if not is_seed and not _is_along(frame, linked, axes.nhat):
-                    continue
                 n_before = n
-                n = put_points(pairs, linked, A, B, view, frame.points, n)
+                if is_seed or _is_along(frame, linked, axes.nhat):
+                    n = put_points(pairs, linked, A, B, view, frame.points, n)
+                else:
+                    n = put_ends_along(pairs, linked, A, B, view, frame.points, n)
                 if is_seed or n > n_before:
                     pairs.states[linked] |= REACHED
                     pairs.queue[end] = linked
