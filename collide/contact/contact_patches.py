@@ -27,7 +27,15 @@ from collide.contact.contact_pairs import (
     facing_b,
     pair_meets,
 )
-from collide.contact.contact_points import PatchPoints, View, copy_of_points, may_share_points, put_points
+from collide.contact.contact_points import (
+    PatchPoints,
+    View,
+    copy_of_points,
+    may_share_points,
+    put_ends_along,
+    put_points,
+    within_gaps,
+)
 from collide.contact.internal_edges import FLAT, is_local_minimum, snapped
 from collide.contact.manifold_points import GAP, HEIGHT, NEAR, POINT, V
 from collide.contact.shallow_overlaps import STEP_ERRORS
@@ -139,10 +147,11 @@ def grow_patch(frame, first, axes, deepest, on_surface):
                     continue
                 pairs.tried[linked] = number
                 is_seed = pairs.states[linked] & WANTED != 0
-                if not is_seed and not _is_along(frame, linked, axes.nhat):
-                    continue
                 n_before = n
-                n = put_points(pairs, linked, A, B, view, frame.points, n)
+                if is_seed or _is_along(frame, linked, axes.nhat):
+                    n = put_points(pairs, linked, A, B, view, frame.points, n)
+                else:
+                    n = put_ends_along(pairs, linked, A, B, view, frame.points, n)
                 if is_seed or n > n_before:
                     pairs.states[linked] |= REACHED
                     pairs.queue[end] = linked
@@ -154,9 +163,11 @@ def grow_patch(frame, first, axes, deepest, on_surface):
 @kernel
 def may_be_reached(frame, k, axes, length):
     """Whether a pair that starts no patch may be in one of a translation along ``axes`` of that length [m]."""
+    view = _overlap_view(frame, axes, DEEPEST * length, True)
+    if frame.A.radius + frame.B.radius > 0.0:  # ends of round edges stand on steep facets, too
+        return within_gaps(frame.pairs, k, view, frame.points.seen)
     if not _is_along(frame, k, axes.nhat):
         return False
-    view = _overlap_view(frame, axes, DEEPEST * length, True)
     over_a, over_b = may_share_points(frame.pairs, k, frame.A, frame.B, view, frame.points.seen)
     return over_a or over_b
 

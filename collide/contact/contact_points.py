@@ -11,23 +11,22 @@ import math
 from typing import Any, NamedTuple
 
 from collide.contact.contact_pairs import facing_a, facing_b
-from collide.contact.internal_edges import fan_allows
+from collide.contact.internal_edges import edge_slopes, fan_allows
 from collide.contact.manifold_points import (
-    ALONG,
     GAP,
     HEIGHT,
     POINT,
     Line,
     ManifoldPoints,
     V,
-    features_of_end,
-    place_between,
-    shared_span,
+    copy_point,
+    put_line_ends,
+    runs_along,
 )
 from collide.contact.support_face import ACROSS, EDGE, FACE, KNOWN, VERTEX, seen_along
 from collide.kernels import kernel
 from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR
-from collide.numerics.vec3 import Vec3, add, norm, put_vec3, scale, sub, vec3_at
+from collide.numerics.vec3 import Vec3, add, neg, norm, put_vec3, scale, sub, vec3_at
 
 #: A facet is looked at along n where its normal's cosine with it is above this.
 LEAST_COSINE = 2.0**-10
@@ -83,7 +82,9 @@ def put_points(pairs, k, A, B, view, points, n):
     """
     over_a, over_b = may_share_points(pairs, k, A, B, view, points.seen)
     if not (over_a or over_b):
-        return n
+        if A.radius + B.radius == 0.0 or _faces_away(pairs, k, A, B, view):
+            return n
+        return put_ends_along(pairs, k, A, B, view, points, n)
     if not view.on_surface or A.radius + B.radius == 0.0:
         return _put_overlap(pairs, k, A, B, 0.0, 0.0, view, over_a, over_b, points, n)
     # Gaps stay those of the cores, less what their surfaces are nearer.
@@ -105,19 +106,29 @@ def may_share_points(pairs, k, A, B, view, seen):
     Points lie in both shadows, or off them by `_FARTHEST_OUTSIDE` and rounding: of lengths above 256 errors that is
     below 2⁻⁸ of a facet for each of its three coordinates.
     """
-    toward_b = facing_a(pairs, k, view.axes.nhat, A)
-    toward_a = facing_b(pairs, k, view.axes.nhat, B)
-    over_a, over_b = toward_b > LEAST_COSINE, toward_a > LEAST_COSINE
-    if view.any_side:
-        over_a = over_b = True
-    elif toward_b < -LEAST_COSINE or toward_a < -LEAST_COSINE or not (over_a or over_b):
+    over_a = view.any_side or facing_a(pairs, k, view.axes.nhat, A) > LEAST_COSINE
+    over_b = view.any_side or facing_b(pairs, k, view.axes.nhat, B) > LEAST_COSINE
+    if not (over_a or over_b) or not view.any_side and _faces_away(pairs, k, A, B, view):
         return False, False
-    least, largest = see_pair(pairs, k, view.axes, seen)
-    if least > view.high + 32.0 * view.error or largest < view.low - 32.0 * view.error:
+    if not within_gaps(pairs, k, view, seen):
         return False, False
     if A.radius + B.radius == 0.0 and (_shadows_apart(seen, 0) or _shadows_apart(seen, 1)):
         return False, False
     return over_a, over_b
+
+
+@kernel(inline=True)
+def _faces_away(pairs, k, A, B, view):
+    """Whether a facet of a pair faces away from the other body."""
+    nhat = view.axes.nhat
+    return min(facing_a(pairs, k, nhat, A), facing_b(pairs, k, nhat, B)) < -LEAST_COSINE
+
+
+@kernel(inline=True)
+def within_gaps(pairs, k, view, seen):
+    """Whether a pair, seen along a normal from here on, may have points within the gaps of a view."""
+    least, largest = see_pair(pairs, k, view.axes, seen)
+    return least <= view.high + 32.0 * view.error and largest >= view.low - 32.0 * view.error
 
 
 @kernel(inline=True)
@@ -302,8 +313,8 @@ def _corners_over(pairs, k, body, view, points, n, exchanged):
 
 @kernel
 def _crossings(pairs, k, A, B, round_a, round_b, view, points, n):
-    """Where edges of A's facet cross edges of B's, seen along the normal; of a round edge along the rim of a surface
-    the ends of what both share.
+    """Where edges of A's facet cross edges of B's, seen along the normal; of a round edge along a sharp one, which may
+    be the rim of a surface, the ends of what both share.
     """
     seen, error = points.seen, view.error
     facet_a, facet_b = pairs.facets[INTS_OF_PAIR * k + FACET_A], pairs.facets[INTS_OF_PAIR * k + FACET_B]
@@ -318,10 +329,10 @@ def _crossings(pairs, k, A, B, round_a, round_b, view, points, n):
             fu, fv, fh = seen[s] - seen[r], seen[s + 1] - seen[r + 1], seen[s + 2] - seen[r + 2]
             wu, wv = seen[r] - seen[p], seen[r + 1] - seen[p + 1]
             span = eu * fv - ev * fu
-            is_round = round_a + round_b > 0.0
-            if is_round and _runs_along_rim(pairs, k, i, j, A, B, round_a, span, eu, ev, fu, fv):
-                n = _put_ends(pairs, k, i, j, A, B, round_a, round_b, view, points, n)
-                continue
+            if round_a + round_b > 0.0:
+                is_along, n = _put_ends(pairs, k, i, j, A, B, round_a, round_b, view, points, n)
+                if is_along:
+                    continue
             along_e, along_f = wu * fv - wv * fu, wu * ev - wv * eu
             # What is clearly outside is the rule: no roots and no quotients for it.
             size = abs(span) * (1.0 + _FARTHEST_OUTSIDE)
@@ -368,30 +379,6 @@ def _beside(of_e, eu, ev, fu, fv, wu, wv):
 
 
 @kernel
-def _runs_along_rim(pairs, k, i, j, A, B, round_a, span, eu, ev, fu, fv):
-    """Whether edges i of A and j of B, a round one and the rim of a surface, run along each other."""
-    square = (eu * eu + ev * ev) * (fu * fu + fv * fv)
-    if not (square > 0.0 and span * span <= ALONG * ALONG * square):
-        return False
-    if round_a > 0.0:
-        return _is_rim(pairs, k, 1, j, B)
-    return _is_rim(pairs, k, 0, i, A)
-
-
-@kernel
-def _is_rim(pairs, k, side, edge, body):
-    """Whether an edge of a pair's facet is that of no other facet."""
-    p = pairs.ids[6 * k + 3 * side + edge]
-    q = pairs.ids[6 * k + 3 * side + (edge + 1) % 3]
-    n = 0
-    for at in range(int(body.fan_starts[p]), int(body.fan_starts[p + 1])):
-        corner = 3 * int(body.fans[at])
-        if body.corners[corner] == q or body.corners[corner + 1] == q or body.corners[corner + 2] == q:
-            n += 1
-    return n == 1
-
-
-@kernel
 def _line_seen(pairs, k, side, i, body, rounding, seen):
     """The `Line` of edge i of A's or B's facet."""
     facet = pairs.facets[INTS_OF_PAIR * k + FACET_A + side]
@@ -404,22 +391,64 @@ def _line_seen(pairs, k, side, i, body, rounding, seen):
 
 
 @kernel
+def _slopes_at(pairs, k, side, i, body, axes):
+    """The `EdgeSlopes` of edge i of a body's facet, towards the other body."""
+    j = (i + 1) % 3
+    ids, at = 6 * k + 3 * side, 18 * k + 9 * side
+    return edge_slopes(
+        body, pairs.ids[ids + i], pairs.ids[ids + j], vec3_at(pairs.corners, at + 3 * i),
+        vec3_at(pairs.corners, at + 3 * j), axes.nhat if side == 0 else neg(axes.nhat), _SUPPORTING,
+    )  # fmt: skip
+
+
+@kernel
 def _put_ends(pairs, k, i, j, A, B, round_a, round_b, view, points, n):
-    """Append the ends of what two edges share that run along each other; how many points there are then."""
+    """Append the ends of what edges i of A and j of B share where they run along each other, one round, the other sharp;
+    (whether they do, how many points there are then).
+    """
     a = _line_seen(pairs, k, 0, i, A, round_a, points.seen)
     b = _line_seen(pairs, k, 1, j, B, round_b, points.seen)
-    shared = shared_span(a, b, 16.0 * view.error)
-    if shared.low > shared.high:
+    if not runs_along(a, b):
+        return False, n
+    is_sharp_b = round_a > 0.0
+    if is_sharp_b:
+        slopes = _slopes_at(pairs, k, 1, j, B, view.axes)
+    else:
+        slopes = _slopes_at(pairs, k, 0, i, A, view.axes)
+    if not slopes.supports or max(slopes.left, slopes.right) <= _SUPPORTING:
+        return False, n
+    n_before, n_after, bound = n, n, 32.0 * view.error
+    n = put_line_ends(a, b, is_sharp_b, slopes, 16.0 * view.error, points.manifold, n)
+    for i_end in range(n_before, n):
+        if _within(view, points.manifold.points[POINT * i_end + GAP], bound):
+            if i_end != n_after:
+                copy_point(points.manifold, i_end, n_after)
+            points.errors[n_after] = bound
+            points.pairs[n_after] = k
+            n_after += 1
+    return True, n_after
+
+
+@kernel
+def put_ends_along(pairs, k, A, B, view, points, n):
+    """Append the ends of round edges of a swept body along sharp ones of a pair's other facet, and no other points, to
+    n; how many there are then: so lines go on beside facets that are too steep to be looked at.
+    """
+    if not view.on_surface or A.radius + B.radius == 0.0:
         return n
-    for end in range(2):
-        at = place_between(a, b, shared, shared.low if end == 0 else shared.high)
-        if not _within(view, at.gap, 32.0 * view.error):
-            continue
-        _append(points, n, k, at.u, at.v, at.h_a, at.h_b, 32.0 * view.error)
-        feature_a, feature_b = features_of_end(a, b, shared, end)
-        points.manifold.features[2 * n] = feature_a
-        points.manifold.features[2 * n + 1] = feature_b
-        n += 1
+    if not within_gaps(pairs, k, view, points.seen):
+        return n
+    round_a, off_a = _sweep(pairs, k, 0, A, view, points.seen)
+    round_b, off_b = _sweep(pairs, k, 1, B, view, points.seen)
+    if round_a + round_b == 0.0:
+        return n
+    n_before = n
+    outer = View(view.axes, view.error, view.low - _LEAN * (A.radius + B.radius), view.high, view.any_side, True)
+    for i in range(3):
+        for j in range(3):
+            _, n = _put_ends(pairs, k, i, j, A, B, round_a, round_b, outer, points, n)
+    for i in range(n_before, n):
+        points.errors[i] += 2.0 * (off_a + off_b)
     return n
 
 

@@ -15,12 +15,24 @@ import numpy as np
 from collide.contact.clip_polygons import Clipped
 from collide.contact.contact_facets import PosedFacets, posed_corner
 from collide.contact.contact_points import PatchPoints
-from collide.contact.internal_edges import fan_allows
-from collide.contact.manifold_points import GAP, HEIGHT, POINT, ManifoldPoints, V, height_at, overlap_points
+from collide.contact.internal_edges import edge_slopes, fan_allows
+from collide.contact.manifold_points import (
+    GAP,
+    HEIGHT,
+    POINT,
+    ManifoldPoints,
+    V,
+    height_at,
+    line_of,
+    overlap_points,
+    put_line_ends,
+    runs_along,
+    side_of,
+)
 from collide.contact.support_face import EDGE, FACE, VERTEX, SupportFace, seen_along
 from collide.kernels import kernel
 from collide.narrowphase.rows import HIT, NORMAL, POINT_A, ROW, view_row
-from collide.numerics.vec3 import Vec3, cross, dot, neg, norm, put_vec3, scale, sub, vec3_at
+from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm, put_vec3, scale, sub, vec3_at
 
 # What a facet is, bits: it is in a patch, or in the one in hand; a search looked at it.
 COVERED, REACHED, TRIED = 1, 2, 4
@@ -265,6 +277,8 @@ def _put_facet(near, k, of_set, look, n):
     if of_set.n > 1:
         m, off = overlap_points(face, of_set, 16.0 * near.error, -math.inf, near.first, near.second, near.overlap)
         bound += off
+        if face.n == 3 and of_set.n == 2 and of_set.round > 0.0:
+            m = _put_ends(near, face, of_set, look.axes, m)
     else:
         m = _vertex_over(face, of_set, 16.0 * near.error, near.overlap)
     points, overlap = near.points, near.overlap
@@ -280,6 +294,29 @@ def _put_facet(near, k, of_set, look, n):
         points.pairs[n] = k
         n += 1
     return n
+
+
+@kernel
+def _put_ends(near, face, of_set, axes, n):
+    """Append the ends of what the set's round line shares with sharp edges of a facet, or the mesh's rim, to n points
+    of the overlap in hand; how many there are then.
+    """
+    line = line_of(of_set)
+    for k in range(3):
+        edge = side_of(face, k)
+        if not runs_along(edge, line):
+            continue
+        p, q = _unseen(axes, edge.p), _unseen(axes, edge.q)
+        slopes = edge_slopes(near.mesh, edge.feature_p // 4, edge.feature_q // 4, p, q, axes.nhat, _SAME)
+        if slopes.supports and max(slopes.left, slopes.right) > _SAME:
+            n = put_line_ends(edge, line, False, slopes, 16.0 * near.error, near.overlap, n)
+    return n
+
+
+@kernel(inline=True)
+def _unseen(axes, p):
+    """Where a point (u, v, h) seen along the normal is."""
+    return add(add(scale(p.x, axes.e), scale(p.y, axes.f)), scale(p.z, axes.nhat))
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from collide.contact.contact_facets import posed_corner
 from collide.kernels import kernel
@@ -59,6 +60,51 @@ def fan_allows(body, corner, end, point, u, slack):
             return False
         outward = add(outward, normal)
     return _is_outside(body, outward, u, slack)
+
+
+class EdgeSlopes(NamedTuple):
+    """How steeply a surface falls off from one of its edges, seen along a direction that the edge supports.
+
+    supports : no facet at the edge rises from it.   left, right : the least tangent of the facets on the side of
+    edge × direction, and on the other; ∞ where there is none.
+    """
+
+    supports: bool
+    left: float
+    right: float
+
+
+@kernel
+def edge_slopes(body, corner, end, p, q, u, slack):
+    """The `EdgeSlopes` of the edge from a corner at p to the corner ``end`` at q, for the unit vector u."""
+    e = sub(q, p)
+    square = dot(e, e)
+    side = cross(e, u)
+    width = norm(side)
+    left, right = math.inf, math.inf
+    if not (square > 0.0 and width > 0.0):
+        return EdgeSlopes(False, left, right)
+    side = scale(1.0 / width, side)
+    up = sub(u, scale(dot(u, e) / square, e))
+    up = scale(1.0 / norm(up), up)
+    for at in range(int(body.fan_starts[corner]), int(body.fan_starts[corner + 1])):
+        facet = int(body.fans[at])
+        if not _has_corner(body, facet, end):
+            continue
+        for k in range(3):
+            third = int(body.corners[3 * facet + k])
+            if third == corner or third == end:
+                continue
+            w = sub(posed_corner(body, int(body.places[facet]), k), p)
+            fall, aside = -dot(w, up), dot(w, side)
+            if fall < -slack * (abs(fall) + abs(aside)):
+                return EdgeSlopes(False, left, right)
+            slope = max(fall, 0.0) / abs(aside) if aside != 0.0 else math.inf
+            if aside > 0.0:
+                left = min(left, slope)
+            else:
+                right = min(right, slope)
+    return EdgeSlopes(True, left, right)
 
 
 @kernel(inline=True)

@@ -84,7 +84,7 @@ class SharedSpan(NamedTuple):
 
 
 @kernel(inline=True)
-def _line_of(edge):
+def line_of(edge):
     """The `Line` of a `SupportFace` of two corners."""
     return Line(
         vec3_at(edge.corners, 0), vec3_at(edge.corners, 3), edge.round, edge.features[0], edge.features[1],
@@ -93,7 +93,7 @@ def _line_of(edge):
 
 
 @kernel(inline=True)
-def _side_of(face, side):
+def side_of(face, side):
     """The `Line` of a side of a face."""
     following = side + 1 if side + 1 < face.n else 0
     return Line(
@@ -113,7 +113,7 @@ def overlap_points(face_a, face_b, tolerance, max_gap, first, second, manifold):
     if face_a.n < 2 or face_b.n < 2:
         return 0, 0.0
     if face_a.n == 2 and face_b.n == 2:
-        a, b = _line_of(face_a), _line_of(face_b)
+        a, b = line_of(face_a), line_of(face_b)
         return _put_shared(a, b, shared_span(a, b, tolerance), manifold)
     if face_a.n == 2:
         return _edge_over_face(face_a, face_b, False, tolerance, max_gap, manifold), 0.0
@@ -206,14 +206,14 @@ def _ends_beside(edge, face, is_edge_of_b, tolerance, max_gap, n, manifold):
 
     A capsule along an edge of a box, turned by a hair, lies over one face with one half, over another with the other.
     """
-    line = _line_of(edge)
+    line = line_of(edge)
     square = 0.0
     if n == 2 and max(manifold.points[GAP], manifold.points[POINT + GAP]) <= max_gap:
         square = _square(manifold.points, 0, 1)
     longest = math.sqrt(square) + tolerance
     best = -1
     for side in range(face.n):
-        rim = _side_of(face, side)
+        rim = side_of(face, side)
         a, b = (rim, line) if is_edge_of_b else (line, rim)
         shared = shared_span(a, b, tolerance)
         du, dv = a.q.x - a.p.x, a.q.y - a.p.y
@@ -225,10 +225,19 @@ def _ends_beside(edge, face, is_edge_of_b, tolerance, max_gap, n, manifold):
             best, longest = side, length
     if best < 0:
         return n
-    rim = _side_of(face, best)
+    rim = side_of(face, best)
     a, b = (rim, line) if is_edge_of_b else (line, rim)
     n, _ = _put_shared(a, b, shared_span(a, b, tolerance), manifold)
     return n
+
+
+@kernel(inline=True)
+def runs_along(a, b):
+    """Whether two lines, seen along the normal, have a length and run along each other."""
+    eu, ev, fu, fv = a.q.x - a.p.x, a.q.y - a.p.y, b.q.x - b.p.x, b.q.y - b.p.y
+    square = (eu * eu + ev * ev) * (fu * fu + fv * fv)
+    span = eu * fv - ev * fu
+    return square > 0.0 and span * span <= ALONG * ALONG * square
 
 
 @kernel
@@ -270,13 +279,19 @@ def shared_span(a, b, tolerance):
 
 
 class PlaceBetween(NamedTuple):
-    """A place (u, v) between two edges, with the heights of both surfaces and the gap there."""
+    """A place (u, v) between two edges, with the heights of both surfaces and the gap there.
+
+    beside_u, beside_v : from A's line to B's.   fall : by how much the gap is larger than that of the lines [m].
+    """
 
     u: float
     v: float
     h_a: float
     h_b: float
     gap: float
+    beside_u: float
+    beside_v: float
+    fall: float
 
 
 @kernel(inline=True)
@@ -288,14 +303,18 @@ def place_between(a, b, shared, t):
     u, v = a.p.x + t * du, a.p.y + t * dv
     wu, wv = b.p.x + s * eu - u, b.p.y + s * ev - v
     h_a, h_b = a.p.z + t * dh, b.p.z + s * eh
+    fall = 0.0
     rounding = a.round + b.round
     if rounding > 0.0:
         share = a.round / rounding
         u += share * wu
         v += share * wv
-        h_a -= _fall(a.round, share * wu, share * wv, du, dv, dh)
-        h_b += _fall(b.round, (1.0 - share) * wu, (1.0 - share) * wv, eu, ev, eh)
-    return PlaceBetween(u, v, h_a, h_b, h_b - h_a)
+        of_a = _fall(a.round, share * wu, share * wv, du, dv, dh)
+        of_b = _fall(b.round, (1.0 - share) * wu, (1.0 - share) * wv, eu, ev, eh)
+        h_a -= of_a
+        h_b += of_b
+        fall = of_a + of_b
+    return PlaceBetween(u, v, h_a, h_b, h_b - h_a, wu, wv, fall)
 
 
 @kernel(inline=True)
@@ -339,6 +358,34 @@ def _put_shared(a, b, shared, manifold):
         feature_a, feature_b = features_of_end(a, b, shared, k)
         _put(manifold, k, at.u, at.v, at.h_a, at.h_b, feature_a, feature_b)
     return 2, shared.off
+
+
+@kernel
+def put_line_ends(a, b, is_sharp_b, slopes, tolerance, manifold, n):
+    """Append the ends of what a round line shares with a sharp edge of a surface; how many points there are then.
+
+    is_sharp_b : the edge is B's.   slopes : `EdgeSlopes` of it, towards the line.   tolerance : rounding of a gap [m].
+    An end whose line runs over a facet beside the edge is that facet's where it is nearer there: with b how far the
+    line is beside, the facet falls off by slope · b.
+    """
+    shared = shared_span(a, b, tolerance)
+    if shared.low > shared.high:
+        return n
+    edge = b if is_sharp_b else a
+    eu, ev = edge.q.x - edge.p.x, edge.q.y - edge.p.y
+    for k in range(2):
+        at = place_between(a, b, shared, shared.low if k == 0 else shared.high)
+        # edge × direction is (−ev, eu) for B, whose surface is seen from below, and for A its opposite; the line is
+        # beside the edge by −(beside_u, beside_v) for B, by itself for A: the signs are the same.
+        is_left = ev * at.beside_u - eu * at.beside_v > 0.0
+        slope = slopes.left if is_left else slopes.right
+        beside = math.sqrt(at.beside_u * at.beside_u + at.beside_v * at.beside_v)
+        if at.fall > slope * beside + tolerance:
+            continue
+        feature_a, feature_b = features_of_end(a, b, shared, k)
+        _put(manifold, n, at.u, at.v, at.h_a, at.h_b, feature_a, feature_b)
+        n += 1
+    return n
 
 
 @kernel(inline=True)

@@ -219,8 +219,8 @@ def flush(seed, rng) -> Case:
 
 
 def along_edges(seed, rng) -> Case:
-    """A capsule, a cylinder or a swept segment along an edge of a box or of its hull, within 1e-16 … 1e-4 rad: both
-    ends of what they share are within the margin."""
+    """A capsule, a cylinder or a swept segment along an edge of a box, of its hull or of its facets as a mesh, within
+    1e-16 … 1e-4 rad: both ends of what they share are within the margin."""
     size = rng.uniform(0.5, 1.0, 3)
     A: collide.Shape = collide.Box(size)
     if rng.uniform() < 0.5:
@@ -252,6 +252,8 @@ def along_edges(seed, rng) -> Case:
     X_WA = pose(_rotation(rng), rng.normal(size=3))
     X_WB = X_WA @ pose(R0, np.zeros(3)) @ pose(R, p)
     margin = max(gap, 0.0) + 1e-6
+    if rng.uniform() < 0.3:
+        A = collide.Mesh(*collide.tessellate(A)[:2])
     return Case(("edge", which), A, B, X_WA, X_WB, margin, ends=2)
 
 
@@ -328,8 +330,9 @@ def judge(case: Case, ask=None):
     r = collide.distance(*pair)
     rows = ask(*pair, margin=case.margin).rows
     if isinstance(case.A, collide.Mesh):
-        return rows, r, failures_of_meshes(case, rows, r)
-    failures = failures_of_convex(*pair, case.margin, rows, r)
+        failures = failures_of_meshes(case, rows, r)
+    else:
+        failures = failures_of_convex(*pair, case.margin, rows, r)
     if case.ends and len(rows) < case.ends:
         failures.append(f"{len(rows)} rows: an end of the line is lost")
     elif case.ends:
@@ -342,9 +345,12 @@ def judge(case: Case, ask=None):
 
 def shared_length(case: Case) -> float:
     """How much of B's line lies beside the edge of A along it."""
-    points = case.A.points if isinstance(case.A, collide.ConvexHull) else None
     e = case.X_WB[:3, 2]
-    if points is None:
+    if isinstance(case.A, collide.Mesh):
+        points = case.A.vertices
+    elif isinstance(case.A, collide.ConvexHull):
+        points = case.A.points
+    else:
         points = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, -1).T * case.A.size
     along = (points @ case.X_WA[:3, :3].T + case.X_WA[:3, 3] - case.X_WB[:3, 3]) @ e
     half = case.B.length / 2 if hasattr(case.B, "length") else float(np.abs(case.B.points[:, 2]).max())
