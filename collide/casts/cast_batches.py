@@ -7,7 +7,15 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.batches import answer_batch
-from collide.casts.convex_casts import CastRows, Marks, PairRows, answer_questions, cast_parts, first_contacts
+from collide.casts.convex_casts import (
+    CastRows,
+    Marks,
+    PairRows,
+    answer_questions,
+    cast_parts,
+    first_contacts,
+    nothing_met,
+)
 from collide.casts.directions import Directions
 from collide.casts.leaves import Leaf, leaves_of
 from collide.casts.mesh_casts import cast_leaves
@@ -29,6 +37,8 @@ def cast_batch(
     limits : (n,) of t, in units of the directions' vectors, as is the t of the answer.
     """
     n = len(limits)
+    if not n:  # what no cast asks about may be a mesh, which has no parts
+        return nothing_met(0)
     sides = [[side] * n if isinstance(side, Shape) else side for side in (A, B)]
     onto_region = np.flatnonzero([b.is_region for b in sides[1]])
     if len(onto_region):
