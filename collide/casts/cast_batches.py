@@ -10,7 +10,7 @@ import numpy as np
 
 from collide.batches import answer_batch
 from collide.broadphase.bounding_boxes import boxes_of
-from collide.casts.convex_casts import CastRows, PairRows, answer_questions, first_contacts, joined
+from collide.casts.convex_casts import CastRows, PairRows, answer_questions, first_contacts, joined, nothing_met
 from collide.casts.directions import Directions
 from collide.casts.items_ahead import FEW_PAIRS, rows_ahead
 from collide.casts.leaves import Leaf, leaves_of
@@ -34,6 +34,8 @@ def cast_batch(
     limits : (n,) of t, in units of the directions' vectors, as is the t of the answer.
     """
     n = len(limits)
+    if not n:  # what no cast asks about may be a mesh, which has no parts
+        return nothing_met(0)
     sides = [[side] * n if isinstance(side, Shape) else side for side in (A, B)]
     onto_region = np.flatnonzero([b.is_region for b in sides[1]])
     if len(onto_region):

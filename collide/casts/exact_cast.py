@@ -62,8 +62,22 @@ def cast_exactly(A: Sequence[Point], B: Sequence[Point], d: Sequence[int]) -> Ex
         return ExactCast(None, zero, {})
     t = sum((value for name, value in zip(basis.names, values) if name == _T), Fraction(0))
     weights = {name: value for name, value in zip(basis.names, values) if isinstance(name, tuple) and value}
-    normal = Fraction(near[0]), Fraction(near[1]), Fraction(near[2])
-    return ExactCast(t, normal if t else zero, weights)
+    return ExactCast(t, _outward(A, B, far, near) if t else zero, weights)
+
+
+def _outward(A, B, far: list[int], near: list[int]) -> tuple[Fraction, Fraction, Fraction]:
+    """A normal of a plane through the point of touching with all of A ⊖ B behind.
+
+    The optimum has n · (a − b) + n₃ ≤ 0 of all pairs for the prices n = M far + near, M beyond all numbers; where the
+    cast grazes, an artificial variable stays in the basis at 0, far is not 0, and near alone bounds nothing. A power of
+    two is large enough for M: pairs with far · (a − b) + far₃ = 0 have it of near, all others have it from some M on.
+    """
+    many = int(any(far))
+    while True:
+        *n, shift = (many * x + y for x, y in zip(far, near))
+        if max(inner(n, a) for a in A) - min(inner(n, b) for b in B) + shift <= 0:
+            return Fraction(n[0]), Fraction(n[1]), Fraction(n[2])
+        many *= 2
 
 
 def _prices(basis: _Basis, name: int) -> list[int]:
