@@ -202,7 +202,8 @@ def test_more_samples_than_can_be_asked_are_refused_with_the_motion():
 def test_every_motion_is_free_or_collides_or_is_open():
     time = np.array([np.nan, 0.0, np.nan, 1.0])
     edges = CertifiedEdges(np.array([True, False, False, False]), time, np.zeros(2, OPEN_DTYPE), [("a", "b")] * 2, 7)
-    assert edges.collides.tolist() == [False, True, False, True] and edges.is_open.tolist() == [False, False, True, False]
+    assert edges.collides.tolist() == [False, True, False, True]
+    assert edges.is_open.tolist() == [False, False, True, False]
     assert len(edges) == 4
     assert repr(edges) == "CertifiedEdges(4 motions: 1 proven free, 2 collide, 1 open)"
 

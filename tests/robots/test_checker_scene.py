@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -94,7 +95,7 @@ def pieces(n: int, threads: int, progress=None) -> list[slice]:
 def test_pieces_are_all_of_it_once(n, threads):
     handed = pieces(n, threads)
     assert handed[0].start == 0 and handed[-1].stop == n
-    assert all(before.stop == after.start for before, after in zip(handed, handed[1:]))
+    assert all(before.stop == after.start for before, after in pairwise(handed))
     assert len(handed) == 1 if threads == 1 or n < 1024 else len(handed) >= threads
     assert all(piece.stop - piece.start >= 512 for piece in handed[:-1])
 

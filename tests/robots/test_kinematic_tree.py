@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -50,7 +51,7 @@ def test_an_axis_is_three_finite_numbers(axis, kind):
 def test_an_axis_of_no_length_is_refused_where_it_is_used(kind, is_refused):
     for axis in ((0.0, 0.0, 0.0), (0.0, -1e-9, 0.0)):
         if is_refused:
-            with pytest.raises(SceneError, match='joint "j": axis .* has length 0 and names no direction'):
+            with pytest.raises(SceneError, match=r'joint "j": axis .* has length 0 and names no direction'):
                 checked_joint(joint(kind, axis=axis), LINKS)
         else:
             assert checked_joint(joint(kind, axis=axis), LINKS).axis.tolist() == list(axis)
@@ -116,7 +117,7 @@ def test_a_cycle_is_told_in_its_order_with_a_joint_of_it():
     told = text.split("cycle, ")[1].split(":")[0].split(" -> ")
     assert told[0] == told[-1] and sorted(told[:-1]) == ["a", "b", "c"] and "tail" not in " ".join(told)
     parent_of = {each.child: each.parent for each in joints}
-    assert all(parent_of[child] == parent for parent, child in zip(told, told[1:])), text
+    assert all(parent_of[child] == parent for parent, child in pairwise(told)), text
 
 
 def test_a_long_cycle_is_told_by_its_ends():
@@ -130,7 +131,7 @@ def test_a_long_cycle_is_told_by_its_ends():
 
 
 def test_a_link_of_two_parents_and_several_roots_are_refused():
-    with pytest.raises(SceneError, match='joint "to c": link "c" has two parents: .* child of joint "to c"'):
+    with pytest.raises(SceneError, match=r'joint "to c": link "c" has two parents: .* child of joint "to c"'):
         tree_of(["a", "b", "c"], [*links_up(c="a"), *links_up(c="b")])
     with pytest.raises(SceneError, match=r"3 links have no parent \(a, b, d\): a robot is one tree"):
         tree_of(["a", "b", "c", "d"], links_up(c="a"))
@@ -162,14 +163,14 @@ def test_a_chain_is_composed_from_its_end():
 @pytest.mark.parametrize("numbers", [(1e200, 0.0), (2.0, 1.7e308)])
 def test_a_chain_that_leaves_the_doubles_is_refused(numbers):
     joints = [follower("a"), follower("b", "a", *numbers), follower("c", "b", *numbers)]
-    with pytest.raises(SceneError, match='joint "c" mimic: along the chain to joint "a".*both must be finite'):
+    with pytest.raises(SceneError, match=r'joint "c" mimic: along the chain to joint "a".*both must be finite'):
         resolve_mimics(joints)
     assert resolve_mimics(joints[:2])["b"] == ("a", *numbers)
 
 
 @pytest.mark.parametrize("numbers", [(math.nan, 0.0), (1.0, math.inf), (math.inf, math.nan)])
 def test_multiplier_and_offset_must_both_be_finite(numbers):
-    with pytest.raises(SceneError, match='joint "b" mimic: multiplier .* and offset .* must be finite'):
+    with pytest.raises(SceneError, match=r'joint "b" mimic: multiplier .* and offset .* must be finite'):
         broken_mimics([follower("a"), follower("b", "a", *numbers)])
 
 
