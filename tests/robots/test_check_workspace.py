@@ -25,7 +25,6 @@ from collide.robots.part_pairs import BEYOND_MARGIN, HITTING, NEAR, OPEN
 from collide.robots.robot import LinkShape, Robot
 from collide.robots.robot_checker import RobotChecker
 
-
 #: A box without its lid: an open mesh, which only others can ask about.
 CLOSED = collide.tessellate(collide.Box((0.4, 0.4, 0.4)))
 LIDLESS = collide.Mesh(CLOSED.vertices, CLOSED.faces[:-2])

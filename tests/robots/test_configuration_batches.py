@@ -28,7 +28,6 @@ from collide.robots.kinematic_tree import Joint, Mimic
 from collide.robots.robot import LinkShape, Robot
 from collide.robots.robot_distances import NEAREST_DTYPE
 
-
 #: A box without its lid, an open mesh: kernels leave it to others.
 CLOSED = collide.tessellate(collide.Box((0.4, 0.4, 0.4)))
 LIDLESS = collide.Mesh(CLOSED.vertices, CLOSED.faces[:-2])
@@ -112,7 +111,7 @@ def test_joints_as_kernels_read_them():
         Joint("bend", "continuous", "e", "f", axis=np.array([0.6, 0, 0.8]), mimic=Mimic("slide", -2.0, 0.5)),
     ]
     ball = [LinkShape(collide.Sphere(0.1), np.eye(4), None, "test")]
-    table = Robot("all", list("fedcba") + ["base"], joints, {"a": ball}).joint_table
+    table = Robot("all", [*"fedcba", "base"], joints, {"a": ball}).joint_table
     assert table.ints[:, KIND].tolist() == [ROTATION_ABOUT_COORDINATE, FIXED, TRANSLATION, PLANAR, FLOATING, ROTATION]
     assert table.ints[:, COLUMN].tolist() == [0, 0, 1, 2, 5, 1] and table.ints[0, COORDINATE] == 1
     assert (table.root, table.n_links, table.dof) == (6, 7, 11)
