@@ -94,11 +94,12 @@ def sampled_collision(
     if n_halvings is not None:
         needed = np.minimum(needed, n_halvings)
     for level in range(-1, int(needed.max(initial=-1)) + 1):
-        alive = np.flatnonzero(np.isnan(times) & (needed >= level))
-        ts = np.array([0.0, 1.0]) if level < 0 else (np.arange(2 ** max(level - 1, 0)) + 0.5) / 2 ** max(level - 1, 0)
         if level == 0:
             continue  # the ends are all of a motion that is not halved
-        for t in ts.tolist():
+        alive = np.flatnonzero(np.isnan(times) & (needed >= level))
+        n_samples = 2 if level < 0 else 2 ** (level - 1)
+        for k in range(n_samples):  # one by one: there may be 2^29, and the first may be a hit
+            t = float(k) if level < 0 else (k + 0.5) / n_samples
             alive = alive[np.isnan(times[alive])]
             if not len(alive):
                 break

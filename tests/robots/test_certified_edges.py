@@ -8,6 +8,8 @@ from naive import pose, rng_of
 from random_robots import plain_link_poses, random_configurations, random_link_shape, random_robot
 
 import collide
+from collide.errors import InvalidArgument
+from collide.robots.certified_edges import OPEN_DTYPE, CertifiedEdges, sampled_collision
 from collide.robots.kinematic_tree import Joint
 from collide.robots.robot import LinkShape, Robot
 
@@ -130,3 +132,110 @@ def test_threads_give_the_same():
     for field in ("free", "time", "open"):
         assert getattr(one, field).tobytes() == getattr(two, field).tobytes()
     assert one.n_checked == two.n_checked
+
+
+# --- samples --------------------------------------------------------------------------------------
+
+
+class Asked:
+    """Whether columns are within a window, and what was asked."""
+
+    def __init__(self, low: float = np.inf, high: float = np.inf):
+        self.low, self.high, self.batches = low, high, []
+
+    def __call__(self, q: np.ndarray) -> np.ndarray:
+        assert q.flags.c_contiguous and len(q)
+        self.batches.append(q[:, 0].tolist())
+        return (q[:, 0] >= self.low) & (q[:, 0] <= self.high)
+
+
+def test_samples_are_the_ends_then_the_middle_then_quarters():
+    asked = Asked()
+    times = sampled_collision(np.array([[0.0]]), np.array([[8.0]]), 1.0, asked)
+    assert np.isnan(times).all()
+    assert asked.batches == [[t] for t in (0.0, 8.0, 4.0, 2.0, 6.0, 1.0, 3.0, 5.0, 7.0)]
+    for change, step, n in ((1.0, 1.0, 2), (1.0, 0.5, 3), (1.0, 0.49, 5), (2.0, 1.0, 3), (1.0, 9.0, 2), (0.0, 1.0, 2)):
+        asked = Asked()
+        sampled_collision(np.array([[0.0, -change]]), np.array([[0.0, 0.0]]), step, asked)
+        assert len(asked.batches) == n, (change, step)
+
+
+def test_the_last_sample_is_the_end_itself():
+    """From −0.9 to −0.3, a + 1.0 · (b − a) is another double than b."""
+    q0, q1 = np.array([[-0.9]]), np.array([[-0.3]])
+    assert q0[0, 0] + 1.0 * (q1[0, 0] - q0[0, 0]) != q1[0, 0]
+    asked = Asked(-0.3, -0.3)
+    assert sampled_collision(q0, q1, 1.0, asked).tolist() == [1.0] and asked.batches == [[-0.9], [-0.3]]
+
+
+def test_what_was_hit_is_not_asked_again_and_short_motions_are_not_halved():
+    asked = Asked(4.0, 4.0)
+    q0, q1 = np.array([[4.0], [0.0], [0.0], [9.0]]), np.array([[0.0], [4.0], [8.0], [9.5]])
+    times = sampled_collision(q0, q1, 4.0, asked)
+    assert times.tolist()[:3] == [0.0, 1.0, 0.5] and np.isnan(times[3])
+    assert asked.batches == [[4.0, 0.0, 0.0, 9.0], [4.0, 8.0, 9.5], [4.0]]
+
+
+def test_halvings_may_be_limited():
+    for n_halvings, n in ((0, 2), (1, 3), (2, 5), (9, 9)):
+        asked = Asked()
+        sampled_collision(np.array([[0.0]]), np.array([[8.0]]), 1.0, asked, n_halvings)
+        assert len(asked.batches) == n
+    asked = Asked()
+    sampled_collision(np.array([[0.0]]), np.array([[1e300]]), 1e-300, asked, 0)  # a quotient beyond the doubles
+    assert len(asked.batches) == 2
+    assert sampled_collision(np.zeros((0, 1)), np.zeros((0, 1)), 1.0, asked).shape == (0,)
+    assert np.isnan(sampled_collision(np.zeros((2, 0)), np.zeros((2, 0)), 1.0, lambda q: np.zeros(2, bool))).all()
+
+
+def test_more_samples_than_can_be_asked_are_refused_with_the_motion():
+    q0, q1 = np.zeros((3, 1)), np.array([[1.0], [-(2.0**30) * 1.5], [2.0]])
+    with pytest.raises(InvalidArgument, match=r"motion 1 changes a column by 1\.61061e\+09 .* more than 2\^30 samples"):
+        sampled_collision(q0, q1, 1.0, Asked())
+    most = Asked(0.0, 0.0)  # 2^30 samples may be asked; the first one is a hit
+    assert sampled_collision(q0[:1], np.array([[2.0**30]]), 1.0, most).tolist() == [0.0]
+
+
+# --- results --------------------------------------------------------------------------------------
+
+
+def test_every_motion_is_free_or_collides_or_is_open():
+    time = np.array([np.nan, 0.0, np.nan, 1.0])
+    edges = CertifiedEdges(np.array([True, False, False, False]), time, np.zeros(2, OPEN_DTYPE), [("a", "b")] * 2, 7)
+    assert edges.collides.tolist() == [False, True, False, True]
+    assert edges.is_open.tolist() == [False, False, True, False]
+    assert len(edges) == 4
+    assert repr(edges) == "CertifiedEdges(4 motions: 1 proven free, 2 collide, 1 open)"
+
+
+def test_intervals_that_stay_open_are_in_order_and_name_their_motion():
+    """Of four motions two graze a pin by a nanometre, one collides, one is free: numbers are those of the four."""
+    world = collide.World()
+    world.add(collide.Sphere(0.01), pose(t=(1.011 + 1e-9, 0.0, 0)), name="pin")
+    world.add(collide.Sphere(0.1), pose(t=(-0.5, 0.0, 0)), name="post")
+    checker = collide.RobotChecker(pendulum(), world)
+    edges = checker.certify_edges([[0.9], [-1.0], [2.9], [-0.9]], [[1.0], [1.0], [3.5], [1.0]], resolution=1e-2)
+    assert edges.free.tolist() == [True, False, False, False] and edges.is_open.tolist() == [False, True, False, True]
+    assert edges.collides.tolist() == [False, False, True, False]
+    assert sorted(set(edges.open["edge"].tolist())) == [1, 3]
+    places = list(zip(edges.open["edge"].tolist(), edges.open["begin"].tolist()))
+    assert places == sorted(places) and set(edges.open_names) == {("rod", "pin")}
+    one = checker.certify_edges([0.9], [1.0])
+    assert one.n_checked >= 1 and one.free.tolist() == [True] and one.open.dtype == OPEN_DTYPE
+
+
+def test_no_motions_at_all():
+    edges = collide.RobotChecker(pendulum(), collide.World()).certify_edges(np.zeros((0, 1)), np.zeros((0, 1)))
+    assert len(edges) == len(edges.open) == edges.n_checked == 0
+    assert repr(edges) == "CertifiedEdges(0 motions: 0 proven free, 0 collide, 0 open)"
+
+
+def test_links_that_cannot_be_told_apart_are_both_named():
+    """Two sliders side by side with 1e-9 m between them: a pair of the robot, not of what is around."""
+    block = [LinkShape(collide.Box((1.0, 1.0, 1.0)), np.eye(4), None, "test")]
+    joints = [Joint(name, "prismatic", "base", name, pose(t=(0, y, 0)), (1.0, 0, 0))
+              for name, y in (("left", 0.0), ("right", 1.0 + 1e-9))]  # fmt: skip
+    robot = Robot("pair", ["base", "left", "right"], joints, {"left": block, "right": block})
+    edges = collide.RobotChecker(robot).certify_edges([[-3.0, 0.0]], [[3.0, 0.0]], resolution=1e-2)
+    assert edges.is_open[0] and set(edges.open_names) == {("right", "left")}
+    assert edges.open["begin"][0] <= 0.34 and edges.open["end"][-1] >= 0.66

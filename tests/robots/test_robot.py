@@ -115,6 +115,53 @@ def test_renamed_keeps_the_kinematics():
     ]
 
 
+def test_pairs_are_of_two_links_with_geometry_in_their_order():
+    ball = [LinkShape(Sphere(0.01), np.eye(4), None, "test")]
+    pairs = [("c", "base", "SRDF"), ("a", "a", "self"), ("base", "c", "again"), ("a", "b", "SRDF"), ("b", "c", "SRDF")]
+    robot = arm(geometry={link: ball for link in ("base", "b", "c")}, semantic_pairs=pairs)
+    assert robot.disabled_pairs == [("base", "c", "SRDF"), ("b", "c", "SRDF")] and robot.rigid_pairs == []
+    assert arm(semantic_pairs=[]).disabled_pairs == [("a", "b", "rigidly joined")]
+
+
+def test_which_joints_move_which_links():
+    """Also the joint that is fixed, which counts as the others in the order of the table."""
+    robot = arm()
+    names = [joint.name for joint in robot.sorted_joints]
+    moved = {name: {link for k, link in enumerate(robot.links) if robot.moves[j, k]} for j, name in enumerate(names)}
+    assert moved == {
+        "turn": {"a", "b", "c", "left", "right"}, "weld": {"b", "c", "left", "right"}, "slide": {"c", "left", "right"},
+        "left": {"left"}, "right": {"right"},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("argument", "value", "words"), [
+    ("semantic_pairs", [("a", "b")], r"semantic_pairs must be \(link, link, reason\), three texts each"),
+    ("semantic_pairs", [("a", "b", 3)], "semantic_pairs must be"),
+    ("semantic_pairs", 3, "semantic_pairs"),
+    ("geometry", {"a": [Sphere(1.0)]}, r"geometry\['a'\]"),
+    ("geometry", 3, "geometry"),
+    ("states", {"up": 3}, r"states\['up'\]"),
+    ("notes", [3], "notes"),
+    ("joints", ["turn"], "joints"),
+])  # fmt: skip
+def test_arguments_of_another_kind_are_named(argument, value, words):
+    with pytest.raises(SceneError, match=words):
+        arm(**{argument: value})
+
+
+def test_links_without_elements_have_no_geometry():
+    assert arm(geometry={"a": [], "b": ()}).geometry == {} and arm(geometry=None).geometry == {}
+
+
+def test_a_prefix_is_put_before_all_names_and_none_gives_the_robot_itself():
+    robot = arm(semantic_pairs=[("left", "right", "SRDF")], notes=["note"], sources=["arm.urdf"])
+    assert robot.renamed("") is robot and robot.prefix == ""
+    twice = robot.renamed("a_").renamed("b_")
+    assert twice.prefix == "b_a_" and twice.root == "b_a_base" and twice.sources == robot.sources
+    assert twice.semantic_pairs == (("b_a_left", "b_a_right", "SRDF"),) and arm().renamed("c").semantic_pairs is None
+    assert {joint.name: joint.mimic and joint.mimic.joint for joint in twice.joints}["b_a_right"] == "b_a_left"
+
+
 # --- configurations -------------------------------------------------------------------------------
 
 
@@ -143,13 +190,82 @@ def test_values_of_joints_that_cannot_take_one_are_noted():
     assert len(notes) == 2
 
 
+def limited(lower: float, upper: float, kind: str = "prismatic", **mimic) -> Robot:
+    joints = [Joint("j0", "continuous" if mimic else kind, "a", "b", pose(), (1, 0, 0), lower, upper)]
+    if mimic:
+        joints.append(Joint("j1", kind, "b", "c", pose(), (1, 0, 0), lower, upper, Mimic("j0", **mimic)))
+    return Robot("limited", ["a", "b", "c"][: len(joints) + 1], joints)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_a_billionth_beyond_a_limit_is_within_it(kind):
+    """Exactly a billionth, of 1 or of the value where that is larger; notes and batches say the same."""
+    for limit, beyond in ((0.0, 1e-9), (-1024.0, 1024e-9), (1024.0, 1024e-9), (0.5, 1e-9)):
+        for side in (-1.0, 1.0):
+            robot = limited(limit, np.inf, kind) if side < 0 else limited(-np.inf, limit, kind)
+            q = np.array([[limit], [limit + 0.999 * side * beyond], [limit + 1.01 * side * beyond]])
+            assert robot.within_limits(q).tolist() == [True, True, False], (limit, side)
+            assert [len(robot.limit_notes(row)) for row in q] == [0, 0, 1], (limit, side)
+    for robot, value in ((limited(0.0, 1.0, kind), -1e-9), (limited(-1.0, 0.0, kind), 1e-9)):
+        assert robot.within_limits([value]).all() and robot.limit_notes(np.array([value])) == []
+
+
+def test_limits_of_joints_that_follow_count_and_those_of_others_do_not():
+    robot = limited(0.0, 1.0, multiplier=-2.0, offset=0.5)
+    q = np.array([[0.25], [-0.25], [0.26], [-0.26]])
+    assert robot.within_limits(q).tolist() == [True, True, False, False]
+    assert robot.limit_notes(np.array([-0.26])) == ["robot limited: joint j1 at 1.02 m is outside its limits [0, 1]"]
+    assert robot.lower.tolist() == [-np.inf] and robot.upper.tolist() == [np.inf]
+    assert limited(0.0, 1.0, "continuous").within_limits([[5.0]]).all()
+    assert limited(0.0, 1.0).within_limits(np.zeros((0, 1))).shape == (0,)
+
+
+def test_a_value_of_a_joint_that_follows_may_be_a_millionth_off():
+    robot = limited(-10.0, 10.0, multiplier=1.0, offset=0.0)
+    for value, n in ((0.0, 0), (1e-6, 0), (-1e-6, 0), (1.001e-6, 1), (-1.001e-6, 1)):
+        assert len(robot.configuration({"j0": 0.0, "j1": value})[1]) == n, value
+
+
+def test_values_may_start_from_a_configuration_that_stays_as_it_is():
+    robot, start = arm(), np.array([0.5, 0.25])
+    q, _ = robot.configuration({"slide": 0.375}, start)
+    assert q.tolist() == [0.5, 0.375] and start.tolist() == [0.5, 0.25]
+    with pytest.raises(InvalidArgument, match=r"start must have shape \(2,\), a value for each of turn, slide"):
+        robot.configuration({}, np.zeros(3))
+
+
+def test_the_value_of_one_joint():
+    robot = arm()
+    assert robot.joint_value("right", np.array([9.0, 0.125])) == -0.5  # 0.25 − (2 · 0.125 + 0.5)
+    with pytest.raises(InvalidArgument, match=r"no joint 'weld' moves .* there are slide, turn|turn, slide"):
+        robot.joint_value("weld", np.zeros(2))
+    bare = Robot("bare", ["a", "b"], [Joint("fly", "floating", "a", "b")])
+    with pytest.raises(InvalidArgument, match=r"no joint 'fly' moves along one coordinate; there are none$"):
+        bare.joint_value("fly", np.zeros(6))
+    with pytest.raises(InvalidArgument, match="unknown joint 'fly'; it has fly/x, fly/y"):
+        bare.configuration({"fly": 1.0})
+    with pytest.raises(InvalidArgument, match="unknown joint 'j'; it has no joints"):
+        Robot("stone", ["a"], []).configuration({"j": 1.0})
+
+
+def test_a_default_that_is_not_zero_is_told():
+    robot = limited(0.25, 1.0)
+    assert robot.default_configuration().tolist() == [0.25] and limited(-1.0, -0.5).default_configuration() == [-0.5]
+    assert robot.default_notes([], robot.default_configuration()) == [
+        "robot limited: no value given for j0 = 0.25: 0 taken, or the limit nearest to 0"
+    ]
+    assert robot.default_notes({"j0"}, robot.default_configuration()) == []
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
         ({"trun": 0.1}, r"unknown joint 'trun'; it has turn, slide"),
         ({"turn": math.nan}, "joint turn: the value must be a finite number, got nan"),
         ({"turn": "far"}, "joint turn: the value must be a number, got 'far'"),
-        ({"turn": True}, "joint turn"),
+        ({"turn": True}, "joint turn: the value must be a finite number, got True"),
+        ({"turn": math.inf}, "joint turn: the value must be a finite number, got inf"),
+        ({"turn": 10**400}, "joint turn: the value must be a number"),
     ],
 )
 def test_refused_values(values, message):
@@ -162,6 +278,11 @@ def test_refused_values(values, message):
     [
         ([1.0], r"one column for each of turn, slide; got \(1,\)"),
         ([math.nan, 0], r"q\[0\], joint turn, is nan"),
+        ([[math.inf, 0]], r"q\[0\], joint turn, is inf"),
+        ([[0, 0], [0, -math.inf]], r"q\[1\], joint slide, is -inf"),
+        (np.zeros((2, 1)), r"one column for each of turn, slide; got \(2, 1\)"),
+        (np.zeros((1, 2, 2)), r"must have shape \(2,\) or \(N, 2\).*got \(1, 2, 2\)"),
+        (0.0, r"got \(\)"),
         ("up", "must be real numbers"),
     ],
 )
