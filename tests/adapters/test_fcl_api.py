@@ -290,55 +290,6 @@ def test_bad_input_is_named():
 
 # --- beside python-fcl --------------------------------------------------------------------------
 
-KINDS = ("Box", "Sphere", "Capsule", "Cylinder", "Ellipsoid", "Convex", "Cone", "BVHModel")
-
-
-def geometry(module, kind, s):
-    if kind in ("Box", "Ellipsoid"):
-        return getattr(module, kind)(*(s / (2 if kind == "Ellipsoid" else 1)))
-    if kind == "Sphere":
-        return module.Sphere(s[0])
-    if kind in ("Capsule", "Cylinder", "Cone"):
-        return getattr(module, kind)(s[0] / 2, s[1])
-    if kind == "Convex":
-        return module.Convex(CORNERS * s, 12, np.concatenate([[3, *facet] for facet in FACETS]))
-    model = module.BVHModel()
-    model.beginModel(12, 8)
-    model.addSubModel(CORNERS * s, FACETS)
-    model.endModel()
-    return model
-
-
-def answers(module, n, seed):
-    """(kinds, whether they meet, else their gap) of random pairs, through the same code whichever fcl it is."""
-    rng, found = np.random.default_rng(seed), []
-    for _ in range(n):
-        kinds, objects = [KINDS[k] for k in rng.integers(0, len(KINDS), 2)], []
-        for kind in kinds:
-            q = rng.normal(size=4)
-            tf = module.Transform(q / np.linalg.norm(q), rng.uniform(-0.6, 0.6, 3))
-            objects.append(module.CollisionObject(geometry(module, kind, rng.uniform(0.2, 1.0, 3)), tf))
-        hit = module.collide(*objects, module.CollisionRequest(), module.CollisionResult()) > 0
-        found.append([kinds, hit, None if hit else float(module.distance(*objects))])
-    return found
-
-
-@needs_fcl
-def test_random_calls_agree():
-    """Booleans are the same but where bodies are within rounding of touching; gaps to FCL's tolerance."""
-    n, seed = 1500, 2206
-    data = f"CORNERS, FACETS, KINDS = np.array({CORNERS.tolist()}), np.array({FACETS.tolist()}), {KINDS}"
-    code = "\n".join(["import fcl, json, numpy as np", data, inspect.getsource(geometry), inspect.getsource(answers)])
-    theirs = json.loads(child(f"{code}\nprint('ANSWERS', json.dumps(answers(fcl, {n}, {seed})))").split("ANSWERS")[1])
-    ours = answers(fcl, n, seed)
-    assert 300 < sum(hit for _, hit, _ in ours) < 1200
-    for k, ((kinds, hit, gap), (_, their_hit, their_gap)) in enumerate(zip(ours, theirs)):
-        case = f"case {k} of seed {seed}, kinds {kinds}: {hit} {gap}, python-fcl {their_hit} {their_gap}"
-        if hit != their_hit:
-            assert abs(gap if their_hit else their_gap) < 1e-5, case
-        elif not hit:
-            assert abs(gap - their_gap) < 1e-3 and gap <= their_gap + 1e-9, case
-
 
 def test_polytopes_are_judged_in_rationals():
     """Boxes that touch or miss by one unit in the last place, as rationals have it."""
