@@ -227,11 +227,12 @@ def distance(
     Notes
     -----
     GJK for gaps, their last digits in double-doubles; EPA (van den Bergen 2001) for depths. Where a body is not convex,
-    an overlap is minus the length of a translation that is proven to separate the bodies, found by some
-    hundred booleans, which ``signed=False`` leaves out: seconds where a rounded body a million times as large as a mesh
-    of 10^5 facets holds it. Beside a mesh, the work of a union grows with the pairs of parts whose boxes overlap or
-    come as near as the nearest parts are. Curved shapes within a mesh of n facets take O(n) where all its facets are
-    near.
+    an overlap is minus the length of a translation that is proven to separate the bodies, found by some hundred
+    booleans, which ``signed=False`` leaves out; each ends at the first two facets that meet, or are as near as the
+    radii. Gaps of meshes of n and m facets take few boxes where one pair of facets is nearest, O(n + m) where all are
+    as near as each other within rounding, n·m at worst. Beside a mesh, the work of a union grows with the pairs of
+    parts whose boxes overlap or come as near as the nearest parts are. Curved shapes within a mesh of n facets take
+    O(n) where all its facets are near.
     """
     limit = checks.limit("max_distance", max_distance)
     if signed.__class__ is not bool:

@@ -8,17 +8,17 @@ section 4.3), and of Python integers where these cannot tell.
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
 
+from collide.numerics.exact_points import Point, integers
 from collide.numerics.exact_vectors import cross, inner, minus
 
 #: Facets times vertices looked at before it is left open; some 0.2 s.
 MAX_SIGNS = 20_000_000
 #: Signs worked out in integers before it is left open; some 0.2 s.
 MAX_EXACT_SIGNS = 100_000
-_CHUNK = 1 << 18
+#: Signs worked out at once: few at first, which tell of most meshes that are not convex; then twice as many each time.
+_FIRST_CHUNK, _CHUNK = 1 << 12, 1 << 16
 #: Of the permanent; Shewchuk's (7 + 56 ε) ε, with room for the rounding of the permanent itself.
 _ERROR = 1e-15
 
@@ -36,16 +36,19 @@ def is_own_hull(vertices: np.ndarray, faces: np.ndarray) -> bool:
     # One power of two for all: the largest coordinate near 1, nothing rounded but what is far too small to matter.
     points = np.ldexp(points, -int(np.frexp(np.abs(points).max())[1]))
     exact = _Exact(vertices[used], facets)
-    step = max(1, _CHUNK // len(points))
-    for begin in range(0, len(facets), step):
+    begin, step = 0, max(1, _FIRST_CHUNK // len(points))
+    while begin < len(facets):
         det, bound = _beyond(points, facets[begin : begin + step])
         if (det > bound).any():
             return False
-        for f, v in np.argwhere(det >= -bound).tolist():
-            if v not in facets[begin + f] and exact.is_beyond(begin + f, v):
+        open_signs = det >= -bound
+        np.put_along_axis(open_signs, facets[begin : begin + step], False, axis=1)  # corners lie in their plane
+        for f, v in np.argwhere(open_signs).tolist():
+            if exact.is_beyond(begin + f, v):
                 return False
         if exact.count > MAX_EXACT_SIGNS:
             return False
+        begin, step = begin + step, min(2 * step, max(step, _CHUNK // len(points)))
     return True
 
 
@@ -62,19 +65,21 @@ def _beyond(points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 class _Exact:
-    """Facets' planes in integers, each made when first asked for."""
+    """Points in integers of one grid, made when first asked for, and facets' planes likewise."""
 
     def __init__(self, points: np.ndarray, facets: np.ndarray):
         self._points, self._facets, self.count = points, facets, 0
-        self._planes: dict[int, tuple] = {}
+        self._grid: list[Point] = []
+        self._planes: dict[int, tuple[Point, int]] = {}
 
     def is_beyond(self, f: int, v: int) -> bool:
         self.count += 1
+        if not self._grid:
+            whole, _ = integers(self._points)
+            self._grid = list(zip(whole[0::3], whole[1::3], whole[2::3]))
         if f not in self._planes:
-            a, b, c = (self._point(i) for i in self._facets[f].tolist())
-            self._planes[f] = a, cross(minus(b, a), minus(c, a))
-        a, normal = self._planes[f]
-        return inner(normal, minus(self._point(v), a)) > 0
-
-    def _point(self, i: int) -> list[Fraction]:
-        return [Fraction(x) for x in self._points[i].tolist()]
+            a, b, c = (self._grid[i] for i in self._facets[f].tolist())
+            normal = cross(minus(b, a), minus(c, a))
+            self._planes[f] = normal, inner(normal, a)
+        normal, height = self._planes[f]
+        return inner(normal, self._grid[v]) > height

@@ -8,11 +8,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from contact_scenes import table
-from mesh_shapes import box
+from mesh_shapes import box, bumpy_sphere
+from naive import rng_of
 from naive_triangles import triangles_meet
 
 import collide
-from collide.contact import contact_pairs, contact_points, mesh_contacts, reduce_patch, shallow_overlaps
+from collide.contact import (
+    contact_pairs,
+    contact_points,
+    facet_manifolds,
+    mesh_contacts,
+    reduce_patch,
+    shallow_overlaps,
+)
 from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP, TRANSLATION
 from collide.contact.manifold_points import POINT, ManifoldPoints
 from collide.contact.support_face import EDGE, FACE, VERTEX, axes_across
@@ -87,6 +95,57 @@ def test_workspaces_grow_and_give_the_same_rows(monkeypatch):
     monkeypatch.setattr(mesh_contacts, "_ROWS_PER_POSE", 0)
     assert same_rows(collide.contacts(ground, shape, EYE, X, margin=0.01).rows, wanted.rows)
     assert space.described[1] > 64, "more pairs than at first"
+
+
+def test_a_call_after_one_that_needed_much_space_begins_with_it(monkeypatch):
+    """Nothing is worked out twice then; memory that was touched is given back all the same."""
+    rng = np.random.default_rng(6)
+    ground, shape, X = collide.Mesh(*table(24, seed=3)), collide.Mesh(*CUBE), poses_on_table(rng, 4)
+    for name, value in (("_FEWEST_PAIRS", 8), ("_KEPT_PAIRS", 8), ("_BEGUN_WITH", 1 << 12)):
+        monkeypatch.setattr(mesh_contacts, name, value)
+    monkeypatch.setattr(mesh_contacts, "_of_thread", mesh_contacts._OfThread())
+    begun, kernel = [], mesh_contacts.facet_manifolds
+    monkeypatch.setattr(mesh_contacts, "facet_manifolds", lambda *args: begun.append(1) or kernel(*args))
+    first = collide.contacts(ground, shape, EYE, X, margin=0.01)
+    n_first, touched = len(begun), mesh_contacts._of_thread._words
+    again = collide.contacts(ground, shape, EYE, X, margin=0.01)
+    assert n_first > 2 and len(begun) == n_first + 1 and same_rows(first.rows, again.rows)
+    assert mesh_contacts._of_thread._words is not touched
+
+
+@pytest.mark.plain_kernels
+def test_pairs_that_no_patch_may_reach_are_not_linked_and_rows_are_the_same(monkeypatch):
+    """Deep overlaps list facets within more than the depth: most lie beside the translation's shadow or look the wrong
+    way. Rows are those of all pairs linked, bit by bit, on sharp and swept bodies and with a margin."""
+    rng = rng_of("pairs that no patch may reach")
+    linked: list[int] = []
+    link_pairs = facet_manifolds.link_pairs
+    monkeypatch.setattr(facet_manifolds, "link_pairs", lambda pairs, n: linked.append(pairs.n) or link_pairs(pairs, n))
+    kept = of_all = wider = 0
+    for case in range(4):
+        ball = collide.Mesh(*bumpy_sphere(32, case))
+        other = (
+            collide.Box((1.0, 0.8, 0.6)), collide.ConvexHull(0.3 * rng.normal(size=(8, 3)), radius=0.05),
+            collide.Mesh(*CUBE),
+        )[case % 3]  # fmt: skip
+        way = rng.normal(size=3)
+        X_WB = collide.pose(way / np.linalg.norm(way) * rng.uniform(0.9, 1.3), rpy=rng.uniform(-3, 3, 3))
+        margin = 0.05 * (case % 2)
+        found = []
+        for culls in (True, False):
+            linked.clear()
+            with monkeypatch.context() as patched:
+                if not culls:
+                    patched.setattr(facet_manifolds, "_MOST_WAYS", -1)
+                    patched.setattr(contact_points, "_shadows_apart", lambda seen, axis: False)
+                found.append((collide.contacts(ball, other, EYE, X_WB, margin=margin).rows, list(linked)))
+        (rows, few), (want, all_of_them) = found
+        told = f"ball = bumpy_sphere(32, {case}), {other!r}, X_WB = {X_WB.tolist()}, margin = {margin}"
+        assert same_rows(rows, want) and len(few) == len(all_of_them), told
+        if len(few) > 1:
+            wider += 1
+            kept, of_all = kept + few[-1], of_all + all_of_them[-1]
+    assert wider >= 3 and kept < 0.7 * of_all, (wider, kept, of_all)
 
 
 # --- features -----------------------------------------------------------------------------------

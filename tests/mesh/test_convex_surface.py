@@ -9,6 +9,7 @@ from mesh_shapes import block_ring, box, bumpy_sphere
 from naive import hull_points, rng_of, rotation
 from naive_triangles import as_integers, cross, inner, minus, world_points
 
+import collide
 from collide.hull.exact_hull import convex_hull
 from collide.mesh import convex_surface
 from collide.mesh.convex_surface import is_own_hull
@@ -60,3 +61,24 @@ def test_too_large_ones_are_left_open(monkeypatch):
     vertices, faces = box()
     monkeypatch.setattr(convex_surface, "MAX_SIGNS", 10)
     assert not is_own_hull(vertices, faces)
+
+
+def test_solids_that_are_not_convex_are_refused_after_few_signs_and_flat_sides_need_few_integers(monkeypatch):
+    """Signs in doubles and points made integers are counted: a bumpy ball shows itself at its first facets, and points
+    of a box whose sides are grids, turned by any angle, become integers once, however many planes they are tested
+    against."""
+    looked_at, beyond = [], convex_surface._beyond
+    monkeypatch.setattr(
+        convex_surface, "_beyond", lambda points, f: looked_at.append(len(points) * len(f)) or beyond(points, f)
+    )
+    vertices, faces = bumpy_sphere(1500)
+    assert not is_own_hull(vertices, faces)
+    assert 0 < sum(looked_at) <= 0.02 * len(vertices) * len(faces), (looked_at, len(vertices), len(faces))
+    made, integers = [], convex_surface.integers
+    monkeypatch.setattr(convex_surface, "integers", lambda values: made.append(len(values)) or integers(values))
+    slab = collide.tessellate(collide.HeightField(np.zeros((9, 9)), (0.125, 0.125), bottom=-0.25))
+    for turned in (np.eye(3), rotation(rng_of("flat sides"))):
+        made.clear()
+        points = slab.vertices @ turned.T
+        assert is_own_hull(points, slab.faces) == by_definition(points, slab.faces)
+        assert made == [len(points)]
