@@ -1,8 +1,8 @@
 """Modules of kernels that a light module may need later: named where it imports, loaded when first used.
 
 Shapes can be made and certificates verified without any kernel. What a shape computes on request, its hull or the tree
-over its facets, takes kernels, and these are loaded then. `lazy_loader` has this for modules and for the names of a
-package, but would be a second package that every installation needs, where numpy is the only one.
+over its facets, takes kernels, and these are loaded then. Scientific Python's lazy-loader has this for modules and for
+the names of a package, but would be a second package that every installation needs, where numpy is the only one.
 """
 
 from __future__ import annotations
