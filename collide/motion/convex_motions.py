@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from threading import local
 from typing import Any, NamedTuple
 
@@ -14,6 +15,8 @@ from collide.motion.convex_impact import FREE
 from collide.motion.impact_jobs import begin_single, find_impacts
 from collide.motion.impact_rows import TimeOfImpact, free_rows, single_result
 from collide.motion.moving_body import BODY
+from collide.motion.parts_ahead import FEW_PAIRS, parts_ahead
+from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_kernel_calls import scratch
 from collide.narrowphase.pair_kernel import answer_pairs
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair
@@ -23,6 +26,8 @@ from collide.threads import pieces_of, share
 
 #: Jobs done in one call of the kernel: their list stays small beside the motions.
 JOBS_AT_ONCE = 1 << 16
+#: Pairs of parts of unions that are searched before a span of time is cut, to tell which of them come first.
+_PARTS_TOGETHER = 1024
 #: A thread is handed at least so many motions.
 _MIN_MOTIONS_PER_THREAD = 200
 
@@ -178,6 +183,19 @@ class _Bodies:
         return np.ascontiguousarray(np.stack([motion + first, part_a, part_a, part_b, part_b], axis=1))
 
 
+    def jobs_ahead(
+        self, shapes: list[Shape], a: int, b: int, k: int, motions: Motions, rows: np.ndarray
+    ) -> Iterator[np.ndarray]:
+        """`jobs` of motion k, of shapes a and b, in which parts may meet before what its row has found, in turn."""
+        motion, ranks = motions.picked(np.array([k])), (self.ranks[a : a + 1], self.ranks[b : b + 1])
+        flip = bool(motion.exchanged(ranks[0] > ranks[1], ranks[0] == ranks[1])[0])
+        unions = compound_parts(shapes[a]), compound_parts(shapes[b])
+        for i, j in parts_ahead(*unions, motion, lambda: float(rows["upper"][k]), _PARTS_TOGETHER):
+            order = np.lexsort((i, j)) if flip else np.arange(len(i))
+            part_a, part_b = self.first[a] + i[order], self.first[b] + j[order]
+            yield np.ascontiguousarray(np.stack([np.full(len(i), k), part_a, part_a, part_b, part_b], axis=1))
+
+
 def _bodies_of(shapes: list[Shape]) -> _Bodies:
     """Those of one pair are kept with A: a simulator asks about the same two again and again."""
     if len(shapes) > 2:
@@ -206,14 +224,17 @@ def convex_impacts(
     rows = free_rows(n)
     bodies = _bodies_of(shapes)
     per_motion = max(int((bodies.counts[a] * bodies.counts[b]).max(initial=1)), 1)
-    at_once = max(JOBS_AT_ONCE // per_motion, 1)
+    at_once = max(JOBS_AT_ONCE // per_motion, 1) if per_motion <= FEW_PAIRS else 1
 
     def work(piece: slice) -> None:
         header = header_of(Tables(bodies.table.addresses, len(bodies.table.packed), bodies.parts), motions)
         for first in range(piece.start, piece.stop, at_once):
             some = slice(first, min(first + at_once, piece.stop))
-            jobs = bodies.jobs(a[some], b[some], first, motions)
-            find_impacts(address_of(header), address_of(jobs), len(jobs), 0.0, 1.0, tolerance, address_of(rows))
+            for jobs in (
+                [bodies.jobs(a[some], b[some], first, motions)] if per_motion <= FEW_PAIRS
+                else bodies.jobs_ahead(shapes, int(a[first]), int(b[first]), first, motions, rows)
+            ):  # fmt: skip
+                find_impacts(address_of(header), address_of(jobs), len(jobs), 0.0, 1.0, tolerance, address_of(rows))
 
     workers = min(threads, n * per_motion // _MIN_MOTIONS_PER_THREAD)
     if workers < 2:

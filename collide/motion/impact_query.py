@@ -84,10 +84,14 @@ def time_of_impact(
     Notes
     -----
     Conservative advancement (Mirtich 1996; Zhang et al. 2006; Tang, Kim and Manocha 2009) along separating axes that
-    are kept, with spans proven by the chord of a function of bounded curvature (`motion/kept_axis.py`); facets of
-    meshes are culled span by span with motion bounds: O(n) of n facets that come near, a few times over, seconds where
-    10^5 facets meet 10^5. Convex pairs: 2 to 8 questions to GJK, some microseconds. Spins:
-    steps are about √(gap / (|ω|² reach)), so a pair of many turns takes some steps a turn.
+    are kept, with spans proven by the chord of a function of bounded curvature (`motion/kept_axis.py`). Convex pairs:
+    2 to 8 questions to GJK, some microseconds. Spins: steps are about √(gap / (|ω|² reach)), so a pair of many turns
+    takes some steps a turn.
+
+    Meshes: facets are culled span by span with motion bounds, spans cut where the distance says: a distance for each of
+    some ten spans, and O(k) of the k pairs of facets that come near together in the last; a hull counts as one facet.
+    All n m pairs of facets where they come together at once, as of flush faces: seconds of 10^5. Unions of m and k
+    parts: pairs of parts whose boxes come near before the contact, O((m + k) log k) a span; m k where all do.
     """
     n_threads = check_threads(threads)
     width = _checked_tolerance(tolerance)

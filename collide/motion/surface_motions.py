@@ -33,7 +33,9 @@ from collide.motion.convex_impact import CONTACT, OPEN
 from collide.motion.convex_motions import JOBS_AT_ONCE, Motions, Tables, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
-from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
+from collide.motion.parts_ahead import FEW_PAIRS, Spans, parts_ahead
+from collide.motion.span_bounds import REACH
+from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.facets.facet_queries import facets_within
 from collide.narrowphase.facets.mesh_batches import pair_rows
@@ -56,6 +58,8 @@ _SHORTEST = 2.0**-46
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
 _BALLS_OUTWARD = 1e-2
 _ULP = 2.0**-53
+#: Pairs of pieces of unions that are searched before a span of time is cut, to tell which of them come first.
+_PIECES_TOGETHER = 4
 #: Jobs of two meshes that are done before it is looked whether one came to nothing; twice as many each time.
 _JOBS_IN_TURN = 4
 
@@ -172,11 +176,26 @@ def surface_impacts(A: Shape, B: Shape, motions: Motions, tolerance: float, rows
 
 def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np.ndarray) -> None:
     """`surface_impacts` in the order worked on."""
-    pieces = [(a, b) for a in pieces_of(A) for b in pieces_of(B)]
+    pieces_a, pieces_b = pieces_of(A), pieces_of(B)
+    is_part = isinstance(A, Compound), isinstance(B, Compound)
+    if len(pieces_a) * len(pieces_b) <= FEW_PAIRS:
+        _search_pieces([(a, b) for a in pieces_a for b in pieces_b], motions, tolerance, rows, is_part)
+        return
+    for k in range(len(rows)):
+        motion, row = motions.picked(np.array([k])), rows[k : k + 1]
+        unions = compound_parts(A), compound_parts(B)
+        for some in parts_ahead(*unions, motion, lambda row=row: float(row["upper"][0]), _PIECES_TOGETHER):
+            pairs = [(pieces_a[i], pieces_b[j]) for i, j in zip(*(numbers.tolist() for numbers in some))]
+            _search_pieces(pairs, motion, tolerance, row, is_part)
+
+
+def _search_pieces(
+    pieces: list[tuple[Piece, Piece]], motions: Motions, tolerance: float, rows: np.ndarray, is_part: tuple[bool, bool]
+) -> None:
+    """The same of some pairs of pieces."""
     convex = [(a, b) for a, b in pieces if not _needs_facets(a, b)]
     for a, b in convex:
         _convex_pieces(a, b, motions, tolerance, rows)
-    is_part = isinstance(A, Compound), isinstance(B, Compound)
     of_facets = [(a, b) for a, b in pieces if _needs_facets(a, b)]
     large = []
     for a, b in of_facets:
@@ -283,33 +302,22 @@ def _do(table, n_shapes: int, parts, motions: Motions, jobs, begin: float, end: 
     find_impacts(address_of(header), address_of(jobs), len(jobs), begin, end, tolerance, address_of(rows))
 
 
-class _Spans:
-    """Spans of one motion of two pieces."""
+class _Spans(Spans):
+    """Spans of one motion of two pieces, and the facets that may meet in them."""
 
     def __init__(self, a: Piece, b: Piece, motion: Motions):
+        super().__init__(_parts(a, b), (a.reach, b.reach, a.slop + b.slop), motion)
         self.a, self.b = a, b
-        self.parts, self.reaches = _parts(a, b), np.array([a.reach, b.reach, a.slop + b.slop])
-        self._work, self._out = np.zeros(WORKSPACE), np.zeros(OUT)
-        self._held, self._normal = motion, np.zeros((1, 3))
-        addresses = [0 if X is None else address_of(X) for X in motion]
-        self._header = np.array([*addresses, address_of(self.parts), address_of(self.reaches)], dtype=np.int64)
-
-    def _describe(self, begin: float, end: float) -> np.ndarray:
-        describe_span(address_of(self._header), begin, end, address_of(self._work), address_of(self._out))
-        return self._out
-
-    def time_of_balls(self) -> tuple[float, float]:
-        """The time in which balls about both bodies' origins meet; begin > end where they never do."""
-        return tuple(self._describe(0.0, 1.0)[BEGIN : END + 1].tolist())
+        self._normal = np.zeros((1, 3))
 
     def placed(self, time: float) -> Placed:
         """Where the pieces are at a time; of a span without a length the reach is what poses miss the motion by."""
-        out = self._describe(time, time)
+        out = self.describe(time, time)
         return Placed(out[:16].reshape(4, 4).copy(), out[16:32].reshape(4, 4).copy(), float(out[REACH]))
 
     def near_facets(self, begin: float, end: float, most: int) -> np.ndarray | None:
         """(k, 2) facets that may meet in a span of time; None where there are more than ``most``."""
-        out = self._describe(begin, end)
+        out = self.describe(begin, end)
         convex = None if self.a.is_mesh and self.b.is_mesh else self.b if self.a.is_mesh else self.a
         if convex is not None and (convex.has_many_facets or (convex.is_curved and out[REACH] < convex.radius)):
             return self._near_convex(convex, out, most)
@@ -355,7 +363,7 @@ class _Spans:
         No contact is before the begin: distances shrink by μ in unit time at most (conservative advancement, Mirtich
         1996). The scale is the time in which the smaller body may move by its own size.
         """
-        reach, half = float(self._describe(begin, end)[REACH]), 0.5 * (end - begin)
+        reach, half = float(self.describe(begin, end)[REACH]), 0.5 * (end - begin)
         at = self.placed(begin)
         shapes = (self.a, self.b) if self.a.is_mesh else (self.b, self.a)
         X = (at.X_A, at.X_B) if self.a.is_mesh else (at.X_B, at.X_A)

@@ -1,0 +1,110 @@
+"""Pairs of parts of two unions in one motion, in the order of the spans of time in which they may first meet.
+
+In a span of length h no point of one union comes nearer the other than μ h / 2 to where it is at the middle
+(`span_bounds.py`, for the unions as a whole). Parts whose boxes are farther apart there do not meet in the span. Spans
+in which too many may are cut in half.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from collide.kernels import address_of
+from collide.lowering.compound_table import PART
+from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
+from collide.narrowphase.composite.composite_parts import CompoundParts, boxes_near
+
+if TYPE_CHECKING:
+    from collide.motion.convex_motions import Motions
+
+#: Of so few pairs of parts all are asked.
+FEW_PAIRS = 64
+#: Spans are cut until bodies move by so much of the smaller one's reach in half of them, or are so short.
+_LEAST_MOVED, _SHORTEST = 2.0**-6, 2.0**-46
+
+
+class Spans:
+    """Spans of one motion of two pieces.
+
+    parts : (2, PART) where they are in their bodies.   reaches : how far each reaches from its own origin, and their
+    slop [m].
+    """
+
+    def __init__(self, parts: np.ndarray, reaches: tuple[float, float, float], motion: Motions):
+        self.parts, self._reaches = parts, np.array(reaches)
+        self._work, self._out = np.zeros(WORKSPACE), np.zeros(OUT)
+        self._held = motion
+        addresses = [0 if X is None else address_of(X) for X in motion]
+        self._header = np.array([*addresses, address_of(self.parts), address_of(self._reaches)], dtype=np.int64)
+
+    def describe(self, begin: float, end: float) -> np.ndarray:
+        """What `describe_span` gives, until it is called again."""
+        describe_span(address_of(self._header), begin, end, address_of(self._work), address_of(self._out))
+        return self._out
+
+    def time_of_balls(self) -> tuple[float, float]:
+        """The time in which balls about both bodies' origins meet; begin > end where they never do."""
+        return tuple(self.describe(0.0, 1.0)[BEGIN : END + 1].tolist())
+
+
+def parts_ahead(
+    A: CompoundParts, B: CompoundParts, motion: Motions, upper: Callable[[], float], few: int
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yields (parts of A, parts of B) (k,), ascending, of pairs that were not named before, span by span: all that may
+    meet before a time.
+
+    upper : that time, which may have become less meanwhile.   few : so many pairs are named before a span is cut.
+    """
+    named = np.zeros((len(A.parts), len(B.parts)), dtype=bool)
+    parts = np.zeros((2, PART))
+    parts[:, [0, 4, 8]] = 1.0
+    spans = Spans(parts, (_reach(A), _reach(B), _slop(A) + _slop(B)), motion)
+    least = _LEAST_MOVED * min(_reach(A), _reach(B))
+    begin, end = (0.0, 1.0) if A.unbounded or B.unbounded else spans.time_of_balls()
+    to_do = [(begin, end)] if begin <= end else []
+    while to_do:
+        begin, end = to_do.pop()
+        end = min(end, upper())
+        if begin > end:
+            continue
+        out = spans.describe(begin, end)
+        X_A, X_B = out[:16].reshape(4, 4).copy(), out[16:32].reshape(4, 4).copy()
+        reach = float(out[REACH]) + _turn_together(A, B, X_A, X_B)
+        _, a, b = boxes_near(A, B, X_A[None], X_B[None], reach)
+        is_new = ~named[a, b]
+        a, b = a[is_new], b[is_new]
+        if len(a) > few and end - begin > _SHORTEST and out[REACH] > least:
+            middle = 0.5 * (begin + end)
+            to_do += [(middle, end), (begin, middle)]
+            continue
+        named[a, b] = True
+        if len(a):
+            order = np.lexsort((b, a))
+            yield a[order], b[order]
+
+
+def _turn_together(A: CompoundParts, B: CompoundParts, X_A: np.ndarray, X_B: np.ndarray) -> float:
+    """Turn both, in place, so that a body of one part stands along the axes, where its box is tight; returns what
+    rounding takes from distances thereby [m]."""
+    if len(A.parts) > 1 and len(B.parts) > 1:
+        return 0.0
+    Q, _ = np.linalg.qr(X_B[:3, :3] if len(B.parts) == 1 else X_A[:3, :3])  # a rotation or mirror, to rounding
+    X_A[:3], X_B[:3] = Q.T @ X_A[:3], Q.T @ X_B[:3]
+    return 2.0**-44 * (_reach(A) + _reach(B) + float(np.abs(X_B[:3, 3]).sum()))
+
+
+def _slop(union: CompoundParts) -> float:
+    """How far rounding moved any part in the union at most [m]."""
+    columns = union.columns
+    return float((columns.rotation * columns.reach + columns.shift).max()) * (1.0 + 2.0**-40)
+
+
+def _reach(union: CompoundParts) -> float:
+    """How far parts that have an end reach from the union's origin, at most [m]."""
+    columns = union.columns
+    at = np.sqrt(np.square(columns.X[:, :3, 3]).sum(axis=1))
+    reach = np.where(np.isnan(columns.plane), 1.001 * (columns.reach + columns.radius + columns.slop), 0.0)
+    return float((at + reach).max()) * (1.0 + 2.0**-30)
