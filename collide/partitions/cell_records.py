@@ -75,7 +75,7 @@ class ConvexCells:
         before = np.cumsum([0] + [len(part.vertices) for part in parts])
         self.loops = np.concatenate([part.loops + n for n, part in zip(before, parts)])
         of_facet = np.concatenate([part.facet for part in parts])
-        self.facet = np.where(of_facet >= 0, facets[of_facet], -1)
+        self._of_facet, self.facet = of_facet, np.where(of_facet >= 0, facets[of_facet], -1)
         self.axis, self.value, self.side = (
             np.concatenate([getattr(part, name) for part in parts]) for name in ("axis", "value", "side")
         )
@@ -176,9 +176,11 @@ class ConvexCells:
             at = self.vertices[self.loops[self.loop_starts[row] : self.loop_starts[row + 1]]]
             if self.facet[row] < 0:
                 normals[k, self.axis[row]] = -self.side[row]
-            else:
-                normals[k] = np.cross(at - at[0], np.roll(at, -1, axis=0) - at[0]).sum(axis=0)
-                normals[k] /= np.linalg.norm(normals[k]) or 1.0
+            else:  # of the facet: corners of a face thinner than rounding tell nothing
+                *n, _ = self.source.tree.planes.coefficients(self._of_facet[row : row + 1])[0]
+                largest = -int(self.side[row]) * max(map(abs, n))
+                normals[k] = [v / largest for v in n]
+                normals[k] /= np.linalg.norm(normals[k])
             offsets[k] = (at @ normals[k]).max()
         return CellPlanes(self.facet[rows], self.axis[rows], self.value[rows], self.side[rows], normals, offsets)
 
