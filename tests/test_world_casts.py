@@ -82,8 +82,9 @@ def test_rays_tell_the_part_and_the_body():
 
 
 def test_half_spaces_are_met_by_every_ray_and_are_near_to_every_point():
-    """Two of them, one a body of a union: neither has a box."""
+    """Two of them, one a body of a union: neither has a box. A ball is before them, and not met."""
     world = collide.World()
+    world.add(BALL, pose(t=(0, 90.0, 0)))
     floor = world.add(collide.Halfspace((0, 0, 1.0), 0.0))
     wall = world.add(collide.Compound([(BALL, pose(t=(0, 0, 9.0))), (collide.Halfspace((1.0, 0, 0), -3.0), np.eye(4))]))
     rays = world.raycast([(0, 0, 1.0), (0, 0, 1.0), (0, 0, 1.0)], [(0, 0, -2.0), (-1.0, 0, 0), (1.0, 0, 0)])

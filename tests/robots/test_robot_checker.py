@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -425,3 +426,46 @@ def test_an_attached_half_space_meets_what_is_in_it():
     assert checker.distances([[-1.0]]).rows["distance"][0] == pytest.approx(0.5)
     certified = checker.certify_edges([[-1.0], [-1.0], [-9.0]], [[-0.6], [1.0], [-0.501]])
     assert certified.free.tolist() == [True, False, True]
+
+
+def test_a_checker_of_a_scene():
+    """Its robot where it stands with what it carries, other bodies with their groups, and pairs that are allowed."""
+    ball, X_WR = collide.Sphere(0.1), pose(t=(3.0, 0, 0))
+    carried = {"cart": ("cart", np.eye(4)), "cup": ("cart", pose(t=(0, 0.5, 0)))}
+    bodies = [
+        SimpleNamespace(name=name, shape=ball, X_WB=pose(t=(x, y, 0)), static=static, group=group, mask=0xFFFF)
+        for name, x, y, static, group in (
+            ("cart", 3.0, 0, False, 1), ("cup", 3.0, 0.5, False, 1), ("post", 3.5, 0.5, True, 1),
+            ("ghost", 3.0, 0, False, 0), ("wall", 3.5, 0.0, True, 1),
+        )
+    ]  # fmt: skip
+    placements = {"slider": SimpleNamespace(robot=slider(), X_WR=X_WR, carried=carried)}
+    scene = SimpleNamespace(name="scene", placements=placements, bodies=bodies, allowed=[("cart", "wall")])
+    for name in (None, "slider"):
+        checker = collide.RobotChecker.from_scene(scene, name, padding=0.0)
+        assert checker.bodies == ["cup", "cart"] and checker.around == ["post", "ghost", "wall"]
+        assert checker.collides([[0.0], [0.5]]).tolist() == [False, True]
+        assert checker.explain([0.5]).collisions[0][:2] == ("cup", "post") and checker.n_pairs == 3
+        assert checker.world.body("post").static and not checker.world.body("ghost").static
+    assert not collide.RobotChecker.from_scene(scene, allowed=[("cup", "post")]).collides([0.5])
+    placements["other"] = placements["slider"]
+    for asked in (None, "arm"):
+        with pytest.raises(InvalidArgument, match=f"scene scene: robot={asked!r}; its robots: slider, other"):
+            collide.RobotChecker.from_scene(scene, asked)
+    placements.clear()
+    with pytest.raises(InvalidArgument, match="scene scene: robot=None; its robots: none"):
+        collide.RobotChecker.from_scene(scene)
+    with pytest.raises(InvalidArgument, match=r"scene must be what collide.scenes.load gives, got 3"):
+        collide.RobotChecker.from_scene(3)
+
+
+def test_edges_of_one_end_or_many_and_resolutions_that_are_none():
+    world = collide.World()
+    world.add(collide.Sphere(0.1), pose(t=(0.5, 0, 0)), name="ball")
+    checker = collide.RobotChecker(slider(), world)
+    assert checker.edge_collides([0.0], [[0.25], [1.0]]).tolist() == [False, True]
+    assert checker.edge_collides([[0.0], [1.0]], [0.0]).tolist() == [False, True]
+    for wrong in (0.0, -1.0, np.inf, np.nan, "fine", None):
+        for ask in (checker.edge_collides, checker.certify_edges):
+            with pytest.raises(InvalidArgument, match=r"resolution must be a positive number .*, got"):
+                ask([0.0], [1.0], resolution=wrong)

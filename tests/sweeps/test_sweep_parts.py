@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,12 +13,14 @@ from plain_robots import joint, robot_of
 from slow_checker import SlowChecker
 
 from collide import InvalidArgument, SceneError, Sphere
+from collide.sweeps import pair_tables
 from collide.sweeps.configurations import (
     DrawnConfigurations,
     GivenConfigurations,
     as_configurations,
     read_configurations,
 )
+from collide.sweeps.pair_proposal import ADJACENT, ALWAYS, DEFAULT, NEVER
 from collide.sweeps.process_pool import ProcessPool
 from collide.sweeps.sweep import MAX_CHUNKS, SweepRun, _duration, _Pace
 from collide.sweeps.sweep_directory import MANIFEST, SCHEMA, SweepDirectory, _is_manifest, _number_of
@@ -258,3 +261,11 @@ def test_processes_answer_every_chunk_and_end():
     assert hits.tolist() == (Q.Q[:, 0] >= 0.25).tolist()
     pool.close()
     assert pool.pids() == [] and not any(thread.is_alive() for thread in pool._threads)
+
+
+def test_pairs_of_links_are_counted_by_reason(monkeypatch):
+    reasons = [ADJACENT, NEVER, None, ADJACENT, NEVER, NEVER, None]
+    proposal = SimpleNamespace(pairs=[SimpleNamespace(reason=reason) for reason in reasons])
+    monkeypatch.setattr(pair_tables, "never_words", lambda proposal: ())
+    counts = {row[0]: row[1] for row in pair_tables._by_reason(proposal).rows}
+    assert counts == {ADJACENT: "2", DEFAULT: "0", ALWAYS: "0", NEVER: "3", "tested": "2"}
