@@ -184,7 +184,11 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
     for k in range(len(rows)):
         motion, row = motions.picked(np.array([k])), rows[k : k + 1]
         unions = compound_parts(A), compound_parts(B)
-        for some in parts_ahead(*unions, motion, lambda row=row: float(row["upper"][0]), _PIECES_TOGETHER):
+
+        def upper(row: np.ndarray = row) -> float:
+            return float(row["upper"][0])
+
+        for some in parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
             pairs = [(pieces_a[i], pieces_b[j]) for i, j in zip(*(numbers.tolist() for numbers in some))]
             _search_pieces(pairs, motion, tolerance, row, is_part)
 
