@@ -140,7 +140,7 @@ def test_pairs_that_no_patch_may_reach_are_not_linked_and_rows_are_the_same(monk
             linked.clear()
             with monkeypatch.context() as patched:
                 if not culls:
-                    patched.setattr(facet_manifolds, "_MOST_WAYS", -1)
+                    patched.setattr(facet_manifolds, "_MAX_WAYS", -1)
                     patched.setattr(contact_points, "_shadows_apart", lambda seen, axis: False)
                 found.append((collide.contacts(ball, other, EYE, X_WB, margin=margin).rows, list(linked)))
         (rows, few), (want, all_of_them) = found
