@@ -30,13 +30,14 @@ from collide.errors import CollideError
 BAR = 50.0
 #: The worst that searches have met, of each class: "question A B ratio place".
 WORST = (
-    "contacts ball:80000 box 1 deep", "contacts ball:80000 box 0.2 deep",
-    "contacts cans:1000 balls:1000 1 inside", "contacts meshes:100 box 1 deep",
-    "distance meshes:100 box 1 far", "distance meshes:100 box 1 deep",
-    "gap boxes:1000 slab:300 1e+07 far",
+    "contacts ball:80000 box 1 deep", "contacts ball:80000 box 0.2 deep", "within terrain:80000 cans:1000 1 inside",
+    "distance terrain:80000 cylinder 1e+07 inside", "contacts cans:1000 balls:1000 1 inside",
+    "contacts meshes:100 box 1 deep",
+    "collide meshes:1000 box 1 inside", "distance meshes:100 box 1 far", "distance meshes:100 box 1 deep",
+    "distance boxes:100 terrain:300 1e+07 far", "gap boxes:1000 slab:300 1e+07 far",
     "within meshes:1000 cylinder 1e+07 inside", "within cans:3 terrain:10000 0.01 inside",
     "distance terrain:80000 rounded:100000 1e+07 touching", "distance terrain:80000 cans:1000 100 inside",
-    "shape_cast cans:1000 boxes:1000 1 far",
+    "distance terrain:80000 capsule 1e+07 inside", "shape_cast cans:1000 boxes:1000 1 far",
     "shape_cast cylinder meshes:1000 100 inside", "certify terrain:10000 hull:1000 1e-07 inside",
     "impact hull:100000 terrain:80000 100 far", "impact ball:10000 hull:100000 1e+07 near",
     "impact sheet:80000 boxes:1000 1e+07 far", "impact cans:1000 slab:300 1e+07 touching",

@@ -86,7 +86,7 @@ _FIXED_WORDS = TRANSLATION_WORDS + CLEARING_WORDS + 18 + 8 + CELLS
 #: Integers that are kept of a pair while more are listed: those of the list, and its group.
 _KNOWN = INTS_OF_PAIR + 1
 #: Pairs are compared one by one with translations where these are no more.
-_MOST_WAYS = 8
+_MAX_WAYS = 8
 
 
 def workspace_words(capacity: int) -> int:
@@ -364,7 +364,7 @@ def _list_wider(task, frame, ways, reach):
 def _may_be_in_a_patch(frame, ways, k):
     """Whether a pair that was not listed at first may be in the patch of a translation."""
     n_ways = ways.counts[N_WAYS]
-    if n_ways > _MOST_WAYS:
+    if n_ways > _MAX_WAYS:
         return True
     for i in range(n_ways):
         if may_be_reached(frame, k, axes_across(vec3_at(ways.ways, 3 * i)), ways.lengths[i]):

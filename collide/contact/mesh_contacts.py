@@ -36,9 +36,8 @@ from collide.narrowphase.facets.facets_within import list_near_pairs
 from collide.shapes.shape import Shape
 from collide.threads import pieces_of, share
 
-#: Pairs of facets there is space for to begin with, what of it is kept from call to call, what a call after one that
-#: needed it begins with, so that nothing is done twice, and at most: a gigabyte.
-_FEWEST_PAIRS, _KEPT_PAIRS, _BEGUN_WITH, MAX_PAIRS = 1 << 10, 1 << 14, 1 << 16, 1 << 18
+#: Pairs of facets there is space for to begin with, what of it is kept from call to call, and at most: a gigabyte.
+_FEWEST_PAIRS, _KEPT_PAIRS, MAX_PAIRS = 1 << 10, 1 << 14, 1 << 18
 #: Rows there is space for to begin with, and so many more a pose.
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
 #: Poses that are worth a thread of their own.
@@ -184,9 +183,10 @@ class _OfThread(local):
         self._keep(min(4 * self._capacity, MAX_PAIRS))
 
     def shrink(self) -> None:
-        """Give back what is more than a thread may keep: memory in place of it that nobody has touched."""
+        """Give back what is more than a thread may keep. The next call begins with that much: less is worked out anew
+        for want of space."""
         if self._capacity > _KEPT_PAIRS:
-            self._keep(min(self._capacity, _BEGUN_WITH))
+            self._keep(_KEPT_PAIRS)
 
 
 _of_thread = _OfThread()

@@ -17,7 +17,7 @@ from collide.mesh.bvh import CENTRE, EXPONENT, REACH, WIDTH, Box, box_at
 from collide.mesh.triangle import Triangle, normal_of, triangle_at
 from collide.narrowphase.facets.filtered_triangles import TINY, sign_error
 from collide.narrowphase.facets.posed_surfaces import ERROR, N_ERROR, SHIFT, M, N
-from collide.numerics.vec3 import Vec3, absolute, add, component, dot, max_abs, rotate, scale, sub, vec3_at
+from collide.numerics.vec3 import absolute, add, component, dot, max_abs, neg, rotate, scale, sub, vec3_at
 
 _U = 2.0**-53
 #: Boxes smaller than this share of the other tree's unit are lost in floats of that: they are off by 2⁻¹⁶ of it.
@@ -49,13 +49,13 @@ def without_missed(placing, which, tree, facet, nodes, node, mask):
     placed = _placed(placing, which, tree, facet, nodes)
     centre = vec3_at(nodes.numbers, CENTRE)
     unit = math.ldexp(1.0, int(nodes.header[EXPONENT]))
-    kept = mask
+    remaining = mask
     for slot in range(WIDTH):
         if (mask >> slot) & 1:
             box = box_at(nodes, WIDTH * node + slot)
             if _misses(placed, Box(add(centre, scale(unit, box.centre)), scale(unit, box.half))):
-                kept -= 1 << slot
-    return kept
+                remaining -= 1 << slot
+    return remaining
 
 
 @kernel
@@ -92,20 +92,20 @@ def _misses(facet, box):
     return (
         _parted_across(u, v, w, box.half, across)
         or _parted_across(v, u, w, box.half, across)
-        or _parted_across(sub(v, u), Vec3(-u.x, -u.y, -u.z), sub(w, u), box.half, across)
+        or _parted_across(sub(v, u), neg(u), sub(w, u), box.half, across)
     )
 
 
 @kernel(inline=True)
-def _parted_across(edge, other, w, half, error):
-    """Whether one of the box's axes across an edge parts them.   other, w : the third corner and the box's middle as
+def _parted_across(edge, third, w, half, error):
+    """Whether one of the box's axes across an edge parts them.   third, w : the third corner and the box's middle as
     the edge's first corner sees them."""
     return (
-        _parted(edge.y * other.z - edge.z * other.y, edge.y * w.z - edge.z * w.y,
+        _parted(edge.y * third.z - edge.z * third.y, edge.y * w.z - edge.z * w.y,
                 abs(edge.y) * half.z + abs(edge.z) * half.y + error)
-        or _parted(edge.z * other.x - edge.x * other.z, edge.z * w.x - edge.x * w.z,
+        or _parted(edge.z * third.x - edge.x * third.z, edge.z * w.x - edge.x * w.z,
                    abs(edge.z) * half.x + abs(edge.x) * half.z + error)
-        or _parted(edge.x * other.y - edge.y * other.x, edge.x * w.y - edge.y * w.x,
+        or _parted(edge.x * third.y - edge.y * third.x, edge.x * w.y - edge.y * w.x,
                    abs(edge.x) * half.y + abs(edge.y) * half.x + error)
     )  # fmt: skip
 
