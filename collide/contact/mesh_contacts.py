@@ -38,6 +38,8 @@ from collide.threads import pieces_of, share
 
 #: Pairs of facets there is space for to begin with, what of it is kept from call to call, and at most: a gigabyte.
 _FEWEST_PAIRS, _KEPT_PAIRS, MAX_PAIRS = 1 << 10, 1 << 14, 1 << 18
+#: Space that has grown is kept for so many calls, 15 or 59 MB; to grow it again lists the pairs of one call twice.
+_CALLS_KEPT = 256
 #: Rows there is space for to begin with, and so many more a pose.
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
 #: Poses that are worth a thread of their own.
@@ -171,7 +173,7 @@ class _OfThread(local):
         self._keep(_FEWEST_PAIRS)
 
     def _keep(self, capacity: int) -> None:
-        self._capacity = capacity
+        self._capacity, self._calls = capacity, 0
         self._words = np.empty(workspace_words(capacity))
 
     @property
@@ -183,10 +185,13 @@ class _OfThread(local):
         self._keep(min(4 * self._capacity, MAX_PAIRS))
 
     def shrink(self) -> None:
-        """Give back what is more than a thread may keep. The next call begins with that much: less is worked out anew
-        for want of space."""
+        """After a call: give back what is more than a thread may keep, so that the next call begins with that much and
+        works out less anew for want of space; and what was grown so many calls ago."""
+        self._calls += 1
         if self._capacity > _KEPT_PAIRS:
             self._keep(_KEPT_PAIRS)
+        elif self._capacity > _FEWEST_PAIRS and self._calls >= _CALLS_KEPT:
+            self._keep(_FEWEST_PAIRS)
 
 
 _of_thread = _OfThread()

@@ -317,3 +317,15 @@ def test_spread_reaches_what_is_linked():
         )
         far += len(wanted) > seeds.sum()
     assert far > 20
+
+
+def test_a_workspace_that_grew_is_given_back_after_some_calls(monkeypatch):
+    """11 MB stayed with a thread for ever after one pair of many facets; small pairs do not need them."""
+    space = mesh_contacts._OfThread()
+    monkeypatch.setattr(mesh_contacts, "_of_thread", space)
+    space.grow()
+    grown, small, X = space._words.nbytes, collide.Mesh(*CUBE), collide.pose((0, 0, 0.45))
+    for k in range(mesh_contacts._CALLS_KEPT):
+        assert space._words.nbytes == grown, f"given back after {k} calls"
+        assert len(collide.contacts(small, small, EYE, X))
+    assert space._words.nbytes < 0.3 * grown and space._capacity == mesh_contacts._FEWEST_PAIRS

@@ -185,20 +185,37 @@ GIVEN = {
     "robots": "X_LS = np.eye(4); world = collide.World(); Q = Q0 = np.zeros((2, 1)); Q1 = Q + 0.1; q = Q[0]",
     "solids": "",
     "worlds": "",
+    "disabled-pairs": "robot = collide.Robot.load('two_links.urdf')",
+    "engines": "",
+    "pages": "from collide.cli import main\nmain(['report', 'scene.yaml', '--html', 'page.html'])\n"
+    "world = collide.World(); ids = [world.add(collide.Sphere(1))]\n"
+    "times, poses = (0.0, 0.1), lambda t: [collide.pose((t, 0, 0))]",
+    "report-schema": "from collide.cli import main\n"
+    "main(['report', 'scene.yaml', '--json', 'report.json', '--geometry'])",
+    "scene-format": "",
 }
+#: Packages that a page's Python needs.
+NEEDED = {
+    "robots": ("yaml", "mujoco"), "disabled-pairs": ("yaml",), "engines": ("mujoco",), "pages": ("yaml",),
+    "report-schema": ("yaml", "trimesh"), "scene-format": ("yaml",),
+}  # fmt: skip
 #: Pages whose Python is not run here, and where it is, or why it is not.
 ELSEWHERE = {
-    "disabled-pairs": "tests/sweeps", "sweeps": "tests/sweeps", "engines": "tests/adapters",
-    "fuzzing": "tests/adapters", "hosts": "tests/adapters, one file a host",
-    "pages": "tests/pages", "report-schema": "tests/reports", "scene-format": "tests/scenes",
+    "sweeps": "a million configurations in 16 processes: tests/sweeps/test_sweep.py makes the calls, of fewer",
+    "fuzzing": "ten minutes, and objects of four engines: tests/adapters/fuzzing makes the calls, of less",
+    "hosts": "each part needs its host, and some take the host's place in the process: tests/adapters, one file a host",
 }
 _ARM = """<robot name="panda"><link name="base"/><link name="panda_hand"><collision><geometry><box size="0.1 0.1 0.1"/>
 </geometry></collision></link><joint name="turn" type="revolute"><parent link="base"/><child link="panda_hand"/>
 <origin xyz="0.5 0 0"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
 _FILES = {
     "panda.urdf": _ARM,
+    "two_links.urdf": _ARM.replace(
+        '<link name="base"/>', '<link name="base"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
+    ),
     "scene.yaml": "collide: 1\nrobots:\n  - {urdf: panda.urdf}\nbodies:\n"
     "  - {name: table, shape: {box: {size: [1, 1, 0.1]}}, pose: {xyz: [0, 0, -1]}}\n",
+    "my_scene.yaml": "collide: 1\nbodies:\n  - {name: ball, shape: {sphere: {radius: 1}}}\n",
     "arm.xml": '<mujoco><worldbody><body name="a"><joint name="turn"/><geom size="0.1"/></body></worldbody>'
     '<keyframe><key name="home" qpos="0.5"/></keyframe></mujoco>',
 }
@@ -219,8 +236,7 @@ def test_python_of_every_page_is_run_somewhere():
 @pytest.mark.parametrize("name", GIVEN)
 def test_python_in_pages_runs(name, tmp_path):
     """All of a page's Python, in order, in one interpreter, after what the page takes as given."""
-    needed = {"robots": ("yaml", "mujoco"), "README": ()}.get(name, ())
-    missing = [package for package in needed if find_spec(package) is None]
+    missing = [package for package in NEEDED.get(name, ()) if find_spec(package) is None]
     if missing:
         pytest.skip(f"{', '.join(missing)} not installed")
     for file, text in _FILES.items():

@@ -121,7 +121,7 @@ def test_motions_that_are_certified_free_have_no_sample_that_meets(settings):
                 assert not hits, f"Setting({seed}), motion {k} is certified free, and meets at t = {hits[0]!r}"
             elif edges.collides[k]:
                 found += any(setting.collides(setting.Q0[k] + t * step) for t in setting.times.tolist())
-    assert total >= 3 * SEEDS and free >= 0.2 * total and collides >= 0.2 * total, (free, collides, total)
+    assert total >= 3 * SEEDS and free >= 0.2 * total and collides >= 0.1 * total, (free, collides, total)
     assert found >= 0.7 * collides, f"the judge finds {found} of {collides} motions that collide: it would notice"
 
 

@@ -40,14 +40,16 @@ class Facets:
         return np.arange(len(self.pose)) - np.repeat(starts, counts)
 
 
-def few_near_facets(
-    tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: float, most: int
-) -> Facets | None:
-    """`near_facets` at one pair of poses; None where more than about ``most`` are near, after few of them."""
+def near_facets_up_to(
+    tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: float,
+    max_facets: int,
+) -> Facets | None:  # fmt: skip
+    """`near_facets` at one pair of poses; None where more than about ``max_facets`` are near, after few of them."""
     blocks: list = []
-    for block in _walk(tree, _Spans(tree, packed, A, B, along), np.array([upper]), np.zeros(1, dtype=np.int64), most):
+    spans, pose = _Spans(tree, packed, A, B, along), np.zeros(1, dtype=np.int64)
+    for block in _walk(tree, spans, np.array([upper]), pose, max_facets):
         blocks.append(block)
-        if sum(len(places) for _, places, _ in blocks) > most:
+        if sum(len(places) for _, places, _ in blocks) > max_facets:
             return None
     return Facets(*(np.concatenate(column) for column in zip(*blocks))) if blocks else None
 
@@ -64,10 +66,10 @@ def near_facets(
     return Facets(*(np.concatenate(column) for column in zip(*blocks)))
 
 
-def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, most: int | None = None):
+def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, max_facets: int | None = None):
     """Yields (pose, place, bound) of the facets that may be near enough, block by block.
 
-    most : nothing where more boxes than so many are near, of which each holds a facet.
+    max_facets : nothing where more boxes than so many are near, of which each holds a facet.
     """
     links = tree.links()
     pose, at = poses, np.zeros(len(poses), dtype=np.int64)
@@ -83,7 +85,7 @@ def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, m
         pose, link = pose[near], link[near]
         leaf = link < 0
         runs.append((pose[leaf], link[leaf]))
-        if most is not None and len(pose) - len(runs[-1][0]) + sum(len(run) for run, _ in runs) > most:
+        if max_facets is not None and len(pose) - len(runs[-1][0]) + sum(len(run) for run, _ in runs) > max_facets:
             return
         pose, at = pose[~leaf], link[~leaf]
         if len(at) * WIDTH > _MAX_BOXES and len(poses) > 1:
