@@ -72,12 +72,12 @@ def _outward(A, B, far: list[int], near: list[int]) -> tuple[Fraction, Fraction,
     cast grazes, an artificial variable stays in the basis at 0, far is not 0, and near alone bounds nothing. A power of
     two is large enough for M: pairs with far · (a − b) + far₃ = 0 have it of near, all others have it from some M on.
     """
-    many = int(any(far))
+    factor = int(any(far))
     while True:
-        *n, shift = (many * x + y for x, y in zip(far, near))
+        *n, shift = (factor * x + y for x, y in zip(far, near))
         if max(inner(n, a) for a in A) - min(inner(n, b) for b in B) + shift <= 0:
             return Fraction(n[0]), Fraction(n[1]), Fraction(n[2])
-        many *= 2
+        factor *= 2
 
 
 def _prices(basis: _Basis, name: int) -> list[int]:

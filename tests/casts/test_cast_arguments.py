@@ -36,7 +36,8 @@ def test_directions_are_scaled_exactly():
     [
         ((0, 0, 0), "length 0: a cast needs a direction"), ((1e-101, 0, 0), "no component within"),
         ((0, 1.01e100, 0), "no component within"), ((1, 2.0**-502, 0), "differ by more than 2^500"),
-        ((np.nan, 0, 0), "direction_W"), ((1, np.inf, 0), "direction_W"), ((1, 2), "direction_W"), ("up", "direction_W"),
+        ((np.nan, 0, 0), "direction_W"), ((1, np.inf, 0), "direction_W"), ((1, 2), "direction_W"),
+        ("up", "direction_W"),
     ],
 )  # fmt: skip
 def test_bad_directions_are_named(direction, words):

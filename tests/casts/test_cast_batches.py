@@ -15,6 +15,7 @@ from collide.casts.cast_batches import cast_batch
 from collide.casts.convex_casts import CastRows
 from collide.casts.directions import Directions
 from collide.casts.leaves import leaves_of
+from collide.casts.shape_cast import ShapeCasts, shape_cast
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 
 EYE = np.eye(4)
@@ -130,7 +131,8 @@ def test_threads_answer_the_same_bits(threads):
     A, B = collide.Box((0.4, 0.3, 0.2)), collide.Cylinder(0.3, 0.5)
     X = np.array([collide.pose(p) for p in rng.normal(size=(n, 3)) * 2])
     d = 0.3 * rng.normal(size=(n, 3)) - X[:, :3, 3]
-    one = collide.shape_cast(A, X, d, B, EYE, max_distance=0.9)
+    one = shape_cast(A, X, d, B, EYE, max_distance=0.9)
+    assert isinstance(one, ShapeCasts)
     many = collide.shape_cast([A] * n, X, d, [B] * n, EYE, max_distance=0.9, threads=threads)
     assert all(a.tobytes() == b.tobytes() for a, b in zip(one, many)) and 0.1 < one.hit.mean() < 0.9
 

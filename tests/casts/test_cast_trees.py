@@ -119,7 +119,12 @@ class Question:
         """(questions answered, candidates)."""
         count = np.zeros(1, dtype=np.int64)
         done = cast_into_tree(
-            address_of(self.header), first, self.n, address_of(count), address_of(self.doubles), address_of(self.integers)
+            address_of(self.header),
+            first,
+            self.n,
+            address_of(count),
+            address_of(self.doubles),
+            address_of(self.integers),
         )
         return done, int(count[0])
 

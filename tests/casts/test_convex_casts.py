@@ -85,7 +85,11 @@ def test_rows_hold_the_truth_and_settled_ones_tell_it():
             status = int(row[P.STATUS])
             seen[status] += 1
             if status == HIT:
-                assert truth is not None and 0 < Fraction(row[P.LOWER]) <= truth <= Fraction(row[P.UPPER]) and truth <= limit
+                assert (
+                    truth is not None
+                    and 0 < Fraction(row[P.LOWER]) <= truth <= Fraction(row[P.UPPER])
+                    and truth <= limit
+                )
                 assert row[P.LOWER] <= row[P.VALUE] <= row[P.UPPER]
             elif status == MISS:
                 assert truth is None or truth > limit
@@ -120,11 +124,16 @@ def test_exact_rows_are_the_least_brackets():
             if row[P.STATUS] == HIT:
                 n += 1
                 assert Fraction(row[P.LOWER]) <= truth <= Fraction(row[P.UPPER])
-                assert np.nextafter(row[P.LOWER], np.inf) >= row[P.UPPER] and row[P.VALUE] in (row[P.LOWER], row[P.UPPER])
+                assert np.nextafter(row[P.LOWER], np.inf) >= row[P.UPPER] and row[P.VALUE] in (
+                    row[P.LOWER],
+                    row[P.UPPER],
+                )
                 if truth:
                     normal = row[P.NORMAL : P.NORMAL + 3]
                     at = row[P.TOUCHING : P.TOUCHING + 3]
-                    reach_a = max(float(normal @ np.array(p)) for p in world[0]) / 4 + float(truth) * float(normal @ case.d)
+                    reach_a = max(float(normal @ np.array(p)) for p in world[0]) / 4 + float(truth) * float(
+                        normal @ case.d
+                    )
                     reach_b = min(float(normal @ np.array(p)) for p in world[1]) / 4
                     np.testing.assert_allclose([reach_a, reach_b], float(normal @ at), rtol=0, atol=1e-12)
     assert n > 8

@@ -20,7 +20,8 @@ from collide.lowering.parts import parts_of
 
 SHAPES = {
     "Sphere": collide.Sphere(0.5), "Capsule": collide.Capsule(0.3, 0.8), "Cylinder": collide.Cylinder(0.4, 0.7),
-    "Cone": collide.Cone(0.5, 0.8), "Ellipsoid": collide.Ellipsoid((0.6, 0.3, 0.2)), "Box": collide.Box((0.6, 0.8, 0.5)),
+    "Cone": collide.Cone(0.5, 0.8), "Ellipsoid": collide.Ellipsoid((0.6, 0.3, 0.2)),
+    "Box": collide.Box((0.6, 0.8, 0.5)),
     "Halfspace": collide.Halfspace((0.2, -0.3, 0.9), 0.1),
     "ConvexHull": collide.ConvexHull(rng_of("cut hull").normal(size=(12, 3)) * 0.4),
     "Rounded": collide.ConvexHull(rng_of("cut rounded").normal(size=(5, 3)) * 0.3, radius=0.15),

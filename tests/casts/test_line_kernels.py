@@ -38,7 +38,10 @@ class Drawn:
         self.d = d / (2.0 * np.abs(d).max())
         self.P, self.Q = (h.points @ Y[:3, :3].T + Y[:3, 3] for h, Y in zip(hulls, X))
         self.pairs = part_pairs(*hulls, X[0][None], X[1][None], 1)
-        self.doubles, self.integers = np.zeros(silhouette.CAST_DOUBLES), np.zeros(silhouette.CAST_INTEGERS, dtype=np.int64)
+        self.doubles, self.integers = (
+            np.zeros(silhouette.CAST_DOUBLES),
+            np.zeros(silhouette.CAST_INTEGERS, dtype=np.int64),
+        )
         table, (pa, pb) = self.pairs.parts.table, self.pairs.pairs[0].tolist()
         ints = view_i64(table.addresses[0], INTS * len(table.packed))
         numbers = view_f64(table.addresses[1], NUMBERS * len(table.packed))

@@ -98,7 +98,8 @@ def test_brackets_hold_what_is_inside(shape):
     ("shape", "o", "d", "first", "last", "sides"),
     [
         (SHAPES[0], (-2, 0, 0), (1, 0, 0), 1.5, 2.5, (0, 0)), (SHAPES[1], (0, 0, 3), (0, 0, -2), 1.15, 1.85, (2, 1)),
-        (SHAPES[1], (1, 0, 0.1), (-1, 0, 0), 0.7, 1.3, (0, 0)), (SHAPES[2], (0.1, 0, 1), (0, 0, -1), 0.65, 1.35, (2, 1)),
+        (SHAPES[1], (1, 0, 0.1), (-1, 0, 0), 0.7, 1.3, (0, 0)),
+        (SHAPES[2], (0.1, 0, 1), (0, 0, -1), 0.65, 1.35, (2, 1)),
         (SHAPES[2], (-1, 0, 0), (1, 0, 0), 0.6, 1.4, (0, 0)), (SHAPES[3], (0.25, 0, -1), (0, 0, 1), 0.6, 1.0, (1, 0)),
         (SHAPES[4], (0, 1, 0), (0, -2, 0), 0.35, 0.65, (0, 0)), (SHAPES[5], (-1, 0, 0), (1, 0, 0), 0.7, 1.3, (1, 2)),
         (SHAPES[5], (0, 0, 1), (0, 0, -1), 0.75, 1.25, (6, 5)), (SHAPES[5], (0, -1, 0), (0, 1, 0), 0.6, 1.4, (3, 4)),
@@ -117,7 +118,10 @@ def test_halfspaces_have_one_end():
         for o, d in (((0, 0, 2), (0, 0, -1)), ((0, 0, 0), (0, 0, 1)), ((0, 0, 0), (1, 0, 0)), ((0, 0, 1), (1, 0, 0)),
                      ((0, 0, 0.5), (0, 1, 0)))
     )  # fmt: skip
-    assert (down.state, down.first, down.last) == (C.MET, 1.5, math.inf) and (down.first_side, down.last_side) == (0, -1)
+    assert (down.state, down.first, down.last) == (C.MET, 1.5, math.inf) and (down.first_side, down.last_side) == (
+        0,
+        -1,
+    )
     assert (up.state, up.first, up.last) == (C.MET, -math.inf, 0.5) and (up.first_side, up.last_side) == (-1, 0)
     assert (within.state, within.first, within.last) == (C.MET, -math.inf, math.inf)
     assert above.state == C.MISSED and level.state == C.UNCLEAR

@@ -32,7 +32,7 @@ def naive_places(normals, offsets, X, o, d) -> list[tuple[Fraction, int]]:
             if height == 0 and along is None:
                 along = row
         elif rate < 0:
-            enters = max([enters, (height / rate, row)], key=lambda e: (e[0], -e[1])) if enters else (height / rate, row)
+            enters = max([enters or (height / rate, row), (height / rate, row)], key=lambda e: (e[0], -e[1]))
         else:
             leaves = min([leaves, (height / rate, row)]) if leaves else (height / rate, row)
     if leaves and (leaves[0] < 0 or (enters and enters[0] > leaves[0])):
@@ -80,7 +80,7 @@ def test_places_are_those_of_all_planes(kind, every):
                 expected += [(k, t, row) for t, row in (places if every else places[:1]) if t <= limit]
                 seen[len(places)] += 1
             assert list(zip(events.ray.tolist(), events.facet.tolist())) == [(k, row) for k, _, row in expected]
-            for (k, t, row), (value, lower, upper), n in zip(expected, events.t.tolist(), events.normal):
+            for (_, t, row), (value, lower, upper), n in zip(expected, events.t.tolist(), events.normal):
                 assert Fraction(lower) <= t <= Fraction(upper) and lower <= value <= upper <= lower + 1e-12
                 outward = X[:3, :3] @ (region.normals[row] / np.linalg.norm(region.normals[row]))
                 np.testing.assert_allclose(n, outward, rtol=0, atol=1e-14)

@@ -85,7 +85,12 @@ class Fixed:
         self.near, self.far, self.is_whole, self.misses = near, far, is_whole, misses
 
 
-WAYS = [Fixed(1.0, 1.0, True, False), Fixed(1.0, 4.0, True, False), Fixed(1.0, 4.0, False, False), Fixed(1.0, 4.0, True, True)]
+WAYS = [
+    Fixed(1.0, 1.0, True, False),
+    Fixed(1.0, 4.0, True, False),
+    Fixed(1.0, 4.0, False, False),
+    Fixed(1.0, 4.0, True, True),
+]
 
 
 @pytest.mark.parametrize("limit", [0.5, 1.0, 2.0, 4.0, 8.0, math.inf])

@@ -124,7 +124,8 @@ def test_what_has_no_end_twice_is_refused_by_name():
     half = collide.Halfspace((0, 0, 1), 0.0)
     for A, B, words in (
         (HALF, half, r"HPolytope\(bounded=False\) and Halfspace: neither has an end.*collide\(\) and distance\(\)"),
-        (half, HALF, r"Halfspace and HPolytope\(bounded=False\)"), (HALF, CORNER, "neither has an end"),
+        (half, HALF, r"Halfspace and HPolytope\(bounded=False\)"),
+        (HALF, CORNER, "neither has an end"),
         (collide.Compound([(half, np.eye(4))]), HALF, "ask about the items of the Compound"),
     ):
         with pytest.raises(UnsupportedQuery, match=words):

@@ -110,7 +110,9 @@ def bodies_and_parts(rng) -> list[tuple[np.ndarray, np.ndarray]]:
     """(X_WB, X_BP): at the origin and not, parts turned and not, tiny and huge numbers."""
     drawn = []
     for k in range(24):
-        X_WB = [np.eye(4), random_pose(rng, 10.0 ** rng.integers(-3, 4)), pose(LATTICE_ROTATIONS[k], (1.0, 2.0, 3.0))][k % 3]
+        X_WB = [np.eye(4), random_pose(rng, 10.0 ** rng.integers(-3, 4)), pose(LATTICE_ROTATIONS[k], (1.0, 2.0, 3.0))][
+            k % 3
+        ]
         X_BP = [np.eye(4), random_pose(rng), pose(t=rng.normal(size=3)), pose(rotation(rng))][(k // 3) % 4]
         drawn.append((X_WB, X_BP))
     tiny = np.eye(4)

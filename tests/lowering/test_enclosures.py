@@ -82,11 +82,13 @@ def test_polytopes_of_planes_are_between_corners_that_may_be_rounded(seed):
         n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
         offset = sum(x * Fraction(y) for x, y in zip(n, a))
         corner = [int(x > 0) for x in n]
-        assert all(sum(x * y for x, y in zip(n, p[4 * corner[0] + 2 * corner[1] + corner[2]])) <= offset for p in stored)
+        assert all(
+            sum(x * y for x, y in zip(n, p[4 * corner[0] + 2 * corner[1] + corner[2]])) <= offset for p in stored
+        )
     outer = found.outer.tree.triangles.reshape(-1, 3)
     assert max(np.linalg.norm(shape.vertices - p, axis=1).min() for p in outer) < 1e-14
-    np.testing.assert_allclose(np.ptp(found.inner.tree.triangles.reshape(-1, 3), axis=0), np.ptp(shape.vertices, axis=0),
-                               rtol=1e-2)  # fmt: skip
+    inner = found.inner.tree.triangles.reshape(-1, 3)
+    np.testing.assert_allclose(np.ptp(inner, axis=0), np.ptp(shape.vertices, axis=0), rtol=1e-2)
 
 
 def test_flat_polytopes_have_none_within():

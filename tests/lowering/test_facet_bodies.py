@@ -102,7 +102,8 @@ def test_what_has_facets(kind):
     words = {
         "Halfspace": "Halfspace has no facets; a large Box", "Compound": "Compound is a union; ask for each",
         "Sphere": "Sphere is rounded", "Capsule": "Capsule is rounded", "ConvexHull": "ConvexHull is rounded",
-    }.get(kind, "HPolytope has no facets of doubles" if kind == "Region" else f"{kind} has no facets of doubles")  # fmt: skip
+        "Region": "HPolytope has no facets of doubles",
+    }.get(kind, f"{kind} has no facets of doubles")  # fmt: skip
     with pytest.raises(UnsupportedQuery, match=f"locality: {words}"):
         F.facet_body(shape, "locality")
     with pytest.raises(InvalidArgument, match="locality: shape must be a shape"):

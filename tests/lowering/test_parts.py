@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -36,9 +36,15 @@ def test_each_class_has_the_numbers_of_its_definition():
     assert len(P.convex_set_of(collide.Capsule(0.5, 0.0)).points) == 1
     for cls, kind in ((collide.Cylinder, CYLINDER), (collide.Cone, CONE)):
         packed = P.convex_set_of(cls(3.0, 8.0))
-        assert packed.kind == kind and packed.params.tolist() == [3.0, 4.0, 0.0, 0.0] and 5.0 <= packed.reach < 5.0 + 1e-12
+        assert (
+            packed.kind == kind and packed.params.tolist() == [3.0, 4.0, 0.0, 0.0] and 5.0 <= packed.reach < 5.0 + 1e-12
+        )
     packed = P.convex_set_of(collide.Ellipsoid((1.0, 3.0, 2.0)))
-    assert packed.kind == ELLIPSOID and packed.params.tolist() == [1.0, 3.0, 2.0, 0.0] and 3.0 <= packed.reach < 3.0 + 1e-12
+    assert (
+        packed.kind == ELLIPSOID
+        and packed.params.tolist() == [1.0, 3.0, 2.0, 0.0]
+        and 3.0 <= packed.reach < 3.0 + 1e-12
+    )
     packed = P.convex_set_of(collide.Halfspace((0, 3, 4), 2.0))
     assert packed.kind == HALFSPACE and packed.params.tolist()[3] == 2.0
     hull = collide.ConvexHull(on_sphere(rng_of("h"), 9), radius=0.25)
@@ -58,7 +64,9 @@ def test_unions_hold_the_parts_of_their_items_in_order():
     assert found[0][0].slop == found[2][0].slop == 0.0 < found[1][0].slop < 1e-13
     exact = [[sum(Fraction(a) * Fraction(b) for a, b in zip(row, column)) for column in zip(*Y.tolist())]
              for row in Z.tolist()]  # fmt: skip
-    off = [[abs(Fraction(v) - e) for v, e in zip(row, exact_row)] for row, exact_row in zip(found[1][1].tolist(), exact)]
+    off = [
+        [abs(Fraction(v) - e) for v, e in zip(row, exact_row)] for row, exact_row in zip(found[1][1].tolist(), exact)
+    ]
     for row in off[:3]:
         assert sum(row[:3]) * Fraction(found[1][0].reach) + row[3] <= Fraction(found[1][0].slop)
 
@@ -77,12 +85,14 @@ def test_single_convex_and_bounding_parts(kind):
         assert bounds is P.parts_of(shape)
         return
     assert P.bounding_parts_of(shape) is bounds and len(bounds) == 1
-    with pytest.raises(UnsupportedQuery, match="Mesh: a mesh is no union" if kind == "Mesh" else "a region has no corners"):
+    with pytest.raises(
+        UnsupportedQuery, match="Mesh: a mesh is no union" if kind == "Mesh" else "a region has no corners"
+    ):
         P.parts_of(shape)
     if kind == "Region":  # is no item of unions
         return
     around = P.bounding_parts_of(collide.Compound([(shape, random_pose(rng)), (each["Sphere"], np.eye(4))]))
-    assert [packed.content for packed, _ in around][0] == bounds[0][0].content and len(around) == 2
+    assert around[0][0].content == bounds[0][0].content and len(around) == 2
 
 
 def test_regions_are_within_the_half_space_that_reaches_least():
@@ -140,7 +150,9 @@ def test_few_points_are_scanned_and_many_get_a_tree():
 
 
 def packed_sets(rng, n: int) -> list:
-    sets = [pack_points(rng.normal(size=(int(rng.integers(1, 70)), 3)), radius=float(rng.integers(0, 2))) for _ in range(n)]
+    sets = [
+        pack_points(rng.normal(size=(int(rng.integers(1, 70)), 3)), radius=float(rng.integers(0, 2))) for _ in range(n)
+    ]
     return [sets[k] for k in rng.integers(0, n, n)]  # some of them twice
 
 
@@ -159,7 +171,7 @@ def test_tables_that_grow_have_the_rows_of_new_ones(pieces):
     assert np.array_equal(table.numbers[:at], whole.numbers) and table.numbers.shape[1] == NUMBERS
     for ranks in (table.ints[:at, RANK].tolist(), whole.ints[:, RANK].tolist()):  # ordered as contents are
         order = sorted(range(at), key=lambda k: sets[k].content)
-        for i, j in zip(order, order[1:]):
+        for i, j in pairwise(order):
             assert (ranks[i] == ranks[j]) if sets[i].content == sets[j].content else ranks[i] < ranks[j]
 
 
@@ -179,7 +191,11 @@ def test_trees_are_built_of_the_rows_asked_about():
     rng = rng_of("trees of rows")
     sets = [pack_points(on_sphere(rng, n), with_tree=True) for n in (300, 20, 300)]
     table = ShapeTable(sets)
-    assert not table.is_built and not table.ints[:, TREE].any() and (table.ints[:, COARSE_AT] != 0).tolist() == [True, False, True]
+    assert (
+        not table.is_built
+        and not table.ints[:, TREE].any()
+        and (table.ints[:, COARSE_AT] != 0).tolist() == [True, False, True]
+    )
     table.build_trees(np.array([[1, 2], [2, 1]]))
     assert (table.ints[:, TREE] != 0).tolist() == [False, False, True] and not table.is_built
     table.build_trees(np.array([0]))

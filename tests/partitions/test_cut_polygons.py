@@ -67,7 +67,7 @@ def test_pieces_are_those_of_clipping(kind):
     value = np.array([0.25, 0.0, 1.0, -1.0]) if kind == "box" else rng.uniform(-0.5, 0.5, 4)
     work = Work(vertices, faces, axis, value)
     some, number = work.polygons, np.arange(len(faces))
-    for turn in range(3):  # pieces of pieces
+    for _ in range(3):  # pieces of pieces
         which = rng.integers(0, 4, len(some.plane))
         before = [work.corners(some, k) for k in range(len(some.plane))]
         cut = cut_polygons(work.vertices, work.edges, some, work.cuts[which])

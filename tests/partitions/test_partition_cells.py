@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from mesh_shapes import block_ring, box, bumpy_sphere
@@ -43,7 +45,7 @@ def test_cells_are_what_their_planes_and_corners_say(name):
             turn = np.cross(face - face[0], np.roll(face, -1, axis=0) - face[0]).sum(axis=0)
             assert turn @ n >= -1e-14  # counter-clockwise seen from outside
             total += sum(float(np.linalg.det([face[0] - corners[0], a - corners[0], b - corners[0]]))
-                         for a, b in zip(face[1:], face[2:])) / 6  # fmt: skip
+                         for a, b in pairwise(face[1:])) / 6  # fmt: skip
         assert cells.volumes[i] == pytest.approx(total, abs=1e-12)
         for facet, axis, value, side, n in zip(planes.facet, planes.axis, planes.value, planes.side, planes.normals):
             assert (facet >= 0) == (axis < 0) == np.isnan(value)
@@ -82,7 +84,7 @@ def test_rows_of_leaves_are_the_cells_that_hold_them(name, inside):
     for wrong in (len(pieces), -len(pieces) - 1, 0.5):
         with pytest.raises(InvalidArgument, match="ConvexCells: i"):
             pieces.corners(wrong)
-    with pytest.raises(InvalidArgument, match="ConvexCells.rows_of: leaves"):
+    with pytest.raises(InvalidArgument, match=r"ConvexCells\.rows_of: leaves"):
         pieces.rows_of([0.5])
 
 

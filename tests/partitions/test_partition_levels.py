@@ -1,4 +1,4 @@
-"""Both levels of a partition, its finished tree and its leaves' labels: what is left in a cell, which leaf holds a point."""
+"""Both levels of a partition, its finished tree, and labels of leaves: pieces in cells, leaves that hold points."""
 
 from __future__ import annotations
 
@@ -83,7 +83,9 @@ def test_pieces_of_facets_are_in_their_cells_and_none_is_lost(name, kappa):
         assert (p >= low - 1e-9).all() and (p <= high + 1e-9).all()
         assert any((p[:, axis] > low[axis] + 1e-9).any() for axis in range(3))
     facet = np.cross(*np.diff(grown.mesh.vertices[grown.mesh.faces], axis=1).transpose(1, 0, 2))
-    held = np.bincount(np.concatenate([np.zeros(0, dtype=int), *(f for _, f in grown.held_first)]), minlength=grown.planes.n)
+    held = np.bincount(
+        np.concatenate([np.zeros(0, dtype=int), *(f for _, f in grown.held_first)]), minlength=grown.planes.n
+    )
     total = np.bincount(grown.pieces.plane, grown.areas, minlength=grown.planes.n)
     whole = 0.5 * np.linalg.norm(facet, axis=1)
     np.testing.assert_allclose(total[held == 0], whole[held == 0], rtol=1e-9)
@@ -132,7 +134,9 @@ def test_points_touch_the_leaves_of_a_walk_in_fractions(name):
     rng, grown = rng_of("touches", name), Grown(name, 8)
     corners = grown.mesh.vertices[grown.mesh.faces]
     weights = rng.integers(0, 3, (30, 3)) + np.array([1, 0, 0])
-    on_facets = np.einsum("ij,ijk->ik", weights / weights.sum(axis=1)[:, None], corners[rng.integers(0, len(corners), 30)])
+    on_facets = np.einsum(
+        "ij,ijk->ik", weights / weights.sum(axis=1)[:, None], corners[rng.integers(0, len(corners), 30)]
+    )
     points = np.vstack([on_facets, grown.mesh.vertices[:10], rng.uniform(-3, 3, (20, 3))])
     touched = grown.finished.touches(points)
     n_many = 0
@@ -148,7 +152,9 @@ def test_points_touch_the_leaves_of_a_walk_in_fractions(name):
         assert w > 0 and [Fraction(int(c), int(w)) / unit for c in (x, y, z)] == [Fraction(v) for v in p]
     on = set(zip(touched.on_point.tolist(), touched.on_cut.tolist()))
     for k, cut in on:
-        value = sum(int(a) * int(c) for a, c in zip(grown.planes.coefficients(grown.finished.plane[cut : cut + 1])[0], exact[k]))
+        value = sum(
+            int(a) * int(c) for a, c in zip(grown.planes.coefficients(grown.finished.plane[cut : cut + 1])[0], exact[k])
+        )
         assert value == 0
     nothing = grown.finished.touches(np.zeros((0, 3)))
     assert all(len(column) == 0 for column in nothing)

@@ -143,7 +143,10 @@ def test_vertices_lie_where_their_planes_meet(kind):
     assert (sides.sign == 0).sum() > 3
     rounded, error = vertices.rounded(every)
     for p, row in zip(vertices.exact(every), rounded.tolist()):
-        assert all(abs(Fraction(int(c), int(p[3])) / 2**planes.grid - Fraction(v)) <= Fraction(error) for c, v in zip(p[:3], row))
+        assert all(
+            abs(Fraction(int(c), int(p[3])) / 2**planes.grid - Fraction(v)) <= Fraction(error)
+            for c, v in zip(p[:3], row)
+        )
     vertices.cut_back(int(made[3]))
     assert len(vertices.xyz.rows) == len(vertices.names.rows) == len(vertices.error.rows) == made[3]
 
@@ -164,7 +167,9 @@ def test_rows_grow_and_are_forgotten(shape):
         new = rng.normal(size=(n, *shape))
         assert rows.add(new).tolist() == list(range(len(expected), len(expected) + n))
         expected += new.tolist()
-        assert rows.rows.tolist() == expected and rows.n == len(expected) and rows.n_bytes == 8 * np.prod([rows.n, *shape])
+        assert (
+            rows.rows.tolist() == expected and rows.n == len(expected) and rows.n_bytes == 8 * np.prod([rows.n, *shape])
+        )
     rows.rows[5] = 9.0
     assert (rows.rows[5] == 9.0).all()  # a view
     rows.cut_back(7)
@@ -188,7 +193,9 @@ def test_a_tree_that_grows_numbers_places_and_refuses_to_outgrow():
     tree.other_bytes, tree.prediction = 2000 - tree.n_bytes, "much is left; "
     tree.check_memory()
     tree.other_bytes += 1
-    with pytest.raises(UnsupportedQuery, match=r"4 cells so far take 2,001 bytes, more than memory=2,000; much is left; raise"):
+    with pytest.raises(
+        UnsupportedQuery, match=r"4 cells so far take 2,001 bytes, more than memory=2,000; much is left; raise"
+    ):
         tree.check_memory()
     with pytest.raises(UnsupportedQuery, match="raise memory"):
         collide.SpacePartition(collide.Mesh(*box()), memory=100)
