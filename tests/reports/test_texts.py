@@ -13,6 +13,7 @@ from collide.reports.checking import COLLISION, DEEPER, GONE, KNOWN, Check, Find
 from collide.reports.comparing import _engine_tables, _wrong_of
 from collide.reports.comparing import verdict as comparison_verdict
 from collide.reports.doctor import _ask, _cache, _known_pairs
+from collide.reports.number_format import seconds
 from collide.reports.pair_classes import Pairs
 from collide.reports.report import _skipped
 from collide.reports.tables import Column, Table, lay_out
@@ -33,7 +34,7 @@ def test_json_of_pairs_is_whole_whatever_the_chunks(monkeypatch, n):
     texts = list(json_text.pieces([("x", 1), ("pairs", pairs_of(n)), ("y", {"z": ["é", None]})]))
     read = json.loads("".join(texts))
     assert [pair["distance"] for pair in read["pairs"]] == list(range(n)) and read["y"] == {"z": ["é", None]}
-    assert max(text.count('"distance"') for text in texts) <= 3
+    assert max(text.count('"distance"') for text in texts) == min(n, 3)
     assert "".join(texts).count("\n    {") == n and ("pairs\": []" in "".join(texts)) == (n == 0)
 
 
@@ -42,6 +43,10 @@ def test_json_of_pairs_is_whole_whatever_the_chunks(monkeypatch, n):
 def test_the_line_about_the_scene(robots, end, bodies, words):
     scene = {"name": "cell", "bodies": bodies, "static": 1, "robots": robots}
     assert _scene_line(SimpleNamespace(scene=scene)) == f"cell: {words} (1 fixed){end}"
+
+
+def test_seconds_have_two_digits_or_three():
+    assert [seconds(value) for value in (0.00994, 0.00995, 0.0123)] == ["9.9 ms", "10 ms", "12 ms"]
 
 
 def test_prose_has_a_title_where_there_is_any():

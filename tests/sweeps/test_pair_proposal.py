@@ -11,7 +11,7 @@ from reproduction import reproducing
 
 from collide import Box, InvalidArgument, Robot, Sphere
 from collide.adapters.peers import exact
-from collide.sweeps.pair_proposal import adjacent_links, propose_disabled_pairs, wilson_bounds
+from collide.sweeps.pair_proposal import NEVER, adjacent_links, propose_disabled_pairs, wilson_bounds
 from collide.sweeps.random_configurations import random_configurations
 
 
@@ -189,3 +189,10 @@ def test_poses_of_elements_in_their_links_count():
     low, high = pair.share_bounds
     assert low < 2 * math.asin(0.1) * 2 / (2 * math.pi) < high
     assert np.linalg.norm(np.array([math.cos(pair.q[0]) + 1, math.sin(pair.q[0])])) <= 0.2
+
+
+def test_a_pair_that_never_collided_has_no_configuration_where_it_does():
+    proposal = propose_disabled_pairs(chain(5, length=0.4, width=0.05), samples=200)
+    never = [pair for pair in proposal.pairs if pair.reason == NEVER]
+    hit = [pair for pair in proposal.pairs if pair.hits]
+    assert never + hit and all(pair.q is None for pair in never) and all(pair.q is not None for pair in hit)
