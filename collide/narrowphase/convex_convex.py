@@ -12,7 +12,6 @@ from collide.narrowphase.core_distance import convex_cores, request_plane
 from collide.narrowphase.exact.depth_requests import add_request
 from collide.narrowphase.gap.gap_queue import enqueue, write_guess
 from collide.narrowphase.gap.precise_pair import is_refinable
-from collide.narrowphase.gap_normal import with_gap_normal
 from collide.narrowphase.gjk.minkowski_difference import AXIS, POINT_OF_A, POINT_OF_B, weighted_sum
 from collide.narrowphase.posed_pair import radius_of
 from collide.narrowphase.rows import (
@@ -52,8 +51,6 @@ def convex_convex(ordered, is_closed_form, query, row, row_number, n_start, work
         core = segment_cores(pair, work, error)
     else:
         core = convex_cores(ordered, query, work, radius, error, curved, n_start)
-    if curved and not query.boolean and core.depth < -error and core.lower - error - radius <= query.limit:
-        core = with_gap_normal(pair, work, core, size, error)
     lower = core.lower - error - radius
     upper = core.upper + error - radius
     how = _how(core, is_closed_form, lower, radius)
