@@ -5,7 +5,8 @@ set swept by both radii lies, h(m) = max m·w + r, proves the pair apart whereve
 the way from some length on, and up to a length that planes bound from above; the union is clear at the first length
 that no pair bars. Planes are those of GJK, seen from the point τ·n, which comes down along the line as planes are found
 (van den Bergen, "Ray casting against general convex objects with application to continuous collision detection", 2004).
-However the search goes, what planes prove holds.
+However the search goes, what planes prove holds. A half-space has one plane, and bars the way without end unless that
+faces the direction.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ import math
 from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64
-from collide.lowering.packed_convex import POINTS
+from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.gjk.minkowski_difference import NEAREST_POINT, POINT, POINT_OF_A, copy_coordinates
 from collide.narrowphase.gjk.simplex import across_simplex, nearest_of_all
-from collide.narrowphase.posed_pair import in_order, posed_pair, radius_of, reach_of_both, size_and_slop
+from collide.narrowphase.halfspace_convex import plane_gap
+from collide.narrowphase.posed_pair import OrderedPair, in_order, posed_pair, radius_of, reach_of_both, size_and_slop
 from collide.numerics.vec3 import (
     Vec3,
     add,
@@ -62,19 +64,25 @@ class _Simplex(NamedTuple):
 
 
 class _Line(NamedTuple):
-    """The line {τ·e} beside A ⊖ B of a pair of parts swept by a radius.   error : of a plane.   curved : a core is."""
+    """The line {τ·e} beside A ⊖ B of a pair of parts swept by a radius.   error : of a plane.   curved : a core is.
+
+    has_plane : the pair's A is a half-space, which the other leaves once height < τ · slope; slope −∞ of two of them.
+    """
 
     e: Vec3
     radius: float
     error: float
     curved: bool
+    has_plane: bool
+    height: float
+    slope: float
 
 
 @kernel
 def clearing_length(parts, first_a, n_a, first_b, n_b, n, start, limit, work_at):
     """The `Length` along the unit vector n that clears B of A, both infinite where it is not less than the limit.
 
-    parts : `PosedParts`.   first, n : each body's parts there, no half-space.   start : a `Length` to which the way is
+    parts : `PosedParts`.   first, n : each body's parts there.   start : a `Length` to which the way is
     barred, by `barred_length`.   work : CLEARING doubles of workspace.
 
     A step goes to the farthest length that a pair barred so far is proven to bar at most: all between is barred too, so
@@ -124,12 +132,20 @@ def _pair_and_line(parts, pa, pb, n):
     size, slop, _ = size_and_slop(numbers, poses, sa, pa, sb, pb)
     radius = radius_of(pair, pair.A) + radius_of(pair, pair.B)
     curved = pair.A.kind != POINTS or pair.B.kind != POINTS
-    return pair, _Line(neg(n) if flip else n, radius, ERROR * size + slop, curved)
+    e = neg(n) if flip else n
+    if pair.A.kind != HALFSPACE:
+        return pair, _Line(e, radius, ERROR * size + slop, curved, False, 0.0, 0.0)
+    if pair.B.kind == HALFSPACE:
+        return pair, _Line(e, radius, 0.0, curved, True, 0.0, -math.inf)
+    near = plane_gap(OrderedPair(pair, ints, flip, size, slop, False))
+    return pair, _Line(e, radius, near.error, curved, True, -near.gap, dot(near.nhat, e))
 
 
 @kernel
 def _apart_at(pair, line, tau, simplex):
     """Whether a ball or a plane is found that parts τ·e from A ⊖ B."""
+    if line.has_plane:
+        return tau * line.slope - line.height > line.error + 2.0**-49 * tau
     x = scale(tau, line.e)
     error = line.error + 2.0**-49 * tau
     m = add(x, pair.t)
@@ -159,6 +175,11 @@ def _apart_at(pair, line, tau, simplex):
 def _bounded_by_planes(pair, line, simplex):
     """The `Length` from which on τ·e is proven to lie outside A ⊖ B."""
     best = Length(math.inf, math.inf)
+    if line.has_plane:
+        if not line.slope > _LEAST_SLOPE:
+            return best
+        bound = (line.height + line.error) / line.slope
+        return Length(line.height / line.slope, bound + abs(bound) * 2.0**-49 / line.slope)
     m = line.e
     n_points = 0
     x = Vec3(0.0, 0.0, 0.0)

@@ -14,10 +14,9 @@ from collide.kernels.prepared import prepared_boolean, prepared_row
 from collide.lowering.compound_table import BALL_IN_WORLD, CompoundTable, LaidOut
 from collide.lowering.shape_table import POSE, TERM_ROW, PoseTable, ShapeTable
 from collide.narrowphase import convex_kernel_calls as run
-from collide.narrowphase.composite.clearing_translation import CLEARING
 from collide.narrowphase.composite.composite_block import BLOCK, HEADER, LIST, N_ANSWERED, N_DONE, N_LISTED, SLOTS
 from collide.narrowphase.composite.composite_poses import BAD_POSE, answer_compounds
-from collide.narrowphase.composite.composite_rows import SCORE, combine_rows
+from collide.narrowphase.composite.composite_rows import SCORE, SEPARATING, combine_rows
 from collide.narrowphase.composite.single_composite_call import collide_single_compound, distance_single_compound
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, answer_pairs
 from collide.results import PAIR_DTYPE, zeroed_rows
@@ -177,7 +176,7 @@ def combine(
     if (spans[:, 1::2] == 1).all():
         return rows
     out = np.zeros(len(starts), dtype=PAIR_DTYPE)  # padding too: equal answers are equal bytes
-    ends, spans, score = np.append(starts, len(rows)), np.ascontiguousarray(spans), np.zeros(SCORE + CLEARING)
+    ends, spans, score = np.append(starts, len(rows)), np.ascontiguousarray(spans), np.zeros(SCORE + SEPARATING)
     combine_rows(
         address_of(rows), address_of(ends), address_of(spans), len(starts), *table.addresses, address_of(poses.rows),
         address_of(shape_of), address_of(score), address_of(out),

@@ -8,6 +8,7 @@ separate the unions.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -289,16 +290,16 @@ def _overlap(
     row["distance"], row["lower"], row["normal"] = 0.0, 0.0, 0.0
     if certain:
         row["how"] = row["how"] or EXACT
-    if depths and (A.unbounded or B.unbounded):
-        row["distance"] = row["lower"] = -math.inf
-        row["normal"], row["certified"] = (0.0, 0.0, 1.0), False
-    elif depths:
-        length, bound, normal = _separating_translation(A, B, X_WA, X_WB, meeting)
+    if depths:
+        if A.unbounded or B.unbounded:
+            length, bound, normal = _way_out(A, B, X_WA, X_WB, meeting)
+        else:
+            length, bound, normal = _separating_translation(A, B, X_WA, X_WB, meeting)
         if certain:  # what separates the unions separates their deepest convex parts, too
             row["upper"] = min(0.0, float(meeting["upper"].min()))
         row["distance"], row["lower"] = min(0.0 - length, float(row["upper"])), 0.0 - bound
         row["normal"] = normal + 0.0
-        length = -float(row["distance"])
+        length = -float(row["distance"]) if bound < math.inf else 0.0
         row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
         row["certified"] = bool(certain and bound == 0.0)
     out[0] = row
@@ -321,5 +322,64 @@ def _separating_translation(
     assert best is not None
     if best.bound == 0.0:
         return best
+    return _shortened(A, B, X_WA, X_WB, best, directions, meeting)
+
+
+def _shortened(A: CompoundParts, B: CompoundParts, X_WA, X_WB, known, directions, meeting) -> SeparatingTranslation:
+    """`shortened` of two unions; the translations of their parts' rows are tried first."""
     more = [-float(row["distance"]) * row["normal"] for row in meeting if -math.inf < row["distance"] < 0.0]
-    return shortened(lambda X, Y: _states(A, B, X, Y) != APART, X_WA, X_WB, best, directions, more)
+    return shortened(lambda X, Y: _states(A, B, X, Y) != APART, X_WA, X_WB, known, directions, more)
+
+
+#: How far a way out of half-spaces is followed, in sizes of the pair without them.
+_FARTHEST = (4.0, 64.0, 1024.0)
+
+
+def _way_out(A: CompoundParts, B: CompoundParts, X_WA, X_WB, meeting: np.ndarray) -> SeparatingTranslation:
+    """A translation of B that separates two unions of which one has half-spaces, proven; infinite where none was found,
+    as of two half-spaces."""
+    nothing = SeparatingTranslation(math.inf, math.inf, np.array([0.0, 0.0, 1.0]))
+    if A.unbounded and B.unbounded:
+        return nothing
+    normals, depths = _planes(A, B, X_WA, X_WB) if A.unbounded else _planes(B, A, X_WB, X_WA)
+    normals = normals if A.unbounded else -normals
+    ways = [x for x in (_shortest_way(normals, depths), _shortest_way(normals, np.ones(len(depths)))) if x is not None]
+    rows = meeting["normal"][np.square(meeting["normal"]).sum(axis=1) > 0.5]
+    directions = np.concatenate([np.array(ways).reshape(-1, 3), rows, normals])
+    directions /= np.sqrt(np.square(directions).sum(axis=1))[:, None]
+    size = float(np.abs(depths).max() + np.abs(X_WA[:3, 3] - X_WB[:3, 3]).sum()) + A.reach + B.reach
+    for length in (factor * size for factor in _FARTHEST):
+        moved = np.repeat(X_WB[None], len(directions), axis=0)
+        moved[:, :3, 3] += length * directions
+        apart = np.flatnonzero(_states(A, B, np.repeat(X_WA[None], len(moved), axis=0), moved) == APART)
+        if len(apart):
+            known = SeparatingTranslation(length, length * (1.0 + 2.0**-40), directions[apart[0]])
+            return _shortened(A, B, X_WA, X_WB, known, directions, meeting)
+    return nothing
+
+
+def _planes(A: CompoundParts, B: CompoundParts, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray]:
+    """((k, 3) outward normals of the half-spaces of A, (k,) how deep B reaches into each [m]), but for rounding."""
+    which = np.flatnonzero(~np.isnan(A.columns.plane))
+    X = A.placed(which, np.broadcast_to(X_WA, (len(which), 4, 4)), np.zeros(len(which))).X
+    planes = np.array([A.parts[k].bound.params[:4] for k in which.tolist()])
+    lengths = np.sqrt(np.square(planes[:, :3]).sum(axis=1))
+    normals = np.einsum("kij,kj->ki", X[:, :3, :3], planes[:, :3]) / lengths[:, None]
+    offsets = planes[:, 3] / lengths + (normals * X[:, :3, 3]).sum(axis=1)
+    return normals, offsets + B.extents(X_WB, -normals)[0]
+
+
+def _shortest_way(normals: np.ndarray, depths: np.ndarray) -> np.ndarray | None:
+    """The shortest x with normals · x ≥ depths, but for rounding, that is not 0; None where there is none.
+
+    It lies on one, two or three of the planes, as near 0 as these let it.
+    """
+    best = None
+    for n in (1, 2, 3):
+        for some in map(list, itertools.combinations(range(len(depths)), n)):
+            x = np.linalg.pinv(normals[some]) @ depths[some]
+            length = float(np.linalg.norm(x))
+            clears = (normals @ x >= depths - 2.0**-40 * (length + np.abs(depths))).all()
+            if clears and length > 0.0 and (best is None or length < np.linalg.norm(best)):
+                best = x
+    return best

@@ -4,7 +4,8 @@ Apart, the distance of two unions is the least one of their parts. Overlapping, 
 separating translation has no such formula. Proven of it are two bounds: each overlapping pair of
 parts must come apart, so it is at least as long as the depth of the deepest pair; and along the
 normals of overlapping parts and the axes of the deepest two the unions are clear from a length on
-(`clearing_translation.py`), the least of which is reported.
+(`clearing_translation.py`), the least of which is reported. Half-spaces among the parts may bar all of
+these without end: of such unions the ways out of all half-spaces are tried, too (`ways_out.py`).
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.shape_table import INTS, KIND, NUMBERS, POSE, RADIUS, REACH
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
-from collide.narrowphase.composite.clearing_translation import Length, barred_length, clearing_length, longer
+from collide.narrowphase.composite.clearing_translation import CLEARING, Length, barred_length, clearing_length, longer
+from collide.narrowphase.composite.ways_out import MAX_PLANES, PLANE, gather_planes, way_out
 from collide.narrowphase.posed_pair import in_order
 from collide.narrowphase.rows import (
     CERTIFIED,
@@ -50,6 +52,8 @@ _N_AXES = 12
 _DISTANCE, _NUMBER, _OF_A, _OF_B, _VECTORS = range(5)
 _OVERLAP = _VECTORS + 9
 SCORE = _DEEPEST + MAX_NORMALS * _OVERLAP
+#: Doubles that `separate_bodies` works in.
+SEPARATING = CLEARING + MAX_PLANES * PLANE
 
 
 class PosedParts(NamedTuple):
@@ -176,7 +180,7 @@ def close_score(score, at, out_at):
 def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_at):
     """Replace distance, lower, normal and points by the shortest translation found that separates both bodies.
 
-    parts : `PosedParts`.   first, n : each body's parts there.   work : CLEARING doubles of workspace.
+    parts : `PosedParts`.   first, n : each body's parts there.   work : SEPARATING doubles of workspace.
 
     Against one half-space the row of the deepest part is the answer: there is one translation for all.
     """
@@ -188,7 +192,15 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
     promised = (PROMISE_CURVED if size.curved else PROMISE_STORED) * size.size
     upper = doubles[UPPER]
     n_overlaps = int(score[at + _N_OVERLAPS])
-    n_directions = 0 if size.has_halfspace else n_overlaps + _N_AXES
+    planes, n_planes = view_f64(work_at + 8 * CLEARING, PLANE * MAX_PLANES), 0
+    if size.has_halfspace:
+        n_planes = gather_planes(parts, first_a, n_a, first_b, n_b, planes)
+    if n_planes < 0:
+        n_directions = 0  # two half-spaces overlap without end
+    else:
+        n_directions = n_overlaps + _N_AXES + (2 if n_planes > 0 else 0)
+        upper = min(upper, -way_out(planes, n_planes, True).least)
+        doubles[UPPER] = upper
     best = Length(math.inf, math.inf)
     overlap_number = 0
     nhat = vec3_at(doubles, NORMAL)
@@ -199,8 +211,13 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
             break  # no translation is shorter than −upper
         if k < n_overlaps:
             n = vec3_at(score, at + _DEEPEST + _OVERLAP * k + _VECTORS)
-        else:
+        elif k < n_overlaps + _N_AXES:
             n = _axis(score, at, parts, first_a, first_b, k - n_overlaps)
+        else:
+            n = way_out(planes, n_planes, k == n_overlaps + _N_AXES).x
+            if not norm(n) > 0.0:
+                continue
+            n = scale(1.0 / norm(n), n)
         length = _way_past_overlaps(score, at, parts, first_a, first_b, n, best.proven, work_at)
         if length.proven < best.proven:
             length = clearing_length(parts, first_a, n_a, first_b, n_b, n, length, best.proven, work_at)
@@ -290,7 +307,7 @@ def combine_rows(rows_at, starts_at, spans_at, n, ints_at, numbers_at, poses_at,
 
     starts : n + 1 numbers of rows, where each pair's begin and end.
     spans : first part and number of parts of A, and of B,
-    pair by pair.   ints, numbers, poses, shape_of : as in `answer_pairs`.   score : SCORE + CLEARING doubles.
+    pair by pair.   ints, numbers, poses, shape_of : as in `answer_pairs`.   score : SCORE + SEPARATING doubles.
     out : zeroed rows.
     """
     starts = view_i64(starts_at, n + 1)
