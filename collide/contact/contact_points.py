@@ -108,7 +108,7 @@ def may_share_points(pairs, k, A, B, view, seen):
     """
     over_a = view.any_side or facing_a(pairs, k, view.axes.nhat, A) > LEAST_COSINE
     over_b = view.any_side or facing_b(pairs, k, view.axes.nhat, B) > LEAST_COSINE
-    if not (over_a or over_b) or not view.any_side and _faces_away(pairs, k, A, B, view):
+    if not (over_a or over_b) or (not view.any_side and _faces_away(pairs, k, A, B, view)):
         return False, False
     if not within_gaps(pairs, k, view, seen):
         return False, False
