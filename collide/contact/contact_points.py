@@ -403,8 +403,8 @@ def _slopes_at(pairs, k, side, i, body, axes):
 
 @kernel
 def _put_ends(pairs, k, i, j, A, B, round_a, round_b, view, points, n):
-    """Append the ends of what edges i of A and j of B share where they run along each other, one round, the other sharp;
-    (whether they do, how many points there are then).
+    """Append the ends of what edges i of A and j of B share where they run along each other, one round, the other
+    sharp; (whether they do, how many points there are then).
     """
     a = _line_seen(pairs, k, 0, i, A, round_a, points.seen)
     b = _line_seen(pairs, k, 1, j, B, round_b, points.seen)

@@ -20,6 +20,7 @@ from collide.contact.manifold_points import (
 from collide.contact.manifold_points import (
     HEIGHT,
     NEAR,
+    NEAR_END,
     POINT,
     ManifoldPoints,
     V,
@@ -142,7 +143,8 @@ def put_manifold(header_at, a, b, row, margin, max_contacts, out_at):
     distance = row.doubles[DISTANCE]
     bracket = max(row.doubles[UPPER] - distance, distance - row.doubles[LOWER])
     if least_gap(manifold, n) - bound > distance + bracket + _ERRORS * error:
-        k = _corner_near(manifold, n, nearest)
+        is_line = of_a.n == 2 or of_b.n == 2
+        k = _corner_near(manifold, n, nearest, NEAR_END if is_line else NEAR)
         if k < 0:  # put in front: the nearest points, where corners are farther apart
             for j in range(n):
                 copy_point(manifold, n - 1 - j, n - j)
@@ -226,14 +228,15 @@ def _points_on_plane(plane, face, manifold):
 
 
 @kernel(inline=True)
-def _corner_near(manifold, n, nearest):
-    """Which point the nearest points are so near to that they are to take its place, and its features; −1 for none."""
+def _corner_near(manifold, n, nearest, share):
+    """Which point the nearest points are so near to, in shares of the manifold's size, that they are to take its place,
+    and its features; −1 for none."""
     closest, square = -1, math.inf
     for k in range(n):
         du, dv = manifold.points[POINT * k] - nearest.x, manifold.points[POINT * k + V] - nearest.y
         if du * du + dv * dv < square:
             closest, square = k, du * du + dv * dv
-    if closest < 0 or square > (NEAR * _extent(manifold, n)) ** 2:
+    if closest < 0 or square > (share * _extent(manifold, n)) ** 2:
         return -1
     return closest
 

@@ -9,8 +9,11 @@ import soak_contacts
 
 import collide
 
-#: Pairs that broke a promise once, (seed, case).
-FOUND = [*((1, k) for k in (80, 135, 170, 308, 612, 689, 784, 805, 972, 1357, 2196, 9133)), (2, 2620), (2, 10339)]
+#: Pairs that broke a promise once, or that the judge was wrong about, (seed, case): planes of needles a nanometre thin.
+FOUND = [
+    *((1, k) for k in (80, 135, 170, 308, 612, 689, 784, 805, 972, 1357, 2196, 9133)), (2, 2620), (2, 10339),
+    *((1, k) for k in (16462, 33683, 52922, 64593, 81979, 93074)),
+]  # fmt: skip
 
 
 @pytest.mark.slow
