@@ -211,7 +211,8 @@ _ARM = """<robot name="panda"><link name="base"/><link name="panda_hand"><collis
 _FILES = {
     "panda.urdf": _ARM,
     "two_links.urdf": _ARM.replace(
-        '<link name="base"/>', '<link name="base"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
+        '<link name="base"/>',
+        '<link name="base"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>',
     ),
     "scene.yaml": "collide: 1\nrobots:\n  - {urdf: panda.urdf}\nbodies:\n"
     "  - {name: table, shape: {box: {size: [1, 1, 0.1]}}, pose: {xyz: [0, 0, -1]}}\n",
