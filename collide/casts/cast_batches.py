@@ -12,7 +12,7 @@ from collide.batches import answer_batch
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.casts.convex_casts import CastRows, PairRows, answer_questions, first_contacts, joined
 from collide.casts.directions import Directions
-from collide.casts.items_ahead import FEW_PAIRS, rows_ahead
+from collide.casts.items_ahead import MAX_ASKED, rows_ahead
 from collide.casts.leaves import Leaf, leaves_of
 from collide.casts.mesh_casts import cast_leaves
 from collide.casts.posed_parts import PosedSides, posed_sides
@@ -106,9 +106,9 @@ _PARTS_TOGETHER = 32
 def _cast_parts(sides: PosedSides, vectors: np.ndarray, limits: np.ndarray) -> CastRows:
     """First contacts of n casts of unions of convex parts."""
     n_pairs = sides.counts.prod(axis=1)
-    rows = [answer_questions(sides.all_pairs(np.flatnonzero(n_pairs <= FEW_PAIRS)), vectors, limits)]
-    many = np.flatnonzero(n_pairs > FEW_PAIRS)
-    if len(many):
+    rows = [answer_questions(sides.all_pairs(np.flatnonzero(n_pairs <= MAX_ASKED)), vectors, limits)]
+    of_unions = np.flatnonzero(n_pairs > MAX_ASKED)
+    if len(of_unions):
         boxes = boxes_of(sides.parts.table, sides.parts.poses.rows, sides.parts.shape_of)
 
         def boxes_of_cast(cast: int) -> tuple[np.ndarray, np.ndarray]:
@@ -118,7 +118,7 @@ def _cast_parts(sides: PosedSides, vectors: np.ndarray, limits: np.ndarray) -> C
         def answer(owner: np.ndarray, item_a: np.ndarray, item_b: np.ndarray) -> PairRows:
             return answer_questions(sides.pairs(owner, item_a, item_b), vectors, limits)
 
-        rows += rows_ahead(many, boxes_of_cast, vectors, limits, answer, _PARTS_TOGETHER)
+        rows += rows_ahead(of_unions, boxes_of_cast, vectors, limits, answer, _PARTS_TOGETHER)
     return first_contacts(joined(rows), len(limits))
 
 
@@ -129,18 +129,18 @@ def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np
     leaves_a, leaves_b = leaves_of(A), leaves_of(B)
 
     def answer(owner: np.ndarray, item_a: np.ndarray, item_b: np.ndarray) -> PairRows:
-        found = []
+        parts = []
         for key in np.unique(item_a * len(leaves_b) + item_b).tolist():
             i, j = divmod(key, len(leaves_b))
             casts = owner[(item_a == i) & (item_b == j)]
             pair = leaves_a[i], leaves_b[j], X_WA[casts], X_WB[casts], vectors[casts], limits[casts]
             rows = cast_leaves(*pair) if leaves_a[i].shape.meshed or leaves_b[j].shape.meshed else _cast_convex(*pair)
             k = len(rows.owner)
-            found.append(rows._replace(owner=casts[rows.owner], item_a=np.full(k, i), item_b=np.full(k, j)))
-        return joined(found)
+            parts.append(rows._replace(owner=casts[rows.owner], item_a=np.full(k, i), item_b=np.full(k, j)))
+        return joined(parts)
 
     n_pairs = len(leaves_a) * len(leaves_b)
-    if n_pairs <= FEW_PAIRS:
+    if n_pairs <= MAX_ASKED:
         owner, pair = np.repeat(ahead, n_pairs), np.tile(np.arange(n_pairs), len(ahead))
         rows = [answer(owner, *np.divmod(pair, len(leaves_b)))]
     else:

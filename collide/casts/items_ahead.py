@@ -17,7 +17,7 @@ from collide.casts.convex_casts import PairRows
 from collide.casts.portal import HIT
 
 #: Of so few pairs of items all are asked: quicker than a tree.
-FEW_PAIRS = 64
+MAX_ASKED = 64
 #: Pairs of items that are listed at once: so many casts at once need little memory.
 _LISTED_AT_ONCE = 1 << 16
 
@@ -38,10 +38,10 @@ def rows_ahead(
     for owner, pairs, bounds in _listed(casts, boxes_of, vectors, limits):
         best = limits.copy()
         for some in nearest_first(owner, bounds, best, first):
-            found = answer(owner[some], *pairs[some].T)
-            proven = found.marks.proven & (found.rows[:, STATUS] == HIT)
-            np.minimum.at(best, found.owner[proven], found.rows[proven, UPPER])
-            yield found
+            pair_rows = answer(owner[some], *pairs[some].T)
+            proven = pair_rows.marks.proven & (pair_rows.rows[:, STATUS] == HIT)
+            np.minimum.at(best, pair_rows.owner[proven], pair_rows.rows[proven, UPPER])
+            yield pair_rows
 
 
 def nearest_first(owner: np.ndarray, bounds: np.ndarray, best: np.ndarray, first: int = 1) -> Iterator[np.ndarray]:

@@ -15,7 +15,7 @@ from collide.motion.convex_impact import FREE
 from collide.motion.impact_jobs import begin_single, find_impacts
 from collide.motion.impact_rows import TimeOfImpact, free_rows, single_result
 from collide.motion.moving_body import BODY
-from collide.motion.parts_ahead import FEW_PAIRS, parts_ahead
+from collide.motion.parts_ahead import MAX_ASKED, parts_ahead
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_kernel_calls import scratch
 from collide.narrowphase.pair_kernel import answer_pairs
@@ -224,14 +224,14 @@ def convex_impacts(
     rows = free_rows(n)
     bodies = _bodies_of(shapes)
     per_motion = max(int((bodies.counts[a] * bodies.counts[b]).max(initial=1)), 1)
-    at_once = max(JOBS_AT_ONCE // per_motion, 1) if per_motion <= FEW_PAIRS else 1
+    at_once = max(JOBS_AT_ONCE // per_motion, 1) if per_motion <= MAX_ASKED else 1
 
     def work(piece: slice) -> None:
         header = header_of(Tables(bodies.table.addresses, len(bodies.table.packed), bodies.parts), motions)
         for first in range(piece.start, piece.stop, at_once):
             some = slice(first, min(first + at_once, piece.stop))
             for jobs in (
-                [bodies.jobs(a[some], b[some], first, motions)] if per_motion <= FEW_PAIRS
+                [bodies.jobs(a[some], b[some], first, motions)] if per_motion <= MAX_ASKED
                 else bodies.jobs_ahead(shapes, int(a[first]), int(b[first]), first, motions, rows)
             ):  # fmt: skip
                 find_impacts(address_of(header), address_of(jobs), len(jobs), 0.0, 1.0, tolerance, address_of(rows))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collide.motion.convex_motions import Motions
 
 #: Of so few pairs of parts all are asked.
-FEW_PAIRS = 64
+MAX_ASKED = 64
 #: Spans are cut until bodies move by so much of the smaller one's reach in half of them, or are so short.
 _LEAST_MOVED, _SHORTEST = 2.0**-6, 2.0**-46
 
@@ -51,12 +51,12 @@ class Spans:
 
 
 def parts_ahead(
-    A: CompoundParts, B: CompoundParts, motion: Motions, upper: Callable[[], float], few: int
+    A: CompoundParts, B: CompoundParts, motion: Motions, upper: Callable[[], float], max_pairs: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yields (parts of A, parts of B) (k,), ascending, of pairs that were not named before, span by span: all that may
     meet before a time.
 
-    upper : that time, which may have become less meanwhile.   few : so many pairs are named before a span is cut.
+    upper : that time, which may have become less meanwhile.   max_pairs : so many pairs are named before a span is cut.
     """
     named = np.zeros((len(A.parts), len(B.parts)), dtype=bool)
     parts = np.zeros((2, PART))
@@ -76,7 +76,7 @@ def parts_ahead(
         _, a, b = boxes_near(A, B, X_A[None], X_B[None], reach)
         is_new = ~named[a, b]
         a, b = a[is_new], b[is_new]
-        if len(a) > few and end - begin > _SHORTEST and out[REACH] > least:
+        if len(a) > max_pairs and end - begin > _SHORTEST and out[REACH] > least:
             middle = 0.5 * (begin + end)
             to_do += [(middle, end), (begin, middle)]
             continue

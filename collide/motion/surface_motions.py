@@ -33,13 +33,13 @@ from collide.motion.convex_impact import CONTACT, OPEN
 from collide.motion.convex_motions import JOBS_AT_ONCE, Motions, Tables, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
-from collide.motion.parts_ahead import FEW_PAIRS, Spans, parts_ahead
+from collide.motion.parts_ahead import MAX_ASKED, Spans, parts_ahead
 from collide.motion.span_bounds import REACH
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.facets.facet_queries import facets_within
 from collide.narrowphase.facets.mesh_batches import pair_rows
-from collide.narrowphase.facets.near_facets import few_near_facets
+from collide.narrowphase.facets.near_facets import near_facets_up_to
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Sphere
@@ -178,7 +178,7 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
     """`surface_impacts` in the order worked on."""
     pieces_a, pieces_b = pieces_of(A), pieces_of(B)
     is_part = isinstance(A, Compound), isinstance(B, Compound)
-    if len(pieces_a) * len(pieces_b) <= FEW_PAIRS:
+    if len(pieces_a) * len(pieces_b) <= MAX_ASKED:
         _search_pieces([(a, b) for a in pieces_a for b in pieces_b], motions, tolerance, rows, is_part)
         return
     for k in range(len(rows)):
@@ -319,18 +319,18 @@ class _Spans(Spans):
         out = self.describe(time, time)
         return Placed(out[:16].reshape(4, 4).copy(), out[16:32].reshape(4, 4).copy(), float(out[REACH]))
 
-    def near_facets(self, begin: float, end: float, most: int) -> np.ndarray | None:
-        """(k, 2) facets that may meet in a span of time; None where there are more than ``most``."""
+    def near_facets(self, begin: float, end: float, max_pairs: int) -> np.ndarray | None:
+        """(k, 2) facets that may meet in a span of time; None where there are more than ``max_pairs``."""
         out = self.describe(begin, end)
         convex = None if self.a.is_mesh and self.b.is_mesh else self.b if self.a.is_mesh else self.a
         if convex is not None and (convex.has_many_facets or (convex.is_curved and out[REACH] < convex.radius)):
-            return self._near_convex(convex, out, most)
+            return self._near_convex(convex, out, max_pairs)
         X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
         reach = float(out[REACH]) + self.a.radius + self.b.radius
-        near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, most)  # type: ignore[arg-type]
-        return None if near is None or len(near.facets) > most < _MAX_JOBS_OF_ALL else near.facets
+        near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, max_pairs)  # type: ignore[arg-type]
+        return None if near is None or len(near.facets) > max_pairs < _MAX_JOBS_OF_ALL else near.facets
 
-    def _near_convex(self, convex: Piece, out: np.ndarray, most: int) -> np.ndarray | None:
+    def _near_convex(self, convex: Piece, out: np.ndarray, max_pairs: int) -> np.ndarray | None:
         """The same of a mesh and a convex piece as a whole: where the polytope around a curved one is farther from it
         than anything moves in the span, and where a facet of the mesh may be near more facets of a hull than can be
         jobs.
@@ -349,7 +349,7 @@ class _Spans(Spans):
                 return np.zeros((0, 2), dtype=np.int64)
             self._take_normal(row)
         at = as_given(X_M), as_given(X_C), self._normal
-        near = few_near_facets(mesh.tree, convex.packed, *at, reach, most)  # type: ignore[arg-type]
+        near = near_facets_up_to(mesh.tree, convex.packed, *at, reach, max_pairs)  # type: ignore[arg-type]
         if near is None:
             return None
         facets = np.zeros((len(near.place), 2), dtype=np.int64)
@@ -394,18 +394,18 @@ def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarr
     begin, end = spans.time_of_balls()
     spans_to_do = [(begin, end, _max_jobs(end - begin))] if begin <= end else []
     while spans_to_do:
-        begin, end, most = spans_to_do.pop()
+        begin, end, max_pairs = spans_to_do.pop()
         end = min(end, float(row["upper"][0]))
         if begin > end:
             continue
         is_shortest = end - begin < _SHORTEST
-        near = spans.near_facets(begin, end, _MAX_JOBS_OF_ALL if is_shortest else most)
+        near = spans.near_facets(begin, end, _MAX_JOBS_OF_ALL if is_shortest else max_pairs)
         if near is None and is_shortest:  # more facets together than can be looked at: open from here on
             if begin < row["lower"][0]:
                 row["lower"], row["status"] = begin, OPEN
         elif near is None:
             begin, middle, is_shorter = spans.cut(begin, end)
-            spans_to_do += [(middle, end, most), (begin, middle, min(most << is_shorter, _MAX_JOBS_OF_ALL))]
+            spans_to_do += [(middle, end, max_pairs), (begin, middle, min(max_pairs << is_shorter, _MAX_JOBS_OF_ALL))]
         elif len(near):
             jobs = _FacetJobs(a, b, near, is_part)
             jobs.search(motion, np.zeros(1, dtype=np.int64), (begin, end), tolerance, row)

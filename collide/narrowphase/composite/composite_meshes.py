@@ -224,9 +224,9 @@ def _raise_along_normals(
         X_A, X_B = X_WA[k : k + 1].copy(), X_WB[k : k + 1].copy()
         X_B[:, :3, 3] -= X_A[:, :3, 3]
         X_A[:, :3, 3] = 0.0
-        turn = _frame_along(row["normal"])
+        rotation = _frame_along(row["normal"])
         for X in (X_A, X_B):
-            X[:, :3] = turn @ X[:, :3]
+            X[:, :3] = rotation @ X[:, :3]
         of_a, of_b = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
         ends = np.concatenate([side.boxes(X, of)[0] for side, X, of in ((A, X_A, of_a), (B, X_B, of_b))])
         size = float(np.abs(ends[np.isfinite(ends)]).max(initial=0.0))

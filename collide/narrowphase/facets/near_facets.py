@@ -17,8 +17,8 @@ from collide.mesh.bvh import NOTHING, REACH, WIDTH, MeshTree, leaf_runs
 
 #: More boxes at once are walked in two parts of the poses.
 _MAX_BOXES = 1 << 16
-#: Of more points the farthest is looked for by the support tree.
-_MANY_POINTS = 2048
+#: Of more points than these the farthest is looked for by the support tree.
+_MAX_SCANNED = 2048
 #: Of the largest numbers met, what rounding takes off a gap; unit vectors are this much shorter than 1.
 _ROUNDING, _SHORTER = 2.0**-46, 1 - 2.0**-40
 
@@ -40,14 +40,16 @@ class Facets:
         return np.arange(len(self.pose)) - np.repeat(starts, counts)
 
 
-def few_near_facets(
-    tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: float, most: int
-) -> Facets | None:
-    """`near_facets` at one pair of poses; None where more than about ``most`` are near, after few of them."""
+def near_facets_up_to(
+    tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: float,
+    max_facets: int,
+) -> Facets | None:  # fmt: skip
+    """`near_facets` at one pair of poses; None where more than about ``max_facets`` are near, after few of them."""
     blocks: list = []
-    for block in _walk(tree, _Spans(tree, packed, A, B, along), np.array([upper]), np.zeros(1, dtype=np.int64), most):
+    spans, pose = _Spans(tree, packed, A, B, along), np.zeros(1, dtype=np.int64)
+    for block in _walk(tree, spans, np.array([upper]), pose, max_facets):
         blocks.append(block)
-        if sum(len(places) for _, places, _ in blocks) > most:
+        if sum(len(places) for _, places, _ in blocks) > max_facets:
             return None
     return Facets(*(np.concatenate(column) for column in zip(*blocks))) if blocks else None
 
@@ -64,10 +66,10 @@ def near_facets(
     return Facets(*(np.concatenate(column) for column in zip(*blocks)))
 
 
-def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, most: int | None = None):
+def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, max_facets: int | None = None):
     """Yields (pose, place, bound) of the facets that may be near enough, block by block.
 
-    most : nothing where more boxes than so many are near, of which each holds a facet.
+    max_facets : nothing where more boxes than so many are near, of which each holds a facet.
     """
     links = tree.links()
     pose, at = poses, np.zeros(len(poses), dtype=np.int64)
@@ -83,7 +85,7 @@ def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, m
         pose, link = pose[near], link[near]
         leaf = link < 0
         runs.append((pose[leaf], link[leaf]))
-        if most is not None and len(pose) - len(runs[-1][0]) + sum(len(run) for run, _ in runs) > most:
+        if max_facets is not None and len(pose) - len(runs[-1][0]) + sum(len(run) for run, _ in runs) > max_facets:
             return
         pose, at = pose[~leaf], link[~leaf]
         if len(at) * WIDTH > _MAX_BOXES and len(poses) > 1:
@@ -153,7 +155,7 @@ def _worth(D: np.ndarray) -> np.ndarray:
 def _support(packed: PackedConvex, g: np.ndarray) -> np.ndarray:
     """(…,) support values of a core along g (…, 3)."""
     p = packed.params
-    if packed.kind == POINTS and len(packed.points) > _MANY_POINTS:
+    if packed.kind == POINTS and len(packed.points) > _MAX_SCANNED:
         return _support_by_tree(packed, g)
     if packed.kind == POINTS:
         return _dot(g[:, :, None], packed.points).max(axis=-1)
