@@ -17,8 +17,8 @@ from collide.mesh.bvh import NOTHING, REACH, WIDTH, MeshTree, leaf_runs
 
 #: More boxes at once are walked in two parts of the poses.
 _MAX_BOXES = 1 << 16
-#: Of more points the farthest is looked for by the support tree.
-_MANY_POINTS = 2048
+#: Of more points than these the farthest is looked for by the support tree.
+_MAX_SCANNED = 2048
 #: Of the largest numbers met, what rounding takes off a gap; unit vectors are this much shorter than 1.
 _ROUNDING, _SHORTER = 2.0**-46, 1 - 2.0**-40
 
@@ -155,7 +155,7 @@ def _worth(D: np.ndarray) -> np.ndarray:
 def _support(packed: PackedConvex, g: np.ndarray) -> np.ndarray:
     """(…,) support values of a core along g (…, 3)."""
     p = packed.params
-    if packed.kind == POINTS and len(packed.points) > _MANY_POINTS:
+    if packed.kind == POINTS and len(packed.points) > _MAX_SCANNED:
         return _support_by_tree(packed, g)
     if packed.kind == POINTS:
         return _dot(g[:, :, None], packed.points).max(axis=-1)
