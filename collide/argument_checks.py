@@ -61,11 +61,11 @@ def length(what: str, value: Any) -> float:
     return read
 
 
-def number_within(what: str, value: Any, least: float, most: float, error: type[CollideError]) -> float:
-    """A number from ``least`` to ``most``, no True or False; −0 as 0. Raises ``error``."""
+def number_within(what: str, value: Any, lowest: float, highest: float, error: type[CollideError]) -> float:
+    """A number from ``lowest`` to ``highest``, no True or False; −0 as 0. Raises ``error``."""
     read = None if isinstance(value, (bool, np.bool_)) else number(value)
-    if read is None or not least <= read <= most:
-        raise error(f"{what} must lie within [{least:g}, {most:g}], got {brief(value)}")
+    if read is None or not lowest <= read <= highest:
+        raise error(f"{what} must lie within [{lowest:g}, {highest:g}], got {brief(value)}")
     return read + 0.0
 
 

@@ -66,8 +66,8 @@ def generate(name: str, seed: int = 0, **size) -> Scene:
                 f"{name} has no argument {argument!r}{did_you_mean(argument, known)}; it has {', '.join(known)}"
             )
     scene = make(np.random.default_rng(seed), **size)
-    given = [repr(name), f"seed={seed}", *(f"{k}={v!r}" for k, v in size.items())]
-    scene.sources = [f"generate({', '.join(given)})"]
+    arguments = [repr(name), f"seed={seed}", *(f"{k}={v!r}" for k, v in size.items())]
+    scene.sources = [f"generate({', '.join(arguments)})"]
     return scene
 
 

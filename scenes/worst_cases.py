@@ -34,7 +34,7 @@ _ANNULUS = ((0, 1, 4), (1, 5, 4), (1, 2, 5), (2, 6, 5), (2, 3, 6), (3, 0, 6), (0
 #: Below this the annulus decides the stretch and not the strings' ends.
 LEAST_STRETCH = 6.0
 #: So many bodies or strings are more than any memory holds.
-_MOST = 10**7
+_MAX_COUNT = 10**7
 #: Longest edge of a fold over the shortest of its hole: a corner to the other, the lowest to the right.
 _TEMPLATE_STRETCH = 1.75 / math.hypot(11 / 32, 3 / 16)
 #: Significant bits of string lengths: products with their positions stay exact, and shifted copies too.
@@ -170,6 +170,6 @@ def _short(length: float) -> float:
 def count_of(name: str, value, least: int = 1) -> int:
     """How many bodies, layers or strings a scene has. Raises SceneError."""
     count = checks.integer(name, value, least, SceneError)
-    if count > _MOST:
-        raise SceneError(f"{name} must be at most {_MOST}, got {brief(value)}")
+    if count > _MAX_COUNT:
+        raise SceneError(f"{name} must be at most {_MAX_COUNT}, got {brief(value)}")
     return count

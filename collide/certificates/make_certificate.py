@@ -56,9 +56,9 @@ def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates
         raise InvalidArgument(f"certify: r must be a PairResult, got {type(r).__name__}")
     X_WA, X_WB = as_poses(X_WA, "X_WA", check=False), as_poses(X_WB, "X_WB", check=False)
     sides = {"A": (A, shapes_a), "B": (B, shapes_b), "X_WA": (X_WA, X_WA), "X_WB": (X_WB, X_WB)}
-    for name, (given, batch) in sides.items():
+    for name, (value, batch) in sides.items():
         if len(batch) not in (1, len(r)):
-            raise InvalidArgument(f"certify: {len(r)} results, but {name} has {len(batch)}: {brief(given)}")
+            raise InvalidArgument(f"certify: {len(r)} results, but {name} has {len(batch)}: {brief(value)}")
     questions = (question_of_row((A, B, X_WA, X_WB), k) for k in range(len(r)))
     certificates = [certificate_of_row(*question, row) for question, row in zip(questions, r.rows)]
     return certificates[0] if r.is_single else certificates

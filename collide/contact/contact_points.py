@@ -415,7 +415,7 @@ def _put_ends(pairs, k, i, j, A, B, round_a, round_b, view, points, n):
         slopes = _slopes_at(pairs, k, 1, j, B, view.axes)
     else:
         slopes = _slopes_at(pairs, k, 0, i, A, view.axes)
-    if not slopes.supports or max(slopes.left, slopes.right) <= _SUPPORTING:
+    if not slopes.supports or max(slopes.left_slope, slopes.right_slope) <= _SUPPORTING:
         return False, n
     n_before, n_after, bound = n, n, 32.0 * view.error
     n = put_line_ends(a, b, is_sharp_b, slopes, 16.0 * view.error, points.manifold, n)

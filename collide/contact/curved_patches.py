@@ -308,7 +308,7 @@ def _put_ends(near, face, of_set, axes, n):
             continue
         p, q = _unseen(axes, edge.p), _unseen(axes, edge.q)
         slopes = edge_slopes(near.mesh, edge.feature_p // 4, edge.feature_q // 4, p, q, axes.nhat, _SAME)
-        if slopes.supports and max(slopes.left, slopes.right) > _SAME:
+        if slopes.supports and max(slopes.left_slope, slopes.right_slope) > _SAME:
             n = put_line_ends(edge, line, False, slopes, 16.0 * near.error, near.overlap, n)
     return n
 

@@ -65,13 +65,14 @@ def fan_allows(body, corner, end, point, u, slack):
 class EdgeSlopes(NamedTuple):
     """How steeply a surface falls off from one of its edges, seen along a direction that the edge supports.
 
-    supports : no facet at the edge rises from it.   left, right : the least tangent of the facets on the side of
-    edge × direction, and on the other; ∞ where there is none.
+    supports : no facet at the edge rises from it.
+    left_slope, right_slope : the least tangent of the facets on the side of edge × direction, and on the other; ∞
+    where there is none.
     """
 
     supports: bool
-    left: float
-    right: float
+    left_slope: float
+    right_slope: float
 
 
 @kernel
@@ -81,9 +82,9 @@ def edge_slopes(body, corner, end, p, q, u, slack):
     square = dot(e, e)
     side = cross(e, u)
     width = norm(side)
-    left, right = math.inf, math.inf
+    left_slope, right_slope = math.inf, math.inf
     if not (square > 0.0 and width > 0.0):
-        return EdgeSlopes(False, left, right)
+        return EdgeSlopes(False, left_slope, right_slope)
     side = scale(1.0 / width, side)
     up = sub(u, scale(dot(u, e) / square, e))
     up = scale(1.0 / norm(up), up)
@@ -98,13 +99,13 @@ def edge_slopes(body, corner, end, p, q, u, slack):
             w = sub(posed_corner(body, int(body.places[facet]), k), p)
             fall, aside = -dot(w, up), dot(w, side)
             if fall < -slack * (abs(fall) + abs(aside)):
-                return EdgeSlopes(False, left, right)
+                return EdgeSlopes(False, left_slope, right_slope)
             slope = max(fall, 0.0) / abs(aside) if aside != 0.0 else math.inf
             if aside > 0.0:
-                left = min(left, slope)
+                left_slope = min(left_slope, slope)
             else:
-                right = min(right, slope)
-    return EdgeSlopes(True, left, right)
+                right_slope = min(right_slope, slope)
+    return EdgeSlopes(True, left_slope, right_slope)
 
 
 @kernel(inline=True)

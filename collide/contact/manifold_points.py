@@ -380,7 +380,7 @@ def put_line_ends(a, b, is_sharp_b, slopes, tolerance, manifold, n):
         # edge × direction is (−ev, eu) for B, whose surface is seen from below, and for A its opposite; the line is
         # beside the edge by −(beside_u, beside_v) for B, by itself for A: the signs are the same.
         is_left = ev * at.beside_u - eu * at.beside_v > 0.0
-        slope = slopes.left if is_left else slopes.right
+        slope = slopes.left_slope if is_left else slopes.right_slope
         beside = math.sqrt(at.beside_u * at.beside_u + at.beside_v * at.beside_v)
         if at.fall > slope * beside + tolerance:
             continue

@@ -395,8 +395,8 @@ def _refuse(question: _Question, rows: np.ndarray) -> None:
         motions = question.motions
         has_omega = motions.omega_WA is not None or motions.omega_WB is not None
         kind = InvalidArgument if has_omega else InvalidPose
-        given = (("omega_WA", motions.omega_WA), ("omega_WB", motions.omega_WB))
-        names = (f"{name} {omega[k % len(omega)].tolist()}" for name, omega in given if omega is not None)
+        turns = (("omega_WA", motions.omega_WA), ("omega_WB", motions.omega_WB))
+        names = (f"{name} {omega[k % len(omega)].tolist()}" for name, omega in turns if omega is not None)
         where = _leads_elsewhere(" or ".join(names), "the first pose", "the second", has_omega)
         raise kind(f"motion {k}: {where}")
     raise UnsupportedQuery(

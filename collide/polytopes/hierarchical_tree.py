@@ -87,10 +87,10 @@ class HierarchicalTree:
             cloud, _ = read_points(points)
             self.points = cloud
         elif points is not None or normals is None or offsets is None:
-            given = {"points": points, "normals": normals, "offsets": offsets}
+            arguments = {"points": points, "normals": normals, "offsets": offsets}
             raise InvalidArgument(
                 "HierarchicalTree: give either points, or normals with offsets, got "
-                + ", ".join(f"{name} {brief(value)}" for name, value in given.items())
+                + ", ".join(f"{name} {brief(value)}" for name, value in arguments.items())
             )
         else:
             shape = np.asarray(normals).shape

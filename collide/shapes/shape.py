@@ -195,8 +195,8 @@ def checked_shape(what: str, value: Any, example: str = "collide.Box((1, 1, 1))"
 def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndarray:
     """Three lengths > 0 along x, y, z, given as one sequence or as three numbers."""
     if (y is None) != (z is None):
-        given = brief((value, y, z))
-        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {given}")
+        values = brief((value, y, z))
+        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {values}")
     lengths = rows(shape, field, value if y is None else (value, y, z), (3,))
     for axis, length in zip("xyz", lengths):
         positive(shape, f"{field}.{axis}", length)

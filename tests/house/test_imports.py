@@ -23,7 +23,7 @@ from house_sources import (
 #: What the modules of a room of the engine may import; a room may always import itself.
 ROOMS = {
     "errors": set(),
-    "cache_folder": set(),
+    "cache_folder": {"log"},
     "whole_file": set(),
     "given_files": {"errors"},
     "log": set(),
@@ -35,7 +35,7 @@ ROOMS = {
     "argument_checks": {"errors"},
     "threads": {"errors", "argument_checks"},
     "transforms": {"errors", "argument_checks"},
-    "results": {"errors"},
+    "results": {"errors", "argument_checks"},
     "numerics": {"errors", "kernels"},
     "least_distance": {"errors", "argument_checks", "kernels", "numerics"},
     "hull": {"errors", "kernels", "least_distance", "numerics"},
@@ -305,7 +305,8 @@ ROOMS = {
         "reports", "whole_file", "",
     },
     "reports": {
-        "errors", "lowering", "results", "shapes", "solids", "cache_folder", "given_files", "kernels", "whole_file", "",
+        "argument_checks", "cache_folder", "errors", "given_files", "kernels", "lowering", "results", "shapes",
+        "solids", "whole_file", "",
     },
     "pages": {"errors", "contact", "lowering", "reports", "results", "shapes", "whole_file"},
     "cli_files": {"errors", "reports", "whole_file"},

@@ -49,13 +49,13 @@ def gather_planes(parts, first_a, n_a, first_b, n_b, planes):
     """
     n = 0
     for side in range(2):
-        own, n_own = (first_a, n_a) if side == 0 else (first_b, n_b)
-        other, n_other = (first_b, n_b) if side == 0 else (first_a, n_a)
-        for part in range(own, own + n_own):
+        first_plane, n_planes = (first_a, n_a) if side == 0 else (first_b, n_b)
+        first_body, n_bodies = (first_b, n_b) if side == 0 else (first_a, n_a)
+        for part in range(first_plane, first_plane + n_planes):
             if not is_halfspace(parts, part):
                 continue
             depth, error, m = -math.inf, 0.0, Vec3(0.0, 0.0, 0.0)
-            for k in range(other, other + n_other):
+            for k in range(first_body, first_body + n_bodies):
                 if is_halfspace(parts, k):
                     return -1
                 near = gap_of_plane(parts, part, k)
