@@ -15,16 +15,14 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Iterable
 
-import numpy as np
-
 #: Characters of a value, of a place in a file and of a whole message that are shown; names may have a megabyte.
 LONGEST_VALUE, LONGEST_PLACE, LONGEST_MESSAGE = 80, 240, 4000
 
 
 def brief(value: object) -> str:
     """A value for a message: numpy's numbers as numbers, cut where it is long, and never written out whole before."""
-    if isinstance(value, (np.number, np.bool_)):
-        value = value.item()
+    if type(value).__module__ == "numpy" and not getattr(value, "shape", True):  # without importing it
+        value = value.item()  # type: ignore[attr-defined]
     if isinstance(value, str):
         return repr(value) if len(value) <= LONGEST_VALUE else repr(value[: LONGEST_VALUE - 3]) + "..."
     return cut(_SHORT.repr(value), LONGEST_VALUE)

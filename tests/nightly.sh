@@ -10,7 +10,7 @@
 # grew is told: the file belongs into a commit.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-steps=(install tests own matrix soaks faults site)
+steps=(install tests own plain matrix soaks faults site)
 chosen=("${@:-${steps[@]}}")
 log=build/nightly
 mkdir -p "$log"
@@ -41,6 +41,7 @@ own() {
     mapfile -t own < <(grep -rl --include='test_*.py' 'mark.own_kernels' tests)
     COLLIDE_JIT=1 run own "${tests[@]}" -m own_kernels "${own[@]}"
 }
+plain() { NUMBA_DISABLE_JIT=1 run plain python -m pytest -q tests/contact/test_facet_manifolds.py -k no_patch_may_reach; }
 matrix() { run matrix bash tests/matrix.sh; }
 soaks() {
     { # one core

@@ -7,8 +7,8 @@ import pytest
 from naive import pose, random_pose, rng_of
 
 import collide
+from collide.casts.items_ahead import nearest_first
 from collide.errors import InvalidArgument
-from collide.world_casts import _nearest_first
 
 BALL = collide.Sphere(0.25)
 #: Two balls, one of them in a union within the union.
@@ -133,7 +133,7 @@ def test_groups_and_masks_are_integers_of_32_bits(name, value):
 
 def test_pairs_are_handed_out_by_twos_until_none_may_be_nearer():
     owner, bounds = np.array([0, 0, 0, 0, 1, 1]), np.array([0.0, 1.0, 2.0, 3.0, 5.0, 6.0])
-    every = [some.tolist() for some in _nearest_first(owner, bounds, np.full(2, np.inf))]
+    every = [some.tolist() for some in nearest_first(owner, bounds, np.full(2, np.inf))]
     assert every == [[0, 4], [1, 2, 5], [3]]
-    assert [some.tolist() for some in _nearest_first(owner, bounds, np.array([1.0, 5.0]))] == [[0, 4], [1]]
-    assert list(_nearest_first(owner[:0], bounds[:0], np.zeros(0))) == []
+    assert [some.tolist() for some in nearest_first(owner, bounds, np.array([1.0, 5.0]))] == [[0, 4], [1]]
+    assert list(nearest_first(owner[:0], bounds[:0], np.zeros(0))) == []

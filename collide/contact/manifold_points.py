@@ -26,7 +26,7 @@ _ASIDE = math.sqrt(0.5)
 #: octagon, and two contacts so near would be one too many.
 NEAR = 2.0**-8
 #: The same of lines, whose ends are where they are: a shorter line is another one.
-NEAR_END = 2.0**-12
+NEAR_END = 2.0**-11
 
 
 class ManifoldPoints(NamedTuple):

@@ -272,5 +272,5 @@ def test_batches_keep_their_order(monkeypatch):
 def test_refused():
     with pytest.raises(InvalidArgument, match=r"no engine 'bullet'; there are .*coal \(:nesterov, .*collide, "):
         run(["rand_sep"], n=1, engine="bullet")
-    with pytest.raises(InvalidArgument, match="no family is called 'rand'; there are rand_sep, rand_pen"):
+    with pytest.raises(InvalidArgument, match="no family has the name 'rand'; there are rand_sep, rand_pen"):
         run(["rand_sep", "rand"], n=1)

@@ -17,7 +17,7 @@ from collide.casts import cast_pairs as P
 from collide.casts.cast_onto_plane import cast_onto_plane
 from collide.casts.convex_casts import workspace
 from collide.casts.portal import BEHIND, HIT, LEVEL, MISS, OPEN
-from collide.casts.posed_parts import part_pairs
+from collide.casts.posed_parts import posed_sides
 from collide.kernels import address_of, view_f64, view_i64
 from collide.lowering.shape_table import INTS, NUMBERS, POSE
 from collide.narrowphase.bounds import ERROR
@@ -29,7 +29,7 @@ FLOOR = collide.Halfspace((0, 0, 1), 0.0)
 
 
 def row_of(A, X_WA, d, limit, B=FLOOR, X_WB=None) -> np.ndarray:
-    pairs = part_pairs(A, B, X_WA[None], (np.eye(4) if X_WB is None else X_WB)[None], 1)
+    pairs = posed_sides(A, B, X_WA[None], (np.eye(4) if X_WB is None else X_WB)[None], 1).all_pairs(np.arange(1))
     pairs.parts.table.build_trees(pairs.parts.shape_of)
     row, question = np.zeros(P.CAST_ROW), np.array([*d, limit])
     P.cast_pairs(
@@ -105,7 +105,8 @@ def test_shapes_fall_as_far_as_they_reach(shape):
 @pytest.mark.plain_kernels
 def test_the_entry_by_itself():
     """The kernel is called as Python on what the row was made of."""
-    pairs = part_pairs(collide.Box((2, 2, 2)), FLOOR, collide.pose((0.5, 0, 4))[None], np.eye(4)[None], 1)
+    box = collide.Box((2, 2, 2))
+    pairs = posed_sides(box, FLOOR, collide.pose((0.5, 0, 4))[None], np.eye(4)[None], 1).all_pairs(np.arange(1))
     ints_at, numbers_at = pairs.parts.table.addresses
     ints, numbers = view_i64(ints_at, 2 * INTS), view_f64(numbers_at, 2 * NUMBERS)
     poses, (pa, pb) = pairs.parts.poses.rows.ravel(), pairs.pairs[0].tolist()

@@ -19,14 +19,13 @@ from collide.casts.convex_casts import (
     PairRows,
     answer_part_pairs,
     answer_questions,
-    cast_parts,
     first_contacts,
     nothing_met,
     settle_points,
     workspace,
 )
 from collide.casts.portal import BEHIND, HIT, LEVEL, MISS, OPEN
-from collide.casts.posed_parts import PartPairs, part_pairs
+from collide.casts.posed_parts import PartPairs, posed_sides
 from collide.kernels import address_of
 
 SOURCE = "A, B, X_WA, X_WB, d = {A}, {B}, {X_WA}, {X_WB}, {d}  # hulls, half units; tests/casts/test_convex_casts.py"
@@ -56,7 +55,7 @@ class Drawn:
 
     def pairs(self) -> PartPairs:
         A, B = (collide.ConvexHull(points.astype(float)) for points in (self.A, self.B))
-        pairs = part_pairs(A, B, self.X_WA[None], self.X_WB[None], 1)
+        pairs = posed_sides(A, B, self.X_WA[None], self.X_WB[None], 1).all_pairs(np.arange(1))
         pairs.parts.table.build_trees(pairs.parts.shape_of)
         return pairs
 
@@ -148,8 +147,8 @@ def test_bodies_before_a_plane():
         (np.nextafter(1.0, 2.0), (0.5, 0, 0), math.inf, None), (3.0, (0.5, 0, -(2.0**-60)), math.inf, 2.0**61),
         (3.0, (0.5, 0, -(2.0**-60)), 2.0**60, None), (3.0, (0, 0, -0.5), 4.0, 4.0),
     ):  # fmt: skip
-        pairs = part_pairs(box, half, collide.pose((0, 0, z))[None], np.eye(4)[None], 1)
-        out = cast_parts(pairs, np.array([d], dtype=float), np.array([limit]), 1)
+        pairs = posed_sides(box, half, collide.pose((0, 0, z))[None], np.eye(4)[None], 1).all_pairs(np.arange(1))
+        out = first_contacts(answer_questions(pairs, np.array([d], dtype=float), np.array([limit])), 1)
         assert out.hit[0] == (expected is not None) and out.proven[0], (z, d)
         if expected is not None:
             assert out.t[0, 1] <= expected <= out.t[0, 2] and out.at_start[0] == (expected == 0.0)
@@ -161,8 +160,8 @@ def test_bodies_before_a_plane():
 def test_curved_bodies_that_graze_are_left_open_and_hit():
     ball = collide.Sphere(0.5)
     for y, hit, certified in ((1.0, True, False), (1.0 + 1e-6, False, True), (1.0 - 1e-3, True, True)):
-        pairs = part_pairs(ball, ball, collide.pose((-3, y, 0))[None], np.eye(4)[None], 1)
-        out = cast_parts(pairs, np.array([(0.5, 0.0, 0.0)]), np.array([math.inf]), 1)
+        pairs = posed_sides(ball, ball, collide.pose((-3, y, 0))[None], np.eye(4)[None], 1).all_pairs(np.arange(1))
+        out = first_contacts(answer_questions(pairs, np.array([(0.5, 0.0, 0.0)]), np.array([math.inf])), 1)
         assert (out.hit[0], out.certified[0]) == (hit, certified)
         assert not hit or out.t[0, 1] <= 2 * (3 - math.sqrt(max(1 - y * y, 0))) <= out.t[0, 2] + 1e-6
 
@@ -221,8 +220,8 @@ def test_nothing_met_is_proven():
     assert not out.hit.any() and out.proven.all() and out.certified.all() and not out.at_start.any()
     assert np.isinf(out.t).all() and not out.normal.any() and (out.item_a == -1).all() and (out.item_b == -1).all()
     assert len({id(column) for column in out}) == len(out)  # columns are written one by one
-    pairs = part_pairs([], [], np.zeros((0, 4, 4)), np.zeros((0, 4, 4)), 0)
-    assert len(cast_parts(pairs, np.zeros((0, 3)), np.zeros(0), 0).hit) == 0
+    pairs = posed_sides([], [], np.zeros((0, 4, 4)), np.zeros((0, 4, 4)), 0).all_pairs(np.arange(0))
+    assert len(first_contacts(answer_questions(pairs, np.zeros((0, 3)), np.zeros(0)), 0).hit) == 0
     assert answer_questions(pairs, np.zeros((0, 3)), np.zeros(0)).rows.shape == (0, P.CAST_ROW)
 
 
@@ -234,7 +233,7 @@ def test_every_row_is_settled(wanted):
     X = np.array([collide.pose(rng.integers(-2, 3, 3) * 0.5) for _ in range(30)])
     half = collide.Halfspace((0, 0, 1), -1.0)
     others = [half if k % 3 == 0 else boxes[k - 1] for k in range(30)]
-    pairs = part_pairs(boxes, others, X, np.eye(4)[None], 30)
+    pairs = posed_sides(boxes, others, X, np.eye(4)[None], 30).all_pairs(np.arange(30))
     d = np.eye(3)[rng.integers(0, 3, 30)] * -0.5
     found = answer_questions(pairs, d, np.full(30, np.inf))
     assert {BEHIND, OPEN, LEVEL}.isdisjoint(found.rows[:, P.STATUS].tolist())

@@ -14,7 +14,7 @@ from reproduction import reproducing
 
 import collide
 from collide.casts import portal, rounded_entry, silhouette
-from collide.casts.posed_parts import part_pairs
+from collide.casts.posed_parts import posed_sides
 from collide.kernels import address_of, view_f64, view_i64
 from collide.lowering.shape_table import INTS, NUMBERS
 from collide.narrowphase.bounds import ERROR
@@ -37,7 +37,7 @@ class Drawn:
         d = X[1][:3, 3] - X[0][:3, 3] + spread * rng.normal(size=3)
         self.d = d / (2.0 * np.abs(d).max())
         self.P, self.Q = (h.points @ Y[:3, :3].T + Y[:3, 3] for h, Y in zip(hulls, X))
-        self.pairs = part_pairs(*hulls, X[0][None], X[1][None], 1)
+        self.pairs = posed_sides(*hulls, X[0][None], X[1][None], 1).all_pairs(np.arange(1))
         self.doubles, self.integers = (
             np.zeros(silhouette.CAST_DOUBLES),
             np.zeros(silhouette.CAST_INTEGERS, dtype=np.int64),

@@ -7,7 +7,7 @@ import pytest
 from naive import one_of_each, random_pose, rng_of
 
 import collide
-from collide.casts.posed_parts import PosedParts, part_pairs, posed_parts
+from collide.casts.posed_parts import PosedParts, posed_parts, posed_sides
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import POSE_SLOP
 
@@ -30,7 +30,7 @@ def test_pairs_are_those_of_loops(single_a, single_b, n_poses):
     A = shapes[0] if single_a else [shapes[k] for k in (0, 1, 0, 3, 1)]
     B = shapes[0] if single_b else [shapes[k] for k in (2, 0, 2, 3, 0)]
     X_WA, X_WB = (np.array([random_pose(rng) for _ in range(k)]) for k in n_poses)
-    found = part_pairs(A, B, X_WA, X_WB, n)
+    found = posed_sides(A, B, X_WA, X_WB, n).all_pairs(np.arange(n))
     expected = [
         (k, i, j)
         for k in range(n)
@@ -52,7 +52,7 @@ def test_pairs_are_those_of_loops(single_a, single_b, n_poses):
 def test_equal_shapes_share_a_row():
     boxes = [collide.Box((1, 1, 1)), collide.Box((1, 1, 1)), collide.Box((1, 1, 2))]
     X = np.array([np.eye(4)] * 3)
-    found = part_pairs(boxes, boxes[::-1], X, X, 3)
+    found = posed_sides(boxes, boxes[::-1], X, X, 3).all_pairs(np.arange(3))
     assert len(found.parts.table.packed) == 2
     assert found.parts.shape_of.tolist() == [0, 0, 1, 1, 0, 0]
 
@@ -60,7 +60,7 @@ def test_equal_shapes_share_a_row():
 def test_no_questions_make_no_pairs():
     box = collide.Box((1, 1, 1))
     for A, B in ((box, box), ([], box), ([], [])):
-        found = part_pairs(A, B, np.zeros((0, 4, 4)), np.eye(4)[None], 0)
+        found = posed_sides(A, B, np.zeros((0, 4, 4)), np.eye(4)[None], 0).all_pairs(np.arange(0))
         assert found.pairs.shape == (0, 2) and len(found.owner) == len(found.item_a) == len(found.item_b) == 0
 
 

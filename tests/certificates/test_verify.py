@@ -32,7 +32,7 @@ def test_questions_that_are_none():
     with pytest.raises(collide.InvalidArgument, match="r must be a result"):
         check_question("verify", [BOX], [BOX], True)
     batch = collide.distance(BOX, BOX, EYE, np.stack([pose(t=(3, 0, 0))] * 2))
-    with pytest.raises(collide.InvalidArgument, match="one pair at one pose"):
+    with pytest.raises(collide.InvalidArgument, match="must be one pose each and r one result"):
         collide.verify(BOX, BOX, EYE, np.stack([pose(t=(3, 0, 0))] * 2), batch)
 
 

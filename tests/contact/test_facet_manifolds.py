@@ -24,7 +24,7 @@ from collide.contact import (
 from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP, TRANSLATION
 from collide.contact.manifold_points import POINT, ManifoldPoints
 from collide.contact.support_face import EDGE, FACE, VERTEX, axes_across
-from collide.kernels import address_of
+from collide.kernels import PLAIN_PYTHON, address_of
 from collide.numerics.vec3 import Vec3
 
 EYE = np.eye(4)
@@ -117,7 +117,7 @@ def test_a_call_after_one_that_needed_much_space_begins_with_what_may_be_kept(mo
     assert mesh_contacts._of_thread._words is kept
 
 
-@pytest.mark.plain_kernels
+@pytest.mark.skipif(not PLAIN_PYTHON, reason="patches kernels: NUMBA_DISABLE_JIT=1 python -m pytest")
 def test_pairs_that_no_patch_may_reach_are_not_linked_and_rows_are_the_same(monkeypatch):
     """Deep overlaps list facets within more than the depth: most lie beside the translation's shadow or look the wrong
     way. Rows are those of all pairs linked, bit by bit, on sharp and swept bodies and with a margin."""

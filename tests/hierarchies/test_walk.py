@@ -459,7 +459,7 @@ def test_what_it_refuses():
             collide.collide(box, box, EYE, EYE, algorithm=wrong)
     with pytest.raises(collide.InvalidArgument, match="axes"):
         collide.collide(box, box, EYE[None], EYE, algorithm=WALK, axes=np.zeros((1, 3)))
-    with pytest.raises(collide.InvalidArgument, match="two shapes"):
+    with pytest.raises(collide.InvalidArgument, match="A must be a shape"):
         collide.collide([box], box, EYE[None], EYE, algorithm=WALK)
     with pytest.raises(collide.InvalidPose):
         collide.collide(box, box, 2 * EYE, EYE, algorithm=WALK)

@@ -106,7 +106,7 @@ def test_what_has_facets(kind):
     }.get(kind, f"{kind} has no facets of doubles")  # fmt: skip
     with pytest.raises(UnsupportedQuery, match=f"locality: {words}"):
         F.facet_body(shape, "locality")
-    with pytest.raises(InvalidArgument, match="locality: shape must be a shape"):
+    with pytest.raises(InvalidArgument, match="locality must be a shape"):
         F.facet_body("box", "locality")
 
 

@@ -451,6 +451,7 @@ _OF_ANY = {
 #: Public names whose arguments are not tried, and why.
 EXCUSED = {
     "Shape": "the base of shapes: it has no arguments",
+    "transforms.refuse_no_pose": "only ever raises, of what a check found",
     "How": "an enumeration of Python's own",
     "WorldResult": "made by World's queries",
     "WorldHits": "made by World's queries",

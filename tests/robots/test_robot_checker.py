@@ -342,7 +342,7 @@ def test_bad_arguments_are_named():
     checker = collide.RobotChecker(robot, world)
     for ask, words in (
         (lambda: checker.collides(np.zeros((2, 3))), r"slide.*\(2, 3\)"),
-        (lambda: checker.collides([[0.0], [np.nan]]), r"q\[1\], joint slide"),
+        (lambda: checker.collides([[0.0], [np.nan]]), r"Q\[1\], joint slide"),
         (lambda: checker.explain([[0.0], [0.1]]), "one configuration"),
         (lambda: checker.edge_collides([0.0], [1.0], resolution=0.0), "resolution"),
         (lambda: checker.certify_edges(np.zeros((2, 1)), np.zeros((3, 1))), "2.*3"),

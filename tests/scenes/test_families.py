@@ -293,10 +293,10 @@ def test_half_spaces_come_first():
 @pytest.mark.parametrize(
     ("name", "n", "options", "message"),
     [
-        ("near_spe", 1, {}, "no family is called 'near_spe'; there are rand_sep, rand_pen, .*halfspace_near"),
-        ("near_sep", -1, {}, "n must be a whole number ≥ 0, got -1"),
-        ("near_sep", 1.5, {}, "n must be a whole number"),
-        ("near_sep", 1, {"seed": True}, "seed must be a whole number ≥ 0, got True"),
+        ("near_spe", 1, {}, "no family has the name 'near_spe'; there are rand_sep, rand_pen, .*halfspace_near"),
+        ("near_sep", -1, {}, "n must be an integer ≥ 0, got -1"),
+        ("near_sep", 1.5, {}, "n must be an integer"),
+        ("near_sep", 1, {"seed": True}, "seed must be an integer ≥ 0, got True"),
         ("near_sep", 1, {"sides": 3}, "near_sep has no size 'sides'; it has none"),
         ("bipyramids", 1, {"edges": 3}, "bipyramids has no size 'edges'; it has sides"),
     ],

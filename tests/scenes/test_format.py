@@ -305,7 +305,7 @@ BAD = {
     ),
     "scene state": (
         {"robots": [{"robot": ARM}], "states": {"s": {"x": 1}}},
-        "states.s: scene scene: unknown joint 'x'",
+        "states.s: scene scene: values of its state name an unknown joint 'x'",
     ),
     "tree": ({"robots": [{"robot": {**ARM, "joints": []}}]}, r"robots\[0\].robot: 3 links have no parent"),
     "joint type": (
@@ -461,7 +461,7 @@ def test_shipped_scenes_are_listed_and_found():
     assert scenes.shipped() == ["panda_workbench", "workcell"]
     for name in scenes.shipped():
         assert scenes.path(name).is_file()
-    with pytest.raises(SceneError, match="no shipped scene is called 'kitchen'; there are panda_workbench, workcell"):
+    with pytest.raises(SceneError, match="no shipped scene has the name 'kitchen'; there are panda_workbench, workcell"):
         scenes.path("kitchen")
 
 

@@ -286,7 +286,7 @@ def test_addresses_that_are_none_in_includes_and_robots(tmp_path):
 
 
 def test_a_scene_without_a_name(tmp_path):
-    with pytest.raises(SceneError, match="the name of a scene is empty: give a file, or the name of a shipped scene"):
+    with pytest.raises(SceneError, match="path is '': give a file, or the name of a shipped scene"):
         load("")
     for name in ("x" * 5000, "x" * 5000 + ".yaml", "a\0b"):
         with pytest.raises(SceneError, match="no such file") as refusal:
@@ -621,7 +621,7 @@ def test_copies_of_scenes_go_to_files_alone(tmp_path, capsys, monkeypatch):
     (tmp_path / "mine.yaml").write_text("collide: 1")
     for name in (str(tmp_path / "mine"), "../../mine", "x" * 5000, "a\0b", ""):
         assert main(["scenes", "--copy", name]) == 2
-        assert "no shipped scene is called" in (said := capsys.readouterr().err) and len(said) < 400
+        assert "no shipped scene has the name" in (said := capsys.readouterr().err) and len(said) < 400
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe.json")
         assert main(["scenes", "--force", "--copy", "workcell", "pipe.json"]) == 2

@@ -41,7 +41,7 @@ def test_order_and_poses_make_the_difference():
         ([], InvalidShape, "empty"), (7, InvalidShape, "sequence of"), ([BALL], InvalidShape, "sequence of"),
         ([(EYE, BALL)], InvalidShape, r"items\[0\] must start with a shape, got ndarray"),
         ([(BALL, EYE), (BALL, 2 * EYE)], InvalidPose, r"items\[1\] pose"),
-        ([(BALL, np.stack([EYE, EYE]))], InvalidPose, "one .*pose, got 2"),
+        ([(BALL, np.stack([EYE, EYE]))], InvalidPose, "one .*pose, got \\(2, 4, 4\\)"),
         ([(BALL, np.full((4, 4), np.nan))], InvalidPose, r"items\[0\]"),
     ],
 )  # fmt: skip

@@ -39,7 +39,7 @@ def test_what_picks_nothing(rows):
 
 
 @pytest.mark.parametrize(
-    ("shapes", "words"), [([], "empty"), ([SHAPES[0], 1.0], r"shapes\[1\] must be a shape, got float"), (7, "got int")]
+    ("shapes", "words"), [([], "empty"), ([SHAPES[0], 1.0], r"shapes\[1\] must be a shape, got 1.0"), (7, "got 7")]
 )
 def test_what_is_no_set(shapes, words):
     with pytest.raises(InvalidShape, match=words):

@@ -202,7 +202,7 @@ def test_bad_input():
         collide.boolean(collide.ConvexHull(b_vertices), b, I, I, "union")
     with pytest.raises(InvalidArgument, match="'union', 'intersection'"):
         collide.boolean(b, b, I, I, "xor")
-    with pytest.raises(InvalidArgument, match="one \\(4, 4\\) pose, got 2"):
+    with pytest.raises(InvalidPose, match="one \\(4, 4\\) pose, got \\(2, 4, 4\\)"):
         collide.boolean(b, b, np.stack([I, I]), I, "union")
     with pytest.raises(InvalidPose):
         collide.overlap_volume(b, b, 2 * I, I)

@@ -57,5 +57,5 @@ def test_one_mesh_with_itself():
     meeting = all_pairs(vertices, faces, np.eye(4), stab, np.array([[0, 1, 2]]), np.eye(4))
     assert r.hit and r.pairs.tolist() == [[a, 12] for a, _ in meeting] and len(meeting) >= 1
     assert r.facets.tolist() == sorted({a for a, _ in meeting} | {12})
-    with pytest.raises(collide.InvalidArgument, match="takes a Mesh, got Box"):
+    with pytest.raises(collide.InvalidArgument, match="mesh must be a Mesh, got Box"):
         collide.self_collisions(collide.Box((1, 1, 1)))

@@ -243,7 +243,7 @@ def test_self_collisions_of_a_mesh():
     found = collide.self_collisions(collide.Mesh(*twice))
     assert found.hit and (found.pairs[:, 0] < 12).all() and (found.pairs[:, 1] >= 12).all()
     assert np.array_equal(found.facets, np.unique(found.pairs)) and found.counters[1] >= len(found.pairs)
-    with pytest.raises(InvalidArgument, match="takes a Mesh"):
+    with pytest.raises(InvalidArgument, match="mesh must be a Mesh"):
         collide.self_collisions(collide.Box((1, 1, 1)))
 
 

@@ -275,8 +275,8 @@ def test_a_page_that_goes_away_is_forgotten(world, viewer):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"clearance": -1}, "clearance must be finite and not negative"),
-        ({"min_depth": float("nan")}, "min_depth must be finite"),
+        ({"clearance": -1}, "clearance must be a number, finite and not negative"),
+        ({"min_depth": float("nan")}, "min_depth must be a number, finite"),
         ({"rate": 0}, "rate must be a number of moments"),
         ({"port": "80"}, "port must be an integer"),
         ({"port": 70000}, "port must be within"),
@@ -291,7 +291,7 @@ def test_a_port_that_is_taken_is_said(world, viewer):
     port = int(re.search(r":(\d+)/", viewer.url)[1])
     with pytest.raises(InvalidArgument, match=rf"port {port} is taken: give another"):
         collide.adapters.view(world, port=port)
-    with pytest.raises(InvalidArgument, match=r"world must be a collide\.World, got dict"):
+    with pytest.raises(InvalidArgument, match=r"world must be a collide\.World, got {}"):
         collide.adapters.view({})
 
 
