@@ -240,7 +240,7 @@ def test_the_value_of_one_joint():
     with pytest.raises(InvalidArgument, match=r"no joint 'weld' moves .* there are slide, turn|turn, slide"):
         robot.joint_value("weld", np.zeros(2))
     bare = Robot("bare", ["a", "b"], [Joint("fly", "floating", "a", "b")])
-    with pytest.raises(InvalidArgument, match=r"no joint of the name 'fly' moves along one coordinate; there are none$"):
+    with pytest.raises(InvalidArgument, match=r"no joint of the name 'fly' moves .*; there are none$"):
         bare.joint_value("fly", np.zeros(6))
     with pytest.raises(InvalidArgument, match="unknown joint 'fly'; it has fly/x, fly/y"):
         bare.configuration({"fly": 1.0})

@@ -461,7 +461,7 @@ def test_shipped_scenes_are_listed_and_found():
     assert scenes.shipped() == ["panda_workbench", "workcell"]
     for name in scenes.shipped():
         assert scenes.path(name).is_file()
-    with pytest.raises(SceneError, match="no shipped scene has the name 'kitchen'; there are panda_workbench, workcell"):
+    with pytest.raises(SceneError, match="no shipped scene has the name 'kitchen'; there are panda_workbench"):
         scenes.path("kitchen")
 
 

@@ -219,7 +219,7 @@ def test_bad_arguments_are_named():
         collide.overlapping_cells(A, A, np.diag([1.0, 1, 0, 1]), EYE, check_poses=False)
     with pytest.raises(InvalidArgument, match="lengths do not match"):
         collide.overlapping_cells(A, A, np.stack([EYE] * 2), np.stack([EYE] * 3))
-    with pytest.raises(InvalidArgument, match="mesh must be a TetMesh, got Mesh.*; surfaces have self_collisions"):
+    with pytest.raises(InvalidArgument, match=r"mesh must be a TetMesh, got Mesh.*; surfaces have self_collisions"):
         collide.self_overlapping_cells(box)
     with pytest.raises(InvalidArgument, match="threads"):
         collide.overlapping_cells(A, A, EYE, EYE, threads=0)
