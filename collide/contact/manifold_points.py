@@ -25,8 +25,8 @@ _ASIDE = math.sqrt(0.5)
 #: Nearest points nearer to a corner than this part of the manifold's size take its place: a rim is a little outside its
 #: octagon, and two contacts so near would be one too many.
 NEAR = 2.0**-8
-#: The same of lines, whose ends are where they are: a shorter line is another one.
-NEAR_END = 2.0**-11
+#: The same of lines: a shorter line is another one. Of 60 lines over rims the nearest point was up to 1/1,175 off.
+NEAR_END = 2.0**-10
 
 
 class ManifoldPoints(NamedTuple):

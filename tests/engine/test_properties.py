@@ -40,7 +40,7 @@ def quaternion_rotation(q) -> np.ndarray:
 
 
 ROTATIONS = st.one_of(
-    st.sampled_from(naive.LATTICE_ROTATIONS),
+    st.sampled_from(list(naive.LATTICE_ROTATIONS)),
     st.tuples(*[st.integers(-3, 3)] * 4).filter(any).map(quaternion_rotation),
     st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: sum(x * x for x in q) > 0.01).map(quaternion_rotation),
 )

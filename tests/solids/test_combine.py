@@ -106,7 +106,7 @@ def test_bad_rules_and_lists():
         (raises, r"rule .* raised KeyError of bodies \[0, 2\] of 3: .*no such part"),
         (lambda bits: sum(bits), "must answer True or False, of bodies .* it answered 0"),
         (lambda bits: None, "it answered None"), (lambda bits: np.array(bits), "must answer True or False"),
-        (lambda bits: not any(bits), "no body holds belongs"), (lambda: True, "the rule raised TypeError"),
+        (lambda bits: not any(bits), "no body holds belongs"), (lambda: True, "rule .* raised TypeError"),
     ]:  # fmt: skip
         with pytest.raises(InvalidArgument, match=words):
             collide.combine(shapes, poses, rule)
