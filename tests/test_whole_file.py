@@ -70,7 +70,6 @@ ROOT = Path(__file__).resolve().parents[1]
 WRITERS = {
     ("collide/whole_file.py", "whole_file"): "the one place",
     ("collide/sweeps/sweep_directory.py", "_opened_lock"): "a lock, without content",
-    ("adapters/bench/child_contestant.py", "_start"): "a folder of its own, for a child process",
 }
 #: Functions that write to the path that they are given; those of the second row take a stream as well.
 _WRITE = {"write_bytes", "tofile", "copyfile", "copy2", "savetxt", "NamedTemporaryFile"}

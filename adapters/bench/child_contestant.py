@@ -4,13 +4,13 @@ answers, and all have the same around them.
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import pickle
-import tempfile
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
+
+from collide.child_process import ChildProcess
 
 #: How long a child may take to be made ready [s].
 START_TIMEOUT = 60.0
@@ -23,65 +23,46 @@ class InChild:
     """
 
     def __init__(self, make: Callable[..., Any], *arguments: Any, timeout: float = 120.0):
-        self._job, self._timeout = (make, arguments), timeout
+        self._made_from, self._timeout = (_module_of(make), make.__qualname__, *arguments), timeout
         #: (method, arguments) → how the child ended on it, "hang" or "abort". Such a call is not repeated.
         self.failures: dict[tuple, str] = {}
-        self._process: Any = None
-        self._pipe: Any = None
+        self._child: ChildProcess | None = None
 
     def call(self, method: str, *arguments: Any) -> Any:
         """What the method gives; None where the child died of it or was silent for too long."""
         question, limit = (method, arguments), self._timeout
         if question in self.failures:
             return None
-        if self._process is None:
-            self._start()
+        if self._child is None:
+            self._child = ChildProcess(f"{__name__}:answer_calls", *self._made_from)
             limit += START_TIMEOUT
+        self._child.send(question)
         try:
-            self._pipe.send(question)
-            if self._pipe.poll(limit):
-                return self._pipe.recv()
+            return self._child.receive(limit)
+        except TimeoutError:
             self.failures[question] = "hang"
-        except (EOFError, OSError):
+        except EOFError:
             self.failures[question] = "abort"
         self.close()
         return None
 
-    def _start(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._pipe, child_end = context.Pipe()
-        # Through a file: a pipe that is full would hold this process up for as long as a child does not read.
-        with tempfile.TemporaryDirectory() as folder:
-            place = Path(folder) / "job"
-            place.write_bytes(pickle.dumps(self._job))
-            self._process = context.Process(target=_serve, args=(child_end, str(place)), daemon=True)
-            self._process.start()
-            child_end.close()
-            if self._pipe.poll(START_TIMEOUT):
-                try:
-                    self._pipe.recv()
-                except (EOFError, OSError):
-                    pass  # it died, which the first question tells
-
     def close(self) -> None:
         """End the child."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.join()
-            self._pipe.close()
-            self._process = None
+        if self._child is not None:
+            self._child.close()
+            self._child = None
 
 
-def _serve(pipe: Any, place: str) -> None:
-    """Make the object, and answer what comes down the pipe."""
-    for stream in (1, 2):  # some engines print when they are imported
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
-    make, arguments = pickle.loads(Path(place).read_bytes())
-    pipe.send("read")
-    made = make(*arguments)
-    while True:
-        try:
-            method, arguments = pipe.recv()
-        except EOFError:
-            return
-        pipe.send(getattr(made, method)(*arguments))
+def _module_of(make: Callable[..., Any]) -> str:
+    """Under which name the child imports it: that of a script which is run, `__main__` here, is its file's."""
+    script = sys.modules["__main__"].__dict__.get("__file__")
+    return Path(script).stem if make.__module__ == "__main__" and script else make.__module__
+
+
+def answer_calls(
+    calls: Iterator[tuple[str, tuple]], send: Callable[[Any], None], module: str, name: str, *arguments: Any
+) -> None:
+    """The child: make the object, and answer calls of its methods."""
+    made = getattr(import_module(module), name)(*arguments)
+    for method, values in calls:
+        send(getattr(made, method)(*values))
