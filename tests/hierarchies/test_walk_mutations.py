@@ -6,14 +6,11 @@ The copies run as plain Python, so that nothing is compiled.
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
+from installed_copy import copied
 
 CHILD = """
 import sys
@@ -74,8 +71,7 @@ MUTATIONS = {
 @pytest.mark.parametrize("name", list(MUTATIONS))
 def test_faults_are_noticed(name, tmp_path):
     file, old, new = MUTATIONS[name]
-    for folder, target in (("collide", "collide"), ("adapters", "collide/adapters"), ("scenes", "collide/scenes")):
-        shutil.copytree(ROOT / folder, tmp_path / target, ignore=shutil.ignore_patterns("__pycache__"))
+    copied(tmp_path)
     source = tmp_path / "collide/hierarchies" / file
     text = source.read_text(encoding="utf-8")
     assert old in text, f"{file} no longer has {old!r}"

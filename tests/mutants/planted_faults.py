@@ -31,6 +31,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "tests" / "kernels"))
+
+from installed_copy import copied
+
 #: Faults that change nothing: ``file | function | code before | code after | why``.
 NO_CHANGE = Path(__file__).with_name("no_change.txt")
 #: Rooms: modules of the package, and their tests.
@@ -153,13 +157,10 @@ class Copy:
 
     def __init__(self, folder: Path):
         self.folder = folder
-        skip = shutil.ignore_patterns("__pycache__")
-        (folder / "checkout").mkdir(parents=True)
-        for source in ("collide", "adapters", "scenes"):
-            target = folder / "package" / ("" if source == "collide" else "collide") / source
-            shutil.copytree(ROOT / source, target, ignore=skip)
-            (folder / "checkout" / source).symlink_to(target)
-        shutil.copytree(ROOT / "tests", folder / "checkout" / "tests", ignore=skip)
+        package = copied(folder / "package") / "collide"
+        shutil.copytree(ROOT / "tests", folder / "checkout" / "tests", ignore=shutil.ignore_patterns("__pycache__"))
+        for name, place in (("collide", package), ("adapters", package / "adapters"), ("scenes", package / "scenes")):
+            (folder / "checkout" / name).symlink_to(place)
         for file in ("pyproject.toml", "README.md"):
             shutil.copy(ROOT / file, folder / "checkout")
         for name in ("docs", "examples", "benchmarks", "native"):

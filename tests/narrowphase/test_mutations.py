@@ -6,14 +6,11 @@ The copies run as plain Python, so that nothing is compiled.
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
+from installed_copy import copied
 
 CHILD = """
 import sys
@@ -49,19 +46,11 @@ MUTATIONS = {
 }
 
 
-def _package(folder: Path) -> None:
-    """The three folders as they are installed."""
-    skip = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(ROOT / "collide", folder / "collide", ignore=skip)
-    shutil.copytree(ROOT / "adapters", folder / "collide" / "adapters", ignore=skip)
-    shutil.copytree(ROOT / "scenes", folder / "collide" / "scenes", ignore=skip)
-
-
 @pytest.mark.many(3)
 @pytest.mark.parametrize("name", MUTATIONS)
 def test_mutation_is_noticed(name, tmp_path):
     file, old, new = MUTATIONS[name]
-    _package(tmp_path)
+    copied(tmp_path)
     source = tmp_path / "collide" / "narrowphase" / file
     text = source.read_text(encoding="utf-8")
     assert old in text, f"{file} no longer contains {old!r}"
