@@ -1,8 +1,8 @@
 """Processes that serve this one: started, asked, waited for up to a time limit, their end and its reason told.
 
 A child runs ``module:function`` as ``function(requests, send, *arguments)``: ``requests`` yields what the parent sends,
-``send`` answers, both over a connection of `multiprocessing`. The process is a plain interpreter: a
-`multiprocessing.Process` runs the caller's script anew, which then needs ``if __name__ == "__main__"``.
+``send`` answers, both over a connection of `multiprocessing`. The process is a plain interpreter:
+processes of `multiprocessing` run the caller's script anew, which then needs ``if __name__ == "__main__"``.
 """
 
 from __future__ import annotations

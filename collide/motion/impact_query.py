@@ -13,9 +13,10 @@ from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.lowering.closed_regions import reach_of
 from collide.lowering.kinds import Kind, kind_of
 from collide.motion.convex_impact import CONTACT, FREE, OPEN_START, TOO_SMALL
-from collide.motion.convex_motions import Motions, convex_impacts, single_impact
+from collide.motion.convex_motions import convex_impacts, single_impact
 from collide.motion.impact_jobs import WRONG_TURN
 from collide.motion.impact_rows import TimeOfImpact, as_result, free_rows
+from collide.motion.motions import Motions
 from collide.motion.placed_motion import poses_at
 from collide.motion.region_motions import with_regions_closed
 from collide.motion.surface_motions import surface_impacts

@@ -8,17 +8,14 @@ in which too many may are cut in half.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide.kernels import address_of
 from collide.lowering.compound_table import PART
+from collide.motion.motions import Motions
 from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
 from collide.narrowphase.composite.composite_parts import CompoundParts, boxes_near
-
-if TYPE_CHECKING:
-    from collide.motion.convex_motions import Motions
 
 #: Of so few pairs of parts all are asked.
 MAX_ASKED = 64

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collide.lowering.closed_regions import closed_shapes, reach_of
-from collide.motion.convex_motions import Motions
+from collide.motion.motions import Motions
 from collide.shapes.shape import Shape
 
 #: More than what differences of lengths round.

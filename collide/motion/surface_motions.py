@@ -30,9 +30,10 @@ from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.mesh.bvh import MeshTree
 from collide.motion.common_points import CommonPoints, Placed
 from collide.motion.convex_impact import CONTACT, OPEN
-from collide.motion.convex_motions import JOBS_AT_ONCE, Motions, Tables, header_of
+from collide.motion.convex_motions import JOBS_AT_ONCE, Tables, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
+from collide.motion.motions import Motions
 from collide.motion.parts_ahead import MAX_ASKED, Spans, parts_ahead
 from collide.motion.span_bounds import REACH
 from collide.narrowphase.composite.composite_parts import compound_parts
@@ -181,9 +182,9 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
     if len(pieces_a) * len(pieces_b) <= MAX_ASKED:
         _search_pieces([(a, b) for a in pieces_a for b in pieces_b], motions, tolerance, rows, is_part)
         return
+    unions = compound_parts(A), compound_parts(B)
     for k in range(len(rows)):
         motion, row = motions.picked(np.array([k])), rows[k : k + 1]
-        unions = compound_parts(A), compound_parts(B)
 
         def upper(row: np.ndarray = row) -> float:
             return float(row["upper"][0])

@@ -9,7 +9,7 @@ from reproduction import reproducing
 
 import collide
 from collide.motion import surface_motions
-from collide.motion.convex_motions import Motions
+from collide.motion.motions import Motions
 
 AGAIN = (
     "import collide, numpy as np\n"

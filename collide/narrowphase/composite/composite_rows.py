@@ -18,7 +18,7 @@ from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.shape_table import INTS, KIND, NUMBERS, POSE, RADIUS, REACH
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.composite.clearing_translation import CLEARING, Length, barred_length, clearing_length, longer
-from collide.narrowphase.composite.ways_out import MAX_PLANES, PLANE, gather_planes, way_out
+from collide.narrowphase.composite.ways_out import MAX_PLANES, PLANE, gather_planes, is_halfspace, way_out
 from collide.narrowphase.posed_pair import in_order
 from collide.narrowphase.rows import (
     CERTIFIED,
@@ -195,11 +195,12 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
     planes, n_planes = view_f64(work_at + 8 * CLEARING, PLANE * MAX_PLANES), 0
     if size.has_halfspace:
         n_planes = gather_planes(parts, first_a, n_a, first_b, n_b, planes)
+    shortest = way_out(planes, n_planes, True)
     if n_planes < 0:
         n_directions = 0  # two half-spaces overlap without end
     else:
         n_directions = n_overlaps + _N_AXES + (2 if n_planes > 0 else 0)
-        upper = min(upper, -way_out(planes, n_planes, True).least)
+        upper = min(upper, -shortest.least)
         doubles[UPPER] = upper
     best = Length(math.inf, math.inf)
     overlap_number = 0
@@ -214,7 +215,7 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
         elif k < n_overlaps + _N_AXES:
             n = _axis(score, at, parts, first_a, first_b, k - n_overlaps)
         else:
-            n = way_out(planes, n_planes, k == n_overlaps + _N_AXES).x
+            n = shortest.x if k == n_overlaps + _N_AXES else way_out(planes, n_planes, False).x
             if not norm(n) > 0.0:
                 continue
             n = scale(1.0 / norm(n), n)
@@ -269,7 +270,7 @@ def _axis(score, at, parts, first_a, first_b, k):
 
 @kernel(inline=True)
 def _is_halfspace(parts, first, n):
-    return n == 1 and parts.ints[INTS * parts.shape_of[first] + KIND] == HALFSPACE
+    return n == 1 and is_halfspace(parts, first)
 
 
 @kernel
