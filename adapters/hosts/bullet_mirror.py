@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import math
+import operator
 from collections.abc import Mapping
 from typing import Any, Literal
 
@@ -67,22 +69,24 @@ class Mirror:
         self, client: int = 0, *, margins: Literal["none", "bullet"] = "none",
         shapes: Mapping[tuple[int, int], Shape] | None = None, contact_margin: float | None = None,
     ) -> None:  # fmt: skip
-        if margins not in MARGINS:
+        if not isinstance(margins, str) or margins not in MARGINS:
             known = ", ".join(map(repr, MARGINS))
             raise InvalidArgument(f"Mirror: margins must be one of {known}, got {brief(margins)}")
         pybullet = genuine_pybullet()
-        if not isinstance(client, int) or not pybullet.isConnected(client):
+        if not isinstance(client, int) or abs(client) > _ALL_GROUPS or not pybullet.isConnected(client):
             raise InvalidArgument(
-                f"Mirror: client must be what pybullet.connect returned, and connected, got {client!r}"
+                f"Mirror: client must be what pybullet.connect returned, and connected, got {brief(client)}"
             )
-        for place, shape in (shapes or {}).items():
-            if not isinstance(shape, Shape):
-                raise InvalidArgument(f"Mirror: shapes[{place!r}] must be a shape, got {type(shape).__name__}")
+        shapes = {} if shapes is None else checks.mapping("Mirror: shapes", shapes, "of shapes by (body, link)")
+        for place, shape in shapes.items():
+            checks.instance(f"Mirror: shapes[{place!r}]", shape, Shape, "a shape")
+        if contact_margin is not None:
+            contact_margin = checks.limit("Mirror: contact_margin", contact_margin)
         self.client, self.contact_margin = client, contact_margin
         self.filters = CollisionFilters()
         #: Shapes without a body, by the numbers that createCollisionShape gave.
         self.collision_shapes: dict[int, Shape] = {}
-        self._bodies = ClientBodies(pybullet, client, margins, shapes or {})
+        self._bodies = ClientBodies(pybullet, client, margins, shapes)
         self._tables = Tables([], np.empty((0, 4, 4)))
         self._coordinates = np.empty((0, 7))
         self._contacts: list[tuple] | None = None
@@ -122,23 +126,25 @@ class Mirror:
 
     def refresh(self, body: int | None = None) -> None:
         """Read shapes anew, of one body or all: after changeDynamics of a margin, or resetMeshData."""
-        self._bodies.forget(body)
+        self._bodies.forget(None if body is None else _integers(body=body)[0])
         self.update()
 
     def set_shape(self, body: int, link: int, shape: Shape) -> None:
         """Take a shape, in the frame of the link's centre of mass, for what pybullet says of a link."""
-        self._bodies.replace(body, link, shape)
+        self._bodies.replace(*_integers(body=body, link=link), checks.instance("shape", shape, Shape, "a shape"))
         self.update()
 
     def note_body(self, body: int, flags: int, shapes: Mapping[int, Shape]) -> None:
         """A body was made with these flags; shapes of links, for those that pybullet does not give back."""
+        self.set_self_collision(body, flags)
+        checks.mapping("note_body: shapes", shapes, "of shapes by link")
         self.filters.forget({body})
         self.set_self_collision(body, flags)
         self._bodies.spare_shapes[body] = dict(shapes)
 
     def note_margin(self, body: int) -> None:
         """A margin of a body was changed: its shapes are read anew at the next update."""
-        self._bodies.forget(body)
+        self._bodies.forget(*_integers(body=body))
 
     def forget_everything(self) -> None:
         """The simulation was reset: no body has filters or shapes."""
@@ -150,26 +156,33 @@ class Mirror:
 
     def set_self_collision(self, body: int, flags: int) -> None:
         """Say with which flags a body was loaded: pybullet's for self-collision, and those that go with it."""
-        self.filters.set_self_collision(body, flags)
+        self.filters.set_self_collision(*_integers(body=body, flags=flags))
         self._stale_filters = True
 
     def set_filter_mode(self, mode: int) -> None:
         """Say what ``collisionFilterMode`` is: 1, as Bullet begins, or 0 where groups must be in masks both ways."""
-        self.filters.needs_both = mode == 0
+        self.filters.needs_both = _integers(mode=mode) == [0]
         self._stale_filters = True
 
     def setCollisionFilterGroupMask(
         self, bodyUniqueId, linkIndexA, collisionFilterGroup, collisionFilterMask, physicsClientId=None
     ):
         """Note a group and a mask; pybullet does not give them back. They have a say in contacts and rays."""
-        self.filters.set_group_mask(bodyUniqueId, linkIndexA, collisionFilterGroup, collisionFilterMask)
+        self.filters.set_group_mask(*_integers(
+            bodyUniqueId=bodyUniqueId, linkIndexA=linkIndexA, collisionFilterGroup=collisionFilterGroup,
+            collisionFilterMask=collisionFilterMask,
+        ))
         self._stale_filters = True
 
     def setCollisionFilterPair(
         self, bodyUniqueIdA, bodyUniqueIdB, linkIndexA, linkIndexB, enableCollision, physicsClientId=None
     ):
         """Note that a pair is switched on or off; pybullet does not give it back. It has a say in contacts."""
-        self.filters.set_pair(bodyUniqueIdA, linkIndexA, bodyUniqueIdB, linkIndexB, bool(enableCollision))
+        *place_a, place_b, link_b, enable = _integers(
+            bodyUniqueIdA=bodyUniqueIdA, linkIndexA=linkIndexA, bodyUniqueIdB=bodyUniqueIdB, linkIndexB=linkIndexB,
+            enableCollision=enableCollision,
+        )
+        self.filters.set_pair(*place_a, place_b, link_b, bool(enable))
         self._stale_filters = True
 
     # --- pybullet's questions -------------------------------------------------------------------
@@ -186,9 +199,11 @@ class Mirror:
         UnknownBody : no such body or link.   InvalidArgument : a shape whose number is not known here.
         UnsupportedQuery : a link that could not be read; two half-spaces.
         """
-        A, rows_a = self._side(bodyA, linkIndexA, collisionShapeA, collisionShapePositionA, collisionShapeOrientationA)
-        B, rows_b = self._side(bodyB, linkIndexB, collisionShapeB, collisionShapePositionB, collisionShapeOrientationB)
-        return closest(A, rows_a, B, rows_b, real("distance", distance))
+        side_a = _integers(bodyA=bodyA, linkIndexA=linkIndexA, collisionShapeA=collisionShapeA)
+        side_b = _integers(bodyB=bodyB, linkIndexB=linkIndexB, collisionShapeB=collisionShapeB)
+        A, rows_a = self._side(*side_a, collisionShapePositionA, collisionShapeOrientationA)
+        B, rows_b = self._side(*side_b, collisionShapePositionB, collisionShapeOrientationB)
+        return closest(A, rows_a, B, rows_b, _number("distance", distance))
 
     def getContactPoints(
         self, bodyA=-1, bodyB=-1, linkIndexA=EVERY_LINK, linkIndexB=EVERY_LINK, physicsClientId=None
@@ -197,14 +212,14 @@ class Mirror:
 
         Bullet lists what its last step met, where bodies stood before they moved. Forces are 0.
         """
+        wanted = tuple(_integers(bodyA=bodyA, bodyB=bodyB, linkIndexA=linkIndexA, linkIndexB=linkIndexB))
         if self._stale_filters:
             self._fill_world()
         if self._contacts is None:
             self._contacts = contact_points(self.world, self._tables, self.contact_margin)
-        for body in (bodyA, bodyB):
+        for body in wanted[:2]:
             if body >= 0:
                 self._rows(body, EVERY_LINK)
-        wanted = bodyA, bodyB, linkIndexA, linkIndexB
         if wanted == (-1, -1, EVERY_LINK, EVERY_LINK):
             return tuple(self._contacts)
         rows = []
@@ -239,13 +254,17 @@ class Mirror:
             raise InvalidArgument(
                 f"rayTestBatch: as many ends as origins are needed, got {len(origins)} origins and {len(ends)} ends"
             )
-        if parentObjectUniqueId >= 0:
-            X = self._pose(parentObjectUniqueId, parentLinkIndex)
+        parent, link, mask, hit_number = _integers(
+            parentObjectUniqueId=parentObjectUniqueId, parentLinkIndex=parentLinkIndex,
+            collisionFilterMask=collisionFilterMask, reportHitNumber=reportHitNumber,
+        )
+        if parent >= 0:
+            X = self._pose(parent, link)
             origins, ends = (points @ X[:3, :3].T + X[:3, 3] for points in (origins, ends))
         groups = np.array([self.filters.bits(geom)[0] for geom in self._tables.geoms], dtype=np.int64)
-        passed = (groups & collisionFilterMask) == 0
-        epsilon = real("fractionEpsilon", fractionEpsilon)
-        return ray_hits(self.world, self._tables, origins, ends, passed, reportHitNumber, epsilon)
+        passed = (groups & mask) == 0
+        epsilon = _number("fractionEpsilon", fractionEpsilon)
+        return ray_hits(self.world, self._tables, origins, ends, passed, hit_number, epsilon)
 
     # --- how they are answered ------------------------------------------------------------------
 
@@ -326,6 +345,27 @@ def genuine_pybullet() -> Any:
             "pybullet", extra="pybullet", purpose="follow its bodies (wheels up to Python 3.11)"
         ) from error
     return getattr(module, "__wrapped__", module)
+
+
+def _integers(**values: Any) -> list[int]:
+    """Numbers of bodies, links and shapes, bits and flags. Raises TypeError as pybullet does, InvalidArgument."""
+    numbers = []
+    for name, value in values.items():
+        try:
+            number = operator.index(value)
+        except TypeError:
+            raise TypeError(f"{name} must be an integer, got {brief(value)}") from None
+        if abs(number) > _ALL_GROUPS:
+            raise InvalidArgument(f"{name} must be an integer of 32 bits, got {brief(value)}")
+        numbers.append(number)
+    return numbers
+
+
+def _number(name: str, value: Any) -> float:
+    number = real(name, value)
+    if math.isnan(number):
+        raise InvalidArgument(f"{name} must be a number, got nan")
+    return number
 
 
 def _matches(wanted: tuple, places: tuple) -> bool:

@@ -70,7 +70,7 @@ def install(models: Any, mode: Literal["contacts", "cull"] = "contacts") -> Inst
     geoms while installed makes the next step raise ``mujoco.FatalError``; after that, or a change of a mesh's vertices
     or of the flag MULTICCD, call `Installed.refresh`. Heights of a field may change freely.
     """
-    if mode not in MODES:
+    if not isinstance(mode, str) or mode not in MODES:
         raise InvalidArgument(f"install: mode must be one of {', '.join(map(repr, MODES))}, got {brief(mode)}")
     mujoco = host().mujoco
     listed = [models] if isinstance(models, mujoco.MjModel) else list(models) if isinstance(models, Iterable) else []
@@ -252,6 +252,8 @@ def world(model: Any, data: Any = None) -> World:
     if data is None:
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
+    elif not isinstance(data, mujoco.MjData) or len(data.geom_xpos) != model.ngeom:
+        raise InvalidArgument(f"world: data must be a mujoco.MjData of this model, or None, got {brief(data)}")
     shapes, rows, _ = geom_shapes(model)
     collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     collides[[*model.pair_geom1.tolist(), *model.pair_geom2.tolist()]] = True

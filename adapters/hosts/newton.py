@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 
 from collide import World
+from collide import argument_checks as checks
 from collide.adapters.hosts.quaternion_poses import poses_of
-from collide.errors import InvalidArgument, InvalidPose, MissingExtra, UnsupportedQuery
+from collide.errors import InvalidArgument, InvalidPose, MissingExtra, UnsupportedQuery, brief
 from collide.shapes import (
     Box,
     Capsule,
@@ -59,9 +60,9 @@ _OF_PARTICLES = (
 )  # fmt: skip
 #: Those that ask for what is not done here, but for these values.
 _REFUSED_BUT = {
-    "body_pair_reduction": None, "narrow_phase": None, "sdf_hydroelastic_config": None, "contact_report": False,
-    "contact_matching": "disabled", "speculative_contact_gap_max": None, "dynamic_shape_scale": False,
-    "include_static_kinematic_pairs": True, "requires_grad": (None, False),
+    "body_pair_reduction": (None,), "narrow_phase": (None,), "sdf_hydroelastic_config": (None,),
+    "contact_report": (False,), "contact_matching": ("disabled",), "speculative_contact_gap_max": (None,),
+    "dynamic_shape_scale": (False,), "include_static_kinematic_pairs": (True,), "requires_grad": (None, False),
 }  # fmt: skip
 
 
@@ -105,6 +106,9 @@ class Pipeline:
         _check_fields(newton, model, _MODEL_FIELDS)
         _check_device(model)
         _check_options(options)
+        if rigid_contact_max is not None:
+            rigid_contact_max = checks.integer("Pipeline: rigid_contact_max", rigid_contact_max, 0)
+        max_contacts = checks.integer("Pipeline: max_contacts", max_contacts, 1)
         self._newton, self._model, self._max_contacts = newton, model, max_contacts
         self.remaining: dict[int, str] = {}
         shapes = [self._shape(k) for k in range(model.shape_count)]
@@ -118,7 +122,7 @@ class Pipeline:
             label = f"{model.shape_label[k]} {k}" if getattr(model, "shape_label", None) else f"shape {k}"
             self.world.add(shapes[k], np.eye(4), name=label, static=body < 0)
         listed = model.shape_contact_pairs if shape_pairs_filtered is None else shape_pairs_filtered
-        pairs = np.empty((0, 2), int) if listed is None else listed.numpy()
+        pairs = np.empty((0, 2), int) if listed is None else _pairs(listed)
         self._allow_others(pairs)
         wanted = min(max(256, 8 * len(pairs)), 65_536)
         self.rigid_contact_max = wanted if rigid_contact_max is None else rigid_contact_max
@@ -270,6 +274,16 @@ def _height_field(source: Any, scale: np.ndarray) -> HeightField:
     return HeightField(scale[2] * heights, cell)
 
 
+def _pairs(listed: Any) -> np.ndarray:
+    """(n, 2) numbers of shapes, of warp's array of pairs."""
+    pairs = listed.numpy() if hasattr(listed, "numpy") else listed
+    if not isinstance(pairs, np.ndarray) or pairs.dtype.kind not in "iu" or pairs.shape[1:] != (2,):
+        raise InvalidArgument(
+            f"Pipeline: shape_pairs_filtered must be pairs of shapes, a warp array, got {brief(listed)}"
+        )
+    return pairs
+
+
 def _check_options(options: dict[str, Any]) -> None:
     for name, value in options.items():
         if name in _OF_ITS_SEARCH or name in _OF_PARTICLES:
@@ -277,9 +291,9 @@ def _check_options(options: dict[str, Any]) -> None:
         if name not in _REFUSED_BUT:
             raise TypeError(f"Pipeline: there is no argument {name!r}, nor has newton.CollisionPipeline 1.8 one")
         harmless = _REFUSED_BUT[name]
-        if value != harmless and not (isinstance(harmless, tuple) and value in harmless):
+        if not any(type(value) is type(allowed) and value == allowed for allowed in harmless):
             raise UnsupportedQuery(
-                f"Pipeline: {name}={value!r} is not done here; leave it out, or take newton.CollisionPipeline"
+                f"Pipeline: {name}={brief(value)} is not done here; leave it out, or take newton.CollisionPipeline"
             )
 
 

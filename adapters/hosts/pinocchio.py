@@ -17,6 +17,7 @@ from collide import argument_checks as checks
 from collide.adapters.hosts.coal_nearest import nearest
 from collide.adapters.hosts.coal_queries import collide_posed
 from collide.adapters.hosts.coal_requests import CollisionResult
+from collide.adapters.hosts.host_numbers import of_kind
 from collide.adapters.hosts.pinocchio_pairs import (
     KnownPairs,
     active_pairs,
@@ -168,7 +169,7 @@ def collides(model, data, geom_model, geom_data, Q) -> np.ndarray:
     InvalidArgument, InvalidShape, UnsupportedQuery, MissingExtra : as of `compute_collisions`.
     """
     pin = _pinocchio()
-    check_models(model, data, geom_model, geom_data)
+    _check(pin, model, data, geom_model, geom_data)
     Q = checks.array("Q", Q, f"(N, {model.nq})", InvalidArgument)
     if Q.ndim != 2 or Q.shape[1] != model.nq:
         raise InvalidArgument(f"Q must have shape (N, {model.nq}), the model's nq, got {Q.shape}")
@@ -234,13 +235,21 @@ def distances(model, data, geom_model, geom_data, q) -> PairDistances:
 def _asked(model, data, geom_model, geom_data, q) -> tuple[KnownPairs, np.ndarray]:
     """What is known of the geometries, and their placements (g, 4, 4), brought up to date with q."""
     pin = _pinocchio()
-    check_models(model, data, geom_model, geom_data)
+    _check(pin, model, data, geom_model, geom_data)
     if q is not None:
         q = checks.array("q", q, f"({model.nq},)", InvalidArgument)
         if q.shape != (model.nq,):
             raise InvalidArgument(f"q must have shape ({model.nq},), the model's nq, got {q.shape}")
     X = _placements(pin, model, data, geom_model, geom_data, q)
     return known_pairs(geom_model), X
+
+
+def _check(pin, model, data, geom_model, geom_data) -> None:
+    """Raises TypeError, as Pinocchio's bindings do, and InvalidArgument."""
+    kinds = {"model": pin.Model, "data": pin.Data, "geom_model": pin.GeometryModel, "geom_data": pin.GeometryData}
+    for (name, kind), value in zip(kinds.items(), (model, data, geom_model, geom_data)):
+        of_kind(name, value, kind)
+    check_models(model, data, geom_model, geom_data)
 
 
 def _pinocchio():

@@ -248,7 +248,7 @@ def test_bad_arguments_are_named(client):
             InvalidArgument,
             "margins must be one of 'none', 'bullet', got 'thick'",
         ),
-        (lambda: Mirror(client, shapes={(0, -1): 3}), InvalidArgument, "must be a shape, got int"),
+        (lambda: Mirror(client, shapes={(0, -1): 3}), InvalidArgument, "must be a shape, got 3"),
         (lambda: mirror.getClosestPoints(ball, 9, 1.0), UnknownBody, "no body 9"),
         (lambda: mirror.getContactPoints(9), UnknownBody, "no body 9"),
         (lambda: mirror.getClosestPoints(ball, -1, 1.0, collisionShapeB=5), InvalidArgument, "shape 5 is not known"),
