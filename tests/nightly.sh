@@ -10,6 +10,7 @@
 # grew is told: the file belongs into a commit.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+unset PYTHONDONTWRITEBYTECODE # where bytecode is kept, collecting the tests takes a third of the time
 steps=(install tests own plain matrix soaks faults site)
 chosen=("${@:-${steps[@]}}")
 log=build/nightly

@@ -4,6 +4,7 @@
 # it ends; one failure is the script's. What takes long, and other parts of many cases: bash tests/nightly.sh.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+unset PYTHONDONTWRITEBYTECODE # where bytecode is kept, collecting the tests takes a third of the time
 python -m pip install --quiet --disable-pip-version-check -e ".[demo,peers,pinocchio,sweep,plots,dev]"
 ruff check .
 types=$(mktemp)

@@ -122,6 +122,7 @@ def test_a_robot_among_regions():
     assert checker.collides(Q).tolist() == expected and 0 < sum(expected) < 40, sum(expected)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", CLOSED)
 def test_casts_rays_and_motions_as_closed_by_a_far_box(family):
     rng, seen = rng_of("region casts", family), [0, 0, 0]

@@ -54,6 +54,7 @@ def assert_same_rows(found, expected):
             assert not differing, f"bodies {a} and {b}: {differing} differ:\n{row}\n{other}"
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("seed", range(6))
 def test_world_equals_brute_force(seed):
     world, rng = random_world(seed), rng_of("changes", seed)

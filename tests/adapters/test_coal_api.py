@@ -555,6 +555,7 @@ class Near(coal.CollisionCallBackDefault):
         return False
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["DynamicAABBTreeCollisionManager", "SSaPCollisionManager", "NaiveCollisionManager"])
 def test_managers_find_all_pairs(kind):
     objects, guests = scattered(60, 1), scattered(25, 2)

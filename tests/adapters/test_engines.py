@@ -120,6 +120,7 @@ def available(name: str, **options):
     return peer
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", ENGINES)
 def test_closed_forms(name):
     question = Question.from_pairs(case[:4] for case in CASES.values())
@@ -146,6 +147,7 @@ def test_closed_forms(name):
             assert np.isnan(step).all() or step == pytest.approx(row["distance"] * row["normal"], abs=off), case
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", ENGINES)
 def test_swapping_the_bodies_negates_the_normal(name):
     cases = [CASES[c] for c in ("boxes apart", "boxes overlapping", "sphere capsule", "hull box")]
@@ -175,7 +177,7 @@ def random_pairs(n: int, seed: int):
     return Question.from_pairs((shape(), shape(), place(), place()) for _ in range(n))
 
 
-@pytest.mark.many(5)
+@pytest.mark.many(10)
 @pytest.mark.parametrize("name", [name for name in ENGINES if name != "exact"])
 def test_random_pairs_agree_with_exact_arithmetic(name):
     question = random_pairs(200, seed=20)

@@ -229,7 +229,7 @@ def signed_square(case):
     return -depth.depth_squared
 
 
-@pytest.mark.many(5)
+@pytest.mark.many(10)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_equals_brute_force_exactly(family):
     for case in cases(family):

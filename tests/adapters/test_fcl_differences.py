@@ -87,6 +87,7 @@ SIGNED = {
 }  # fmt: skip
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", SIGNED)
 def test_signed_distance_of_what_all_but_touches(name):
     A, B, t, q, end = SIGNED[name]

@@ -114,7 +114,7 @@ def contact_values(result):
     ]
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("seed", range(8))
 def test_batches_say_what_callbacks_would(seed):
     """The same contacts in the same order, bit by bit, and the same least distance."""

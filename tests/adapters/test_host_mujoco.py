@@ -99,6 +99,7 @@ def nothing_stays(tmp_path, monkeypatch):
 # --- contacts ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("a", KINDS)
 def test_contacts_are_those_of_collide(a):
     """Distances, normals and places of random pairs, with a margin: bit by bit, but for normals."""

@@ -85,6 +85,7 @@ def verdicts(geom_data):
 # --- beside Pinocchio ---------------------------------------------------------------------------
 
 
+@pytest.mark.many(2)
 @needs_arms
 @pytest.mark.parametrize("name", ARMS)
 def test_collisions_are_pinocchios(name):
@@ -109,6 +110,7 @@ def test_collisions_are_pinocchios(name):
     assert found.tolist() == any_hit and (0 < sum(any_hit))
 
 
+@pytest.mark.many(2)
 @needs_arms
 @pytest.mark.parametrize("name", ARMS)
 def test_distances_are_pinocchios(name):
@@ -284,6 +286,7 @@ def test_joints_that_are_not_numbers():
         host.compute_collisions(arm, arm.createData(), geom_model, geom_model.createData(), q)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("first", ["", "import coal as former", "import pinocchio as former"])
 def test_pinocchio_has_coals_own_whatever_is_installed_first(first):
     """While coal_api stands in for coal, Pinocchio finds coal itself, and programs find ours, then and afterwards."""
@@ -332,6 +335,7 @@ def test_nearest_points_are_written():
     assert n_meet > 10, n_meet
 
 
+@pytest.mark.many(2)
 @needs_arms
 @pytest.mark.parametrize("name", ARMS)
 def test_nearest_points_stand_as_pinocchios(name):

@@ -80,6 +80,7 @@ def test_a_wrong_boolean_is_found(monkeypatch):
     assert table.wrong == 6 and {f.kind for f in table.findings} == {"boolean"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fcl", "coal"])
 def test_other_engines_see_surfaces(name):
     if engine(name).missing():

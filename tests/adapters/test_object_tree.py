@@ -53,7 +53,7 @@ def checked(found: list, gaps: np.ndarray, limit: float, case: str) -> None:
     assert not farther, (case, farther[:5])
 
 
-@pytest.mark.many(5)
+@pytest.mark.many(10)
 @pytest.mark.parametrize("seed", range(12))
 def test_all_pairs_of_boxes_that_meet(seed):
     rng = np.random.default_rng(seed)

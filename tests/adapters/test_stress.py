@@ -37,6 +37,7 @@ def case(request) -> Case:
 # --- collide itself -------------------------------------------------------------------------------
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", SMALL)
 def test_nothing_is_wrong(ours, name):
     result = next(f for f in ours.families if f.family == name)
@@ -45,6 +46,7 @@ def test_nothing_is_wrong(ours, name):
     assert result.cases == result.answered == sum(result.how.values()) == 8
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", LARGE)
 def test_nothing_is_wrong_with_many_vertices(name):
     table = run(name, n=3, seed=2)
@@ -245,6 +247,7 @@ def test_misses_is_strict_where_the_bodies_touch():
 # --- other engines, refusals ----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["exact", "coal", "fcl", "pybullet"])
 def test_other_engines(name):
     missing = engine(name).missing()

@@ -53,6 +53,7 @@ def all_pairs(tree: BoxTree, alive, margin: float, group, mask, still, allowed) 
     return np.array([pair for pair in pairs if tuple(pair) not in allowed]).reshape(-1, 2)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("n", [1, 2, 5, 40, 170])
 def test_pairs_are_those_of_all_boxes_whatever_happens(kind, n):
@@ -179,7 +180,7 @@ def test_most_small_steps_change_no_node():
     assert 0 < tree.take_work()["leaves changed"] < 0.3 * 40 * 400
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("kind", ["uniform", "clusters", "all sizes", "a few huge", "flat"])
 @pytest.mark.parametrize("n", [60, 400])
 def test_pairs_are_kept_while_all_bodies_jitter(kind, n):

@@ -45,6 +45,7 @@ def by_all_pairs(A: collide.Compound, B: collide.Compound, X, d, limit: float):
     return casts.distance.reshape(n, m), casts
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize(
     ("kinds_a", "a", "kinds_b", "b"),
     [

@@ -16,6 +16,7 @@ def facet_hulls(mesh: collide.Mesh) -> list[collide.ConvexHull]:
     return [collide.ConvexHull(mesh.vertices[face]) for face in mesh.faces]
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["Box", "Sphere", "Capsule", "Cylinder", "ConvexHull", "Mesh"])
 def test_first_facet_of_all(kind):
     """The walk along the trees misses none: t is the least of all facets, and of all pairs of them."""

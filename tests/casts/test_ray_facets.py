@@ -64,6 +64,7 @@ def corners_in_world(mesh, X) -> list:
 MESHES = {"box": collide.Mesh(*box()), "ring": collide.Mesh(*block_ring())}
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", MESHES)
 @pytest.mark.parametrize("every", [False, True])
 def test_facets_are_those_of_the_formula(name, every):

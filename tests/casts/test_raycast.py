@@ -30,7 +30,7 @@ def rays_about(rng, X, n):
     return origins, directions * 2.0 ** rng.integers(-20, 20, size=(n, 1))
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("kind", SHAPES)
 def test_brackets_hold_the_surface(kind):
     """Just before the first bracket the ray is not inside, just behind it it is; nowhere on a miss."""

@@ -80,6 +80,7 @@ def test_grazing_is_told_to_the_last_digit():
     assert collide.shape_cast(box, above, (1, 0, -1e-8), floor, EYE).hit
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind_a", ["Sphere", "Box", "Capsule", "Cylinder", "Cone", "Ellipsoid", "ConvexHull"])
 def test_every_pair_of_convex_shapes(kind_a):
     """Brackets hold what planes prove from below, and come as near; what planes prove free is a miss."""

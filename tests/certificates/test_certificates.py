@@ -16,6 +16,7 @@ from collide.scenes.families import generate, names
 LARGE = {"spheres_big", "cyl1000", "bipyramids", "repeats"}
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", sorted(set(names()) - LARGE))
 def test_every_answer_of_a_family_verifies(family):
     for case in generate(family, 8, 3):

@@ -50,7 +50,7 @@ def gentlest(places: np.ndarray, gaps: np.ndarray, i: int) -> float:
     return float((slopes[below] ** 2).sum(axis=1).min(initial=np.inf))
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("seed", range(8))
 def test_against_all_planes(seed):
     rng = np.random.default_rng(seed)

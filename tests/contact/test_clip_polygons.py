@@ -54,6 +54,7 @@ def sampled_area(P, Q, m: int = 400) -> float:
     return both.mean() * float(np.prod(high - low))
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("seed", range(60))
 def test_overlaps_of_polygons(seed):
     rng = np.random.default_rng(seed)
@@ -83,6 +84,7 @@ def test_equal_and_touching_polygons():
     assert len(clip(square, square + np.array((1.0 + 1e-09, 0.25)), 1e-8)[0]) >= 2
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("seed", range(60))
 def test_segments(seed):
     rng = np.random.default_rng(seed)

@@ -34,6 +34,7 @@ def posed_rows(monkeypatch):
     return rows
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize(("n_a", "n_b"), [(1, 200), (12, 15), (60, 60)])
 def test_rows_are_those_of_the_parts_one_by_one(n_a, n_b, posed_rows):
     """Against every part of A with every part of B, through the box-tree and without; hits and misses both."""

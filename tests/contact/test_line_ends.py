@@ -42,6 +42,7 @@ TARGETS = {
 }  # fmt: skip
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("body", ROUND)
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_line_along_a_rim_or_a_sharp_edge_has_both_ends(target, body):

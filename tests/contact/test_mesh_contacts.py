@@ -34,6 +34,7 @@ def clears(a, b, X_WA, X_WB, c) -> bool:
     return not facet_pairs(*a, X_WA, *b, moved)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("as_mesh", [False, True])
 @pytest.mark.parametrize("solid", [True, False])
 @pytest.mark.parametrize(

@@ -121,7 +121,7 @@ FAMILIES = [
 ]  # fmt: skip
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda f: f.__name__)
 def test_rows_are_what_they_promise(family):
     seen: Counter = Counter()

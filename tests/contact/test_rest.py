@@ -164,6 +164,7 @@ def test_round_bodies_lie_on_their_sides(name, ground):
     assert np.abs(stepper.X[body] - start)[:3, 3].max() <= sag(9.81, 2, 4.0)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("ground", [(PLANE, EYE), (FLOOR, X_FLOOR)], ids=["plane", "box"])
 @pytest.mark.parametrize("tilt", [0.0, 0.05])
 def test_a_cylinder_stands(ground, tilt):
@@ -208,6 +209,7 @@ def test_a_body_rests_on_a_mesh(cells, is_mesh):
     assert abs(stepper.X[body, 2, 3] - 0.15) < sag(2 * 9.81, 4, 7.0)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("floor", ["two triangles", "solid", "wide"])
 def test_a_box_slides_over_inner_edges_as_over_a_plane(floor):
     """No ghost contacts: without friction a box crosses edges within a flat floor at the speed that it had, straight,

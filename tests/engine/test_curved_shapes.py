@@ -56,7 +56,7 @@ def shape_of(kind: str, rng) -> collide.Shape:
     return naive.one_of_each(rng)[kind]
 
 
-@pytest.mark.many(7)
+@pytest.mark.many(14)
 @pytest.mark.parametrize("kind_a", CURVED)
 @pytest.mark.parametrize("kind_b", ["Sphere", "Box", "Capsule", "ConvexHull", *CURVED])
 def test_between_the_polytopes_inside_and_around(kind_a, kind_b):
@@ -82,6 +82,7 @@ PAIRS = [pair for pair in combinations_with_replacement(naive.KINDS, 2) if set(p
 CONVEX_PAIRS = [pair for pair in PAIRS if not set(pair) & {"Compound", "Halfspace"}]
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize(("kind_a", "kind_b"), CONVEX_PAIRS)
 def test_the_normal_is_a_certificate_and_no_direction_does_better(kind_a, kind_b):
     rng = rng_of("certificate", kind_a, kind_b)

@@ -177,7 +177,7 @@ def cases_of(family):
     return [generator(rng) for _ in range(count)]
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_bracket_holds_and_the_sign_is_right(family):
     hits = []
@@ -207,6 +207,7 @@ def assert_promise(r):
     assert r.certified == (decided and width <= promised * (1 + Fraction(naive.ULP)))
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_bodies_of_points_are_decided_and_certified(family):
     """Doubles leave a sign open only within a few ulps of touching; there integers decide."""
@@ -214,6 +215,7 @@ def test_bodies_of_points_are_decided_and_certified(family):
     assert not open_ones, f"{len(open_ones)} cases without certificate, the first:\n{naive.snippet(open_ones[0])}"
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_witness_points_and_normal(family):
     for case in cases_of(family):
@@ -244,6 +246,7 @@ def test_witness_points_of_segments_end_to_end():
     assert apart > 50, apart
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_moving_by_the_distance_brings_to_touch(family):
     for case in cases_of(family):
@@ -256,6 +259,7 @@ def test_moving_by_the_distance_brings_to_touch(family):
             )
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_distance_beyond_a_limit_is_a_proven_lower_bound(family):
     for case in cases_of(family)[::4]:

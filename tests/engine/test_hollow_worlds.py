@@ -44,7 +44,7 @@ def one_by_one(made: list[tuple]) -> dict[tuple[int, int], object]:
     }  # fmt: skip
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("seed", range(N_SCENES))
 def test_worlds_name_the_nearest_and_all_within_a_distance(seed):
     made = bodies(seed)
@@ -62,6 +62,7 @@ def test_worlds_name_the_nearest_and_all_within_a_distance(seed):
         assert not len(nearest) or nearest["distance"][0] == least, (limit, nearest, say)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("seed", range(N_SCENES))
 def test_nearest_bodies_of_points(seed):
     made = bodies(seed)
@@ -94,6 +95,7 @@ def scene_of(made: list[tuple], carried: collide.Shape | None = None) -> Scene:
     return scene
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("seed", range(N_SCENES))
 def test_reports_list_what_is_within_the_clearance(seed):
     made = bodies(seed)

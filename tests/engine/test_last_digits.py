@@ -73,6 +73,7 @@ def test_brackets_once_missed(family, index, seed):
     assert check(family, index, seed)[0].certified
 
 
+@pytest.mark.slow
 def test_the_families_hold_gaps_depths_and_touching():
     signs = [np.sign(float(truth(family, index, 41)[1])) for family in names() for index in range(CASES)]
     for sign in (-1, 0, 1):

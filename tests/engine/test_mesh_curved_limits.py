@@ -44,7 +44,7 @@ def test_a_part_beside_a_tank_is_within_the_clearance():
     assert len(world.contacts(0.01)) == 1
 
 
-@pytest.mark.many(5)
+@pytest.mark.many(10)
 @pytest.mark.parametrize("size", (1e-2, 1e-3, 1e-4, 1e-6, 1e-9))
 @pytest.mark.parametrize("kind", CURVED)
 def test_limits_change_nothing_but_what_is_beyond_them(kind, size):

@@ -27,7 +27,7 @@ SHAPES = {
 AWAY = (7.0, 0.9, 0.0)
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("second", SHAPES)
 @pytest.mark.parametrize("first", ["solid", "ring", "union of meshes"])
 def test_every_call(first, second):

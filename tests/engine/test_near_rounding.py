@@ -81,6 +81,7 @@ def test_a_gap_of_a_few_ulps_beside_a_mesh_has_a_unit_normal():
     assert tiny > 60
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_normals_points_and_margins_beside_rounding(seed):
     """|normal| = 1; point_b − point_a = distance · normal; contacts at a margin agree with the bracket of the

@@ -94,7 +94,7 @@ def test_the_page_has_every_pair():
             assert not width > WIDEST[column], (pair, column)
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("pair", TABLE, ids="-".join)
 def test_brackets_keep_the_promised_width(pair):
     rng = naive.rng_of("promised", *pair)

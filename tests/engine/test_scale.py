@@ -82,6 +82,7 @@ def test_every_pair_scales_by_powers_of_two(kind_a, kind_b):
             assert_scales(Case(A, A, *poses), 2.0**k)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("k", range(-60, 61, 5))
 def test_touching_and_nearly_touching_scale_too(k):
     """Where the sign hangs on the last bit, any absolute tolerance would show."""

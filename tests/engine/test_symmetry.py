@@ -37,6 +37,7 @@ def rows_of(case: Case) -> np.ndarray:
         return collide.collide(*case)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize(("kind_a", "kind_b"), PAIRS)
 def test_swapping_swaps_points_and_negates_the_normal(kind_a, kind_b):
     for case in cases_of(kind_a, kind_b):
@@ -70,6 +71,7 @@ def test_flipping_twice_changes_nothing():
     assert not naive.same_bits(flipped(flipped(rows)), rows, naive.FIELDS)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize(("kind_a", "kind_b"), PAIRS)
 def test_a_batch_answers_like_single_queries(kind_a, kind_b):
     """Also where one pose goes with many; half-spaces in half-spaces have a boolean only."""

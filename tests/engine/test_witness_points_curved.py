@@ -120,6 +120,7 @@ def test_bodies_at_one_origin(A, B):
         assert off_bodies(P, Q, np.eye(4), np.eye(4), r) <= 0.5 * (r.upper - r.lower) + 1e-13
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("b", MAKERS)
 @pytest.mark.parametrize("a", ("cone", "cylinder", "ellipsoid"))
 def test_overlaps_of_curved_bodies(a, b):

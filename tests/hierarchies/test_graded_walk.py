@@ -48,6 +48,7 @@ def test_the_walk_comes_to_all_pairs_of_facets_whose_boxes_meet(kind):
     assert found > 1000 and fewer > 3, (found, fewer)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["cubes", "tight"])
 def test_harpsicordia_show_the_bound_of_theorem_3_6(kind):
     """Σ = n. Pairs of boxes that meet, the walk's calls: a constant a meeting, and below 8 n log2 n."""

@@ -29,7 +29,7 @@ def built(name: str, bound: int) -> tuple[np.ndarray, Hierarchy]:
     return points, build_hierarchy(points, convex_hull(points), bound)
 
 
-@pytest.mark.many(7)
+@pytest.mark.many(14)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("bound", [0, 12, DEGREE_BOUND])
 def test_families(name, bound):
@@ -38,7 +38,7 @@ def test_families(name, bound):
     validate_hierarchy(points, hierarchy, bounded_from=late)
 
 
-@pytest.mark.many(7)
+@pytest.mark.many(14)
 @pytest.mark.parametrize("name", NAMES)
 def test_polars(name):
     points = families(SIZE // 2)[name]

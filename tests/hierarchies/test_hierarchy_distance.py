@@ -104,6 +104,7 @@ def test_a_vertex_of_large_degree_in_the_body_itself_is_scanned_with_and_without
         assert 0.9 * len(points) < found.counters[3] < 2 * len(points) + 1000
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize(
     "family", ["rand_sep", "near_sep", "rand_pen", "boxes_rest", "needles", "cyl1000", "identical"]
 )

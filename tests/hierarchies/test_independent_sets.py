@@ -16,6 +16,7 @@ def edges_of(triangles) -> set[tuple[int, int]]:
     return {(int(t[k]), int(t[k - 1])) for t in triangles for k in range(3)}
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("bound", BOUNDS)
 def test_independence_degrees_and_hulls(bound):
     rng = rng_of("independent sets", bound)

@@ -32,6 +32,7 @@ def pair(kind: str, rng) -> tuple[np.ndarray, np.ndarray]:
     return P, R
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["apart or not", "lattice", "flush"])
 def test_equal_to_the_oracle_with_all_invariants(kind):
     rng = np.random.default_rng([6, len(kind)])
@@ -53,6 +54,7 @@ def test_equal_to_the_oracle_with_all_invariants(kind):
     ) or kind == "flush", seen
 
 
+@pytest.mark.slow
 def test_larger_bodies_go_deep():
     rng = np.random.default_rng(3)
     for k in range(3):

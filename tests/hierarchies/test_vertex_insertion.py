@@ -21,6 +21,7 @@ def points_of(rng, kind: str) -> np.ndarray:
     return points / (np.linalg.norm(points, axis=1)[:, None] if kind == "sphere" else 1.0)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["sphere", "scattered", "lattice"])
 def test_the_hull_grows_by_what_is_outside(kind):
     rng = rng_of("vertex insertion", kind)

@@ -60,7 +60,7 @@ def roles(found: Walks, A, B, X_WA, X_WB):
 # --- equal to the oracle --------------------------------------------------------------------------
 
 
-@pytest.mark.many(7)
+@pytest.mark.many(14)
 @pytest.mark.parametrize("name", names())
 def test_equal_to_the_oracle_on_the_hard_families(name):
     """Both ways round, with the invariants of every round where the walk walked."""
@@ -376,6 +376,7 @@ def test_rounds_grow_with_the_logarithm():
     assert most[2] <= 12 + 3.5 * 2 * np.log2(3000) and most[2] < 2.5 * most[1]
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["bipyramid", "cone", "prism", "degree doubling", "moment curve"])
 def test_tests_a_round_do_not_grow_with_a_degree(kind):
     """Bodies with a vertex or a facet of degree n: a mean of a few tests a round, at eight times the vertices too."""

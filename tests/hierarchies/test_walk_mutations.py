@@ -67,7 +67,7 @@ MUTATIONS = {
 }  # fmt: skip
 
 
-@pytest.mark.many(5)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(MUTATIONS))
 def test_faults_are_noticed(name, tmp_path):
     file, old, new = MUTATIONS[name]

@@ -54,6 +54,7 @@ def is_way_out(direction, normals) -> bool:
     return bool((normals @ direction <= 1e-12 * np.abs(normals).sum(axis=1)).all()) and np.abs(direction).max() == 1.0
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["lattice", "random", "boxed"])
 def test_vertices(kind):
     rng = rng_of("double description", kind)

@@ -247,6 +247,7 @@ def all_clouds(size: int, seed: int) -> dict[str, np.ndarray]:
     return families(rng, size) | scaled_apart(rng, size)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", [*NAMES, *SCALES])
 def test_small_clouds_by_brute_force(name):
     for size, seed in product((8, 12, 30), range(3)):
@@ -301,6 +302,7 @@ def test_last_bits_decide():
 # --- large ones ---------------------------------------------------------------------------------
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", NAMES)
 def test_large_clouds(name):
     rng = np.random.default_rng(5)

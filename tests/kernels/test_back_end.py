@@ -89,6 +89,7 @@ for cpu in ("x86-64-v2", "x86-64-v3") if "x86" in __import__("platform").machine
 """
 
 
+@pytest.mark.slow
 def test_kernels_compile_to_the_same_bytes():
     """Whatever order Python's sets have in a process."""
     told = []

@@ -251,6 +251,7 @@ print(sorted(seen), changed(before))
 )
 
 
+@pytest.mark.slow
 @pytest.mark.own_kernels
 @pytest.mark.parametrize("where", ["lowering", "machine code", "loading"])
 def test_another_thread_may_compile_its_own_meanwhile(tmp_path, where):
@@ -282,6 +283,7 @@ print(meanwhile, power(3.0, 2), changed(before))
 )
 
 
+@pytest.mark.slow
 @pytest.mark.own_kernels
 @needs_signals
 def test_what_handlers_of_signals_compile_meanwhile_is_compiled_as_well(tmp_path):
@@ -350,6 +352,7 @@ print(interrupted >= 20, changed(before))
 )
 
 
+@pytest.mark.slow
 @pytest.mark.own_kernels
 @needs_signals
 @pytest.mark.parametrize("when", ["at any moment", "at the lock"])
@@ -400,6 +403,7 @@ print(len(made), out)
 """
 
 
+@pytest.mark.many(2)
 @pytest.mark.skipif(PLAIN_PYTHON, reason="there are no single calls")
 @pytest.mark.parametrize("kind", ["convex", "union", "mesh"])
 def test_two_threads_may_make_the_workspace_of_single_calls_at_once(tmp_path, kind):

@@ -200,6 +200,7 @@ def harms(length: int) -> dict:
     }  # fmt: skip
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("of", ["library", "module"])
 def test_what_is_damaged_is_not_loaded(site, ask, of):
     file = library_of(site) if of == "library" else glue_of(site)
@@ -215,6 +216,7 @@ def test_what_is_damaged_is_not_loaded(site, ask, of):
     assert ask()[0]["mode"] == "compiled"
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("of", ["library", "module", "built.py"])
 def test_what_is_missing_is_done_without(site, ask, of):
     file = {
@@ -313,6 +315,7 @@ def test_the_library_needs_no_numba(ask, no_numba):
     assert told["mode"] == "compiled" and told["box"] == RIGHT and said == ""
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("harm", ["damaged", "missing", "other sources"])
 def test_without_library_and_numba_it_is_said_what_to_do(site, no_numba, harm):
     if harm == "damaged":

@@ -30,6 +30,7 @@ def below(tree: MeshTree, link: int) -> list[int]:
     return [k for slot in np.flatnonzero(tree.used()[link]) for k in below(tree, int(tree.links()[link, slot]))]
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("make", [lambda tree: tree, with_origins], ids=["plain", "origins"])
 def test_slabs_hold_their_facets_and_little_more(family, make):

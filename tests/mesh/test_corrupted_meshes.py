@@ -139,6 +139,7 @@ def test_solid_true_names_the_facets():
 # --- the judge ------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_wrong_answer_would_be_found(monkeypatch):
     """The engine's hits turned round, its gaps moved, its solids taken for surfaces: each shows."""
     honest = corruptions.collide, corruptions.distance

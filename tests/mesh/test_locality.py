@@ -121,6 +121,7 @@ def test_nothing_to_measure():
         collide.Mesh(np.ones((3, 3)), [(0, 1, 2)]).locality()
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("n", [1, 2, 7, 8, 9, 17, 100, 1000])
 @pytest.mark.parametrize("k", [1, 3, 10, 32])
 def test_nearest_are_those_of_all_pairs(n, k):

@@ -150,6 +150,7 @@ def spoilt(rng, vertices, faces):
     return vertices, faces
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", CLOSED)
 def test_random_defects(name):
     rng = rng_of("defects", name)

@@ -48,6 +48,7 @@ def motion(rng, ratio: float) -> tuple[np.ndarray, ...]:
     return X_WA0, X_WA1, X_WB0, X_WB1
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("ratio", [0.01, 1.0, 100.0])
 def test_the_first_contact_is_that_of_all_facets(ratio):
     """Each facet as a convex hull of its own, asked one by one."""

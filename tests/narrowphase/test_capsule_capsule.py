@@ -39,6 +39,7 @@ def segments(rng, kind: str) -> tuple[np.ndarray, np.ndarray]:
     return a, b
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["random", "lattice", "parallel", "point", "near"])
 def test_nearest_of_segments(kind):
     rng = rng_of("segments", kind)

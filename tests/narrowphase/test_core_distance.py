@@ -43,6 +43,7 @@ def cores(bodies: PosedBodies, **asked):
     return convex_cores(bodies.ordered, query, bodies.work, bodies.radius, bodies.error, False, 0)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["any", "near", "lattice", "large", "flat"])
 def test_brackets(kind):
     rng = rng_of("core distance", kind)

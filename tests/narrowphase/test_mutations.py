@@ -46,7 +46,7 @@ MUTATIONS = {
 }
 
 
-@pytest.mark.many(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MUTATIONS)
 def test_mutation_is_noticed(name, tmp_path):
     file, old, new = MUTATIONS[name]

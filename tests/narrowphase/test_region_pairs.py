@@ -31,7 +31,7 @@ def partners(rng) -> dict[str, collide.Shape]:
     return shapes
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_as_closed_by_a_far_box(family):
     rng, seen = rng_of("region", family), {True: 0, False: 0}

@@ -115,6 +115,7 @@ def on_segment(x, p, q) -> bool:
     return E.cross(edge, way) == (0, 0, 0) and 0 <= E.inner(edge, way) <= E.inner(edge, edge)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("size", [2, 5, 1000])
 def test_where_rays_enter_triangles(size):
     """Small lattices: rays in the triangle's plane, along its edges, through corners, and triangles without area."""

@@ -97,7 +97,7 @@ CLOUDS = {
 }  # fmt: skip
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("kind", CLOUDS)
 def test_sides_are_exact(kind):
     rng = rng_of("sides", kind)

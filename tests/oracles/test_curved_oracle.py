@@ -128,6 +128,7 @@ def test_bounds_hold_against_sampled_points_and_directions():
                 assert curved_cells.separation(a, b, vector(n)) <= found.upper + Decimal("1e-60")
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["cylinder", "cone", "ellipsoid", "box", "hull"])
 def test_supports_are_farthest_points_of_the_body(kind):
     """A support is a point of the body, by the definition of the shape, and no sampled point lies farther."""

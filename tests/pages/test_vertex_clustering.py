@@ -49,6 +49,7 @@ SURFACES = {
 }
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", SURFACES)
 @pytest.mark.parametrize("wanted", [1000, 200])
 def test_no_point_drawn_is_farther_off_than_said(name, wanted):

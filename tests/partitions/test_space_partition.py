@@ -61,6 +61,7 @@ def points_near(partition, n: int, seed: int) -> np.ndarray:
     return np.concatenate((flat, np.nextafter(flat, rng.choice([-np.inf, np.inf], flat.shape))))
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", SOLIDS)
 def test_cells_hold_no_facets_and_tell_inside_from_outside(family):
     mesh = mesh_of(family, 3)
@@ -101,6 +102,7 @@ WHOLE = {
 }
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", WHOLE)
 def test_volumes_add_up_in_fractions(name):
     """All cells fill the box; those inside have the mesh's volume, and so have the pieces."""
@@ -119,6 +121,7 @@ def test_volumes_add_up_in_fractions(name):
     assert np.isclose(solid.volumes.sum(), float(all_.volume_inside), rtol=1e-12)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", SOLIDS)
 def test_points_are_where_contains_has_them(family):
     on_boundary = inside = total = 0

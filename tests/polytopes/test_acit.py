@@ -65,7 +65,7 @@ def pruned(seed: int, d: int, count: int):
             yield question, asked
 
 
-@pytest.mark.many(2)
+@pytest.mark.many(4)
 @pytest.mark.parametrize("d", [1, 2, 3, 4, 5])
 def test_the_recursion_alone_equals_the_oracle(d):
     spaces, depths, rounds = [], [], []
@@ -212,6 +212,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_planted_faults_are_noticed(fault):
     """By a wrong answer, or by an invariant that refuses to give one."""

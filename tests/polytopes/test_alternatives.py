@@ -49,6 +49,7 @@ def test_brute_force_says_what_is_too_much():
         polytopes.meets(np.zeros((500, 3)), [[1.0, 0, 0]], [1.0], algorithm="brute-force")
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("d", [1, 2, 3, 4])
 def test_seidel_finds_the_best_corner(d):
     rng, n_found = np.random.default_rng(7), 0

@@ -42,6 +42,7 @@ def _pose(rng, d, distance):
     return X
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", ["ball and lattice", "curve"])
 @pytest.mark.parametrize("d", [2, 3, 4, 5])
 def test_answers_are_those_of_the_rational_simplex(d, family):
@@ -68,6 +69,7 @@ def test_answers_are_those_of_the_rational_simplex(d, family):
     assert cases >= 6 and 1 <= hits < cases
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize(("d", "n"), [(2, 400), (3, 300), (4, 120), (5, 40)])
 def test_every_answer_is_proven_and_every_set_recomputed(d, n):
     rng = np.random.default_rng([7, d])

@@ -36,6 +36,7 @@ def answered(question: families.Question, algorithm: str = "auto") -> Meeting:
     return answer
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("d", [1, 2, 3, 4, 5])
 def test_equals_the_rational_simplex(d):
     answers = [(name, answered(question)) for name, question in families.questions(20, d, 72, 16)]

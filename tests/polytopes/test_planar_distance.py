@@ -39,7 +39,7 @@ def outside(polygon, X, point) -> float:
     return float((normals * (point - corners)).sum(axis=1).max())
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 def test_within_bounds_of_fractions(family):
     rng = np.random.default_rng(11)

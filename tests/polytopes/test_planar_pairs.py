@@ -49,7 +49,7 @@ def check_family(family, n: int, seed: int) -> tuple[np.ndarray, int]:
 RARER = {"nested": 0.0, "magnitudes": 0.02}
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 def test_equal_to_fractions(family):
     hit, _ = check_family(family, 250, 1)

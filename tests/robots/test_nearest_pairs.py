@@ -48,7 +48,7 @@ def told(seed: int, q) -> str:
     )
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("seed", range(N_SCENES))
 def test_equal_to_the_least_of_pairs_asked_one_by_one(seed):
     rng, robot, world = hollow_scene(seed)

@@ -471,6 +471,7 @@ def urdf_files() -> list[Path]:
     return files
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("file", urdf_files(), ids=lambda file: file.name)
 def test_forward_kinematics_against_yourdfpy(file):
     yourdfpy = pytest.importorskip("yourdfpy")

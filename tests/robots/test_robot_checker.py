@@ -42,7 +42,7 @@ def random_world(rng, n: int, meshes: bool = False) -> collide.World:
     return world
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("seed", range(12))
 def test_equal_to_pairs_asked_one_by_one(seed):
     rng = rng_of("checker", seed)

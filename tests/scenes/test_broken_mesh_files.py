@@ -322,6 +322,7 @@ def test_a_file_that_is_cut_short_is_refused(tmp_path, name):
     assert refused > 40
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", GOOD)
 def test_damaged_bytes_are_refused_or_read_never_more(tmp_path, name):
     """A few bytes of a file changed at random: an error of ours, or a scene of finite meshes."""

@@ -54,6 +54,7 @@ def test_a_case_depends_on_family_seed_and_index_alone(name):
     assert not any(map(same, cases, generate(name, n, 4)))
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", names())
 def test_a_case_is_plain_finite_numbers(name):
     for case in generate(name, 2 if name in LARGE else 10, 5):
@@ -173,7 +174,7 @@ BOUNDS = {
 }
 
 
-@pytest.mark.many(7)
+@pytest.mark.many(14)
 @pytest.mark.parametrize("name", BOUNDS)
 def test_gaps_and_hit_rates(name):
     smallest, largest, fewest, most = BOUNDS[name]

@@ -56,7 +56,7 @@ DEEP = {
 }  # fmt: skip
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("case", DEEP)
 def test_deep_nesting_is_refused(tmp_path, case):
     """In a process of its own: PyYAML's C code ended it by SIGSEGV."""
@@ -297,6 +297,7 @@ def test_a_scene_without_a_name(tmp_path):
 MEGABYTE = "n" * 2**20
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize(
     ("name", "text"),
     [
@@ -587,6 +588,7 @@ LONG = {
 }  # fmt: skip
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", LONG)
 def test_twice_the_file_is_twice_the_work(tmp_path, name):
     """Calls of functions, Python's and C's, while a file is read."""

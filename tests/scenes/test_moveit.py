@@ -32,7 +32,7 @@ URDF = """<robot name="crane">
 </robot>"""
 
 
-@pytest.mark.many(5)
+@pytest.mark.many(10)
 @pytest.mark.skipif(not SCENES, reason="../shared/data is absent")
 @pytest.mark.parametrize("family", sorted({file.parent for file in SCENES}), ids=lambda folder: folder.name)
 def test_motion_bench_maker(family):

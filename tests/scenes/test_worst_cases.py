@@ -196,6 +196,7 @@ def box_pairs(A, B, gap=0.0) -> int:
     return looked
 
 
+@pytest.mark.slow
 def test_box_pairs_of_local_meshes_grow_like_n_log_n():
     sizes = (250, 500, 1000, 2000, 4000, 8000)
     looked, meetings = [], []

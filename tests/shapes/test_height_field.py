@@ -289,6 +289,7 @@ EXTREMES = {
 }  # fmt: skip
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", EXTREMES)
 def test_extreme_fields_answer_within_their_brackets(name):
     heights, cell, bottom = EXTREMES[name]

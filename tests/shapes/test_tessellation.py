@@ -85,6 +85,7 @@ def volume(vertices, faces) -> float:
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", CONVEX)
 @pytest.mark.parametrize("tolerance", [None, 0.02, 0.001])
 def test_convex_shapes_are_closed_and_as_near_as_they_say(name, tolerance):

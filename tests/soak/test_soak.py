@@ -138,6 +138,7 @@ def unchanged():
     return [(case, {found[0] for found in judge(case, judges=OF_DISTANCE).failures}) for case in cases]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("change", "promise", "least"), MUTATIONS, ids=lambda value: getattr(value, "__name__", None))
 def test_a_wrong_distance_is_noticed(change, promise, least, unchanged):
     noticed = 0

@@ -63,6 +63,7 @@ def keep_one(rows):
     return rows[:1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "families", "least"),
     [

@@ -39,6 +39,7 @@ def test_every_kind_has_a_part_in_every_sort_asked_often_and_every_change(soaked
     assert {what for _, what in soaked.cells} >= {*ASKED, "added", "moved", "moved near", "margin set", "woken"}
 
 
+@pytest.mark.slow
 def test_a_world_is_the_same_whenever_it_is_drawn():
     one, other = Tally(), Tally()
     for tally in (one, other):
@@ -58,6 +59,7 @@ def differing(
     return tally.differing
 
 
+@pytest.mark.slow
 def test_boxes_of_nan_are_noticed(monkeypatch):
     """The room that boxes were given once: of bodies without end and without margins no number."""
 
@@ -97,11 +99,13 @@ class Hasty(collide.World):
         return found
 
 
+@pytest.mark.slow
 def test_a_world_that_ends_its_search_early_is_noticed():
     assert len(differing(Hasty, "minimum")) >= 3
     assert len(differing(Hasty, "nearest")) >= 3
 
 
+@pytest.mark.slow
 def test_one_world_again_and_exit_status(capsys):
     assert soak(4, 1, first=3, steps=1).questions.total() == soak_worlds.QUESTIONS
     assert main(["--seed", "4", "--questions", "1"]) == 1, "so few leave cells empty"

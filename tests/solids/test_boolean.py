@@ -21,6 +21,7 @@ I = np.eye(4)
 OPERATIONS = ("union", "intersection", "difference", "symmetric_difference")
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", SOLIDS)
 def test_points_are_where_the_solids_hold_them(family):
     """Half the points within 1e-9 of a surface; volumes add up in fractions."""
@@ -49,6 +50,7 @@ def edges_balance(mesh) -> bool:
     return not any(runs.values())
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", ["smooth", "boxes", "rings", "turned grid shells", "identical shells"])
 def test_results_are_closed_and_say_whose_facets_they_are_of(family):
     for seed in range(2):

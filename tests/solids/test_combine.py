@@ -23,6 +23,7 @@ def verdicts():
     return {case: judge_many(case[0], 1, case[1], 16) for case in CASES}
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family,r", CASES)
 def test_points_are_where_the_rule_puts_them(family, r, verdicts):
     """Half the points within 1e-9 of a surface; volumes of a rule and of its opposite add up in fractions."""

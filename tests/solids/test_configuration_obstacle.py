@@ -16,6 +16,7 @@ from collide.solids import convolution as convolution_module
 I = np.eye(4)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize(
     "name", [name for name in cases() if name not in ("rings", "turned boxes", "cells 1", "bumpy")]
 )

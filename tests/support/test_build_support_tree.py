@@ -117,7 +117,7 @@ def test_a_vertex_of_many_neighbours_is_proven_by_few():
 # --- keeping and checking -----------------------------------------------------------------------
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("name", HULLS)
 def test_validation_passes(name):
     validate_support_tree(made(name)[2], samples=25)
@@ -249,6 +249,7 @@ np.savez(sys.argv[2], ids=extreme_vertices(tree, given["directions"]), **parts)
 """
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", ["small sphere", "sphere", "bipyramid"])
 def test_without_compilation_the_bits_are_the_same(name, tmp_path):
     points, facets = {

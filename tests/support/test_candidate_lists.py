@@ -38,6 +38,7 @@ def margin(points, w: int, coarse, v: int) -> float:
     return -optimize.linprog(objective, A_ub=rows, b_ub=np.zeros(len(rows)), bounds=[(-1, 1)] * 3 + [(None, 1)]).fun
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["ball", "pancake", "needle", "prism", "box"])
 def test_lists_hold_whoever_may_be_farthest(kind):
     """A vertex stands in a list exactly where its normal cone meets the owner's in directions of some extent."""

@@ -37,7 +37,7 @@ def _is_built(shape) -> bool:
     return may_have_tree(packed) and support_tree_of(packed).tree is not None
 
 
-@pytest.mark.many(5)
+@pytest.mark.many(10)
 @pytest.mark.parametrize("family", names())
 def test_hard_families_with_a_tree_on_every_hull(family, trees_everywhere):
     """Booleans as without trees (which the oracle has judged), brackets that share the truth."""

@@ -19,7 +19,7 @@ from collide.support.support_tree_query import extreme_vertex, extreme_vertices
 pytest.importorskip("scipy.spatial")
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("name", HULLS)
 def test_settled_answers_are_exact(name):
     points, facets, tree = made(name)
@@ -29,7 +29,7 @@ def test_settled_answers_are_exact(name):
         assert found in farthest_of(whole, g), snippet(name, g)
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("name", HULLS)
 def test_unsettled_answers_are_almost_always_right(name):
     points, _, tree = made(name)

@@ -124,7 +124,7 @@ def check(A, B, X, Y):
     return kinds
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("name", FAMILIES)
 def test_pieces_are_those_of_brute_force(name):
     make, _ = FAMILIES[name]

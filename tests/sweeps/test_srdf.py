@@ -176,6 +176,7 @@ def test_pinocchio_reads_what_is_kept(name, tmp_path):
     assert states[0] == states[1] and (name == "fetch" or len(states[0]) >= 3)
 
 
+@pytest.mark.many(2)
 @pytest.mark.skipif(not ROBOTS.is_dir(), reason="the shared robots are not here")
 @pytest.mark.parametrize(
     "name, wrong",

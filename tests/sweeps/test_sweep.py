@@ -50,6 +50,7 @@ def chunk_files(folder: Path) -> list[str]:
     return sorted(file.name for file in folder.glob("chunk-*.parquet"))
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("workers, chunk", [(0, None), (0, 7), (2, 130)])
 def test_rows_are_those_of_the_checker(tmp_path, workers, chunk):
     results = sweep(SlowChecker(), DrawnConfigurations(1000, 3), tmp_path / "s", workers=workers, chunk=chunk,
@@ -302,6 +303,7 @@ def _alone(diary: Path) -> bool:
     return len(diary_lines(diary)) == before
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     find_spec("distributed") is None, reason="dask is not installed: pip install 'collide-robotics[sweep]'"
 )

@@ -77,13 +77,14 @@ def check_every_pair(name, A, B, X, Y) -> tuple[int, int, int]:
     return len(rows), touching, int(got.counters[0, 2:].max())
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("name", list(FAMILIES))
 def test_equal_to_fractions(name):
     hits = check_every_pair(name, *FAMILIES[name])
     assert all(n >= least for n, least in zip(hits, HITS[name])), (name, hits)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("far", [False, True])
 @pytest.mark.parametrize("make", [edges_near_faces, edges_near_edges])
 def test_verdicts_within_rounding_of_touching(make, far):
@@ -244,6 +245,7 @@ def _without_low(corners):
     return corners._replace(plain=True, exact=True, error=0.0, wide_error=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mutant", list(MUTANTS))
 def test_mutants_are_noticed(mutant, monkeypatch):
     module, name, change = MUTANTS[mutant]

@@ -54,6 +54,7 @@ def points():
     return {point.engine: point for point in made}
 
 
+@pytest.mark.slow
 def test_errors_are_parts_of_the_size(points):
     np.testing.assert_allclose(points["wrong"].error, 1e-3 / math.sqrt(3), rtol=1e-9)
     assert points["right"].error.max() < 1e-15 and points["collide"].error.max() < 1e-15
@@ -145,6 +146,7 @@ def test_labels_do_not_overlap():
     assert not [(i, j) for i in range(9) for j in range(i) if boxes[i].overlaps(boxes[j])]
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("name", CLASSES)
 def test_classes_are_seeded_and_judged(name):
     cases, again = cases_of(name, 3, 5), cases_of(name, 3, 5)

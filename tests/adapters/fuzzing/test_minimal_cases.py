@@ -74,6 +74,7 @@ def session_of() -> Iterator[Callable[[str], EngineSession]]:
         yield started
 
 
+@pytest.mark.slow
 @CASES
 def test_the_engine_still_errs(place, session_of):
     found, about = load_finding(place)

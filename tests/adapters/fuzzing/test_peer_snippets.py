@@ -54,7 +54,7 @@ def _without_collide(text: str) -> str:
     return f"import sys\nsys.path[:] = {sys.path!r}\nsys.modules['collide'] = None\n{text}"
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("name", SETTINGS)
 def test_snippets_say_what_the_peer_says(name):
     peer = engine(name)

@@ -71,6 +71,7 @@ def _halfspace_on(rng, X_WP):
     return above, X_WP @ collide.pose((0, 0, 1.0)) @ np.linalg.inv(X_BP)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("lay", [_box_on, _part_on, _capsule_on, _halfspace_on])
 def test_flush_parts_of_posed_bodies_are_decided_exactly(lay):
     rng = np.random.default_rng(5)

@@ -76,6 +76,7 @@ def test_parts_before_a_large_face_are_told_apart_along_its_normal(monkeypatch):
     assert 0 < sum(asked) < 40, sum(asked)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("size", [0.3, 3.0, 1e3, 1e6])
 def test_parts_left_out_along_a_normal_are_no_nearer(size):
     """The distance of a union is the least one of its parts asked one by one; with a limit, too."""

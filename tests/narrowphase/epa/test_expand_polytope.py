@@ -55,6 +55,7 @@ def farthest(bodies: PosedBodies, n) -> float:
     return float((corners @ np.array(n)).max())
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["any", "boxes", "round", "shallow"])
 def test_surface_and_bracket(kind):
     """A sphere by Euler's formula, outwards, convex but for rounding, of points of A ⊖ B, around the origin; the depth

@@ -46,6 +46,7 @@ def check(corners, weights, distance: float, p) -> None:
     assert distance <= float(sum(map(abs, true.point))) + 32 * ULP * size
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["random", "lattice", "needle", "repeated"])
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 def test_nearest_points(n, kind):

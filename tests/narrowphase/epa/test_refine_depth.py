@@ -55,6 +55,7 @@ def refined(bodies: PosedBodies):
     return result, fine, [[tuple(surface.ids[2 * v : 2 * v + 2].tolist()) for v in facet] for facet in facets]
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["any", "boxes", "lattice", "1e-9", "1e-13", "1e-15"])
 def test_brackets(kind):
     """Sound nearly always: the bracket then holds the depth, along the normal that has it, and is narrow as promised,

@@ -17,7 +17,7 @@ from collide.scenes.families import generate, names
 LARGE = {"spheres_big", "cyl1000", "bipyramids", "repeats"}
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("family", sorted(set(names()) - LARGE))
 def test_booleans_without_doubles_are_the_same(family, monkeypatch):
     cases = generate(family, 25, 5)

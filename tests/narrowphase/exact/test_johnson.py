@@ -84,6 +84,7 @@ def test_products_of_points(kind):
                 assert number_at(simplex.exact.digits, gram_at(D, i, j), 2 * D) == true, simplex.points
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 @pytest.mark.parametrize("kind", KINDS)
 def test_nearest_subset(kind, n):

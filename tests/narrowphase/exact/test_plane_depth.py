@@ -63,6 +63,7 @@ def surface_requests(bodies: ExactBodies) -> list[int]:
     return [complete, len(facets), *(k for _, facet in facets for corner in facet for k in names[corner])]
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["rounding", "touching", "any"])
 def test_nearest_planes(kind):
     rng = rng_of("nearest plane", kind)
@@ -129,6 +130,7 @@ def planes_that_may_decide(bodies: ExactBodies, depth: float) -> tuple[int, int]
     return n_planes, n_tied
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["rounding", "touching", "any"])
 def test_all_planes(kind):
     """The least extent over all of them is the depth; three vertex pairs are named around its point of A ⊖ B."""

@@ -43,6 +43,7 @@ class Row:
         return [b, a] if bodies.ordered.flip else [a, b]
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 def test_points_along_the_normal(n):
     """The point of the named simplex nearest the origin, taken apart: each body's point is in the hull of its named

@@ -16,6 +16,7 @@ from collide.narrowphase.facets.exact_triangles import BACK, BY, FROM, MEET, OVE
 pytestmark = pytest.mark.plain_kernels  # corners are placed by kernels
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_meeting(family):
     rng = rng_of("exact triangles meet", family)

@@ -51,7 +51,7 @@ def poses(rng, n: int, spread: float) -> np.ndarray:
     return np.array([random_pose(rng, spread) for _ in range(n)])
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("partner", list(partners(rng_of("names"))))
 def test_batches_are_single_calls_broadcast_and_swapped(partner):
     rng = rng_of("mesh batches", partner)

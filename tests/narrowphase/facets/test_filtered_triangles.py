@@ -33,6 +33,7 @@ def perturbed(rng, Q, error: float) -> np.ndarray:
     return Q + np.clip(off, -error, error) * (1 - 1e-9)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_verdicts_hold_within_the_error(family):
     rng = rng_of("filtered triangles", family)

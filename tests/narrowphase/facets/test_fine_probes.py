@@ -61,6 +61,7 @@ def trees(mesh):
     return plain, with_origins(plain)
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize(("name", "a", "b", "X", "Y"), CASES, ids=[case[0] for case in CASES])
 def test_pairs_and_distances_are_those_of_plain_trees(name, a, b, X, Y):
     (A, A_fine), (B, B_fine) = trees(a), trees(b)

@@ -135,6 +135,7 @@ def test_between_the_polytopes_inside_and_around(kind):
     assert min(told.values()) >= 3, told
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_gaps_are_those_of_all_facets_one_by_one(kind):
     rng = rng_of("mesh", "one by one", kind)
@@ -162,6 +163,7 @@ def snippet_of(mesh, shape, X, Y) -> str:
     return f"vertices, faces = bumpy_sphere(300)\nB = {naive.spell(shape)}\nX_WA = {X.tolist()}\nX_WB = {Y.tolist()}"
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_overlaps_come_apart_by_the_translation_told(kind):
     rng = rng_of("mesh", "depth", kind)
@@ -190,6 +192,7 @@ def test_overlaps_come_apart_by_the_translation_told(kind):
     assert deep >= 6, deep
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_swapped_batched_threaded_and_listed_answers_are_the_same_bits(kind):
     rng = rng_of("mesh", "bits", kind)

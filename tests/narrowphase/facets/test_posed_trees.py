@@ -156,6 +156,7 @@ def test_probes_keep_what_meets_and_prisms_are_the_sharper_ones():
     assert kept["box"] > kept["leaf"] > kept["prism"] > kept["true"] > 50, kept
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_facets_meet_as_exact_arithmetic_says(family):
     rng = rng_of("facets meet", family)

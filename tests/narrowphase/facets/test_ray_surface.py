@@ -112,7 +112,7 @@ def check(shape, vertices, faces, X, origins, directions, limit=np.inf):
     return len(origins), int(first.hit.sum()), ties
 
 
-@pytest.mark.many(2)
+@pytest.mark.many(4)
 @pytest.mark.parametrize("kind", ["soup", "grid", "flat", "thin", "scaled"])
 def test_hits_are_those_of_brute_force(kind):
     rng = np.random.default_rng(["soup", "grid", "flat", "thin", "scaled"].index(kind) + 700)

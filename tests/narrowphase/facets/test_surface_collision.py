@@ -14,7 +14,7 @@ from collide.mesh.build_bvh import build_mesh_tree
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_all_pairs_are_those_of_brute_force(family):
     make, cases = FAMILIES[family]

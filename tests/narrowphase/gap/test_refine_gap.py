@@ -80,6 +80,7 @@ def refined(feature: Feature) -> list[float]:
     return answer
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["any", "near", "lattice"])
 @pytest.mark.parametrize(("n", "parts"), [(1, 1), (2, 1), (2, 2), (3, 1), (3, 2)])
 def test_proven_gaps(n, parts, kind):

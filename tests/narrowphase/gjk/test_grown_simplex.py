@@ -57,7 +57,7 @@ def height_below(points) -> Fraction | None:
     return min(squares)
 
 
-@pytest.mark.many(3)
+@pytest.mark.many(6)
 @pytest.mark.parametrize("kind", ["random", "around", "lattice", "thin", "any"])
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_nearest_point_or_none(n, kind):

@@ -189,6 +189,7 @@ def test_few_pairs_and_other_shapes_are_left_alone():
         assert len(others) > 7 and not decided(rows_of(others)).any()
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("scale", (2.0**-100, 2.0**-60, 2.0**60, 2.0**100, 2.0**150))
 def test_sizes_that_portals_cannot_multiply_are_answered_all_the_same(scale):
     cases = asked(26, "scale")

@@ -58,6 +58,7 @@ def nearest(corners, faces: int = ALL_FACES) -> tuple[float, list[float], list[f
     return square, weights[:4], weights[4:]
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 def test_nearest_point(n, kind):
@@ -83,6 +84,7 @@ def test_nearest_point(n, kind):
     assert n == 1 or len(features) >= 2 or kind in ("around the origin", "needle"), features
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("kind", ["random", "around the origin", "lattice", "thin", "far"])
 def test_faces_in_sight_prove_what_they_leave_out(kind):
     """A face that is left out holds no nearest point; where all four are, the origin is as deep as said, wherever the
