@@ -131,7 +131,8 @@ class Mirror:
 
     def set_shape(self, body: int, link: int, shape: Shape) -> None:
         """Take a shape, in the frame of the link's centre of mass, for what pybullet says of a link."""
-        self._bodies.replace(*_integers(body=body, link=link), checks.instance("shape", shape, Shape, "a shape"))
+        body, link = _integers(body=body, link=link)
+        self._bodies.replace(body, link, checks.instance("shape", shape, Shape, "a shape"))
         self.update()
 
     def note_body(self, body: int, flags: int, shapes: Mapping[int, Shape]) -> None:

@@ -6,6 +6,8 @@ its proximity engine uses. A pair of shapes that Drake has no distance for is re
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from collide.adapters.peers.answers import Reply
@@ -117,7 +119,7 @@ def scene_of(A, X_WA: np.ndarray, B, X_WB: np.ndarray):
     return scene, context, poses, frames, tuple(ids)
 
 
-def rigid_transform(X: np.ndarray):
+def rigid_transform(X: Any):
     """Drake's transform of a pose (4, 4); a rotation that it finds no rotation is projected."""
     from pydrake.math import RigidTransform, RotationMatrix
 

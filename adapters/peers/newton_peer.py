@@ -5,6 +5,7 @@ Its kernels are compiled at the first launch, a minute or so once a machine; the
 
 from __future__ import annotations
 
+import importlib
 import math
 from typing import Any, NamedTuple
 
@@ -105,9 +106,7 @@ def placed_pair(A, X_WA: np.ndarray, B, X_WB: np.ndarray) -> PlacedPair:
 
 def quiet_warp() -> None:
     """Warp tells of every module that it loads."""
-    import warp
-
-    warp.config.quiet = True
+    importlib.import_module("warp").config.quiet = True
 
 
 def _mesh(points: np.ndarray, facets: np.ndarray) -> Any:
