@@ -30,7 +30,7 @@ from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.mesh.bvh import MeshTree
 from collide.motion.common_points import CommonPoints, Placed
 from collide.motion.convex_impact import CONTACT, OPEN
-from collide.motion.convex_motions import JOBS_AT_ONCE, Tables, header_of
+from collide.motion.convex_motions import JOBS_AT_ONCE, Tables, earliest_times, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
 from collide.motion.motions import Motions
@@ -59,8 +59,8 @@ _SHORTEST = 2.0**-46
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
 _BALLS_OUTWARD = 1e-2
 _ULP = 2.0**-53
-#: Pairs of pieces of unions that are searched before a span of time is cut, to tell which of them come first.
-_PIECES_TOGETHER = 4
+#: Pairs of pieces of unions whose earliest times are asked for before a span of time is cut, to leave most of them out.
+_PIECES_TOGETHER = 4096
 #: Jobs of two meshes that are done before it is looked whether one came to nothing; twice as many each time.
 _JOBS_IN_TURN = 4
 
@@ -190,14 +190,21 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
             return float(row["upper"][0])
 
         for some in parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
-            pairs = [(pieces_a[i], pieces_b[j]) for i, j in zip(*(numbers.tolist() for numbers in some))]
-            _search_pieces(pairs, motion, tolerance, row, is_part)
+            # Nothing is earlier than the convex sets around two pieces meet: in that order, the first contact found
+            # leaves out all pieces whose sets meet later.
+            earliest = earliest_times(A, B, motion, some, min(upper(), 1.0), tolerance)
+            for n in np.argsort(earliest, kind="stable").tolist():
+                if not earliest[n] <= upper() or earliest[n] > 1.0:
+                    break
+                pair = pieces_a[some[0][n]], pieces_b[some[1][n]]
+                _search_pieces([pair], motion, tolerance, row, is_part, float(earliest[n]))
 
 
 def _search_pieces(
-    pieces: list[tuple[Piece, Piece]], motions: Motions, tolerance: float, rows: np.ndarray, is_part: tuple[bool, bool]
-) -> None:
-    """The same of some pairs of pieces."""
+    pieces: list[tuple[Piece, Piece]], motions: Motions, tolerance: float, rows: np.ndarray, is_part: tuple[bool, bool],
+    earliest: float = 0.0,
+) -> None:  # fmt: skip
+    """The same of some pairs of pieces, which have no contact before the time ``earliest``."""
     convex = [(a, b) for a, b in pieces if not _needs_facets(a, b)]
     for a, b in convex:
         _convex_pieces(a, b, motions, tolerance, rows)
@@ -208,11 +215,11 @@ def _search_pieces(
         if pairs is None:
             large.append((a, b))
         else:
-            _search_few(a, b, pairs, motions, tolerance, rows, is_part)
+            _search_few(a, b, pairs, motions, (earliest, 1.0), tolerance, rows, is_part)
     for k in np.flatnonzero(_come_near(motions, large)).tolist():
         motion = motions.picked(np.array([k]))
         for a, b in large:
-            _search(a, b, motion, tolerance, rows[k : k + 1], is_part)
+            _search(a, b, motion, tolerance, rows[k : k + 1], is_part, earliest)
 
 
 def _all_facets(a: Piece, b: Piece) -> np.ndarray | None:
@@ -224,15 +231,17 @@ def _all_facets(a: Piece, b: Piece) -> np.ndarray | None:
     return np.stack(np.meshgrid(*ids, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
-def _search_few(a: Piece, b: Piece, pairs: np.ndarray, motions: Motions, tolerance: float, rows, is_part) -> None:
-    """`_search` for all motions at once, by all pairs of facets."""
+def _search_few(
+    a: Piece, b: Piece, pairs: np.ndarray, motions: Motions, span: tuple[float, float], tolerance: float, rows, is_part
+) -> None:
+    """`_search` for all motions at once, in a span of time, by all pairs of facets."""
     near = np.flatnonzero(_come_near(motions, [(a, b)]))
     if not len(near):
         return
     job = _FacetJobs(a, b, pairs, is_part)
     at_once = max(JOBS_AT_ONCE // len(pairs), 1)
     for first in range(0, len(near), at_once):
-        job.search(motions, near[first : first + at_once], (0.0, 1.0), tolerance, rows)
+        job.search(motions, near[first : first + at_once], span, tolerance, rows)
 
 
 def _come_near(motions: Motions, pieces: list[tuple[Piece, Piece]]) -> np.ndarray:
@@ -386,13 +395,17 @@ def _max_jobs(span: float) -> int:
     return int(min(_MAX_JOBS * max(_SHORT / max(span, 1e-9), 1.0), _MAX_JOBS_OF_ALL))
 
 
-def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool]) -> None:
+def _search(
+    a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool], earliest: float
+) -> None:
     """Look for contacts of two pieces in one motion, span by span; ``row`` keeps the earliest found so far.
 
-    is_part : whether A and B are compounds, of which rows name the part; else the facet.
+    is_part : whether A and B are compounds, of which rows name the part; else the facet.   earliest : no contact is
+    before it.
     """
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
+    begin = max(begin, earliest)
     spans_to_do = [(begin, end, _max_jobs(end - begin))] if begin <= end else []
     while spans_to_do:
         begin, end, max_pairs = spans_to_do.pop()

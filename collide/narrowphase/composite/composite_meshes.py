@@ -13,9 +13,11 @@ import math
 
 import numpy as np
 
+from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
 from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
+from collide.narrowphase.convex_kernel_calls import run_poses
 from collide.narrowphase.facets.collide_kernel import APART, HIT, OPEN
 from collide.narrowphase.facets.separating_translation import SeparatingTranslation, shortened
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED, flipped
@@ -23,6 +25,8 @@ from collide.shapes.shape import Shape
 
 #: Pairs of parts that trial booleans of a depth search ask about before boxes of all parts are made.
 _ASKED_FIRST = 8
+#: Pairs of convex sets around parts that are posed at once: they need little memory.
+_BOUNDS_AT_ONCE = 1 << 14
 
 
 def compound_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones: bool = False) -> np.ndarray:
@@ -57,11 +61,41 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
             meshed[i, j] = False
     poses = np.flatnonzero(states != HIT)
     if len(poses):
-        gaps = _box_gaps(A, B, X_WA[poses], X_WB[poses])
-        for i, j in np.argwhere(meshed & np.any(gaps <= 0.0, axis=0)).tolist():
-            remaining = poses[gaps[:, i, j] <= 0.0]
+        near = _near_pairs(A, B, X_WA[poses], X_WB[poses], meshed)
+        for i, j in np.argwhere(np.any(near, axis=0)).tolist():
+            remaining = poses[near[:, i, j]]
             _take_states(A, B, i, j, remaining[states[remaining] != HIT], X_WA, X_WB, states)
     return states
+
+
+def _near_pairs(A: CompoundParts, B: CompoundParts, X_WA, X_WB, wanted: np.ndarray) -> np.ndarray:
+    """(n, parts of A, parts of B) bool: pairs of parts, of those wanted, that neither their boxes nor, where these leave
+    many, the convex sets around them prove apart.
+
+    A part lies in its convex set. Poses, rounded, put the sets within their slops of where they are: the sets are apart
+    where their distance is more than both.
+    """
+    near = wanted & (_box_gaps(A, B, X_WA, X_WB) <= 0.0)
+    if np.any(near, axis=0).sum() <= _ASKED_FIRST or A.unbounded or B.unbounded:
+        return near
+    entries = np.argwhere(near)
+    for first in range(0, len(entries), _BOUNDS_AT_ONCE):
+        pose, *which = some = entries[first : first + _BOUNDS_AT_ONCE].T
+        sets, rows, slop = [], [], np.zeros(len(pose))
+        placed = []
+        for side, parts, X in ((A, which[0], X_WA), (B, which[1], X_WB)):
+            of, row = np.unique(parts, return_inverse=True)
+            rows.append(row.ravel() + len(sets))
+            sets += [side.parts[k].bound for k in of.tolist()]
+            placed.append(side.placed(parts, X[pose], np.zeros(len(pose))))
+            slop += 1.001 * placed[-1].slop
+        distances = np.zeros(len(pose), dtype=PAIR_DTYPE)
+        run_poses(
+            distances, ShapeTable(sets), np.stack(rows, axis=1), placed[0].X, placed[1].X, boolean=False,
+            limit=float(slop.max()), check=False, depths=False,
+        )  # fmt: skip
+        near[tuple(some[:, distances["lower"] > slop])] = False
+    return near
 
 
 def _take_states(A: CompoundParts, B: CompoundParts, i: int, j: int, poses, X_WA, X_WB, states: np.ndarray) -> None:
