@@ -13,6 +13,7 @@ A half-space meets a mesh where it meets the mesh's hull.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -53,7 +54,12 @@ _MAX_JOBS, _SHORT, _MAX_JOBS_OF_ALL = 96, 2.0**-6, 1 << 20
 #: A span is cut to this part of it at least, and to so many times as long as is known to be free before it.
 _LARGEST_CUT, _FREE_TIMES = 16, 4.0
 #: So much of the time that is known to be free is left out: jobs begin where the bodies are still apart.
-_SHARE_OF_FREE = 7 / 8
+_SHARE_OF_FREE = 31 / 32
+#: A span that begins before bodies are about to meet ends behind that by so much of it, and is so much of the time in
+#: which the smaller body may move by its own size at least.
+_BEHIND_MEETING, _LEAST_CUT = 1 / 4, 2.0**-12
+#: So many times the jobs are done in a part of a span rather than cut it again: a distance costs as much as hundreds.
+_MORE = 4
 #: Spans shorter than this are not cut any more.
 _SHORTEST = 2.0**-46
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
@@ -179,47 +185,51 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
     """`surface_impacts` in the order worked on."""
     pieces_a, pieces_b = pieces_of(A), pieces_of(B)
     is_part = isinstance(A, Compound), isinstance(B, Compound)
-    if len(pieces_a) * len(pieces_b) <= MAX_ASKED:
-        _search_pieces([(a, b) for a in pieces_a for b in pieces_b], motions, tolerance, rows, is_part)
-        return
-    unions = compound_parts(A), compound_parts(B)
-    for k in range(len(rows)):
+    numbers = np.divmod(np.arange(len(pieces_a) * len(pieces_b)), len(pieces_b))
+    is_small = len(numbers[0]) <= MAX_ASKED
+    if is_small:
+        pairs = [(pieces_a[i], pieces_b[j]) for i, j in zip(*(of.tolist() for of in numbers))]
+        is_large = _search_small(pairs, motions, (0.0, 1.0), tolerance, rows, is_part)
+        numbers = numbers[0][is_large], numbers[1][is_large]
+        some = np.flatnonzero(_come_near(motions, [pair for pair, large in zip(pairs, is_large) if large]))
+    for k in some.tolist() if is_small else range(len(rows)):
         motion, row = motions.picked(np.array([k])), rows[k : k + 1]
 
         def upper(row: np.ndarray = row) -> float:
             return float(row["upper"][0])
 
-        for some in parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
-            # Nothing is earlier than the convex sets around two pieces meet: in that order, the first contact found
-            # leaves out all pieces whose sets meet later.
-            earliest = earliest_times(A, B, motion, some, min(upper(), 1.0), tolerance)
+        unions = compound_parts(A), compound_parts(B)
+        for i, j in [numbers] if is_small else parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
+            # No contact of two pieces is earlier than that of the convex sets around them: in the order of these, the
+            # first contact found leaves out all pieces whose sets meet later.
+            earliest = earliest_times(A, B, motion, (i, j), min(upper(), 1.0), tolerance)
             for n in np.argsort(earliest, kind="stable").tolist():
-                if not earliest[n] <= upper() or earliest[n] > 1.0:
+                if not earliest[n] <= min(upper(), 1.0):
                     break
-                pair = pieces_a[some[0][n]], pieces_b[some[1][n]]
-                _search_pieces([pair], motion, tolerance, row, is_part, float(earliest[n]))
+                a, b = pieces_a[i[n]], pieces_b[j[n]]
+                if _search_small([(a, b)], motion, (float(earliest[n]), 1.0), tolerance, row, is_part)[0]:
+                    _search(a, b, motion, tolerance, row, is_part, float(earliest[n]))
 
 
-def _search_pieces(
-    pieces: list[tuple[Piece, Piece]], motions: Motions, tolerance: float, rows: np.ndarray, is_part: tuple[bool, bool],
-    earliest: float = 0.0,
-) -> None:  # fmt: skip
-    """The same of some pairs of pieces, which have no contact before the time ``earliest``."""
-    convex = [(a, b) for a, b in pieces if not _needs_facets(a, b)]
+def _search_small(
+    pairs: list[tuple[Piece, Piece]], motions: Motions, span: tuple[float, float], tolerance: float, rows: np.ndarray,
+    is_part: tuple[bool, bool],
+) -> np.ndarray:  # fmt: skip
+    """Search those pairs of pieces that are convex or of few facets, in a span of time, for all motions; returns which
+    are neither (k,)."""
+    is_large = np.zeros(len(pairs), dtype=bool)
+    convex = [(a, b) for a, b in pairs if not _needs_facets(a, b)]
     for a, b in convex:
         _convex_pieces(a, b, motions, tolerance, rows)
-    of_facets = [(a, b) for a, b in pieces if _needs_facets(a, b)]
-    large = []
-    for a, b in of_facets:
-        pairs = _all_facets(a, b)
-        if pairs is None:
-            large.append((a, b))
+    for k, (a, b) in enumerate(pairs):
+        if not _needs_facets(a, b):
+            continue
+        facets = _all_facets(a, b)
+        if facets is None:
+            is_large[k] = True
         else:
-            _search_few(a, b, pairs, motions, (earliest, 1.0), tolerance, rows, is_part)
-    for k in np.flatnonzero(_come_near(motions, large)).tolist():
-        motion = motions.picked(np.array([k]))
-        for a, b in large:
-            _search(a, b, motion, tolerance, rows[k : k + 1], is_part, earliest)
+            _search_few(a, b, facets, motions, span, tolerance, rows, is_part)
+    return is_large
 
 
 def _all_facets(a: Piece, b: Piece) -> np.ndarray | None:
@@ -371,8 +381,8 @@ class _Spans(Spans):
         if row["normal"].any():
             self._normal = row["normal"][None].copy()
 
-    def cut(self, begin: float, end: float) -> tuple[float, float, bool]:
-        """(begin, end of the part of a span to be looked at first, whether it is shorter than by its scale alone).
+    def cut(self, begin: float, end: float) -> tuple[float, float]:
+        """(begin, end) of the part of a span to be looked at first.
 
         No contact is before the begin: distances shrink by μ in unit time at most (conservative advancement, Mirtich
         1996). The scale is the time in which the smaller body may move by its own size.
@@ -383,12 +393,30 @@ class _Spans(Spans):
         X = (at.X_A, at.X_B) if self.a.is_mesh else (at.X_B, at.X_A)
         row = pair_rows(*(piece.shape for piece in shapes), *(x[None] for x in X), limit=np.inf, depths=False)[0]
         self._take_normal(row)
-        free = min(max((float(row["lower"]) - at.error) / reach * half * _SHARE_OF_FREE, 0.0), end - begin)
+        in_reach = max((float(row["lower"]) - at.error) / reach * half, 0.0)
+        free = min(in_reach * _SHARE_OF_FREE, end - begin)
         rest = end - begin - free
         scale = min(self.a.reach, self.b.reach) / reach * half
-        is_long = rest > 2.0 * scale
-        length = max(scale if is_long else rest / _LARGEST_CUT, _FREE_TIMES * free, _SHORTEST)
-        return begin + free, begin + free + min(length, 0.5 * rest), not is_long
+        length = max(scale if rest > 2.0 * scale else rest / _LARGEST_CUT, _FREE_TIMES * free, _SHORTEST)
+        until_met = self._time_until_met(row, *X, begin, min(in_reach, end - begin))
+        length = min(length, max((1.0 + _BEHIND_MEETING) * (until_met - free), _LEAST_CUT * scale, _SHORTEST))
+        return begin + free, begin + free + min(length, 0.5 * rest)
+
+    def _time_until_met(self, row: np.void, X_0: np.ndarray, X_1: np.ndarray, begin: float, passed: float) -> float:
+        """When the points that are nearest at ``begin`` meet along the normal, by how near they are when some time has
+        passed; infinity where they do not come nearer. A guess, of which nothing that is proven makes use.
+
+        row : of the pieces at ``begin``, at poses X_0 and X_1, the mesh's first.
+        """
+        at = self.placed(begin + passed)
+        later = (at.X_A, at.X_B) if self.a.is_mesh else (at.X_B, at.X_A)
+        moved = [
+            X[:3, :3] @ (X0[:3, :3].T @ (row[point] - X0[:3, 3])) + X[:3, 3]
+            for point, X0, X in zip(("point_a", "point_b"), (X_0, X_1), later)
+        ]
+        gap = float(row["normal"] @ (row["point_b"] - row["point_a"]))
+        nearer = gap - float(row["normal"] @ (moved[1] - moved[0]))
+        return passed * gap / nearer if gap > 0.0 and nearer > 0.0 else math.inf
 
 
 def _max_jobs(span: float) -> int:
@@ -418,8 +446,8 @@ def _search(
             if begin < row["lower"][0]:
                 row["lower"], row["status"] = begin, OPEN
         elif near is None:
-            begin, middle, is_shorter = spans.cut(begin, end)
-            spans_to_do += [(middle, end, max_pairs), (begin, middle, min(max_pairs << is_shorter, _MAX_JOBS_OF_ALL))]
+            begin, middle = spans.cut(begin, end)
+            spans_to_do += [(middle, end, max_pairs), (begin, middle, min(_MORE * max_pairs, _MAX_JOBS_OF_ALL))]
         elif len(near):
             jobs = _FacetJobs(a, b, near, is_part)
             jobs.search(motion, np.zeros(1, dtype=np.int64), (begin, end), tolerance, row)
