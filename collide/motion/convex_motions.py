@@ -179,13 +179,22 @@ def earliest_times(
     pairs : parts of A and of B (k,). Of a mesh the convex set around it is asked, which meets all that the mesh meets:
     time of contact of the sets ≤ time of contact of the parts. Some microseconds a pair.
     """
-    bodies = _bodies_of([A, B], "_moving_bounds")  # "_moving" answers for the shapes themselves
-    i, j = pairs
-    part_a, part_b = bodies.first[0] + i, bodies.first[-1] + j
-    jobs = np.ascontiguousarray(np.stack([np.arange(len(i)), part_a, part_a, part_b, part_b], axis=1))
-    rows = free_rows(len(i))
+    bodies = bounds_of(A, B)
+    part_a, part_b = bodies.first[0] + pairs[0], bodies.first[-1] + pairs[1]
+    jobs = np.ascontiguousarray(np.stack([np.arange(len(part_a)), part_a, part_a, part_b, part_b], axis=1))
+    rows = free_rows(len(part_a))
     header = header_of(Tables(bodies.table.addresses, len(bodies.table.packed), bodies.parts), motion)
     find_impacts(address_of(header), address_of(jobs), len(jobs), 0.0, end, tolerance, address_of(rows))
+    return earliest_of(rows)
+
+
+def bounds_of(A: Shape, B: Shape) -> _Bodies:
+    """Convex sets around the parts of two shapes, kept with A."""
+    return _bodies_of([A, B], "_moving_bounds")  # "_moving" answers for the shapes themselves
+
+
+def earliest_of(rows: np.ndarray) -> np.ndarray:
+    """(k,) times before which rows have no contact; infinity where there is none at all."""
     is_open = rows["status"] > OPEN_START  # nothing is known of these; what is wrong with them is for others to say
     return np.where(rows["status"] == FREE, math.inf, np.where(is_open, 0.0, rows["lower"]))
 

@@ -26,16 +26,17 @@ from collide.lowering.facet_bodies import as_given, body_of, is_halfspace
 from collide.lowering.facet_table import Facets, FacetTable
 from collide.lowering.kinds import WITH_FACETS, kind_of
 from collide.lowering.packed_convex import PackedConvex
-from collide.lowering.parts import convex_set_of
+from collide.lowering.parts import bounding_parts_of, convex_set_of
 from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.mesh.bvh import MeshTree
 from collide.motion.common_points import CommonPoints, Placed
 from collide.motion.convex_impact import CONTACT, OPEN
-from collide.motion.convex_motions import JOBS_AT_ONCE, Tables, earliest_times, header_of
+from collide.motion.convex_motions import JOBS_AT_ONCE, Tables, bounds_of, earliest_times, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
 from collide.motion.motions import Motions
-from collide.motion.parts_ahead import MAX_ASKED, Spans, parts_ahead
+from collide.motion.parts_ahead import MAX_ASKED, Spans, parts_ahead, reach_of_union, slop_of_union
+from collide.motion.path_facets import earliest_by_facets, facets_on_path
 from collide.motion.span_bounds import REACH
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_rows
@@ -62,6 +63,11 @@ _BEHIND_MEETING, _LEAST_CUT = 1 / 4, 2.0**-12
 _MORE = 4
 #: Spans shorter than this are not cut any more.
 _SHORTEST = 2.0**-46
+#: A union is small beside a mesh that reaches so many times as far. Of fewer pairs of its pieces and that mesh together
+#: each is looked at by itself.
+_TIMES_SMALLER, _TOGETHER = 8.0, 8
+#: So many facets on a way are looked at, and so many pairs of them and of pieces.
+_MAX_ON_THE_WAY, _JOBS_ON_THE_WAY = 1024, 1 << 13
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
 _BALLS_OUTWARD = 1e-2
 _ULP = 2.0**-53
@@ -200,15 +206,57 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 
         unions = compound_parts(A), compound_parts(B)
         for i, j in [numbers] if is_small else parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
-            # No contact of two pieces is earlier than that of the convex sets around them: in the order of these, the
-            # first contact found leaves out all pieces whose sets meet later.
+            # No contact of two pieces is earlier than that of the convex sets around them, nor than that of one set and
+            # the facets on its way: in the order of these, the first contact found leaves out all that come later.
             earliest = earliest_times(A, B, motion, (i, j), min(upper(), 1.0), tolerance)
-            for n in np.argsort(earliest, kind="stable").tolist():
-                if not earliest[n] <= min(upper(), 1.0):
+            known_until = 0.0 if len(earliest) >= _TOGETHER else math.inf
+            while len(earliest):
+                n, end = int(earliest.argmin()), min(upper(), 1.0)
+                if not earliest[n] <= end:
                     break
+                if earliest[n] >= known_until:
+                    known_until = _ask_on_the_way((A, B), (i, j), motion, earliest, end, tolerance)
+                    continue
                 a, b = pieces_a[i[n]], pieces_b[j[n]]
                 if _search_small([(a, b)], motion, (float(earliest[n]), 1.0), tolerance, row, is_part)[0]:
                     _search(a, b, motion, tolerance, row, is_part, float(earliest[n]))
+                earliest[n] = math.inf
+
+
+def _ask_on_the_way(
+    shapes: tuple[Shape, Shape], pairs: tuple[np.ndarray, np.ndarray], motion: Motions, earliest: np.ndarray, end: float,
+    tolerance: float,
+) -> float:  # fmt: skip
+    """Raise the ``earliest`` times (k,) of pairs of pieces, in place, where one of them is a large mesh, the other of a
+    small union, by the facets on the union's way; returns the time until which they are known now.
+    """
+    bounds, known_until = bounds_of(*shapes), math.inf
+    for side in (0, 1):
+        mesh_shape, union_shape = shapes[side], shapes[1 - side]
+        pieces, union = pieces_of(mesh_shape), compound_parts(union_shape)
+        numbers, counts = np.unique(pairs[side][earliest <= end], return_counts=True)
+        for number in numbers[counts >= _TOGETHER].tolist():
+            mesh = pieces[number]
+            some = np.flatnonzero((pairs[side] == number) & (earliest <= end))
+            if not mesh.is_mesh or union.unbounded or _TIMES_SMALLER * reach_of_union(union) > mesh.reach:
+                continue
+            ball = Piece(lambda: None, IDENTITY, -1, reach_of_union(union), slop_of_union(union), None, 0.0, False, None)
+            spans = _Spans(*((mesh, ball) if side == 0 else (ball, mesh)), motion)
+            begin = float(earliest[some].min())
+            facets = until = None
+            for until in (end, min(begin + 2.0 * spans.scale(begin, end), end)):
+                facets = facets_on_path(spans, mesh.tree, side, begin, until, _MAX_ON_THE_WAY)  # type: ignore[arg-type]
+                if facets is not None and len(facets) * len(some) <= _JOBS_ON_THE_WAY:
+                    break
+            if facets is not None:
+                rows = bounds.first[1 - side if len(bounds.first) > 1 else 0] + pairs[1 - side][some]
+                sets = bounds.table, rows, bounds.parts[rows]
+                times = earliest_by_facets(
+                    spans, mesh.corners(facets), mesh.slop, side, sets, (begin, until), tolerance
+                )  # fmt: skip
+                earliest[some] = np.maximum(earliest[some], times if until == end else np.minimum(times, until))
+            known_until = min(known_until, until if until < end else math.inf)
+    return known_until
 
 
 def _search_small(
@@ -381,11 +429,32 @@ class _Spans(Spans):
         if row["normal"].any():
             self._normal = row["normal"][None].copy()
 
+    def scale(self, begin: float, end: float) -> float:
+        """The time in which the smaller piece may move by its own size."""
+        return min(self.a.reach, self.b.reach) / float(self.describe(begin, end)[REACH]) * 0.5 * (end - begin)
+
+    def earliest_on_the_way(self, begin: float, end: float, tolerance: float) -> float:
+        """A time in a span before which nothing meets, by the facets of the larger piece that the smaller one, or the
+        convex set around it, passes; ``begin`` where this tells nothing, infinity where nothing meets in the span."""
+        side = 0 if self.a.reach > self.b.reach else 1
+        mesh, other = (self.a, self.b) if side == 0 else (self.b, self.a)
+        if not mesh.is_mesh or _TIMES_SMALLER * other.reach > mesh.reach:
+            return begin
+        facets = facets_on_path(self, mesh.tree, side, begin, end, _MAX_ON_THE_WAY)  # type: ignore[arg-type]
+        if facets is None:
+            return begin
+        packed = bounding_parts_of(other.shape)[0][0] if other.packed is None else other.packed
+        table, rows = ShapeTable([packed._replace(slop=packed.slop + other.slop)]), np.zeros(1, dtype=np.int64)
+        table.build_trees(rows)
+        sets = table, rows, self.parts[1 - side : 2 - side]
+        times = earliest_by_facets(self, mesh.corners(facets), mesh.slop, side, sets, (begin, end), tolerance)
+        return max(float(times[0]), begin)
+
     def cut(self, begin: float, end: float) -> tuple[float, float]:
         """(begin, end) of the part of a span to be looked at first.
 
         No contact is before the begin: distances shrink by μ in unit time at most (conservative advancement, Mirtich
-        1996). The scale is the time in which the smaller body may move by its own size.
+        1996).
         """
         reach, half = float(self.describe(begin, end)[REACH]), 0.5 * (end - begin)
         at = self.placed(begin)
@@ -396,7 +465,7 @@ class _Spans(Spans):
         in_reach = max((float(row["lower"]) - at.error) / reach * half, 0.0)
         free = min(in_reach * _SHARE_OF_FREE, end - begin)
         rest = end - begin - free
-        scale = min(self.a.reach, self.b.reach) / reach * half
+        scale = self.scale(begin, end)
         length = max(scale if rest > 2.0 * scale else rest / _LARGEST_CUT, _FREE_TIMES * free, _SHORTEST)
         until_met = self._time_until_met(row, *X, begin, min(in_reach, end - begin))
         length = min(length, max((1.0 + _BEHIND_MEETING) * (until_met - free), _LEAST_CUT * scale, _SHORTEST))
@@ -433,24 +502,37 @@ def _search(
     """
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
-    begin = max(begin, earliest)
-    spans_to_do = [(begin, end, _max_jobs(end - begin))] if begin <= end else []
+    spans_to_do = [(max(begin, earliest), end, _max_jobs(end - begin), earliest > 0.0)]
     while spans_to_do:
-        begin, end, max_pairs = spans_to_do.pop()
+        begin, end, max_pairs, is_about_to_meet = spans_to_do.pop()
         end = min(end, float(row["upper"][0]))
         if begin > end:
             continue
+        scale, whole = spans.scale(begin, end), end
+        if is_about_to_meet and end - begin > 2.0 * scale:  # of bodies that are convex there the first contact is here
+            end = begin + max(_LEAST_CUT * scale, _SHORTEST)
         is_shortest = end - begin < _SHORTEST
         near = spans.near_facets(begin, end, _MAX_JOBS_OF_ALL if is_shortest else max_pairs)
-        if near is None and is_shortest:  # more facets together than can be looked at: open from here on
+        if near is None and end < whole:
+            spans_to_do.append((begin, whole, max_pairs, False))
+        elif near is None and is_shortest:  # more facets together than can be looked at: open from here on
             if begin < row["lower"][0]:
                 row["lower"], row["status"] = begin, OPEN
         elif near is None:
+            later = spans.earliest_on_the_way(begin, end, tolerance) if end - begin > 4.0 * scale else begin
+            if later > begin + scale:
+                spans_to_do.append((later, end, max_pairs, True))
+                continue
             begin, middle = spans.cut(begin, end)
-            spans_to_do += [(middle, end, max_pairs), (begin, middle, min(_MORE * max_pairs, _MAX_JOBS_OF_ALL))]
-        elif len(near):
-            jobs = _FacetJobs(a, b, near, is_part)
-            jobs.search(motion, np.zeros(1, dtype=np.int64), (begin, end), tolerance, row)
+            more = _MORE if end - begin <= 2.0 * scale else 1
+            spans_to_do.append((middle, end, max_pairs, False))
+            spans_to_do.append((begin, middle, min(more * max_pairs, _MAX_JOBS_OF_ALL), False))
+        else:
+            if end < whole:
+                spans_to_do.append((end, whole, max_pairs, False))
+            if len(near):
+                jobs = _FacetJobs(a, b, near, is_part)
+                jobs.search(motion, np.zeros(1, dtype=np.int64), (begin, end), tolerance, row)
 
 
 class _FacetJobs:
