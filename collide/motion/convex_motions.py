@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from threading import local
 from typing import Any, NamedTuple
@@ -11,7 +12,7 @@ import numpy as np
 from collide.kernels import address_of, code_of
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.shape_table import POSE, ShapeTable
-from collide.motion.convex_impact import FREE
+from collide.motion.convex_impact import FREE, OPEN_START
 from collide.motion.impact_jobs import begin_single, find_impacts
 from collide.motion.impact_rows import TimeOfImpact, free_rows, single_result
 from collide.motion.motions import Motions
@@ -158,15 +159,44 @@ class _Bodies:
             yield np.ascontiguousarray(np.stack([np.full(len(i), k), part_a, part_a, part_b, part_b], axis=1))
 
 
-def _bodies_of(shapes: list[Shape]) -> _Bodies:
-    """Those of one pair are kept with A: a simulator asks about the same two again and again."""
+def _bodies_of(shapes: list[Shape], slot: str = "_moving") -> _Bodies:
+    """Those of one pair are kept with A, in a slot: a simulator asks about the same two again and again."""
     if len(shapes) > 2:
         return _Bodies(shapes)
-    bodies = prepared_pair(shapes[0], shapes[-1], "_moving")
+    bodies = prepared_pair(shapes[0], shapes[-1], slot)
     if bodies is None:
         bodies = _Bodies(shapes)
-        keep_prepared(shapes[0], shapes[-1], bodies, "_moving")
+        keep_prepared(shapes[0], shapes[-1], bodies, slot)
     return bodies
+
+
+def earliest_times(
+    A: Shape, B: Shape, motion: Motions, pairs: tuple[np.ndarray, np.ndarray], end: float, tolerance: float
+) -> np.ndarray:
+    """(k,) times before which parts of A and of B, pair by pair, have no contact in one motion: infinity of those that
+    have none up to ``end``.
+
+    pairs : parts of A and of B (k,). Of a mesh the convex set around it is asked, which meets all that the mesh meets:
+    time of contact of the sets ≤ time of contact of the parts. Some microseconds a pair.
+    """
+    bodies = bounds_of(A, B)
+    part_a, part_b = bodies.first[0] + pairs[0], bodies.first[-1] + pairs[1]
+    jobs = np.ascontiguousarray(np.stack([np.arange(len(part_a)), part_a, part_a, part_b, part_b], axis=1))
+    rows = free_rows(len(part_a))
+    header = header_of(Tables(bodies.table.addresses, len(bodies.table.packed), bodies.parts), motion)
+    find_impacts(address_of(header), address_of(jobs), len(jobs), 0.0, end, tolerance, address_of(rows))
+    return earliest_of(rows)
+
+
+def bounds_of(A: Shape, B: Shape) -> _Bodies:
+    """Convex sets around the parts of two shapes, kept with A."""
+    return _bodies_of([A, B], "_moving_bounds")  # "_moving" answers for the shapes themselves
+
+
+def earliest_of(rows: np.ndarray) -> np.ndarray:
+    """(k,) times before which rows have no contact; infinity where there is none at all."""
+    is_open = rows["status"] > OPEN_START  # nothing is known of these; what is wrong with them is for others to say
+    return np.where(rows["status"] == FREE, math.inf, np.where(is_open, 0.0, rows["lower"]))
 
 
 def single_impact(A: Any, B: Any, matrices: tuple, tolerance: float) -> TimeOfImpact | None:

@@ -14,6 +14,7 @@ import numpy as np
 from collide.kernels import address_of
 from collide.lowering.compound_table import PART
 from collide.motion.motions import Motions
+from collide.motion.moving_body import BODY
 from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
 from collide.narrowphase.composite.composite_parts import CompoundParts, boxes_near
 
@@ -31,16 +32,25 @@ class Spans:
     """
 
     def __init__(self, parts: np.ndarray, reaches: tuple[float, float, float], motion: Motions):
-        self.parts, self._reaches = parts, np.array(reaches)
+        self.parts, self.reaches, self.motion = parts, np.array(reaches), motion
         self._work, self._out = np.zeros(WORKSPACE), np.zeros(OUT)
-        self._held = motion
         addresses = [0 if X is None else address_of(X) for X in motion]
-        self._header = np.array([*addresses, address_of(self.parts), address_of(self._reaches)], dtype=np.int64)
+        self._header = np.array([*addresses, address_of(self.parts), address_of(self.reaches)], dtype=np.int64)
 
     def describe(self, begin: float, end: float) -> np.ndarray:
         """What `describe_span` gives, until it is called again."""
         describe_span(address_of(self._header), begin, end, address_of(self._work), address_of(self._out))
         return self._out
+
+    @property
+    def bodies(self) -> np.ndarray:
+        """(2, BODY) of both pieces (`moving_body.py`), once a span was described."""
+        return self._work[: 2 * BODY].reshape(2, BODY)
+
+    def between_origins(self, time: float) -> np.ndarray:
+        """(3,) from the origin of body A to that of B."""
+        a0, a1, b0, b1 = (X[0, :3, 3] for X in self.motion[:4])
+        return (b0 - a0) + time * ((b1 - a1) - (b0 - a0))
 
     def time_of_balls(self) -> tuple[float, float]:
         """The time in which balls about both bodies' origins meet; begin > end where they never do."""
@@ -58,8 +68,8 @@ def parts_ahead(
     named = np.zeros((len(A.parts), len(B.parts)), dtype=bool)
     parts = np.zeros((2, PART))
     parts[:, [0, 4, 8]] = 1.0
-    spans = Spans(parts, (_reach(A), _reach(B), _slop(A) + _slop(B)), motion)
-    least = _LEAST_MOVED * min(_reach(A), _reach(B))
+    spans = Spans(parts, (reach_of_union(A), reach_of_union(B), slop_of_union(A) + slop_of_union(B)), motion)
+    least = _LEAST_MOVED * min(reach_of_union(A), reach_of_union(B))
     begin, end = (0.0, 1.0) if A.unbounded or B.unbounded else spans.time_of_balls()
     to_do = [(begin, end)] if begin <= end else []
     while to_do:
@@ -90,16 +100,16 @@ def _turn_together(A: CompoundParts, B: CompoundParts, X_A: np.ndarray, X_B: np.
         return 0.0
     Q, _ = np.linalg.qr(X_B[:3, :3] if len(B.parts) == 1 else X_A[:3, :3])  # a rotation or mirror, to rounding
     X_A[:3], X_B[:3] = Q.T @ X_A[:3], Q.T @ X_B[:3]
-    return 2.0**-44 * (_reach(A) + _reach(B) + float(np.abs(X_B[:3, 3]).sum()))
+    return 2.0**-44 * (reach_of_union(A) + reach_of_union(B) + float(np.abs(X_B[:3, 3]).sum()))
 
 
-def _slop(union: CompoundParts) -> float:
+def slop_of_union(union: CompoundParts) -> float:
     """How far rounding moved any part in the union at most [m]."""
     columns = union.columns
     return float((columns.rotation * columns.reach + columns.shift).max()) * (1.0 + 2.0**-40)
 
 
-def _reach(union: CompoundParts) -> float:
+def reach_of_union(union: CompoundParts) -> float:
     """How far parts that have an end reach from the union's origin, at most [m]."""
     columns = union.columns
     at = np.sqrt(np.square(columns.X[:, :3, 3]).sum(axis=1))

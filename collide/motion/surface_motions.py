@@ -13,6 +13,7 @@ A half-space meets a mesh where it meets the mesh's hull.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -25,16 +26,17 @@ from collide.lowering.facet_bodies import as_given, body_of, is_halfspace
 from collide.lowering.facet_table import Facets, FacetTable
 from collide.lowering.kinds import WITH_FACETS, kind_of
 from collide.lowering.packed_convex import PackedConvex
-from collide.lowering.parts import convex_set_of
+from collide.lowering.parts import bounding_parts_of, convex_set_of
 from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.mesh.bvh import MeshTree
 from collide.motion.common_points import CommonPoints, Placed
 from collide.motion.convex_impact import CONTACT, OPEN
-from collide.motion.convex_motions import JOBS_AT_ONCE, Tables, header_of
+from collide.motion.convex_motions import JOBS_AT_ONCE, Tables, bounds_of, earliest_times, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
 from collide.motion.motions import Motions
-from collide.motion.parts_ahead import MAX_ASKED, Spans, parts_ahead
+from collide.motion.parts_ahead import MAX_ASKED, Spans, parts_ahead, reach_of_union, slop_of_union
+from collide.motion.path_facets import earliest_by_facets, facets_on_path
 from collide.motion.span_bounds import REACH
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_rows
@@ -53,14 +55,24 @@ _MAX_JOBS, _SHORT, _MAX_JOBS_OF_ALL = 96, 2.0**-6, 1 << 20
 #: A span is cut to this part of it at least, and to so many times as long as is known to be free before it.
 _LARGEST_CUT, _FREE_TIMES = 16, 4.0
 #: So much of the time that is known to be free is left out: jobs begin where the bodies are still apart.
-_SHARE_OF_FREE = 7 / 8
+_SHARE_OF_FREE = 31 / 32
+#: A span that begins before bodies are about to meet ends behind that by so much of it, and is so much of the time in
+#: which the smaller body may move by its own size at least.
+_BEHIND_MEETING, _LEAST_CUT = 1 / 4, 2.0**-12
+#: So many times the jobs are done in a part of a span rather than cut it again: a distance costs as much as hundreds.
+_MORE = 4
 #: Spans shorter than this are not cut any more.
 _SHORTEST = 2.0**-46
+#: A union is small beside a mesh that reaches so many times as far. Of fewer pairs of its pieces and that mesh together
+#: each is looked at by itself.
+_TIMES_SMALLER, _TOGETHER = 8.0, 8
+#: So many facets on a way are looked at, and so many pairs of them and of pieces.
+_MAX_ON_THE_WAY, _JOBS_ON_THE_WAY = 1024, 1 << 13
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
 _BALLS_OUTWARD = 1e-2
 _ULP = 2.0**-53
-#: Pairs of pieces of unions that are searched before a span of time is cut, to tell which of them come first.
-_PIECES_TOGETHER = 4
+#: Pairs of pieces of unions whose earliest times are asked for before a span of time is cut, to leave most of them out.
+_PIECES_TOGETHER = 4096
 #: Jobs of two meshes that are done before it is looked whether one came to nothing; twice as many each time.
 _JOBS_IN_TURN = 4
 
@@ -179,40 +191,93 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
     """`surface_impacts` in the order worked on."""
     pieces_a, pieces_b = pieces_of(A), pieces_of(B)
     is_part = isinstance(A, Compound), isinstance(B, Compound)
-    if len(pieces_a) * len(pieces_b) <= MAX_ASKED:
-        _search_pieces([(a, b) for a in pieces_a for b in pieces_b], motions, tolerance, rows, is_part)
-        return
-    unions = compound_parts(A), compound_parts(B)
-    for k in range(len(rows)):
+    numbers = np.divmod(np.arange(len(pieces_a) * len(pieces_b)), len(pieces_b))
+    is_small = len(numbers[0]) <= MAX_ASKED
+    if is_small:
+        pairs = [(pieces_a[i], pieces_b[j]) for i, j in zip(*(of.tolist() for of in numbers))]
+        is_large = _search_small(pairs, motions, (0.0, 1.0), tolerance, rows, is_part)
+        numbers = numbers[0][is_large], numbers[1][is_large]
+        some = np.flatnonzero(_come_near(motions, [pair for pair, large in zip(pairs, is_large) if large]))
+    for k in some.tolist() if is_small else range(len(rows)):
         motion, row = motions.picked(np.array([k])), rows[k : k + 1]
 
         def upper(row: np.ndarray = row) -> float:
             return float(row["upper"][0])
 
-        for some in parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
-            pairs = [(pieces_a[i], pieces_b[j]) for i, j in zip(*(numbers.tolist() for numbers in some))]
-            _search_pieces(pairs, motion, tolerance, row, is_part)
+        unions = compound_parts(A), compound_parts(B)
+        for i, j in [numbers] if is_small else parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
+            # No contact of two pieces is earlier than that of the convex sets around them, nor than that of one set and
+            # the facets on its way: in the order of these, the first contact found leaves out all that come later.
+            earliest = earliest_times(A, B, motion, (i, j), min(upper(), 1.0), tolerance)
+            known_until = 0.0 if len(earliest) >= _TOGETHER else math.inf
+            while len(earliest):
+                n, end = int(earliest.argmin()), min(upper(), 1.0)
+                if not earliest[n] <= end:
+                    break
+                if earliest[n] >= known_until:
+                    known_until = _ask_on_the_way((A, B), (i, j), motion, earliest, end, tolerance)
+                    continue
+                a, b = pieces_a[i[n]], pieces_b[j[n]]
+                if _search_small([(a, b)], motion, (float(earliest[n]), 1.0), tolerance, row, is_part)[0]:
+                    _search(a, b, motion, tolerance, row, is_part, float(earliest[n]))
+                earliest[n] = math.inf
 
 
-def _search_pieces(
-    pieces: list[tuple[Piece, Piece]], motions: Motions, tolerance: float, rows: np.ndarray, is_part: tuple[bool, bool]
-) -> None:
-    """The same of some pairs of pieces."""
-    convex = [(a, b) for a, b in pieces if not _needs_facets(a, b)]
+def _ask_on_the_way(
+    shapes: tuple[Shape, Shape], pairs: tuple[np.ndarray, np.ndarray], motion: Motions, earliest: np.ndarray, end: float,
+    tolerance: float,
+) -> float:  # fmt: skip
+    """Raise the ``earliest`` times (k,) of pairs of pieces, in place, where one of them is a large mesh, the other of a
+    small union, by the facets on the union's way; returns the time until which they are known now.
+    """
+    bounds, known_until = bounds_of(*shapes), math.inf
+    for side in (0, 1):
+        mesh_shape, union_shape = shapes[side], shapes[1 - side]
+        pieces, union = pieces_of(mesh_shape), compound_parts(union_shape)
+        numbers, counts = np.unique(pairs[side][earliest <= end], return_counts=True)
+        for number in numbers[counts >= _TOGETHER].tolist():
+            mesh = pieces[number]
+            some = np.flatnonzero((pairs[side] == number) & (earliest <= end))
+            if not mesh.is_mesh or union.unbounded or _TIMES_SMALLER * reach_of_union(union) > mesh.reach:
+                continue
+            ball = Piece(lambda: None, IDENTITY, -1, reach_of_union(union), slop_of_union(union), None, 0.0, False, None)
+            spans = _Spans(*((mesh, ball) if side == 0 else (ball, mesh)), motion)
+            begin = float(earliest[some].min())
+            facets = until = None
+            for until in (end, min(begin + 2.0 * spans.scale(begin, end), end)):
+                facets = facets_on_path(spans, mesh.tree, side, begin, until, _MAX_ON_THE_WAY)  # type: ignore[arg-type]
+                if facets is not None and len(facets) * len(some) <= _JOBS_ON_THE_WAY:
+                    break
+            if facets is not None:
+                rows = bounds.first[1 - side if len(bounds.first) > 1 else 0] + pairs[1 - side][some]
+                sets = bounds.table, rows, bounds.parts[rows]
+                times = earliest_by_facets(
+                    spans, mesh.corners(facets), mesh.slop, side, sets, (begin, until), tolerance
+                )  # fmt: skip
+                earliest[some] = np.maximum(earliest[some], times if until == end else np.minimum(times, until))
+            known_until = min(known_until, until if until < end else math.inf)
+    return known_until
+
+
+def _search_small(
+    pairs: list[tuple[Piece, Piece]], motions: Motions, span: tuple[float, float], tolerance: float, rows: np.ndarray,
+    is_part: tuple[bool, bool],
+) -> np.ndarray:  # fmt: skip
+    """Search those pairs of pieces that are convex or of few facets, in a span of time, for all motions; returns which
+    are neither (k,)."""
+    is_large = np.zeros(len(pairs), dtype=bool)
+    convex = [(a, b) for a, b in pairs if not _needs_facets(a, b)]
     for a, b in convex:
         _convex_pieces(a, b, motions, tolerance, rows)
-    of_facets = [(a, b) for a, b in pieces if _needs_facets(a, b)]
-    large = []
-    for a, b in of_facets:
-        pairs = _all_facets(a, b)
-        if pairs is None:
-            large.append((a, b))
+    for k, (a, b) in enumerate(pairs):
+        if not _needs_facets(a, b):
+            continue
+        facets = _all_facets(a, b)
+        if facets is None:
+            is_large[k] = True
         else:
-            _search_few(a, b, pairs, motions, tolerance, rows, is_part)
-    for k in np.flatnonzero(_come_near(motions, large)).tolist():
-        motion = motions.picked(np.array([k]))
-        for a, b in large:
-            _search(a, b, motion, tolerance, rows[k : k + 1], is_part)
+            _search_few(a, b, facets, motions, span, tolerance, rows, is_part)
+    return is_large
 
 
 def _all_facets(a: Piece, b: Piece) -> np.ndarray | None:
@@ -224,15 +289,17 @@ def _all_facets(a: Piece, b: Piece) -> np.ndarray | None:
     return np.stack(np.meshgrid(*ids, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
-def _search_few(a: Piece, b: Piece, pairs: np.ndarray, motions: Motions, tolerance: float, rows, is_part) -> None:
-    """`_search` for all motions at once, by all pairs of facets."""
+def _search_few(
+    a: Piece, b: Piece, pairs: np.ndarray, motions: Motions, span: tuple[float, float], tolerance: float, rows, is_part
+) -> None:
+    """`_search` for all motions at once, in a span of time, by all pairs of facets."""
     near = np.flatnonzero(_come_near(motions, [(a, b)]))
     if not len(near):
         return
     job = _FacetJobs(a, b, pairs, is_part)
     at_once = max(JOBS_AT_ONCE // len(pairs), 1)
     for first in range(0, len(near), at_once):
-        job.search(motions, near[first : first + at_once], (0.0, 1.0), tolerance, rows)
+        job.search(motions, near[first : first + at_once], span, tolerance, rows)
 
 
 def _come_near(motions: Motions, pieces: list[tuple[Piece, Piece]]) -> np.ndarray:
@@ -362,11 +429,32 @@ class _Spans(Spans):
         if row["normal"].any():
             self._normal = row["normal"][None].copy()
 
-    def cut(self, begin: float, end: float) -> tuple[float, float, bool]:
-        """(begin, end of the part of a span to be looked at first, whether it is shorter than by its scale alone).
+    def scale(self, begin: float, end: float) -> float:
+        """The time in which the smaller piece may move by its own size."""
+        return min(self.a.reach, self.b.reach) / float(self.describe(begin, end)[REACH]) * 0.5 * (end - begin)
+
+    def earliest_on_the_way(self, begin: float, end: float, tolerance: float) -> float:
+        """A time in a span before which nothing meets, by the facets of the larger piece that the smaller one, or the
+        convex set around it, passes; ``begin`` where this tells nothing, infinity where nothing meets in the span."""
+        side = 0 if self.a.reach > self.b.reach else 1
+        mesh, other = (self.a, self.b) if side == 0 else (self.b, self.a)
+        if not mesh.is_mesh or _TIMES_SMALLER * other.reach > mesh.reach:
+            return begin
+        facets = facets_on_path(self, mesh.tree, side, begin, end, _MAX_ON_THE_WAY)  # type: ignore[arg-type]
+        if facets is None:
+            return begin
+        packed = bounding_parts_of(other.shape)[0][0] if other.packed is None else other.packed
+        table, rows = ShapeTable([packed._replace(slop=packed.slop + other.slop)]), np.zeros(1, dtype=np.int64)
+        table.build_trees(rows)
+        sets = table, rows, self.parts[1 - side : 2 - side]
+        times = earliest_by_facets(self, mesh.corners(facets), mesh.slop, side, sets, (begin, end), tolerance)
+        return max(float(times[0]), begin)
+
+    def cut(self, begin: float, end: float) -> tuple[float, float]:
+        """(begin, end) of the part of a span to be looked at first.
 
         No contact is before the begin: distances shrink by μ in unit time at most (conservative advancement, Mirtich
-        1996). The scale is the time in which the smaller body may move by its own size.
+        1996).
         """
         reach, half = float(self.describe(begin, end)[REACH]), 0.5 * (end - begin)
         at = self.placed(begin)
@@ -374,42 +462,77 @@ class _Spans(Spans):
         X = (at.X_A, at.X_B) if self.a.is_mesh else (at.X_B, at.X_A)
         row = pair_rows(*(piece.shape for piece in shapes), *(x[None] for x in X), limit=np.inf, depths=False)[0]
         self._take_normal(row)
-        free = min(max((float(row["lower"]) - at.error) / reach * half * _SHARE_OF_FREE, 0.0), end - begin)
+        in_reach = max((float(row["lower"]) - at.error) / reach * half, 0.0)
+        free = min(in_reach * _SHARE_OF_FREE, end - begin)
         rest = end - begin - free
-        scale = min(self.a.reach, self.b.reach) / reach * half
-        is_long = rest > 2.0 * scale
-        length = max(scale if is_long else rest / _LARGEST_CUT, _FREE_TIMES * free, _SHORTEST)
-        return begin + free, begin + free + min(length, 0.5 * rest), not is_long
+        scale = self.scale(begin, end)
+        length = max(scale if rest > 2.0 * scale else rest / _LARGEST_CUT, _FREE_TIMES * free, _SHORTEST)
+        until_met = self._time_until_met(row, *X, begin, min(in_reach, end - begin))
+        length = min(length, max((1.0 + _BEHIND_MEETING) * (until_met - free), _LEAST_CUT * scale, _SHORTEST))
+        return begin + free, begin + free + min(length, 0.5 * rest)
+
+    def _time_until_met(self, row: np.void, X_0: np.ndarray, X_1: np.ndarray, begin: float, passed: float) -> float:
+        """When the points that are nearest at ``begin`` meet along the normal, by how near they are when some time has
+        passed; infinity where they do not come nearer. A guess, of which nothing that is proven makes use.
+
+        row : of the pieces at ``begin``, at poses X_0 and X_1, the mesh's first.
+        """
+        at = self.placed(begin + passed)
+        later = (at.X_A, at.X_B) if self.a.is_mesh else (at.X_B, at.X_A)
+        moved = [
+            X[:3, :3] @ (X0[:3, :3].T @ (row[point] - X0[:3, 3])) + X[:3, 3]
+            for point, X0, X in zip(("point_a", "point_b"), (X_0, X_1), later)
+        ]
+        gap = float(row["normal"] @ (row["point_b"] - row["point_a"]))
+        nearer = gap - float(row["normal"] @ (moved[1] - moved[0]))
+        return passed * gap / nearer if gap > 0.0 and nearer > 0.0 else math.inf
 
 
 def _max_jobs(span: float) -> int:
     return int(min(_MAX_JOBS * max(_SHORT / max(span, 1e-9), 1.0), _MAX_JOBS_OF_ALL))
 
 
-def _search(a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool]) -> None:
+def _search(
+    a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool], earliest: float
+) -> None:
     """Look for contacts of two pieces in one motion, span by span; ``row`` keeps the earliest found so far.
 
-    is_part : whether A and B are compounds, of which rows name the part; else the facet.
+    is_part : whether A and B are compounds, of which rows name the part; else the facet.   earliest : no contact is
+    before it.
     """
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
-    spans_to_do = [(begin, end, _max_jobs(end - begin))] if begin <= end else []
+    spans_to_do = [(max(begin, earliest), end, _max_jobs(end - begin), earliest > 0.0)]
     while spans_to_do:
-        begin, end, max_pairs = spans_to_do.pop()
+        begin, end, max_pairs, is_about_to_meet = spans_to_do.pop()
         end = min(end, float(row["upper"][0]))
         if begin > end:
             continue
+        scale, whole = spans.scale(begin, end), end
+        if is_about_to_meet and end - begin > 2.0 * scale:  # of bodies that are convex there the first contact is here
+            end = begin + max(_LEAST_CUT * scale, _SHORTEST)
         is_shortest = end - begin < _SHORTEST
         near = spans.near_facets(begin, end, _MAX_JOBS_OF_ALL if is_shortest else max_pairs)
-        if near is None and is_shortest:  # more facets together than can be looked at: open from here on
+        if near is None and end < whole:
+            spans_to_do.append((begin, whole, max_pairs, False))
+        elif near is None and is_shortest:  # more facets together than can be looked at: open from here on
             if begin < row["lower"][0]:
                 row["lower"], row["status"] = begin, OPEN
         elif near is None:
-            begin, middle, is_shorter = spans.cut(begin, end)
-            spans_to_do += [(middle, end, max_pairs), (begin, middle, min(max_pairs << is_shorter, _MAX_JOBS_OF_ALL))]
-        elif len(near):
-            jobs = _FacetJobs(a, b, near, is_part)
-            jobs.search(motion, np.zeros(1, dtype=np.int64), (begin, end), tolerance, row)
+            later = spans.earliest_on_the_way(begin, end, tolerance) if end - begin > 4.0 * scale else begin
+            if later > begin + scale:
+                spans_to_do.append((later, end, max_pairs, True))
+                continue
+            begin, middle = spans.cut(begin, end)
+            more = _MORE if end - begin <= 2.0 * scale else 1
+            spans_to_do.append((middle, end, max_pairs, False))
+            spans_to_do.append((begin, middle, min(more * max_pairs, _MAX_JOBS_OF_ALL), False))
+        else:
+            if end < whole:
+                spans_to_do.append((end, whole, max_pairs, False))
+            if len(near):
+                jobs = _FacetJobs(a, b, near, is_part)
+                jobs.search(motion, np.zeros(1, dtype=np.int64), (begin, end), tolerance, row)
 
 
 class _FacetJobs:

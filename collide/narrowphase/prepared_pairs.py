@@ -43,18 +43,14 @@ def keep_prepared(A: Shape, B: Shape, pair: Any, slot: str = "_prepared") -> Non
     prepared, serial = getattr(A, slot), B._serial
     # a list: other threads add, and partners that go take
     for oldest in list(prepared)[: max(0, len(prepared) + 1 - _MAX_PARTNERS)]:
-        _forget(A, slot, oldest)
+        _forget(lambda: A, slot, oldest)
     prepared[serial] = pair
-    A._partners[slot, serial] = weakref.ref(B, partial(_forget_of, weakref.ref(A), slot, serial))
+    A._partners[slot, serial] = weakref.ref(B, partial(_forget, weakref.ref(A), slot, serial))
 
 
-def _forget_of(A: Callable[[], Shape | None], slot: str, serial: int, _: Any) -> None:
-    """A partner is gone."""
+def _forget(A: Callable[[], Shape | None], slot: str, serial: int, _: Any = None) -> None:
+    """A partner is gone. Nothing of this module is called: at the end of the process its names are gone before."""
     shape = A()
     if shape is not None:
-        _forget(shape, slot, serial)
-
-
-def _forget(A: Shape, slot: str, serial: int) -> None:
-    getattr(A, slot).pop(serial, None)
-    A._partners.pop((slot, serial), None)
+        getattr(shape, slot).pop(serial, None)
+        shape._partners.pop((slot, serial), None)

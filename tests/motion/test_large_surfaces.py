@@ -80,7 +80,7 @@ def test_nothing_touches_before_a_span_that_is_cut(ratio):
         poses = motion(rng, ratio)
         (a,), (b,) = (surface_motions.pieces_of(side) for side in (A, other))
         spans = surface_motions._Spans(a, b, Motions(*(X[None] for X in poses), None, None))
-        free_until, middle, _ = spans.cut(0.0, 1.0)
+        free_until, middle = spans.cut(0.0, 1.0)
         assert 0.0 < free_until <= middle <= 1.0
         times = free_until * np.linspace(0.0, 1.0, 12)
         X_WA, X_WB = (

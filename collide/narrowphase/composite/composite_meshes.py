@@ -13,16 +13,21 @@ import math
 
 import numpy as np
 
+from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
 from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
+from collide.narrowphase.convex_kernel_calls import run_poses
 from collide.narrowphase.facets.collide_kernel import APART, HIT, OPEN
 from collide.narrowphase.facets.separating_translation import SeparatingTranslation, shortened
+from collide.numerics.frames import frame_along
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.shape import Shape
 
 #: Pairs of parts that trial booleans of a depth search ask about before boxes of all parts are made.
 _ASKED_FIRST = 8
+#: Pairs of convex sets around parts that are posed at once: they need little memory.
+_BOUNDS_AT_ONCE = 1 << 14
 
 
 def compound_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones: bool = False) -> np.ndarray:
@@ -58,10 +63,42 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
     poses = np.flatnonzero(states != HIT)
     if len(poses):
         gaps = _box_gaps(A, B, X_WA[poses], X_WB[poses])
-        for i, j in np.argwhere(meshed & np.any(gaps <= 0.0, axis=0)).tolist():
-            remaining = poses[gaps[:, i, j] <= 0.0]
+        near = meshed & (gaps <= 0.0)
+        if np.any(near, axis=0).sum() > _ASKED_FIRST and not (A.unbounded or B.unbounded):
+            if len(X_WA) == 1:
+                i, j = np.unravel_index(np.where(near[0], gaps[0], math.inf).argmin(), meshed.shape)
+                _take_states(A, B, int(i), int(j), poses, X_WA, X_WB, states)
+            if (states[poses] != HIT).any():
+                _leave_out_sets(A, B, X_WA[poses], X_WB[poses], near)
+        for i, j in np.argwhere(np.any(near, axis=0)).tolist():
+            remaining = poses[near[:, i, j]]
             _take_states(A, B, i, j, remaining[states[remaining] != HIT], X_WA, X_WB, states)
     return states
+
+
+def _leave_out_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, near: np.ndarray) -> None:
+    """Take from ``near``, (n, parts of A, parts of B) bool, in place, the pairs that convex sets around both prove apart.
+
+    A part lies in its convex set. Poses, rounded, put the sets within their slops of where they are: the sets are apart
+    where their distance is more than both.
+    """
+    entries = np.argwhere(near)
+    for first in range(0, len(entries), _BOUNDS_AT_ONCE):
+        pose, *which = some = entries[first : first + _BOUNDS_AT_ONCE].T
+        sets, rows, slop = [], [], np.zeros(len(pose))
+        placed = []
+        for side, parts, X in ((A, which[0], X_WA), (B, which[1], X_WB)):
+            of, row = np.unique(parts, return_inverse=True)
+            rows.append(row.ravel() + len(sets))
+            sets += [side.parts[k].bound for k in of.tolist()]
+            placed.append(side.placed(parts, X[pose], np.zeros(len(pose))))
+            slop += 1.001 * placed[-1].slop
+        distances = np.zeros(len(pose), dtype=PAIR_DTYPE)
+        run_poses(
+            distances, ShapeTable(sets), np.stack(rows, axis=1), placed[0].X, placed[1].X, boolean=False,
+            limit=float(slop.max()), check=False, depths=False,
+        )  # fmt: skip
+        near[tuple(some[:, distances["lower"] > slop])] = False
 
 
 def _take_states(A: CompoundParts, B: CompoundParts, i: int, j: int, poses, X_WA, X_WB, states: np.ndarray) -> None:
@@ -225,7 +262,7 @@ def _raise_along_normals(
         X_A, X_B = X_WA[k : k + 1].copy(), X_WB[k : k + 1].copy()
         X_B[:, :3, 3] -= X_A[:, :3, 3]
         X_A[:, :3, 3] = 0.0
-        rotation = _frame_along(row["normal"])
+        rotation = frame_along(row["normal"])
         for X in (X_A, X_B):
             X[:, :3] = rotation @ X[:, :3]
         of_a, of_b = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
@@ -234,13 +271,6 @@ def _raise_along_normals(
         raised = _box_gaps(A, B, X_A, X_B, of_a, of_b)[0] - 2.0**-44 * size
         at = np.ix_([k], of_a, of_b)
         gaps[at] = np.maximum(gaps[at], raised)
-
-
-def _frame_along(normal: np.ndarray) -> np.ndarray:
-    """(3, 3) a rotation, but for rounding, whose first row is a unit vector."""
-    across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    across /= np.sqrt(np.square(across).sum())
-    return np.stack([normal, across, np.cross(normal, across)])
 
 
 def _nearest_first(gaps: np.ndarray, sight: float, rows_of) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
