@@ -262,9 +262,7 @@ def _nearest_by_rounds(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSl
     def may_be_nearer(facets: Facets) -> np.ndarray:
         return (facets.bound <= upper[facets.pose]) & (facets.place != first[facets.pose])
 
-    order = np.empty(len(A.tree.ids), dtype=np.int64)
-    order[A.tree.ids] = np.arange(len(order))
-    first = order[facets]
+    first = A.tree.places[facets]
     poses, places = [np.arange(len(PA.X))], [first]
     rows = [gaps_at(poses[0], first)]
     upper = rows[0]["upper"].copy()
