@@ -23,7 +23,7 @@ from collide.narrowphase.facets.curved_gap_calls import gap_rows, serves
 from collide.narrowphase.facets.facet_kernel_calls import balls_farther, core_hits, farthest_gap, hull_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.facets_against_curved import facet_rows
-from collide.narrowphase.facets.near_facets import Facets, likely_facets, near_facets
+from collide.narrowphase.facets.near_facets import Facets, few_near_facets, likely_facets, near_facets
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
 from collide.narrowphase.fallback_searches import lay_points_apart
@@ -31,8 +31,8 @@ from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
 
 #: Facets of a pose that are asked about together: so many first, then so many times more.
 _FIRST_ROUND, _GROWTH = 8, 4
-#: Of meshes of more facets, hulls are asked before facets are gone through.
-_MANY_FACETS = 1024
+#: Of more that may touch at a pose, a likely one and the hull are asked before all are gone through.
+_MANY_FACETS = 128
 
 
 class CurvedStates(NamedTuple):
@@ -101,8 +101,8 @@ def _settle_by_polytopes(
 def _settle_by_facets(
     A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, poses: np.ndarray, states: CurvedStates
 ) -> None:
-    """Ask about every facet that may touch, until one does: a likely one first, and the hulls of meshes of many, so
-    that no facet of a mesh that lies wholly between the polytopes is gone through.
+    """Ask about every facet that may touch, until one does. Where many may, as of a mesh that lies wholly between the
+    polytopes, a likely one is asked first, and then the mesh's hull, before all are gone through.
 
     A mesh is within its hull: where this is farther from the shape than rounding moved the two, both are apart.
     """
@@ -119,16 +119,20 @@ def _settle_by_facets(
             hit[p] |= proven
             ambiguous[p] |= not proven
 
-    across, remaining = _across(A, E, PA, PB), np.arange(n)
-    if len(A.tree.ids) > _MANY_FACETS:
-        ask(remaining, likely_facets(A.tree, E.packed, PA, PB, across))
-        remaining = np.flatnonzero(~hit)
-        remaining = remaining[~_hulls_apart(A, E, PA.of(remaining), PB.of(remaining))]
-    if len(remaining):
-        PA_left, PB_left = PA.of(remaining), PB.of(remaining)
-        near = near_facets(A.tree, E.packed, PA_left, PB_left, across[remaining], np.zeros(len(remaining)))
-        for some in _rounds(near, lambda facets: ~hit[remaining[facets.pose]]):
-            ask(remaining[near.pose[some]], near.place[some])
+    def ask_all(near: Facets, of: np.ndarray) -> None:
+        for some in _rounds(near, lambda facets: ~hit[of[facets.pose]]):
+            ask(of[near.pose[some]], near.place[some])
+
+    across, nothing = _across(A, E, PA, PB), np.zeros(n)
+    near, many = few_near_facets(A.tree, E.packed, PA, PB, across, nothing, _MANY_FACETS)
+    ask_all(near, np.arange(n))
+    left = np.flatnonzero(many)
+    if len(left):
+        ask(left, likely_facets(A.tree, E.packed, PA.of(left), PB.of(left), across[left]))
+        left = left[~hit[left]]
+        left = left[~_hulls_apart(A, E, PA.of(left), PB.of(left))]
+        if len(left):
+            ask_all(near_facets(A.tree, E.packed, PA.of(left), PB.of(left), across[left], nothing[left]), left)
     states.state[poses] = np.where(hit, HIT, np.where(ambiguous, OPEN, APART))
     states.how[poses], states.place[poses] = how, place
 

@@ -45,13 +45,22 @@ def near_facets_up_to(
     max_facets: int,
 ) -> Facets | None:  # fmt: skip
     """`near_facets` at one pair of poses; None where more than about ``max_facets`` are near, after few of them."""
-    blocks: list = []
-    spans, pose = _Spans(tree, packed, A, B, along), np.zeros(1, dtype=np.int64)
-    for block in _walk(tree, spans, np.array([upper]), pose, max_facets):
-        blocks.append(block)
-        if sum(len(places) for _, places, _ in blocks) > max_facets:
-            return None
-    return Facets(*(np.concatenate(column) for column in zip(*blocks))) if blocks else None
+    facets, many = few_near_facets(tree, packed, A, B, along, np.array([upper]), max_facets)
+    return None if many[0] else facets
+
+
+def few_near_facets(
+    tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: np.ndarray,
+    max_facets: int,
+) -> tuple[Facets, np.ndarray]:  # fmt: skip
+    """(`near_facets`, none of poses that are (n,) said to have more than about ``max_facets``, after few of them)."""
+    spans, many = _Spans(tree, packed, A, B, along), np.zeros(len(upper), dtype=bool)
+    pose, place, bound = map(
+        np.concatenate, zip(*_walk(tree, spans, upper, np.arange(len(upper)), (max_facets, many)))
+    )
+    many |= np.bincount(pose, minlength=len(many)) > max_facets
+    few = ~many[pose]
+    return Facets(pose[few], place[few], bound[few]), many
 
 
 def near_facets(
@@ -83,10 +92,11 @@ def likely_facets(
     return leaf_runs(link)[0]
 
 
-def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, max_facets: int | None = None):
+def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, most: tuple | None = None):
     """Yields (pose, place, bound) of the facets that may be near enough, block by block.
 
-    max_facets : nothing where more boxes than so many are near, of which each holds a facet.
+    most : (how many boxes of a pose at most, of which each holds a facet; mask (n,) of poses that have more, which are
+        marked and left out).
     """
     links = tree.links()
     pose, at = poses, np.zeros(len(poses), dtype=np.int64)
@@ -102,15 +112,19 @@ def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, m
         pose, link = pose[near], link[near]
         leaf = link < 0
         runs.append((pose[leaf], link[leaf]))
-        if max_facets is not None and len(pose) - len(runs[-1][0]) + sum(len(run) for run, _ in runs) > max_facets:
-            return
         pose, at = pose[~leaf], link[~leaf]
+        if most is not None:
+            boxes = sum(np.bincount(of, minlength=len(most[1])) for of in (pose, *(run for run, _ in runs)))
+            most[1][boxes > most[0]] = True
+            pose, at = pose[~most[1][pose]], at[~most[1][pose]]
         if len(at) * WIDTH > _MAX_BOXES and len(poses) > 1:
             half = len(poses) // 2
-            yield from _walk(tree, spans, upper, poses[:half])
-            yield from _walk(tree, spans, upper, poses[half:])
+            yield from _walk(tree, spans, upper, poses[:half], most)
+            yield from _walk(tree, spans, upper, poses[half:], most)
             return
     pose, link = (np.concatenate(column) for column in zip(*runs))
+    if most is not None:
+        pose, link = pose[~most[1][pose]], link[~most[1][pose]]
     first, count = leaf_runs(link)
     pose = np.repeat(pose, count)
     place = np.repeat(first - (np.cumsum(count) - count), count) + np.arange(len(pose))

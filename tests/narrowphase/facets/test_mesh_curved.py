@@ -106,7 +106,7 @@ def snippet(name, shape, X, Y) -> str:
 
 @pytest.fixture(params=["as it is", "hulls first"])
 def order(request, monkeypatch):
-    """Hulls and a likely facet are asked first of large meshes only; here of small ones, too."""
+    """Hulls and a likely facet are asked first where many facets may be near only; here everywhere."""
     if request.param == "hulls first":
         monkeypatch.setattr(mesh_curved, "_MANY_FACETS", 0)
 
