@@ -247,10 +247,10 @@ def test_intervals_that_more_pairs_leave_open_than_there_is_space_for_are_named(
     """Of sliders side by side two pairs cannot be told apart, and the lists of pairs have too little space."""
     monkeypatch.setattr(check_workspace, "_MAX_ITEMS", space)
     block = [LinkShape(collide.Box((1.0, 1.0, 1.0)), np.eye(4), None, "test")]
-    links = {"left": -1.0 - 1e-9, "middle": 0.0, "right": 1.0 + 1e-9, "far": 100.0, "farther": 200.0}
+    links = {"far": 100.0, "farther": 200.0, "left": -1.0 - 1e-9, "middle": 0.0, "right": 1.0 + 1e-9}
     joints = [Joint(name, "prismatic", "base", name, pose(t=(0, y, 0)), (1.0, 0, 0)) for name, y in links.items()]
     robot = Robot("three", ["base", *links], joints, dict.fromkeys(links, block))
-    q = np.array([[0.0, 3.0, 0.0, 0.0, 0.0]])
+    q = np.array([[0.0, 0.0, 0.0, 3.0, 0.0]])
     edges = collide.RobotChecker(robot).certify_edges(-q, q, resolution=1e-2)
     assert edges.is_open[0] and {frozenset(names) for names in edges.open_names} <= {
         frozenset(("left", "middle")), frozenset(("middle", "right"))
