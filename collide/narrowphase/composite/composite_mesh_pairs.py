@@ -176,8 +176,8 @@ def loose_states(A: Body, B: Body, PA: PosesWithSlop, PB: PosesWithSlop) -> np.n
             every = all_hits(A.tree, B.tree, PA.X[remaining], PB.X[remaining])
             starts, count = every.starts[:-1], np.diff(every.starts)
             of_pair, rank = np.repeat(remaining, count), np.arange(len(every.pairs)) - np.repeat(starts, count)
-            for first in range(0, min(int(count.max()), _MAX_PAIRS), _PAIRS_AT_ONCE):
-                some = (rank >= first) & (rank < first + _PAIRS_AT_ONCE) & (states[of_pair] == OPEN)
+            for begin in range(0, min(int(count.max()), _MAX_PAIRS), _PAIRS_AT_ONCE):
+                some = (rank >= begin) & (rank < begin + _PAIRS_AT_ONCE) & (states[of_pair] == OPEN)
                 k = of_pair[some]
                 states[k[_crossing(A, B, every.pairs[some], PA.X[k], PB.X[k], slop[k])]] = HIT
     return states
@@ -195,7 +195,8 @@ def _crossing(A: Body, B: Body, pairs: np.ndarray, X_WA: np.ndarray, X_WB: np.nd
         _terms(A, pairs[:, 0], X_WA) + _terms(B, pairs[:, 1], X_WB) + np.abs(shift).max(axis=1)
     )
     edges = [(S[:, k], S[:, k - 2], T[:, 0], T[:, 1], T[:, 2], moved) for T, S in ((U, V), (V, U)) for k in range(3)]
-    return _passes(*map(np.concatenate, zip(*edges))).reshape(6, -1).any(axis=0)
+    passes: np.ndarray = _passes(*map(np.concatenate, zip(*edges))).reshape(6, -1)
+    return np.logical_or.reduce(passes)
 
 
 def _corners(body: Body, facets: np.ndarray, X: np.ndarray, shift: np.ndarray) -> np.ndarray:
@@ -216,7 +217,8 @@ def _own_corners(body: Body, facets: np.ndarray) -> np.ndarray:
 def _passes(p, q, a, b, c, moved) -> np.ndarray:
     """(k,) whether segments pq pass through triangles abc, (k, 3) each, whoever moves any corner by ``moved`` (k,)."""
     corners = (a, b, c, p), (a, b, c, q), (p, q, a, b), (p, q, b, c), (p, q, c, a)
-    below, above, *sides = _sign(*map(np.concatenate, zip(*corners)), np.tile(moved, 5)).reshape(5, -1)
+    of, to, by, at = map(np.concatenate, zip(*corners))
+    below, above, *sides = _sign(of, to, by, at, np.tile(moved, 5)).reshape(5, -1)
     return (below * above < 0) & (sides[0] != 0) & (sides[0] == sides[1]) & (sides[1] == sides[2])
 
 

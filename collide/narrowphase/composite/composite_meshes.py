@@ -81,15 +81,15 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
 def _take_states(A: CompoundParts, B: CompoundParts, i, j, poses, X_WA, X_WB, states: np.ndarray) -> None:
     """Ask about pairs of parts i, j (k,) at poses by number (k,), those of a pair together, and put what is told of the
     unions into ``states`` (n,)."""
-    told = np.full(len(poses), OPEN)
+    status = np.full(len(poses), OPEN)
     begins = (np.diff(i, prepend=-1) != 0) | (np.diff(j, prepend=-1) != 0)
     for of_mesh, of_other, sides in ((i, j, (A, B, X_WA, X_WB)), (j, i, (B, A, X_WB, X_WA))):
         for number in np.flatnonzero(np.bincount(of_mesh[begins]) > _AT_ONE_MESH).tolist():
-            some = np.flatnonzero((told == OPEN) & (of_mesh == number))
+            some = np.flatnonzero((status == OPEN) & (of_mesh == number))
             if sides[0].columns.meshed[number]:
-                told[some] = _states_by_balls(*sides, number, of_other[some], poses[some])
-    states[poses[told == HIT]] = HIT
-    some = np.flatnonzero((told == OPEN) & (states[poses] != HIT))
+                status[some] = _states_by_balls(*sides, number, of_other[some], poses[some])
+    states[poses[status == HIT]] = HIT
+    some = np.flatnonzero((status == OPEN) & (states[poses] != HIT))
     if not len(some):
         return
     PA, PB = _placed(A, B, i[some], j[some], X_WA[poses[some]], X_WB[poses[some]])
@@ -110,7 +110,7 @@ def _states_by_balls(
     A part is within its ball. Where no facet comes as near to the centre as the ball is large, and rounding moved them,
     all of the ball is on the side of the surface that the centre is on.
     """
-    told = np.full(len(others), OPEN)
+    status = np.full(len(others), OPEN)
     body, unique = body_of(M.parts[mesh].shape), np.unique(poses, return_inverse=True)
     placed = M.parts[mesh].at(X_WM[unique[0]], np.zeros(len(unique[0]))).of(unique[1])
     centres, radii = N.balls(others, X_WN[poses])
@@ -120,12 +120,12 @@ def _states_by_balls(
         X = np.tile(np.eye(4), (len(some), 1, 1))
         X[:, :3, 3] = centres[some]
         limit = float(reach[some].max()) * (1.0 + 2.0**-40)
-        clear = surface_distances(body.tree, _point().tree, placed.X[some], X, limit).lower > reach[some]
-        some, X = some[clear], X[clear]
+        proven_apart = surface_distances(body.tree, _point().tree, placed.X[some], X, limit).lower > reach[some]
+        some, X = some[proven_apart], X[proven_apart]
     if len(some):
         sides = points_in_solid(body.tree, placed.X[some], np.zeros(3), X) if body.solid else OUTSIDE
-        told[some] = np.where(sides == OUTSIDE, APART, np.where(sides == INSIDE, HIT, OPEN))
-    return told
+        status[some] = np.where(sides == OUTSIDE, APART, np.where(sides == INSIDE, HIT, OPEN))
+    return status
 
 
 @cache

@@ -23,7 +23,7 @@ from collide.narrowphase.facets.curved_gap_calls import gap_rows, serves
 from collide.narrowphase.facets.facet_kernel_calls import balls_farther, core_hits, farthest_gap, hull_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.facets_against_curved import facet_rows
-from collide.narrowphase.facets.near_facets import Facets, few_near_facets, likely_facets, near_facets
+from collide.narrowphase.facets.near_facets import Facets, likely_facets, near_facets, near_facets_if_few
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
 from collide.narrowphase.fallback_searches import lay_points_apart
@@ -32,7 +32,7 @@ from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
 #: Facets of a pose that are asked about together: so many first, then so many times more.
 _FIRST_ROUND, _GROWTH = 8, 4
 #: Of more that may touch at a pose, a likely one and the hull are asked before all are gone through.
-_MANY_FACETS = 128
+_MAX_NEAR_FACETS = 128
 
 
 class CurvedStates(NamedTuple):
@@ -124,15 +124,16 @@ def _settle_by_facets(
             ask(of[near.pose[some]], near.place[some])
 
     across, nothing = _across(A, E, PA, PB), np.zeros(n)
-    near, many = few_near_facets(A.tree, E.packed, PA, PB, across, nothing, _MANY_FACETS)
+    near, exceeds = near_facets_if_few(A.tree, E.packed, PA, PB, across, nothing, _MAX_NEAR_FACETS)
     ask_all(near, np.arange(n))
-    left = np.flatnonzero(many)
-    if len(left):
-        ask(left, likely_facets(A.tree, E.packed, PA.of(left), PB.of(left), across[left]))
-        left = left[~hit[left]]
-        left = left[~_hulls_apart(A, E, PA.of(left), PB.of(left))]
-        if len(left):
-            ask_all(near_facets(A.tree, E.packed, PA.of(left), PB.of(left), across[left], nothing[left]), left)
+    remaining = np.flatnonzero(exceeds)
+    if len(remaining):
+        ask(remaining, likely_facets(A.tree, E.packed, PA.of(remaining), PB.of(remaining), across[remaining]))
+        remaining = remaining[~hit[remaining]]
+        remaining = remaining[~_hulls_apart(A, E, PA.of(remaining), PB.of(remaining))]
+        if len(remaining):
+            at = PA.of(remaining), PB.of(remaining)
+            ask_all(near_facets(A.tree, E.packed, *at, across[remaining], nothing[remaining]), remaining)
     states.state[poses] = np.where(hit, HIT, np.where(ambiguous, OPEN, APART))
     states.how[poses], states.place[poses] = how, place
 

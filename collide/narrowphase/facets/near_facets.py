@@ -45,22 +45,22 @@ def near_facets_up_to(
     max_facets: int,
 ) -> Facets | None:  # fmt: skip
     """`near_facets` at one pair of poses; None where more than about ``max_facets`` are near, after few of them."""
-    facets, many = few_near_facets(tree, packed, A, B, along, np.array([upper]), max_facets)
-    return None if many[0] else facets
+    facets, exceeds = near_facets_if_few(tree, packed, A, B, along, np.array([upper]), max_facets)
+    return None if exceeds[0] else facets
 
 
-def few_near_facets(
+def near_facets_if_few(
     tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: np.ndarray,
     max_facets: int,
 ) -> tuple[Facets, np.ndarray]:  # fmt: skip
-    """(`near_facets`, none of poses that are (n,) said to have more than about ``max_facets``, after few of them)."""
-    spans, many = _Spans(tree, packed, A, B, along), np.zeros(len(upper), dtype=bool)
+    """(`near_facets` but of poses that have more than about ``max_facets``, (n,) bool: which these are)."""
+    spans, exceeds = _Spans(tree, packed, A, B, along), np.zeros(len(upper), dtype=bool)
     pose, place, bound = map(
-        np.concatenate, zip(*_walk(tree, spans, upper, np.arange(len(upper)), (max_facets, many)))
+        np.concatenate, zip(*_walk(tree, spans, upper, np.arange(len(upper)), (max_facets, exceeds)))
     )
-    many |= np.bincount(pose, minlength=len(many)) > max_facets
-    few = ~many[pose]
-    return Facets(pose[few], place[few], bound[few]), many
+    exceeds |= np.bincount(pose, minlength=len(exceeds)) > max_facets
+    some = ~exceeds[pose]
+    return Facets(pose[some], place[some], bound[some]), exceeds
 
 
 def near_facets(
@@ -92,10 +92,10 @@ def likely_facets(
     return leaf_runs(link)[0]
 
 
-def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, most: tuple | None = None):
+def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, limit: tuple | None = None):
     """Yields (pose, place, bound) of the facets that may be near enough, block by block.
 
-    most : (how many boxes of a pose at most, of which each holds a facet; mask (n,) of poses that have more, which are
+    limit : (how many boxes a pose may have, of which each holds a facet; mask (n,) of poses that have more, which are
         marked and left out).
     """
     links = tree.links()
@@ -113,18 +113,18 @@ def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, m
         leaf = link < 0
         runs.append((pose[leaf], link[leaf]))
         pose, at = pose[~leaf], link[~leaf]
-        if most is not None:
-            boxes = sum(np.bincount(of, minlength=len(most[1])) for of in (pose, *(run for run, _ in runs)))
-            most[1][boxes > most[0]] = True
-            pose, at = pose[~most[1][pose]], at[~most[1][pose]]
+        if limit is not None:
+            boxes = sum(np.bincount(of, minlength=len(limit[1])) for of in (pose, *(run for run, _ in runs)))
+            limit[1][boxes > limit[0]] = True
+            pose, at = pose[~limit[1][pose]], at[~limit[1][pose]]
         if len(at) * WIDTH > _MAX_BOXES and len(poses) > 1:
             half = len(poses) // 2
-            yield from _walk(tree, spans, upper, poses[:half], most)
-            yield from _walk(tree, spans, upper, poses[half:], most)
+            yield from _walk(tree, spans, upper, poses[:half], limit)
+            yield from _walk(tree, spans, upper, poses[half:], limit)
             return
     pose, link = (np.concatenate(column) for column in zip(*runs))
-    if most is not None:
-        pose, link = pose[~most[1][pose]], link[~most[1][pose]]
+    if limit is not None:
+        pose, link = pose[~limit[1][pose]], link[~limit[1][pose]]
     first, count = leaf_runs(link)
     pose = np.repeat(pose, count)
     place = np.repeat(first - (np.cumsum(count) - count), count) + np.arange(len(pose))

@@ -108,7 +108,7 @@ def snippet(name, shape, X, Y) -> str:
 def order(request, monkeypatch):
     """Hulls and a likely facet are asked first where many facets may be near only; here everywhere."""
     if request.param == "hulls first":
-        monkeypatch.setattr(mesh_curved, "_MANY_FACETS", 0)
+        monkeypatch.setattr(mesh_curved, "_MAX_NEAR_FACETS", 0)
 
 
 @pytest.mark.slow
