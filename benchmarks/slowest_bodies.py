@@ -13,6 +13,8 @@ from functools import cache
 import numpy as np
 
 import collide
+from collide.robots.kinematic_tree import Joint
+from collide.robots.robot import LinkShape
 
 PLACES = ("far", "near", "touching", "deep", "inside")
 #: The direction from A to B, and the turns of both: nothing is parallel to anything.
@@ -191,23 +193,69 @@ def _certify(A, B, X, Y, small: float):
     return collide.distance(A, B, X, Y).certificate
 
 
+def _world_of(A, B, X, Y) -> collide.World:
+    """A built World of the pair, B moved to its pose."""
+    world = _worlds.get((id(A), id(B)))
+    if world is None:
+        world = _worlds[id(A), id(B)] = collide.World()
+        world.add(A, X)
+        world.add(B, Y)
+    world.set_pose(world.ids[1], Y)
+    return world
+
+
 def _world(question: str) -> Callable:
+    return lambda A, B, X, Y, small: getattr(_world_of(A, B, X, Y), question)()
+
+
+def _world_nearest(A, B, X, Y, small: float):
+    return _world_of(A, B, X, Y).nearest(Y[None, :3, 3])
+
+
+def _world_within(A, B, X, Y, small: float):
+    return _world_of(A, B, X, Y).distances(0.05 * small)
+
+
+def _world_rays(all_hits: bool) -> Callable:
     def ask(A, B, X, Y, small: float):
-        world = _worlds.get((id(A), id(B)))
-        if world is None:
-            world = _worlds[id(A), id(B)] = collide.World()
-            world.add(A, X)
-            world.add(B, Y)
-        world.set_pose(world.ids[1], Y)
-        if question == "nearest":
-            return world.nearest(Y[None, :3, 3])
-        return getattr(world, question)()
+        aside = small * np.random.default_rng(0).normal(size=(10, 3))
+        return _world_of(A, B, X, Y).raycast(Y[:3, 3] + aside, np.tile(-ALONG, (10, 1)), all_hits=all_hits)
 
     return ask
 
 
-#: Worlds of pairs, kept so that each call is that of a world that is built.
+def _world_cast(A, B, X, Y, small: float):
+    """B moved at a World of A."""
+    return _world_of(A, A, X, X).shape_cast(B, Y, -ALONG)
+
+
+def _world_query(A, B, X, Y, small: float):
+    return _world_of(A, A, X, X).query(B, Y, 0.05 * small)
+
+
+def _verify(A, B, X, Y, small: float):
+    """A result with its certificate, checked; pairs that have none are asked the distance only."""
+    row = collide.distance(A, B, X, Y)
+    certificate = row.certificate
+    return None if certificate is None else collide.verify(A, B, X, Y, row, certificate=certificate)
+
+
+def _certify_motion(A, B, X, Y, small: float):
+    """B on a slide past A, by six sizes of the smaller across ALONG, proven free or not."""
+    checker = _checkers.get((id(A), id(B), X.tobytes(), Y.tobytes()))
+    if checker is None:
+        slide = Joint("slide", "prismatic", "base", "body", np.eye(4), (0.8, -0.36, -0.48), -1e9, 1e9)
+        geometry = {"body": [LinkShape(B, Y, None, "")]}
+        robot = collide.Robot("slide", ["base", "body"], [slide], geometry)
+        world = collide.World()
+        world.add(A, X)
+        checker = _checkers[id(A), id(B), X.tobytes(), Y.tobytes()] = collide.RobotChecker(robot, world)
+    return checker.certify_edges(np.array([[-3.0 * small]]), np.array([[3.0 * small]]), resolution=0.01 * small)
+
+
+#: Worlds and checkers of pairs, kept so that each call is that of one that is built.
 _worlds: dict[tuple[int, int], collide.World] = {}
+_checkers: dict[tuple, collide.RobotChecker] = {}
 
 #: What is asked of shapes A, B at poses X, Y; ``small`` is the size of the smaller [m].
 QUESTIONS: dict[str, Callable] = {
@@ -222,7 +270,10 @@ QUESTIONS: dict[str, Callable] = {
     "rays": _rays, "rays_through": _rays_through, "contains": _points, "certify": _certify,
     "facet_pairs": lambda A, B, X, Y, small: collide.facet_pairs(A, B, X, Y),
     "world_collides": _world("collides"), "world_distances": _world("distances"), "world_contacts": _world("contacts"),
-    "world_minimum": _world("minimum"), "world_nearest": _world("nearest"),
+    "world_minimum": _world("minimum"), "world_nearest": _world_nearest, "world_collisions": _world("collisions"),
+    "world_overlaps": _world("overlaps"), "world_within": _world_within, "world_rays": _world_rays(False),
+    "world_rays_through": _world_rays(True), "world_cast": _world_cast, "world_query": _world_query,
+    "verify": _verify, "certify_motion": _certify_motion,
 }  # fmt: skip
 #: Questions about A alone, whatever B is.
 OF_ONE = frozenset(("rays", "rays_through", "contains"))

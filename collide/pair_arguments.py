@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.errors import InvalidArgument, InvalidPose
+from collide.errors import InvalidArgument
 from collide.shapes.shape import Shape, checked_shape
 from collide.shapes.shape_set import Picked
 from collide.transforms import poses_as_given
@@ -22,7 +22,7 @@ def matched_counts(A, B, counts: dict[str, int]) -> tuple[int, bool]:
     """(the length of a batch, whether A and B are two shapes), of checked shapes and arguments of these lengths.
 
     counts : by name; single arguments, of length 1, go with all of the others.   A, B : None where there are none.
-    Raises InvalidArgument, and InvalidPose where it is poses that do not match.
+    Raises InvalidArgument where lengths do not match, whatever arguments have them.
     """
     single = True
     for name, side in (("A", A), ("B", B)):
@@ -40,8 +40,7 @@ def matched_length(counts: dict[str, int]) -> int:
     for name, count in counts.items():
         if count != wanted and (count != 1 or name in "AB"):
             lengths = ", ".join(f"{argument} {n}" for argument, n in counts.items())
-            kind = InvalidPose if name.startswith("X") else InvalidArgument
-            raise kind(f"lengths do not match: {lengths}; batches must be equally long, or a single pose")
+            raise InvalidArgument(f"lengths do not match: {lengths}; batches must be equally long, or a single pose")
     return wanted
 
 

@@ -387,7 +387,7 @@ def test_a_mesh_of_an_object_that_has_vertices_and_faces():
 def test_batches_must_match():
     two, three = np.array([EYE] * 2), np.array([EYE] * 3)
     for query in (distance, meets):
-        with pytest.raises(InvalidPose, match="X_WA 2, X_WB 3"):
+        with pytest.raises(InvalidArgument, match="X_WA 2, X_WB 3"):
             query(Sphere(1), Sphere(1), two, three)
 
 

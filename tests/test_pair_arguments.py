@@ -36,11 +36,11 @@ def test_what_goes_together(A, B, X_WA, X_WB, lengths, single):
 @pytest.mark.parametrize(
     ("A", "B", "X_WA", "X_WB", "error", "words"),
     [
-        (BOX, BALL, THREE, THREE[:2], InvalidPose, "X_WA 3, X_WB 2; batches must be equally long"),
+        (BOX, BALL, THREE, THREE[:2], InvalidArgument, "X_WA 3, X_WB 2; batches must be equally long"),
         ([BOX] * 2, BALL, THREE, EYE, InvalidArgument, "X_WA 3, X_WB 1, A 2"),
         ([BOX], BALL, THREE, EYE, InvalidArgument, "X_WA 3, X_WB 1, A 1"),
         ([BOX] * 2, [BALL] * 3, EYE, EYE, InvalidArgument, "A 2, B 3"),
-        (BOX, BALL, THREE[:0], THREE, InvalidPose, "X_WA 0, X_WB 3"),
+        (BOX, BALL, THREE[:0], THREE, InvalidArgument, "X_WA 0, X_WB 3"),
         (1.0, BALL, EYE, EYE, InvalidArgument, "A must be a shape, for example .*, got 1.0"),
         (BOX, [BALL, None], EYE, EYE, InvalidArgument, "B must be a shape"),
         (BOX, BALL, np.eye(3)[:2], EYE, InvalidPose, "X_WA"),

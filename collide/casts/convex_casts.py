@@ -19,7 +19,7 @@ from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.shape_table import KIND
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_kernel_calls import run_pairs
-from collide.numerics.exact_points import integers, rounded
+from collide.numerics.exact_points import in_integers, integers, rounded
 from collide.numerics.exact_vectors import inner
 from collide.results import UNDECIDED
 
@@ -163,7 +163,7 @@ def settle_exactly(parts: PosedParts, pair: np.ndarray, question: np.ndarray, ro
 def settle_points(points_a, points_b, grid: int, question: np.ndarray, row: np.ndarray) -> None:
     """Write the row of two hulls of integer points times 2^grid."""
     d, exponent = integers(question[:3])
-    contact = cast_exactly(points_a, points_b, d)
+    contact = cast_exactly(list(points_a), list(points_b), d)
     if contact.t is None or contact.t * Fraction(2) ** (grid - exponent) > float(question[3]):
         row[STATUS] = MISS
         return
@@ -192,12 +192,12 @@ def _settle_level(parts: PosedParts, pair, question, row) -> None:
 
 
 def _settle_plane(parts: PosedParts, pair, question, row) -> None:
-    """Write the row of a hull A and a half-space B, by the height of every vertex."""
+    """Write the row of a hull A and a half-space B, by the height of its lowest vertex."""
     normal, offset = parts.exact(pair[1]).plane
-    points, grid = parts.exact(pair[0]).vertices
-    scale = Fraction(2) ** grid
-    heights = [inner(normal, p) * scale - offset for p in points]
-    height = min(heights)
+    points = parts.exact(pair[0]).vertices
+    lowest = points[points.first_along(in_integers(normal))]
+    scale = Fraction(2) ** points.grid
+    height = inner(normal, lowest) * scale - offset
     pace = -inner(normal, [Fraction(v) for v in question[:3].tolist()])
     if height <= 0:
         t = Fraction(0)
@@ -211,7 +211,6 @@ def _settle_plane(parts: PosedParts, pair, question, row) -> None:
         return
     row[STATUS] = HIT
     row[VALUE], row[LOWER], row[UPPER] = rounded(t)
-    lowest = points[heights.index(height)]
     row[TOUCHING : TOUCHING + 3] = [
         float(v * scale + t * Fraction(d)) for v, d in zip(lowest, question[:3].tolist())
     ]  # fmt: skip

@@ -197,7 +197,8 @@ def _chord_of_points(parts: PosedParts, part: int, origin, direction) -> tuple[F
     """Exact t at which a ray's line enters and leaves a hull: casts of a point from far away, to and fro."""
     d, d_exponent = integers(direction)
     whole, o_exponent = integers(origin)
-    ((o,), vertices), grid = on_one_grid(([(whole[0], whole[1], whole[2])], o_exponent), parts.exact(part).vertices)
+    points = parts.exact(part).vertices
+    ((o,), vertices), grid = on_one_grid(([(whole[0], whole[1], whole[2])], o_exponent), (list(points), points.grid))
     unit = Fraction(2) ** (grid - d_exponent)
     # Farther than all of it is from the origin: the largest component of d is at least 1.
     far = 4 * max(abs(c - b) for v in [*vertices, (0, 0, 0)] for c, b in zip(v, o)) + 1

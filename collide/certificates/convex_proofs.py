@@ -1,4 +1,5 @@
-"""Whether vertex pairs prove that two convex parts meet, or that they are apart. Every vertex is looked at."""
+"""Whether vertex pairs prove that two convex parts meet, or that they are apart. Every vertex is looked at, in
+doubles: those that may be the farthest along a normal are compared in integers (`PlacedPoints.first_along`)."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from collide.certificates.certificate import VertexPair
 from collide.certificates.exact_parts import ExactPart, common_vertices
 from collide.certificates.nearest_to_origin import nearest_to_origin
 from collide.lowering.packed_convex import HALFSPACE, POINTS
-from collide.numerics.exact_points import Point
+from collide.numerics.exact_points import Point, in_integers, opposite
 from collide.numerics.exact_vectors import inner, minus
 
 
@@ -30,11 +31,10 @@ def flaw_of_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hi
         return None if square <= radius**2 * scale**2 else "the points named do not come within the radii of the origin"
     if square == 0:
         return "the points named contain the origin, so they give no axis"
-    along_a, along_b = [inner(v, p) for p in points_a], [inner(v, q) for q in points_b]
-    gap = min(along_a) - max(along_b)
+    i, j = points_a.first_along(v), points_b.first_along(opposite(v))
+    gap = inner(v, minus(points_a[i], points_b[j]))
     if gap > 0 and gap**2 > radius**2 * square:
         return None
-    i, j = along_a.index(min(along_a)), along_b.index(max(along_b))
     return f"vertex {i} of A and vertex {j} of B are not apart along the axis"
 
 
@@ -47,19 +47,20 @@ def flaw_of_plane_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair],
         return "two half-spaces have no certificate"
     halfspace, body = (A, B) if A.kind == HALFSPACE else (B, A)
     n, offset = halfspace.plane
-    points, grid = body.vertices
-    denominator = max(c.denominator for c in n)  # powers of two
-    normal = tuple(int(c * denominator) for c in n)
-    limit = (body.radius / Fraction(2) ** grid) ** 2 * inner(normal, normal)
-    offset = offset * denominator / Fraction(2) ** grid
-    heights = [inner(normal, p) - offset for p in points]
-    is_clear = [height > 0 and height**2 > limit for height in heights]
+    points, unit = body.vertices, Fraction(2) ** body.vertices.grid
+    limit = (body.radius / unit) ** 2 * inner(n, n)
+
+    def is_clear(vertex: int) -> bool:
+        height = inner(n, points[vertex]) - offset / unit
+        return height > 0 and height**2 > limit
+
     if hit:
         vertices = [j if halfspace is A else i for i, j in pairs]
-        if any(0 <= k < len(points) and not is_clear[k] for k in vertices):
+        if any(0 <= k < len(points) and not is_clear(k) for k in vertices):
             return None
         return "no vertex named reaches the half-space"
-    return None if all(is_clear) else f"vertex {is_clear.index(False)} reaches the half-space"
+    lowest = points.first_along(in_integers(n))
+    return None if is_clear(lowest) else f"vertex {lowest} reaches the half-space"
 
 
 def flaw_of_normal(A: ExactPart, B: ExactPart, normal: Point) -> str | None:
@@ -67,8 +68,7 @@ def flaw_of_normal(A: ExactPart, B: ExactPart, normal: Point) -> str | None:
     if not (A.kind == B.kind == POINTS and A.radius == B.radius == 0):
         return "a plane proves something of convex bodies of vertices without radii alone"
     points_a, points_b, _ = common_vertices(A, B)
-    along_a, along_b = [inner(normal, p) for p in points_a], [inner(normal, q) for q in points_b]
-    if min(along_a) > max(along_b):
+    i, j = points_a.first_along(normal), points_b.first_along(opposite(normal))
+    if inner(normal, points_a[i]) > inner(normal, points_b[j]):
         return None
-    i, j = along_a.index(min(along_a)), along_b.index(max(along_b))
     return f"vertex {i} of A and vertex {j} of B are not on different sides of the plane"

@@ -9,7 +9,7 @@ import numpy as np
 
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex
 from collide.lowering.parts import parts_of
-from collide.numerics.exact_points import Point, moved, on_one_grid, placed
+from collide.numerics.exact_points import PlacedPoints
 from collide.numerics.exact_vectors import cross, inner
 
 IDENTITY = np.eye(4)
@@ -30,13 +30,9 @@ class ExactPart:
         return len(self.points_P)
 
     @cached_property
-    def vertices(self) -> tuple[list[Point], int]:
-        """(integer points, e): the vertices in W are these times 2^e [m]."""
-        first, *rest = self._poses
-        points, grid = placed(first, self.points_P)
-        for X in rest:
-            points, grid = moved(X, points, grid)
-        return points, grid
+    def vertices(self) -> PlacedPoints:
+        """The vertices in W [m]."""
+        return PlacedPoints(self.points_P, self._poses)
 
     @cached_property
     def plane(self) -> tuple[tuple[Fraction, Fraction, Fraction], Fraction]:
@@ -66,7 +62,7 @@ def has_exact_numbers(part: ExactPart) -> bool:
     return part.kind in (POINTS, HALFSPACE)
 
 
-def common_vertices(A: ExactPart, B: ExactPart) -> tuple[list[Point], list[Point], int]:
+def common_vertices(A: ExactPart, B: ExactPart) -> tuple[PlacedPoints, PlacedPoints, int]:
     """(vertices of A, vertices of B, e) as integers on one grid: in W they are these times 2^e [m]."""
-    (points_a, points_b), grid = on_one_grid(A.vertices, B.vertices)
-    return points_a, points_b, grid
+    grid = min(A.vertices.grid, B.vertices.grid)
+    return A.vertices.on_grid(grid), B.vertices.on_grid(grid), grid

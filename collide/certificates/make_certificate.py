@@ -16,7 +16,7 @@ from collide.certificates.region_proofs import RegionCertificate, make_region_ce
 from collide.certificates.verify import check_question
 from collide.errors import InvalidArgument, brief
 from collide.lowering.packed_convex import HALFSPACE
-from collide.numerics.exact_vectors import inner
+from collide.numerics.exact_points import in_integers
 from collide.results import UNDECIDED, PairResult, question_of_row
 from collide.transforms import as_poses
 
@@ -44,8 +44,9 @@ def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates
     InvalidArgument : shapes, results or numbers of poses that do not belong together.
     InvalidPose : poses that are no (4, 4) matrices of finite numbers.
 
-    The vertices that decided in doubles are tried first, O(vertices) integer operations; where they prove nothing
-    exactly, Gilbert's, Johnson's and Keerthi's algorithm goes on from them in integers, O(vertices) a round. Of meshes
+    The vertices that decided in doubles are tried first, O(vertices) doubles; where they prove nothing exactly,
+    Gilbert's, Johnson's and Keerthi's algorithm goes on from them, O(vertices) doubles a round: integers, which decide,
+    are made of those vertices alone that may be the farthest by a proven bound of rounding. Of meshes
     these are the hulls' where they are apart: O(n + m) a round; two facets where they meet; where one lies inside the
     other, O(m) a connected part of the surface. Of unions apart every pair of parts has its own: O(k l) searches for k
     and l parts.
@@ -100,13 +101,11 @@ def certificate_from_pairs(A, B, X_WA, X_WB, pairs: Sequence[VertexPair], *, hit
 def certificate_from_normal(A, B, X_WA, X_WB, normal: np.ndarray) -> tuple[Certificate, ...] | None:
     """The certificate "plane" of two convex polytopes from a normal (3,) towards A, its doubles taken exactly; None
     where the plane does not part them."""
-    fractions = [Fraction(float(c)) for c in normal]
-    scale = max(c.denominator for c in fractions)
-    x, y, z = (int(c * scale) for c in fractions)
+    whole = in_integers([Fraction(float(c)) for c in normal])
     (part_a,), (part_b,) = exact_parts(A, X_WA), exact_parts(B, X_WB)
-    if flaw_of_normal(part_a, part_b, (x, y, z)) is not None:
+    if flaw_of_normal(part_a, part_b, whole) is not None:
         return None
-    return (Certificate(PLANE, 0, 0, ((x, y, z),)),)
+    return (Certificate(PLANE, 0, 0, (whole,)),)
 
 
 def _of_parts(A: ExactPart, B: ExactPart, i: int, j: int, pairs: list[VertexPair], *, hit: bool) -> Certificate:
@@ -142,8 +141,7 @@ def _of_plane(A: ProofBody, B: ProofBody, hit: bool) -> Certificates:
     if body.kind == HALFSPACE:
         return None
     n, _ = halfspace.part().plane
-    points, _ = body.part().vertices
-    vertex = body.id_of(min(range(len(points)), key=lambda k: inner(n, points[k])), None)
+    vertex = body.id_of(body.part().vertices.first_along(in_integers(n)), None)
     pair = (NO_VERTEX, vertex) if halfspace is A else (vertex, NO_VERTEX)
     return (Certificate(TOGETHER if hit else APART, 0, 0, (pair,)),)
 

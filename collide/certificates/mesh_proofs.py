@@ -12,8 +12,7 @@ from collide.certificates.exact_parts import IDENTITY, ExactPart, exact_part, ha
 from collide.certificates.winding_number import winding_number
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.parts import parts_of
-from collide.numerics.exact_points import on_one_grid, placed
-from collide.numerics.exact_vectors import minus
+from collide.numerics.exact_points import PlacedPoints
 
 
 class ProofBody:
@@ -31,7 +30,7 @@ class ProofBody:
         self.vertex_ids: np.ndarray | None = None
         self._part: ExactPart | None = None
         if self.is_mesh:
-            self.vertex_ids, self.has_certificates = np.unique(shape.faces), True
+            self.vertex_ids, self.has_certificates = np.flatnonzero(np.bincount(shape.faces.ravel())), True
             return
         parts = [] if shape.meshed else parts_of(shape)
         if parts:
@@ -144,9 +143,10 @@ def flaw_of_inside_proof(A: ProofBody, B: ProofBody, pairs: Sequence[VertexPair]
         return "the other body is no solid mesh"
     if not body.has_vertex(vertex):
         return f"there is no vertex {vertex}"
-    points, grid = body.part([vertex] if body.is_mesh else None).vertices
-    point = points[0 if body.is_mesh else vertex]
-    (vertices, (origin,)), _ = on_one_grid(placed(solid.X, solid.shape.vertices), ([point], grid))
-    if winding_number([minus(p, origin) for p in vertices], solid.shape.faces.tolist()) > 0:
+    points = body.part([vertex] if body.is_mesh else None).vertices
+    vertices = PlacedPoints(solid.shape.vertices, [solid.X])
+    grid = min(points.grid, vertices.grid)
+    origin = points.on_grid(grid)[0 if body.is_mesh else vertex]
+    if winding_number(vertices.on_grid(grid).minus(origin), solid.shape.faces) > 0:
         return None
     return f"vertex {vertex} does not lie in the solid"

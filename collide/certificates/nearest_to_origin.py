@@ -7,7 +7,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 from collide.certificates.certificate import VertexPair
-from collide.numerics.exact_points import Point
+from collide.numerics.exact_points import PlacedPoints, Point, opposite
 from collide.numerics.exact_vectors import determinant, inner, minus
 
 
@@ -42,7 +42,7 @@ def nearest_to_origin(points: Sequence[Point]) -> NearestPoint:
     raise AssertionError("some subset holds the nearest point")
 
 
-def nearest_vertex_pairs(A: list[Point], B: list[Point], pairs: Sequence[VertexPair]) -> list[VertexPair]:
+def nearest_vertex_pairs(A: PlacedPoints, B: PlacedPoints, pairs: Sequence[VertexPair]) -> list[VertexPair]:
     """Index pairs (i, j) whose points A_i − B_j span the simplex of A ⊖ B nearest the origin: GJK in integers.
 
     pairs : where the search begins; of more than four the first four.
@@ -53,8 +53,7 @@ def nearest_vertex_pairs(A: list[Point], B: list[Point], pairs: Sequence[VertexP
         simplex = [simplex[k] for k in carrier]
         if not any(v):
             return simplex
-        i = min(range(len(A)), key=lambda k: inner(v, A[k]))
-        j = max(range(len(B)), key=lambda k: inner(v, B[k]))
+        i, j = A.first_along(v), B.first_along(opposite(v))
         if inner(v, minus(A[i], B[j])) * scale >= inner(v, v):
             return simplex
         simplex.append((i, j))

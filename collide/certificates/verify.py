@@ -40,8 +40,9 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     InvalidArgument : there is nothing to check: no shape, no single result, or none that has a certificate.
     InvalidPose : poses that are no (4, 4) matrices of finite numbers.
 
-    O(vertices) integer operations a pair of parts; O(facets) where a body lies inside a solid mesh. What certificates
-    there are, and what they prove: `collide.certificates.certificate`.
+    O(vertices) doubles a pair of parts, and integers of those vertices that these leave in doubt; O(facets) where a
+    body lies inside a solid mesh. What certificates there are, and what they prove:
+    `collide.certificates.certificate`.
     """
     check_question("verify", [A], [B], r)
     X_WA, X_WB = as_poses(X_WA, "X_WA", check=False), as_poses(X_WB, "X_WB", check=False)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from collide.numerics.exact_points import Point
+import numpy as np
+
+from collide.numerics.exact_points import PlacedPoints, Point
 from collide.numerics.exact_vectors import cross, inner, minus
 
 #: Directions of the rays tried one after another, until one passes no edge and no corner.
@@ -13,10 +15,11 @@ _DIRECTIONS: tuple[Point, ...] = (
 )  # fmt: skip
 
 
-def winding_number(points: Sequence[Point], faces: Sequence[Sequence[int]]) -> int:
+def winding_number(points: PlacedPoints, faces: np.ndarray) -> int:
     """Winding number of closed facets about the origin; 1 where it lies on a facet, 0 where every ray passes an edge.
 
-    Facets that the ray leaves from inside count 1, those it enters −1. O(facets).
+    faces : (m, 3) numbers of points. Facets that the ray leaves from inside count 1, those it enters −1. O(m) doubles,
+    and integers of those facets that a line may meet.
     """
     for direction in _DIRECTIONS:
         number = _along_ray(points, faces, direction)
@@ -25,15 +28,18 @@ def winding_number(points: Sequence[Point], faces: Sequence[Sequence[int]]) -> i
     return 0
 
 
-def _along_ray(points: Sequence[Point], faces: Sequence[Sequence[int]], direction: Point) -> int | None:
+def _along_ray(points: PlacedPoints, faces: np.ndarray, direction: Point) -> int | None:
     """The winding number by one ray from the origin; None where it passes an edge or a corner."""
     # Coordinates across the line: its facets have corners on both sides of two planes through it.
     u = -direction[1], direction[0], 0
     w = cross(direction, u)
-    across = [(inner(u, p), inner(w, p)) for p in points]
+    for axis in (u, w):
+        signs = points.signs_along(axis)[faces]
+        faces = faces[(signs[:, 0] == 0) | (signs != signs[:, :1]).any(axis=1)]
     total, passes_edge = 0, False
-    for a, b, c in faces:
-        (pa, qa), (pb, qb), (pc, qc) = across[a], across[b], across[c]
+    for face in faces.tolist():
+        corners = [points[k] for k in face]
+        (pa, qa), (pb, qb), (pc, qc) = ((inner(u, p), inner(w, p)) for p in corners)
         if (pa > 0 and pb > 0 and pc > 0) or (pa < 0 and pb < 0 and pc < 0):
             continue
         if (qa > 0 and qb > 0 and qc > 0) or (qa < 0 and qb < 0 and qc < 0):
@@ -42,7 +48,6 @@ def _along_ray(points: Sequence[Point], faces: Sequence[Sequence[int]], directio
         low, high = min(sides), max(sides)
         if low < 0 < high:
             continue  # the line passes beside the facet
-        corners = points[a], points[b], points[c]
         n = cross(minus(corners[1], corners[0]), minus(corners[2], corners[0]))
         height = inner(n, corners[0])
         if height == 0 and any(n) and _holds_origin(corners, n):

@@ -216,24 +216,23 @@ def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[n
     is_body = (X_BP == np.eye(4)).all(axis=(-2, -1))
     if is_body.all():
         return X_WB, np.zeros(len(X_WB))
+    total, lost = np.zeros((len(X_WB), 3, 4)), np.zeros((len(X_WB), 3, 4), dtype=bool)
+    for k in range(4):
+        some = slice(0 if k < 3 else 3, 4)  # only the shift has a fourth term
+        if k < 3:
+            factor_a, factor = X_WB[:, :3, k, None], X_BP[..., None, k, :]
+            high, low = _two_products(factor_a, factor)
+            lost |= ~((np.abs(high) > SAFE_PRODUCT) | (factor_a == 0.0) | (factor == 0.0)) | (low != 0.0)
+        else:
+            high = X_WB[:, :3, 3:]
+        before = total[:, :, some]
+        sum_ = before + high
+        back = sum_ - before
+        lost[:, :, some] |= (before - (sum_ - back)) + (high - back) != 0.0
+        total[:, :, some] = sum_
+    exact = ~lost.any(axis=(1, 2))
     out = np.zeros_like(X_WB)
-    out[:, 3, 3] = 1.0
-    exact = np.ones(len(X_WB), dtype=bool)
-    for j in range(4):
-        total = np.zeros((len(X_WB), 3))
-        for k in range(4 if j == 3 else 3):
-            if k == 3:
-                high, low = X_WB[:, :3, 3], np.zeros((len(X_WB), 3))
-            else:
-                factor_a, factor = X_WB[:, :3, k], X_BP[..., k, j, None]
-                high, low = _two_products(factor_a, factor)
-                exact &= ((np.abs(high) > SAFE_PRODUCT) | (factor_a == 0.0) | (factor == 0.0)).all(axis=1)
-            sum_, low_term = total + high, total
-            back = sum_ - low_term
-            lost = (low_term - (sum_ - back)) + (high - back)
-            exact &= ((low == 0.0) & (lost == 0.0)).all(axis=1)
-            total = sum_
-        out[:, :3, j] = total
+    out[:, :3], out[:, 3, 3] = total, 1.0
     stretch = np.maximum(1.0, np.abs(X_WB[:, :3, :3]).sum(axis=2).max(axis=1))
     parts = reach + np.abs(X_BP[..., :3, 3]).sum(axis=-1)
     slop = PRODUCT_SLOP * (stretch * parts + np.abs(X_WB[:, :3, 3]).max(axis=1))

@@ -78,6 +78,7 @@ class MeshTree:
         self.address = address_of(self.header)
         self._content: bytes | None = None
         self._slabs: np.ndarray | None = None
+        self._places: np.ndarray | None = None
         for part in (self.nodes, self.triangles, self.ids, self.centre, self.numbers):
             part.flags.writeable = False
 
@@ -93,6 +94,15 @@ class MeshTree:
             self._content = digest.digest()
         return self._content
 
+    @property
+    def places(self) -> np.ndarray:
+        """(n,) int64: where each facet, by number, stands in the order of the leaves."""
+        if self._places is None:
+            places = np.empty(len(self.ids), dtype=np.int64)
+            places[self.ids] = np.arange(len(places))
+            self._places = places
+        return self._places
+
     def need_slabs(self, make) -> None:
         """Make the slabs that distances need (``make``: `bvh_slabs.make_slabs`) unless they are there."""
         if self._slabs is None:
@@ -105,7 +115,7 @@ class MeshTree:
     @property
     def nbytes(self) -> int:
         """Bytes of the tree, its triangles included."""
-        parts = (self.nodes, self.triangles, self.ids, self.numbers, self.header, self._slabs)
+        parts = (self.nodes, self.triangles, self.ids, self.numbers, self.header, self._slabs, self._places)
         return sum(part.nbytes for part in parts if part is not None)
 
     def boxes(self, nodes=slice(None)) -> tuple[np.ndarray, np.ndarray]:

@@ -175,14 +175,13 @@ def _take(motion, top, n, p, q, body, partner, margin):
     if state == OPEN and (only_holds(motion.scene, p) or only_holds(motion.scene, q)):
         _leave_meshes(motion, body, partner)
         return n
-    if top + n + 1 > motion.words[ITEM_CAPACITY]:
-        return -1
-    at = ITEM * (top + n)
+    has_space = top + n < motion.words[ITEM_CAPACITY]
+    at = ITEM * (top + n if has_space else motion.words[ITEM_CAPACITY])  # the last place is for a name without space
     motion.items[at] = p
     motion.items[at + 1] = q
     motion.items[at + 2] = body
     motion.items[at + 3] = partner
-    return n + 1
+    return n + 1 if has_space else -1
 
 
 @kernel
@@ -221,7 +220,8 @@ def _pass_on(motion, first, n_items, top):
 
 @kernel
 def _leave_interval(motion, number, begin, end, top, n_items):
-    """Note an interval that stays open, with the first of its pairs; what follows on the last one lengthens that.
+    """Note an interval that stays open, with the first of its pairs, the one that found no space where there was none;
+    what follows on the last one lengthens that.
 
     It is counted where there is no space.
     """
@@ -239,8 +239,9 @@ def _leave_interval(motion, number, begin, end, top, n_items):
     out[at] = float(number)
     out[at + 1] = begin
     out[at + 2] = end
-    out[at + 3] = float(motion.items[ITEM * top + 2] if n_items > 0 else -1)
-    out[at + 4] = float(motion.items[ITEM * top + 3] if n_items > 0 else -1)
+    item = ITEM * (top if n_items > 0 else words[ITEM_CAPACITY])
+    out[at + 3] = float(motion.items[item + 2])
+    out[at + 4] = float(motion.items[item + 3])
 
 
 @kernel

@@ -94,7 +94,7 @@ class MotionWorkspace:
             motions.PATHS_AT: table, motions.PATH_LENGTHS_AT: lengths, motions.BETWEEN_AT: between,
             motions.CONFIGURATION_AT: np.zeros(max(dof, 1)), motions.MOVED_AT: np.zeros((len(paths), stride + 1)),
             motions.INTERVALS_AT: np.zeros((motions.MAX_INTERVALS + 1, motions.INTERVAL)),
-            motions.ITEMS_AT: np.empty((n_items, motions.ITEM), dtype=np.int64),
+            motions.ITEMS_AT: np.empty((n_items + 1, motions.ITEM), dtype=np.int64),
         }  # fmt: skip
         self.header = np.zeros(motions.MOTION_HEADER, dtype=np.int64)
         for word, buffer in self._buffers.items():

@@ -92,7 +92,7 @@ def motion_at(scene, motions_at, q0, q1, at, dof):
         scene, words, q0, q1, at, dof, view_f64(words[CONFIGURATION_AT], dof),
         view_f64(words[MOVED_AT], scene.words[N_BODIES] * (words[PATH_STRIDE] + 1)),
         view_f64(words[INTERVALS_AT], INTERVAL * (MAX_INTERVALS + 1)),
-        view_i64(words[ITEMS_AT], ITEM * words[ITEM_CAPACITY]), settings[0], settings[1], max_change,
+        view_i64(words[ITEMS_AT], ITEM * (words[ITEM_CAPACITY] + 1)), settings[0], settings[1], max_change,
     )  # fmt: skip
 
 

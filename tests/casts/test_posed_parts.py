@@ -76,7 +76,7 @@ def test_parts_of_one_body_follow_its_poses():
         assert parts.packed(k) is packed
         np.testing.assert_allclose(place_of(parts, k), (X_WA[pose_number] @ X_AP)[:3], rtol=0, atol=1e-14)
         assert (parts.poses.rows[k, POSE_SLOP] > 0.0) == (item > 0)  # the first stands where its body does
-    corners, grid = parts.exact(0).vertices
+    corners, grid = parts.exact(0).vertices, parts.exact(0).vertices.grid
     rounded = np.array([[float(v) for v in p] for p in corners]) * 2.0**grid
     by_hand = parts.packed(0).points @ X_WA[0, :3, :3].T + X_WA[0, :3, 3]
     np.testing.assert_allclose(rounded, by_hand, rtol=0, atol=1e-14)

@@ -13,6 +13,7 @@ import collide
 from collide.certificates.exact_parts import exact_parts
 from collide.certificates.nearest_to_origin import nearest_to_origin, nearest_vertex_pairs
 from collide.certificates.winding_number import winding_number
+from collide.numerics.exact_points import PlacedPoints
 from collide.numerics.exact_vectors import inner
 
 EYE = np.eye(4)
@@ -104,7 +105,8 @@ def test_nearest_vertex_pairs_agree_with_all_pairs():
     rng = rng_of("nearest vertex pairs")
     for _ in range(60):
         A, B = (
-            [tuple(p) for p in (rng.integers(-9, 10, (7, 3)) + shift).tolist()] for shift in ((0, 0, 0), (14, 3, 0))
+            PlacedPoints(rng.integers(-9, 10, (7, 3)) + np.array(shift, dtype=float), []).on_grid(-60)
+            for shift in ((0, 0, 0), (14, 3, 0))
         )
         pairs = nearest_vertex_pairs(A, B, [(0, 0)])
         v, scale, _ = nearest_to_origin([tuple(a - b for a, b in zip(A[i], B[j])) for i, j in pairs])
@@ -116,7 +118,7 @@ def test_winding_numbers_of_a_box():
     """Inside 1, outside 0, on the surface 1; of a box inside out −1 within."""
     corners = np.array([[x, y, z] for x in (0, 4) for y in (0, 4) for z in (0, 4)])
     hull = collide.ConvexHull(corners.astype(float))
-    faces = hull.hull.facets.tolist()
+    faces = hull.hull.facets
     for point, number in (
         ((1, 2, 3), 1),
         ((5, 1, 1), 0),
@@ -125,10 +127,10 @@ def test_winding_numbers_of_a_box():
         ((-1, -1, -1), 0),
         ((4, 2, 0), 1),
     ):
-        vertices = [tuple(p) for p in (corners - point).tolist()]
+        vertices = PlacedPoints((corners - point).astype(float), [])
         assert winding_number(vertices, faces) == number, point
-    turned_inside_out = [face[::-1] for face in faces]
-    assert winding_number([tuple(p) for p in (corners - (1, 2, 3)).tolist()], turned_inside_out) == -1
+    turned_inside_out = faces[:, ::-1]
+    assert winding_number(PlacedPoints((corners - (1, 2, 3)).astype(float), []), turned_inside_out) == -1
 
 
 def test_planes_and_vertices_of_nested_poses_are_exact():
@@ -139,5 +141,5 @@ def test_planes_and_vertices_of_nested_poses_are_exact():
     points = collide.ConvexHull(np.column_stack([rng.integers(-8, 9, (5, 2)) / 8, np.full(5, 0.25)]))
     (plane,), (hull,) = (exact_parts(collide.Compound([(shape, X_AP)]), X_WA) for shape in (half, points))
     n, offset = plane.plane
-    vertices, grid = hull.vertices
+    vertices, grid = hull.vertices, hull.vertices.grid
     assert {inner(n, p) * 2**grid if grid >= 0 else inner(n, p) / 2**-grid for p in vertices} == {offset}

@@ -62,7 +62,7 @@ def test_half_spaces_by_every_vertex():
         B = collide.Halfspace(normal, float(rng.integers(-3, 4)))
         (A,), (plane,) = exact_parts(case.A, case.X_WA), exact_parts(B, case.X_WB)
         n, offset = plane.plane
-        points, grid = A.vertices
+        points, grid = A.vertices, A.vertices.grid
         square = sum(c * c for c in n)
         heights = [sum(c * x for c, x in zip(n, p)) * Fraction(2) ** grid - offset for p in points]
         reaches = [h <= 0 or h * h <= A.radius**2 * square for h in heights]

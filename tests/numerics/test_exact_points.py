@@ -146,3 +146,57 @@ def test_where_rays_enter_triangles(size):
         at_once += true == 0
         flat += not E.inner(E.cross(E.minus(triangle[1], triangle[0]), E.minus(triangle[2], triangle[0])), direction)
     assert met > 800 and (size > 2 or min(flat, at_once) > 20), (met, flat, at_once)
+
+
+# --- points that are made when they are asked for ------------------------------------------------
+
+
+def drawn_points(rng, kind: int) -> np.ndarray:
+    points = rng.normal(size=(int(rng.integers(1, 30)), 3))
+    if kind == 1:  # on a grid: many have equal products
+        return np.round(3 * points) / 4
+    if kind == 2:  # of all magnitudes, denormal ones and such as overflow among them
+        return points * 2.0 ** rng.integers(-1070, 1021, points.shape)
+    return points + rng.choice((0.0, 2.0**30))
+
+
+def drawn_vector(rng, kind: int) -> tuple[int, int, int]:
+    low, high = ((-2, 3), (-(2**40), 2**40))[int(rng.integers(2))]
+    x, y, z = rng.integers(low, high, 3).tolist()
+    return (x << 1100, y, z) if kind == 2 and rng.integers(2) else (x, y, z)
+
+
+def by_fractions(points: np.ndarray, poses: list[np.ndarray]) -> list[list[Fraction]]:
+    exact = [[Fraction(v) for v in p] for p in points.tolist()]
+    for X in poses:
+        rows = [[Fraction(v) for v in row] for row in X[:3].tolist()]
+        exact = [[sum((a * b for a, b in zip(row, p)), row[3]) for row in rows] for p in exact]
+    return exact
+
+
+@pytest.mark.parametrize("kind", range(3))
+def test_the_first_point_along_a_vector_is_that_of_fractions(kind):
+    rng, ties, open_signs, signs = rng_of("points along a vector", kind), 0, 0, 0
+    for case in range(150):
+        points, poses = drawn_points(rng, kind), [random_pose(rng) for _ in range(case % 3)]
+        if case % 5 == 0:
+            poses = [np.diag((1.0, -1.0, -1.0, 1.0))]
+        v = drawn_vector(rng, kind)
+        placed, exact = E.PlacedPoints(points, poses), by_fractions(points, poses)
+        told = f"{points.tolist()}, {[X.tolist() for X in poses]}, {v}"
+        unit = Fraction(2) ** placed.grid
+        assert [[x * unit for x in p] for p in placed] == exact, told
+        assert placed[len(points) - 1] == list(placed)[-1], told
+        finer = placed.on_grid(placed.grid - 7)
+        assert finer[0] == tuple(x << 7 for x in placed[0]), told
+        products = [sum(a * b for a, b in zip(v, p)) for p in exact]
+        assert placed.first_along(v) == products.index(min(products)), told
+        ties += products.count(min(products)) > 1
+        last = [sum(a * b for a, b in zip(v, exact[-1]))] * len(exact)
+        for seen, heights in ((placed, products), (placed.minus(placed[-1]), [a - b for a, b in zip(products, last)])):
+            for sign, height in zip(seen.signs_along(v).tolist(), heights):
+                assert sign == 0 or sign == (height > 0) - (height < 0), told
+                open_signs += sign == 0 and height != 0
+                signs += height != 0
+    assert ties > (8 if kind == 1 else -1) and signs > 500, (ties, signs)
+    assert kind == 2 or open_signs < 0.05 * signs, (open_signs, signs)

@@ -9,6 +9,7 @@ from random_robots import plain_link_poses, random_configurations, random_link_s
 
 import collide
 from collide.errors import InvalidArgument
+from collide.robots import check_workspace
 from collide.robots.certified_edges import OPEN_DTYPE, CertifiedEdges, sampled_collision
 from collide.robots.kinematic_tree import Joint
 from collide.robots.robot import LinkShape, Robot
@@ -239,3 +240,19 @@ def test_links_that_cannot_be_told_apart_are_both_named():
     edges = collide.RobotChecker(robot).certify_edges([[-3.0, 0.0]], [[3.0, 0.0]], resolution=1e-2)
     assert edges.is_open[0] and set(edges.open_names) == {("right", "left")}
     assert edges.open["begin"][0] <= 0.34 and edges.open["end"][-1] >= 0.66
+
+
+@pytest.mark.parametrize("space", [0, 1, 2])
+def test_intervals_that_more_pairs_leave_open_than_there_is_space_for_are_named(space, monkeypatch):
+    """Of sliders side by side two pairs cannot be told apart, and the lists of pairs have too little space."""
+    monkeypatch.setattr(check_workspace, "_MAX_ITEMS", space)
+    block = [LinkShape(collide.Box((1.0, 1.0, 1.0)), np.eye(4), None, "test")]
+    links = {"far": 100.0, "farther": 200.0, "left": -1.0 - 1e-9, "middle": 0.0, "right": 1.0 + 1e-9}
+    joints = [Joint(name, "prismatic", "base", name, pose(t=(0, y, 0)), (1.0, 0, 0)) for name, y in links.items()]
+    robot = Robot("three", ["base", *links], joints, dict.fromkeys(links, block))
+    q = np.array([[0.0, 0.0, 0.0, 3.0, 0.0]])
+    edges = collide.RobotChecker(robot).certify_edges(-q, q, resolution=1e-2)
+    assert edges.is_open[0] and {frozenset(names) for names in edges.open_names} <= {
+        frozenset(("left", "middle")), frozenset(("middle", "right"))
+    }  # fmt: skip
+    assert edges.open["begin"].min() <= 0.34 and edges.open["end"].max() >= 0.66

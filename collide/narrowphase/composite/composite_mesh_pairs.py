@@ -28,8 +28,8 @@ from collide.shapes.shape import Shape
 
 #: Rounding of a determinant of differences, of the product of their lengths; and of a coordinate, of the size.
 _DETERMINANT, _COORDINATE = 2.0**-46, 2.0**-48
-#: Pairs of facets that meet and are looked at for a crossing that no rounding undoes.
-_MAX_PAIRS = 4096
+#: Pairs of facets of a pose that meet and are looked at for a crossing that no rounding undoes; so many at once.
+_MAX_PAIRS, _PAIRS_AT_ONCE = 4096, 64
 
 
 def part_states(A: Shape, B: Shape, X_WA: PosesWithSlop, X_WB: PosesWithSlop) -> np.ndarray:
@@ -171,11 +171,15 @@ def loose_states(A: Body, B: Body, PA: PosesWithSlop, PB: PosesWithSlop) -> np.n
         remaining = remaining[met]
         crossing = _crossing(A, B, first.pairs, PA.X[remaining], PB.X[remaining], slop[remaining])
         states[remaining[crossing]] = HIT
-        for k in remaining[~crossing].tolist():
-            pairs = all_hits(A.tree, B.tree, PA.X[k], PB.X[k]).pairs[:_MAX_PAIRS]
-            repeated = (np.broadcast_to(value, (len(pairs), *value.shape)) for value in (PA.X[k], PB.X[k], slop[k]))
-            if _crossing(A, B, pairs, *repeated).any():
-                states[k] = HIT
+        remaining = remaining[~crossing]
+        if len(remaining):
+            every = all_hits(A.tree, B.tree, PA.X[remaining], PB.X[remaining])
+            starts, count = every.starts[:-1], np.diff(every.starts)
+            of_pair, rank = np.repeat(remaining, count), np.arange(len(every.pairs)) - np.repeat(starts, count)
+            for begin in range(0, min(int(count.max()), _MAX_PAIRS), _PAIRS_AT_ONCE):
+                some = (rank >= begin) & (rank < begin + _PAIRS_AT_ONCE) & (states[of_pair] == OPEN)
+                k = of_pair[some]
+                states[k[_crossing(A, B, every.pairs[some], PA.X[k], PB.X[k], slop[k])]] = HIT
     return states
 
 
@@ -190,11 +194,9 @@ def _crossing(A: Body, B: Body, pairs: np.ndarray, X_WA: np.ndarray, X_WB: np.nd
     moved = 1.001 * slop + _COORDINATE * (
         _terms(A, pairs[:, 0], X_WA) + _terms(B, pairs[:, 1], X_WB) + np.abs(shift).max(axis=1)
     )
-    crossing = np.zeros(len(pairs), dtype=bool)
-    for T, S in ((U, V), (V, U)):
-        for k in range(3):
-            crossing |= _passes(S[:, k], S[:, (k + 1) % 3], T[:, 0], T[:, 1], T[:, 2], moved)
-    return crossing
+    edges = [(S[:, k], S[:, k - 2], T[:, 0], T[:, 1], T[:, 2], moved) for T, S in ((U, V), (V, U)) for k in range(3)]
+    passes: np.ndarray = _passes(*map(np.concatenate, zip(*edges))).reshape(6, -1)
+    return np.logical_or.reduce(passes)
 
 
 def _corners(body: Body, facets: np.ndarray, X: np.ndarray, shift: np.ndarray) -> np.ndarray:
@@ -209,22 +211,21 @@ def _terms(body: Body, facets: np.ndarray, X: np.ndarray) -> np.ndarray:
 
 
 def _own_corners(body: Body, facets: np.ndarray) -> np.ndarray:
-    place = np.empty(len(body.tree.ids), dtype=np.int64)
-    place[body.tree.ids] = np.arange(len(place))
-    return body.tree.triangles[place[facets]].reshape(-1, 3, 3)
+    return body.tree.triangles[body.tree.places[facets]].reshape(-1, 3, 3)
 
 
 def _passes(p, q, a, b, c, moved) -> np.ndarray:
     """(k,) whether segments pq pass through triangles abc, (k, 3) each, whoever moves any corner by ``moved`` (k,)."""
-    below, above = _sign(a, b, c, p, moved), _sign(a, b, c, q, moved)
-    sides = [_sign(p, q, u, v, moved) for u, v in ((a, b), (b, c), (c, a))]
+    corners = (a, b, c, p), (a, b, c, q), (p, q, a, b), (p, q, b, c), (p, q, c, a)
+    of, to, by, at = map(np.concatenate, zip(*corners))
+    below, above, *sides = _sign(of, to, by, at, np.tile(moved, 5)).reshape(5, -1)
     return (below * above < 0) & (sides[0] != 0) & (sides[0] == sides[1]) & (sides[1] == sides[2])
 
 
 def _sign(a, b, c, d, moved) -> np.ndarray:
     """(k,) sign of the volume of abcd, 0 where moving corners by ``moved`` might change it."""
     u, v, w = b - a, c - a, d - a
-    value = (u * np.cross(v, w)).sum(axis=1)
+    value = sum(u[:, i] * (v[:, j] * w[:, k] - v[:, k] * w[:, j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)))
     x, y, z = (np.sqrt(np.square(edge).sum(axis=1)) for edge in (u, v, w))
     m = 2.0 * moved
     error = m * (x * y + y * z + z * x) + m * m * (x + y + z) + m * m * m

@@ -10,24 +10,32 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import cache
 
 import numpy as np
 
+from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
 from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
 from collide.narrowphase.convex_kernel_calls import run_poses
 from collide.narrowphase.facets.collide_kernel import APART, HIT, OPEN
+from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.separating_translation import SeparatingTranslation, shortened
+from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE
 from collide.numerics.frames import frame_along
 from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED, flipped
+from collide.shapes.primitives import Sphere
 from collide.shapes.shape import Shape
 
 #: Pairs of parts that trial booleans of a depth search ask about before boxes of all parts are made.
 _ASKED_FIRST = 8
 #: Pairs of convex sets around parts that are posed at once: they need little memory.
 _BOUNDS_AT_ONCE = 1 << 14
+#: Of more parts at one mesh, balls around them are asked before they are.
+_AT_ONE_MESH = 4
+_POINT = Sphere(1.0)
 
 
 def compound_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, open_ones: bool = False) -> np.ndarray:
@@ -53,12 +61,14 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
     if len(first) and len(X_WA) > 1 and meshed.size > _ASKED_FIRST:
         gaps = np.where(meshed, _box_gaps(A, B, X_WA[first], X_WB[first])[0], math.inf)
         deepest = np.argsort(gaps, axis=None, kind="stable")[:_ASKED_FIRST]
-        meeting = np.unravel_index(deepest[gaps.flat[deepest] <= 0.0], gaps.shape)
-        for i, j in zip(*(number.tolist() for number in meeting)):
+        deepest = deepest[gaps.flat[deepest] <= 0.0]
+        for some in (deepest[:1], deepest[1:]):
+            i, j = np.unravel_index(some, gaps.shape)
             poses = np.flatnonzero(states != HIT)
-            if len(poses):
-                gaps_ij = _box_gaps(A, B, X_WA[poses], X_WB[poses], np.array([i]), np.array([j]))[:, 0, 0]
-                _take_states(A, B, i, j, poses[gaps_ij <= 0.0], X_WA, X_WB, states)
+            if len(some) and len(poses):
+                gaps_ij = _box_gaps(A, B, X_WA[poses], X_WB[poses], i, j)[:, range(len(some)), range(len(some))]
+                at, pose = np.nonzero(gaps_ij.T <= 0.0)
+                _take_states(A, B, i[at], j[at], poses[pose], X_WA, X_WB, states)
             meshed[i, j] = False
     poses = np.flatnonzero(states != HIT)
     if len(poses):
@@ -67,12 +77,16 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
         if np.any(near, axis=0).sum() > _ASKED_FIRST and not (A.unbounded or B.unbounded):
             if len(X_WA) == 1:
                 i, j = np.unravel_index(np.where(near[0], gaps[0], math.inf).argmin(), meshed.shape)
-                _take_states(A, B, int(i), int(j), poses, X_WA, X_WB, states)
+                _take_states(A, B, i[None], j[None], poses, X_WA, X_WB, states)
             if (states[poses] != HIT).any():
                 _leave_out_sets(A, B, X_WA[poses], X_WB[poses], near)
-        for i, j in np.argwhere(np.any(near, axis=0)).tolist():
-            remaining = poses[near[:, i, j]]
-            _take_states(A, B, i, j, remaining[states[remaining] != HIT], X_WA, X_WB, states)
+        pairs = np.argwhere(np.any(near, axis=0))
+        begin, size = 0, _ASKED_FIRST
+        while begin < len(pairs):  # in blocks, each larger, since poses with a hit are done with
+            i, j = pairs[begin : begin + size].T
+            begin, size = begin + size, 4 * size
+            at, pose = np.nonzero(near[:, i, j].T & (states[poses] != HIT))
+            _take_states(A, B, i[at], j[at], poses[pose], X_WA, X_WB, states)
     return states
 
 
@@ -101,12 +115,60 @@ def _leave_out_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, near: np.nda
         near[tuple(some[:, distances["lower"] > slop])] = False
 
 
-def _take_states(A: CompoundParts, B: CompoundParts, i: int, j: int, poses, X_WA, X_WB, states: np.ndarray) -> None:
-    """Ask about one pair of parts at poses by number, and put what it tells of the unions into ``states`` (n,)."""
-    if len(poses):
-        part_a, part_b, PA, PB = _parts_at(A, B, i, j, X_WA[poses], X_WB[poses])
-        part_state = part_states(part_a.shape, part_b.shape, PA, PB)
-        states[poses] = np.where(part_state == APART, states[poses], part_state)
+def _take_states(A: CompoundParts, B: CompoundParts, i, j, poses, X_WA, X_WB, states: np.ndarray) -> None:
+    """Ask about pairs of parts i, j (k,) at poses by number (k,), those of a pair together, and put what is told of the
+    unions into ``states`` (n,)."""
+    status = np.full(len(poses), OPEN)
+    begins = (np.diff(i, prepend=-1) != 0) | (np.diff(j, prepend=-1) != 0)
+    for of_mesh, of_other, sides in ((i, j, (A, B, X_WA, X_WB)), (j, i, (B, A, X_WB, X_WA))):
+        for number in np.flatnonzero(np.bincount(of_mesh[begins]) > _AT_ONE_MESH).tolist():
+            some = np.flatnonzero((status == OPEN) & (of_mesh == number))
+            if sides[0].columns.meshed[number]:
+                status[some] = _states_by_balls(*sides, number, of_other[some], poses[some])
+    states[poses[status == HIT]] = HIT
+    some = np.flatnonzero((status == OPEN) & (states[poses] != HIT))
+    if not len(some):
+        return
+    PA, PB = _placed(A, B, i[some], j[some], X_WA[poses[some]], X_WB[poses[some]])
+    of_pair = np.cumsum(begins)[some]
+    for rows in np.split(np.arange(len(some)), np.flatnonzero(np.diff(of_pair)) + 1):
+        rows = rows[states[poses[some[rows]]] != HIT]
+        if len(rows):
+            at, first = poses[some[rows]], some[rows[0]]
+            state = part_states(A.parts[i[first]].shape, B.parts[j[first]].shape, PA.of(rows), PB.of(rows))
+            states[at] = np.where(state == APART, states[at], state)
+
+
+def _states_by_balls(
+    M: CompoundParts, N: CompoundParts, X_WM, X_WN, mesh: int, others: np.ndarray, poses: np.ndarray
+) -> np.ndarray:
+    """(k,) what balls around parts of N tell of them and a mesh of M, at poses by number: APART or HIT, OPEN otherwise.
+
+    A part is within its ball. Where no facet comes as near to the centre as the ball is large, and rounding moved them,
+    all of the ball is on the side of the surface that the centre is on.
+    """
+    status = np.full(len(others), OPEN)
+    body, unique = body_of(M.parts[mesh].shape), np.unique(poses, return_inverse=True)
+    placed = M.parts[mesh].at(X_WM[unique[0]], np.zeros(len(unique[0]))).of(unique[1])
+    centres, radii = N.balls(others, X_WN[poses])
+    reach = radii + placed.slop
+    some = np.flatnonzero(np.isfinite(reach))
+    if len(some):
+        X = np.tile(np.eye(4), (len(some), 1, 1))
+        X[:, :3, 3] = centres[some]
+        limit = float(reach[some].max()) * (1.0 + 2.0**-40)
+        proven_apart = surface_distances(body.tree, _point().tree, placed.X[some], X, limit).lower > reach[some]
+        some, X = some[proven_apart], X[proven_apart]
+    if len(some):
+        sides = points_in_solid(body.tree, placed.X[some], np.zeros(3), X) if body.solid else OUTSIDE
+        status[some] = np.where(sides == OUTSIDE, APART, np.where(sides == INSIDE, HIT, OPEN))
+    return status
+
+
+@cache
+def _point() -> Body:
+    """The origin as a body: one facet without area."""
+    return body_of(_POINT)
 
 
 def _mesh_pairs(A: CompoundParts, B: CompoundParts, wanted: np.ndarray) -> list[list[int]]:
@@ -116,11 +178,17 @@ def _mesh_pairs(A: CompoundParts, B: CompoundParts, wanted: np.ndarray) -> list[
 
 def _parts_at(A: CompoundParts, B: CompoundParts, i: int, j: int, X_WA, X_WB):
     """(part, part, their poses, their poses)."""
-    part_a, part_b = A.parts[i], B.parts[j]
+    which = np.full(len(X_WA), i), np.full(len(X_WB), j)
+    return A.parts[i], B.parts[j], *_placed(A, B, *which, X_WA, X_WB)
+
+
+def _placed(A: CompoundParts, B: CompoundParts, i, j, X_WA, X_WB) -> tuple[PosesWithSlop, PosesWithSlop]:
+    """Poses of pairs of parts by number (k,), of the unions' poses (k, 4, 4)."""
     about = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
-    for part in (part_a, part_b):
-        about = about + 2.0 * (part.bound.reach + part.bound.radius + np.abs(part.X[:3, 3]).sum())
-    return part_a, part_b, part_a.at(X_WA, about), part_b.at(X_WB, about)
+    for columns, which in ((A.columns, i), (B.columns, j)):
+        shift = np.abs(columns.X[which, :3, 3]).sum(axis=1)
+        about = about + 2.0 * (columns.reach[which] + columns.radius[which] + shift)
+    return A.placed(i, X_WA, about), B.placed(j, X_WB, about)
 
 
 def _box_gaps(A: CompoundParts, B: CompoundParts, X_WA, X_WB, of_a=None, of_b=None) -> np.ndarray:
@@ -231,6 +299,8 @@ def _part_rows(
     wanted = np.any(gaps <= np.minimum(upper, sight)[:, None, None], axis=0)
     wanted[tuple(last)] = True
     for i, j in _mesh_pairs(A, B, wanted):
+        if hit.all() and not planes:
+            break
         far = gaps[:, i, j] > np.minimum(upper, sight)
         if [i, j] == last:  # a pose keeps at least one row
             far &= np.array([bool(rows) for rows in asked], dtype=bool)

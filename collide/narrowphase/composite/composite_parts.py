@@ -71,6 +71,12 @@ def _placed(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray, rotation, shi
     return PosesWithSlop(X, slop + stretch * (rotation * reach + shift) * _UP)
 
 
+def _stretch_of(R: np.ndarray) -> np.ndarray:
+    """(k,) at least how much longer matrices (k, 3, 3) make a vector, and 1: the root of the norm of R^T R."""
+    gram = np.abs(R.transpose(0, 2, 1) @ R).sum(axis=2).max(axis=1)
+    return np.maximum(np.sqrt(gram), 1.0) * _UP
+
+
 class PartColumns(NamedTuple):
     """All parts of a union, a row each.
 
@@ -190,6 +196,24 @@ class CompoundParts:
         reach = np.tile(self._table.numbers[which, REACH], n)
         poses = pose_table(np.repeat(X_WB, k, axis=0), X_BP, reach, terms=False)
         return boxes_of(self._table, poses.rows, np.tile(which, n)).reshape(n, k, 6)
+
+    def balls(self, which: np.ndarray, X_WB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(centres (m, 3), radii (m,) [m]) of balls that hold parts (m,) by number, at the union's poses (m, 4, 4);
+        infinite of half-spaces.
+
+        Centres are the parts' origins, three products and three sums of each coordinate rounded.
+        """
+        columns, R, p = self.columns, X_WB[:, :3, :3], X_WB[:, :3, 3]
+        terms = R * columns.X[which, None, :3, 3]
+        reach = columns.reach[which]
+        held = self._stretch[which] * reach + columns.radius[which] + columns.slop[which]
+        held += columns.rotation[which] * reach + columns.shift[which]
+        radii = _stretch_of(R) * held * _UP + 2.0**-45 * (np.abs(terms).sum(axis=(1, 2)) + np.abs(p).sum(axis=1))
+        return terms.sum(axis=2) + p, np.where(np.isnan(columns.plane[which]), radii, math.inf)
+
+    @cached_property
+    def _stretch(self) -> np.ndarray:
+        return _stretch_of(self.columns.X[:, :3, :3])
 
     def extents(self, X_WB: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, float]:
         """((d,) what no product of its points with each of d unit vectors exceeds, error of these), at a pose (4, 4).

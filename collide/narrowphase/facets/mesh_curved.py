@@ -13,16 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.lowering.enclosures import Enclosure
-from collide.lowering.facet_bodies import Body, PosesWithSlop, as_given, reach_of
+from collide.lowering.facet_bodies import Body, PosesWithSlop, as_given, hull_of, reach_of
 from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
+from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.narrowphase.facets.collide_kernel import APART, HIT, OPEN
 from collide.narrowphase.facets.curved_gap_calls import gap_rows, serves
 from collide.narrowphase.facets.facet_kernel_calls import balls_farther, core_hits, farthest_gap, hull_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.facets_against_curved import facet_rows
-from collide.narrowphase.facets.near_facets import Facets, near_facets
+from collide.narrowphase.facets.near_facets import Facets, likely_facets, near_facets, near_facets_if_few
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
 from collide.narrowphase.fallback_searches import lay_points_apart
@@ -30,6 +31,8 @@ from collide.results import EXACT, FIELDS, PAIR_DTYPE, UNDECIDED
 
 #: Facets of a pose that are asked about together: so many first, then so many times more.
 _FIRST_ROUND, _GROWTH = 8, 4
+#: Of more that may touch at a pose, a likely one and the hull are asked before all are gone through.
+_MAX_NEAR_FACETS = 128
 
 
 class CurvedStates(NamedTuple):
@@ -98,21 +101,48 @@ def _settle_by_polytopes(
 def _settle_by_facets(
     A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, poses: np.ndarray, states: CurvedStates
 ) -> None:
-    """Ask about every facet that may touch, until one does."""
+    """Ask about every facet that may touch, until one does. Where many may, as of a mesh that lies wholly between the
+    polytopes, a likely one is asked first, and then the mesh's hull, before all are gone through.
+
+    A mesh is within its hull: where this is farther from the shape than rounding moved the two, both are apart.
+    """
     n, PA, PB = len(poses), X_WA.of(poses), X_WB.of(poses)
-    near = near_facets(A.tree, E.packed, PA, PB, _across(A, E, PA, PB), np.zeros(n))
     hit, ambiguous = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     how, place = np.full(n, EXACT), np.full(n, -1)
-    for some in _rounds(near, lambda facets: ~hit[facets.pose]):
-        rows = facet_rows(A.tree, E.packed, PA, PB, near.pose[some], near.place[some], boolean=True, limit=0.0)
+
+    def ask(pose: np.ndarray, facets: np.ndarray) -> None:
+        rows = facet_rows(A.tree, E.packed, PA, PB, pose, facets, boolean=True, limit=0.0)
         for k in np.flatnonzero(rows["hit"]).tolist():
-            p, proven = near.pose[some][k], rows["how"][k] != UNDECIDED
+            p, proven = pose[k], rows["how"][k] != UNDECIDED
             if not hit[p] and (proven or not ambiguous[p]):
-                place[p], how[p] = near.place[some][k], rows["how"][k]
+                place[p], how[p] = facets[k], rows["how"][k]
             hit[p] |= proven
             ambiguous[p] |= not proven
+
+    def ask_all(near: Facets, of: np.ndarray) -> None:
+        for some in _rounds(near, lambda facets: ~hit[of[facets.pose]]):
+            ask(of[near.pose[some]], near.place[some])
+
+    across, nothing = _across(A, E, PA, PB), np.zeros(n)
+    near, exceeds = near_facets_if_few(A.tree, E.packed, PA, PB, across, nothing, _MAX_NEAR_FACETS)
+    ask_all(near, np.arange(n))
+    remaining = np.flatnonzero(exceeds)
+    if len(remaining):
+        ask(remaining, likely_facets(A.tree, E.packed, PA.of(remaining), PB.of(remaining), across[remaining]))
+        remaining = remaining[~hit[remaining]]
+        remaining = remaining[~_hulls_apart(A, E, PA.of(remaining), PB.of(remaining))]
+        if len(remaining):
+            at = PA.of(remaining), PB.of(remaining)
+            ask_all(near_facets(A.tree, E.packed, *at, across[remaining], nothing[remaining]), remaining)
     states.state[poses] = np.where(hit, HIT, np.where(ambiguous, OPEN, APART))
     states.how[poses], states.place[poses] = how, place
+
+
+def _hulls_apart(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop) -> np.ndarray:
+    """(n,) bool: whether the hull of a mesh is proven apart from a shape."""
+    slop = PA.slop + PB.slop
+    rows = convex_rows(hull_of(A), hull_of(E.outer), PA.X, PB.X, limit=float(slop.max(initial=0.0)), depths=False)
+    return rows["lower"] > 1.001 * slop
 
 
 def _rounds(near: Facets, wanted):
@@ -237,9 +267,7 @@ def _nearest_by_rounds(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSl
     def may_be_nearer(facets: Facets) -> np.ndarray:
         return (facets.bound <= upper[facets.pose]) & (facets.place != first[facets.pose])
 
-    order = np.empty(len(A.tree.ids), dtype=np.int64)
-    order[A.tree.ids] = np.arange(len(order))
-    first = order[facets]
+    first = A.tree.places[facets]
     poses, places = [np.arange(len(PA.X))], [first]
     rows = [gaps_at(poses[0], first)]
     upper = rows[0]["upper"].copy()

@@ -45,13 +45,22 @@ def near_facets_up_to(
     max_facets: int,
 ) -> Facets | None:  # fmt: skip
     """`near_facets` at one pair of poses; None where more than about ``max_facets`` are near, after few of them."""
-    blocks: list = []
-    spans, pose = _Spans(tree, packed, A, B, along), np.zeros(1, dtype=np.int64)
-    for block in _walk(tree, spans, np.array([upper]), pose, max_facets):
-        blocks.append(block)
-        if sum(len(places) for _, places, _ in blocks) > max_facets:
-            return None
-    return Facets(*(np.concatenate(column) for column in zip(*blocks))) if blocks else None
+    facets, exceeds = near_facets_if_few(tree, packed, A, B, along, np.array([upper]), max_facets)
+    return None if exceeds[0] else facets
+
+
+def near_facets_if_few(
+    tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: np.ndarray,
+    max_facets: int,
+) -> tuple[Facets, np.ndarray]:  # fmt: skip
+    """(`near_facets` but of poses that have more than about ``max_facets``, (n,) bool: which these are)."""
+    spans, exceeds = _Spans(tree, packed, A, B, along), np.zeros(len(upper), dtype=bool)
+    pose, place, bound = map(
+        np.concatenate, zip(*_walk(tree, spans, upper, np.arange(len(upper)), (max_facets, exceeds)))
+    )
+    exceeds |= np.bincount(pose, minlength=len(exceeds)) > max_facets
+    some = ~exceeds[pose]
+    return Facets(pose[some], place[some], bound[some]), exceeds
 
 
 def near_facets(
@@ -66,10 +75,28 @@ def near_facets(
     return Facets(*(np.concatenate(column) for column in zip(*blocks)))
 
 
-def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, max_facets: int | None = None):
+def likely_facets(
+    tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray
+) -> np.ndarray:
+    """(n,) a facet that is likely to meet the set, at n pairs of poses, by its place in the order of the tree: down the
+    tree through the box whose bound is the least; O(depth) boxes a pose. Proves nothing."""
+    spans, links, scale = _Spans(tree, packed, A, B, along), tree.links(), np.ldexp(1.0, tree.exponent)
+    link, going = np.zeros(len(along), dtype=np.int64), np.arange(len(along))
+    while len(going):
+        at = link[going]
+        centres, half_lengths = ((of.reshape(-1, 3) * scale) for of in tree.boxes(at))
+        bounds = spans.of_boxes(np.repeat(going, WIDTH), tree.centre + centres, half_lengths).reshape(-1, WIDTH)
+        nearest = np.where(tree.used(at), bounds, np.inf).argmin(axis=1)
+        link[going] = links[at, nearest]
+        going = going[link[going] >= 0]
+    return leaf_runs(link)[0]
+
+
+def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, limit: tuple | None = None):
     """Yields (pose, place, bound) of the facets that may be near enough, block by block.
 
-    max_facets : nothing where more boxes than so many are near, of which each holds a facet.
+    limit : (how many boxes a pose may have, of which each holds a facet; mask (n,) of poses that have more, which are
+        marked and left out).
     """
     links = tree.links()
     pose, at = poses, np.zeros(len(poses), dtype=np.int64)
@@ -85,15 +112,19 @@ def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, m
         pose, link = pose[near], link[near]
         leaf = link < 0
         runs.append((pose[leaf], link[leaf]))
-        if max_facets is not None and len(pose) - len(runs[-1][0]) + sum(len(run) for run, _ in runs) > max_facets:
-            return
         pose, at = pose[~leaf], link[~leaf]
+        if limit is not None:
+            boxes = sum(np.bincount(of, minlength=len(limit[1])) for of in (pose, *(run for run, _ in runs)))
+            limit[1][boxes > limit[0]] = True
+            pose, at = pose[~limit[1][pose]], at[~limit[1][pose]]
         if len(at) * WIDTH > _MAX_BOXES and len(poses) > 1:
             half = len(poses) // 2
-            yield from _walk(tree, spans, upper, poses[:half])
-            yield from _walk(tree, spans, upper, poses[half:])
+            yield from _walk(tree, spans, upper, poses[:half], limit)
+            yield from _walk(tree, spans, upper, poses[half:], limit)
             return
     pose, link = (np.concatenate(column) for column in zip(*runs))
+    if limit is not None:
+        pose, link = pose[~limit[1][pose]], link[~limit[1][pose]]
     first, count = leaf_runs(link)
     pose = np.repeat(pose, count)
     place = np.repeat(first - (np.cumsum(count) - count), count) + np.arange(len(pose))

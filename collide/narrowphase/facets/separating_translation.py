@@ -147,9 +147,7 @@ def _directions(A: Body, B: Body, X_WA, X_WB, first: list[np.ndarray]) -> np.nda
 
 def _normals(body: Body, X: np.ndarray, facets: np.ndarray) -> np.ndarray:
     """(k, 3) unit normals of facets in the world, 0 of those without area."""
-    place = np.empty(len(body.tree.ids), dtype=np.int64)
-    place[body.tree.ids] = np.arange(len(place))
-    corners = body.tree.triangles[place[facets]].reshape(-1, 3, 3)
+    corners = body.tree.triangles[body.tree.places[facets]].reshape(-1, 3, 3)
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     u, v = ((X[:3, :3] * w[:, None]).sum(axis=2) for w in (u, v))
     n = np.cross(u, v)

@@ -123,3 +123,67 @@ def test_parts_placed_at_once_stand_where_each_is_placed(n):
         assert (one.X == placed.X).all() and (one.slop == placed.slop).all()
         moved += int((placed.slop > 0.0).sum())
     assert moved >= 4 * n
+
+
+def terrain(n: int) -> collide.HeightField:
+    x, y = np.meshgrid(*[np.linspace(-0.5, 0.5, n + 1)] * 2)
+    return collide.HeightField(0.05 * np.sin(9 * x) * np.cos(7 * y), (1 / n, 1 / n), bottom=-0.3)
+
+
+def cans(n: int, width: float) -> collide.Compound:
+    rng = rng_of(f"cans {n}")
+    return collide.Compound(
+        [(collide.Cylinder(0.5 * width, width), collide.pose(rng.uniform(-0.5, 0.5, 3), rpy=rng.uniform(-3, 3, 3)))
+         for _ in range(n)]
+    )  # fmt: skip
+
+
+def test_balls_decide_most_of_many_parts_at_one_mesh(monkeypatch):
+    """A pose that clears a union is proven by all parts; few of them come near the surface, or are asked one by one.
+    Parts are placed in blocks."""
+    ground, union = terrain(20), cans(400, 0.04)
+    asked = counted(monkeypatch, composite_meshes, "part_states", lambda A, B, X, Y: len(X.X))
+    placed = counted(monkeypatch, composite_parts, "moved_pose", lambda X, *_: len(X))
+    tried = counted(monkeypatch, composite_meshes, "_states", lambda A, B, X, Y, *_: len(X))
+    row = collide.distance(ground, union, collide.pose(rpy=(0.3, -0.2, 0.5)), collide.pose((0.01, 0.0, 0.0)))
+    assert row.hit and row.distance < 0.0 and sum(tried) > 100
+    assert 0 < sum(asked) < 2 * sum(tried) and len(asked) < 60, (sum(asked), len(asked), sum(tried))
+    assert len(placed) < 150, len(placed)
+
+
+def test_parts_told_by_balls_meet_as_each_does_alone():
+    """Parts within a solid, outside of it, in its hole, at its surface, and within an open mesh, which has no inside;
+    of all kinds, at poses that are rounded, and stretched ones."""
+    rng, told = rng_of("parts told by balls"), {"inside": 0, "outside": 0, "open": 0}
+    inner, outer = (collide.tessellate(collide.Sphere(r)) for r in (0.5, 1.0))
+    hollow = collide.Mesh(
+        np.concatenate([outer.vertices, inner.vertices]),
+        np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]),
+    )
+    meshes_of = {"hollow": hollow, "open": collide.Mesh(outer.vertices, outer.faces[1:])}
+    for case in range(40):
+        name = "open" if case % 4 == 0 else "hollow"
+        size, far = 10.0 ** rng.uniform(-3, -0.7), rng.uniform(0.2, 1.6)
+        shapes = (
+            collide.Box((size, 2 * size, size)), collide.Sphere(size), collide.Cylinder(size, size),
+            collide.Capsule(size, size), collide.ConvexHull(size * rng.normal(size=(6, 3)) + size, radius=0.1 * size),
+            collide.Mesh(size * inner.vertices, inner.faces),
+        )  # fmt: skip
+        directions = rng.normal(size=(len(shapes), 3))
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        items = [(s, collide.pose(far * d, rpy=rng.uniform(-3, 3, 3))) for s, d in zip(shapes, directions)]
+        union = collide.Compound([(collide.Compound(items[:3]), collide.pose(rpy=(0.1, 0.2, 0.3))), *items[3:]])
+        flat = [(s, collide.pose(rpy=(0.1, 0.2, 0.3)) @ X) for s, X in items[:3]] + items[3:]
+        X_WA, X_WB = random_pose(rng, 1e3), np.eye(4)
+        X_WB[:, :] = X_WA @ collide.pose(0.01 * rng.normal(size=3))
+        if case % 5 == 0:
+            X_WB[:3, :3] *= 1.5
+        mesh = meshes_of[name]
+        want = [collide.collide(mesh, s, X_WA, X_WB @ X, check_poses=False) for s, X in flat]
+        for poses in ((X_WA, X_WB), (np.repeat(X_WA[None], 3, axis=0), np.repeat(X_WB[None], 3, axis=0))):
+            hit = np.atleast_1d(collide.collide(mesh, union, *poses, check_poses=False))
+            assert (hit == any(want)).all(), (case, size, far, want)
+            alone = [collide.collide(mesh, collide.Compound([item]), *poses, check_poses=False) for item in flat]
+            assert (np.any(alone, axis=0) == hit).all(), (case, size, far, want)
+        told["open" if name == "open" and not any(want) else "inside" if all(want) else "outside"] += 1
+    assert min(told.values()) >= 4, told

@@ -23,6 +23,8 @@ import collide
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import PosesWithSlop
+from collide.narrowphase.facets import mesh_curved
+from collide.narrowphase.facets import near_facets as near_facets_module
 from collide.narrowphase.facets.near_facets import near_facets
 from collide.results import HOW
 
@@ -102,7 +104,15 @@ def snippet(name, shape, X, Y) -> str:
     )
 
 
+@pytest.fixture(params=["as it is", "hulls first"])
+def order(request, monkeypatch):
+    """Hulls and a likely facet are asked first where many facets may be near only; here everywhere."""
+    if request.param == "hulls first":
+        monkeypatch.setattr(mesh_curved, "_MAX_NEAR_FACETS", 0)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("order")
 @pytest.mark.parametrize("kind", KINDS)
 def test_between_the_polytopes_inside_and_around(kind):
     rng = rng_of("mesh", "between", kind)
@@ -273,6 +283,7 @@ def test_far_tiny_and_huge():
     assert not gap.hit and abs(gap.distance - 1e-3 + 3e-9) < 1e-10
 
 
+@pytest.mark.usefixtures("order")
 def test_matrices_that_are_no_rotations_are_used_as_they_stand():
     rng = rng_of("mesh", "sheared")
     told = []
@@ -296,6 +307,32 @@ def test_matrices_that_are_no_rotations_are_used_as_they_stand():
                 with pytest.raises(collide.InvalidPose):
                     collide.collide(mesh, shape, X, bad, check_poses=False)
     assert 0.1 < np.mean(told) < 0.9
+
+
+@pytest.mark.parametrize("kind", ["Cylinder", "Cone", "Ellipsoid"])
+def test_a_large_mesh_between_the_polytopes_is_not_gone_through(kind, monkeypatch):
+    """A mesh of 1 m before the curved side of a shape of 1e6 m lies between both polytopes wholly: all of its facets
+    may be near. One that meets the shape, or the hull that does not, decides."""
+    mesh = collide.Mesh(*bumpy_sphere(2000))
+    r = 1e6
+    side = 2 * math.pi * 1.5 / 32  # halfway between two corners of the ring: the inner polytope is 0.5 % away
+    shape, y = {
+        "Cylinder": (collide.Cylinder(r, r), r), "Cone": (collide.Cone(r, 2 * r), 0.5 * r),
+        "Ellipsoid": (collide.Ellipsoid((r, r, r)), r),
+    }[kind]  # fmt: skip
+    gone_through = []
+    bounds = near_facets_module._Spans.of_triangles
+    monkeypatch.setattr(
+        near_facets_module._Spans, "of_triangles", lambda *args: gone_through.append(len(args[1])) or bounds(*args)
+    )
+    asked, rows_of = [], mesh_curved.facet_rows
+    monkeypatch.setattr(mesh_curved, "facet_rows", lambda *a, **o: asked.append(len(a[4])) or rows_of(*a, **o))
+    told = []
+    for gap in (-100.0, -10.0, 10.0, 100.0):
+        X = pose(t=((y + gap) * math.cos(side), (y + gap) * math.sin(side), 0.0))
+        told.append(collide.collide(mesh, shape, X, EYE))
+    assert told == [True, True, False, False]
+    assert sum(gone_through) <= 100 and 1 <= sum(asked) <= 100, (gone_through, asked)
 
 
 # --- the polytopes themselves ---------------------------------------------------------------------
