@@ -292,14 +292,14 @@ def _not_far_aside(a, b, shared, at_low, at_high):
     low, high = shared.low, shared.high
     limit_low, limit_high = _ASIDE * _radius_between(a, b, shared, low), _ASIDE * _radius_between(a, b, shared, high)
     for side in range(2):
-        room_low = limit_low - at_low if side == 0 else limit_low + at_low
-        room_high = limit_high - at_high if side == 0 else limit_high + at_high
-        if room_low < 0.0 and room_high < 0.0:
+        left_low = limit_low - at_low if side == 0 else limit_low + at_low
+        left_high = limit_high - at_high if side == 0 else limit_high + at_high
+        if left_low < 0.0 and left_high < 0.0:
             return SharedSpan(1.0, 0.0, shared.begin, shared.end, 0.0)
-        if room_low < 0.0:
-            low = max(low, shared.low + room_low / (room_low - room_high) * (shared.high - shared.low))
-        elif room_high < 0.0:
-            high = min(high, shared.high - room_high / (room_high - room_low) * (shared.high - shared.low))
+        if left_low < 0.0:
+            low = max(low, shared.low + left_low / (left_low - left_high) * (shared.high - shared.low))
+        elif left_high < 0.0:
+            high = min(high, shared.high - left_high / (left_high - left_low) * (shared.high - shared.low))
     return SharedSpan(low, high, shared.begin, shared.end, 0.0)
 
 
@@ -456,7 +456,7 @@ def _past_end(line, s, sign, wu, wv, fall):
     """
     e = Vec3(line.q.x - line.p.x, line.q.y - line.p.y, line.q.z - line.p.z)
     length = math.sqrt(e.x * e.x + e.y * e.y + e.z * e.z)
-    most = -math.inf
+    max_past = -math.inf
     for end in range(2):
         out = sign / length if end == 1 else -sign / length
         taper = (line.round_q - line.round_p) / length
@@ -466,8 +466,8 @@ def _past_end(line, s, sign, wu, wv, fall):
         z, root = out * e.z, math.sqrt(e.x * e.x + e.y * e.y) / length
         along = out * (wu * e.x + wv * e.y)
         inside = (s if end == 0 else 1.0 - s) * length
-        most = max(most, along * (1.0 + taper * z / root) + fall * (taper * root - z) - inside)
-    return most
+        max_past = max(max_past, along * (1.0 + taper * z / root) + fall * (taper * root - z) - inside)
+    return max_past
 
 
 @kernel(inline=True)
