@@ -13,9 +13,10 @@ from collide.algorithms import named_algorithm
 from collide.batches import answer_batch, length_of
 from collide.certificates.make_certificate import certify
 from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.lowering.kinds import kind_of
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.convex_kernel_calls import finish_distances
-from collide.narrowphase.dispatch import REFUSED, Method
+from collide.narrowphase.dispatch import REFUSED, Method, method_of
 from collide.pair_arguments import asked_poses, pose_at, shape_at
 from collide.results import PairResult
 from collide.security_margin import checked_margin, within
@@ -262,8 +263,10 @@ def distance(
     if unbounded:
         k = int(np.argmax(np.isneginf(rows["distance"])))
         where = "" if single else f" (pose {k} of the batch)"
-        pair = " and ".join(type(shape_at(S, k)).__name__ for S in (A, B))
-        raise UnsupportedQuery(f"distance of {pair}{where}: {REFUSED[Method.PLANES, 'distance']}")
+        shapes = [shape_at(S, k) for S in (A, B)]
+        pair = " and ".join(type(shape).__name__ for shape in shapes)
+        why = REFUSED.get((method_of(*map(kind_of, shapes)), "distance"), REFUSED[Method.PLANES, "distance"])
+        raise UnsupportedQuery(f"distance of {pair}{where}: {why}")
     return PairResult(rows, single, (_immutable(A), _immutable(B), *pose_copies), certify)
 
 

@@ -385,7 +385,7 @@ def _line_seen(pairs, k, side, i, body, rounding, seen):
     j = (i + 1) % 3
     ids, at = 6 * k + 3 * side, 9 * side
     return Line(
-        vec3_at(seen, at + 3 * i), vec3_at(seen, at + 3 * j), rounding, 4 * pairs.ids[ids + i] + VERTEX,
+        vec3_at(seen, at + 3 * i), vec3_at(seen, at + 3 * j), rounding, rounding, 4 * pairs.ids[ids + i] + VERTEX,
         4 * pairs.ids[ids + j] + VERTEX, 4 * int(body.edges[3 * facet + i]) + EDGE,
     )  # fmt: skip
 

@@ -207,7 +207,7 @@ def _bound(error, of_a, of_b):
 def _plane_face(of_b, nearest):
     """The face of a half-space: its plane, without corners."""
     return SupportFace(
-        0, -1, nearest.x, nearest.y, nearest.z, 0.0, 0.0, 0.0, 0.0, of_b.corners, of_b.features, of_b.edges, -1
+        0, -1, nearest.x, nearest.y, nearest.z, 0.0, 0.0, 0.0, 0.0, 0.0, of_b.corners, of_b.features, of_b.edges, -1
     )
 
 

@@ -200,8 +200,9 @@ def _empty_face(near):
     """No corners."""
     zero = np.int64(0)
     return SupportFace(
-        zero, zero, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, near.face, near.face_features, near.face_edges, np.int64(-1)
-    )
+        zero, zero, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, near.face, near.face_features, near.face_edges,
+        np.int64(-1),
+    )  # fmt: skip
 
 
 @kernel
@@ -235,7 +236,7 @@ def _face_of(near, k, axes):
             slope_u, slope_v = (e.z * f.y - f.z * e.y) / area, (e.x * f.z - f.x * e.z) / area
             spread = max(p.z, q.z, r.z) - min(p.z, q.z, r.z)
             face = SupportFace(
-                np.int64(3), np.int64(facet), p.x, p.y, p.z, slope_u, slope_v, 0.0, 0.0, near.face,
+                np.int64(3), np.int64(facet), p.x, p.y, p.z, slope_u, slope_v, 0.0, 0.0, 0.0, near.face,
                 near.face_features, near.face_edges, np.int64(4 * facet + FACE),
             )  # fmt: skip
             return face, 32.0 * near.error + 64.0 * near.error * longest * spread / abs(area)
@@ -262,7 +263,7 @@ def _edge_of(near, facet):
     near.face_edges[0] = edge
     near.face_edges[1] = edge
     return SupportFace(
-        np.int64(2), np.int64(facet), p.x, p.y, p.z, 0.0, 0.0, 0.0, 0.0, near.face, near.face_features,
+        np.int64(2), np.int64(facet), p.x, p.y, p.z, 0.0, 0.0, 0.0, 0.0, 0.0, near.face, near.face_features,
         near.face_edges, edge,
     ), 32.0 * near.error  # fmt: skip
 
@@ -277,7 +278,7 @@ def _put_facet(near, k, of_set, look, n):
     if of_set.n > 1:
         m, off = overlap_points(face, of_set, 16.0 * near.error, -math.inf, near.first, near.second, near.overlap)
         bound += off
-        if face.n == 3 and of_set.n == 2 and of_set.round > 0.0:
+        if face.n == 3 and of_set.n == 2 and of_set.round_p > 0.0:
             m = _put_ends(near, face, of_set, look.axes, m)
     else:
         m = _vertex_over(face, of_set, 16.0 * near.error, near.overlap)

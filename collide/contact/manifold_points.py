@@ -22,6 +22,8 @@ _BESIDE = 2.0**-20
 ALONG = 2.0**-10
 #: Round surfaces are looked at down to 45°, as faces are: so far beside its line, in radii.
 _ASIDE = math.sqrt(0.5)
+#: Ends of what round bodies share are found in so many steps, each some thousand times shorter than the one before.
+_STEPS_TO_END = 12
 #: Nearest points nearer to a corner than this part of the manifold's size take its place: a rim is a little outside its
 #: octagon, and two contacts so near would be one too many.
 NEAR = 2.0**-8
@@ -61,12 +63,13 @@ def height_at(face, u, v):
 class Line(NamedTuple):
     """An edge seen along the normal: its ends (u, v, h), and what is named there.
 
-    round : as in `SupportFace`.
+    round_p, round_q : as in `SupportFace`.
     """
 
     p: Vec3
     q: Vec3
-    round: float
+    round_p: float
+    round_q: float
     feature_p: int
     feature_q: int
     edge: int
@@ -89,8 +92,8 @@ class SharedSpan(NamedTuple):
 def line_of(edge):
     """The `Line` of a `SupportFace` of two corners."""
     return Line(
-        vec3_at(edge.corners, 0), vec3_at(edge.corners, 3), edge.round, edge.features[0], edge.features[1],
-        edge.edges[0],
+        vec3_at(edge.corners, 0), vec3_at(edge.corners, 3), edge.round_p, edge.round_q, edge.features[0],
+        edge.features[1], edge.edges[0],
     )  # fmt: skip
 
 
@@ -99,7 +102,7 @@ def side_of(face, side):
     """The `Line` of a side of a face."""
     following = side + 1 if side + 1 < face.n else 0
     return Line(
-        vec3_at(face.corners, 3 * side), vec3_at(face.corners, 3 * following), 0.0, face.features[side],
+        vec3_at(face.corners, 3 * side), vec3_at(face.corners, 3 * following), 0.0, 0.0, face.features[side],
         face.features[following], face.edges[side],
     )  # fmt: skip
 
@@ -196,7 +199,7 @@ def _edge_over_face(edge, face, is_edge_of_b, tolerance, max_gap, manifold):
             _put(manifold, k, u, v, height_at(face, u, v), h, of_face, of_edge)
         else:
             _put(manifold, k, u, v, h, height_at(face, u, v), of_edge, of_face)
-    if edge.round > 0.0:
+    if edge.round_p > 0.0:
         return _ends_beside(edge, face, is_edge_of_b, tolerance, max_gap, n, manifold)
     return n
 
@@ -250,7 +253,7 @@ def shared_span(a, b, tolerance):
     length_a, length_b = math.sqrt(du * du + dv * dv), math.sqrt(eu * eu + ev * ev)
     if length_a == 0.0 or length_b == 0.0:
         return none
-    rounding = a.round + b.round
+    rounding = max(a.round_p, a.round_q) + max(b.round_p, b.round_q)
     across = abs(du * ev - dv * eu)
     if across > (ALONG if rounding > 0.0 else _PARALLEL) * length_a * length_b + tolerance * (length_a + length_b):
         return none
@@ -273,17 +276,55 @@ def shared_span(a, b, tolerance):
             low += slip * abs(at_low)
         if max(begin, end) < 1.0:
             high -= slip * abs(at_high)
-        return SharedSpan(low, high, begin, end, 0.0) if off <= _ASIDE * rounding else none
+        shared = _not_far_aside(a, b, SharedSpan(low, high, begin, end, 0.0), at_low, at_high)
+        return _within_ends(a, b, shared, 0.25 * tolerance)
     # The normal of curved bodies is good to 2⁻²⁶: seen along it, lines that touch may lie beside each other by as much.
     if off > _BESIDE * min(length_a, length_b) + tolerance:
         return none
     return SharedSpan(low, high, begin, end, off)
 
 
+@kernel(inline=True)
+def _not_far_aside(a, b, shared, at_low, at_high):
+    """What of a `SharedSpan` is beside A's line by at_low … at_high [m], linear in between, and by no more than round
+    surfaces are looked at, as radii are there: those of cones are linear, too.
+    """
+    low, high = shared.low, shared.high
+    limit_low, limit_high = _ASIDE * _radius_between(a, b, shared, low), _ASIDE * _radius_between(a, b, shared, high)
+    for side in range(2):
+        left_low = limit_low - at_low if side == 0 else limit_low + at_low
+        left_high = limit_high - at_high if side == 0 else limit_high + at_high
+        if left_low < 0.0 and left_high < 0.0:
+            return SharedSpan(1.0, 0.0, shared.begin, shared.end, 0.0)
+        if left_low < 0.0:
+            low = max(low, shared.low + left_low / (left_low - left_high) * (shared.high - shared.low))
+        elif left_high < 0.0:
+            high = min(high, shared.high - left_high / (left_high - left_low) * (shared.high - shared.low))
+    return SharedSpan(low, high, shared.begin, shared.end, 0.0)
+
+
+@kernel(inline=True)
+def _radius_of(line, s):
+    """Across a line at parameter s."""
+    return line.round_p + s * (line.round_q - line.round_p)
+
+
+@kernel(inline=True)
+def _parameter_of_b(shared, t):
+    """Of B's line beside parameter t of A's."""
+    return min(max((t - shared.begin) / (shared.end - shared.begin), 0.0), 1.0)
+
+
+@kernel(inline=True)
+def _radius_between(a, b, shared, t):
+    return _radius_of(a, t) + _radius_of(b, _parameter_of_b(shared, t))
+
+
 class PlaceBetween(NamedTuple):
     """A place (u, v) between two edges, with the heights of both surfaces and the gap there.
 
-    beside_u, beside_v : from A's line to B's.   fall : by how much the gap is larger than that of the lines [m].
+    beside_u, beside_v : from A's line to B's, of which A's share leads to the place.
+    fall_a, fall_b : by how much the surfaces have fallen off from their lines there, ∞ where one is not there [m].
     """
 
     u: float
@@ -293,7 +334,9 @@ class PlaceBetween(NamedTuple):
     gap: float
     beside_u: float
     beside_v: float
-    fall: float
+    share: float
+    fall_a: float
+    fall_b: float
 
 
 @kernel(inline=True)
@@ -301,28 +344,30 @@ def place_between(a, b, shared, t):
     """The `PlaceBetween` at parameter t of A: of sharp edges on A, else between both, as their radii are."""
     du, dv, dh = a.q.x - a.p.x, a.q.y - a.p.y, a.q.z - a.p.z
     eu, ev, eh = b.q.x - b.p.x, b.q.y - b.p.y, b.q.z - b.p.z
-    s = min(max((t - shared.begin) / (shared.end - shared.begin), 0.0), 1.0)
+    s = _parameter_of_b(shared, t)
     u, v = a.p.x + t * du, a.p.y + t * dv
     wu, wv = b.p.x + s * eu - u, b.p.y + s * ev - v
     h_a, h_b = a.p.z + t * dh, b.p.z + s * eh
-    fall = 0.0
-    rounding = a.round + b.round
+    share, fall_a, fall_b = 0.0, 0.0, 0.0
+    round_a, round_b = _radius_of(a, t), _radius_of(b, s)
+    rounding = round_a + round_b
     if rounding > 0.0:
-        share = a.round / rounding
+        share = round_a / rounding
         u += share * wu
         v += share * wv
-        of_a = _fall(a.round, share * wu, share * wv, du, dv, dh)
-        of_b = _fall(b.round, (1.0 - share) * wu, (1.0 - share) * wv, eu, ev, eh)
-        h_a -= of_a
-        h_b += of_b
-        fall = of_a + of_b
-    return PlaceBetween(u, v, h_a, h_b, h_b - h_a, wu, wv, fall)
+        fall_a = _fall(round_a, a.round_q - a.round_p, share * wu, share * wv, du, dv, dh)
+        # B seen from its other side, through the point on its line: the same surface, its line turned about.
+        fall_b = _fall(round_b, b.round_p - b.round_q, (1.0 - share) * wu, (1.0 - share) * wv, eu, ev, eh)
+        h_a -= fall_a
+        h_b += fall_b
+    return PlaceBetween(u, v, h_a, h_b, h_b - h_a, wu, wv, share, fall_a, fall_b)
 
 
 @kernel(inline=True)
-def _fall(radius, wu, wv, du, dv, dh):
+def _fall(radius, growth, wu, wv, du, dv, dh):
     """By how much a round surface falls off from its line at a place (wu, wv) beside it; (du, dv, dh) along the line.
 
+    growth : of the radius along the line [m]; not 0 of cones (`_fall_of_cone`).
     With e the unit vector along the axis, w across nhat, and z the height over the axis, |w + z·nhat|² less the square
     of its product with e is the squared radius: a·z² − 2·(e·nhat)·(w·e)·z + w² − (w·e)² = r², where a = 1 − (e·nhat)².
     Of A w leads from its axis and z is above it, of B both are turned about.
@@ -331,11 +376,98 @@ def _fall(radius, wu, wv, du, dv, dh):
         return 0.0
     square = du * du + dv * dv
     length = math.sqrt(square + dh * dh)
+    if growth != 0.0:
+        return _fall_of_cone(radius, growth / length, wu, wv, Vec3(du / length, dv / length, dh / length))
     along, rise = (wu * du + wv * dv) / length, dh / length
     a = square / (length * length)
     aside = a * (wu * wu + wv * wv) - along * along
     level = a * radius * radius
     return (aside / (math.sqrt(level) + math.sqrt(max(level - aside, 0.0))) - rise * along) / a
+
+
+@kernel
+def _fall_of_cone(radius, taper, wu, wv, e):
+    """`_fall` of a cone with this radius of curvature across its line at the place, growing by ``taper`` along e.
+
+    With x, y, z along e, across it and nhat, and out of the tangent plane, from the line, a cone of half angle α,
+    taper = tan α, is z²·(taper² − 1) − 2·(radius + taper·x)·z = y². A place is at (e·w, y, −(e·nhat)·(e·w)/√a), where
+    a = 1 − (e·nhat)² and y² = w² − (e·w)²/a; nhat at (e·nhat, 0, √a). ∞ where the cone has no point over the place.
+    """
+    if taper < 0.0:
+        e, taper = Vec3(-e.x, -e.y, -e.z), -taper
+    square = e.x * e.x + e.y * e.y
+    root, along = math.sqrt(square), wu * e.x + wv * e.y
+    z, aside = -e.z * along / root, max(wu * wu + wv * wv - along * along / square, 0.0)
+    form, reach = taper * taper - 1.0, radius + taper * along
+    # The height h over the place: quadratic · h² − 2 · linear · h + constant = 0.
+    quadratic = square * form - 2.0 * taper * e.z * root
+    linear = root * reach + taper * e.z * z - root * z * form
+    constant = z * z * form - 2.0 * reach * z - aside
+    under = linear * linear - quadratic * constant
+    if not (linear > 0.0 and under >= 0.0):
+        return math.inf
+    return -constant / (linear + math.sqrt(under))
+
+
+@kernel
+def _within_ends(a, b, shared, tolerance):
+    """A `SharedSpan` without places that are past an end of a round body by more than the tolerance [m].
+
+    None where its ends are not found in some steps, or where a surface is not over them.
+    """
+    none = SharedSpan(1.0, 0.0, shared.begin, shared.end, 0.0)
+    low, high = shared.low, shared.high
+    du, dv = a.q.x - a.p.x, a.q.y - a.p.y
+    length = math.sqrt(du * du + dv * dv)
+    for end in range(2):
+        past = math.inf
+        for _ in range(_STEPS_TO_END):
+            t = low if end == 0 else high
+            at = place_between(a, b, shared, t)
+            if not at.fall_a + at.fall_b < math.inf:
+                return none
+            rest = 1.0 - at.share
+            past = max(
+                _past_end(a, t, 1.0, at.share * at.beside_u, at.share * at.beside_v, at.fall_a),
+                _past_end(b, _parameter_of_b(shared, t), -1.0, rest * at.beside_u, rest * at.beside_v, at.fall_b),
+            )  # fmt: skip
+            if past <= tolerance:
+                break
+            if end == 0:
+                low += past / length
+            else:
+                high -= past / length
+            if low > high:
+                return none
+        if past > tolerance:
+            return none
+    return SharedSpan(low, high, shared.begin, shared.end, 0.0)
+
+
+@kernel
+def _past_end(line, s, sign, wu, wv, fall):
+    """How far past an end of its body a place (wu, wv) beside parameter s of a round line is, fallen off from it,
+    along the line [m]; below 0 within both ends.
+
+    Ends are square to the axis, which is off the line by the half angle α of a cone, tan α = taper. With e the unit
+    vector along the line towards the end, z = e·nhat and a = 1 − z², a place that is w beside the line and has fallen
+    off is past a plane square to the axis there by w·e · (1 + taper · z/√a) + fall · (taper · √a − z).
+    sign : 1 for A, −1 for B, which is seen from its other side (`place_between`).
+    """
+    e = Vec3(line.q.x - line.p.x, line.q.y - line.p.y, line.q.z - line.p.z)
+    length = math.sqrt(e.x * e.x + e.y * e.y + e.z * e.z)
+    max_past = -math.inf
+    for end in range(2):
+        out = sign / length if end == 1 else -sign / length
+        taper = (line.round_q - line.round_p) / length
+        taper = taper if end == 1 else -taper
+        if taper < 0.0 or max(line.round_p, line.round_q) == 0.0:
+            continue  # an apex, or a sharp edge
+        z, root = out * e.z, math.sqrt(e.x * e.x + e.y * e.y) / length
+        along = out * (wu * e.x + wv * e.y)
+        inside = (s if end == 0 else 1.0 - s) * length
+        max_past = max(max_past, along * (1.0 + taper * z / root) + fall * (taper * root - z) - inside)
+    return max_past
 
 
 @kernel(inline=True)
@@ -382,7 +514,7 @@ def put_line_ends(a, b, is_sharp_b, slopes, tolerance, manifold, n):
         is_left = ev * at.beside_u - eu * at.beside_v > 0.0
         slope = slopes.left_slope if is_left else slopes.right_slope
         beside = math.sqrt(at.beside_u * at.beside_u + at.beside_v * at.beside_v)
-        if at.fall > slope * beside + tolerance:
+        if at.fall_a + at.fall_b > slope * beside + tolerance:
             continue
         feature_a, feature_b = features_of_end(a, b, shared, k)
         _put(manifold, n, at.u, at.v, at.h_a, at.h_b, feature_a, feature_b)

@@ -71,7 +71,8 @@ class SupportFace(NamedTuple):
     triangle : of the hull, −1 where there is none.
     u, v, h : a point of the face's plane.   slope_u, slope_v : of the height h there; 0 but of faces.
     flatness : how far what the corners stand for may be off that plane, or off an edge between them [m].
-    round : radius of the body's surface across an edge, 0 where it is sharp [m].
+    round_p, round_q : radius of the body's surface across an edge at its first and its second corner, linear in
+    between, 0 where the edge is sharp [m].
     corners : view of the coordinates.   features, edges : of each corner, and of the edge from it to the next.
     feature : of the face as a whole.
     """
@@ -84,7 +85,8 @@ class SupportFace(NamedTuple):
     slope_u: float
     slope_v: float
     flatness: float
-    round: float
+    round_p: float
+    round_q: float
     corners: Any
     features: Any
     edges: Any
@@ -138,7 +140,7 @@ def support_face(pair, body, faces_at, axes, sign, shift, capacity, doubles_at, 
     facing = Vec3(dot(cofactors[0], direction), dot(cofactors[1], direction), dot(cofactors[2], direction))
     normal = Vec3(0.0, 0.0, 0.0)
     flatness = 0.0
-    rounding = 0.0
+    round_p, round_q = 0.0, 0.0
     triangle = np.int64(-1)
     feature = np.int64(-1)
     if body.kind == POINTS:
@@ -148,8 +150,8 @@ def support_face(pair, body, faces_at, axes, sign, shift, capacity, doubles_at, 
         )
     elif body.kind == CYLINDER or body.kind == CONE:
         n, normal, flatness = _round_corners(pair, body, g, corners, features, edges)
-        if body.kind == CYLINDER and n == 2:
-            rounding = pair.numbers[body.params_at]
+        if n == 2:
+            round_p, round_q = _side_radii(pair, body)
     else:
         n = 1
         put_vec3(corners, 0, curved_support(body.kind, pair.numbers, body.params_at, g))
@@ -160,15 +162,16 @@ def support_face(pair, body, faces_at, axes, sign, shift, capacity, doubles_at, 
     base = vec3_at(corners, 0)
     if n < 3:
         return SupportFace(
-            n, triangle, base.x, base.y, base.z, 0.0, 0.0, flatness, rounding, corners, features, edges, feature
+            n, triangle, base.x, base.y, base.z, 0.0, 0.0, flatness, round_p, round_q, corners, features, edges, feature
         )
     N = add(
         add(scale(normal.x, cofactors[0]), scale(normal.y, cofactors[1])), scale(normal.z, cofactors[2])
     )
     N = seen_along(axes, N)
     return SupportFace(
-        n, triangle, base.x, base.y, base.z, -N.x / N.z, -N.y / N.z, flatness, 0.0, corners, features, edges, feature
-    )
+        n, triangle, base.x, base.y, base.z, -N.x / N.z, -N.y / N.z, flatness, 0.0, 0.0, corners, features, edges,
+        feature,
+    )  # fmt: skip
 
 
 @kernel
@@ -204,7 +207,7 @@ def swept_face(face, sign, radius, error):
     base = add(Vec3(face.u, face.v, face.h), scale(radius, shift))
     return SupportFace(
         n, face.triangle, base.x, base.y, base.z, face.slope_u, face.slope_v, face.flatness + unknown * radius,
-        radius if n == 2 else 0.0, corners, face.features, face.edges, face.feature,
+        radius if n == 2 else 0.0, radius if n == 2 else 0.0, corners, face.features, face.edges, face.feature,
     )  # fmt: skip
 
 
@@ -338,6 +341,19 @@ def _round_corners(pair, body, g, corners, features, edges):
         put_vec3(corners, 0, vec3_at(corners, 3))
         features[0] = features[1]
     return np.int64(1), normal, 0.0
+
+
+@kernel(inline=True)
+def _side_radii(pair, body):
+    """Radii of curvature across a line on the side, at its lower end and at its upper one.
+
+    Of a cone with half angle α the radius at s from the apex, along the side, is s · tan α.
+    """
+    radius = pair.numbers[body.params_at]
+    if body.kind == CYLINDER:
+        return radius, radius
+    height = 2.0 * pair.numbers[body.params_at + 1]
+    return radius * math.sqrt(radius * radius + height * height) / height, 0.0
 
 
 @kernel(inline=True)

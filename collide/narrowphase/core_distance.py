@@ -20,12 +20,15 @@ from collide.narrowphase.gjk.minkowski_difference import AXIS, NEAREST_POINT, we
 from collide.narrowphase.gjk.simplex import nearest_of_all, weigh_enclosed
 from collide.narrowphase.shallow_cylinders import is_cylinder_pair, shallow_cylinders
 from collide.narrowphase.shallow_ellipsoids import NOTHING, is_ellipsoid_pair, shallow_ellipsoids
-from collide.numerics.vec3 import Vec3, neg, norm, norm1, scale, sub, vec3_at
+from collide.numerics.vec3 import Vec3, add, neg, norm, norm1, scale, sub, vec3_at
 
 #: A weighted point is the foot on a plane if it misses that by no more, in units of the pair's size.
 _NEAR_MISS = 2.0**-48
 #: Of a bracket's width, what weighted points of curved cores may miss the foot by.
 _MISS_OF_WIDTH = 2.0**-10
+#: Nearest points of curved cores move by half of so much, in units of the pair's size, and of twice the width of their
+#: bracket, to be across the plane between them.
+_CARRIED = 2.0**-35
 #: Least weight of a foot well inside its facet.
 _WELL_INSIDE = 2.0**-10
 #: With more vertices than this in two cores, a better seed for EPA than GJK's tetrahedron is worth its support points.
@@ -70,11 +73,18 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
         if shallow.is_proven:
             depth, proven, nhat = shallow.depth, shallow.proven, shallow.nhat
             return CoreDistance(depth, -depth, -proven, -math.inf, math.inf, nhat, 1, 1, shallow.iterations)
-    run = gjk(pair, points, ids, weights, n_start, query.boolean, radius, query.limit, error, GJK_ROUNDS)
+    # Of polytopes at rest the last digits tell the normal (`gap/refine_gap.py`); a motion tries axes between this one
+    # and the last where it is a poor one.
+    axis_from = 0.125 if query.resumes else 0.0 if curved else math.inf
+    axis_from = math.inf if query.boolean else axis_from
+    run = gjk(pair, points, ids, weights, n_start, query.boolean, axis_from, radius, query.limit, error, GJK_ROUNDS)
     n = run.n_points
     distance = norm(vec3_at(weights, NEAREST_POINT))
     if run.status == NEAREST or run.status == APART:
         nhat = neg(vec3_at(weights, AXIS))
+        if curved and not (query.boolean or query.resumes):
+            tolerance = _CARRIED * ordered.size + 2.0 * max(distance - run.lower, 0.0)
+            nhat = _normal_of_gap(vec3_at(weights, NEAREST_POINT), distance, nhat, tolerance)
         return CoreDistance(-distance, run.lower, distance, -math.inf, math.inf, nhat, n, n, run.iterations)
     enclosed = run.status == ENCLOSED
     upper = -run.clearance if enclosed else distance
@@ -86,6 +96,19 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
                 nearest_of_all(points, 4, weights, 15)
         return _common_point(upper, n, run.iterations)
     return _by_epa(ordered, query, work, run, upper, radius, error, curved)
+
+
+@kernel(inline=True)
+def _normal_of_gap(v, distance, nhat, tolerance):
+    """The direction in which curved cores are as far apart as is proven, if their nearest points can be moved onto it.
+
+    The nearest point v of A ⊖ B stops at rounding: across it, it is off by the root of distance · rounding, and its
+    direction by that over the distance, so that corners far from it may come nearer along v than they are. Along the
+    normal of the plane that proves the lower bound none does.   tolerance : what the points may miss it by [m].
+    """
+    if not distance > 0.0 or norm(add(v, scale(distance, nhat))) <= tolerance:
+        return nhat
+    return scale(-1.0 / distance, v)
 
 
 @kernel

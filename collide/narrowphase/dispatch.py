@@ -92,6 +92,11 @@ REFUSED: dict[tuple[Method, str], str] = {
     ),
 }
 REFUSED[Method.REGIONS, "distance"] = REFUSED[Method.PLANES, "distance"]
+# Of unions with half-spaces there may be a way out that is not found, or none, as out of a corridor too narrow.
+REFUSED[Method.PARTS, "distance"] = REFUSED[Method.MESH_PARTS, "distance"] = (
+    "no translation was found that clears all half-spaces and all other parts; collide(), contacts() and "
+    "distance(signed=False) still answer, and distance() of the items one by one"
+)
 
 
 def method_of(kind_a: Kind, kind_b: Kind) -> Method:

@@ -29,7 +29,7 @@ from collide.narrowphase.rows import (
     is_undecided,
     view_row,
 )
-from collide.numerics.vec3 import add, put_vec3, scale, sub, vec3_at
+from collide.numerics.vec3 import add, norm1, put_vec3, scale, sub, vec3_at
 from collide.results import PAIR_DTYPE, UNDECIDED
 
 #: (boolean, depths) of `answer_pairs`: the search for the sign, for a depth, and for a gap.
@@ -92,6 +92,9 @@ def _take_sign(row, result, limit):
         doubles[UPPER] = min(doubles[UPPER], 0.0)
     else:
         doubles[LOWER] = max(doubles[LOWER], result.doubles[LOWER])
+        n = vec3_at(result.doubles, NORMAL)
+        if norm1(n) > 0.0:  # that of the plane between them: an overlap's leaned, though it was no more than rounding
+            put_vec3(doubles, NORMAL, n)
         doubles[UPPER] = max(doubles[UPPER], doubles[LOWER])
     beyond = doubles[LOWER] > limit
     flags[BEYOND] = 1 if beyond else 0

@@ -285,6 +285,19 @@ def _beside(pair, owner, Q, t, n, u):
 
 
 @kernel(inline=True)
+def _depth_within(insets):
+    """How deep a point is within planes at right angles, from how far inside each it is; minus its distance outside.
+
+    Beyond two of them at once, as beside a rim, it is farther from the body than from either.
+    """
+    x, y, z = min(insets.x, 0.0), min(insets.y, 0.0), min(insets.z, 0.0)
+    least = min(min(x, y), z)
+    if least < 0.0 and x + y + z < least:
+        return -math.sqrt(x * x + y * y + z * z)
+    return min(min(insets.x, insets.y), insets.z)
+
+
+@kernel(inline=True)
 def _proven(pair, points, ids, weights, of_a, nhat, b, tolerance):
     """The `ShallowDepth` of a normal and of a point of one body within the other, A if ``of_a``, seen from its origin.
 
@@ -299,9 +312,9 @@ def _proven(pair, points, ids, weights, of_a, nhat, b, tolerance):
     at = owner.params_at
     p0, p1 = pair.numbers[at], pair.numbers[at + 1]
     if owner.kind == CYLINDER:
-        inner = min(p0 - math.sqrt(p.x * p.x + p.y * p.y), p1 - abs(p.z))
+        inner = _depth_within(Vec3(p0 - math.sqrt(p.x * p.x + p.y * p.y), p1 - abs(p.z), math.inf))
     else:
-        inner = min(min(p0 - abs(p.x), p1 - abs(p.y)), pair.numbers[at + 2] - abs(p.z))
+        inner = _depth_within(Vec3(p0 - abs(p.x), p1 - abs(p.y), pair.numbers[at + 2] - abs(p.z)))
     proven = inner - 4.0 * off * reach_of(pair, owner)
     difference_point(pair, points, ids, 0, nhat)
     depth = height(points, 0, nhat)

@@ -448,14 +448,29 @@ def _way_out(A: CompoundParts, B: CompoundParts, X_WA, X_WB, meeting: np.ndarray
     directions = np.concatenate([np.array(ways).reshape(-1, 3), rows, normals])
     directions /= np.sqrt(np.square(directions).sum(axis=1))[:, None]
     size = float(np.abs(depths).max() + np.abs(X_WA[:3, 3] - X_WB[:3, 3]).sum()) + A.reach + B.reach
-    for length in (factor * size for factor in _FARTHEST):
-        moved = np.repeat(X_WB[None], len(directions), axis=0)
-        moved[:, :3, 3] += length * directions
-        apart = np.flatnonzero(_states(A, B, np.repeat(X_WA[None], len(moved), axis=0), moved) == APART)
+    # Between half-spaces that face each other a long way leads into the other one, but for along both.
+    shortest = _shortest_way(normals, depths + 2.0**-40 * size)
+    shortest = np.zeros(3) if shortest is None else shortest
+    along = _across_all(normals)
+    steps = [shortest[None], *(shortest + factor * size * along for factor in _FARTHEST)]
+    steps += [factor * size * directions for factor in _FARTHEST]
+    for some in steps:
+        moved = np.repeat(X_WB[None], len(some), axis=0)
+        moved[:, :3, 3] += some
+        apart = some[_states(A, B, np.repeat(X_WA[None], len(moved), axis=0), moved) == APART]
         if len(apart):
-            known = SeparatingTranslation(length, length * (1.0 + 2.0**-40), directions[apart[0]])
-            return _shortened(A, B, X_WA, X_WB, known, directions, meeting)
+            lengths = np.sqrt(np.square(apart).sum(axis=1))
+            length, k = float(lengths.min()), int(lengths.argmin())
+            known = SeparatingTranslation(length, length * (1.0 + 2.0**-40), apart[k] / length)
+            return _shortened(A, B, X_WA, X_WB, known, np.concatenate([directions, along]), meeting)
     return nothing
+
+
+def _across_all(normals: np.ndarray) -> np.ndarray:
+    """Unit vectors (k, 3) along all planes with these normals, both ways; k = 0, 2 or 4."""
+    _, lengths, axes = np.linalg.svd(normals)
+    free = axes[int((lengths > 2.0**-30).sum()) :]
+    return np.concatenate([free, -free])
 
 
 def _planes(A: CompoundParts, B: CompoundParts, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray]:

@@ -51,7 +51,7 @@ class GjkResult(NamedTuple):
 
 
 @kernel(inline=True)
-def gjk(pair, points, ids, weights, n_start, boolean, radius, limit, error, max_iterations):
+def gjk(pair, points, ids, weights, n_start, boolean, axis_from, radius, limit, error, max_iterations):
     """Run GJK on the cores of a pair; returns a `GjkResult`.
 
     points, ids : workspace for five difference points; the simplex found stands first.
@@ -60,6 +60,7 @@ def gjk(pair, points, ids, weights, n_start, boolean, radius, limit, error, max_
         nearest point v, and the unit axis (along v, from the simplex's own edges where v is too short to have a
         direction).
     boolean : stop as soon as an overlap is proven.
+    axis_from : the axis is that of the plane that proves ``lower``, where that is more than this part of |v|.
     radius : sum of the swept radii.   limit : stop once proven farther apart than this.
     error : absolute error of a bound, from `bounds.py`.
     """
@@ -67,7 +68,7 @@ def gjk(pair, points, ids, weights, n_start, boolean, radius, limit, error, max_
     start = begin(pair, points, ids, weights, limits)
     if start.status == APART:
         return GjkResult(APART, start.n_points, start.lower, 0.0, 0)
-    run = _search(pair, points, ids, weights, n_start, start, limits)
+    run = _search(pair, points, ids, weights, n_start, start, axis_from, limits)
     if run.status == ENCLOSED or run.status == APART:
         return run
     v = vec3_at(weights, NEAREST_POINT)
@@ -91,9 +92,10 @@ def gjk(pair, points, ids, weights, n_start, boolean, radius, limit, error, max_
 
 
 @kernel(inline=True)
-def _search(pair, points, ids, weights, n_start, start, limits):
+def _search(pair, points, ids, weights, n_start, start, axis_from, limits):
     """The iterations of GJK, from what `begin` found; see `gjk` for arguments and results."""
     error, max_iterations, lower = limits.error, limits.max_iterations, start.lower
+    axis = scale(-1.0 / start.length, start.d)  # of the plane that proves ``lower``
     n, coarse = first_simplex(pair, points, ids, weights, n_start, start)
     # The simplex: points A, B, C in registers, of which n are there, and where they stand in memory.
     # It is loaded so once more, below: through a kernel for both, gaps at n = 512 took 2 to 4 % longer.
@@ -114,7 +116,9 @@ def _search(pair, points, ids, weights, n_start, start, limits):
             break
         new = _next_point(pair, points, ids, places, v, square, asked, limits, used == max_iterations)
         asked = new.asked
-        lower = max(lower, new.proven)
+        if new.proven > lower:
+            lower = new.proven
+            axis = scale(1.0 / length, v)
         if lower - error - limits.radius > limits.limit:
             status = APART
             break
@@ -150,7 +154,10 @@ def _search(pair, points, ids, weights, n_start, start, limits):
                 continue
             if has_trees(pair):
                 settle_point(pair, points, ids, places.d, neg(v))
-                lower = max(lower, height(points, places.d, v) / length)
+                settled = height(points, places.d, v) / length
+                if settled > lower:
+                    lower = settled
+                    axis = scale(1.0 / length, v)
             break
         square = closer
     if status == ENCLOSED:
@@ -158,6 +165,8 @@ def _search(pair, points, ids, weights, n_start, start, limits):
     if not (limits.boolean and status == APART):  # of a miss nothing else is wanted
         bring_to_front(points, ids, places)
     _put_nearest(weights, places.n, wa, wb, wc, v)
+    if -math.inf < lower and lower > axis_from * norm(v):
+        put_vec3(weights, AXIS, axis)
     return GjkResult(status, places.n, lower, 0.0, used)
 
 

@@ -229,6 +229,42 @@ def test_halfspaces_inside_a_compound():
     assert collide.collide(corridor, ball, np.eye(4), pose(t=(3, 4, 0.75)))
 
 
+@pytest.mark.parametrize("of_meshes", [(True, False), (False, True), (True, True)])
+@pytest.mark.parametrize(
+    ("width", "beside", "height", "shortest"),
+    [(1.0, 2.0, 0.45, 0.1), (1.0, 0.0, 0.45, 0.1), (1.0, 0.0, 0.0, 0.25), (0.4, 2.0, 0.3, 0.25), (0.4, 0.0, 0.3, 0.35)],
+)
+def test_there_is_a_way_out_between_half_spaces_that_face_each_other(width, beside, height, shortest, of_meshes):
+    """A long way led into the other half-space, whatever its direction: unions with meshes were refused.
+
+    A corridor with a cube in it, and a cube of the same size; no way out is shorter than ``shortest``.
+    """
+    cube = collide.Box((0.3, 0.3, 0.3))
+    mesh = collide.Mesh(*collide.tessellate(cube)[:2])
+    inner, B = (mesh if is_mesh else cube for is_mesh in of_meshes)
+    walls = [(collide.Halfspace((0, 0, z), -width / 2), np.eye(4)) for z in (1, -1)]
+    corridor = collide.Compound([*walls, (inner, pose(t=(beside, 0, 0)))])
+    X = pose(t=(0.05, 0, height))
+    for case in (Case(corridor, B, np.eye(4), X), Case(B, corridor, X, np.eye(4))):
+        r = collide.distance(*case)
+        assert r.hit and -r.lower >= shortest - 1e-9
+        moved = case.X_WB.copy()
+        moved[:3, 3] += (1e-12 - r.lower) * r.normal
+        assert not collide.collide(case.A, case.B, case.X_WA, moved)
+
+
+def test_a_corridor_too_narrow_says_what_else_to_ask():
+    cube = collide.Box((0.3, 0.3, 0.3))
+    mesh = collide.Mesh(*collide.tessellate(cube)[:2])
+    walls = [(collide.Halfspace((0, 0, z), -0.1), np.eye(4)) for z in (1, -1)]
+    for inner in (cube, mesh):
+        corridor = collide.Compound([*walls, (inner, pose(t=(2, 0, 0)))])
+        with pytest.raises(collide.UnsupportedQuery, match=r"no translation was found .* distance\(signed=False\)"):
+            collide.distance(corridor, cube, np.eye(4), np.eye(4))
+        assert collide.distance(corridor, cube, np.eye(4), np.eye(4), signed=False).hit
+        assert len(collide.contacts(corridor, cube, np.eye(4), np.eye(4))) == 8
+
+
 def test_gaps_alone_of_overlapping_unions_name_a_point_of_both():
     """Both points in one place, which lies in a part of either body: the parts that are named."""
     rng = rng_of("common points of unions")

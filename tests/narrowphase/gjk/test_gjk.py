@@ -38,6 +38,7 @@ def run(bodies: PosedBodies, *, boolean=False, limit=math.inf, axis=(0.0, 0.0, 0
         weights,
         0,
         boolean,
+        math.inf,
         bodies.radius,
         limit,
         bodies.error,
