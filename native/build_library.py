@@ -10,6 +10,7 @@ compiles kernels at their first call. ``COLLIDE_REQUIRE_COMPILED=1``, as for rel
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ import sys
 import sysconfig
 import tempfile
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -157,6 +159,7 @@ class BuildLibrary(build_ext):
         (place / "lib" / "pkgconfig" / "collide.pc").write_text(text.replace("@VERSION@", version), encoding="utf-8")
 
     def _compiled(self, names: list[str], generated: Path) -> list[str]:
+        """Object files of modules of C, each kept under a hash of all that it is made from."""
         import numpy
 
         flags = (
@@ -165,8 +168,36 @@ class BuildLibrary(build_ext):
             else ["-O2", "-g0", "-std=c99", "-ffp-contract=off", "-fvisibility=hidden", f"-ffile-prefix-map={ROOT}=."]
         )
         include = [str(generated), str(NATIVE), numpy.get_include(), sysconfig.get_path("include")]
-        sources = [str(NATIVE / name) for name in names]
-        return self.compiler.compile(sources, output_dir=self.build_temp, include_dirs=include, extra_postargs=flags)
+        headers = sorted([*NATIVE.glob("*.h"), *generated.iterdir()])
+        common = hashlib.sha256(repr((flags, include, numpy.__version__, sys.version, self._c_compiler())).encode())
+        for header in headers:
+            common.update(header.name.encode() + header.read_bytes())
+
+        def compiled(name: str) -> str:
+            made_from = common.copy()
+            made_from.update(name.encode() + (NATIVE / name).read_bytes())
+            place = BUILD / "c" / f"{name}-{made_from.hexdigest()[:16]}{self.compiler.obj_extension}"
+            if not place.exists():
+                for old in place.parent.glob(f"{name}-*"):
+                    old.unlink()
+                place.parent.mkdir(parents=True, exist_ok=True)
+                out = str(Path(self.build_temp) / name)
+                source = [str(NATIVE / name)]
+                (made,) = self.compiler.compile(source, output_dir=out, include_dirs=include, extra_postargs=flags)
+                shutil.copy(made, part := place.with_suffix(f".{os.getpid()}"))
+                part.replace(place)
+            return str(place)
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            return list(pool.map(compiled, names))
+
+    def _c_compiler(self) -> str:
+        """The C compiler and its version, in its own words."""
+        command = getattr(self.compiler, "compiler_so", None)
+        if not command:
+            return self.compiler.compiler_type  # of Windows: whose version is that of the build's environment
+        asked = [*command[:1], "--version"]
+        return repr(command) + subprocess.run(asked, stdout=subprocess.PIPE, check=True, text=True).stdout
 
     def _link(self, objects: list[str], out: Path, exported: list[str], calls_python: bool = False) -> None:
         """A shared library that leaves nothing open but the C library's functions, and Python's where it calls them.

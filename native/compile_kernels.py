@@ -1,12 +1,13 @@
-"""Compile kernels ahead of time: an object file for each link unit and level of processors.
+"""Compile kernels ahead of time: object files of all kernels for each level of processors.
 
     python native/compile_kernels.py                       # for this processor's level, into build/kernels
     python native/compile_kernels.py --levels all          # for all levels of the platform, as releases have them
     python native/compile_kernels.py --out arm --triple aarch64-unknown-linux-gnu
 
-Needs numba and llvmlite, no C compiler. Link units are compiled in parallel, each in a process of its own. Files are
-kept under a hash of the code that they are made from: a second call compiles the units that an edit concerns. The same
-sources and versions give the same bytes.
+Needs numba and llvmlite, no C compiler. Three kinds of files are kept, and a second call makes those anew that an edit
+concerns: each kernel as Numba lowers it (`collide/kernels/kept_lowered.py`), each link unit's list of its objects,
+under a hash of its entries' code, and each object file, under a hash of what LLVM makes it from. So an object is the
+same, byte by byte, whether or not there was anything to take. Units are lowered in parallel, then objects compiled.
 """
 
 from __future__ import annotations
@@ -17,15 +18,22 @@ import importlib
 import json
 import multiprocessing
 import os
+import pickle
 import platform
+import subprocess
 import sys
 import time
+import zlib
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
+
+
+#: Seconds after which a lowered kernel that nothing asked for is forgotten.
+_KEPT_FOR = 30 * 86_400
 
 
 class Level(NamedTuple):
@@ -62,6 +70,25 @@ UNITS = {
     "worlds": ("broadphase.", "robots.", "support.", "numerics."),
     "meshes": ("mesh.", "solids.", "hull."),
 }
+
+
+#: Kernels that stand in objects of their own, which their callers' objects call: large ones that are called from few
+#: places, and seldom in a pair's time. An edit of theirs, or of what they call, does not concern their callers' code.
+APART = (
+    "narrowphase.core_distance._by_epa", "narrowphase.core_distance._shallow_depth",
+    "narrowphase.epa.expand_polytope.epa", "narrowphase.epa.refine_depth.refine",
+    "narrowphase.gap.gap_queue.refine_queued", "narrowphase.gjk.mpr_batch.answer_small_hulls",
+    "narrowphase.composite.composite_rows.separate_bodies", "narrowphase.halfspace_convex.halfspace_convex",
+    "narrowphase.shallow_cylinders.shallow_cylinders", "narrowphase.exact.exact_gjk.touch_exactly",
+    "narrowphase.facets.exact_triangles._meeting_exactly",
+    "contact.shallow_overlaps.separate_pairs", "contact.contact_patches.grow_patch",
+    "contact.facet_manifolds._put_patch", "contact.facet_manifolds._put_patches",
+    "contact.convex_manifolds.put_manifold", "contact.closed_form_rows.put_closed_form",
+    "contact.support_face.support_face", "contact.curved_manifolds._put_patches",
+    "contact.curved_patches.grow_over", "contact.patch_rows.choose_points", "contact.clearing_length._facets_part",
+    "casts.portal.cast_line", "casts.cut_parts.cut_part", "motion.kept_axis.gap_along",
+    "motion.convex_impact.search_contact",
+)  # fmt: skip
 
 
 def unit_of(module: str) -> str:
@@ -141,50 +168,104 @@ def compile_kernels(out: Path, triple: str = "", levels: str = "", jobs: int | N
     described = [(entry.__name__, entry.signature, entry.nogil) for entry in entries]
     if strange := set(hashes) ^ {entry.__name__ for entry in entries}:
         raise SystemExit(f"entries whose sources were not found, or the other way round: {', '.join(sorted(strange))}")
+    if strange := [name for name in APART if not _is_kernel(name)]:
+        raise SystemExit(f"{strange[0]} stands in APART of native/compile_kernels.py, and is no kernel of its module")
     out.mkdir(parents=True, exist_ok=True)
-    tasks = [_Task(unit, triple, chosen, out, _made_from(unit, hashes, sources.compiler_versions())) for unit in UNITS]
-    missing = [task for task in tasks if not all(task.place(level).exists() for level in task.levels)]
+    tasks = [_Unit(unit, out, _made_from(unit, hashes, sources.compiler_versions())) for unit in UNITS]
+    jobs = jobs or os.cpu_count() or 1
+    if changed := [task for task in tasks if not task.complete()]:
+        say(f"lowering {len(changed)} of {len(tasks)} link units: {', '.join(task.unit for task in changed)}")
+        _do(_lower, changed, jobs)
+    groups = list(dict.fromkeys(group for task in tasks for group in task.groups()))
+    missing = [
+        _Object(group, triple, level, out) for group in groups for level in chosen
+        if not group.place(out, triple, level).exists()
+    ]  # fmt: skip
     if missing:
-        counts = f"{len(missing)} of {len(tasks)} link units for {', '.join(level.cpu for level in chosen)}"
-        say(f"compiling {counts}: {', '.join(task.unit for task in missing)} (about a minute for all on two cores)")
-        with multiprocessing.Pool(min(jobs or os.cpu_count() or 1, len(missing)), maxtasksperchild=1) as pool:
-            for done, (unit, seconds) in enumerate(pool.imap_unordered(_make, missing, chunksize=1), 1):
-                say(f"{done} of {len(missing)}: {unit}, {seconds:.0f} s")
-    _forget_others(out, tasks)
+        made_for = ", ".join(level.cpu for level in chosen)
+        say(f"compiling {len(missing)} of {len(groups) * len(chosen)} objects for {made_for}")
+        _do(_compile, sorted(missing, key=lambda task: -task.group.size), jobs)
+    _forget_others(out, tasks, groups)
     say(f"machine code of {len(entries)} kernels: {time.perf_counter() - begun:.0f} s")
-    objects = {level.name: [task.place(level) for task in tasks] for level in chosen}
+    objects = {level.name: [group.place(out, triple, level) for group in groups] for level in chosen}
     return Compiled(objects, described, sources.compiler_versions(), fingerprint, names, hashes)
 
 
-class _Task(NamedTuple):
-    """A link unit to be compiled."""
+def _do(work, tasks: list, jobs: int) -> None:
+    """Each task in a process of its own, so that what one leaves in memory ends with it."""
+    with multiprocessing.Pool(min(jobs, len(tasks)), maxtasksperchild=1) as pool:
+        for done, (name, seconds) in enumerate(pool.imap_unordered(work, tasks, chunksize=1), 1):
+            if seconds > 2 or done == len(tasks):
+                say(f"{done} of {len(tasks)}: {name}, {seconds:.0f} s")
+
+
+class _Group(NamedTuple):
+    """What one object file is made from: the entries of a module, or a kernel that stands apart, with all they call."""
+
+    label: str
+    digest: str
+    size: int
+
+    def place(self, out: Path, triple: str, level: Level) -> Path:
+        return out / f"{self.label}-{triple}-{level.name}-{self.digest}.o"
+
+    def code(self, out: Path) -> Path:
+        return out / f"{self.label}-{self.digest}.bc"
+
+
+class _Unit(NamedTuple):
+    """A link unit, and the list of its objects."""
 
     unit: str
-    triple: str
-    levels: tuple[Level, ...]
     out: Path
     made_from: str
 
-    def place(self, level: Level) -> Path:
-        return self.out / f"{self.unit}-{self.triple}-{level.name}-{self.made_from}.o"
+    @property
+    def place(self) -> Path:
+        return self.out / f"{self.unit}-{self.made_from}.json"
+
+    def groups(self) -> list[_Group]:
+        return [_Group(*known) for known in json.loads(self.place.read_text(encoding="utf-8"))]
+
+    def complete(self) -> bool:
+        return self.place.exists() and all(group.code(self.out).exists() for group in self.groups())
+
+
+class _Object(NamedTuple):
+    """An object file to be made."""
+
+    group: _Group
+    triple: str
+    level: Level
+    out: Path
 
 
 def _made_from(unit: str, hashes: dict[str, str], versions: str) -> str:
     """A hash of all that a unit's machine code depends on."""
     own = sorted((entry.__name__, entry.signature, hashes[entry.__name__]) for entry in _entries_of(unit))
-    return hashlib.sha256(repr((own, versions, X86, ARM, APPLE)).encode()).hexdigest()[:16]
+    return hashlib.sha256(repr((own, versions, X86, ARM, APPLE, APART)).encode()).hexdigest()[:16]
 
 
 def _entries_of(unit: str) -> list:
     return [entry for entry in _entries() if unit_of(entry.function.__module__) == unit]
 
 
-def _forget_others(out: Path, tasks: list[_Task]) -> None:
+def _is_kernel(name: str) -> bool:
+    from collide.kernels.front_end import KernelDispatcher
+
+    module, _, function = f"collide.{name}".rpartition(".")
+    return isinstance(getattr(sys.modules.get(module), function, None), KernelDispatcher)
+
+
+def _forget_others(out: Path, tasks: list[_Unit], groups: list[_Group]) -> None:
     """Delete what was made from other sources, or by other versions."""
-    for task in tasks:
-        for file in (*out.glob(f"{task.unit}-*.o"), *out.glob(f"{task.unit}-*.bc")):
-            if not file.stem.endswith(task.made_from):
-                file.unlink()
+    known = {task.made_from for task in tasks} | {group.digest for group in groups}
+    for file in (*out.glob("*.o"), *out.glob("*.bc"), *out.glob("*.json")):
+        if file.stem.split("-")[-1] not in known:
+            file.unlink()
+    for file in (out / "lowered").glob("*"):
+        if file.stat().st_mtime < time.time() - _KEPT_FOR:
+            file.unlink(missing_ok=True)
 
 
 @cache
@@ -207,38 +288,63 @@ def _entries() -> list:
     return entries
 
 
-def _make(task: _Task) -> tuple[str, float]:
-    """Numba's part of a unit, kept for further levels, and LLVM's for each level. (unit, seconds)."""
-    from collide.kernels.back_end import Target, machine_code
+def _lower(task: _Unit) -> tuple[str, float]:
+    """Numba's part of a unit's objects, and the list of them. (unit, seconds)."""
+    import gc
+
+    from collide.kernels.front_end import Lowered, keep_lowered
 
     begun = time.perf_counter()
-    bitcode = task.out / f"{task.unit}-{task.made_from}.bc"
-    if not bitcode.exists():
-        _write(bitcode, _lowered(task.unit))
-    names = [entry.__name__ for entry in _entries_of(task.unit)]
-    for level in task.levels:
-        if not task.place(level).exists():
-            target = Target(level.cpu, level.features, task.triple, level.function_passes)
-            code = machine_code(names, [bitcode.read_bytes()], target, prefix=f"collide_{level.name}_")
-            _write(task.place(level), code)
+    gc.disable()  # hundreds of megabytes of syntax trees live to the end anyway
+    keep_lowered(task.out / "lowered")
+    apart, modules = frozenset(f"collide.{name}" for name in APART), {}
+    for entry in _entries_of(task.unit):
+        code = modules.setdefault(entry.function.__module__, Lowered(apart))
+        code.add(entry.__name__, entry.function, entry.signature)
+    groups = [_written(module.split(".")[-1], code, task.out) for module, code in modules.items()]
+    waiting, known = [code.outside for code in modules.values()], set()
+    while waiting:
+        for name, library in waiting.pop().items():
+            if name not in known:
+                known.add(name)
+                code = Lowered(apart)
+                code.add_apart(name, library)
+                groups.append(_written(name, code, task.out))
+                waiting.append(code.outside)
+    _write(task.place, json.dumps(groups).encode())
     return task.unit, time.perf_counter() - begun
 
 
-def _lowered(unit: str) -> bytes:
-    import gc
+def _written(label: str, code, out: Path) -> _Group:
+    """What an object is made from, in a file under its hash."""
+    from collide.kernels import sources
 
-    from collide.kernels.back_end import joined
-    from collide.kernels.front_end import Lowered
+    names, outside = code.names, sorted(code.outside)
+    versions = repr((sources.compiler_versions(), sources.of_compiler(), X86, ARM, APPLE))
+    digest = hashlib.sha256(repr((versions, names, outside)).encode())
+    for module in code.modules:
+        digest.update(hashlib.sha256(module).digest())
+    group = _Group(label, digest.hexdigest()[:16], sum(map(len, code.modules)))
+    if not group.code(out).exists():
+        _write(group.code(out), zlib.compress(pickle.dumps((names, outside, code.modules)), 1))
+    return group
 
-    code = Lowered()
-    gc.disable()  # hundreds of megabytes of syntax trees live to the end anyway
-    for entry in _entries_of(unit):
-        code.add(entry.__name__, entry.function, entry.signature)
-    return joined(code.modules)
+
+def _compile(task: _Object) -> tuple[str, float]:
+    """LLVM's part of an object. (its name, seconds)."""
+    from collide.kernels.back_end import Target, machine_code
+
+    begun = time.perf_counter()
+    names, outside, modules = pickle.loads(zlib.decompress(task.group.code(task.out).read_bytes()))
+    level = task.level
+    target = Target(level.cpu, level.features, task.triple, level.function_passes)
+    code = machine_code(names, modules, target, prefix=f"collide_{level.name}_", outside=outside)
+    _write(task.group.place(task.out, task.triple, level), code)
+    return f"{task.group.label} for {level.cpu}", time.perf_counter() - begun
 
 
 def _write(place: Path, content: bytes) -> None:
-    part = place.with_suffix(".part")
+    part = place.with_suffix(f".{os.getpid()}")  # units that call one kernel write its object's file both
     part.write_bytes(content)
     part.replace(place)
 
@@ -259,6 +365,9 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, help="link units compiled at once, by default one a processor")
     parser.add_argument("--json", action="store_true", help="tell what was made as JSON")
     given = parser.parse_args()
+    if os.environ.get("PYTHONHASHSEED") != "0":  # the order of sets, which Numba's code has, must be one for all
+        seeded = {**os.environ, "PYTHONHASHSEED": "0"}
+        raise SystemExit(subprocess.run([sys.executable, *sys.argv], env=seeded, check=False).returncode)
     made = compile_kernels(given.out, given.triple, given.levels, given.jobs)
     if given.json:
         objects = {level: [str(place) for place in places] for level, places in made.objects.items()}

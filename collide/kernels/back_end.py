@@ -59,45 +59,41 @@ def host(position_independent: bool = True) -> Target:
     )
 
 
-def machine_code(names: Iterable[str], modules: Iterable[bytes], target: Target, prefix: str = "") -> bytes:
+def machine_code(
+    names: Iterable[str], modules: Iterable[bytes], target: Target, prefix: str = "", outside: Iterable[str] = ()
+) -> bytes:
     """An object file of C functions of these names, with a prefix if so wished; all else in it is its own affair.
 
-    modules : bitcode, as `front_end.Lowered` has it.
+    modules : bitcode, as `front_end.Lowered` has it.   outside : functions of other object files that it calls.
     Raises BackEndError where a kernel may raise, or needs what is not to be had without Python.
     """
     machine = target.machine()
     whole = _linked(modules, target, machine)
-    for name in names:
+    for name in (*names, *(outside := {*outside})):
         entry = whole.get_function(name)
         entry.name = prefix + name
         if target.position_independent:
             entry.visibility = "hidden"  # for the library's own modules
     _keep_inside(whole, {prefix + name for name in names})
     _optimise(whole, machine)
-    _check(whole, {prefix + name for name in names})
+    _check(whole, {prefix + name for name in names}, {prefix + name for name in outside})
     return machine.emit_object(whole)
 
 
-def joined(modules: Iterable[bytes]) -> bytes:
-    """All bitcode in one module's."""
-    whole = llvm.parse_assembly("")
-    whole.name = "collide"
-    for code in modules:
-        whole.link_in(llvm.parse_bitcode(code))
-    return whole.as_bitcode()
-
-
 def _linked(modules: Iterable[bytes], target: Target, machine) -> llvm.ModuleRef:
-    whole = llvm.parse_assembly("")
-    whole.name = "collide"
-    whole.triple = target.triple or llvm.get_process_triple()
-    whole.data_layout = str(machine.target_data)
+    parsed = []
     for code in modules:
-        module = llvm.parse_bitcode(code)
-        module.triple, module.data_layout = whole.triple, whole.data_layout
+        parsed.append(module := llvm.parse_bitcode(code))
+        module.triple, module.data_layout = target.triple or llvm.get_process_triple(), str(machine.target_data)
         if target.function_passes:
             _simplify(module, machine)
-        whole.link_in(module)
+    while len(parsed) > 1:  # eight by eight: the time to take in a module is that of what it is taken into
+        for first in (groups := [parsed[k : k + 8] for k in range(0, len(parsed), 8)]):
+            for module in first[1:]:
+                first[0].link_in(module)
+        parsed = [group[0] for group in groups]
+    (whole,) = parsed
+    whole.name = "collide"
     for kernel, name in _OF_C.items():
         if any(function.name == kernel for function in whole.functions):
             whole.get_function(kernel).name = name
@@ -132,7 +128,7 @@ def _optimise(whole, machine) -> None:
     builder.getModulePassManager().run(whole, builder)
 
 
-def _check(whole, names: set[str]) -> None:
+def _check(whole, names: set[str], outside: set[str]) -> None:
     """Nothing missing, nothing undefined, no status that somebody would have to look at."""
     whole.verify()
     defined = {function.name for function in whole.functions if not function.is_declaration}
@@ -147,7 +143,7 @@ def _check(whole, names: set[str]) -> None:
         raise BackEndError(
             f"a kernel may raise, and nobody would see it: called by {', '.join(_callers(whole, FAILED))}"
         )
-    if strange := called - MAY_BE_UNDEFINED:
+    if strange := called - MAY_BE_UNDEFINED - outside:
         raise BackEndError(f"not to be had without Python: {', '.join(sorted(strange))}")
 
 

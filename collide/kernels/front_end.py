@@ -8,15 +8,19 @@ entry and all it calls at once.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
 
 import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import _dynfunc
-from numba.core import compiler, sigutils, types, typing, untyped_passes
+from numba.core import callconv, cgutils, compiler, errors, funcdesc, sigutils, types, typing, untyped_passes
 from numba.core.codegen import AOTCPUCodegen, CPUCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.compiler_machinery import PassManager
+from numba.core.compiler_machinery import FunctionPass, PassManager, register_pass
 from numba.core.cpu import CPUContext
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUTarget
@@ -25,6 +29,7 @@ from numba.core.typed_passes import NopythonRewrites
 from numba.core.utils import threadsafe_cached_property
 from numba.extending import intrinsic
 
+from collide.kernels import kept_lowered, sources
 from collide.kernels.back_end import FAILED
 
 #: Numba's name for the target of kernels.
@@ -51,9 +56,14 @@ class _Library(CPUCodeLibrary):
     def __init__(self, codegen, name):
         super().__init__(codegen, name)
         self.modules: list[bytes] = []
+        self.called: list[_Library] = []
+        #: What it is kept under, and the type of its result.
+        self.kept_as: Any = None
+        #: Numba's description of the kernel.
+        self.description: Any = None
 
     def add_linking_library(self, library):
-        self._linking_libraries.append(library)
+        self.called.append(library)
 
     def add_llvm_module(self, ll_module):
         self.modules.append(ll_module.as_bitcode())
@@ -66,6 +76,12 @@ class _Codegen(AOTCPUCodegen):
     _library_class = _Library
 
 
+class _Calls(callconv.CPUCallConv):
+    def return_user_exc(self, builder, exc, exc_args=None, loc=None, func_name=None):
+        """Without the line that raises: nobody sees what is raised, and code does not depend on its place in a file."""
+        super().return_user_exc(builder, exc)
+
+
 class _Context(CPUContext):
     def init(self):
         super().init()
@@ -74,7 +90,24 @@ class _Context(CPUContext):
 
     def get_executable(self, library, fndesc, env):
         """Kernels are reached through entries only: what stands for one in Python cannot be called."""
+        env = env or _dynfunc.Environment({})
         return _dynfunc.make_function(fndesc.lookup_module(), fndesc.qualname, "a kernel", 0, env, (library,))
+
+    @cached_property
+    def call_conv(self):
+        return _Calls(self)
+
+    def add_dynamic_addr(self, builder, intaddr, info):
+        """Python's objects have addresses of their process; kernels see none of them."""
+        return self.get_constant_null(types.voidptr)
+
+    def compile_subroutine(self, builder, impl, sig, locals=None, flags=None, caching=True):
+        """Numba's own functions that are called from its instructions: kernels like others."""
+        made = _of_instructions(impl)
+        made.compile(sig)
+        compiled = made.overloads[tuple(sig.args)]
+        self.active_code_library.add_linking_library(compiled.library)
+        return compiled
 
     def post_lowering(self, mod, library):
         """Kernels count no references: nothing is to be linked for that."""
@@ -121,11 +154,29 @@ class _Target(CPUTarget):
         return _Typing()
 
 
+@register_pass(mutates_CFG=False, analysis_only=True)
+class _NameByContent(FunctionPass):
+    """A kernel's name for LLVM says what it is, not how many were compiled before it in this process: code that was
+    kept is put together with code that was not, and comes out as the same bytes."""
+
+    _name = "collide_name_by_content"
+
+    def __init__(self):
+        FunctionPass.__init__(self)
+
+    def run_pass(self, state) -> bool:
+        identity = state.func_id
+        identity.unique_id = _made_as(identity.func) or None
+        identity.unique_name = f"{identity.func_qualname}${identity.unique_id}"
+        return False
+
+
 class _Compiler(compiler.CompilerBase):
     def define_pipelines(self):
         whole = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
         ours = PassManager("kernels")
         ours.passes = [step for step in whole.passes if step[0] not in _UNUSED_PASSES]
+        ours.add_pass_after(_NameByContent, untyped_passes.TranslateByteCode)
         ours.finalize()
         return [ours]
 
@@ -135,11 +186,134 @@ class KernelDispatcher(Dispatcher):
 
     targetdescr = _Target(TARGET)
 
+    @cached_property
+    def full_name(self) -> tuple[str, str, str]:
+        """Module, qualified name, and what tells it from others made of one source."""
+        return self.py_func.__module__, self.py_func.__qualname__, _made_as(self.py_func)
+
     def get_call_template(self, args, kws):
         """An argument written as a constant has no type of its own, or kernels would be compiled for each constant."""
         return super().get_call_template(
             tuple(types.unliteral(a) for a in args), {name: types.unliteral(a) for name, a in kws.items()}
         )
+
+    def compile(self, sig):
+        """Lower it for these types, or take what was kept of that."""
+        arguments, asked = sigutils.normalize_signature(sig)
+        known = self.overloads.get(tuple(arguments))
+        if known is not None:
+            return known.entry_point
+        called = kept_lowered.Called(
+            self.full_name, tuple(arguments), asked,
+            tuple(sorted(self.targetoptions.items())),
+        )  # fmt: skip
+        compiled = _taken(called)
+        if compiled is None:
+            super().compile(sig)
+            compiled = self.overloads[tuple(arguments)]
+            self._keep(called, compiled)
+        else:
+            self.targetctx.insert_user_function(compiled.entry_point, compiled.fndesc, [compiled.library])
+            self.add_overload(compiled)
+        compiled.library.kept_as = called, str(compiled.signature.return_type)
+        compiled.library.description = compiled.fndesc
+        return compiled.entry_point
+
+    def _keep(self, called: kept_lowered.Called, compiled: compiler.CompileResult) -> None:
+        """Nothing is kept of a kernel that calls itself, or what has no name from one process to the next."""
+        calls = [library.kept_as for library in dict.fromkeys(compiled.library.called)]
+        if _folder is None or None in calls or " at 0x" in repr((called, sources.values_held(self.py_func))):
+            return
+        description = compiled.fndesc
+        record = kept_lowered.Record(
+            code_hash=_own_hash(called), symbol=description.mangled_name, environment=description.env_name,
+            parameters=tuple(description.args), result=compiled.signature.return_type,
+            modules=tuple(compiled.library.modules), calls=tuple(calls),
+        )  # fmt: skip
+        kept_lowered.write(_folder, called, record)
+
+
+class _Changed(Exception):
+    """A kernel is not there any more, or gives results of other types than it did."""
+
+
+def _taken(called: kept_lowered.Called) -> compiler.CompileResult | None:
+    """A kernel as it was lowered before; None where nothing of it is kept, or its code would be another now."""
+    record = kept_lowered.read(_folder, called, _own_hash(called)) if _folder else None
+    if record is None or called in _being_taken:
+        return None
+    context = KernelDispatcher.targetdescr.target_context
+    library = context.codegen().create_library(called.name[1])
+    _being_taken.add(called)
+    try:
+        for callee, result in record.calls:
+            library.add_linking_library(_lowered_again(callee, result))
+    except (_Changed, errors.NumbaError):
+        return None
+    finally:
+        _being_taken.discard(called)
+    library.modules += record.modules
+    library.finalize()
+    description = funcdesc.FunctionDescriptor(
+        native=True, modname=called.name[0], qualname=called.name[1], unique_name=record.symbol, doc="", typemap=None,
+        restype=record.result, calltypes=None, args=record.parameters, kws=(),
+        mangler=lambda *_types, **_tags: record.symbol, argtypes=called.arguments,
+        inline=bool(dict(called.options)["forceinline"]), env_name=record.environment,
+    )  # fmt: skip
+    library.kept_as, library.description = (called, str(record.result)), description
+    return compiler.compile_result(
+        target_context=context, library=library, fndesc=description, objectmode=False,
+        entry_point=context.get_executable(library, description, None),
+        signature=typing.signature(record.result, *called.arguments),
+    )  # fmt: skip
+
+
+def _lowered_again(called: kept_lowered.Called, result: str) -> _Library:
+    """The library of a kernel that a kept one calls. Raises _Changed, or numba's errors."""
+    known = _dispatcher_of(called)
+    if known is not None:
+        known.compile(typing.signature(called.asked, *called.arguments) if called.asked else called.arguments)
+        compiled = known.overloads[called.arguments]
+    else:  # of Numba's own, which are there once they are asked for
+        compiled = _taken(called)
+    if compiled is None or str(compiled.signature.return_type) != result:
+        raise _Changed
+    return compiled.library
+
+
+def _dispatcher_of(called: kept_lowered.Called) -> KernelDispatcher | None:
+    """The package's kernel of this name; None where there is none, and of Numba's own functions."""
+    candidates = _dispatchers.get(called.name[:2], ())
+    return next((known for known in candidates if known.full_name == called.name), None)
+
+
+def _own_hash(called: kept_lowered.Called) -> str:
+    """Of what a kernel is lowered from, beside the kernels that it calls. Of one that its values tell from others, they
+    are in its name."""
+    known = _dispatcher_of(called)
+    code_hash = sources.of_own_code(known.py_func) if known is not None else sources.of_compiler()
+    return f"{code_hash}, {sources.compiler_versions()}"
+
+
+def _made_as(function: Callable) -> str:
+    """What tells a function from others of its module and name: those of a module's own level are the only ones."""
+    if function.__module__.startswith("collide.") and sources.is_defined_in_module(function):
+        return ""
+    return hashlib.sha256(sources.values_held(function).encode()).hexdigest()[:16]
+
+
+#: Where lowered kernels are kept; nowhere, unless somebody asks for it.
+_folder: Path | None = None
+_being_taken: set[kept_lowered.Called] = set()
+#: All kernels, by their modules and names.
+_dispatchers: dict[tuple[str, str], list[KernelDispatcher]] = {}
+
+
+def keep_lowered(folder: Path) -> None:
+    """From now on, keep lowered kernels in a folder, and take from there what is still right."""
+    global _folder
+    folder.mkdir(parents=True, exist_ok=True)
+    _folder = folder
 
 
 #: Kernels on rarely taken paths, by their modules and names.
@@ -151,7 +325,15 @@ def dispatcher(function: Callable, *, inline: bool = False, cold: bool = False) 
     if cold:
         _cold.add((function.__module__, function.__qualname__))
     options = {**_FLAGS, "forceinline": inline}
-    return KernelDispatcher(function, targetoptions=options, pipeline_class=_Compiler)
+    made = KernelDispatcher(function, targetoptions=options, pipeline_class=_Compiler)
+    if function.__module__.startswith("collide."):
+        _dispatchers.setdefault((function.__module__, function.__qualname__), []).append(made)
+    return made
+
+
+@cache
+def _of_instructions(function: Callable) -> KernelDispatcher:
+    return dispatcher(function)
 
 
 def _of_numba(*args, **options):
@@ -167,43 +349,90 @@ dispatcher_registry[Kernels] = KernelDispatcher
 
 
 class Lowered:
-    """The code of entries and of the kernels that they call, each kernel once."""
+    """The code of entries and of the kernels that they call, each kernel once.
 
-    def __init__(self) -> None:
+    apart : kernels by module and name that stand in object files of their own, "collide.narrowphase.gjk.gjk.gjk" say.
+        Where one is called, the code calls a function that is defined elsewhere.
+    """
+
+    def __init__(self, apart: frozenset[str] = frozenset()) -> None:
         self.names: list[str] = []
         self.modules: list[bytes] = []
-        self._known: set[_Library] = set()
+        #: Kernels that stand apart and are called here, and the names of their C functions.
+        self.outside: dict[str, _Library] = {}
+        self._apart = apart
+        self._known: set = set()
 
     def add(self, name: str, function: Callable, signature: str) -> None:
         """Lower an entry, and what of its callees is not there yet. In LLVM's code it is a C function of this name.
 
         Raises numba's errors where it is no kernel.
         """
-        arguments, result = sigutils.normalize_signature(signature)
-        target, flags = KernelDispatcher.targetdescr, compiler.Flags()
-        target.options.parse_as_flags(flags, _FLAGS)
+        made = dispatcher(function)
         with target_override(TARGET), global_compiler_lock:
-            compiled = compiler.compile_extra(
-                target.typing_context, target.target_context, function, arguments, result, flags, {}, None, _Compiler
-            )
+            made.targetctx.refresh()  # LLVM numbers kinds of metadata as it meets them: Numba's own first, always
+            made.compile(signature)
+        (compiled,) = made.overloads.values()
         self.names.append(name)
-        self.modules.append(_c_function(name, compiled, target.target_context))
-        for library in _all_called(compiled.library):
-            if library not in self._known:
-                self._known.add(library)
+        self.modules.append(_c_function(name, compiled, made.targetctx))
+        self._add_code(compiled.library)
+
+    def add_apart(self, name: str, library: _Library) -> None:
+        """A kernel that stands apart, under the name that `outside` has it by."""
+        self.names.append(name)
+        self.modules.append(_apart_function(name, library.description, defined=True))
+        self._add_code(library)
+
+    def _add_code(self, root: _Library) -> None:
+        waiting = [root]
+        while waiting:
+            library = waiting.pop()
+            if library.kept_as in self._known:
+                continue
+            self._known.add(library.kept_as)
+            if library is not root and self._stands_apart(library):
+                name = _name_apart(library)
+                self.outside[name] = library
+                self.modules.append(_apart_function(name, library.description, defined=False))
+            else:
                 self.modules += library.modules
+                waiting += reversed(library.called)
+
+    def _stands_apart(self, library: _Library) -> bool:
+        return f"{library.description.modname}.{library.description.qualname}" in self._apart
 
 
-def _all_called(library: _Library) -> list[_Library]:
-    """A library, those that it calls, and those that they call in turn, each once."""
-    reached: dict[_Library, None] = {}
-    waiting = [library]
-    while waiting:
-        current = waiting.pop()
-        if current not in reached:
-            reached[current] = None
-            waiting += reversed(current._linking_libraries)
-    return list(reached)
+def _name_apart(library: _Library) -> str:
+    symbol = library.description.mangled_name
+    return f"{library.description.qualname.split('.')[-1]}_{hashlib.sha256(symbol.encode()).hexdigest()[:12]}"
+
+
+def _apart_function(name: str, description: funcdesc.FunctionDescriptor, *, defined: bool) -> bytes:
+    """Bitcode of a kernel that stands apart as a function without a status, and the other way round, for its callers:
+    the object file that it stands in was refused if the status could be an error."""
+    context = KernelDispatcher.targetdescr.target_context
+    module = ir.Module(name, context=ir.Context())
+    module.triple = llvm.get_process_triple()
+    kind = context.call_conv.get_function_type(description.restype, description.argtypes)
+    result_at, raised_at, *arguments = kind.args
+    native = ir.Function(module, kind, description.mangled_name)
+    bare = ir.Function(module, ir.FunctionType(ir.VoidType(), [result_at, *arguments]), name)
+    bare.attributes.add("nounwind")
+    if (description.modname, description.qualname) in _cold:
+        bare.attributes.add("cold")
+    made = bare if defined else native
+    builder = ir.IRBuilder(made.append_basic_block("entry"))
+    if defined:
+        raised = cgutils.alloca_once(builder, raised_at.pointee)
+        status = builder.call(native, [made.args[0], raised, *made.args[1:]])
+        with builder.if_then(builder.icmp_signed("!=", status, ir.Constant(status.type, 0)), likely=False):
+            builder.call(ir.Function(module, ir.FunctionType(ir.VoidType(), []), FAILED), [])
+        builder.ret_void()
+    else:
+        made.attributes.add("alwaysinline")
+        builder.call(bare, [made.args[0], *made.args[2:]])
+        builder.ret(ir.Constant(kind.return_type, 0))
+    return llvm.parse_assembly(str(module)).as_bitcode()
 
 
 def c_function_type(context, arguments: tuple, result: types.Type) -> ir.FunctionType:
@@ -216,7 +445,7 @@ def _c_function(name: str, compiled, context) -> bytes:
     """Bitcode of a C function that calls an entry; a status that is an error ends in `FAILED`."""
     description = compiled.fndesc
     arguments, result = description.argtypes, description.restype
-    module = ir.Module(name)
+    module = ir.Module(name, context=ir.Context())  # without types that others defined before
     module.triple = llvm.get_process_triple()
     native = ir.Function(module, context.call_conv.get_function_type(result, arguments), description.llvm_func_name)
     made = ir.Function(module, c_function_type(context, arguments, result), name)

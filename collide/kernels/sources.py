@@ -21,7 +21,8 @@ PACKAGE = Path(__file__).parent.parent
 #: Files of this room that make code of kernels; its others only decide how kernels run.
 COMPILER_SOURCES = tuple(
     f"kernels/{name}.py" for name in
-    ("back_end", "box_vectors", "compiled_lanes", "front_end", "lanes", "plain_lanes", "prepared", "vectors", "views")
+    ("back_end", "box_vectors", "compiled_lanes", "front_end", "kept_lowered", "lanes", "plain_lanes", "prepared",
+     "vectors", "views")
 )  # fmt: skip
 
 
@@ -79,33 +80,67 @@ def of_function(function: Callable) -> str:
     imports, or these import: names alone decide, so that a name of another thing makes a hash change too often, never
     too seldom.
     """
-    module = function.__module__ or ""
-    known = _parsed(module).definitions
-    if known.get(function.__qualname__) and not function.__closure__:
-        return _hash_of(module, (function.__qualname__,))
+    return _hash_of_function(function, beyond_kernels=True)
+
+
+def of_own_code(function: Callable) -> str:
+    """A hash of what a function is lowered from, the kernels that it calls being known by their results' types: as
+    `of_function`, but of those kernels the decorators and parameters alone."""
+    return _hash_of_function(function, beyond_kernels=False)
+
+
+@cache
+def of_compiler() -> str:
+    """A hash of what makes code of kernels."""
+    return _hash_of("", ())
+
+
+def is_defined_in_module(function: Callable) -> bool:
+    """Whether a function's module and name say which it is; one made by another function holds values beside them."""
+    return not function.__closure__ and function.__qualname__ in _parsed(function.__module__ or "").definitions
+
+
+def values_held(function: Callable) -> str:
+    """What tells a function from others that were made of one source: its code, and the values that it holds."""
     code = function.__code__
     cells = [_named(cell.cell_contents) for cell in function.__closure__ or ()]
     parts = code.co_code.hex(), code.co_names, _constants(code), function.__defaults__, cells
-    return _hash_of(module, tuple(known), repr((function.__qualname__, *parts)))
+    return repr((function.__qualname__, *parts))
 
 
-def _hash_of(module: str, names: tuple[str, ...], values: str = "") -> str:
+def _hash_of_function(function: Callable, *, beyond_kernels: bool) -> str:
+    module = function.__module__ or ""
+    if is_defined_in_module(function):
+        return _hash_of(module, (function.__qualname__,), beyond_kernels=beyond_kernels)
+    names = tuple(_parsed(module).definitions)
+    return _hash_of(module, names, values_held(function), beyond_kernels=beyond_kernels)
+
+
+def _hash_of(module: str, names: tuple[str, ...], values: str = "", *, beyond_kernels: bool = True) -> str:
     """Of the definitions of these names in a module, and of all that they reach."""
     import hashlib  # here: a start from the library need not load it
 
-    parts = {*_compiler_parts(), *definitions_reached(module, names).values()}
+    parts = {*_compiler_parts(), *definitions_reached(module, names, beyond_kernels=beyond_kernels).values()}
     return hashlib.sha256((values + "".join(sorted(part.digest for part in parts))).encode()).hexdigest()
 
 
-def definitions_reached(module: str, names: Iterable[str]) -> dict[tuple[str, str], _Part]:
+def definitions_reached(
+    module: str, names: Iterable[str], *, beyond_kernels: bool = True
+) -> dict[tuple[str, str], _Part]:
     """Definitions of the package that code of these names in a module can reach, by module and name; under "" what
-    stands in a module beside definitions, where any of them is reached or imported from there."""
+    stands in a module beside definitions, where any of them is reached or imported from there.
+
+    beyond_kernels : False takes of the kernels that are reached what their callers are lowered from, and ends there.
+    """
     modules, known = _reached(module), _definitions_seen_by(module)
     parts: dict[tuple[str, str], _Part] = {}
+    names = {*names}
     waiting, reached = {module, *names}, set[str]()
     while waiting:
         reached.add(name := waiting.pop())
         added = known.get(name, {})
+        if not beyond_kernels and name not in names:
+            added = {place: _faces(place).get(name, part) for place, part in added.items()}
         places = {*added} | ({name} & modules)
         parts |= {(place, name): part for place, part in added.items()}
         parts |= {(place, ""): _parsed(place).rest for place in places}
@@ -161,6 +196,20 @@ def _parsed(module: str) -> _Module:
     return _Module(definitions, _part(module, rest))
 
 
+@cache
+def _faces(module: str) -> dict[str, _Part]:
+    """Of a module's kernels what their callers are lowered from beside the types of their results: decorators and
+    parameters."""
+    kernels = [node for node in _tree(module).body if _is_decorated(node, "kernel") or _is_decorated(node, "entry")]
+    faces: dict[str, _Part] = {}
+    for node in kernels:
+        assert isinstance(node, ast.FunctionDef)
+        decorators = [ast.copy_location(ast.Expr(decorator), decorator) for decorator in node.decorator_list]
+        node.body, node.decorator_list = [ast.copy_location(ast.Pass(), node)], []
+        faces[node.name] = _part(module, [*decorators, node])
+    return faces
+
+
 def _tree(module: str) -> ast.Module:
     try:
         return ast.parse(_text(module))
@@ -187,7 +236,9 @@ def _part(module: str, nodes: list[ast.stmt]) -> _Part:
         ]  # fmt: skip
         waiting += inner
     return _Part(
-        hashlib.sha256(repr(content).encode()).hexdigest(), frozenset(names), is_entry=any(map(_is_entry, nodes))
+        hashlib.sha256(repr(content).encode()).hexdigest(),
+        frozenset(names),
+        is_entry=any(_is_decorated(node, "entry") for node in nodes),
     )
 
 
@@ -207,15 +258,19 @@ def _names_set_by(node: ast.stmt) -> list[tuple[str, ast.stmt]]:
     return [(name, node) for name in known] if len(known) == len(names) else []
 
 
-def _is_entry(node: ast.stmt) -> bool:
+def _is_decorated(node: ast.stmt, name: str) -> bool:
+    """Whether a function is decorated by this name, called or not."""
     decorators = getattr(node, "decorator_list", ())
-    return any(isinstance(call, ast.Call) and getattr(call.func, "id", "") == "entry" for call in decorators)
+    return any(getattr(getattr(call, "func", call), "id", "") == name for call in decorators)
 
 
 def _named(value):
-    """A value, or what a kernel is called: its own text would tell where it stands in memory."""
+    """A value, or what a function or kernel is called and holds: its own text would tell where it stands in memory."""
     function = getattr(value, "py_func", value)
-    return f"{function.__module__}.{function.__qualname__}" if hasattr(function, "__qualname__") else value
+    if not hasattr(function, "__qualname__"):
+        return value
+    named = f"{function.__module__}.{function.__qualname__}"
+    return (named, values_held(function)) if getattr(function, "__closure__", None) else named
 
 
 def _constants(code) -> list:

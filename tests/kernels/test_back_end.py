@@ -53,6 +53,35 @@ def _raising(a):
     return a
 
 
+def test_a_kernel_that_stands_apart_is_refused_where_it_may_raise():
+    """Its callers take its status for a success, unseen: the object that it stands in must not be made otherwise."""
+
+    def asks(a, b):
+        return _raising(a) + _adding(a, b)
+
+    code = Lowered(frozenset({f"{__name__}._raising", f"{__name__}._adding"}))
+    code.add("entry", asks, "int64(int64, int64)")
+    names = {name.rsplit("_", 1)[0]: name for name in code.outside}
+    assert set(names) == {"_raising", "_adding"}
+    made = machine_code(code.names, code.modules, host(), prefix="p_", outside=code.outside)
+    assert all(f"p_{name}".encode() in made for name in code.outside)
+    with pytest.raises(BackEndError, match="not to be had without Python: "):
+        machine_code(code.names, code.modules, host())
+    for kernel_name, refused in (("_adding", False), ("_raising", True)):
+        apart = Lowered()
+        apart.add_apart(names[kernel_name], code.outside[names[kernel_name]])
+        if refused:
+            with pytest.raises(BackEndError, match="a kernel may raise, and nobody would see it: called by _raising_"):
+                machine_code(apart.names, apart.modules, host())
+        else:
+            assert len(machine_code(apart.names, apart.modules, host())) > 100
+
+
+@kernel
+def _adding(a, b):
+    return a + b
+
+
 def test_what_cannot_raise_is_no_entry_that_may():
     def divides(a, b):
         return a // b + a % b

@@ -88,7 +88,10 @@ def test_the_checksum_reads_each_source_once_and_nothing_else(copy, monkeypatch)
 
 
 def forget() -> None:
-    for known in (sources._parsed, sources._imported, sources._compiler_parts, sources._definitions_seen_by):
+    for known in (
+        sources._parsed, sources._imported, sources._compiler_parts, sources._definitions_seen_by, sources._faces,
+        sources.of_compiler,
+    ):  # fmt: skip
         known.cache_clear()
 
 
