@@ -450,19 +450,28 @@ class _Spans(Spans):
         sets : as of `earliest_by_facets`.
         """
         side = 0 if self.a.reach > self.b.reach else 1
-        mesh, until = self.a if side == 0 else self.b, end
-        facets = facets_on_path(self, mesh.tree, side, begin, until, _MAX_ON_THE_WAY)  # type: ignore[arg-type]
-        if facets is not None and len(facets) * len(sets[1]) > _JOBS_ON_THE_WAY:  # when the first of all may be met
-            at = self, mesh.corners(facets), mesh.slop, side, self.smaller_set(), (begin, end), tolerance
-            begin, facets = max(begin, float(earliest_by_facets(*at)[0])), None
-        if facets is None and begin <= end:
-            until = min(begin + 2.0 * self.scale(begin, end), end) if begin < end else end
-            facets = facets_on_path(self, mesh.tree, side, begin, until, _MAX_ON_THE_WAY)  # type: ignore[arg-type]
+        mesh, n = self.a if side == 0 else self.b, len(sets[1])
+        facets, until = self._facets_ahead(side, begin, end, _MAX_ON_THE_WAY)
+        if facets is not None and len(facets) * n > _JOBS_ON_THE_WAY:  # when the first of all may be met
+            at = self, mesh.corners(facets), mesh.slop, side, self.smaller_set(), (begin, until), tolerance
+            begin = min(max(begin, float(earliest_by_facets(*at)[0])), until)
+            if begin < until:
+                facets, until = self._facets_ahead(side, begin, until, _JOBS_ON_THE_WAY // n)
         known = until if until < end else math.inf
         if facets is None:
-            return np.full(len(sets[1]), begin), known
+            return np.full(n, begin), known
         times = earliest_by_facets(self, mesh.corners(facets), mesh.slop, side, sets, (begin, until), tolerance)
         return np.minimum(np.maximum(times, begin), known), known
+
+    def _facets_ahead(self, side: int, begin: float, end: float, most: int) -> tuple[np.ndarray | None, float]:
+        """(facets of the mesh of a side on the way of the other piece until a time, None of more than ``most``; that time:
+        the end, or as early as these are few, but not before the piece may have moved by its own size)."""
+        mesh, until, least = (self.a, self.b)[side], end, 2.0 * self.scale(begin, end)
+        while True:
+            facets = facets_on_path(self, mesh.tree, side, begin, until, most)  # type: ignore[arg-type]
+            if facets is not None or until - begin <= least:
+                return facets, until
+            until = begin + max(0.25 * (until - begin), least)
 
     def cut(self, begin: float, end: float) -> tuple[float, float]:
         """(begin, end) of the part of a span to be looked at first.
@@ -506,6 +515,19 @@ def _max_jobs(span: float) -> int:
     return int(min(_MAX_JOBS * max(_SHORT / max(span, 1e-9), 1.0), _MAX_JOBS_OF_ALL))
 
 
+class _Span(NamedTuple):
+    """A span of time to be looked at.
+
+    max_pairs : of more facets that may meet in it it is cut.   may_meet : whether bodies that are convex where they meet
+    do so as it begins: its first part is looked at before it is cut.
+    """
+
+    begin: float
+    end: float
+    max_pairs: int
+    may_meet: bool = False
+
+
 def _search(
     a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool], earliest: float
 ) -> None:
@@ -516,38 +538,44 @@ def _search(
     """
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
-    spans_to_do = [(max(begin, earliest), end, _max_jobs(end - begin), earliest > 0.0)]
-    while spans_to_do:
-        begin, end, max_pairs, is_about_to_meet = spans_to_do.pop()
-        end = min(end, float(row["upper"][0]))
-        if begin > end:
+    to_do = [_Span(max(begin, earliest), end, _max_jobs(end - begin), earliest > 0.0)]
+    while to_do:
+        span = to_do.pop()
+        span = span._replace(end=min(span.end, float(row["upper"][0])))
+        if span.begin > span.end:
             continue
-        scale, whole = spans.scale(begin, end), end
-        if is_about_to_meet and end - begin > 2.0 * scale:  # of bodies that are convex there the first contact is here
-            end = begin + max(_LEAST_CUT * scale, _SHORTEST)
-        is_shortest = end - begin < _SHORTEST
-        if not is_about_to_meet and end - begin > 4.0 * scale and spans.is_small_beside():
-            later = float(spans.times_on_the_way(spans.smaller_set(), begin, end, tolerance)[0][0])
-            if later > begin + scale:
-                spans_to_do.append((later, end, max_pairs, True))
+        scale, length = spans.scale(span.begin, span.end), span.end - span.begin
+        if span.may_meet and length > 2.0 * scale:
+            to_do.append(span._replace(may_meet=False))
+            end, more = min(span.begin + max(_LEAST_CUT * scale, _SHORTEST), span.end), _MORE * span.max_pairs
+            near = spans.near_facets(span.begin, end, min(more, _MAX_JOBS_OF_ALL))
+            if near is not None:
+                to_do[-1] = _Span(end, span.end, span.max_pairs)
+                _look_at(near, a, b, motion, (span.begin, end), tolerance, row, is_part)
+            continue
+        if length > 4.0 * scale and spans.is_small_beside():
+            later = float(spans.times_on_the_way(spans.smaller_set(), span.begin, span.end, tolerance)[0][0])
+            if later > span.begin + scale:
+                to_do.append(span._replace(begin=later, may_meet=True))
                 continue
-        near = spans.near_facets(begin, end, _MAX_JOBS_OF_ALL if is_shortest else (max_pairs << 2 * (end < whole)))
-        if near is None and end < whole:
-            spans_to_do.append((begin, whole, max_pairs, False))
-        elif near is None and is_shortest:  # more facets together than can be looked at: open from here on
-            if begin < row["lower"][0]:
-                row["lower"], row["status"] = begin, OPEN
-        elif near is None:
-            begin, middle = spans.cut(begin, end)
-            more = _MORE if end - begin <= 2.0 * scale else 1
-            spans_to_do.append((middle, end, max_pairs, False))
-            spans_to_do.append((begin, middle, min(more * max_pairs, _MAX_JOBS_OF_ALL), False))
+        near = spans.near_facets(span.begin, span.end, _MAX_JOBS_OF_ALL if length < _SHORTEST else span.max_pairs)
+        if near is not None:
+            _look_at(near, a, b, motion, (span.begin, span.end), tolerance, row, is_part)
+        elif length < _SHORTEST:  # more facets together than can be looked at: open from here on
+            if span.begin < row["lower"][0]:
+                row["lower"], row["status"] = span.begin, OPEN
         else:
-            if end < whole:
-                spans_to_do.append((end, whole, max_pairs, False))
-            if len(near):
-                jobs = _FacetJobs(a, b, near, is_part)
-                jobs.search(motion, np.zeros(1, dtype=np.int64), (begin, end), tolerance, row)
+            begin, middle = spans.cut(span.begin, span.end)
+            more = span.max_pairs * (_MORE if span.end - begin <= 2.0 * scale else 1)
+            to_do += [_Span(middle, span.end, span.max_pairs), _Span(begin, middle, min(more, _MAX_JOBS_OF_ALL))]
+
+
+def _look_at(
+    near: np.ndarray, a: Piece, b: Piece, motion: Motions, span: tuple[float, float], tolerance: float, row, is_part
+) -> None:
+    """Search pairs of facets (k, 2) that may meet in a span of time."""
+    if len(near):
+        _FacetJobs(a, b, near, is_part).search(motion, np.zeros(1, dtype=np.int64), span, tolerance, row)
 
 
 class _FacetJobs:
