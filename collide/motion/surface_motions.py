@@ -25,7 +25,7 @@ from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import as_given, body_of, is_halfspace
 from collide.lowering.facet_table import Facets, FacetTable
 from collide.lowering.kinds import WITH_FACETS, kind_of
-from collide.lowering.packed_convex import PackedConvex
+from collide.lowering.packed_convex import PackedConvex, pack_points
 from collide.lowering.parts import bounding_parts_of, convex_set_of
 from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.mesh.bvh import MeshTree
@@ -206,16 +206,18 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 
         unions = compound_parts(A), compound_parts(B)
         for i, j in [numbers] if is_small else parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
-            # No contact of two pieces is earlier than that of the convex sets around them, nor than that of one set and
-            # the facets on its way: in the order of these, the first contact found leaves out all that come later.
-            earliest = earliest_times(A, B, motion, (i, j), min(upper(), 1.0), tolerance)
-            known_until = 0.0 if len(earliest) >= _TOGETHER else math.inf
+            # No contact of two pieces is earlier than that of one convex set around a piece and the facets on its way, nor
+            # than that of the sets around both: in the order of these, the first contact found leaves out all later ones.
+            earliest, end = np.zeros(len(i)), min(upper(), 1.0)
+            known_until, is_known = _ask_on_the_way((A, B), (i, j), motion, earliest, end, tolerance)
+            others = np.flatnonzero(~is_known)
+            earliest[others] = earliest_times(A, B, motion, (i[others], j[others]), end, tolerance)
             while len(earliest):
                 n, end = int(earliest.argmin()), min(upper(), 1.0)
                 if not earliest[n] <= end:
                     break
                 if earliest[n] >= known_until:
-                    known_until = _ask_on_the_way((A, B), (i, j), motion, earliest, end, tolerance)
+                    known_until, _ = _ask_on_the_way((A, B), (i, j), motion, earliest, end, tolerance)
                     continue
                 a, b = pieces_a[i[n]], pieces_b[j[n]]
                 if _search_small([(a, b)], motion, (float(earliest[n]), 1.0), tolerance, row, is_part)[0]:
@@ -226,37 +228,30 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 def _ask_on_the_way(
     shapes: tuple[Shape, Shape], pairs: tuple[np.ndarray, np.ndarray], motion: Motions, earliest: np.ndarray, end: float,
     tolerance: float,
-) -> float:  # fmt: skip
-    """Raise the ``earliest`` times (k,) of pairs of pieces, in place, where one of them is a large mesh, the other of a
-    small union, by the facets on the union's way; returns the time until which they are known now.
-    """
-    bounds, known_until = bounds_of(*shapes), math.inf
+) -> tuple[float, np.ndarray]:  # fmt: skip
+    """Raise the ``earliest`` times (k,) of pairs of pieces, in place, where one of them is a large mesh and the other is of
+    a small union, by the facets on the union's way; returns the time until which they are known now, and of which pairs
+    (k,)."""
+    bounds, known_until, is_known = bounds_of(*shapes), math.inf, np.zeros(len(earliest), dtype=bool)
     for side in (0, 1):
-        mesh_shape, union_shape = shapes[side], shapes[1 - side]
-        pieces, union = pieces_of(mesh_shape), compound_parts(union_shape)
+        pieces, union = pieces_of(shapes[side]), compound_parts(shapes[1 - side])
         numbers, counts = np.unique(pairs[side][earliest <= end], return_counts=True)
+        reach = math.inf if union.unbounded else reach_of_union(union)
         for number in numbers[counts >= _TOGETHER].tolist():
             mesh = pieces[number]
-            some = np.flatnonzero((pairs[side] == number) & (earliest <= end))
-            if not mesh.is_mesh or union.unbounded or _TIMES_SMALLER * reach_of_union(union) > mesh.reach:
+            if not mesh.is_mesh or _TIMES_SMALLER * reach > mesh.reach:
                 continue
-            ball = Piece(lambda: None, IDENTITY, -1, reach_of_union(union), slop_of_union(union), None, 0.0, False, None)
-            spans = _Spans(*((mesh, ball) if side == 0 else (ball, mesh)), motion)
-            begin = float(earliest[some].min())
-            facets = until = None
-            for until in (end, min(begin + 2.0 * spans.scale(begin, end), end)):
-                facets = facets_on_path(spans, mesh.tree, side, begin, until, _MAX_ON_THE_WAY)  # type: ignore[arg-type]
-                if facets is not None and len(facets) * len(some) <= _JOBS_ON_THE_WAY:
-                    break
-            if facets is not None:
-                rows = bounds.first[1 - side if len(bounds.first) > 1 else 0] + pairs[1 - side][some]
-                sets = bounds.table, rows, bounds.parts[rows]
-                times = earliest_by_facets(
-                    spans, mesh.corners(facets), mesh.slop, side, sets, (begin, until), tolerance
-                )  # fmt: skip
-                earliest[some] = np.maximum(earliest[some], times if until == end else np.minimum(times, until))
-            known_until = min(known_until, until if until < end else math.inf)
-    return known_until
+            some = np.flatnonzero((pairs[side] == number) & (earliest <= end))
+            ball = pack_points(np.zeros((1, 3)), reach)
+            body = Piece(lambda: None, IDENTITY, -1, reach, slop_of_union(union), None, 0.0, False, ball)
+            spans = _Spans(*((mesh, body) if side == 0 else (body, mesh)), motion)
+            first = bounds.first[1 - side if len(bounds.first) > 1 else 0]
+            rows = first + pairs[1 - side][some]
+            sets = bounds.table, rows, bounds.parts[rows]
+            times, until = spans.times_on_the_way(sets, float(earliest[some].min()), end, tolerance)
+            earliest[some] = np.maximum(earliest[some], times)
+            is_known[some], known_until = True, min(known_until, until)
+    return known_until, is_known
 
 
 def _search_small(
@@ -433,22 +428,50 @@ class _Spans(Spans):
         """The time in which the smaller piece may move by its own size."""
         return min(self.a.reach, self.b.reach) / float(self.describe(begin, end)[REACH]) * 0.5 * (end - begin)
 
-    def earliest_on_the_way(self, begin: float, end: float, tolerance: float) -> float:
-        """A time in a span before which nothing meets, by the facets of the larger piece that the smaller one, or the
-        convex set around it, passes; ``begin`` where this tells nothing, infinity where nothing meets in the span."""
+    def smaller_set(self) -> tuple[ShapeTable, np.ndarray, np.ndarray]:
+        """The convex set around the smaller piece, as `earliest_by_facets` takes sets."""
+        side = 1 if self.a.reach > self.b.reach else 0
+        piece, row = (self.a, self.b)[side], np.zeros(1, dtype=np.int64)
+        packed = bounding_parts_of(piece.shape)[0][0] if piece.packed is None else piece.packed
+        table = ShapeTable([packed._replace(slop=packed.slop + piece.slop)])
+        table.build_trees(row)
+        return table, row, self.parts[side : side + 1]
+
+    def is_small_beside(self) -> bool:
+        """Whether one piece is small beside the other, which is a mesh."""
+        large, small = (self.a, self.b) if self.a.reach > self.b.reach else (self.b, self.a)
+        return large.is_mesh and _TIMES_SMALLER * small.reach <= large.reach
+
+    def times_on_the_way(self, sets: Any, begin: float, end: float, tolerance: float) -> tuple[np.ndarray, float]:
+        """((n,) times before which convex sets, all in the smaller piece, meet none of the facets of the larger one that
+        this passes, infinity of those that meet none up to ``end``; the time until which these are known, infinity where
+        this is the end).
+
+        sets : as of `earliest_by_facets`.
+        """
         side = 0 if self.a.reach > self.b.reach else 1
-        mesh, other = (self.a, self.b) if side == 0 else (self.b, self.a)
-        if not mesh.is_mesh or _TIMES_SMALLER * other.reach > mesh.reach:
-            return begin
-        facets = facets_on_path(self, mesh.tree, side, begin, end, _MAX_ON_THE_WAY)  # type: ignore[arg-type]
+        mesh, n = self.a if side == 0 else self.b, len(sets[1])
+        facets, until = self._facets_ahead(side, begin, end, _MAX_ON_THE_WAY)
+        if facets is not None and len(facets) * n > _JOBS_ON_THE_WAY:  # when the first of all may be met
+            at = self, mesh.corners(facets), mesh.slop, side, self.smaller_set(), (begin, until), tolerance
+            begin = min(max(begin, float(earliest_by_facets(*at)[0])), until)
+            if begin < until:
+                facets, until = self._facets_ahead(side, begin, until, _JOBS_ON_THE_WAY // n)
+        known = until if until < end else math.inf
         if facets is None:
-            return begin
-        packed = bounding_parts_of(other.shape)[0][0] if other.packed is None else other.packed
-        table, rows = ShapeTable([packed._replace(slop=packed.slop + other.slop)]), np.zeros(1, dtype=np.int64)
-        table.build_trees(rows)
-        sets = table, rows, self.parts[1 - side : 2 - side]
-        times = earliest_by_facets(self, mesh.corners(facets), mesh.slop, side, sets, (begin, end), tolerance)
-        return max(float(times[0]), begin)
+            return np.full(n, begin), known
+        times = earliest_by_facets(self, mesh.corners(facets), mesh.slop, side, sets, (begin, until), tolerance)
+        return np.minimum(np.maximum(times, begin), known), known
+
+    def _facets_ahead(self, side: int, begin: float, end: float, most: int) -> tuple[np.ndarray | None, float]:
+        """(facets of the mesh of a side on the way of the other piece until a time, None of more than ``most``; that time:
+        the end, or as early as these are few, but not before the piece may have moved by its own size)."""
+        mesh, until, least = (self.a, self.b)[side], end, 2.0 * self.scale(begin, end)
+        while True:
+            facets = facets_on_path(self, mesh.tree, side, begin, until, most)  # type: ignore[arg-type]
+            if facets is not None or until - begin <= least:
+                return facets, until
+            until = begin + max(0.25 * (until - begin), least)
 
     def cut(self, begin: float, end: float) -> tuple[float, float]:
         """(begin, end) of the part of a span to be looked at first.
@@ -492,6 +515,19 @@ def _max_jobs(span: float) -> int:
     return int(min(_MAX_JOBS * max(_SHORT / max(span, 1e-9), 1.0), _MAX_JOBS_OF_ALL))
 
 
+class _Span(NamedTuple):
+    """A span of time to be looked at.
+
+    max_pairs : of more facets that may meet in it it is cut.   may_meet : whether bodies that are convex where they meet
+    do so as it begins: its first part is looked at before it is cut.
+    """
+
+    begin: float
+    end: float
+    max_pairs: int
+    may_meet: bool = False
+
+
 def _search(
     a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool], earliest: float
 ) -> None:
@@ -502,37 +538,44 @@ def _search(
     """
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
-    spans_to_do = [(max(begin, earliest), end, _max_jobs(end - begin), earliest > 0.0)]
-    while spans_to_do:
-        begin, end, max_pairs, is_about_to_meet = spans_to_do.pop()
-        end = min(end, float(row["upper"][0]))
-        if begin > end:
+    to_do = [_Span(max(begin, earliest), end, _max_jobs(end - begin), earliest > 0.0)]
+    while to_do:
+        span = to_do.pop()
+        span = span._replace(end=min(span.end, float(row["upper"][0])))
+        if span.begin > span.end:
             continue
-        scale, whole = spans.scale(begin, end), end
-        if is_about_to_meet and end - begin > 2.0 * scale:  # of bodies that are convex there the first contact is here
-            end = begin + max(_LEAST_CUT * scale, _SHORTEST)
-        is_shortest = end - begin < _SHORTEST
-        near = spans.near_facets(begin, end, _MAX_JOBS_OF_ALL if is_shortest else max_pairs)
-        if near is None and end < whole:
-            spans_to_do.append((begin, whole, max_pairs, False))
-        elif near is None and is_shortest:  # more facets together than can be looked at: open from here on
-            if begin < row["lower"][0]:
-                row["lower"], row["status"] = begin, OPEN
-        elif near is None:
-            later = spans.earliest_on_the_way(begin, end, tolerance) if end - begin > 4.0 * scale else begin
-            if later > begin + scale:
-                spans_to_do.append((later, end, max_pairs, True))
+        scale, length = spans.scale(span.begin, span.end), span.end - span.begin
+        if span.may_meet and length > 2.0 * scale:
+            to_do.append(span._replace(may_meet=False))
+            end, more = min(span.begin + max(_LEAST_CUT * scale, _SHORTEST), span.end), _MORE * span.max_pairs
+            near = spans.near_facets(span.begin, end, min(more, _MAX_JOBS_OF_ALL))
+            if near is not None:
+                to_do[-1] = _Span(end, span.end, span.max_pairs)
+                _look_at(near, a, b, motion, (span.begin, end), tolerance, row, is_part)
+            continue
+        if length > 4.0 * scale and spans.is_small_beside():
+            later = float(spans.times_on_the_way(spans.smaller_set(), span.begin, span.end, tolerance)[0][0])
+            if later > span.begin + scale:
+                to_do.append(span._replace(begin=later, may_meet=True))
                 continue
-            begin, middle = spans.cut(begin, end)
-            more = _MORE if end - begin <= 2.0 * scale else 1
-            spans_to_do.append((middle, end, max_pairs, False))
-            spans_to_do.append((begin, middle, min(more * max_pairs, _MAX_JOBS_OF_ALL), False))
+        near = spans.near_facets(span.begin, span.end, _MAX_JOBS_OF_ALL if length < _SHORTEST else span.max_pairs)
+        if near is not None:
+            _look_at(near, a, b, motion, (span.begin, span.end), tolerance, row, is_part)
+        elif length < _SHORTEST:  # more facets together than can be looked at: open from here on
+            if span.begin < row["lower"][0]:
+                row["lower"], row["status"] = span.begin, OPEN
         else:
-            if end < whole:
-                spans_to_do.append((end, whole, max_pairs, False))
-            if len(near):
-                jobs = _FacetJobs(a, b, near, is_part)
-                jobs.search(motion, np.zeros(1, dtype=np.int64), (begin, end), tolerance, row)
+            begin, middle = spans.cut(span.begin, span.end)
+            more = span.max_pairs * (_MORE if span.end - begin <= 2.0 * scale else 1)
+            to_do += [_Span(middle, span.end, span.max_pairs), _Span(begin, middle, min(more, _MAX_JOBS_OF_ALL))]
+
+
+def _look_at(
+    near: np.ndarray, a: Piece, b: Piece, motion: Motions, span: tuple[float, float], tolerance: float, row, is_part
+) -> None:
+    """Search pairs of facets (k, 2) that may meet in a span of time."""
+    if len(near):
+        _FacetJobs(a, b, near, is_part).search(motion, np.zeros(1, dtype=np.int64), span, tolerance, row)
 
 
 class _FacetJobs:

@@ -64,3 +64,77 @@ def test_impacts_of_unions_search_few_pairs_of_parts(monkeypatch):
     assert 0 < sum(jobs) < 0.2 * 150 * 150, jobs
     assert collide.time_of_impact(clutter(150, True, "a"), collide.Box((0.3, 0.3, 0.3)), eye, eye, *ends).hit
     assert 0 < len(searched) < 40, len(searched)
+
+
+def small(union: collide.Compound, size: float) -> collide.Compound:
+    """The same boxes, so many times as large."""
+    items = []
+    for part, X in union.items:
+        of = collide.Mesh(size * part.vertices, part.faces) if part.meshed else collide.Box(size * part.size)
+        at = X.copy()
+        at[:3, 3] *= size
+        items.append((of, at))
+    return collide.Compound(items)
+
+
+def counted(monkeypatch, *names: str) -> list[str]:
+    """Calls of functions of the module of surfaces, by name."""
+    calls: list[str] = []
+    for name in names:
+        of = getattr(surface_motions, name)
+        monkeypatch.setattr(surface_motions, name, lambda *args, of=of, name=name: (calls.append(name), of(*args))[1])
+    return calls
+
+
+@pytest.mark.parametrize(("meshed", "size"), [(True, 1e-5), (False, 1e-5), (True, 0.01)])
+def test_parts_that_come_to_one_face_are_searched_in_order_of_their_convex_sets(monkeypatch, meshed, size):
+    """All 150 parts of a small union are about as near a large, turned face: the sets around them tell which is first."""
+    calls = counted(monkeypatch, "_search", "_search_few")
+    union = small(clutter(150, meshed, "before a face"), size)
+    corners, faces = collide.tessellate(collide.Box((2.0, 2.0, 2.0)))[:2]
+    cube = collide.Mesh(corners, faces)
+    ends = (collide.pose(t, rpy=(0.1, 0.7, 0.3)) for t in ((0.9, 1.3, 1.1), (-0.9, -1.3, -1.1)))
+    r = collide.time_of_impact(union, cube, np.eye(4), np.eye(4), *ends)
+    assert r.hit and r.certified
+    assert 0 < len(calls) < 8, len(calls)
+
+
+@pytest.mark.parametrize("meshed", [False, True])
+def test_a_small_union_beside_a_surface_is_asked_about_the_facets_on_its_way(monkeypatch, meshed):
+    """70 parts that fly through the hull of a rough surface and graze it: few pieces are searched, few spans cut."""
+    calls = counted(monkeypatch, "_search", "_search_few", "pair_rows")
+    union = small(clutter(70, meshed, "grazes"), 1e-5)
+    ends = collide.pose((-1.0, 0.01, 0.12)), collide.pose((1.0, 0.02, -0.06))
+    r = collide.time_of_impact(union, rough_sheet(20), *ends, np.eye(4), np.eye(4))
+    assert r.hit and r.certified and 0.2 < r.time < 0.8
+    assert 0 < len(calls) < 20, len(calls)
+
+
+def rough_sheet(n: int) -> collide.Mesh:
+    x, y = np.meshgrid(*[np.linspace(-0.5, 0.5, n + 1)] * 2)
+    at = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    faces = np.concatenate([np.stack([at, at + 1, at + n + 2], 1), np.stack([at, at + n + 2, at + n + 1], 1)])
+    z = 0.05 * np.sin(9 * x) * np.cos(7 * y)
+    return collide.Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), faces, solid=False)
+
+
+@pytest.mark.parametrize("size", [0.001, 0.05])
+def test_the_first_contact_of_a_small_union_and_a_surface_is_that_of_all_parts_and_facets(size):
+    """Each part against each facet as a hull of its own; both bodies turn."""
+    rng = rng_of(f"small unions beside a surface {size}")
+    sheet, hits = rough_sheet(6), []
+    facets = [collide.ConvexHull(sheet.vertices[face]) for face in sheet.faces]
+    for seed in map(str, range(5)):
+        union = small(clutter(66, False, seed), size)
+        poses = [random_pose(rng, 0.0) for _ in range(4)]
+        n = rng.normal(size=3)
+        poses[2][:3, 3], poses[3][:3, 3] = n / np.linalg.norm(n), -n / np.linalg.norm(n) + rng.normal(size=3) * 0.4
+        r = collide.time_of_impact(sheet, union, *poses)
+        i, j = np.divmod(np.arange(len(facets) * 66), 66)
+        parts = [collide.Compound([item]) for item in union.items]
+        each = collide.time_of_impact([facets[k] for k in i], [parts[k] for k in j], *poses)
+        hits.append(bool(r.hit))
+        assert r.hit == each.hit.any() and r.certified, (seed, [X.tolist() for X in poses])
+        if r.hit:
+            assert r.lower <= each.upper.min() and each.lower.min() <= r.upper, (seed, [X.tolist() for X in poses])
+    assert 2 <= sum(hits), hits

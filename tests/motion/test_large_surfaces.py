@@ -10,6 +10,7 @@ from reproduction import reproducing
 import collide
 from collide.motion import surface_motions
 from collide.motion.motions import Motions
+from collide.motion.path_facets import facets_on_path
 
 AGAIN = (
     "import collide, numpy as np\n"
@@ -123,3 +124,62 @@ def test_impacts_of_large_meshes_list_few_spans(monkeypatch):
     r = collide.time_of_impact(ball, ball, np.eye(4), np.eye(4), start, end)
     assert r.hit and r.certified and 0.499 < r.time < 0.5
     assert 1 < len(spans) < 12, len(spans)
+
+
+def test_a_small_body_that_grazes_a_large_surface_is_asked_about_the_facets_on_its_way(monkeypatch):
+    """At two degrees to the facets that it meets in the end; distances along the way would be hundreds."""
+    spans = []
+    cut, near = surface_motions._Spans.cut, surface_motions._Spans.near_facets
+    monkeypatch.setattr(surface_motions._Spans, "cut", lambda *a: (spans.append("cut"), cut(*a))[1])
+    monkeypatch.setattr(surface_motions._Spans, "near_facets", lambda *a: (spans.append("near"), near(*a))[1])
+    A, B = sheet(100), hull(400, 1e-6, "grazes")
+    ends = collide.pose((-1.0, 0.01, 0.12)), collide.pose((1.0, 0.02, -0.06))
+    r = collide.time_of_impact(A, B, np.eye(4), np.eye(4), *ends)
+    assert r.hit and r.certified and 0.2 < r.time < 0.8
+    assert 0 < len(spans) < 12, spans
+
+
+def turned(omega: np.ndarray) -> np.ndarray:
+    angle = np.linalg.norm(omega)
+    x, y, z = omega / angle
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_body_touches_no_facet_beside_its_way(side):
+    """Points of facets that are not named, and a ball that is placed at many times, both bodies turning about far points."""
+    rng = rng_of(f"facets beside a way {side}")
+    named = reached = 0
+    for _ in range(30):
+        mesh, ball, place = sheet(14), collide.Sphere(0.02), random_pose(rng, 0.7)
+        large, small = (surface_motions.pieces_of(collide.Compound([(of, X)]))[0] for of, X in (
+            (mesh, np.eye(4)), (ball, place)))  # fmt: skip
+        starts, ends = np.tile(np.eye(4), (2, 2, 1, 1))
+        omegas = rng.normal(size=(2, 3)) * rng.choice([0.05, 0.5])
+        begin = rng.uniform(0.0, 0.7)
+        end = begin + rng.uniform(0.02, 0.3)
+        R, velocities = [turned(0.5 * (begin + end) * omega) for omega in omegas], rng.normal(size=(2, 3))
+        on_surface = mesh.vertices[rng.integers(len(mesh.vertices))]  # the ball is there at the middle
+        for k, t in enumerate((np.zeros(3), R[0] @ on_surface - R[1] @ place[:3, 3])):
+            starts[k, :3, 3] = t - 0.5 * (begin + end) * velocities[k]
+            ends[k] = collide.moved_poses(starts[k], velocities[k], omegas[k])
+        order = [0, 1] if side == 0 else [1, 0]
+        poses = [X[k][None] for k in order for X in (starts, ends)]
+        motion = Motions(*poses, *(omegas[k][None] for k in order))
+        spans = surface_motions._Spans(*((large, small) if side == 0 else (small, large)), motion)
+        facets = facets_on_path(spans, large.tree, side, begin, end, 10_000)
+        if facets is None:
+            continue
+        shares = rng.dirichlet(np.ones(3), 20)
+        points = np.einsum("sk,fkj->fsj", shares, mesh.vertices[mesh.faces])
+        others = np.setdiff1d(np.arange(len(mesh.faces)), facets)
+        for t in np.linspace(begin, end, 9):
+            R = [turned(t * omega) for omega in omegas]
+            p = [starts[k, :3, 3] + t * (ends[k, :3, 3] - starts[k, :3, 3]) for k in (0, 1)]
+            centre = R[0].T @ (R[1] @ place[:3, 3] + p[1] - p[0])
+            touched = (np.linalg.norm(points - centre, axis=2) < 0.02).any(axis=1)
+            assert not touched[others].any(), (starts.tolist(), ends.tolist(), omegas.tolist(), begin, end)
+            reached += bool(touched.any())
+        named += len(facets) < 0.5 * len(mesh.faces)
+    assert named >= 15 and reached >= 5, (named, reached)

@@ -74,7 +74,7 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
     if len(poses):
         gaps = _box_gaps(A, B, X_WA[poses], X_WB[poses])
         near = meshed & (gaps <= 0.0)
-        if np.any(near, axis=0).sum() > _ASKED_FIRST and not (A.unbounded or B.unbounded):
+        if np.any(near, axis=0).sum() > _ASKED_FIRST and not (A.unbounded and B.unbounded):
             if len(X_WA) == 1:
                 i, j = np.unravel_index(np.where(near[0], gaps[0], math.inf).argmin(), meshed.shape)
                 _take_states(A, B, i[None], j[None], poses, X_WA, X_WB, states)
@@ -99,13 +99,13 @@ def _leave_out_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, near: np.nda
     entries = np.argwhere(near)
     for first in range(0, len(entries), _BOUNDS_AT_ONCE):
         pose, *which = some = entries[first : first + _BOUNDS_AT_ONCE].T
-        sets, rows, slop = [], [], np.zeros(len(pose))
-        placed = []
+        about = _about(A, B, *which, X_WA[pose], X_WB[pose])
+        rows, sets, placed, slop = [], [], [], np.zeros(len(pose))
         for side, parts, X in ((A, which[0], X_WA), (B, which[1], X_WB)):
             of, row = np.unique(parts, return_inverse=True)
             rows.append(row.ravel() + len(sets))
             sets += [side.parts[k].bound for k in of.tolist()]
-            placed.append(side.placed(parts, X[pose], np.zeros(len(pose))))
+            placed.append(side.placed(parts, X[pose], about))
             slop += 1.001 * placed[-1].slop
         distances = np.zeros(len(pose), dtype=PAIR_DTYPE)
         run_poses(
@@ -184,11 +184,16 @@ def _parts_at(A: CompoundParts, B: CompoundParts, i: int, j: int, X_WA, X_WB):
 
 def _placed(A: CompoundParts, B: CompoundParts, i, j, X_WA, X_WB) -> tuple[PosesWithSlop, PosesWithSlop]:
     """Poses of pairs of parts by number (k,), of the unions' poses (k, 4, 4)."""
-    about = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
-    for columns, which in ((A.columns, i), (B.columns, j)):
-        shift = np.abs(columns.X[which, :3, 3]).sum(axis=1)
-        about = about + 2.0 * (columns.reach[which] + columns.radius[which] + shift)
+    about = _about(A, B, i, j, X_WA, X_WB)
     return A.placed(i, X_WA, about), B.placed(j, X_WB, about)
+
+
+def _about(A: CompoundParts, B: CompoundParts, i, j, X_WA, X_WB) -> np.ndarray:
+    """(n,) how far from them half-spaces among parts i and j, a number or (n,), are looked at [m]."""
+    about = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
+    for columns, k in ((A.columns, i), (B.columns, j)):
+        about = about + 2.0 * (columns.reach[k] + columns.radius[k] + np.abs(columns.X[k, :3, 3]).sum(axis=-1))
+    return about
 
 
 def _box_gaps(A: CompoundParts, B: CompoundParts, X_WA, X_WB, of_a=None, of_b=None) -> np.ndarray:

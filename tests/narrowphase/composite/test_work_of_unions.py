@@ -76,6 +76,31 @@ def test_parts_before_a_large_face_are_told_apart_along_its_normal(monkeypatch):
     assert 0 < sum(asked) < 40, sum(asked)
 
 
+def test_parts_before_a_large_face_are_proven_apart_by_the_sets_around_them(monkeypatch):
+    """A boolean of a union whose parts' boxes all overlap a large, turned body's box asks about the facets of few."""
+    union, slab = meshes(200, 0.05), large_slab(1e4)
+    asked = counted(monkeypatch, composite_meshes, "part_states", lambda A, B, X, Y: len(X.X))
+    apart = collide.pose(5e3 * np.array([0.6, 0.48, 0.64]), rpy=(-0.4, 0.7, 0.1))
+    assert not collide.collide(union, slab, np.eye(4), apart)
+    assert not collide.collide(union, slab, np.stack([np.eye(4)] * 2), apart).any()
+    assert 0 < sum(asked) < 30, sum(asked)
+
+
+def test_states_of_parts_are_those_of_each(monkeypatch):
+    """A boolean that leaves parts out by their sets says what the parts say one by one."""
+    rng, hits = rng_of("states of parts"), []
+    left_out = counted(monkeypatch, composite_meshes, "_leave_out_sets", lambda *args: 1)
+    for seed in range(12):
+        union, slab = meshes(40, 0.05 + 0.01 * seed), large_slab(3.0)
+        X_WA, X_WB = random_pose(rng, 1.0), random_pose(rng, 1.0)
+        n = rng.normal(size=3)
+        X_WB[:3, 3] = X_WA[:3, 3] + rng.uniform(0.3, 1.8) * n / np.linalg.norm(n)
+        each = [collide.collide(collide.Compound([item]), slab, X_WA, X_WB) for item in union.items]
+        hits.append(collide.collide(union, slab, X_WA, X_WB))
+        assert hits[-1] == any(each), (seed, X_WA.tolist(), X_WB.tolist())
+    assert 3 <= sum(hits) <= 10 and len(left_out) >= 3, (hits, len(left_out))
+
+
 @pytest.mark.many(2)
 @pytest.mark.parametrize("size", [0.3, 3.0, 1e3, 1e6])
 def test_parts_left_out_along_a_normal_are_no_nearer(size):
