@@ -1,14 +1,14 @@
-"""A small body on its way past a large mesh: the facets that it may come near, and when parts of it may first meet them.
+"""A small body on its way past a large mesh: the facets that it may come near, and when its parts may meet them.
 
-As seen from the mesh's body, the origin of a piece of the small body is at z = Rot_Lᵀ w, w = d + Rot_S a: d leads from one
-body's origin to the other's and changes by v in unit time, a from the small body's origin to its piece's. Since
+As seen from the mesh's body, the origin of a piece of the small body is at z = Rot_Lᵀ w, w = d + Rot_S a: d leads from
+one body's origin to the other's and changes by v in unit time, a from the small body's origin to its piece's. Since
 z″ = Rot_Lᵀ (w″ − 2 ω_L × w′ + ω_L × (ω_L × w)), its acceleration is at most
 
     K = |ω_S|² |a| + 2 |ω_L| (|v| + |ω_S| |a|) + |ω_L|² (|d| + |a|),
 
-and in a span of length h it is within K h² / 8 of the chord between where it is at both ends. The chord swept by a ball of
-that and of the piece's reach holds the piece all the time: facets outside are free in the span. What `span_bounds.py` has, a
-ball in which the piece moves, holds as many facets as a body as long as the way would meet.
+and in a span of length h the origin is within K h² / 8 of the chord between its places at both ends. The chord swept by
+a ball of this radius and the piece's reach holds the piece all the time: facets outside are free in the span. What
+`span_bounds.py` has, a ball in which the piece moves, holds as many facets as a body as long as the way would meet.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ def earliest_by_facets(
     """(n,) times before which convex sets have no contact with any of some facets: infinity of those that have none in
     the span.
 
-    spans : of the mesh, its ``side`` 0 or 1, whose row of parts is read.   corners : (k, 3, 3) of the facets.   slop : of
-    the mesh [m].   movers : table of the sets, which rows of it (n,), and their rows of parts (n, PART).
+    spans : of the mesh, its ``side`` 0 or 1, whose row of parts is read.   corners : (k, 3, 3) of the facets.
+    slop : of the mesh [m].   movers : table of the sets, which rows of it (n,), and their rows of parts (n, PART).
     """
     table, rows, parts = movers
     k, n = len(corners), len(rows)
@@ -95,6 +95,7 @@ def earliest_by_facets(
     ends = [[facet, np.zeros(n * k, dtype=np.int64)], [k + mover, 1 + mover]]
     jobs = np.ascontiguousarray(np.stack([mover, *ends[side], *ends[1 - side]], axis=1))
     found = free_rows(n)
-    header = header_of(Tables(facets.addresses, k + n, np.concatenate([spans.parts[side : side + 1], parts])), spans.motion)
+    of_parts = np.concatenate([spans.parts[side : side + 1], parts])
+    header = header_of(Tables(facets.addresses, k + n, of_parts), spans.motion)
     find_impacts(address_of(header), address_of(jobs), len(jobs), *span, tolerance, address_of(found))
     return earliest_of(found)

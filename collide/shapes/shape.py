@@ -25,8 +25,8 @@ class Shape:
 
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges", "_hulls_instead",
-        "_kind", "_laid_out", "_moving", "_moving_bounds", "_partners", "_parts", "_pieces", "_prepared", "_serial", "_surface",
-        "_topology", "_union", "_walk",
+        "_kind", "_laid_out", "_moving", "_moving_bounds", "_partners", "_parts", "_pieces", "_prepared", "_serial",
+        "_surface", "_topology", "_union", "_walk",
     )  # fmt: skip
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).

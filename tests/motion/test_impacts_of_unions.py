@@ -88,7 +88,7 @@ def counted(monkeypatch, *names: str) -> list[str]:
 
 @pytest.mark.parametrize(("meshed", "size"), [(True, 1e-5), (False, 1e-5), (True, 0.01)])
 def test_parts_that_come_to_one_face_are_searched_in_order_of_their_convex_sets(monkeypatch, meshed, size):
-    """All 150 parts of a small union are about as near a large, turned face: the sets around them tell which is first."""
+    """All 150 parts of a small union are about as near a large, turned face: sets around them tell which is first."""
     calls = counted(monkeypatch, "_search", "_search_few")
     union = small(clutter(150, meshed, "before a face"), size)
     corners, faces = collide.tessellate(collide.Box((2.0, 2.0, 2.0)))[:2]

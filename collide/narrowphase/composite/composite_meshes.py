@@ -91,7 +91,7 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
 
 
 def _leave_out_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, near: np.ndarray) -> None:
-    """Take from ``near``, (n, parts of A, parts of B) bool, in place, the pairs that convex sets around both prove apart.
+    """Take from ``near``, (n, parts of A, parts of B) bool, in place, pairs that convex sets around both prove apart.
 
     A part lies in its convex set. Poses, rounded, put the sets within their slops of where they are: the sets are apart
     where their distance is more than both.
