@@ -49,7 +49,7 @@ def facets_on_path(
         ends.append((matrices[side], matrices[1 - side, :3, 3], float(np.linalg.norm(way))))
     (X_M, start, near_way), (_, stop, far_way) = ends
     large, small = spans.bodies[side], spans.bodies[1 - side]
-    w_l, w_s, h, way = large[ANGLE], small[ANGLE], end - begin, max(near_way, far_way)
+    w_l, w_s, h, way = float(large[ANGLE]), float(small[ANGLE]), end - begin, np.maximum(near_way, far_way)
     arm = float(np.linalg.norm(small[ARM : ARM + 3]))
     reach = small[REACH_OF_CORE] - arm
     speed = float(np.linalg.norm(spans.between_origins(1.0) - spans.between_origins(0.0)))
@@ -64,9 +64,9 @@ def facets_on_path(
     length = float(np.linalg.norm(chord))
     X_C = np.eye(4)
     X_C[:3, :3], X_C[:3, 3] = frame_along(chord / length if length > 0.0 else X_M[:3, 0]).T, start
-    swept = pack_points(np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0]]))
+    path = pack_points(np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0]]))
     at = as_given(X_M[None]), as_given(X_C[None]), np.zeros((1, 3))
-    near = near_facets_up_to(tree, swept, *at, radius, max_facets)
+    near = near_facets_up_to(tree, path, *at, radius, max_facets)
     return None if near is None else np.unique(tree.ids[near.place])
 
 
@@ -94,8 +94,8 @@ def earliest_by_facets(
     mover, facet = np.divmod(np.arange(n * k), max(k, 1))
     ends = [[facet, np.zeros(n * k, dtype=np.int64)], [k + mover, 1 + mover]]
     jobs = np.ascontiguousarray(np.stack([mover, *ends[side], *ends[1 - side]], axis=1))
-    found = free_rows(n)
+    impacts = free_rows(n)
     of_parts = np.concatenate([spans.parts[side : side + 1], parts])
     header = header_of(Tables(facets.addresses, k + n, of_parts), spans.motion)
-    find_impacts(address_of(header), address_of(jobs), len(jobs), *span, tolerance, address_of(found))
-    return earliest_of(found)
+    find_impacts(address_of(header), address_of(jobs), len(jobs), *span, tolerance, address_of(impacts))
+    return earliest_of(impacts)

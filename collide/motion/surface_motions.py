@@ -243,7 +243,7 @@ def _ask_on_the_way(
             some = np.flatnonzero((pairs[side] == number) & (earliest <= end))
             ball = pack_points(np.zeros((1, 3)), reach)
             body = Piece(lambda: None, IDENTITY, -1, reach, slop_of_union(union), None, 0.0, False, ball)
-            spans = _Spans(*((mesh, body) if side == 0 else (body, mesh)), motion)
+            spans = _Spans(mesh, body, motion) if side == 0 else _Spans(body, mesh, motion)
             first = bounds.first[1 - side if len(bounds.first) > 1 else 0]
             rows = first + pairs[1 - side][some]
             sets = bounds.table, rows, bounds.parts[rows]
@@ -442,7 +442,7 @@ class _Spans(Spans):
         return large.is_mesh and _TIMES_SMALLER * small.reach <= large.reach
 
     def times_on_the_way(self, sets: Any, begin: float, end: float, tolerance: float) -> tuple[np.ndarray, float]:
-        """((n,) times before which convex sets, all in the smaller piece, meet no facet of the larger piece on their way,
+        """((n,) times before which convex sets, all in the smaller piece, meet no facet of the larger one on their way,
         infinity of sets that meet none up to ``end``; the time until which these are known, infinity where this is the
         end).
 
@@ -462,12 +462,12 @@ class _Spans(Spans):
         times = earliest_by_facets(self, mesh.corners(facets), mesh.slop, side, sets, (begin, until), tolerance)
         return np.minimum(np.maximum(times, begin), known), known
 
-    def _facets_ahead(self, side: int, begin: float, end: float, most: int) -> tuple[np.ndarray | None, float]:
-        """(facets of the mesh of a side on the way of the other piece until a time, None of more than ``most``; that
+    def _facets_ahead(self, side: int, begin: float, end: float, max_facets: int) -> tuple[np.ndarray | None, float]:
+        """(facets of the mesh of a side on the way of the other piece until a time, None of more than max_facets; that
         time: the end, or as early as these are few, but not before the piece may have moved by its own size)."""
         mesh, until, least = (self.a, self.b)[side], end, 2.0 * self.scale(begin, end)
         while True:
-            facets = facets_on_path(self, mesh.tree, side, begin, until, most)  # type: ignore[arg-type]
+            facets = facets_on_path(self, mesh.tree, side, begin, until, max_facets)  # type: ignore[arg-type]
             if facets is not None or until - begin <= least:
                 return facets, until
             until = begin + max(0.25 * (until - begin), least)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -76,8 +77,9 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
         near = meshed & (gaps <= 0.0)
         if np.any(near, axis=0).sum() > _ASKED_FIRST and not (A.unbounded and B.unbounded):
             if len(X_WA) == 1:
-                i, j = np.unravel_index(np.where(near[0], gaps[0], math.inf).argmin(), meshed.shape)
-                _take_states(A, B, i[None], j[None], poses, X_WA, X_WB, states)
+                deepest = np.where(near[0], gaps[0], math.inf).argmin().reshape(1)
+                first_a, first_b = np.unravel_index(deepest, meshed.shape)
+                _take_states(A, B, first_a, first_b, poses, X_WA, X_WB, states)
             if (states[poses] != HIT).any():
                 _leave_out_sets(A, B, X_WA[poses], X_WB[poses], near)
         pairs = np.argwhere(np.any(near, axis=0))
@@ -98,10 +100,10 @@ def _leave_out_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, near: np.nda
     """
     entries = np.argwhere(near)
     for first in range(0, len(entries), _BOUNDS_AT_ONCE):
-        pose, *which = some = entries[first : first + _BOUNDS_AT_ONCE].T
-        about = _about(A, B, *which, X_WA[pose], X_WB[pose])
-        rows, sets, placed, slop = [], [], [], np.zeros(len(pose))
-        for side, parts, X in ((A, which[0], X_WA), (B, which[1], X_WB)):
+        pose, i, j = some = entries[first : first + _BOUNDS_AT_ONCE].T
+        about = _about(A, B, i, j, X_WA[pose], X_WB[pose])
+        rows, sets, placed, slop = [], list[Any](), [], np.zeros(len(pose))
+        for side, parts, X in ((A, i, X_WA), (B, j, X_WB)):
             of, row = np.unique(parts, return_inverse=True)
             rows.append(row.ravel() + len(sets))
             sets += [side.parts[k].bound for k in of.tolist()]
