@@ -88,7 +88,7 @@ APART = (
     "contact.curved_patches.grow_over", "contact.patch_rows.choose_points", "contact.clearing_length._facets_part",
     "casts.portal.cast_line", "casts.cut_parts.cut_part", "motion.kept_axis.gap_along",
     "motion.convex_impact.search_contact",
-)  # fmt: skip
+)
 
 
 def unit_of(module: str) -> str:
@@ -180,7 +180,7 @@ def compile_kernels(out: Path, triple: str = "", levels: str = "", jobs: int | N
     missing = [
         _Object(group, triple, level, out) for group in groups for level in chosen
         if not group.place(out, triple, level).exists()
-    ]  # fmt: skip
+    ]
     if missing:
         made_for = ", ".join(level.cpu for level in chosen)
         say(f"compiling {len(missing)} of {len(groups) * len(chosen)} objects for {made_for}")

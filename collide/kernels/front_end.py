@@ -206,7 +206,7 @@ class KernelDispatcher(Dispatcher):
         called = kept_lowered.Called(
             self.full_name, tuple(arguments), asked,
             tuple(sorted(self.targetoptions.items())),
-        )  # fmt: skip
+        )
         compiled = _taken(called)
         if compiled is None:
             super().compile(sig)
@@ -229,7 +229,7 @@ class KernelDispatcher(Dispatcher):
             code_hash=_own_hash(called), symbol=description.mangled_name, environment=description.env_name,
             parameters=tuple(description.args), result=compiled.signature.return_type,
             modules=tuple(compiled.library.modules), calls=tuple(calls),
-        )  # fmt: skip
+        )
         kept_lowered.write(_folder, called, record)
 
 
@@ -259,13 +259,13 @@ def _taken(called: kept_lowered.Called) -> compiler.CompileResult | None:
         restype=record.result, calltypes=None, args=record.parameters, kws=(),
         mangler=lambda *_types, **_tags: record.symbol, argtypes=called.arguments,
         inline=bool(dict(called.options)["forceinline"]), env_name=record.environment,
-    )  # fmt: skip
+    )
     library.kept_as, library.description = (called, str(record.result)), description
     return compiler.compile_result(
         target_context=context, library=library, fndesc=description, objectmode=False,
         entry_point=context.get_executable(library, description, None),
         signature=typing.signature(record.result, *called.arguments),
-    )  # fmt: skip
+    )
 
 
 def _lowered_again(called: kept_lowered.Called, result: str) -> _Library:

@@ -23,7 +23,7 @@ COMPILER_SOURCES = tuple(
     f"kernels/{name}.py" for name in
     ("back_end", "box_vectors", "compiled_lanes", "front_end", "kept_lowered", "lanes", "plain_lanes", "prepared",
      "vectors", "views")
-)  # fmt: skip
+)
 
 
 def kernel_sources() -> tuple[str, ...]:
@@ -233,7 +233,7 @@ def _part(module: str, nodes: list[ast.stmt]) -> _Part:
         content += [
             sorted(map(repr, value)) if isinstance(value, frozenset) else repr(value)
             for value in current.co_consts if not hasattr(value, "co_code")
-        ]  # fmt: skip
+        ]
         waiting += inner
     return _Part(
         hashlib.sha256(repr(content).encode()).hexdigest(),

@@ -228,7 +228,7 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 def _ask_on_the_way(
     shapes: tuple[Shape, Shape], pairs: tuple[np.ndarray, np.ndarray], motion: Motions, earliest: np.ndarray,
     end: float, tolerance: float,
-) -> tuple[float, np.ndarray]:  # fmt: skip
+) -> tuple[float, np.ndarray]:
     """Raise the ``earliest`` times (k,) of pairs of pieces, in place, by the facets on a small union's way past a large
     mesh; returns the time until which these times are known now, and of which pairs (k,)."""
     bounds, known_until, is_known = bounds_of(*shapes), math.inf, np.zeros(len(earliest), dtype=bool)
@@ -256,7 +256,7 @@ def _ask_on_the_way(
 def _search_small(
     pairs: list[tuple[Piece, Piece]], motions: Motions, span: tuple[float, float], tolerance: float, rows: np.ndarray,
     is_part: tuple[bool, bool],
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Search those pairs of pieces that are convex or of few facets, in a span of time, for all motions; returns which
     are neither (k,)."""
     is_large = np.zeros(len(pairs), dtype=bool)

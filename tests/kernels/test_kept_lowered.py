@@ -136,7 +136,7 @@ class Builds:
         source.write_text("".join(
             f"double collide_{self.level}_{name}(double); "
             f"double {name}(double x) {{ return collide_{self.level}_{name}(x); }}\n" for name in names
-        ), encoding="utf-8")  # fmt: skip
+        ), encoding="utf-8")
         objects = [str(place) for place in (self.folder / "kept").glob("*.o")]
         subprocess.run(["cc", "-shared", "-fPIC", "-o", str(library), str(source), *objects], check=True)
         loaded = ctypes.CDLL(str(library))
@@ -180,7 +180,7 @@ def made_anew(names: set[str]) -> set[str]:
         # what stands before a kernel's name is seen where it is called
         ("@kernel\ndef alone", "@kernel(cold=True)\ndef alone", {"alone", "second", "tried_one"}, (9.0, 0.0, 10.0)),
     ],
-)  # fmt: skip
+)
 def test_an_edit_makes_anew_what_it_concerns_and_the_bytes_are_those_of_a_build_from_nothing(
     builds, old, new, anew, answers
 ):

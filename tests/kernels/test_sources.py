@@ -91,7 +91,7 @@ def forget() -> None:
     for known in (
         sources._parsed, sources._imported, sources._compiler_parts, sources._definitions_seen_by, sources._faces,
         sources.of_compiler,
-    ):  # fmt: skip
+    ):
         known.cache_clear()
 
 
@@ -140,7 +140,7 @@ def changed_by(hashes, file: Path, old: str, new: str) -> set[str]:
         # where a name comes from
         ("narrowphase/pair_kernel.py", "annotations\n", "annotations\nimport collide.casts\n", set(), {"answer_pairs"}),
     ],
-)  # fmt: skip
+)
 def test_an_edit_makes_stale_what_reaches_it_and_nothing_else(copy, hashes, name, old, new, stale, fresh):
     changed = changed_by(hashes, copy / name, old, new)
     assert stale <= changed and not fresh & changed

@@ -154,7 +154,7 @@ def test_a_body_touches_no_facet_beside_its_way(side):
     for _ in range(30):
         mesh, ball, place = sheet(14), collide.Sphere(0.02), random_pose(rng, 0.7)
         large, small = (surface_motions.pieces_of(collide.Compound([(of, X)]))[0] for of, X in (
-            (mesh, np.eye(4)), (ball, place)))  # fmt: skip
+            (mesh, np.eye(4)), (ball, place)))
         starts, ends = np.tile(np.eye(4), (2, 2, 1, 1))
         omegas = rng.normal(size=(2, 3)) * rng.choice([0.05, 0.5])
         begin = rng.uniform(0.0, 0.7)

@@ -63,7 +63,7 @@ def test_shapes_of_convex_parts_that_are_the_same_set():
     (collide.Sphere(0.5), (0.5, 0.5, 0.5)), (collide.Capsule(0.25, 2.0), (0.25, 0.25, 1.25)),
     (collide.Cylinder(0.25, 2.0), (0.25, 0.25, 1.0)), (collide.Cone(0.25, 2.0), (0.25, 0.25, 1.0)),
     (collide.Ellipsoid((1.0, 2.0, 3.0)), (1.0, 2.0, 3.0)), (CUBE, (1.0, 1.0, 1.0)),
-])  # fmt: skip
+])
 @pytest.mark.parametrize("by", [0.0, 0.125])
 def test_boxes_of_sets_and_of_swollen_ones(shape, half, by):
     ((packed, _),) = parts_of(shape)
