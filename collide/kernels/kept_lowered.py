@@ -17,6 +17,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from collide.whole_file import whole_file
+
 _DIGEST = hashlib.sha256().digest_size
 
 
@@ -68,7 +70,5 @@ def read(folder: Path, called: Called, code_hash: str) -> Record | None:
 
 def write(folder: Path, called: Called, record: Record) -> None:
     rest = pickle.dumps(tuple(record))
-    place = folder / called.file_name
-    part = place.with_suffix(f".{os.getpid()}")  # link units are lowered side by side
-    part.write_bytes(hashlib.sha256(rest).digest() + rest)
-    part.replace(place)
+    with whole_file(folder / called.file_name) as file:  # link units are lowered side by side
+        file.write(hashlib.sha256(rest).digest() + rest)

@@ -20,7 +20,7 @@ def polygon(rng, n: int) -> np.ndarray:
 def face(points: np.ndarray) -> SupportFace:
     corners = np.column_stack([points, np.zeros(len(points))]).ravel()
     none = np.zeros(len(points), dtype=np.int64)
-    return SupportFace(len(points), -1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, corners, none, none, -1)
+    return SupportFace(len(points), -1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, corners, none, none, -1)
 
 
 def clip(P: np.ndarray, Q: np.ndarray, tolerance: float = 0.0):

@@ -235,7 +235,7 @@ def test_what_cannot_be_answered_is_refused():
         collide.contacts([mesh, None], mesh, EYE, EYE)
     with pytest.raises(collide.InvalidPose, match="X_WB"):
         collide.contacts(mesh, mesh, EYE, 2 * np.eye(4))
-    with pytest.raises(collide.InvalidPose, match="lengths"):
+    with pytest.raises(collide.InvalidArgument, match="lengths"):
         collide.contacts(mesh, mesh, np.stack([EYE] * 2), np.stack([EYE] * 3))
     with pytest.raises(collide.InvalidPose):
         collide.contacts(mesh, mesh, EYE, np.full((4, 4), np.nan))

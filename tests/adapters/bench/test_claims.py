@@ -23,7 +23,7 @@ from collide.adapters.bench.turns import Seconds, race, turns
 from collide.errors import InvalidArgument
 
 #: Lines of a script, and of a part that scripts import.
-MAX_SCRIPT, MAX_PART = 215, 240
+MAX_SCRIPT, MAX_PART = 215, 280
 QUICK = argparse.Namespace(quick=True, repeats=None, only={}, no_csv=False)
 
 
