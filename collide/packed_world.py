@@ -350,8 +350,8 @@ class PackedWorld:
     # --- convex bodies and unions of convex parts -----------------------------------------------
 
     def _answer_unions(self, candidates: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> Answer:
-        """`_answer_convex`; but rows of two unions of many parts, where the limit rules out few of them, are those of the
-        pair by itself.
+        """`_answer_convex`; but rows of two unions of many parts are those of the pair by itself, where the limit rules
+        out few of their parts.
         """
         parts = self.parts
         if boolean or parts.all_of_one_part:
