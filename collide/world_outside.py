@@ -18,8 +18,7 @@ from collide.packed_world import PackedWorld, batches_of_shapes
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
 from collide.threads import share
-from collide.world_part_pairs import MANY_PAIRS
-from collide.world_parts import runs
+from collide.world_parts import MIN_BY_TREE, runs
 
 #: Half of the engine, which scenes without meshes never load.
 mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
@@ -81,7 +80,7 @@ def answer_outside(packed: PackedWorld, questions: Questions, limit: float, thre
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
     is_meshed = np.array([shape.is_asked_whole for shape in questions.shapes], dtype=bool)
     whole = is_meshed[questions.shape_of[pairs[:, 0]]] | packed.meshed[pairs[:, 1]]
-    whole |= questions.counts[pairs[:, 0]] * packed.parts.counts[pairs[:, 1]] >= MANY_PAIRS
+    whole |= questions.counts[pairs[:, 0]] * packed.parts.counts[pairs[:, 1]] >= MIN_BY_TREE
     answered = [np.zeros(0, dtype=PAIR_DTYPE), _of_convex(packed, questions, pairs[~whole], limit, threads)]
     shape_of = np.concatenate([questions.shape_of, len(questions.shapes) + packed.shape_of])
     n = len(questions.boxes)

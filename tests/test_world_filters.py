@@ -317,8 +317,8 @@ def test_parts_by_trees_are_those_of_all_parts(monkeypatch):
         candidates = np.array([(i, j) for i in range(4) for j in range(i + 1, 4)])
         for margin in (0.0, 0.2):
             answers = []
-            for many_pairs in (0, 1 << 60):
-                monkeypatch.setattr("collide.world_part_pairs.MANY_PAIRS", many_pairs)
+            for n_least in (0, 1 << 60):
+                monkeypatch.setattr("collide.world_part_pairs.MIN_BY_TREE", n_least)
                 answers.append([found.tolist() for found in PartTrees(parts).near(candidates, margin)])
             assert answers[0] == answers[1], (seed, margin)
             assert 50 < len(answers[0][0]) < 4000
