@@ -81,7 +81,7 @@ def theirs(name: str, cases: list[Case]) -> list[Row | None]:
     return [
         {"distance": float(row["distance"]), "normal": row["normal"], "path": "", "us": math.nan, "certified": False}
         if row["answered"] and abs(row["distance"]) < UNBOUNDED else None for row in table.rows
-    ]  # fmt: skip
+    ]
 
 
 def families(options: Options, family: str, peer: str) -> list[Row]:
@@ -135,7 +135,7 @@ def arguments(parser) -> None:
 
 CLAIMS = [
     Claim("families", "largest errors of hard pairs", family_cases, families, file="accuracy-families"),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

@@ -62,7 +62,7 @@ def against_time(options: Options, n: int, side: str, level: float) -> Race:
             fcl = FclLoop(*lists)
             tasks["fcl"], answers["fcl"], close = fcl.loop("signed"), fcl.answers("signed"), fcl.close
     errors = {name: [float(abs(Decimal(float(d)) - t) / abs(t)) for d, t in zip(values, truths)]
-              for name, values in answers.items()}  # fmt: skip
+              for name, values in answers.items()}
     beside = {name: {"max_error": max(e), "median_error": statistics.median(e)} for name, e in errors.items()}
     return Race(tasks, count, {"judged": judged}, beside, close=close)
 
@@ -98,7 +98,7 @@ CLAIMS = [
     Claim("curved", "brackets in units of S", curved_cases, curved, file="accuracy-curved", panels=tuple(
               Panel(f"largest bracket of a {side}, in units of S", "us", f"{side}_width", "where", "xy", style="o",
                     x_label="µs a pair") for side in ("gap", "depth"))),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

@@ -72,7 +72,7 @@ class Uncertified:
         self.process = subprocess.Popen(
             [sys.executable, __file__, "--child", str(place)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
             env={**os.environ, "COLLIDE_CACHE_DIR": str(place)},
-        )  # fmt: skip
+        )
         assert self.process.stdout is not None
         check(self.process.stdout.readline() == "ready\n", "the copy without proofs did not start")
 
@@ -113,7 +113,7 @@ def measure(options: Options, pairs: str) -> Race:
     A, B, X_WA, X_WBs = question = made[pairs]
     how = collide.distance(*question).rows["how"]
     tasks = {"certified": lambda: collide.collide(*question), "uncertified": lambda: plain.seconds(pairs),
-             "distance": lambda: collide.distance(*question)}  # fmt: skip
+             "distance": lambda: collide.distance(*question)}
     n = len(X_WBs)
     if installed(coal="coal"):
         tasks["coal"] = CoalLoop([A] * n, [B] * n, np.tile(X_WA, (n, 1, 1)), X_WBs).loop("boolean")

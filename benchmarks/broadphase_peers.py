@@ -175,4 +175,4 @@ class MuJoCo(Engine):
 PEERS: dict[str, tuple[type[Engine], str, int]] = {
     "coal": (Coal, "coal", 10**6), "fcl": (Fcl, "fcl", 10**6), "Bullet": (Bullet, "pybullet", 10_000),
     "Bullet boxes": (BulletBoxes, "pybullet", 10_000), "MuJoCo": (MuJoCo, "mujoco", 1000),
-}  # fmt: skip
+}

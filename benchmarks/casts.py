@@ -29,9 +29,9 @@ SHAPES = {
     "sphere": collide.Sphere(0.5), "box": collide.Box((1.0, 0.8, 0.6)), "capsule": collide.Capsule(0.3, 0.6),
     "cylinder": collide.Cylinder(0.4, 0.8), "cone": collide.Cone(0.4, 0.8),
     "ellipsoid": collide.Ellipsoid((0.5, 0.3, 0.4)),
-}  # fmt: skip
+}
 PAIRS = ("box box", "sphere box", "capsule box", "capsule capsule", "cylinder box", "cylinder cylinder",
-         "ellipsoid ellipsoid", "hull48 hull48")  # fmt: skip
+         "ellipsoid ellipsoid", "hull48 hull48")
 
 
 def bullet_rays(bodies: list, origins: np.ndarray, motions: np.ndarray) -> tuple[Callable, Callable]:

@@ -117,7 +117,7 @@ def robot(options: Options, scene: str) -> Race:
     made = collide.combine(shapes, poses, "union")
     columns = {"links": len(shapes), "solid_meshes": n_meshes, "facets": len(made.mesh.faces),
                "shells": made.mesh.report.shells, "litres": 1e3 * made.mesh.report.volume,
-               "crossings": len(made.self_collisions)}  # fmt: skip
+               "crossings": len(made.self_collisions)}
     return Race({"collide": lambda: collide.combine(shapes, poses, "union")}, columns=columns)
 
 
@@ -126,7 +126,7 @@ def space(options: Options, facets_a: int, facets_b: int) -> Race:
     r = collide.configuration_obstacle(A, B, TURNED)
     tasks, beside = {"collide": lambda: collide.configuration_obstacle(A, B, TURNED)}, {}
     columns = {"pieces": r.n_pieces, "cells": r.n_cells, "asked": r.n_asked, "facets": len(r.mesh.faces),
-               "crossings": len(r.self_collisions)}  # fmt: skip
+               "crossings": len(r.self_collisions)}
     if installed(manifold3d="manifold3d"):
         first, second = manifold_of(A.vertices, A.faces), manifold_of(-B.vertices @ TURNED.T, B.faces[:, ::-1])
         volume = first.minkowski_sum(second).volume()
@@ -182,7 +182,7 @@ def figure_10(options: Options, n: int) -> list[dict]:
     r = collide.configuration_obstacle(A, B, R)
     holes = len(r.rings) - 1
     return [{"corners_of_A": len(A[0]), "pieces": r.n_pieces, "points": r.n_corners,
-             "corners": sum(map(len, r.rings)), "holes": holes, "holes_over_n3": holes / n**3}]  # fmt: skip
+             "corners": sum(map(len, r.rings)), "holes": holes, "holes_over_n3": holes / n**3}]
 
 
 def claim(name: str, sentence: str, measure, *columns: str, of=(), everywhere=False) -> Claim:
@@ -204,7 +204,7 @@ CLAIMS = [
           of=[(20, 20), (50, 20), (50, 50), (100, 50), (200, 50)]),
     claim("plane", "ms of one in the plane", plane, "corners", of=[25, 100, 250, 500, 1000]),
     claim("combs", "figure 10 of the paper", figure_10, "n", of=[2, 4, 6, 8, 12], everywhere=True),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from collide.adapters.bench.claims import Claim, Options, Race, grid, main
 SPREAD = {"near": 0.8, "far": 3.0}
 QUESTIONS: dict[str, Callable] = {
     "collide": collide.collide, "distance": collide.distance, "gap": partial(collide.distance, signed=False),
-}  # fmt: skip
+}
 BOX = collide.Box((0.5, 0.5, 0.5))
 
 
@@ -68,7 +68,7 @@ def measure(options: Options, interface: str, question: str, where: str, parts: 
     if interface == "single":
         pairs = [pair for at in zip(X, Y) for pair in pairs_of(A, BOX, *at)]
         return Race({"compound": partial(one_by_one, ask, [(A, BOX, *at) for at in zip(X, Y)]),
-                     "parts": partial(one_by_one, ask, pairs)}, n)  # fmt: skip
+                     "parts": partial(one_by_one, ask, pairs)}, n)
     if interface in ("ShapeSet", "list"):
         whole, each = picked(rng, n, parts, X, interface == "ShapeSet")
         whole, pairs = (*whole, X, Y), [(S, B, x, Y) for S, B, x in each]
@@ -89,7 +89,7 @@ def cases(options: Options):
 def notes(rows):
     ratios = np.array([1 / row["ratio"] for row in rows if row["engine"] == "parts"])
     yield f"a compound's time by its parts': median {np.median(ratios):.2f}, largest {ratios.max():.2f}, above 1.2: " \
-          f"{int((ratios > 1.2).sum())}"  # fmt: skip
+          f"{int((ratios > 1.2).sum())}"
 
 
 CLAIMS = [Claim("compounds", "µs a pose", cases, measure, turns=15, seconds=3.0, notes=notes)]

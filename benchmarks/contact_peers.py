@@ -35,7 +35,7 @@ def manifold_of(points, normals, distances) -> Manifold:
     return Manifold(
         np.array(points, dtype=float).reshape(-1, 3), np.array(normals, dtype=float).reshape(-1, 3),
         np.array(distances, dtype=float).reshape(-1),
-    )  # fmt: skip
+    )
 
 
 class CoalContacts:
@@ -61,7 +61,7 @@ class CoalContacts:
         self.request.security_margin = margin
         self.result, self.patch_request, self.patch_result = (
             coal.CollisionResult(), coal.ContactPatchRequest(), coal.ContactPatchResult(),
-        )  # fmt: skip
+        )
 
     def detect(self) -> None:
         ask, patch, result, request = self.coal.collide, self.coal.computeContactPatch, self.result, self.request
@@ -155,7 +155,7 @@ class MujocoContacts:
         for k, both in enumerate(zip(As, Bs)):
             for side, shape in zip("ab", both):
                 bodies.append(f'<body><freejoint/><geom name="{side}{k}" {shapes.attributes(shape)} mass="1" '
-                              'contype="0" conaffinity="0"/></body>')  # fmt: skip
+                              'contype="0" conaffinity="0"/></body>')
             pairs.append(f'<pair geom1="a{k}" geom2="b{k}" margin="{margin!r}"/>')
         self.model = mujoco.MjModel.from_xml_string(
             f'<mujoco><size memory="200M"/><option><flag multiccd="enable"/></option><asset>{shapes.xml()}</asset>'

@@ -35,7 +35,7 @@ BARS = {
     ("pairs", "box on box", "apart"): 0.3, ("pairs", "hull 48 on hull 48", "apart"): 0.3,
     ("single", "box on box", "touching"): 3.0, ("meshes", "box on ground", "touching"): 20.0,
     ("meshes", "bunny on bunny", "touching"): 1000.0, ("world", "5000 bodies", "contacts"): 20.0,
-}  # fmt: skip
+}
 BOX = collide.Box((0.4, 0.3, 0.2))
 #: Sunk so far, or above by so much, within the margin [m].
 STATES = {"touching": (-1e-4, 0.0), "apart": (1e-3, 2e-3)}
@@ -59,7 +59,7 @@ def cases() -> dict[str, tuple[collide.Shape, collide.Shape, float, bool]]:
         "capsule on box": (BOX, collide.Capsule(0.1, 0.2), 0.2, True),
         "cylinder on box, standing": (BOX, collide.Cylinder(0.1, 0.2), 0.2, False),
         "cylinder on box, lying": (BOX, collide.Cylinder(0.1, 0.2), 0.2, True),
-    }  # fmt: skip
+    }
 
 
 def resting(n: int, height: float, lying: bool, seed: int) -> np.ndarray:
@@ -68,7 +68,7 @@ def resting(n: int, height: float, lying: bool, seed: int) -> np.ndarray:
     return np.array([
         collide.pose((*rng.uniform(-0.01, 0.01, 2), height), rpy=(0.5 * np.pi * lying, 0, rng.uniform(-np.pi, np.pi)))
         for _ in range(n)
-    ])  # fmt: skip
+    ])
 
 
 def per_pair(manifolds) -> float:
@@ -86,7 +86,7 @@ def pairs(options: Options, case: str, state: str) -> Race:
     ours = partial(collide.contacts, A, B, np.eye(4), Ys, margin=margin)
     tasks, beside, lists = {"collide": ours}, {"collide": {"contacts": len(ours()) / n}}, ([A] * n, [B] * n)
     kinds = {"coal": CoalContacts, "coal + patch": partial(CoalContacts, patches=True), "bullet": BulletContacts,
-             "mujoco": MujocoContacts}  # fmt: skip
+             "mujoco": MujocoContacts}
     packages = {"coal": "coal", "coal + patch": "coal", "bullet": "pybullet", "mujoco": "mujoco"}
     for name in installed(**packages):
         peer = kinds[name](*lists, np.tile(np.eye(4), (n, 1, 1)), Ys, margin)
@@ -202,7 +202,7 @@ CLAIMS = [
     claim("meshes", "µs a pair", lambda o: grid(case=["box on ground", *(f"{m} on {m}" for m in meshes_here("bunny"))]),
           meshes, turns=5, file="contacts-meshes"),
     claim("world", "ms a step", world_cases, world, unit="ms", file="contacts-world"),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ BARS: dict[tuple[str, str], dict[int, float]] = {
     ("shapes", "signed"): {8: 2.6, 128: 3.0, 2048: 4.3, 8192: 8.3},
     ("shapes", "unsigned"): {8: 3.3, 128: 5.0, 2048: 6.8, 8192: 12.2},
     ("single", "boolean"): dict(zip(SIZES, (2.0, 3.5, 5, 6.9, 13.9))),
-}  # fmt: skip
+}
 STRETCH_BARS = {
     ("sphere", "boolean"): dict(zip(SIZES, (5, 7, 9, 11, 15, 20, 70))),
     ("sphere", "signed"): dict(zip(SIZES, (4, 4, 4, 5, 7, 10, 25))),
@@ -111,7 +111,7 @@ def rounds(asked: Scene) -> dict:
     """Means of GJK's and EPA's rounds, each one support point of each body, and the exact stage's share."""
     rows = collide.distance(*asked.question()).rows
     return {"gjk": float((rows["iterations"] & 0xFFFF).mean()), "epa": float((rows["iterations"] >> 16).mean()),
-            "exact": float((rows["exact"] > 0).mean())}  # fmt: skip
+            "exact": float((rows["exact"] > 0).mean())}
 
 
 def arithmetic(share: int) -> None:
@@ -126,7 +126,7 @@ def threaded(options: Options, table: str, n: int, question: str) -> Race:
     if question == "arithmetic":
         pool = ThreadPoolExecutor(2)
         return Race({"two threads": lambda: list(pool.map(arithmetic, (1, 1))), "collide": lambda: arithmetic(2)},
-                    close=pool.shutdown)  # fmt: skip
+                    close=pool.shutdown)
     asked = scene_of(options, table, n)
     tasks = {"two threads": asks(question, asked, threads=2), "collide": asks(question, asked)}
     return Race(tasks, len(asked.which), bars={"collide": 1.8})

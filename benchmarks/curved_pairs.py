@@ -22,7 +22,7 @@ OTHERS = ("sphere", "capsule", "box", "hull", "half-space")
 #: Every pair with a curved body, once.
 PAIRS = tuple(
     (a, b) for k, a in enumerate(CURVED) for b in (*OTHERS, *CURVED[k:])
-)  # fmt: skip
+)
 POSES = ("random", "aligned", "one axis", "nearly")
 #: Lengths of a pair differ by this factor at most.
 SPREAD = 20.0

@@ -30,7 +30,7 @@ from collide.polytopes.facet_tree import Sizes
 #: Points of the trees that are built whole; the last is what is asked for.
 SIZES = {
     2: (1000, 10_000, 100_000, 1_000_000), 3: (3000, 10_000, 30_000, 100_000), 4: (3000, 5000, 10_000), 5: (1700, 2000),
-}  # fmt: skip
+}
 #: Points of the bodies that are posed, with nets of at most 24 simplices and leaves of at most 48 corners.
 SIZES_ASKED = {2: (100, 1000, 10_000, 100_000), 3: (100, 1000, 10_000), 4: (100, 300, 1000), 5: (60, 120, 240)}
 SMALL = Sizes(0.5, 24, 48)
@@ -119,7 +119,7 @@ def poses(options: Options, family: str, d: int, n: int) -> list[dict]:
         "nodes": A.tree.n_nodes + B.tree.n_nodes, "depth": max(A.size.depth, B.size.depth),
         "redrawn": A.tree.n_redrawn + B.tree.n_redrawn, "megabytes": (A.tree.n_bytes + B.tree.n_bytes) / 1e6,
         "median_ms": 1e3 * float(np.median(times)), "meets_ms": 1e3 * float(np.median(judged)),
-    }]  # fmt: skip
+    }]
 
 
 def pose_notes(rows: list[dict]):
@@ -143,20 +143,20 @@ def beside_walk(options: Options, n: int) -> Race:
         "tree_cones": [t.counters["simplices_read"] for t in trees],
         "tree_rows": [t.counters["net_rows"] for t in trees], "walk_rounds": [w.rows["rounds"][0] for w in walks],
         "walk_tests": [w.rows["tests"][0] for w in walks],
-    }  # fmt: skip
+    }
     columns = {"poses": len(asked), "hits": sum(t.hit for t in trees),
-               "unlike": sum(bool(w.hit[0]) != t.hit for t, w in zip(trees, walks))}  # fmt: skip
+               "unlike": sum(bool(w.hit[0]) != t.hit for t, w in zip(trees, walks))}
     return Race({
         "tree": lambda: [polytopes.trees_meet(A, B, X, certificate=False) for X in asked],
         "walk": lambda: [collide.walk(*hulls, X, np.eye(4)) for X in asked],
-    }, len(asked), columns | {name: float(np.mean(some)) for name, some in means.items()})  # fmt: skip
+    }, len(asked), columns | {name: float(np.mean(some)) for name, some in means.items()})
 
 
 def cases(sizes: dict):
     return lambda options: (
         {"family": family, "d": d, "n": n}
         for family in FAMILIES for d in sizes for n in sizes[d][: 1 if options.quick else None]
-    )  # fmt: skip
+    )
 
 
 
@@ -179,7 +179,7 @@ CLAIMS = [
                     lambda row, name=name: row["family"] == name, "cones_read_mean") for name in FAMILIES)),
     Claim("walk", "ms a pose beside the walk", lambda o: [{"n": n} for n in SIZES_ASKED[3][: 1 if o.quick else None]],
           beside_walk, unit="ms", turns=3, file="hierarchical-trees-walk", everywhere=True),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

@@ -67,7 +67,7 @@ def row_of(kind: str, which: str, n: int, hierarchy: Hierarchy, hull_s: float, b
         "added": int((hierarchy.birth > 0).sum()),
         "bytes_per_n": sum(a.nbytes for a in hierarchy if isinstance(a, np.ndarray)) / sizes[0],
         "hull_s": hull_s, "build_s": build_s,
-    }  # fmt: skip
+    }
 
 
 def timed(task):
@@ -121,7 +121,7 @@ def distance(options: Options, kind: str, n: int, bound: int) -> Race:
     names = "levels_a", "levels_b", "problems", "looked_at"
     counts = dict(zip(names, np.mean([r.counters for r in results], axis=0).tolist()))
     tasks = {"hierarchy": lambda: [hierarchy_distance(body, body, *pose) for pose in asked],
-             "default": lambda: collide.distance(shape, shape, np.eye(4), X_WB)}  # fmt: skip
+             "default": lambda: collide.distance(shape, shape, np.eye(4), X_WB)}
     return Race(tasks, count, {"depth": body.hierarchy.depth} | counts)
 
 
@@ -158,7 +158,7 @@ CLAIMS = [
           bounds, file="hierarchies-bounds", everywhere=True, asked_for=True),
     Claim("distance", "µs a distance down the hierarchies", distance_cases, distance, file="hierarchies-distance",
           everywhere=True, asked_for=True, turns=4, notes=squares),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

@@ -47,19 +47,19 @@ def client() -> dict:
 
     ends = [[x, y, 5.0] for x, y in random.uniform(-4, 4, (100, 2))], [[0.0, 0.0, -1.0]] * 100
     of_shape = {"collisionShapeB": shape, "collisionShapePositionB": [0, 0, 1],
-                "collisionShapeOrientationB": [0, 0, 0, 1]}  # fmt: skip
+                "collisionShapeOrientationB": [0, 0, 0, 1]}
     questions = {
         "closest points of two bodies": ("getClosestPoints", (balls[0], hull, 9.0), {}),
         "closest points of a body and a shape": ("getClosestPoints", (balls[0], -1, 9.0), of_shape),
         "contacts of two bodies": ("getContactPoints", (balls[0], hull), {}),
         "contacts of all": ("getContactPoints", (), {}), "a ray": ("rayTest", (ends[0][0], ends[1][0]), {}),
         "a batch of 100 rays": ("rayTestBatch", ends, {}),
-    }  # fmt: skip
+    }
     calls: dict = {"update of 102 bodies": {"collide": mirror.update}, "100 reset, and update": {"collide": moved}}
     for name, (method, positional, named) in questions.items():
         named = named | {"physicsClientId": number}
         calls[name] = {engine: partial(getattr(module, method), *positional, **named)
-                       for engine, module in (("collide", q), ("pybullet", p))}  # fmt: skip
+                       for engine, module in (("collide", q), ("pybullet", p))}
     return calls
 
 
@@ -83,7 +83,7 @@ def ball_mesh(module):
 SHAPES = {
     "two boxes": lambda m: (m.Box(1, 1, 1), m.Box(1, 1, 1)), "ball and box": lambda m: (m.Sphere(0.5), m.Box(1, 1, 1)),
     "two balls of 996 triangles": lambda m: (ball_mesh(m), ball_mesh(m)),
-}  # fmt: skip
+}
 
 
 def of_coal(options: Options, shapes: str, where: str, question: str) -> Race:
@@ -131,7 +131,7 @@ def of_pinocchio(options: Options, robot: str, question: str) -> Race:
 def pinocchio_cases(options: Options):
     present = installed(pinocchio="pinocchio") and pinocchio_robots.robots_folder()
     return grid(robot=list(pinocchio_robots.ROBOTS)[: 1 if options.quick else None] if present else (),
-                question=("all pairs", "any"))  # fmt: skip
+                question=("all pairs", "any"))
 
 
 claim = partial(Claim, turns=40, seconds=3.0, clock=time.perf_counter)
@@ -140,7 +140,7 @@ CLAIMS = [
           lambda o, call: Race(client()[call]), file="host-calls-pybullet"),
     claim("coal", "µs a call", coal_cases, of_coal, file="host-calls-coal"),
     claim("pinocchio", "µs a configuration", pinocchio_cases, of_pinocchio, file="host-calls-pinocchio"),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

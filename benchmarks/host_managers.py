@@ -28,7 +28,7 @@ from collide.adapters.peers.fcl_peer import triangulate
 
 #: Single calls: what bodies, and how far apart the overlapping and the separated ones stand [m].
 PAIRS = ("Box Box", "Sphere Sphere", "Box Sphere", "Capsule Capsule", "Capsule Box", "Cylinder Box", "Cone Cone",
-         "Ellipsoid Box", "Convex Convex", "BVHModel Box", "BVHModel BVHModel", "BVHModel Sphere")  # fmt: skip
+         "Ellipsoid Box", "Convex Convex", "BVHModel Box", "BVHModel BVHModel", "BVHModel Sphere")
 PLACES = {"apart": 1.6, "meeting": 0.5}
 
 
@@ -86,7 +86,7 @@ class Managed:
             "own callback": lambda: self.manager.collide(None, lambda a, b, cdata: False),
             "one to all": partial(self.asked, self.guest), "least distance": self.nearest,
             "distance of one": partial(self.nearest, self.guest),
-        }  # fmt: skip
+        }
 
 
 @cache
@@ -117,7 +117,7 @@ def calls(options: Options, pair: str, where: str, question: str) -> Race:
             "collide": partial(module.collide, a, b),
             "one contact": lambda m=module, a=a, b=b, r=request: m.collide(a, b, r, m.CollisionResult()),
             "distance": lambda m=module, a=a, b=b, r=near: m.distance(a, b, r, m.DistanceResult()),
-        }[question]  # fmt: skip
+        }[question]
     return Race(tasks)
 
 
@@ -146,7 +146,7 @@ class Trimesh:
             "internal, names": partial(manager.in_collision_internal, return_names=True),
             "other, names": partial(manager.in_collision_other, guests, return_names=True),
             "single": partial(manager.in_collision_single, meshes[0], np.eye(4)),
-        }  # fmt: skip
+        }
 
     def seconds(self, question: str) -> float:
         begin = time.thread_time()

@@ -103,7 +103,7 @@ class Bullet:
             ends.append([
                 core.TransformState.make_pos_quat_scale(core.LPoint3f(*p), core.LQuaternionf(w, x, y, z), unscaled)
                 for p, (x, y, z, w) in zip(X_BA[:, :3, 3].tolist(), turns.tolist())
-            ])  # fmt: skip
+            ])
         self.motions = list(zip(*ends))
 
     def _geometry(self, shape: collide.Shape) -> Any:

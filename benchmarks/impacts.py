@@ -54,7 +54,7 @@ def resting(group: motions.Group) -> motions.Group:
 
     return group._replace(
         A=group.B, B=group.A, X_WA0=group.X_WB0, X_WA1=group.X_WB1, X_WB0=group.X_WA0, X_WB1=group.X_WA0, gap=gap
-    )  # fmt: skip
+    )
 
 
 def box_group(n: int, angle: float | None = None) -> motions.Group:

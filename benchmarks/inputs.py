@@ -16,7 +16,7 @@ FILES = {
     "teapot": "teapot_1177.ply", "bunny": "bunny_35947.ply", "env": "env.obj", "rob": "rob.obj",
     "dragon 11k": "dragon_vrip_res4.ply.gz", "dragon 48k": "dragon_vrip_res3.ply.gz",
     "dragon 203k": "dragon_vrip_res2.ply.gz", "dragon 871k": "dragon_vrip.ply.gz",
-}  # fmt: skip
+}
 
 
 def use_tests(*folders: str) -> None:

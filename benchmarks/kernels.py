@@ -127,7 +127,7 @@ print(json.dumps(told))
 def run(python: str, level: str, only: str) -> dict:
     environment = {**os.environ, **({"COLLIDE_CPU": level} if level else {})}
     done = subprocess.run([python, "-c", WORK, only], cwd=tempfile.gettempdir(), env=environment, capture_output=True,
-                          text=True, check=False)  # fmt: skip
+                          text=True, check=False)
     if done.returncode:
         raise CollideError(f"{python} failed: {done.stderr}")
     return json.loads(done.stdout)
@@ -147,7 +147,7 @@ def measure(options: Options, case: str) -> Race:
     beside = {name: {"bits": "the same" if answer == first else "OTHER"} for name, answer in bits.items()}
     return Race({
         name: lambda of=contestant: Seconds(run(*of, case)[case][0] * 1e-9) for name, contestant in contestants.items()
-    }, beside=beside)  # fmt: skip
+    }, beside=beside)
 
 
 def cases(options: Options):

@@ -41,7 +41,7 @@ POSES, BOOLEANS = 6, 100
 def growth(options: Options, log2_n: int) -> list[dict]:
     made = Mesh(*surfaces.box((0, 0, 0), (2.0**log2_n, 2.0**log2_n, 1.0))).localised()
     return [{"before": made.before.local_stretches[0], "after": made.after.local_stretches[0],
-             "facets": len(made.mesh.faces), "moved": made.moved}]  # fmt: skip
+             "facets": len(made.mesh.faces), "moved": made.moved}]
 
 
 def growth_notes(rows):
@@ -97,7 +97,7 @@ def parts(options: Options, part: str) -> list[dict]:
         row["why"] = str(error).split(": ", 1)[1][:100]
     for when, locality in stretches.items():
         row |= {f"Σ_{when}": locality.global_stretch, f"σ_{when}": locality.local_stretches[0],
-                f"σ10_{when}": locality.local_stretches[9]}  # fmt: skip
+                f"σ10_{when}": locality.local_stretches[9]}
     return [row]
 
 
@@ -137,7 +137,7 @@ def part_notes(rows):
     for key in ("shells", "shallow", "boolean", "us") if made else ():
         ratios = [row[key] for row in made]
         yield (f"{key}: after over before, median {np.median(ratios):.2f}, from {min(ratios):.2f} to "
-               f"{max(ratios):.2f}, less in {sum(r < 1 for r in ratios)}")  # fmt: skip
+               f"{max(ratios):.2f}, less in {sum(r < 1 for r in ratios)}")
 
 
 CLAIMS = [
@@ -147,7 +147,7 @@ CLAIMS = [
         sides=(32, 64, 128, 256, 1024, 8192)[: 2 if o.quick else None], stretch=(10.0, 20.0)), cylinders,
           file="localised-cylinders", everywhere=True),
     Claim("parts", "CAD parts", part_cases, parts, notes=part_notes, file="localised-parts", everywhere=True),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

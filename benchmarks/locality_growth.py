@@ -53,7 +53,7 @@ def growth(options: Options, family: str, size: int, gap: float) -> list[dict]:
     hits = all_hits(A.tree, B.tree, X, np.eye(4))
     nodes, tested, exact = hits.counters[0].tolist()
     return [{"vertices": len(A.vertices), "meetings": meetings, "pairs": len(hits.pairs), "nodes": nodes,
-             "facet_pairs": tested, "exact": exact}]  # fmt: skip
+             "facet_pairs": tested, "exact": exact}]
 
 
 def growth_notes(rows):
@@ -107,11 +107,11 @@ def walks(options: Options, bodies_of: str, motion: str) -> list[dict]:
             boxes_of_queries(b.tree, b.vertices, b.faces) if kind == "queries"
             else boxes_of_graded(graded_tree(b.vertices, b.faces), b.vertices, b.faces, kind == "graded, tight")
             for b in (A, B)
-        ]  # fmt: skip
+        ]
         counts = count_walk(*trees, X)
         over = counts.meeting / (n * np.log2(n))
         rows.append({"tree": kind, "vertices": n, "meetings": meetings, **counts._asdict(), "default_nodes": nodes,
-                     "meeting_over_nlogn": over, "default_facet_pairs": tested})  # fmt: skip
+                     "meeting_over_nlogn": over, "default_facet_pairs": tested})
     return rows
 
 
@@ -145,7 +145,7 @@ CLAIMS = [
         {"facets": n} for n in (1000, 4000, 16_000, 64_000, 256_000, 1_024_000)[: 2 if o.quick else None]],
           build, unit="s", turns=3, notes=build_notes, everywhere=True, file="locality-build"),
     Claim("walks", "the walk of theorem 3.6", walk_cases, walks, everywhere=True, file="locality-walks"),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

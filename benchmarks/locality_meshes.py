@@ -69,7 +69,7 @@ def meshes(options: Options, mesh_name: str) -> list[dict]:
         "σ10 90 %": float(locality.quantiles([0.9])[0, 9]), "outliers": trees.outlier_share,
         "graded depth": trees.graded_depth, "shells": shells / n, "shallow": shallow / n,
         "boolean": float(np.mean(counts["boolean"])), "shallow / √F": shallow / np.sqrt(n),
-    }]  # fmt: skip
+    }]
 
 
 MEASURES = ("facets", "Σ", "σ", "σ4", "σ10", "σ mean", "σ10 mean", "σ10 90 %", "outliers")
@@ -96,7 +96,7 @@ CLAIMS = [
           file="locality-meshes", panels=tuple(
               Panel("pairs looked at, a facet, two shells nearly alike", measure, "shells", "all", "xy", style=".")
               for measure in ("σ", "σ10 mean"))),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ def making(options: Options, source: str) -> Race:
         "mesh": lambda: Mesh(vertices, faces), "soup": lambda: Mesh(corners, ids),
         "surface": lambda: Mesh(vertices, faces, solid=False), "unpickle": lambda: pickle.loads(pickled),
         "locality": whole.locality,
-    }, columns=columns)  # fmt: skip
+    }, columns=columns)
 
 
 def making_cases(options: Options):

@@ -47,7 +47,7 @@ def coplanar_pair(case: str) -> tuple:
     if name == "grids":
         vertices, faces = flat_grid(GRID)
         X, Y = {"on each other": (X, Y), "half a cell moved": (X, half), "turned in their plane": (X, moved(angle=0.3)),
-                "turned out of it": (turned, turned @ half)}[how]  # fmt: skip
+                "turned out of it": (turned, turned @ half)}[how]
     else:
         vertices, faces = mesh(name)
         if how == "rounded and moved":

@@ -54,7 +54,7 @@ def measure(options: Options, scene_name: str, bodies: int, when: str, what: str
     check(np.array_equal(ends["MuJoCo alone"], ends["cull"]), f"culled steps of {scene_name} are not MuJoCo's")
     return Race({
         name: lambda mode=mode: stepped(model, data, state, mode, n_steps, what) for name, mode in CONTESTANTS.items()
-    }, n_steps, beside=beside)  # fmt: skip
+    }, n_steps, beside=beside)
 
 
 def rest(options: Options, scene_name: str, bodies: int, mode: str) -> list[dict]:
@@ -84,7 +84,7 @@ def scenes(options: Options, largest: int = 5000):
 def cases(options: Options):
     for case in scenes(options):
         yield from grid(**{key: [value] for key, value in case.items()}, when=("falling", "resting"),
-                        what=("step", "collision"))  # fmt: skip
+                        what=("step", "collision"))
 
 
 def rest_cases(options: Options):

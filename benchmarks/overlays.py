@@ -81,7 +81,7 @@ def overlay(options: Options, cubes: int, family: str) -> list[dict]:
     names = ("boxes_meet", "in_integers", "in_fractions")
     row |= {"pairs": len(result.pairs), **dict(zip(names, result.counters[0, 1:4].tolist()))}
     return [row | {"sum_of_volumes": float(result.volumes.sum()),
-                   "memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024}]  # fmt: skip
+                   "memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024}]
 
 
 def cases(options: Options):
@@ -99,7 +99,7 @@ def peers(options: Options, pairs: str) -> list[dict]:
     rng, hair = np.random.default_rng(0), collide.pose((2.0**-47, 2.0**-48, 2.0**-48))
     second, X_WB = {"overlapping": (B, STILL), "by a hair": (A, hair), "touching": (A, STILL)}[pairs]
     seconds, ours = cpu(lambda: collide.overlapping_cells(A, second, STILL, X_WB, volumes=True,
-                                                          settle=pairs != "by a hair"))  # fmt: skip
+                                                          settle=pairs != "by a hair"))
     if pairs == "touching":
         around = [np.flatnonzero((A.cells == v).any(axis=1)) for v in range(len(A.vertices))]
         cells = rng.choice(len(A.cells), count)
@@ -122,7 +122,7 @@ def peers(options: Options, pairs: str) -> list[dict]:
         off = [abs(Fraction(float(v)) - e.volume) / e.volume for v, e in zip(measured, exact) if e.volume and v]
         wrong = sum((v > 0) != (e.volume > 0) for v, e in zip(measured, exact))
         rows.append({"engine": name, "n": len(exact), "us_a_pair": 1e6 * spent / len(exact),
-                     "off": float(max(off, default=0)), "wrong": int(wrong)})  # fmt: skip
+                     "off": float(max(off, default=0)), "wrong": int(wrong)})
     return rows
 
 
@@ -166,7 +166,7 @@ CLAIMS = [
     Claim("overlays", "overlays of tetrahedral meshes", cases, overlay),
     Claim("peers", "µs a pair of cells", lambda o: grid(pairs=("overlapping", "by a hair", "touching")), peers,
           file="overlays-peers"),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ def crowd(shared: bool) -> Scene:
             pose((k % 10, k // 10 % 10, k // 100)),
         )
         for k in range(1000)
-    ])  # fmt: skip
+    ])
 
 
 def large() -> Scene:
@@ -98,7 +98,7 @@ def opened(place: Path) -> dict:
     finally:
         driver.quit()
     return {"ready_s": measures["opened"] / 1e3, "first_s": first / 1e3, "picture_ms": picture,
-            "draw_calls": measures["calls"], "triangles": measures["triangles"]}  # fmt: skip
+            "draw_calls": measures["calls"], "triangles": measures["triangles"]}
 
 
 def measure(options: Options, scene: str) -> Race:
@@ -116,7 +116,7 @@ def measure(options: Options, scene: str) -> Race:
         "bodies": len(of.bodies), "MB": place.stat().st_size / 1e6,
         "facets": sum(shape["simplified_from"] or shape["triangle_count"] for shape in shapes),
         "drawn": sum(shape["triangle_count"] for shape in shapes),
-    } | (opened(place) if options.open else {})  # fmt: skip
+    } | (opened(place) if options.open else {})
     tasks = {"report": lambda: report.make(of, clearance=CLEARANCE), "page": page}
     return Race(tasks, columns=columns, close=folder.cleanup)
 

@@ -152,7 +152,7 @@ def mesh_loops(question: str, asked: tuple, kinds=("OBBRSS", "OBB")) -> tuple[di
         lists = [A] * len(Xs), [B] * len(Xs), Xs, Ys
         if name == "coal":
             engines |= {f"coal {kind}": CoalLoop(*lists, coal_model(kind)) for kind in kinds
-                        if not (kind == "OBB" and question == "distance")}  # fmt: skip
+                        if not (kind == "OBB" and question == "distance")}
         else:
             engines[name] = FclLoop(*lists)
     return {name: engine.loop(question) for name, engine in engines.items()}, engines

@@ -40,7 +40,7 @@ def partition_of(mesh: collide.Mesh, **arguments) -> dict:
         "over_n2": s.cells / n**2, "depth": s.depth, "mean_depth": s.mean_depth, "over_log_n": s.depth / np.log2(n),
         "first_cells": s.first_cells, "most_in_one": s.max_facets, "mean_in_one": s.pieces / s.first_cells,
         "integers": s.integers, "fractions": s.fractions, "s": seconds, "kappa": s.kappa,
-    }  # fmt: skip
+    }
 
 
 def growth_notes(rows, by: str = "family"):
@@ -50,7 +50,7 @@ def growth_notes(rows, by: str = "family"):
             fit = line_fit(np.log2(n), [row["depth"] for row in some])
             yield (f"{family or 'all'}: cells n^{power_of(n, [row['cells'] for row in some]):.3f}; over n log2 n from "
                    f"{ratio.min():.3f} to {ratio.max():.3f}, a factor of {ratio.max() / ratio.min():.2f}; depth "
-                   f"{fit.start:.1f} + {fit.slope:.2f} log2 n")  # fmt: skip
+                   f"{fit.start:.1f} + {fit.slope:.2f} log2 n")
 
 
 def settings(options: Options, facets: int, **arguments) -> list[dict]:
@@ -105,7 +105,7 @@ def pair_of(family: str, **arguments) -> collide.Mesh:
 
 #: Family → (its size's name, sizes).
 WORST = {"harpsicordia": ("n", (150, 500, 1500)), "chazelle": ("strings", (10, 20, 40, 80)),
-         "accordions": ("strings", (10, 20, 40, 80))}  # fmt: skip
+         "accordions": ("strings", (10, 20, 40, 80))}
 
 
 def hard_points(mesh: collide.Mesh, partition: collide.SpacePartition, n: int, seed: int = 0) -> np.ndarray:
@@ -129,7 +129,7 @@ def hard_points(mesh: collide.Mesh, partition: collide.SpacePartition, n: int, s
 
 MESHES = {"bumpy sphere, 1,000": lambda: sphere(1000), "bumpy sphere, 3,000": lambda: sphere(3000),
           "bumpy sphere, 10,000": lambda: sphere(10_000),
-          "square ring": lambda: collide.Mesh(*block_ring())}  # fmt: skip
+          "square ring": lambda: collide.Mesh(*block_ring())}
 
 
 def points(options: Options, mesh: str) -> Race:
@@ -140,7 +140,7 @@ def points(options: Options, mesh: str) -> Race:
     wrong = int((results.inside != collide.contains(made, np.eye(4), every)).sum())
     tasks = {"locate": lambda: partition.locate(some), "contains": lambda: collide.contains(made, np.eye(4), some)}
     return Race(tasks, len(some), {"points": len(every), "inside": int(results.inside.sum()), "differ": wrong,
-                                   "on_boundary": int(results.boundary.sum())})  # fmt: skip
+                                   "on_boundary": int(results.boundary.sum())})
 
 
 def pieces(options: Options, mesh: str) -> list[dict]:
@@ -149,7 +149,7 @@ def pieces(options: Options, mesh: str) -> list[dict]:
     volume, start = made.report.volume, time.process_time()
     parts = collide.SpacePartition(made).convex_pieces()
     row = {"volume": volume, "pieces": len(parts), "s": time.process_time() - start,
-           "volume_off": float(parts.volumes.sum() / volume - 1)}  # fmt: skip
+           "volume_off": float(parts.volumes.sum() / volume - 1)}
     if not installed(coacd="coacd"):
         return [row]
     import coacd
@@ -194,7 +194,7 @@ CLAIMS = [
           file="partitions-pieces"),
     asked("clutter", "facets in a cube without guards", sized(("bumpy sphere", (1000, 10_000, 100_000)), (
           "harpsicordia", (1000, 10_000)), ("chazelle", (10, 40, 160))), cluttered, file="partitions-clutter"),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

@@ -116,7 +116,7 @@ def rounds(options: Options, n: int, pairs: str) -> list[dict]:
     check(bool((r.rounds <= bound + 6).all() and (r.vertices_read <= 12 * bound + 60).all()), f"bounds at {n} {pairs}")
     return [{"corners": len(A.vertices), "mean_rounds": float(r.rounds.mean()), "max_rounds": int(r.rounds.max()),
              "bound_rounds": bound + 6, "mean_read": float(r.vertices_read.mean()),
-             "max_read": int(r.vertices_read.max()), "bound_read": 12 * bound + 60}]  # fmt: skip
+             "max_read": int(r.vertices_read.max()), "bound_read": 12 * bound + 60}]
 
 
 CLAIMS = [
@@ -126,7 +126,7 @@ CLAIMS = [
     Claim("pairs", "µs a pair of polygons", lambda o: grid(
         corners=(4, 16, 128) if o.quick else (4, 8, 16, 128, 1024, 8192), pairs=PAIRS), compared, turns=5,
           file="planar-pairs", everywhere=True),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ def linprog(question: Question) -> bool:
         answer = scipy.optimize.linprog(
             np.zeros(n + d), inside, question.offsets, equalities, right, bounds, method=method,
             options={"time_limit": _HIGHS_SECONDS},
-        )  # fmt: skip
+        )
         if answer.status in (0, 2):
             return answer.status == 0
     raise RuntimeError(answer.message)
@@ -138,7 +138,7 @@ def _clarabel(question: Question) -> bool:
         hessian, np.zeros(n + 2 * d), sparse.csc_matrix(sparse.diags(signs) @ rows),
         np.where(np.isfinite(upper), upper, lower),
         [clarabel.ZeroConeT(d + 1), clarabel.NonnegativeConeT(n + len(question.offsets))], settings,
-    )  # fmt: skip
+    )
     return float(np.linalg.norm(np.array(solver.solve().x)[n + d :])) <= _HIT
 
 
@@ -160,7 +160,7 @@ def _proxsuite(question: Question) -> bool:
     H, equality, G, h, half = _program(question)
     result = proxsuite.proxqp.dense.solve(
         H, np.zeros(len(H)), equality[None], np.array([1.0]), G, np.full(len(h), -1e30), h, eps_abs=1e-9
-    )  # fmt: skip
+    )
     return float(np.linalg.norm(half @ result.x)) <= _HIT
 
 
@@ -176,4 +176,4 @@ PEERS: dict[str, tuple[str, Callable[[Question], bool], int]] = {
     "quadprog": ("quadprog", _quadprog, 1000), "daqp": ("daqp", _daqp, 1000),
     "clarabel": ("clarabel", _clarabel, 10**6), "osqp": ("osqp", _osqp, 10**6),
     "proxsuite": ("proxsuite", _proxsuite, 1000), "Drake": ("pydrake", _drake, 10**6),
-}  # fmt: skip
+}

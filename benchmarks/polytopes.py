@@ -32,7 +32,7 @@ from collide.polytopes.meets_query import ALGORITHMS
 Question = meeting_families.Question
 SIZES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
 TABLE = [(3, 30, 30), (2, 100, 50), (2, 100_000, 50), (3, 100, 30), (3, 1000, 100), (3, 100_000, 50),
-         (3, 10_000, 10_000), (6, 1000, 50), (6, 100_000, 50), (7, 200, 100)]  # fmt: skip
+         (3, 10_000, 10_000), (6, 1000, 50), (6, 100_000, 50), (7, 200, 100)]
 #: Gaps above this are seen by HiGHS, whose tolerance it is.
 _SEEN_BY_HIGHS = 1e-7
 
@@ -110,7 +110,7 @@ def fit_notes(rows):
             off = np.abs((c + k * n) / read - 1).max()
             last = np.log(read[-1] / read[-2]) / np.log(n[-1] / n[-2])
             yield (f"{' '.join(map(str, key))}: rows read ~ n^{power_of(n, read):.3f}, n^{last:.3f} at last; "
-                   f"{c:.0f} + {k:.2f} n within {off:.0%}")  # fmt: skip
+                   f"{c:.0f} + {k:.2f} n within {off:.0%}")
 
 
 def peers(options: Options, d: int, n: int, m: int) -> Race:
@@ -125,7 +125,7 @@ def peers(options: Options, d: int, n: int, m: int) -> Race:
     contestants: dict[str, Callable] = {
         name: lambda q, name=name: polytopes.meets(*q, algorithm=name).hit
         for name in ALGORITHMS if name != "brute-force" or n <= 40
-    }  # fmt: skip
+    }
     present = installed(**{name: module for name, (module, _, _) in PEERS.items()})
     contestants |= {name: PEERS[name][1] for name in present if n <= PEERS[name][2]}
     tasks, beside = {}, {}
@@ -173,7 +173,7 @@ CLAIMS = [
           peers, unit="ms", turns=5, seconds=60.0, file="polytopes"),
     Claim("judge", "against the rational simplex", lambda o: grid(d=(1, 2, 3, 4, 5)), judge, asked_for=True,
           file="polytopes-judged", everywhere=True),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

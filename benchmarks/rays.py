@@ -68,14 +68,14 @@ def measure(options: Options, mesh_name: str, rays: int) -> Race:
         same = ours[: len(theirs)]
         beside[name] = {"missed": int(((theirs == -1) & (same >= 0)).sum()),
                         "extra": int(((theirs != -1) & (same < 0)).sum()),
-                        "other_facet": int(((theirs != same) & (theirs >= 0) & (same >= 0)).sum())}  # fmt: skip
+                        "other_facet": int(((theirs != same) & (theirs >= 0) & (same >= 0)).sum())}
     per = {name: float(len(theirs)) for name, theirs in facets.items()}
     return Race(tasks, per, {"facets": len(faces), "hit_share": float((ours >= 0).mean())}, beside)
 
 
 def cases(options: Options):
     return [{"mesh_name": name, "rays": 2000 if options.quick else RAYS}
-            for name in meshes_here("teapot", "bunny", "dragon 203k")[: 1 if options.quick else 3]]  # fmt: skip
+            for name in meshes_here("teapot", "bunny", "dragon 203k")[: 1 if options.quick else 3]]
 
 
 CLAIMS = [Claim("rays", "µs a ray at a mesh", cases, measure, turns=7)]

@@ -85,7 +85,7 @@ class MujocoRobot:
         self._joints = [
             (self.model.joint(joint.name).qposadr[0], joint.name)
             for joint in robot.joints if joint.type in ("revolute", "continuous", "prismatic")
-        ]  # fmt: skip
+        ]
 
     def _add(self, spec, body, shape, X: np.ndarray) -> None:
         mujoco = self._mujoco
@@ -154,7 +154,7 @@ class PinocchioRobot:
         make_manager = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager
         self.manager = make_manager(self.model, self.geometry, self.geometry_data)
         self._order = [(self.model.joints[self.model.getJointId(j.name)].idx_q, j.name) for j in robot.joints
-                       if j.type in ("revolute", "continuous", "prismatic")]  # fmt: skip
+                       if j.type in ("revolute", "continuous", "prismatic")]
         self._robot = robot
 
     def _add(self, coal, name: str, joint: int, shape, place) -> int:

@@ -77,11 +77,11 @@ def motions(options: Options, robot: str, family: str, meshes: str) -> Race:
     tasks = {
         "configurations": lambda: checker.collides(sample), "motions of 32": lambda: checker.collides(samples),
         "certified": lambda: checker.certify_edges(free, ends),
-    }  # fmt: skip
+    }
     per = {"configurations": len(sample), "motions of 32": len(free), "certified": len(free)}
     columns = {"hit": float(checker.collides(sample).mean()), "proven_free": float(edges.free.mean()),
                "collide": float(edges.collides.mean()), "open": float(edges.is_open.mean()),
-               "configurations_a_proof": edges.n_checked / max(len(free), 1)}  # fmt: skip
+               "configurations_a_proof": edges.n_checked / max(len(free), 1)}
     return Race(tasks, per, columns)
 
 
@@ -97,7 +97,7 @@ CLAIMS = [
           bar="median"),
     Claim("batches", "µs a configuration", batch_cases, batches, file="robots_batches", seconds=2.0),
     Claim("motions", "µs a configuration or motion", motion_cases, motions, file="robots_motions", turns=5),
-]  # fmt: skip
+]
 
 
 if __name__ == "__main__":

@@ -98,13 +98,13 @@ MAKERS: dict[str, Callable[[int], collide.Shape]] = {
     "balls": lambda size: clutter(size, collide.Sphere),
     "cans": lambda size: clutter(size, lambda w: collide.Cylinder(0.5 * w, w)),
     "meshes": lambda size: clutter(size, lambda w: collide.Mesh(w * _small_mesh()[0], _small_mesh()[1])),
-}  # fmt: skip
+}
 #: Sizes that are tried, of kinds that have any: facets, points, planes, or parts.
 SIZES = {
     **dict.fromkeys(("hull", "rounded"), (10, 1000, 100_000)), "planes": (10, 300),
     **dict.fromkeys(("ball", "slab", "sheet", "terrain"), (300, 10_000, 80_000)),
     **dict.fromkeys(("boxes", "balls", "cans"), (3, 100, 1000)), "meshes": (3, 100, 1000),
-}  # fmt: skip
+}
 RATIOS = (1e-7, 1e-2, 1.0, 1e2, 1e7)
 
 
@@ -162,7 +162,7 @@ def placed(A: str, B: str, ratio: float, place: str) -> tuple[np.ndarray, np.nda
     apart = {
         "far": reach + 10 * max(1.0, ratio), "near": reach + 0.01 * smaller, "touching": reach,
         "deep": reach - 0.33 * smaller, "inside": 0.01 * smaller,
-    }[place]  # fmt: skip
+    }[place]
     return collide.pose((0, 0, 0), rpy=TURN_A), collide.pose(apart * ALONG, rpy=TURN_B)
 
 
@@ -277,6 +277,6 @@ QUESTIONS: dict[str, Callable] = {
     "world_overlaps": _world("overlaps"), "world_within": _world_within, "world_rays": _world_rays(False),
     "world_rays_through": _world_rays(True), "world_cast": _world_cast, "world_query": _world_query,
     "verify": _verify, "certify_motion": _certify_motion,
-}  # fmt: skip
+}
 #: Questions about A alone, whatever B is.
 OF_ONE = frozenset(("rays", "rays_through", "contains"))

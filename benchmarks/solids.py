@@ -39,7 +39,7 @@ def measure(options: Options, facets: int, op: str) -> Race:
     made = collide.boolean(A, B, X, Y, op)
     nodes, tested = collide.facet_pairs(A, B, X, Y).counters[0, :2].tolist()
     columns = {"crossings": len(made.self_collisions), "meeting": made.n_meeting, "cut": made.n_cut, "boxes": nodes,
-               "tested": tested}  # fmt: skip
+               "tested": tested}
     tasks = {"collide": lambda: collide.boolean(A, B, X, Y, op)}
     beside = {"collide": {"facets_made": len(made.mesh.faces)}}
     if installed(manifold3d="manifold3d"):

@@ -39,7 +39,7 @@ def measure(options: Options, family: str, size: int) -> list[dict]:
         "facets": n, **counts, "boxes_a_meeting": counts["boxes"] / counts["meeting"],
         "tested_a_meeting": counts["tested"] / counts["meeting"],
         **{f"{name}_over_nlogn": count / (n * np.log2(n)) for name, count in counts.items()},
-    }]  # fmt: skip
+    }]
 
 
 def notes(rows):
@@ -54,7 +54,7 @@ def notes(rows):
 
 def cases(options: Options):
     return grid(family=FAMILIES, size=[10**k * m for k in range(3, 4 if options.quick else 6) for m in (1, 3)]
-                + ([] if options.quick else [10**6]))  # fmt: skip
+                + ([] if options.quick else [10**6]))
 
 
 CLAIMS = [Claim("solids_growth", "what is looked at", cases, measure, everywhere=True, notes=notes)]

@@ -60,12 +60,12 @@ def measure(options: Options, kind: str, n: int) -> Race:
     tasks = {
         "settled": lambda: extreme_vertices(tree, directions, True),
         "tree": lambda: extreme_vertices(tree, directions, False), "scan": lambda: (sample @ points.T).argmax(axis=1),
-    }  # fmt: skip
+    }
     return Race(tasks, dict.fromkeys(tasks, float(len(directions))) | {"scan": float(len(sample))}, {
         "hull_ms": 1e3 * mean_seconds(lambda: convex_hull(points), 1), "tree_ms": 1e3 * mean_seconds(build, 1),
         "bytes_a_vertex": tree.nbytes / n, "longest_list": int(np.diff(tree.nodes).max()), "scanned": scanned,
         "climbed": looked_at, "looked_at": scanned + looked_at, "steps": steps, "exact_signs": signs,
-    })  # fmt: skip
+    })
 
 
 def settled(row: dict) -> bool:
@@ -85,7 +85,7 @@ CLAIMS = [Claim(
         Panel("ns a query not settled", "n", "median_ns", "kind", "xy", lambda row: row["engine"] == "tree"),
         Panel("ns a query by a scan", "n", "median_ns", "kind", "xy", lambda row: row["engine"] == "scan"),
     ),
-)]  # fmt: skip
+)]
 
 
 if __name__ == "__main__":

@@ -96,7 +96,7 @@ def measure(options: Options, kind: str, asked: int) -> Race:
         "tests_a_round": tests, "tests_a_round_most": float((rows["tests"] / rows["rounds"]).max()),
         "proven": float(result.walked.mean()), "prepare_ms": prepared * 1e3,
         "bytes_a_vertex_p": A._walk.hierarchy.bytes / asked, "bytes_a_vertex_q": B._walk.polar.hierarchy.bytes / asked,
-    })  # fmt: skip
+    })
 
 
 def walked(row: dict) -> bool:
@@ -119,7 +119,7 @@ CLAIMS = [Claim("walk", "µs a query, and what it counts", cases, measure, notes
     Panel("tests a round, mean", "n", "tests_a_round", "kind", "x", walked),
     Panel("µs a query: the walk's kernel", "n", "median_us", "kind", "xy", walked),
     Panel("µs a query: the default", "n", "median_us", "kind", "xy", lambda row: row["engine"] == "default"),
-))]  # fmt: skip
+))]
 
 
 if __name__ == "__main__":

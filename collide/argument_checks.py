@@ -24,7 +24,7 @@ _REAL = "fiub"
 _KINDS = {
     "c": "complex numbers", "m": "time spans", "M": "dates", "U": "text", "S": "bytes", "V": "records", "T": "text",
     "O": "objects",
-}  # fmt: skip
+}
 
 
 def number(value: Any) -> float | None:

@@ -169,7 +169,7 @@ def _check(args) -> int:
             tolerance=args.baseline_tolerance,
         )
         for result in made
-    ]  # fmt: skip
+    ]
     _write_reports(made, args.json)
     if args.write_baseline:
         write_whole(args.write_baseline, checking.baseline_text(checks))
@@ -294,4 +294,4 @@ _COMMANDS: dict[str, Callable] = {
     "srdf": lambda args: FREE if cli_srdf.run(args, _progress(args.quiet)) else YES,
     "sweep": lambda args: FREE if cli_sweep.run(args, _progress(args.quiet)) else YES,
     "view": lambda args: cli_view.run(args, _progress(args.quiet), _STARTED, _say),
-}  # fmt: skip
+}

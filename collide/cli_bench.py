@@ -111,7 +111,7 @@ def _pareto(args: argparse.Namespace, progress: Callable) -> int:
             args.engines or pareto.default_engines(), args.classes or list(CLASSES),
             minutes=args.minutes or (0.2 if args.quick else 3.0), n=args.cases or (12 if args.quick else 60),
             seed=args.seed, progress=_renamer(rename),
-        )  # fmt: skip
+        )
     rows = [point.row() for point in points]
     write_csv(places[0], rows, stamp)
     if places[1:]:
@@ -121,7 +121,7 @@ def _pareto(args: argparse.Namespace, progress: Callable) -> int:
             "class": "class", "engine": "engine", "ratio": "× collide", "median_us": "µs", "p99_us": "p99",
             "median_error": "error", "max_error": "largest", "wrong": "wrong", "wrong_apart": "apart",
             "mishaps": "failed", "unsupported": "n/a",
-        }  # fmt: skip
+        }
         _show("PARETO  time and error of signed distances; errors as parts of the size", heads, rows, places)
     return 0
 
@@ -138,7 +138,7 @@ def _scaling(args: argparse.Namespace, progress: Callable) -> int:
         grown = scaling.measure(
             args.engines or scaling_engines(), sizes, minutes=args.minutes or (0.2 if args.quick else 2.0),
             seed=args.seed, progress=_renamer(rename),
-        )  # fmt: skip
+        )
     write_csv(places[0], [row for growth in grown for row in growth.rows()], stamp)
     for place in places[1:]:
         growth.draw([row for of in grown for row in of.rows()], scaling.PANELS, place)
@@ -147,7 +147,7 @@ def _scaling(args: argparse.Namespace, progress: Callable) -> int:
             {"what": g.name, "unit": g.unit, "slope": f"{g.slope:.2f}",
              **{str(n): f"{value:.3g}" for n, value in zip(g.sizes, g.values)}}
             for g in grown
-        ]  # fmt: skip
+        ]
         heads = {"what": "engine", "unit": "unit", **{str(n): f"n = {n:,}" for n in sizes}, "slope": "slope"}
         _show("SCALING  hulls of n points on a sphere; slope: value ~ n^slope", heads, rows, places)
     return 0

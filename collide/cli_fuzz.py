@@ -80,7 +80,7 @@ def run(args: argparse.Namespace, progress: Callable) -> bool:
         result = fuzz(
             args.engines, args.save, minutes=args.minutes, rounds=args.rounds, seed=args.seed, resume=args.resume,
             timeout=args.timeout, progress=progress,
-        )  # fmt: skip
+        )
     except KeyboardInterrupt:
         print(f"collide: what was found is in {args.save}: --resume goes on", file=sys.stderr)
         raise

@@ -17,7 +17,7 @@ def add_argument(parser) -> None:
     """``--html``, for a command whose result can be looked at."""
     parser.add_argument("--html", metavar="FILE|-",
                         help="write a page to look at: one .html file that opens in any browser, offline; or - for "
-                             "standard output")  # fmt: skip
+                             "standard output")
 
 
 def check_page_place(place: str) -> None:

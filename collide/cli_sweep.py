@@ -106,7 +106,7 @@ def _options(args: argparse.Namespace, progress: Callable) -> dict[str, Any]:
     return {
         "options": _load_options(args), "distances": args.distances, "values": args.values, "chunk": args.chunk,
         "workers": args.workers, "scheduler": args.scheduler, "restart": args.restart, "progress": progress,
-    }  # fmt: skip
+    }
 
 
 def _drawn(args: argparse.Namespace) -> Any:

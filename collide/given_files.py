@@ -17,7 +17,7 @@ LARGEST_MESH = 512 * 2**20
 _KINDS = (
     (stat.S_ISFIFO, "a named pipe"), (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"),
     (stat.S_ISSOCK, "a socket"),
-)  # fmt: skip
+)
 
 
 def read_bytes(path: Path, largest: int = LARGEST_TEXT, what: str = "description") -> bytes:

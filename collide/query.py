@@ -39,12 +39,12 @@ _TOUCHING = 0.0
 def collide(
     A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, security_margin: float = ..., check_poses: bool = ...,
     threads: int = ..., axes: NDArray[np.float64] | None = ..., algorithm: str | None = ...,
-) -> bool: ...  # fmt: skip
+) -> bool: ...
 @overload
 def collide(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, security_margin: float = ..., check_poses: bool = ...,
     threads: int = ..., axes: NDArray[np.float64] | None = ..., algorithm: str | None = ...,
-) -> Any: ...  # fmt: skip
+) -> Any: ...
 def collide(
     A,
     B,
@@ -172,12 +172,12 @@ def _with_axes(A, B, X_WA, X_WB, check_poses: bool, threads: int, axes):
 def distance(
     A: Shape, B: Shape, X_WA: Pose, X_WB: Pose, *, max_distance: float = ..., signed: bool = ...,
     check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
-) -> PairResult[Single]: ...  # fmt: skip
+) -> PairResult[Single]: ...
 @overload
 def distance(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
     check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
-) -> PairResult: ...  # fmt: skip
+) -> PairResult: ...
 def distance(
     A,
     B,

@@ -239,7 +239,7 @@ def _is_surely_pose(row_x: list, row_y: list, row_z: list, last: list) -> bool:
         and -SAFE_TOLERANCE <= a * c + d * f + g * i <= SAFE_TOLERANCE
         and -SAFE_TOLERANCE <= b * c + e * f + h * i <= SAFE_TOLERANCE
         and a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.5
-    )  # fmt: skip
+    )
 
 
 def _are_surely_poses(batch: np.ndarray) -> bool:
@@ -260,7 +260,7 @@ def _is_surely_rigid(block: np.ndarray) -> bool:
     return bool(
         worst.max() <= SAFE_TOLERANCE and determinant.min() > 0.5 and np.abs(columns[3:12:4]).max() <= LARGEST
         and not columns[12:15].any() and (columns[15] == 1.0).all()
-    )  # fmt: skip
+    )
 
 
 def _refuse(bad: np.ndarray, X: np.ndarray, name: str, complaint: str) -> None:

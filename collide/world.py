@@ -143,7 +143,7 @@ class World(WorldPairs):
     def raycast(
         self, origins_W, directions_W, *, max_distance: float = math.inf, all_hits: bool = False,
         group: int | None = None, mask: int | None = None,
-    ) -> WorldHits:  # fmt: skip
+    ) -> WorldHits:
         """What rays meet first, or everything that they meet.
 
         Parameters
@@ -180,7 +180,7 @@ class World(WorldPairs):
     def shape_cast(
         self, shape: Shape, X_WS, direction_W, *, max_distance: float = math.inf, group: int | None = None,
         mask: int | None = None,
-    ) -> WorldHits:  # fmt: skip
+    ) -> WorldHits:
         """The first body that an outside shape touches when it is moved along a direction.
 
         Parameters

@@ -56,7 +56,7 @@ class Body:
     def __reduce__(self):
         return Body, (
             self.id, self.name, self.shape, self.X_WB, self.static, self.group, self.mask, self.margin, self.sleeping,
-        )  # fmt: skip
+        )
 
 
 class Roster(NamedTuple):
@@ -83,7 +83,7 @@ class Roster(NamedTuple):
             int(self.ids[position]), self.names[position], self.shapes[position], X_WB.copy(),
             bool(self.static[position]), int(self.group[position]), int(self.mask[position]),
             float(self.margin[position]), bool(self.sleeping[position]),
-        )  # fmt: skip
+        )
 
 
 class BodiesAsTheyStood(dict):
@@ -132,7 +132,7 @@ class WorldBodies:
             "_moved": np.zeros(n, dtype=bool), "_alive": np.ones(n, dtype=bool), "_asleep": self._asleep[:n].copy(),
             "_margins": self._margins[:n].copy(), "_made": {}, "_columns": _columns_of(self._ids, self._flags),
             "_roster": None,
-        }  # fmt: skip
+        }
 
     def __len__(self) -> int:
         return len(self._row_of)

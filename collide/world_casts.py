@@ -133,7 +133,7 @@ def _as_rows(events: RayEvents, bodies: np.ndarray, origins, directions: Directi
         "distance": events.t[:, 0], "lower": events.t[:, 1], "upper": events.t[:, 2], "normal": events.normal,
         "point": origins[events.ray] + events.t[:, :1] * step, "ray": events.ray, "body": bodies, "item": events.item,
         "facet": events.facet, "hit": True, "certified": events.certified,
-    }  # fmt: skip
+    }
     for name, values in columns.items():
         rows[name][at] = values
     return rows, starts
@@ -153,7 +153,7 @@ def cast_shape(
     questions = np.empty((n, SWEEP))
     questions[:, :6], questions[:, 6:9], questions[:, 9] = (
         _boxes_around(shape, X_WS), directions.vectors, directions.limits(limit)
-    )  # fmt: skip
+    )
     pairs, bounds = bodies_ahead(packed.tree, questions)
     counts = which.skipped(packed)[pairs[:, 1]] == 0
     pairs, bounds = pairs[counts], bounds[counts]
@@ -200,7 +200,7 @@ def _take_first(rows: np.ndarray, pairs: np.ndarray, answers, directions: Direct
         "distance": t[:, 0], "lower": t[:, 1], "upper": t[:, 2], "normal": first.normal,
         "point": got.point[first.facet], "body": body[at], "item": first.item, "facet": none[at] - 1, "hit": True,
         "certified": first.certified, "at_start": got.at_start[first.facet],
-    }  # fmt: skip
+    }
     for name, values in columns.items():
         rows[name][row] = values
 
@@ -226,7 +226,7 @@ def nearest_bodies(packed: PackedWorld, points: np.ndarray, limit: float, which:
     shapes = [packed.shapes[k] for k in packed.shape_of[body].tolist()]
     got = answer_batch(
         [POINT] * len(point), shapes, X_WP[point], packed.X_WBs[body], Question(False, np.inf, True)
-    )  # fmt: skip
+    )
     order = np.lexsort((body, got["distance"], point))
     at = order[np.flatnonzero(np.diff(point[order], prepend=-1))]
     # Another body may be nearer where brackets overlap: what is proven is the least of both ends.

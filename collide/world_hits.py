@@ -30,7 +30,7 @@ WORLD_HIT_DTYPE = np.dtype(
         ("hit", "?"), ("certified", "?"), ("at_start", "?"),
     ],
     align=True,
-)  # fmt: skip
+)
 
 
 def empty_hits(n: int) -> np.ndarray:

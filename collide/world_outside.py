@@ -121,7 +121,7 @@ def _of_convex(
             questions.first[pairs[:, 0]], questions.counts[pairs[:, 0]],
             (n_own + np.cumsum(counts_b) - counts_b)[of_body.reshape(-1)], counts_b[of_body.reshape(-1)],
         ], axis=1,
-    )  # fmt: skip
+    )
     answers: dict[int, np.ndarray] = {}
 
     def work(start: int) -> None:

@@ -27,7 +27,7 @@ OVERLAP_DTYPE = np.dtype(
         ("patch_area", "f8"), ("flush_area", "f8"), ("a", "i4"), ("b", "i4"),
     ],
     align=True,
-)  # fmt: skip
+)
 _FIELDS = ("volume", "lower", "upper", "centroid", "area_a", "area_b", "patch_area", "flush_area")
 
 

@@ -249,7 +249,7 @@ class WorldPairs(WorldScene):
             sum(answer.body_pairs for answer in answers), sum(answer.mesh_pairs for answer in answers),
             packed.take_work(),
             {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
-        )  # fmt: skip
+        )
         return wanted[0] if len(wanted) == 1 else np.concatenate(wanted) if boolean else _sorted_by_pair(
             np.concatenate(wanted), PAIR_DTYPE
         )

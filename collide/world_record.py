@@ -45,7 +45,7 @@ class QueryRecord:
         skipped = count_skipped(
             roster.static[alive], roster.group[alive], roster.mask[alive], roster.sleeping[alive],
             place[allowed[is_there]], reasons,
-        )  # fmt: skip
+        )
         pairs = n * (n - 1) // 2
         skipped[CULLED] = pairs - sum(skipped.values()) - self.n_candidates
         return {
@@ -57,4 +57,4 @@ class QueryRecord:
             "gjk_iterations": int((self.iterations & 0xFFFF).sum()),
             "epa_iterations": int((self.iterations >> 16).sum()), "updates": self.work,
             "bytes_per_body": round(self.packed.nbytes / n) if n else 0, "seconds": self.seconds,
-        }  # fmt: skip
+        }

@@ -35,12 +35,12 @@ class WorldScene:
             "_bodies": copy.copy(self._bodies), "_allowed": dict(self._allowed),
             "_pair_margins": dict(self._pair_margins), "_partners": copy.deepcopy(self._partners), "_packed": None,
             "_pairs_changed": False,
-        }  # fmt: skip
+        }
 
     def add(
         self, shape: Shape, X_WB=None, *, name: str | None = None, static: bool = False, group: int = 1,
         mask: int = 0xFFFF, margin: float = 0.0,
-    ) -> int:  # fmt: skip
+    ) -> int:
         """Add a body.
 
         Parameters

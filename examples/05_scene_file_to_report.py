@@ -20,7 +20,7 @@ SCENE = {
         {"name": "ram", "shape": {"box": {"size": [80, 80, 30]}}, "pose": {"xyz": [0, 0, 91]}},
     ],
     "allow": [["blank", "anvil", "lies on it"]],
-}  # fmt: skip
+}
 
 with tempfile.TemporaryDirectory() as folder:
     file = Path(folder) / "press.json"

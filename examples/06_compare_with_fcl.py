@@ -19,7 +19,7 @@ def stack(edge: float, gap: float) -> Scene:
     heights = [k * (edge + gap) for k in range(5)]
     return Scene("stack", [
         SceneBody(f"cube {k}", cube, collide.pose((0, 0, z), rpy=(0, 0, 0.3 * k))) for k, z in enumerate(heights)
-    ])  # fmt: skip
+    ])
 
 
 # The same question in decimetres and in micrometres. An engine whose tolerance is a fixed number of
@@ -29,9 +29,9 @@ for edge, gap in ((0.1, 1e-5), (1e-6, 1e-10)):
     print(f"\ncubes of {edge} m, gaps of {gap} m: {comparison.pairs} pairs within {edge} m")
     for s in comparison.summaries:
         print(f"  {s.engine:8} {s.version:9} answered {s.answered}, wrong booleans {s.wrong}, "
-              f"distances off by more than {comparison.tolerance:.0e} of the size: {s.wrong_distances}")  # fmt: skip
+              f"distances off by more than {comparison.tolerance:.0e} of the size: {s.wrong_distances}")
     # `exact_distance` is rational arithmetic on the numbers given: no rounding until it is printed.
     for d in comparison.disagreements[:4]:
         print(f"    {d.a}, {d.b}: {d.engine} says {d.distance}, collide {d.reference_distance}, "
-              f"exactly {d.exact_distance}; wrong by {d.off} m: {', '.join(d.wrong)}")  # fmt: skip
+              f"exactly {d.exact_distance}; wrong by {d.off} m: {', '.join(d.wrong)}")
     print("  pairs where collide is refuted:", comparison.ours_wrong)

@@ -35,7 +35,7 @@ vertices = np.array([(x, y, z) for x in (-1.0, 1) for y in (-1.0, 1) for z in (-
 faces = [
     [0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7], [0, 5, 1], [0, 4, 5],
     [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
-]  # fmt: skip
+]
 cube = collide.Mesh(vertices, faces)
 beside = np.nextafter(1.0, 2.0)
 rays = collide.raycast(cube, np.eye(4), [(3, 1, 0), (3, 1, 1), (3, beside, 0)], (-2, 0, 0))

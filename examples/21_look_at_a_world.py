@@ -12,7 +12,7 @@ from collide.scenes import generate
 SHAPES = (
     collide.Sphere(0.1), collide.Box((0.2, 0.15, 0.1)), collide.Capsule(0.05, 0.2), collide.Cylinder(0.08, 0.15),
     collide.Ellipsoid((0.15, 0.1, 0.06)), collide.Cone(0.1, 0.2),
-)  # fmt: skip
+)
 
 
 def dance(t: float) -> collide.World:

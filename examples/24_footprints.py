@@ -33,7 +33,7 @@ path = np.array([planar_pose((d, -0.2), 0.0) for d in np.linspace(0, 4, 41)])
 r = polygon_distance(base, shelf, path, X_WS)
 nearest = int(np.argmin(r.distance))
 print(f"nearest at x = {path[nearest, 0, 2]:.1f} m: {r.distance[nearest]:.3f} m, "
-      f"from {r.point_a[nearest].round(3)} to {r.point_b[nearest].round(3)}")  # fmt: skip
+      f"from {r.point_a[nearest].round(3)} to {r.point_b[nearest].round(3)}")
 
 # Three feet on the ground: does the centre of mass stand above their hull, and how far from the edge?
 feet = ConvexPolygon([(0.3, 0.2), (0.3, -0.2), (-0.3, 0.2)])

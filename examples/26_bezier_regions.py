@@ -44,4 +44,4 @@ for k in range(10):
     checked = [piece for c, curve in enumerate(curves) for piece in pieces(curve, region, float(c))]
     inside = [(start, end) for start, end, gap in checked if gap == 0.0]
     print(f"region {k}:", f"entered at {inside[0][0]:.3f}, left at {inside[-1][1]:.3f}" if inside else "never entered",
-          f"({len(checked) - len(inside)} of {len(checked)} pieces are proven outside)")  # fmt: skip
+          f"({len(checked) - len(inside)} of {len(checked)} pieces are proven outside)")

@@ -198,7 +198,7 @@ class Scene:
             For an unknown state or joint; the known ones are listed.
         """
         values = self._named_state(state) if isinstance(state, str) else checks.mapping(
-            f"scene {self.name}: state", state, "joint → value, or the name of a state")  # fmt: skip
+            f"scene {self.name}: state", state, "joint → value, or the name of a state")
         shares = self.joint_shares(values)
         placements, notes = {}, []
         for name, placement in self.placements.items():

@@ -170,7 +170,7 @@ def _certificates(pair):
 
 WAYS: dict[str, Callable] = {
     "single": _single, "swapped": _swapped, "batch": _batched, "contacts": _contacts, "certificate": _certificates,
-}  # fmt: skip
+}
 
 
 def _in_a_list(pairs: list[Pair]) -> Iterator:

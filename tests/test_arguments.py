@@ -26,14 +26,14 @@ def test_every_public_name_is_reached_or_excused():
         for name, value in fuzzer.public_names()
         if name not in names | methods and name not in fuzzer.EXCUSED
         and not (isinstance(value, type) and issubclass(value, (tuple, BaseException)))
-    }  # fmt: skip
+    }
     assert not left_out
 
 
 def test_good_arguments_are_good():
     """Otherwise the first of them would be refused, and the bad one never be looked at."""
     absent = {"read_sweep", "scenes.allow_pairs", "TetMesh.from_file", "Robot.load", "Mesh.load", "ConvexHull.load",
-              "HeightField.load"}  # fmt: skip
+              "HeightField.load"}
     refused = {}
     for target in fuzzer.targets()[0]:
         if target.name not in absent and target.name != "sweep" and not target.name.endswith(".save"):
@@ -70,7 +70,7 @@ def test_messages_name_the_argument_and_the_value():
         (lambda: fuzzer.robot().renamed(None), ("prefix", "None")),
         (lambda: fuzzer.polytopes.hull_boundary(3), ("hull_boundary: body", "HierarchicalTree", "3")),
         (lambda: fuzzer.partition().convex_pieces().hull(1.5), ("ConvexCells: i", "1.5")),
-    ):  # fmt: skip
+    ):
         try:
             call()
         except collide.CollideError as error:

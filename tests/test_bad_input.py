@@ -103,7 +103,7 @@ BAD_SHAPES = [
     (lambda: Compound([Sphere(1)]), ("Compound", "items")),
     (lambda: Compound([("ball", EYE)]), ("Compound", "items[0]", "str")),
     (lambda: Compound(7), ("Compound", "items")),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("make", "words"), BAD_SHAPES, ids=[" ".join(words) for _, words in BAD_SHAPES])
@@ -223,7 +223,7 @@ NO_NUMBERS = {
     "None": None,
     "time": np.timedelta64(1, "s"), "date": np.datetime64("2020-01-01"), "masked": np.ma.masked, "list": [1.0, 2.0],
     "array": np.ones(2), "nan": NAN, "object": object(), "deep": nested(2000), "numpy text": np.str_("1"),
-}  # fmt: skip
+}
 #: Everything that takes one number.
 NUMBER_TAKERS = {
     "Sphere": Sphere, "Capsule radius": lambda v: Capsule(v, 1), "Capsule length": lambda v: Capsule(1, v),
@@ -256,11 +256,11 @@ NUMBER_TAKERS = {
     "World.remove": lambda v: world_of_three().remove(v),
     "World.contacts": lambda v: world_of_three().contacts(v),
     "Compound": lambda v: Compound([(Sphere(1), (np.eye(3), (v, 0, 0)))]),
-}  # fmt: skip
+}
 #: Whole numbers of any size are as good here.
 WHOLE = {("threads", "beyond doubles"), ("threads", "too long to print"), ("threads of distance", "beyond doubles"),
          ("threads of distance", "too long to print"), ("max_contacts", "beyond doubles"),
-         ("max_contacts", "too long to print")}  # fmt: skip
+         ("max_contacts", "too long to print")}
 
 
 def triangle():
@@ -308,7 +308,7 @@ NO_ARRAYS = {
     "deep": (nested(2000), "lengths"),
     "None": ([[0, 0, None]], "None"), "a dictionary": ({"x": 1}, "x"),
     "records": (np.zeros(3, dtype=[("x", "f8")]), "records"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", NO_ARRAYS)
@@ -324,7 +324,7 @@ def test_what_is_no_array_of_numbers_is_refused_wherever_it_is_given(name):
         lambda v: collide.raycast(triangle(), EYE, (0, 0, 1), v),
         lambda v: collide.contacts(Sphere(1), Sphere(1), EYE, v),
         lambda v: World().add(Sphere(1), v), lambda v: collide.raycast(triangle(), v, (0, 0, 0), (0, 0, 1)),
-    ):  # fmt: skip
+    ):
         with warnings.catch_warnings(), pytest.raises(CollideError, match=words):
             warnings.simplefilter("error")
             take(value)
@@ -337,7 +337,7 @@ def test_what_is_no_array_of_numbers_is_refused_wherever_it_is_given(name):
         np.array([[0, 1, 2 + 0j]]), [[0, 1, 10**30]], nested(2000), [[0, 1, None]], [[True, False, True]],
     ],
     ids=range(9),
-)  # fmt: skip
+)
 def test_faces_are_rows_of_integers(faces):
     for make in (lambda: Mesh(np.eye(3), faces), lambda: ConvexHull(np.eye(3), faces=faces)):
         with pytest.raises(InvalidShape, match="faces"):

@@ -180,7 +180,7 @@ def test_poses_in_any_form(form):
         "read-only": np.array(exact32), "Fortran": np.asfortranarray(exact32),
         "strided": np.repeat(np.repeat(exact32, 2, 0), 2, 1)[::2, ::2], "float32": exact32.astype(np.float32),
         "list": exact32.tolist(), "tuple": (exact32[:3, :3], exact32[:3, 3]),
-    }[form]  # fmt: skip
+    }[form]
     if form == "read-only":
         given.flags.writeable = False
     expected = collide.distance(A, B, EYE, exact32.copy()).rows.tobytes()
@@ -331,7 +331,7 @@ def test_axes_that_are_none_are_refused():
     for axes, word in (
         ([0, 0, 1], "list"), (np.zeros((3, 3)), r"\(4, 3\)"), (np.zeros((4, 3), dtype=np.float32), "float32"),
         (np.full((4, 3), np.nan), "finite"), (np.full((4, 3), 1e200), "longer"), (np.zeros((3, 4)).T, "contiguous"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(InvalidArgument, match=word):
             collide.collide(box, box, EYE, X, axes=axes)
 

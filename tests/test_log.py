@@ -39,7 +39,7 @@ def test_what_is_made_is_said_once(caplog):
         f"box-tree of a mesh of {len(mesh.faces)} facets made",
         f"convex hull around a mesh of {len(mesh.faces)} facets made",
         "tables and box-tree of a World of 2 bodies made",
-    ):  # fmt: skip
+    ):
         assert sum(line.startswith(f"{words}: ") and line.endswith(" s") for line in told) == 1, (words, told)
     assert all(record.name == "collide" and record.levelno == logging.INFO for record in caplog.records)
 

@@ -23,7 +23,7 @@ def shapes(rng):
         ring, ball, half_open, ball.scaled(0.5), *naive.one_of_each(rng).values(),
         collide.Compound([(ring, random_pose(rng, 0.5)), (collide.Cylinder(0.2, 0.9), random_pose(rng, 0.5))]),
         collide.Compound([(collide.Compound([(half_open, random_pose(rng, 0.5))]), random_pose(rng, 0.5))]),
-    ]  # fmt: skip
+    ]
 
 
 def build(rng, n, spread):
@@ -127,7 +127,7 @@ def test_boxes_of_posed_meshes_hold_them_and_are_tight():
         (*bumpy_sphere(5000), 1.6), (*torus(60, 20), 1.6), (*block_ring(), 1.0),
         (scattered, np.arange(900).reshape(-1, 3), 2.0),
         (np.vstack([bumpy_sphere(3000)[0], [[1e9, 0, 0]]]), bumpy_sphere(3000)[1], 1.6),
-    ):  # fmt: skip
+    ):
         mesh = collide.Mesh(vertices, faces)
         ratios = []
         for _ in range(8):

@@ -173,7 +173,7 @@ def test_what_is_neither_true_nor_false_is_refused(static):
     assert len(world) == 0
     assert [world.body(world.add(collide.Sphere(1), static=s)).static for s in (True, False, np.True_, 1, 0)] == [
         True, False, True, True, False,
-    ]  # fmt: skip
+    ]
 
 
 @pytest.mark.parametrize("dtype", [PAIR_DTYPE, CONTACT_DTYPE], ids=["pairs", "contacts"])

@@ -118,7 +118,7 @@ def test_a_robot_among_regions():
             for link in links for element in robot.geometry[link]
         )
         for own, X_WL in zip(alone.collides(Q), robot.link_poses(Q))
-    ]  # fmt: skip
+    ]
     assert checker.collides(Q).tolist() == expected and 0 < sum(expected) < 40, sum(expected)
 
 
@@ -186,7 +186,7 @@ SCENE = {
         {"name": "can", "shape": {"cylinder": {"radius": 30, "length": 140}}, "pose": {"xyz": [0, 0, 300]}},
         {"name": "ball", "shape": {"sphere": {"radius": 20}}, "pose": {"xyz": [230, 0, 200]}},
     ],
-}  # fmt: skip
+}
 
 
 def test_scene_files_reports_and_pages(tmp_path):

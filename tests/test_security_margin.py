@@ -31,7 +31,7 @@ SHAPES = [
     Box(1, 1, 1), Sphere(0.5), Capsule(0.3, 1.0), Cylinder(0.5, 1.0), Ellipsoid(0.5, 0.4, 0.3),
     ConvexHull(np.eye(3), radius=0.1),
     Mesh(*surfaces.box()), Compound([(Box(1, 1, 1), pose((1, 0, 0))), (Sphere(0.5), EYE)]),
-]  # fmt: skip
+]
 
 
 def poses(n: int, seed: int = 1) -> np.ndarray:

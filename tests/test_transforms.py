@@ -106,7 +106,7 @@ def test_scipys_own():
     "entry, value, words",
     [((0, 2), np.nan, "not finite"), ((2, 0), 1.0, "must end in the row"), ((0, 2), 2e50, "exceeds"),
      ((0, 1), 2e-4, "is not a rotation"), ((0, 0), -1.0, "mirrors"), ((0, 1), 5e-5, None)],
-)  # fmt: skip
+)
 def test_poses_of_the_plane_and_of_space_are_refused_alike(entry, value, words):
     """The same defect in both, at the same place of a batch; the last is within the tolerance."""
     plane, space = np.tile(np.eye(3), (3, 1, 1)), np.tile(np.eye(4), (3, 1, 1))

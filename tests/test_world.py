@@ -24,7 +24,7 @@ def random_world(seed: int, n: int = 24, spread: float = 1.6) -> collide.World:
         world.add(
             naive.one_of_each(rng)[kinds[k]], random_pose(rng, spread), name=f"{kinds[k]} {k}",
             static=bool(rng.random() < 0.25), group=int(rng.choice([1, 2, 3])), mask=int(rng.choice([1, 2, 3, 3, 3])),
-        )  # fmt: skip
+        )
     for _ in range(2):
         normal = naive.unit(rng.normal(size=3))
         world.add(collide.Halfspace(normal, -1.2), random_pose(rng, 0.1), static=bool(rng.random() < 0.5), group=3)

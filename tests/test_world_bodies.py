@@ -58,7 +58,7 @@ def test_every_way_of_naming_bodies_moves_the_same_ones(removed):
         (np.array([1, 2**64 - 1], dtype=np.uint64), UnknownBody),
         ([1, "nobody"], UnknownBody), ([1], InvalidPose), ([], InvalidPose), ([1, 2, 3], InvalidPose),
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("gap", [False, True])
 def test_refused_moves_move_nothing(names, error, gap):
     bodies = bodies_of(20)
@@ -128,7 +128,7 @@ def test_quick_checks_of_poses_agree_with_the_slow_one():
             good = (
                 np.isfinite(X).all() and (X[3] == (0, 0, 0, 1)).all() and np.abs(X).max() <= 1e50
                 and np.abs(R.T @ R - np.eye(3)).max() <= 1e-4 and np.linalg.det(R) > 0
-            )  # fmt: skip
+            )
         for ask in (lambda X=X: as_pose(X), lambda X=X: as_poses(np.array([EYE, X]))[1]):
             if good:
                 assert np.array_equal(ask(), X)

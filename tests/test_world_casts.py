@@ -29,7 +29,7 @@ def scattered(seed: int) -> tuple[collide.World, list]:
 def test_an_empty_world_is_met_by_nothing():
     world = collide.World()
     asked = (world.shape_cast(BALL, np.eye(4), (1.0, 0, 0)), world.raycast((0, 0, 0), (1.0, 0, 0)),
-             world.nearest((0, 0, 0)))  # fmt: skip
+             world.nearest((0, 0, 0)))
     for hits in asked:
         assert len(hits) == 1 and hits.names == [None] and not hits["hit"][0] and hits["distance"][0] == np.inf
         assert hits["body"][0] == -1 and repr(hits) == "WorldHits(1 rows, 0 of them hits)"

@@ -46,7 +46,7 @@ class Model:
                 "radius": RADII[radius], "p": rng.uniform(-2, 2, 3), "static": bool(rng.random() < 0.3),
                 "group": int(rng.choice([1, 2, 3])), "mask": int(rng.choice([1, 2, 3, 3])),
                 "margin": float(rng.choice([0, 0, 0, 0.05])), "asleep": False,
-            }  # fmt: skip
+            }
             traits = {name: body[name] for name in ("static", "group", "mask", "margin")}
             self.bodies[world.add(BALLS[radius], pose(t=body["p"]), **traits)] = body
         elif what == "remove":
@@ -227,7 +227,7 @@ ENDLESS = {
     "union with a half-space": collide.Compound([
         (collide.Halfspace((0, 0, 1), 0.0), np.eye(4)), (collide.Sphere(0.2), pose(t=(0, 0, -1)))
     ]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", ENDLESS)

@@ -19,7 +19,7 @@ def least_pair(world: collide.World) -> tuple[float, tuple[int, int]]:
     """By every pair; of several as near the one with the least ids."""
     bodies = [world.body(identity) for identity in world.ids]
     asked = [(collide.distance(a.shape, b.shape, a.X_WB, b.X_WB).distance, (a.id, b.id))
-             for a, b in itertools.combinations(bodies, 2)]  # fmt: skip
+             for a, b in itertools.combinations(bodies, 2)]
     return min(asked)
 
 

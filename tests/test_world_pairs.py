@@ -43,7 +43,7 @@ def spaced(*margins: float, gap: float = 0.25) -> collide.World:
 @pytest.mark.parametrize(("margins", "pairs"), [
     ((0.0, 0.0, 0.0, 0.0), []), ((0.25, 0.0, 0.0, 0.25), [(0, 1), (2, 3)]), ((0.125,) * 4, [(0, 1), (1, 2), (2, 3)]),
     ((0.5, 0.25, 0.0, 0.3), [(0, 1), (1, 2), (2, 3)]), ((0.0, 0.2, 0.06, 0.0), [(1, 2)]),
-])  # fmt: skip
+])
 def test_margins_of_several_lengths(margins, pairs):
     """Each is a group of pairs that are asked together; what is exactly a margin away is a hit."""
     world = spaced(*margins)

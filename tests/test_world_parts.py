@@ -59,7 +59,7 @@ def test_columns_of_bodies_added_one_by_one_or_at_once():
 
 @pytest.mark.parametrize("moved", [(0,), (1,), (2,), (0, 2), (0, 1, 2), ()])
 @pytest.mark.parametrize("shapes", [(TURNED, BALL, TURNED), (TURNED,) * 3, (BALL, BOX, BALL), (BALL, chain(2), BOX)],
-                         ids=["mixed", "turned", "single", "chain"])  # fmt: skip
+                         ids=["mixed", "turned", "single", "chain"])
 def test_moved_bodies_are_as_if_added_there(shapes, moved):
     """Some of them, all, none: poses, what their products lost, and boxes, bit by bit."""
     before, after = (np.array([random_pose(rng_of(word, k)) for k in range(3)]) for word in ("before", "after"))
@@ -208,7 +208,7 @@ def test_bodies_are_told_by_name_number_and_none():
 
 @pytest.mark.parametrize(("value", "is_static"), [
     (True, True), (False, False), (1, True), (0, False), (np.int8(1), True), (np.bool_(False), False),
-])  # fmt: skip
+])
 def test_flags_may_be_numbers_that_are_0_or_1(value, is_static):
     world = collide.World()
     assert world.body(world.add(BALL, static=value)).static is is_static

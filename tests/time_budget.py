@@ -89,6 +89,6 @@ def slower_than(last: dict[str, float], now: dict[str, float]) -> list[str]:
     found = [
         (seconds - last[name], name) for name, seconds in now.items()
         if name in last and seconds > SLOWER * last[name] and seconds > last[name] + BY
-    ]  # fmt: skip
+    ]
     names = [name for _, name in sorted(found, reverse=True)]
     return [f"slower: {name}, {last[name]:.1f} s before, {now[name]:.1f} s now" for name in names]

@@ -97,7 +97,7 @@ def _bumpy_ball(random: np.random.Generator, n: int) -> tuple[np.ndarray, np.nda
     unit = np.stack([
         np.sin(theta)[:, None] * np.cos(phi), np.sin(theta)[:, None] * np.sin(phi),
         np.cos(theta)[:, None] + 0 * phi,
-    ], axis=-1).reshape(-1, 3)  # fmt: skip
+    ], axis=-1).reshape(-1, 3)
     vertices = np.concatenate([unit * random.uniform(0.4, 0.5, (len(unit), 1)), [(0, 0, 0.45), (0, 0, -0.45)]])
     north, south, j = len(unit), len(unit) + 1, np.arange(n)
     k = (j + 1) % n

@@ -181,7 +181,7 @@ def show(claim: Claim, rows: list[Row], keys: list[str]) -> None:
         Column(key.replace("_us", "_µs").replace("_", " "), "label" if key in texts else "number",
                0 if key in needed else k + 1)
         for k, key in enumerate(columns)
-    ]  # fmt: skip
+    ]
     notes = [*(claim.notes(rows) if claim.notes else ())]
     if len(rows) > 2 and (everywhere := [f"{key} {same[key]}" for key in same if key not in columns and same[key]]):
         notes.append(f"in all rows: {', '.join(everywhere)}")
@@ -219,7 +219,7 @@ def write(claim: Claim, rows: list[Row], keys: list[str], stamp: dict[str, str],
     text = io.StringIO(newline="")
     names = dict.fromkeys(key for line in lines for key in line)
     writer = csv.DictWriter(text, [*(n for n in names if n not in stamp), *stamp], restval="", lineterminator="\n",
-                            extrasaction="ignore")  # fmt: skip
+                            extrasaction="ignore")
     writer.writeheader()
     writer.writerows(lines)
     place.parent.mkdir(exist_ok=True)

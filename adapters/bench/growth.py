@@ -71,7 +71,7 @@ def groups(rows: list[Row], *by: str) -> Iterator[tuple[tuple, list[Row]]]:
 
 
 def log2_lines(rows: list[Row], by: tuple[str, ...], figures: tuple[str, ...], x: Figure = "n", of: str = "log2 n",
-               least: int = 3) -> Iterator[str]:  # fmt: skip
+               least: int = 3) -> Iterator[str]:
     """A line of text a group and figure: figure = a + b·log2 x, and how far the farthest row is off."""
     for key, some in groups(rows, *by):
         if len({value(row, x) for row in some}) >= least:
@@ -79,7 +79,7 @@ def log2_lines(rows: list[Row], by: tuple[str, ...], figures: tuple[str, ...], x
             for name in figures:
                 fit = line_fit(logs, [value(row, name) for row in some])
                 yield (f"{' '.join(map(str, key))}: {name} = {fit.start:.1f} + {fit.slope:.2f}·{of}, at most "
-                       f"{fit.off:.1f} off; all ≤ {fit.above:.1f} + {fit.slope:.2f}·{of}")  # fmt: skip
+                       f"{fit.off:.1f} off; all ≤ {fit.above:.1f} + {fit.slope:.2f}·{of}")
 
 
 def draw(rows: list[Row], panels: tuple[Panel, ...], place: Path) -> None:
@@ -103,7 +103,7 @@ def draw(rows: list[Row], panels: tuple[Panel, ...], place: Path) -> None:
                 axis.plot(x, [value(row, panel.dashed) for row in some], "o--", color=line.get_color(), markersize=3)
         axis.set(title=panel.title, xlabel=panel.x_label or (panel.x if isinstance(panel.x, str) else ""),
                  ylabel=panel.y_label, xscale="log" if "x" in panel.log else "linear",
-                 yscale="log" if "y" in panel.log else "linear")  # fmt: skip
+                 yscale="log" if "y" in panel.log else "linear")
         axis.title.set_fontsize(9)
         axis.grid(alpha=0.3)
         if axis.has_data():

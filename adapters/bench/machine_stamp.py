@@ -20,7 +20,7 @@ def machine_stamp() -> dict[str, str]:
     return {
         "cpu": _cpu(), "cores": str(cores), "load": _load(), "system": platform.system(),
         "python": platform.python_version(), "numpy": metadata.version("numpy"), "collide": _collide(),
-    }  # fmt: skip
+    }
 
 
 def _cpu() -> str:

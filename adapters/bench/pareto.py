@@ -81,13 +81,13 @@ class Point:
             "min_us": number(quantile(self.us, 0.0)), "max_us": number(quantile(self.us, 1.0)),
             "median_error": number(quantile(self.error, 0.5)), "p99_error": number(quantile(self.error, 0.99)),
             "max_error": number(quantile(self.error, 1.0)),
-        }  # fmt: skip
+        }
         names = ("pairs", "answered", "with_distance", "wrong", "wrong_apart", "apart", "undecided", "unsupported")
         row |= {name: getattr(self, name) for name in names}
         return row | {
             "mishaps": counted(self.mishaps), "reason": self.reason, "rounds": self.rounds,
             "timed": what_is_timed(self.engine),
-        }  # fmt: skip
+        }
 
 
 def default_engines() -> list[str]:
@@ -139,7 +139,7 @@ def measure(
     pairs = {name: [case.shapes() for case in cases[name]] for name in classes}
     timers = [
         EngineTimer(e, ENGINES[engine_of(e)], groups_of(answered[e], pairs), TURN_TIMEOUT) for e in engines
-    ]  # fmt: skip
+    ]
     points: list[Point] = []
     try:
         for k, name in enumerate(classes):

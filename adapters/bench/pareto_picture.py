@@ -26,7 +26,7 @@ NO_ERROR = 1e3
 _COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6000", "#555555", "#A020F0", "#8B0000",
     "#00CED1",
-)  # fmt: skip
+)
 #: Engines in a panel from which on it is drawn larger, to keep room for names.
 CROWDED = 14
 _MARKERS = "osD^vP*Xh"
@@ -67,7 +67,7 @@ def draw(points: list[Point], places: list[Path], stamp: dict[str, str]) -> list
     figure.suptitle(
         "Signed distances: error against time. Point: medians; lines: to the p99 time and the largest error\n"
         f"{stamp['cpu']}, {stamp['cores']} cores, load {stamp['load']}, Python {stamp['python']}", fontsize=11,
-    )  # fmt: skip
+    )
     for place in places:
         with whole_file(place) as file:
             figure.savefig(file, dpi=110, format=Path(place).suffix[1:].lower())
@@ -82,7 +82,7 @@ def styles_of(engines: list[str]) -> dict[str, tuple[str, str]]:
     return {
         name: (_COLOURS[bases.index(base) % len(_COLOURS)], _MARKERS[settings[base].index(name) % len(_MARKERS)])
         for name in names for base in [name.partition(":")[0]]
-    }  # fmt: skip
+    }
 
 
 def place_of(point: Point) -> tuple[float, float, str]:
@@ -123,7 +123,7 @@ def _panel(panel: Any, points: list[Point], styles: dict[str, tuple[str, str]]) 
     _labels(panel, [mark for mark in marks if not math.isnan(mark["x"])], styles)
     if silent:
         panel.text(0.985, 0.985, "no answer:\n× " + "\n× ".join(silent), transform=panel.transAxes, ha="right",
-                   va="top", fontsize=7, color="#C00000")  # fmt: skip
+                   va="top", fontsize=7, color="#C00000")
     return marks
 
 
@@ -143,7 +143,7 @@ def _axes(panel: Any, kind: str, points: list[Point]) -> None:
     panel.tick_params(labelsize=8)
     about = CLASSES[kind].about if kind in CLASSES else ""
     panel.set_title(f"{kind}: {about}\n{points[0].pairs} pairs, {points[0].apart} farther than 1e-12 from touching",
-                    fontsize=8.5, loc="left")  # fmt: skip
+                    fontsize=8.5, loc="left")
     panel.set_xlabel("µs of CPU a call", fontsize=8)
     panel.set_ylabel("|distance − exact| / size", fontsize=8)
 
@@ -168,7 +168,7 @@ def _labels(panel: Any, marks: list[dict], styles: dict[str, tuple[str, str]]) -
             (dx, dy) for dx, dy in spots
             if low_x < x + dx and x + dx + width < high_x and bottom + height < y + dy < top - height
             and not any(_overlap((x + dx, y + dy - height / 2, x + dx + width, y + dy + height / 2), t) for t in taken)
-        ]  # fmt: skip
+        ]
         dx, dy = min(free or spots[:1], key=lambda spot: abs(spot[1]) + (6 * pixel if spot[0] < 0 else 0))
         taken.append((x + dx, y + dy - height / 2, x + dx + width, y + dy + height / 2))
         arrow = {"arrowstyle": "-", "lw": 0.5, "color": styles[mark["engine"]][0], "alpha": 0.7}
@@ -176,7 +176,7 @@ def _labels(panel: Any, marks: list[dict], styles: dict[str, tuple[str, str]]) -
             mark["text"], (mark["x"], mark["y"]), (dx / pixel, dy / pixel), textcoords="offset points", fontsize=7,
             va="center", ha="left", color=styles[mark["engine"]][0], arrowprops=arrow if abs(dy) > height else None,
             zorder=5, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.85},
-        )  # fmt: skip
+        )
 
 
 def _steps(n: int) -> list[float]:

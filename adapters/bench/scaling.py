@@ -37,7 +37,7 @@ PANELS = (
           x_label="vertices of each hull"),
     Panel("vertices looked at", "n", "value", "what", "xy", lambda row: row["what"] == OPERATIONS,
           x_label="vertices of each hull"),
-)  # fmt: skip
+)
 
 
 class Growth(NamedTuple):

@@ -129,4 +129,4 @@ _CALLS: dict[str, Callable[..., Callable[[], Any]]] = {
     "mujoco": engine_calls.mujoco_call, "drake": engine_calls.drake_call, "trimesh": engine_calls.trimesh_call,
     "rapier": engine_calls.rapier_call, "distance3d": engine_calls.distance3d_call,
     "newton": engine_calls.newton_call, "cgal": engine_calls.cgal_call,
-}  # fmt: skip
+}

@@ -87,7 +87,7 @@ def _panel(panel: Any, finding: Finding, about: dict[str, Any]) -> None:
         corners = (made.vertices @ body.X_WB[:3, :3].T + body.X_WB[:3, 3])[made.faces]
         panel.add_collection3d(Poly3DCollection(
             corners, facecolors=colour, alpha=0.4, shade=_has_areas(corners),
-        ))  # fmt: skip
+        ))
         ridges = _ridges(corners)
         if len(ridges):
             panel.add_collection3d(Line3DCollection(ridges, colors=colour, linewidths=0.9))
@@ -102,7 +102,7 @@ def _panel(panel: Any, finding: Finding, about: dict[str, Any]) -> None:
     x, width = panel.get_position().x0, panel.get_position().y1
     panel.figure.text(x + 0.004, width, title(finding, about), va="top", fontsize=10, fontweight="bold")
     panel.figure.text(x + 0.004, panel.get_position().y0, "\n".join([*body_lines(case), answer_line(finding),
-                      true_line(about)]), va="top", fontsize=8, linespacing=1.35)  # fmt: skip
+                      true_line(about)]), va="top", fontsize=8, linespacing=1.35)
 
 
 def _has_areas(corners: np.ndarray) -> bool:

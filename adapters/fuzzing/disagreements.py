@@ -31,7 +31,7 @@ CONTRADICTION, LEFT_OUT, WRONG_BRACKET = "contradicts itself", "left out of a Wo
 KINDS = (
     ABORTED, HUNG, RAISED, FALSE_MISS, FALSE_HIT, NOT_A_NUMBER, NO_LENGTH, WRONG_GAP, WRONG_DEPTH, WRONG_POINTS,
     CONTRADICTION, LEFT_OUT, WRONG_BRACKET,
-)  # fmt: skip
+)
 OURS = "collide"
 #: A gap or a depth below this part of the pair's size is near touching.
 NEAR = 1e-3
@@ -134,7 +134,7 @@ class _Truth:
         """Exact answers to the pairs that do not take long; the others stand as unsupported."""
         table = Table(self.question, "exact", ExactPeer().version)
         wanted = [k for k, (i, j) in enumerate(self.question.pairs) if self._n_facets(i) * self._n_facets(j)
-                  <= MAX_FACET_PAIRS]  # fmt: skip
+                  <= MAX_FACET_PAIRS]
         for event in ExactPeer().stream(self.question, wanted):
             if event.kind in STATUSES:
                 table.record(event)
@@ -199,7 +199,7 @@ def _add_wrong_points(flaws: list[list[Flaw]], cases: list[Case], truth: _Truth,
             flaws[k].append(Flaw(
                 name, WRONG_POINTS, truth.position(k), False, distance, why, False, _number(gap["distance"]),
                 _number(gap["lower"]), _number(gap["upper"]), BRACKET, off / size,
-            ))  # fmt: skip
+            ))
 
 
 def _of_dispute(truth: _Truth, k: int, d: Disagreement, name: str) -> Flaw | None:
@@ -263,7 +263,7 @@ def _refuted_by_supports(case: Case, truth: _Truth, ours: Table, k: int) -> list
         OURS, WRONG_BRACKET, truth.position(k), bool(row["hit"]), float(row["distance"]),
         f"along {np.round(bound[1], 6).tolist()} the bodies are {bound[0]!r} m apart", None, None, lower, upper,
         "support functions", (bound[0] - upper) / (truth.judge.size[k] or 1.0),
-    )]  # fmt: skip
+    )]
 
 
 def world_flaws(case: Case) -> list[Flaw]:
@@ -281,7 +281,7 @@ def world_flaws(case: Case) -> list[Flaw]:
         OURS, LEFT_OUT if ours["answered"] else "exception", "deep" if expected["hit"] else "apart", bool(ours["hit"]),
         _number(ours["distance"]), reason, bool(expected["hit"]), _number(expected["distance"]), None, None,
         "its own pair query", math.inf,
-    )]  # fmt: skip
+    )]
 
 
 def _number(value) -> float | None:

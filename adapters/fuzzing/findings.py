@@ -71,7 +71,7 @@ def save_finding(finding: Finding, folder: str | Path) -> Path:
         "command": command(finding, place.name), "flaw": _plain_flaw(finding.flaw), "exact": known,
         "versions": versions(finding.flaw.engine), "seed": finding.seed, "round": finding.round,
         "times": finding.times, "minimal": finding.is_minimal,
-    }  # fmt: skip
+    }
     snippet = peer_snippets.snippet(finding.flaw, finding.case, known)
     if snippet is not None:
         write_whole(folder / f"{finding.stem}.py", snippet)
@@ -103,7 +103,7 @@ def command(finding: Finding, name: str) -> str:
     known = [x for x in (finding.flaw.exact_distance, finding.flaw.upper, finding.flaw.distance) if x is not None]
     farthest = max(known, default=0.0)
     clearance = f" --clearance {2 * farthest:.0f}" if farthest > CLEARANCE and 2 * farthest >= 1 else (
-        " --clearance 1" if farthest > CLEARANCE else "")  # fmt: skip
+        " --clearance 1" if farthest > CLEARANCE else "")
     engines = "exact" if finding.flaw.engine == "collide" else finding.flaw.engine
     return f"collide compare {name} --engines {engines}{clearance}"
 

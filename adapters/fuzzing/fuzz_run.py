@@ -126,7 +126,7 @@ class FuzzRun:
             "format": FORMAT, "seed": self.seed, "engines": self.engines, "rounds": self.rounds, "pairs": self.pairs,
             "seconds": self.seconds, "kinds": self.kinds, "shrunk": self.shrunk,
             "invented": self.invented, "waiting": self.waiting, "tried": self.tried,
-        }  # fmt: skip
+        }
 
     def save(self) -> None:
         """Write the state into its folder."""

@@ -189,5 +189,5 @@ SOURCES: dict[str, tuple[float, Callable[[Random], list[Case]]]] = {
     "thin": (0.03, _thin), "flat": (0.03, _flat_hulls), "tiny and huge": (0.03, _tiny_and_huge),
     "far away": (0.03, _far_away), "concentric": (0.03, _concentric), "identical": (0.03, _identical),
     "hard family": (0.14, _family_cases), "world": (0.04, _worlds), "robot": (0.02, _robots),
-}  # fmt: skip
+}
 assert math.isclose(sum(share for share, _ in SOURCES.values()), 1.0)

@@ -41,7 +41,7 @@ def length(rng: Random) -> float:
 def _box_mesh(size: np.ndarray) -> Mesh:
     corners = (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5) * size
     faces = [(0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5), (2, 3, 7), (2, 7, 6), (0, 2, 6),
-             (0, 6, 4), (1, 5, 7), (1, 7, 3)]  # fmt: skip
+             (0, 6, 4), (1, 5, 7), (1, 7, 3)]
     return Mesh(corners, faces)
 
 

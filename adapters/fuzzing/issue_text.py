@@ -35,7 +35,7 @@ def issue(flaw: Flaw, case: Case, about: dict[str, Any], snippet: str | None) ->
         lines += [
             "<details><summary>Certificate</summary>", "", certificate_text(known), "", "```json",
             json.dumps(known["certificate"]), "```", "", "</details>", "",
-        ]  # fmt: skip
+        ]
     lines += [f"Found and shrunk by collide; `{about['command']}` shows it again."]
     return "\n".join(lines) + "\n"
 
@@ -64,7 +64,7 @@ def title(flaw: Flaw, case: Case) -> str:
     names = " and ".join(case.kinds)
     place = {"touching": "touching", "inside": "one inside the other", "meeting": "meeting"}.get(
         flaw.position, {"near": "nearly touching", "shallow": "barely overlapping", "deep": "overlapping"}.get(
-            flaw.position, "apart"))  # fmt: skip
+            flaw.position, "apart"))
     return f"{flaw.kind.capitalize()}: {names}, {place}"
 
 

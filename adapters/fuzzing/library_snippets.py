@@ -41,7 +41,7 @@ def fcl_lines(asked: Asked) -> list[str]:
             *lines, wanted, "result = fcl.DistanceResult()",
             "print('fcl distance:', fcl.distance(a, b, request, result))",
             "print('fcl points:', [point.tolist() for point in result.nearest_points])",
-        ]  # fmt: skip
+        ]
     lines.append(
         "print('fcl collide:', fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()) > 0, flush=True)"
     )
@@ -90,7 +90,7 @@ def coal_lines(asked: Asked) -> list[str]:
         "result = coal.DistanceResult()",
         "print('coal distance:', coal.distance(A, X_A, B, X_B, number, result))",
         "print('coal points:', result.getNearestPoint1().tolist(), result.getNearestPoint2().tolist())",
-    ]  # fmt: skip
+    ]
     answers = [
         "print('coal collide:', coal.collide(A, X_A, B, X_B, boolean, coal.CollisionResult()) > 0, flush=True)",
         "print('coal distance:', coal.distance(A, X_A, B, X_B, number, coal.DistanceResult()))",
@@ -100,7 +100,7 @@ def coal_lines(asked: Asked) -> list[str]:
         "boolean, number = coal.CollisionRequest(), coal.DistanceRequest()",
         "boolean.enable_contact = False" + ("; boolean.break_distance = 0.0" if meshed else ""),
         *_coal_setting(asked.setting), asked.true_line(), *(points if asked.points else answers),
-    ]  # fmt: skip
+    ]
     return lines
 
 
@@ -141,7 +141,7 @@ def trimesh_lines(asked: Asked) -> list[str]:
         "    X[:3, :3], X[:3, 3] = R, t",
         "    made.add_object(name, trimesh.Trimesh(vertices, faces, process=False), transform=X)",
         "    return made",
-    ]  # fmt: skip
+    ]
     lines += poses(asked.case)
     for letter, body in zip("AB", asked.case.bodies):
         vertices, faces = _triangles(body.shape)
@@ -153,11 +153,11 @@ def trimesh_lines(asked: Asked) -> list[str]:
             *lines, "distance, data = a.min_distance_other(b, return_data=True)",
             "print('trimesh distance:', distance)",
             "print('trimesh points:', data.point('a').tolist(), data.point('b').tolist())",
-        ]  # fmt: skip
+        ]
     return [
         *lines, "print('trimesh collide:', a.in_collision_other(b), flush=True)",
         "print('trimesh distance:', a.min_distance_other(b))",
-    ]  # fmt: skip
+    ]
 
 
 def _triangles(shape: Shape) -> tuple[np.ndarray, np.ndarray]:

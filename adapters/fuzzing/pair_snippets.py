@@ -26,12 +26,12 @@ def distance3d_lines(asked: Asked) -> list[str]:
         return [
             *lines, "hit, depth, direction, position = mpr.mpr_penetration(A, B)",
             "print('distance3d collide:', hit)", "print('distance3d depth:', depth)",
-        ]  # fmt: skip
+        ]
     if asked.setting == "nesterov":
         return [
             *lines, "hit, gap, *_ = gjk.gjk_nesterov_accelerated(A, B, use_nesterov_acceleration=True)",
             "print('distance3d collide:', bool(hit))", "print('distance3d distance:', gap)",
-        ]  # fmt: skip
+        ]
     if asked.setting == "original":
         lines.append("gap, on_A, on_B, *_ = gjk.gjk_distance_original(A, B)")
     else:
@@ -104,7 +104,7 @@ def _launch_lines(kinds: str, pair: PlacedPair) -> list[str]:
         f"shape_types=array([{kinds}], int)", "shape_data=array(sizes, wp.vec4)",
         "shape_transform=array(places, wp.transform)",
         "shape_source=array([h.finalize('cpu') if h else 0 for h in hulls], wp.uint64)",
-    ]  # fmt: skip
+    ]
     rest = [
         f"shape_gap=array([{pair.gap / 2!r}] * 2, float)", f"shape_collision_radius=array({pair.reaches!r}, float)",
         "shape_flags=array([int(newton.ShapeFlags.COLLIDE_SHAPES)] * 2, int)",
@@ -113,7 +113,7 @@ def _launch_lines(kinds: str, pair: PlacedPair) -> list[str]:
         "shape_voxel_resolution=array([(4, 4, 4)] * 2, wp.vec3i)",
         "contact_pair=wp.zeros(64, dtype=wp.vec2i, device='cpu')", "contact_position=at", "contact_normal=normal",
         "contact_penetration=gaps", "contact_count=n)",
-    ]  # fmt: skip
+    ]
     return [f"    {', '.join(shapes)},", f"    {', '.join(rest)}"]
 
 
@@ -130,7 +130,7 @@ def cgal_lines(asked: Asked) -> list[str]:
         "    convex_hull_3([Point_3(*point) for point in points], made)", "    return made",
         "def has_vertex_in(outer, inner):", "    side = Side_of_triangle_mesh(outer)",
         "    return any(side.bounded_side(v.point()) != ON_UNBOUNDED_SIDE for v in inner.vertices())",
-    ]  # fmt: skip
+    ]
     for letter, body in zip("AB", asked.case.bodies):
         points = None if isinstance(body.shape, Mesh | Sphere | Capsule) else corners(body.shape)
         if points is None or points[1]:

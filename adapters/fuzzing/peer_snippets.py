@@ -28,7 +28,7 @@ FORMS: dict[str, Callable[[Asked], list[str]]] = {
     "drake": simulator_snippets.drake_lines, "rapier": simulator_snippets.rapier_lines,
     "distance3d": pair_snippets.distance3d_lines, "newton": pair_snippets.newton_lines,
     "cgal": pair_snippets.cgal_lines,
-}  # fmt: skip
+}
 
 
 def snippet(flaw: Flaw, case: Case, known: dict[str, Any]) -> str | None:

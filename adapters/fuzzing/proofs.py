@@ -71,7 +71,7 @@ def _of_hulls(case: Case, A: tuple[np.ndarray, float], B: tuple[np.ndarray, floa
     return {
         "hit": exact.hit(*pair, **radii), "distance": text, "lower": bound, "upper": bound,
         "by": "exact arithmetic on integers", "certificate": certificate,
-    }  # fmt: skip
+    }
 
 
 def _proven(case: Case) -> dict[str, Any]:
@@ -85,7 +85,7 @@ def _proven(case: Case) -> dict[str, Any]:
     plain: Any = _direction_and_points(case, r) if certificate is None else [
         {"kind": c.kind, "part_a": c.part_a, "part_b": c.part_b, "pairs": [list(map(int, p)) for p in c.pairs]}
         for c in certificate
-    ]  # fmt: skip
+    ]
     by = "the bracket that collide proves" if lower is not None and upper is not None else "nothing"
     return {"hit": bool(r.hit), "lower": lower, "upper": upper, "by": by, "certificate": plain}
 

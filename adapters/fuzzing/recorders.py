@@ -49,7 +49,7 @@ def record_fcl(objects: Iterable[tuple[Any, Any]], path: str | Path, names: Sequ
         For a geometry without numbers, naming the object.
     """
     read = [(_of_fcl(geometry, k), pose(o.getTranslation(), R=o.getRotation())) for k, (o, geometry) in
-            enumerate(objects)]  # fmt: skip
+            enumerate(objects)]
     return _saved(read, path, names, "python-fcl")
 
 
@@ -77,7 +77,7 @@ def record_coal(objects: Iterable[Any], path: str | Path, names: Sequence[str] |
         For a geometry that has no form in scene files, naming the object.
     """
     read = [(_of_coal(o.collisionGeometry(), k), pose(o.getTranslation(), R=o.getRotation())) for k, o in
-            enumerate(objects)]  # fmt: skip
+            enumerate(objects)]
     return _saved(read, path, names, "coal")
 
 
@@ -197,7 +197,7 @@ def _of_fcl(geometry: Any, k: int) -> Shape:
 
 _ROUND: dict[str, type[Capsule | Cylinder | Cone]] = {
     "Capsule": Capsule, "Cylinder": Cylinder, "Cone": Cone,
-}  # fmt: skip
+}
 
 
 def _of_coal(geometry: Any, k: int) -> Shape:
@@ -210,7 +210,7 @@ def _of_coal(geometry: Any, k: int) -> Shape:
         corners = (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5) * 2.0
         points = corners * np.array(geometry.halfSide).ravel() if name == "Box" else np.array(geometry.points())
         return Box(2.0 * np.array(geometry.halfSide).ravel()) if name == "Box" and not radius else ConvexHull(
-            points, radius=radius)  # fmt: skip
+            points, radius=radius)
     if name == "Sphere":
         return Sphere(float(geometry.radius) + radius)
     if name == "Capsule":

@@ -285,7 +285,7 @@ def _to_digits(x: float, digits: int) -> float:
 #: From a case to simpler ones, the boldest first; None stands for one that cannot be built.
 STEPS: tuple[Callable[[Case], Iterator[Case | None]], ...] = (
     _fewer_bodies, _fewer_parts, _fewer_points, _plain_poses, _on_an_axis, _plain_sizes, _rounded, _short_numbers,
-)  # fmt: skip
+)
 
 
 # --- making shapes --------------------------------------------------------------------------------

@@ -150,7 +150,7 @@ def drake_lines(asked: Asked) -> list[str]:
         "    made = g.GeometryInstance(RigidTransform(), shape, str(len(ids)))",
         "    made.set_proximity_properties(g.ProximityProperties())",
         "    ids.append(scene.RegisterGeometry(source, frame, made)); poses.set_value(frame, RigidTransform(R, t))",
-    ]  # fmt: skip
+    ]
     for body in asked.case.bodies[:2]:
         X_WG = body.X_WB @ plane_pose(body.shape) if isinstance(body.shape, Halfspace) else body.X_WB
         lines.append(f"body({_drake_shape(body.shape)}, {_drake_rotation(X_WG)}, {numbers(X_WG[:3, 3])})")
@@ -167,11 +167,11 @@ def drake_lines(asked: Asked) -> list[str]:
             *lines, "pair = query.ComputeSignedDistancePairClosestPoints(*ids)",
             "A, B = (query.GetPoseInWorld(i).multiply(p).tolist() for i, p in zip(ids, (pair.p_ACa, pair.p_BCb)))",
             "print('drake points:', A, B)",
-        ]  # fmt: skip
+        ]
     return [
         *lines, "print('drake collide:', query.HasCollisions(), flush=True)",
         "print('drake distance:', query.ComputeSignedDistancePairClosestPoints(*ids).distance)",
-    ]  # fmt: skip
+    ]
 
 
 def _drake_rotation(X: np.ndarray) -> str:
@@ -179,7 +179,7 @@ def _drake_rotation(X: np.ndarray) -> str:
     R = X[:3, :3]
     is_rotation = np.abs(R @ R.T - np.eye(3)).max() <= 128 * np.finfo(float).eps
     return f"RotationMatrix({rotation(X)})" if is_rotation else (
-        f"RotationMatrix.ProjectToRotationMatrix({rotation(X)})")  # fmt: skip
+        f"RotationMatrix.ProjectToRotationMatrix({rotation(X)})")
 
 
 def _drake_shape(shape: Shape) -> str:
@@ -213,7 +213,7 @@ def rapier_lines(asked: Asked) -> list[str]:
         "    made, kinds = r.PhysicsWorld(), r.ActiveCollisionTypes.all()",
         "    of = [r.Collider.new(shape).position(X).active_collision_types(kinds) for shape, X in placed]",
         "    return made, [made.add_collider(collider) for collider in of]",
-    ]  # fmt: skip
+    ]
     for letter, body in zip("AB", bodies):
         shape, X_BS = _rapier_shape(body.shape)
         x, y, z, w = quaternion_xyzw((body.X_WB @ X_BS)[:3, :3])
@@ -224,7 +224,7 @@ def rapier_lines(asked: Asked) -> list[str]:
         "only_A.detect_collisions(); only_A.update_query_pipeline()",
         "only_A.query_pipeline.intersect_shape(B[1], B[0], lambda handle: hits.append(handle) or True)",
         "print('rapier collide:', bool(hits), flush=True)",
-    ]  # fmt: skip
+    ]
     if any(isinstance(body.shape, Mesh) for body in bodies):
         return lines
     X_WA, X_WB = (body.X_WB @ _rapier_shape(body.shape)[1] for body in bodies)

@@ -21,7 +21,7 @@ MAX_TURNS = 150
 _SPHERE = np.random.default_rng(7).standard_normal((3000, 3))
 _DIRECTIONS = np.concatenate([
     _SPHERE / np.linalg.norm(_SPHERE, axis=1)[:, None], np.eye(3), -np.eye(3),
-])  # fmt: skip
+])
 _STEPS = np.random.default_rng(8).standard_normal((60, 3))
 
 

@@ -113,7 +113,7 @@ def _row(place_a: tuple, place_b: tuple, point_a: tuple, point_b: tuple, normal:
     return (
         0, place_a[0], place_b[0], place_a[1], place_b[1], point_a, point_b, normal, distance,
         0.0, 0.0, _NO_DIRECTION, 0.0, _NO_DIRECTION,
-    )  # fmt: skip
+    )
 
 
 def contact_points(world: World, tables: Tables, contact_margin: float | None) -> list[tuple]:

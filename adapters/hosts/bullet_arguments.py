@@ -17,14 +17,14 @@ SHAPE_ARGUMENTS = (
     "shapeType", "radius", "halfExtents", "height", "fileName", "meshScale", "planeNormal", "flags",
     "collisionFramePosition", "collisionFrameOrientation", "vertices", "indices", "heightfieldTextureScaling",
     "heightfieldData", "numHeightfieldRows", "numHeightfieldColumns", "replaceHeightfieldIndex", "physicsClientId",
-)  # fmt: skip
+)
 BODY_ARGUMENTS = (
     "baseMass", "baseCollisionShapeIndex", "baseVisualShapeIndex", "basePosition", "baseOrientation",
     "baseInertialFramePosition", "baseInertialFrameOrientation", "linkMasses", "linkCollisionShapeIndices",
     "linkVisualShapeIndices", "linkPositions", "linkOrientations", "linkInertialFramePositions",
     "linkInertialFrameOrientations", "linkParentIndices", "linkJointTypes", "linkJointAxis", "useMaximalCoordinates",
     "flags", "batchPositions", "physicsClientId",
-)  # fmt: skip
+)
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -74,7 +74,7 @@ def inertial_frames(arguments: dict[str, Any]) -> dict[int, tuple[int, np.ndarra
     ]
     orientations = [
         arguments.get("baseInertialFrameOrientation", _UPRIGHT), *(arguments.get("linkInertialFrameOrientations") or ())
-    ]  # fmt: skip
+    ]
     return {
         k - 1: (shape, _inverse(pose_of(position, orientation)))
         for k, (shape, position, orientation) in enumerate(zip(shapes, positions, orientations))

@@ -68,7 +68,7 @@ class Mirror:
     def __init__(
         self, client: int = 0, *, margins: Literal["none", "bullet"] = "none",
         shapes: Mapping[tuple[int, int], Shape] | None = None, contact_margin: float | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         if not isinstance(margins, str) or margins not in MARGINS:
             known = ", ".join(map(repr, MARGINS))
             raise InvalidArgument(f"Mirror: margins must be one of {known}, got {brief(margins)}")
@@ -192,7 +192,7 @@ class Mirror:
         self, bodyA, bodyB, distance, linkIndexA=EVERY_LINK, linkIndexB=EVERY_LINK, collisionShapeA=NO_SHAPE,
         collisionShapeB=NO_SHAPE, collisionShapePositionA=(0, 0, 0), collisionShapePositionB=(0, 0, 0),
         collisionShapeOrientationA=(0, 0, 0, 1), collisionShapeOrientationB=(0, 0, 0, 1), physicsClientId=None,
-    ):  # fmt: skip
+    ):
         """Nearest points of two bodies, as of the last `update`: one row for each two links within the distance [m].
 
         Raises
@@ -208,7 +208,7 @@ class Mirror:
 
     def getContactPoints(
         self, bodyA=-1, bodyB=-1, linkIndexA=EVERY_LINK, linkIndexB=EVERY_LINK, physicsClientId=None
-    ):  # fmt: skip
+    ):
         """Contacts of the bodies as they stood at the last `update`, of pairs that the filters let meet.
 
         Bullet lists what its last step met, where bodies stood before they moved. Forces are 0.
@@ -246,7 +246,7 @@ class Mirror:
     def rayTestBatch(
         self, rayFromPositions, rayToPositions, numThreads=1, parentObjectUniqueId=-1, parentLinkIndex=-1,
         reportHitNumber=-1, collisionFilterMask=-1, fractionEpsilon=-1.0, physicsClientId=None,
-    ):  # fmt: skip
+    ):
         """What each of n rays meets first, (n, 3) positions in W [m], or in the frame of a parent's centre of mass."""
         if self._stale_filters:
             self._fill_world()
@@ -374,7 +374,7 @@ def _matches(wanted: tuple, places: tuple) -> bool:
     return (
         (wanted[0] < 0 or wanted[0] == places[0]) and (wanted[1] < 0 or wanted[1] == places[1])
         and wanted[2] in (EVERY_LINK, places[2]) and wanted[3] in (EVERY_LINK, places[3])
-    )  # fmt: skip
+    )
 
 
 def _vectors(name: str, values) -> np.ndarray:

@@ -148,7 +148,7 @@ __all__ = [
     "StdVec_Vec6", "Transform3f", "Transform3s", "Triangle", "TriangleP", "WITH_OCTOMAP", "WITH_QHULL",
     "__raw_version__", "__version__", "checkVersionAtLeast", "checkVersionAtMost", "collide", "computeContactPatch",
     "distance", "install", "installed", "makeOctree", "rotate", "seed", "sharedMemory", "translate", "uninstall",
-]  # fmt: skip
+]
 __all__.extend(MEMBERS)
 
 
@@ -231,4 +231,4 @@ def _gap_of_two(coal) -> float:
     return coal.distance(
         coal.Sphere(0.5), coal.Transform3s(), coal.Box(1, 1, 1), coal.Transform3s([2.0, 0.0, 0.0]),
         coal.DistanceRequest(), coal.DistanceResult(),
-    )  # fmt: skip
+    )

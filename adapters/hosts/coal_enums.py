@@ -22,7 +22,7 @@ class NODE_TYPE(_Enum):
         BV_UNKNOWN, BV_AABB, BV_OBB, BV_RSS, BV_kIOS, BV_OBBRSS, BV_KDOP16, BV_KDOP18, BV_KDOP24, GEOM_BOX,
         GEOM_SPHERE, GEOM_CAPSULE, GEOM_CONE, GEOM_CYLINDER, GEOM_CONVEX, GEOM_PLANE, GEOM_HALFSPACE, GEOM_TRIANGLE,
         GEOM_OCTREE, GEOM_ELLIPSOID, HF_AABB, HF_OBBRSS,
-    ) = range(22)  # fmt: skip
+    ) = range(22)
 
 
 class OBJECT_TYPE(_Enum):
@@ -43,7 +43,7 @@ class BVHBuildState(_Enum):
     (
         BVH_BUILD_STATE_EMPTY, BVH_BUILD_STATE_BEGUN, BVH_BUILD_STATE_PROCESSED, BVH_BUILD_STATE_UPDATE_BEGUN,
         BVH_BUILD_STATE_UPDATED, BVH_BUILD_STATE_REPLACE_BEGUN,
-    ) = range(6)  # fmt: skip
+    ) = range(6)
 
 
 class BVHModelType(_Enum):
@@ -91,7 +91,7 @@ class GJKStatus(_Enum):
 ENUMS = (
     NODE_TYPE, OBJECT_TYPE, CollisionRequestFlag, BVHBuildState, BVHModelType, ContactPatchDirection, GJKVariant,
     GJKInitialGuess, GJKConvergenceCriterion, GJKConvergenceCriterionType, GJKStatus,
-)  # fmt: skip
+)
 #: Boost's tables of an enum: ``NODE_TYPE.names["GEOM_BOX"]``, ``NODE_TYPE.values[9]``.
 for _enum in ENUMS:
     setattr(_enum, "names", dict(_enum.__members__))  # noqa: B010 - members of enums are not to be declared

@@ -207,7 +207,7 @@ class BVHModelBase(CollisionGeometry):
         """Vertices are to be moved, from the first one on."""
         if self.build_state not in (
             BVHBuildState.BVH_BUILD_STATE_PROCESSED, BVHBuildState.BVH_BUILD_STATE_UPDATED,
-        ):  # fmt: skip
+        ):
             warnings.warn("beginReplaceModel: there is no finished model; nothing done", stacklevel=2)
             return _OUT_OF_SEQUENCE
         self.build_state, self._n_replaced = BVHBuildState.BVH_BUILD_STATE_REPLACE_BEGUN, 0

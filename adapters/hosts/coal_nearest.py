@@ -47,7 +47,7 @@ class Nearest(NamedTuple):
 def nearest(
     g1: CollisionGeometry, X1: np.ndarray, g2: CollisionGeometry, X2: np.ndarray, margin: float, limit: float,
     is_signed: bool,
-) -> Nearest:  # fmt: skip
+) -> Nearest:
     """How far two geometries are apart.
 
     margin : what counts as within [m].   limit : farther pairs need a lower bound alone [m].   is_signed : whether
@@ -61,12 +61,12 @@ def nearest(
     for (shapes_1, facets_1), (shapes_2, facets_2) in ((p, q) for p in _connected(g1) for q in _connected(g2)):
         sides = [
             _of_shapes((A, B), g1, X1, g2, X2, margin, limit, is_signed) for A in shapes_1 for B in shapes_2
-        ]  # fmt: skip
+        ]
         farthest = max(sides, key=lambda side: side.distance)
         answers.append(farthest._replace(
             is_within=all(side.is_within for side in sides), lower=max(side.lower for side in sides),
             facets_1=facets_1, facets_2=facets_2,
-        ))  # fmt: skip
+        ))
     least = min(answers, key=lambda answer: answer.distance)
     return least._replace(
         is_within=any(answer.is_within for answer in answers), lower=min(answer.lower for answer in answers)
@@ -115,7 +115,7 @@ def _of_flats(g1, X1, g2, X2, margin: float) -> Nearest:
     """Of planes and half-spaces, which have no end: the farthest of their sides."""
     sides = [
         _of_shapes((A, B), g1, X1, g2, X2, margin, math.inf, True) for A in g1._shapes for B in g2._shapes
-    ]  # fmt: skip
+    ]
     farthest = max(sides, key=lambda side: side.distance)
     return farthest._replace(is_within=all(side.is_within for side in sides))
 

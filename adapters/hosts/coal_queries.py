@@ -100,7 +100,7 @@ def contact_of(g1, g2, b1, b2, normal, point_1, point_2, depth) -> Contact:
 
 def _facet_rows(
     g1, X1, g2, X2, margin: float, n_wanted: int, with_geometry: bool
-) -> tuple[list[tuple], float]:  # fmt: skip
+) -> tuple[list[tuple], float]:
     """One for each pair of facets of two meshes that meet, deep enough where the margin is below 0; and minus the
     greatest depth among those looked at [m].
     """
@@ -205,7 +205,7 @@ def asked(name: str, args: tuple, n_more: int) -> tuple:
         g1, tf1, g2, tf2 = args[:4]
         return (
             checked_geometry("o1", g1), pose_of("tf1", tf1), checked_geometry("o2", g2), pose_of("tf2", tf2), *args[4:],
-        )  # fmt: skip
+        )
     raise TypeError(
         f"{name} takes two CollisionObjects, or (geometry, transform, geometry, transform), and {n_more} more arguments"
     )

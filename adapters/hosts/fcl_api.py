@@ -64,11 +64,11 @@ __all__ = [
     "DistanceResult", "DynamicAABBTreeCollisionManager", "Ellipsoid", "GJKSolverType", "Halfspace", "NODE_TYPE",
     "OBJECT_TYPE", "OcTree", "Plane", "Sphere", "Transform", "TriangleP", "__version__", "collide",
     "continuousCollide", "defaultCollisionCallback", "defaultDistanceCallback", "distance",
-]  # fmt: skip
+]
 
 _stand_in = StandIn({
     "fcl": sys.modules[__name__], "fcl.fcl": sys.modules[__name__], "fcl.collision_data": fcl_requests,
-})  # fmt: skip
+})
 
 
 def install() -> StandIn:

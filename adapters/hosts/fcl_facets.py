@@ -137,7 +137,7 @@ def _common_points(corners_a, corners_b, normal_a, normal_b) -> np.ndarray:
             for corners, plane_normal, plane_corners in (
                 (corners_a, normal_b, corners_b), (corners_b, normal_a, corners_a)
             )
-        ]  # fmt: skip
+        ]
         (low_a, high_a, at_low, at_high), (low_b, high_b, *_) = ends
         s = 0.5 * (np.maximum(low_a, low_b) + np.minimum(high_a, high_b))
         part = np.where(high_a > low_a, (s - low_a) / (high_a - low_a), 0.0)

@@ -122,7 +122,7 @@ def _exact_side(n, d, X_WP, X_WB, middle, offset) -> int:
     p = [sum(a * b for a, b in zip(row, q)) + row[3] - t[k] for k, row in enumerate(rows)]
     C = [[R[3 * ((i + 1) % 3) + (j + 1) % 3] * R[3 * ((i + 2) % 3) + (j + 2) % 3]
           - R[3 * ((i + 1) % 3) + (j + 2) % 3] * R[3 * ((i + 2) % 3) + (j + 1) % 3] for j in range(3)]
-         for i in range(3)]  # fmt: skip
+         for i in range(3)]
     det = sum(R[j] * C[0][j] for j in range(3))
     height = sum(p[i] * C[i][j] * n[j] for i in range(3) for j in range(3)) - Fraction(d) * det
     return (height > 0) - (height < 0)

@@ -20,7 +20,7 @@ class NODE_TYPE:
         BV_UNKNOWN, BV_AABB, BV_OBB, BV_RSS, BV_kIOS, BV_OBBRSS, BV_KDOP16, BV_KDOP18, BV_KDOP24, GEOM_BOX,
         GEOM_SPHERE, GEOM_ELLIPSOID, GEOM_CAPSULE, GEOM_CONE, GEOM_CYLINDER, GEOM_CONVEX, GEOM_PLANE, GEOM_HALFSPACE,
         GEOM_TRIANGLE, GEOM_OCTREE, NODE_COUNT,
-    ) = range(21)  # fmt: skip
+    ) = range(21)
 
 
 class CCDMotionType:
@@ -67,7 +67,7 @@ class CollisionRequest:
     def __init__(
         self, num_max_contacts=1, enable_contact=False, num_max_cost_sources=1, enable_cost=False,
         use_approximate_cost=True, gjk_solver_type=GJKSolverType.GST_LIBCCD,
-    ):  # fmt: skip
+    ):
         self.num_max_contacts = num_max_contacts
         self.enable_contact = enable_contact
         self.num_max_cost_sources = num_max_cost_sources
@@ -91,7 +91,7 @@ class ContinuousCollisionRequest:
     def __init__(
         self, num_max_iterations=10, toc_err=0.0001, ccd_motion_type=CCDMotionType.CCDM_TRANS,
         gjk_solver_type=GJKSolverType.GST_LIBCCD, ccd_solver_type=CCDSolverType.CCDC_CONSERVATIVE_ADVANCEMENT,
-    ):  # fmt: skip
+    ):
         self.num_max_iterations = num_max_iterations
         self.toc_err = toc_err
         self.ccd_motion_type = ccd_motion_type

@@ -76,7 +76,7 @@ def rotation_of(q) -> np.ndarray:
         [1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
         [s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)],
         [s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)],
-    ])  # fmt: skip
+    ])
 
 
 def quaternion_of(R: np.ndarray) -> np.ndarray:

@@ -135,7 +135,7 @@ class Installed:
                     raise UnsupportedQuery(
                         "install: too many models; at most 256 at a time" if number == -1
                         else "install: libcollide and the Python package differ; install collide-robotics again"
-                    )  # fmt: skip
+                    )
                 self._numbers.append(number)
         except (UnsupportedQuery, MemoryError):
             self._remove()
@@ -163,7 +163,7 @@ def _library() -> ctypes.CDLL:
     library = ctypes.CDLL(library_path())
     library.collide_mujoco_hook.argtypes = [
         ctypes.POINTER(Layout), ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p,
-    ]  # fmt: skip
+    ]
     library.collide_mujoco_add.argtypes = [ctypes.POINTER(Model)]
     library.collide_mujoco_remove.argtypes = [ctypes.c_int]
     for name in ("unhook", "remove"):

@@ -109,7 +109,7 @@ class Model(ctypes.Structure):
         )),
         *((name, ctypes.c_int64) for name in ("largest", "face_ints", "manifold_header", "contact_bytes")),
         ("max_contacts", ctypes.c_int64 * (N * N)),
-    ]  # fmt: skip
+    ]
 
 
 class ModelTables:
@@ -146,5 +146,5 @@ class ModelTables:
             model=model._address, signature=model.signature, n_geoms=model.ngeom, is_cull=is_cull,
             largest=faces.largest, face_ints=FACE_INTS, manifold_header=HEADER, contact_bytes=CONTACT_DTYPE.itemsize,
             **{name: array.ctypes.data for name, array in arrays.items()},
-        )  # fmt: skip
+        )
         self.made.max_contacts[:] = counts.ravel().tolist()

@@ -51,7 +51,7 @@ class Layout(ctypes.Structure):
         for name in (
             *ARRAYS, "signature", "geom_xpos", "geom_xmat", "contact_size",
         )
-    ]  # fmt: skip
+    ]
 
 
 class Host(NamedTuple):

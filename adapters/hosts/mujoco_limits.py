@@ -35,7 +35,7 @@ def _bits() -> tuple[int, int]:
     mujoco = host().mujoco
     off, on = (getattr(bits, name, 0) for bits, name in (
         (mujoco.mjtDisableBit, "mjDSBL_MULTICCD"), (mujoco.mjtEnableBit, "mjENBL_MULTICCD"),
-    ))  # fmt: skip
+    ))
     return int(off), int(on)
 
 
@@ -61,7 +61,7 @@ def main() -> None:
     print(json.dumps([
         [bool(disabled), bool(enabled), _counts(lambda i, j: _limit(i, j, disabled, enabled)).tolist()]  # noqa: B023
         for disabled in {0, off} for enabled in {0, on}
-    ]))  # fmt: skip
+    ]))
 
 
 def _counts(limit) -> np.ndarray:

@@ -41,29 +41,29 @@ from collide.shapes import (
 _MODEL_FIELDS = (
     "shape_type", "shape_scale", "shape_transform", "shape_body", "shape_flags", "shape_margin", "shape_gap",
     "shape_source", "shape_contact_pairs",
-)  # fmt: skip
+)
 _CONTACT_FIELDS = tuple(
     f"rigid_contact_{name}"
     for name in (
         "count", "shape0", "shape1", "point0", "point1", "offset0", "offset1", "normal", "margin0", "margin1", "tids",
     )
-)  # fmt: skip
+)
 #: Arguments of ``newton.CollisionPipeline`` about how it searches, which change no answer here.
 _OF_ITS_SEARCH = (
     "broad_phase", "reduce_contacts", "max_triangle_pairs", "shape_pairs_max", "deterministic", "verify_buffers",
     "contact_reduction_hashtable_size_factor", "publish_capacity", "contact_matching_pos_threshold",
     "contact_matching_normal_dot_threshold",
-)  # fmt: skip
+)
 #: Those about particles, which Newton's own pipeline answers.
 _OF_PARTICLES = (
     "soft_contact_max", "soft_contact_gap", "soft_contact_margin", "enable_rigid_soft_full_surface_contact",
-)  # fmt: skip
+)
 #: Those that ask for what is not done here, but for these values.
 _REFUSED_BUT = {
     "body_pair_reduction": (None,), "narrow_phase": (None,), "sdf_hydroelastic_config": (None,),
     "contact_report": (False,), "contact_matching": ("disabled",), "speculative_contact_gap_max": (None,),
     "dynamic_shape_scale": (False,), "include_static_kinematic_pairs": (True,), "requires_grad": (None, False),
-}  # fmt: skip
+}
 
 
 class Pipeline:
@@ -99,7 +99,7 @@ class Pipeline:
     def __init__(
         self, model: Any, *, rigid_contact_max: int | None = None, max_contacts: int = 8,
         shape_pairs_filtered: Any = None, **options: Any,
-    ):  # fmt: skip
+    ):
         newton = _newton()
         if not isinstance(model, newton.Model):
             raise InvalidArgument(f"Pipeline: model must be a newton.Model, got {type(model).__name__}")
@@ -138,7 +138,7 @@ class Pipeline:
         return self._newton.CollisionPipeline(
             self._model, broad_phase="explicit", shape_pairs_filtered=no_pairs,
             rigid_contact_max=self.rigid_contact_max, **options,
-        )  # fmt: skip
+        )
 
     def contacts(self) -> Any:
         """A new ``newton.Contacts`` with room for this model's."""
@@ -256,7 +256,7 @@ class Pipeline:
         self.remaining[k] = "planes with ends" if kind == kinds.PLANE else f"shapes of kind {kind.name}"
         warnings.warn(
             f"shape {k} is left out: {self.remaining[k]} are not taken over", RuntimeWarning, stacklevel=4
-        )  # fmt: skip
+        )
         return None
 
 

@@ -138,7 +138,7 @@ def compute_distances(model, data, geom_model, geom_data, q) -> int:
     for k, distance, normal, point_1, point_2, b1, b2 in zip(
         answer.pair.tolist(), answer.distance.tolist(), answer.normal, answer.point_1, answer.point_2,
         answer.part_1.tolist(), answer.part_2.tolist(),
-    ):  # fmt: skip
+    ):
         result = write(point_1, point_2)
         result.min_distance, result.normal, result.b1, result.b2 = distance, normal, b1, b2
         results[k] = result
@@ -217,7 +217,7 @@ def distances(model, data, geom_model, geom_data, q) -> PairDistances:
             pairs = which[some]
             rows = engine.distance(*shapes_of(known, pairs), *_placed(known, X, pairs), signed=signed).rows
             names = zip(("distance", "lower", "normal", "point_1", "point_2"),
-                        ("distance", "lower", "normal", "point_a", "point_b"))  # fmt: skip
+                        ("distance", "lower", "normal", "point_a", "point_b"))
             for name, field in names:
                 getattr(answer, name)[some] = rows[field]
     for row in np.flatnonzero(~in_batch).tolist():
@@ -291,7 +291,7 @@ def _add_contacts(coal, known: KnownPairs, geom_model, X, k: int, request, resul
     for contact in ours.getContacts():
         result.addContact(coal.Contact(
             first, second, contact.b1, contact.b2, contact.pos, contact.normal, contact.penetration_depth
-        ))  # fmt: skip
+        ))
     result.distance_lower_bound = ours.distance_lower_bound
 
 

@@ -67,7 +67,7 @@ _FIELDS = {
     "Cone": ("radius", "halfLength"), "Cylinder": ("radius", "halfLength"), "Halfspace": ("n", "d"),
     "Plane": ("n", "d"), "ConvexBase": ("num_points",),
     "BVHModelOBBRSS": ("num_tris", "num_vertices"), "BVHModelOBB": ("num_tris", "num_vertices"),
-}  # fmt: skip
+}
 
 
 def class_name(geometry) -> str | None:

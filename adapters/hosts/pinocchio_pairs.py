@@ -81,7 +81,7 @@ def known_pairs(geom_model) -> KnownPairs:
     known = _known[geom_model] = KnownPairs(
         geometries, numbers, mapping, pairs, np.array([g._bounds() for g in geometries]).reshape(-1, 2, 3),
         ShapeSet(shapes or [engine.Sphere(1.0)]), np.asarray(is_convex[pairs].all(axis=1)), radii[pairs].sum(axis=1),
-    )  # fmt: skip
+    )
     return known
 
 

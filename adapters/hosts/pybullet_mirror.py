@@ -43,7 +43,7 @@ _CLIENT_AT = {
     "createCollisionShape": SHAPE_ARGUMENTS.index("physicsClientId"), "createMultiBody": len(BODY_ARGUMENTS) - 1,
     "loadURDF": 7, "loadSDF": 3, "loadMJCF": 3, "resetSimulation": 1, "disconnect": 0, "setCollisionFilterPair": 5,
     "setCollisionFilterGroupMask": 4, "changeDynamics": 24, "setPhysicsEngineParameter": 99, "connect": 99,
-}  # fmt: skip
+}
 _CLIENT_AT_OF_QUESTIONS = dict(zip(QUESTIONS, (11, 4, 2, 4, 8)))
 #: Where flags stand among those of what loads bodies.
 _FLAGS_AT = {"createMultiBody": BODY_ARGUMENTS.index("flags"), "loadURDF": 5, "loadMJCF": 1}
@@ -118,7 +118,7 @@ def install(**options) -> _Installed:
             for name, module in list(sys.modules.items())
             if isinstance(module, ModuleType) and not name.startswith("collide.")
             and any(value is genuine for value in list(vars(module).values()))
-        )  # fmt: skip
+        )
         _before, _stand_in = genuine, attach(genuine, **options)
         sys.modules["pybullet"] = _stand_in
         if holders:

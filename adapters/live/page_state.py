@@ -127,7 +127,7 @@ class WorldState(PageState):
         drawn = drawing.of_scene(self.scene, report)
         blocks: list[ReportBlock | DataBlock] = [
             ReportBlock("report", report.items()), DataBlock("drawing", drawn), live_block(self.drawing),
-        ]  # fmt: skip
+        ]
         return page_pieces(f"collide view: {self.scene.name}", blocks, live=True)
 
     def update(self, since: PageState | None) -> str | None:

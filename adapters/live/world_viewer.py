@@ -18,7 +18,7 @@ from collide.world import World
 def view(
     world: World, *, clearance: float = 0.0, min_depth: float = 0.0, title: str = "World", port: int = 0,
     rate: float = 30.0, browser: bool = False,
-) -> WorldViewer:  # fmt: skip
+) -> WorldViewer:
     """Look at a World: the page of a report, in a browser on this machine, that follows it.
 
         viewer = collide.adapters.view(world, clearance=0.02)
@@ -85,7 +85,7 @@ class WorldViewer:
     def __init__(
         self, world: World, *, clearance: float = 0.0, min_depth: float = 0.0, title: str = "World", port: int = 0,
         rate: float = 30.0,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._world = checks.instance("view: world", world, World, "a collide.World")
         self._title = checks.text("view: title", title)
         self._limits = Limits(checks.length("view: clearance", clearance), checks.length("view: min_depth", min_depth))

@@ -28,11 +28,11 @@ class CgalPeer(PairwisePeer):
     receives = (
         "corners rounded to doubles in world coordinates; its predicates are exact",
         "hull corners, of which it takes its own hull",
-    )  # fmt: skip
+    )
     cannot = (
         "gaps and depths: the wheel has none", "half-spaces and whatever is round", "flat hulls",
         "meshes that bound no solid",
-    )  # fmt: skip
+    )
 
     def prepare(self) -> None:
         from CGAL import CGAL_Convex_hull_3, CGAL_Polygon_mesh_processing  # noqa: F401 - the work is in these

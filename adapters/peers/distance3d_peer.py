@@ -34,7 +34,7 @@ class Distance3dPeer(PairwisePeer):
     receives = (
         "doubles; corners in world coordinates", "hulls with a radius as a Margin of it",
         "max_distance_squared infinite instead of 1e5",
-    )  # fmt: skip
+    )
     cannot = (_NO_DEPTH, *_SHAPES)
     settings = {
         "original": Setting(f"gjk_distance_original, a hit below {TOUCHING:g} m", {"flavour": "original"}),
@@ -46,7 +46,7 @@ class Distance3dPeer(PairwisePeer):
             cannot=("most depths of what is round: its polytope is full at 64 faces", *_SHAPES),
         ),
         "mpr": Setting("mpr_penetration", {"flavour": "mpr"}, cannot=(_NO_GAP, *_SHAPES)),
-    }  # fmt: skip
+    }
 
     def prepare(self) -> None:
         warnings.filterwarnings("ignore", module="distance3d")  # Numba's, about the speed of products

@@ -27,17 +27,17 @@ class DrakePeer(PairwisePeer):
     receives = (
         "doubles; hull corners, of which Drake takes its own hull", "a SceneGraph made for each pair",
         "rotations projected where it refuses them",
-    )  # fmt: skip
+    )
     cannot = (
         "cones, hulls with a radius, meshes other than as their hull", "flat hulls",
         "pairs of shapes that its tables leave out, most of those with half-spaces",
-    )  # fmt: skip
+    )
     settings = {
         "penetration": Setting(
             "ComputePointPairPenetration: a hit where it lists a pair, its depth the distance", {"penetration": True},
             cannot=("gaps: bodies apart have no penetration", *cannot),
         )
-    }  # fmt: skip
+    }
 
     def prepare(self) -> None:
         import pydrake.geometry  # noqa: F401 - the work is in this one

@@ -78,7 +78,7 @@ def _with_mesh(A, X_WA, B, X_WB) -> Reply:
         exact_meshes.mesh_cells(body.vertices, body.faces, body.solid, X) if isinstance(body, Mesh)
         else exact_meshes.convex_cells(body[0], body[1], X)
         for body, X in ((A, X_WA), (B, X_WB))
-    )  # fmt: skip
+    )
     verdict = exact_meshes.judge(a, b)
     if verdict.hit:
         return Reply(True, certified=True, note="" if verdict.surfaces else INSIDE)

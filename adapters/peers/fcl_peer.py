@@ -29,7 +29,7 @@ class FclPeer(PairwisePeer):
     cannot = (
         "insides and depths of meshes", "distances to half-spaces, which crash it", "hulls with a radius, flat hulls",
         "a normal with a distance: taken from its nearest points",
-    )  # fmt: skip
+    )
     settings = {
         "indep": Setting(
             "collide alone, with contacts, by FCL's own GJK and EPA", {"solver": "GST_INDEP"},
@@ -38,7 +38,7 @@ class FclPeer(PairwisePeer):
                 "insides and depths of meshes", "hulls with a radius, flat hulls",
             ),
         )
-    }  # fmt: skip
+    }
 
     def refuses(self, part: Shape) -> str | None:
         return "python-fcl has no hull with a radius" if has_radius(part) else None

@@ -29,11 +29,11 @@ class MujocoPeer(PairwisePeer):
     receives = (
         "hull corners in single precision, recentred, with MuJoCo's own hull around them",
         "poses as unit quaternions", "a model compiled for each pair, explicit contact pair, margin 0, multiccd off",
-    )  # fmt: skip
+    )
     cannot = (
         "gaps: bodies apart have no contact", "cones, hulls with a radius, meshes other than as their hull",
         "flat hulls, and hulls whose volume it finds too small", "two planes",
-    )  # fmt: skip
+    )
     settings = {
         "libccd": Setting("as mujoco, solver libccd", {"libccd": True}),
         "distance": Setting(
@@ -44,7 +44,7 @@ class MujocoPeer(PairwisePeer):
             "mj_geomDistance, solver libccd; a hit is a distance of 0 or less", {"distance": True, "libccd": True},
             cannot=("a boolean of its own", *cannot[1:]),
         ),
-    }  # fmt: skip
+    }
 
     def refuses(self, part: Shape) -> str | None:
         if isinstance(part, Mesh):

@@ -34,7 +34,7 @@ class NewtonPeer(PairwisePeer):
     receives = (
         "all in single precision: sizes, corners, poses with unit quaternions", "hulls with faces of our own",
         "a gap larger than the distance, margin 0, none of its support tables", "no broad phase",
-    )  # fmt: skip
+    )
     cannot = ("a boolean of its own", "hulls with a radius, flat hulls, two planes", "meshes: they are not asked of it")
 
     def prepare(self) -> None:
@@ -146,7 +146,7 @@ def launched(pair: PlacedPair):
         "shape_collision_aabb_lower": array(-boxes, wp.vec3),
         "shape_collision_aabb_upper": array(boxes, wp.vec3),
         "shape_voxel_resolution": array([(4, 4, 4)] * 2, wp.vec3i), "device": "cpu",
-    }  # fmt: skip
+    }
     narrow_phase, count = _narrow_phase(), contacts["contact_count"].numpy()
 
     def launch(_alive=meshes) -> None:  # the arrays hold numbers of the hulls' meshes, which must not end before
@@ -169,7 +169,7 @@ def _narrow_phase():
                 max_candidate_pairs=1, max_triangle_pairs=1, reduce_contacts=False, device="cpu", has_meshes=False,
                 verify_buffers=False,
             )
-        )  # fmt: skip
+        )
     return _MADE[0]
 
 

@@ -32,7 +32,7 @@ from collide.adapters.peers.answers import (
     Reply,
     Table,
     nearest,
-)  # fmt: skip
+)
 from collide.adapters.peers.engine_names import ENGINES
 from collide.adapters.peers.question import Body, Question, convex_parts
 from collide.errors import CollideError, InvalidArgument, MissingExtra, UnsupportedQuery
@@ -41,7 +41,7 @@ from collide.shapes import ConvexHull, Shape
 __all__ = [
     "ENGINES", "TABLE_DTYPE", "Body", "PairwisePeer", "Peer", "Question", "Reply", "Setting", "Table", "engine",
     "installed",
-]  # fmt: skip
+]
 
 #: Asks one of them in a child process.
 _ISOLATED = "collide.adapters.peers.child:IsolatedPeer"
@@ -340,7 +340,7 @@ def check_names(names: Iterable[str]) -> None:
     for name in names:
         if name not in ENGINES:
             settings = {base: [s for b, _, s in (n.partition(":") for n in sorted(ENGINES)) if b == base and s]
-                        for base in sorted({n.partition(":")[0] for n in ENGINES})}  # fmt: skip
+                        for base in sorted({n.partition(":")[0] for n in ENGINES})}
             listed = (f"{base} (:{', :'.join(of)})" if of else base for base, of in settings.items())
             raise InvalidArgument(f"no engine {name!r}; there are {', '.join(listed)}")
 

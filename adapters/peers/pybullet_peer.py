@@ -39,7 +39,7 @@ class PybulletPeer(PairwisePeer):
     cannot = (
         "a boolean of its own for posed bodies", "cones, ellipsoids, hulls with a radius", "two planes",
         "meshes against meshes or planes, depths of meshes",
-    )  # fmt: skip
+    )
     settings = {
         "margins": Setting(
             "getClosestPoints as it comes; a hit is a distance of 0 or less",
@@ -128,7 +128,7 @@ def collision_shape(pybullet, part: Shape) -> tuple[dict, float]:
         return {
             "shapeType": pybullet.GEOM_MESH, "vertices": part.vertices.tolist(), "indices": part.faces.ravel().tolist(),
             "flags": pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
-        }, float(np.sqrt(np.square(part.vertices).sum(axis=1)).max())  # fmt: skip
+        }, float(np.sqrt(np.square(part.vertices).sum(axis=1)).max())
     points = corners(part)
     if points is None:
         raise UnsupportedQuery(f"pybullet has no {type(part).__name__}")

@@ -41,7 +41,7 @@ class RapierPeer(PairwisePeer):
         "all in single precision: sizes, corners, facets, and poses as unit quaternions",
         "hull corners, of which it takes its own hull", "meshes as TriMesh, a surface",
         "a prediction distance larger than the gap", "a PhysicsWorld made for each pair",
-    )  # fmt: skip
+    )
     cannot = _CANNOT
     settings = {
         "cast": Setting(
@@ -53,7 +53,7 @@ class RapierPeer(PairwisePeer):
             {"cast": "cast_shape_nonlinear"},
             cannot=(_NO_DEPTH, "half-spaces: this cast goes through them without a word", *_CANNOT),
         ),
-    }  # fmt: skip
+    }
 
     def refuses(self, part: Shape) -> str | None:
         if isinstance(part, Halfspace) and self.values.get("cast") == "cast_shape_nonlinear":

@@ -30,7 +30,7 @@ class TrimeshPeer(PairwisePeer):
     cannot = (
         "spheres, capsules, cylinders, cones, ellipsoids, half-spaces", "hulls with a radius, flat hulls",
         "insides and depths of meshes that are not convex", "a normal with a distance",
-    )  # fmt: skip
+    )
 
     def missing(self) -> str | None:
         from importlib.util import find_spec

@@ -142,7 +142,7 @@ def boxes_of(table: ShapeTable, poses: np.ndarray, shape_of: np.ndarray) -> np.n
     bounding_boxes(
         address_of(table.ints), address_of(table.numbers), address_of(poses), address_of(shape_of), len(poses),
         address_of(boxes),
-    )  # fmt: skip
+    )
     return boxes
 
 
@@ -163,7 +163,7 @@ def widened(boxes: np.ndarray, margins: np.ndarray) -> np.ndarray:
 def move_parts(
     table: ShapeTable, row_of: np.ndarray, moved: np.ndarray, X_new: np.ndarray, X_WBs: np.ndarray, poses: np.ndarray,
     boxes: np.ndarray,
-) -> None:  # fmt: skip
+) -> None:
     """`move_single_parts` of arrays.
 
     row_of : (n,) int64, the row of the table of each body.   moved : (k,) int64.   X_new, X_WBs : (n, 4, 4).
@@ -172,4 +172,4 @@ def move_parts(
     move_single_parts(
         address_of(table.ints), address_of(table.numbers), address_of(row_of), len(row_of), address_of(moved),
         len(moved), address_of(X_new), address_of(X_WBs), address_of(poses), address_of(boxes),
-    )  # fmt: skip
+    )

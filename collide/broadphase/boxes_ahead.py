@@ -166,7 +166,7 @@ def bodies_ahead(tree: BoxTree, questions: np.ndarray, of_points: bool = False) 
         count = boxes_ahead(
             address_of(questions), len(questions), of_points, address_of(tree.nodes), address_of(tree.links),
             tree.n_nodes, address_of(pairs), address_of(bounds), capacity,
-        )  # fmt: skip
+        )
         if count <= capacity:
             break
         capacity = count

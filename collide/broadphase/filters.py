@@ -15,7 +15,7 @@ _BLOCK = 256
 def count_skipped(
     static: np.ndarray, group: np.ndarray, mask: np.ndarray, asleep: np.ndarray, allowed: np.ndarray,
     reasons: Sequence[str],
-) -> dict[str, int]:  # fmt: skip
+) -> dict[str, int]:
     """Pairs of n bodies that no query tests, by reason; each pair is counted once.
 
     static, group, mask, asleep : (n,).   allowed : (k, 2) bodies, each pair once.   reasons : (k,) why, of each.

@@ -59,7 +59,7 @@ def _is_box(nodes, node, box):
     return (
         nodes[at] == box.low_x and nodes[at + 1] == box.low_y and nodes[at + 2] == box.low_z
         and nodes[at + 3] == box.high_x and nodes[at + 4] == box.high_y and nodes[at + 5] == box.high_z
-    )  # fmt: skip
+    )
 
 
 @entry("float64(int64, int64, int64, int64)")

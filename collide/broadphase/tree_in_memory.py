@@ -18,7 +18,7 @@ STATIC_BIT, STILL_BIT, CHANGED_BIT = 1, 2, 4
 (
     NODES_AT, LINKS_AT, N_NODES, N_FIXED, BOXES_AT, N_BOXES, TRAITS_AT, ALLOWED_ROWS_AT, N_ALLOWED, LEAF_OF_AT,
     CHANGED_AT, N_CHANGED,
-) = range(12)  # fmt: skip
+) = range(12)
 TREE = 12
 
 
@@ -51,4 +51,4 @@ def tree_in_memory(header_at):
         view_f64(header[BOXES_AT], 6 * n_boxes), view_i64(header[TRAITS_AT], TRAITS * n_boxes),
         view_i64(header[ALLOWED_ROWS_AT], header[N_ALLOWED]), view_i64(header[LEAF_OF_AT], n_boxes),
         view_i64(header[CHANGED_AT], n_boxes),
-    )  # fmt: skip
+    )

@@ -134,7 +134,7 @@ class TreeOverBodies:
         end = grow_graded(
             address_of(bodies), m, address_of(self.boxes), len(self.boxes), begin, address_of(self.links),
             len(self.links), address_of(scratch),
-        )  # fmt: skip
+        )
         leaves = begin + np.flatnonzero(self.links[begin:end, BODY] >= 0)
         self.leaf_of[bodies], self.nodes[leaves] = leaves, self.boxes[bodies]
         self.sections.append(end)
@@ -211,7 +211,7 @@ class TreeOverBodies:
             self._sides[0] += fit_paths(
                 address_of(leaves), len(leaves), address_of(self.links), address_of(self.nodes), self.n_nodes,
                 address_of(out),
-            )  # fmt: skip
+            )
             self._work["nodes fitted"] += int(out[0])
         sides, relative = self._quality()
         if sides > _GROWN * self._least[0] or relative > _GROWN * self._least[1]:
@@ -308,7 +308,7 @@ class TreeOverBodies:
                     address_of(self.leaf_of), address_of(self._changed), self._n_changed,
                 ],
                 dtype=np.int64,
-            )  # fmt: skip
+            )
         return self._header
 
     def _forget_header(self) -> None:

@@ -53,7 +53,7 @@ def _meet(boxes, at, box):
         boxes[at] <= box.high_x and boxes[at + 3] >= box.low_x
         and boxes[at + 1] <= box.high_y and boxes[at + 4] >= box.low_y
         and boxes[at + 2] <= box.high_z and boxes[at + 5] >= box.low_z
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -68,7 +68,7 @@ def _are_tested(tree, i, j, either):
     return (
         traits[a + ALLOWED_AT] < 0 or traits[b + ALLOWED_AT] < 0
         or not is_allowed(tree.allowed, traits[a + ALLOWED_AT], j)
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -81,7 +81,7 @@ def _are_near(boxes, i, j, margin):
         (boxes[a] - margin <= boxes[b + 3]) & (boxes[a + 3] + margin >= boxes[b])
         & (boxes[a + 1] - margin <= boxes[b + 4]) & (boxes[a + 4] + margin >= boxes[b + 1])
         & (boxes[a + 2] - margin <= boxes[b + 5]) & (boxes[a + 5] + margin >= boxes[b + 2])
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -101,7 +101,7 @@ def _box_at(boxes, at, margin):
     return _Box(
         _lowered(boxes[at], margin), _lowered(boxes[at + 1], margin), _lowered(boxes[at + 2], margin),
         _raised(boxes[at + 3], margin), _raised(boxes[at + 4], margin), _raised(boxes[at + 5], margin),
-    )  # fmt: skip
+    )
 
 
 # --- all pairs ----------------------------------------------------------------------------------
@@ -115,7 +115,7 @@ def _are_nodes_near(nodes, a, b, reach):
         (nodes[a] - nodes[b + 3] <= reach) & (nodes[b] - nodes[a + 3] <= reach)
         & (nodes[a + 1] - nodes[b + 4] <= reach) & (nodes[b + 1] - nodes[a + 4] <= reach)
         & (nodes[a + 2] - nodes[b + 5] <= reach) & (nodes[b + 2] - nodes[a + 5] <= reach)
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -298,7 +298,7 @@ def boxes_met(tree_at, queries_at, n, margin, pairs_at, capacity):
         box = _Box(
             queries[at] - margin, queries[at + 1] - margin, queries[at + 2] - margin,
             queries[at + 3] + margin, queries[at + 4] + margin, queries[at + 5] + margin,
-        )  # fmt: skip
+        )
         node = _next_leaf(tree, 0, tree.n_nodes, box)
         while node < tree.n_nodes:
             j = tree.links[LINK * node + BODY]

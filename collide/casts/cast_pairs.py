@@ -35,7 +35,7 @@ def cast_pair(pair, size, slop, question, row, doubles_at, integers_at):
         cast = open_cast(
             pair, direction, radius_of(pair, pair.A), radius_of(pair, pair.B), ERROR * size + slop, size, doubles_at,
             integers_at,
-        )  # fmt: skip
+        )
         met = cast_line(cast, question[_LIMIT], False)
     row[STATUS] = met.status
     row[LOWER] = met.lower
@@ -71,4 +71,4 @@ def cast_pairs(
         cast_pair(
             pair, size, slop, view_f64(questions_at + 8 * QUESTION * k, QUESTION),
             view_f64(rows_at + 8 * CAST_ROW * k, CAST_ROW), doubles_at, integers_at,
-        )  # fmt: skip
+        )

@@ -53,7 +53,7 @@ FACET_A, FACET_B, OF_QUESTION = CAST_ROW, CAST_ROW + 1, CAST_ROW + 2
 # from one question to the next, questions, candidates, and how many of them there is room for.
 (
     TREE_A, TREE_B, INTS_AT, NUMBERS_AT, POSES_A, POSES_B, STEP_A, STEP_B, QUESTIONS_AT, CANDIDATES_AT, CAPACITY,
-) = range(11)  # fmt: skip
+) = range(11)
 HEADER = 11
 _LOW = 0xFFFFFFFF
 
@@ -98,7 +98,7 @@ def _inverse_rows(R, at):
     share = 1.0 / dot(a, p)
     return Matrix3(
         scale(share, Vec3(p.x, q.x, r.x)), scale(share, Vec3(p.y, q.y, r.y)), scale(share, Vec3(p.z, q.z, r.z))
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -163,7 +163,7 @@ def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
         high = Vec3(
             _extent_along(pair, rows.x, radius, points, ids), _extent_along(pair, rows.y, radius, points, ids),
             _extent_along(pair, rows.z, radius, points, ids),
-        )  # fmt: skip
+        )
         low = Vec3(
             -_extent_along(pair, neg(rows.x), radius, points, ids),
             -_extent_along(pair, neg(rows.y), radius, points, ids),
@@ -207,7 +207,7 @@ def _entry_of(sweep, a, b, ref_a, ref_b, has_tree_a, best):
         half = Vec3(
             dot(absolute(rotation.x), of_a.half), dot(absolute(rotation.y), of_a.half),
             dot(absolute(rotation.z), of_a.half),
-        )  # fmt: skip
+        )
     gap = sub(box.centre, middle)
     wide = add(box.half, half)
     pad = sweep.pad + 2.0**-40 * (abs(gap.x) + abs(gap.y) + abs(gap.z))
@@ -225,7 +225,7 @@ def _cast_facets(sweep, work, radius, limit, best, row):
     """
     cast = open_cast(
         sweep.pair, sweep.d, radius, 0.0, sweep.error, sweep.size, work.doubles_at, work.integers_at
-    )  # fmt: skip
+    )
     met = cast_line(cast, limit, False)
     status = met.status
     if met.lower > best:
@@ -298,7 +298,7 @@ def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
     work = _Work(
         view_f64(corners_at, 48), view_i64(integers_at + 8 * CAST_INTEGERS, STACK),
         view_f64(corners_at + 8 * 48, STACK), doubles_at, integers_at,
-    )  # fmt: skip
+    )
     for k in range(first, n):
         begin = count[0]
         question = view_f64(header[QUESTIONS_AT] + 8 * QUESTION * k, QUESTION)

@@ -100,7 +100,7 @@ def answer_part_pairs(parts: PosedParts, pairs: np.ndarray, questions: np.ndarra
     cast_pairs(
         *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(pairs),
         address_of(questions), len(pairs), address_of(rows), *workspace(),
-    )  # fmt: skip
+    )
     _settle_starts(parts, pairs, rows, marks)
     for i in np.flatnonzero(rows[:, STATUS] == LEVEL).tolist():
         _settle_level(parts, pairs[i], questions[i], rows[i])
@@ -213,7 +213,7 @@ def _settle_plane(parts: PosedParts, pair, question, row) -> None:
     row[VALUE], row[LOWER], row[UPPER] = rounded(t)
     row[TOUCHING : TOUCHING + 3] = [
         float(v * scale + t * Fraction(d)) for v, d in zip(lowest, question[:3].tolist())
-    ]  # fmt: skip
+    ]
 
 
 def joined(some: list[PairRows]) -> PairRows:

@@ -237,7 +237,7 @@ def _cut_hull(body, numbers, poses, ray, radius, size, slop, both, row, doubles_
     state = UNCLEAR if there.status == OPEN or back.status == OPEN else MET
     chord = Chord(
         state, there.lower, there.value, there.upper, -back.upper, -back.value, -back.lower, -1, -1
-    )  # fmt: skip
+    )
     _put_chord(row, chord)
     put_vec3(row, FIRST_NORMAL, neg(there.normal))
     put_vec3(row, LAST_NORMAL, neg(back.normal))

@@ -28,7 +28,7 @@ Answer = Callable[[np.ndarray, np.ndarray, np.ndarray], PairRows]
 def rows_ahead(
     casts: np.ndarray, boxes_of: Callable[[int], tuple[np.ndarray, np.ndarray]], vectors: np.ndarray,
     limits: np.ndarray, answer: Answer, first: int,
-) -> Iterator[PairRows]:  # fmt: skip
+) -> Iterator[PairRows]:
     """Rows of pairs of items of unions, all that may be first contacts among them.
 
     casts : (k,) numbers of casts, of whose pairs only those are asked that they may come to first.

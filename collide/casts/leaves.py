@@ -23,4 +23,4 @@ def leaves_of(shape: Shape, X_AS: np.ndarray = IDENTITY) -> list[Leaf]:
         return [Leaf(shape, X_AS)]
     return [
         leaf for item, X_SI in shape.items for leaf in leaves_of(item, X_SI if X_AS is IDENTITY else X_AS @ X_SI)
-    ]  # fmt: skip
+    ]

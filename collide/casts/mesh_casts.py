@@ -142,7 +142,7 @@ def _candidates(A: _Side, B: _Side, vectors: np.ndarray, limits: np.ndarray) -> 
                 address_of(B.poses.rows), POSE, POSE, address_of(questions), address_of(candidates), capacity,
             ],
             dtype=np.int64,
-        )  # fmt: skip
+        )
         assert len(header) == HEADER
         before, count[0] = done, 0
         done = cast_into_tree(address_of(header), done, n, address_of(count), *_workspace.addresses)

@@ -76,7 +76,7 @@ def common(a, b):
         MET if met else UNCLEAR, first_lower, max(a.first, b.first), first_upper, last_lower, min(a.last, b.last),
         last_upper, a.first_side if a.first >= b.first else b.first_side,
         a.last_side if a.last <= b.last else b.last_side,
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -95,7 +95,7 @@ def together(a, b):
         state, min(a.first_lower, b.first_lower), min(a.first, b.first), first_upper, last_lower, max(a.last, b.last),
         max(a.last_upper, b.last_upper), a.first_side if a.first <= b.first else b.first_side,
         a.last_side if a.last >= b.last else b.last_side,
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -118,7 +118,7 @@ def ball_chord(m, g, radius, error, side):
     return Chord(
         MET if rest > slack else UNCLEAR, middle - outer - off, middle - half, middle - inner + off,
         middle + inner - off, middle + half, middle + outer + off, side, side,
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -137,7 +137,7 @@ def slab_chord(origin, step, low, high, line, low_side, high_side):
     if step > 0.0:
         return Chord(
             MET, near - near_off, near, near + near_off, far - far_off, far, far + far_off, low_side, high_side
-        )  # fmt: skip
+        )
     return Chord(MET, far - far_off, far, far + far_off, near - near_off, near, near + near_off, high_side, low_side)
 
 

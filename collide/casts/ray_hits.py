@@ -92,7 +92,7 @@ def first_of_each(events: RayEvents) -> RayEvents:
     certified = np.logical_and.reduceat(events.certified | ~matters, starts)
     return first._replace(
         t=t, proven=np.logical_or.reduceat(events.proven, starts), certified=certified
-    )  # fmt: skip
+    )
 
 
 def as_hits(events: RayEvents, origins: np.ndarray, directions: Directions, *, every: bool, single: bool) -> RayHits:
@@ -105,7 +105,7 @@ def as_hits(events: RayEvents, origins: np.ndarray, directions: Directions, *, e
     columns = (
         np.ones(len(ray), dtype=bool), t[:, 0], t[:, 1], t[:, 2], origins[ray] + t[:, :1] * step, events.normal,
         events.facet, None, events.certified, events.item,
-    )  # fmt: skip
+    )
     if every:
         starts = np.concatenate([[0], np.cumsum(np.bincount(ray, minlength=n))])
         return RayHits(np.diff(starts) > 0, *columns[1:7], starts, *columns[8:])

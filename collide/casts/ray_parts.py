@@ -67,7 +67,7 @@ def parts_met(
         cut_parts(
             *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(questions),
             address_of(rays), len(questions), every, address_of(rows), *_workspace.addresses,
-        )  # fmt: skip
+        )
     limits = directions.limits(limit)[questions[:, 0]]
     met = np.flatnonzero(rows[:, STATE] != MISSED)
     rows, asked, limits = rows[met], questions[met], limits[met]
@@ -85,7 +85,7 @@ def parts_met(
 def candidate_parts(
     parts: PosedParts, tree: BoxTree, first: np.ndarray, skipped: np.ndarray, meshed: np.ndarray, origins, directions,
     limit: float, every: bool,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """(k, 2) int64: rays and parts that may make a ray's first wall, or any, of the bodies of a tree that have an end.
 
     first : (bodies + 1,) the first part of each.   skipped, meshed : (bodies,) int64, 1 of those not asked, and of
@@ -100,14 +100,14 @@ def candidate_parts(
             address_of(skipped), address_of(meshed),
         ],
         dtype=np.int64,
-    )  # fmt: skip
+    )
     capacity = 64 + 4 * n
     while True:
         pairs = np.empty((capacity, 2), dtype=np.int64)
         count = parts_on_rays(
             *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(header),
             address_of(rays), address_of(limits), n, every, address_of(pairs), capacity, *_workspace.addresses,
-        )  # fmt: skip
+        )
         if count <= capacity:
             return pairs[:count]
         capacity = count
@@ -143,7 +143,7 @@ def _events(rows, met, asked, limits, exact, directions: Directions) -> RayEvent
     """The ends of chords that count: from the origin to the limit."""
     both = []
     ends = (FIRST, FIRST_LOWER, FIRST_UPPER, FIRST_NORMAL, FIRST_SIDE), (LAST, LAST_LOWER, LAST_UPPER, LAST_NORMAL,
-                                                                         LAST_SIDE)  # fmt: skip
+                                                                         LAST_SIDE)
     for value, lower, upper, normal, side in ends:
         counts = np.isfinite(rows[:, value]) & (rows[:, upper] >= 0.0) & (rows[:, lower] <= limits)
         proven = (rows[:, STATE] == MET) & (rows[:, lower] >= 0.0) & (rows[:, upper] <= limits)
@@ -159,7 +159,7 @@ def _events(rows, met, asked, limits, exact, directions: Directions) -> RayEvent
                 asked[k, 0], t, rows[k][:, normal : normal + 3], rows[k, side].astype(np.int64), met[k], proven[k],
                 proven[k] & narrow,
             )
-        )  # fmt: skip
+        )
     ray = np.concatenate([events.ray for events in both])
     t = np.concatenate([events.t for events in both])
     with np.errstate(over="ignore", under="ignore"):

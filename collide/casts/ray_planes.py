@@ -103,7 +103,7 @@ def _span_of(region: HPolytope, X_WA: np.ndarray, origin: np.ndarray, direction:
     return _Span(
         enters[0] if enters else None, leaves[0] if leaves else None, enters[1] if enters else -1,
         leaves[1] if leaves else -1, along,
-    )  # fmt: skip
+    )
 
 
 def _candidates(region: HPolytope, X_WA: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> np.ndarray | None:

@@ -96,7 +96,7 @@ def surfaces_met(
     numbers = np.arange(len(items))
     events = [
         _on_parts([items[k] for k in numbers[~meshed]], numbers[~meshed], X_WA, origins, directions, limit, every)
-    ]  # fmt: skip
+    ]
     for k in numbers[meshed].tolist():
         mesh, X_AM = items[k]
         body = body_of(mesh)

@@ -76,7 +76,7 @@ def _tree_at(header_at):
         view_f64(header[NODES_AT], 6 * header[N_NODES]), view_i64(header[LINKS_AT], LINK * header[N_NODES]),
         header[N_NODES], view_i64(header[FIRST_AT], n + 1), view_i64(header[SKIPPED_AT], n),
         view_i64(header[MESHED_AT], n),
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -126,7 +126,7 @@ def _push_met(tree, walk, node, end, top, best):
 def parts_on_rays(
     ints_at, numbers_at, poses_at, shape_of_at, tree_at, rays_at, limits_at, n, every, pairs_at, capacity, doubles_at,
     integers_at,
-):  # fmt: skip
+):
     """Pairs (ray, part) that may make the first wall of n rays, or any; returns how many there are.
 
     ints, numbers, poses, shape_of : as of `cut_parts`.   tree : TREE_OF_PARTS integers.   rays : RAY doubles each.
@@ -145,7 +145,7 @@ def parts_on_rays(
             view_i64(integers_at + 8 * CAST_INTEGERS, _STACK),
             view_f64(doubles_at + 8 * (RAY_DOUBLES + RAY_ROW), _STACK), view_f64(doubles_at + 8 * RAY_DOUBLES, RAY_ROW),
             doubles_at, integers_at,
-        )  # fmt: skip
+        )
         best = limits[k]
         for axis in range(3):
             walk.inverse[axis] = 1.0 / walk.ray[3 + axis] if walk.ray[3 + axis] != 0.0 else math.inf

@@ -73,7 +73,7 @@ def are_to_be_asked_again(ways: list[Way], hit: np.ndarray, limits: np.ndarray) 
     return np.flatnonzero([
         not met and not way.misses and way.far > way.near and limit > way.near
         for way, met, limit in zip(ways, hit.tolist(), limits.tolist())
-    ])  # fmt: skip
+    ])
 
 
 def are_proven(ways: list[Way], hit: np.ndarray, limits: np.ndarray) -> np.ndarray:

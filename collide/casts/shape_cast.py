@@ -157,4 +157,4 @@ def as_casts(rows: CastRows, directions: Directions) -> ShapeCasts:
     return ShapeCasts(
         rows.hit, t[:, 0], t[:, 1], t[:, 2], rows.point, rows.normal, rows.certified, rows.at_start, rows.item_a,
         rows.item_b,
-    )  # fmt: skip
+    )

@@ -90,7 +90,7 @@ def open_cast(pair, direction, radius_a, radius_b, error, size, doubles_at, inte
         pair, view_f64(doubles_at, POINT * SLOTS), view_f64(doubles_at + 8 * POINT * SLOTS, 2 * SLOTS),
         view_i64(integers_at, 2 * SLOTS), view_i64(integers_at + 16 * SLOTS, 2 * SLOTS), e, length, across, up,
         radius_a, radius_b, error, size,
-    )  # fmt: skip
+    )
 
 
 @kernel

@@ -84,7 +84,7 @@ def make_region_certificate(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarr
     return RegionCertificate(
         kind, tuple(pair.points), tuple(Fraction(weight, pair.denominator) for weight in pair.weights),
         tuple(int(near[row]) for row in pair.halfspaces), tuple(multipliers),
-    )  # fmt: skip
+    )
 
 
 def flaw_of_region_certificate(A: Shape, B: Shape, X_WA, X_WB, certificate, claim: str) -> str | None:
@@ -153,7 +153,7 @@ def _read(values) -> RegionCertificate:
         read = RegionCertificate(
             kind, tuple(map(int, vertices)), tuple(map(Fraction, weights)), tuple(map(int, rows)),
             tuple(map(Fraction, multipliers)),
-        )  # fmt: skip
+        )
     except (TypeError, ValueError, ZeroDivisionError):
         read = None
     if read is None or len(read.vertices) != len(read.weights) or len(read.halfspaces) != len(read.multipliers):

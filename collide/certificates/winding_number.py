@@ -12,7 +12,7 @@ from collide.numerics.exact_vectors import cross, inner, minus
 #: Directions of the rays tried one after another, until one passes no edge and no corner.
 _DIRECTIONS: tuple[Point, ...] = (
     (7919, 104729, 1299709), (-15485863, 32452843, 49979687), (86028121, -3, 17), (5, 982451653, -373587883),
-)  # fmt: skip
+)
 
 
 def winding_number(points: PlacedPoints, faces: np.ndarray) -> int:

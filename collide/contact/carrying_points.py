@@ -143,7 +143,7 @@ def _next_compared(space, k, n, stride, n_corners, walk):
 @kernel
 def _span_on_border(
     p, at_i, n_before, n, stride, n_corners, tolerance, space, base_u, base_v, along_u, along_v
-):  # fmt: skip
+):
     """(low, high): for which t the slope base + t · along is left by the points before; low > high for none."""
     low, high = -math.inf, math.inf
     walk = 0

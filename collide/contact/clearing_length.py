@@ -100,7 +100,7 @@ def _facets_part(pairs, A, B, axes, length, clearing, move_a):
     trees, invertible = pose_trees(
         open_tree(clearing.tree_a), clearing.words, open_tree(clearing.tree_b), clearing.words + 128, clearing.doubles,
         clearing.doubles + 8 * (PLACING + CORNERS), PROBE, clearing.integers, clearing.exact,
-    )  # fmt: skip
+    )
     if not invertible:
         return False
     triangles = view_f64(clearing.words + 256, 18)

@@ -77,7 +77,7 @@ def _tips_of(face):
     return Tips(
         first, second, (face.corners[3 * first] - face.corners[3 * second]) / length,
         (face.corners[3 * first + 1] - face.corners[3 * second + 1]) / length,
-    )  # fmt: skip
+    )
 
 
 @kernel

@@ -57,7 +57,7 @@ class PartPairs(NamedTuple):
 def contact_batch(
     A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, margin: float, max_contacts: int, *, check: bool = False,
     threads: int = 1,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """(rows, ends) of n pairs: rows of `CONTACT_DTYPE`, pair after pair, and where those of each pair end.
 
     A, B : shapes, or sequences of n shapes.   X_WA, X_WB : (n, 4, 4) or (1, 4, 4), finite.   check : refuse matrices
@@ -176,7 +176,7 @@ def _rows_of_parts(
             Picked(shape_set, some.A), Picked(shape_set, some.B), np.ascontiguousarray(some.X_WA),
             np.ascontiguousarray(some.X_WB), margin, max_contacts, slack=np.ascontiguousarray(some.slack),
             threads=threads,
-        )  # fmt: skip
+        )
         counts[convex] = np.diff(ends, prepend=0)
         blocks.append(rows)
     owners = [np.repeat(convex, counts[convex])]

@@ -53,7 +53,7 @@ from collide.narrowphase.rows import BEYOND, LOWER, ROW, is_undecided_or_refused
 (
     WHICH_AT, XA_AT, STEP_A, XB_AT, STEP_B, OF_PAIR_AT, IDS_AT, SLACK_AT, OUT_AT, CAPACITY, ENDS_AT, LIMIT, CHECK,
     PLACES_AT, BEGIN, IS_ANSWERED, N_GENERAL,
-) = range(SINGLE_HEADER, SINGLE_HEADER + 17)  # fmt: skip
+) = range(SINGLE_HEADER, SINGLE_HEADER + 17)
 BLOCK_HEADER = SINGLE_HEADER + 17
 #: Why a call ended: all is done; rows of the block are open, for the exact stage; a matrix is no pose; no space for
 #: rows; a pair whose depth has no end.

@@ -48,7 +48,7 @@ def open_facets(body, topology_at, X_at, shift):
         view_f64(tree[TRIANGLES_AT], 9 * m),
         view_i32(words[CORNERS_AT], 3 * m), view_i32(words[PLACES_AT], m), view_i32(words[FANS_AT], 3 * m),
         view_i32(words[FAN_STARTS_AT], n_corners + 1), view_i32(words[EDGES_AT], 3 * m), n_corners,
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

@@ -89,7 +89,7 @@ def open_pairs(words_at, capacity, n):
     return ContactPairs(
         n, near, facets, corners, normals, ids, keys, by_key, key_starts, seen_keys, states, groups, queue, tried,
         search, directions, slacks, gaps, order, table,
-    )  # fmt: skip
+    )
 
 
 @kernel

@@ -220,7 +220,7 @@ def _least_point(points, n):
     return NearestPoint(
         p[at], p[at + V], p[at + GAP], p[at + HEIGHT], points.errors[least], points.pairs[least], features[2 * least],
         features[2 * least + 1],
-    )  # fmt: skip
+    )
 
 
 @kernel

@@ -387,7 +387,7 @@ def _line_seen(pairs, k, side, i, body, rounding, seen):
     return Line(
         vec3_at(seen, at + 3 * i), vec3_at(seen, at + 3 * j), rounding, rounding, 4 * pairs.ids[ids + i] + VERTEX,
         4 * pairs.ids[ids + j] + VERTEX, 4 * int(body.edges[3 * facet + i]) + EDGE,
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -398,7 +398,7 @@ def _slopes_at(pairs, k, side, i, body, axes):
     return edge_slopes(
         body, pairs.ids[ids + i], pairs.ids[ids + j], vec3_at(pairs.corners, at + 3 * i),
         vec3_at(pairs.corners, at + 3 * j), axes.nhat if side == 0 else neg(axes.nhat), _SUPPORTING,
-    )  # fmt: skip
+    )
 
 
 @kernel

@@ -31,7 +31,7 @@ _ALL_CONTACTS = 2**31 - 1
 def contacts(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, margin: float = 0.0, max_contacts: int = 8,
     check_poses: bool = True, threads: int = 1,
-) -> Contacts:  # fmt: skip
+) -> Contacts:
     """Contact manifolds of A and B: where they touch, overlap, or come within a margin.
 
     Parameters

@@ -91,7 +91,7 @@ class ConvexPairs(NamedTuple):
 def convex_contacts(
     A, B, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, max_contacts: int, *, slack: np.ndarray | None = None,
     check: bool = False, threads: int = 1,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """(rows, ends): contacts of pairs of single convex sets, pair after pair, and where those of each end.
 
     A, B : shapes, or shapes `Picked` from one set pose by pose.   X_WA, X_WB : C-contiguous (n, 4, 4), or (1, 4, 4) for
@@ -161,7 +161,7 @@ def _contacts_of(pairs: ConvexPairs, asked: _Asked) -> tuple[np.ndarray, np.ndar
         _address_or_0(pairs.which), address_of(pairs.X_WA), 16 * (len(pairs.X_WA) > 1), address_of(pairs.X_WB),
         16 * (len(pairs.X_WB) > 1), _address_or_0(pairs.of_pair), _address_or_0(pairs.ids), _address_or_0(pairs.slack),
         address_of(out), len(out), address_of(ends),
-    )  # fmt: skip
+    )
     header[CHECK], header[PLACES_AT] = asked.check, address_of(places)
     n_done, n_rows = HEADER_OF_POSES + PAIRS_DONE, HEADER_OF_POSES + ROWS_DONE
     while status := contacts_of_pairs(address_of(header), n):
@@ -202,7 +202,7 @@ def _addresses(
     return (
         *table.addresses, address_of(faces.ints), address_of(poses), address_of(shape_of),
         address_of(space.doubles), address_of(space.integers), faces.largest,
-    )  # fmt: skip
+    )
 
 
 def prepare_contacts(A, B) -> None:

@@ -157,13 +157,13 @@ def _patches(
     header[:POSE_A] = (
         body.tree.address, address_of(topology.header), body.solid, len(slots), *table.addresses,
         address_of(faces.ints), faces.largest, *map(address_of, buffers), capacity, min(max_contacts, 1 << 40),
-    )  # fmt: skip
+    )
     ends, lacks = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     out = np.zeros(_FIRST_ROWS + _ROWS_PER_POSE * n, dtype=CONTACT_DTYPE)
     while curved_manifolds(
         address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), n, margin,
         0 if slack is None else address_of(slack), address_of(out), len(out), address_of(ends), address_of(lacks),
-    ):  # fmt: skip
+    ):
         out[header[ROWS_DONE] :] = np.zeros((), dtype=CONTACT_DTYPE)
         out = np.concatenate([out, np.zeros(2 * len(out), dtype=CONTACT_DTYPE)])
     return out[: header[ROWS_DONE]], ends, lacks
@@ -172,7 +172,7 @@ def _patches(
 def _shortened(
     body: Body, packed: PackedConvex, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, rows: np.ndarray,
     ends: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Rows whose ``apart`` is no longer than what facets, asked again, prove: B moved by it clears them, and A."""
     pose = np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))
     begins = np.flatnonzero((np.diff(pose, prepend=-1) != 0) | (np.diff(rows["patch"], prepend=-1) != 0))
@@ -197,7 +197,7 @@ def _shortened(
 def _parted(
     body: Body, packed: PackedConvex, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, rows: np.ndarray,
     pose: np.ndarray, length: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """(m,) bool: whether the set moved by a length along the normal of a patch is proven clear of the patch's facets,
     and so is the mesh moved against it.
     """

@@ -50,7 +50,7 @@ from collide.numerics.vec3 import Vec3, add, neg, norm, norm1, scale, sub, vec3_
 (
     TREE_AT, TOPOLOGY_AT, SOLID, N_MESH, INTS_AT, NUMBERS_AT, FACES_AT, LARGEST, FACETS_AT, ROWS_AT, STARTS_AT,
     PATCHES_AT, SLOTS_AT, SEEN_AT, WORDS_AT, CAPACITY, MAX_CONTACTS, POSE_A, POSE_B, POSES_DONE, ROWS_DONE,
-) = range(21)  # fmt: skip
+) = range(21)
 HEADER = 21
 #: Facets that meet the set whose normals are tried where none of them starts a patch.
 _TRIED = 16
@@ -139,7 +139,7 @@ def _open_near(words, at, first, n, error, pair):
         view_i64(words[SEEN_AT], mesh.n_corners), origin, error, sub(vec3_at(R, 9), origin), axis, points, face,
         face_features, face_edges, Clipped(points_1, sides_1), Clipped(points_2, sides_2),
         ManifoldPoints(overlap, features),
-    )  # fmt: skip
+    )
     return near, at
 
 
@@ -166,7 +166,7 @@ def _open_task(header_at, first, n, margin, slack, out_at, capacity):
     error = 8.0 * error + pair.numbers[SLOP] + slack
     return _Task(
         near, pair, words[FACES_AT], buffers_at, buffers_at + 24 * largest, largest, pair.numbers[RADIUS], error, space,
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -260,7 +260,7 @@ def _put_patch(task, k, nhat, feature, number, n_rows):
         nearest = NearestPoint(
             a.x, a.y, distance, a.z + 0.5 * distance, max(bracket, 4.0 * near.error), k, feature,
             of_set.features[0] if of_set.n == 1 else of_set.feature,
-        )  # fmt: skip
+        )
         n = put_nearest(points, n, nearest, task.radius)
     first = task.space.out + CONTACT * n_rows
     n_rows = _put_rows(task, axes, n, meets, number, n_rows)

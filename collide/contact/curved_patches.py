@@ -202,7 +202,7 @@ def _empty_face(near):
     return SupportFace(
         zero, zero, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, near.face, near.face_features, near.face_edges,
         np.int64(-1),
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -238,7 +238,7 @@ def _face_of(near, k, axes):
             face = SupportFace(
                 np.int64(3), np.int64(facet), p.x, p.y, p.z, slope_u, slope_v, 0.0, 0.0, 0.0, near.face,
                 near.face_features, near.face_edges, np.int64(4 * facet + FACE),
-            )  # fmt: skip
+            )
             return face, 32.0 * near.error + 64.0 * near.error * longest * spread / abs(area)
     return _edge_of(near, facet)
 
@@ -265,7 +265,7 @@ def _edge_of(near, facet):
     return SupportFace(
         np.int64(2), np.int64(facet), p.x, p.y, p.z, 0.0, 0.0, 0.0, 0.0, 0.0, near.face, near.face_features,
         near.face_edges, edge,
-    ), 32.0 * near.error  # fmt: skip
+    ), 32.0 * near.error
 
 
 @kernel

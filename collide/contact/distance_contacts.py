@@ -13,7 +13,7 @@ from collide.shapes.shape import Shape
 def with_distances(
     A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: np.ndarray, rows: np.ndarray, ends: np.ndarray,
     lacks: np.ndarray, *, reach: float = np.inf,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """(rows, ends) with those of `distance` behind the contacts of the poses that lack them.
 
     limit : (n,) none is added beyond it where there are no others [m].   reach : nothing farther is looked for [m].

@@ -75,7 +75,7 @@ _list_pairs = native_call(facets_within.SIGNATURE)
 # max_contacts; then what a call has done: poses, rows.
 (
     TOPOLOGY_A, TOPOLOGY_B, LIMIT, NEAR_CODE, WORDS_AT, CAPACITY, IS_LARGEST, MAX_CONTACTS, POSES_DONE, ROWS_DONE,
-) = range(HEADER, HEADER + 10)  # fmt: skip
+) = range(HEADER, HEADER + 10)
 CONTACT_HEADER = HEADER + 10
 #: Why a call ended: all is done; no place for rows; none for pairs; more pairs than may be looked at; a matrix that
 #: places no mesh.
@@ -167,7 +167,7 @@ def _open_rows(task, max_contacts, out_at, capacity):
     hull = HullSpace(
         view_i64(numbers_at, n), view_i64(numbers_at + 8 * n, n), view_i64(numbers_at + 16 * n, n),
         view_i64(cells_at, CELLS),
-    )  # fmt: skip
+    )
     X = view_f64(task.pair.XA_at, 16)
     return PatchSpace(target, hull, Vec3(X[3], X[7], X[11]), out_at, capacity, max_contacts, task.margin)
 
@@ -178,7 +178,7 @@ def _open_clearing(task):
     return Clearing(
         pair.A.tree_at, pair.B.tree_at, pair.XA_at, pair.XB_at, space.exact, space.doubles_at, space.integers_at,
         _fixed_at(task) + 8 * TRANSLATION_WORDS, pair.A.radius + pair.B.radius, task.error,
-    )  # fmt: skip
+    )
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64, int64)")
@@ -231,7 +231,7 @@ def _contacts_at(header_at, XA_at, XB_at, margin, out_at, capacity, first):
     task = _Task(
         pair, open_space(header_at), topology_a, topology_b, view_f64(header_at + 8 * LIMIT, 1)[0], margin, error,
         words[WORDS_AT], words[CAPACITY], words[IS_LARGEST] != 0, words[NEAR_CODE],
-    )  # fmt: skip
+    )
     if balls_farther_than(pair, _reach_of(task)):
         return DONE, first, False
     rows = _open_rows(task, words[MAX_CONTACTS], out_at, capacity)
@@ -256,7 +256,7 @@ def _list(task, reach, measures):
             task.words_at + 8 * NUMBERS_OF_PAIR * task.capacity, task.capacity, space.stack_at, space.n_stack,
             space.doubles_at, space.integers_at, space.exact, measures,
         ),
-    )  # fmt: skip
+    )
     if n >= 0:
         return DONE, n
     if n != -FULL:

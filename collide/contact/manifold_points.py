@@ -94,7 +94,7 @@ def line_of(edge):
     return Line(
         vec3_at(edge.corners, 0), vec3_at(edge.corners, 3), edge.round_p, edge.round_q, edge.features[0],
         edge.features[1], edge.edges[0],
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -104,7 +104,7 @@ def side_of(face, side):
     return Line(
         vec3_at(face.corners, 3 * side), vec3_at(face.corners, 3 * following), 0.0, 0.0, face.features[side],
         face.features[following], face.edges[side],
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -171,7 +171,7 @@ def _put_corner(face_a, face_b, before, side, u, v, tolerance, manifold, k):
         _put(
             manifold, k, u, v, height_at(face_a, u, v), face_b.corners[3 * corner + 2], face_a.feature,
             face_b.features[corner],
-        )  # fmt: skip
+        )
     else:
         of_a, of_b = (side, before) if side >= 0 else (before, side)
         corner = corner_of_b(face_b, -1 - of_b)
@@ -179,7 +179,7 @@ def _put_corner(face_a, face_b, before, side, u, v, tolerance, manifold, k):
         _put(
             manifold, k, u, v, height_at(face_a, u, v), height_at(face_b, u, v), face_a.edges[of_a],
             face_b.edges[edge],
-        )  # fmt: skip
+        )
 
 
 @kernel
@@ -430,7 +430,7 @@ def _within_ends(a, b, shared, tolerance):
             past = max(
                 _past_end(a, t, 1.0, at.share * at.beside_u, at.share * at.beside_v, at.fall_a),
                 _past_end(b, _parameter_of_b(shared, t), -1.0, rest * at.beside_u, rest * at.beside_v, at.fall_b),
-            )  # fmt: skip
+            )
             if past <= tolerance:
                 break
             if end == 0:

@@ -124,7 +124,7 @@ def _of_poses(
     header[HEADER:POSES_DONE] = (
         *(address_of(topology.header) for topology in topologies), 0, code_of(list_near_pairs), *space.described,
         min(max_contacts, 1 << 40),
-    )  # fmt: skip
+    )
     header.view(np.float64)[LIMIT] = _longest_translation(*ordered)
     ends, lacks = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.uint8)
     out = np.zeros(_FIRST_ROWS + _ROWS_PER_POSE * n, dtype=CONTACT_DTYPE)
@@ -132,7 +132,7 @@ def _of_poses(
         status = facet_manifolds(
             address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), n, margin,
             0 if slack is None else address_of(slack), address_of(out), len(out), address_of(ends), address_of(lacks),
-        )  # fmt: skip
+        )
         if status == DONE:
             break
         if status == ROWS_FULL:

@@ -171,7 +171,7 @@ def support_face(pair, body, faces_at, axes, sign, shift, capacity, doubles_at, 
     return SupportFace(
         n, triangle, base.x, base.y, base.z, -N.x / N.z, -N.y / N.z, flatness, 0.0, 0.0, corners, features, edges,
         feature,
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -208,7 +208,7 @@ def swept_face(face, sign, radius, error):
     return SupportFace(
         n, face.triangle, base.x, base.y, base.z, face.slope_u, face.slope_v, face.flatness + unknown * radius,
         radius if n == 2 else 0.0, radius if n == 2 else 0.0, corners, face.features, face.edges, face.feature,
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

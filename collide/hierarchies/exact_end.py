@@ -84,4 +84,4 @@ def end_exactly(
     return ExactEnds(
         proven, rows["hit"].copy(), rows["exact"].astype(np.int64), rows["vertices_a"], rows["vertices_b"],
         rows["count"].astype(np.int64),
-    )  # fmt: skip
+    )

@@ -67,7 +67,7 @@ def _from_cycles(points: np.ndarray, cycles: list[np.ndarray]) -> FlatHierarchy:
     return FlatHierarchy(
         points, birth, np.full(count, -1, dtype=np.int32), row, *_lists(ring), *_lists(gone), starts,
         np.concatenate(cycles).astype(np.int32),
-    )  # fmt: skip
+    )
 
 
 def _lists(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

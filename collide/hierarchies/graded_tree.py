@@ -89,7 +89,7 @@ def graded_tree(vertices: np.ndarray, faces: np.ndarray) -> GradedTree:
     used = fill_graded(
         address_of(facets), m, address_of(low), width, levels, address_of(nodes), address_of(order), address_of(owner),
         address_of(outlier), address_of(scratch), address_of(stack), len(stack),
-    )  # fmt: skip
+    )
     return GradedTree(low, width, nodes[:used].copy(), order, owner, outlier != 0, levels)
 
 

@@ -122,7 +122,7 @@ def count_walk(A: BoxHierarchy, B: BoxHierarchy, X_AB: np.ndarray | None = None)
         opens_a = (n_a > 0) & ~opens_b
         waiting += [
             more for more in (_opened(A, pairs[opens_a], 0), _opened(B, pairs[opens_b], 1)) if len(more)
-        ]  # fmt: skip
+        ]
     return WalkCounts(compared, meeting, facet_pairs)
 
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.hierarchies.half_edges import USED
-from collide.hierarchies.independent_sets import (  # fmt: skip
+from collide.hierarchies.independent_sets import (
     ANCHORS,
     REMOVED,
     STATE,
@@ -175,7 +175,7 @@ class _Building:
         return (
             address_of(self.corners), address_of(self.twins), len(self.corners) // 3, address_of(self.leaving),
             len(self.leaving),
-        )  # fmt: skip
+        )
 
     def keep_level(self) -> None:
         """Write down the present surface."""
@@ -212,7 +212,7 @@ class _Building:
             address_of(self.degree), address_of(self.blocked), address_of(order), bound, max_degree,
             address_of(scratch),
             address_of(self.state),
-        )  # fmt: skip
+        )
 
     def _cut(self) -> None:
         """Cut the vertices over the bound, those of the largest degree first, but for neighbours of one cut before."""
@@ -232,7 +232,7 @@ class _Building:
                 *self.cloud.addresses, self.cloud.exponent, self.cloud.count, *self._mesh[:4],
                 address_of(self.seen), address_of(self.degree), address_of(self.blocked), w, first, free,
                 address_of(scratch), address_of(self.state),
-            )  # fmt: skip
+            )
             if n_new < 0:
                 continue
             self.parent[first : first + n_new] = w

@@ -72,7 +72,7 @@ def hierarchy_distance(A: PackedHierarchy, B: PackedHierarchy, rotation: np.ndar
     nearest(
         A.address, B.address, max_a, max_b, address_of(pose), address_of(doubles), address_of(integers),
         address_of(result), address_of(counters),
-    )  # fmt: skip
+    )
     ids_at = max_a + max_b + 10
     vertices = integers[ids_at : ids_at + _IDS].reshape(2, 3).T
     return Nearest(math.sqrt(result[0]), result[1:4], result[4:7], counters, vertices)

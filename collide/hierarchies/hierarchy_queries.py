@@ -47,7 +47,7 @@ class Walks:
 
     __slots__ = (
         "_ends", "_question", "depth_p", "depth_q", "exact_rounds", "exchanged", "hit", "rows", "trace", "walked",
-    )  # fmt: skip
+    )
 
     def __init__(self, question, hit, rows, exchanged, depths, trace):
         self._question, self.hit, self.rows, self.exchanged, self.trace = question, hit, rows, exchanged, trace
@@ -64,7 +64,7 @@ class Walks:
         self.exact_rounds[proven] = ends.rounds[ends.proven]
         for k, p, r, count in zip(ids[ends.proven].tolist(), *(
             field[ends.proven].tolist() for field in (ends.vertices_p, ends.vertices_r, ends.counts)
-        )):  # fmt: skip
+        )):
             self._ends[k] = [(j, i) if self.exchanged else (i, j) for i, j in zip(p[:count], r[:count])]
 
     def __len__(self) -> int:

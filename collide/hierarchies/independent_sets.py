@@ -38,7 +38,7 @@ def mesh_at(corners_at, twins_at, triangles, leaving_at, rows, state_at):
     return HalfEdges(
         view_i32(corners_at, 3 * triangles), view_i32(twins_at, 3 * triangles), view_i32(leaving_at, rows),
         view_i64(state_at, STATE),
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -106,7 +106,7 @@ def write_level(corners_at, twins_at, triangles, leaving_at, rows, vertices_at, 
 def thin(
     scaled_at, originals_at, rows, work_at, digits_at, centres, corners_at, twins_at, triangles, leaving_at,
     vertices_at, count, degree_at, blocked_at, order_at, bound, max_degree, scratch_at, state_at,
-):  # fmt: skip
+):
     """Remove an independent set; ``blocked`` vertices stay, and become more: neighbours of those that leave.
 
     degree : by row, kept up to date; 0 for a vertex removed.

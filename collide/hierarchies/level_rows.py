@@ -34,7 +34,7 @@ def by_vertex(levels, points: int, parent: np.ndarray):
     arguments = (
         points, address_of(birth), address_of(last), address_of(parent), address_of(row), rows, address_of(start),
         address_of(neighbours), address_of(removed_start),
-    )  # fmt: skip
+    )
     write_removed(*arguments, 0, 0)
     np.cumsum(removed_start, out=removed_start)
     removed = np.empty(removed_start[-1], dtype=np.int32)
@@ -44,7 +44,7 @@ def by_vertex(levels, points: int, parent: np.ndarray):
     return (
         birth, last, row, start, neighbours, removed_start, removed, level_start,
         np.concatenate([vertices for vertices, _, _ in levels]),
-    )  # fmt: skip
+    )
 
 
 @entry("void(int64, int64, int64, int64, int64)")

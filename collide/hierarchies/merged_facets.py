@@ -56,7 +56,7 @@ def merged_facets(
         address_of(cloud.originals), len(cloud.originals), address_of(triangles), address_of(twins), len(triangles),
         address_of(patch), address_of(listed), address_of(start), len(polar), address_of(order), address_of(centre),
         address_of(points), address_of(floor), address_of(taken_by), address_of(stack),
-    )  # fmt: skip
+    )
     keep = np.flatnonzero(taken_by == np.arange(len(polar)))
     return keep, np.searchsorted(keep, taken_by), patch
 
@@ -65,7 +65,7 @@ def merged_facets(
 def merge_facets(
     points_at, rows, corners_at, twins_at, count, patch_at, listed_at, start_at, facets, order_at, origin_at, polar_at,
     floor_at, taken_by_at, stack_at,
-):  # fmt: skip
+):
     """Write for each facet the one that stands for it, itself where none does.
 
     listed, start : the triangles of each facet.   order : facets as they are to be taken.

@@ -33,7 +33,7 @@ class PackedHierarchy:
             hierarchy.points, hierarchy.birth, hierarchy.parent, hierarchy.row, hierarchy.neighbour_start,
             hierarchy.neighbours, hierarchy.removed_start, hierarchy.removed, hierarchy.level_start,
             hierarchy.level_vertices,
-        )  # fmt: skip
+        )
         kinds = np.float64, np.int32, np.int32, np.int64, np.int64, np.int32, np.int64, np.int32, np.int64, np.int32
         self._arrays = tuple(np.ascontiguousarray(array, dtype=kind) for array, kind in zip(arrays, kinds))
         points, birth, parent, row, starts, neighbours, removed_start, removed, level_start, vertices = self._arrays
@@ -45,7 +45,7 @@ class PackedHierarchy:
                 address_of(removed), len(removed), address_of(level_start), address_of(vertices), len(level_start) - 1,
             ],
             dtype=np.int64,
-        )  # fmt: skip
+        )
         self.depth = len(level_start) - 1
         self.max_degree = int(np.diff(starts).max())
         self.bytes = sum(array.nbytes for array in self._arrays)
@@ -85,7 +85,7 @@ def levels_at(address):
         view_i32(header[_NEIGHBOURS_AT], header[_NEIGHBOURS]), view_i64(header[_REMOVED_START_AT], rows + 1),
         view_i32(header[_REMOVED_AT], header[_REMOVED]), view_i64(header[_LEVEL_START_AT], header[_DEPTH] + 1),
         view_i32(header[_LEVEL_VERTICES_AT], rows), header[_DEPTH],
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

@@ -32,7 +32,7 @@ _MAX_STEPS, _MAX_DRAWN = 64.0, 2.0**-30
 def dome_drops(
     points: np.ndarray, triangles: np.ndarray, of_triangle: np.ndarray, origin: np.ndarray, polar: np.ndarray,
     weight: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """(m,) by what part of itself each polar point is to be drawn towards the origin; 0 for most.
 
     points, triangles : R's surface, closed.   of_triangle : (f,), the polar point of each triangle's plane.
@@ -64,7 +64,7 @@ def _large_sides(points, triangles, of_triangle) -> tuple[np.ndarray, np.ndarray
     status = order_rings(
         address_of(points), n, address_of(triangles), f, address_of(starts), address_of(ring), address_of(ring_facets),
         address_of(following), address_of(place), address_of(normals),
-    )  # fmt: skip
+    )
     if status:
         raise AssertionError("the facets of a solid hull are no closed surface")
     degree = np.diff(starts)
@@ -104,7 +104,7 @@ def _steps(polar, across, start, side) -> np.ndarray:
             beyond = (
                 area(middle, end, apex) * steps[low] + area(low, middle, apex) * steps[end]
                 + area(low, end, middle) * steps[apex]
-            ) / whole  # fmt: skip
+            ) / whole
         level = np.maximum(steps[low], steps[end])
         steps[middle] = np.clip(np.where(np.isfinite(beyond), beyond, level) + 1.0, 1.0, _MAX_STEPS)
         apex, first, size = np.concatenate([end, low]), np.tile(first, 2), np.tile(size, 2)

@@ -93,7 +93,7 @@ def interior_point(cloud: Cloud, spans: np.ndarray) -> np.ndarray:
     middles = [
         0.5 * used.min(axis=0) + 0.5 * used.max(axis=0), (used / len(used)).sum(axis=0),
         (corners.sum(axis=1) / 3.0 / len(corners)).sum(axis=0), *_mid_simplices(used),
-    ]  # fmt: skip
+    ]
     order = np.argsort([-_clearance(corners, middle) for middle in middles], kind="stable")
     for k in order.tolist():
         if strictly_inside(cloud, spans, middles[k]):
@@ -137,7 +137,7 @@ def _polar_points(cloud: Cloud, spans: np.ndarray, origin: np.ndarray, extent: n
     write_polar(
         address_of(cloud.originals), len(cloud.originals), address_of(triples), len(triples), address_of(centre),
         address_of(reach), address_of(polar), address_of(proven),
-    )  # fmt: skip
+    )
     for k in np.flatnonzero(proven == 0).tolist():
         polar[k] = _from_fractions(cloud.originals[triples[k]], centre, reach)
     if not np.isfinite(polar).all():

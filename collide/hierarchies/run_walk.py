@@ -73,7 +73,7 @@ def run_walks(
         body_p.hierarchy.address, polar.hierarchy.address, polar.address, *table.addresses,
         address_of(laid_out.rows), n, early, address_of(rows), 0 if rounds is None else address_of(rounds),
         *_of_thread.addresses,
-    )  # fmt: skip
+    )
     if rounds is None or n == 0:
         return rows, ()
     return rows, tuple(_read(k, row) for k, row in enumerate(rounds[: rows["rounds"][-1]]))

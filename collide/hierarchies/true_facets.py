@@ -65,7 +65,7 @@ class Cloud:
         return (
             address_of(self.scaled), address_of(self.originals), len(self.scaled), address_of(self.work),
             address_of(self.digits),
-        )  # fmt: skip
+        )
 
 
 def _centres(points: np.ndarray) -> np.ndarray:
@@ -151,7 +151,7 @@ def _triangulated(triangles, twins, patch, n_facets, extreme, ranks) -> np.ndarr
     trace_borders(
         address_of(triangles), address_of(twins), len(triangles), address_of(patch), n_facets, address_of(strict),
         len(strict), address_of(border), address_of(start), address_of(seen),
-    )  # fmt: skip
+    )
     border = border[: start[-1]]
     size = np.diff(start)
     owner = np.repeat(np.arange(n_facets), size)
@@ -161,7 +161,7 @@ def _triangulated(triangles, twins, patch, n_facets, extreme, ranks) -> np.ndarr
     cut_ears(
         address_of(border), address_of(start), n_facets, address_of(order), address_of(before),
         address_of(after), address_of(made), len(border),
-    )  # fmt: skip
+    )
     return made
 
 
@@ -208,7 +208,7 @@ def cloud_at(scaled_at, originals_at, rows, work_at, digits_at, centres, exponen
     return CloudView(
         view_f64(scaled_at, 3 * rows), view_f64(originals_at, 3 * rows), view_f64(work_at, WORK),
         view_i64(digits_at, DIGITS), centres, exponent,
-    )  # fmt: skip
+    )
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
@@ -310,7 +310,7 @@ def cut_ears(border_at, start_at, n_polygons, order_at, before_at, after_at, mad
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
 def flip_until_convex(
     scaled_at, originals_at, rows, work_at, digits_at, centres, corners_at, twins_at, count, stack_at
-):  # fmt: skip
+):
     """Flip edges until the perturbed surface is convex at each; returns how many, −1 if that does not end.
 
     Only edges inside a strictly convex flat facet are ever concave; any two triangles there make a convex

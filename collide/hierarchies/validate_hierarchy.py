@@ -98,7 +98,7 @@ def _check_inclusion(hierarchy: Hierarchy, levels: list[np.ndarray], level: int,
     both = np.union1d(finer, coarser)
     for vertices, triangles, cloud in (
         (finer, levels[level], both), (coarser, levels[level + 1], coarser),
-    ):  # fmt: skip
+    ):
         hull = Hull(3, _places(cloud, vertices), _places(cloud, triangles))
         _named(f"{name}2: level {level + 1} is not in level {level}", hierarchy.points[cloud], hull)
 

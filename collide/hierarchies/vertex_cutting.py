@@ -30,7 +30,7 @@ from collide.hierarchies.cut_placement import (
     place,
     prove_new,
     shortest_part,
-)  # fmt: skip
+)
 from collide.hierarchies.half_edges import (
     degree_of,
     drop_star,
@@ -42,7 +42,7 @@ from collide.hierarchies.half_edges import (
     plan_hole,
     preceding,
     read_ring,
-)  # fmt: skip
+)
 from collide.hierarchies.independent_sets import mesh_at
 from collide.hierarchies.symbolic_perturbation import exact_side, side
 from collide.hierarchies.true_facets import cloud_at
@@ -60,7 +60,7 @@ SCRATCH = 20
 def cut(
     scaled_at, originals_at, rows, work_at, digits_at, exponent, centres, corners_at, twins_at, triangles, leaving_at,
     seen_at, degree_at, blocked_at, w, first, may_go, scratch_at, state_at,
-):  # fmt: skip
+):
     """Cut vertex w off; rows first, first + 1, ... are for new vertices, and one more.
 
     may_go : whether w may go even where no new vertex can take its place.

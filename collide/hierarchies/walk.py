@@ -65,7 +65,7 @@ WALK_DTYPE = np.dtype(
         ("axis", "f8", 3),  # from P to R in the world, for APART
         ("point", "f8", 3), # of P in its own frame, for MEETING
     ]
-)  # fmt: skip
+)
 _ROW = WALK_DTYPE.itemsize
 _STATUS, _ROUNDS, _TESTS, _GAMES, _PIVOTS, _LEVEL_P, _LEVEL_Q, _VERTEX_P, _VERTEX_Q, _CORNERS = range(10)
 _AXIS, _POINT = 12, 15
@@ -183,7 +183,7 @@ def _answer(walk, proof, outcome, proven, size, error, row, counts):
 @entry("void(int64, int64, int64, int64, int64, int64, int64, boolean, int64, int64, int64, int64)")
 def walk_poses(
     p_at, q_at, ball_address, ints_at, numbers_at, poses_at, n, early, rows_at, trace_at, doubles_at, integers_at
-):  # fmt: skip
+):
     """Walk at n pairs of poses.
 
     p, q : packed hierarchies, of P and of Q = ρ0(R).   ball : see `walk_proof.ball_at`.

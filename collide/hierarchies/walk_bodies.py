@@ -123,7 +123,7 @@ class PolarSide:
                 len(self.triangles),
             ],
             dtype=np.int64,
-        )  # fmt: skip
+        )
 
     @property
     def address(self) -> int:

@@ -68,7 +68,7 @@ def ball_at(address):
     return Ball(
         view_f64(ball[_CENTRE_AT], 4), view_i64(ball[_STARTS_AT], ball[_FACETS] + 1),
         view_i32(ball[_TRIANGLES_AT], 3 * ball[_TRIANGLES]),
-    )  # fmt: skip
+    )
 
 
 @kernel

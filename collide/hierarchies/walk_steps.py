@@ -84,7 +84,7 @@ def walk_at(P, Q, doubles_at, integers_at):
         view_f64(points_at + 8 * 6 * MAX_POINTS, 3 * MAX_POINTS),
         view_f64(weights_at, MAX_POINTS), view_f64(weights_at + 8 * MAX_POINTS, MAX_POINTS),
         view_f64(weights_at + 16 * MAX_POINTS, TABLEAU), view_i64(integers_at + 8 * _MARKS, LABELS),
-    )  # fmt: skip
+    )
 
 
 @kernel

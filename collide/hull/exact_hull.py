@@ -59,7 +59,7 @@ def convex_hull(points: np.ndarray) -> Hull:
         count, address_of(originals), scaled, work, digits, following + 16 * row, scaled + 24 * capacity,
         following, following + row, following + 2 * row, following + 3 * row, following + 4 * row,
         following + 5 * row, following + 7 * row, following + 9 * row, following + 10 * row, digits + 8 * DIGITS,
-    )  # fmt: skip
+    )
     surface = ids[10 * capacity : 16 * capacity].reshape(-1, 3)
     if dimension < 0:
         raise AssertionError("quickhull: the rim of a visible region is no simple cycle")

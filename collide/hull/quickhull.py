@@ -306,7 +306,7 @@ def grow(hull, count, n_orphans):
 def quickhull(
     count, originals_at, points_at, work_at, digits_at, facets_at, planes_at, following_at, orphans_at, starting_at,
     owner_at, order_at, region_at, rim_at, fan_at, surface_at, state_at,
-):  # fmt: skip
+):
     """The dimension of a cloud; its facets are left in ``surface``, their number in state[0], corners marked.
 
     All buffers hold APICES points more than the cloud has. ``starting`` receives the marks: 1 for points
@@ -323,7 +323,7 @@ def quickhull(
         view_i64(state_at, STATE), view_i32(following_at, capacity), view_i32(owner_at, capacity),
         view_i32(orphans_at, capacity), view_i32(region_at, 2 * capacity), view_i32(rim_at, 2 * capacity),
         view_i32(fan_at, capacity), view_i32(starting_at, capacity), view_i32(order_at, capacity),
-    )  # fmt: skip
+    )
     corners = view_i64(state_at + 8 * CORNERS, 4)
     starting = hull.starting
     dimension = first_simplex(cloud, count, corners)

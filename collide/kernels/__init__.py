@@ -58,7 +58,7 @@ __all__ = [
     "MODE", "PLAIN_PYTHON", "WITH_NUMBA", "address_of", "code_of", "entry", "kernel", "native_call", "view_f32",
     "view_f64",
     "view_i32", "view_i64", "view_u8",
-]  # fmt: skip
+]
 
 view_f64 = _view(ctypes.c_double, np.float64)
 view_i64 = _view(ctypes.c_int64, np.int64)

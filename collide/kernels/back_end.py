@@ -21,7 +21,7 @@ _OF_C = {"numba_frexp": "frexp", "numba_ldexp": "ldexp"}
 #: What objects may leave to whoever links them.
 MAY_BE_UNDEFINED = {
     "frexp", "ldexp", "fma", "sqrt", "memset", "memcpy", "memmove", "__chkstk", "_fltused", "_GLOBAL_OFFSET_TABLE_",
-}  # fmt: skip
+}
 
 
 class BackEndError(RuntimeError):
@@ -155,4 +155,4 @@ def _callers(whole, name: str) -> list[str]:
     return [
         function.name for function in whole.functions
         for block in function.blocks for instruction in block.instructions if f"@{name}(" in str(instruction)
-    ]  # fmt: skip
+    ]

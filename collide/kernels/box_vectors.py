@@ -92,7 +92,7 @@ def _float_data(context, builder, signature, args):
     """Pointers to the node's first float, to the frame and to the probe."""
     data, frame, probe = (
         data_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 3)
-    )  # fmt: skip
+    )
     return builder.gep(data, [args[1]]), frame, probe
 
 

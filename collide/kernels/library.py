@@ -89,7 +89,7 @@ def about() -> dict[str, str]:
         "level": level, "levels": ", ".join(built.LEVELS), "compiler": built.COMPILER,
         "sources": f"{built.SOURCES:08x}",
         "path": library_path(),
-    }  # fmt: skip
+    }
 
 
 def entries() -> tuple[str, ...]:

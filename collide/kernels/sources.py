@@ -22,7 +22,7 @@ PACKAGE = Path(__file__).parent.parent
 COMPILER_SOURCES = tuple(
     f"kernels/{name}.py" for name in
     ("back_end", "box_vectors", "compiled_lanes", "front_end", "lanes", "plain_lanes", "prepared", "vectors", "views")
-)  # fmt: skip
+)
 
 
 def kernel_sources() -> tuple[str, ...]:
@@ -184,7 +184,7 @@ def _part(module: str, nodes: list[ast.stmt]) -> _Part:
         content += [
             sorted(map(repr, value)) if isinstance(value, frozenset) else repr(value)
             for value in current.co_consts if not hasattr(value, "co_code")
-        ]  # fmt: skip
+        ]
         waiting += inner
     return _Part(
         hashlib.sha256(repr(content).encode()).hexdigest(), frozenset(names), is_entry=any(map(_is_entry, nodes))

@@ -99,7 +99,7 @@ def _products(builder: ir.IRBuilder, data, start, stride, gx, gy, gz):
     """The products with g of the eight points from an index on, as a function of the index."""
     g = [splat(builder, component, _VALUES) for component in (gx, gy, gz)]
     planes = [builder.gep(data, [at]) for at in (
-        start, builder.add(start, stride), builder.add(start, builder.add(stride, stride)))]  # fmt: skip
+        start, builder.add(start, stride), builder.add(start, builder.add(stride, stride)))]
 
     def values(at):
         x, y, z = (_load(builder, plane, at) for plane in planes)

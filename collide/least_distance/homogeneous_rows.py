@@ -50,7 +50,7 @@ class HomogeneousRows:
 
     __slots__ = (
         "_integers", "_known", "_record", "error", "last", "magnitude", "max_last", "n_exact", "n_read", "values",
-    )  # fmt: skip
+    )
 
     def __init__(
         self,
@@ -137,7 +137,7 @@ class HomogeneousRows:
             at, values = np.empty(capacity, dtype=np.int64), np.empty(capacity + BLOCK)
             count = products_below(
                 record, self.dimension, address_of(vector), bound, address_of(at), address_of(values), capacity
-            )  # fmt: skip
+            )
             if count <= capacity:
                 return Violations(at[:count], values[:count])
             capacity = count

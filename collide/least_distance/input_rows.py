@@ -69,7 +69,7 @@ def input_rows(points: ArrayLike, normals: ArrayLike, offsets: ArrayLike) -> Inp
     return InputRows(
         HomogeneousRows(point_values, 1.0, integers_of_point, magnitude=math.ldexp(size, -exponent)),
         HomogeneousRows(values, last, integers_of_halfspace), exponent, a,
-    )  # fmt: skip
+    )
 
 
 def read_points(points: ArrayLike) -> tuple[np.ndarray, float]:

@@ -89,13 +89,13 @@ def nearest_pair(
     working_points, working_halfspaces = ([first], []) if start is None else (list(start[0]) or [first], list(start[1]))
     proposal = propose_from_samples(
         points, halfspaces, work, point_rows, halfspace_rows, working_points, working_halfspaces
-    )  # fmt: skip
+    )
     pair, working_points, working_halfspaces = None, proposal.points, proposal.halfspaces
     if proposal.is_settled:
         pair = settle_basis(points, halfspaces, working_points, working_halfspaces)
     return finish_exactly(
         pair, points, halfspaces, work, point_rows, halfspace_rows, working_points, working_halfspaces
-    )  # fmt: skip
+    )
 
 
 def finish_exactly(
@@ -187,7 +187,7 @@ def settle_basis(
         APART if any(u) else MEETING, [row for row, _ in of_points], [weight for _, weight in of_points],
         [row for row, _ in of_halfspaces], [number for _, number in of_halfspaces], y,
         [p - q for p, q in zip(y, u)], u, [unit * number for number in u] + [-dot(u, base)], unit * denominator,
-    )  # fmt: skip
+    )
 
 
 def _over_one_denominator(vectors: list[Sequence[int]], d: int) -> tuple[list[Sequence[int]], int]:
@@ -240,7 +240,7 @@ def _solve_in_integers(points, halfspaces, working_points, working_halfspaces, w
         M.append(
             [-base[d] * dot(edge, normal, d) for edge in edges]
             + [0] + [base[d] * dot(normal, beside, d) for beside in a]
-        )  # fmt: skip
+        )
         q.append(normal[d] * base[d] - dot(normal, base, d))
     basis, _ = decide_basis(M, q)
     work.add("exact_pivots", basis.n_pivots)
@@ -251,7 +251,7 @@ def _solve_in_integers(points, halfspaces, working_points, working_halfspaces, w
     pair = settle_basis(
         points, halfspaces, [working_points[k] for k in rows],
         [working_halfspaces[k] for k in range(n_halfspaces) if size + n_points + k in is_basic],
-    )  # fmt: skip
+    )
     if pair is None:
         raise UnsupportedQuery("meets: a complementary basis without a solution, which no basis is")
     return pair
@@ -267,4 +267,4 @@ def _contradiction(a, working_halfspaces, multipliers: list[int], d: int) -> Nea
     return NearestPair(
         EMPTY, [], [], [working_halfspaces[k] for k in positive], [multipliers[k] for k in positive],
         zero, zero, zero, [*zero, 0], 1,
-    )  # fmt: skip
+    )

@@ -115,7 +115,7 @@ def propose_from_samples(
     for _ in range(_MAX_SAMPLES):
         proposal = propose_pair(
             points, halfspaces, work, some_points, some_halfspaces, working_points, working_halfspaces
-        )  # fmt: skip
+        )
         if not proposal.is_settled or (some_points is point_rows and some_halfspaces is halfspace_rows):
             return proposal
         working_points, working_halfspaces = list(proposal.points), list(proposal.halfspaces)

@@ -27,7 +27,7 @@ def points_at(points: np.ndarray, pose: ExactPose) -> list[ExactRow]:
     return [
         [dot(pose[3 * i : 3 * i + 3], point) + pose[9 + i] for i in range(3)]
         for point in ([Fraction(v) for v in row] for row in points.tolist())
-    ]  # fmt: skip
+    ]
 
 
 def planes_at(normals: np.ndarray, offsets: np.ndarray, pose: ExactPose) -> list[ExactRow]:
@@ -73,4 +73,4 @@ def planes_seen_from(planes: list[ExactRow], pose: ExactPose) -> list[ExactRow]:
     return [
         [*(dot(column, n) for column in columns), b - dot(n, pose[9:12])]
         for *n, b in planes
-    ]  # fmt: skip
+    ]

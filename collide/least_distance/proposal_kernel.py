@@ -210,7 +210,7 @@ def propose_rows(d, points_at, halfspaces_at, doubles_at, integers_at, capacity,
         view_f64(doubles_at, n_before), integers, view_i64(basic_at, 2 * capacity),
         view_i64(basic_at + 16 * capacity, 2 * capacity + 1),
         view_f64(doubles_at + 8 * n_before, 2 * capacity * (2 * capacity + 2)), capacity,
-    )  # fmt: skip
+    )
     for _ in range(_MAX_ROUNDS):
         s = integers[N_POINTS]
         t = integers[N_HALFSPACES]

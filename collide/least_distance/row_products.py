@@ -39,7 +39,7 @@ def rows_of_record(record_at, d):
     return KernelRows(
         view_f64(words[0], words[3] * d), view_f64(words[1], (words[3] - 1) * words[2] + 1),
         view_i64(words[4], 0 if all_rows else n), words[2], n, d, all_rows, sizes[0], sizes[1],
-    )  # fmt: skip
+    )
 
 
 class Function(NamedTuple):

@@ -111,7 +111,7 @@ def reach_of(shape: Shape) -> float:
     lengths = [
         math.inf if packed.kind == HALFSPACE else _UP * (packed.reach + packed.slop + np.linalg.norm(X[:3, 3]))
         + packed.radius for packed, X in bounding_parts_of(shape)
-    ]  # fmt: skip
+    ]
     return float(max(lengths))
 
 

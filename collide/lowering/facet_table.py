@@ -46,7 +46,7 @@ class FacetTable(Facets):
             packed.kind, len(packed.points), packed.coordinates.shape[1], address_of(packed.coordinates), packed.lowest,
             1,
             0, coarse,
-        )  # fmt: skip
+        )
         self.numbers[k, :PARAMS] = packed.radius, packed.reach, packed.slop
         self.numbers[k, PARAMS:] = packed.params
         self.packed = [_FACET] * k + [packed]

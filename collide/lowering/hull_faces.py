@@ -28,7 +28,7 @@ _THIN = 2.0**-6
 (
     N_VERTICES, PADDED, N_FACES, COLUMNS_AT, VERTEX_IDS_AT, NORMALS_AT, FLATNESS_AT, TRIANGLES_AT, STARTS_AT,
     CORNERS_AT, EDGES_AT, FACE_OF_AT, FAN_STARTS_AT, FANS_AT,
-) = range(14)  # fmt: skip
+) = range(14)
 FACE_INTS = 14
 
 
@@ -185,7 +185,7 @@ def _components(triangles: _Triangles, twins: np.ndarray) -> np.ndarray:
     """
     T, units, areas, wide, tolerance = (
         triangles.T, triangles.units, triangles.areas, triangles.wide, triangles.tolerance,
-    )  # fmt: skip
+    )
     a = np.repeat(np.arange(len(T)), 3)
     b = twins // 3
     larger, smaller = np.where(areas[a] >= areas[b], a, b), np.where(areas[a] >= areas[b], b, a)
@@ -303,7 +303,7 @@ def _linked(points: np.ndarray, hull: Hull, loops, normals, flatness, triangles)
     return HullFaces(
         columns, ids, np.ascontiguousarray(normals, dtype=np.float64), np.asarray(flatness, dtype=np.float64),
         triangles, starts, corners, edges, face_of, fan_starts, fans,
-    )  # fmt: skip
+    )
 
 
 def faces_of(packed: PackedConvex) -> HullFaces:

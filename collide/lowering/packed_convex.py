@@ -18,7 +18,7 @@ from collide.support.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, PO
 __all__ = [
     "BLOCK", "CONE", "CYLINDER", "ELLIPSOID", "HALFSPACE", "POINTS", "PackedConvex", "on_cache_lines", "pack_curved",
     "pack_halfspace", "pack_points",
-]  # fmt: skip
+]
 
 #: Coordinates stand in blocks of this many doubles, so that a scan needs no remainder loop.
 BLOCK = 8

@@ -121,4 +121,4 @@ else:
 __all__ = [
     "FRAME", "NEAR_PROBE", "PRISM", "PROBE", "boxes_meeting", "boxes_meeting_one_by_one", "boxes_meeting_prism",
     "boxes_meeting_prism_one_by_one", "boxes_nearest", "boxes_nearest_one_by_one",
-]  # fmt: skip
+]

@@ -60,7 +60,7 @@ def build_mesh_tree(vertices: np.ndarray, faces: np.ndarray) -> MeshTree:
         address_of(vertices), len(vertices), address_of(faces), m, address_of(records), address_of(nodes), len(nodes),
         address_of(triangles), address_of(ids), address_of(numbers), address_of(work), address_of(stack), len(stack),
         address_of(counts),
-    )  # fmt: skip
+    )
     return MeshTree(nodes[: counts[0]].copy(), triangles, ids, numbers[:3], int(numbers[3]), int(counts[1]))
 
 
@@ -89,7 +89,7 @@ class _Build(NamedTuple):
 def fill_tree(
     vertices_at, n, faces_at, m, records_at, nodes_at, n_nodes, triangles_at, ids_at, numbers_at, work_at, stack_at,
     n_stack, counts_at,
-):  # fmt: skip
+):
     """Nodes, triangles in the order of the leaves, and their numbers; counts become nodes used and depth.
 
     Arguments are flat: it is called from C too.
@@ -102,7 +102,7 @@ def fill_tree(
     build = _Build(
         view_f32(records_at, _RECORD * m), view_i64(records_at, _RECORD // 2 * m), view_f32(nodes_at, NODE * n_nodes),
         view_i32(nodes_at, NODE * n_nodes), view_f64(work_at, _WORK), stack,
-    )  # fmt: skip
+    )
     _load(vertices, faces, m, build.floats, words, view_f64(numbers_at, 4))
     _measure(build.floats, 0, m, build.work, 0)
     _clear_node(build, 0)

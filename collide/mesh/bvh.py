@@ -74,7 +74,7 @@ class MeshTree:
                 len(self.nodes), len(self.ids), self.depth, self.exponent, 0, self.has_origins,
             ],
             dtype=np.int64,
-        )  # fmt: skip
+        )
         self.address = address_of(self.header)
         self._content: bytes | None = None
         self._slabs: np.ndarray | None = None
@@ -211,7 +211,7 @@ def open_tree(header_at):
         header, view_f64(header[NUMBERS_AT], NUMBERS), view_f32(header[NODES_AT], NODE * header[N_NODES]),
         view_i32(header[NODES_AT], NODE * header[N_NODES]), view_f64(header[TRIANGLES_AT], 9 * header[N_FACETS]),
         view_i32(header[IDS_AT], header[N_FACETS]),
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

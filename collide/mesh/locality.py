@@ -98,7 +98,7 @@ def quiet(_label: str) -> AbstractContextManager:
 def locality(
     vertices: np.ndarray, faces: np.ndarray, *, repeated: bool = False,
     progress: Callable[[str], AbstractContextManager] = quiet,
-) -> Locality:  # fmt: skip
+) -> Locality:
     """Stretches of a triangle mesh.
 
     vertices : (n, 3) finite.   faces : (m, 3) rows of vertices, within range.
@@ -124,7 +124,7 @@ def locality(
     return Locality(
         len(vertices), len(distinct), len(used), len(faces), float(lengths[0]), float(lengths[1]),
         stretches, distinct[used],
-    )  # fmt: skip
+    )
 
 
 def _edge_squares(points: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, float]:

@@ -75,13 +75,13 @@ def survey_surface(vertices: np.ndarray, faces: np.ndarray) -> Survey:
     topology.classify_facets(
         address_of(corners), n, n_vertices, address_of(flags), address_of(shells), address_of(counts),
         address_of(workspace),
-    )  # fmt: skip
+    )
     flags[without_area(vertices, corners)] |= NO_AREA
     survey = Survey(
         corners, flags, shells, np.zeros(0), np.zeros(0, dtype=np.int8), int(counts[topology.SHELLS]),
         int(counts[topology.EDGES]), int(counts[topology.OPEN_EDGES]), int(counts[topology.PINCHES]),
         int(counts[topology.USED]), welded,
-    )  # fmt: skip
+    )
     return _with_volumes(vertices, survey) if survey.closed else survey
 
 

@@ -319,7 +319,7 @@ def classify_facets(corners_at, n, n_vertices, flags_at, shells_at, counts_at, w
         view_i32(workspace_at + 36 * n, n), view_i32(workspace_at + 40 * n, n), view_i32(workspace_at + 44 * n, n),
         view_i32(of_vertices, n_vertices + 1), view_i32(of_vertices + 4 * n_vertices + 4, n_vertices),
         view_i32(of_vertices + 8 * n_vertices + 4, n_vertices), view_i32(of_vertices + 12 * n_vertices + 4, n_vertices),
-    )  # fmt: skip
+    )
     _start(surface)
     n_half_edges = _sort_half_edges(surface)
     _classify_edges(surface, n_half_edges)

@@ -60,7 +60,7 @@ class PointTree:
         nearest_points(
             address_of(self.points), len(self.points), self.levels, address_of(self.boxes), address_of(queries),
             len(queries), first, k, address_of(squares), address_of(places),
-        )  # fmt: skip
+        )
         return squares, places
 
 

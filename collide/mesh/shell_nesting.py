@@ -90,7 +90,7 @@ def _winding(vertices, scaled, corners, row) -> int | None:
         count = cast_ray(
             address_of(scaled), len(scaled), address_of(corners), len(corners), address_of(ray), address_of(total),
             address_of(ambiguous),
-        )  # fmt: skip
+        )
         sides, heights = _exact_signs(vertices, corners[ambiguous[:count]], row, direction)
         up, down, level = ((sides == s).any(axis=1) for s in (1, -1, 0))
         met = ~(up & down)

@@ -56,7 +56,7 @@ def shell_volumes(vertices: np.ndarray, parts: Shells) -> tuple[np.ndarray, np.n
     sum_volumes(
         address_of(scaled), len(vertices), address_of(parts.corners), len(parts.corners), address_of(parts.shells), n,
         address_of(first), address_of(members), address_of(six), address_of(sizes),
-    )  # fmt: skip
+    )
     margin = sizes * 2.0 * (_TERM_ERROR + _UNIT * members) + _UNDERFLOW * members
     signs = np.sign(six).astype(np.int8)
     for shell in np.flatnonzero(np.abs(six) <= margin).tolist():

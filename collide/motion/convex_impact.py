@@ -104,7 +104,7 @@ def ask_pair(asking, row_at, boolean):
             header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIR_AT], 1, boolean,
             False, True, math.inf, row_at, header[DOUBLES_AT], header[INTEGERS_AT],
         ),
-    )  # fmt: skip
+    )
     return row
 
 
@@ -255,7 +255,7 @@ def _turn_across(motion, n, row):
     of_a, of_b = dot(omega_a, m_a), dot(omega_b, m_b)
     across = add(
         scale((of_a * bb - of_b * ab) / determinant, m_a), scale((of_b * aa - of_a * ab) / determinant, m_b)
-    )  # fmt: skip
+    )
     return add(across, scale(0.5 * (dot(omega_a, n) + dot(omega_b, n)), n))
 
 

@@ -111,7 +111,7 @@ def header_of(tables: Tables, motions: Motions) -> np.ndarray:
             *(0 if w is None else 3 * (len(w) > 1) for w in omegas), tables.n_shapes,
         ),
         dtype=np.int64,
-    )  # fmt: skip
+    )
 
 
 class _Bodies:
@@ -225,7 +225,7 @@ def convex_impacts(
             for jobs in (
                 [bodies.jobs(a[some], b[some], first, motions)] if per_motion <= MAX_ASKED
                 else bodies.jobs_ahead(shapes, int(a[first]), int(b[first]), first, motions, rows)
-            ):  # fmt: skip
+            ):
                 find_impacts(address_of(header), address_of(jobs), len(jobs), 0.0, 1.0, tolerance, address_of(rows))
 
     workers = min(threads, n * per_motion // _MIN_MOTIONS_PER_THREAD)

@@ -34,7 +34,7 @@ from collide.transforms import ROTATION_TOLERANCE
 (
     BODIES_AT, ROW_AT, PROBE_AT, PARTS_AT, N_PARTS, XA0_AT, XA1_AT, XB0_AT, XB1_AT, XA0_STEP, XA1_STEP, XB0_STEP,
     XB1_STEP, OMEGA_A_AT, OMEGA_B_AT, OMEGA_A_STEP, OMEGA_B_STEP, N_SHAPES,
-) = range(8, 26)  # fmt: skip
+) = range(8, 26)
 HEADER = 26
 
 # A job: the motion's number, then shape row and part row of A, and of B.
@@ -79,7 +79,7 @@ def find_impacts(header_at, jobs_at, n, begin, end, tolerance, rows_at):
     motions = Motions(
         header, view_f64(header[PARTS_AT], PART * header[N_PARTS]), view_i64(header[INTS_AT], INTS * header[N_SHAPES]),
         view_f64(header[NUMBERS_AT], NUMBERS * header[N_SHAPES]), view_f64(header[POSES_AT], 2 * POSE),
-    )  # fmt: skip
+    )
     asking = Asking(header, header[ROW_AT], header[PROBE_AT])
     for k in range(n):
         job = view_i64(jobs_at + 8 * JOB * k, JOB)
@@ -195,7 +195,7 @@ def _do_job(motions, asking, job, span, answer_at):
         words[STATUS] = TOO_SMALL
         return
     if search.lower < numbers[LOWER] or (search.status == CONTACT and search.upper < numbers[UPPER]
-                                         and search.lower == numbers[LOWER]):  # fmt: skip
+                                         and search.lower == numbers[LOWER]):
         words[JOB_A] = job[SHAPE_A]
         words[JOB_B] = job[SHAPE_B]
         words[STATUS] = search.status

@@ -43,7 +43,7 @@ def time_of_impact(
     A: Shapes, B: Shapes, X_WA0: PoseLike, X_WA1: PoseLike, X_WB0: PoseLike, X_WB1: PoseLike, *,
     omega_WA: ArrayLike | None = None, omega_WB: ArrayLike | None = None, tolerance: float = 1e-9,
     check_poses: bool = True, threads: int = 1,
-) -> TimeOfImpact:  # fmt: skip
+) -> TimeOfImpact:
     """When two moving bodies first touch, with a proven bracket.
 
     In unit time each body's origin moves on a line from its first pose to its second, and the body turns about it with

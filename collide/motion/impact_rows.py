@@ -19,7 +19,7 @@ IMPACT_DTYPE = np.dtype(
         ("part_a", "<i4"), ("part_b", "<i4"), ("queries", "<i4"), ("status", "<i4"),
     ],
     align=True,
-)  # fmt: skip
+)
 
 
 class TimeOfImpact(NamedTuple):
@@ -77,7 +77,7 @@ def as_result(rows: np.ndarray, tolerance: float, single: bool) -> TimeOfImpact:
     columns = (
         ~free, lower, lower.copy(), upper, certified, *(rows[name].copy() for name in (
             "normal", "point_a", "point_b", "part_a", "part_b", "queries")),
-    )  # fmt: skip
+    )
     return TimeOfImpact(*(only_value(column) if single else column for column in columns))
 
 

@@ -37,7 +37,7 @@ from collide.numerics.vec3 import Vec3, add, divide, norm, put_vec3, rotate, sca
 # adds; slop of a pose; 1 where it does not turn at all.
 OMEGA, AXIS, ANGLE, START, DRIFT, ARM, ARM_DRIFT, REACH_OF_CORE, DRIFT_REACH, POSE_ERROR, IS_STILL = (
     0, 3, 6, 7, 16, 25, 28, 31, 32, 33, 34,
-)  # fmt: skip
+)
 BODY = 35
 
 #: Bounds are rounded up by more than a dozen roundings.
@@ -114,7 +114,7 @@ def _stretch(body):
     return stretch_of(
         x.x * x.x + x.y * x.y + x.z * x.z, y.x * y.x + y.y * y.y + y.z * y.z, z.x * z.x + z.y * z.y + z.z * z.z,
         x.x * y.x + x.y * y.y + x.z * y.z, y.x * z.x + y.y * z.y + y.z * z.z, z.x * x.x + z.y * x.y + z.z * x.z,
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

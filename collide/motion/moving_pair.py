@@ -74,18 +74,18 @@ def moving_pair(ints, numbers, poses, sa, sb, motion_a, motion_b, a, b):
     off_a = set_body(
         a, motion_a.X0, motion_a.X1, motion_a.omega, motion_a.has_omega, motion_a.parts, motion_a.part_at,
         numbers[NUMBERS * sa + REACH],
-    )  # fmt: skip
+    )
     off_b = set_body(
         b, motion_b.X0, motion_b.X1, motion_b.omega, motion_b.has_omega, motion_b.parts, motion_b.part_at,
         numbers[NUMBERS * sb + REACH],
-    )  # fmt: skip
+    )
     d0 = sub(_translation(motion_b.X0), _translation(motion_a.X0))
     d1 = sub(_translation(motion_b.X1), _translation(motion_a.X1))
     farthest = max(norm(d0), norm(d1)) * OUTWARD
     radius = numbers[NUMBERS * sa + RADIUS] + numbers[NUMBERS * sb + RADIUS]
     size = (
         a[REACH_OF_CORE] + b[REACH_OF_CORE] + a[DRIFT_REACH] + b[DRIFT_REACH] + farthest + radius
-    ) * OUTWARD  # fmt: skip
+    ) * OUTWARD
     is_plane = pair.A.kind == HALFSPACE
     if is_plane and a[IS_STILL] == 0.0:  # a turned plane is wrong by as much as B is far
         a[POSE_ERROR] = TURN_ERROR * (1.0 + a[ANGLE]) * size

@@ -78,7 +78,7 @@ def _turned(p: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
 def earliest_by_facets(
     spans: Spans, corners: np.ndarray, slop: float, side: int, movers: tuple[ShapeTable, np.ndarray, np.ndarray],
     span: tuple[float, float], tolerance: float,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """(n,) times before which convex sets have no contact with any of some facets: infinity of those that have none in
     the span.
 

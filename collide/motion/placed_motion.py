@@ -58,5 +58,5 @@ def poses_at(X0: np.ndarray, X1: np.ndarray, omega: np.ndarray | None, time: np.
         address_of(ends), 16 * (len(X0) > 1), 16 * (len(X1) > 1), 0 if omega is None else address_of(omega),
         0 if omega is None else 3 * (len(omega) > 1), address_of(time), int(len(time) > 1), n, address_of(work),
         address_of(out),
-    )  # fmt: skip
+    )
     return out, float(worst)

@@ -226,7 +226,7 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 def _ask_on_the_way(
     shapes: tuple[Shape, Shape], pairs: tuple[np.ndarray, np.ndarray], motion: Motions, earliest: np.ndarray, end: float,
     tolerance: float,
-) -> float:  # fmt: skip
+) -> float:
     """Raise the ``earliest`` times (k,) of pairs of pieces, in place, where one of them is a large mesh, the other of a
     small union, by the facets on the union's way; returns the time until which they are known now.
     """
@@ -253,7 +253,7 @@ def _ask_on_the_way(
                 sets = bounds.table, rows, bounds.parts[rows]
                 times = earliest_by_facets(
                     spans, mesh.corners(facets), mesh.slop, side, sets, (begin, until), tolerance
-                )  # fmt: skip
+                )
                 earliest[some] = np.maximum(earliest[some], times if until == end else np.minimum(times, until))
             known_until = min(known_until, until if until < end else math.inf)
     return known_until
@@ -262,7 +262,7 @@ def _ask_on_the_way(
 def _search_small(
     pairs: list[tuple[Piece, Piece]], motions: Motions, span: tuple[float, float], tolerance: float, rows: np.ndarray,
     is_part: tuple[bool, bool],
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Search those pairs of pieces that are convex or of few facets, in a span of time, for all motions; returns which
     are neither (k,)."""
     is_large = np.zeros(len(pairs), dtype=bool)

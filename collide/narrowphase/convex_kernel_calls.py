@@ -57,7 +57,7 @@ def run_pairs(
         answered = answer_pairs(
             *tables, address_of(todo), len(todo), boolean, depths, stop_at_hit, limit, address_of(out),
             *_of_thread.space.addresses,
-        )  # fmt: skip
+        )
         _finish(out[:answered], todo, table, poses, shape_of, boolean=boolean, limit=limit, depths=depths)
         done += answered
         # The hit that stopped the kernel may have been an open one that turned out to be apart.
@@ -109,7 +109,7 @@ def _finish(
             rows, pairs, table, poses, shape_of, boolean=boolean, depths=depths, limit=limit,
             digits=_of_thread.space.digits,
             requests_at=_of_thread.space.addresses[1] + 8 * REQUESTS_AT,
-        )  # fmt: skip
+        )
         if not distrust_doubles:
             shapes_and_poses = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
             settle_by_other_searches(
@@ -154,7 +154,7 @@ def run_poses(
             address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
             address_of(X_WB), 16 * (len(X_WB) > 1), done, n, boolean, depths and not boolean, limit, check,
             0 if axes is None else address_of(axes), address_of(out),
-        )  # fmt: skip
+        )
         if status == BAD_POSE:
             return False
         done = int(header[ANSWERED])

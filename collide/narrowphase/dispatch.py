@@ -63,7 +63,6 @@ R, S = Method.REGION, Method.REGIONS
 #: Row and column in the order of `Kind`; what stands below the diagonal is mirrored.
 #: The column "both" is of compounds with meshes among their parts, the last of an `HPolytope` kept as planes.
 #: ROUNDED is an `HPolytope` whose corners are not doubles: to kernels it is points, to meshes it has no exact facets.
-# fmt: off
 _UPPER_HALF = (
     #                      sphere capsule polytope rounded cylinder cone ellipsoid halfspace mesh compound both region
     (Kind.SPHERE,         (C,     C,      G,       G,      G,       G,   G,        H,        F,   U,       M,   R)),
@@ -79,7 +78,6 @@ _UPPER_HALF = (
     (Kind.MESH_COMPOUND,  (                                                                                M,   R)),
     (Kind.REGION,         (                                                                                     S,)),
 )
-# fmt: on
 
 #: TABLE[kind of A][kind of B].
 TABLE: tuple[tuple[Method, ...], ...] = tuple(

@@ -40,7 +40,7 @@ def settle_by_other_searches(
     rows: np.ndarray, pairs: np.ndarray, tables: tuple[int, int, int, int, int], workspace: tuple[int, int], *,
     boolean: bool,
     depths: bool, limit: float,
-) -> None:  # fmt: skip
+) -> None:
     """Settle in place what is still open; arguments as of `run_pairs`.
 
     tables : addresses of the shapes' integers and numbers, the poses' rows and terms, and which shape a part is.

@@ -36,7 +36,7 @@ SIGNATURE = (
 def answer_pairs(
     ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, depths, stop_at_hit, limit,
     rows_at, doubles_at, integers_at,
-):  # fmt: skip
+):
     """Answer pairs of posed convex sets, one row each; returns how many were answered.
 
     ints, numbers : a `ShapeTable`.   poses : POSE doubles a part.   terms : of a `PoseTable`.

@@ -80,4 +80,4 @@ def workspace_at(doubles_at, integers_at):
         doubles_at + 8 * _FINE_AT, integers_at + 8 * _NEAREST_AT, integers_at + 8 * _TIES_AT,
         doubles_at + 8 * _EPA_DOUBLES_AT, integers_at + 8 * _EPA_INTEGERS_AT,
         doubles_at + 8 * _QUEUE_DOUBLES_AT, integers_at + 8 * _QUEUE_INTEGERS_AT,
-    )  # fmt: skip
+    )

@@ -31,7 +31,7 @@ OPEN, BAD_POSE = range(1, 3)
 (
     CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT,
     SETTLE, DIGITS_AT, ANSWERED,
-) = range(12)  # fmt: skip
+) = range(12)
 #: Integers of the header.
 HEADER = 12
 
@@ -56,7 +56,7 @@ def block_of(header_at):
     return PoseBlock(
         header, view_f64(header[POSES_AT], 2 * BLOCK * POSE), view_i64(header[SHAPE_OF_AT], 2 * BLOCK),
         view_i64(header[PAIRS_AT], 2 * BLOCK),
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -68,7 +68,7 @@ def answer_block(header, n, boolean, depths, limit, rows_at):
             header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT], n, boolean,
             depths, False, limit, rows_at, header[DOUBLES_AT], header[INTEGERS_AT],
         ),
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

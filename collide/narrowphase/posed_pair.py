@@ -155,7 +155,7 @@ def posed_body(ints, shape, part):
         view_f64(ints[at + ADDRESS], 3 * ints[at + PADDED]), ints[at + COUNT], ints[at + PADDED], ints[at + KIND],
         shape, NUMBERS * shape + PARAMS, POSE * part,
         ints[at + TREE], ints[at + COARSE_AT],
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

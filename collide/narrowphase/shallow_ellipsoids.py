@@ -138,7 +138,7 @@ def _rolling_ball(pair, body):
     square = _Symmetric(
         x.x * x.x + y.x * y.x + z.x * z.x, x.y * x.y + y.y * y.y + z.y * z.y, x.z * x.z + y.z * y.z + z.z * z.z,
         x.x * x.y + y.x * y.y + z.x * z.y, x.y * x.z + y.y * y.z + z.y * z.z, x.z * x.x + y.z * y.x + z.z * z.x,
-    )  # fmt: skip
+    )
     smallest = min(min(p0, p1), p2)
     radius = smallest * (smallest / max(max(p0, p1), p2)) * least / math.sqrt(greatest)
     return _RollingBall(square, radius * _ROUNDED if least > _LEAST_EIGENVALUE else 0.0)
@@ -227,7 +227,7 @@ def _curvature(square, s, height_of):
     return _Symmetric(
         (square.xx - s.x * s.x) * over, (square.yy - s.y * s.y) * over, (square.zz - s.z * s.z) * over,
         (square.xy - s.x * s.y) * over, (square.yz - s.y * s.z) * over, (square.zx - s.z * s.x) * over,
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

@@ -75,7 +75,7 @@ def _settle(header, boolean, depths, limit, row_at):
             header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
             depths, limit, row_at, 0, 0, requests_at, header[DIGITS_AT],
         ),
-    )  # fmt: skip
+    )
 
 
 @entry(prepared.BOOLEAN, nogil=False)

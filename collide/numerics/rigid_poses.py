@@ -29,7 +29,7 @@ def are_rigid(X_at, n, tolerance, largest):
             & (a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) > 0.5)
             & (abs(X[at + 3]) <= largest) & (abs(X[at + 7]) <= largest) & (abs(X[at + 11]) <= largest)
             & (X[at + 12] == 0.0) & (X[at + 13] == 0.0) & (X[at + 14] == 0.0) & (X[at + 15] == 1.0)
-        )  # fmt: skip
+        )
         if not is_rigid:
             return False
     return True

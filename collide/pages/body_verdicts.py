@@ -32,7 +32,7 @@ def body_verdicts(scene, report: Report) -> dict[str, str]:
     verdicts = {body.name: FREE if body.name in tested else NEVER_TESTED for body in scene.bodies}
     members = {
         name: {body for body, _ in getattr(report, name).busiest()} for name in classes.NAMES
-    } | {NOT_ANSWERED: {entry[side] for entry in report.unanswered for side in ("a", "b")}}  # fmt: skip
+    } | {NOT_ANSWERED: {entry[side] for entry in report.unanswered for side in ("a", "b")}}
     for verdict in reversed(ORDER):
         verdicts.update(dict.fromkeys(members.get(verdict, ()), verdict))
     return verdicts

@@ -25,7 +25,7 @@ _ITSELF = np.eye(4)
 def of_scene(
     scene, report: Report, *, kind: str = REPORT, looks: Mapping[str, Sequence[PosedShape]] | None = None,
     notes: Sequence[str] = (), max_facets: int = MAX_FACETS,
-) -> dict:  # fmt: skip
+) -> dict:
     """The drawing of a scene, as the page's block ``drawing`` has it.
 
     Parameters
@@ -50,7 +50,7 @@ def of_scene(
         "version": VERSION, "kind": kind, "size": extent(bodies, table.boxes()),
         "notes": [*notes, *_about(bodies, shapes, table)], "contacts": None, "shapes": shapes, "bodies": bodies,
         "states": None,
-    }  # fmt: skip
+    }
 
 
 def _body(body, table: ShapeTable, looks: Mapping[str, Sequence[PosedShape]], verdict: str) -> dict:
@@ -62,7 +62,7 @@ def _body(body, table: ShapeTable, looks: Mapping[str, Sequence[PosedShape]], ve
         "name": body.name, "static": bool(body.static), "owner": getattr(body, "owner", None),
         "kind": type(body.shape).__name__, "X_WB": [float(x) for x in np.asarray(body.X_WB).ravel()], "shown": visual,
         "tested": None if visual == tested else tested, "verdict": verdict, "note": body.approximation,
-    }  # fmt: skip
+    }
 
 
 def extent(bodies: Sequence[Mapping], boxes: Sequence[np.ndarray | None]) -> float:

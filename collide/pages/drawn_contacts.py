@@ -78,7 +78,7 @@ def _patches(A, B) -> list[dict]:
             patches.append({
                 "points": points.tolist(), "normal": (manifold.rows["normal"][some[0]] + 0.0).tolist(),
                 "depths": (depths + 0.0).tolist(),
-            })  # fmt: skip
+            })
     return patches
 
 

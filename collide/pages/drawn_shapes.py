@@ -88,7 +88,7 @@ class ShapeTable:
             np.concatenate(vertices), np.concatenate(faces), max(deviations),
             any(is_smooth(shape) for shape, _ in shapes),
             any(isinstance(shape, Halfspace) or shape.is_region for shape, _ in shapes),
-        )  # fmt: skip
+        )
 
     def boxes(self) -> list[np.ndarray | None]:
         """(2, 3) lowest and highest corner of each shape in its frame [m]; None of unbounded and of empty ones."""
@@ -96,7 +96,7 @@ class ShapeTable:
             None if drawn.unbounded or not len(drawn.vertices) else
             np.array([drawn.vertices.min(axis=0), drawn.vertices.max(axis=0)])
             for drawn in self._shapes
-        ]  # fmt: skip
+        ]
 
     def is_empty(self, row: int) -> bool:
         """Whether a shape has no triangle: a point, a segment, or what cannot be tessellated."""

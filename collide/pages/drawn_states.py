@@ -56,7 +56,7 @@ def of_states(made: Sequence[Stated]) -> dict:
     return {
         "labels": [state.label for state in made], "shares": None, "times": None, "samples": None, "start": 0,
         "moving": moving.tolist(), "poses": _poses_as_text(poses[:, moving]), "rows": rows, "body_verdicts": verdicts,
-    }  # fmt: skip
+    }
 
 
 def of_trajectory(stated: Stated, max_samples: int = MAX_SAMPLES) -> dict:
@@ -84,7 +84,7 @@ def of_trajectory(stated: Stated, max_samples: int = MAX_SAMPLES) -> dict:
         "times": times, "samples": _about(len(samples), len(path.share), left_out), "start": 0,
         "moving": [row_of[name] for name in watch.moving], "poses": _poses_as_text(poses), "rows": rows,
         "body_verdicts": verdicts,
-    }  # fmt: skip
+    }
 
 
 # --- which samples ------------------------------------------------------------------------------
@@ -122,7 +122,7 @@ def _state_row(by_class: Mapping[str, ClassRows], least: float | None, is_open: 
     return {
         "verdict": worst(verdicts), **{name: pairs.rows for name, pairs in by_class.items()},
         "left_out": sum(pairs.size - len(pairs.rows) for pairs in by_class.values()), "clearance": least,
-    }  # fmt: skip
+    }
 
 
 def _of_report(pairs, row_of: Mapping[str, int]) -> ClassRows:

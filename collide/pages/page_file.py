@@ -104,7 +104,7 @@ def _policy(script: str, style: str, live: bool) -> str:
     rules = [
         "default-src 'none'", f"script-src {_hash_of(script)}", f"style-src {_hash_of(style)}", "img-src data: blob:",
         "base-uri 'none'", "form-action 'none'", *(["connect-src 'self'"] if live else []),
-    ]  # fmt: skip
+    ]
     return "; ".join(rules)
 
 

@@ -38,7 +38,7 @@ def report_blocks(
         drawn["contacts"], drawn["notes"] = about, [*drawn["notes"], about["note"]]
     return [
         ReportBlock("report", _items(made, checks)), DataBlock("drawing", drawn), DataBlock("contacts", contacts),
-    ]  # fmt: skip
+    ]
 
 
 def comparison_blocks(
@@ -56,7 +56,7 @@ def comparison_blocks(
     drawn = drawing.of_scene(scene, ours, kind=drawing.COMPARE, looks=looks, notes=notes)
     return [
         ReportBlock("report", comparison.items()), ReportBlock("ours", ours.items()), DataBlock("drawing", drawn),
-    ]  # fmt: skip
+    ]
 
 
 def _items(made: list[Stated], checks: Sequence[Check] | None) -> Iterator[tuple[str, object]]:
@@ -70,4 +70,4 @@ def _of_check(check: Check) -> dict:
     return {
         "label": check.label, "verdict": check.verdict(), "fails": check.fails,
         "against_baseline": check.against_baseline, "findings": findings,
-    }  # fmt: skip
+    }

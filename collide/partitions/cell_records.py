@@ -216,7 +216,7 @@ def part_of_block(block: CellBlock) -> _Part:
         np.searchsorted(faces.cell, np.arange(len(block.leaf) + 1)), np.append(0, np.cumsum(faces.count)),
         np.ravel(loops), np.where(on_axis, -1, faces.plane), np.where(on_axis, planes.axis.rows[k], -1),
         np.where(on_axis, planes.value.rows[k], np.nan), faces.side,
-    )  # fmt: skip
+    )
 
 
 def _chained(starts: list[np.ndarray]) -> np.ndarray:

@@ -130,7 +130,7 @@ def _split_in_two(vertices, edges, polygons, planes, rows, owner, vertex, sides,
         vertices, polygons, planes, owner[crossing], vertex[crossing], vertex[following[crossing]], carrier[crossing],
         Sides(*(column[crossing] for column in sides)), Sides(*(column[following[crossing]] for column in sides)),
         shared,
-    )  # fmt: skip
+    )
     parts = []
     for side in (-1, 1):
         here, there = sign * side, sign[following] * side

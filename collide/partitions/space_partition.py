@@ -134,7 +134,7 @@ class SpacePartition:
             planes.n, len(mesh.faces) - planes.n, self._tree.n_leaves, int(self.inside.sum()), len(self._tree.plane),
             len(facets_in), int(facets_in.sum()), int(facets_in.max()), kappa, self._tree.depth, self._tree.mean_depth,
             vertices.n_exact, n_fractions,
-        )  # fmt: skip
+        )
 
     def locate(self, points) -> Located:
         """Which cell points lie in, and whether inside, on the boundary or outside of the solid: exactly.

@@ -18,4 +18,4 @@ __all__ = [
     "PlanarCertificate", "PolygonDistances", "PolygonHits", "TreeMeeting", "TreeSize", "hull_boundary", "meets",
     "planar_pose", "polygon_distance", "polygons_meet", "trees_meet", "verify", "verify_boundary", "verify_exclusion",
     "verify_polygons", "verify_trees",
-]  # fmt: skip
+]

@@ -127,7 +127,7 @@ def gjk(rows: InputRows, work: Work) -> NearestPair:
     tight = np.argsort(slack)[: 2 * d]
     return nearest_pair(
         points, halfspaces, work, start=(list(dict.fromkeys(used_points[-2 * d :])), sorted(tight.tolist()))
-    )  # fmt: skip
+    )
 
 
 def _nearest_to_origin(points: np.ndarray) -> np.ndarray | None:
@@ -185,7 +185,7 @@ def brute_force(rows: InputRows, work: Work) -> NearestPair:
     start = {row for k in tight if k < len(normals) for row in members[k]}
     return nearest_pair(
         points, halfspaces, work, start=(sorted(start), sorted(k - len(normals) for k in tight if k >= len(normals)))
-    )  # fmt: skip
+    )
 
 
 def _facets(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[tuple[int, ...]]]:

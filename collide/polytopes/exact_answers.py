@@ -15,7 +15,7 @@ from collide.polytopes.meeting import Meeting, MeetingCertificate
 
 _KINDS: dict[str, Literal["common point", "separating plane", "contradiction"]] = {
     MEETING: "common point", APART: "separating plane", EMPTY: "contradiction",
-}  # fmt: skip
+}
 
 
 def make_meeting(pair: NearestPair, rows: InputRows, counters: Mapping[str, int | str]) -> Meeting:
@@ -49,7 +49,7 @@ def _certificate(pair: NearestPair, rows: InputRows, up: int, down: int) -> Meet
         _KINDS[pair.kind], tuple(row for row, _ in weights),
         tuple(Fraction(weight, pair.denominator) for _, weight in weights), tuple(row for row, _ in multipliers),
         tuple(Fraction(number * _factor(rows, row) * up, down) for row, number in multipliers),
-    )  # fmt: skip
+    )
 
 
 def _factor(rows: InputRows, row: int) -> int:

@@ -73,5 +73,5 @@ def meets(
     counters = {
         **log.counters, "points_read": rows.points.n_read, "halfspaces_read": rows.halfspaces.n_read,
         "decided_in_integers": rows.points.n_exact + rows.halfspaces.n_exact,
-    }  # fmt: skip
+    }
     return make_meeting(pair, rows, counters)

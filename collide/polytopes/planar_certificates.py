@@ -89,7 +89,7 @@ def verify_polygons(A: ConvexPolygon, B: ConvexPolygon, X_WA, X_WB, certificate:
             for polygon, X, weights, name in (
                 (A, X_WA, certificate.weights_a, "A"), (B, X_WB, certificate.weights_b, "B"),
             )
-        ]  # fmt: skip
+        ]
         for name, point in zip("AB", points):
             if point != certificate.point:
                 raise CertificateRefused(f"the weights of {name}'s vertices make another point than the one named")

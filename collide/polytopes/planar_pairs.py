@@ -280,7 +280,7 @@ def _arguments_from(numbers: tuple[int, ...], first: int) -> tuple[int, ...]:
     return (
         polygons_a + 16 * step_a * first, step_a, poses_a + 72 * pose_step_a * first, pose_step_a,
         polygons_b + 16 * step_b * first, step_b, poses_b + 72 * pose_step_b * first, pose_step_b,
-    )  # fmt: skip
+    )
 
 
 class _OfThread(local):

@@ -25,11 +25,11 @@ def relative_of(A: HierarchicalTree, B: HierarchicalTree, X_BA: Rows, X_AB: Rows
     M = as_doubles(X_BA)[:d, :d]
     a = np.array([
         float(sum((x * y for x, y in zip(row, centre)), row[d]) - c) for row, c in zip(X_BA[:d], inside)
-    ])  # fmt: skip
+    ])
     unit = Fraction(grid.unit)
     o = np.array([
         float((sum((x * y for x, y in zip(row, inside)), row[d]) - c) / unit) for row, c in zip(X_AB[:d], centre)
-    ])  # fmt: skip
+    ])
     map_of_unit = M * grid.unit
     size = float((np.abs(map_of_unit).sum(axis=1) * A.tree.reach + np.abs(a)).max())
     shift = float(np.abs(map_of_unit).sum(axis=1).max())  # what a point is off by

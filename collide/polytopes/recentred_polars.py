@@ -119,7 +119,7 @@ def pair_in_input(pair: NearestPair, centre: Centre) -> NearestPair:
         y=[p + q for p, q in zip(y, shift)], x=[p + q for p, q in zip(x, shift)], u=u,
         plane=[*(number * unit for number in pair.plane[:-1]), pair.plane[-1] * unit - dot(pair.plane, c)],
         denominator=pair.denominator * unit,
-    )  # fmt: skip
+    )
 
 
 def common_point(points: HomogeneousRows, rows: list[int], weights: list[Fraction]) -> NearestPair:
@@ -136,7 +136,7 @@ def common_point(points: HomogeneousRows, rows: list[int], weights: list[Fractio
     return NearestPair(
         MEETING, [row for row, _ in terms], [int(weight * denominator) for _, weight in terms], [], [], y, list(y),
         [0] * d, [0] * (d + 1), denominator,
-    )  # fmt: skip
+    )
 
 
 def common_point_of_polar(pair: NearestPair, points: HomogeneousRows, polar: Space) -> NearestPair:

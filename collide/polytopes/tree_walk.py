@@ -116,7 +116,7 @@ class TreeWalk:
         return Walk(
             status, self.planes, self.origin_planes, self.origin_rounds, self.rounds, self.points, self.halfspaces,
             self.simplices_read, self.net_rows,
-        )  # fmt: skip
+        )
 
     # --- the origin ---------------------------------------------------------------------------------------------------
 
@@ -203,7 +203,7 @@ class TreeWalk:
         halfspaces = HomogeneousRows(w, 1.0 - 4.0 * eta, _no_integers)
         proposal = propose_pair(
             points, halfspaces, self.work, None, None, [int(np.argmin(y @ z))], [int(np.argmax(w @ x))]
-        )  # fmt: skip
+        )
         if proposal is None:
             return None
         weights, multipliers = _coefficients(y[proposal.points], w[proposal.halfspaces], proposal.y, proposal.u)

@@ -99,7 +99,7 @@ def trees_meet(
     counters = {
         "origin_rounds": walk.origin_rounds, "rounds": walk.rounds, "simplices_read": walk.simplices_read,
         "net_rows": walk.net_rows,
-    }  # fmt: skip
+    }
     exclusion = exclusion_of(A, B, walk, relative.o) if walk.status == MISS else None
     if walk.status != OPEN and not certificate:
         return TreeMeeting(walk.status == HIT, False, None, exclusion, counters)

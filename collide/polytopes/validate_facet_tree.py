@@ -47,7 +47,7 @@ def _children(tree: FacetTree, node: Node, F: np.ndarray, whole: bool) -> list[t
     local = np.searchsorted(rows, tree.facets[F])
     if whole:
         keys = {(vertex, cone) for vertex in np.unique(node.hull.facets).tolist()
-                for cone in range(len(node.cones[vertex]))}  # fmt: skip
+                for cone in range(len(node.cones[vertex]))}
         assert keys == set(node.children), "a shell cone was not looked at"
     children: list[tuple[Node, np.ndarray]] = []
     for (vertex, cone), child in node.children.items():

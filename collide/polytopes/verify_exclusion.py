@@ -165,4 +165,4 @@ def _determinant(rows: list[list[int]]) -> int:
     return sum(
         (-1) ** k * int(x) * _determinant([row[:k] + row[k + 1 :] for row in rows[1:]])
         for k, x in enumerate(rows[0]) if x
-    )  # fmt: skip
+    )

@@ -56,7 +56,7 @@ def verify_trees(
         _check_rows(proof.points, proof.weights, len(p), d + 1)
         _check(sum(proof.weights) == 1, "weights do not sum to 1")
         x = [sum((w * Fraction(float(p[row, k])) for row, w in zip(proof.points, proof.weights)), Fraction(0))
-             for k in range(d)]  # fmt: skip
+             for k in range(d)]
         x_W = [sum((m * y for m, y in zip(line, x)), line[d]) for line in M_P[:d]]
         x_R = _solve([line[:d] for line in M_R[:d]], [y - line[d] for y, line in zip(x_W, M_R)])
         highest, row = largest_value(np.column_stack((a, b)), [*x_R, Fraction(-1)])

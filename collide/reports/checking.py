@@ -86,7 +86,7 @@ class Check:
         deeper = next((finding for finding in self.findings if finding.what == DEEPER), None)
         deepened = "" if deeper is None else (
             f"; {deeper.a} and {deeper.b}: {brief_length(deeper.depth)} deep, was {_length(deeper.before)}"
-        )  # fmt: skip
+        )
         return f"{label}{', '.join(parts)}{deepened} ({self.summary})"
 
 

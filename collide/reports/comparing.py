@@ -59,7 +59,7 @@ def _wrong_of(summary: dict) -> str:
     counts = [
         (summary["wrong"], "wrong boolean"), (summary["wrong_distances"], "wrong distance"),
         (summary["contradictions"], "contradiction"), (len(summary["failed"]), "failure"),
-    ]  # fmt: skip
+    ]
     parts = [count(n, what) for n, what in counts if n]
     if summary["wrong_distances"]:
         worst = f" ({brief_length(summary['furthest_off']['difference'])} off at worst)"

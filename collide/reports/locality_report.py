@@ -54,7 +54,7 @@ def _mesh_dict(item: Measured) -> dict:
         "quantiles": {str(share): row.tolist() for share, row in zip(_SHARES, locality.quantiles(_SHARES))},
         "histogram": {"limits": limits.tolist(), "counts": counts.T.tolist()}, "depth_bound": locality.depth_bound,
         "trees": {**item.trees._asdict(), "node_bound": item.trees.node_bound},
-    }  # fmt: skip
+    }
 
 
 def tables(measured: list[Measured]) -> list[Table]:
@@ -77,7 +77,7 @@ def _trees(measured: list[Measured]) -> Table:
         Column("graded nodes", optional=1),
         Column("at most", optional=1), Column("graded depth"), Column("level"), Column("at most"), Column("outliers"),
         Column("at one node", optional=2),
-    ]  # fmt: skip
+    ]
     rows = []
     for item in measured:
         t = item.trees

@@ -30,7 +30,7 @@ def of_scene(scene) -> list[dict]:
         }
         for body in scene.bodies
         for mesh in meshes_of(body.shape)
-    ]  # fmt: skip
+    ]
 
 
 def describe(mesh) -> str:

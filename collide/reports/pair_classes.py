@@ -115,14 +115,14 @@ class Pairs(Sequence):
         distance, lower, upper = (_finite(rows[name]) for name in ("distance", "lower", "upper"))
         depth = [
             max(0.0, -d) if hit and d is not None else None for hit, d in zip(rows["hit"].tolist(), distance)
-        ]  # fmt: skip
+        ]
         a, b = ([self._names[k] for k in rows[side].tolist()] for side in ("a", "b"))
         approximated = [[name for name in pair if name in self._approximated] for pair in zip(a, b)]
         return zip(
             a, b, distance, depth, lower, upper, *(_plain(rows[name]) for name in ("normal", "point_a", "point_b")),
             rows["part_a"].tolist(), rows["part_b"].tolist(), map(proofs.name_of, rows["how"].tolist()),
             rows["certified"].tolist(), approximated,
-        )  # fmt: skip
+        )
 
     # --- many at once ---------------------------------------------------------------------------
 

@@ -96,7 +96,7 @@ class Report:
         yield "schema", SCHEMA
         yield "verdict", {
             "text": self.verdict(), "collides": self.collides, **{name: len(pairs) for name, pairs in by_class.items()},
-        }  # fmt: skip
+        }
         yield from ((name, getattr(self, name)) for name in ("scene", "query", "pairs"))
         yield from by_class.items()
         yield from (
@@ -105,7 +105,7 @@ class Report:
                 "overlaps", "meshes", "approximations", "unanswered", "skipped", "proofs", "work", "notes",
                 "missing_meshes", "seconds", "versions",
             )
-        )  # fmt: skip
+        )
         asked = {"trajectory": self.trajectory, "geometry": self.geometry}
         yield from ((name, value) for name, value in asked.items() if value is not None)
 
@@ -117,7 +117,7 @@ class Report:
 def make(
     scene, clearance: float = 0.0, min_depth: float = 0.0, progress=None, started: float | None = None,
     ignore: Iterable[tuple[str, str]] = (),
-) -> Report:  # fmt: skip
+) -> Report:
     """Test a scene and sort what was found.
 
     Parameters

@@ -45,7 +45,7 @@ def tables(report: Report, everything: bool, proofs: bool) -> list[Table]:
         all_tables += [
             _pair_table(title, "touching", report.touching, "within", True, proofs),
             _overlap_table(report), _mesh_table(report), _approximation_table(report),
-        ]  # fmt: skip
+        ]
     all_tables.append(_line_table(report, everything, proofs))
     if proofs:
         all_tables += [_skip_table(report), _proof_table(report)]
@@ -123,7 +123,7 @@ def _is_range(pair: Pair) -> bool:
     return (
         pair.depth is not None and not pair.certified and pair.upper is not None and pair.upper < 0.0
         and _bracket(pair) > _WIDE * pair.depth
-    )  # fmt: skip
+    )
 
 
 def depth_texts(pairs: list[Pair]) -> list[str]:
@@ -177,7 +177,7 @@ def _line_table(report: Report, everything: bool, proofs: bool) -> Table:
     lines = [] if everything else [
         ("touching", _touching_line(report)), ("overlaps", _overlap_line(report)), ("meshes", _mesh_line(report)),
         ("stand-ins", _approximation_line(report)),
-    ]  # fmt: skip
+    ]
     lines += [] if proofs else [("never tested", _skip_line(report))]
     lines += [] if everything else _note_lines(report)
     title = "BESIDES" if everything else "BESIDES  --all lists them, --proofs tells how each answer is known"

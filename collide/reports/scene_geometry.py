@@ -27,7 +27,7 @@ def of_scene(scene) -> dict:
         bodies.append({
             "name": body.name, "static": bool(body.static), "owner": body.owner, "X_WB": body.X_WB.tolist(),
             "shape": rows[id(body.shape)],
-        })  # fmt: skip
+        })
     return {"bodies": bodies, "shapes": shapes}
 
 

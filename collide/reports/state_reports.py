@@ -101,7 +101,7 @@ def _trajectory_tables(trajectory: dict, limit: int | None) -> list[Table]:
             [Column("body A", "name"), Column("body B", "name"), Column("because", "text")],
             [[entry["a"], entry["b"], entry["why"]] for entry in trajectory["unanswered"]],
         ),
-    ]  # fmt: skip
+    ]
     return [table for table in tables if table.rows]
 
 
@@ -119,7 +119,7 @@ def _motion_table(title: str, pairs: list[dict], measure: str, limit: int | None
         [pair["a"] for pair in listed], [pair["b"] for pair in listed], lengths(sizes),
         [place(pair["at"]) for pair in listed],
         [str(pair["samples"]) for pair in listed],
-    )  # fmt: skip
+    )
     rows = [list(row) for row in cells]
     if measure == "depth":
         columns.insert(2, Column("from"))

@@ -119,7 +119,7 @@ def follow(
 def watched(
     scene, trajectory, *, clearance: float = 0.0, min_depth: float = 0.0, resolution: float = RESOLUTION,
     progress=None, keep: bool = False,
-) -> Watch:  # fmt: skip
+) -> Watch:
     """As `follow`, for those who want to look at samples again: what has followed the trajectory to its end.
 
     keep : samples will be looked at again; rows of the first 20,000 are kept.
@@ -135,7 +135,7 @@ def watched(
         "source": str(trajectory.source), "waypoints": len(trajectory.waypoints), "samples": len(path.share),
         "resolution": resolution, "certified": False, "moving": watch.moving,
         "duration": None if path.times is None else float(path.times[-1] - path.times[0]),
-    }  # fmt: skip
+    }
     return watch
 
 
@@ -180,7 +180,7 @@ class Watch:
             name
             for name, X in self._carried(corners)
             if (X != X[0]).any()
-        }  # fmt: skip
+        }
         return [body.name for body in self.scene.bodies if body.name in moved]
 
     def _carried(self, samples: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
@@ -301,7 +301,7 @@ class Watch:
             "first_collision": None if self.first is None else self._entry(self.first),
             "least": None if self.least is None else self._entry(self.least),
             **listed, "unanswered": self.unanswered, "notes": self.path.notes,
-        }  # fmt: skip
+        }
 
     def _listed(self, name: str) -> list[dict]:
         """Pairs that are in this class at worst: collisions in the order they begin, others the nearest first."""
@@ -328,7 +328,7 @@ class Watch:
         return {
             "share": float(path.share[k]), "time": None if path.times is None else float(path.times[k]),
             "sample": k, "waypoint": int(path.waypoint[k]),
-        }  # fmt: skip
+        }
 
     def _state(self, k: int) -> dict[str, float]:
         """Joint values of all robots at sample k."""
@@ -361,7 +361,7 @@ def verdict(trajectory: dict) -> str:
     near = "nothing near" if least is None else (
         f"least clearance {brief_length(max(0.0, least['distance']))} at {place(least['at'], ' of it')}: "
         f"{least['a']} and {least['b']}"
-    )  # fmt: skip
+    )
     return f"no collision at {count(trajectory['samples'], 'sample')} of the path; {near}"
 
 

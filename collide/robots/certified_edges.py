@@ -75,7 +75,7 @@ class CertifiedEdges:
 def sampled_collision(
     q0: np.ndarray, q1: np.ndarray, step: float, collides: Callable[[np.ndarray], np.ndarray],
     n_halvings: int | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """(N,) a t at which each motion collides, NaN where none of its samples does.
 
     Ends first, then the middle, then quarters, …, until no column changes by more than ``step``; motions that were
@@ -184,4 +184,4 @@ def _motion_workspace(checker: CheckerScene, resolution: float) -> MotionWorkspa
     return MotionWorkspace(
         [np.array([number[name] for name in path], dtype=np.int64) for path in paths], between, robot.dof,
         checker.n_pairs, resolution, _ROUNDING * reach,
-    )  # fmt: skip
+    )

@@ -17,7 +17,7 @@ from collide.robots.motion_bounds import bound_motions
 def settle_meshes(
     checker: CheckerScene, space: CheckWorkspace, work: MotionWorkspace, q0: np.ndarray, q1: np.ndarray,
     rows: np.ndarray, times: np.ndarray, resolution: float,
-) -> list[np.ndarray]:  # fmt: skip
+) -> list[np.ndarray]:
     """Open intervals (k, OPEN_INTERVAL) that remain of pairs of bodies; ``times`` (N,) of collisions are written.
 
     q0, q1 : (N, dof) ends of the motions that rows name.   rows : (k, OPEN_INTERVAL).
@@ -33,7 +33,7 @@ def settle_meshes(
         bound_motions(
             space.address, work.address, address_of(q0), address_of(q1), q0.shape[1], address_of(rows), len(rows),
             address_of(bounds),
-        )  # fmt: skip
+        )
         middle = 0.5 * (rows[:, 1] + rows[:, 2])
         X_WLs = checker.link_poses(q0[edges] + middle[:, None] * (q1 - q0)[edges])
         measured = open_pairs.distances(

@@ -36,7 +36,7 @@ from collide.robots.forward_kinematics import Joints, view_joints
     OPEN_AT, OPEN_CAPACITY, N_OPEN, STAMP,
     # a double: boxes are moved outwards by this share of all that went into them
     SLACK,
-) = range(44)  # fmt: skip
+) = range(44)
 HEADER = 44
 
 # Integers of a body: its link, its first part and how many there are.
@@ -82,7 +82,7 @@ def view_scene(header_at):
         view_f64(words[PARTS_AT], PART * words[N_LINK_PARTS]), view_f64(words[PART_BOXES_AT], BOX * n_parts),
         view_f64(words[POSES_AT], POSE * n_parts), view_i64(words[PLACED_AT], n_parts),
         view_i64(words[CANDIDATES_AT], n_parts),
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -114,7 +114,7 @@ def boxes_meet(scene, a, b, margin):
         boxes[p] - margin <= boxes[q + 3] and boxes[q] - margin <= boxes[p + 3]
         and boxes[p + 1] - margin <= boxes[q + 4] and boxes[q + 1] - margin <= boxes[p + 4]
         and boxes[p + 2] - margin <= boxes[q + 5] and boxes[q + 2] - margin <= boxes[p + 5]
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -143,7 +143,7 @@ def find_parts_around(scene, body, margin):
             nodes[n] <= high0 and nodes[n + 3] >= low0
             and nodes[n + 1] <= high1 and nodes[n + 4] >= low1
             and nodes[n + 2] <= high2 and nodes[n + 5] >= low2
-        )  # fmt: skip
+        )
         if meets and links[NODE_LINK * node + BODY] >= 0:
             near[count] = links[NODE_LINK * node + BODY]
             count += 1

@@ -159,7 +159,7 @@ def check_tables(bodies: Sequence[RobotBody], around: Surroundings, matrices: np
         rows, _body_boxes(rows, parts, part_boxes, padded), parts, padded, part_boxes,
         np.concatenate([is_bound, around.is_bound]).astype(np.uint8), table_of, np.arange(len(poses)), poses,
         _slack_of(matrices, parts, around.poses),
-    )  # fmt: skip
+    )
 
 
 @kept_with_shape("_convex_parts")

@@ -51,14 +51,14 @@ class CheckWorkspace:
             layout.PARTS_AT: tables.parts, layout.PART_BOXES_AT: tables.part_boxes, layout.IS_BOUND_AT: tables.is_bound,
             layout.UNBOUNDED_AT: unbounded, layout.BODY_OF_AT: around.body_of, layout.ALLOWED_AT: allowed,
             layout.TERMS_AT: NO_TERMS, layout.SHAPE_OF_AT: tables.shape_of,
-        }  # fmt: skip
+        }
         numbers = {
             layout.N_JOINTS: len(joints.ints), layout.ROOT: joints.root, layout.N_LINKS: joints.n_links,
             layout.CORE: code_of(answer_pairs), layout.N_BODIES: n_bodies, layout.N_SELF_PAIRS: len(self_pairs),
             layout.N_LINK_PARTS: n_parts - n_around, layout.PADDED: tables.padded, layout.N_PARTS: n_parts,
             layout.N_UNBOUNDED: len(unbounded), layout.N_AROUND: allowed.shape[1],
             layout.OPEN_CAPACITY: capacity,
-        }  # fmt: skip
+        }
         if tree is not None:
             buffers |= {layout.NODES_AT: tree.nodes, layout.NODE_LINKS_AT: tree.links}
             numbers |= {layout.N_NODES: tree.n_nodes}
@@ -83,7 +83,7 @@ class MotionWorkspace:
     """
 
     def __init__(self, paths: list[np.ndarray], between: np.ndarray, dof: int, n_pairs: int, resolution: float,
-                 rounding: float):  # fmt: skip
+                 rounding: float):
         lengths = np.array([len(path) for path in paths], dtype=np.int64)
         stride = max(int(lengths.max(initial=0)), 1)
         table = np.zeros((len(paths), stride), dtype=np.int64)
@@ -95,7 +95,7 @@ class MotionWorkspace:
             motions.CONFIGURATION_AT: np.zeros(max(dof, 1)), motions.MOVED_AT: np.zeros((len(paths), stride + 1)),
             motions.INTERVALS_AT: np.zeros((motions.MAX_INTERVALS + 1, motions.INTERVAL)),
             motions.ITEMS_AT: np.empty((n_items + 1, motions.ITEM), dtype=np.int64),
-        }  # fmt: skip
+        }
         self.header = np.zeros(motions.MOTION_HEADER, dtype=np.int64)
         for word, buffer in self._buffers.items():
             self.header[word] = address_of(buffer)

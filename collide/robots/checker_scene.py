@@ -32,7 +32,7 @@ class CheckerScene:
     def __init__(
         self, robot: Robot, world: World | None, X_WR, attached: Iterable, padding, allowed: Iterable[tuple[str, str]],
         mobile: bool,
-    ):  # fmt: skip
+    ):
         if not isinstance(robot, Robot):
             raise InvalidArgument(f"RobotChecker: robot must be a collide.Robot, got {checks.brief(robot)}")
         if world is not None and not isinstance(world, World):

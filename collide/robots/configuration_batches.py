@@ -40,7 +40,7 @@ def measure_piece(
     distance_gradients(
         space.address, address_of(q), checker.robot.dof, len(q), address_of(checker.robot.moves), address_of(rows),
         address_of(gradient),
-    )  # fmt: skip
+    )
     for field in NEAREST_DTYPE.names or ():
         out[field] = rows[field]
     far = rows["a"] < 0
@@ -70,7 +70,7 @@ def _nearest_rows(checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, l
 def _search(
     checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, within: np.ndarray, rows: np.ndarray,
     some: np.ndarray | None, asked: np.ndarray, limit: float,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """``rows`` (n,) take the nearest pairs of configurations q (n, dof), or some of them (k,), that are known within
     limits ``within`` (n,), which become those searched; (m, 3) pairs left to others and asked so far.
     """
@@ -81,7 +81,7 @@ def _search(
         first, done = done, nearest_pairs(
             space.address, address_of(q_some), checker.robot.dof, done, len(nearest), limit, address_of(limits),
             address_of(nearest),
-        )  # fmt: skip
+        )
         if some is not None:
             rows[some[first:done]] = open_pairs.nearer_of(rows[some[first:done]], nearest[first:done])
         if len(space.open_pairs):

@@ -72,7 +72,7 @@ class ConfigurationReport:
             q, [pair for pair, hit in zip(explained, hits) if hit],
             [pair for pair, hit in zip(explained, hits) if not hit], checker.robot.limit_notes(q), checker.n_pairs,
             checker.skipped, checker.robot.name,
-        )  # fmt: skip
+        )
 
     @property
     def collides(self) -> bool:
@@ -111,4 +111,4 @@ def _explained(checker: CheckerScene, row: np.ndarray) -> ExplainedPair:
     return ExplainedPair(
         a, b, float(row["distance"]), float(row["lower"]), float(row["upper"]), row["normal"].copy(),
         row["point_a"].copy(), row["point_b"].copy(),
-    )  # fmt: skip
+    )

@@ -31,7 +31,7 @@ LINK_POSE = 12
 _KINDS = {
     "fixed": FIXED, "revolute": ROTATION, "continuous": ROTATION, "prismatic": TRANSLATION, "planar": PLANAR,
     "floating": FLOATING,
-}  # fmt: skip
+}
 _FULL_CIRCLE = 2.0 * math.pi
 
 
@@ -52,7 +52,7 @@ class JointTable(NamedTuple):
 def joint_table(
     joints: Sequence[Joint], link_numbers: Mapping[str, int], columns: Mapping[str, int],
     drivers: Mapping[str, tuple[str, float, float]], root: str, dof: int,
-) -> JointTable:  # fmt: skip
+) -> JointTable:
     """The `JointTable` of joints sorted from the root on.
 
     columns : joint → its first column of q.   drivers : joint → (the joint that it follows, multiplier, offset).
@@ -96,7 +96,7 @@ def link_poses_of(table: JointTable, q: np.ndarray, X_WR: np.ndarray) -> np.ndar
     pose_all_links(
         address_of(table.ints), address_of(table.doubles), len(table.ints), table.root, table.n_links, address_of(base),
         address_of(q), table.dof, len(q), address_of(scratch), address_of(out),
-    )  # fmt: skip
+    )
     return out
 
 
@@ -116,7 +116,7 @@ def view_joints(ints_at, doubles_at, n, root, base_at):
     return Joints(
         view_i64(ints_at, JOINT_INTS * n), view_f64(doubles_at, JOINT_DOUBLES * n), n, root,
         view_f64(base_at, LINK_POSE),
-    )  # fmt: skip
+    )
 
 
 @entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")

@@ -43,7 +43,7 @@ from collide.robots.forward_kinematics import (
     # two doubles: intervals no longer than this are not halved [rad or m, of the column that moves by most]; how far
     # a link may be off by rounding [m]
     RESOLUTION, ROUNDING,
-) = range(18)  # fmt: skip
+) = range(18)
 MOTION_HEADER = 18
 #: Doubles of an interval on the stack: where it begins and ends, the first of its pairs and how many, −1 for all there
 #: are.
@@ -93,7 +93,7 @@ def motion_at(scene, motions_at, q0, q1, at, dof):
         view_f64(words[MOVED_AT], scene.words[N_BODIES] * (words[PATH_STRIDE] + 1)),
         view_f64(words[INTERVALS_AT], INTERVAL * (MAX_INTERVALS + 1)),
         view_i64(words[ITEMS_AT], ITEM * (words[ITEM_CAPACITY] + 1)), settings[0], settings[1], max_change,
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

@@ -36,7 +36,7 @@ def are_hits(
 def distances(
     pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround], *, limit,
     by_parts: bool = False,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """(k,) rows of PAIR_DTYPE of such pairs, ``a`` and ``b`` as the pairs name bodies; ``beyond`` a limit [m].
 
     limit : one of all, or (k,) of each, which may be exceeded.   by_parts : of unions of convex parts that overlap, the

@@ -76,7 +76,7 @@ def ask(scene, p, q, d, boolean, limit):
             words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], words[TERMS_AT], words[SHAPE_OF_AT], words[PAIR_AT], 1,
             boolean, not boolean, boolean, limit, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
         ),
-    )  # fmt: skip
+    )
     return row
 
 

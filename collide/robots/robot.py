@@ -567,7 +567,7 @@ def _checked_geometry(geometry) -> dict[str, tuple[LinkShape, ...]]:
 def _checked_pairs(pairs) -> tuple[tuple[str, str, str], ...]:
     wanted = "(link, link, reason), three texts each"
     checked = [checks.listed_entries("Robot: semantic_pairs", pair, wanted, SceneError)
-             for pair in checks.listed_entries("Robot: semantic_pairs", pairs, wanted, SceneError)]  # fmt: skip
+             for pair in checks.listed_entries("Robot: semantic_pairs", pairs, wanted, SceneError)]
     for pair in checked:
         if len(pair) != 3 or not all(isinstance(word, str) for word in pair):
             raise SceneError(f"Robot: semantic_pairs must be {wanted}, got {brief(pair)}")

@@ -141,7 +141,7 @@ def refuse_own_margins(packed: PackedWorld, robot: Robot) -> None:
 def filters_of(
     robot: Robot, bodies: list[RobotBody], objects: dict[str, Attached], world: World, around: list[BodyAround],
     allowed: Iterable[tuple[str, str]], mobile: bool,
-) -> Filters:  # fmt: skip
+) -> Filters:
     """Pairs that are tested, and how many are not, by reason.
 
     Never tested: pairs that the robot disables, that ``allowed`` or the World name, links of a fixed base against

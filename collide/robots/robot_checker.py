@@ -65,7 +65,7 @@ class RobotChecker(CheckerScene):
     def __init__(
         self, robot: Robot, world: World | None = None, *, X_WR=None, attached: Iterable = (), padding=0.0,
         allowed: Iterable[tuple[str, str]] = (), mobile: bool = False,
-    ):  # fmt: skip
+    ):
         super().__init__(robot, world, X_WR, attached, padding, allowed, mobile)
 
     @classmethod
@@ -177,7 +177,7 @@ class RobotChecker(CheckerScene):
         self.in_pieces(
             len(q), threads, progress,
             lambda space, piece: measure_piece(self, space, q[piece], rows[piece], gradient[piece], limit),
-        )  # fmt: skip
+        )
         return RobotDistances(rows, gradient, self.bodies, self.around)
 
     def edge_collides(self, Q0, Q1, *, resolution: float = 0.01, threads: int = 1) -> np.ndarray:

@@ -12,7 +12,7 @@ NEAREST_DTYPE = np.dtype(
         ("distance", "f8"), ("lower", "f8"), ("upper", "f8"), ("normal", "f8", 3), ("point_a", "f8", 3),
         ("point_b", "f8", 3), ("a", "i4"), ("b", "i4"), ("hit", "?"), ("certified", "?"), ("beyond", "?"),
     ]
-)  # fmt: skip
+)
 
 
 #: Why there is no gradient: what is the case, and what to do about it where there is anything to do.

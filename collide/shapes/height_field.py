@@ -89,7 +89,7 @@ class HeightField(Mesh):
         self._store(
             heights=heights, cell=cell, bottom=bottom, vertices=vertices, faces=faces, solid=True, scale=1.0,
             _copied=None, _survey=_known_survey(vertices, faces, _volume(heights, cell, bottom)),
-        )  # fmt: skip
+        )
 
     @classmethod
     def _from_fields(cls, heights, cell, bottom) -> HeightField:  # type: ignore[override]
@@ -299,4 +299,4 @@ def _known_survey(vertices: np.ndarray, faces: np.ndarray, volume: float) -> Sur
     return mesh_survey.Survey(
         faces, flags, shells, volumes, signs, n_shells=1, edges=3 * len(faces) // 2, open_edges=0, pinches=0,
         used=len(vertices), welded=0,
-    )  # fmt: skip
+    )

@@ -329,7 +329,7 @@ _FILE_FORMAT = 1
 _FILE_FIELDS = {
     "vertices": Field("f8", (None, 3)), "faces": Field("i4", (None, 3)), "solid": Field("b1", ()),
     "scale": Field("f8", ()),
-}  # fmt: skip
+}
 
 
 def _what_spoils(vertices: int, survey: Survey) -> str:

@@ -117,4 +117,4 @@ def make_report(vertices: int, solid: bool, survey: Survey) -> MeshReport:
     return MeshReport(
         solid, why, vertices, len(survey.flags), survey.used, survey.welded, survey.edges, survey.n_shells,
         survey.euler, float(survey.volumes.sum()), defects,
-    )  # fmt: skip
+    )

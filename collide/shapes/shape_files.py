@@ -135,7 +135,7 @@ def unpack(
     except (
         OSError, TypeError, AttributeError, ValueError, EOFError, KeyError, IndexError, OverflowError, MemoryError,
         RuntimeError, SyntaxError, struct.error, zipfile.BadZipFile,
-    ) as error:  # fmt: skip
+    ) as error:
         raise InvalidShape(f"{named} is no file that collide wrote ({error})") from None
     if not {*_STAMPS, *needed} <= arrays.keys() or int(arrays.pop("format")) != version:
         raise InvalidShape(complaint)

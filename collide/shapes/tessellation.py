@@ -278,7 +278,7 @@ def _icosahedron() -> tuple[np.ndarray, np.ndarray]:
         (a, b, c)
         for a in range(12) for b in range(a + 1, 12) for c in range(b + 1, 12)
         if near[a, b] and near[b, c] and near[a, c]
-    ]  # fmt: skip
+    ]
     outward = [np.linalg.det(corners[list(side)]) > 0 for side in sides]
     return corners, np.array([side if out else side[::-1] for side, out in zip(sides, outward)])
 

@@ -62,7 +62,7 @@ class BooleanResult(NamedTuple):
 def boolean(
     A: Shape, B: Shape, X_WA, X_WB, op: str, *, check_poses: bool = True, progress=None,
     time_limit: float | None = None, memory: int | None = None,
-) -> BooleanResult:  # fmt: skip
+) -> BooleanResult:
     """Union, intersection or difference of two posed solids, as a mesh: decided exactly on the poses as given.
 
     Parameters
@@ -119,4 +119,4 @@ def solid_of(arrangement: Arrangement, keep: np.ndarray) -> BooleanResult:
     return BooleanResult(
         made.mesh, arrangement.facets.body[source], arrangement.facets.number[source], before, behind, made.moved,
         made.n_collapsed, made.n_thin, arrangement.n_meeting, arrangement.n_cut,
-    )  # fmt: skip
+    )

@@ -30,7 +30,7 @@ RULES: dict[str, MembershipRule] = {
 def combine(
     shapes: Sequence[Shape], poses, rule: str | MembershipRule, *, check_poses: bool = True, progress=None,
     time_limit: float | None = None, memory: int | None = None,
-) -> BooleanResult:  # fmt: skip
+) -> BooleanResult:
     """One solid of r posed solids, by any rule of which of them hold a point: all in one arrangement, decided exactly.
 
     Results of pairs are rounded, so that a chain of them is not the boolean of what was given; this is.

@@ -153,7 +153,7 @@ def _surfaces(A: Shape, B: Shape, X: np.ndarray, check: bool):
     reflected[3, 3] = 1.0
     groups, grid = on_one_grid(
         placed(np.eye(4), operands[0].mesh.vertices), placed(reflected, operands[1].mesh.vertices)
-    )  # fmt: skip
+    )
     surfaces, numbers = [], []
     for name, operand, points, turned in zip("AB", operands, groups, (False, True)):
         rows, faces = _checked_faces(name, operand.mesh)

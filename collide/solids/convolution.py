@@ -95,7 +95,7 @@ def convolution(A: ExactSurface, B: ExactSurface) -> Pieces:
     at_vertices_of_b = _vertex_counts(A.normals, B, along_b, of_b, there)
     at_vertices_of_a = _vertex_counts(B.normals, A, along_a, of_a, back)
     of_edges = _crossings(of_b[A.sides[:, 0]], of_b[A.sides[:, 1]], of_a[B.sides[:, 0]].T, of_a[B.sides[:, 1]].T,
-                          A.bend[:, None], B.bend[None, :])  # fmt: skip
+                          A.bend[:, None], B.bend[None, :])
     some_of_a, some_of_b = _a_facet_at(A), _a_facet_at(B)
     pieces = [
         _facets_and_vertices(A.faces, at_vertices_of_b, some_of_b),
@@ -182,7 +182,7 @@ def _rings(Q: ExactSurface) -> np.ndarray:
     corner = {(f, v): 3 * f + k for f, face in enumerate(Q.faces.tolist()) for k, v in enumerate(face)}
     joined = [
         (corner[f, v], corner[g, v]) for edge, (f, g) in zip(Q.edges.tolist(), Q.sides.tolist()) for v in edge
-    ]  # fmt: skip
+    ]
     root = components(3 * len(Q.faces), *np.array(joined).T)
     tops = np.flatnonzero(root == np.arange(len(root)))
     return np.bincount(Q.faces.ravel()[tops], minlength=len(Q.points))

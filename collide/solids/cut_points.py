@@ -123,7 +123,7 @@ class CutPoints:
         ru_, rv_, rw = (self.exact(c)[k] for k in (u, v, 3))
         exact = (
             (qu_ * pw - pu_ * qw) * (rv_ * pw - pv_ * rw) - (qv_ * pw - pv_ * qw) * (ru_ * pw - pu_ * rw)
-        )  # fmt: skip
+        )
         return (exact > 0) - (exact < 0)
 
     def before(self, a: int, b: int, u: int, v: int) -> int:

@@ -33,7 +33,7 @@ class FacetCuts:
     def __init__(
         self, facets: PlacedFacets, points: CutPoints, pairs: np.ndarray, crossings: np.ndarray, ids: np.ndarray,
         rows: np.ndarray, limits: Limits = UNLIMITED,
-    ):  # fmt: skip
+    ):
         self.facets, self.points = facets, points
         self.corners_of: dict[int, tuple[int, int, int]] = {}
         self.segments_of: dict[int, set[Segment]] = {}

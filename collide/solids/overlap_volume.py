@@ -39,7 +39,7 @@ class OverlapVolume(NamedTuple):
 def overlap_volume(
     A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True, progress=None, time_limit: float | None = None,
     memory: int | None = None,
-) -> OverlapVolume:  # fmt: skip
+) -> OverlapVolume:
     """Volume, centroid and surfaces of the overlap of two posed solids; no mesh is made of it.
 
     Parameters
@@ -79,7 +79,7 @@ def overlap_volume(
         volume.volume, volume.lower, volume.upper, centroid, float(size[steps[:, 0] & ~steps[:, 1]].sum()),
         float(size[steps[:, 1] & ~steps[:, 0]].sum()), float(patch.sum()), float(size[steps.all(axis=1)].sum()),
         arrangement.n_meeting, arrangement.n_cut,
-    )  # fmt: skip
+    )
 
 
 def _patch(arrangement: Arrangement, holds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

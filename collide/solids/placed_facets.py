@@ -130,7 +130,7 @@ class PlacedFacets:
         unit = w << down
         return (
             quotient((x + a * w) << up, unit), quotient((y + b * w) << up, unit), quotient((z + c * w) << up, unit)
-        )  # fmt: skip
+        )
 
     def _on_grid(self, points: list[Point], grid: int) -> list[Point]:
         shift = grid - self.grid

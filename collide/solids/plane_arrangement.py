@@ -79,7 +79,7 @@ class PlaneArrangement:
         at_u, at_v, at_p, at_q = (
             self.side_of(u, p, q), self.side_of(v, p, q), self.side_of(p, u, v),
             self.side_of(q, u, v),
-        )  # fmt: skip
+        )
         for side, point, row, ends in ((at_u, t[0], a, s), (at_v, t[1], a, s), (at_p, s[0], b, t), (at_q, s[1], b, t)):
             if side == 0 and point not in ends and self._between(point, *ends):
                 self._splits[row].add(point)

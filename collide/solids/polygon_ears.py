@@ -60,7 +60,7 @@ def _is_empty(seen, m, i, j, k, limit):
             and not (
                 _area(seen, i, j, p) < -limit or _area(seen, j, k, p) < -limit or _area(seen, k, i, p) < -limit
             )
-        ):  # fmt: skip
+        ):
             return False
     return True
 
@@ -129,7 +129,7 @@ def _walk_around(following, points, rows, seen_step, head, ids):
 def clip_parts(
     poses_at, n_bodies, local_at, n_vertices, corners_at, body_at, n_facets, place_at, error_at, n_points, following_at,
     points_at, rows_at, n, n_border, seen_at, failed_at, triangles_at, owners_at, workspace_at,
-):  # fmt: skip
+):
     """How many triangles were made, those of facets that fail among them.
 
     poses, local, corners, body : of `PlacedFacets`.   place, error : of the points that are no vertices, in W.

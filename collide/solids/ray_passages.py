@@ -36,7 +36,7 @@ def count_passages(
         count = pass_facets(
             tree.address, address_of(X), address_of(points), address_of(axes), len(axes), float(slack),
             address_of(totals), address_of(remaining), len(remaining), address_of(stack), len(stack),
-        )  # fmt: skip
+        )
         if count <= len(remaining):
             return totals, remaining[:count]
         remaining = np.empty((count, 2), dtype=np.int64)
@@ -111,7 +111,7 @@ def _passage(T, at, X, points, k, axis, slack):
 @entry("int64(int64, int64, int64, int64, int64, float64, int64, int64, int64, int64, int64)")
 def pass_facets(
     header_at, X_at, points_at, axes_at, n, slack, totals_at, left_at, capacity, stack_at, n_stack
-):  # fmt: skip
+):
     """How many pairs of rays and facets are left open; of those that fit, ray and facet.   totals : out, per ray."""
     tree = open_tree(header_at)
     X = view_f64(X_at, 16)

@@ -80,7 +80,7 @@ def _passage(facets: PlacedFacets, f: int, p: Rational, axis: int) -> int | None
     x, y, w = p[u], p[v], p[3]
     sides = [
         (b[u] - a[u]) * (y - a[v] * w) - (b[v] - a[v]) * (x - a[u] * w) for a, b in zip(c, (c[1], c[2], c[0]))
-    ]  # fmt: skip
+    ]
     if min(sides) < 0 < max(sides):
         return 0
     if n[axis] == 0:

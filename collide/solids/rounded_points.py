@@ -47,7 +47,7 @@ def _bodies(facets: PlacedFacets) -> tuple[int, ...]:
     return (
         address_of(facets.poses), len(facets.poses), address_of(facets.local), address_of(facets.body_of),
         len(facets.local),
-    )  # fmt: skip
+    )
 
 
 def _answers(k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

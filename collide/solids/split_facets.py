@@ -68,7 +68,7 @@ def split_facets(
 def _clipped(
     facets: PlacedFacets, following: np.ndarray, n_border: int, rows: np.ndarray, points: np.ndarray,
     place: np.ndarray, error: np.ndarray, is_bad: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """(triangles (t, 3), their facets (t,)) as of `polygon_ears.clip_parts`, which marks further facets as bad."""
     n = len(following)
     triangles, owners = np.empty((n, 3), dtype=np.int64), np.empty(n, dtype=np.int64)
@@ -78,7 +78,7 @@ def _clipped(
         address_of(facets.corners), address_of(facets.body), len(facets.corners), address_of(place), address_of(error),
         len(place), address_of(following), address_of(points), address_of(rows), n, n_border, address_of(seen),
         address_of(is_bad.view(np.uint8)), address_of(triangles), address_of(owners), address_of(workspace),
-    )  # fmt: skip
+    )
     return triangles[:count], owners[:count]
 
 

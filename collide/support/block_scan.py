@@ -65,4 +65,4 @@ else:
 __all__ = [
     "count_level", "count_level_one_by_one", "farthest", "farthest_listed", "farthest_one_by_one", "least",
     "least_one_by_one",
-]  # fmt: skip
+]

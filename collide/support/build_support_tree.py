@@ -51,7 +51,7 @@ class Rings:
         self.status = order_rings(
             address_of(points), n, address_of(facets), f, address_of(self.starts), address_of(self.ring),
             address_of(self.ring_facets), address_of(following), address_of(place), address_of(self.normals),
-        )  # fmt: skip
+        )
         self.corner = place >= 3
 
     def _as_polygon(self, points: np.ndarray, facets: np.ndarray) -> None:
@@ -221,7 +221,7 @@ def _built(points, scaled, ordered, sizes, rings: Rings, hull_of) -> SupportTree
     return SupportTree(
         points, rings.flat, partial.depth, partial.nodes, np.concatenate(owners), partial.entries,
         list_coordinates_of(points, partial.nodes, rows), rings.starts, rings.ring,
-    )  # fmt: skip
+    )
 
 
 def _lists(partial: _TreeInProgress, fine, rings: Rings, coarse, first_node) -> tuple[np.ndarray, np.ndarray]:
@@ -237,7 +237,7 @@ def _lists(partial: _TreeInProgress, fine, rings: Rings, coarse, first_node) -> 
             address_of(partial.nodes), address_of(partial.entries), address_of(partial.coordinates),
             len(partial.nodes) - 1, partial.depth, address_of(coarse), len(coarse), first_node,
             address_of(pairs), capacity, address_of(list_starts), address_of(work),
-        )  # fmt: skip
+        )
         if n_pairs <= capacity:
             return list_starts.astype(np.int64), pairs[: list_starts[-1]]
         capacity = n_pairs

@@ -152,7 +152,7 @@ def candidate_lists(
     points_at, n, fine_at, n_fine, starts_at, ring_at, ring_facets_at, normals_at, n_facets,
     nodes_at, entries_at, coordinates_at, n_nodes, depth, coarse_at, n_coarse, first_node,
     pairs_at, capacity, list_starts_at, work_at,
-):  # fmt: skip
+):
     """Candidate lists of ``n_coarse`` vertices among ``n_fine`` ones; returns how many pairs were met.
 
     fine : rows of the fine vertices; rings and facet normals as `order_rings` gives them, which may know more
@@ -162,7 +162,7 @@ def candidate_lists(
     pairs : ``capacity`` pairs of integers, out. Where more are met nothing is made: call again with more.
     list_starts : (n_coarse + 1), out; the rows of list i end up at pairs[list_starts[i] : list_starts[i + 1]].
     work : n + capacity + 2·STACK doubles of workspace.   Arguments are flat: entries are called by address, from C too.
-    """  # fmt: skip
+    """
     fine = view_i32(fine_at, n_fine)
     starts = view_i32(starts_at, n + 1)
     ring = view_i32(ring_at, starts[n])
@@ -178,7 +178,7 @@ def candidate_lists(
     search = ArcSearch(
         points, lists, view_i32(coarse_at, n_coarse), first_node, _sizes(points, fine, n_fine),
         view_f64(work_at, 2 * STACK), stamp, view_i32(pairs_at, 2 * capacity), capacity,
-    )  # fmt: skip
+    )
     for i in range(n):
         stamp[i] = -1
         known[i] = 0

@@ -18,7 +18,7 @@ from collide.numerics.lowest_bits import lowest_exponents
 
 #: Header entries: how many of what, then addresses.
 (POINTS, DEPTH, NODES, ENTRIES, LINKS, AT_NODES, AT_ENTRIES, AT_LIST_COORDINATES, AT_RING_STARTS, AT_RING, AT_RANGE,
- FLAT, AT_POINTS, HEADER) = range(14)  # fmt: skip
+ FLAT, AT_POINTS, HEADER) = range(14)
 #: No coordinate may be larger in size: products with a direction, and their halves, stay finite.
 LARGEST_COORDINATE = 2.0**480
 #: Fewest entries of a list: a block of the scan.
@@ -56,7 +56,7 @@ class SupportTree:
                  self.nodes, self.entries, self.list_coordinates, self.ring_starts, self.ring,
                  self.range)), self.flat, address_of(self.points)],
             dtype=np.int64,
-        )  # fmt: skip
+        )
         self.address = address_of(self.header)
         for part in (self.header, self.range, self.list_coordinates, *(getattr(self, name) for name in _PARTS)):
             part.flags.writeable = False

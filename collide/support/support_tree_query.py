@@ -32,7 +32,7 @@ from collide.support.support_tree import (
     NODES,
     POINTS,
     SupportTree,
-)  # fmt: skip
+)
 
 #: Operations counted: see `extreme_vertices`.
 COUNTERS = 4
@@ -98,7 +98,7 @@ def _lists_of(tree_at, list_id):
     return Lists(
         view_i32(header[AT_NODES], header[NODES] + 1), view_i32(header[AT_ENTRIES], header[ENTRIES]),
         view_f64(header[AT_LIST_COORDINATES], 3 * header[ENTRIES]), header[DEPTH] if list_id < 0 else np.int64(1),
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -133,7 +133,7 @@ def two_extreme_vertices(tree_a, list_a, g_a, tree_b, list_b, g_b):
     return (
         SupportPoint(np.int64(node_a), _listed_point(lists_a, at_a, count_a), np.int64(list_a)),
         SupportPoint(np.int64(node_b), _listed_point(lists_b, at_b, count_b), np.int64(list_b)),
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -155,7 +155,7 @@ def rings_of(tree_at):
     return (
         view_i32(header[AT_RING_STARTS], header[POINTS] + 1), view_i32(header[AT_RING], header[LINKS]),
         view_f64(header[AT_POINTS], 3 * header[POINTS]),
-    )  # fmt: skip
+    )
 
 
 @entry("void(int64, int64, int64, boolean, int64, int64)")
@@ -191,5 +191,5 @@ def extreme_vertices(
     write_extreme_vertices(
         tree.address, address_of(directions), len(directions), settled, address_of(ids),
         0 if counters is None else address_of(counters),
-    )  # fmt: skip
+    )
     return ids

@@ -253,7 +253,7 @@ def _order(names: list[str], robot: Robot, path: Path) -> list[int]:
     strangers = [name for name in names if name not in robot.joint_names]
     repeated = [name for k, name in enumerate(names) if name in names[:k]]
     for what, wrong in (("lacks columns for", missing), ("has columns that are no joints:", strangers),
-                        ("names columns twice:", repeated)):  # fmt: skip
+                        ("names columns twice:", repeated)):
         if wrong:
             raise SceneError(f"{what} {listing(wrong)}; robot {robot.name} has {listing(robot.joint_names)}", path=path)
     return [names.index(name) for name in robot.joint_names]

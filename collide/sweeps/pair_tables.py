@@ -39,13 +39,13 @@ def proposal_tables(proposal: Proposal, everything: bool = False) -> list[Table]
         notes = ["They touch where the robot starts, so that a test would always fail there; disabled, it never does."]
         rows = [[pair.a, pair.b, _share(pair)] for pair in hidden]
         tables.append(Table("HIDDEN  disabled, and free in part of the sample", [*_A_AND_B, Column("collide in")], rows,
-                            notes=notes))  # fmt: skip
+                            notes=notes))
     rare = [pair for pair in proposal.pairs if pair.searched]
     if rare:
         rows = [[pair.a, pair.b] for pair in rare]
         notes = [f"{pair.a} and {pair.b}: {state_words(pair.q)}" for pair in rare if pair.q is not None]
         tables.append(Table("RARE  collide, though in no configuration of the sample: tested", list(_A_AND_B), rows,
-                            notes=notes))  # fmt: skip
+                            notes=notes))
     if everything:
         rows = [[pair.a, pair.b, pair.reason or "tested", _share(pair), _gap(pair)] for pair in proposal.pairs]
         columns = [*_A_AND_B, Column("reason", "label"), Column("collide in"), Column("least gap", optional=1)]
@@ -87,7 +87,7 @@ def comparison_tables(proposal: Proposal, comparison: PairComparison, place: str
     columns = [
         *_A_AND_B, Column("its reason", "label"), Column("collide in", optional=2), Column("depth"),
         Column("verdict", "label"),
-    ]  # fmt: skip
+    ]
     if theirs:
         rows = [
             [pair.a, pair.b, pair.reason, f"{100 * pair.share:.3g} %", _depth(pair), "wrong" if pair.wrong else "meant"]
@@ -101,7 +101,7 @@ def comparison_tables(proposal: Proposal, comparison: PairComparison, place: str
             [pair.a, pair.b, pair.reason, f"{100 * pair.share:.3g} %",
              "" if pair.gap is None else lengths([pair.gap])[0].strip()]
             for pair in comparison.only_ours
-        ]  # fmt: skip
+        ]
         columns = [*_A_AND_B, Column("reason", "label"), Column("collide in"), Column("least gap", optional=1)]
         tables.append(Table(f"NOT IN {place}  tests of these pairs could be spared", columns, rows))
     return tables
@@ -127,14 +127,14 @@ def to_dict(proposal: Proposal, comparison: PairComparison | None, place: str | 
         "schema": SCHEMA, "robot": proposal.robot.name, "joints": list(proposal.robot.joint_names),
         "samples": proposal.samples, "seed": proposal.seed, "rounds": proposal.rounds, "notes": proposal.notes,
         "pairs": [_pair_dict(pair) for pair in proposal.pairs],
-    }  # fmt: skip
+    }
     if comparison is not None:
         data["compared"] = {
             "with": place, "both": [list(row) for row in comparison.both],
             "only_theirs": [_difference_dict(pair) for pair in comparison.only_theirs],
             "only_ours": [_difference_dict(pair) for pair in comparison.only_ours],
             "not_comparable": [list(row) for row in comparison.not_comparable],
-        }  # fmt: skip
+        }
     return data
 
 
@@ -145,7 +145,7 @@ def _pair_dict(pair: LinkPair) -> dict[str, Any]:
         "share_at_least": low, "share_at_most": high, "fixed": pair.fixed, "searched": pair.searched,
         "collide_at": None if pair.q is None else pair.q.tolist(),
         "least_gap": None if pair.nearest is None else pair.nearest.gap,
-    }  # fmt: skip
+    }
 
 
 def _difference_dict(pair: PairDifference) -> dict[str, Any]:

@@ -103,7 +103,7 @@ class SweepRun:
         self, question: OneQuestion | ScenesQuestion, n_scenes: int,
         configurations: DrawnConfigurations | GivenConfigurations | None, folder: str | Path,
         look: Callable[[bool], str], *, chunk: int | None = None, about: dict[str, Any] | None = None,
-    ):  # fmt: skip
+    ):
         self.question, self.n_scenes, self.Q, self.look = question, n_scenes, configurations, look
         self.rows_each = 1 if configurations is None else configurations.rows
         self.rows = n_scenes * self.rows_each
@@ -138,7 +138,7 @@ class SweepRun:
             "configurations": None if self.Q is None else self.Q.about(), "joints": joints,
             "columns": {"distances": question.distances, "values": question.values}, "rows": self.rows,
             "chunk": self.chunk, "chunks": -(-self.rows // self.chunk),
-        }  # fmt: skip
+        }
         return json.loads(json.dumps(manifest))
 
     def go(

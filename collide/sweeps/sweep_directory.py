@@ -195,7 +195,7 @@ def _stamp(table: Any, number: int, of_sweep: bytes) -> dict[bytes, bytes]:
     return {
         b"collide": SCHEMA.encode(), b"chunk": str(number).encode(), b"sweep": of_sweep,
         b"content": _content_digest(table),
-    }  # fmt: skip
+    }
 
 
 def _is_chunk(table: Any, number: int, of_sweep: bytes) -> bool:

@@ -115,7 +115,7 @@ def read_sweep(folder: str | Path) -> SweepResults:
     return SweepResults(
         folder, manifest["rows"], counts.done, counts.colliding, counts.done - counts.n_no_answer - counts.colliding,
         counts.n_no_answer, counts.n_outside, first, counts.least,
-    )  # fmt: skip
+    )
 
 
 class _Counts:

@@ -43,4 +43,4 @@ def to_dict(results: SweepResults) -> dict[str, Any]:
         "free": results.free, "unanswered": results.unanswered, "outside": results.outside,
         "named": [{"row": row, "note": note} for row, note in results.named],
         "least": None if least is None else dict(zip(("distance", "row", "a", "b"), least)),
-    }  # fmt: skip
+    }

@@ -18,7 +18,7 @@ def signs(vertices: np.ndarray, cells: np.ndarray) -> np.ndarray:
     orient_cells(
         address_of(vertices), address_of(scaled), len(vertices), address_of(cells), len(cells), address_of(work),
         address_of(digits), address_of(result),
-    )  # fmt: skip
+    )
     return result
 
 

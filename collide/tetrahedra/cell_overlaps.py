@@ -46,7 +46,7 @@ class CellOverlaps(NamedTuple):
 def overlapping_cells(
     A: TetMesh, B: TetMesh, X_WA, X_WB, *, volumes: bool = False, centroids: bool = False, settle: bool = True,
     threads: int = 1, progress: Callable | None = None, check_poses: bool = True,
-) -> CellOverlaps:  # fmt: skip
+) -> CellOverlaps:
     """Overlay of two tetrahedral meshes: every pair of cells whose interiors meet, and the volume that they share.
 
     Parameters

@@ -37,7 +37,7 @@ VOLUMES, CENTROIDS, WITH_ITSELF, PLAIN, EXACT = 1, 2, 4, 8, 16
 (
     NODES_AT, N_NODES, IDS_AT, CELLS_A, N_CELLS_A, CELLS_B, N_CELLS_B, CORNERS_A, N_CORNERS_A, CORNERS_B, N_CORNERS_B,
     ORDER_AT, QUERIES_AT, FLAGS, NUMBERS_AT,
-) = range(15)  # fmt: skip
+) = range(15)
 JOB = 15
 #: Errors of leading parts and of both parts together; how far a query may be off, in the tree's units; the determinant
 #: of the map to the world, its low part and its bound.
@@ -109,7 +109,7 @@ def overlap_cells(
         view_i32(stack_at, stack_size), view_f64(work_at, WORK),
         view_f64(work_at + 8 * _WIDE, 2 * clip.WIDE_CELL), view_f64(work_at + 8 * _DIGITS, orientation.WORK),
         view_f64(work_at + 8 * _CLIP, clip.WORK), view_i64(counts_at, 3),
-    )  # fmt: skip
+    )
     n = 0
     for k in range(begin, end):
         after = _cell_pairs(job, int(order[k]), pairs, status, n, capacity)
@@ -185,7 +185,7 @@ def _query_box(cells, queries, a, margin):
     return _Query(
         0.5 * (low_x + high_x), 0.5 * (low_y + high_y), 0.5 * (low_z + high_z), 0.5 * (high_x - low_x) + margin,
         0.5 * (high_y - low_y) + margin, 0.5 * (high_z - low_z) + margin,
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -336,7 +336,7 @@ def _volume(job, at):
     relative = (
         out[clip.SHARE_BOUND] / share.high + out[clip.DETERMINANT_BOUND] / determinant.high
         + numbers[SCALE_BOUND] / scale.high
-    )  # fmt: skip
+    )
     job.answers[at] = volume.high
     if not relative < 0.5:
         largest = min(share.high + out[clip.SHARE_BOUND], 1.0) * (determinant.high + out[clip.DETERMINANT_BOUND])

@@ -134,7 +134,7 @@ def map_between(X_WB: np.ndarray, X_WA: np.ndarray) -> tuple[np.ndarray, np.ndar
             for j in range(3)
         ]
         for i in range(3)
-    ]  # fmt: skip
+    ]
     a = [[Fraction(x) for x in row] for row in X_WA[:3].tolist()]
     shift = [a[k][3] - b[k][3] for k in range(3)]
     matrix = [[float(sum(inverse[i][k] * a[k][j] for k in range(3))) for j in range(3)] for i in range(3)]

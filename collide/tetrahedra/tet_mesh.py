@@ -74,7 +74,7 @@ class TetMesh:
             log.warning(
                 "TetMesh: %d of %d cells ran the other way round and were turned: mesh.turned has their numbers",
                 len(turned), len(ids),
-            )  # fmt: skip
+            )
         for name, value in (("vertices", points), ("cells", ids), ("turned", turned)):
             value.flags.writeable = False
             object.__setattr__(self, name, value)

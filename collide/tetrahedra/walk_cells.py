@@ -128,7 +128,7 @@ def _walk_piece(job: np.ndarray, first: int, last: int, depth: int, flags: int) 
         stopped = kernel.overlap_cells(
             address_of(job), first, last, address_of(pairs), address_of(status), address_of(answers), capacity,
             address_of(stack), len(stack), address_of(work), address_of(counts),
-        )  # fmt: skip
+        )
         n = int(counts[0])
         kept_answers = answers[:n, :width].copy() if width else np.empty((n, 0))
         pieces.append(_Piece(pairs[:n].copy(), status[:n].copy(), kept_answers, counts))

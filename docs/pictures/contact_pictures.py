@@ -43,7 +43,7 @@ def sharp_edges(points: np.ndarray, faces: np.ndarray, all_edges: bool) -> np.nd
     remaining = [
         edge for edge, both in sides.items()
         if all_edges or len(both) != 2 or normals[both[0]] @ normals[both[1]] < 0.9
-    ]  # fmt: skip
+    ]
     return points[np.array(remaining, dtype=int).reshape(-1, 2)]
 
 
@@ -98,7 +98,7 @@ def scenes() -> dict[str, tuple[collide.Shape, np.ndarray, collide.Shape, np.nda
             ("a box over two triangles", floor, collide.Box((0.3, 0.25, 0.2)), (0.02, -0.01, 0.1), (0, 0, 0.35)),
             ("a ball", table, collide.Sphere(0.15), (0.05, 0, 0.15), (0, 0, 0)),
         )
-    }  # fmt: skip
+    }
 
 
 def main() -> None:

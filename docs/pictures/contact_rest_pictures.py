@@ -71,7 +71,7 @@ def scenes() -> dict[str, Stepper]:
         "a cylinder on its side": dropped(FLOOR, X_FLOOR, cylinder, rod, (0, 0, 0.1), (quarter, 0, 0.3)),
         "a cylinder on its side, on a mesh": dropped(mesh, np.eye(4), cylinder, rod, (0, 0, 0.1), (quarter, 0, 0.3)),
         "a mesh dropped on a mesh": dropped(mesh, np.eye(4), cube, box_inertia(size), (0, 0, 0.12), (0.3, 0.2, 0.5)),
-    }  # fmt: skip
+    }
 
 
 def changes(steps: list[Step]) -> np.ndarray:

@@ -38,7 +38,7 @@ FLAGS = (
     "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
     "--hide-scrollbars", "--window-size=1500,760",
-)  # fmt: skip
+)
 
 
 class Entry(NamedTuple):
@@ -98,7 +98,7 @@ ENTRIES = {
     "accordions": Entry(world=lambda: generate("accordions", strings=12).world()),
     "ring": Entry(world=ring, keys=("section",)),
     "dance": Entry(world=dance, clearance=0.03),
-}  # fmt: skip
+}
 
 
 def write(name: str, entry: Entry, place: Path) -> None:

@@ -27,7 +27,7 @@ def main() -> None:
     elevation, azimuth = np.radians(50.0), np.radians(35.0)
     towards = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
     bodies = (("64 × 64 × 1 box", Mesh(*surfaces.box((0, 0, 0), (64.0, 64.0, 1.0)))),
-              ("fr12_h103_lowres.stl", Mesh(surface.vertices, surface.faces)))  # fmt: skip
+              ("fr12_h103_lowres.stl", Mesh(surface.vertices, surface.faces)))
     for panels, (name, body) in zip(axes, bodies):
         made = body.localised()
         for panel, mesh, locality in zip(panels, (body, made.mesh), (made.before, made.after)):

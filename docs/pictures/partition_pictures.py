@@ -66,7 +66,7 @@ def draw_cells(axes, cells: collide.ConvexCells, colours, alpha: float, shrunk: 
             at = cells.vertices[cells.loops[cells.loop_starts[j] : cells.loop_starts[j + 1]]]
             polygons.append(middle + shrunk * (at - middle))
         axes.add_collection3d(Poly3DCollection(polygons, facecolor=colours[i % len(colours)], edgecolor="#333333",
-                                               linewidth=0.4, alpha=alpha))  # fmt: skip
+                                               linewidth=0.4, alpha=alpha))
 
 
 def main() -> None:
@@ -85,7 +85,7 @@ def main() -> None:
     axes.set_axis_off()
     axes.view_init(elev=90, azim=-90)
     figure.text(0.02, 0.03, f"{partition.size.facets} facets of 6 pillars: {len(free)} convex cells of free space, "
-                f"{len(portals.area)} portals; in red a path through {len(path) - 2} of them", fontsize=10)  # fmt: skip
+                f"{len(portals.area)} portals; in red a path through {len(path) - 2} of them", fontsize=10)
     figure.savefig(FILE, dpi=110)
     print(FILE, len(free), len(portals.area))
 

@@ -46,7 +46,7 @@ def frame(axes, title: str, corners: np.ndarray) -> None:
     low, high = corners.reshape(-1, 3).min(axis=0), corners.reshape(-1, 3).max(axis=0)
     middle, reach = (low + high) / 2, 0.33 * (high - low).max()
     axes.set(xlim=(middle[0] - reach, middle[0] + reach), ylim=(middle[1] - reach, middle[1] + reach),
-             zlim=(middle[2] - reach, middle[2] + reach))  # fmt: skip
+             zlim=(middle[2] - reach, middle[2] + reach))
     axes.set_box_aspect((1, 1, 1))
     axes.view_init(elev=ELEVATION, azim=AZIMUTH)
     axes.set_proj_type("ortho")
@@ -65,7 +65,7 @@ def main() -> None:
     corners = {op: r.mesh.vertices[r.mesh.faces] for op, r in results.items()}
     overlap = collide.overlap_volume(A, B, X, Y)
     print(f"volume {overlap.volume!r} in {overlap.lower!r} … {overlap.upper!r}, cut {overlap.n_cut}, moved "
-          f"{max(r.moved for r in results.values()):.1e} m")  # fmt: skip
+          f"{max(r.moved for r in results.values()):.1e} m")
     figure = plt.figure(figsize=(9.6, 3.2))
     titles = "A and B, their clash in red", "A ∩ B", "A without B"
     for k, (op, title) in enumerate(zip(("union", "intersection", "difference"), titles)):

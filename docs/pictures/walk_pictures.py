@@ -41,7 +41,7 @@ def draw_body(axes, points, triangles, colour, alpha=1.0, edge=True):
             corners, facecolors=np.concatenate([faces, np.full((len(faces), 1), alpha)], axis=1),
             edgecolors=(0, 0, 0, 0.35) if edge else "none", linewidths=0.4,
         )
-    )  # fmt: skip
+    )
 
 
 def tidy(axes, points, title):
@@ -50,7 +50,7 @@ def tidy(axes, points, title):
     axes.set(
         xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half),
         zlim=(middle[2] - half, middle[2] + half),
-    )  # fmt: skip
+    )
     axes.set_box_aspect((1, 1, 1), zoom=1.45)
     axes.set_axis_off()
     axes.set_title(title, fontsize=10)
@@ -142,7 +142,7 @@ def rounds() -> None:
     margins.set(
         xlabel="round", ylabel="least ⟨p, z⟩ (blue), largest ⟨x, q⟩ (green)",
         title="blue stays above 1, green below, against the levels",
-    )  # fmt: skip
+    )
     margins.legend()
     figure.savefig(FOLDER / "walk_rounds.png", dpi=110)
 

@@ -161,7 +161,7 @@ def _box(half) -> tuple[np.ndarray, np.ndarray]:
     faces = [
         (0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5),
         (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
-    ]  # fmt: skip
+    ]
     return corners, np.array(faces)
 
 

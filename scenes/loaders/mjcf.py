@@ -172,7 +172,7 @@ class _Reading:
                 owners[geom] = free_name(self._geom_name(geom), names)
                 self.surroundings.append(SceneBody(
                     owners[geom], shape, X_WBs[body] @ X_BG, static=True, source=source, approximation=approximation,
-                ))  # fmt: skip
+                ))
         self.owner = owners
 
     def _shape(self, geom: int, taken: Mapping[int, Taken], source: str) -> Taken:

@@ -7,7 +7,7 @@ import numpy as np
 #: Why a pair is never tested, by the codes of `filtered`; 0: it is tested.
 REASONS = (
     "", "contype and conaffinity", "parent and child", "excluded", "contacts are off", "neither moves", "one body",
-)  # fmt: skip
+)
 #: Reasons up to this one are filters; those after it follow from how bodies hang together.
 FILTERS, _OFF, _STILL, _ONE_BODY = 4, 4, 5, 6
 #: Flags that disable; with either MuJoCo tests nothing.

@@ -27,7 +27,7 @@ _TYPES = {
     "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
     "int64": "i8", "uint64": "u8",
-}  # fmt: skip
+}
 _CORNERS = ("vertex_indices", "vertex_index")
 _ENDIAN = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 

@@ -14,7 +14,7 @@ from collide.scenes.loaders.xml_text import parse_xml
 def load_robot(
     path, srdf=None, *, meshes: str = "mesh", package_path=(), missing_meshes: str = "error",
     seconds: dict[str, float] | None = None,
-) -> Robot:  # fmt: skip
+) -> Robot:
     """A `Robot` from a URDF or an MJCF file, whatever it is called; options as of `urdf.load_robot`.
 
     MuJoCo looks for meshes itself, beside the file, and needs all of them: ``package_path`` and ``missing_meshes``

@@ -19,7 +19,7 @@ _NAMES = {
     "link": ("name",), "joint": ("name",), "chain": ("base_link", "tip_link"), "end_effector": ("parent_link",),
     "virtual_joint": ("name", "child_link"), "passive_joint": ("name",), "joint_property": ("joint_name",),
     "link_sphere_approximation": ("link",),
-}  # fmt: skip
+}
 
 
 @dataclass

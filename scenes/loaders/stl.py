@@ -16,7 +16,7 @@ _NEXT = {
     b"solid": (b"facet", b"endsolid"), b"facet": (b"outer",), b"outer": (b"vertex",),
     b"vertex": (b"vertex", b"endloop"),
     b"endloop": (b"endfacet",), b"endfacet": (b"facet", b"endsolid"), b"endsolid": (b"solid",),
-}  # fmt: skip
+}
 
 
 def read(content: bytes, path: Path) -> Read:

@@ -31,7 +31,7 @@ def bodies(fcl) -> dict:
     shapes = {
         "box": fcl.Box(1.0, 1.0, 1.0), "ball": fcl.Sphere(1.0), "cone": fcl.Cone(1.0, 1.0),
         "cylinder": fcl.Cylinder(1.0, 1.0), "mesh": mesh, "hull": fcl.Convex(CORNERS, 6, faces),
-    }  # fmt: skip
+    }
     return {name: fcl.CollisionObject(shape) for name, shape in shapes.items()}
 
 
@@ -297,7 +297,7 @@ def trimesh_of_two_managers(trimesh) -> None:
     hit, names, data = mine.in_collision_other(theirs, return_names=True, return_data=True)
     assert hit and names == {("b", "y"), ("a", "z")} and {frozenset(c.names) for c in data} == {
         frozenset(("b", "y")), frozenset(("a", "z"))
-    }  # fmt: skip
+    }
     others = trimesh.collision.CollisionManager()
     others.add_object("far", cube, moved(-3))  # along y or z python-fcl itself says 2.236, not 2
     distance, names, near = mine.min_distance_other(others, return_names=True, return_data=True)

@@ -70,12 +70,12 @@ ARCHIVES = {
 }
 NOT_THERE = {
     "coal_pywrap", "viewer", "boost_type_index", "std_type_index", "computeMemoryFootprint", "windows_dll_manager",
-}  # fmt: skip
+}
 REFUSED = {"GJK", "MinkowskiDiff"}
 MEMBERS_NOT_THERE = {
     "OcTree": {"size", "tobytes", "setCellDefaultOccupancy"}, "HeightFieldAABB": {"getBV"},
     "HeightFieldOBBRSS": {"getBV"}, "Exception": {"message"},
-}  # fmt: skip
+}
 
 
 def described(module):
@@ -122,7 +122,7 @@ def _fields_of(name):
     made = {
         "Contact": coal.Contact, "ContactPatch": coal.ContactPatch, "CPUTimes": coal.CPUTimes,
         "QueryRequest": coal.CollisionRequest, "QueryResult": coal.CollisionResult,
-    }  # fmt: skip
+    }
     return set(dir(made[name]())) if name in made else set()
 
 
@@ -312,7 +312,7 @@ def test_planes_and_half_spaces():
     for other, T, gap in (
         (half, at(z=2), lowest), (coal.Halfspace([0, 0, -1], -3.0), at(), 2.5), (coal.Plane([0, 0, 1], 2.0), at(), 1.5),
         (coal.Halfspace([0, 0, -1], 1.0), at(), -1.5), (coal.Plane([1, 0, 0], 2.0), at(), lowest),
-    ):  # fmt: skip
+    ):
         result = measured(half, at(), other, T)
         assert result.min_distance == gap, (other, gap)
         assert collided(half, at(), other, T).isCollision() == (gap <= 0)
@@ -418,7 +418,7 @@ def test_patches_are_what_faces_share():
         middle = 0.5 * a[2] + 0.5 * gap
         wanted = {
             tuple(np.round([x, y, middle], 9) + 0.0) for x in (low[0], high[0]) for y in (low[1], high[1])
-        }  # fmt: skip
+        }
         assert corners == wanted, where
         assert math.isclose(patch.getPointShape1(0)[2], 0.5 * a[2]) and math.isclose(
             patch.getPointShape2(0)[2], z - 0.5 * b[2]
@@ -494,7 +494,7 @@ def masses(module):
     shapes = [
         module.Sphere(1.5), module.Ellipsoid(1, 2, 3), module.Box(1, 2, 3), module.Capsule(1, 2), module.Cone(1, 2),
         module.Cylinder(1, 3),
-    ]  # fmt: skip
+    ]
     return [[s.computeVolume(), s.computeCOM().tolist(), s.computeMomentofInertia().tolist()] for s in shapes]
 
 
@@ -588,14 +588,14 @@ def test_managers_find_all_pairs(kind):
         callback.data.request.security_margin, callback.data.request.num_max_contacts = margin, 1
         lists = [(manager.collide, itertools.combinations(objects, 2)),
                  (lambda cb: manager.collide(guests[1], cb), ((a, guests[1]) for a in objects)),
-                 (lambda cb: manager.collide(guest_manager, cb), itertools.product(objects, guests))]  # fmt: skip
+                 (lambda cb: manager.collide(guest_manager, cb), itertools.product(objects, guests))]
         for ask, pairs in lists:
             near = Near(margin)
             ask(near)
             wanted = {
                 frozenset((id(a), id(b))) for a, b in pairs
                 if measured(a._geometry, a.getTransform(), b._geometry, b.getTransform()).min_distance <= margin
-            }  # fmt: skip
+            }
             assert near.pairs == wanted
     collected = coal.CollisionCallBackCollect(10)
     manager.collide(collected)
@@ -646,14 +646,14 @@ def test_bad_input_is_named():
         ("triangles", lambda: coal.Convex(CORNERS, [[0, 1, 9]])), ("n must", lambda: coal.Plane([0, 0, 0], 1.0)),
         ("contacts is zero", lambda: coal.CollisionResult().getContact(0)),
         ("heights", lambda: coal.HeightFieldAABB(1.0, 1.0, [1.0])),
-    ):  # fmt: skip
+    ):
         with pytest.raises((InvalidArgument, InvalidShape), match=match):
             wrong()
     for wrong in (
         lambda: coal.collide(box, box, coal.CollisionRequest(), coal.CollisionResult()),
         lambda: coal.collide(box, np.eye(4), box, at(), coal.CollisionRequest(), coal.CollisionResult()),
         lambda: coal.CollisionObject("box"), lambda: coal.ComputeCollision(box, 3), lambda: coal.Transform3s(1, 2, 3),
-    ):  # fmt: skip
+    ):
         with pytest.raises(TypeError):
             wrong()
     with pytest.raises(UnsupportedQuery, match="ComputeDistance"):

@@ -113,7 +113,7 @@ ROWS = {
     "lists": Row("answer = said(lambda: coal.Box([1, 2, 3]).computeVolume())", ["TypeError"], 6.0),
     "long quaternions": Row("R = coal.Quaternion(2.0, 0.0, 0.0, 2.0).matrix()\n"
                             "answer = bool(np.abs(R @ R.T - np.eye(3)).max() < 1e-12)", False, True),
-}  # fmt: skip
+}
 
 
 def run(code: str) -> subprocess.CompletedProcess:

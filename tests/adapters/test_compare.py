@@ -232,7 +232,7 @@ def test_a_ball_that_rests_on_a_table_of_several_parts_is_judged_exactly():
     scene = Scene("kitchen", [
         SceneBody("table", table, pose((0.3, 0.1, 0), rpy=(0, 0, 0.7)), static=True),
         SceneBody("ball", Sphere(0.08), pose((0.31, 0.12, 0.72 + 0.08 + 4e-16))),
-    ])  # fmt: skip
+    ])
     comparison = compare(scene, ("skewed", "exact"))
     (wrong,) = [d for d in comparison.disagreements if d.engine == "skewed" and d.kind == "distance"]
     assert not wrong.not_judged and wrong.judged_by == "exact arithmetic" and wrong.touching

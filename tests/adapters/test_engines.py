@@ -67,14 +67,14 @@ UNSUPPORTED = {
     "distance3d": PLANES, "newton": SWEPT,
     "cgal": CASES.keys() - {"boxes apart", "boxes overlapping", "hull box", "polytope box"},
     "exact": CURVED | PLANES,
-}  # fmt: skip
+}
 #: Cases answered by a boolean alone.
 WITHOUT_DISTANCE = {
     "fcl": PLANES, "fcl:indep": APART, "mujoco": APART, "mujoco:distance": set(), "mujoco:distance-libccd": set(),
     "drake:penetration": APART, "rapier": set(), "rapier:cast": CASES.keys() - APART,
     "rapier:nonlinear": CASES.keys() - APART, "distance3d": CASES.keys() - APART, "distance3d:epa": set(),
     "distance3d:mpr": APART, "cgal": CASES.keys(),
-}  # fmt: skip
+}
 #: [m] at sizes of about 1 m. Bullet snaps hull corners to a grid; FCL and coal stop at 1e-6 on what is round; MuJoCo
 #: holds corners, and trimesh's managers poses, in single precision; Rapier's points near round shapes are off by more.
 TOLERANCE = {
@@ -82,14 +82,14 @@ TOLERANCE = {
     "drake": 2e-5, "trimesh": 2e-6, "rapier": 1e-4, "rapier:cast": 1e-3, "rapier:nonlinear": 3e-4, "exact": 1e-14,
     "distance3d": 1e-6, "distance3d:nesterov": 1e-5, "distance3d:epa": 1e-2, "distance3d:mpr": 1e-4, "newton": 1e-5,
     "cgal": 1e-14,
-}  # fmt: skip
+}
 #: Distances of random pairs are off by more: depths of FCL's own EPA, MuJoCo's capsule and box, and all that libccd's
 #: MPR finds, as distance3d's and Newton's, gaps of Rapier's manifolds, and what distance3d's accelerated GJK says of a
 #: sphere or a capsule beside a hull or a cone: it counts the radius twice.
 WRONG_DISTANCES = {
     "fcl:indep", "mujoco", "mujoco:libccd", "mujoco:distance", "mujoco:distance-libccd", "drake:penetration", "rapier",
     "distance3d:nesterov", "distance3d:mpr", "newton",
-}  # fmt: skip
+}
 #: One of them is a closed form.
 WRONG_CASES = {"mujoco:distance-libccd": {"polytope box"}, "distance3d:nesterov": {"cone sphere", "swept hull"}}
 #: distance3d's EPA and MPR end with directions that are rougher than others'.

@@ -354,5 +354,5 @@ others = CollisionManager(); others.add_object("e", cube, X(0.5, 0.5, 0))
 assert manager.in_collision_other(others, return_names=True) == (True, {("a", "e")})
 assert abs(manager.min_distance_other(others)) >= 0
 print("done")
-""")  # fmt: skip
+""")
     assert out.strip() == "done"

@@ -84,7 +84,7 @@ SIGNED = {
     "a box and a capsule": (
         "fcl.Box(1, 1, 0.25)", "fcl.Capsule(0.25, 0.75)", (-0.5, 0.5, -0.5), (1.0, 0.0, 0.0, 0.0), "hangs",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.many(2)
@@ -104,7 +104,7 @@ def test_signed_distance_of_what_all_but_touches(name):
 
 @pytest.mark.parametrize("flat, gap", [
     ("fcl.Halfspace(np.array([0.0, 0, 1]), 0.5)", 1.0), ("fcl.Plane(np.array([0.0, 0, 1]), 0.5)", 1.0),
-])  # fmt: skip
+])
 @pytest.mark.parametrize("body", ["fcl.Sphere(0.5)", "fcl.Cylinder(0.2, 1)"])
 def test_distance_to_a_half_space_or_a_plane(flat, gap, body):
     code = f"print(json.dumps(fcl.distance(at({body}, 0, 0, 2), at({flat}, 0, 0, 0))))"
@@ -166,7 +166,7 @@ CONTAINED = {
         (-0.046305762765796926, 0.08218387940754945, 0.03412381259252997),
         (0.5025686493151211 + 0.15507014641673783) / 2 - 0.03412381259252997,
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", CONTAINED)
@@ -211,7 +211,7 @@ TOUCHING = {
         "fcl.Cylinder(0.25, 0.75)", (0.5, -0.25, 0.0), "fcl.Capsule(0.25, 0.75)", (0.0, -0.25, -0.25),
         (0.25, -0.25, -0.125),
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", TOUCHING)
@@ -232,7 +232,7 @@ GAPS = {
     "two cylinders": (
         "fcl.Cylinder(0.5, 0.75)", (-0.5, 0.0, -0.25), "fcl.Cylinder(0.375, 0.75)", (0.5, 0.25, 0.5), 8e-4,
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", GAPS)

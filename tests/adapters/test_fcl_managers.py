@@ -102,7 +102,7 @@ def one_by_one(default):
 def crowd(rng, n: int, spread: float) -> list:
     shapes = [fcl.Box(0.5, 0.4, 0.3), fcl.Sphere(0.3), fcl.Capsule(0.1, 0.5), cube_mesh(), fcl.Cone(0.3, 0.4),
               fcl.Plane(np.array([0.0, 0.6, 0.8]), 0.1), fcl.Halfspace(np.array([1.0, 0.0, 0.0]), -0.9 * spread),
-              fcl.OcTree(0.0001, bytes([3, 0, 0, 0x80])), fcl.Ellipsoid(0.2, 0.3, 0.1)]  # fmt: skip
+              fcl.OcTree(0.0001, bytes([3, 0, 0, 0x80])), fcl.Ellipsoid(0.2, 0.3, 0.1)]
     kinds = rng.choice(9, n, p=[0.2, 0.2, 0.15, 0.1, 0.1, 0.01, 0.01, 0.03, 0.2])
     poses = [fcl.Transform(rng.normal(size=4), rng.uniform(-spread, spread, 3)) for _ in kinds]
     return [fcl.CollisionObject(shapes[k], tf) for k, tf in zip(kinds, poses)]

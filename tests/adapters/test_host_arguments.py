@@ -28,7 +28,7 @@ BAD = {
     "three nan": [NAN] * 3, "three complex": np.ones(3) * 1j, "ragged": [[1, 2], [3]],
     "dates": np.array(["2020"], "M8"),
     "masked": np.ma.masked_array([1.0, 2.0, 3.0], [True, False, False]), "text array": np.array(["a", "b", "c"]),
-}  # fmt: skip
+}
 E3 = np.eye(3)
 CORNERS = np.vstack([E3, np.zeros(3)])
 
@@ -40,14 +40,14 @@ def arguments(api) -> dict[str, list]:
         "Halfspace": [[0, 0, 1], 0.0], "Plane": [[0, 0, 1], 0.0], "TriangleP": [*E3],
         "CollisionObject": [api.Sphere(1), transform()], transform.__name__: [E3, [0, 0, 0]],
         "Convex": [CORNERS, 1, [3, 0, 1, 2]] if api is fcl_api else [CORNERS, ()],
-    }  # fmt: skip
+    }
     if api is coal_api:
         made |= {
             "Quaternion": [1, 0, 0, 0], "AngleAxis": [1.0, [0, 0, 1]], "Triangle": [0, 1, 2],
             "AABB": [[0, 0, 0], [1, 1, 1]],
             "HeightFieldAABB": [1.0, 1.0, np.eye(2)], "OcTree": [0.1], "ContactPatchRequest": [1, 12, 1e-3],
             "CollisionRequest": [coal_api.CollisionRequestFlag.CONTACT, 1],
-        }  # fmt: skip
+        }
     return made
 
 
@@ -130,7 +130,7 @@ def test_pybullets_questions_refuse_bad_arguments(client):
         "set_shape": {"body": 0, "link": -1, "shape": Sphere(0.1)}, "refresh": {"body": 0},
         "note_body": {"body": 0, "flags": 0, "shapes": {}}, "note_margin": {"body": 0},
         "set_self_collision": {"body": 0, "flags": 0}, "set_filter_mode": {"mode": 1},
-    }  # fmt: skip
+    }
     for name, good in questions.items():
         for what, call in calls_of(getattr(Mirror(client), name), good):
             more = tried("", [(what, call)])
@@ -201,7 +201,7 @@ def test_poses_that_are_no_numbers_are_refused_by_the_query(api, bad):
     transform = api.Transform3s if api is coal_api else api.Transform
     objects = [api.CollisionObject(api.Sphere(1.0), transform(E3, [x, 0, 0])) for x in (0.0, bad)]
     for ask, request, result in ((api.collide, api.CollisionRequest, api.CollisionResult),
-                                 (api.distance, api.DistanceRequest, api.DistanceResult)):  # fmt: skip
+                                 (api.distance, api.DistanceRequest, api.DistanceResult)):
         with pytest.raises(CollideError):
             ask(*objects, request(), result())
 
@@ -214,7 +214,7 @@ def test_messages_name_the_argument_and_the_value():
         (lambda: shaped("T", [1, 1j, 2], (3,)), InvalidArgument, ("T", "complex")),
         (lambda: rows_of_three("ps", E3[0]), InvalidArgument, ("ps", "(n, 3)", "(3,)")),
         (lambda: fcl_api.Box(1, 10**400, 1), CollideError, ("Box", "size", "inf")),
-    ):  # fmt: skip
+    ):
         with pytest.raises(error) as caught:
             call()
         assert all(word in str(caught.value) for word in words), caught.value

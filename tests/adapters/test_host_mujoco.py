@@ -456,7 +456,7 @@ def test_world_tests_the_pairs_that_mujoco_tests():
     chain = body(
         geom("box") + '<body pos="0 0 .12"><joint axis="1 0 0"/><geom name="mid" type="capsule" size=".06 .08"/>'
         '<body pos=".1 0 .1"><joint axis="0 1 0"/><geom name="tip" size=".09"/></body></body>', (0.0, 0.0, 0.05),
-    )  # fmt: skip
+    )
     loose = [
         body(geom("mesh", more=f'contype="{1 + k % 3}" conaffinity="{k % 2}"'), (0.05 * k, 0.05, 0.1)) for k in range(8)
     ]

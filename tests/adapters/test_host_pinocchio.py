@@ -26,7 +26,7 @@ coal = pin.coal
 ROBOTS = next(
     (folder / "example-robot-data/robots" for folder in installed_folders()
      if (folder / "example-robot-data/robots").is_dir()), None,
-)  # fmt: skip
+)
 ARMS = ("panda_description/urdf/panda.urdf", "z1_description/urdf/z1.urdf", "ur_description/urdf/ur5_robot.urdf")
 needs_arms = pytest.mark.skipif(ROBOTS is None, reason="example-robot-data is not installed")
 
@@ -221,7 +221,7 @@ def test_every_geometry_is_read():
         (coal.Halfspace(np.array([0.0, 0, 1]), 0.5), 2.5), (coal.Plane(np.array([0.0, 0, 1]), 0.5), 2.5),
         (coal.HeightFieldAABB(1.0, 1.0, np.zeros((3, 3)), -1.0), 3.0),
         (coal.makeOctree(np.array([[0.05, 0.05, 0.45]]), 0.1), 2.5),
-    ]  # fmt: skip
+    ]
     pin_model, geom_model = pin.Model(), pin.GeometryModel()
     place = pin.SE3(np.eye(3), np.array([0.05, 0.05, 3.5]))
     geom_model.addGeometryObject(pin.GeometryObject("ball", 0, place, coal.Sphere(0.5)))

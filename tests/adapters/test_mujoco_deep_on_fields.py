@@ -22,7 +22,7 @@ HULL *= 0.03 / np.linalg.norm(HULL, axis=1)[:, None]
 SIZES = {
     "sphere": 'size=".02"', "capsule": 'size=".015 .03"', "ellipsoid": 'size=".02 .03 .015"',
     "cylinder": 'size=".02 .025"', "box": 'size=".02 .03 .015"', "mesh": 'mesh="hull"',
-}  # fmt: skip
+}
 #: Rises of fields along x and y.
 SLOPES = (0.0, 0.0), (0.3, -0.2), (0.9, 0.5)
 GROUND = 0.5  # m, the field's height at its middle

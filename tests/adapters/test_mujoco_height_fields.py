@@ -241,7 +241,7 @@ def test_base_and_rims():
         ((0.1, 0.2, -0.355), (0, 0, -1), -0.005), ((1.055, 0.2, -0.1), (1, 0, 0), -0.005),
         ((0.1, -0.855, -0.1), (0, -1, 0), -0.005), ((0.1, 0.2, 0.05), (0, 0, 1), -0.11),
         ((1.04, 0.2, 0.14), (0.5**0.5, 0, 0.5**0.5), 0.04 * 2**0.5 - 0.06),
-    ):  # fmt: skip
+    ):
         X = np.eye(4)
         X[:3, 3] = p
         place(model, data, X)
@@ -293,7 +293,7 @@ def dropped(n: int = 18, seed: int = 0):
     model = model_of(
         hills(24, random), *(form(KINDS[k % 6], grip) for k in range(n)), size="1 1 .2 .1", pose=LEVEL,
         option='<option timestep=".004" cone="elliptic"/>', field=grip,
-    )  # fmt: skip
+    )
     data = mujoco.MjData(model)
     q = data.qpos.reshape(n, 7)
     q[:, 3:] = random.normal(size=(n, 4))
@@ -329,7 +329,7 @@ def test_inner_edges_do_not_kick():
         model = model_of(
             heights, form("box", 'condim="1"'), size=f"3 2 {4 * slope or 0.1} .1", pose=LEVEL,
             option='<option timestep=".002"/>', field='condim="1"',
-        )  # fmt: skip
+        )
         data = mujoco.MjData(model)
         tilt = np.arctan(slope)
         X = np.eye(4)

@@ -22,7 +22,7 @@ MESH = '<asset><mesh name="m" vertex="0 0 0 .3 0 0 0 .3 0 0 0 .3 .2 .2 .2"/></as
 FORMS = {
     "sphere": ("0.1", 0.1), "capsule": ("0.1 0.2", 0.3), "ellipsoid": ("0.1 0.2 0.3", 0.3),
     "cylinder": ("0.1 0.2", 0.2), "box": ("0.1 0.2 0.3", 0.3),
-}  # fmt: skip
+}
 
 
 def model_of(inner: str, before: str = "", after: str = ""):

@@ -220,7 +220,7 @@ def test_arguments_of_newtons_pipeline_are_taken_or_refused_by_name():
     for name, value in (
         ("contact_matching", "sticky"), ("speculative_contact_gap_max", 0.1), ("requires_grad", True),
         ("include_static_kinematic_pairs", False), ("contact_report", True),
-    ):  # fmt: skip
+    ):
         with pytest.raises(UnsupportedQuery, match=f"{name}={value!r} is not done here; .*newton.CollisionPipeline"):
             Pipeline(model, **{name: value})
     with pytest.raises(TypeError, match="no argument 'broad_fase'"):

@@ -29,7 +29,7 @@ def test_what_pybullet_does_not_give_back_is_noted_as_it_passes(client):
     field = stand_in.createCollisionShape(
         p.GEOM_HEIGHTFIELD, numHeightfieldRows=6, numHeightfieldColumns=5, heightfieldData=heights.tolist(),
         meshScale=[0.5, 0.4, 2.0],
-    )  # fmt: skip
+    )
     ground = stand_in.createMultiBody(0.0, field, basePosition=[1, 2, 0])
     crate = stand_in.createMultiBody(
         0.0,
@@ -37,7 +37,7 @@ def test_what_pybullet_does_not_give_back_is_noted_as_it_passes(client):
             p.GEOM_MESH, vertices=CORNERS, indices=FACETS, collisionFramePosition=[0.1, 0, 0]
         ),
         basePosition=[6, 0, 1], baseInertialFramePosition=[0.3, 0.2, 0.1], baseInertialFrameOrientation=[0.5] * 4,
-    )  # fmt: skip
+    )
     ball = stand_in.createMultiBody(
         1.0, stand_in.createCollisionShape(p.GEOM_SPHERE, radius=0.2), useMaximalCoordinates=1
     )

@@ -52,7 +52,7 @@ def test_pairs_that_filters_leave_out_are_those_of_bullet(client, mode):
         stand_in.createMultiBody(
             float(k % 4 > 0), stand_in.createCollisionShape(p.GEOM_BOX, halfExtents=[0.3, 0.3, 0.3]),
             basePosition=random.uniform(-0.5, 0.5, 3).tolist(), baseOrientation=quaternion(random),
-        )  # fmt: skip
+        )
         bodies.append(k)
     seen = 0
     for k in range(25):
@@ -132,7 +132,7 @@ def test_rays_begin_inside_come_from_behind_and_pass_filters_as_in_bullet(client
     rays = [
         ((0.1, 0.1, 0.1), (5, 0.1, 0.1)), ((0.1, 0.1, 0.1), (1.2, 0.1, 0.1)), ((2.1, 0.1, 0.1), (6, 0.1, 0.1)),
         ((10, 0, 0), (4, 0, 0)), ((4, 0.3, 0), (12, 0, 0)), ((-3, 0.2, 0.1), (9, 0.1, 0.1)), ((0, 0, 5), (0, 0, 5)),
-    ]  # fmt: skip
+    ]
     p.performCollisionDetection(client)
     for origin, end in rays:
         (theirs,), (ours,) = p.rayTest(origin, end, physicsClientId=client), mirror.rayTest(origin, end)
@@ -145,7 +145,7 @@ def test_rays_begin_inside_come_from_behind_and_pass_filters_as_in_bullet(client
     assert mirror.rayTest(*through, collisionFilterMask=3)[0][0] == made["ball"]
     assert [mirror.rayTest(*through, reportHitNumber=k)[0][0] for k in range(4)] == [
         made["box"], made["ball"], made["plane"], -1
-    ]  # fmt: skip
+    ]
     ((_, _, fraction, _, _),) = mirror.rayTestBatch([[0, 0, 3]], [[0, 0, -3]], parentObjectUniqueId=made["ball"])
     assert abs(fraction - 2.5 / 6) < 1e-12
     assert mirror.rayTestBatch([], []) == ()

@@ -18,7 +18,7 @@ def test_pairs_that_are_found_are_those_that_are_not_allowed(kind):
     keep = {
         "neighbours": j - i <= 2, "anything": rng.random(len(i)) < 0.05, "one with all": (i == 70) | (j == 70),
         "all": i >= 0, "none": i < 0,
-    }[kind]  # fmt: skip
+    }[kind]
     allowed = np.stack([i[keep], j[keep]], axis=1)
     tree = BoxTree(np.tile(EVERYWHERE, (n, 1)))
     tree.set_allowed(rng.permutation(allowed))

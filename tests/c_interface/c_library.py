@@ -77,7 +77,7 @@ _TYPES = {
     "collide_mesh_free": [c_void_p],
     "collide_mesh_collide": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, POINTER(c_int)],
     "collide_mesh_distance": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, c_void_p],
-}  # fmt: skip
+}
 _TEXTS = {"collide_status_text", "collide_version"}
 
 
@@ -210,7 +210,7 @@ class Asker:
         status = library().collide_contacts(
             self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, margin, max_contacts, flags,
             rows.ctypes.data, count,
-        )  # fmt: skip
+        )
         return status, rows[: count.value]
 
     def contact_batch(self, asked, X_WA, X_WB, margin: float, max_contacts: int, *, capacity: int, flags: int = 0):
@@ -227,7 +227,7 @@ class Asker:
         status = getattr(library(), f"collide_contacts_{name}")(
             self.handle, *first, Poses(X_WA.ctypes.data, len(X_WA)), Poses(X_WB.ctypes.data, len(X_WB)), margin,
             max_contacts, flags, rows.ctypes.data, capacity, starts.ctypes.data, failed,
-        )  # fmt: skip
+        )
         return status, rows, starts.astype(np.int64), failed.value
 
     def meshes_meet(self, A: CMesh, B: CMesh, X_WA, X_WB, flags: int = 0) -> tuple[int, bool]:

@@ -28,7 +28,7 @@ if mode.MODE != mode.COMPILED:
 CONVEX = (
     "sphere", "box", "capsule", "hull", "swept hull", "flat hull", "h-polytope", "half-space", "cylinder", "cone",
     "ellipsoid",
-)  # fmt: skip
+)
 #: Where `struct collide_shape` keeps its faces: after eight integers, seven doubles, a digest and three addresses.
 _FACES_AT = 8 * (8 + 7 + 2 + 3)
 
@@ -51,7 +51,7 @@ def drawn() -> list[tuple]:
         body = (
             collide.Box(0.2, 0.3, 0.4), collide.Cylinder(0.2, 0.4), collide.Capsule(0.1, 0.4), prism(number % 9 + 3),
             collide.ConvexHull(random.normal(size=(30, 3)) * 0.1),
-        )[number % 5]  # fmt: skip
+        )[number % 5]
         X_WB = c.identity_at(*random.normal(size=2) * 0.3, 0.3 + 1e-3 * random.normal())
         X_WA = np.eye(4)
         if number % 3 == 0:
@@ -171,7 +171,7 @@ def clouds() -> dict[str, np.ndarray]:
         "flat grid": grid * [1, 1, 0], "segment": np.outer(np.arange(9.0) - 3.0, [1.0, 2.0, -3.0]),
         "point": np.ones((4, 3)), "alone": np.zeros((1, 3)),
         "triangle": np.eye(3), "pancake": random.normal(size=(80, 3)) * [1, 1, 1e-13],
-    }  # fmt: skip
+    }
     for number in range(40):  # slivers: hulls that are lines but for rounding, and points on edges
         line = np.outer(random.uniform(-1, 1, int(random.integers(3, 9))), random.uniform(-1, 1, 3))
         found[f"line {number}"] = line + random.integers(-2, 3, line.shape) * 10.0 ** random.uniform(-18, -11)

@@ -39,7 +39,7 @@ EXAMPLES = ROOT / "examples" / "c"
 CONVEX = (
     "sphere", "box", "capsule", "hull", "swept hull", "flat hull", "h-polytope", "half-space", "cylinder", "cone",
     "ellipsoid",
-)  # fmt: skip
+)
 STRICT = ["-Wall", "-Wextra", "-Werror", "-pedantic"]
 
 
@@ -72,7 +72,7 @@ def built(tmp_path: Path, text: str, *options: str) -> Path:
     run(
         compiler("cc", "gcc", "clang"), "-std=c99", *STRICT, *options, f"-I{header_folder()}", source, library,
         f"-Wl,-rpath,{library.parent}", "-lm", "-o", program,
-    )  # fmt: skip
+    )
     return program
 
 
@@ -130,7 +130,7 @@ def test_examples_are_built_by_make_and_run(tmp_path):
     (tmp_path / "collide.pc").write_text(
         f"libdir={library.parent}\n\nName: collide\nDescription: collisions\nVersion: {collide.__version__}\n"
         f"Cflags: -I{header_folder()}\nLibs: -L${{libdir}} -lcollide\n", encoding="utf-8",
-    )  # fmt: skip
+    )
     bare = {"PATH": os.environ["PATH"], "PKG_CONFIG_PATH": str(tmp_path)}
     flags = " ".join(STRICT)
     run("make", f"CFLAGS=-O2 {flags}", f"CXXFLAGS=-O2 {flags}", cwd=tmp_path / "c", env=bare)
@@ -419,7 +419,7 @@ def _clouds() -> dict[str, np.ndarray]:
         "tiny": hull_families.ellipsoid(700)[0] * 1e-40,
         "rounded": np.round(hull_families.ellipsoid(20000)[0] * 200.0),
         "negative zeros": -np.abs(np.round(random.normal(size=(400, 3)))) * [1.0, -0.0, 1.0],
-    }  # fmt: skip
+    }
     return found
 
 
@@ -517,7 +517,7 @@ NUMBERS = [
         ((0.0, 0.0, 1.1e6), 0.0),
         ((0.0, _NAN, 1.0), 0.0), ((0.0, 0.0, 1.0), _INF), ((0.0, 0.0, 1.0), 1e51), ((1e51, 0.0, 0.0), 0.0),
     )
-]  # fmt: skip
+]
 
 
 def test_what_is_no_shape_is_refused_as_python_does():

@@ -31,7 +31,7 @@ def test_meshes_have_pythons_bits_or_are_left_to_python():
         A, B = c.CMesh(case.A), c.CMesh(case.B)
         for (one, other), (shape, partner), poses in (
             ((A, B), (case.A, case.B), (case.X_WA, case.X_WB)), ((B, A), (case.B, case.A), (case.X_WB, case.X_WA)),
-        ):  # fmt: skip
+        ):
             status, hit = asker.meshes_meet(one, other, *poses)
             wanted = collide.collide(shape, partner, *poses)
             assert status == c.UNSUPPORTED or (status, hit) == (c.OK, wanted), f"draw(77, {number}): {case.kinds}"
@@ -54,7 +54,7 @@ def _surfaces() -> list:
         surfaces.box(), surfaces.torus(), surfaces.ball(), surfaces.loosened(*surfaces.torus()),
         surfaces.joined(surfaces.box(), surfaces.box((3, 0, 0), (4, 1, 1))), (flat, np.array([[0, 1, 2], [0, 2, 1]])),
         surfaces.joined(surfaces.box(), (cavity[0], cavity[1][:, ::-1])),
-    ]  # fmt: skip
+    ]
 
 
 def test_what_is_a_solid_is_what_python_takes_for_one():

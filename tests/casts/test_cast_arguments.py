@@ -39,7 +39,7 @@ def test_directions_are_scaled_exactly():
         ((np.nan, 0, 0), "direction_W"), ((1, np.inf, 0), "direction_W"), ((1, 2), "direction_W"),
         ("up", "direction_W"),
     ],
-)  # fmt: skip
+)
 def test_bad_directions_are_named(direction, words):
     with pytest.raises(InvalidArgument) as caught:
         checked_directions("shape_cast", "direction_W", direction, "a cast")

@@ -35,7 +35,7 @@ def row_of(A, X_WA, d, limit, B=FLOOR, X_WB=None) -> np.ndarray:
     P.cast_pairs(
         *pairs.parts.table.addresses, address_of(pairs.parts.poses.rows), address_of(pairs.parts.shape_of),
         address_of(pairs.pairs), address_of(question), 1, address_of(row), *workspace(),
-    )  # fmt: skip
+    )
     return row
 
 
@@ -79,7 +79,7 @@ def test_brackets_hold_the_fall_of_the_lowest_vertex(kind):
 @pytest.mark.parametrize(
     "shape", [collide.Sphere(0.4), collide.Capsule(0.2, 0.8), collide.Cylinder(0.3, 0.6), collide.Cone(0.3, 0.6),
               collide.Ellipsoid((0.5, 0.3, 0.2)), collide.Box((0.3, 0.5, 0.7))], ids=lambda s: type(s).__name__,
-)  # fmt: skip
+)
 def test_shapes_fall_as_far_as_they_reach(shape):
     """Onto a turned and moved plane whose normal is no unit vector."""
     rng = rng_of("shapes onto a plane", type(shape).__name__)
@@ -116,7 +116,7 @@ def test_the_entry_by_itself():
     size, slop, _ = size_and_slop(numbers, poses, sa, pa, sb, pb)
     assert slop == 0.0 and size > 4.0
     for d, limit, status in (((0, 0, -0.5), math.inf, HIT), ((0, 0, -0.5), 5.9, MISS), ((0, 0, -0.5), 6.0, OPEN),
-                             ((0.5, 0, 0), math.inf, LEVEL), ((0.5, 0, 0.25), math.inf, MISS)):  # fmt: skip
+                             ((0.5, 0, 0), math.inf, LEVEL), ((0.5, 0, 0.25), math.inf, MISS)):
         met = cast_onto_plane(pair, Vec3(*map(float, d)), size, slop, limit)
         assert met.status == status, (d, limit)
         if status in (HIT, OPEN):

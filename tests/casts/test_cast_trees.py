@@ -31,7 +31,7 @@ from collide.lowering.shape_table import POSE, ShapeTable
 EYE = np.eye(4)
 BUMPY, RING = collide.Mesh(*bumpy_sphere(60)), collide.Mesh(*block_ring())
 MOVERS = {"Box": collide.Box((0.3, 0.2, 0.4)), "Capsule": collide.Capsule(0.1, 0.5), "Cone": collide.Cone(0.2, 0.4),
-          "Mesh": collide.Mesh(*box((-0.2, -0.1, -0.3), (0.1, 0.2, 0.2)))}  # fmt: skip
+          "Mesh": collide.Mesh(*box((-0.2, -0.1, -0.3), (0.1, 0.2, 0.2)))}
 
 
 def drawn(*words, n: int):
@@ -112,7 +112,7 @@ class Question:
         self.header = np.array([
             0 if a.tree is None else a.tree.address, b.tree.address, *self.table.addresses, address_of(a.poses.rows),
             address_of(b.poses.rows), POSE, POSE, address_of(self.questions), address_of(self.candidates), capacity,
-        ])  # fmt: skip
+        ])
         self.doubles, self.integers = np.zeros(TREE_CAST_DOUBLES), np.zeros(TREE_CAST_INTEGERS, dtype=np.int64)
 
     def ask(self, first: int) -> tuple[int, int]:

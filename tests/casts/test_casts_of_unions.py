@@ -22,7 +22,7 @@ MAKERS = {
     "box": lambda w: collide.Box((w, 0.8 * w, 0.6 * w)), "sphere": lambda w: collide.Sphere(0.5 * w),
     "can": lambda w: collide.Cylinder(0.4 * w, w), "capsule": lambda w: collide.Capsule(0.2 * w, 0.6 * w),
     "mesh": lambda w: collide.Mesh(w * CORNERS, FACES),
-}  # fmt: skip
+}
 
 
 def clutter(kinds: tuple[str, ...], n: int, seed: str) -> collide.Compound:
@@ -41,7 +41,7 @@ def by_all_pairs(A: collide.Compound, B: collide.Compound, X, d, limit: float):
     a, b = np.divmod(np.arange(n * m), m)
     casts = collide.shape_cast(
         [ones_a[k] for k in a], X, d, [ones_b[k] for k in b], np.eye(4), max_distance=limit
-    )  # fmt: skip
+    )
     return casts.distance.reshape(n, m), casts
 
 
@@ -109,7 +109,7 @@ def test_casts_of_unions_ask_few_pairs_of_parts(monkeypatch):
     answer = convex_casts.answer_part_pairs
     monkeypatch.setattr(
         convex_casts, "answer_part_pairs", lambda *args: (asked.append(len(args[1])), answer(*args))[1]
-    )  # fmt: skip
+    )
     A, B = clutter(("can",), 200, "moves"), clutter(("box",), 200, "stands")
     r = collide.shape_cast(A, collide.pose((-5.0, 0.1, 0.0)), (1, 0, 0), B, np.eye(4))
     assert r.hit and 0 < sum(asked) < 200, asked

@@ -50,7 +50,7 @@ class Drawn:
         d = np.clip(ahead + rng.integers(-1, 2, 3) * int(rng.random() < 0.3), -2, 2)
         self.d = d if d.any() else np.array((1, 0, 0))
         world = [[tuple(int(x) for x in row) for row in points @ X[:3, :3].T + X[:3, 3]]
-                 for points, X in ((self.A, self.X_WA), (self.B, self.X_WB))]  # fmt: skip
+                 for points, X in ((self.A, self.X_WA), (self.B, self.X_WB))]
         self.truth = exact_first_contact(*world, tuple(self.d.tolist()))
 
     def pairs(self) -> PartPairs:
@@ -68,7 +68,7 @@ def kernel_row(pairs: PartPairs, question: np.ndarray) -> np.ndarray:
     P.cast_pairs(
         *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(pairs.pairs),
         address_of(question), 1, address_of(row), *workspace(),
-    )  # fmt: skip
+    )
     return row
 
 
@@ -113,7 +113,7 @@ def test_exact_rows_are_the_least_brackets():
     for _ in range(40):
         case = Drawn(rng)
         world = [[tuple(int(x) for x in row) for row in points @ X[:3, :3].T + X[:3, 3]]
-                 for points, X in ((case.A, case.X_WA), (case.B, case.X_WB))]  # fmt: skip
+                 for points, X in ((case.A, case.X_WA), (case.B, case.X_WB))]
         row = np.zeros(P.CAST_ROW)
         limit = float(rng.choice([math.inf, 3.0]))
         with reproducing(SOURCE, **{name: getattr(case, name) for name in ("A", "B", "X_WA", "X_WB", "d")}):
@@ -146,7 +146,7 @@ def test_bodies_before_a_plane():
         (3.0, (0, 0, -0.5), 3.99, None), (1.0, (0.5, 0, 0), math.inf, 0.0), (0.5, (0, 0, 0.5), math.inf, 0.0),
         (np.nextafter(1.0, 2.0), (0.5, 0, 0), math.inf, None), (3.0, (0.5, 0, -(2.0**-60)), math.inf, 2.0**61),
         (3.0, (0.5, 0, -(2.0**-60)), 2.0**60, None), (3.0, (0, 0, -0.5), 4.0, 4.0),
-    ):  # fmt: skip
+    ):
         pairs = posed_sides(box, half, collide.pose((0, 0, z))[None], np.eye(4)[None], 1).all_pairs(np.arange(1))
         out = first_contacts(answer_questions(pairs, np.array([d], dtype=float), np.array([limit])), 1)
         assert out.hit[0] == (expected is not None) and out.proven[0], (z, d)

@@ -25,7 +25,7 @@ SHAPES = {
     "Halfspace": collide.Halfspace((0.2, -0.3, 0.9), 0.1),
     "ConvexHull": collide.ConvexHull(rng_of("cut hull").normal(size=(12, 3)) * 0.4),
     "Rounded": collide.ConvexHull(rng_of("cut rounded").normal(size=(5, 3)) * 0.3, radius=0.15),
-}  # fmt: skip
+}
 
 
 def cut(parts: PosedParts, questions, rays, both: bool) -> np.ndarray:
@@ -35,7 +35,7 @@ def cut(parts: PosedParts, questions, rays, both: bool) -> np.ndarray:
     P.cut_parts(
         *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(questions),
         address_of(rays), len(questions), both, address_of(rows), address_of(doubles), address_of(integers),
-    )  # fmt: skip
+    )
     return rows
 
 

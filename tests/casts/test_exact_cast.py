@@ -55,7 +55,7 @@ def test_solids_are_those_of_their_facets():
         ([(0, 0, 0), (2, 0, 0), (0, 2, 0)], [(6, 1, 0), (8, 1, 0), (7, 5, 0)], (1, 0, 0), Fraction(5)),
         ([(0, 0, 0), (2, 0, 0), (0, 2, 0)], [(6, 0, 3), (8, 1, 3), (7, 5, 3)], (0, 0, 1), None),
     ],
-)  # fmt: skip
+)
 def test_points_segments_and_flat_sets(A, B, d, t):
     assert cast_exactly(A, B, d).t == t
     assert cast_exactly(A * 2, B + B[:1], d).t == t

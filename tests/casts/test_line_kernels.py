@@ -52,7 +52,7 @@ class Drawn:
         self.cast = silhouette.open_cast(
             pair, Vec3(*self.d.tolist()), radius_of(pair, pair.A), radius_of(pair, pair.B), ERROR * size + slop, size,
             address_of(self.doubles), address_of(self.integers),
-        )  # fmt: skip
+        )
         #: Points of A ⊖ B.
         self.D = (self.P[:, None] - self.Q[None]).reshape(-1, 3)
 

@@ -25,7 +25,7 @@ def test_first_facet_of_all(kind):
         "Box": collide.Box((0.3, 0.2, 0.4)), "Sphere": collide.Sphere(0.2), "Capsule": collide.Capsule(0.1, 0.5),
         "Cylinder": collide.Cylinder(0.2, 0.3), "ConvexHull": collide.ConvexHull(0.3 * rng.normal(size=(8, 3))),
         "Mesh": collide.Mesh(*box((-0.2, -0.1, -0.3), (0.1, 0.2, 0.2))),
-    }[kind]  # fmt: skip
+    }[kind]
     mesh = collide.Mesh(*bumpy_sphere(60 if kind == "Mesh" else 160))
     X, Y = (np.array([random_pose(rng, s) for _ in range(10)]) for s in (3.0, 0.2))
     d = Y[:, :3, 3] - X[:, :3, 3] + 0.7 * rng.normal(size=(10, 3))

@@ -45,7 +45,7 @@ def chord_of(shape, o, d) -> C.Chord:
 SHAPES = [
     collide.Sphere(0.5), collide.Capsule(0.3, 0.8), collide.Cylinder(0.4, 0.7), collide.Cone(0.5, 0.8),
     collide.Ellipsoid((0.6, 0.3, 0.2)), collide.Box((0.6, 0.8, 0.5)), collide.Halfspace((0.2, -0.3, 0.9), 0.1),
-]  # fmt: skip
+]
 
 
 def check(shape, o, d, chord: C.Chord) -> None:
@@ -64,7 +64,7 @@ def check(shape, o, d, chord: C.Chord) -> None:
         assert all(inside(t) for t in ends)
         assert all(np.ptp(ends) < 1e-9 or inside(t) for t in np.linspace(min(ends), max(ends), 5))
         width = max(chord.first_upper - chord.first_lower if math.isfinite(chord.first) else 0.0,
-                    chord.last_upper - chord.last_lower if math.isfinite(chord.last) else 0.0)  # fmt: skip
+                    chord.last_upper - chord.last_lower if math.isfinite(chord.last) else 0.0)
         assert width < 1e-6
 
 
@@ -104,7 +104,7 @@ def test_brackets_hold_what_is_inside(shape):
         (SHAPES[4], (0, 1, 0), (0, -2, 0), 0.35, 0.65, (0, 0)), (SHAPES[5], (-1, 0, 0), (1, 0, 0), 0.7, 1.3, (1, 2)),
         (SHAPES[5], (0, 0, 1), (0, 0, -1), 0.75, 1.25, (6, 5)), (SHAPES[5], (0, -1, 0), (0, 1, 0), 0.6, 1.4, (3, 4)),
     ],
-)  # fmt: skip
+)
 def test_by_hand(shape, o, d, first, last, sides):
     chord = chord_of(shape, np.array(o, dtype=float), np.array(d, dtype=float))
     assert chord.state == C.MET and (chord.first_side, chord.last_side) == sides
@@ -117,7 +117,7 @@ def test_halfspaces_have_one_end():
         chord_of(half, np.array(o, dtype=float), np.array(d, dtype=float))
         for o, d in (((0, 0, 2), (0, 0, -1)), ((0, 0, 0), (0, 0, 1)), ((0, 0, 0), (1, 0, 0)), ((0, 0, 1), (1, 0, 0)),
                      ((0, 0, 0.5), (0, 1, 0)))
-    )  # fmt: skip
+    )
     assert (down.state, down.first, down.last) == (C.MET, 1.5, math.inf) and (down.first_side, down.last_side) == (
         0,
         -1,
@@ -130,7 +130,7 @@ def test_halfspaces_have_one_end():
 def test_rays_that_touch_are_left_open():
     """A line that grazes is not said to miss, nor to meet."""
     for shape, o, d in ((SHAPES[0], (0.5, 0, -2), (0, 0, 1)), (SHAPES[2], (0.4, 0, -2), (0, 0, 1)),
-                        (SHAPES[5], (0.3, 0, -2), (0, 0, 1)), (SHAPES[4], (0.6, 0, -2), (0, 0, 1))):  # fmt: skip
+                        (SHAPES[5], (0.3, 0, -2), (0, 0, 1)), (SHAPES[4], (0.6, 0, -2), (0, 0, 1))):
         o, d = np.array(o, dtype=float), np.array(d, dtype=float)
         assert chord_of(shape, o, d).state == C.UNCLEAR
         assert chord_of(shape, o * (1 + 1e-9), d).state == C.MISSED
@@ -148,7 +148,7 @@ def interval(rng) -> C.Chord:
     return C.Chord(
         state, first - wide[0], float(first), first + wide[1], last - wide[2], float(last), last + wide[3],
         int(rng.integers(3)), int(rng.integers(3)),
-    )  # fmt: skip
+    )
 
 
 def truths(chord: C.Chord, rng) -> list:

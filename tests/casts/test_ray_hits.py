@@ -20,7 +20,7 @@ def drawn(rng, n_rays: int, k: int, all_proven: bool = False) -> RayEvents:
     return RayEvents(
         rng.integers(0, n_rays, k), np.stack([t, np.maximum(t - wide[:, 0], 0.0), t + wide[:, 1]], axis=1),
         rng.normal(size=(k, 3)), rng.integers(0, 4, k), rng.integers(0, 3, k), proven, proven & (rng.random(k) < 0.7),
-    )  # fmt: skip
+    )
 
 
 def as_lists(events: RayEvents) -> list[tuple]:
@@ -57,7 +57,7 @@ def test_first_of_each_ray():
         rows = as_lists(events)
         by_ray = [[row for row in rows if row[0] == ray] for ray in range(5)]
         expected = [naive_first(of_ray) if len(rows) > len({row[0] for row in rows}) else of_ray[0]
-                    for of_ray in by_ray if of_ray]  # fmt: skip
+                    for of_ray in by_ray if of_ray]
         assert as_lists(first_of_each(events)) == expected
         n_open += sum(not row[5] for row in expected)
     assert n_open > 20

@@ -84,7 +84,7 @@ def test_walls_of_lattice_boxes_are_exact(kind, every):
 def test_halfspaces_have_one_wall():
     half = collide.Halfspace((0, 0, 1), 0.5)
     rays = [((0, 0, 2), (0, 0, -1)), ((0, 0, 0), (0, 0, 2)), ((0, 0, 2), (0, 0, 1)), ((0, 0, 0.5), (1, 0, 0)),
-            ((0, 0, 0), (1, 0, 0)), ((0, 0, 0.5), (0, 0, -1)), ((0, 0, 0.5), (0, 0, 1))]  # fmt: skip
+            ((0, 0, 0), (1, 0, 0)), ((0, 0, 0.5), (0, 0, -1)), ((0, 0, 0.5), (0, 0, 1))]
     origins, directions, _ = checked_rays("f", *(np.array(side, dtype=float) for side in zip(*rays)))
     questions = np.stack([np.arange(7), np.zeros(7, dtype=np.int64)], axis=1)
     events = parts_met(parts_for([(half, EYE)]), questions, origins, directions, math.inf, True)
@@ -131,7 +131,7 @@ class Scene:
         )
         middle = np.array([X[:3, 3] for _, X in self.items])
         low, high = (np.array([f(b[i:j], axis=0) for i, j in zip(self.first, self.first[1:])])
-                     for f, b in ((np.min, middle - half), (np.max, middle + half)))  # fmt: skip
+                     for f, b in ((np.min, middle - half), (np.max, middle + half)))
         self.tree = BoxTree(np.hstack([low, high]), np.zeros(n, dtype=bool))
         self.low, self.high = low, high
         self.skipped, self.meshed = (rng.random((2, n)) < 0.25).astype(np.int64)
@@ -147,13 +147,13 @@ def test_candidates_hold_all_walls_and_none_of_what_is_skipped(every, limit):
     origins, directions, _ = checked_rays("f", o, at - o + 0.1 * rng.normal(size=(25, 3)))
     found = candidate_parts(
         scene.parts, scene.tree, scene.first, scene.skipped, scene.meshed, origins, directions, limit, every
-    )  # fmt: skip
+    )
     pairs = set(map(tuple, found.tolist()))
     assert len(pairs) == len(found)
     body = np.searchsorted(scene.first, np.arange(len(scene.items)), "right") - 1
     assert not any(scene.skipped[body[part]] for _, part in pairs)
     asked = np.array([(k, part) for k in range(25) for part in range(len(scene.items))
-                      if not scene.skipped[body[part]] and not scene.meshed[body[part]]])  # fmt: skip
+                      if not scene.skipped[body[part]] and not scene.meshed[body[part]]])
     events = parts_met(scene.parts, asked, origins, directions, limit, True)
     n_needed = 0
     for k in range(25):
@@ -184,7 +184,7 @@ def test_more_candidates_than_room_are_counted():
     header = np.array([
         address_of(scene.tree.nodes), address_of(scene.tree.links), scene.tree.n_nodes, address_of(scene.first), 12,
         address_of(arguments[3]), address_of(arguments[4]),
-    ])  # fmt: skip
+    ])
     rays, limits = np.hstack([origins, directions.vectors]), np.full(10, math.inf)
     doubles, integers = np.zeros(TREE_RAY_DOUBLES), np.zeros(TREE_RAY_INTEGERS, dtype=np.int64)
     pairs = np.full((5, 2), -7, dtype=np.int64)
@@ -192,5 +192,5 @@ def test_more_candidates_than_room_are_counted():
         *scene.parts.table.addresses, address_of(scene.parts.poses.rows), address_of(scene.parts.shape_of),
         address_of(header), address_of(rays), address_of(limits), 10, True, address_of(pairs), 3, address_of(doubles),
         address_of(integers),
-    )  # fmt: skip
+    )
     assert count == len(whole) > 3 and np.array_equal(pairs[:3], whole[:3]) and (pairs[3:] == -7).all()

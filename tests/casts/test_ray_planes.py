@@ -95,5 +95,5 @@ def test_poses_go_with_rays():
     events = planes_met(region, X, origins, directions, math.inf, every=False)
     assert events.t[:, 0].tolist() == [5.0, 4.0, 3.0] and events.normal.tolist() == [[0.0, 0.0, 1.0]] * 3
     nothing = planes_met(region, X, origins[:0], directions.repeated(3)._replace(
-        vectors=directions.vectors[:0], exponents=directions.exponents[:0]), math.inf, every=True)  # fmt: skip
+        vectors=directions.vectors[:0], exponents=directions.exponents[:0]), math.inf, every=True)
     assert len(nothing.ray) == 0 and nothing.t.shape == (0, 3) and nothing.normal.shape == (0, 3)

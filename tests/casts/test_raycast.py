@@ -15,7 +15,7 @@ SHAPES = {
     "Sphere": collide.Sphere(0.5), "Capsule": collide.Capsule(0.3, 0.8), "Cylinder": collide.Cylinder(0.4, 0.7),
     "Cone": collide.Cone(0.5, 0.8), "Ellipsoid": collide.Ellipsoid((0.6, 0.3, 0.2)),
     "Halfspace": collide.Halfspace((0.2, -0.3, 0.9), 0.1), "Box": collide.Box((0.6, 0.8, 0.5)),
-}  # fmt: skip
+}
 AGAIN = "import collide, numpy as np; print(collide.raycast(collide.{shape!r}, np.array({X}), {o}, {d}, all_hits=True))"
 
 
@@ -121,7 +121,7 @@ def test_sides_and_items():
         (can, (3, 0, 0), (-1, 0, 0), 0), (can, (0.1, 0, 3), (0, 0, -1), 2), (can, (0.1, 0, -3), (0, 0, 1), 1),
         (cone, (0.1, 0, -3), (0, 0, 1), 1), (cone, (0.1, 0, 3), (0, 0, -1), 0), (pill, (3, 0, 0.5), (-1, 0, 0), 0),
         (pill, (0.1, 0, 5), (0, 0, -1), 2), (pill, (0.1, 0, -5), (0, 0, 1), 1),
-    ):  # fmt: skip
+    ):
         assert collide.raycast(shape, EYE, o, d).facet == side
     mesh = collide.Mesh(*collide.tessellate(collide.Box((1, 1, 1)), tolerance=1e-3)[:2])
     ball = collide.Sphere(0.5)
@@ -153,7 +153,7 @@ def test_any_size(scale):
         collide.Capsule(0.3 * scale, 0.8 * scale), collide.Cylinder(0.4 * scale, 0.7 * scale),
         collide.Cone(0.5 * scale, 0.8 * scale), collide.Ellipsoid(scale * np.array([0.6, 0.3, 0.2])),
         collide.ConvexHull(core, radius=0.1 * scale),
-    ):  # fmt: skip
+    ):
         r = collide.raycast(shape, EYE, np.array([-3, 0.05, 0.02]) * scale, (scale, 0, 0))
         assert r.hit and r.certified and 2.2 < r.distance < 3.0, shape
         r = collide.raycast(shape, EYE, np.array([-3, 2, 0.02]) * scale, (scale, 0, 0))

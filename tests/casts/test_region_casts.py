@@ -60,7 +60,7 @@ def test_bodies_moved_along_a_plane_before_them_miss():
     for z, vector, misses, is_whole in (
         (2.0, (1, 0, 0), True, True), (0.1, (1, 0, 0), False, True), (-2.0, (1, 0, 0), False, True),
         (2.0, (1, 0, -(2.0**-60)), False, False), (2.0, (1, 0, 2.0**-60), True, True),
-    ):  # fmt: skip
+    ):
         found = way([(0, 0, 1), (1, 0, 0)], [0.0, 50.0], (0, 0, z), vector)
         assert (found.misses, found.is_whole) == (misses, is_whole), (z, vector)
 

@@ -90,7 +90,7 @@ def test_every_pair_of_convex_shapes(kind_a):
         "Cylinder": collide.Cylinder(0.4, 0.6), "Cone": collide.Cone(0.4, 0.7),
         "Ellipsoid": collide.Ellipsoid((0.5, 0.3, 0.2)),
         "ConvexHull": collide.ConvexHull(0.4 * rng.normal(size=(10, 3)), radius=0.1),
-    }  # fmt: skip
+    }
     hits = []
     A = shapes[kind_a]
     for B in shapes.values():

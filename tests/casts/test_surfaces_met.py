@@ -25,7 +25,7 @@ def shapes_of(rng) -> dict[str, collide.Shape]:
     each["Mixed"] = collide.Compound(
         [(RING, collide.pose((2, 0, 0))), (each["Sphere"], np.eye(4)), (each["Compound"], random_pose(rng)),
          (each["Box"], random_pose(rng))]
-    )  # fmt: skip
+    )
     return each
 
 
@@ -59,7 +59,7 @@ def test_batches_are_singles_bit_by_bit(kind, all_hits):
 
 def without_repeats(places: list[tuple[float, int]]) -> list[tuple[float, int]]:
     return [p for i, p in enumerate(places)
-            if not i or p[1] != places[i - 1][1] or p[0] - places[i - 1][0] > 1e-9]  # fmt: skip
+            if not i or p[1] != places[i - 1][1] or p[0] - places[i - 1][0] > 1e-9]
 
 
 @pytest.mark.parametrize("kind", ["Compound", "Mixed"])
@@ -73,7 +73,7 @@ def test_unions_are_all_their_leaves(kind):
     for k in range(40):
         mine = slice(found.starts[k], found.starts[k + 1])
         places = sorted((t, number) for number, item in enumerate(items)
-                        for t in item.distance[item.starts[k] : item.starts[k + 1]].tolist())  # fmt: skip
+                        for t in item.distance[item.starts[k] : item.starts[k + 1]].tolist())
         # facets of a polytope count one by one, its walls in a union once
         merged = without_repeats(places)
         assert (np.diff(found.distance[mine]) >= 0.0).all()
@@ -104,7 +104,7 @@ def test_numbers_of_rays_that_differ_are_refused():
         with pytest.raises(InvalidArgument, match="raycast"):
             raycast(ball, *arguments)
     for wrong, words in (({"max_distance": -1.0}, "max_distance"), ({"max_distance": math.nan}, "max_distance"),
-                         ({"all_hits": 2}, "all_hits")):  # fmt: skip
+                         ({"all_hits": 2}, "all_hits")):
         with pytest.raises(InvalidArgument, match=f"raycast: {words}"):
             raycast(ball, np.eye(4), (5, 0, 0), (-1, 0, 0), **wrong)
     with pytest.raises(InvalidArgument, match="shape must be a shape"):

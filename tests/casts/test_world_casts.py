@@ -36,7 +36,7 @@ def test_rays_are_those_of_all_bodies():
     directions = rng.normal(size=(60, 3)) - 0.4 * origins
     of_bodies = {
         i: collide.raycast(world.body(i).shape, world.body(i).X_WB, origins, directions) for i in world.ids
-    }  # fmt: skip
+    }
     for group in (None, 2):
         counts = [i for i in world.ids if group is None or world.body(i).group & 2]
         rows = world.raycast(origins, directions, mask=group)
@@ -140,7 +140,7 @@ def test_empty_worlds_and_endless_bodies():
     for rows in (
         world.raycast([(0, 0, 0)] * 2, (1, 0, 0)), world.shape_cast(collide.Sphere(1), np.eye(4), [(1, 0, 0)] * 2),
         world.nearest([(0, 0, 0)] * 2),
-    ):  # fmt: skip
+    ):
         assert len(rows) == 2 and not rows["hit"].any() and rows.names == [None, None]
     assert world.raycast((0, 0, 0), (1, 0, 0), all_hits=True).starts.tolist() == [0, 0]
     floor = world.add(collide.Halfspace((0, 0, 1), 0.0))
@@ -172,7 +172,7 @@ def test_stats_stay():
         (lambda w: w.shape_cast("box", np.eye(4), (1, 0, 0)), "must be a shape"),
         (lambda w: w.shape_cast(collide.Sphere(1), np.eye(4), (0, 0, 0)), "World.shape_cast: direction_W"),
     ],
-)  # fmt: skip
+)
 def test_what_is_refused(ask, words):
     world = collide.World()
     world.add(collide.Sphere(1.0))

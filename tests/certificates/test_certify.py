@@ -58,7 +58,7 @@ def test_what_does_not_belong_together_is_refused():
         (None, box, EYE, EYE, r), (box, [box], EYE, np.array([EYE] * 3), r), (box, box, EYE, np.array([EYE] * 3), r),
         (box, box, EYE, EYE, True), (box, box, EYE, EYE, collide.collide(box, box, EYE, EYE)),
         ([box] * 3, box, EYE, EYE, r),
-    ):  # fmt: skip
+    ):
         with pytest.raises(collide.InvalidArgument, match="certify"):
             collide.certify(*arguments)
 

@@ -23,7 +23,7 @@ def shapes(rng):
         collide.Mesh(box()[0], box()[1][2:]), collide.Box((0.5, 0.25, 0.5)),
         collide.ConvexHull(rng.normal(size=(9, 3)) * 0.3),
         collide.Sphere(0.25), collide.Capsule(0.125, 0.5), collide.Halfspace((0, 0, 1), -0.5),
-    ]  # fmt: skip
+    ]
     return pool[rng.integers(5)], pool[rng.integers(len(pool))]
 
 
@@ -106,7 +106,7 @@ def test_one_inside_the_other():
         Certificate("inside", 0, 0, ((0, 1),)), Certificate("beside", 0, 0, ((0, 0),)),
         Certificate("together", 0, 0, ((0, 0),) * 5),
     ],
-)  # fmt: skip
+)
 def test_tampered(tampered):
     mesh = collide.Mesh(*box())
     X_WB = collide.pose((1.5, 0.25, 0.125))
@@ -143,7 +143,7 @@ def test_world_rows_have_them():
         [("apart", 0, 0, None)],
         {"kind": "together"},
     ],
-)  # fmt: skip
+)
 def test_what_has_not_the_form_is_refused(given):
     mesh, X_WB = collide.Mesh(*box()), collide.pose((1.5, 0.25, 0.125))
     for B in (mesh, collide.Box((2, 2, 2)), collide.Halfspace((0, 0, 1), 0.0)):

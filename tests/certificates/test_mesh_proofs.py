@@ -38,7 +38,7 @@ def test_convex_shapes_and_those_without_certificates():
     for shape in (
         collide.Cylinder(1, 1), collide.Compound([(collide.Sphere(1), EYE), (collide.Sphere(1), EYE)]),
         collide.Compound([(collide.Sphere(1), pose(t=(1, 0, 0)))]), collide.Compound([(MESH, EYE)]),
-    ):  # fmt: skip
+    ):
         assert not ProofBody(shape, EYE).has_certificates
     assert "no certificates" in flaw_of_mesh_certificates(MESH, collide.Cylinder(1, 1), EYE, EYE, [], "apart")
 
@@ -72,5 +72,5 @@ def test_what_is_no_proof_of_inside():
         (A, B, []), (A, B, [(0, 0)]), (A, B, [(NO_VERTEX, NO_VERTEX)]), (A, B, [(NO_VERTEX, 0)] * 2),
         (A, B, [(NO_VERTEX, 1)]), (A, B, [(0, NO_VERTEX)]), (surface, B, [(NO_VERTEX, 0)]), (B, B, [(NO_VERTEX, 0)]),
         (B, A, [(NO_VERTEX, 0)]),
-    ):  # fmt: skip
+    ):
         assert flaw_of_inside_proof(first, second, pairs), pairs

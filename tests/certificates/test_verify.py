@@ -19,7 +19,7 @@ def test_forms_of_certificates():
     read = read_certificates([["apart", 0, np.int64(1), [[2, 3], (4, 5)]]])
     assert read == [Certificate("apart", 0, 1, ((2, 3), (4, 5)))] and type(read[0].part_b) is int
     for bad in (7, [7], ["apart"], [("apart", 0, 0)], [("apart", 0.5, 0, [])], [("apart", 0, 0, [(1, 2, 3)])],
-                [("apart", 0, 0, [("1", 2)])]):  # fmt: skip
+                [("apart", 0, 0, [("1", 2)])]):
         with pytest.raises(CertificateRefused, match="rows of"):
             read_certificates(bad)
 
@@ -46,7 +46,7 @@ def test_every_pair_of_parts_must_be_apart():
         (given[:1], "2 pairs of parts, 1"), ((given[0], given[0]), "2 pairs of parts, 1"), ((), "2 pairs of parts, 0"),
         ((given[0], given[1]._replace(part_a=2)), "no parts 2 and 0"),
         ((given[0], given[1]._replace(kind="together")), "says apart, the certificate 'together'"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(CertificateRefused, match=words):
             collide.verify(TWO, BOX, EYE, X_WB, r, certificate=tampered)
 

@@ -26,7 +26,7 @@ def open_sheet() -> collide.Mesh:
 BODIES = {"hull": large_hull, "ball": lambda: collide.Mesh(*bumpy_sphere(4000)), "sheet": open_sheet,
           "small": lambda: collide.Mesh(*(0.01 * np.asarray(part) if k == 0 else part
                                           for k, part in enumerate(bumpy_sphere(300)))),
-          "plane": lambda: collide.Halfspace((0.1, 0.2, -1.0), -1.9)}  # fmt: skip
+          "plane": lambda: collide.Halfspace((0.1, 0.2, -1.0), -1.9)}
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ BODIES = {"hull": large_hull, "ball": lambda: collide.Mesh(*bumpy_sphere(4000)),
         ("ball", "small", np.eye(4), "inside"), ("ball", "plane", np.eye(4), "apart"),
         ("hull", "plane", np.eye(4), "apart"),
     ],
-)  # fmt: skip
+)
 def test_few_vertices_of_large_bodies_become_integers(A, B, X_WB, kind, monkeypatch):
     A, B = BODIES[A](), BODIES[B]()
     row = collide.distance(A, B, np.eye(4), X_WB)

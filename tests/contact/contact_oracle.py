@@ -173,7 +173,7 @@ class Core:
         self.facings = np.array([_long(v) for v in facings])
         self.sides = np.array([
             [_long(cross(n, minus(P[t[(k + 1) % 3]], P[t[k]]))) for k in range(3)] for t, n in zip(triples, facings)
-        ])  # fmt: skip
+        ])
         self.normals = np.array([_long(v) for v in found])
         self.offsets = np.max(self.points @ self.normals.T, axis=0)
 

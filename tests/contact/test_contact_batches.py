@@ -17,7 +17,7 @@ def clutter(rng, n: int, spread: float) -> collide.Compound:
     return collide.Compound([
         (makers[int(rng.integers(3))](rng.uniform(0.05, 0.1)), collide.pose(p, rpy=r))
         for p, r in zip(rng.uniform(-spread, spread, (n, 3)), rng.uniform(-3, 3, (n, 3)))
-    ])  # fmt: skip
+    ])
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ def stack_of_bodies(rng, n: int):
     some = [
         collide.Box((0.5, 0.5, 0.5)), collide.Box((0.6, 0.4, 0.5)), collide.ConvexHull(rng.normal(size=(12, 3)) * 0.3),
         collide.Sphere(0.3), collide.Cylinder(0.25, 0.5), collide.Capsule(0.2, 0.3),
-    ]  # fmt: skip
+    ]
     side = int(np.ceil(n ** (1 / 3)))
     shapes, poses = [], []
     for k in range(n):

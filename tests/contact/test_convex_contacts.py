@@ -31,7 +31,7 @@ def convex_pairs(rng):
             lambda: collide.ConvexHull([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]),
             lambda: collide.ConvexHull([[0.0, 0, -0.5], [0, 0, 0.5]], radius=0.1),
             lambda: collide.Halfspace((0, 0.6, 0.8), 0.1),
-        ][rng.integers(11)]()  # fmt: skip
+        ][rng.integers(11)]()
     while True:
         A, B = one(), one()
         X_WA, X_WB = (collide.pose(rng.normal(size=3) * s, rpy=rng.uniform(-3, 3, 3)) for s in (0.5, 3))
@@ -217,7 +217,7 @@ def test_a_world_has_them_all():
         ({"max_contacts": 0}, "max_contacts"), ({"max_contacts": 2.5}, "max_contacts"),
         ({"max_contacts": True}, "max_contacts"),
     ],
-)  # fmt: skip
+)
 def test_bad_arguments_are_named(options, message):
     mesh = collide.Mesh(*box())
     with pytest.raises(collide.InvalidArgument, match=message):

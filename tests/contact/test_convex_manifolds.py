@@ -238,7 +238,7 @@ NEEDLES = [
      collide.ConvexHull(np.outer([-0.5, 0, -0.375, -0.125], [4, -8, 9]) / 8 + _OFF), EYE, 0.5, 0.3212176887586335),
     (collide.Box((1, 1, 1)), collide.ConvexHull(np.outer([-0.2, 0.3, 0.7], [0.1, 0.7, 0.3])),
      collide.pose((-0.5, 0.6, -0.3), rpy=(-1.1, 0, 1.3)), 0.2, 0.0494379204379737),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("A", "B", "X_WB", "margin", "gap"), NEEDLES)
@@ -265,7 +265,7 @@ def test_sides_of_a_sliver_end_at_its_tips():
 GROUNDS = [
     collide.Halfspace((0, 0, 1), 0.0), collide.Box((4, 4, 1)),
     collide.ConvexHull([[-2, -2, 0], [2, -2, 0], [0, 3, 0.0]]),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("other", GROUNDS)
@@ -274,7 +274,7 @@ def test_rows_of_swept_bodies_lie_on_their_surface(other):
     bodies = [
         collide.Capsule(0.3, 1.0), collide.ConvexHull([[-0.5, 0, 0], [0.5, 0, 0], [0, 0.6, 0.1]], radius=0.2),
         collide.ConvexHull(list(itertools.product((-0.3, 0.3), repeat=3)), radius=0.1),
-    ]  # fmt: skip
+    ]
     several = 0
     for body, lean in itertools.product(bodies, (1e-9, 1e-4, 0.05, 0.3, 0.7)):
         X_WB = collide.pose((0, 0.1, 1.0), rpy=(0.5 * np.pi + lean, 0.3 * lean, 0.4))
@@ -292,7 +292,7 @@ def test_both_ends_of_a_line_along_an_edge_are_there():
     for angle, lean, gap, body in itertools.product(
         (0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-4), (-0.5, 0.0, 0.3), (-1e-3, 0.0, 1e-9),
         (collide.Capsule(0.1, 0.6), collide.Cylinder(0.1, 0.6)),
-    ):  # fmt: skip
+    ):
         out = np.array([0.0, np.cos(np.pi / 4 + lean), np.sin(np.pi / 4 + lean)])
         along = np.cos(angle) * np.eye(3)[0] + np.sin(angle) * np.cross(out, np.eye(3)[0])
         X_WB = np.eye(4)

@@ -55,7 +55,7 @@ def test_on_a_table(height, margin, solid):
     scenes = [
         (CAN, 0.25, np.eye(3), 8), (CONE, 0.25, np.eye(3), 8), (CAN, 0.3, ON_ITS_SIDE, 2), (EGG, 0.1, np.eye(3), 1),
         (CONE, 0.25, np.diag([1.0, -1, -1]), 1),
-    ]  # fmt: skip
+    ]
     for seed in range(3):
         rng = np.random.default_rng(seed)
         ground = table(6, seed=seed)
@@ -162,7 +162,7 @@ def scene(rng):
     B = [
         collide.Cylinder(*rng.uniform(0.05, 0.4, 2)), collide.Cone(*rng.uniform(0.05, 0.4, 2)),
         collide.Ellipsoid(rng.uniform(0.05, 0.3, 3)),
-    ][rng.integers(3)]  # fmt: skip
+    ][rng.integers(3)]
     X_WA = collide.pose(rng.normal(size=3), rpy=rng.uniform(-3, 3, 3))
     X_AB = collide.pose(rpy=rng.uniform(-3, 3, 3) if rng.random() < 0.5 else np.pi / 2 * rng.integers(4, size=3))
     corners = vertices[faces[rng.integers(len(faces))]]

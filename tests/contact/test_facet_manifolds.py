@@ -131,7 +131,7 @@ def test_pairs_that_no_patch_may_reach_are_not_linked_and_rows_are_the_same(monk
         other = (
             collide.Box((1.0, 0.8, 0.6)), collide.ConvexHull(0.3 * rng.normal(size=(8, 3)), radius=0.05),
             collide.Mesh(*CUBE),
-        )[case % 3]  # fmt: skip
+        )[case % 3]
         way = rng.normal(size=3)
         X_WB = collide.pose(way / np.linalg.norm(way) * rng.uniform(0.9, 1.3), rpy=rng.uniform(-3, 3, 3))
         margin = 0.05 * (case % 2)
@@ -226,7 +226,7 @@ def one_pair(P, Q):
     points = contact_points.PatchPoints(
         ManifoldPoints(np.zeros(60), np.zeros(30, dtype=np.int64)), np.zeros(15), np.zeros(15, dtype=np.int64),
         np.zeros(18),
-    )  # fmt: skip
+    )
     return words, pairs, body, points
 
 

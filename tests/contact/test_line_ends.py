@@ -89,7 +89,7 @@ TARGETS = {
     **{f"rim {n}": (square(n), np.deg2rad([90, 70, 53, 45, 30, 1, -60])) for n in (1, 3)},
     **{f"edge of {a}, {n}": (wedge(a, n), leaning(a)) for a in (20, 90, 120, 170) for n in (1, 3)},
     **{f"hull of {a}": (collide.ConvexHull(wedge(a, 1).vertices), leaning(a)) for a in (20, 90, 120, 170)},
-}  # fmt: skip
+}
 
 
 @pytest.mark.many(2)
@@ -148,7 +148,7 @@ def lines_along(number: int):
     X_EL[:3, 3] = (
         rng.choice([0.0, 1e-9, -1e-9, 1e-3, -1e-3]), rng.choice([0.0, 1e-6, 0.1, -0.2]) * radius,
         rng.uniform(-0.5, 0.5) * lined.length,
-    )  # fmt: skip
+    )
     if a in ("edge", "box"):
         degrees = 90.0 if a == "box" else rng.uniform(20, 170)
         angle = np.deg2rad(rng.uniform(-0.9, 0.9) * (90 - degrees / 2))

@@ -78,7 +78,7 @@ def solids_and_balls(rng):
         (collide.Mesh(*TETRAHEDRON), *TETRAHEDRON, 0.0),
         (collide.Sphere(0.25), POINT, np.array([[0, 0, 0]]), 0.25),
         (collide.Capsule(0.125, 0.5), LINE, np.array([[0, 1, 1]]), 0.125),
-    ]  # fmt: skip
+    ]
     return pool[rng.integers(3)], pool[rng.integers(len(pool))]
 
 
@@ -118,7 +118,7 @@ FAMILIES = [
     *map(surfaces, (random_case, grid_case, flat_case, turned_grid_case, degenerate_case, identical_case)), solids,
     solids_on_a_grid,
     nearly_touching,
-]  # fmt: skip
+]
 
 
 @pytest.mark.many(6)

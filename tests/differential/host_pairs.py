@@ -11,7 +11,7 @@ CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in
 FACETS = [
     [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
     [1, 5, 7], [1, 7, 3],
-]  # fmt: skip
+]
 KINDS = ("Box", "Sphere", "Capsule", "Cylinder", "Ellipsoid", "Convex", "Cone", "BVHModel")
 #: Sets of infinite extent that take the place of the second body of every eighth pair with coal.
 FLAT = ("Halfspace", "Plane")

@@ -42,7 +42,7 @@ AGREE = 1e-6
 #: Pairs asked at once; lines of the grid a side.
 CHUNK, GRID = 450, 32
 PEERS = [peer for package, peer in (("mujoco", MujocoContacts), ("pybullet", BulletContacts))
-         if importlib.util.find_spec(package)]  # fmt: skip
+         if importlib.util.find_spec(package)]
 pytestmark = pytest.mark.skipif(not PEERS, reason="neither mujoco nor pybullet is installed")
 
 

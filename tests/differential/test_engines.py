@@ -31,7 +31,7 @@ MAKERS = {
     "sphere": lambda d: ConvexHull([(0, 0, 0)], radius=d["radius"]),  # some have radius 0
     "capsule": lambda d: Capsule(d["radius"], d["length"]), "cylinder": lambda d: Cylinder(d["radius"], d["length"]),
     "ellipsoid": lambda d: Ellipsoid(d["radii"]),
-}  # fmt: skip
+}
 
 
 def engines(alone: bool) -> list[str]:
@@ -63,7 +63,7 @@ def test_ours_has_no_wrong_boolean_in_the_hard_families(n):
                 "farthest": max((f.gap for f in wrong), default=0.0), "undecided": total.undecided,
                 "mishaps": counted(total.mishaps), "gap off by": total.distance_error_of_size,
                 "depth off by": total.depth_error_of_size, "most in": ", ".join(f"{f} {k}" for f, k in worst),
-            })  # fmt: skip
+            })
             assert total.cases >= len(members) // 4
             assert name != "collide" or not (total.wrong or total.mishaps), [finding.snippet for finding in wrong]
 
@@ -88,7 +88,7 @@ def test_ours_is_right_about_the_published_cases(n):
             "wrong distances": int((off > WRONG).sum()), "with a distance": int(with_distance.sum()),
             "off by at most": float(off.max()), "mishaps": counted(Counter(filter(None, table.mishaps))),
             "worst": records[int(off.argmax())]["id"] if off.max() > WRONG else "",
-        })  # fmt: skip
+        })
         ours_wrong = [records[k]["id"] for k in np.flatnonzero(wrong | (off > WRONG))]
         assert name != "collide" or not ours_wrong, ours_wrong
     assert len(records) > 100

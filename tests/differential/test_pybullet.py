@@ -40,7 +40,7 @@ def body(pybullet, kind: str, s: np.ndarray, R: np.ndarray, t: np.ndarray) -> in
             "shapeType": p.GEOM_MESH, "vertices": (CORNERS * s).tolist(), "indices": np.ravel(FACETS).tolist(),
             "flags": p.GEOM_FORCE_CONCAVE_TRIMESH,
         },
-    }[kind]  # fmt: skip
+    }[kind]
     number = pybullet.createCollisionShape(**arguments)
     mass = float(kind != "BVHModel")
     return pybullet.createMultiBody(mass, number, basePosition=t.tolist(), baseOrientation=quaternion_xyzw(R))
@@ -77,7 +77,7 @@ def test_signs_of_closest_points_are_judged_in_our_favour(n):
         shapes = {
             (number, -1): collide.Mesh(CORNERS * s, np.array(FACETS), solid=False)
             for number, (kind, s, _, _) in zip((A, B), pair) if kind == "BVHModel"
-        }  # fmt: skip
+        }
         plain, grown = Mirror(client, shapes=shapes), Mirror(client, shapes=shapes, margins="bullet")
         rows = [ask.getClosestPoints(A, B, 10.0) for ask in (p, plain, grown)]
         if not rows[0]:
@@ -119,7 +119,7 @@ def test_rays_at_balls_hit_the_right_ones(n):
             number = p.createCollisionShape(p.GEOM_SPHERE, radius=s / 2, physicsClientId=client)
             inertial = random.uniform(-0.3, 0.3, 3).tolist()
             p.createMultiBody(1.0, number, basePosition=place.tolist(), physicsClientId=client,
-                              baseInertialFramePosition=inertial)  # fmt: skip
+                              baseInertialFramePosition=inertial)
         if round_ % 2:
             p.performCollisionDetection(client)
         mirror = Mirror(client)

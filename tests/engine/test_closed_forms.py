@@ -244,7 +244,7 @@ def test_curved_shape_around_a_point(other):
     shape = {
         "Cylinder": collide.Cylinder(0.5, 2.0), "Cone": collide.Cone(1.0, 2.0),
         "Ellipsoid": collide.Ellipsoid((1, 2, 3)),
-    }[other]  # fmt: skip
+    }[other]
     depth = {"Cylinder": 0.5, "Cone": math.sin(math.atan2(1, 2)), "Ellipsoid": 1.0}[other]
     r = collide.distance(shape, collide.Sphere(0.125), EYE, EYE)
     truth = -depth - 0.125

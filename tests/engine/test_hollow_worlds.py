@@ -41,7 +41,7 @@ def one_by_one(made: list[tuple]) -> dict[tuple[int, int], object]:
     return {
         (i, j): collide.distance(made[i][0], made[j][0], made[i][1], made[j][1]).rows[0]
         for i in range(len(made)) for j in range(i + 1, len(made))
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.many(6)
@@ -84,7 +84,7 @@ def test_nearest_bodies_of_points(seed):
 def scene_of(made: list[tuple], carried: collide.Shape | None = None) -> Scene:
     """Bodies that stand still, but for the first, which a robot moves along x and turns; ``carried`` it moves alone."""
     joints = [Joint("slide", "prismatic", "base", "cart", made[0][1], (1.0, 0.0, 0.0), -3.0, 3.0),
-              Joint("turn", "revolute", "cart", "hand", np.eye(4), (0.0, 0.6, 0.8), -3.0, 3.0)]  # fmt: skip
+              Joint("turn", "revolute", "cart", "hand", np.eye(4), (0.0, 0.6, 0.8), -3.0, 3.0)]
     geometry = {"hand": [LinkShape(made[0][0], np.eye(4), None, "test")]}
     if carried is not None:
         joints.append(Joint("fixed", "fixed", "cart", "wedge", np.linalg.inv(made[0][1])))

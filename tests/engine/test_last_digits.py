@@ -28,7 +28,7 @@ MET = (("tiny_vs_huge", 5, 2), ("plates", 3, 5), ("near_pen", 0, 5), ("box_latti
        ("needles", 0, 104), ("needles", 3, 104), ("needles", 3, 108), ("needles", 9, 112), ("needles", 6, 115),
        ("needles", 7, 119),
        ("needles", 5, 12), ("needles", 3, 101), ("needles", 7, 114), ("needles", 3, 117), ("rot90", 6, 109),
-       ("touch_tiny_step", 2, 108))  # fmt: skip
+       ("touch_tiny_step", 2, 108))
 
 
 @cache

@@ -22,7 +22,7 @@ SHAPES = {
     "union of meshes": collide.Compound([
         (BALL, np.eye(4)), (collide.Cylinder(0.3, 0.4), collide.pose((1, 0, 0), rpy=(0.1, 0.2, 0.3))),
     ]),
-}  # fmt: skip
+}
 #: Far apart, near, and into each other.
 AWAY = (7.0, 0.9, 0.0)
 

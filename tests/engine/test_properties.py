@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 QUICK = settings(
     max_examples=120, derandomize=True, deadline=None, print_blob=False,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
-)  # fmt: skip
+)
 
 #: Integers come first and shrink towards 0; then quarters, then doubles that need all their bits.
 COORDINATES = st.one_of(

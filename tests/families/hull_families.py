@@ -182,7 +182,7 @@ def directions_for(points, facets, seed, each=40):
         (k, edges[tuple(sorted(edge))])
         for k, (a, b, c) in enumerate(facets.tolist()) for edge in ((a, b), (b, c), (c, a))
         if edges[tuple(sorted(edge))] != k
-    ]  # fmt: skip
+    ]
     between = np.array([unit[k] + unit[m] for k, m in rng.permutation(pairs)[:each]])
     axes = np.concatenate([np.eye(3), -np.eye(3), [(0.0, -0.0, 1.0), (1, 1, 0), (0, -1, 1), (0, 0, 0)]])
     zeros = random[: each // 2] * rng.integers(0, 2, size=(each // 2, 3))

@@ -20,7 +20,7 @@ from collide.adapters.peers.question import corners
 KINDS = (
     "as it is", "flip facets", "drop facets", "duplicate facets", "NaN vertices", "ids out of range", "merge vertices",
     "move vertices", "tiny", "huge", "tiny facets beside", "collapse facets", "turn all", "snap", "shuffle ids",
-)  # fmt: skip
+)
 #: What a refusal must name: a row, or that there is none.
 NAMED = re.compile(r"(vertices|faces)\[\d+(, \d+)?\]|no facets|largest coordinate")
 
@@ -166,7 +166,7 @@ def _probe(rng: np.random.Generator, mesh: Mesh):
 _BOX = np.array(
     [[0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7], [0, 5, 1], [0, 4, 5], [2, 3, 7], [2, 7, 6],
      [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
-)  # fmt: skip
+)
 
 
 # --- what is a solid --------------------------------------------------------------------------------

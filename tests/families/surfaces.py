@@ -35,7 +35,7 @@ def torus(around=12, across=7, radius=0.3) -> tuple[np.ndarray, np.ndarray]:
         for t in (
             (name(i, j), name(i + 1, j), name(i + 1, j + 1)), (name(i, j), name(i + 1, j + 1), name(i, j + 1)),
         )
-    ]  # fmt: skip
+    ]
     return points, np.array(facets)
 
 

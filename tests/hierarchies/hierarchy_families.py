@@ -88,7 +88,7 @@ def families(n: int) -> dict[str, np.ndarray]:
         "needle, turned": turned(sphere(n) * [1.0, 1e-6, 1e-6]), "cube": cube_grid(4),
         "cube, turned": turned(cube_grid(4)),
         "moment curve": moment_curve(n), "arcs": arcs(n), "arcs, turned": turned(arcs(n)), "crowded": crowded(n),
-    }  # fmt: skip
+    }
 
 
 #: Families in which vertices of large degree are neighbours, or cannot all be cut.

@@ -118,7 +118,7 @@ def from_halfspaces(halfspaces: Sequence[Halfspace]) -> Polyhedron:
             terms = (
                 scaled(cross(g.normal, h.normal), f.offset), scaled(cross(h.normal, f.normal), g.offset),
                 scaled(cross(f.normal, g.normal), h.offset),
-            )  # fmt: skip
+            )
             x = vector(sum(parts) / determinant for parts in zip(*terms))
             if contains(planes, x):
                 vertices[x] = None

@@ -45,7 +45,7 @@ def exact_within(points, w, r, beside, s, x) -> bool:
     parts = [
         volume(P[x], P[r], P[beside], P[s]) / whole, volume(P[w], P[x], P[beside], P[s]) / whole,
         volume(P[w], P[r], P[x], P[s]) / whole, volume(P[w], P[r], P[beside], P[x]) / whole,
-    ]  # fmt: skip
+    ]
     return parts[0] > 0 and parts[1] > 0 and parts[3] > 0 and parts[2] >= 0
 
 

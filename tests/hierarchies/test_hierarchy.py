@@ -238,7 +238,7 @@ def appended(hierarchy: Hierarchy) -> Hierarchy:
         hierarchy, points=put([0, 0, 3.0]), birth=put(-1), last=put(-1), parent=lambda p: put(-1)(shift(p)),
         row=put(-1),
         neighbours=shift, removed=shift, level_vertices=shift,
-    )  # fmt: skip
+    )
 
 
 def test_damage_to_dependence_and_ends_is_noticed():

@@ -197,7 +197,7 @@ def box() -> list[Halfspace]:
     return [
         Halfspace(tuple(Fraction(sign * (k == axis)) for k in range(3)), Fraction(1000))
         for axis in range(3) for sign in (1, -1)
-    ]  # fmt: skip
+    ]
 
 
 @SETTINGS

@@ -277,7 +277,7 @@ def test_the_checking_mode_sees_what_is_wrong():
         for changed in (
             one._replace(**{own: 2.0 * getattr(one, own) + 0.5}), one._replace(level_p=one.level_p + 1),
             one._replace(vertex_p=-1, vertex_q=-1), one._replace(p_star=10**6, q_star=10**6),
-        ):  # fmt: skip
+        ):
             with pytest.raises(AssertionError):
                 validate_rounds(A._walk, B._walk, X_WA, X_WB, (*good[:number], changed, *good[number + 1 :]))
 
@@ -312,7 +312,7 @@ def sides_split_by_rounding() -> dict:
         "cube": cube, "flat box": cube * (1.0, 0.3, 0.1), "grid cube": np.argwhere(np.ones((5, 5, 5))) * 0.5 - 1.0,
         "prism of 40": np.concatenate([ring + up, ring - up]),
         "cone of 40": np.concatenate([ring, [(0, 0, 1)]]),
-    }  # fmt: skip
+    }
     return {name: collide.ConvexHull(own @ turned(rng, 0.0)[:3, :3].T) for name, own in points.items()}
 
 
@@ -384,7 +384,7 @@ def test_tests_a_round_do_not_grow_with_a_degree(kind):
         "bipyramid": families.bipyramid, "cone": families.cone, "prism": lambda n: families.prism(n // 2),
         "degree doubling": lambda n: families.degree_doubling(round(np.log2(n / 3))),
         "moment curve": families.moment_curve,
-    }[kind]  # fmt: skip
+    }[kind]
     rng, farthest = rng_of("tests a round", kind), 4.0 if kind == "prism" else 2.5  # it is longer
     means = []
     for n in (800, 6400):
@@ -431,7 +431,7 @@ def test_kernels_are_plain_python_too():
     child = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", PLAIN], input=pickle.dumps(asked), capture_output=True, check=False,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(Path(collide.__file__).parent.parent)},
-    )  # fmt: skip
+    )
     assert child.returncode == 0, child.stderr.decode()
     assert pickle.loads(child.stdout) == [collide.walk(*case).rows.tobytes() for case in asked]
 
@@ -451,7 +451,7 @@ def test_what_it_refuses():
     for shape in (
         collide.Sphere(1), collide.Capsule(1, 1), collide.Cylinder(1, 1), collide.Halfspace((0, 0, 1), 0),
         collide.ConvexHull(np.eye(3), radius=0.1), collide.Compound([(box, EYE), (box, shifted(2))]),
-    ):  # fmt: skip
+    ):
         for A, B in ((shape, box), (box, shape)):
             with pytest.raises(collide.UnsupportedQuery, match=type(shape).__name__):
                 collide.collide(A, B, EYE, EYE, algorithm=WALK)

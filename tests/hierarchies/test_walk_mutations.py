@@ -64,7 +64,7 @@ MUTATIONS = {
     "the star keeps the old plane": (
         "walk_steps.py", "put_vec3(state, Z_STAR, z)", "put_vec3(state, Z_STAR, vec3_at(state, Z_STAR))",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.slow
@@ -80,7 +80,7 @@ def test_faults_are_noticed(name, tmp_path):
         [sys.executable, "-W", "ignore", "-c", CHILD, str(tmp_path), "all" if name == "none" else "until noticed"],
         capture_output=True, text=True, check=False,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tmp_path)}, timeout=300,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     wrong, broken, unproven = map(int, done.stdout.split())
     assert (wrong + broken + unproven == 0) == (name == "none"), done.stdout

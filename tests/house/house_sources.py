@@ -17,7 +17,7 @@ COMPILER_PACKAGES = {"numba", "llvmlite"}
 MAKERS = {
     f"collide.kernels.{name}"
     for name in ("back_end", "box_vectors", "compiled_lanes", "front_end", "jit", "vectors", "views")
-}  # fmt: skip
+}
 #: Under what they and the compilers' packages are imported otherwise.
 GUARD = "WITH_NUMBA"
 

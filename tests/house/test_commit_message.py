@@ -29,7 +29,7 @@ def judged(tmp_path, message: str) -> tuple[int, str]:
         GOOD + "# Please enter the commit message\n",
         GOOD + "# ------------------------ >8 ------------------------\ndiff --git a b\n" + "+" * 200,
     ],
-)  # fmt: skip
+)
 def test_messages_that_are_taken(tmp_path, message):
     assert judged(tmp_path, message) == (0, "")
 
@@ -44,7 +44,7 @@ def test_messages_that_are_taken(tmp_path, message):
         ("Boxes\n\n# ------------------------ >8 ------------------------\ndiff --git a b\n", "write a body"),
         ("Merged boxes\n", "write a body"),
     ],
-)  # fmt: skip
+)
 def test_messages_that_are_refused(tmp_path, message, told):
     code, said = judged(tmp_path, message)
     assert code == 1 and said.startswith("commit-msg: ") and told in said

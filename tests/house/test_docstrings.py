@@ -44,12 +44,12 @@ LENGTHS = {
     "radius", "length", "height", "size", "radii", "clearance", "max_distance", "margin", "security_margin",
     "min_depth",
     "tolerance_m",
-}  # fmt: skip
+}
 #: Parameters that hold arrays: their description gives the shape.
 ARRAYS = {
     "X_WA", "X_WB", "X_WR", "X_CS", "points", "vertices", "faces", "normals", "offsets", "normal", "axes", "origins",
     "directions", "poses", "q",
-}  # fmt: skip
+}
 #: A shape such as (N, 4, 4), (3,) or (n, 3).
 SHAPE = re.compile(r"\((?:\w+|\.\.\.)(?:, ?(?:\w+|\.\.\.))*,?\)")
 #: name → what it lacks, for public names whose room is still being rebuilt. Only to be struck out.
@@ -196,7 +196,7 @@ def test_rule_sees_what_is_missing():
 
     assert lacking(Documented("short", short, short)) == [
         "a full stop after its summary", "parameter radius", "parameter points", "Returns", "Raises ValueError",
-    ]  # fmt: skip
+    ]
     assert lacking(Documented("full", full, full)) == []
     assert len(NAMES) > 100
 

@@ -18,7 +18,7 @@ from house_sources import (
     room,
     shown,
     sources,
-)  # fmt: skip
+)
 
 #: What the modules of a room of the engine may import; a room may always import itself.
 ROOMS = {
@@ -401,7 +401,7 @@ def test_what_is_to_go_is_still_there():
     found = {
         (room(dotted(file)), room(module)) for file in sources("collide") for module, _, _ in imports(file)
         if module.startswith("collide.")
-    }  # fmt: skip
+    }
     none_of(
         f"{own}: {name} is gone; strike it out"
         for own, names in TO_GO.items()

@@ -27,7 +27,7 @@ from collide.kernels import sources as kernel_sources
 #: What compiles, or makes code for a compiler.
 COMPILERS = {
     "njit", "jit", "cfunc", "vectorize", "guvectorize", "jitclass", "stencil", "overload", "intrinsic", "prange",
-}  # fmt: skip
+}
 BLAS = {"dot", "vdot", "inner", "matmul", "einsum", "linalg"}
 
 
@@ -43,7 +43,7 @@ def _of_typing(file: Path) -> set[str]:
         alias.name
         for node in nodes(file) if isinstance(node, ast.ImportFrom) and node.module == "typing"
         for alias in node.names
-    }  # fmt: skip
+    }
 
 
 def test_one_way_to_compile():
@@ -190,4 +190,4 @@ def _own_modules(file: Path) -> set[str]:
         alias.asname or alias.name
         for node in nodes(file) if isinstance(node, ast.ImportFrom)
         for alias in node.names if f"{node.module}.{alias.name}" in modules()
-    }  # fmt: skip
+    }

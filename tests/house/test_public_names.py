@@ -73,7 +73,7 @@ def test_names_in_all_are_the_lazy_ones():
         for node in ast.walk(init) if isinstance(node, ast.If) and is_type_checking(node.test)
         for inner in node.body if isinstance(inner, ast.ImportFrom) and inner.module != "collide"
         for alias in inner.names
-    }  # fmt: skip
+    }
     renamed = {own: name for name, (_, own) in collide._RENAMED.items()}
     assert {renamed.get(name, name) for name in checked} == set(collide.__all__) == {*collide._HOME, *collide._RENAMED}
 

@@ -51,7 +51,7 @@ def site(tmp_path_factory) -> dict[Path, Page]:
     done = subprocess.run(
         command, check=False, capture_output=True, text=True, timeout=300, cwd=ROOT,
         env={**os.environ, "http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"},
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return {file: Page(file.read_text(encoding="utf-8")) for file in place.rglob("*.html")}
 

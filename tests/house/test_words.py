@@ -208,7 +208,7 @@ def test_exceptions_are_needed():
         ("Posed", False), ("foundations", True), ("max_facets", True), ("another", True), ("mostly", True),
         ("PosedPair", True),
     ],
-)  # fmt: skip
+)
 def test_rule_knows_good_names_from_bad(name, good):
     assert (better(name) is None) == good
 

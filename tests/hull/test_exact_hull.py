@@ -113,7 +113,7 @@ def scaled_apart(rng, n: int) -> dict[str, np.ndarray]:
         + np.where(lattice == 0, lattice[:, ::-1] * 5e-324, 0),
         "nearly straight": lattice * [1, 1e-200, 1e-310],
         "crowded at 0": points * 2.0 ** -rng.integers(0, 1070, (n, 1)),
-    }  # fmt: skip
+    }
 
 
 # --- the oracle: brute force in integers --------------------------------------------------------
@@ -423,7 +423,7 @@ def test_plain_python_builds_the_same_hulls():
         [sys.executable, "-W", "ignore", "-c", CHILD],
         input=pickle.dumps(clouds), capture_output=True, check=False, timeout=300,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-    )  # fmt: skip
+    )
     assert child.returncode == 0, child.stderr.decode()
     for points, plain in zip(clouds, pickle.loads(child.stdout), strict=True):
         assert all(np.array_equal(a, b) for a, b in zip(convex_hull(points), plain)), said(points)

@@ -33,7 +33,7 @@ class Growing:
             O.CloudView(scaled, originals, work, [0] * O.DIGITS, 0, exponent), self.facets,
             np.zeros(2 * G.PLANE * capacity), self.state, self.following, self.owner, [0] * capacity, self.region,
             self.rim, self.fan, [-1] * capacity, [0] * capacity,
-        )  # fmt: skip
+        )
         assert first_simplex(self.hull.cloud, n, corners) == 3
         self.exact = exact(points)
         Q.distribute(self.hull, Q.begin(self.hull, n, corners), 4)

@@ -43,7 +43,7 @@ def child(given: list[str], env: dict[str, str], timeout: float = 300) -> subpro
     return subprocess.run(
         [sys.executable, *given], env=env, cwd=env["PYTHONPATH"].split(os.pathsep)[-1], capture_output=True, text=True,
         timeout=timeout, check=False,
-    )  # fmt: skip
+    )
 
 
 def why_no_library() -> str:

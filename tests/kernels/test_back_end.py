@@ -114,7 +114,7 @@ def test_other_platforms_are_emitted_too():
     heads = {
         "aarch64-unknown-linux-gnu": b"\x7fELF", "arm64-apple-macosx11.0": b"\xcf\xfa\xed\xfe",
         "x86_64-pc-windows-msvc": b"\x64\x86",
-    }  # fmt: skip
+    }
     for triple, head in heads.items():
         cpu = "x86-64-v2" if triple.startswith("x86") else "generic" if "linux" in triple else "apple-m1"
         assert machine_code(code.names, code.modules, Target(cpu, triple=triple)).startswith(head), triple

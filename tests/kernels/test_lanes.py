@@ -193,7 +193,7 @@ def test_without_compilation_the_bits_are_the_same():
     child = subprocess.run(
         [sys.executable, "-c", code], input=x.tobytes(), env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
         cwd=Path(collide.__file__).parents[1], capture_output=True, timeout=120, check=False,
-    )  # fmt: skip
+    )
     assert child.returncode == 0, child.stderr.decode()[-2000:]
     plain = np.frombuffer(child.stdout).reshape(2, 200, LANES, OUT)
     for found in plain:
@@ -207,7 +207,7 @@ def _refine(question_at, out_at, n, parts):
     refine_gaps(
         view_lanes(question_at, at.QUESTION), n, parts, False, view_lanes(out_at, at.FEATURE),
         view_lanes(direction_at, dd.STRIDE), view_lanes(direction_at + 8 * LANES * dd.STRIDE, at.ANSWER),
-    )  # fmt: skip
+    )
 
 
 @entry("void(int64, int64, int64, int64)")
@@ -216,7 +216,7 @@ def _refine_one(question_at, out_at, n, parts):
     refine_gaps(
         view_f64(question_at, at.QUESTION), n, parts, False, view_f64(out_at, at.FEATURE),
         view_f64(direction_at, dd.STRIDE), view_f64(direction_at + 8 * dd.STRIDE, at.ANSWER),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.own_kernels
@@ -254,7 +254,7 @@ def test_rows_do_not_depend_on_who_waits_with_them():
     shapes = [
         *hulls, collide.ConvexHull(rng.normal(size=(6, 3)), radius=0.3), collide.Box((1, 1, 1)), collide.Sphere(0.5),
         collide.Capsule(0.3, 1.0), collide.ConvexHull([(0, 0, 0), (1, 1, 0)]),
-    ]  # fmt: skip
+    ]
     A, B = zip(*[(shapes[i], shapes[j]) for i, j in rng.integers(0, len(shapes), size=(400, 2))])
     X = np.array([collide.pose(rng.uniform(-3, 3, 3), rpy=rng.uniform(-3, 3, 3)) for _ in range(400)])
     X[::4, :3, :3] = np.eye(3)  # level faces

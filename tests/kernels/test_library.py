@@ -197,7 +197,7 @@ def harms(length: int) -> dict:
         "one byte short": lambda content: content[:-1], "longer": lambda content: content + b"\0",
         "a bit flipped": flipped, "another bit flipped": flipped,
         "its head flipped": lambda content: b"\x7eELF" + content[4:],
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.many(2)

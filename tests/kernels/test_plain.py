@@ -60,7 +60,7 @@ def test_without_compilation_the_bits_are_the_same():
         input=pickle.dumps([tuple(case) for case in asked]) + pickle.dumps(scene()),
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=Path(collide.__file__).parents[1],
         capture_output=True, timeout=300, check=False,
-    )  # fmt: skip
+    )
     assert child.returncode == 0, child.stderr.decode()[-3000:]
     *answers, (world_rows, world_hit) = pickle.loads(child.stdout)
     assert len(answers) == len(asked)

@@ -29,7 +29,7 @@ def misaligned() -> np.ndarray:
     [EYE.tolist(), EYE.astype(np.float32), np.asfortranarray(collide.pose((1, 2, 3))), np.stack([EYE] * 2)[:, :3],
      np.zeros((2, 4, 4)), np.eye(8)[::2, ::2], np.eye(3), None, EYE.astype(">f8")],
     ids=range(9),
-)  # fmt: skip
+)
 def test_what_is_left_to_the_long_way(pair, X):
     assert pair.collide(X, EYE) is None and pair.collide(EYE, X) is None
     assert pair.distance(X, FAR, True, np.inf) is None and pair.distance(EYE, X, True, np.inf) is None

@@ -137,7 +137,7 @@ def changed_by(hashes, file: Path, old: str, new: str) -> set[str]:
         # where a name comes from
         ("narrowphase/pair_kernel.py", "annotations\n", "annotations\nimport collide.casts\n", set(), {"answer_pairs"}),
     ],
-)  # fmt: skip
+)
 def test_an_edit_makes_stale_what_reaches_it_and_nothing_else(copy, hashes, name, old, new, stale, fresh):
     changed = changed_by(hashes, copy / name, old, new)
     assert stale <= changed and not fresh & changed

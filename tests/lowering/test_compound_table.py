@@ -33,7 +33,7 @@ from collide.lowering.shape_table import (
 def shapes_of(rng) -> list[collide.Shape]:
     each = one_of_each(rng)
     each["Far"] = collide.Compound([(each["Cone"], random_pose(rng, 30.0)), (each["Compound"], random_pose(rng, 5.0)),
-                                    (each["ConvexHull"], np.eye(4))])  # fmt: skip
+                                    (each["ConvexHull"], np.eye(4))])
     each["Mesh"] = collide.Mesh(*collide.tessellate(each["Box"])[:2])
     return list(each.values())
 

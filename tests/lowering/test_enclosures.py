@@ -76,7 +76,7 @@ def test_polytopes_of_planes_are_between_corners_that_may_be_rounded(seed):
         assert all(sum(a * c for a, c in zip(n, x)) <= b for n, b in planes)
     cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     stored = [[[Fraction(c) + Fraction(found.packed.slop) * int(s) for c, s in zip(p, corner)] for corner in cube]
-              for p in shape.vertices.tolist()]  # fmt: skip
+              for p in shape.vertices.tolist()]
     for a, b, c in found.outer.tree.triangles.reshape(-1, 3, 3).tolist():
         u, v = ([Fraction(x) - Fraction(y) for x, y in zip(q, a)] for q in (b, c))
         n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]

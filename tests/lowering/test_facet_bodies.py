@@ -19,7 +19,7 @@ SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
 HULLS = {
     "point": [(1, 2, 3)], "segment": [(0, 0, 0), (0, 0, 2), (0, 0, 1)], "flat": [*SQUARE, (0.5, 0.5, 0)],
     "solid": [*SQUARE, (0.5, 0.5, 1), (0.5, 0.5, 0.25)],
-}  # fmt: skip
+}
 
 
 def triangles(body: F.Body) -> np.ndarray:
@@ -103,7 +103,7 @@ def test_what_has_facets(kind):
         "Halfspace": "Halfspace has no facets; a large Box", "Compound": "Compound is a union; ask for each",
         "Sphere": "Sphere is rounded", "Capsule": "Capsule is rounded", "ConvexHull": "ConvexHull is rounded",
         "Region": "HPolytope has no facets of doubles",
-    }.get(kind, f"{kind} has no facets of doubles")  # fmt: skip
+    }.get(kind, f"{kind} has no facets of doubles")
     with pytest.raises(UnsupportedQuery, match=f"locality: {words}"):
         F.facet_body(shape, "locality")
     with pytest.raises(InvalidArgument, match="locality must be a shape"):
@@ -125,7 +125,7 @@ def test_kinds_of_all_shapes():
         (collide.Compound([(each["Sphere"], X)]), Kind.COMPOUND), (collide.Compound([(mesh, X)]), Kind.MESH_COMPOUND),
         (collide.Compound([(collide.Compound([(mesh, X)]), X), (each["Box"], X)]), Kind.MESH_COMPOUND),
         (collide.HPolytope([(0, 0, 1)], [0.0], bounded=False), Kind.REGION),
-    ]  # fmt: skip
+    ]
     for shape, kind in table:
         assert kind_of(shape) is kind, shape
 

@@ -51,7 +51,7 @@ def test_content_tells_sets_apart():
         P.pack_points(points[:1].copy()),
         P.pack_curved(P.CYLINDER, (1.0, 2.0), 3.0), P.pack_curved(P.CONE, (1.0, 2.0), 3.0),
         P.pack_halfspace((0.0, 0.0, 1.0), 2.0),
-    ]  # fmt: skip
+    ]
     assert len({same, *(p.content for p in others)}) == 1 + len(others)
 
 

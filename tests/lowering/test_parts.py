@@ -63,7 +63,7 @@ def test_unions_hold_the_parts_of_their_items_in_order():
     # A product of poses rounds: the slop of that part alone holds it, exactly.
     assert found[0][0].slop == found[2][0].slop == 0.0 < found[1][0].slop < 1e-13
     exact = [[sum(Fraction(a) * Fraction(b) for a, b in zip(row, column)) for column in zip(*Y.tolist())]
-             for row in Z.tolist()]  # fmt: skip
+             for row in Z.tolist()]
     off = [
         [abs(Fraction(v) - e) for v, e in zip(row, exact_row)] for row, exact_row in zip(found[1][1].tolist(), exact)
     ]
@@ -77,7 +77,7 @@ def test_single_convex_and_bounding_parts(kind):
     each = one_of_each(rng)
     mesh = collide.Mesh(*collide.tessellate(each["Ellipsoid"])[:2])
     each |= {"Mesh": mesh, "Region": REGION, "Shifted": collide.Compound([(each["Box"], random_pose(rng))]),
-             "Wrapped": collide.Compound([(each["Box"], np.eye(4))])}  # fmt: skip
+             "Wrapped": collide.Compound([(each["Box"], np.eye(4))])}
     shape = each[kind]
     assert P.is_single_convex(shape) == (kind not in ("Compound", "Mesh", "Region", "Shifted"))
     bounds = P.bounding_parts_of(shape)

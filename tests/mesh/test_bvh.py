@@ -149,7 +149,7 @@ def _nearest(node_at, slab_at, frame_at, probe_at, out_at):
     boxes_nearest(
         view_f32(node_at, NODE), 0, view_f32(slab_at, SLAB), 0, view_f32(frame_at, 9), view_f32(probe_at, NEAR_PROBE),
         view_f32(out_at, 16),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.own_kernels

@@ -21,7 +21,7 @@ FAMILIES = {
     "grid": lambda rng: grid(rng, 60),
     "flat": lambda rng: (rng.normal(size=(90, 2)) @ [[1.0, 0.0, 1.0], [0.0, 1.0, 1.0]], soup(rng, 30)[1]),
     "tiny and far": lambda rng: (bumpy_sphere(100)[0] * 1e-9 + 1.0, bumpy_sphere(100)[1]),
-}  # fmt: skip
+}
 
 
 def below(tree: MeshTree, link: int) -> list[int]:

@@ -23,7 +23,7 @@ def test_figures_keep_their_bounds(name):
     vertices, faces = {
         "box": box, "sphere": lambda: bumpy_sphere(2000), "soup": lambda: soup(rng, 400),
         "one facet": lambda: (np.eye(3), np.array([[0, 1, 2]])),
-    }[name]()  # fmt: skip
+    }[name]()
     mesh = collide.Mesh(vertices, faces, solid=False)
     figures = tree_figures(mesh)
     assert figures.facets == len(faces) and figures.depth == mesh.tree.depth and figures.nodes == len(mesh.tree.nodes)

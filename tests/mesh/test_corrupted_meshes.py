@@ -25,7 +25,7 @@ SAMPLE = (
     "random_urdfs/000/000.obj",
     "random_urdfs/503/503.obj", "kuka_iiwa/meshes/link_0.stl", "franka_panda/meshes/collision/finger.obj",
     "table/table.obj",
-)  # fmt: skip
+)
 PER_MESH = 15
 
 
@@ -131,7 +131,7 @@ def test_solid_true_names_the_facets():
         (faces[1:], "open edges"),
         (np.concatenate([faces[:5], faces[5:6, ::-1], faces[6:]]), "inconsistent orientation"),
         (np.concatenate([faces, faces[3:4]]), "duplicate facets"), (faces[:, ::-1], "inside out"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(InvalidShape, match=rf"{defect} \(.*facets? \d+"):
             Mesh(vertices, spoilt, solid=True)
 

@@ -183,7 +183,7 @@ def test_what_cannot_be_had_is_refused():
         ({"stretch": math.nan}, "at least 3.2"), ({"stretch": "ten"}, "'ten'"), ({"order": 0}, "order"),
         ({"order": 1.5}, "order"), ({"order": 11}, "1 … 10"), ({"order": 8}, "8 distinct vertices"),
         ({"max_facets": 0}, "max_facets"), ({"max_facets": 20}, "more than max_facets = 20"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(collide.InvalidArgument, match=match):
             box.localised(**bad)
     with pytest.raises(collide.InvalidShape, match="no edge of any length"):

@@ -49,7 +49,7 @@ def check(vertices, faces) -> None:
         meet.COLLAPSED: known.collapsed, meet.OPEN: known.open, meet.UNBALANCED: known.unbalanced,
         meet.SEVERAL: known.several, meet.DOUBLED: same, meet.BACK_TO_BACK: opposite, meet.PINCHED: known.pinched(),
         says.NO_AREA: {f for f, c in enumerate(known.corners) if surfaces.exact_area_is_zero(vertices, c)},
-    }  # fmt: skip
+    }
     for bit, facets in expected.items():
         assert flagged(survey, bit) == facets, f"bit {bit}{repeat}"
     assert survey.edges == len(known.edges) and survey.euler == known.euler, repeat
@@ -373,7 +373,7 @@ def moebius():
         ((np.eye(3), [(0, 1, 2), (2, 1, 0)]), "encloses nothing", "facets 0, 1"),
         ((np.eye(3), [(0, 1, 1)]), "no facet has three distinct corners", ""),
     ],
-)  # fmt: skip
+)
 def test_no_solid_without_an_inside(mesh, name, facets):
     with pytest.raises(
         collide.InvalidShape, match=rf"(?s)^Mesh: no inside can be told: .*{name}.*{facets}.* Repair the mesh"

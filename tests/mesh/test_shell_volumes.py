@@ -51,7 +51,7 @@ def test_volumes_and_signs():
         cube, turned_over(cube), sphere, tilted(sphere, rng, 1e9), tilted(flattened(cube, 3e-16), rng, 0.3),
         turned_over(tilted(flattened(cube, 3e-16), rng, 0.3)), flattened(cube, 0.0), flattened(sphere, 0.0),
         flattened(cube, 1e-300),
-    ]  # fmt: skip
+    ]
     vertices, corners, shells = together(*meshes)
     volumes, signs = shell_volumes(vertices, Shells(corners, shells, len(meshes)))
     doubtful = 0

@@ -146,7 +146,7 @@ def test_equal_meshes_head_on():
         (cube, cube, 1.0, 12), (cube, larger, 1.0, 12), (simplex, simplex, 1.0, 40), (ball, ball, 1.0, 4),
         (cube, box, 1.0, 12), (collide.Compound([(cube, I)]), cube, 1.0, 12), (union, union, 2.0, 24),
         (l_mesh(), l_mesh(), 2.0, 12),
-    ]  # fmt: skip
+    ]
     for A, B, width, most in pairs:
         n_facets = [len(s.faces) if isinstance(s, collide.Mesh) else 12 for s in (A, B)]
         for turned in (False, True):  # in a frame in which nothing is flush to the last digit
@@ -155,7 +155,7 @@ def test_equal_meshes_head_on():
             r = certain(
                 A, B, X, X, X @ collide.pose((start, 0, 0)), X @ collide.pose((end, 0, 0)),
                 truth=(start - width) / (start - end),
-            )  # fmt: skip
+            )
             assert r.queries <= most * n_facets[0] * n_facets[1], (r, A, B, X.tolist(), start, end)
 
 

@@ -164,7 +164,7 @@ class Passage:
         self.pairs = [
             ([list(map(Fraction, map(float, x))) for x in a], [list(map(Fraction, map(float, x))) for x in b])
             for a in case.A.boxes for b in case.B.boxes
-        ]  # fmt: skip
+        ]
 
     def first(self) -> Fraction | None:
         """The first time within 0 … 1 at which the closed bodies touch."""

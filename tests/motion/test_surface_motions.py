@@ -66,7 +66,7 @@ UNION = collide.Compound([(collide.Box((0.3, 0.3, 1)), collide.pose((0, 0.4, 0))
 OTHERS = [
     collide.Sphere(0.3), collide.Capsule(0.2, 0.6), collide.Cylinder(0.3, 0.5), collide.Cone(0.3, 0.8),
     collide.Ellipsoid((0.3, 0.2, 0.5)), collide.Halfspace((0.2, 0.1, 1), -1.0), UNION,
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("other", OTHERS, ids=lambda shape: type(shape).__name__)
@@ -96,7 +96,7 @@ def test_unions_of_meshes_and_hulls():
     answers = [
         collide.time_of_impact(A, other, *group.poses)
         for A in (l_mesh(), collide.Compound(parts), collide.Compound(mixed))
-    ]  # fmt: skip
+    ]
     for r in answers[1:]:
         assert (r.hit == answers[0].hit).all()
         assert (r.lower <= answers[0].upper + 1e-14).all() and (answers[0].lower <= r.upper + 1e-14).all()
@@ -173,7 +173,7 @@ def test_finely_cut_faces_come_together_at_once():
     assert r.hit and r.lower <= 0.5 and r.lower >= 0.5 - 1e-9
     flush = collide.time_of_impact(sheet, collide.Box((1, 1, 1)), *[np.eye(4)] * 2, *(
         collide.pose((0, 0, z)) for z in (1.0, 0.25)
-    ))  # fmt: skip
+    ))
     assert flush.hit and flush.certified and flush.lower <= 2 / 3 <= flush.upper
 
 

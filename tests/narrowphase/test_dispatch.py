@@ -19,11 +19,11 @@ from collide.narrowphase.method_functions import ANSWERS, OF_ONE_PAIR, answer_of
 PACKED = {
     Kind.SPHERE: (POINTS, 1), Kind.CAPSULE: (POINTS, 2), Kind.POLYTOPE: (POINTS, 8), Kind.CYLINDER: (CYLINDER, 0),
     Kind.CONE: (CONE, 0), Kind.ELLIPSOID: (ELLIPSOID, 0), Kind.HALFSPACE: (HALFSPACE, 0),
-}  # fmt: skip
+}
 OF_KERNELS = {
     Method.CLOSED: convex_methods.CAPSULES, Method.PLANE: convex_methods.HALFSPACE_CONVEX,
     Method.PLANES: convex_methods.HALFSPACES, Method.CONVEX: convex_methods.CONVEX,
-}  # fmt: skip
+}
 
 
 #: The kernel as plain Python, however kernels run.

@@ -60,7 +60,7 @@ def test_mutation_is_noticed(name, tmp_path):
          "all" if name == "none" else "until noticed"], check=False,
         capture_output=True, text=True, cwd=tmp_path,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, timeout=300,
-    )  # fmt: skip
+    )
     assert run.returncode == 0, run.stderr[-2000:]
     wrong, undecided = (int(word) for word in run.stdout.split())
     if name == "none":

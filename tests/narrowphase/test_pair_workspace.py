@@ -23,7 +23,7 @@ def test_parts_of_a_workspace():
     doubles, integers = np.zeros(W.DOUBLES), np.zeros(W.INTEGERS, dtype=np.int64)
     work = W.workspace_at(address_of(doubles), address_of(integers))
     for number, (buffer, views) in enumerate([(doubles, (work.points, work.weights)),
-                                              (integers, (work.ids, work.request, work.requests))]):  # fmt: skip
+                                              (integers, (work.ids, work.request, work.requests))]):
         for k, view in enumerate(views, start=1):
             assert not np.any(view), "another view has written here"
             view[:] = k + 10 * number
@@ -41,7 +41,7 @@ def test_parts_of_a_workspace():
         view(doubles, work.queue_at, Q.QUEUE_DOUBLES), view(integers, work.nearest_at, 6),
         view(integers, work.ties_at, max(MAX_TIES + 1, PRODUCT_TERMS)),
         view(integers, work.epa_integers_at, E.INTEGERS), view(integers, work.queue_integers_at, Q.QUEUE_INTEGERS),
-    ]  # fmt: skip
+    ]
     for part in parts:
         assert not part.any(), "another part has been here"
         part[:] = 99

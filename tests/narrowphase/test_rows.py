@@ -27,17 +27,17 @@ def empty() -> tuple[np.ndarray, R.Row]:
 
 def test_places_of_fields():
     for name, at in {"distance": R.DISTANCE, "lower": R.LOWER, "upper": R.UPPER, "normal": R.NORMAL,
-                     "point_a": R.POINT_A, "point_b": R.POINT_B}.items():  # fmt: skip
+                     "point_a": R.POINT_A, "point_b": R.POINT_B}.items():
         rows, row = empty()
         row.doubles[at] = 0.25
         assert np.ravel(rows[name])[0] == 0.25
     for name, at in {"b": R.BODY_B, "part_a": R.PART_A, "part_b": R.PART_B, "vertices_a": R.VERTICES_A,
-                     "vertices_b": R.VERTICES_B, "iterations": R.ITERATIONS}.items():  # fmt: skip
+                     "vertices_b": R.VERTICES_B, "iterations": R.ITERATIONS}.items():
         rows, row = empty()
         row.words[at] = -7
         assert np.ravel(rows[name])[0] == -7
     for name, at in {"count": R.COUNT, "how": R.HOW, "exact": R.EXACT_ROUNDS, "hit": R.HIT,
-                     "certified": R.CERTIFIED, "beyond": R.BEYOND}.items():  # fmt: skip
+                     "certified": R.CERTIFIED, "beyond": R.BEYOND}.items():
         rows = np.zeros(1, dtype=PAIR_DTYPE)
         R.view_row(address_of(rows)).flags[at] = 1
         assert rows[name][0] == 1 and rows.tobytes().count(1) == 1

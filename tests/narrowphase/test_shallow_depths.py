@@ -21,7 +21,7 @@ EXPANSION = 65536
 PAIRS = (
     "ellipsoid ellipsoid", "ellipsoid cylinder", "ellipsoid box", "ellipsoid capsule", "ellipsoid sphere",
     "cylinder cylinder", "cylinder box",
-)  # fmt: skip
+)
 #: What the least depth along a face, a side or a ball proves, of overlaps in any position; the others take EPA.
 SHARE = {"cylinder cylinder": 0.3, "cylinder box": 0.4}
 

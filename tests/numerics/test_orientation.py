@@ -94,7 +94,7 @@ CLOUDS = {
     "of all sizes": of_all_sizes, "a line of doubles": line_of_doubles,
     "denormal": lambda rng: rng.integers(-2, 3, size=(4, 3)) * 5e-324, "of the whole range": of_the_whole_range,
     "coplanar": coplanar, "crowded": crowded,
-}  # fmt: skip
+}
 
 
 @pytest.mark.many(6)

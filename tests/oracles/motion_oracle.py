@@ -35,7 +35,7 @@ class BodyMotion:
         body = copy.copy(self)
         body.start, body.p0, body.p1, body.omega = (
             self.start[which], self.p0[which], self.p1[which], self.omega[which]
-        )  # fmt: skip
+        )
         return body
 
     def at(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -59,7 +59,7 @@ class Judged(NamedTuple):
 def judge(
     gap: Gap, A: BodyMotion, B: BodyMotion, lower: np.ndarray, upper: np.ndarray, *, samples: int = 32,
     rounds: int = 7, tolerance: float | np.ndarray = 0.0,
-) -> Judged:  # fmt: skip
+) -> Judged:
     """Look for contacts before ``lower`` (1 where a motion is said to be free).
 
     tolerance : gaps below minus this are contacts [m].   samples : times to begin with, evenly.   rounds : of
@@ -114,7 +114,7 @@ def speeds(A: BodyMotion, B: BodyMotion, reach_a: float, reach_b: float) -> np.n
 def subdivide(
     gap: Gap, A: BodyMotion, B: BodyMotion, lower: np.ndarray, speed: np.ndarray, floor: float,
     tolerance: float | np.ndarray = 0.0,
-) -> Subdivided:  # fmt: skip
+) -> Subdivided:
     """Prove that there is no contact before ``lower`` (1 where a motion is said to be free), or find one.
 
     speed : (n,) bounds of `speeds`.   tolerance : gaps below minus this are contacts [m].

@@ -40,7 +40,7 @@ class PosedBodies:
         self.ordered = ordered_pair(
             address_of(self.table.ints), address_of(self.table.numbers), address_of(self.poses.rows),
             address_of(self._shape_of), 0, 1,
-        )  # fmt: skip
+        )
         self.pair = self.ordered.pair
         self.error = ERROR * self.ordered.size + self.ordered.slop
         self.radius = packed_a.radius + packed_b.radius

@@ -70,7 +70,7 @@ def holds(found, truth: float, within: float = 1e-15) -> None:
         (Mesh(*TETRAHEDRON), Mesh(*TETRAHEDRON), (0, 0, 3), 2.0),
         (Compound([(Box((1, 1, 1)), I), (Sphere(1), pose((4, 0, 0)))]), Cylinder(1, 1), (1.75, 0, 0), 0.25),
     ],
-)  # fmt: skip
+)
 def test_closed_forms(A, B, at, truth):
     within = 1e-12 if truth < 0 and not isinstance(A, Sphere | Box) else 1e-15
     holds(bracket(A, B, I, pose(at)), truth, within)
@@ -201,7 +201,7 @@ def test_a_search_that_finds_nothing_makes_brackets_wide_and_not_wrong(monkeypat
     for A, B, at, truth in (
         (Cylinder(1, 2), Cylinder(0.5, 1), (1.25, 0, 0), -0.25), (Cone(3, 4), Sphere(1), (3, 0, 2), 1.4),
         (Ellipsoid((1, 2, 3)), Sphere(1), (0, 4, 3), None),
-    ):  # fmt: skip
+    ):
         found = bracket(A, B, I, pose(at))
         assert truth is None or found.lower - Decimal("1e-15") <= Decimal(truth) <= found.upper + Decimal("1e-15")
         wide += found.upper - found.lower > Decimal("1e-6")

@@ -83,7 +83,7 @@ def folder(native, tmp_path, monkeypatch):
     about = {
         "platforms": {f"{sys.platform}-{platform.machine().lower()}": levels},
         "entries": [], "versions": "…", "sources": sources.fingerprint(names), "source_files": names, "hashes": {},
-    }  # fmt: skip
+    }
     (tmp_path / "about.json").write_text(json.dumps(about), encoding="utf-8")
     return tmp_path
 

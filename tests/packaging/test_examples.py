@@ -115,7 +115,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess:
     return subprocess.run(
         [sys.executable, *arguments], cwd=ROOT, env={**os.environ, "PYTHONIOENCODING": "utf-8"},
         check=False, capture_output=True, encoding="utf-8", timeout=120,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.many(7)
@@ -198,7 +198,7 @@ GIVEN = {
 NEEDED = {
     "robots": ("yaml", "mujoco"), "disabled-pairs": ("yaml",), "engines": ("mujoco",), "pages": ("yaml",),
     "report-schema": ("yaml", "trimesh"), "scene-format": ("yaml",),
-}  # fmt: skip
+}
 #: Pages whose Python is not run here, and where it is, or why it is not.
 ELSEWHERE = {
     "sweeps": "a million configurations in 16 processes: tests/sweeps/test_sweep.py makes the calls, of fewer",

@@ -124,7 +124,7 @@ def test_wheel_holds_the_folders_and_nothing_else(wheel):
 def test_wheel_holds_what_is_no_module(wheel):
     names = wheel.namelist()
     for file in ("collide/py.typed", "collide/reports/schema.json", "collide/scenes/assets/workcell.json",
-                 "collide/scenes/assets/panda_workbench.yaml"):  # fmt: skip
+                 "collide/scenes/assets/panda_workbench.yaml"):
         assert file in names
 
 
@@ -242,7 +242,7 @@ def test_installed_wheel_imports_from_itself(wheel, tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(tmp_path)},
         check=False, capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     files, bodies = done.stdout.splitlines()
     assert all(Path(file).is_relative_to(tmp_path) for file in files.split())

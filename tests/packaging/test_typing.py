@@ -75,7 +75,7 @@ def checked(tmp_path_factory):
          "--cache-dir", str(folder / "cache"), *files],
         cwd=folder, env={**os.environ, "MYPYPATH": str(folder / "site")}, capture_output=True, text=True, check=False,
         timeout=300,
-    )  # fmt: skip
+    )
     assert done.returncode == 1, done.stdout + done.stderr
     return done.stdout.splitlines()
 

@@ -11,7 +11,7 @@ _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1
 _SIDES = np.array([
     [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
     [1, 5, 7], [1, 7, 3],
-])  # fmt: skip
+])
 
 
 def packed(values: np.ndarray, dtype: str) -> str:
@@ -24,7 +24,7 @@ def shape_of(positions, triangles, smooth: bool = False) -> dict:
         "positions": packed(positions, "<f4"), "triangles": packed(triangles, "<u4"), "vertex_count": len(positions),
         "triangle_count": len(triangles), "smooth": smooth, "simplified_from": None, "deviation": None,
         "unbounded": False,
-    }  # fmt: skip
+    }
 
 
 def box(half: float) -> dict:
@@ -48,7 +48,7 @@ def body(name: str, position, verdict: str, shown: int = 0, **fields) -> dict:
     return {
         "name": name, "static": False, "owner": None, "kind": "Box", "X_WB": X_WB.ravel().tolist(), "shown": shown,
         "tested": None, "verdict": verdict, "note": None, **fields,
-    }  # fmt: skip
+    }
 
 
 def pair(a: str, b: str, distance: float, point_a=(0, 0, 0), normal=(1, 0, 0), how: str = "closed form") -> dict:
@@ -58,7 +58,7 @@ def pair(a: str, b: str, distance: float, point_a=(0, 0, 0), normal=(1, 0, 0), h
         "lower": distance - 1e-15, "upper": distance + 1e-15, "normal": n.tolist(),
         "point_a": list(map(float, point_a)), "point_b": (np.array(point_a, dtype=float) + distance * n).tolist(),
         "part_a": 0, "part_b": 0, "how": how, "certified": True, "approximated": [],
-    }  # fmt: skip
+    }
 
 
 def report_of(name: str, clearance: float = 0.5, **classes) -> dict:
@@ -86,11 +86,11 @@ def report_of(name: str, clearance: float = 0.5, **classes) -> dict:
         "seconds": {"read": 0.25, "report": 0.5, "other": 0.25, "total": 1.0},
         "versions": {"collide": "0.0.1", "python": "3.11", "numpy": "2.0", "kernels": "library, v4", "machine": None},
         "extra": {"from a later version": 1},
-    }  # fmt: skip
+    }
 
 
 def drawing_of(shapes: list[dict], bodies: list[dict], states: dict | None = None, kind: str = "report") -> dict:
     return {
         "version": 1, "kind": kind, "size": 4.0, "notes": ["one mesh drawn with fewer facets"], "contacts": None,
         "shapes": shapes, "bodies": bodies, "states": states,
-    }  # fmt: skip
+    }

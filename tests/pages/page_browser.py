@@ -19,7 +19,7 @@ ARGUMENTS = (
     "--disable-component-update", "--disable-sync", "--disable-extensions", "--hide-scrollbars",
     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
     "--force-prefers-reduced-motion",
-)  # fmt: skip
+)
 SECONDS = 20.0
 
 
@@ -109,4 +109,4 @@ class PageBrowser:
         self.run(
             "const field = document.querySelector(arguments[0]); field.value = arguments[1];"
             "field.dispatchEvent(new Event('input', {bubbles: true}))", selector, value,
-        )  # fmt: skip
+        )

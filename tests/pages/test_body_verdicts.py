@@ -24,13 +24,13 @@ def random_scene(draw: random.Random):
             draw.choice((1, 2, 3)), draw.choice((0, 1, 3, 3)),
         )
         for _ in range(draw.randint(1, 12))
-    ]  # fmt: skip
+    ]
     n = len(balls)
     allowed = [tuple(draw.sample(range(n), 2)) for _ in range(draw.randint(0, n))] if n > 1 else []
     scene = Scene("balls", [
         SceneBody(f"b{k}", Sphere(float(r)), pose([float(x) for x in at]), static=static, group=group, mask=mask)
         for k, (at, r, static, group, mask) in enumerate(balls)
-    ])  # fmt: skip
+    ])
     scene.allowed = [(f"b{i}", f"b{j}", "test") for i, j in allowed]
     return scene, balls, {frozenset(pair) for pair in allowed}
 

@@ -43,13 +43,13 @@ def test_bodies_stand_where_they_stand():
     body = data["bodies"][0]
     assert {key: body[key] for key in ("name", "static", "owner", "kind", "tested", "note")} == {
         "name": "box", "static": True, "owner": "robot", "kind": "Box", "tested": None, "note": "a guess",
-    }  # fmt: skip
+    }
     assert body["X_WB"] == X_WB.ravel().tolist(), "poses are in full precision"
     corners = {(round(x, 6), round(y, 6), round(z, 6)) for x, y, z in world_points(data, 0).tolist()}
     wanted = {
         tuple(np.round(X_WB[:3, :3] @ (0.1 * i, 0.2 * j, 0.3 * k) + X_WB[:3, 3], 6).tolist())
         for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)
-    }  # fmt: skip
+    }
     assert corners == wanted
 
 
@@ -113,7 +113,7 @@ def test_bodies_without_triangles_are_named():
         (Mesh(np.eye(3), [[0, 1, 2]]), True), (Compound([(Box((1, 1, 1)), np.eye(4))]), False),
         (Compound([(Box((1, 1, 1)), np.eye(4)), (Sphere(1), np.eye(4))]), True), (Halfspace((0, 0, 1), 0.0), False),
     ],
-)  # fmt: skip
+)
 def test_what_is_round(shape, smooth):
     assert is_smooth(shape) is smooth
 

@@ -119,7 +119,7 @@ def test_more_changes_than_samples():
     watch = SimpleNamespace(
         path=SimpleNamespace(share=np.linspace(0, 1, 5000)), verdicts=verdicts, first={"sample": 7},
         least={"sample": 13},
-    )  # fmt: skip
+    )
     samples, left_out = drawn_states.samples_of_page(watch, 100)
     assert len(samples) <= 100 and {0, 7, 13, 4999} <= set(samples.tolist()) and 4999 - 48 <= left_out <= 4999
     assert f"{left_out} changes" in drawn_states._about(len(samples), 5000, left_out)

@@ -54,7 +54,7 @@ def test_report_is_the_data(scene, tmp_path):
     assert drawing["kind"] == "report"
     assert {body["name"]: body["verdict"] for body in drawing["bodies"]} == {
         "ball": "colliding", "</script><b>": "colliding", "far": "free",
-    }  # fmt: skip
+    }
 
 
 def test_check_adds_its_findings(scene, tmp_path, capsys):
@@ -157,7 +157,7 @@ def test_panda_looks_like_itself(tmp_path):
 HOSTILE = [
     "<script>alert(1)</script>", "</script><script>alert(1)</script>", "<!--<script>", 'a"b\'c', "a\nb\r\nc", "\x1b[2J",
     "\u202egnp.exe\u202c", "a\u2028b", "\ud800", "&lt;", "x" * 10_000, "</title><b>", '"}]</script>',
-]  # fmt: skip
+]
 
 
 def test_names_in_scene_files_stay_text(tmp_path):
@@ -173,7 +173,7 @@ def test_names_in_scene_files_stay_text(tmp_path):
             "name": HOSTILE[2], "type": "revolute", "parent": "base", "child": HOSTILE[0] * 2, "limits": [-1, 1],
         }],
         "states": {HOSTILE[3]: {HOSTILE[2]: 0.5}},
-    }  # fmt: skip
+    }
     scene = tmp_path / "hostile.json"
     allow = [[HOSTILE[0], HOSTILE[1], HOSTILE[2]]]
     whole = {"collide": 1, "name": HOSTILE[1], "bodies": bodies, "robots": [{"robot": robot}], "allow": allow}

@@ -19,7 +19,7 @@ HOSTILE = [
     "\u2028\u2029", "\u05e9\u05dc\u05d5\u05dd", "\ud800", "\U0001f916", "x" * 10_000, "<" * 10_000, '"}]}</script>',
     "{{constructor}}", "__proto__", "javascript:alert(1)", "<img src=x onerror=alert(1)>", "%s%n", "<!--DATA-->",
     "<!--SCRIPT-->", "",
-]  # fmt: skip
+]
 
 
 @pytest.fixture
@@ -117,7 +117,7 @@ def test_nothing_is_fetched(viewer):
         ("page.css", "</style>", "</style"),
         ("page.html", "<html></html>", "<!--DATA-->"), ("page.html", None, "install"), ("bundle.js", None, "install"),
     ],
-)  # fmt: skip
+)
 def test_broken_viewers_are_refused(viewer, file, text, complaint):
     if text is None:
         (viewer / file).unlink()

@@ -27,7 +27,7 @@ HOSTILE = [
     'quote " and \' ', "two\nlines\tand a tab", "\u202eright to left\u202c", "שלום", "%7C|&state=9#pair=",
     "long " + "name " * 2000, "half a pair \ud800",
     "{{constructor}}`${1}`", "javascript:alert(1)", "__proto__",
-]  # fmt: skip
+]
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def test_tables_hold_every_row_of_the_report(page, workcell):
         rows = page.run(
             "return [...document.querySelectorAll(`#table-${arguments[0]} tbody tr`)].map((row) =>"
             " [...row.cells].slice(0, 2).map((cell) => cell.textContent))", name,
-        )  # fmt: skip
+        )
         assert data[name] and rows == [[row["a"], row["b"]] for row in data[name]]
     assert len(page.texts("#table-bodies tbody tr")) == data["scene"]["bodies"]
     assert len(page.texts("#table-proofs tbody tr")) == len(data["proofs"])
@@ -97,7 +97,7 @@ def test_the_page_hides_nothing(page):
         "a formula for this pair of shapes", "joint 4 is outside its limits", "all.yaml",
         "ignored A and ignored B", "500 mm", "library, v4", "1.00 s", "250 ms", "convex pairs", "from a later version",
         "one mesh drawn with fewer facets",
-    ):  # fmt: skip
+    ):
         assert told in text, told
 
 
@@ -342,7 +342,7 @@ def states_page(page: PageBrowser):
         "times": [0, 0.1, 0.2, 0.3, 0.4], "moving": [1],
         "poses": packed(poses, "<f4"), "rows": rows, "samples": SAMPLES,
         "body_verdicts": [[] if verdict == "free" else [[0, verdict], [1, verdict]] for verdict in classes],
-    }  # fmt: skip
+    }
     at = {"share": 0.75, "time": None, "sample": 3, "waypoint": 0}
     worst = {**pair("still", "mover", -0.5, (1, 0, 0)), "at": at, "from": at, "samples": 1, "state": {"joint": 0.1}}
     data = report_of("states")
@@ -350,7 +350,7 @@ def states_page(page: PageBrowser):
         "certified": False, "source": "plan.csv", "waypoints": 2, "samples": 5, "resolution": 0.02, "duration": None,
         "moving": ["mover"], "collides": True, "first_collision": worst, "least": worst, "colliding": [worst],
         "shallow": [], "touching": [], "near": [], "unanswered": [], "notes": [],
-    }  # fmt: skip
+    }
     bodies = [body("still", (0, 0, 0), "free", static=True), body("mover", (2.5, 0, 0), "free")]
     return page.write("states", report=data, drawing=drawing_of([box(1.0)], bodies, states))
 
@@ -390,11 +390,11 @@ def test_several_states_have_tables_and_contacts_of_their_own(page):
     states = {
         "labels": ["home", "goal"], "shares": None, "times": None, "moving": [1], "poses": packed(poses, "<f4"),
         "rows": rows, "samples": None, "body_verdicts": [[[row, verdict] for row in range(2)] for verdict, _ in both],
-    }  # fmt: skip
+    }
     data = {
         "schema": "collide-states/1", "verdict": {"text": "1 of 2 states collides", "collides": True},
         "states": [{"name": name, "report": each} for name, each in zip(("home", "goal"), reports)],
-    }  # fmt: skip
+    }
     bodies = [body("still", (0, 0, 0), "near"), body("mover", (2.25, 0, 0), "near")]
     patch = {"points": [[1, -1, -1], [1, 1, -1], [1, 1, 1]], "normal": [1, 0, 0], "depths": [0.5, 0.5, 0.5]}
     contacts = [{"a": "still", "b": "mover", "state": 1, "patches": [patch], "overlap": None}]
@@ -415,14 +415,14 @@ def test_a_comparison_shows_disagreements_first(page):
         "reference_distance": -0.5, "hit": False, "distance": 0.125, "exact_hit": True, "exact_distance": -0.5,
         "lower": None, "upper": None, "judged_by": "exact arithmetic", "off": 0.625, "touching": None, "not_judged": "",
         "wrong": ["peer"], "proven": [], "undecided": [], "note": "",
-    }  # fmt: skip
+    }
     asked = {"version": "1", "skipped": "", "asked": 3, "seconds": 0.1}
     summaries = [{"engine": name, **asked} for name in ("collide", "peer")]
     summaries.append({"engine": "absent", "version": "", "skipped": "not installed", "seconds": None})
     data = {
         "reference": "collide", "bodies": 3, "pairs": 3, "max_distance": 0.5, "tolerance": 1e-6, "summaries": summaries,
         "disagreements": [dispute], "ours_wrong": 0, "peers_wrong": 1,
-    }  # fmt: skip
+    }
     ours = report_of("ours", colliding=[pair("first", "second", -0.5, (1, 0, 0))])
     bodies = [body("first", (0, 0, 0), "colliding"), body("second", (1.5, 0, 0), "colliding")]
     place = page.write("compared", report=data, ours=ours, drawing=drawing_of([box(1.0)], bodies, kind="compare"))
@@ -498,7 +498,7 @@ def test_a_live_page_follows_what_it_is_sent(page):
     blocks = [
         DataBlock("report", report_of("live", colliding=[pair("first", "second", -0.5, (1, 0, 0))])),
         DataBlock("drawing", drawing_of([box(1.0)], bodies)), DataBlock("live", {"events": "events?token=1"}),
-    ]  # fmt: skip
+    ]
     server = _Server("".join(page_pieces("live", blocks, live=True)))
     try:
         page.driver.get(f"http://127.0.0.1:{server.server_port}/#pair=first|second")
@@ -509,7 +509,7 @@ def test_a_live_page_follows_what_it_is_sent(page):
         server.events.put(("update", {
             "poses": [[1, pose]], "verdicts": [[0, "near"], [1, "near"]], "report": apart, "contacts": None,
             "label": "t = 1.25 s",
-        }))  # fmt: skip
+        }))
         page.wait("return document.getElementById('live-mark').textContent.endsWith('t = 1.25 s')")
         assert page.run("return collideViewer.placeOf('second')") == [2.25, 0, 0]
         assert "near, distance 250.000 mm" in selected(page), "the pair stays selected, its numbers are the new ones"

@@ -35,7 +35,7 @@ def main(n_seeds: int, n_cells: int, n_points: int) -> None:
             meshes, cells, facets = meshes + 1, cells + verdict.n_cells, facets + verdict.n_facet_tests
             points, held = points + len(every), held + int(inside.sum())
         print(f"{family}: {meshes} meshes, {cells:,} cells, {facets:,} facets against cells, {points:,} points, "
-              f"{held:,} inside; wrong: {wrong}", flush=True)  # fmt: skip
+              f"{held:,} inside; wrong: {wrong}", flush=True)
 
 
 if __name__ == "__main__":

@@ -144,4 +144,4 @@ def test_cells_close_and_fill_the_box(name):
 def signed(mesh) -> list[Fraction]:
     corners = [[[Fraction(c) for c in mesh.vertices[k].tolist()] for k in face] for face in mesh.faces.tolist()]
     return [sum(a[i] * (b[(i + 1) % 3] * c[(i + 2) % 3] - b[(i + 2) % 3] * c[(i + 1) % 3]) for i in range(3)) / 6
-            for a, b, c in corners]  # fmt: skip
+            for a, b, c in corners]

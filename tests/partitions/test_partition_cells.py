@@ -28,7 +28,7 @@ def made(name: str) -> tuple[SpacePartition, ConvexCells]:
 
 def faces_of(cells: ConvexCells, i: int) -> list[np.ndarray]:
     return [cells.vertices[cells.loops[cells.loop_starts[j] : cells.loop_starts[j + 1]]]
-            for j in range(cells.face_starts[i], cells.face_starts[i + 1])]  # fmt: skip
+            for j in range(cells.face_starts[i], cells.face_starts[i + 1])]
 
 
 @pytest.mark.parametrize("name", MESHES)
@@ -45,7 +45,7 @@ def test_cells_are_what_their_planes_and_corners_say(name):
             turn = np.cross(face - face[0], np.roll(face, -1, axis=0) - face[0]).sum(axis=0)
             assert turn @ n >= -1e-14  # counter-clockwise seen from outside
             total += sum(float(np.linalg.det([face[0] - corners[0], a - corners[0], b - corners[0]]))
-                         for a, b in pairwise(face[1:])) / 6  # fmt: skip
+                         for a, b in pairwise(face[1:])) / 6
         assert cells.volumes[i] == pytest.approx(total, abs=1e-12)
         for facet, axis, value, side, n in zip(planes.facet, planes.axis, planes.value, planes.side, planes.normals):
             assert (facet >= 0) == (axis < 0) == np.isnan(value)
@@ -158,7 +158,7 @@ def test_clutter_is_what_cubes_of_chance_meet():
     apart = collide.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 9), (1, 0, 9), (0, 1, 9)], [(0, 1, 2), (3, 4, 5)])
     assert clutter(apart).max_facets == 1 and clutter(apart).mean == 1.0
     for arguments, words in ((("mesh",), "mesh must be a collide.Mesh"), ((mesh, 0), "clutter: cubes"),
-                             ((mesh, 5, -1), "clutter: seed"), ((mesh, 2.5), "clutter: cubes")):  # fmt: skip
+                             ((mesh, 5, -1), "clutter: seed"), ((mesh, 2.5), "clutter: cubes")):
         with pytest.raises(InvalidArgument, match=words):
             clutter(*arguments)
 
@@ -177,7 +177,7 @@ def test_sizes_count_what_there_is(name):
 def test_points_are_located_one_by_one_as_in_batches(name):
     rng, (partition, cells) = rng_of("located", name), made(name)
     points = np.vstack([rng.uniform(-1.4, 1.4, (20, 3)), partition.mesh.vertices[:5],
-                        partition.mesh.vertices[partition.mesh.faces[:5]].mean(axis=1)])  # fmt: skip
+                        partition.mesh.vertices[partition.mesh.faces[:5]].mean(axis=1)])
     batch = partition.locate(points)
     assert np.array_equal(batch.inside, collide.contains(partition.mesh, np.eye(4), points))
     assert batch.boundary[20:25].all() and batch.inside[batch.boundary].all() and not batch.boundary[:20].all()

@@ -52,7 +52,7 @@ def points_near(partition, n: int, seed: int) -> np.ndarray:
         rng.uniform(low, high, (n, 3)), some[:, 0], 0.5 * (some[:, 0] + some[:, 1]), some.mean(axis=1),
         0.25 * some[:, 0] + 0.25 * some[:, 1] + 0.5 * some[:, 2],
         cells.vertices[rng.integers(len(cells.vertices), size=n)],
-    ]  # fmt: skip
+    ]
     on_cut = rng.uniform(low, high, (n, 3))
     axis_rows = np.flatnonzero(cells.axis >= 0)
     rows = axis_rows[rng.integers(len(axis_rows), size=n)]

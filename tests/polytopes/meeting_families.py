@@ -94,7 +94,7 @@ def unbounded(rng, d, n, m) -> Question:
 
 FAMILIES: dict[str, Callable[..., Question]] = {
     "lattice": lattice, "touching": touching, "nested": nested, "flat": flat, "empty": empty, "unbounded": unbounded,
-}  # fmt: skip
+}
 
 
 def questions(seed: int, d: int, count: int, max_rows: int = 30) -> Iterator[tuple[str, Question]]:

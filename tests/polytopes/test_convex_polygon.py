@@ -81,7 +81,7 @@ def test_is_immutable_and_a_value():
         (np.zeros((0, 2)), "points is empty"), ([(0, np.nan)], r"points\[0, 1\] is nan"),
         ([(1e60, 0)], "within ±1e"), ([(1e-60, 0)], "at least 1e-50"), ("no", "real numbers"),
     ],
-)  # fmt: skip
+)
 def test_refused(points, complaint):
     with pytest.raises(InvalidShape, match=complaint):
         ConvexPolygon(points)

@@ -20,7 +20,7 @@ from collide.polytopes import (
     verify_boundary,
     verify_exclusion,
     verify_trees,
-)  # fmt: skip
+)
 from collide.polytopes.boundary_hull import boundary_hull
 from collide.polytopes.facet_tree import FacetTree, Sizes
 from collide.polytopes.hierarchical_tree import as_grid
@@ -60,7 +60,7 @@ def test_answers_are_those_of_the_rational_simplex(d, family):
         P = HierarchicalTree(V, limits=SMALL)
         X = _pose(rng, d, rng.uniform(0.5, 3.5))
         moved = [[sum(Fraction(X[i, j]) * Fraction(v[j]) for j in range(d)) + Fraction(X[i, d]) for i in range(d)]
-                 for v in V.tolist()]  # fmt: skip
+                 for v in V.tolist()]
         wanted = rational_simplex.have_common_point(moved, A, np.ones(len(A)))
         answer = trees_meet(P, R, X)
         assert answer.hit == wanted, f"V = np.array({V.tolist()})\nA = np.array({A.tolist()})\nX = {X.tolist()}"
@@ -101,7 +101,7 @@ def _nearly_touching(rng, V, A, d):
 
 @pytest.mark.parametrize(("d", "n", "limits"), [
     (2, 200, Sizes(0.6, 12, 12)), (3, 150, Sizes(0.7, 12, 30)), (4, 40, Sizes(0.8, 8, 20)), (5, 20, Sizes(0.8, 6, 14)),
-])  # fmt: skip
+])
 def test_planes_of_a_miss_leave_out_the_hull(d, n, limits):
     """O(log n) planes, substituted in fractions by a reader who has checked the boundary once."""
     rng = np.random.default_rng([5, d])
@@ -123,7 +123,7 @@ def test_planes_of_a_miss_leave_out_the_hull(d, n, limits):
             proof._replace(planes=()), proof._replace(ray_planes=()), proof._replace(ray=tuple(-x for x in proof.ray)),
             proof._replace(outside=(X @ np.append(V.mean(axis=0), 1.0))[:d].tolist()),
             proof._replace(planes=(proof.planes[0]._replace(multipliers=(-1.0,) * len(proof.planes[0].rows)),)),
-        ]  # fmt: skip
+        ]
         for mutant in mutants:
             with pytest.raises(CertificateRefused):
                 verify_exclusion(boundary, A, b, polytopes.TreeMeeting(False, False, None, mutant, {}), X)
@@ -178,7 +178,7 @@ WHOLE = [
     ("ball", 3, 120, Sizes(0.7, 16, 60)), ("curve", 3, 120, Sizes(0.7, 16, 60)),
     ("lattice", 3, 2000, Sizes(0.7, 16, 60)),
     ("ball", 4, 100, Sizes(0.8, 24, 80)), ("ball", 5, 50, Sizes(0.9, 14, 48)),
-]  # fmt: skip
+]
 
 
 @pytest.mark.many(3)

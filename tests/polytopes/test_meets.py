@@ -97,7 +97,7 @@ def test_no_plane_that_keeps_the_points_away_cuts_less():
     corners = [
         np.linalg.solve(normals[[i, j]], offsets[[i, j]]) for i in range(6) for j in range(i)
         if abs(np.linalg.det(normals[[i, j]])) > 1e-9
-    ]  # fmt: skip
+    ]
     region = np.array([corner for corner in corners if (normals @ corner <= offsets + 1e-9).all()])
 
     def gap(n: np.ndarray) -> float:

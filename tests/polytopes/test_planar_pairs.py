@@ -114,7 +114,7 @@ def test_batch_equals_single_calls_and_swapped():
         single = polygons_meet(A, B, np.eye(3), X_WB)
         assert (single.hit, single.rounds, single.vertices_read) == (
             batch.hit[k], batch.rounds[k], batch.vertices_read[k],
-        )  # fmt: skip
+        )
         assert single.certificate() == batch.certificate(k)
     assert polygons_meet([], [], np.eye(3), np.eye(3)).hit.shape == (0,)
 
@@ -152,7 +152,7 @@ def test_tampered_certificates_are_refused():
         (touching, hit._replace(weights_b=((7, hit.weights_b[0][1]),))),
         (touching, hit._replace(point=(hit.point[0] + 1, hit.point[1]))),
         (planar_pose((1, 0)), miss._replace(normal=(miss.normal[0], miss.normal[1]), offset=miss.offset)),
-    ):  # fmt: skip
+    ):
         with pytest.raises(CertificateRefused):
             verify_polygons(square, square, np.eye(3), X_WB, wrong)
 

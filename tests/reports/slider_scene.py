@@ -24,12 +24,12 @@ def slider_scene() -> Scene:
         "rail", ["base", "carriage", "slider"], [carriage, slider],
         {"slider": [LinkShape(Box((0.2, 0.2, 0.2)), np.eye(4), None, "test")]},
         states={"home": {"slide": 0.0}, "hit": {"slide": 0.6}},
-    )  # fmt: skip
+    )
     scene = Scene("rail", [
         SceneBody("floor", Box((4, 4, 0.1)), pose((0, 0, -0.35)), static=True),
         SceneBody("post", Box((0.2, 0.2, 1)), pose((0.7, 0, 0)), static=True),
         SceneBody("crate", Box((0.2, 0.2, 0.2)), pose((0.35, 0.3, -0.201))),
         SceneBody("lamp", Sphere(0.1), pose((0, 0, 3))),
-    ])  # fmt: skip
+    ])
     scene.place_robot(robot, np.eye(4))
     return scene

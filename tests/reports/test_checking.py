@@ -25,7 +25,7 @@ def stacked(*depths, extra=()) -> Scene:
     bodies = [
         SceneBody(f"{which} {k}", cube, pose((5 * k, 0, z)))
         for k, depth in enumerate(depths) for which, z in (("low", 0.0), ("high", 1.0 - depth))
-    ]  # fmt: skip
+    ]
     return Scene("stack", [*bodies, *extra])
 
 
@@ -117,7 +117,7 @@ def test_baselines_are_sorted_and_one_a_line(command, tmp_path):
      ('{"schema": "collide-baseline/1", "collisions": [{"class": "collision", "a": "b", "b": "c", "depth": "deep"}]}',
       "damaged"),
      ('{"schema": "collide-report/3", "colliding": 4}', "damaged")],
-)  # fmt: skip
+)
 def test_what_is_no_baseline_is_refused_before_the_work(command, tmp_path, text, words):
     (tmp_path / "b.json").write_text(text)
     status, out, err = command(None, "check", "--baseline", tmp_path / "b.json")
@@ -316,7 +316,7 @@ def test_geometry_is_enough_to_draw_every_body():
         SceneBody("floor", Halfspace((0, 0, 1), -2.0), pose(), static=True),
         SceneBody("part", Mesh(corners, faces), pose()),
         SceneBody("both", Compound([(ball, pose((0, 0, 1))), (Box((1, 1, 1)), pose())]), pose((9, 9, 9))),
-    ])  # fmt: skip
+    ])
     data = json.loads(json.dumps(geometry.of_scene(scene), allow_nan=False))
     bodies, shapes = {body["name"]: body for body in data["bodies"]}, data["shapes"]
     assert bodies["one"]["shape"] == bodies["two"]["shape"] and len(shapes) == 4

@@ -75,7 +75,7 @@ def test_boxes_that_rest_or_overlap_a_little(size):
         (at_rest - rounding / 2, "touching"), (at_rest + rounding / 2, "touching"),
         (at_rest - 2 * rounding, "colliding"),
         (at_rest + 2 * rounding, "near"), (at_rest - 1e-6, "colliding"), (at_rest + 1e-6, "near"),
-    ]:  # fmt: skip
+    ]:
         assert class_of((box, pose((0, 0, z))), floor) == expected, (size, z - at_rest, expected)
 
 

@@ -18,7 +18,7 @@ def overlaps_and_tables():
         ("table", collide.Box((2, 2, 1)), (0, 0, 0)), ("crate", collide.Box((1, 1, 1)), (0, 0, 0.75)),
         ("ball", collide.Sphere(0.2), (0.5, 0.5, 0.5)), ("part", collide.Box((0.1, 0.1, 0.1)), (0, 0, 0.5)),
         ("far", collide.Box((1, 1, 1)), (9, 0, 0)),
-    ]  # fmt: skip
+    ]
     bodies = [SceneBody(name, shape, collide.pose(place)) for name, shape, place in shapes]
     made = report.make(Scene("boxes", bodies))
     return made, {name: report_tables.tables(made, name == "all", False) for name in ("page", "all")}
@@ -32,7 +32,7 @@ def test_volumes_are_told():
     for pair, volume, centroid in (
         (("table", "crate"), 0.25, (0, 0, 0.375)), (("table", "part"), 5e-4, (0, 0, 0.475)),
         (("crate", "part"), 1e-3, (0, 0, 0.5)),
-    ):  # fmt: skip
+    ):
         entry = found[frozenset(pair)]
         assert entry["lower"] <= entry["volume"] <= entry["upper"]
         assert entry["volume"] == pytest.approx(volume, rel=1e-12)

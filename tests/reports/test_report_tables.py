@@ -29,7 +29,7 @@ from collide.reports.report_tables import (
 def pair(a="a", b="b", distance=-0.002, lower=-0.002, upper=-0.002, depth=0.002, certified=True, **values) -> Pair:
     values = {"how": "simplex", "approximated": [], "part_a": 0, "part_b": 0, **values}
     return Pair(a, b, distance, depth, lower, upper, [0.0, 0.0, 1.0], [1.0, 2.0, 3.0], [1.0, 2.0, 5.0],
-                certified=certified, **values)  # fmt: skip
+                certified=certified, **values)
 
 
 #: No depth is known but that it is at most so large; it lies between two lengths; it is not certified, and near.
@@ -47,7 +47,7 @@ class Some(list):
 
 @pytest.mark.parametrize(("one", "text", "z"), [
     (BOUND, "≤ 5.000 mm", 4.0), (RANGE, "2 mm … 5.000 mm", 4.0), (NARROW, "5.000 mm", 3.0), (pair(), "2.000 mm", 3.0),
-])  # fmt: skip
+])
 def test_depths_that_are_bounds_or_ranges(one, text, z):
     """Those are told to be in the middle of the contact."""
     assert [each.strip() for each in depth_texts([one])] == [text] and _place(one) == [1.0, 2.0, z]
@@ -56,7 +56,7 @@ def test_depths_that_are_bounds_or_ranges(one, text, z):
 def test_notes_say_which_signs_there_are():
     bound, a_range = "≤: a move that long", "…: at least so deep"
     for pairs, begins in (([BOUND], [bound]), ([RANGE], [a_range]), ([BOUND, RANGE], [bound, a_range]), ([pair()], []),
-                          ([NARROW], ["a and b: depth known to"])):  # fmt: skip
+                          ([NARROW], ["a and b: depth known to"])):
         notes = _bracket_notes(pairs, "depth", False)
         assert len(notes) == len(begins) and all(note.startswith(begin) for note, begin in zip(notes, begins)), notes
     assert _bracket_notes([BOUND, NARROW], "within", False) == []
@@ -156,7 +156,7 @@ def test_stand_ins_in_a_line(n):
     entries = [{"body": f"b{k}", "what": "hull"} for k in range(n)]
     line = _approximation_line(SimpleNamespace(approximations=entries))
     assert line == ("" if not n else f"≈ {n} bod{'y' if n == 1 else 'ies'}, answers hold for these: "
-                    + ", ".join(f"b{k} (hull)" for k in range(min(n, 2))) + ", …" * (n > 2))  # fmt: skip
+                    + ", ".join(f"b{k} (hull)" for k in range(min(n, 2))) + ", …" * (n > 2))
 
 
 def test_pairs_that_are_never_tested_in_a_line():
@@ -173,7 +173,7 @@ def test_pairs_that_are_never_tested_in_a_line():
      "4 pairs, gap or overlap at most 2.000 µm: a and b, c and d, e and f, …"),
     ("abacadae", [("a", 4), ("b", 1), ("c", 1)], "4 pairs, gap or overlap at most 2.000 µm: 4 with a, …"),
     ("abacad", [("a", 3), ("b", 1)], "3 pairs, gap or overlap at most 2.000 µm: a and b, a and c, a and d"),
-])  # fmt: skip
+])
 def test_touching_pairs_in_a_line(names, often, words):
     """Bodies that are in several of more than three pairs are named; where there is none, the first pairs are."""
     class Touching(Some):

@@ -71,10 +71,10 @@ def test_columns_are_given_up_where_they_do_not_fit_and_not_where_they_just_do()
     (2, 0, 1, 2, "2 new collisions, 2 known, 1 gone"),
     (0, 1, 0, 2, "2 new collisions, 1 known and deeper than before; a and b: 2 mm deep, was 1 mm"),
     (1, 2, 0, 0, "no new collision, 2 known and deeper than before, 1 known; a and b: 2 mm deep, was 1 mm"),
-])  # fmt: skip
+])
 def test_a_check_against_a_baseline_counts_what_is_new(known, deeper, gone, new, words):
     made = {what: [Finding(what, "a", "b", -0.002, before=0.001) for _ in range(n)]
-            for what, n in ((KNOWN, known), (DEEPER, deeper), (GONE, gone), (COLLISION, new))}  # fmt: skip
+            for what, n in ((KNOWN, known), (DEEPER, deeper), (GONE, gone), (COLLISION, new))}
     findings = [finding for some in made.values() for finding in some]
     check = Check("", "cell", ["a", "b"], "summary", findings, [*made[DEEPER], *made[COLLISION]], against_baseline=True)
     assert check.verdict() == f"{words} (summary)" and check.fails == bool(deeper + new)
@@ -129,7 +129,7 @@ def test_engines_that_do_not_fit_stand_below_and_those_not_asked_are_told_once()
 
 def test_a_comparison_in_one_line():
     data = {"summaries": [summary("ours"), summary("peer", wrong=2, failed=["x"])], "reference": "ours", "pairs": 1,
-            "ours_wrong": 0, "disagreements": []}  # fmt: skip
+            "ours_wrong": 0, "disagreements": []}
     assert comparison_verdict(data) == (
         "no answer of ours proven wrong; 1 pair asked of ours, peer; peer: 2 wrong booleans, 1 failure; no disagreement"
     )
@@ -137,7 +137,7 @@ def test_a_comparison_in_one_line():
     for disputes, end in (([open_], "; 1 disagreement not judged"), ([inside, open_], (
             "; 1 disagreement not judged; 1 answer about insides of solids, which others do not see")),
             ([inside] * 2, "; no disagreement; 2 answers about insides of solids, which others do not see"),
-    ):  # fmt: skip
+    ):
         assert comparison_verdict({**data, "disagreements": disputes}).endswith(f"1 failure{end}")
     assert _wrong_of(summary("peer")) == ""
 

@@ -84,7 +84,7 @@ def test_without_a_collision_the_least_clearance_is_told():
     # the crate is 0.1 m from the way: it comes near, never in it; floor, lamp and crate do not move
     assert {frozenset((pair["a"], pair["b"])) for pair in found["near"]} == {
         frozenset(("slider", "post")), frozenset(("slider", "crate")),
-    }  # fmt: skip
+    }
     assert verdict(found).startswith("no collision at ") and "least clearance" in verdict(found)
 
 
@@ -132,7 +132,7 @@ def test_few_pairs_are_asked_once_something_near_is_known(monkeypatch):
 ROS = {"joint_names": ["slide", "lift"], "points": [
     {"positions": [0.0, 0.1], "time_from_start": {"secs": 0, "nsecs": 0}},
     {"positions": [0.5, 0.2], "time_from_start": {"sec": 1, "nanosec": 500000000}},
-]}  # fmt: skip
+]}
 FILES = {
     "a.csv": "time, slide, lift\n# a remark\n0, 0, 0.1\n1.5, 0.5, 0.2\n",
     "b.csv": "slide;lift;t\n0;0.1;0\n0.5;0.2;1.5\n",
@@ -143,7 +143,7 @@ FILES = {
     "g.json": json.dumps({"model_id": "rail", "trajectory": [{"joint_trajectory": ROS}]}),
     "h.json": json.dumps({"waypoints": [{"name": ["slide", "lift"], "position": [0, 0.1], "time_from_start": 0},
                                         {"name": ["slide", "lift"], "position": [0.5, 0.2], "time_from_start": 1.5}]}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -179,7 +179,7 @@ def test_yaml_as_moveit_prints_it(tmp_path):
         ("x.json", '{"a": [1, 2], "b": [1]}', "no trajectory"), ("x.json", '[{"a": "b"}]', r"\[0\].*number"),
         ("x.json", "3", "must be a mapping"),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_with_a_file_is_named(tmp_path, name, text, words):
     (tmp_path / name).write_text(text)
     with pytest.raises(SceneError, match=words):
@@ -216,7 +216,7 @@ def test_states_are_named_files_values_in_order_or_by_name(tmp_path):
         (["-0.5,0.1"], [("-0.5,0.1", -0.5)]), (["slide=0.7"], [("slide=0.7", 0.7)]),
         (["slide=0.7, lift=1"], [("slide=0.7, lift=1", 0.7)]),
         ([f"home,{file}"], [("home", 0.0), (str(file), 0.25)]),
-    ]:  # fmt: skip
+    ]:
         found = in_states(scene, words)
         assert [(label, one.state["slide"]) for label, one in found] == expected, words
 
@@ -228,7 +228,7 @@ def test_states_are_named_files_values_in_order_or_by_name(tmp_path):
      ("swing=1", "unknown joint 'swing'"), ("away", "unknown state 'away'; it has home, hit"),
      ("home,away", "unknown state 'away'"),
      ("slide=nan", "finite")],
-)  # fmt: skip
+)
 def test_states_that_are_none_are_refused(word, complaint):
     with pytest.raises(SceneError, match=complaint):
         in_states(slider_scene(), [word])

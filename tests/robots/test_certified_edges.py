@@ -235,7 +235,7 @@ def test_links_that_cannot_be_told_apart_are_both_named():
     """Two sliders side by side with 1e-9 m between them: a pair of the robot, not of what is around."""
     block = [LinkShape(collide.Box((1.0, 1.0, 1.0)), np.eye(4), None, "test")]
     joints = [Joint(name, "prismatic", "base", name, pose(t=(0, y, 0)), (1.0, 0, 0))
-              for name, y in (("left", 0.0), ("right", 1.0 + 1e-9))]  # fmt: skip
+              for name, y in (("left", 0.0), ("right", 1.0 + 1e-9))]
     robot = Robot("pair", ["base", "left", "right"], joints, {"left": block, "right": block})
     edges = collide.RobotChecker(robot).certify_edges([[-3.0, 0.0]], [[3.0, 0.0]], resolution=1e-2)
     assert edges.is_open[0] and set(edges.open_names) == {("right", "left")}
@@ -254,5 +254,5 @@ def test_intervals_that_more_pairs_leave_open_than_there_is_space_for_are_named(
     edges = collide.RobotChecker(robot).certify_edges(-q, q, resolution=1e-2)
     assert edges.is_open[0] and {frozenset(names) for names in edges.open_names} <= {
         frozenset(("left", "middle")), frozenset(("middle", "right"))
-    }  # fmt: skip
+    }
     assert edges.open["begin"].min() <= 0.34 and edges.open["end"].max() >= 0.66

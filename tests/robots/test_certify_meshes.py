@@ -30,7 +30,7 @@ def test_a_rod_is_proven_to_pass_through_a_ring():
     world.add(ring(), name="ring", static=True)
     rod = [LinkShape(collide.Capsule(0.1, 0.4), np.eye(4), None, "test")]
     joints = [Joint("slide", "prismatic", "base", "rod", np.eye(4), (0, 0, 1.0), -2.0, 2.0),
-              Joint("shift", "prismatic", "rod", "tip", np.eye(4), (1.0, 0, 0), -2.0, 2.0)]  # fmt: skip
+              Joint("shift", "prismatic", "rod", "tip", np.eye(4), (1.0, 0, 0), -2.0, 2.0)]
     robot = Robot("rod", ["base", "rod", "tip"], joints, {"rod": rod})
     checker = collide.RobotChecker(robot, world)
     assert ring().solid and not collide.contains(ring(), np.eye(4), np.zeros((1, 3)))[0]

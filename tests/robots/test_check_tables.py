@@ -63,7 +63,7 @@ def test_shapes_of_convex_parts_that_are_the_same_set():
     (collide.Sphere(0.5), (0.5, 0.5, 0.5)), (collide.Capsule(0.25, 2.0), (0.25, 0.25, 1.25)),
     (collide.Cylinder(0.25, 2.0), (0.25, 0.25, 1.0)), (collide.Cone(0.25, 2.0), (0.25, 0.25, 1.0)),
     (collide.Ellipsoid((1.0, 2.0, 3.0)), (1.0, 2.0, 3.0)), (CUBE, (1.0, 1.0, 1.0)),
-])  # fmt: skip
+])
 @pytest.mark.parametrize("by", [0.0, 0.125])
 def test_boxes_of_sets_and_of_swollen_ones(shape, half, by):
     ((packed, _),) = parts_of(shape)
@@ -202,7 +202,7 @@ def test_hulls_of_many_vertices_have_a_support_tree_and_it_serves_what_is_swolle
             around=[BodyAround("hull", hull, pose(t=(3.0, 0, 0)), margin)],
         ).table
         for margin in (0.0, 0.2, 0.3)
-    ]  # fmt: skip
+    ]
     trees = np.array([table.ints[: len(table.packed), TREE] for table in tables])
     assert all(table.is_built for table in tables)
     assert trees[:, [0, 2, 4]].all() and not trees[:, [1, 3]].any() and len(np.unique(trees)) == 2

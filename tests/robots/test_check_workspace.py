@@ -57,7 +57,7 @@ def test_states_and_words_are_numbers_of_their_own():
         "BODY", "SKIP", "NODE_LINK", "MEASURE", "PART", "TURNED", "POSE", "POSE_SLOP", "POSE_STRETCH", "POSE_TERMS",
         "PRODUCT_SLOP", "HEADER", "LINK", "FIRST", "COUNT", "BODY_INTS", "CENTRE", "HALF", "BOX", "OPEN_INTS",
         "OPEN_LOWER",
-    )]  # fmt: skip
+    )]
     assert sorted(words) == list(range(layout.HEADER))
     assert motions.ROUNDING + 1 == motions.MOTION_HEADER and motions.RESOLUTION + 1 == motions.ROUNDING
 
@@ -180,7 +180,7 @@ def test_bounds_of_motions_are_of_the_half_interval_and_hold():
     rng = rng_of("bounds of motions")
     joints = [Joint("turn", "revolute", "base", "a", pose(t=(0, 0, 0.2)), (0, 0, 1.0)),
               Joint("slide", "prismatic", "a", "b", pose(t=(0.3, 0, 0)), (0, 1.0, 0)),
-              Joint("bend", "continuous", "b", "c", pose(t=(0.2, 0, 0)), (0.6, 0, 0.8))]  # fmt: skip
+              Joint("bend", "continuous", "b", "c", pose(t=(0.2, 0, 0)), (0.6, 0, 0.8))]
     box = [LinkShape(collide.Box((0.2, 0.1, 0.3)), pose(t=(0.1, 0, 0)), None, "test")]
     robot = Robot("chain", ["base", "a", "b", "c"], joints, {"a": box, "c": box})
     checker = checker_of(collide.Sphere(0.1), robot=robot)
@@ -194,7 +194,7 @@ def test_bounds_of_motions_are_of_the_half_interval_and_hold():
             rows = np.array([(k, begin, end, body, -1) for k in range(20)], dtype=float)
             bounds = np.empty(20)
             bound_motions(space.address, work.address, address_of(q0), address_of(q1), 3, address_of(rows), 20,
-                          address_of(bounds))  # fmt: skip
+                          address_of(bounds))
             middle = 0.5 * (begin + end)
             at_middle = robot.link_poses(q0 + middle * (q1 - q0))[:, link] @ corners.T
             moved = np.zeros(20)

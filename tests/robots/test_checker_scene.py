@@ -37,7 +37,7 @@ def test_names_of_bodies_by_their_numbers():
     assert checker.names_of(0, 1) == ("cart", "base") and checker.names_of(1, -1) == ("base", "wall")
     assert checker.names_of(0, -2) == ("cart", "ball") and checker.n_pairs == 4
     for a, b, words in ((2, 0, "names_of: a"), (0, 2, "names_of: b"), (0, -3, "b must be an integer, one of"),
-                        (0, 0.5, "names_of: b")):  # fmt: skip
+                        (0, 0.5, "names_of: b")):
         with pytest.raises(InvalidArgument, match=words):
             checker.names_of(a, b)
 
@@ -49,7 +49,7 @@ def test_names_of_bodies_by_their_numbers():
     ({"attached": 3}, InvalidArgument, "attached"),
     ({"allowed": 3}, InvalidArgument, "allowed"),
     ({"mobile": "yes"}, InvalidArgument, "mobile"),
-])  # fmt: skip
+])
 def test_arguments_of_another_kind_are_named(arguments, error, words):
     with pytest.raises(error, match=words):
         scene(**arguments)
@@ -68,7 +68,7 @@ def test_a_setting_stays_until_the_world_changes():
         lambda: world.set_pose("wall", pose(t=(2.0, 0, 0))), lambda: world.allow("wall", "ball", reason="known"),
         lambda: world.set_margin("ball", 0.5), lambda: world.add(collide.Sphere(1.0), name="cart"),
         lambda: world.sleep(["ball"]), lambda: world.remove("wall"),
-    )  # fmt: skip
+    )
     for change in changes:
         before = checker.setting
         change()

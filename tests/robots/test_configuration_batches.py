@@ -77,7 +77,7 @@ def test_of_pairs_left_to_others_the_nearest_is_found_among_convex_ones():
     for row, (x,) in zip(rows, q.tolist()):
         shapes = ((LIDLESS, 1.0), (LIDLESS, -1.0), (collide.Sphere(0.05), 0.5), (LIDLESS, 3.0))
         gaps = [collide.distance(collide.Sphere(0.1), shape, pose(t=(x, 0, 0)), pose(t=(at, 0, 0))).distance
-                for shape, at in shapes]  # fmt: skip
+                for shape, at in shapes]
         assert abs(row["distance"] - min(gaps)) <= 1e-9 and -1 - row["b"] == int(np.argmin(gaps)), (x, row, gaps)
     assert set((-1 - rows["b"]).tolist()) == {1, 2}
 

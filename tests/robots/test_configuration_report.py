@@ -29,7 +29,7 @@ def test_the_text_of_a_free_configuration():
     assert text.split("\n") == [
         "arm: free (12 pairs tested)", "  near: cart and wall, 12.5 mm apart, at (1, -0.25, 0.3333) m", "  a note",
         "  never tested: 20 pairs, a reason", "  never tested: 1 pairs, b reason",
-    ]  # fmt: skip
+    ]
 
 
 def test_the_text_of_a_collision():
@@ -38,7 +38,7 @@ def test_the_text_of_a_collision():
     assert str(made).split("\n") == [
         "arm: in collision (12 pairs tested)", "  collides: cart and wall, 12.5 mm deep, at (1, -0.25, 0.3333) m",
         "  collides: cart and pin, -0 mm deep, at (1, -0.25, 0.3333) m",
-    ]  # fmt: skip
+    ]
 
 
 @pytest.mark.parametrize(("n", "more"), [(1, 0), (8, 0), (9, 1), (11, 3)])

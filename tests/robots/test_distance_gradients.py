@@ -17,7 +17,7 @@ from collide.robots.robot_distances import NO_GRADIENT
 
 STEP = 1e-6
 ROBOTS = {"ur5": "ur_description/urdf/ur5_robot.urdf", "panda": "panda_description/urdf/panda.urdf",
-          "xarm": "xarm_description/urdf/xarm7.urdf"}  # fmt: skip
+          "xarm": "xarm_description/urdf/xarm7.urdf"}
 needs_robots = pytest.mark.skipif(DEMO is None, reason="example-robot-data is not installed")
 
 
@@ -97,7 +97,7 @@ def test_random_robots_of_every_shape():
 
 def test_every_reason_is_told():
     notch = collide.Compound([(collide.Mesh(*collide.tessellate(collide.Box((0.2, 0.2, 0.2)))[:2]), pose(t=(x, 0, 0)))
-                              for x in (0.0, 0.3)])  # fmt: skip
+                              for x in (0.0, 0.3)])
     world = collide.World()
     world.add(collide.Box((0.5, 0.5, 0.5)), pose(t=(1.0, 0, 0)), name="wall")
     ball = collide.RobotChecker(slider(collide.Sphere(0.25)), world)

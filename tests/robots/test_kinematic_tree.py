@@ -37,7 +37,7 @@ def follower(name: str, followed: str | None = None, *numbers: float, kind: str 
 
 
 @pytest.mark.parametrize("axis", [(0.0, 1.0), (1.0, 0.0, 0.0, 0.0), ((0.0, 0.0, 1.0),), (0.0, math.nan, 1.0),
-                                  (math.inf, 0.0, 0.0)])  # fmt: skip
+                                  (math.inf, 0.0, 0.0)])
 @pytest.mark.parametrize("kind", ["revolute", "fixed"])
 def test_an_axis_is_three_finite_numbers(axis, kind):
     with pytest.raises(SceneError, match='joint "j": axis must be 3 finite numbers, got'):
@@ -47,7 +47,7 @@ def test_an_axis_is_three_finite_numbers(axis, kind):
 @pytest.mark.parametrize(("kind", "is_refused"), [
     ("revolute", True), ("continuous", True), ("prismatic", True), ("planar", True), ("floating", False),
     ("fixed", False),
-])  # fmt: skip
+])
 def test_an_axis_of_no_length_is_refused_where_it_is_used(kind, is_refused):
     for axis in ((0.0, 0.0, 0.0), (0.0, -1e-9, 0.0)):
         if is_refused:
@@ -155,7 +155,7 @@ def test_a_chain_is_composed_from_its_end():
     for listed in (joints, joints[::-1]):
         drivers = resolve_mimics(listed)
         assert drivers == {"a": ("a", 1.0, 0.0), "b": ("a", 2.0, 0.5), "c": ("a", -2.0, -0.25),
-                           "free": ("free", 1.0, 0.0)}  # fmt: skip
+                           "free": ("free", 1.0, 0.0)}
         assert broken_mimics(listed) == {}
     assert resolve_mimics([joint("fixed"), joint("floating", name="k")]) == {}
 
@@ -176,7 +176,7 @@ def test_multiplier_and_offset_must_both_be_finite(numbers):
 
 def test_circles_are_told_whole_and_what_hangs_on_them_is_not_broken():
     joints = [follower("x", "a"), follower("a", "b"), follower("b", "c"), follower("c", "a"), follower("self", "self"),
-              follower("y", "x")]  # fmt: skip
+              follower("y", "x")]
     broken = broken_mimics(joints)
     assert broken.keys() == {"a", "b", "c", "self"}
     assert broken["self"] == "joints mimic each other in a circle, self -> self"
@@ -187,7 +187,7 @@ def test_what_cannot_follow_or_be_followed_is_told():
     joints = [
         follower("weld", kind="fixed"), follower("plane", "a", kind="planar"), follower("a"),
         follower("of weld", "weld"), follower("of plane", "plane"), follower("of nothing", "nothing"),
-    ]  # fmt: skip
+    ]
     broken = broken_mimics(joints)
     assert broken["plane"] == "a planar joint has no single value that could follow another"
     for name in ("weld", "plane", "nothing"):

@@ -35,7 +35,7 @@ def nearer(mine: tuple, theirs: tuple) -> tuple:
 def test_no_pair_is_infinitely_far():
     assert distances_of(rows((0, 0, -1.0, 0, True), (-1, 0, -1.0, 0, True), (3, 0, 2.0, 0, True))).tolist() == [
         -1.0, np.inf, 2.0,
-    ]  # fmt: skip
+    ]
     some, none = (0, 1.0, 1.0, 1.0, True), (-1, 0.0, 0.0, 0.0, False)
     assert nearer(some, none) == nearer(none, some) == some
     assert nearer(none, none)[0] == -1

@@ -131,7 +131,7 @@ def test_which_joints_move_which_links():
     assert moved == {
         "turn": {"a", "b", "c", "left", "right"}, "weld": {"b", "c", "left", "right"}, "slide": {"c", "left", "right"},
         "left": {"left"}, "right": {"right"},
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.parametrize(("argument", "value", "words"), [
@@ -143,7 +143,7 @@ def test_which_joints_move_which_links():
     ("states", {"up": 3}, r"states\['up'\]"),
     ("notes", [3], "notes"),
     ("joints", ["turn"], "joints"),
-])  # fmt: skip
+])
 def test_arguments_of_another_kind_are_named(argument, value, words):
     with pytest.raises(SceneError, match=words):
         arm(**{argument: value})

@@ -22,7 +22,7 @@ def test_bodies_go_from_the_last_link_to_the_root_and_objects_come_first():
     bodies, objects = robot_bodies(robot, [("tool", "cart", BALL), ("cap", "base", BALL, pose(t=(1, 2, 3)), "x")], 0.25)
     assert [(body.name, body.link, body.padding) for body in bodies] == [
         ("tool", 1, 0.25), ("cap", 0, 0.25), ("cart", 1, 0.25), ("base", 0, 0.25),
-    ]  # fmt: skip
+    ]
     assert objects["tool"].touch == () and objects["cap"].touch == ("x",)
     assert np.array_equal(objects["tool"].X_LS, np.eye(4)) and objects["cap"].X_LS[:3, 3].tolist() == [1, 2, 3]
 
@@ -69,7 +69,7 @@ def test_paddings_that_are_lengths_and_those_by_name():
     ([("tool", "cart", BALL, np.eye(3))], InvalidPose, 'attached "tool": X_LS'),
     ([("tool", "cart", BALL)] * 2, InvalidArgument, 'the name "tool" is used twice'),
     ([("base", "cart", BALL)], InvalidArgument, 'the name "base" is used twice'),
-])  # fmt: skip
+])
 def test_objects_that_are_none_are_told(attached, error, words):
     with pytest.raises(error, match=words):
         robot_bodies(slider(), attached, 0.0)
@@ -146,7 +146,7 @@ def test_static_and_sleeping_bodies_rest_with_the_base_alone():
 
 
 @pytest.mark.parametrize(("groups", "is_tested"), [((1, 1, 1, 1), True), ((2, 1, 1, 2), True), ((2, 1, 1, 1), False),
-                                                   ((1, 1, 1, 2), False), ((2, 3, 1, 1), False)])  # fmt: skip
+                                                   ((1, 1, 1, 2), False), ((2, 3, 1, 1), False)])
 def test_both_masks_must_hold_the_other_group(groups, is_tested):
     world = collide.World()
     world.add(BALL, name="cart", group=groups[0], mask=groups[1])
@@ -183,7 +183,7 @@ def test_paths_name_the_joints_that_move_from_the_link_to_the_root():
     joints = [
         Joint("turn", "revolute", "base", "a"), Joint("weld", "fixed", "a", "b"), Joint("fly", "floating", "b", "c"),
         Joint("slide", "prismatic", "base", "d"),
-    ]  # fmt: skip
+    ]
     robot = Robot("tree", ["c", "b", "base", "a", "d"], joints)
     assert paths_to_root(robot, [0, 1, 2, 3, 4]) == [["fly", "turn"], ["turn"], [], ["turn"], ["slide"]]
     assert paths_to_root(robot, []) == []

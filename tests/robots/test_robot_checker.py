@@ -158,7 +158,7 @@ def test_margins_are_decided_to_the_last_digit():
     cases = [  # half of the link, columns of q, shape, its x, where it begins, margin
         (0.25, beside - 0.25, ball, 0.30000000000000004, Fraction(0.30000000000000004) - Fraction(0.1), 0.2),
         (0.75, 0.15 + beside, plane, 0.0, Fraction(1), 0.1),
-    ]  # fmt: skip
+    ]
     for half, q, shape, x, begin, margin in cases:
         world = collide.World()
         world.add(shape, pose(t=(x, 0, 0)), name="wall", margin=margin)
@@ -406,7 +406,7 @@ def test_links_without_end_are_asked_like_others(padding):
                     A, B, X_WL[number[a]], X_WL[number[b]] if X_WB is None else X_WB,
                     security_margin=0.0 if X_WB is None else padding,
                 ) for A, a, B, b, X_WB in pairs_to_test(checker)
-            )  # fmt: skip
+            )
             assert found[k] == expected, f"seed {seed}, configuration {Q[k].tolist()}"
         ends = Q + rng.normal(size=Q.shape) * 0.2
         certified = checker.certify_edges(Q, ends)
@@ -438,7 +438,7 @@ def test_a_checker_of_a_scene():
             ("cart", 3.0, 0, False, 1), ("cup", 3.0, 0.5, False, 1), ("post", 3.5, 0.5, True, 1),
             ("ghost", 3.0, 0, False, 0), ("wall", 3.5, 0.0, True, 1),
         )
-    ]  # fmt: skip
+    ]
     placements = {"slider": SimpleNamespace(robot=slider(), X_WR=X_WR, carried=carried)}
     scene = SimpleNamespace(name="scene", placements=placements, bodies=bodies, allowed=[("cart", "wall")])
     for name in (None, "slider"):

@@ -33,7 +33,7 @@ def test_names_of_bodies_and_of_what_is_around():
     ({"distance": -0.5, "upper": 5e-324, "hit": True}, "bracket"),
     ({"distance": -0.5, "upper": -0.25, "hit": False}, "bracket"),
     ({"distance": 0.5, "upper": 1.0}, "bracket"),
-])  # fmt: skip
+])
 def test_why_there_is_no_gradient(values, reason):
     assert made(values).no_gradient == [NO_GRADIENT[reason] if reason else None]
 

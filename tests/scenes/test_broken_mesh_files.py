@@ -33,7 +33,7 @@ FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
 
 STL = "solid tetra\n" + "".join(
     "facet normal 0 0 0\nouter loop\n" + "".join("vertex {} {} {}\n".format(*POINTS[k]) for k in face) + "endloop\nendfacet\n" for face in FACES
-) + "endsolid tetra\n"  # fmt: skip
+) + "endsolid tetra\n"
 OBJ = "".join("v {} {} {}\n".format(*p) for p in POINTS) + "".join("f {} {} {}\n".format(*(k + 1 for k in face)) for face in FACES)
 OFF = "OFF\n4 4 6\n" + "".join("{} {} {}\n".format(*p) for p in POINTS) + "".join("3 {} {} {}\n".format(*face) for face in FACES)
 _PLY = (
@@ -77,7 +77,7 @@ def gltf(edit=lambda header: None, **numbers) -> dict:
         ],
         "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 24}],
         "buffers": [{"byteLength": len(data), "uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode()}],
-    }  # fmt: skip
+    }
     edit(header)
     return header
 
@@ -99,7 +99,7 @@ GOOD = {
     "continued.obj": OBJ.replace("f 1 3 2", "f 1 \\\n3 \\\n2"), "crlf.obj": OBJ.replace("\n", "\r\n"), "crlf.ply": PLY.replace("\n", "\r\n"),
     "crlf.stl": STL.replace("\n", "\r\n"), "one line.off": OFF.replace("OFF\n", "OFF "), "comments.off": "# of ours\n" + OFF.replace("\n3 ", " # here\n3 "),
     "solid in the header.stl": b"solid" + binary_stl()[5:], "floats.off": OFF.replace("3 0 2 1", "3 0 2.0 1"),
-}  # fmt: skip
+}
 NEEDS_TRIMESH = (".dae", ".gltf", ".glb")
 
 
@@ -277,7 +277,7 @@ BAD = {
     "glb cut": ("a.glb", glb()[:-20], "cut short or is damaged"),
     "glb chunk": ("a.glb", glb()[:12] + struct.pack("<I", 2**31) + glb()[16:], "a part of it says that it has 2147483648 bytes"),
     "glb empty": ("a.glb", b"glTF" + bytes(40), "is GLB of version 0"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", BAD)
@@ -302,7 +302,7 @@ def test_what_is_wrong_is_refused_with_place_and_value(tmp_path, case):
         ),
         ("a.gltf", gltf(lambda h: h["meshes"][0]["primitives"].append({"attributes": {"POSITION": 0}, "mode": 1})), "is lines (mode 1) and was not read"),
     ],
-)  # fmt: skip
+)
 def test_what_is_left_out_is_noted(tmp_path, name, content, note):
     scene = load(written(tmp_path, name, content))
     assert any(note in one for one in scene.notes), scene.notes
@@ -357,7 +357,7 @@ def test_numbers_as_trimesh_reads_them(tmp_path):
         "p.off": f"OFF\n30 40 0\n{rows}" + "".join(f"{len(p)} {' '.join(map(str, p))}\n" for p in polygons),
         "p.ply": _PLY.format("ascii").replace("vertex 4", "vertex 30").replace("face 4", "face 40").replace("double", "float") + rows
         + "".join(f"{len(p)} {' '.join(map(str, p))}\n" for p in polygons),
-    }  # fmt: skip
+    }
     for name, text in files.items():
         path = written(tmp_path, name, text)
         ((_, vertices, faces),), _ = read_triangles(path)

@@ -53,7 +53,7 @@ DEEP = {
     "compounds": "collide: 1\nbodies: [{name: a, shape: " + "{compound: [{shape: " * 20_000 + "{sphere: {radius: 1}}" + "}]}" * 20_000 + "}]",
     "block mappings": "".join(" " * k + "a:\n" for k in range(300)),
     "a tag on each": "!!seq [" * 50_000,
-}  # fmt: skip
+}
 
 
 @pytest.mark.many(6)
@@ -203,7 +203,7 @@ def test_pipes_in_every_place_where_a_file_is_named(tmp_path):
     for ask in (
         lambda: load(tmp_path / "r.urdf"), lambda: load(tmp_path / "s.json"), lambda: load("workcell", state=tmp_path / "pipe.stl"),
         lambda: Robot.load(tmp_path / "pipe.stl"), lambda: read_state(tmp_path / "pipe.stl"), lambda: Robot.load(tmp_path / "r.urdf", srdf=tmp_path / "pipe.stl"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(CollideError, match="pipe"):
             ask()
 
@@ -319,7 +319,7 @@ MEGABYTE = "n" * 2**20
         ("a.json", json.dumps({"robot_model_name": MEGABYTE})),
         ("a.json", f'{{"{MEGABYTE}": 1, "{MEGABYTE}": 2}}'),
     ],
-)  # fmt: skip
+)
 def test_messages_stay_short_whatever_the_names(tmp_path, name, text):
     (tmp_path / name).write_text(text)
     with pytest.raises(CollideError) as refusal:
@@ -406,7 +406,7 @@ SCENE = {
         {"name": "p", "shape": {"hpolytope": {"normals": np.vstack([np.eye(3), -np.eye(3)]).tolist(), "offsets": [1] * 6}}},
     ],
     "allow": [["a", "m", "r"]], "states": {"st": {"l_j": 0.1}},
-}  # fmt: skip
+}
 PLANNING = {
     "name": "x", "robot_model_name": "r",
     "robot_state": {
@@ -425,12 +425,12 @@ PLANNING = {
         "meshes": [{"vertices": [{"x": 0, "y": 0, "z": 0}, {"x": 1}, {"y": 1}], "triangles": [{"vertex_indices": [0, 1, 2]}]}], "mesh_poses": [{}],
         "planes": [{"coef": [0, 0, 1, 0]}], "plane_poses": [{}], "primitives": [{"type": "sphere", "dimensions": [1]}],
     }]},
-}  # fmt: skip
+}
 STATE = {"joint_state": {"name": ["j"], "position": [0.5]}}
 JUNK = [
     None, True, 0, -1, 1.5, 1e60, float("nan"), 10**60, "", "x", "1", [], [1], [[]], ["x"], {}, {"x": 1}, [None], [{}], {"a": {"b": [1]}},
     [[1, 2, 3]], "\0", [True],
-]  # fmt: skip
+]
 
 
 def places(data, above=()):
@@ -574,7 +574,7 @@ def gltf_chain(n: int) -> str:
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
         "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
         "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri": f"data:;base64,{data}"}],
-    })  # fmt: skip
+    })
 
 
 LONG = {
@@ -585,7 +585,7 @@ LONG = {
     "equal objects.obj": lambda n: "".join(f"o part{k}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n" for k in range(n)),
     "chain.urdf": urdf_chain, "chain.gltf": gltf_chain,
     "pieces.stl": lambda n: "".join(f"solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 {k}\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n" for k in range(n)),
-}  # fmt: skip
+}
 
 
 @pytest.mark.many(2)
@@ -668,7 +668,7 @@ def mjcf(asset: str = "", world: str = "") -> str:
         (mjcf('<hfield name="h" file="zero.png" size="1 1 1 1"/>'), "zero.png: is a device"),
         ('<mujoco><include file="round.xml"/></mujoco>', "includes more than"),
     ],
-)  # fmt: skip
+)
 def test_models_are_looked_at_before_mujoco_reads_them(tmp_path, text, words):
     mujoco = pytest.importorskip("mujoco")
     if not hasattr(os, "mkfifo"):

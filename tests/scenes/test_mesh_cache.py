@@ -111,7 +111,7 @@ def test_entries_are_looked_at(folder, ball):
     grown = b"9" * 12 + right[comma:header_end]
     huge = right[:at] + grown[: header_end - at] + right[header_end:]
     bad = {"another key": forged(entry, 0.01, "0" * 64), "a huge count": huge, "empty": b"", "no zip": b"x" * 900,
-           "cut": right[:-80]}  # fmt: skip
+           "cut": right[:-80]}
     for k in range(60, len(right), len(right) // 20):
         bad[f"bit {k}"] = right[:k] + bytes([right[k] ^ 1]) + right[k + 1:]
     read = 0

@@ -117,7 +117,7 @@ def test_tested_pairs_are_those_of_mujoco(tmp_path):
             frozenset((a, b)) for a in owners for b in owners
             if owners[a] != owners[b] and frozenset((owners[a], owners[b])) not in never
             and not {owners[a], owners[b]} <= static
-        }  # fmt: skip
+        }
         named = {frozenset(pair) for pair in zip(model.pair_geom1.tolist(), model.pair_geom2.tolist())}
         rigid = {pair for pair in named if len(set(model.body_weldid[model.geom_bodyid[list(pair)]])) == 1}
         still = {pair for pair in named if {owners[geom] for geom in pair} <= static}
@@ -175,7 +175,7 @@ def test_verdicts_are_those_of_mujoco(tmp_path):
             theirs = {
                 frozenset(owners[int(geom)] for geom in contact.geom)
                 for contact in data.contact[: data.ncon] if contact.dist <= 0
-            }  # fmt: skip
+            }
             theirs = {pair for pair in theirs if len(pair) == 2 and not pair <= static}
             theirs -= {frozenset(pair[:2]) for pair in scene.allowed}  # pairs that the model names, welded together
             for a, b in ours ^ theirs:
@@ -199,14 +199,14 @@ def test_defaults_units_limits_and_includes(write):
     write(
         '<worldbody><body name="hand" pos="0 0 1"><joint name="grip" type="slide" class="slow"/><geom name="palm" '
         'class="big"/></body></worldbody>', "parts/hand.xml",
-    )  # fmt: skip
+    )
     file = write(
         '<compiler angle="degree"/><default><geom type="box" size=".1 .1 .1"/><default class="slow"><joint axis="1 0 0"'
         ' range="-.5 .25"/><default class="fast"><joint range="-90 45" axis="0 1 0" ref="30"/></default></default>'
         '<default class="big"><geom type="capsule" size=".2 .5"/></default></default><worldbody><body name="arm" '
         'childclass="fast"><joint name="turn"/><joint name="spin" axis="0 0 1" limited="false"/><geom name="boxed"/>'
         '</body></worldbody><include file="parts/hand.xml"/>', root='<mujoco model="gripper">',
-    )  # fmt: skip
+    )
     robot = Robot.load(file)
     assert robot.name == "gripper" and robot.joint_names == ("turn", "spin", "grip")
     kinds = {joint.name: joint.type for joint in robot.joints}
@@ -225,7 +225,7 @@ def test_links_of_several_joints_keep_the_names_of_bodies(write):
     robot = Robot.load(write(
         '<worldbody><body name="a"><joint name="x" type="slide"/><joint name="y" pos="0 0 1"/><geom size=".1"/>'
         '<body><joint/><geom size=".1"/></body></body></worldbody>'
-    ))  # fmt: skip
+    ))
     assert robot.links == ("world", "a/x", "a/y", "a", "body 2")
     assert [(joint.name, joint.parent, joint.child) for joint in robot.joints] == [
         ("x", "world", "a/x"), ("y", "a/x", "a/y"), ("a/fixed", "a/y", "a"), ("body 2/joint", "a", "body 2")
@@ -281,7 +281,7 @@ def test_surroundings_are_bodies_of_a_scene(write):
         'pos="0 0 -5"/><body name="stand" pos="0 0 1" euler="0 90 0"><geom name="side" type="plane" size="1 1 1"/>'
         '<geom name="leg" type="box" size=".1 .1 .1"/></body><body name="ball"><freejoint/><geom name="round" size=".1"'
         '/></body></worldbody>'
-    )  # fmt: skip
+    )
     robot, scene = Robot.load(file), load(file)
     assert list(robot.geometry) == ["stand", "ball"] and robot.base_links == ("world", "stand")
     assert "what stands in the world is no part of the robot: floor, world/geom 1, side" in robot.notes[-1]
@@ -334,7 +334,7 @@ def test_keyframes_are_states(write):
         '/><body name="c"><joint name="h" ref="20" range="-90 90"/><geom name="gc" pos=".3 .2 .1" size=".1"/></body>'
         '</body></worldbody><keyframe><key name="home" qpos="4 5 6 .1 .2 .3 .4 1 2 3 4 .5"/>'
         '<key qpos="0 0 1 1 0 -1 0 1 0 1 0 -.25"/></keyframe>'
-    )  # fmt: skip
+    )
     model, scene = mujoco.MjModel.from_xml_path(str(file)), load(file)
     assert list(scene.states) == ["qpos0", "home", "key 1"]
     data = mujoco.MjData(model)
@@ -362,7 +362,7 @@ def test_an_srdf_beside_it_counts_too(write, tmp_path):
         '<worldbody><body name="a"><freejoint/>' + BALL.format("ga") + '</body><body name="b"><freejoint/>'
         + BALL.format("gb") + '</body><body name="c"><freejoint/>' + BALL.format("gc")
         + '</body></worldbody><contact><exclude body1="a" body2="b"/></contact>'
-    )  # fmt: skip
+    )
     (tmp_path / "m.srdf").write_text('<robot name="m"><disable_collisions link1="b" link2="c" reason="User"/></robot>')
     assert Robot.load(file).disabled_pairs == [("a", "b", "MuJoCo: excluded"), ("b", "c", "SRDF: User")]
     assert Robot.load(file, srdf=False).disabled_pairs == [("a", "b", "MuJoCo: excluded")]
@@ -374,7 +374,7 @@ def test_scene_files_name_models(write, tmp_path):
         '<worldbody><geom name="wall" type="box" size=".1 1 1" pos="2 0 0" contype="2" conaffinity="2"/><body name="a" '
         'pos="1 0 0"><joint name="j" ref="10"/><geom name="ga" size=".1" pos=".1 0 0"/></body></worldbody><keyframe>'
         '<key name="up" qpos="1"/></keyframe>'
-    )  # fmt: skip
+    )
     scene_file = tmp_path / "s.json"
     scene_file.write_text(
         '{"collide": 1, "robots": [{"mjcf": "m.xml", "state": "up"}, {"mjcf": "m.xml", "prefix": "B_", "name": "B", '
@@ -434,7 +434,7 @@ def test_commands_take_models(write, capsys):
     file = write(
         '<worldbody><geom name="floor" type="plane" size="1 1 1"/><body name="a" pos="0 0 .05"><freejoint/>'
         + BALL.format("g") + "</body></worldbody>"
-    )  # fmt: skip
+    )
     assert main(["check", str(file)]) == 1
     out = capsys.readouterr().out
     assert "floor" in out and "a" in out

@@ -191,7 +191,7 @@ def box_pairs(A, B, gap=0.0) -> int:
         steps = [(2 * i + a if a >= 0 else i, 2 * j + b if b >= 0 else j, keep) for a, b, keep in (
             *((a, b, down_i & down_j) for a in (0, 1) for b in (0, 1)),
             *((a, -1, down_i & ~down_j) for a in (0, 1)), *((-1, b, ~down_i & down_j) for b in (0, 1)),
-        )]  # fmt: skip
+        )]
         i, j = (np.concatenate([step[k][step[2]] for step in steps]) for k in (0, 1))
     return looked
 
@@ -250,7 +250,7 @@ def test_numbers_that_make_none():
         lambda: harpsicordion(2000, 6.0),
         lambda: accordion(True), lambda: chazelle("many"), lambda: harpsicordia(1000, 10.0, math.inf),
         lambda: harpsicordia(1000, 10.0, -1.0), lambda: harpsicordia(10**6, 10.0, 1e15),
-    ):  # fmt: skip
+    ):
         with pytest.raises(SceneError):
             ask()
 

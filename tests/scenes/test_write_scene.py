@@ -37,7 +37,7 @@ SHAPES = [
     Mesh(*TETRAHEDRON), Mesh(*TETRAHEDRON, solid=False),
     Mesh(TETRAHEDRON[0], TETRAHEDRON[1][:2]), HeightField([[0, 0.1, 0.2], [0.3, 0, 1 / 3]], (0.5, 0.25)),
     Compound([(Sphere(0.1), TURNED), (Compound([(Mesh(*TETRAHEDRON), TURNED)]), pose())]),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
@@ -87,7 +87,7 @@ def test_facets_in_the_file_itself(tmp_path):
         ({"vertices": vertices, "faces": faces, "scale": 2}, "'scale' goes with a file"),
         ({"vertices": vertices, "faces": faces[:2], "solid": True}, "no inside"),
         ({"file": "a.stl", "faces": faces}, "in place of a file"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(collide.CollideError, match=complaint):
             read(**wrong)
 

@@ -44,7 +44,7 @@ def test_order_and_poses_make_the_difference():
         ([(BALL, np.stack([EYE, EYE]))], InvalidPose, "one .*pose, got \\(2, 4, 4\\)"),
         ([(BALL, np.full((4, 4), np.nan))], InvalidPose, r"items\[0\]"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_compound(items, error, words):
     with pytest.raises(error, match=words):
         Compound(items)

@@ -56,7 +56,7 @@ def test_faces_given_are_judged_by_validate_alone():
     [({"points": np.zeros((0, 3))}, "points"), ({"points": np.zeros((3, 2))}, r"shape \(N, 3\)"),
      ({"points": [[0, 0, np.nan]]}, "finite"), ({"points": [[1e-60, 0, 0]]}, "at least 1e-50"),
      ({"points": CUBE, "radius": -1.0}, "radius must be ≥ 0"), ({"points": CUBE, "faces": [[0, 1, 8]]}, r"faces\[0\]")],
-)  # fmt: skip
+)
 def test_what_is_no_hull(arguments, words):
     with pytest.raises(InvalidShape, match=f"ConvexHull.*{words}"):
         ConvexHull(**arguments)

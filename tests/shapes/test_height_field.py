@@ -221,7 +221,7 @@ def test_every_query_answers_as_for_its_mesh():
         HeightField(rng.normal(size=(3, 3)) * 0.1, 0.2),
         collide.ConvexHull(rng.normal(size=(12, 3)) * 0.2, radius=0.05),
         collide.Compound([(collide.Sphere(0.1), EYE), (collide.Box((0.5, 0.1, 0.1)), pose(t=(0, 0, 0.2)))]),
-    ]  # fmt: skip
+    ]
     X = np.array([random_pose(rng, 0.7) for _ in others])
     X[:, 2, 3] += np.arange(len(others)) % 2
     listed = collide.distance([field] * len(others), others, EYE, X, threads=2)
@@ -286,7 +286,7 @@ EXTREMES = {
     "thin": ([[0, 1e-9], [1e-9, 0]], 1, -1e-12), "huge cells": ([[0, 1], [1, 0]], 1e40, None),
     "tiny cells": ([[0, 1e-30], [0, 0]], 1e-40, None), "unequal": ([[0, 1], [1, 0]], (1e-8, 1e8), None),
     "far up": (1e12 + np.arange(9.0).reshape(3, 3), 0.1, None), "long": (np.arange(40.0).reshape(2, 20) % 3, 0.1, None),
-}  # fmt: skip
+}
 
 
 @pytest.mark.many(2)
@@ -342,7 +342,7 @@ REFUSED = {
         lambda: HeightField([[-1e50, 1e50], [0, 0]], 1),
         "HeightField: heights: the bottom would be at -3e+50 m, beyond 1e+50 m",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", REFUSED)

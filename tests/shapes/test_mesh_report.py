@@ -30,7 +30,7 @@ CASES = {
     "no area": ((BOX, np.concatenate([FACES, [[0, 0, 1]]])), True, {"no area": {12}}),
     "two at a vertex": (joined((BOX, FACES), box((1, 1, 1), (2, 2, 2))), True, {"non-manifold vertices": None}),
     "two at an edge": (joined((BOX, FACES), box((1, 1, -1), (2, 2, 1))), True, {"non-manifold edges": None}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", CASES)

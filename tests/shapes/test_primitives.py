@@ -37,7 +37,7 @@ def test_three_lengths(kind, field):
     for arguments, words in (
         (((1, 2),), "shape"), ((1, 2), "got \\(1, 2, None\\)"), (((1, -2, 3),), rf"{field}\.y must be > 0"),
         (((1, 2, math.inf),), "finite"), ((((1, 2, 3),) * 2,), "shape"), ((0, 1, 1), rf"{field}\.x"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(InvalidShape, match=words):
             kind(*arguments)
 

@@ -58,7 +58,7 @@ def answers(shape) -> list[bytes]:
     probe = ConvexHull(ball(4, 60) * 0.4)
     r = collide.distance(shape, probe, EYE, poses())
     return [r[name].tobytes() if name == "rows" else getattr(r, name).tobytes() for name in (
-        "hit", "distance", "lower", "upper", "normal", "point_a", "point_b")]  # fmt: skip
+        "hit", "distance", "lower", "upper", "normal", "point_a", "point_b")]
 
 
 def stored(shape, tmp_path) -> dict[str, np.ndarray]:
@@ -80,7 +80,7 @@ def forged(array: np.ndarray) -> dict[str, np.ndarray]:
         "zero": np.zeros_like(array), "one more axis": array[None], "as text": array.astype(str),
         "as complex": array.astype(complex), "as float32": array.astype(np.float32), "as int16": array.astype(np.int16),
         "flat and longer": np.concatenate([array.ravel(), array.ravel()]),
-    }  # fmt: skip
+    }
     for value in (np.nan, np.inf, -1, 1e300, 2**20):
         changed = array.copy()
         with np.errstate(all="ignore"):
@@ -248,7 +248,7 @@ def damages(path):
         "another kind": (lambda: path.write_bytes(b"solid ascii stl\nendsolid\n"), r"scenes\.load"),
         "half a file": (lambda: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]), "no file that"),
         "another version": (changed("format.npy", header_of(np.array(99))), "another format"),
-    }  # fmt: skip
+    }
 
 
 def header_of(array) -> bytes:
@@ -260,7 +260,7 @@ def header_of(array) -> bytes:
 KINDS = sorted(["compressed", "a huge array", "a negative array", "objects", "a header that is no header",
     "a header of code", "cut short", "only magic", "nothing in it", "an array besides", "an array less",
     "a newer array format", "encrypted", "compression 99", "empty", "another kind", "half a file",
-    "another version"])  # fmt: skip
+    "another version"])
 
 
 @pytest.mark.parametrize("kind", ["mesh", "hull"])

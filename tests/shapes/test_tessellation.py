@@ -44,7 +44,7 @@ CONVEX = {
     "swept triangle": (ConvexHull([(0, 0, 0), (1, 0, 0), (0, 1, 0)], radius=0.1), None),
     "swept needle": (ConvexHull([(0, 0, 0), (1e-3, 0, 0), (100, 1, 1)], radius=0.01), None),
     "polytope": (HPolytope(np.vstack([np.eye(3), -np.eye(3)]), [1, 2, 3, 1, 2, 3]), 48.0),
-}  # fmt: skip
+}
 
 
 def support(shape, u: np.ndarray) -> np.ndarray:

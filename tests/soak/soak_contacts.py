@@ -36,7 +36,7 @@ POOL = 40
 KINDS = (
     "box", "hull", "plate", "needle", "segment", "collinear", "rounded hull", "swept triangle", "capsule", "sphere",
     "cylinder", "cone", "ellipsoid", "half-space",
-)  # fmt: skip
+)
 ROUND = ("capsule", "cylinder")
 
 
@@ -84,7 +84,7 @@ def shape(kind: str, rng) -> collide.Shape:
         "cylinder": lambda: collide.Cylinder(L[0] / 2, L[1]), "cone": lambda: collide.Cone(L[0] / 2, L[1]),
         "ellipsoid": lambda: collide.Ellipsoid(L / 2),
         "half-space": lambda: collide.Halfspace(rng.normal(size=3), 0.3 * rng.normal()),
-    }[kind]()  # fmt: skip
+    }[kind]()
 
 
 def _is_solid(points) -> bool:
@@ -239,7 +239,7 @@ def along_edges(seed, rng) -> Case:
     B = {
         "capsule": collide.Capsule(radius, length), "cylinder": collide.Cylinder(radius, length),
         "segment": collide.ConvexHull([[0, 0, -length / 2], [0, 0, length / 2]], radius=radius),
-    }[which]  # fmt: skip
+    }[which]
     angle = 10.0 ** rng.uniform(-16, -4)
     lean = rng.uniform(-0.6, 0.6)
     out = np.array([0.0, math.cos(math.pi / 4 + lean), math.sin(math.pi / 4 + lean)])
@@ -300,7 +300,7 @@ FAMILIES = {
     "at random": at_random, "touching": touching, "thin": thin, "nearly collinear": collinear, "tilted": tilted,
     "tiny beside huge": tiny_beside_huge, "flush, or an ulp off": flush, "along edges": along_edges,
     "curved": curved, "swept": swept, "meshes": meshes,
-}  # fmt: skip
+}
 #: Of so many cases of a family that is slow to judge, all but the first are of the others.
 RARE = {"meshes": 3}
 

@@ -397,7 +397,7 @@ def judge_certificate(asked: Asked) -> Iterator[Failure]:
 JUDGES = (
     judge_bracket, judge_normal, judge_points, judge_move, judge_swapped, judge_ladder, judge_unsigned, judge_limits,
     judge_world, judge_contacts, judge_certificate,
-)  # fmt: skip
+)
 
 
 class Judged(NamedTuple):

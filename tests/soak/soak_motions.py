@@ -72,7 +72,7 @@ def soak_group(family: str, seed: list[int], n: int, tally: Tally) -> None:
         )
     counted = (
         np.ones(n, dtype=bool), proven, ~r.hit, r.hit & ~proven, proven & ~r.certified, missed, made_up
-    )  # fmt: skip
+    )
     for name, mask in zip(tally.counts, counted):
         tally.counts[name] += int(mask.sum())
 

@@ -20,12 +20,12 @@ MESHES = ("solid", "surface", "mesh compound")
 KINDS = (
     "sphere", "box", "capsule", "hull", "swept hull", "flat hull", "h-polytope", "half-space",
     *CURVED, "compound", "solid", "surface", "mesh compound",
-)  # fmt: skip
+)
 #: Kinds that only Worlds are soaked with: the oracle of pairs has none of them, or has them among the others.
 WORLD_KINDS = (
     *KINDS, "point", "segment", "polygon", "height field", "region", "region with an end", "half-space compound",
     "nested compound",
-)  # fmt: skip
+)
 #: Those that have no end.
 ENDLESS = ("half-space", "region", "half-space compound")
 POSES = ("near", "equal origins", "inside", "anywhere", "one frame")
@@ -304,7 +304,7 @@ def source(shape) -> str:
     if kind == "ConvexHull":
         return f"C.ConvexHull({shape.points.tolist()!r}, radius={shape.radius!r})"
     names = {"Box": ("size",), "Sphere": ("radius",), "Ellipsoid": ("radii",), "Halfspace": ("normal", "offset"),
-             "HPolytope": ("normals", "offsets")}.get(kind, ("radius", "length"))  # fmt: skip
+             "HPolytope": ("normals", "offsets")}.get(kind, ("radius", "length"))
     values = (getattr(shape, name) for name in names)
     return f"C.{kind}(" + ", ".join(repr(v.tolist() if isinstance(v, np.ndarray) else v) for v in values) + ")"
 

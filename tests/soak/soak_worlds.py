@@ -57,7 +57,7 @@ MOST_OPEN = 0.01
 #: Kinds of which two are within a margin or not for certain: integers decide (docs of `collide.collide`).
 EXACT = (
     "sphere", "box", "capsule", "hull", "swept hull", "flat hull", "point", "segment", "polygon", "half-space",
-)  # fmt: skip
+)
 #: Fields of rows that say nothing of the pair.
 _SKIPPED = ("a", "b", "iterations")
 _PAIR_FIELDS = tuple(name for name in PAIR_DTYPE.names or () if name not in _SKIPPED)
@@ -112,7 +112,7 @@ class Tally:
         return [
             (kind, what) for kind in WORLD_KINDS for what in columns
             if not self.cells[kind, what] and (kind, what) not in NEVER
-        ]  # fmt: skip
+        ]
 
     def is_mostly_decided(self) -> bool:
         return sum(self.open.values()) <= MOST_OPEN * sum(self.judged.values())
@@ -127,7 +127,7 @@ class Tally:
         lines += [
             f"{sort:24} {n:7d} questions, {self.judged[sort]:8d} pairs judged, {self.share(sort):6.1%} hit or named, "
             f"{self.refused[sort]} refused, {self.open[sort]} open" for sort, n in self.questions.items()
-        ]  # fmt: skip
+        ]
         for columns in (tuple(ASKED), CHANGED):
             width = max(map(len, columns)) + 1
             lines += ["", " " * 20 + "".join(f"{name:>{width}}" for name in columns)]
@@ -178,7 +178,7 @@ class Model:
         body = Body(
             kind, made, self._anywhere(), bool(random.uniform() < 0.2), int(random.choice([1, 1, 3, 2])),
             int(random.choice([3, 3, 1, 2])), self._margin() if random.uniform() < 0.5 else 0.0,
-        )  # fmt: skip
+        )
         traits = {trait: getattr(body, trait) for trait in ("static", "group", "mask", "margin")}
         identity = self.world.add(made, body.X, name=name, **traits)
         self.bodies[identity] = body
@@ -730,12 +730,12 @@ ASKED: dict[str, tuple[float, Callable[[Model], Iterator[str]]]] = {
     "contacts": (0.06, Model.all_contacts), "nearest": (0.08, Model.nearest), "rays": (0.07, Model.rays),
     "casts": (0.03, Model.casts), "query": (0.06, Model.query), "boxes": (0.04, Model.boxes),
     "unanswerable": (0.02, Model.unanswerable), "overlaps": (0.01, Model.overlaps), "report": (0.01, Model.report),
-}  # fmt: skip
+}
 #: Changes.
 CHANGED = (
     "added", "moved", "moved near", "replaced", "removed", "margin set", "pair margin", "allowed pair", "put to sleep",
     "woken", "copied",
-)  # fmt: skip
+)
 #: Cells that stay empty, and why: none.
 NEVER: dict[tuple[str, str], str] = {}
 

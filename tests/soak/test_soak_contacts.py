@@ -13,7 +13,7 @@ import collide
 FOUND = [
     *((1, k) for k in (80, 135, 170, 308, 612, 689, 784, 805, 972, 1357, 2196, 9133)), (2, 2620), (2, 10339),
     *((1, k) for k in (16462, 33683, 52922, 64593, 81979, 93074)),
-]  # fmt: skip
+]
 
 
 @pytest.mark.slow
@@ -70,7 +70,7 @@ def keep_one(rows):
         (shift, ("touching", "flush, or an ulp off"), 0.9), (deepen, ("touching", "thin"), 0.9),
         (drop_all, ("flush, or an ulp off",), 0.9), (keep_one, ("along edges",), 0.9),
     ],
-)  # fmt: skip
+)
 def test_a_wrong_engine_is_noticed(change, families, least):
     with_rows = noticed = 0
     for number in range(60):

@@ -17,7 +17,7 @@ CASES = [
     ("smooth", 2), ("boxes", 8), ("cavities", 6), ("rings", 3), ("touching boxes", 5), ("random shells", 3),
     ("grid shells", 4), ("turned grid shells", 4), ("identical shells", 7), ("degenerate shells", 7),
     ("touching shells", 3), ("scaled shells", 4),
-]  # fmt: skip
+]
 
 
 class ManyVerdict(NamedTuple):
@@ -100,5 +100,5 @@ def same_bits(a, b) -> bool:
     if a.empty or b.empty:
         return a.empty and b.empty
     same = [np.array_equal(x.view(np.uint8), y.view(np.uint8)) for x, y in (
-        (a.mesh.vertices, b.mesh.vertices), (a.mesh.faces, b.mesh.faces))]  # fmt: skip
+        (a.mesh.vertices, b.mesh.vertices), (a.mesh.faces, b.mesh.faces))]
     return all(same)

@@ -16,7 +16,7 @@ import collide
 from collide.solids.configuration_obstacle import exact_obstacle
 
 TETRAHEDRON = (np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float),
-               np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]))  # fmt: skip
+               np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]))
 TURNED = collide.pose((0, 0, 0), rpy=(0.3, -0.4, 0.7))[:3, :3]
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 

@@ -168,7 +168,7 @@ def _touch(a, b, c, d) -> bool:
             return False
     first, second, third, fourth = _turn(a, b, c), _turn(a, b, d), _turn(c, d, a), _turn(c, d, b)
     return not ((first > 0 and second > 0) or (first < 0 and second < 0) or (third > 0 and fourth > 0)
-                or (third < 0 and fourth < 0))  # fmt: skip
+                or (third < 0 and fourth < 0))
 
 
 def winding(rings, x) -> int | None:

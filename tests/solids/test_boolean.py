@@ -150,7 +150,7 @@ def test_volume_brackets_hold():
         exact = sum(
             inner(a, cross(b, c))
             for a, b, c in _rounded_corners(collide.boolean(A, B, X, Y, "intersection").mesh)
-        ) / 6  # fmt: skip
+        ) / 6
         assert abs(float(exact) - r.volume) <= 1e-12 * r.volume
         assert 0 < r.lower <= r.volume <= r.upper <= r.lower * (1 + 1e-10)
 

@@ -66,7 +66,7 @@ def test_of_two_it_is_the_boolean():
     A, B = collide.Mesh(*bumpy_sphere(60)), collide.Mesh(*bumpy_sphere(60, 1))
     X = collide.pose((0.5, 0.1, 0.2), rpy=(0.1, 0.2, 0.3))
     pairs = [("union", "union"), ("intersection", "intersection"), ("parity", "symmetric_difference"),
-             (lambda bits: bits[0] and not bits[1], "difference"), ("at least 2", "intersection")]  # fmt: skip
+             (lambda bits: bits[0] and not bits[1], "difference"), ("at least 2", "intersection")]
     for rule, op in pairs:
         many, two = collide.combine([A, B], [I, X], rule), collide.boolean(A, B, I, X, op)
         assert many.mesh.report.volume == pytest.approx(two.mesh.report.volume, rel=1e-12)
@@ -108,7 +108,7 @@ def test_bad_rules_and_lists():
         (lambda bits: sum(bits), "must answer True or False, of bodies .* it answered 0"),
         (lambda bits: None, "it answered None"), (lambda bits: np.array(bits), "must answer True or False"),
         (lambda bits: not any(bits), "no body holds belongs"), (lambda: True, "rule .* raised TypeError"),
-    ]:  # fmt: skip
+    ]:
         with pytest.raises(InvalidArgument, match=words):
             collide.combine(shapes, poses, rule)
     with pytest.raises(InvalidArgument, match=r"3 shapes need as many poses, .* got 2"):

@@ -97,7 +97,7 @@ def test_bad_input():
         ([square(size=3.0), square(1.0, 1.0)], "wind 2 times"), ([square(), square(1.0)], "touch or cross"),
         ([np.repeat(square(), 2, axis=0)], "one place"), ("polygon", "ring 0 of A"),
         ([np.array([(0, 0), (2, 0), (1, 0), (1, 1)])], "touch or cross"),
-    ]:  # fmt: skip
+    ]:
         with pytest.raises(InvalidArgument, match=words):
             obstacle(bad, b)
     with pytest.raises(InvalidArgument, match="list of rings"):
@@ -130,7 +130,7 @@ def test_faults_are_noticed(monkeypatch):
     for fault_name, fault, name in (
         ("_corner_counts", convex_alone, "letters"),
         ("polygons_meet_at", lambda P, Q, x: False, "a frame and a larger square"),
-    ):  # fmt: skip
+    ):
         with monkeypatch.context() as patch:
             patch.setattr(module, fault_name, fault)
             assert noticed(name), fault_name

@@ -53,7 +53,7 @@ def scanned(coordinates, start, stride, count, directions, way=1):
     scan_all(
         address_of(coordinates), len(coordinates), start, stride, count, address_of(directions), len(directions),
         way, address_of(index), address_of(value),
-    )  # fmt: skip
+    )
     return index, value
 
 

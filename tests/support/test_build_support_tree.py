@@ -255,18 +255,18 @@ def test_without_compilation_the_bits_are_the_same(name, tmp_path):
     points, facets = {
         "small sphere": lambda: ellipsoid(100), "sphere": lambda: ellipsoid(400, seed=18),
         "bipyramid": lambda: bipyramid(250),
-    }[name]()  # fmt: skip
+    }[name]()
     tree = build_support_tree(points, np.arange(len(points)), facets, hull_of)
     directions = directions_for(points, facets, seed=19, each=10)
     directions = directions[np.abs(directions).max(axis=1) < 1e100]
     np.savez(
         tmp_path / "in.npz", points=points, vertices=np.arange(len(points)), facets=facets, directions=directions,
         none=np.zeros((0, 3)),
-    )  # fmt: skip
+    )
     child = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", PLAIN, str(tmp_path / "in.npz"), str(tmp_path / "out.npz"), *PARTS],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False, timeout=100,
-    )  # fmt: skip
+    )
     assert child.returncode == 0, child.stderr[-2000:]
     with np.load(tmp_path / "out.npz") as plain:
         for part, array in parts_of(tree).items():

@@ -72,7 +72,7 @@ def test_climbing_from_anywhere_is_exact(name):
     settle_from(
         tree.address, address_of(tree.points), len(points), address_of(starts), address_of(directions),
         len(directions), address_of(out),
-    )  # fmt: skip
+    )
     whole = integers(points)
     for g, start, found in zip(directions, starts, out[:, 0]):
         assert int(found) in farthest_of(whole, g), f"from {start}: {snippet(name, g)}"

@@ -28,7 +28,7 @@ def test_vectors(values, count, single):
     [((1, 2), r"ask: points must be \(3,\) or \(N, 3\), got \(2,\)"), (np.zeros((2, 2, 3)), r"\(2, 2, 3\)"),
      ([[0, 0, 0], [0, np.nan, 0]], r"points\[1\] has entries that are not finite, got \[0.0, nan, 0.0\]"),
      ("abc", "points"), ([[0, 0, np.inf]], r"points\[0\]")],
-)  # fmt: skip
+)
 def test_what_is_no_vector(values, words):
     with pytest.raises(InvalidArgument, match=words):
         vectors("ask", "points", values)

@@ -89,7 +89,7 @@ CURVED = {
         collide.HPolytope([[3, 1, 0], [-3, 0, 1], [0, 7, 1], [0, -1, 0], [1, 0, 3], [0, 0, -1]], [1, 1, 1, 1, 1, 1]),
         lambda x, y, z: 3 * x + y <= 1 and z - 3 * x <= 1 and 7 * y + z <= 1 and -y <= 1 and x + 3 * z <= 1 and -z <= 1,
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", CURVED)

@@ -43,7 +43,7 @@ SHAPES = {
     "segment": (ConvexHull([[0, 0, 0], [1, 0, 0]]), (0.25, 0.0, 0.0)),
     "half-spaces": (HPolytope([*np.eye(3), *-np.eye(3)], np.full(6, 0.5)), (0.5, 0.25, 0.125)),
     "solid mesh": (Mesh(*surfaces.box()), None), "open mesh": (Mesh(surfaces.box()[0], surfaces.box()[1][:-1]), None),
-}  # fmt: skip
+}
 
 
 def on_surface(name: str) -> np.ndarray:

@@ -31,7 +31,7 @@ def chain(n, *, length, width) -> Robot:
         joint(f"j{k}", "revolute", links[k], links[k + 1], axis=((0, 1, 0), (0, 0, 1))[k % 2], at=(length, 0, 0),
               lower=-2.5, upper=2.5)
         for k in range(n - 1)
-    ]  # fmt: skip
+    ]
     shape = Box((length, width, width))
     return robot_of(links, joints, {link: (shape, (length / 2, 0, 0)) for link in links})
 

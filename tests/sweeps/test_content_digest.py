@@ -40,7 +40,7 @@ VALUES = [
     robot_of(["l0", "l1"], [joint("j0", "continuous", "l0", "l1")], {}),
     robot_of(["l0", "l1"], [joint("j0", "revolute", "l0", "l1", upper=1.0)], {}),
     robot_of(["l0", "l1"], [joint("j0", "revolute", "l0", "l1", at=(0, 0, 1e-12))], {}),
-]  # fmt: skip
+]
 
 
 def test_different_content_has_different_digests():
@@ -67,7 +67,7 @@ def test_another_process_agrees():
         "print(digest({'z': (1.5, None), 'a': np.arange(3.0)}, collide.Box((1, 2, 3)), 'x'))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60,
-                          env={"PYTHONHASHSEED": "5", "PYTHONPATH": ":".join(filter(None, sys.path))})  # fmt: skip
+                          env={"PYTHONHASHSEED": "5", "PYTHONPATH": ":".join(filter(None, sys.path))})
     assert done.stdout.strip() == digest({"z": (1.5, None), "a": np.arange(3.0)}, Box((1, 2, 3)), "x")
 
 

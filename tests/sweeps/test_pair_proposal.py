@@ -33,14 +33,14 @@ def test_every_reason_by_hand():
             "far": (Sphere(0.1), (0, 1, 0)), "start": (Box((0.01, 0.01, 0.5)), (0, 0, 0)),
             "there": (Box((0.01, 0.01, 0.5)), (0.6, 0, 0)),
         },
-    )  # fmt: skip
+    )
     base_free = propose_disabled_pairs(robot, 2000, seed=3)
     # `base` has no geometry: the slider and what is welded to it are neighbours through it, as MoveIt has them.
     assert set(reasons(base_free).values()) == {"Adjacent"}
     with_base = robot_of(robot.links, robot.joints, {
         **{link: (elements[0].shape, elements[0].X_LG[:3, 3]) for link, elements in robot.geometry.items()},
         "base": (Sphere(0.01), (0, -1, 0)),
-    })  # fmt: skip
+    })
     found = propose_disabled_pairs(with_base, 2000, seed=3)
     assert reasons(found) == {
         ("base", "slider"): "Adjacent", ("base", "inner"): "Adjacent", ("base", "far"): "Adjacent",
@@ -49,7 +49,7 @@ def test_every_reason_by_hand():
         ("slider", "there"): None,
         ("inner", "far"): "Never", ("inner", "start"): "Always", ("inner", "there"): "Always",
         ("far", "start"): "Never", ("far", "there"): "Never", ("start", "there"): "Never",
-    }  # fmt: skip
+    }
     # The slider (half width 0.1) meets the post (0.005) where |slide − 0.6| ≤ 0.105, of a range of 2.
     share = found.pair("there", "slider")
     assert share.share_bounds[0] < 0.105 < share.share_bounds[1]
@@ -97,7 +97,7 @@ def test_rare_collision_is_found_by_search_alone():
             "tool": (Sphere(0.005), (0, 0, 0)), "post": (Sphere(0.005), (1.004, 1.004, 1.004)),
             "base": (Sphere(0.1), (-1, -1, -1)), "xy": (Sphere(0.001), (0, 0, -2)),
         },
-    )  # fmt: skip
+    )
     sampled = propose_disabled_pairs(robot, 5000, seed=1, rounds=0)
     assert reasons(sampled)["tool", "post"] == "Never"
     searched = propose_disabled_pairs(robot, 5000, seed=1)
@@ -109,7 +109,7 @@ def test_rare_collision_is_found_by_search_alone():
     robot = robot_of(robot.links, robot.joints, {
         "tool": (Sphere(0.005), (0, 0, 0)), "post": (Sphere(0.005), (post, post, post)),
         "base": (Sphere(0.1), (-1, -1, -1)), "xy": (Sphere(0.001), (0, 0, -2)),
-    })  # fmt: skip
+    })
     pair = propose_disabled_pairs(robot, 5000, seed=1).pair("tool", "post")
     assert pair.reason == "Never" and 1e-4 - 1e-12 <= pair.nearest.gap < 2e-3
 
@@ -128,7 +128,7 @@ def test_always_share():
         [joint("slide", "prismatic", "base", "a", lower=0.0, upper=1.0), joint("weld", "fixed", "base", "post")],
         {"a": (Box((0.1, 0.1, 0.1)), (0, 0, 0)), "post": (Box((1.84, 0.1, 0.1)), (1.0, 0, 0)),
          "base": (Sphere(0.1), (0, 0, 5))},
-    )  # fmt: skip
+    )
     # At slide s the faces stand at s + 0.05 and 0.08: apart for s < 0.03, of a range of 1; 0 is the default.
     assert propose_disabled_pairs(robot, 3000).pair("a", "post").reason is None
     assert propose_disabled_pairs(robot, 3000, always_share=0.95).pair("a", "post").reason == "Always"
@@ -140,7 +140,7 @@ def test_links_without_geometry_pass_adjacency_on():
         [joint("j1", "revolute", "a", "flange"), joint("j2", "fixed", "flange", "b"),
          joint("j3", "revolute", "flange", "c"), joint("j4", "revolute", "c", "d")],
         {link: (Sphere(0.1), (0, 0, 0)) for link in "abcd"},
-    )  # fmt: skip
+    )
     assert adjacent_links(robot) == {frozenset(pair) for pair in ("ab", "ac", "bc", "cd")}
 
 
@@ -171,7 +171,7 @@ def test_robot_without_geometry_is_refused():
 
 def test_joints_without_limits_are_told():
     robot = robot_of(["a", "b"], [joint("j", "floating", "a", "b")],
-                     {link: (Sphere(0.1), (0, 0, 0)) for link in "ab"})  # fmt: skip
+                     {link: (Sphere(0.1), (0, 0, 0)) for link in "ab"})
     proposal = propose_disabled_pairs(robot, 10)
     assert any("j/x, j/y, j/z" in note for note in proposal.notes)
 
@@ -183,7 +183,7 @@ def test_poses_of_elements_in_their_links_count():
         [joint("turn", "revolute", "base", "arm", axis=(0, 0, 1), lower=-math.pi, upper=math.pi),
          joint("weld", "fixed", "base", "post")],
         {"arm": (Sphere(0.1), (1, 0, 0)), "post": (Sphere(0.1), (-1, 0, 0)), "base": (Sphere(0.1), (0, 0, 3))},
-    )  # fmt: skip
+    )
     pair = propose_disabled_pairs(robot, 4000).pair("arm", "post")
     # Chord 2 sin(angle / 2) ≤ 0.2, on both sides of π.
     low, high = pair.share_bounds

@@ -37,7 +37,7 @@ def test_limits(robot):
         "narrow": (-0.5, 1.5), "turn": (-pi, pi), "wide": (-pi, pi), "high": (5, 5 + 2 * pi),
         "low": (-5 - 2 * pi, -5), "slide": (0.2, 0.3), "rail": (1, 1), "base/x": (0, 0), "base/y": (0, 0),
         "base/yaw": (-pi, pi),
-    }  # fmt: skip
+    }
     for name, low, high in zip(robot.joint_names, lower, upper):
         assert (low, high) == pytest.approx(expected[name]), name
     assert unlimited_lengths(robot) == ["rail", "base/x", "base/y"]
@@ -49,7 +49,7 @@ def test_any_split_gives_the_same_rows(robot):
     pieces = [random_configurations(robot, a, b, 7) for a, b in ((0, 1), (1, 400), (400, 401), (401, 1000))]
     assert np.array_equal(whole, np.vstack(pieces))
     assert np.array_equal(random_configurations(robot, 10**12, 10**12 + 3, 7)[1:],
-                          random_configurations(robot, 10**12 + 1, 10**12 + 3, 7))  # fmt: skip
+                          random_configurations(robot, 10**12 + 1, 10**12 + 3, 7))
     assert not np.array_equal(whole, random_configurations(robot, 0, 1000, 8))
 
 

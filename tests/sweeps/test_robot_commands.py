@@ -85,7 +85,7 @@ def test_srdf_as_json(capsys, arm):
         (["workcell", "--srdf", "arm.srdf"], "--srdf: workcell is a scene, which names the SRDF"),
         (["workcell", "--seed", "-1"], "seed"),
     ],
-)  # fmt: skip
+)
 def test_srdf_says_what_is_wrong(capsys, words, complaint):
     status, out, err = run(capsys, "srdf", *words)
     assert status == 2 and complaint in err and not out and len(err.splitlines()) == 1
@@ -139,7 +139,7 @@ def test_formats_of_configurations_agree(capsys, tmp_path, arm):
     answers = []
     for suffix in ("npy", "csv", "parquet"):
         status, _, err = run(capsys, "sweep", "workcell", "--configurations", tmp_path / f"q.{suffix}", "--out",
-                             tmp_path / suffix, "--workers", 0, "--values", "--quiet")  # fmt: skip
+                             tmp_path / suffix, "--workers", 0, "--values", "--quiet")
         assert status == 0, err
         table = parquet.read_table(tmp_path / suffix)
         answers.append((table["collides"].to_pylist(), np.stack([table[name].to_numpy() for name in names], axis=1)))
@@ -153,7 +153,7 @@ def test_scenes_one_by_one(capsys, tmp_path):
 
     scenes = [_slider_scene(tmp_path / f"scene{k}", x) for k, x in enumerate((0.3, 0.9, 2.0))]
     status, _, err = run(capsys, "sweep", *scenes, "--each", "--out", tmp_path / "s", "--workers", 0, "--random", 40,
-                           "--values", "--chunk", 7)  # fmt: skip
+                           "--values", "--chunk", 7)
     assert status == 0, err
     table = parquet.read_table(tmp_path / "s").to_pydict()
     assert table["row"] == list(range(120)) and table["scene"] == [str(s) for s in scenes for _ in range(40)]
@@ -189,7 +189,7 @@ def _slider_scene(folder, x):
         (b"\x93NUMPY no", "npy", "no array of numbers"), ("PAR1", "parquet", "no table of numbers"),
         ("x", "txt", ".npy, .csv, .parquet"),
     ],
-)  # fmt: skip
+)
 def test_files_that_are_no_configurations(capsys, tmp_path, content, suffix, complaint):
     file = tmp_path / f"q.{suffix}"
     file.write_bytes(content if isinstance(content, bytes) else content.encode())
@@ -219,7 +219,7 @@ def test_rows_of_csv_are_named(capsys, tmp_path, arm):
         (["--random", "5", "--seed", "-3"], "seed"), (["--configurations", "none.npy"], "there is no such file"),
         (["--random", "5", "--state", "yaw=0", "--state", "yaw=1"], "takes one state"),
     ],
-)  # fmt: skip
+)
 def test_sweep_says_what_is_wrong(capsys, tmp_path, words, complaint):
     status, out, err = run(capsys, "sweep", "workcell", "--out", tmp_path / "s", *words)
     assert status == 2 and complaint in err and not out

@@ -49,7 +49,7 @@ def test_names_that_xml_must_escape():
     robot = robot_of(
         hostile, [joint(f"j{k}", "revolute", hostile[k], hostile[k + 1], at=(0, 0, 1)) for k in range(3)],
         {link: (Sphere(0.1), (0, 0, 0)) for link in hostile},
-    )  # fmt: skip
+    )
     proposal = propose_disabled_pairs(robot, 50)
     assert disabled(srdf_text(proposal)) == {(pair.a, pair.b, pair.reason) for pair in proposal.disabled}
     assert {name for pair in disabled(srdf_text(proposal)) for name in pair[:2]} == set(hostile)
@@ -82,7 +82,7 @@ def said(text: str) -> list[str]:
     """What an SRDF says besides collisions, by the standard library: elements in order, blanks between them off."""
     return [
         ET.canonicalize(ET.tostring(e), strip_text=True) for e in ET.fromstring(text) if "collisions" not in e.tag
-    ]  # fmt: skip
+    ]
 
 
 HAND = """<robot name="hand">
@@ -186,7 +186,7 @@ def test_pinocchio_reads_what_is_kept(name, tmp_path):
                    ("shoulder_pan_link", "wrist_flex_link")}),
         ("ur5", set()),
     ],
-)  # fmt: skip
+)
 def test_shipped_srdf_are_judged(name, wrong):
     """Pairs that they say never collide, in configurations in which a bracket proven in 80 digits says they do."""
     robot = collide.Robot.load(ROBOTS / name / f"{name}.urdf", meshes="hull", missing_meshes="skip")
@@ -235,7 +235,7 @@ def pairs_of(world) -> set[tuple[str, str]]:
 def test_srdf_into_a_world(tmp_path):
     file = tmp_path / "r.srdf"
     file.write_text('<robot name="r"><disable_collisions link1="b" link2="a" reason="Never"/>'
-                    '<disable_collisions link1="c" link2="elsewhere" reason="User"/></robot>')  # fmt: skip
+                    '<disable_collisions link1="c" link2="elsewhere" reason="User"/></robot>')
     world = world_of("abc")
     assert allow_pairs(world, file) == [("b", "a", "SRDF: Never")]
     assert pairs_of(world) == {("a", "b")} and len(world.collisions()) == 2
@@ -251,7 +251,7 @@ def test_matrix_into_a_world(tmp_path, whole):
         "entry_names": ["a", "b", "c"],
         "entry_values": [[True, True, False], {"enabled": [True, True, False]}, [False, False, True]],
         "default_entry_names": ["d", "c"], "default_entry_values": [True, False],
-    }  # fmt: skip
+    }
     file = tmp_path / "scene.json"
     file.write_text(json.dumps({"robot_model_name": "r", "allowed_collision_matrix": matrix} if whole else matrix))
     world = world_of("abcd")

@@ -54,7 +54,7 @@ def chunk_files(folder: Path) -> list[str]:
 @pytest.mark.parametrize("workers, chunk", [(0, None), (0, 7), (2, 130)])
 def test_rows_are_those_of_the_checker(tmp_path, workers, chunk):
     results = sweep(SlowChecker(), DrawnConfigurations(1000, 3), tmp_path / "s", workers=workers, chunk=chunk,
-                    values=True)  # fmt: skip
+                    values=True)
     table = results.table()
     assert table.column_names == ["row", "collides", "note", "slide"]
     assert np.array_equal(table["row"].to_numpy(), np.arange(1000))
@@ -130,7 +130,7 @@ def test_second_run_asks_what_is_missing_only(tmp_path):
     after = {name: (folder / name).stat().st_mtime_ns for name in chunk_files(folder)}
     assert {name for name in before if before[name] != after[name]} == {
         "chunk-00000003.parquet", "chunk-00000007.parquet",
-    }  # fmt: skip
+    }
     assert np.array_equal(results.collides(), expected(1000)) and not list(folder.glob("_partial*"))
 
 
@@ -143,7 +143,7 @@ def test_second_run_asks_what_is_missing_only(tmp_path):
         ({"configurations": random_configurations(SlowChecker().robot, 0, 100, 3)}, "the configurations are others"),
         ({"distances": True}, "other columns"), ({"values": True}, "other columns"), ({"chunk": 11}, "another size"),
     ],
-)  # fmt: skip
+)
 def test_another_question_is_refused(tmp_path, change, words):
     arguments = {"checker": SlowChecker(), "configurations": DrawnConfigurations(100, 3), "workers": 0, "chunk": 10}
     sweep(folder=tmp_path / "s", **arguments)
@@ -177,7 +177,7 @@ def test_two_runs_at_once_are_refused(tmp_path):
     def second_run(label):
         if not said:
             done = subprocess.run([sys.executable, "-c", code, str(HERE), str(tmp_path / "s")], capture_output=True,
-                                  text=True, check=True, timeout=300)  # fmt: skip
+                                  text=True, check=True, timeout=300)
             said.append(done.stdout)
 
     results = sweep(SlowChecker(), DrawnConfigurations(10, 3), tmp_path / "s", workers=0, progress=calls(second_run))
@@ -198,7 +198,7 @@ def calls(function):
 def test_progress_says_how_far_and_how_long(tmp_path):
     labels: list[str] = []
     sweep(SlowChecker(0.01), DrawnConfigurations(1000, 3), tmp_path / "s", workers=0, chunk=100,
-          progress=calls(labels.append))  # fmt: skip
+          progress=calls(labels.append))
     assert labels[0] == "sweeping: 0 of 1,000 rows" and len(labels) == 11
     assert labels[5].startswith("sweeping: 500 of 1,000 rows, ") and labels[5].endswith("/s, 1 s to go")
     assert labels[-1].endswith("0 s to go")
@@ -405,10 +405,10 @@ def test_a_manifest_that_is_none_is_told_as_such(tmp_path, text):
     place = folder / "_sweep.json"
     good = json.loads(place.read_text())
     changes = {"rows": {"rows": []}, "negative": {"chunk": -10}, "columns": {"columns": 7}, "chunks": {"chunks": 10**9},
-               "schema": {"schema": "collide-sweep/1"}, "1e400": {"rows": 1e400}}  # fmt: skip
+               "schema": {"schema": "collide-sweep/1"}, "1e400": {"rows": 1e400}}
     place.write_text(json.dumps(good | changes[text]) if text in changes else text)
     for ask in (lambda: read_sweep(folder),
-                lambda: sweep(SlowChecker(), DrawnConfigurations(20, 3), folder, workers=0, chunk=10)):  # fmt: skip
+                lambda: sweep(SlowChecker(), DrawnConfigurations(20, 3), folder, workers=0, chunk=10)):
         with pytest.raises((SceneError, InvalidArgument), match=r"_sweep\.json.*(JSON|manifest)"):
             ask()
     assert sweep(SlowChecker(), DrawnConfigurations(20, 3), folder, workers=0, chunk=10, restart=True).done == 20
@@ -434,7 +434,7 @@ def test_a_lock_that_is_a_link_is_refused(tmp_path):
     ("rows", "chunk", "words"),
     [(10**20, None, "more than 1,000,000 chunks of 50,000"), (10**400, None, "more than 1,000,000 chunks"),
      (10**9, 100, "more than 1,000,000 chunks of 100"), (10, 10**12, "at most 10,000,000 rows")],
-)  # fmt: skip
+)
 def test_more_rows_than_can_be_listed_are_refused_at_once(tmp_path, rows, chunk, words):
     with pytest.raises(InvalidArgument, match=words):
         sweep(SlowChecker(), DrawnConfigurations(rows, 3), tmp_path / "s", workers=0, chunk=chunk)

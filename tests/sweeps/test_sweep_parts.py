@@ -30,7 +30,7 @@ from collide.sweeps.sweep_question import Chunk, OneQuestion, ScenesQuestion, an
 def arm():
     """Two joints, x and y."""
     joints = [joint("x", "prismatic", "base", "a", lower=-1.0, upper=1.0),
-              joint("y", "prismatic", "a", "b", axis=(0, 1, 0), lower=0.0, upper=2.0)]  # fmt: skip
+              joint("y", "prismatic", "a", "b", axis=(0, 1, 0), lower=0.0, upper=2.0)]
     return robot_of(["base", "a", "b"], joints, {"b": (Sphere(0.1), (0, 0, 0))})
 
 
@@ -45,7 +45,7 @@ def run_of(tmp_path, n_scenes: int, rows: int | None, chunk: int | None, questio
 
 @pytest.mark.parametrize(("n_scenes", "rows", "chunk"), [
     (1, 1, 1), (1, 10, 3), (1, 9, 3), (3, 5, 4), (3, 5, 5), (3, 5, 7), (4, 1, 3), (2, 5, 100),
-])  # fmt: skip
+])
 def test_chunks_are_all_rows_once_scene_after_scene(tmp_path, n_scenes, rows, chunk):
     run = run_of(tmp_path, n_scenes, rows, chunk)
     chunks = [run._chunk_of(number) for number in range(run.manifest["chunks"])]
@@ -65,7 +65,7 @@ def test_scenes_with_a_configuration_of_their_own_have_a_row_each(tmp_path):
     run = run_of(tmp_path, 5, None, 2)
     assert run.rows == 5 and [run._chunk_of(k).blocks for k in range(3)] == [
         [(0, None), (1, None)], [(2, None), (3, None)], [(4, None)],
-    ]  # fmt: skip
+    ]
     assert run.manifest["configurations"] is None
     assert str(run._chunk_of(1)) == "chunk 1, rows 2 to 3"
 
@@ -73,7 +73,7 @@ def test_scenes_with_a_configuration_of_their_own_have_a_row_each(tmp_path):
 @pytest.mark.parametrize(("rows", "chunk", "words"), [
     (0, None, "there are no configurations to ask about"), (5, 0, "chunk"), (5, 1.5, "chunk"),
     (5, 10**9, "chunk must be at most .* rows, which are in memory, got 1000000000"),
-])  # fmt: skip
+])
 def test_chunks_that_are_none_are_refused(tmp_path, rows, chunk, words):
     with pytest.raises(InvalidArgument, match=words):
         run_of(tmp_path, 1, rows, chunk)
@@ -93,7 +93,7 @@ def test_how_far_and_how_long():
     pace._started -= 9.5
     assert re.fullmatch(r"sweeping: 700 of 1,200 rows, 5\d/s, 10 s to go", pace.after(500))
     for seconds, words in ((0.0, "0 s"), (99.0, "99 s"), (99.5, "1 min"), (5999.0, "99 min"), (5999.5, "1 h 40 min"),
-                           (7260.0, "2 h 1 min")):  # fmt: skip
+                           (7260.0, "2 h 1 min")):
         assert _duration(seconds) == words
 
 
@@ -186,7 +186,7 @@ def test_columns_of_csv_in_any_order_with_empty_cells(tmp_path):
     ("x,y\n1,2\n3\n", "line 3: has 1 values, the header 2 columns"),
     ("x,y\n1,\n\nnan,far\n", "line 4: must be numbers, got 'far'"),
     ("y,x\n ,near\n", "line 2: must be numbers, got 'near'"),
-])  # fmt: skip
+])
 def test_csv_that_is_wrong_is_told_with_its_place(tmp_path, text, words):
     with pytest.raises(SceneError) as raised:
         read_configurations(written(tmp_path, text), arm())
@@ -221,7 +221,7 @@ def test_arrays_and_files_of_arrays(tmp_path):
 @pytest.mark.parametrize(("stem", "number"), [
     ("chunk-00000000", 0), ("chunk-00000012", 12), ("chunk-", None), ("chunk--1", None), ("chunk-1a", None),
     ("chunk-٣", None), ("chunk-" + "9" * 18, 10**18 - 1), ("chunk-" + "9" * 19, None),
-])  # fmt: skip
+])
 def test_numbers_of_chunk_files(stem, number):
     assert _number_of(Path(f"{stem}.parquet")) == number
 

@@ -36,7 +36,7 @@ HITS = {
     "edges near faces and edges, far away": (12, 15, 2), "tiny within large": (12, 10, 0),
     "cubes on themselves": (6, 20, 0), "cubes by halves": (40, 100, 0),
     "cubes by halves in one frame": (40, 100, 0), "cubes by tenths": (8, 8, 1), "cubes, mirrored": (6, 5, 0),
-}  # fmt: skip
+}
 
 
 def snippet(name, A, B, X, Y, a, b) -> str:
@@ -64,7 +64,7 @@ def check_every_pair(name, A, B, X, Y) -> tuple[int, int, int]:
             assert (volume > 0) == ((i, j) in rows), case
             if not volume:
                 boxes = [(max(p[k] for p in a) < min(p[k] for p in b)) for k in range(3)
-                         for a, b in ((cell_a, cell_b), (cell_b, cell_a))]  # fmt: skip
+                         for a, b in ((cell_a, cell_b), (cell_b, cell_a))]
                 touching += not any(boxes)
                 continue
             k = rows[i, j]
@@ -232,7 +232,7 @@ MUTANTS = {
     "queries in another place": (walk_cells, "_queries", lambda f: lambda *a: (f(*a)[0] + 1.0, f(*a)[1])),
     "low parts forgotten": (walk_cells, "place_corners", lambda f: lambda *a: _without_low(f(*a))),
     "a mirror overlooked": (walk_cells, "_oriented", lambda f: lambda cells, X, local: cells),
-}  # fmt: skip
+}
 
 
 def _all_meet(walked):

@@ -116,7 +116,7 @@ def test_files(tmp_path):
         ("surface.vtk", "it has no tetrahedra; its cells are: triangle"), ("q.vtk", "kind tetra10; make them linear"),
         ("broken.vtk", "meshio cannot read it"), ("body.unknown", "meshio cannot read it"),
         ("none.vtk", "no such file"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(SceneError, match=words):
             TetMesh.from_file(tmp_path / name)
 

@@ -102,7 +102,7 @@ def answer_compound_batch(
             address_of(header), 0 if which is None else address_of(which), address_of(X_WA), 16 * (len(X_WA) > 1),
             address_of(X_WB), 16 * (len(X_WB) > 1), len(out), boolean, depths and not boolean, limit, check,
             run.distrust_doubles, address_of(out),
-        )  # fmt: skip
+        )
         if not status or status == BAD_POSE:
             of_thread.asked += int(header[N_ANSWERED])
             return not status
@@ -111,7 +111,7 @@ def answer_compound_batch(
             space.rows[:listed], space.pairs[:listed], table.table, space.poses, space.shape_of, boolean=boolean,
             limit=limit,
             depths=depths and not boolean,
-        )  # fmt: skip
+        )
 
 
 class CompoundPair:
@@ -180,5 +180,5 @@ def combine(
     combine_rows(
         address_of(rows), address_of(ends), address_of(spans), len(starts), *table.addresses, address_of(poses.rows),
         address_of(shape_of), address_of(score), address_of(out),
-    )  # fmt: skip
+    )
     return out

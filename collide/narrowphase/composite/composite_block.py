@@ -25,7 +25,7 @@ LIST = ROWS_PER_BATCH
     INTEGERS_AT,
     CAPACITY,
     N_DONE, N_POSES, STAGE, SLOT, PAIR, N_LISTED, N_ANSWERED,
-) = range(25)  # fmt: skip
+) = range(25)
 HEADER = 25
 
 # Integers of a slot, which is a pose of the block: both bodies, rows of poses of theirs and where those of their parts
@@ -67,7 +67,7 @@ def open_block(header_at):
         view_i64(header[OWNERS_AT], 2 * LIST), view_f64(header[SCORES_AT], SCORE * BLOCK),
         view_i64(header[SLOTS_AT], SLOTS),
         view_f64(header[BALLS_AT], (2 + header[CAPACITY]) * BALL_IN_WORLD),
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -154,7 +154,7 @@ def row_of_part(block, k, which, part, exactly):
         place_part(
             block.poses, POSE * row, POSE * body.row, part_view(block, number + 1), PART * number,
             terms_at(block, row) if exactly else 0,
-        )  # fmt: skip
+        )
     return row
 
 

@@ -111,7 +111,7 @@ def _leave_out_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, near: np.nda
         run_poses(
             distances, ShapeTable(sets), np.stack(rows, axis=1), placed[0].X, placed[1].X, boolean=False,
             limit=float(slop.max()), check=False, depths=False,
-        )  # fmt: skip
+        )
         near[tuple(some[:, distances["lower"] > slop])] = False
 
 

@@ -161,7 +161,7 @@ class CompoundParts:
             np.array([bound.radius for bound in bounds]), np.array([bound.slop for bound in bounds]),
             np.array([abs(bound.params[3]) if bound.kind == HALFSPACE else math.nan for bound in bounds]),
             np.array([part.shape.meshed for part in self.parts]),
-        )  # fmt: skip
+        )
 
     @cached_property
     def reach(self) -> float:

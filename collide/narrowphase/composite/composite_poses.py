@@ -246,7 +246,7 @@ def _answer_list(header, boolean, depths, limit):
             header[PAIRS_AT],
             header[N_LISTED], boolean, depths, False, limit, rows_at, header[DOUBLES_AT], header[INTEGERS_AT],
         ),
-    )  # fmt: skip
+    )
     is_open = False
     for k in range(header[N_LISTED]):
         marks = view_u8(rows_at + ROW * k, ROW)
@@ -319,11 +319,11 @@ def _separate_bodies_of(block, k, row_at):
     parts = PosedParts(
         view_i64(block.header[INTS_AT], INTS * n_shapes), view_f64(block.header[NUMBERS_AT], NUMBERS * n_shapes),
         view_f64(block.header[POSES_AT], POSE * last), view_i64(block.header[SHAPE_OF_AT], last),
-    )  # fmt: skip
+    )
     separate_bodies(
         block.scores, SCORE * k, row_at, parts, A.part_rows, A.n_parts, B.part_rows, B.n_parts,
         block.header[DOUBLES_AT],  # the narrowphase's workspace: its lists are answered
-    )  # fmt: skip
+    )
 
 
 #: How `answer_compounds` is called.

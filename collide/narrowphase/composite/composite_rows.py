@@ -47,7 +47,7 @@ _N_AXES = 12
 # of the first row, the number of overlaps kept, and the deepest of them.
 (
     _LEAST, _NEAREST, _LOWER, _UPPER, _UNCERTIFIED, _GJK, _EPA, _HIT, _FIRST_UPPER, _N_OVERLAPS, _DEEPEST,
-) = range(11)  # fmt: skip
+) = range(11)
 # Of an overlap: its distance, the number of its row, its parts, its normal and both points.
 _DISTANCE, _NUMBER, _OF_A, _OF_B, _VECTORS = range(5)
 _OVERLAP = _VECTORS + 9
@@ -332,6 +332,6 @@ def combine_rows(rows_at, starts_at, spans_at, n, ints_at, numbers_at, poses_at,
             parts = PosedParts(
                 view_i64(ints_at, INTS * n_shapes), view_f64(numbers_at, NUMBERS * n_shapes),
                 view_f64(poses_at, POSE * last), shape_of,
-            )  # fmt: skip
+            )
             separate_bodies(score, 0, out, parts, first_a, n_a, first_b, n_b, score_at + 8 * SCORE)
     return 0

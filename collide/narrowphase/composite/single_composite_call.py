@@ -28,7 +28,7 @@ def _answer(header_at, XA_at, XB_at, boolean, depths, limit, out_at):
         (
             header_at + 8 * _HEADER, 0, XA_at, 0, XB_at, 0, 1, boolean, depths, limit, True, False, out_at,
         ),
-    )  # fmt: skip
+    )
     return status == 0
 
 

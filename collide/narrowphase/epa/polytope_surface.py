@@ -94,7 +94,7 @@ def surface_at(doubles_at, integers_at):
         view_f64(reaches_at + 8 * EPA_FACETS, EPA_FACETS), view_i64(integers_at, 2 * POINTS),
         view_i64(facets_at, FACET * EPA_FACETS), view_i64(starts_at, 2 * EPA_VERTICES),
         view_i64(border_at, 2 * WIDEST_BORDER), view_i64(border_at + 8 * 2 * WIDEST_BORDER, EPA_FACETS),
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

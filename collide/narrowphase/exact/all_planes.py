@@ -188,7 +188,7 @@ def _find_candidates(ordered, terms_at, doubles_at):
     search = PlaneSearch(
         view_f64(doubles_at, STRIDE * (MAX_VERTICES + 1)), view_f64(doubles_at + 8 * _DIRECTION, STRIDE),
         view_f64(doubles_at + 8 * _PLANES, _PLANE * _MAX_CANDIDATES), n_a, n_b,
-    )  # fmt: skip
+    )
     unit = unit_scale(ordered.size)
     for i in range(n_a):
         fine_point(pair, low, search.fine, i, i, 0, unit)

@@ -18,7 +18,7 @@ from collide.results import EXACT
 def exact_depth(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, wanted_at, n_pairs, limit, rows_at, terms_at, n_terms,
     digits_at,
-):  # fmt: skip
+):
     """Find the depths of overlaps that `settle_hulls` has settled without one; returns how many it found.
 
     wanted : a byte a pair, whether its depth is wanted.   Other arguments as there, and flat as there. Rows are left as

@@ -119,7 +119,7 @@ def _exact_plane(ordered, terms, digits):
         digits, pair, pose_a, pose_b, radius_of(pair, B), rotation_a, normal, offset, rotation_b, core, Span(grid, d),
         n_plane,
         Span(low, n_height),
-    )  # fmt: skip
+    )
 
 
 @kernel

@@ -40,7 +40,7 @@ SIGNATURE = (
 def settle_hulls(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at, n_terms,
     requests_at, digits_at,
-):  # fmt: skip
+):
     """Settle the undecided rows of `answer_pairs`, in place; returns how many it leaves to `settle_halfspaces.py`.
 
     Arguments as there; without depths bodies that meet get a point of both.   terms, n_terms : of the `PoseTable`.

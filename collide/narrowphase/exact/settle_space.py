@@ -41,7 +41,7 @@ def settle_space(terms_at, n_terms, digits_at):
     return SettleSpace(
         view_f64(terms_at, TERM_ROW * n_terms), view_i64(digits_at, _DIGITS), view_i64(ids_at, _SIMPLEX),
         view_i64(ids_at + 8 * _SIMPLEX, _FACET), terms_at, digits_at, ids_at + 8 * (_SIMPLEX + _FACET),
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

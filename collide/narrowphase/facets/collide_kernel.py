@@ -31,7 +31,7 @@ APART, HIT, OPEN, NO_POSE, SINGULAR = range(5)
     TREE_A, TREE_B, SOLID_A, SOLID_B, POINTS_A, POINTS_B, N_POINTS_A, N_POINTS_B, RADIUS_A, RADIUS_B,
     SAME_TREE, SAME_BODY, EXCHANGED, SURFACES_CODE, POINTS_CODE, DISTANCES_CODE, EXACT_CODE,
     STACK_AT, N_STACK, DOUBLES_AT, INTEGERS_AT, HEAP_AT, N_HEAP, SCRATCH_AT,
-) = range(24)  # fmt: skip
+) = range(24)
 HEADER = 24
 #: Words of scratch: facet pairs (as many as a walk that stops at the first asks for), counters and marks, a result.
 KEYS, COUNTERS = 128, 8
@@ -99,7 +99,7 @@ def open_space(header_at):
     return Space(
         words[SURFACES_CODE], words[POINTS_CODE], words[DISTANCES_CODE], words[EXACT_CODE], words[STACK_AT],
         words[N_STACK], words[DOUBLES_AT], words[INTEGERS_AT], words[HEAP_AT], words[N_HEAP], words[SCRATCH_AT],
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)
@@ -114,7 +114,7 @@ def placed(X, p):
     return Vec3(
         X[0] * p.x + X[1] * p.y + X[2] * p.z + X[3], X[4] * p.x + X[5] * p.y + X[6] * p.z + X[7],
         X[8] * p.x + X[9] * p.y + X[10] * p.z + X[11],
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -170,7 +170,7 @@ def _point_inside(space, body, X_at, points_at, n_points, Y_at):
                 body.tree_at, X_at, 0, Y_at, 0, point_at, 0, 1, answer_at, answer_at + 8, space.stack_at, space.n_stack,
                 space.doubles_at, space.integers_at, space.exact,
             ),
-        )  # fmt: skip
+        )
         if words[0] == winding_numbers.SINGULAR:
             return -2
         if words[0] != winding_numbers.OUTSIDE:
@@ -212,7 +212,7 @@ def cores_state(space, pair, inside_at):
             KEYS, starts_at, starts_at + 16, starts_at + 40, space.stack_at, space.n_stack, space.doubles_at,
             space.integers_at, space.exact,
         ),
-    )  # fmt: skip
+    )
     if done != surface_collision.DONE:
         return SINGULAR
     if words[1] > words[0]:
@@ -248,7 +248,7 @@ def measure(space, pair, limit, enough):
                 result_at, result_at + 8 * RESULT, space.stack_at, space.n_stack, space.heap_at, space.n_heap,
                 space.doubles_at, space.integers_at, space.exact,
             ),
-        )  # fmt: skip
+        )
         if done < 1:
             return False
         # Facets that rounding leaves on either side of the limit: not found within it, nor proven beyond.

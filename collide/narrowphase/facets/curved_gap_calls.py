@@ -50,7 +50,7 @@ class GapQuestion:
         buffers = self.table.coordinates, self.poses, self.numbers, self.numbers, self.rows
         self.header[:STACK_AT] = (
             code_of(answer_pairs), A.tree.address, *self.table.addresses, *map(address_of, buffers), *workspace,
-        )  # fmt: skip
+        )
         self.header[STACK_AT:EXCHANGED] = address_of(self.stack), address_of(self.bounds)
         self.header.view(np.float64)[REACH_OF_MESH] = reach_of(A)
 

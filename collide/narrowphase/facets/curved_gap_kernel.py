@@ -61,7 +61,7 @@ _answer_pairs_at = native_call(SIGNATURE)
 (
     CORE, TREE_AT, INTS_AT, NUMBERS_AT, COORDINATES_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROW_AT, DOUBLES_AT,
     INTEGERS_AT, STACK_AT, BOUNDS_AT, EXCHANGED, REACH_OF_MESH,
-) = range(15)  # fmt: skip
+) = range(15)
 HEADER = 15
 #: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh.
 LONG_WAY, SURFACES_APART, MAYBE_INSIDE = -1, 1, 0
@@ -173,7 +173,7 @@ def _ask_facet(walk, place):
             words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], 0, words[SHAPE_OF_AT], words[PAIRS_AT], 1, False, False,
             False, math.inf, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
         ),
-    )  # fmt: skip
+    )
     return view_row(row_at)
 
 

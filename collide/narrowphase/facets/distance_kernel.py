@@ -335,7 +335,7 @@ def gap_poses(
         lacks[k] = _row_at_poses(
             header_at, space, XA_at + 8 * step_a * k, XB_at + 8 * step_b * k, limit, reach, depths, hull_at,
             rows_at + ROW * k,
-        )  # fmt: skip
+        )
         if lacks[k] == ROW_SINGULAR:
             return k
     return n

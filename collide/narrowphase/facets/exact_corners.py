@@ -110,7 +110,7 @@ def sign3(pair, i, j, k, m):
         equal_at(corners, 3 * i, 3 * j) or equal_at(corners, 3 * i, 3 * k) or equal_at(corners, 3 * i, 3 * m)
         or equal_at(corners, 3 * j, 3 * k) or equal_at(corners, 3 * j, 3 * m) or equal_at(corners, 3 * k, 3 * m)
         or _share_a_coordinate(corners, i, j, k, m)
-    ):  # fmt: skip
+    ):
         return 0
     _load_points(pair)
     state[_SIGNS] += 1
@@ -169,7 +169,7 @@ def sign2(pair, axis, i, j, k):
     if corners[EXACT_ERROR] == 0.0 and (
         (yj == 0.0 and yk == 0.0) or (zj == 0.0 and zk == 0.0) or (yj == 0.0 and zj == 0.0)
         or (yk == 0.0 and zk == 0.0) or (yj == yk and zj == zk and equal_at(corners, 3 * j, 3 * k))
-    ):  # fmt: skip
+    ):
         return 0
     _load_points(pair)
     state[_SIGNS] += 1

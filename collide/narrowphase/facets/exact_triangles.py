@@ -56,7 +56,7 @@ def decide_exactly(what, corners_at, placing_at, integers_at, XA_at, XB_at):
     pair = ExactPair(
         view_f64(corners_at, CORNERS), view_f64(placing_at, PLACING), view_i64(integers_at + 8 * STATE, DIGITS),
         view_i64(integers_at, STATE), view_f64(XA_at, 16), view_f64(XB_at, 16),
-    )  # fmt: skip
+    )
     invalidate_points(pair.state)
     if what == PASS:
         return _passing_exactly(pair)

@@ -43,7 +43,7 @@ def facet_crossings(A: np.ndarray, B: np.ndarray, X_WA: np.ndarray, X_WB: np.nda
     slots, place, error = np.zeros((k, 2), dtype=np.int64), np.zeros((k, 2, 3)), np.zeros(k)
     cross_facets(
         *map(address_of, arguments), k, *map(address_of, (is_segment, is_clear, slots, place, error))
-    )  # fmt: skip
+    )
     return FacetCrossings(is_segment.view(bool), is_clear.view(bool), slots, place, error)
 
 
@@ -167,10 +167,10 @@ def cross_facets(A_at, B_at, poses_a_at, poses_b_at, n, is_segment_at, is_clear_
             continue
         a, b, off_a = _ends(
             _shifted((p, q, r), corner_a), _shifted((heights_a.x, heights_a.y, heights_a.z), corner_a), limit_a, error
-        )  # fmt: skip
+        )
         c, d, off_b = _ends(
             _shifted((s, t, u), corner_b), _shifted((heights_b.x, heights_b.y, heights_b.z), corner_b), limit_b, error
-        )  # fmt: skip
+        )
         off = max(off_a, off_b)
         along = cross(n_a, n_b)
         along = divide(along, max_abs(along))

@@ -16,7 +16,7 @@ Direction = TypeVar("Direction", bound=tuple)
 #: Directions of rays tried one after another, where one passes an edge or a corner.
 RAY_DIRECTIONS = (
     (89, 233, 610), (-1597, 377, 987), (144, -2584, 55), (-34, 21, -4181), (6765, -8, 13), (-3, -5, 10946),
-)  # fmt: skip
+)
 #: Normals of facets whose longest edge is 1 along some axis: those shorter than this are worked out exactly.
 _MIN_LENGTH = 2.0**-24
 

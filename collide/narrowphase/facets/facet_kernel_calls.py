@@ -97,7 +97,7 @@ def balls_farther(
         return cull_poses(
             address_of(numbers_a), address_of(X_WA), step_of(X_WA), address_of(numbers_b), address_of(X_WB),
             step_of(X_WB), first, len(out), check, margin, address_of(out),
-        )  # fmt: skip
+        )
 
     _ask_all(ask_from, len(out), X_WA, X_WB, check, lambda k: out[k] == NO_POSE)
     return out == APART
@@ -132,7 +132,7 @@ def _states(
         return meet_poses(
             address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), first, n, check,
             inside is not None, 0 if inside is None else address_of(inside), address_of(out),
-        )  # fmt: skip
+        )
 
     _ask_all(ask_from, n, X_WA, X_WB, check, lambda k: out[k] == NO_POSE)
     return out
@@ -177,7 +177,7 @@ def pair_header(A: Body, B: Body, exchanged: bool, space: Workspace) -> np.ndarr
             space.heap_address, HEAP, space.scratch_address,
         ],
         dtype=np.int64,
-    )  # fmt: skip
+    )
     header.view(np.float64)[RADIUS_A : RADIUS_B + 1] = A.radius, B.radius
     return header
 
@@ -188,7 +188,7 @@ def pair_header(A: Body, B: Body, exchanged: bool, space: Workspace) -> np.ndarr
 def body_rows(
     A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float, depths: bool, check: bool = False,
     out: np.ndarray | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Rows (PAIR_DTYPE) for poses (n, 4, 4) or (1, 4, 4); part_a and part_b are facets, 0 where none decided.
 
     limit, depths : as in `distance`.   check : as in `states`.   out : rows to fill, zeroed. Raises InvalidPose.
@@ -228,7 +228,7 @@ def _fill_rows(
         return gap_poses(
             address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), first, len(rows),
             check, limit, reach, depths, 0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
-        )  # fmt: skip
+        )
 
     _ask_all(ask_from, len(rows), X_WA, X_WB, check, lambda k: lacks[k] == ROW_NO_POSE)
     return lacks

@@ -130,7 +130,7 @@ def _hit_keys(A: MeshTree, B: MeshTree, X_WA, X_WB, first_only: bool) -> tuple[n
             A.address, B.address, address_of(X_WA), step(X_WA), address_of(X_WB), step(X_WB), n, A.content == B.content,
             first_only, address_of(keys), len(keys), address_of(starts), address_of(counters), address_of(progress),
             *work.addresses,
-        )  # fmt: skip
+        )
         if status == SINGULAR:
             raise not_invertible(int(progress[0]))
         if status != FULL:
@@ -158,7 +158,7 @@ def surface_distances(A: MeshTree, B: MeshTree, X_WA, X_WB, limit: float = np.in
     return SurfaceDistances(
         results[:, 0], results[:, 1], results[:, 2], results[:, 3:6], results[:, 6:9], results[:, 9:12], marks[:, :2],
         marks[:, 2] != 0, marks[:, 3:],
-    )  # fmt: skip
+    )
 
 
 def _near(A: MeshTree, B: MeshTree, X_WA, X_WB, n: int, limit: float) -> tuple[np.ndarray, np.ndarray]:
@@ -170,7 +170,7 @@ def _near(A: MeshTree, B: MeshTree, X_WA, X_WB, n: int, limit: float) -> tuple[n
         A.address, B.address, address_of(X_WA), step(X_WA), address_of(X_WB), step(X_WB), n, A.content == B.content,
         float(limit), distances.IN_FULL, address_of(results), address_of(marks), *work.addresses[:2],
         work.heap_address, HEAP, *work.addresses[2:],
-    )  # fmt: skip
+    )
     if done < n:
         raise not_invertible(done)
     return results, marks
@@ -193,7 +193,7 @@ def facets_within(
     count = near_pairs.list_near_pairs(
         A.address, B.address, address_of(X_WA), address_of(X_WB), float(reach), address_of(out), address_of(marks),
         capacity, *work.addresses, True,
-    )  # fmt: skip
+    )
     if count == -SINGULAR:
         raise not_invertible(0)
     if count == -FULL:
@@ -225,7 +225,7 @@ def points_in_solid(A: MeshTree, X_WA, points: np.ndarray, X_WB) -> np.ndarray:
     inside.points_inside(
         A.address, address_of(X_WA), step(X_WA), address_of(X_WB), step(X_WB), address_of(points),
         3 if points.ndim == 2 else 0, n, address_of(answers), address_of(counters), *work.addresses,
-    )  # fmt: skip
+    )
     singular = np.flatnonzero(answers == inside.SINGULAR)
     if len(singular):
         raise not_invertible(int(singular[0]))
@@ -268,7 +268,7 @@ def facets_on_rays(A: MeshTree, X_WA, rays_T: np.ndarray, first_only: bool) -> t
         status = rays.cast_rays(
             A.address, address_of(X_WA), step(X_WA), address_of(rays_T), n, first_only, address_of(hits), len(hits),
             address_of(counters), address_of(progress), *work.addresses,
-        )  # fmt: skip
+        )
         if status == rays.SINGULAR:
             raise not_invertible(int(progress[0]))
         if status != rays.FULL:
@@ -315,7 +315,7 @@ class Workspace:
         self.addresses = (
             address_of(self._stack), n_stack, address_of(self._doubles), address_of(self._integers),
             code_of(decide_exactly),
-        )  # fmt: skip
+        )
         self._scratch = np.empty(SCRATCH, dtype=np.int64)
         self.heap_address, self.scratch_address = address_of(self._heap), address_of(self._scratch)
 

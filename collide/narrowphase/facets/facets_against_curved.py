@@ -20,7 +20,7 @@ from collide.narrowphase.convex_kernel_calls import run_pairs
 def facet_rows(
     tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, pose: np.ndarray, place: np.ndarray, *,
     boolean: bool, limit: float, depths: bool = True,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Rows (PAIR_DTYPE) of k facets, each at one of n pairs of poses, against a convex set; the facet is A.
 
     pose, place : (k,) which poses, and which triangles in the order of the tree.

@@ -239,7 +239,7 @@ SIGNATURE = (
 def list_near_pairs(
     header_a_at, header_b_at, XA_at, XB_at, reach, out_at, facets_at, capacity, stack_at, n_stack, doubles_at,
     integers_at, exact_at, measures,
-):  # fmt: skip
+):
     """How many pairs of facets come within ``reach`` at one pair of poses (16 doubles each); −FULL, −SINGULAR.
 
     Every pair whose distance is at most ``reach`` is listed; a few that are farther by rounding may be.
@@ -262,7 +262,7 @@ def list_near_pairs(
         view_i64(numbers_at + 8 * _COUNTERS, 2), view_f64(numbers_at + 8 * _LEAF, _BOXED * (MAX_LEAF + 1)),
         view_f64(out_at, NUMBERS_OF_PAIR * capacity), view_i64(facets_at, INTS_OF_PAIR * capacity), capacity,
         measures,
-    )  # fmt: skip
+    )
     _set_reaches(A, B, trees.placing, reach + 8.0 * error, query.reaches)
     query.counters[_N_PAIRS] = 0
     query.counters[_EXACT] = 0

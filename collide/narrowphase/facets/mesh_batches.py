@@ -73,7 +73,7 @@ def _compound_states(A: Shape, B: Shape, X_WA, X_WB, check: bool, parts_open: bo
 def pair_rows(
     A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float, depths: bool = True, check: bool = False,
     out: np.ndarray | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Rows (PAIR_DTYPE) of two shapes; poses and check as of `pair_hits`, limit and depths as in `distance`.
 
     part_a, part_b : of a `Compound` the number of its part, in the order of its items, nested ones in their place; of

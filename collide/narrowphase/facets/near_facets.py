@@ -43,7 +43,7 @@ class Facets:
 def near_facets_up_to(
     tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: float,
     max_facets: int,
-) -> Facets | None:  # fmt: skip
+) -> Facets | None:
     """`near_facets` at one pair of poses; None where more than about ``max_facets`` are near, after few of them."""
     facets, exceeds = near_facets_if_few(tree, packed, A, B, along, np.array([upper]), max_facets)
     return None if exceeds[0] else facets
@@ -52,7 +52,7 @@ def near_facets_up_to(
 def near_facets_if_few(
     tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: np.ndarray,
     max_facets: int,
-) -> tuple[Facets, np.ndarray]:  # fmt: skip
+) -> tuple[Facets, np.ndarray]:
     """(`near_facets` but of poses that have more than about ``max_facets``, (n,) bool: which these are)."""
     spans, exceeds = _Spans(tree, packed, A, B, along), np.zeros(len(upper), dtype=bool)
     pose, place, bound = map(

@@ -60,7 +60,7 @@ def open_segment(tree, XA_at, XB_at, doubles_at, floats_at, integers_at, exact_a
         view_f32(floats_at, FRAME), view_f32(floats_at + 4 * FRAME, FRAME), view_f32(floats_at + 8 * FRAME, PROBE),
         view_f32(floats_at + 8 * FRAME + 4 * PROBE, PROBE),
         ExactCall(exact_at, corners_at, doubles_at, integers_at, XA_at, XB_at), view_i64(counters_at, COUNTERS),
-    )  # fmt: skip
+    )
 
 
 @kernel

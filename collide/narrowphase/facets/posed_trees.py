@@ -53,7 +53,7 @@ def pose_trees(A, XA_at, B, XB_at, doubles_at, floats_at, n_probe, integers_at, 
         A, B, view_f64(XA_at, 16), view_f64(XB_at, 16), view_f64(doubles_at, PLACING),
         view_f64(doubles_at + 8 * PLACING, CORNERS), view_f32(floats_at, FRAME), view_f32(floats_at + 4 * FRAME, FRAME),
         view_f32(floats_at + 8 * FRAME, n_probe), exact,
-    )  # fmt: skip
+    )
     invertible = place(extent_of(A), trees.XA, extent_of(B), trees.XB, trees.placing, trees.frame_a, trees.frame_b)
     invalidate_pose_cache(view_i64(integers_at, STATE))
     return trees, invertible

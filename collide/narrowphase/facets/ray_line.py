@@ -120,7 +120,7 @@ def set_ends(line, last, probe):
     put_floats(
         probe, 3,
         Vec3(_enlarged(line, centre.x, half.x), _enlarged(line, centre.y, half.y), _enlarged(line, centre.z, half.z)),
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

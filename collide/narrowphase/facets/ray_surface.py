@@ -219,7 +219,7 @@ def _set_ray(ray, segment):
 def cast_rays(
     header_at, XA_at, step_a, rays_at, n, first_only, hits_at, capacity, counters_at, progress_at, stack_at, n_stack,
     doubles_at, integers_at, exact_at,
-):  # fmt: skip
+):
     """Facets that n rays (RAY doubles each, in the world) meet, from where an earlier call stopped.
 
     Returns DONE, FULL or SINGULAR. Arguments are flat, as those of all entries.
@@ -238,7 +238,7 @@ def cast_rays(
         segment = open_segment(
             tree, XA_at + 8 * step_a * k, XB_at, doubles_at, doubles_at + 8 * DOUBLES, integers_at, exact_at,
             counters_at + 8 * COUNTERS * k,
-        )  # fmt: skip
+        )
         progress[AT_RAY] = k
         if not place_segment(segment, _set_ray(ray, segment)):
             return SINGULAR
@@ -254,7 +254,7 @@ def cast_rays(
         best[_BEST] = ray[_LIMIT]
         query = _Query(
             segment, line, along, height, pace, slack, keys, best, k, first_only, hits, capacity, progress
-        )  # fmt: skip
+        )
         if not _cast(query, stack):
             for word in range(COUNTERS):
                 segment.counters[word] = 0

@@ -400,7 +400,7 @@ def walk_itself(
         trees, planes, math.ldexp(1.0, int(tree.header[EXPONENT])),
         2.0**-16 + 2.0 * max(rounding.x, rounding.y, rounding.z),
         view_i64(pairs_at, capacity), capacity, progress, view_i64(counters_at, 3),
-    )  # fmt: skip
+    )
     if progress[TOP] == 0:
         _set_planes(tree.triangles, n_facets, planes)
         stack[0] = 0

@@ -64,7 +64,7 @@ def write_depth(row: np.ndarray, point: np.ndarray, translation: SeparatingTrans
 
 def shortened(
     meet: Callable, X_WA, X_WB, known: SeparatingTranslation, directions: np.ndarray, candidates: list[np.ndarray]
-) -> SeparatingTranslation:  # fmt: skip
+) -> SeparatingTranslation:
     """The shortest translation found that separates two bodies, at most as long as one that is known to.
 
     meet : (n, 4, 4), (n, 4, 4) → (n,) bool, False only where the bodies are proven apart.   directions : (k, 3) unit

@@ -66,7 +66,7 @@ def _placed(placing, which, tree, facet, nodes):
     triangle = Triangle(
         add(rotate(placing, matrix, corners.p), shift), add(rotate(placing, matrix, corners.q), shift),
         add(rotate(placing, matrix, corners.r), shift),
-    )  # fmt: skip
+    )
     error = placing[N_ERROR if which == 0 else ERROR] + _BOX_ERROR * max_abs(vec3_at(nodes.numbers, REACH))
     return _Facet(triangle, error)
 
@@ -107,7 +107,7 @@ def _parted_across(edge, third, w, half, error):
                    abs(edge.z) * half.x + abs(edge.x) * half.z + error)
         or _parted(edge.x * third.y - edge.y * third.x, edge.x * w.y - edge.y * w.x,
                    abs(edge.x) * half.y + abs(edge.y) * half.x + error)
-    )  # fmt: skip
+    )
 
 
 @kernel(inline=True)

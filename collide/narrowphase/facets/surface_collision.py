@@ -155,7 +155,7 @@ SIGNATURE = (
 def walk_surfaces(
     header_a_at, header_b_at, XA_at, step_a, XB_at, step_b, n, same_tree, first_only, pairs_at, capacity, starts_at,
     counters_at, progress_at, stack_at, n_stack, doubles_at, integers_at, exact_at,
-):  # fmt: skip
+):
     """Facet pairs of two surfaces at n pairs of poses, from where an earlier call stopped; DONE, FULL or SINGULAR.
 
     Arguments are flat: entries are called by address, from C too.

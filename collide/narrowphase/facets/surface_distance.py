@@ -322,7 +322,7 @@ SIGNATURE = (
 def near_surfaces(
     header_a_at, header_b_at, XA_at, step_a, XB_at, step_b, n, same_tree, limit, enough, results_at, marks_at,
     stack_at, n_stack, heap_at, n_heap, doubles_at, integers_at, exact_at,
-):  # fmt: skip
+):
     """Distances of two surfaces at n pairs of poses; returns how many were done (fewer: that matrix is singular).
 
     Arguments are flat: entries are called by address, from C too.
@@ -353,7 +353,7 @@ def near_surfaces(
             view_f32(floats_at + 8 * FRAME + 4 * NEAR_PROBE, 2 * WIDTH), view_i64(stack_at + 16 * n_stack, WIDTH),
             view_f64(stack_at + 8 * n_stack, n_stack), view_i64(heap_at, n_heap),
             view_f64(heap_at + 8 * n_heap, n_heap), n_heap, view_i64(marks_at + 8 * MARKS * k, MARKS),
-        )  # fmt: skip
+        )
         prepare(query, limit, enough)
         stack[0] = 0
         query.bounds[0] = 0.0

@@ -183,7 +183,7 @@ SIGNATURE = (
 def points_inside(
     header_a_at, XA_at, step_a, XB_at, step_b, points_at, step_points, n, answers_at, counters_at, stack_at, n_stack,
     doubles_at, integers_at, exact_at,
-):  # fmt: skip
+):
     """Where point k of B's frame (3 doubles; step 3 or 0) is, for n pairs of poses: OUTSIDE … SINGULAR.
 
     counters : COUNTERS integers a point.   Arguments are flat: entries are called by address, from C too.
@@ -198,7 +198,7 @@ def points_inside(
         segment = open_segment(
             tree, XA_at + 8 * step_a * k, XB_at + 8 * step_b * k, doubles_at, floats_at, integers_at, exact_at,
             counters_at + 8 * COUNTERS * k,
-        )  # fmt: skip
+        )
         x = view_f64(points_at + 8 * step_points * k, 3)
         for i in range(3):
             segment.numbers[CENTRE + i] = x[i]

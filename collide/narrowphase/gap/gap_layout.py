@@ -18,7 +18,7 @@ from collide.numerics.vec3 import Vec3
 # [m], 1 where the nearest point lies in the parallelogram of two segments; two edges.
 POSE_A, POSE_B, LOW_A, LOW_B, CORNER_A, CORNER_B, SCALE, SLOP, ERROR, RADIUS_A, RADIUS_B, PARALLELOGRAM, EDGES = (
     0, 12, 24, 36, 48, 51, 54, 55, 56, 57, 58, 59, 60
-)  # fmt: skip
+)
 # An edge is the sum of at most two parts, each R (head − tail) of one body: whether of A, else of B.
 HEAD, TAIL, OF_A = 0, 3, 6
 PART = 7
@@ -32,7 +32,7 @@ QUESTION = EDGES + 2 * EDGE
     PROVEN, CORE, SPREAD, LENGTH, GAP, GAP_LOW, GAP_LOWER, GAP_NEAREST, GAP_UPPER, UNIT, POINT_A, POINT_B, ALONG_A,
     ALONG_B,
     LIMIT_A, LIMIT_B,
-) = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12, 15, 18, 21, 24, 25)  # fmt: skip
+) = (0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12, 15, 18, 21, 24, 25)
 ANSWER = 26
 
 #: Numbers of a feature: its first point and two edges, three `DDVec3`.

@@ -221,7 +221,7 @@ def refine_queued(ints_at, numbers_at, poses_at, kind, depths, limit, rows_at, d
     refine_gaps(
         view_lanes(question_at, at.QUESTION), n, parts, composed,
         view_lanes(feature_at, at.FEATURE), view_lanes(direction_at, dd.STRIDE), view_lanes(answer_at, at.ANSWER),
-    )  # fmt: skip
+    )
     for lane in range(count):
         answer = lane_of(answer_at, at.ANSWER, lane)
         question = lane_of(question_at, at.QUESTION, lane)

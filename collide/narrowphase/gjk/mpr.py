@@ -203,7 +203,7 @@ def _place(block, body, n_padded, count, pose, t):
                 block[pose] * p.x + block[pose + 1] * p.y + block[pose + 2] * p.z,
                 block[pose + 3] * p.x + block[pose + 4] * p.y + block[pose + 5] * p.z,
                 block[pose + 6] * p.x + block[pose + 7] * p.y + block[pose + 12] * p.z,
-            ), t)  # fmt: skip
+            ), t)
             block[at] = q.x
             block[at + n_padded] = q.y
             block[at + 2 * n_padded] = q.z

@@ -105,7 +105,7 @@ def test_csv_has_a_row_a_point_and_the_machine(points, tmp_path):
         rows = {row["engine"]: row for row in csv.DictReader(file)}
     assert list(rows) == list(points)
     assert {"class", "ratio", "median_us", "p99_us", "median_error", "max_error", "wrong", "wrong_apart", "mishaps",
-            "timed", "cpu", "cores", "load", "python", "numpy", "collide"} <= rows["wrong"].keys()  # fmt: skip
+            "timed", "cpu", "cores", "load", "python", "numpy", "collide"} <= rows["wrong"].keys()
     assert rows["crashing"]["median_us"] == "" and rows["crashing"]["mishaps"] == "4 abort"
     assert rows["wrong"]["wrong"] == "2" and float(rows["wrong"]["median_error"]) == pytest.approx(5.774e-4)
 

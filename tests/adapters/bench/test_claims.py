@@ -44,7 +44,7 @@ def test_rows_have_ratios_bars_and_what_stands_beside():
     asked = Race(
         {"collide": lambda: Seconds(2.0), "peer": lambda: Seconds(8.0), "half": lambda: Seconds(4.0)},
         {"collide": 1.0, "peer": 1.0, "half": 2.0}, {"hits": 3}, {"peer": {"differ": 1}}, {"peer": 4.5},
-    )  # fmt: skip
+    )
     claim = Claim("c", "a claim", lambda o: [{"n": 8}], lambda o, n: asked, unit="ms")
     rows, keys = claims.measured(claim, QUICK)
     assert keys == ["n"] and [row["engine"] for row in rows] == ["collide", "peer", "half"]
@@ -72,7 +72,7 @@ def run(tmp_path, monkeypatch, *arguments, value=1.5, **more):
     monkeypatch.setattr(claims, "FOLDER", tmp_path / "benchmarks")
     (tmp_path / "benchmarks").mkdir(exist_ok=True)
     counted = Claim("counted", "what is counted", lambda o: grid(kind="ab", n=(1, 2)),
-                    lambda o, kind, n: [{"value": value * n}], everywhere=True, **more)  # fmt: skip
+                    lambda o, kind, n: [{"value": value * n}], everywhere=True, **more)
     claims.main("Counts.", [counted], arguments=list(arguments))
     return tmp_path / "benchmarks" / "results" / "counted.csv"
 
@@ -86,12 +86,12 @@ def test_a_partial_run_keeps_the_rows_of_other_cases(tmp_path, monkeypatch, caps
     place = run(tmp_path, monkeypatch)
     assert [(r["kind"], r["n"], r["value"]) for r in read(place)] == [
         ("a", "1", "1.5"), ("a", "2", "3"), ("b", "1", "1.5"), ("b", "2", "3"),
-    ]  # fmt: skip
+    ]
     assert machine_stamp().keys() <= read(place)[0].keys() and "COUNTED" in capsys.readouterr().out
     run(tmp_path, monkeypatch, "--only", "kind=b", "--only", "n=2", value=7.0)
     assert sorted((r["kind"], r["n"], r["value"]) for r in read(place)) == [
         ("a", "1", "1.5"), ("a", "2", "3"), ("b", "1", "1.5"), ("b", "2", "14"),
-    ]  # fmt: skip
+    ]
 
 
 def test_a_look_writes_no_file(tmp_path, monkeypatch):
@@ -117,7 +117,7 @@ def test_wrong_answers_are_not_timed(tmp_path, monkeypatch):
 def test_tables_fit_their_width_and_say_what_had_no_room(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
     wide = Claim("wide", "many columns", lambda o: grid(n=(1, 2, 3)),
-                 lambda o, n: [{f"a long name {k}": n + k / 3 for k in range(12)}])  # fmt: skip
+                 lambda o, n: [{f"a long name {k}": n + k / 3 for k in range(12)}])
     claims.main("", [wide], arguments=["--no-csv"])
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines[1:])) <= 80 and any("in the CSV alone" in line for line in lines)
@@ -163,7 +163,7 @@ SCRIPTS = {script.name: script.runs for script in scripts()}
 def test_scripts_are_short_and_have_claims():
     lines = {name: (FOLDER / f"{name}.py").read_text(encoding="utf-8") for name in SCRIPTS}
     long = {name: text.count("\n") for name, text in lines.items()
-            if text.count("\n") > (MAX_SCRIPT if SCRIPTS[name] else MAX_PART)}  # fmt: skip
+            if text.count("\n") > (MAX_SCRIPT if SCRIPTS[name] else MAX_PART)}
     assert not long
     own = [name for name, runs in SCRIPTS.items() if runs and "main(__doc__, CLAIMS" not in lines[name]]
     assert own in ([], ["slowest_calls"]), f"{own} have command lines of their own"
@@ -180,7 +180,7 @@ def test_what_scripts_import_is_there():
                 part = ast.parse((FOLDER / f"{node.module}.py").read_text(encoding="utf-8"))
                 there = {n.name for n in part.body if isinstance(n, ast.FunctionDef | ast.ClassDef)}
                 there |= {n.id for top in part.body for n in ast.walk(top)
-                          if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}  # fmt: skip
+                          if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
             elif node.module.split(".")[0] == "collide" and "hosts" not in node.module:
                 module = importlib.import_module(node.module)
                 there = {alias.name for alias in node.names if hasattr(module, alias.name)}

@@ -12,7 +12,7 @@ STUBS = {
     "stub": "Honest", "large_boxes": "LargeBoxes", "cones_abort": "ConesAbort", "ellipsoids_hang": "EllipsoidsHang",
     "spheres_nan": "SpheresNaN", "raises": "Raises",
     "exchanges_points": "ExchangesPoints",
-}  # fmt: skip
+}
 
 
 @pytest.fixture

@@ -24,11 +24,11 @@ def lines_of(stem: str) -> list[str]:
 def test_what_stands_under_a_panel():
     assert lines_of("fcl-hang-sphere-sphere-deep") == [
         "A and B, at one place: Sphere(radius=1)", "answers: nothing (hang)", "true: -2 m, exact"
-    ]  # fmt: skip
+    ]
     assert lines_of("fcl-wrong-gap-cone-cylinder-apart") == [
         "A: Cylinder(radius=0.1, length=1)", "B: Cone(radius=0.1, length=1) at [0, 0, -2]",
         "answers: no collision, 1.00499 m", "true: 1 m, proven",
-    ]  # fmt: skip
+    ]
     assert lines_of("fcl-wrong-points-box-mesh-apart")[-2] == (
         "answers: no collision, 0.5 m; nearest points exchanged"
     )

@@ -88,7 +88,7 @@ def test_streams_quoted_in_an_issue():
         ("Halfspace<double>(0, 0, 1, -0.5);", Halfspace((0, 0, 1), -0.5)),
         ("Halfspace(n: 0 0 1, d: -0.5)", Halfspace((0, 0, 1), -0.5)),
     ],
-)  # fmt: skip
+)
 def test_every_shape_in_both_forms(text, shape):
     (found,) = parse_fcl_dumps(dump(text))
     assert found.case.bodies[0].shape == shape
@@ -130,7 +130,7 @@ def test_several_dumps_and_text_between_them():
         (dump("Sphere<double>(-1);"), "Shape 1"), (dump("Sphere(1)").replace("0, 0, 1, 0,", "0, 0, 1,", 1), "got 15"),
         (dump("Sphere(1)").replace("0, 0, 1, 0,", "0, 0, 2, 0,", 1), "dump 1"), (dump("Convex<double>();"), "vertices"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_dump_is_told(text, complaint):
     with pytest.raises(SceneError, match=complaint):
         parse_fcl_dumps(text)

@@ -61,7 +61,7 @@ def test_an_answer_of_ours_that_is_wrong_sets_the_status(stubs, tmp_path, monkey
     ("words", "complaint"),
     [(("--minutes", "0"), "above 0"), (("--seed", "-1"), "0 or more"), (("--engines", "odd"), "no engine 'odd'"),
      (("--rounds", "0"), "1 or more")],
-)  # fmt: skip
+)
 def test_wrong_arguments(words, complaint, tmp_path, capsys):
     assert run("fuzz", "--save", tmp_path / "x", *words) == 2
     assert complaint in capsys.readouterr().err

@@ -140,7 +140,7 @@ def test_what_a_folder_must_be(stubs, tmp_path):
     fuzz(["large_boxes"], tmp_path, rounds=0, seed=1)
     for options, complaint in (
         ({"seed": 1}, "--resume"), ({"seed": 2, "resume": True}, "seed 1 of large_boxes"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(InvalidArgument, match=complaint):
             fuzz(["large_boxes"], tmp_path, rounds=0, **options)
     (tmp_path / STATE).write_text("[]")
@@ -183,7 +183,7 @@ def test_every_kind_of_scene_is_invented(invented):
     assert kinds.keys() == {
         "Sphere", "Box", "Capsule", "Cylinder", "Cone", "Ellipsoid", "ConvexHull", "HPolytope", "Mesh", "HeightField",
         "Compound", "Halfspace",
-    }  # fmt: skip
+    }
     assert min(kinds.values()) >= 5, kinds
     worlds = [case for case in invented if case.world]
     assert worlds and max(len(case.bodies) for case in worlds) > 5

@@ -26,7 +26,7 @@ PAIRS: dict[str, tuple[Shape, Shape]] = {
     "mesh": (SURFACE, Sphere(0.25)), "hull and mesh": (TETRAHEDRON, SURFACE),
     "plane": (Halfspace((0, 0, 2), -8), Box((1, 1, 1))),
     "cones": (Cone(0.5, 1), Ellipsoid((0.1, 0.2, 0.3))),
-}  # fmt: skip
+}
 #: Rapier's casts have no form.
 SETTINGS = [
     name for name in ENGINES if name.partition(":")[0] in FORMS and name not in ("rapier:cast", "rapier:nonlinear")
@@ -35,7 +35,7 @@ SETTINGS = [
 WITHOUT_POINTS = ("rapier", "newton", "cgal", "distance3d:nesterov", "distance3d:mpr")
 #: How the lines of snippets begin; pybullet prints others.
 PRINTED = ("true: ", "fcl ", "coal ", "pybullet dist", "pybullet points", "mujoco ", "drake ", "trimesh ", "rapier ",
-           "distance3d ", "newton ", "cgal ")  # fmt: skip
+           "distance3d ", "newton ", "cgal ")
 
 
 def flaw(name: str, kind: str = "wrong gap") -> Flaw:

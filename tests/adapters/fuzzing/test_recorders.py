@@ -27,7 +27,7 @@ POINTS = np.array([[0, 0, 0], [1.0, 0, 0], [0, 1, 0], [0, 0, 1 / 3]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 TURNED = pose((0.1, 1 / 3, -2), rpy=(0.1, 0.2, 0.3))
 ROUND = [Sphere(0.3), Box((1, 2, 1 / 3)), Capsule(0.3, 0.5), Cylinder(0.1, 0.7), Cone(0.2, 0.4),
-         Ellipsoid((0.1, 0.2, 0.3)), Halfspace((0, 0, 1), -0.5)]  # fmt: skip
+         Ellipsoid((0.1, 0.2, 0.3)), Halfspace((0, 0, 1), -0.5)]
 
 
 def check(place, expected, X_WB, atol: float = 0.0) -> None:
@@ -41,7 +41,7 @@ def test_python_fcl(tmp_path):
     fcl = pytest.importorskip("fcl", reason="python-fcl is not installed")
     geometries = [fcl.Sphere(0.3), fcl.Box(1, 2, 1 / 3), fcl.Capsule(0.3, 0.5), fcl.Cylinder(0.1, 0.7),
                   fcl.Cone(0.2, 0.4), fcl.Ellipsoid(0.1, 0.2, 0.3),
-                  fcl.Halfspace(np.array([0, 0, 1.0]), -0.5)]  # fmt: skip
+                  fcl.Halfspace(np.array([0, 0, 1.0]), -0.5)]
     X = fcl.Transform(TURNED[:3, :3], TURNED[:3, 3])
     objects = [(fcl.CollisionObject(geometry, X), geometry) for geometry in geometries]
     model = fcl.BVHModel()
@@ -72,7 +72,7 @@ def test_coal(tmp_path):
     swept.setSweptSphereRadius(0.25)
     geometries = [coal.Sphere(0.3), coal.Box(1, 2, 1 / 3), coal.Capsule(0.3, 0.5), coal.Cylinder(0.1, 0.7),
                   coal.Cone(0.2, 0.4), coal.Ellipsoid(0.1, 0.2, 0.3), coal.Halfspace(np.array([0, 0, 1.0]), -0.5),
-                  coal.Convex(corners, triangles), swept, model]  # fmt: skip
+                  coal.Convex(corners, triangles), swept, model]
     X = coal.Transform3s(TURNED[:3, :3], TURNED[:3, 3])
     place = tmp_path / "scene.json"
     record_coal([coal.CollisionObject(geometry, X) for geometry in geometries], place)
@@ -89,7 +89,7 @@ def test_pybullet(tmp_path):
     client = p.connect(p.DIRECT)
     try:
         for at, shape in (((0, 0, 0.5), {"shapeType": p.GEOM_BOX, "halfExtents": [0.5, 0.25, 0.5]}),
-                          ((1, 2, 3), {"shapeType": p.GEOM_SPHERE, "radius": 0.5})):  # fmt: skip
+                          ((1, 2, 3), {"shapeType": p.GEOM_SPHERE, "radius": 0.5})):
             collision = p.createCollisionShape(**shape, physicsClientId=client)
             p.createMultiBody(1.0, collision, basePosition=at, physicsClientId=client)
         place = tmp_path / "scene.json"

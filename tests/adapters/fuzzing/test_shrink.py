@@ -52,7 +52,7 @@ def smallest(name: str, case: Case, kind: str) -> Shrunk:
 
 def test_a_large_box_becomes_a_plain_one(stubs):
     case = pair_case(Box((0.7231, 1.1931, 3.3719)), ConvexHull(POINTS, radius=0.1), pose((5, 6, 7)) @ TURNED,
-                     pose((5.2, 6.1, 7.3)))  # fmt: skip
+                     pose((5.2, 6.1, 7.3)))
     A, B = smallest("large_boxes", case, "false miss").case.bodies
     assert sorted(A.shape.size)[:2] == [1.0, 1.0] and max(A.shape.size) == 3.0
     assert isinstance(B.shape, ConvexHull) and len(B.shape.points) == 1 and B.shape.radius == 0
@@ -111,7 +111,7 @@ def test_an_abort_and_a_hang_are_shrunk_in_children(stubs):
         flaws = examiner.flaws([right, cone, oblong, right])
         assert [[(flaw.engine, flaw.kind) for flaw in found] for found in flaws] == [
             [], [("cones_abort", "abort")], [("ellipsoids_hang", "hang")], []
-        ]  # fmt: skip
+        ]
         assert "SIGABRT" in flaws[1][0].reason and flaws[2][0].reason == "no answer in 2 s"
         starts = aborting.starts
         assert examiner.flaws([right])[0] == [] and aborting.starts == starts, "a child stays from question to question"
@@ -142,7 +142,7 @@ def _names(case: Case) -> list[str]:
 @pytest.mark.parametrize(
     "shape", [HPolytope(np.vstack([np.eye(3), -np.eye(3), [[1, 1, 0]]]), [0.4] * 7), Cylinder(0.37, 1.21),
               HeightField(np.arange(12.0).reshape(3, 4), 0.5), Ellipsoid((0.3, 0.41, 0.52))],
-)  # fmt: skip
+)
 def test_every_step_gives_cases_that_can_be_asked(shape):
     case = pair_case(shape, Box((0.71, 0.83, 0.97)), TURNED, pose((0.123, 0.456, 0.789)))
     made = [tried for step in STEPS for tried in step(case) if tried is not None]
@@ -165,5 +165,5 @@ def test_angles_of_few_digits_are_found_again():
 def _block(size):
     corners = (np.indices((2, 2, 2)).reshape(3, 8).T - 0.5) * size
     faces = [(0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5), (2, 3, 7), (2, 7, 6), (0, 2, 6),
-             (0, 6, 4), (1, 5, 7), (1, 7, 3)]  # fmt: skip
+             (0, 6, 4), (1, 5, 7), (1, 7, 3)]
     return corners, faces

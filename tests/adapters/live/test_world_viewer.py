@@ -202,7 +202,7 @@ def test_only_loopback_the_token_and_the_right_host(viewer):
     for path in (
         f"/{token[:-1]}/", "/", "//", "", "*", f"/{token}", f"/{token}/../etc/passwd", f"/{token}/report.json", "/é/",
         f"http://127.0.0.1:{port}/x/", "/[::1/",
-    ):  # fmt: skip
+    ):
         answer = answer_to(port, f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
         # without a path the request is one of HTTP/0.9, whose answers have no status
         assert re.match(r"HTTP/1.0 404 ", answer) or (path == "" and answer == "nothing is here\n"), (path, answer)

@@ -124,7 +124,7 @@ def test_parts_are_placed_together_as_one_by_one():
     for _ in range(10):
         items = [(shape, EYE if k % 3 == 0 else random_pose(rng, 1.0)) for k, shape in enumerate(
             (collide.Box((1, 1, 1)), collide.Sphere(0.2), collide.Halfspace((0, 0, 1), 0.25), collide.Cone(0.1, 0.3))
-        )]  # fmt: skip
+        )]
         union = CompoundParts(collide.Compound(items))
         which = rng.integers(0, len(union.parts), 30)
         X, about = np.array([random_pose(rng, 2.0) for _ in which]), rng.uniform(0, 3, 30)

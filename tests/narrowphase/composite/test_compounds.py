@@ -254,7 +254,7 @@ def _rows_of_part(one, X, other, Y, X_WA, X_WB) -> np.ndarray:
     poses = pose_table(
         np.concatenate([X_WA, X_WB]), np.concatenate([np.tile(X, (n, 1, 1)), np.tile(Y, (n, 1, 1))]),
         np.repeat([one.reach, other.reach], n),
-    )  # fmt: skip
+    )
     pairs = np.stack([np.arange(n), n + np.arange(n)], axis=1)
     return run.run_pairs(ShapeTable([one, other]), poses, np.repeat([0, 1], n), pairs, boolean=False, limit=np.inf)
 

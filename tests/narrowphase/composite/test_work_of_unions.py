@@ -135,7 +135,7 @@ def cans(n: int, width: float) -> collide.Compound:
     return collide.Compound(
         [(collide.Cylinder(0.5 * width, width), collide.pose(rng.uniform(-0.5, 0.5, 3), rpy=rng.uniform(-3, 3, 3)))
          for _ in range(n)]
-    )  # fmt: skip
+    )
 
 
 def test_balls_decide_most_of_many_parts_at_one_mesh(monkeypatch):
@@ -168,7 +168,7 @@ def test_parts_told_by_balls_meet_as_each_does_alone():
             collide.Box((size, 2 * size, size)), collide.Sphere(size), collide.Cylinder(size, size),
             collide.Capsule(size, size), collide.ConvexHull(size * rng.normal(size=(6, 3)) + size, radius=0.1 * size),
             collide.Mesh(size * inner.vertices, inner.faces),
-        )  # fmt: skip
+        )
         directions = rng.normal(size=(len(shapes), 3))
         directions /= np.linalg.norm(directions, axis=1)[:, None]
         items = [(s, collide.pose(far * d, rpy=rng.uniform(-3, 3, 3))) for s, d in zip(shapes, directions)]

@@ -77,7 +77,7 @@ def test_caps():
         flat = collide.ConvexHull(naive.hull_points(rng, 30) * (1.0, 1.0, 0.0))
         case = Case(flat, collide.Sphere(0.2), pose(), pose(t=(0.1, 0.0, 0.0))) if k % 6 == 0 else Case(
             A, B, random_pose(rng, 0.3), random_pose(rng, 0.3)
-        )  # fmt: skip
+        )
         if k % 6 == 1:
             case = case._replace(X_WB=pose(rotation(rng), case.X_WA[:3, 3]))
         bodies = PosedBodies(*case)

@@ -39,7 +39,7 @@ def check(corners, weights, distance: float, p) -> None:
     size = max(float(np.abs(corners - p).max()), float(np.abs(corners).max()))
     assert min(weights) >= 0.0 and abs(sum(weights) - 1.0) <= 4 * ULP
     combined = [sum(Fraction(w) * (x - y) for w, x, y in zip(weights, axis, [Fraction(p[k])] * len(weights)))
-                for k, axis in enumerate(zip(*exact(corners)))]  # fmt: skip
+                for k, axis in enumerate(zip(*exact(corners)))]
     assert abs(float(sum(map(abs, combined))) - distance) <= 32 * ULP * size
     true = nearest_to_origin([[x - y for x, y in zip(row, exact([p])[0])] for row in exact(corners)])
     assert distance >= math.sqrt(float(true.square)) - 32 * ULP * size

@@ -50,7 +50,7 @@ def refined(bodies: PosedBodies):
     fine = refine(
         bodies.pair, address_of(bodies.poses.terms), bodies.work, surface, result.n_facets, result.n_vertices, size,
         bodies.ordered.slop, error,
-    )  # fmt: skip
+    )
     facets = triangles(surface, fine.facet).values() if fine.sound else []
     return result, fine, [[tuple(surface.ids[2 * v : 2 * v + 2].tolist()) for v in facet] for facet in facets]
 

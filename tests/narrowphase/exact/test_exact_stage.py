@@ -26,7 +26,7 @@ SHAPES = (
     collide.Box((1.0, 1.0, 2.0)), collide.Box((0.5, 1.0, 1.0)), collide.Sphere(0.5), collide.Capsule(0.25, 1.0),
     collide.ConvexHull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]), collide.ConvexHull([(0, 0, 0), (0, 1, 1)]),
     collide.Halfspace((0.0, 0.0, 1.0), 0.5), collide.Halfspace((0.0, 0.0, -1.0), 0.25), collide.Cylinder(0.5, 1.0),
-)  # fmt: skip
+)
 CURVED = (8,)
 HALFSPACES = (6, 7)
 
@@ -56,7 +56,7 @@ class Scene:
         settle_rows(
             rows, self.pairs, self.table, self.poses, self.shape_of, **asked, limit=np.inf, digits=digits,
             requests_at=address_of(requests),
-        )  # fmt: skip
+        )
         return rows
 
     def case(self, k: int) -> Case:

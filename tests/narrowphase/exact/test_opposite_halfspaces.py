@@ -33,7 +33,7 @@ def plane(half: collide.Halfspace, X: np.ndarray) -> tuple[list[Fraction], Fract
     """(n, b) of {x : n·x ≤ b} in the world, up to a positive factor: n = cof(R) m, b = b·det R + n·p."""
     R, p, m = exact(X[:3, :3]), exact([X[:3, 3]])[0], exact([half.normal])[0]
     cofactor = [[R[i - 2][j - 2] * R[i - 1][j - 1] - R[i - 2][j - 1] * R[i - 1][j - 2] for j in range(3)]
-                for i in range(3)]  # fmt: skip
+                for i in range(3)]
     n = [inner(row, m) for row in cofactor]
     return n, Fraction(half.offset) * inner(R[0], cofactor[0]) + inner(n, p)
 

@@ -118,7 +118,7 @@ def planes_that_may_decide(bodies: ExactBodies, depth: float) -> tuple[int, int]
     """How many pairs of edges span a plane, and how many have no plane or one as near the origin as the depth."""
     difference = np.array([[float(x) for x in p] for p in bodies.difference().values()])
     cores = [np.array([[float(x) for x in p] for p in world_points(naive.corners(shape)[0], X)])
-             for shape, X in zip(bodies.shapes, bodies.X)]  # fmt: skip
+             for shape, X in zip(bodies.shapes, bodies.X)]
     edges = [[q - p for p, q in combinations(core, 2)] for core in cores]
     corners = [(q - p, r - p) for core in cores for p, q, r in combinations(core, 3)]
     n_planes = n_tied = 0

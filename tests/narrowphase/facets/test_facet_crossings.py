@@ -22,7 +22,7 @@ def _cases(rng, n: int):
     B[2::4] = A[2::4] + 1e-9 * rng.normal(size=B[2::4].shape)
     A[3::4] *= (1.0, 1.0, 1e-6)
     poses = [np.array([collide.pose(0.3 * rng.normal(size=3), rpy=rng.normal(size=3)) for _ in range(n)])
-             for _ in range(2)]  # fmt: skip
+             for _ in range(2)]
     poses[0][1::4] = poses[1][1::4] = poses[1][2::4] = np.eye(4)
     poses[0][2::4] = np.eye(4)
     return A, B, *poses

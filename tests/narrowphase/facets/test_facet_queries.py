@@ -200,7 +200,7 @@ def test_without_compilation_the_bits_are_the_same():
     child = subprocess.run(
         [sys.executable, "-c", CHILD], input=pickle.dumps(cases), env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
         cwd=Path(collide.__file__).parents[1], capture_output=True, timeout=300, check=False,
-    )  # fmt: skip
+    )
     assert child.returncode == 0, child.stderr.decode()[-3000:]
     assert pickle.loads(child.stdout) == answers(cases)
 

@@ -117,6 +117,6 @@ def test_plain_python_says_the_same():
         done = subprocess.run(
             [sys.executable, "-c", CHILD], input=pickle.dumps(cases), env={**os.environ, "NUMBA_DISABLE_JIT": flag},
             capture_output=True, check=True, timeout=300,
-        )  # fmt: skip
+        )
         answers.append(pickle.loads(done.stdout))
     assert answers[0] == answers[1] and sum(len(found[1]) for found in answers[0]) > 10

@@ -234,7 +234,7 @@ def test_touching_is_open_and_a_hair_beside_it_is_not():
     for shape, half in (
         (collide.Cylinder(0.25, 0.5), 0.25), (collide.Cone(0.25, 0.5), 0.25),
         (collide.Ellipsoid((0.5, 0.75, 0.25)), 0.25),
-    ):  # fmt: skip
+    ):
         for shift, want in ((1e-9, False), (0.0, True), (-1e-9, True)):
             Y = pose(t=(0.125, 0.25, 1.0 + half + shift))
             r = collide.distance(mesh, shape, EYE, Y)
@@ -319,7 +319,7 @@ def test_a_large_mesh_between_the_polytopes_is_not_gone_through(kind, monkeypatc
     shape, y = {
         "Cylinder": (collide.Cylinder(r, r), r), "Cone": (collide.Cone(r, 2 * r), 0.5 * r),
         "Ellipsoid": (collide.Ellipsoid((r, r, r)), r),
-    }[kind]  # fmt: skip
+    }[kind]
     gone_through = []
     bounds = near_facets_module._Spans.of_triangles
     monkeypatch.setattr(

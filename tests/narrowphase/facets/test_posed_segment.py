@@ -45,7 +45,7 @@ def test_every_facet_is_passed_as_exact_arithmetic_says():
         buffers = (
             X.ravel().copy(), Y.ravel().copy(), np.zeros(SEGMENT_DOUBLES), np.zeros(SEGMENT_FLOATS, dtype=np.float32),
             np.zeros(INTEGERS, dtype=np.int64), np.zeros(COUNTERS, dtype=np.int64),
-        )  # fmt: skip
+        )
         at = [address_of(buffer) for buffer in buffers]
         segment = open_segment(open_tree(tree.address), *at[:5], code_of(decide_exactly), at[5])
         segment.ends[:] = *ends[0], *ends[1], *ends[0]

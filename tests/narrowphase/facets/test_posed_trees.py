@@ -40,7 +40,7 @@ class Workspace:
             open_tree(A.address), address_of(self.kept[2]), open_tree(B.address), address_of(self.kept[3]),
             address_of(self.doubles), address_of(self.floats), PRISM, address_of(self.integers),
             code_of(decide_exactly),
-        )  # fmt: skip
+        )
 
 
 class Query(NamedTuple):

@@ -281,7 +281,7 @@ def test_kernels_as_plain_python_say_the_same_bits():
             capture_output=True,
         ).stdout
         for plain in ("0", "1")
-    ]  # fmt: skip
+    ]
     assert said[0] == said[1] and int(said[0].split()[1]) > 10
 
 
@@ -302,7 +302,7 @@ def test_empty_batches_of_poses_and_numbers_beyond_doubles():
     for poses, origins, directions in (
         (np.zeros((0, 4, 4)), none, none), (np.zeros((0, 4, 4)), np.zeros(3), np.ones(3)),
         (np.eye(4), none, np.ones(3)),
-    ):  # fmt: skip
+    ):
         for every in (False, True):
             r = collide.raycast(mesh, poses, origins, directions, all_hits=every)
             assert len(r.hit) == len(r.facet) == 0 and r.point.shape == (0, 3)

@@ -132,7 +132,7 @@ def test_facets_without_area_are_what_their_corners_span():
         ([0, 1, 5], [0, 1, 6], True),
         ([0, 1, 5], [0, 1, 7], False), ([3, 1, 5], [0, 3, 5], False), ([0, 0, 1], [0, 1, 1], False),
         ([0, 1, 4], [0, 0, 3], True),
-    ):  # fmt: skip
+    ):
         for faces in ([a, b], [b, a], [a[::-1], b[1:] + b[:1]], [b[2:] + b[:2], a]):
             pairs, _ = self_hits(build_mesh_tree(line, np.array(faces)))
             assert (len(pairs) == 1) is want, faces

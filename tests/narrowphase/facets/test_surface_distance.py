@@ -132,7 +132,7 @@ def near(A, B, X, Y, limit: float, enough: float) -> tuple[np.ndarray, np.ndarra
     done = near_surfaces(
         A.address, B.address, address_of(X), 0, address_of(Y), 0, 1, False, limit, enough, address_of(results),
         address_of(marks), *work.addresses[:2], work.heap_address, HEAP, *work.addresses[2:],
-    )  # fmt: skip
+    )
     assert done == 1
     return results, marks
 

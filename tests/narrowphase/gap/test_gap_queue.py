@@ -37,7 +37,7 @@ class Pairs:
             shape = (collide.Box(tuple(rng.uniform(0.3, 0.8, 3))), collide.Box((0.3, 0.9, 0.9)),
                      collide.ConvexHull(naive.hull_points(rng, 7) * 0.4, radius=float(rng.choice([0.0, 0.1]))),
                      collide.Capsule(0.1, 0.6), collide.Sphere(0.3))[
-                int(rng.choice(5, p=[0.3, 0.3, 0.2, 0.1, 0.1]))]  # fmt: skip
+                int(rng.choice(5, p=[0.3, 0.3, 0.2, 0.1, 0.1]))]
             X = random_pose(rng, 0.3)
             if k % 2:
                 X[:3, 3] += (0.0, 0.0, 2.0)

@@ -167,7 +167,7 @@ def pairs(kind_a: str, kind_b: str, turned: bool, n: int, seed: int):
     [("cylinder", "cylinder", False, (40, 128, 512, 2048)), ("cylinder", "cylinder", True, (40, 128, 512, 2048)),
      ("plate", "cylinder", False, (40, 512)), ("pyramids", "plate", False, (128, 600)),
      ("frustum", "pyramids", False, (40, 512)), ("plate", "frustum", True, (128, 600))],
-)  # fmt: skip
+)
 def test_gaps_across_caps(kind_a, kind_b, turned, sizes):
     for n in sizes:
         for what, A, X_WA, B, X_WB in pairs(kind_a, kind_b, turned, n, seed=3):

@@ -92,7 +92,7 @@ def test_nearest_point_or_none(n, kind):
         ("random", 1): [1, 2], ("random", 2): [2, 3], ("random", 3): [2, 3], ("around", 1): [2],
         ("around", 2): [2, 3], ("around", 3): [2, 3, G.INSIDE], ("thin", 2): [3], ("thin", 3): [3],
         ("lattice", 3): [3], ("any", 3): [3, G.NOT_FOUND],
-    }  # fmt: skip
+    }
     assert all(seen[n_kept] >= 4 for n_kept in found.get((kind, n), [])), seen
     assert kind == "any" or (n == 3 and kind in ("thin", "lattice")) or seen[G.NOT_FOUND] <= 6, seen
 

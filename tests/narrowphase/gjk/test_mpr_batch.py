@@ -239,7 +239,7 @@ def test_without_compilation_the_bits_are_the_same():
         [sys.executable, "-W", "ignore", "-c", CHILD, *(str(Path(file).parent) for file in (__file__, naive.__file__))],
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, cwd=Path(collide.__file__).parents[1], capture_output=True,
         timeout=300, check=False,
-    )  # fmt: skip
+    )
     assert child.returncode == 0, child.stderr.decode()[-3000:]
     rows, gaps = (rows_of(asked(40, "plain"), boolean=boolean) for boolean in (True, False))
     assert child.stdout == rows.tobytes() + gaps.tobytes()
