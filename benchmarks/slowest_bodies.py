@@ -194,13 +194,15 @@ def _certify(A, B, X, Y, small: float):
 
 
 def _world_of(A, B, X, Y) -> collide.World:
-    """A built World of the pair, B moved to its pose."""
+    """A built World of the pair, B moved to its pose; of A alone without B."""
     world = _worlds.get((id(A), id(B)))
     if world is None:
         world = _worlds[id(A), id(B)] = collide.World()
-        world.add(A, X)
-        world.add(B, Y)
-    world.set_pose(world.ids[1], Y)
+        for shape, pose in ((A, X), (B, Y)):
+            if shape is not None:
+                world.add(shape, pose)
+    if B is not None:
+        world.set_pose(world.ids[1], Y)
     return world
 
 
@@ -226,11 +228,12 @@ def _world_rays(all_hits: bool) -> Callable:
 
 def _world_cast(A, B, X, Y, small: float):
     """B moved at a World of A."""
-    return _world_of(A, A, X, X).shape_cast(B, Y, -ALONG)
+    return _world_of(A, None, X, X).shape_cast(B, Y, -ALONG)
 
 
 def _world_query(A, B, X, Y, small: float):
-    return _world_of(A, A, X, X).query(B, Y, 0.05 * small)
+    """B from outside, asked of a World of A."""
+    return _world_of(A, None, X, X).query(B, Y, 0.05 * small)
 
 
 def _verify(A, B, X, Y, small: float):

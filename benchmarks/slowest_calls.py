@@ -1,6 +1,6 @@
 """The slowest calls of the public interface: found by a search over bodies, sizes, placements and questions, and kept.
 
-    python benchmarks/slowest_calls.py                        # the thirty kept, beside the bar; five minutes
+    python benchmarks/slowest_calls.py                        # the forty kept, beside the bar; five minutes
     python benchmarks/slowest_calls.py --search --seconds 600 # looks for others; prints the worst, writes no file
     python benchmarks/slowest_calls.py --case "contacts ball:80000 box 1 deep"
 
@@ -42,7 +42,11 @@ WORST = (
     "certify sheet:300 rounded:100000 1 deep", "distance meshes:1000 terrain:80000 1 inside",
     "distance terrain:80000 cans:1000 0.01 near", "contacts sheet:80000 cone 100 inside",
     "shape_cast ball:80000 terrain:10000 100 near", "distance rounded:100000 terrain:300 100 inside",
-    "world_minimum meshes:1000 sheet:300 1e+07 inside",
+    "world_minimum meshes:1000 sheet:300 1e+07 inside", "world_minimum boxes:1000 cans:1000 1e+07 touching",
+    "world_distances cans:1000 boxes:1000 1e-07 far", "world_rays hull:100000 rounded:10 0.01 deep",
+    "world_cast cans:1000 sheet:80000 100 deep", "world_nearest cylinder ball:10000 1e-07 deep",
+    "within meshes:1000 terrain:80000 100 deep", "rays meshes:1000 meshes:1000 1 far",
+    "certify_motion hull:100000 cans:1000 1e-07 deep",
     "impact hull:100000 terrain:80000 100 far", "impact ball:10000 hull:100000 1e+07 near",
     "impact sheet:80000 boxes:1000 1e+07 far", "impact cans:1000 slab:300 1e+07 touching",
     "impact balls:3 meshes:1000 0.01 touching", "impact hull:100000 meshes:1000 1e-07 near",

@@ -15,7 +15,7 @@ from collide.casts.posed_parts import PosedParts
 from collide.errors import UnsupportedQuery
 from collide.lazy_modules import lazy_module
 from collide.lowering.shape_table import ShapeTable
-from collide.narrowphase.composite.composite import combine
+from collide.narrowphase.composite.composite import combine, of_thread
 from collide.narrowphase.convex_kernel_calls import run_pairs
 from collide.narrowphase.method_functions import rows_of_pair
 from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
@@ -291,9 +291,9 @@ class PackedWorld:
 
     def _answer_piece(self, candidates: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> Answer:
         if not self._any_meshed:
-            return self._answer_convex(candidates, limit, boolean, stop_at_hit)
+            return self._answer_unions(candidates, limit, boolean, stop_at_hit)
         meshed = self.parts.meshed[candidates].any(axis=1)
-        convex = self._answer_convex(candidates[~meshed], limit, boolean, stop_at_hit)
+        convex = self._answer_unions(candidates[~meshed], limit, boolean, stop_at_hit)
         if stop_at_hit and convex.rows["hit"].any():
             return convex
         of_meshes = self._answer_meshes(candidates[meshed], limit, boolean, stop_at_hit)
@@ -348,6 +348,23 @@ class PackedWorld:
         return refused
 
     # --- convex bodies and unions of convex parts -----------------------------------------------
+
+    def _answer_unions(self, candidates: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> Answer:
+        """`_answer_convex`; but rows of two unions of many parts are those of the pair by itself, where the limit rules
+        out few of their parts.
+        """
+        parts = self.parts
+        if boolean or parts.all_of_one_part:
+            return self._answer_convex(candidates, limit, boolean, stop_at_hit)
+        whole = self._part_trees.are_mostly_near(candidates, limit)
+        answers = [self._answer_convex(candidates[~whole], limit, boolean, stop_at_hit)]
+        for batch in batches_of_shapes(candidates[whole], self.shape_of, len(self.shapes)):
+            asked, (a, b) = of_thread.asked, batch.T
+            A, B = self.shapes[self.shape_of[a[0]]], self.shapes[self.shape_of[b[0]]]
+            rows = rows_of_pair(A, B, self.X_WBs[a], self.X_WBs[b], limit)
+            rows["a"], rows["b"] = a, b
+            answers.append(Answer(rows, of_thread.asked - asked, len(rows), 0))
+        return answers[0] if len(answers) == 1 else _joined(answers, boolean)
 
     def _answer_convex(self, candidates: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> Answer:
         parts = self.parts

@@ -4,6 +4,8 @@ that is left can be nearer than the best.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from collide.packed_world import PackedWorld
@@ -14,12 +16,19 @@ _ROUNDING = 2.0**-24
 _FIRST = 16
 
 
+class _Nearest(NamedTuple):
+    """pair : (1, 2), the nearest so far, or (0, 2).   row : (1,) what is told of it; None where it is to be asked."""
+
+    pair: np.ndarray
+    row: np.ndarray | None
+
+
 def nearest_pair(packed: PackedWorld, limit: float, threads: int) -> np.ndarray:
     """One row: of the tested pairs at most ``limit`` [m] apart the one with the least signed distance, of several the
     one with the least positions; no row where there is none.
     """
     asked = np.empty(0, dtype=np.int64)
-    best, winner = np.inf, np.empty((0, 2), dtype=np.int64)
+    best, winner = np.inf, _Nearest(np.empty((0, 2), dtype=np.int64), None)
     n = len(packed.roster.ids)
     for margin in _margins(packed, limit):
         candidates = packed.candidates(margin)
@@ -33,7 +42,9 @@ def nearest_pair(packed: PackedWorld, limit: float, threads: int) -> np.ndarray:
         candidates = packed.candidates(min(best * (1.0 + _ROUNDING), limit))
         is_new = ~np.isin(candidates[:, 0] * n + candidates[:, 1], asked)
         best, winner = _least(packed, candidates[is_new], min(limit, best), best, winner, threads)
-    return packed.answer(winner, np.inf, boolean=False, stop_at_hit=False).rows
+    if winner.row is not None:
+        return winner.row
+    return packed.answer(winner.pair, np.inf, boolean=False, stop_at_hit=False).rows
 
 
 def _margins(packed: PackedWorld, limit: float):
@@ -51,8 +62,8 @@ def _margins(packed: PackedWorld, limit: float):
     yield limit
 
 
-def _least(packed: PackedWorld, pairs: np.ndarray, limit: float, best: float, winner: np.ndarray, threads: int):
-    """(least distance, its pair (1, 2)) among pairs (k, 2) and the best so far."""
+def _least(packed: PackedWorld, pairs: np.ndarray, limit: float, best: float, winner: _Nearest, threads: int):
+    """(least distance, its pair) among pairs (k, 2) and the best so far."""
     bounds = _lower_bounds(packed, pairs)
     order = np.lexsort((pairs[:, 1], pairs[:, 0], bounds))
     pairs, bounds = pairs[order], bounds[order]
@@ -62,13 +73,14 @@ def _least(packed: PackedWorld, pairs: np.ndarray, limit: float, best: float, wi
         some = pairs[at : at + size][bounds[at : at + size] <= min(top, limit)]
         if not len(some):
             break
-        rows = packed.answer(some, max(min(limit, top), 0.0), boolean=False, stop_at_hit=False, threads=threads).rows
+        reach = max(min(limit, top), 0.0)
+        rows = packed.answer(some, reach, boolean=False, stop_at_hit=False, threads=threads).rows
         rows = rows[~rows["beyond"] & (rows["distance"] <= limit)]
-        for row in rows[np.lexsort((rows["b"], rows["a"], rows["distance"]))][:1]:
-            pair = np.array([[row["a"], row["b"]]], dtype=np.int64)
-            is_less = row["distance"] < best or (row["distance"] == best and tuple(pair[0]) < tuple(winner[0]))
-            if is_less:
-                best, winner = float(row["distance"]), pair
+        for row in rows[np.lexsort((rows["b"], rows["a"], rows["distance"]))][:1, None]:
+            pair, distance = np.array([[row["a"][0], row["b"][0]]], dtype=np.int64), float(row["distance"][0])
+            if distance < best or (distance == best and tuple(pair[0]) < tuple(winner.pair[0])):
+                # Depths have no limit: a row that hits is that of any, a gap's may be of a search that the limit cut.
+                best, winner = distance, _Nearest(pair, row if reach == np.inf or row["hit"][0] else None)
         if best == -np.inf:  # two half-spaces
             break
         at, size = at + size, 2 * size

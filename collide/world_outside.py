@@ -18,7 +18,7 @@ from collide.packed_world import PackedWorld, batches_of_shapes
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
 from collide.threads import share
-from collide.world_parts import runs
+from collide.world_parts import MIN_BY_TREE, runs
 
 #: Half of the engine, which scenes without meshes never load.
 mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
@@ -79,21 +79,23 @@ def answer_outside(packed: PackedWorld, questions: Questions, limit: float, thre
     pairs = packed.tree.boxes_met(questions.boxes, limit)
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
     is_meshed = np.array([shape.is_asked_whole for shape in questions.shapes], dtype=bool)
-    meshed = is_meshed[questions.shape_of[pairs[:, 0]]] | packed.meshed[pairs[:, 1]]
-    answered = [np.zeros(0, dtype=PAIR_DTYPE), _of_convex(packed, questions, pairs[~meshed], limit, threads)]
+    whole = is_meshed[questions.shape_of[pairs[:, 0]]] | packed.meshed[pairs[:, 1]]
+    whole |= questions.counts[pairs[:, 0]] * packed.parts.counts[pairs[:, 1]] >= MIN_BY_TREE
+    answered = [np.zeros(0, dtype=PAIR_DTYPE), _of_convex(packed, questions, pairs[~whole], limit, threads)]
     shape_of = np.concatenate([questions.shape_of, len(questions.shapes) + packed.shape_of])
     n = len(questions.boxes)
-    for batch in batches_of_shapes(pairs[meshed] + [0, n], shape_of, len(questions.shapes) + len(packed.shapes)):
-        answered.append(_of_mesh(packed, questions, batch - [0, n], limit))
+    for batch in batches_of_shapes(pairs[whole] + [0, n], shape_of, len(questions.shapes) + len(packed.shapes)):
+        answered.append(_of_shapes(packed, questions, batch - [0, n], limit))
     rows = np.concatenate(answered)
     return rows[np.lexsort((rows["b"], rows["a"]))]
 
 
-def _of_mesh(packed: PackedWorld, questions: Questions, pairs: np.ndarray, limit: float) -> np.ndarray:
+def _of_shapes(packed: PackedWorld, questions: Questions, pairs: np.ndarray, limit: float) -> np.ndarray:
     """Rows of pairs (k, 2) of the same two shapes."""
     q, b = pairs.T
     A, B = questions.shapes[questions.shape_of[q[0]]], packed.shapes[packed.shape_of[b[0]]]
-    rows_of = rows_of_pair if A.is_region or B.is_region else mesh_batches.rows_within
+    is_of_meshes = (A.meshed or B.meshed) and not (A.is_region or B.is_region)
+    rows_of = mesh_batches.rows_within if is_of_meshes else rows_of_pair
     rows = rows_of(A, B, questions.X_WS[q], packed.X_WBs[b], limit)
     rows["a"], rows["b"] = q, b
     return rows

@@ -10,10 +10,12 @@ import numpy as np
 
 from collide.broadphase.box_tree import BoxTree
 from collide.fork_safe_lock import ForkSafeLock
-from collide.world_parts import WorldParts, runs
+from collide.world_parts import MIN_BY_TREE, WorldParts, runs
 
-#: Two bodies with fewer pairs of parts than this are compared part by part.
-_MIN_BY_TREE = 1024
+#: Bodies that are together at most so many times as wide as the margin are asked as a pair by itself, which goes
+#: through parts from the nearest on. Of two places in a unit, drawn evenly, a share of 1 − (1 − 1/4)² is at most 1/4
+#: apart: boxes would leave a twelfth of all pairs or more, and each be asked.
+_TIMES_AS_WIDE = 4.0
 #: Relative: far more than what a sum of a coordinate and a margin is off.
 _ROUNDING = 2.0**-40
 
@@ -29,6 +31,15 @@ class PartTrees:
         self._parts = parts
         self._trees: dict[int, BoxTree] = {}
 
+    def are_mostly_near(self, candidates: np.ndarray, margin: float) -> np.ndarray:
+        """(k,) bool: candidates (k, 2) of many parts, of which boxes would rule few pairs out."""
+        parts = self._parts
+        are_near = parts.counts[candidates].prod(axis=1) >= MIN_BY_TREE
+        a, b = (parts.body_boxes(bodies) for bodies in candidates[are_near].T)
+        widths = np.maximum(a[:, 3:], b[:, 3:]) - np.minimum(a[:, :3], b[:, :3])
+        are_near[are_near] = (widths <= _TIMES_AS_WIDE * margin).all(axis=1)
+        return are_near
+
     def near(self, candidates: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
         """((m, 2) pairs of parts whose boxes come within margin [m], (m,) the candidate each belongs to), by candidate.
 
@@ -39,8 +50,8 @@ class PartTrees:
         if parts.all_of_one_part:
             return candidates, np.arange(len(candidates))
         n_pairs = parts.counts[candidates].prod(axis=1)
-        by_tree = np.flatnonzero(n_pairs >= _MIN_BY_TREE)
-        by_part = np.flatnonzero(n_pairs < _MIN_BY_TREE)
+        by_tree = np.flatnonzero(n_pairs >= MIN_BY_TREE)
+        by_part = np.flatnonzero(n_pairs < MIN_BY_TREE)
         all_pairs, owners = self._all_pairs(candidates[by_part])
         pairs_found, owner = [all_pairs], [by_part[owners]]
         for k in by_tree.tolist():

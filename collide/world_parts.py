@@ -26,6 +26,9 @@ from collide.lowering.shape_table import (
 )
 from collide.shapes.shape import Shape
 
+#: Two bodies with fewer pairs of parts than this are compared part by part.
+MIN_BY_TREE = 1024
+
 
 class WorldParts:
     """Parts of bodies by position (0 … n − 1).

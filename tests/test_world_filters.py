@@ -11,6 +11,7 @@ import pytest
 from naive import one_of_each, pose, random_pose, rng_of
 
 import collide
+from collide import world_outside
 from collide.errors import InvalidArgument, UnknownBody
 from collide.world_part_pairs import PartTrees
 from collide.world_parts import WorldParts
@@ -316,8 +317,8 @@ def test_parts_by_trees_are_those_of_all_parts(monkeypatch):
         candidates = np.array([(i, j) for i in range(4) for j in range(i + 1, 4)])
         for margin in (0.0, 0.2):
             answers = []
-            for many_pairs in (0, 1 << 60):
-                monkeypatch.setattr("collide.world_part_pairs._MIN_BY_TREE", many_pairs)
+            for n_least in (0, 1 << 60):
+                monkeypatch.setattr("collide.world_part_pairs.MIN_BY_TREE", n_least)
                 answers.append([found.tolist() for found in PartTrees(parts).near(candidates, margin)])
             assert answers[0] == answers[1], (seed, margin)
             assert 50 < len(answers[0][0]) < 4000
@@ -331,3 +332,41 @@ def test_large_unions_ask_few_of_their_parts():
         world.add(beads, pose(t=(0, side, 0)))
     assert world.collides()
     assert len(world.collisions()) == 1 and world.stats["convex_pairs"] <= 400
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_distances_of_large_unions_ask_few_of_their_parts(seed, monkeypatch):
+    """Two scattered unions of 200 and 150 parts, of 30,000 pairs of which a hundredth is asked without a limit: the row
+    is that of the pair, and outside shapes ask no pair of parts beside it.
+    """
+    rng, asked = rng_of("large unions apart", seed), []
+    A, B = (
+        collide.Compound([(collide.Box(rng.uniform(0.02, 0.1, 3)), random_pose(rng, 1.0)) for _ in range(n)])
+        for n in (200, 150)
+    )
+    X_WA, X_WB = pose(), random_pose(rng, 0.3)
+    X_WB[:3, 3] += 3.0
+
+    def without_names(rows: np.ndarray) -> bytes:
+        rows = rows.copy()
+        rows["a"] = rows["b"] = rows["iterations"] = 0
+        return rows.tobytes()
+
+    expected = collide.distance(A, B, X_WA, X_WB).rows
+    world, of_B = collide.World(), collide.World()
+    world.add(A, X_WA)
+    for each in (world, of_B):
+        each.add(B, X_WB)
+    run_pairs = world_outside.run_pairs
+
+    def counted(table, poses, shape_of, pairs, **named):
+        asked.append(len(pairs))
+        return run_pairs(table, poses, shape_of, pairs, **named)
+
+    monkeypatch.setattr(world_outside, "run_pairs", counted)
+    limit = 1.01 * float(expected["distance"][0])
+    told = [world.distances(), world.distances(limit)]
+    assert world.stats["convex_pairs"] <= 300 and world.stats["narrowphase"] == 1
+    for rows in (*told, world.minimum(), of_B.query(A, X_WA, np.inf)):
+        assert without_names(rows.rows) == without_names(expected), f"seed {seed}"
+    assert not sum(asked)

@@ -6,9 +6,10 @@ import itertools
 
 import numpy as np
 import pytest
-from naive import pose, rng_of
+from naive import pose, random_pose, rng_of
 
 import collide
+from collide.packed_world import PackedWorld
 from collide.world_minimum import _lower_bounds
 
 BOX = collide.Box((1.0, 1.0, 1.0))
@@ -112,3 +113,41 @@ def test_bounds_are_below_every_distance():
     expected = [2.0, np.hypot(0.5, 4.0), -0.75, -np.inf, 1.75, -np.inf]
     for bound, value in zip(bounds.tolist(), expected):
         assert bound == value if np.isinf(value) else value - 1e-6 <= bound < value, bounds
+
+
+def asked_pairs(world: collide.World, monkeypatch) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """The rows of `minimum`, and every pair that was answered for them, as often as it was."""
+    asked: list[tuple[int, int]] = []
+    answer = PackedWorld.answer
+
+    def counted(packed, candidates, *rest, **named):
+        asked.extend(map(tuple, candidates.tolist()))
+        return answer(packed, candidates, *rest, **named)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(PackedWorld, "answer", counted)
+        rows = world.minimum().rows
+    return rows, asked
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_pairs_are_asked_once_and_the_row_is_that_of_the_pair(seed, monkeypatch):
+    """Two to seven bodies, meshes and unions among them, deep in one another or apart: no pair whose depth is told, and
+    none that was asked without a limit, is asked again; rows are those of `distances`, to the last bit.
+    """
+    rng, n_overlaps = rng_of("each pair once", seed), 0
+    mesh = collide.Mesh(*collide.tessellate(collide.Ellipsoid((0.4, 0.3, 0.5))))
+    union = collide.Compound([(BOX, pose()), (mesh, pose(t=(0.6, 0, 0)))])
+    shapes = [mesh, union, BOX, collide.Cylinder(0.3, 0.8), collide.Sphere(0.4)]
+    for case in range(6):
+        world, spread = collide.World(), (0.3, 3.0)[case % 2]
+        for _ in range(int(rng.integers(2, 8))):
+            world.add(shapes[int(rng.integers(5))], random_pose(rng, spread))
+        rows, asked = asked_pairs(world, monkeypatch)
+        every = world.distances().rows
+        pair = every[(every["a"] == rows["a"][0]) & (every["b"] == rows["b"][0])]
+        assert rows.tobytes() == pair.tobytes(), f"seed {seed}, case {case}"
+        n_overlaps += int(rows["hit"][0])
+        repeated = len(asked) - len(set(asked))
+        assert repeated == 0 or (repeated == 1 and not rows["hit"][0] and len(asked) > 17), f"seed {seed}, case {case}"
+    assert n_overlaps >= 2

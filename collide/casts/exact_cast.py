@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
-from collide.numerics.exact_points import Point
+from collide.numerics.exact_points import PlacedPoints, Point, opposite
 from collide.numerics.exact_vectors import inner, minus
 
 _ARTIFICIAL, _T = -1, -2
@@ -45,7 +45,8 @@ class _Basis(NamedTuple):
 def cast_exactly(A: Sequence[Point], B: Sequence[Point], d: Sequence[int]) -> ExactCast:
     """The first contact of the hull of A, moved along d, with the hull of B.
 
-    A, B : integer points on one grid.   d : integers, in units of the same grid a unit of t; not 0.
+    A, B : integer points on one grid; of `PlacedPoints` doubles rule out most.   d : integers, in units of the same
+        grid a unit of t; not 0.
     """
     basis = _Basis([_ARTIFICIAL] * 4, [[int(i == j) for j in range(4)] + [int(i == 3)] for i in range(4)], [1])
     while True:
@@ -75,7 +76,8 @@ def _outward(A, B, far: list[int], near: list[int]) -> tuple[Fraction, Fraction,
     factor = int(any(far))
     while True:
         *n, shift = (factor * x + y for x, y in zip(far, near))
-        if max(inner(n, a) for a in A) - min(inner(n, b) for b in B) + shift <= 0:
+        direction = n[0], n[1], n[2]
+        if shift <= _lowest(A, opposite(direction))[0] + _lowest(B, direction)[0]:
             return Fraction(n[0]), Fraction(n[1]), Fraction(n[2])
         factor *= 2
 
@@ -88,11 +90,10 @@ def _prices(basis: _Basis, name: int) -> list[int]:
 def _entering(A, B, d, far: list[int], near: list[int], unit: int):
     """(name, column) of a variable that makes the sums less, the artificial one first; None at the optimum."""
     n = far[0], far[1], far[2]
-    heights_a, heights_b = [inner(n, a) for a in A], [-inner(n, b) for b in B]
-    highest_a, highest_b = max(heights_a), max(heights_b)
-    gain = highest_a + highest_b + far[3]
+    (least_a, lowest_a), (least_b, lowest_b) = _lowest(A, opposite(n)), _lowest(B, n)
+    gain = far[3] - least_a - least_b
     if gain > 0:
-        i, j = heights_a.index(highest_a), heights_b.index(highest_b)
+        i, j = lowest_a[0], lowest_b[0]
         return (i, j), (*minus(A[i], B[j]), 1)
     time = near[0], near[1], near[2]
     price_of_t = inner(n, d)
@@ -100,11 +101,22 @@ def _entering(A, B, d, far: list[int], near: list[int], unit: int):
         return _T, (*d, 0)
     if gain < 0:
         return None
-    i = max((k for k, height in enumerate(heights_a) if height == highest_a), key=lambda k: inner(time, A[k]))
-    j = min((k for k, height in enumerate(heights_b) if height == highest_b), key=lambda k: inner(time, B[k]))
+    i, j = _lowest(A, opposite(time), lowest_a)[1][0], _lowest(B, time, lowest_b)[1][0]
     if inner(time, minus(A[i], B[j])) + near[3] > 0:
         return (i, j), (*minus(A[i], B[j]), 1)
     return None
+
+
+def _lowest(points: Sequence[Point], n: Point, some: Sequence[int] | None = None) -> tuple[int, Sequence[int]]:
+    """(least product with n of points, or of some of them, the numbers of all that have it, ascending)."""
+    if not any(n):
+        return 0, range(len(points)) if some is None else some
+    if isinstance(points, PlacedPoints) and (some is None or len(some) == len(points)):
+        some = points.lowest_along(n)
+    numbers = range(len(points)) if some is None else some
+    heights = [inner(n, points[k]) for k in numbers]
+    least = min(heights)
+    return least, [k for k, height in zip(numbers, heights) if height == least]
 
 
 def _leaving(rows: list[list[int]], pivots: list[int]) -> int:

@@ -32,11 +32,13 @@ from collide.casts.ray_hits import RayEvents
 from collide.casts.rays_in_tree import TREE_RAY_DOUBLES, TREE_RAY_INTEGERS, parts_on_rays
 from collide.kernels import address_of
 from collide.lowering.packed_convex import HALFSPACE, POINTS
-from collide.numerics.exact_points import integers, on_one_grid, rounded
+from collide.numerics.exact_points import integers, rounded
 from collide.numerics.exact_vectors import inner
 
 #: Brackets wider than this, in units of t of the far side, are not certified.
 _MAX_WIDTH = 2.0**-36
+#: Of so many vertices doubles choose those of which exact numbers are made; all are made of fewer.
+_MIN_BY_DOUBLES = 64
 
 
 class _Workspace(local):
@@ -198,14 +200,17 @@ def _chord_of_points(parts: PosedParts, part: int, origin, direction) -> tuple[F
     d, d_exponent = integers(direction)
     whole, o_exponent = integers(origin)
     points = parts.exact(part).vertices
-    ((o,), vertices), grid = on_one_grid(([(whole[0], whole[1], whole[2])], o_exponent), (list(points), points.grid))
+    grid = min(o_exponent, points.grid)
+    x, y, z = (c << (o_exponent - grid) for c in whole)
+    o, vertices = (x, y, z), points.on_grid(grid)
     unit = Fraction(2) ** (grid - d_exponent)
     # Farther than all of it is from the origin: the largest component of d is at least 1.
-    far = 4 * max(abs(c - b) for v in [*vertices, (0, 0, 0)] for c, b in zip(v, o)) + 1
+    far = 4 * (vertices.reach + max(map(abs, o))) + 1
+    corners = vertices if len(vertices) >= _MIN_BY_DOUBLES else list(vertices)
     ends = []
     for sign in (1, -1):
         begin = (o[0] - sign * far * d[0], o[1] - sign * far * d[1], o[2] - sign * far * d[2])
-        t = cast_exactly([begin], vertices, [sign * c for c in d]).t
+        t = cast_exactly([begin], corners, [sign * c for c in d]).t
         ends.append(None if t is None else sign * (t - far) * unit)
     return ends[0], ends[1]
 

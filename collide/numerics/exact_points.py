@@ -124,16 +124,27 @@ class PlacedPoints(Sequence[Point]):
             yield tuple(a * x + b * y + c * z + t for a, b, c, t in self._rows)  # type: ignore[misc]
 
     def first_along(self, v: Point) -> int:
-        """The first of the points with the least product with v: O(k) doubles, integers only of those that may have it.
-
-        What exceeds the least product by more than twice their error is not the least.
-        """
-        values, error, along = self._products(v, 0)
-        candidates = np.flatnonzero(~(values > values.min() + 2.0 * error))
+        """The first of the points with the least product with v: O(k) doubles, integers of those that may have it."""
+        candidates, along = self._lowest_along(v)
         # Of points whose coordinates along R^T v are equal, as on a side of a box, the first stands for all.
         used = self._points[candidates][:, along != 0.0]
         _, first = np.unique(used, axis=0, return_index=True) if used.size else (None, np.zeros(1, dtype=np.int64))
         return min(candidates[np.sort(first)].tolist(), key=lambda k: inner(v, self[k]))
+
+    def lowest_along(self, v: Point) -> list[int]:
+        """Numbers, ascending, of points that may have the least product with v, all that have it among them: O(k)."""
+        return self._lowest_along(v)[0].tolist()
+
+    def _lowest_along(self, v: Point) -> tuple[np.ndarray, np.ndarray]:
+        """(numbers, digits of R^T v). What exceeds the least product by over twice their error is not the least."""
+        values, error, along = self._products(v, 0)
+        return np.flatnonzero(~(values > values.min() + 2.0 * error)), along
+
+    @property
+    def reach(self) -> int:
+        """An integer that no coordinate exceeds: |R v + t| ≤ |R| |v| + |t|, row by row."""
+        largest = [_on_grid(value, self._own_grid) for value in self._largest.tolist()]
+        return max(sum(abs(entry) * value for entry, value in zip(row, (*largest, 1))) for row in self._rows)
 
 
 def _on_grid(value: float, grid: int) -> int:

@@ -15,6 +15,7 @@ from collide.broadphase.box_tree import BoxTree
 from collide.lowering.compound_table import lay_out
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_halfspace, pack_points
 from collide.lowering.parts import Part, bounding_parts_of, parts_of
+from collide.lowering.prepared_structures import may_have_tree, support_tree_of
 from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, ShapeTable, pose_table
 from collide.mesh.convex_surface import is_own_hull
 from collide.robots.check_scene import BODY_INTS, BOX
@@ -151,6 +152,7 @@ def check_tables(bodies: Sequence[RobotBody], around: Surroundings, matrices: np
         packed = packed + [swollen(part, by) for part, by in zip(packed, padding.tolist())]
         parts, is_bound = np.concatenate([parts, parts]), np.concatenate([is_bound, is_bound])
     table_of = ShapeTable([*packed, *around.packed])
+    table_of.build_trees(np.arange(len(table_of.packed)))  # else each support of a hull looks at all its vertices
     part_boxes = np.array([box_of(part) for part in (*packed, *around.packed)]).reshape(-1, BOX)
     poses = np.concatenate([np.zeros((len(packed), POSE)), around.poses])
     return CheckTables(
@@ -188,7 +190,10 @@ def _hulls_instead(shape: Shape) -> Shape | None:
 def swollen(packed: PackedConvex, by: float) -> PackedConvex:
     """A convex set and all that is at most so far from it [m]."""
     if packed.kind == POINTS:
-        return pack_points(packed.points, packed.radius + by, packed.slop, packed.prepared.with_tree)
+        wider = pack_points(packed.points, packed.radius + by, packed.slop, packed.prepared.with_tree)
+        if may_have_tree(packed):  # of the same points: one tree serves both, however often margins change
+            wider.prepared.made["tree"] = support_tree_of(packed)
+        return wider
     radius = packed.radius + by
     return packed._replace(radius=radius, content=packed.content + np.float64(radius).tobytes())
 

@@ -13,7 +13,7 @@ from random_robots import random_link_shape
 import collide
 from collide.lowering.packed_convex import pack_halfspace, pack_points
 from collide.lowering.parts import parts_of
-from collide.lowering.shape_table import POSE_SLOP, POSE_STRETCH, POSE_TERMS
+from collide.lowering.shape_table import POSE_SLOP, POSE_STRETCH, POSE_TERMS, TREE
 from collide.robots.check_tables import (
     UNBOUNDED_HALF,
     BodyAround,
@@ -188,3 +188,21 @@ def test_a_plane_is_shifted_by_the_margin_times_its_normals_length(scale, slop):
     assert made.params[:3].tolist() == normal.tolist()
     assert abs(made.params[3] - (-0.7 + 0.3 * scale)) <= 1e-15 * (1 + scale)
     assert 2.0**-50 <= made.slop - slop <= 2.0**-40
+
+
+def test_hulls_of_many_vertices_have_a_support_tree_and_it_serves_what_is_swollen():
+    """Of a link, of its padded twin and of a body around, whatever its margin: without one, each support looks at all
+    vertices, for every pair of parts and every configuration. No tree is built again when a margin changes.
+    """
+    points = rng_of("hull of many vertices").normal(size=(600, 3))
+    hull = collide.ConvexHull(points / np.linalg.norm(points, axis=1)[:, None])
+    tables = [
+        tables_of(
+            RobotBody("link", 0, hull, 0.1), RobotBody("box", 1, CUBE, 0.1),
+            around=[BodyAround("hull", hull, pose(t=(3.0, 0, 0)), margin)],
+        ).table
+        for margin in (0.0, 0.2, 0.3)
+    ]
+    trees = np.array([table.ints[: len(table.packed), TREE] for table in tables])
+    assert all(table.is_built for table in tables)
+    assert trees[:, [0, 2, 4]].all() and not trees[:, [1, 3]].any() and len(np.unique(trees)) == 2
