@@ -146,10 +146,23 @@ def _states_by_balls(
 ) -> np.ndarray:
     """(k,) what balls around parts of N tell of them and a mesh of M, at poses by number: APART or HIT, OPEN otherwise.
 
-    A part is within its ball. Where no facet comes as near to the centre as the ball is large, and rounding moved them,
-    all of the ball is on the side of the surface that the centre is on.
+    Where a part is farther from every facet than rounding moved it, all of it is on the side that its ball is on.
     """
-    status = np.full(len(others), OPEN)
+    gaps, sides = _ball_gaps(M, N, X_WM, X_WN, mesh, others, poses, np.zeros(len(others)))
+    return np.where(gaps > 0.0, np.where(sides == OUTSIDE, APART, np.where(sides == INSIDE, HIT, OPEN)), OPEN)
+
+
+def _ball_gaps(
+    M: CompoundParts, N: CompoundParts, X_WM, X_WN, mesh: int, others: np.ndarray, poses: np.ndarray, within: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """((k,) how far parts of N, by number, are at least from the surface of a mesh of M, at poses by number [m], looked
+    for up to ``within`` (k,), -inf where they may touch; (k,) on which side of the surface the others are).
+
+    A part is within its ball, which is moved by no more than the slop: what of it is nearest to the surface is nearer
+    than the ball's centre by radius and slop at most, and while these are less than the centre's distance, no facet
+    parts it from the centre.
+    """
+    gaps, sides = np.full(len(others), -math.inf), np.full(len(others), OUTSIDE)
     body, unique = body_of(M.parts[mesh].shape), np.unique(poses, return_inverse=True)
     placed = M.parts[mesh].at(X_WM[unique[0]], np.zeros(len(unique[0]))).of(unique[1])
     centres, radii = N.balls(others, X_WN[poses])
@@ -158,13 +171,15 @@ def _states_by_balls(
     if len(some):
         X = np.tile(np.eye(4), (len(some), 1, 1))
         X[:, :3, 3] = centres[some]
-        limit = float(reach[some].max()) * (1.0 + 2.0**-40)
-        proven_apart = surface_distances(body.tree, _point().tree, placed.X[some], X, limit).lower > reach[some]
-        some, X = some[proven_apart], X[proven_apart]
-    if len(some):
-        sides = points_in_solid(body.tree, placed.X[some], np.zeros(3), X) if body.solid else OUTSIDE
-        status[some] = np.where(sides == OUTSIDE, APART, np.where(sides == INSIDE, HIT, OPEN))
-    return status
+        limit = float((within + reach)[some].max()) * (1.0 + 2.0**-40)
+        lower = surface_distances(body.tree, _point().tree, placed.X[some], X, limit).lower
+        gap = (lower - reach[some]) * (1.0 - 2.0**-40)
+        apart = gap > 0.0
+        some, X = some[apart], X[apart]
+        gaps[some] = gap[apart]
+    if len(some) and body.solid:
+        sides[some] = points_in_solid(body.tree, placed.X[some], np.zeros(3), X)
+    return gaps, sides
 
 
 @cache
@@ -297,11 +312,26 @@ def _part_rows(
                 rows[name] = number
         return rows
 
-    # What comes near is known at once from the pair whose boxes are nearest; then in the order of the parts.
-    known = _nearest_first(np.where(meshed, gaps, math.inf), sight, rows_of) if len(A.parts) * len(B.parts) > 1 else {}
+    # What comes near is known at once from the pair whose boxes are nearest, or whose ball is; then in the order of the
+    # parts.
+    known: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
+    if len(A.parts) * len(B.parts) > 1:
+        known = _nearest_first(np.where(meshed, gaps, math.inf), np.full(n, sight), rows_of)
     for poses, rows in known.values():
         upper[poses] = np.minimum(upper[poses], np.maximum(rows["upper"], 0.0))
         _raise_along_normals(A, B, X_WA, X_WB, poses, rows, upper, gaps)
+    within = np.minimum(upper, sight)
+    raised = _raise_by_balls(A, B, X_WA, X_WB, within, gaps)
+    raised |= _raise_by_balls(B, A, X_WB, X_WA, within, gaps.transpose(0, 2, 1))
+    if raised.any():
+        left_out |= (meshed & (gaps > sight)).any(axis=(1, 2))
+        others = np.where(meshed & raised[:, None, None], gaps, math.inf)
+        for (i, j), (poses, _) in known.items():
+            others[poses, i, j] = math.inf
+        for pair, (poses, rows) in _nearest_first(others, within, rows_of).items():
+            upper[poses] = np.minimum(upper[poses], np.maximum(rows["upper"], 0.0))
+            before = known.get(pair, (poses[:0], rows[:0]))
+            known[pair] = np.concatenate([before[0], poses]), np.concatenate([before[1], rows])
     last = np.argwhere(meshed)[-1].tolist()
     wanted = np.any(gaps <= np.minimum(upper, sight)[:, None, None], axis=0)
     wanted[tuple(last)] = True
@@ -350,14 +380,39 @@ def _raise_along_normals(
         gaps[at] = np.maximum(gaps[at], raised)
 
 
-def _nearest_first(gaps: np.ndarray, sight: float, rows_of) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
+def _raise_by_balls(M: CompoundParts, N: CompoundParts, X_WM, X_WN, within: np.ndarray, gaps) -> np.ndarray:
+    """(n,) bool, where any was: raise ``gaps``, as of `_box_gaps`, in place to what balls around many parts of N say
+    before one mesh of M.
+
+    Neither boxes nor a normal tell the parts of a small union apart that is beside a rough mesh, or in a valley of it.
+    Only parts that are outside are farther than their balls are from the surface. within : (n,) [m] what is known;
+        poses at which it is 0 are left as they are, since a pair that meets ends the search there.
+    """
+    near = (gaps <= within[:, None, None]) & M.columns.meshed[:, None] & (within > 0.0)[:, None, None]
+    near &= near.sum(axis=2, keepdims=True) > _ASKED_FIRST
+    raised = np.zeros(len(gaps), dtype=bool)
+    for mesh in np.flatnonzero(near.any(axis=(0, 2))).tolist():
+        entries = np.argwhere(near[:, mesh])
+        for first in range(0, len(entries), _BOUNDS_AT_ONCE):
+            pose, other = entries[first : first + _BOUNDS_AT_ONCE].T
+            by_balls, sides = _ball_gaps(M, N, X_WM, X_WN, mesh, other, pose, within[pose])
+            by_balls[sides != OUTSIDE] = -math.inf
+            gaps[pose, mesh, other] = np.maximum(gaps[pose, mesh, other], by_balls)
+            raised[pose[by_balls > -math.inf]] = True
+    return raised
+
+
+def _nearest_first(
+    gaps: np.ndarray, sight: np.ndarray, rows_of
+) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
     """{(part of A, part of B): (poses, their rows)}: at each pose the pair whose boxes are nearest, if it is in sight.
 
-    gaps : (n, parts of A, parts of B), infinite of pairs that are not asked about here.
+    gaps : (n, parts of A, parts of B), infinite of pairs that are not asked about here.   sight : (n,) [m].
     """
     n = len(gaps)
     nearest = gaps.reshape(n, -1).argmin(axis=1)
-    in_sight = gaps.reshape(n, -1)[np.arange(n), nearest] <= sight
+    least = gaps.reshape(n, -1)[np.arange(n), nearest]
+    in_sight = (least <= sight) & (least < math.inf)
     known = {}
     for which in np.unique(nearest[in_sight]).tolist():
         poses = np.flatnonzero(in_sight & (nearest == which))

@@ -155,11 +155,10 @@ def terrain(n: int) -> collide.HeightField:
     return collide.HeightField(0.05 * np.sin(9 * x) * np.cos(7 * y), (1 / n, 1 / n), bottom=-0.3)
 
 
-def cans(n: int, width: float) -> collide.Compound:
-    rng = rng_of(f"cans {n}")
+def cans(n: int, width: float, across: float = 1.0) -> collide.Compound:
+    rng, can = rng_of(f"cans {n}"), collide.Cylinder(0.5 * width, width)
     return collide.Compound(
-        [(collide.Cylinder(0.5 * width, width), collide.pose(rng.uniform(-0.5, 0.5, 3), rpy=rng.uniform(-3, 3, 3)))
-         for _ in range(n)]
+        [(can, collide.pose(across * rng.uniform(-0.5, 0.5, 3), rpy=rng.uniform(-3, 3, 3))) for _ in range(n)]
     )
 
 
@@ -212,3 +211,61 @@ def test_parts_told_by_balls_meet_as_each_does_alone():
             assert (np.any(alone, axis=0) == hit).all(), (case, size, far, want)
         told["open" if name == "open" and not any(want) else "inside" if all(want) else "outside"] += 1
     assert min(told.values()) >= 4, told
+
+
+@pytest.mark.parametrize("limit", [np.inf, 0.26])
+def test_parts_of_a_small_union_beside_a_rough_mesh_are_told_apart_by_balls(monkeypatch, limit):
+    """Boxes of the terrain, and its extent along any normal, hold all of the union: in its valley none is nearer."""
+    ground, union = terrain(40), cans(200, 5e-4, 0.01)
+    X_WA, X_WB = collide.pose(rpy=(0.3, -0.2, 0.5)), collide.pose((0.4, 0.32, 0.43))
+    asked = counted(monkeypatch, composite_meshes, "part_rows", lambda A, B, X, Y, limit: len(X.X))
+    row = collide.distance(ground, union, X_WA, X_WB, max_distance=limit)
+    assert not row.hit and row.certified and row.beyond == (limit < row.lower)
+    assert 0 < sum(asked) < 12, sum(asked)
+    if limit == np.inf:
+        each = [collide.distance(ground, collide.Compound([item]), X_WA, X_WB) for item in union.items]
+        assert all(getattr(row, of) == min(getattr(r, of) for r in each) for of in ("lower", "distance", "upper"))
+
+
+@pytest.mark.many(2)
+@pytest.mark.parametrize("seed", range(6))
+def test_parts_left_out_by_balls_are_no_nearer(seed):
+    """Around, within and partly within a hollow solid, before an open mesh, and of several meshes; in batches of poses
+    each of which has its own nearest pair; swapped, and with a limit."""
+    rng, apart = rng_of(f"parts left out by balls {seed}"), 0
+    outer, inner = (collide.tessellate(collide.Sphere(r)) for r in (1.0, 0.6))
+    hollow = collide.Mesh(
+        np.concatenate([outer.vertices, inner.vertices]),
+        np.concatenate([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)]),
+    )
+    box, mesh = collide.Box((0.02, 0.01, 0.03)), collide.Mesh(0.01 * outer.vertices, outer.faces)
+    items = [
+        (shape, collide.pose(rng.normal(scale=0.05, size=3), rpy=rng.uniform(-3, 3, 3)))
+        for shape in 8 * (box, collide.Cylinder(0.01, 0.02), mesh)
+    ]
+    union = collide.Compound(items)
+    grounds = (hollow, collide.Mesh(outer.vertices, outer.faces[2:]), terrain(6),
+               collide.Compound([(hollow, np.eye(4)), (terrain(4), collide.pose((1.5, 0.0, 0.0)))]))  # fmt: skip
+    ground = grounds[seed % 4]
+    directions = rng.normal(size=(6, 3))
+    directions *= (np.array([0.0, 0.3, 0.8, 1.0, 1.3, 2.0]) / np.linalg.norm(directions, axis=1))[:, None]
+    X_WA = random_pose(rng, 1.0)
+    X_WB = np.array([X_WA @ collide.pose(p, rpy=rng.uniform(-3, 3, 3)) for p in directions])
+    each = [collide.distance(ground, collide.Compound([item]), X_WA, X_WB, signed=False) for item in items]
+    rows = collide.distance(ground, union, X_WA, X_WB, signed=False)
+    turned = collide.distance(union, ground, X_WB, X_WA, signed=False)
+    for k in range(len(X_WB)):
+        hit = any(part.hit[k] for part in each)
+        least = min(part.distance[k] for part in each)
+        assert rows.hit[k] == hit == turned.hit[k], (seed, k)
+        if hit:
+            continue
+        apart += 1
+        assert rows.distance[k] == least == turned.distance[k], (seed, k)
+        assert rows.lower[k] == min(part.lower[k] for part in each), (seed, k)
+        alone = collide.distance(ground, union, X_WA, X_WB[k], signed=False)
+        assert (alone.distance, alone.lower, alone.upper) == (rows.distance[k], rows.lower[k], rows.upper[k])
+        for limit in (0.999 * least, 1.001 * least):
+            within = collide.distance(ground, union, X_WA, X_WB[k], max_distance=limit, signed=False)
+            assert within.beyond == (limit < least) and (within.beyond or within.distance == least), (seed, k, limit)
+    assert apart >= 3, (seed, apart)
