@@ -3,6 +3,8 @@
 A box moved along a direction meets another where a ray meets a third (`broadphase/boxes_ahead.py`), here in the frame
 and the units of B's tree. Pairs of boxes are opened nearest first; a pair of facets, or a facet and the convex set, is
 a cast of convex sets (`portal.py`). What is proven of one bounds how far it is worth looking (van den Bergen 2004).
+A facet that lies across the axes is far smaller than its box: what may meet it is asked along its normal and across
+its edges, too.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from collide.casts.portal import BEHIND, HIT, MISS, OPEN, cast_line
 from collide.casts.silhouette import CAST_DOUBLES, CAST_INTEGERS, open_cast
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_SLOP, RADIUS, REACH
-from collide.mesh.bvh import CENTRE, EXPONENT, NODE, WIDTH, box_at, link_of, open_tree
+from collide.mesh.bvh import CENTRE, EXPONENT, NODE, WIDTH, Box, box_at, link_of, open_tree
 from collide.mesh.bvh import REACH as TREE_REACH
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.gjk.minkowski_difference import POINT_OF_A, difference_point
@@ -31,6 +33,7 @@ from collide.numerics.vec3 import (
     max_abs,
     neg,
     norm,
+    norm1,
     put_vec3,
     rotate,
     scale,
@@ -56,6 +59,10 @@ FACET_A, FACET_B, OF_QUESTION = CAST_ROW, CAST_ROW + 1, CAST_ROW + 2
 ) = range(11)
 HEADER = 11
 _LOW = 0xFFFFFFFF
+#: In the count of candidates.
+CASTS = 1
+#: Of products that a vector across a facet is used in: far above what underflows.
+_LEAST = 1e-200
 
 
 class _Sweep(NamedTuple):
@@ -63,7 +70,7 @@ class _Sweep(NamedTuple):
 
     pair : both sides; a side of facets has the corners of one of them.   d : the direction.   error, size : of a cast.
     In B's frame, in units of its tree and from its centre: middle, half : the box of A, where that is a convex set.
-    inverse : of the direction there, component by component.
+    step, inverse : the direction there, and the inverses of its components.
     rotation : from A's tree to it, coordinates.   shift : where the centre of A's tree is.
     pad : by what boxes are widened.
     """
@@ -74,6 +81,7 @@ class _Sweep(NamedTuple):
     size: float
     middle: Vec3
     half: Vec3
+    step: Vec3
     inverse: Vec3
     rotation: Matrix3
     shift: Vec3
@@ -186,7 +194,7 @@ def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
     pad = 4.0 * widest * (error + 2.0**-44 * size) + 2.0**-44 * (norm(origin) + norm(centre) + 1.0)
     step = apply(rows, d)
     inverse = Vec3(_inverted(step.x, step), _inverted(step.y, step), _inverted(step.z, step))
-    return _Sweep(pair, d, error, size, middle, half, inverse, rotation, shift, pad)
+    return _Sweep(pair, d, error, size, middle, half, step, inverse, rotation, shift, pad)
 
 
 @kernel(inline=True)
@@ -196,9 +204,8 @@ def _inverted(x, step):
 
 
 @kernel(inline=True)
-def _entry_of(sweep, a, b, ref_a, ref_b, has_tree_a, best):
-    """t at which the box of A behind a reference comes to that of B, from below; infinite for later than ``best``."""
-    box = box_at(b, ref_b)
+def _box_of_a(sweep, a, ref_a, has_tree_a):
+    """The box of A behind a reference, or of the convex set, in B's frame."""
     middle, half = sweep.middle, sweep.half
     if has_tree_a:
         of_a = box_at(a, ref_a)
@@ -207,14 +214,82 @@ def _entry_of(sweep, a, b, ref_a, ref_b, has_tree_a, best):
         half = Vec3(
             dot(absolute(rotation.x), of_a.half), dot(absolute(rotation.y), of_a.half),
             dot(absolute(rotation.z), of_a.half),
-        )
-    gap = sub(box.centre, middle)
-    wide = add(box.half, half)
+        )  # fmt: skip
+    return Box(middle, half)
+
+
+@kernel(inline=True)
+def _entry_of(sweep, a, b, ref_a, ref_b, has_tree_a, best):
+    """t at which the box of A behind a reference comes to that of B, from below; infinite for later than ``best``."""
+    box = box_at(b, ref_b)
+    of_a = _box_of_a(sweep, a, ref_a, has_tree_a)
+    gap = sub(box.centre, of_a.centre)
+    wide = add(box.half, of_a.half)
     pad = sweep.pad + 2.0**-40 * (abs(gap.x) + abs(gap.y) + abs(gap.z))
     first, last = slab_entry(gap.x - wide.x - pad, gap.x + wide.x + pad, sweep.inverse.x, 0.0, best)
     first, last = slab_entry(gap.y - wide.y - pad, gap.y + wide.y + pad, sweep.inverse.y, first, last)
     first, last = slab_entry(gap.z - wide.z - pad, gap.z + wide.z + pad, sweep.inverse.z, first, last)
     return first if first <= last else math.inf
+
+
+@kernel(inline=True)
+def _unit_of(tree):
+    return math.ldexp(1.0, int(-tree.header[EXPONENT]))
+
+
+@kernel(inline=True)
+def _corner_in(sweep, tree, facet, k, is_of_a, unit):
+    """A corner of a facet of A's tree, or of B's, in B's frame.   unit : 2⁻ᵉ of its tree."""
+    corner = scale(unit, sub(vec3_at(tree.triangles, 9 * facet + 3 * k), vec3_at(tree.numbers, CENTRE)))
+    return add(sweep.shift, apply(sweep.rotation, corner)) if is_of_a else corner
+
+
+@kernel
+def _facet_entry(sweep, tree, facet, is_of_a, unit, box, best):
+    """t at which a facet and the other body's box come to each other along the facet's normal, and across the step and
+    each edge, where they pass each other if ever; from below, infinite for later than ``best``."""
+    p = _corner_in(sweep, tree, facet, 0, is_of_a, unit)
+    u = sub(_corner_in(sweep, tree, facet, 1, is_of_a, unit), p)
+    v = sub(_corner_in(sweep, tree, facet, 2, is_of_a, unit), p)
+    step = sweep.step if is_of_a else neg(sweep.step)  # of the facet, the box standing still
+    gap = sub(box.centre, p)
+    pad = sweep.pad + 2.0**-40 * (norm1(gap) + norm1(u) + norm1(v) + norm1(box.half))
+    first, last = _entry_along(cross(u, v), u, v, gap, box.half, step, pad, 0.0, best)
+    first, last = _entry_along(cross(step, u), u, v, gap, box.half, step, pad, first, last)
+    first, last = _entry_along(cross(step, v), u, v, gap, box.half, step, pad, first, last)
+    first, last = _entry_along(cross(step, sub(v, u)), u, v, gap, box.half, step, pad, first, last)
+    return first if first <= last else math.inf
+
+
+@kernel(inline=True)
+def _entry_along(n, u, v, gap, half, step, pad, first, last):
+    """(first, last) of the t in [first, last] at which the extents along n of a facet 0, u, v, moved, and of a box at
+    ``gap`` meet.
+
+    Bodies are apart while their extents along any vector are: rounding of n itself takes nothing from the bound.
+    Rounding moves points by the pad, which is worth at most n's 1-norm times as much along n. A step along n that is 0
+    but for rounding moves less than that until the boxes have passed each other. Vectors whose products leave the range
+    of doubles say nothing.
+    """
+    length = norm1(n)
+    widening, weight = length * pad, length * max_abs(step)
+    if not (length > _LEAST and weight > _LEAST and widening < 1.0 / _LEAST):
+        return first, last
+    along_u, along_v, across = dot(n, u), dot(n, v), dot(n, gap)
+    low, high = min(0.0, min(along_u, along_v)), max(0.0, max(along_u, along_v))
+    wide = dot(absolute(n), half) + widening
+    along = dot(n, step)
+    inverse = 1.0 / along if abs(along) > 2.0**-46 * weight else math.inf
+    return slab_entry(across - high - wide, across - low + wide, inverse, first, last)
+
+
+@kernel
+def _leaf_entry(sweep, tree, run, is_of_a, unit, box, best):
+    """The least `_facet_entry` of a leaf's facets."""
+    least = math.inf
+    for i in range(run & 7):
+        least = min(least, _facet_entry(sweep, tree, (run >> 3) + i, is_of_a, unit, box, best))
+    return least
 
 
 @kernel
@@ -265,7 +340,7 @@ def _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top):
         rotation = sweep.rotation
         size_a = dot(absolute(rotation.x), of_a) + dot(absolute(rotation.y), of_a) + dot(absolute(rotation.z), of_a)
         opens_a = size_a > of_b.x + of_b.y + of_b.z
-    base = top
+    base, unit_a, unit_b = top, _unit_of(a), _unit_of(b)
     for slot in range(WIDTH):
         child_a = WIDTH * link_a + slot if opens_a else ref_a
         child_b = ref_b if opens_a else WIDTH * link_b + slot
@@ -274,6 +349,13 @@ def _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top):
         if not boxes[NODE * node + 3 * WIDTH + slot] >= 0.0:
             continue
         key = _entry_of(sweep, a, b, child_a, child_b, has_tree_a, best)
+        link = link_of(a.links, child_a) if has_tree_a else 0
+        if key < math.inf and link < 0:
+            key = max(key, _leaf_entry(sweep, a, ~link, True, unit_a, box_at(b, child_b), best))
+        link = link_of(b.links, child_b)
+        if key < math.inf and link < 0:
+            of_a = _box_of_a(sweep, a, child_a, has_tree_a)
+            key = max(key, _leaf_entry(sweep, b, ~link, False, unit_b, of_a, best))
         if key < math.inf:
             _push(work, top, base, (child_a << 32) | child_b, key)
             top += 1
@@ -284,12 +366,12 @@ def _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top):
 def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
     """Candidates for the first contacts of questions ``first`` … n − 1 that are apart at the start.
 
-    header : HEADER integers.   count : one integer, how many candidates there are, in and out.
+    header : HEADER integers.   count : how many candidates there are, and how many casts were made, in and out.
     doubles, integers : workspace (TREE_CAST_DOUBLES, TREE_CAST_INTEGERS).
     Returns how many questions are answered; fewer than n where there is no room for more candidates.
     """
     header = view_i64(header_at, HEADER)
-    count = view_i64(count_at, 1)
+    count = view_i64(count_at, 2)
     has_tree_a = header[TREE_A] != 0
     b = open_tree(header[TREE_B])
     a = open_tree(header[TREE_A] if has_tree_a else header[TREE_B])
@@ -314,6 +396,7 @@ def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
 def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, count):
     """All candidates of one question; False where there is no room for them."""
     best = limit
+    unit_a, unit_b = _unit_of(a), _unit_of(b)
     radius = 0.0 if has_tree_a else sweep.pair.numbers[RADIUS]
     top = 0
     if _entry_of(sweep, a, b, 0, 0, has_tree_a, best) < math.inf:
@@ -333,13 +416,19 @@ def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, count):
             top = _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top)
             continue
         run_a, run_b = ~link_a, ~link_b
+        of_a, of_b = _box_of_a(sweep, a, ref_a, has_tree_a), box_at(b, ref_b)
         n_a = run_a & 7 if has_tree_a else 1
         if count[0] + n_a * (run_b & 7) > header[CAPACITY]:
             return False
         for i in range(n_a):
             if has_tree_a:
+                if _facet_entry(sweep, a, (run_a >> 3) + i, True, unit_a, of_b, best) == math.inf:
+                    continue
                 _put_corners(work.corners, 0, a.triangles, (run_a >> 3) + i)
             for j in range(run_b & 7):
+                if _facet_entry(sweep, b, (run_b >> 3) + j, False, unit_b, of_a, best) == math.inf:
+                    continue
+                count[CASTS] += 1
                 _put_corners(work.corners, 24, b.triangles, (run_b >> 3) + j)
                 row = view_f64(header[CANDIDATES_AT] + 8 * CANDIDATE * count[0], CANDIDATE)
                 best = _cast_facets(sweep, work, radius, limit, best, row)

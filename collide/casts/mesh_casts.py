@@ -132,7 +132,7 @@ def _candidates(A: _Side, B: _Side, vectors: np.ndarray, limits: np.ndarray) -> 
     questions = np.ascontiguousarray(np.hstack([vectors, limits[:, None]]))
     table = ShapeTable([A.packed if A.packed is not None else pack_points(np.zeros((1, 3)))])
     table.build_trees(np.zeros(1, dtype=np.int64))
-    count, done, answered = np.zeros(1, dtype=np.int64), 0, []
+    count, done, answered = np.zeros(2, dtype=np.int64), 0, []
     capacity = 1024 + 8 * n
     while True:
         candidates = np.empty((capacity, CANDIDATE))

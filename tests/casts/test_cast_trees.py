@@ -14,6 +14,7 @@ from collide.casts import mesh_casts
 from collide.casts.cast_pairs import LOWER, NORMAL, STATUS, TOUCHING, UPPER, VALUE
 from collide.casts.cast_trees import (
     CANDIDATE,
+    CASTS,
     FACET_A,
     FACET_B,
     OF_QUESTION,
@@ -116,8 +117,8 @@ class Question:
         self.doubles, self.integers = np.zeros(TREE_CAST_DOUBLES), np.zeros(TREE_CAST_INTEGERS, dtype=np.int64)
 
     def ask(self, first: int) -> tuple[int, int]:
-        """(questions answered, candidates)."""
-        count = np.zeros(1, dtype=np.int64)
+        """(questions answered, candidates); ``casts`` of facets are counted."""
+        count = np.zeros(2, dtype=np.int64)
         done = cast_into_tree(
             address_of(self.header),
             first,
@@ -126,6 +127,7 @@ class Question:
             address_of(self.doubles),
             address_of(self.integers),
         )
+        self.casts = int(count[CASTS])
         return done, int(count[0])
 
 
@@ -163,3 +165,67 @@ def test_batches_are_singles_bit_by_bit():
         assert one.rows.tobytes() == whole.rows[mine].tobytes() and (one.owner == 0).all()
     assert (np.abs(np.linalg.norm(whole.rows[whole.marks.proven, NORMAL : NORMAL + 3], axis=1) - 1) < 1e-9).all()
     assert np.isfinite(whole.rows[whole.marks.proven, TOUCHING : TOUCHING + 3]).all()
+
+
+def test_facets_far_smaller_than_their_boxes_are_cast_few_times():
+    """Before a few large turned facets, whose boxes hold all of it, a fine mesh casts those of its facets that come
+    first; large ones that its way passes by are told from the others, whichever of the two moves."""
+    fine, coarse = collide.Mesh(*bumpy_sphere(4000)), collide.Mesh(*bumpy_sphere(40))
+    coarse = collide.Mesh(40.0 * coarse.vertices, coarse.faces)
+    rng, n = rng_of("large facets"), 4
+    X_WA, X_WB = (np.array([random_pose(rng, 0.2) for _ in range(n)]) for _ in range(2))
+    away = rng.normal(size=(n, 3))
+    X_WA[:, :3, 3] += 50.0 * away / np.linalg.norm(away, axis=1)[:, None]
+    d = X_WB[:, :3, 3] - X_WA[:, :3, 3]
+    for A, B, X, Y, way in ((fine, coarse, X_WA, X_WB, d), (coarse, fine, X_WB, X_WA, -d)):
+        question = Question(A, B, X, Y, way / (2.0001 * np.abs(way).max(axis=1))[:, None], 4000)
+        done, count = question.ask(0)
+        assert done == n and count >= n
+        assert count <= question.casts < 0.05 * n * len(fine.faces), (question.casts, len(fine.faces))
+
+
+def first_meeting(A: np.ndarray, B: np.ndarray, d: np.ndarray) -> float:
+    """Least t >= 0 at which triangles (k, 3, 3), moved by t d, meet triangles (m, 3, 3): a corner comes to a face, or
+    an edge to an edge; inf for never. In doubles, by solving for both."""
+
+    def corners_to_faces(points, faces, way):
+        a, u, v = faces[:, 0], faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0]
+        normal = np.cross(u, v)
+        rate, to = normal @ way, a[None] - points[:, None]
+        t = (to * normal).sum(axis=2) / rate
+        at = points[:, None] + t[..., None] * way - a
+        square = (normal * normal).sum(axis=1)
+        x, y = (np.cross(at, v) * normal).sum(axis=2) / square, (np.cross(u, at) * normal).sum(axis=2) / square
+        return t[(x >= 0) & (y >= 0) & (x + y <= 1) & (t >= 0)]
+
+    edges_a, edges_b = (np.stack([T, np.roll(T, -1, axis=1)], axis=2).reshape(-1, 2, 3) for T in (A, B))
+    p, u = edges_a[:, None, 0], (edges_a[:, 1] - edges_a[:, 0])[:, None]
+    q, v = edges_b[None, :, 0], (edges_b[:, 1] - edges_b[:, 0])[None]
+    across, to = np.cross(u, v), q - p
+    rate = across @ d  # to = x u + t d - y v
+    t, x, y = (across * to).sum(axis=2) / rate, (np.cross(to, v) @ d) / rate, (np.cross(to, u) @ d) / rate
+    of_edges = t[(x >= 0) & (x <= 1) & (y >= 0) & (y <= 1) & (t >= 0)]
+    found = corners_to_faces(A.reshape(-1, 3), B, d), corners_to_faces(B.reshape(-1, 3), A, -d), of_edges
+    return min(float(of.min(initial=math.inf)) for of in found)
+
+
+@pytest.mark.parametrize("ratio", [1e-6, 1e-2, 1.0, 1e2, 1e6])
+def test_meshes_of_unlike_sizes_meet_where_their_facets_do(ratio):
+    rng, met, n = rng_of("unlike sizes", str(ratio)), 0, 12
+    slanted = collide.Mesh(*box((-0.2, -0.1, -0.3), (0.1, 0.2, 0.2)))
+    A = collide.Mesh(ratio * slanted.vertices, slanted.faces)
+    size = max(1.0, ratio)
+    for case in range(n):
+        X_WA, X_WB = random_pose(rng, 0.2 * size), random_pose(rng, 0.2 * size)
+        away = rng.normal(size=3)
+        X_WA[:3, 3] += 4.0 * size * away / np.linalg.norm(away)
+        d = X_WB[:3, 3] - X_WA[:3, 3] + 0.15 * size * rng.normal(size=3)
+        d /= 2.0001 * np.abs(d).max()
+        T_A, T_B = ((M.vertices @ X[:3, :3].T + X[:3, 3])[M.faces] for M, X in ((A, X_WA), (BUMPY, X_WB)))
+        t = first_meeting(T_A, T_B, d)
+        for one, other, X, Y, way in ((A, BUMPY, X_WA, X_WB, d), (BUMPY, A, X_WB, X_WA, -d)):
+            found = first_contacts(rows_of(one, other, X[None], Y[None], way[None], np.full(1, math.inf)), 1)
+            assert found.hit[0] == np.isfinite(t), (case, t)
+            assert not found.hit[0] or abs(found.t[0, 0] - t) <= 1e-9 * size, (case, found.t, t)
+        met += math.isfinite(t)
+    assert 3 <= met, met
