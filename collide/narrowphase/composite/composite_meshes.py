@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of
+from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
 from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
@@ -394,10 +395,10 @@ def _raise_by_balls(M: CompoundParts, N: CompoundParts, X_WM, X_WN, within: np.n
     for mesh in np.flatnonzero(near.any(axis=(0, 2))).tolist():
         entries = np.argwhere(near[:, mesh])
         for first in range(0, len(entries), _BOUNDS_AT_ONCE):
-            pose, other = entries[first : first + _BOUNDS_AT_ONCE].T
-            by_balls, sides = _ball_gaps(M, N, X_WM, X_WN, mesh, other, pose, within[pose])
+            pose, part = entries[first : first + _BOUNDS_AT_ONCE].T
+            by_balls, sides = _ball_gaps(M, N, X_WM, X_WN, mesh, part, pose, within[pose])
             by_balls[sides != OUTSIDE] = -math.inf
-            gaps[pose, mesh, other] = np.maximum(gaps[pose, mesh, other], by_balls)
+            gaps[pose, mesh, part] = np.maximum(gaps[pose, mesh, part], by_balls)
             raised[pose[by_balls > -math.inf]] = True
     return raised
 
