@@ -12,7 +12,7 @@ import numpy as np
 from collide.kernels import address_of, code_of
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.shape_table import POSE, ShapeTable
-from collide.motion.convex_impact import FREE, OPEN_START
+from collide.motion.convex_impact import CONTACT, FREE, OPEN, OPEN_START
 from collide.motion.impact_jobs import begin_single, find_impacts
 from collide.motion.impact_rows import TimeOfImpact, free_rows, single_result
 from collide.motion.motions import Motions
@@ -179,13 +179,32 @@ def earliest_times(
     pairs : parts of A and of B (k,). Of a mesh the convex set around it is asked, which meets all that the mesh meets:
     time of contact of the sets ≤ time of contact of the parts. Some microseconds a pair.
     """
+    return earliest_of(_search_bounds(A, B, motion, pairs, np.arange(len(pairs[0])), end, tolerance)[1])
+
+
+def first_pair(
+    A: Shape, B: Shape, motion: Motions, pairs: tuple[np.ndarray, np.ndarray], end: float, tolerance: float
+) -> tuple[int, float] | None:
+    """(which of some pairs of parts, as of `earliest_times`, has the convex sets that meet first; a time before which none
+    meet); None where none do.
+
+    Each is searched no farther than to the first contact of those before: less work than the times of all.
+    """
+    which, row = _search_bounds(A, B, motion, pairs, np.zeros(len(pairs[0]), dtype=np.int64), end, tolerance)
+    at = np.flatnonzero((which == (row["part_a"][0], row["part_b"][0])).all(axis=1)) if len(row) else row
+    return (int(at[0]), float(row["lower"][0])) if len(at) and row["status"][0] in (CONTACT, OPEN) else None
+
+
+def _search_bounds(A: Shape, B: Shape, motion: Motions, pairs, numbers: np.ndarray, end: float, tolerance: float):
+    """(rows of the table (k, 2) of pairs of convex sets, rows of `IMPACT_DTYPE`) of one motion, pair by pair in the row of
+    these numbers."""
     bodies = bounds_of(A, B)
-    part_a, part_b = bodies.first[0] + pairs[0], bodies.first[-1] + pairs[1]
-    jobs = np.ascontiguousarray(np.stack([np.arange(len(part_a)), part_a, part_a, part_b, part_b], axis=1))
-    rows = free_rows(len(part_a))
+    which = np.stack([bodies.first[0] + pairs[0], bodies.first[-1] + pairs[1]], axis=1)
+    jobs = np.ascontiguousarray(np.stack([numbers, *np.repeat(which.T, 2, axis=0)], axis=1))
+    rows = free_rows(len(np.unique(numbers)))
     header = header_of(Tables(bodies.table.addresses, len(bodies.table.packed), bodies.parts), motion)
     find_impacts(address_of(header), address_of(jobs), len(jobs), 0.0, end, tolerance, address_of(rows))
-    return earliest_of(rows)
+    return which, rows
 
 
 def bounds_of(A: Shape, B: Shape) -> _Bodies:

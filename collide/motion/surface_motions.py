@@ -31,7 +31,7 @@ from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.mesh.bvh import MeshTree
 from collide.motion.common_points import CommonPoints, Placed
 from collide.motion.convex_impact import CONTACT, OPEN
-from collide.motion.convex_motions import JOBS_AT_ONCE, Tables, bounds_of, earliest_times, header_of
+from collide.motion.convex_motions import JOBS_AT_ONCE, Tables, bounds_of, earliest_times, first_pair, header_of
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts
 from collide.motion.motions import Motions
@@ -204,6 +204,10 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
         def upper(row: np.ndarray = row) -> float:
             return float(row["upper"][0])
 
+        def search(a: Piece, b: Piece, begin: float, motion: Motions = motion, row: np.ndarray = row) -> None:
+            if _search_small([(a, b)], motion, (begin, 1.0), tolerance, row, is_part)[0]:
+                _search(a, b, motion, tolerance, row, is_part, begin)
+
         unions = compound_parts(A), compound_parts(B)
         for i, j in [numbers] if is_small else parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
             # No contact of two pieces is earlier than that of one convex set around a piece and the facets on its way,
@@ -211,6 +215,12 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
             earliest, end = np.zeros(len(i)), min(upper(), 1.0)
             known_until, is_known = _ask_on_the_way((A, B), (i, j), motion, earliest, end, tolerance)
             others = np.flatnonzero(~is_known)
+            if len(others) >= _TOGETHER:  # what comes first by its sets is searched first: all others end with its contact
+                first = first_pair(A, B, motion, (i[others], j[others]), end, tolerance)
+                if first is not None:
+                    n, others = int(others[first[0]]), np.delete(others, first[0])
+                    search(pieces_a[i[n]], pieces_b[j[n]], first[1])
+                    earliest[n], end = math.inf, min(upper(), 1.0)
             earliest[others] = earliest_times(A, B, motion, (i[others], j[others]), end, tolerance)
             while len(earliest):
                 n, end = int(earliest.argmin()), min(upper(), 1.0)
@@ -219,9 +229,7 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
                 if earliest[n] >= known_until:
                     known_until, _ = _ask_on_the_way((A, B), (i, j), motion, earliest, end, tolerance)
                     continue
-                a, b = pieces_a[i[n]], pieces_b[j[n]]
-                if _search_small([(a, b)], motion, (float(earliest[n]), 1.0), tolerance, row, is_part)[0]:
-                    _search(a, b, motion, tolerance, row, is_part, float(earliest[n]))
+                search(pieces_a[i[n]], pieces_b[j[n]], float(earliest[n]))
                 earliest[n] = math.inf
 
 
@@ -467,10 +475,11 @@ class _Spans(Spans):
         time: the end, or as early as these are few, but not before the piece may have moved by its own size)."""
         mesh, until, least = (self.a, self.b)[side], end, 2.0 * self.scale(begin, end)
         while True:
-            facets = facets_on_path(self, mesh.tree, side, begin, until, max_facets)  # type: ignore[arg-type]
-            if facets is not None or until - begin <= least:
+            facets = facets_on_path(self, mesh.tree, side, begin, until, most)  # type: ignore[arg-type]
+            shorter = begin + max(0.25 * (until - begin), least)
+            if facets is not None or not shorter < until:
                 return facets, until
-            until = begin + max(0.25 * (until - begin), least)
+            until = shorter
 
     def cut(self, begin: float, end: float) -> tuple[float, float]:
         """(begin, end) of the part of a span to be looked at first.
