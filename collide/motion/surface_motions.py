@@ -210,18 +210,17 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 
         unions = compound_parts(A), compound_parts(B)
         for i, j in [numbers] if is_small else parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
-            # No contact of two pieces is earlier than that of one convex set around a piece and the facets on its way,
-            # nor than that of the sets around both: in their order, the first contact found leaves out all later ones.
-            earliest, end = np.zeros(len(i)), min(upper(), 1.0)
+            # No contact of two pieces is earlier than that of one convex set around a piece and the facets on its way, nor
+            # than that of the sets around both: in the order of these, the first contact found leaves out all later ones.
+            earliest, some, end = np.zeros(len(i)), np.arange(len(i)), min(upper(), 1.0)
+            first = first_pair(A, B, motion, (i, j), end, tolerance) if len(i) >= _TOGETHER else None
+            if first is not None:  # what comes first by its sets is searched first: all others end with its contact
+                n, some = first[0], np.delete(some, first[0])
+                search(pieces_a[i[n]], pieces_b[j[n]], first[1])
+                earliest[n], end = math.inf, min(upper(), 1.0)
             known_until, is_known = _ask_on_the_way((A, B), (i, j), motion, earliest, end, tolerance)
-            others = np.flatnonzero(~is_known)
-            if len(others) >= _TOGETHER:  # what comes first by its sets is searched first: all others end with its contact
-                first = first_pair(A, B, motion, (i[others], j[others]), end, tolerance)
-                if first is not None:
-                    n, others = int(others[first[0]]), np.delete(others, first[0])
-                    search(pieces_a[i[n]], pieces_b[j[n]], first[1])
-                    earliest[n], end = math.inf, min(upper(), 1.0)
-            earliest[others] = earliest_times(A, B, motion, (i[others], j[others]), end, tolerance)
+            some = some[~is_known[some]]
+            earliest[some] = earliest_times(A, B, motion, (i[some], j[some]), end, tolerance)
             while len(earliest):
                 n, end = int(earliest.argmin()), min(upper(), 1.0)
                 if not earliest[n] <= end:
