@@ -210,35 +210,34 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 
         unions = compound_parts(A), compound_parts(B)
         for i, j in [numbers] if is_small else parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
-            # No contact of two pieces is earlier than that of one convex set around a piece and the facets on its way, nor
-            # than that of the sets around both: in the order of these, the first contact found leaves out all later ones.
+            # No contact of two pieces is earlier than that of the convex sets around both, nor than that of one set and the
+            # facets on its way: in the order of these, the first contact found leaves out all later ones.
             earliest, some, end = np.zeros(len(i)), np.arange(len(i)), min(upper(), 1.0)
             first = first_pair(A, B, motion, (i, j), end, tolerance) if len(i) >= _TOGETHER else None
             if first is not None:  # what comes first by its sets is searched first: all others end with its contact
                 n, some = first[0], np.delete(some, first[0])
                 search(pieces_a[i[n]], pieces_b[j[n]], first[1])
                 earliest[n], end = math.inf, min(upper(), 1.0)
-            known_until, is_known = _ask_on_the_way((A, B), (i, j), motion, earliest, end, tolerance)
-            some = some[~is_known[some]]
             earliest[some] = earliest_times(A, B, motion, (i[some], j[some]), end, tolerance)
+            known_until = 0.0 if len(i) >= _TOGETHER else math.inf
             while len(earliest):
                 n, end = int(earliest.argmin()), min(upper(), 1.0)
                 if not earliest[n] <= end:
                     break
                 if earliest[n] >= known_until:
-                    known_until, _ = _ask_on_the_way((A, B), (i, j), motion, earliest, end, tolerance)
+                    known_until = _ask_on_the_way((A, B), (i, j), motion, earliest, end, tolerance)
                     continue
                 search(pieces_a[i[n]], pieces_b[j[n]], float(earliest[n]))
                 earliest[n] = math.inf
 
 
 def _ask_on_the_way(
-    shapes: tuple[Shape, Shape], pairs: tuple[np.ndarray, np.ndarray], motion: Motions, earliest: np.ndarray,
-    end: float, tolerance: float,
-) -> tuple[float, np.ndarray]:
-    """Raise the ``earliest`` times (k,) of pairs of pieces, in place, by the facets on a small union's way past a large
-    mesh; returns the time until which these times are known now, and of which pairs (k,)."""
-    bounds, known_until, is_known = bounds_of(*shapes), math.inf, np.zeros(len(earliest), dtype=bool)
+    shapes: tuple[Shape, Shape], pairs: tuple[np.ndarray, np.ndarray], motion: Motions, earliest: np.ndarray, end: float,
+    tolerance: float,
+) -> float:  # fmt: skip
+    """Raise the ``earliest`` times (k,) of pairs of pieces, in place, where one of them is a large mesh and the other is of
+    a small union, by the facets on the union's way; returns the time until which they are known now."""
+    bounds, known_until = bounds_of(*shapes), math.inf
     for side in (0, 1):
         pieces, union = pieces_of(shapes[side]), compound_parts(shapes[1 - side])
         numbers, counts = np.unique(pairs[side][earliest <= end], return_counts=True)
@@ -256,8 +255,8 @@ def _ask_on_the_way(
             sets = bounds.table, rows, bounds.parts[rows]
             times, until = spans.times_on_the_way(sets, float(earliest[some].min()), end, tolerance)
             earliest[some] = np.maximum(earliest[some], times)
-            is_known[some], known_until = True, min(known_until, until)
-    return known_until, is_known
+            known_until = min(known_until, until)
+    return known_until
 
 
 def _search_small(

@@ -27,7 +27,7 @@ class Shape:
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges", "_hulls_instead",
         "_kind", "_laid_out", "_moving", "_moving_bounds", "_partners", "_parts", "_pieces", "_prepared", "_serial",
         "_surface", "_topology", "_union", "_walk",
-    )
+    )  # fmt: skip
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
     _parts: tuple
@@ -42,6 +42,7 @@ class Shape:
     _partners: dict[tuple[str, int], Any]
     #: The same for times of impact (`motion/convex_motions.py`).
     _moving: dict[int, Any]
+    _moving_bounds: dict[int, Any]
     #: Hierarchies for the walk of Barba and Langerman, made when it is first asked for (`hierarchy_queries.py`).
     _walk: Any
     #: The shape as meshes meet it: facets under a tree, and a radius (`lowering/facet_bodies.py`), or two polytopes.
