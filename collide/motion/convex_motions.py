@@ -185,8 +185,8 @@ def earliest_times(
 def first_pair(
     A: Shape, B: Shape, motion: Motions, pairs: tuple[np.ndarray, np.ndarray], end: float, tolerance: float
 ) -> tuple[int, float] | None:
-    """(which of some pairs of parts, as of `earliest_times`, has the convex sets that meet first; a time before which none
-    meet); None where none do.
+    """(which of some pairs of parts, as of `earliest_times`, has the convex sets that meet first; a time before which
+    none meet); None where none do.
 
     Each is searched no farther than to the first contact of those before: less work than the times of all.
     """
@@ -196,8 +196,8 @@ def first_pair(
 
 
 def _search_bounds(A: Shape, B: Shape, motion: Motions, pairs, numbers: np.ndarray, end: float, tolerance: float):
-    """(rows of the table (k, 2) of pairs of convex sets, rows of `IMPACT_DTYPE`) of one motion, pair by pair in the row of
-    these numbers."""
+    """(rows of the table (k, 2) of pairs of convex sets, rows of `IMPACT_DTYPE`) of one motion, pair by pair in the row
+    of these numbers."""
     bodies = bounds_of(A, B)
     which = np.stack([bodies.first[0] + pairs[0], bodies.first[-1] + pairs[1]], axis=1)
     jobs = np.ascontiguousarray(np.stack([numbers, *np.repeat(which.T, 2, axis=0)], axis=1))

@@ -1,4 +1,4 @@
-"""A small body on its way past a large mesh: the facets that it may come near, and when its parts may meet them.
+"""A small body on its way past a large mesh: the facets that it may come near, and when it may first meet them.
 
 As seen from the mesh's body, the origin of a piece of the small body is at z = Rot_Lᵀ w, w = d + Rot_S a: d leads from
 one body's origin to the other's and changes by v in unit time, a from the small body's origin to its piece's. Since
@@ -6,9 +6,9 @@ z″ = Rot_Lᵀ (w″ − 2 ω_L × w′ + ω_L × (ω_L × w)), its acceleratio
 
     K = |ω_S|² |a| + 2 |ω_L| (|v| + |ω_S| |a|) + |ω_L|² (|d| + |a|),
 
-and in a span of length h the origin is within K h² / 8 of the chord between its places at both ends. The chord swept by
-a ball of this radius and the piece's reach holds the piece all the time: facets outside are free in the span. What
-`span_bounds.py` has, a ball in which the piece moves, holds as many facets as a body as long as the way would meet.
+and in a span of length h it is within K h² / 8 of the chord between where it is at both ends. The chord swept by a ball
+of that and of the piece's reach holds the piece all the time: facets outside are free in the span. The ball in which
+the piece moves (`span_bounds.py`) holds all facets that are as near as the way is long.
 """
 
 from __future__ import annotations
@@ -41,15 +41,10 @@ def facets_on_path(
 
     spans : of a mesh, its ``side`` 0 or 1, and the other piece.   tree : of the mesh.
     """
-    ends = []
-    for time in (begin, end):
-        matrices = spans.describe(time, time)[:32].reshape(2, 4, 4).copy()
-        way = spans.between_origins(time)
-        matrices[:, :3, 3] -= way if side else 0.0  # from the origin of the mesh's body
-        ends.append((matrices[side], matrices[1 - side, :3, 3], float(np.linalg.norm(way))))
-    (X_M, start, near_way), (_, stop, far_way) = ends
+    (X_M, start), (_, stop) = (_seen_from(spans, side, time) for time in (begin, end))
     large, small = spans.bodies[side], spans.bodies[1 - side]
-    w_l, w_s, h, way = float(large[ANGLE]), float(small[ANGLE]), end - begin, np.maximum(near_way, far_way)
+    w_l, w_s, h = large[ANGLE], small[ANGLE], end - begin
+    way = max(float(np.linalg.norm(spans.between_origins(time))) for time in (begin, end))
     arm = float(np.linalg.norm(small[ARM : ARM + 3]))
     reach = small[REACH_OF_CORE] - arm
     speed = float(np.linalg.norm(spans.between_origins(1.0) - spans.between_origins(0.0)))
@@ -64,10 +59,19 @@ def facets_on_path(
     length = float(np.linalg.norm(chord))
     X_C = np.eye(4)
     X_C[:3, :3], X_C[:3, 3] = frame_along(chord / length if length > 0.0 else X_M[:3, 0]).T, start
-    path = pack_points(np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0]]))
+    segment = pack_points(np.array([[0.0, 0.0, 0.0], [length, 0.0, 0.0]]))
     at = as_given(X_M[None]), as_given(X_C[None]), np.zeros((1, 3))
-    near = near_facets_up_to(tree, path, *at, radius, max_facets)
+    near = near_facets_up_to(tree, segment, *at, radius, max_facets)
     return None if near is None else np.unique(tree.ids[near.place])
+
+
+def _seen_from(spans: Spans, side: int, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """(pose (4, 4) of the mesh of a side, (3,) the origin of the other piece) at a time, from the origin of the mesh's
+    body."""
+    matrices = spans.describe(time, time)[:32].reshape(2, 4, 4).copy()
+    if side == 1:  # A's body is where they are from
+        matrices[:, :3, 3] -= spans.between_origins(time)
+    return matrices[side], matrices[1 - side, :3, 3]
 
 
 def _turned(p: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
@@ -94,8 +98,8 @@ def earliest_by_facets(
     mover, facet = np.divmod(np.arange(n * k), max(k, 1))
     ends = [[facet, np.zeros(n * k, dtype=np.int64)], [k + mover, 1 + mover]]
     jobs = np.ascontiguousarray(np.stack([mover, *ends[side], *ends[1 - side]], axis=1))
-    impacts = free_rows(n)
-    of_parts = np.concatenate([spans.parts[side : side + 1], parts])
-    header = header_of(Tables(facets.addresses, k + n, of_parts), spans.motion)
-    find_impacts(address_of(header), address_of(jobs), len(jobs), *span, tolerance, address_of(impacts))
-    return earliest_of(impacts)
+    rows_of_sets = free_rows(n)
+    tables = Tables(facets.addresses, k + n, np.concatenate([spans.parts[side : side + 1], parts]))
+    header = header_of(tables, spans.motion)
+    find_impacts(address_of(header), address_of(jobs), len(jobs), *span, tolerance, address_of(rows_of_sets))
+    return earliest_of(rows_of_sets)

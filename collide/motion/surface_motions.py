@@ -210,8 +210,8 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 
         unions = compound_parts(A), compound_parts(B)
         for i, j in [numbers] if is_small else parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
-            # No contact of two pieces is earlier than that of the convex sets around both, nor than that of one set and the
-            # facets on its way: in the order of these, the first contact found leaves out all later ones.
+            # No contact of two pieces is earlier than that of the convex sets around both, nor than that of one set and
+            # the facets on its way: in the order of these, the first contact found leaves out all later ones.
             earliest, some, end = np.zeros(len(i)), np.arange(len(i)), min(upper(), 1.0)
             first = first_pair(A, B, motion, (i, j), end, tolerance) if len(i) >= _TOGETHER else None
             if first is not None:  # what comes first by its sets is searched first: all others end with its contact
@@ -232,11 +232,11 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 
 
 def _ask_on_the_way(
-    shapes: tuple[Shape, Shape], pairs: tuple[np.ndarray, np.ndarray], motion: Motions, earliest: np.ndarray, end: float,
-    tolerance: float,
+    shapes: tuple[Shape, Shape], pairs: tuple[np.ndarray, np.ndarray], motion: Motions, earliest: np.ndarray,
+    end: float, tolerance: float,
 ) -> float:  # fmt: skip
-    """Raise the ``earliest`` times (k,) of pairs of pieces, in place, where one of them is a large mesh and the other is of
-    a small union, by the facets on the union's way; returns the time until which they are known now."""
+    """Raise the ``earliest`` times (k,) of pairs of pieces, in place, where one is a large mesh and the other is of a
+    small union, by the facets on the union's way; returns the time until which they are known now."""
     bounds, known_until = bounds_of(*shapes), math.inf
     for side in (0, 1):
         pieces, union = pieces_of(shapes[side]), compound_parts(shapes[1 - side])
@@ -448,9 +448,9 @@ class _Spans(Spans):
         return large.is_mesh and _TIMES_SMALLER * small.reach <= large.reach
 
     def times_on_the_way(self, sets: Any, begin: float, end: float, tolerance: float) -> tuple[np.ndarray, float]:
-        """((n,) times before which convex sets, all in the smaller piece, meet no facet of the larger one on their way,
-        infinity of sets that meet none up to ``end``; the time until which these are known, infinity where this is the
-        end).
+        """((n,) times before which convex sets, all in the smaller piece, meet none of the facets of the larger one
+        that this passes, infinity of those that meet none up to ``end``; the time until which these are known, infinity
+        where this is the end).
 
         sets : as of `earliest_by_facets`.
         """
@@ -469,11 +469,11 @@ class _Spans(Spans):
         return np.minimum(np.maximum(times, begin), known), known
 
     def _facets_ahead(self, side: int, begin: float, end: float, max_facets: int) -> tuple[np.ndarray | None, float]:
-        """(facets of the mesh of a side on the way of the other piece until a time, None of more than max_facets; that
-        time: the end, or as early as these are few, but not before the piece may have moved by its own size)."""
+        """(facets of the mesh of a side on the way of the other piece until a time, None of more than ``max_facets``;
+        that time: the end, or as early as these are few, but not before the piece may have moved by its own size)."""
         mesh, until, least = (self.a, self.b)[side], end, 2.0 * self.scale(begin, end)
         while True:
-            facets = facets_on_path(self, mesh.tree, side, begin, until, most)  # type: ignore[arg-type]
+            facets = facets_on_path(self, mesh.tree, side, begin, until, max_facets)  # type: ignore[arg-type]
             shorter = begin + max(0.25 * (until - begin), least)
             if facets is not None or not shorter < until:
                 return facets, until
@@ -524,8 +524,8 @@ def _max_jobs(span: float) -> int:
 class _Span(NamedTuple):
     """A span of time to be looked at.
 
-    max_pairs : a span in which more facets may meet is cut.   may_meet : whether bodies that are convex where they meet
-    do so as the span begins: its first part is looked at before the span is cut.
+    max_pairs : of more facets that may meet in it it is cut.   may_meet : whether bodies that are convex where they
+    meet do so as it begins: its first part is looked at before it is cut.
     """
 
     begin: float

@@ -81,20 +81,24 @@ def counted(monkeypatch, *names: str) -> list[str]:
     """Calls of functions of the module of surfaces, by name."""
     calls: list[str] = []
     for name in names:
-        of = getattr(surface_motions, name)
-        monkeypatch.setattr(surface_motions, name, lambda *args, of=of, name=name: (calls.append(name), of(*args))[1])
+
+        def recorded(*args, of=getattr(surface_motions, name), name=name, **options):
+            calls.append(name)
+            return of(*args, **options)
+
+        monkeypatch.setattr(surface_motions, name, recorded)
     return calls
 
 
 @pytest.mark.parametrize(("meshed", "size"), [(True, 1e-5), (False, 1e-5), (True, 0.01)])
 def test_parts_that_come_to_one_face_are_searched_in_order_of_their_convex_sets(monkeypatch, meshed, size):
-    """All 150 parts of a small union are about as near a large, turned face: sets around them tell which is first."""
+    """All 150 parts of a small union are about as near a large, turned face: the sets around them tell the first."""
     calls = counted(monkeypatch, "_search", "_search_few")
     union = small(clutter(150, meshed, "before a face"), size)
-    corners, faces = collide.tessellate(collide.Box((2.0, 2.0, 2.0)))[:2]
-    cube = collide.Mesh(corners, faces)
+    octahedron = collide.ConvexHull(np.concatenate([np.eye(3), -np.eye(3)]))  # its faces are oblique to its box
+    large = collide.Mesh(*collide.tessellate(octahedron)[:2])
     ends = (collide.pose(t, rpy=(0.1, 0.7, 0.3)) for t in ((0.9, 1.3, 1.1), (-0.9, -1.3, -1.1)))
-    r = collide.time_of_impact(union, cube, np.eye(4), np.eye(4), *ends)
+    r = collide.time_of_impact(union, large, np.eye(4), np.eye(4), *ends)
     assert r.hit and r.certified
     assert 0 < len(calls) < 8, len(calls)
 

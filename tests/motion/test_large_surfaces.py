@@ -148,7 +148,7 @@ def turned(omega: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("side", [0, 1])
 def test_a_body_touches_no_facet_beside_its_way(side):
-    """Points of facets that are not named, and a ball at many times, both bodies turning about far points."""
+    """Points of facets that are not named, and a ball that is placed at many times; both bodies turn."""
     rng = rng_of(f"facets beside a way {side}")
     named = reached = 0
     for _ in range(30):

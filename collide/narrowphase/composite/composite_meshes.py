@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
@@ -103,7 +102,8 @@ def _leave_out_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, near: np.nda
     for first in range(0, len(entries), _BOUNDS_AT_ONCE):
         pose, i, j = some = entries[first : first + _BOUNDS_AT_ONCE].T
         about = _about(A, B, i, j, X_WA[pose], X_WB[pose])
-        rows, sets, placed, slop = [], list[Any](), [], np.zeros(len(pose))
+        sets: list[PackedConvex] = []
+        rows, placed, slop = [], [], np.zeros(len(pose))
         for side, parts, X in ((A, i, X_WA), (B, j, X_WB)):
             of, row = np.unique(parts, return_inverse=True)
             rows.append(row.ravel() + len(sets))

@@ -90,15 +90,15 @@ def test_states_of_parts_are_those_of_each(monkeypatch):
     """A boolean that leaves parts out by their sets says what the parts say one by one."""
     rng, hits = rng_of("states of parts"), []
     left_out = counted(monkeypatch, composite_meshes, "_leave_out_sets", lambda *args: 1)
-    for seed in range(12):
-        union, slab = meshes(40, 0.05 + 0.01 * seed), large_slab(3.0)
+    for seed in range(6):
+        union, slab = meshes(24, 0.05 + 0.01 * seed), large_slab(3.0)
         X_WA, X_WB = random_pose(rng, 1.0), random_pose(rng, 1.0)
         n = rng.normal(size=3)
         X_WB[:3, 3] = X_WA[:3, 3] + rng.uniform(0.3, 1.8) * n / np.linalg.norm(n)
         each = [collide.collide(collide.Compound([item]), slab, X_WA, X_WB) for item in union.items]
         hits.append(collide.collide(union, slab, X_WA, X_WB))
         assert hits[-1] == any(each), (seed, X_WA.tolist(), X_WB.tolist())
-    assert 3 <= sum(hits) <= 10 and len(left_out) >= 3, (hits, len(left_out))
+    assert 1 <= sum(hits) <= 5 and len(left_out) >= 3, (hits, len(left_out))
 
 
 @pytest.mark.many(2)
