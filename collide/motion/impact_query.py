@@ -92,7 +92,8 @@ def time_of_impact(
     Meshes: facets are culled span by span with motion bounds, spans cut where the distance says: a distance for each of
     some ten spans, and O(k) of the k pairs of facets that come near together in the last; a hull counts as one facet.
     All n m pairs of facets where they come together at once, as of flush faces: seconds of 10^5. Unions of m and k
-    parts: pairs of parts whose boxes come near before the contact, O((m + k) log k) a span; m k where all do.
+    parts: O((m + k) log k) a span, and some microseconds for each pair of parts whose boxes come near before the
+    contact, m k where all do; facets of those alone whose convex sets meet before it.
     """
     n_threads = check_threads(threads)
     width = _checked_tolerance(tolerance)

@@ -559,12 +559,15 @@ def _search(
                 to_do[-1] = _Span(end, span.end, span.max_pairs)
                 _look_at(near, a, b, motion, (span.begin, end), tolerance, row, is_part)
             continue
-        if length > 4.0 * scale and spans.is_small_beside():
+        is_long = length > 4.0 * scale and spans.is_small_beside()  # of so long a way a ball holds too many facets
+        if is_long:
             later = float(spans.times_on_the_way(spans.smaller_set(), span.begin, span.end, tolerance)[0][0])
             if later > span.begin + scale:
                 to_do.append(span._replace(begin=later, may_meet=True))
                 continue
-        near = spans.near_facets(span.begin, span.end, _MAX_JOBS_OF_ALL if length < _SHORTEST else span.max_pairs)
+        max_pairs, near = _MAX_JOBS_OF_ALL if length < _SHORTEST else span.max_pairs, None
+        if not is_long or length < _SHORTEST:
+            near = spans.near_facets(span.begin, span.end, max_pairs)
         if near is not None:
             _look_at(near, a, b, motion, (span.begin, span.end), tolerance, row, is_part)
         elif length < _SHORTEST:  # more facets together than can be looked at: open from here on
