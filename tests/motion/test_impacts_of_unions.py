@@ -80,13 +80,12 @@ def small(union: collide.Compound, size: float) -> collide.Compound:
 def counted(monkeypatch, *names: str) -> list[str]:
     """Calls of functions of the module of surfaces, by name."""
     calls: list[str] = []
+
+    def recorded(name: str, of):
+        return lambda *args, **options: (calls.append(name), of(*args, **options))[1]
+
     for name in names:
-
-        def recorded(*args, of=getattr(surface_motions, name), name=name, **options):
-            calls.append(name)
-            return of(*args, **options)
-
-        monkeypatch.setattr(surface_motions, name, recorded)
+        monkeypatch.setattr(surface_motions, name, recorded(name, getattr(surface_motions, name)))
     return calls
 
 
