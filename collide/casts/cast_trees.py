@@ -214,7 +214,7 @@ def _box_of_a(sweep, a, ref_a, has_tree_a):
         half = Vec3(
             dot(absolute(rotation.x), of_a.half), dot(absolute(rotation.y), of_a.half),
             dot(absolute(rotation.z), of_a.half),
-        )  # fmt: skip
+        )
     return Box(middle, half)
 
 

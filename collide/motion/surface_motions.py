@@ -234,7 +234,7 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
 def _ask_on_the_way(
     shapes: tuple[Shape, Shape], pairs: tuple[np.ndarray, np.ndarray], motion: Motions, earliest: np.ndarray,
     end: float, tolerance: float,
-) -> float:  # fmt: skip
+) -> float:
     """Raise the ``earliest`` times (k,) of pairs of pieces, in place, where one is a large mesh and the other is of a
     small union, by the facets on the union's way; returns the time until which they are known now."""
     bounds, known_until = bounds_of(*shapes), math.inf

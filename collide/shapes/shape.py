@@ -27,7 +27,7 @@ class Shape:
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges", "_hulls_instead",
         "_kind", "_laid_out", "_moving", "_moving_bounds", "_partners", "_parts", "_pieces", "_prepared", "_serial",
         "_surface", "_topology", "_union", "_walk",
-    )  # fmt: skip
+    )
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
     _parts: tuple

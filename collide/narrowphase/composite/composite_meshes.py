@@ -11,10 +11,10 @@ from __future__ import annotations
 import itertools
 import math
 from functools import cache
-from typing import Any
 
 import numpy as np
 
+from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states

@@ -245,7 +245,7 @@ def test_parts_left_out_by_balls_are_no_nearer(seed):
     ]
     union = collide.Compound(items)
     grounds = (hollow, collide.Mesh(outer.vertices, outer.faces[2:]), terrain(6),
-               collide.Compound([(hollow, np.eye(4)), (terrain(4), collide.pose((1.5, 0.0, 0.0)))]))  # fmt: skip
+               collide.Compound([(hollow, np.eye(4)), (terrain(4), collide.pose((1.5, 0.0, 0.0)))]))
     ground = grounds[seed % 4]
     directions = rng.normal(size=(6, 3))
     directions *= (np.array([0.0, 0.3, 0.8, 1.0, 1.3, 2.0]) / np.linalg.norm(directions, axis=1))[:, None]
