@@ -58,17 +58,17 @@ ARM = (Level("arm64", "generic"),)
 APPLE = (Level("arm64", "apple-m1"),)
 
 
-#: Link units, those that take longest first, and the beginnings of the names of their modules in `collide`: kernels
-#: that share what they call stand together.
+#: Link units and the beginnings of the names of their modules in `collide`: kernels that share what they call stand
+#: together. Those that take longest are lowered first; two that share much not at once, or both would lower it.
 UNITS = {
     "convex": ("narrowphase.",),
-    "contacts": ("contact.",),
     "papers": ("hierarchies.", "polytopes.", "tetrahedra.", "least_distance."),
+    "contacts": ("contact.",),
     "facets": ("narrowphase.facets.",),
     "motion": ("casts.", "motion."),
     "exact": ("narrowphase.exact.",),
-    "worlds": ("broadphase.", "robots.", "support.", "numerics."),
     "meshes": ("mesh.", "solids.", "hull."),
+    "worlds": ("broadphase.", "robots.", "support.", "numerics."),
 }
 
 

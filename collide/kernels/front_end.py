@@ -17,7 +17,9 @@ from typing import Any
 import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import _dynfunc
-from numba.core import callconv, cgutils, compiler, errors, funcdesc, sigutils, types, typing, untyped_passes
+from numba.core import callconv, cgutils, compiler, errors, funcdesc, sigutils, types, typing
+from numba.core import typed_passes as typed
+from numba.core import untyped_passes as untyped
 from numba.core.codegen import AOTCPUCodegen, CPUCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import FunctionPass, PassManager, register_pass
@@ -25,7 +27,6 @@ from numba.core.cpu import CPUContext
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUTarget
 from numba.core.target_extension import CPU, dispatcher_registry, jit_registry, target_override, target_registry
-from numba.core.typed_passes import NopythonRewrites
 from numba.core.utils import threadsafe_cached_property
 from numba.extending import intrinsic
 
@@ -42,8 +43,14 @@ _FLAGS = {
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
 }
-#: For functions within functions, with-blocks and expressions of whole arrays, of which kernels have none.
-_UNUSED_PASSES = {untyped_passes.InlineClosureLikes, untyped_passes.WithLifting, NopythonRewrites}
+#: For functions within functions, with-blocks, expressions of whole arrays, loops over tuples, messages made as code
+#: runs, and reports, of which kernels have none: without these passes a kernel is lowered to the same bytes.
+_UNUSED_PASSES = {
+    untyped.InlineClosureLikes, untyped.WithLifting, untyped.RewriteDynamicRaises, untyped.MakeFunctionToJitFunction,
+    untyped.InlineInlinables, untyped.FindLiterallyCalls, untyped.LiteralUnroll,
+    untyped.LiteralPropagationSubPipelinePass, typed.InlineOverloads, typed.NopythonRewrites,
+    typed.NoPythonSupportedFeatureValidation, typed.AnnotateTypes, typed.DumpParforDiagnostics,
+}
 
 
 class Kernels(CPU):
@@ -175,8 +182,9 @@ class _Compiler(compiler.CompilerBase):
     def define_pipelines(self):
         whole = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
         ours = PassManager("kernels")
-        ours.passes = [step for step in whole.passes if step[0] not in _UNUSED_PASSES]
-        ours.add_pass_after(_NameByContent, untyped_passes.TranslateByteCode)
+        last = {step[0]: step for step in whole.passes}  # branches that are never taken are looked for thrice
+        ours.passes = [step for step in whole.passes if step is last[step[0]] and step[0] not in _UNUSED_PASSES]
+        ours.add_pass_after(_NameByContent, untyped.TranslateByteCode)
         ours.finalize()
         return [ours]
 
@@ -287,6 +295,7 @@ def _dispatcher_of(called: kept_lowered.Called) -> KernelDispatcher | None:
     return next((known for known in candidates if known.full_name == called.name), None)
 
 
+@cache
 def _own_hash(called: kept_lowered.Called) -> str:
     """Of what a kernel is lowered from, beside the kernels that it calls. Of one that its values tell from others, they
     are in its name."""
