@@ -1,12 +1,12 @@
-"""The slowest calls of the public interface: found by a search over bodies, sizes, placements and questions, and kept.
+"""The slowest calls of the public interface: what searches over bodies, sizes, placements and questions have met.
 
-    python benchmarks/slowest_calls.py                        # the forty kept, beside the bar; five minutes
-    python benchmarks/slowest_calls.py --search --seconds 600 # looks for others; prints the worst, writes no file
-    python benchmarks/slowest_calls.py --case "contacts ball:80000 box 1 deep"
+    python benchmarks/slowest_calls.py                           # the forty kept, beside the bar; five minutes
+    python benchmarks/slowest_calls.py --search 600 --seed 3     # looks for others; prints the worst, writes no file
+    python benchmarks/slowest_calls.py --only "case=contacts ball:80000 box 1 deep"
 
 A call is timed after one that makes ready what is kept with shapes, so that building is not in the figure: CPU time,
-the median of five, or of one where it takes more than a second. Bodies and questions are in `slowest_bodies.py`. The
-search prints every case above the bar as it meets it, so that it may be stopped at any time.
+the median of five, or of one where it takes more than a second. Bodies and questions are in `slowest_bodies.py`. A
+search may be stopped at any time: what it has met above the bar is told.
 """
 
 from __future__ import annotations
@@ -14,16 +14,15 @@ from __future__ import annotations
 import argparse
 import itertools
 import random
-import statistics
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 from slowest_bodies import OF_ONE, PLACES, QUESTIONS, RATIOS, all_bodies, body, placed
 
-from collide.adapters.bench.claims import RESULTS
-from collide.adapters.bench.machine_stamp import file_name, machine_stamp, write_csv
+from collide.adapters.bench.claims import Claim, Options, Race, Row, check, main
 from collide.errors import CollideError
 
 #: No call on 10^5 facets or 1,000 parts is to take longer, building apart [ms].
@@ -53,77 +52,64 @@ WORST = (
 )
 
 
-def timed(case: str) -> tuple[float, float]:
-    """(ms of the first call, ms of a later one) of a case; raises what the call raises."""
-    question, A, B, ratio, place = case.split()
-    X, Y = placed(A, B, float(ratio), place)
-    shapes, small = (body(A), body(B, float(ratio))), min(1.0, float(ratio))
-    taken: list[float] = []
-    while len(taken) < 2 or (len(taken) < 6 and taken[-1] < 1e3):
-        started = time.process_time()
-        QUESTIONS[question](*shapes, X, Y, small)
-        taken.append(1e3 * (time.process_time() - started))
-    return taken[0], statistics.median(taken[1:])
 
 
-def cases(rng: random.Random, questions: list[str]) -> list[str]:
-    """All there are, in random order."""
+def cases(options: Options) -> Iterator[Row]:
+    """What is kept; of a search all there are, in random order, until its time is up."""
+    if options.search is None:
+        yield from ({"case": case} for case in WORST)
+        return
+    options.no_csv = True
+    unknown = set(options.questions) - QUESTIONS.keys()
+    check(not unknown, f"no question {min(unknown, default='')!r}: {', '.join(QUESTIONS)}")
     bodies = all_bodies()
     every = [
         f"{question} {A} {B} {ratio:g} {place}"
-        for question, A, B, ratio, place in itertools.product(questions, bodies, bodies, RATIOS, PLACES)
+        for question, A, B, ratio, place in itertools.product(options.questions, bodies, bodies, RATIOS, PLACES)
         if question not in OF_ONE or B in ("sphere", A)
     ]
-    rng.shuffle(every)
-    return every
+    random.Random(options.seed).shuffle(every)
+    started = time.process_time()
+    for case in every:
+        if time.process_time() - started > options.search:
+            return
+        yield {"case": case}
 
 
-def search(seconds: float, seed: int, questions: list[str]) -> None:
-    """Ask cases in random order until the time is up, and print those above the bar, then the worst."""
-    slowest: list[tuple[float, float, str]] = []
-    refused, started = 0, time.process_time()
-    for case in cases(random.Random(seed), questions):
-        if time.process_time() - started > seconds:
-            break
-        try:
-            first, later = timed(case)
-        except CollideError:
-            refused += 1
-            continue
-        slowest.append((later, first, case))
-        if later > BAR:
-            print(line(first, later, case), flush=True)
-    slowest.sort(reverse=True)
-    print(f"{len(slowest)} cases, {refused} refused; above {BAR:g} ms: {sum(later > BAR for later, *_ in slowest)}")
-    for later, first, case in slowest[:20]:
-        print(line(first, later, case))
+def measure(options: Options, case: str) -> Race | list[Row]:
+    """The call, after a first one; of a search nothing where the call is refused, or below the bar."""
+    question, A, B, ratio, place = case.split()
+    X, Y = placed(A, B, float(ratio), place)
+    shapes, small = (body(A), body(B, float(ratio))), min(1.0, float(ratio))
+
+    def ask() -> float:
+        """CPU ms of a call."""
+        started = time.process_time()
+        QUESTIONS[question](*shapes, X, Y, small)
+        return 1e3 * (time.process_time() - started)
+
+    try:
+        first = ask()
+        if options.search is not None and ask() <= BAR:
+            return []
+    except CollideError:
+        if options.search is None:
+            raise
+        return []
+    return Race({"collide": ask}, beside={"collide": {"first_ms": first}}, bars={"collide": BAR})
 
 
-def line(first: float, later: float, case: str) -> str:
-    return f"{later:10.2f} ms  {'above' if later > BAR else '     '}  (first {first:10.1f})  {case}"
+def more(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--search", type=float, metavar="SECONDS", help="look for slow calls for so much CPU time")
+    parser.add_argument("--seed", type=int, default=0, help="of the order in which a search asks")
+    parser.add_argument("--questions", nargs="+", default=list(QUESTIONS), metavar="NAME", help="that a search asks")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--search", action="store_true", help="look for slow calls instead of timing those kept")
-    parser.add_argument("--seconds", type=float, default=600.0, help="CPU time of a search")
-    parser.add_argument("--seed", type=int, default=0, help="of the order in which cases are asked")
-    parser.add_argument("--questions", default=",".join(QUESTIONS), help="asked in a search")
-    parser.add_argument("--case", action="append", help="time this one, and write no file")
-    parser.add_argument("--no-csv", action="store_true")
-    asked = parser.parse_args()
-    if asked.search:
-        search(asked.seconds, asked.seed, asked.questions.split(","))
-        return
-    rows = []
-    for case in asked.case or WORST:
-        first, later = timed(case)
-        print(line(first, later, case), flush=True)
-        rows.append({"case": case, "first_ms": f"{first:.4f}", "later_ms": f"{later:.4f}", "bar_ms": BAR})
-    if not (asked.case or asked.no_csv):
-        stamp = machine_stamp()
-        write_csv(RESULTS / file_name("slowest-calls", stamp), rows, stamp)
-
+CLAIMS = [
+    Claim(
+        "slowest-calls", "beside 50 ms; CPU time", cases, measure, unit="ms", turns=5, seconds=2.0, bar="median",
+    )
+]
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS, more)
