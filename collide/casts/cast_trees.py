@@ -52,12 +52,14 @@ TREE_CAST_INTEGERS = CAST_INTEGERS + STACK
 CANDIDATE = CAST_ROW + 3
 FACET_A, FACET_B, OF_QUESTION = CAST_ROW, CAST_ROW + 1, CAST_ROW + 2
 
-# Integers of a header: addresses of A's tree (0 for a convex set) and B's, of the shape table, poses of A and of B and
-# from one question to the next, questions, candidates, and how many of them there is room for.
+# Integers of a header: addresses of A's tree (0 for convex sets) and B's, of the shape table, poses of A and of B and
+# from one question to the next, questions, candidates, how many of them there is room for, the row of the table that
+# is A in each question, the cast that each is a question of, and the largest t of interest in each cast, in and out.
 (
     TREE_A, TREE_B, INTS_AT, NUMBERS_AT, POSES_A, POSES_B, STEP_A, STEP_B, QUESTIONS_AT, CANDIDATES_AT, CAPACITY,
-) = range(11)
-HEADER = 11
+    SHAPE_OF_AT, CAST_OF_AT, BEST_AT,
+) = range(14)
+HEADER = 14
 _LOW = 0xFFFFFFFF
 #: In the count of candidates.
 CASTS = 1
@@ -137,14 +139,15 @@ def _posed_pair(header, k, poses, corners_at):
     for i in range(POSE):
         poses[i] = of_a[i]
         poses[POSE + i] = of_b[i]
-    ints = view_i64(header[INTS_AT], INTS)
-    A = posed_body(ints, 0, 0)
+    shape = view_i64(header[SHAPE_OF_AT], k + 1)[k]
+    ints, numbers = view_i64(header[INTS_AT], INTS * (shape + 1)), view_f64(header[NUMBERS_AT], NUMBERS * (shape + 1))
+    A = posed_body(ints, shape, 0)
     if header[TREE_A] != 0:
         A = _facet_body(view_f64(corners_at, 24))
     B = _facet_body(view_f64(corners_at + 8 * 24, 24))
     B = PosedBody(B.coords, 3, 8, POINTS, 0, 0, POSE, 0, 0)
     t = sub(vec3_at(poses, POSE + 9), vec3_at(poses, 9))
-    return PosedPair(A, B, view_f64(header[NUMBERS_AT], NUMBERS), poses, t)
+    return PosedPair(A, B, numbers, poses, t)
 
 
 @kernel
@@ -152,8 +155,9 @@ def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
     """The `_Sweep` of question k.   a, b : both trees; b twice where A is none."""
     numbers, poses = pair.numbers, pair.poses
     is_convex = header[TREE_A] == 0
-    reach_a = numbers[REACH] if is_convex else norm(vec3_at(a.numbers, TREE_REACH))
-    radius = numbers[RADIUS] if is_convex else 0.0
+    at = NUMBERS * view_i64(header[SHAPE_OF_AT], k + 1)[k]
+    reach_a = numbers[at + REACH] if is_convex else norm(vec3_at(a.numbers, TREE_REACH))
+    radius = numbers[at + RADIUS] if is_convex else 0.0
     reach_a = reach_a * stretch_of_pose(poses, 0) + radius
     reach_b = norm(vec3_at(b.numbers, TREE_REACH)) * stretch_of_pose(poses, POSE)
     size = reach_a + reach_b + norm(pair.t)
@@ -366,6 +370,7 @@ def _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top):
 def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
     """Candidates for the first contacts of questions ``first`` … n − 1 that are apart at the start.
 
+    Of questions of one cast each is looked into no farther than to the contacts proven of those before it.
     header : HEADER integers.   count : how many candidates there are, and how many casts were made, in and out.
     doubles, integers : workspace (TREE_CAST_DOUBLES, TREE_CAST_INTEGERS).
     Returns how many questions are answered; fewer than n where there is no room for more candidates.
@@ -386,18 +391,21 @@ def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
         question = view_f64(header[QUESTIONS_AT] + 8 * QUESTION * k, QUESTION)
         pair = _posed_pair(header, k, view_f64(poses_at, 2 * POSE), corners_at)
         sweep = _sweep_of(header, k, a, b, pair, doubles_at, integers_at)
-        if not _walk_pairs(header, sweep, work, a, b, has_tree_a, k, question[3], count):
+        cast = view_i64(header[CAST_OF_AT], k + 1)[k]
+        best = view_f64(header[BEST_AT] + 8 * cast, 1)
+        found = _walk_pairs(header, sweep, work, a, b, has_tree_a, k, question[3], best[0], count)
+        if found < 0.0:
             count[0] = begin
             return k
+        best[0] = found
     return n
 
 
 @kernel
-def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, count):
-    """All candidates of one question; False where there is no room for them."""
-    best = limit
+def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, best, count):
+    """Take down all candidates of one question; what ``best`` is then, below 0 where there is no room for them."""
     unit_a, unit_b = _unit_of(a), _unit_of(b)
-    radius = 0.0 if has_tree_a else sweep.pair.numbers[RADIUS]
+    radius = 0.0 if has_tree_a else sweep.pair.numbers[NUMBERS * view_i64(header[SHAPE_OF_AT], k + 1)[k] + RADIUS]
     top = 0
     if _entry_of(sweep, a, b, 0, 0, has_tree_a, best) < math.inf:
         work.stack[0] = 0
@@ -412,14 +420,14 @@ def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, count):
         link_b = link_of(b.links, ref_b)
         if link_a >= 0 or link_b >= 0:
             if top + WIDTH > STACK:
-                return False
+                return -1.0
             top = _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top)
             continue
         run_a, run_b = ~link_a, ~link_b
         of_a, of_b = _box_of_a(sweep, a, ref_a, has_tree_a), box_at(b, ref_b)
         n_a = run_a & 7 if has_tree_a else 1
         if count[0] + n_a * (run_b & 7) > header[CAPACITY]:
-            return False
+            return -1.0
         for i in range(n_a):
             if has_tree_a:
                 if _facet_entry(sweep, a, (run_a >> 3) + i, True, unit_a, of_b, best) == math.inf:
@@ -437,4 +445,4 @@ def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, count):
                     row[FACET_B] = b.ids[(run_b >> 3) + j]
                     row[OF_QUESTION] = k
                     count[0] += 1
-    return True
+    return best

@@ -47,39 +47,54 @@ _workspace = _Workspace()
 
 
 class _Side(NamedTuple):
-    """One body of n casts.
+    """One body of n questions, a mesh or convex sets.
 
-    packed : of a convex set; of a mesh, None.   tree : of a mesh.   poses : (n,) rows.   X, X_item : body and item.
+    packed : the sets; none of a mesh.   which : (n,) the set of each question.   tree : of a mesh.
+    poses : (n,) rows.   X, X_item : (n, 4, 4) body and item.
     """
 
-    packed: PackedConvex | None
+    packed: list[PackedConvex]
+    which: np.ndarray
     tree: MeshTree | None
     poses: PoseTable
     X: np.ndarray
     X_item: np.ndarray
 
     def exact(self, k: int, facet: int, corners: FacetCorners | None) -> ExactPart | None:
-        """The body, or one of its facets, of cast k as exact numbers; None where it has none."""
+        """The body, or one of its facets, of question k as exact numbers; None where it has none."""
         if corners is not None:
-            return ExactPart(POINTS, corners[facet], 0.0, None, self.X[k], self.X_item)
-        assert self.packed is not None
-        if self.packed.kind != POINTS or self.packed.radius or self.packed.slop:
+            return ExactPart(POINTS, corners[facet], 0.0, None, self.X[k], self.X_item[k])
+        packed = self.packed[self.which[k]]
+        if packed.kind != POINTS or packed.radius or packed.slop:
             return None
-        return exact_part(self.packed, self.X[k], self.X_item)
+        return exact_part(packed, self.X[k], self.X_item[k])
 
 
-def cast_leaves(A: Leaf, B: Leaf, X_WA, X_WB, vectors: np.ndarray, limits: np.ndarray) -> PairRows:
-    """Rows of n casts of bodies that are apart at the start, the last two fields empty.
-
-    X_WA, X_WB : (n, 4, 4).   vectors : (n, 3).   limits : (n,) of t.
+class Casts(NamedTuple):
+    """Casts that k questions belong to: which (k,), their directions (k, 3) and limits (k,) of t, and how many casts
+    there are. Of one cast no question matters whose contact is later than that of another.
     """
-    if not B.shape.meshed and convex_set_of(B.shape).kind == HALFSPACE:
-        return _onto_plane(A, B, X_WA, X_WB, vectors, limits)
+
+    number: np.ndarray
+    vectors: np.ndarray
+    limits: np.ndarray
+    n: int
+
+
+def cast_leaves(A: list[Leaf], B: list[Leaf], X_WA, X_WB, casts: Casts) -> PairRows:
+    """Rows of k questions of bodies that are apart at the start, by question, the last two fields empty.
+
+    A, B : one leaf of all questions, or one a question: these are convex sets, no half-spaces; one of both sides is a
+    mesh.   X_WA, X_WB : (k, 4, 4).
+    """
+    if not B[0].shape.meshed and convex_set_of(B[0].shape).kind == HALFSPACE:
+        return _onto_plane(A[0], B[0], X_WA, X_WB, casts.vectors, casts.limits)
     side_a, side_b = _side(A, X_WA), _side(B, X_WB)
     if side_b.tree is not None:
-        return _cast(side_a, side_b, vectors, limits)
+        return _cast(side_a, side_b, casts)
     # The mesh moves: the convex set is moved the other way instead.
-    rows = _cast(side_b, side_a, -vectors, limits)
+    vectors = casts.vectors
+    rows = _cast(side_b, side_a, casts._replace(vectors=-vectors))
     t = rows.rows[:, VALUE, None]
     rows.rows[:, NORMAL : NORMAL + 3] *= -1.0
     rows.rows[:, TOUCHING : TOUCHING + 3] += t * vectors[rows.owner]
@@ -100,38 +115,48 @@ def _onto_plane(A: Leaf, B: Leaf, X_WA, X_WB, vectors, limits) -> PairRows:
     return answer_questions(PartPairs(parts, pairs, np.arange(n), none, none), vectors, limits)
 
 
-def _side(leaf: Leaf, X: np.ndarray) -> _Side:
-    packed, tree = (None, body_of(leaf.shape).tree) if leaf.shape.meshed else (convex_set_of(leaf.shape), None)
-    if packed is not None:
-        reach = packed.reach
+def _side(leaves: list[Leaf], X: np.ndarray) -> _Side:
+    k = len(X)
+    X_item = np.array([leaf.X for leaf in leaves])
+    if leaves[0].shape.meshed:
+        (leaf,), packed = leaves, []
+        tree, which = body_of(leaf.shape).tree, np.zeros(k, dtype=np.int64)
+        reach = np.full(k, float(np.linalg.norm(tree.numbers[3:6])))
     else:
-        assert tree is not None
-        reach = float(np.linalg.norm(tree.numbers[3:6]))
-    poses = pose_table(X, np.repeat(leaf.X[None], len(X), axis=0), np.full(len(X), reach))
-    return _Side(packed, tree, poses, X, leaf.X)
+        rows = {id(leaf.shape): leaf.shape for leaf in leaves}
+        packed, tree = [convex_set_of(shape) for shape in rows.values()], None
+        numbers = {key: row for row, key in enumerate(rows)}
+        which = np.array([numbers[id(leaf.shape)] for leaf in leaves], dtype=np.int64)
+        reach = np.array([one.reach for one in packed])[which]
+    if len(leaves) < k:
+        X_item, which, reach = np.repeat(X_item, k, axis=0), np.resize(which, k), np.resize(reach, k)
+    return _Side(packed, which, tree, pose_table(X, X_item, reach), X, X_item)
 
 
-def _cast(A: _Side, B: _Side, vectors: np.ndarray, limits: np.ndarray) -> PairRows:
+def _cast(A: _Side, B: _Side, casts: Casts) -> PairRows:
     """Rows of casts into a mesh B."""
-    candidates = _candidates(A, B, vectors, limits)
+    candidates = _candidates(A, B, casts)
     owner = candidates[:, OF_QUESTION].astype(np.int64)
     rows = np.ascontiguousarray(candidates[:, :CAST_ROW])
     k = len(rows)
     marks = Marks(rows[:, STATUS] == HIT, np.zeros(k, dtype=bool), np.zeros(k, dtype=bool))
-    width = PROMISE_CURVED if A.packed is not None and A.packed.kind != POINTS else PROMISE_STORED
-    _settle(A, B, candidates, rows, owner, marks, width, vectors, limits)
-    marks.certified[:] = marks.proven & (rows[:, UPPER] - rows[:, LOWER] <= width * rows[:, SIZE])
+    curved = np.array([packed.kind != POINTS for packed in A.packed] or [False])
+    width = np.where(curved[A.which[owner]], PROMISE_CURVED, PROMISE_STORED) * rows[:, SIZE]
+    _settle(A, B, candidates, rows, owner, marks, width, casts)
+    marks.certified[:] = marks.proven & (rows[:, UPPER] - rows[:, LOWER] <= width)
     none = np.zeros(k, dtype=np.int64)
     return PairRows(rows, marks, owner, none, none)
 
 
-def _candidates(A: _Side, B: _Side, vectors: np.ndarray, limits: np.ndarray) -> np.ndarray:
+def _candidates(A: _Side, B: _Side, casts: Casts) -> np.ndarray:
     """(k, CANDIDATE) what may be the first contacts."""
     assert B.tree is not None
-    n = len(limits)
-    questions = np.ascontiguousarray(np.hstack([vectors, limits[:, None]]))
-    table = ShapeTable([A.packed if A.packed is not None else pack_points(np.zeros((1, 3)))])
-    table.build_trees(np.zeros(1, dtype=np.int64))
+    n = len(casts.limits)
+    questions = np.ascontiguousarray(np.hstack([casts.vectors, casts.limits[:, None]]))
+    table = ShapeTable(A.packed or [pack_points(np.zeros((1, 3)))])
+    table.build_trees(A.which)
+    best = np.full(casts.n, np.inf)
+    np.minimum.at(best, casts.number, casts.limits)
     count, done, answered = np.zeros(2, dtype=np.int64), 0, []
     capacity = 1024 + 8 * n
     while True:
@@ -140,6 +165,7 @@ def _candidates(A: _Side, B: _Side, vectors: np.ndarray, limits: np.ndarray) -> 
             [
                 0 if A.tree is None else A.tree.address, B.tree.address, *table.addresses, address_of(A.poses.rows),
                 address_of(B.poses.rows), POSE, POSE, address_of(questions), address_of(candidates), capacity,
+                address_of(A.which), address_of(casts.number), address_of(best),
             ],
             dtype=np.int64,
         )
@@ -153,19 +179,22 @@ def _candidates(A: _Side, B: _Side, vectors: np.ndarray, limits: np.ndarray) -> 
             capacity *= 4
 
 
-def _settle(A: _Side, B: _Side, candidates, rows, owner, marks: Marks, width: float, vectors, limits) -> None:
+def _settle(A: _Side, B: _Side, candidates, rows, owner, marks: Marks, width: np.ndarray, casts: Casts) -> None:
     """Decide open candidates, nearest first, as long as they may be nearer than what is proven; drop the others."""
     assert B.tree is not None
-    best = limits.copy()
-    np.minimum.at(best, owner[marks.proven], rows[marks.proven, UPPER])
-    rows[rows[:, LOWER] > best[owner], STATUS] = MISS
+    best, limits, cast = np.full(casts.n, np.inf), casts.limits, casts.number[owner]
+    np.minimum.at(best, casts.number, limits)
+    np.minimum.at(best, cast[marks.proven], rows[marks.proven, UPPER])
+    rows[rows[:, LOWER] > best[cast], STATUS] = MISS
+    wide = marks.proven & (rows[:, UPPER] - rows[:, LOWER] > width)
+    unsettled = np.flatnonzero(((rows[:, STATUS] == OPEN) | wide) & (rows[:, STATUS] != MISS))
+    if not len(unsettled):
+        return
     corners_a = None if A.tree is None else FacetCorners(A.tree)
     corners_b = FacetCorners(B.tree)
-    wide = marks.proven & (rows[:, UPPER] - rows[:, LOWER] > width * rows[:, SIZE])
-    unsettled = np.flatnonzero(((rows[:, STATUS] == OPEN) | wide) & (rows[:, STATUS] != MISS))
     for k in unsettled[np.argsort(rows[unsettled, LOWER], kind="stable")].tolist():
         q = owner[k]
-        if rows[k, LOWER] > best[q]:
+        if rows[k, LOWER] > best[cast[k]]:
             rows[k, STATUS] = MISS
             continue
         facet_a, facet_b = (int(candidates[k, column]) for column in (FACET_A, FACET_B))
@@ -176,8 +205,8 @@ def _settle(A: _Side, B: _Side, candidates, rows, owner, marks: Marks, width: fl
                 rows[k, [LOWER, VALUE]] = np.minimum(rows[k, [LOWER, VALUE]], limits[q])
             continue
         question = np.empty(QUESTION)
-        question[:3], question[3] = vectors[q], limits[q]
+        question[:3], question[3] = casts.vectors[q], limits[q]
         settle_points(*common_vertices(exact_a, exact_b), question, rows[k])
         if rows[k, STATUS] == HIT:
             marks.proven[k] = True
-            best[q] = min(best[q], rows[k, UPPER])
+            best[cast[k]] = min(best[cast[k]], rows[k, UPPER])
