@@ -166,7 +166,7 @@ def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np
     leaves_a, leaves_b = leaves_of(A), leaves_of(B)
     meshed = [np.array([leaf.shape.meshed for leaf in leaves]) for leaves in (leaves_a, leaves_b)]
 
-    def answer(owner: np.ndarray, item_a: np.ndarray, item_b: np.ndarray) -> PairRows:
+    def answer(owner: np.ndarray, item_a: np.ndarray, item_b: np.ndarray, best: np.ndarray) -> PairRows:
         rows = []
         for some in _answered_together(owner, item_a, item_b, leaves_b, meshed):
             cast, i, j = owner[some], item_a[some], item_b[some]
@@ -174,7 +174,7 @@ def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np
             if meshed[0][i[0]] or meshed[1][j[0]]:
                 of_a = [leaves_a[k] for k in (i[:1] if meshed[0][i[0]] else i).tolist()]
                 of_b = [leaves_b[k] for k in (j[:1] if meshed[1][j[0]] else j).tolist()]
-                got = cast_leaves(of_a, of_b, X, Y, Casts(cast, vectors[cast], limits[cast], len(limits)))
+                got = cast_leaves(of_a, of_b, X, Y, Casts(cast, vectors[cast], limits[cast], best))
             else:
                 got = _cast_convex(leaves_a[i[0]], leaves_b[j[0]], X, Y, vectors[cast], limits[cast])
             rows.append(got._replace(owner=cast[got.owner], item_a=i[got.owner], item_b=j[got.owner]))
@@ -183,7 +183,7 @@ def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np
     n_pairs = len(leaves_a) * len(leaves_b)
     if n_pairs <= MAX_ASKED:
         owner, pair = np.repeat(ahead, n_pairs), np.tile(np.arange(n_pairs), len(ahead))
-        rows = [answer(owner, *np.divmod(pair, len(leaves_b)))]
+        rows = [answer(owner, *np.divmod(pair, len(leaves_b)), limits)]
     else:
         rows = list(_rows_of_unions(A, B, X_WA, X_WB, vectors, limits, ahead, answer))
     out = first_contacts(joined(rows), len(limits))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.casts.cast_pairs import CAST_ROW, LOWER, NORMAL, QUESTION, SIZE, STATUS, TOUCHING, UPPER, VALUE, cast_pairs
-from collide.casts.exact_cast import cast_exactly
+from collide.casts.exact_cast import cast_exactly, corners_of
 from collide.casts.portal import BEHIND, HIT, LEVEL, MISS, OPEN
 from collide.casts.posed_parts import PartPairs, PosedParts
 from collide.casts.silhouette import CAST_DOUBLES, CAST_INTEGERS
@@ -194,7 +194,7 @@ def settle_exactly(parts: PosedParts, pair: np.ndarray, question: np.ndarray, ro
 def settle_points(points_a, points_b, grid: int, question: np.ndarray, row: np.ndarray) -> None:
     """Write the row of two hulls of integer points times 2^grid."""
     d, exponent = integers(question[:3])
-    contact = cast_exactly(list(points_a), list(points_b), d)
+    contact = cast_exactly(corners_of(points_a), corners_of(points_b), d)
     if contact.t is None or contact.t * Fraction(2) ** (grid - exponent) > float(question[3]):
         row[STATUS] = MISS
         return

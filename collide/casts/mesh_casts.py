@@ -71,14 +71,17 @@ class _Side(NamedTuple):
 
 
 class Casts(NamedTuple):
-    """Casts that k questions belong to: which (k,), their directions (k, 3) and limits (k,) of t, and how many casts
-    there are. Of one cast no question matters whose contact is later than that of another.
+    """Casts that k questions belong to.
+
+    number : (k,) which cast.   vectors : (k, 3) directions.   limits : (k,) of t.
+    best : (n,) of all casts, what is known of their first contacts from above. Of one cast no question matters whose
+        contact is later than that of another.
     """
 
     number: np.ndarray
     vectors: np.ndarray
     limits: np.ndarray
-    n: int
+    best: np.ndarray
 
 
 def cast_leaves(A: list[Leaf], B: list[Leaf], X_WA, X_WB, casts: Casts) -> PairRows:
@@ -130,7 +133,7 @@ def _side(leaves: list[Leaf], X: np.ndarray) -> _Side:
         reach = np.array([one.reach for one in packed])[which]
     if len(leaves) < k:
         X_item, which, reach = np.repeat(X_item, k, axis=0), np.resize(which, k), np.resize(reach, k)
-    return _Side(packed, which, tree, pose_table(X, X_item, reach), X, X_item)
+    return _Side(packed, which, tree, pose_table(X, X_item, reach, terms=False), X, X_item)
 
 
 def _cast(A: _Side, B: _Side, casts: Casts) -> PairRows:
@@ -155,8 +158,7 @@ def _candidates(A: _Side, B: _Side, casts: Casts) -> np.ndarray:
     questions = np.ascontiguousarray(np.hstack([casts.vectors, casts.limits[:, None]]))
     table = ShapeTable(A.packed or [pack_points(np.zeros((1, 3)))])
     table.build_trees(A.which)
-    best = np.full(casts.n, np.inf)
-    np.minimum.at(best, casts.number, casts.limits)
+    best = casts.best.copy()
     count, done, answered = np.zeros(2, dtype=np.int64), 0, []
     capacity = 1024 + 8 * n
     while True:
@@ -182,8 +184,7 @@ def _candidates(A: _Side, B: _Side, casts: Casts) -> np.ndarray:
 def _settle(A: _Side, B: _Side, candidates, rows, owner, marks: Marks, width: np.ndarray, casts: Casts) -> None:
     """Decide open candidates, nearest first, as long as they may be nearer than what is proven; drop the others."""
     assert B.tree is not None
-    best, limits, cast = np.full(casts.n, np.inf), casts.limits, casts.number[owner]
-    np.minimum.at(best, casts.number, limits)
+    best, limits, cast = casts.best.copy(), casts.limits, casts.number[owner]
     np.minimum.at(best, cast[marks.proven], rows[marks.proven, UPPER])
     rows[rows[:, LOWER] > best[cast], STATUS] = MISS
     wide = marks.proven & (rows[:, UPPER] - rows[:, LOWER] > width)

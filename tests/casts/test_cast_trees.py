@@ -45,7 +45,7 @@ def drawn(*words, n: int):
 
 
 def rows_of(A, B, X_WA, X_WB, vectors, limits) -> PairRows:
-    casts = mesh_casts.Casts(np.arange(len(limits)), vectors, limits, len(limits))
+    casts = mesh_casts.Casts(np.arange(len(limits)), vectors, limits, limits)
     return mesh_casts.cast_leaves([Leaf(A, EYE)], [Leaf(B, EYE)], X_WA, X_WB, casts)
 
 
