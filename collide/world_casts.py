@@ -177,10 +177,10 @@ def cast_shape(
     best, beyond, answers = np.full(n, np.inf), np.full(n, np.inf), []
     for some in nearest_first(pairs[:, 0], bounds, best):
         got = answer(some)
-        known, (_, lower, upper) = got.hit & got.proven, got.t.T
-        np.minimum.at(best, pairs[some, 0], np.where(known, upper, np.inf))
-        farther = upper[known] * (1.0 + _BEYOND) + 8.0 * (upper - lower)[known]
-        np.minimum.at(beyond, pairs[some[known], 0], farther)
+        known = np.flatnonzero(got.hit & got.proven)
+        cast, (_, lower, upper) = pairs[some[known], 0], got.t[known].T
+        np.minimum.at(best, cast, upper)
+        np.minimum.at(beyond, cast, upper * (1.0 + _BEYOND) + 8.0 * (upper - lower))
         answers.append((some, got))
     if answers:
         _take_first(rows, pairs, answers, directions)
