@@ -24,12 +24,12 @@ from collide.casts.leaves import Leaf, leaves_of
 from collide.casts.mesh_casts import Casts, cast_leaves
 from collide.casts.posed_parts import PosedSides, posed_sides
 from collide.casts.region_casts import Way, are_proven, are_to_be_asked_again, limits_of
+from collide.casts.starts import Starts, item_of
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of, convex_set_of
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import Question
-from collide.results import UNDECIDED
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 
@@ -59,18 +59,10 @@ def _add_start_normals(rows: CastRows, A, B, X_WA, X_WB) -> None:
     for (*_, i, j), some in numbers.items():
         a, b = (side if isinstance(side, Shape) else side[some[0]] for side in (A, B))
         found = answer_batch(
-            _item_of(a, i), _item_of(b, j), np.ascontiguousarray(X_WA[some]), np.ascontiguousarray(X_WB[some]),
+            item_of(a, i), item_of(b, j), np.ascontiguousarray(X_WA[some]), np.ascontiguousarray(X_WB[some]),
             Question(False, np.inf, True),
         )
         rows.normal[some], rows.point[some] = found["normal"], found["point_b"]
-
-
-def _item_of(shape: Shape, item: int) -> Shape:
-    """A part of a union by its number, where it is in it; of any other shape the shape."""
-    if not isinstance(shape, Compound):
-        return shape
-    leaf = leaves_of(shape)[item]
-    return Compound([(leaf.shape, leaf.X)])
 
 
 def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Directions, limits: np.ndarray) -> CastRows:
@@ -161,8 +153,6 @@ def _cast_parts(sides: PosedSides, vectors: np.ndarray, limits: np.ndarray) -> C
 
 def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np.ndarray) -> CastRows:
     """The same of two shapes of which one is a mesh or holds one."""
-    hit = answer_batch(A, B, X_WA, X_WB, Question(True))
-    ahead = np.flatnonzero(~hit)
     leaves_a, leaves_b = leaves_of(A), leaves_of(B)
     meshed = [np.array([leaf.shape.meshed for leaf in leaves]) for leaves in (leaves_a, leaves_b)]
 
@@ -180,23 +170,23 @@ def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np
             rows.append(got._replace(owner=cast[got.owner], item_a=i[got.owner], item_b=j[got.owner]))
         return joined(rows)
 
-    n_pairs = len(leaves_a) * len(leaves_b)
+    n, n_pairs, starts = len(limits), len(leaves_a) * len(leaves_b), Starts(A, B, X_WA, X_WB)
     if n_pairs <= MAX_ASKED:
+        rows = [starts.of_casts(np.arange(n))]
+        ahead = np.flatnonzero(starts.are_apart)
         owner, pair = np.repeat(ahead, n_pairs), np.tile(np.arange(n_pairs), len(ahead))
-        rows = [answer(owner, *np.divmod(pair, len(leaves_b)), limits)]
+        rows.append(answer(owner, *np.divmod(pair, len(leaves_b)), limits))
     else:
-        rows = list(_rows_of_unions(A, B, X_WA, X_WB, vectors, limits, ahead, answer))
-    out = first_contacts(joined(rows), len(limits))
-    _take_starts(out, np.flatnonzero(hit), A, B, X_WA, X_WB)
-    return out
+        rows = list(_rows_of_unions(A, B, X_WA, X_WB, vectors, limits, starts, answer))
+    return first_contacts(joined(rows), n)
 
 
-def _rows_of_unions(A: Shape, B: Shape, X_WA, X_WB, vectors, limits, casts: np.ndarray, answer) -> Iterator[PairRows]:
-    """Rows of pairs of leaves that may be first contacts of casts, by number, in the order of sets around them."""
+def _rows_of_unions(A: Shape, B: Shape, X_WA, X_WB, vectors, limits, starts: Starts, answer) -> Iterator[PairRows]:
+    """Rows of pairs of leaves that may be first contacts of casts, in the order of sets around them."""
     of_a, of_b = _boxes_at(A), _boxes_at(B)
     at_once = max(1, _POSED_AT_ONCE // (len(compound_parts(A).parts) + len(compound_parts(B).parts)))
-    for first in range(0, len(casts), at_once):
-        some = casts[first : first + at_once]
+    for first in range(0, len(limits), at_once):
+        some = np.arange(first, min(first + at_once, len(limits)))
         sets = posed_sides(A, B, X_WA[some], X_WB[some], len(some), bounding_parts_of)
 
         def earliest(owner, item_a, item_b, some=some, sets=sets) -> np.ndarray:
@@ -204,7 +194,8 @@ def _rows_of_unions(A: Shape, B: Shape, X_WA, X_WB, vectors, limits, casts: np.n
             return earliest_contacts(pairs, vectors[some], limits[some])
 
         yield from rows_within_sets(
-            some, lambda k: (of_a(X_WA[k]), of_b(X_WB[k])), vectors, limits, earliest, answer, _PARTS_TOGETHER
+            some, lambda k: (of_a(X_WA[k]), of_b(X_WB[k])), vectors, limits, earliest, starts.of_pairs, answer,
+            _PARTS_TOGETHER,
         )
 
 
@@ -217,19 +208,6 @@ def _answered_together(owner, item_a, item_b, leaves_b: list[Leaf], meshed) -> I
     keys = key_a * (len(leaves_b) + 1) + key_b
     for key in np.unique(keys).tolist():
         yield np.flatnonzero(keys == key)
-
-
-def _take_starts(out: CastRows, some: np.ndarray, A: Shape, B: Shape, X_WA, X_WB) -> None:
-    """Write the rows of casts that touch at the start: a common point and the items that hold it."""
-    if not len(some):
-        return
-    rows = answer_batch(A, B, X_WA[some], X_WB[some], Question(False, 0.0, False))
-    out.hit[some], out.at_start[some], out.t[some] = True, True, 0.0
-    out.proven[some] = out.certified[some] = rows["how"] != UNDECIDED
-    out.normal[some], out.point[some] = 0.0, rows["point_b"]
-    # Of a shape that is no union these are numbers of facets.
-    out.item_a[some] = rows["part_a"] if isinstance(A, Compound) else 0
-    out.item_b[some] = rows["part_b"] if isinstance(B, Compound) else 0
 
 
 def _boxes_at(shape: Shape) -> Callable[[np.ndarray], np.ndarray]:

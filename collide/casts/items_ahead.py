@@ -45,13 +45,14 @@ def rows_ahead(
 
 def rows_within_sets(
     casts: np.ndarray, boxes_of: Callable[[int], tuple[np.ndarray, np.ndarray]], vectors: np.ndarray,
-    limits: np.ndarray, earliest: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray],
+    limits: np.ndarray, earliest: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray], starts: Answer,
     answer: Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], PairRows], first: int,
 ) -> Iterator[PairRows]:
     """The same of items that take long to answer, in the order in which convex sets around them meet.
 
     earliest : t before which items of A and of B (k,) have no contact in casts (k,), infinity of none at all, quickly.
-    answer : as of `rows_ahead`, and handed what bounds the first contact of every cast from above.
+    starts : rows of pairs that touch at the start, asked of those whose sets may.
+    answer : of pairs that do not, and handed what bounds the first contact of every cast from above.
     first : pairs of a cast whose sets are asked together.
     A pair is answered once its bound is not above that of the boxes of all pairs whose sets were not asked: then no
     other pair has a lower one.
@@ -68,7 +69,14 @@ def rows_within_sets(
             ready, waiting = waiting[is_ready], waiting[~is_ready]
             ready = ready[np.lexsort((until[ready], owner[ready]))]
             for few in nearest_first(owner[ready], until[ready], best):
-                pair_rows = answer(owner[ready[few]], *pairs[ready[few]].T, best)
+                asked = ready[few]
+                near = asked[until[asked] <= 0.0]
+                if len(near):
+                    touching = starts(owner[near], *pairs[near].T)
+                    take_best(best, touching)
+                    yield touching
+                    asked = asked[(best >= 0.0)[owner[asked]]]
+                pair_rows = answer(owner[asked], *pairs[asked].T, best)
                 take_best(best, pair_rows)
                 yield pair_rows
 
