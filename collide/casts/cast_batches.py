@@ -162,15 +162,19 @@ def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np
             cast, i, j = owner[some], item_a[some], item_b[some]
             X, Y = np.ascontiguousarray(X_WA[cast]), np.ascontiguousarray(X_WB[cast])
             if meshed[0][i[0]] or meshed[1][j[0]]:
-                of_a = [leaves_a[k] for k in (i[:1] if meshed[0][i[0]] else i).tolist()]
-                of_b = [leaves_b[k] for k in (j[:1] if meshed[1][j[0]] else j).tolist()]
-                got = cast_leaves(of_a, of_b, X, Y, Casts(cast, vectors[cast], limits[cast], best))
+                of_a, of_b = (
+                    [leaves[k] for k in (items if (items != items[0]).any() else items[:1]).tolist()]
+                    for leaves, items in ((leaves_a, i), (leaves_b, j))
+                )
+                # Chosen by the shapes alone: a cast has the same bits whatever else is in the batch.
+                into_a = meshed[0][i[0]] and meshed[1][j[0]] and len(leaves_a) < len(leaves_b)
+                got = cast_leaves(of_a, of_b, X, Y, Casts(cast, vectors[cast], limits[cast], best), into_a=into_a)
             else:
                 got = _cast_convex(leaves_a[i[0]], leaves_b[j[0]], X, Y, vectors[cast], limits[cast])
             rows.append(got._replace(owner=cast[got.owner], item_a=i[got.owner], item_b=j[got.owner]))
         return joined(rows)
 
-    n, n_pairs, starts = len(limits), len(leaves_a) * len(leaves_b), Starts(A, B, X_WA, X_WB)
+    n, n_pairs, starts = len(limits), len(leaves_a) * len(leaves_b), Starts(A, B, (leaves_a, leaves_b), X_WA, X_WB)
     if n_pairs <= MAX_ASKED:
         rows = [starts.of_casts(np.arange(n))]
         ahead = np.flatnonzero(starts.are_apart)
@@ -201,11 +205,13 @@ def _rows_of_unions(A: Shape, B: Shape, X_WA, X_WB, vectors, limits, starts: Sta
 
 def _answered_together(owner, item_a, item_b, leaves_b: list[Leaf], meshed) -> Iterator[np.ndarray]:
     """Numbers of pairs of leaves that one call answers: of a mesh and all convex sets that are cast at it, or it at
-    them; else of two leaves."""
+    them; of a mesh of the union with fewer leaves and all meshes of the other; else of two leaves."""
     mesh_a, mesh_b = meshed[0][item_a], meshed[1][item_b]
     is_plane = np.array([not leaf.shape.meshed and convex_set_of(leaf.shape).kind == HALFSPACE for leaf in leaves_b])
-    key_a, key_b = np.where(mesh_b & ~mesh_a, -1, item_a), np.where(mesh_a & ~mesh_b & ~is_plane[item_b], -1, item_b)
-    keys = key_a * (len(leaves_b) + 1) + key_b
+    by_b = len(meshed[0]) >= len(meshed[1])
+    key_a = np.where(mesh_b & ~mesh_a, -1, np.where(mesh_a & mesh_b & by_b, -2, item_a))
+    key_b = np.where(mesh_a & ~mesh_b & ~is_plane[item_b], -1, np.where(mesh_a & mesh_b & (not by_b), -2, item_b))
+    keys = (key_a + 2) * (len(leaves_b) + 2) + key_b + 2
     for key in np.unique(keys).tolist():
         yield np.flatnonzero(keys == key)
 

@@ -58,11 +58,11 @@ TREE_CAST_INTEGERS = CAST_INTEGERS + STACK
 CANDIDATE = CAST_ROW + 3
 FACET_A, FACET_B, OF_QUESTION = CAST_ROW, CAST_ROW + 1, CAST_ROW + 2
 
-# Integers of a header: addresses of A's tree (0 for convex sets) and B's, of the shape table, poses of A and of B and
+# Integers of a header: addresses of an address of A's tree for each question (0 for convex sets), of B's, the shape table, poses of A and of B and
 # from one question to the next, questions, candidates, how many of them there is room for, the row of the table that
 # is A in each question, the cast that each is a question of, and the largest t of interest in each cast, in and out.
 (
-    TREE_A, TREE_B, INTS_AT, NUMBERS_AT, POSES_A, POSES_B, STEP_A, STEP_B, QUESTIONS_AT, CANDIDATES_AT, CAPACITY,
+    TREES_A, TREE_B, INTS_AT, NUMBERS_AT, POSES_A, POSES_B, STEP_A, STEP_B, QUESTIONS_AT, CANDIDATES_AT, CAPACITY,
     SHAPE_OF_AT, CAST_OF_AT, BEST_AT,
 ) = range(14)
 HEADER = 14
@@ -152,7 +152,7 @@ def _posed_pair(header, k, poses, corners_at):
     shape = view_i64(header[SHAPE_OF_AT], k + 1)[k]
     ints, numbers = view_i64(header[INTS_AT], INTS * (shape + 1)), view_f64(header[NUMBERS_AT], NUMBERS * (shape + 1))
     A = posed_body(ints, shape, 0)
-    if header[TREE_A] != 0:
+    if header[TREES_A] != 0:
         A = _facet_body(view_f64(corners_at, 24))
     B = _facet_body(view_f64(corners_at + 8 * 24, 24))
     B = PosedBody(B.coords, 3, 8, POINTS, 0, 0, POSE, 0, 0)
@@ -164,7 +164,7 @@ def _posed_pair(header, k, poses, corners_at):
 def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
     """The `_Sweep` of question k.   a, b : both trees; b twice where A is none."""
     numbers, poses = pair.numbers, pair.poses
-    is_convex = header[TREE_A] == 0
+    is_convex = header[TREES_A] == 0
     at = NUMBERS * view_i64(header[SHAPE_OF_AT], k + 1)[k]
     reach_a = numbers[at + REACH] if is_convex else norm(vec3_at(a.numbers, TREE_REACH))
     radius = numbers[at + RADIUS] if is_convex else 0.0
@@ -445,9 +445,8 @@ def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
     """
     header = view_i64(header_at, HEADER)
     count = view_i64(count_at, 2)
-    has_tree_a = header[TREE_A] != 0
+    has_tree_a = header[TREES_A] != 0
     b = open_tree(header[TREE_B])
-    a = open_tree(header[TREE_A] if has_tree_a else header[TREE_B])
     poses_at = doubles_at + 8 * CAST_DOUBLES
     corners_at = poses_at + 8 * 2 * POSE
     work = _Work(
@@ -457,6 +456,7 @@ def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
     )
     for k in range(first, n):
         begin = count[0]
+        a = open_tree(view_i64(header[TREES_A] + 8 * k, 1)[0]) if has_tree_a else b
         question = view_f64(header[QUESTIONS_AT] + 8 * QUESTION * k, QUESTION)
         pair = _posed_pair(header, k, view_f64(poses_at, 2 * POSE), corners_at)
         sweep = _sweep_of(header, k, a, b, pair, doubles_at, integers_at)

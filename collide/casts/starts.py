@@ -7,7 +7,7 @@ import numpy as np
 from collide.batches import answer_batch
 from collide.casts.cast_pairs import CAST_ROW, STATUS, TOUCHING
 from collide.casts.convex_casts import Marks, PairRows, joined
-from collide.casts.leaves import leaves_of
+from collide.casts.leaves import Leaf, leaves_of
 from collide.casts.portal import HIT
 from collide.narrowphase.convex_batches import Question
 from collide.results import UNDECIDED
@@ -15,18 +15,18 @@ from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 
 #: Pairs of parts of a cast that are asked one by one before the unions are asked as wholes.
-_ASKED_ALONE = 12
+_ASKED_ALONE = 6
 
 
 class Starts:
-    """Two shapes at the poses (n, 4, 4) of n casts.
+    """Two shapes at the poses (n, 4, 4) of n casts, and what they come down to.
 
     are_apart : (n,) bool, of what was asked.
     """
 
-    def __init__(self, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray):
+    def __init__(self, A: Shape, B: Shape, leaves: tuple[list[Leaf], list[Leaf]], X_WA: np.ndarray, X_WB: np.ndarray):
         self.are_apart = np.zeros(len(X_WA), dtype=bool)
-        self._shapes, self._poses = (A, B), (X_WA, X_WB)
+        self._shapes, self._leaves, self._poses = (A, B), leaves, (X_WA, X_WB)
         self._asked = np.zeros(len(X_WA), dtype=np.int64)
 
     def of_pairs(self, casts: np.ndarray, item_a: np.ndarray, item_b: np.ndarray) -> PairRows:
@@ -41,7 +41,8 @@ class Starts:
         rows = [self.of_casts(np.unique(casts[unknown & ~is_alone]))]
         for i, j in np.unique(np.stack([item_a, item_b], axis=1)[is_alone], axis=0).tolist():
             some = casts[is_alone & (item_a == i) & (item_b == j)]
-            rows.append(self._touching(item_of(self._shapes[0], i), item_of(self._shapes[1], j), some, i, j))
+            part_a, part_b = (Compound([leaves[k]]) for leaves, k in zip(self._leaves, (i, j)))
+            rows.append(self._touching(part_a, part_b, some, i, j))
         return joined(rows)
 
     def of_casts(self, casts: np.ndarray) -> PairRows:
@@ -73,5 +74,4 @@ def item_of(shape: Shape, item: int) -> Shape:
     """A part of a union by its number, where it is in it; of any other shape the shape."""
     if not isinstance(shape, Compound):
         return shape
-    leaf = leaves_of(shape)[item]
-    return Compound([(leaf.shape, leaf.X)])
+    return Compound([leaves_of(shape)[item]])

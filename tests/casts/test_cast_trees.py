@@ -110,10 +110,11 @@ class Question:
         self.n, self.capacity = len(d), capacity
         self.questions = np.ascontiguousarray(np.hstack([d, np.full((self.n, 1), math.inf)]))
         self.table = ShapeTable(a.packed or [pack_points(np.zeros((1, 3)))])
+        self.trees = np.array([tree.address for tree in a.trees] * self.n)
         self.cast, self.best = np.arange(self.n), np.full(self.n, math.inf)
         self.candidates = np.full((capacity + 1, CANDIDATE), np.nan)
         self.header = np.array([
-            0 if a.tree is None else a.tree.address, b.tree.address, *self.table.addresses, address_of(a.poses.rows),
+            address_of(self.trees) if a.trees else 0, b.trees[0].address, *self.table.addresses, address_of(a.poses.rows),
             address_of(b.poses.rows), POSE, POSE, address_of(self.questions), address_of(self.candidates), capacity,
             address_of(a.which), address_of(self.cast), address_of(self.best),
         ])
