@@ -58,9 +58,10 @@ TREE_CAST_INTEGERS = CAST_INTEGERS + STACK
 CANDIDATE = CAST_ROW + 3
 FACET_A, FACET_B, OF_QUESTION = CAST_ROW, CAST_ROW + 1, CAST_ROW + 2
 
-# Integers of a header: addresses of an address of A's tree for each question (0 for convex sets), of B's, the shape table, poses of A and of B and
-# from one question to the next, questions, candidates, how many of them there is room for, the row of the table that
-# is A in each question, the cast that each is a question of, and the largest t of interest in each cast, in and out.
+# Integers of a header: addresses of the addresses of A's trees, one a question (0 for convex sets), of B's tree, of the
+# shape table, poses of A and of B and from one question to the next, questions, candidates, how many of them there is
+# room for, the row of the table that is A in each question, the cast that each is a question of, and the largest t of
+# interest in each cast, in and out.
 (
     TREES_A, TREE_B, INTS_AT, NUMBERS_AT, POSES_A, POSES_B, STEP_A, STEP_B, QUESTIONS_AT, CANDIDATES_AT, CAPACITY,
     SHAPE_OF_AT, CAST_OF_AT, BEST_AT,
@@ -69,7 +70,8 @@ HEADER = 14
 _LOW = 0xFFFFFFFF
 #: In the count of candidates.
 CASTS = 1
-#: A normal is kept where the step along it is at least so much of what it could be: rounding then moves t by 2⁻⁴⁰ of it.
+#: A normal is kept where the step along it is at least so much of what it could be: rounding then moves t by less than
+#: 2⁻³⁸ of it.
 _STEEP = 2.0**-10
 #: Of products that a vector across a facet is used in: far above what underflows.
 _LEAST = 1e-200
@@ -260,7 +262,7 @@ def _keep_front(sweep, work, n, radius, at):
 def _front_entry(sweep, fronts, centre, u, v, half):
     """t before which A has no contact with the sums of a triangle centre, centre + u, centre + v and a box, by fronts.
 
-    Rounding moves y by the pad, as of `_entry_of`, and h by 2⁻⁴⁴ of itself; t by 2⁻⁴⁰ (`_STEEP`).
+    Rounding moves y by the pad, as of `_entry_of`, and h by 2⁻⁴⁴ of itself; t by 2⁻³⁸ (`_STEEP`).
     """
     first = 0.0
     pad = sweep.pad + 2.0**-40 * (norm1(centre) + norm1(u) + norm1(v) + norm1(half))

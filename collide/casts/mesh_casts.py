@@ -172,9 +172,9 @@ def _candidates(A: _Side, B: _Side, casts: Casts) -> np.ndarray:
         candidates = np.empty((capacity, CANDIDATE))
         header = np.array(
             [
-                0 if trees is None else address_of(trees), B.trees[0].address, *table.addresses, address_of(A.poses.rows),
-                address_of(B.poses.rows), POSE, POSE, address_of(questions), address_of(candidates), capacity,
-                address_of(shape_of), address_of(casts.number), address_of(best),
+                0 if trees is None else address_of(trees), B.trees[0].address, *table.addresses,
+                address_of(A.poses.rows), address_of(B.poses.rows), POSE, POSE, address_of(questions),
+                address_of(candidates), capacity, address_of(shape_of), address_of(casts.number), address_of(best),
             ],
             dtype=np.int64,
         )

@@ -13,7 +13,6 @@ from collide.lowering.parts import Part, parts_of
 from collide.lowering.shape_table import REACH, PoseTable, ShapeTable, has_own_pose, pose_table
 from collide.shapes.shape import Shape
 
-
 #: Convex sets of a shape and their poses in it.
 PartsOf = Callable[[Shape], tuple[Part, ...]]
 

@@ -29,7 +29,6 @@ from collide.shapes.hpolytope import HPolytope
 from collide.shapes.shape import IDENTITY, Shape, checked_shape
 from collide.transforms import poses_as_given
 
-
 #: Boxes of items that are meshes are put into a tree where there are so many for each pose that rays see them at.
 _LEAST_ITEMS = 16
 
@@ -109,7 +108,8 @@ def surfaces_met(
 
     def ask(k: int, ray: np.ndarray) -> RayEvents:
         """Events of some rays, by number, and mesh k."""
-        X, of_rays = X_WA[ray] if len(X_WA) > 1 else X_WA, Directions(directions.vectors[ray], directions.exponents[ray])
+        X = X_WA[ray] if len(X_WA) > 1 else X_WA
+        of_rays = Directions(directions.vectors[ray], directions.exponents[ray])
         met = _on_mesh(*items[k], X, origins[ray], of_rays, limit, every)
         return met._replace(ray=ray[met.ray], item=np.full_like(met.item, k))
 
@@ -147,7 +147,8 @@ def _on_meshes(
     for pose in range(len(poses)):
         rays = np.flatnonzero(of_ray == pose)
         tree = BoxTree(compound_parts(shape).boxes(poses[pose : pose + 1], numbers)[0])
-        sweeps = np.hstack([origins[rays], origins[rays], directions.vectors[rays], directions.limits(limit)[rays, None]])
+        limits = directions.limits(limit)[rays, None]
+        sweeps = np.hstack([origins[rays], origins[rays], directions.vectors[rays], limits])
         pairs, bounds = bodies_ahead(tree, sweeps)
         best = np.full(len(rays), np.inf)
         for some in [np.arange(len(pairs))] if every else nearest_first(pairs[:, 0], bounds, best):

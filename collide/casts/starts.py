@@ -48,26 +48,29 @@ class Starts:
     def of_casts(self, casts: np.ndarray) -> PairRows:
         """Rows of casts that touch, and the first parts that do; the others are apart from then on."""
         A, B = self._shapes
-        hit = answer_batch(A, B, *(np.ascontiguousarray(X[casts]) for X in self._poses), Question(True))
+        hit = answer_batch(A, B, *self._poses_of(casts), Question(True))
         self.are_apart[casts[~hit]] = True
         return self._touching(A, B, casts[hit])
 
     def _touching(self, A: Shape, B: Shape, casts: np.ndarray, i: int | None = None, j: int | None = None) -> PairRows:
         """Rows of casts in which A and B touch, parts i and j or those that the answer names."""
-        poses = (np.ascontiguousarray(X[casts]) for X in self._poses)
-        found = answer_batch(A, B, *poses, Question(False, 0.0, False))
+        found = answer_batch(A, B, *self._poses_of(casts), Question(False, 0.0, False))
         casts, found = casts[found["hit"]], found[found["hit"]]
         rows = np.zeros((len(found), CAST_ROW))
         rows[:, STATUS], rows[:, TOUCHING : TOUCHING + 3] = HIT, found["point_b"]
         proven = found["how"] != UNDECIDED
         marks = Marks(proven, proven.copy(), np.ones(len(found), dtype=bool))
         # Of a shape that is no union its fields are numbers of facets.
-        items = (
+        item_a, item_b = (
             np.full(len(found), number) if number is not None
             else found[field].astype(np.int64) * isinstance(shape, Compound)
             for number, field, shape in ((i, "part_a", A), (j, "part_b", B))
         )
-        return PairRows(rows, marks, casts, *items)
+        return PairRows(rows, marks, casts, item_a, item_b)
+
+    def _poses_of(self, casts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        X_WA, X_WB = self._poses
+        return np.ascontiguousarray(X_WA[casts]), np.ascontiguousarray(X_WB[casts])
 
 
 def item_of(shape: Shape, item: int) -> Shape:

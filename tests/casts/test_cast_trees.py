@@ -114,8 +114,9 @@ class Question:
         self.cast, self.best = np.arange(self.n), np.full(self.n, math.inf)
         self.candidates = np.full((capacity + 1, CANDIDATE), np.nan)
         self.header = np.array([
-            address_of(self.trees) if a.trees else 0, b.trees[0].address, *self.table.addresses, address_of(a.poses.rows),
-            address_of(b.poses.rows), POSE, POSE, address_of(self.questions), address_of(self.candidates), capacity,
+            address_of(self.trees) if a.trees else 0, b.trees[0].address, *self.table.addresses,
+            address_of(a.poses.rows), address_of(b.poses.rows), POSE, POSE, address_of(self.questions),
+            address_of(self.candidates), capacity,
             address_of(a.which), address_of(self.cast), address_of(self.best),
         ])
         self.doubles, self.integers = np.zeros(TREE_CAST_DOUBLES), np.zeros(TREE_CAST_INTEGERS, dtype=np.int64)
