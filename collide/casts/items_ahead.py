@@ -61,14 +61,15 @@ def rows_within_sets(
         best, following = limits.copy(), np.zeros(len(limits))
         after = np.append(np.where(np.diff(owner) == 0, bounds[1:], np.inf), np.inf)[: len(owner)]
         waiting, until = np.zeros(0, dtype=np.int64), np.full(len(owner), np.inf)
-        for some in nearest_first(owner, bounds, best, first):
+        for number, some in enumerate(nearest_first(owner, bounds, best, first)):
             until[some] = np.maximum(earliest(owner[some], *pairs[some].T), bounds[some])
             following[owner[some]] = after[some]  # of several of an owner the last one counts
             waiting = np.concatenate([waiting, some[until[some] < np.inf]])
             is_ready = until[waiting] <= following[owner[waiting]]
             ready, waiting = waiting[is_ready], waiting[~is_ready]
             ready = ready[np.lexsort((until[ready], owner[ready]))]
-            for few in nearest_first(owner[ready], until[ready], best):
+            # One at first; the more were asked in vain, the more at once.
+            for few in nearest_first(owner[ready], until[ready], best, 4**number):
                 asked = ready[few]
                 near = asked[until[asked] <= 0.0]
                 if len(near):

@@ -41,7 +41,10 @@ class Starts:
         rows = [self.of_casts(np.unique(casts[unknown & ~is_alone]))]
         for i, j in np.unique(np.stack([item_a, item_b], axis=1)[is_alone], axis=0).tolist():
             some = casts[is_alone & (item_a == i) & (item_b == j)]
-            part_a, part_b = (Compound([leaves[k]]) for leaves, k in zip(self._leaves, (i, j)))
+            part_a, part_b = (
+                Compound([leaves[k]]) if isinstance(shape, Compound) else shape
+                for shape, leaves, k in zip(self._shapes, self._leaves, (i, j))
+            )
             rows.append(self._touching(part_a, part_b, some, i, j))
         return joined(rows)
 
