@@ -58,11 +58,11 @@ def _add_start_normals(rows: CastRows, A, B, X_WA, X_WB) -> None:
         numbers.setdefault((id(a), id(b), int(rows.item_a[k]), int(rows.item_b[k])), []).append(k)
     for (*_, i, j), some in numbers.items():
         a, b = (side if isinstance(side, Shape) else side[some[0]] for side in (A, B))
-        found = answer_batch(
+        pair_rows = answer_batch(
             item_of(a, i), item_of(b, j), np.ascontiguousarray(X_WA[some]), np.ascontiguousarray(X_WB[some]),
             Question(False, np.inf, True),
         )
-        rows.normal[some], rows.point[some] = found["normal"], found["point_b"]
+        rows.normal[some], rows.point[some] = pair_rows["normal"], pair_rows["point_b"]
 
 
 def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Directions, limits: np.ndarray) -> CastRows:

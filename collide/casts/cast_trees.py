@@ -464,11 +464,11 @@ def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
         sweep = _sweep_of(header, k, a, b, pair, doubles_at, integers_at)
         cast = view_i64(header[CAST_OF_AT], k + 1)[k]
         best = view_f64(header[BEST_AT] + 8 * cast, 1)
-        found = _walk_pairs(header, sweep, work, a, b, has_tree_a, k, question[3], best[0], count)
-        if found < 0.0:
+        until = _walk_pairs(header, sweep, work, a, b, has_tree_a, k, question[3], best[0], count)
+        if until < 0.0:
             count[0] = begin
             return k
-        best[0] = found
+        best[0] = until
     return n
 
 

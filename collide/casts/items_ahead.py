@@ -69,15 +69,16 @@ def rows_within_sets(
             ready, waiting = waiting[is_ready], waiting[~is_ready]
             ready = ready[np.lexsort((until[ready], owner[ready]))]
             # One at first; the more were asked in vain, the more at once.
-            for few in nearest_first(owner[ready], until[ready], best, 4**number):
-                asked = ready[few]
+            for next_ones in nearest_first(owner[ready], until[ready], best, 2**number):
+                asked = ready[next_ones]
                 near = asked[until[asked] <= 0.0]
                 if len(near):
                     touching = starts(owner[near], *pairs[near].T)
                     take_best(best, touching)
                     yield touching
                     asked = asked[(best >= 0.0)[owner[asked]]]
-                pair_rows = answer(owner[asked], *pairs[asked].T, best)
+                item_a, item_b = pairs[asked].T
+                pair_rows = answer(owner[asked], item_a, item_b, best)
                 take_best(best, pair_rows)
                 yield pair_rows
 

@@ -136,7 +136,7 @@ def _side(leaves: list[Leaf], X: np.ndarray) -> _Side:
         reach = np.array([float(np.linalg.norm(tree.numbers[3:6])) for tree in trees])[which]
     else:
         packed = [convex_set_of(shape) for shape in shapes.values()]
-        reach = np.array([one.reach for one in packed])[which]
+        reach = np.array([part.reach for part in packed])[which]
     if len(leaves) < k:
         X_item, which, reach = np.repeat(X_item, k, axis=0), np.resize(which, k), np.resize(reach, k)
     return _Side(packed, trees, which, pose_table(X, X_item, reach, terms=False), X, X_item, {})

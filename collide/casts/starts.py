@@ -57,16 +57,16 @@ class Starts:
 
     def _touching(self, A: Shape, B: Shape, casts: np.ndarray, i: int | None = None, j: int | None = None) -> PairRows:
         """Rows of casts in which A and B touch, parts i and j or those that the answer names."""
-        found = answer_batch(A, B, *self._poses_of(casts), Question(False, 0.0, False))
-        casts, found = casts[found["hit"]], found[found["hit"]]
-        rows = np.zeros((len(found), CAST_ROW))
-        rows[:, STATUS], rows[:, TOUCHING : TOUCHING + 3] = HIT, found["point_b"]
-        proven = found["how"] != UNDECIDED
-        marks = Marks(proven, proven.copy(), np.ones(len(found), dtype=bool))
+        hits = answer_batch(A, B, *self._poses_of(casts), Question(False, 0.0, False))
+        casts, hits = casts[hits["hit"]], hits[hits["hit"]]
+        rows = np.zeros((len(hits), CAST_ROW))
+        rows[:, STATUS], rows[:, TOUCHING : TOUCHING + 3] = HIT, hits["point_b"]
+        proven = hits["how"] != UNDECIDED
+        marks = Marks(proven, proven.copy(), np.ones(len(hits), dtype=bool))
         # Of a shape that is no union its fields are numbers of facets.
         item_a, item_b = (
-            np.full(len(found), number) if number is not None
-            else found[field].astype(np.int64) * isinstance(shape, Compound)
+            np.full(len(hits), number) if number is not None
+            else hits[field].astype(np.int64) * isinstance(shape, Compound)
             for number, field, shape in ((i, "part_a", A), (j, "part_b", B))
         )
         return PairRows(rows, marks, casts, item_a, item_b)

@@ -109,7 +109,7 @@ def test_meshes_are_cast_in_the_order_of_sets_around_them(walks, monkeypatch):
     union = clutter(("mesh",), 300, "before a face")
     large = collide.Box((1000.0, 1000.0, 1000.0))
     r = collide.shape_cast(union, collide.pose((0.0, 0.0, 900.0)), (0, 0, -1), large, collide.pose(rpy=(0.6, 0.5, 0.1)))
-    assert r.hit and r.certified and 0 < len(walks) < 12, walks
+    assert r.hit and r.certified and 0 < len(walks) < 30, walks
 
 
 def test_no_depth_is_worked_out_unless_it_is_asked_for(monkeypatch):
