@@ -178,8 +178,8 @@ class World(WorldPairs):
         return self._hits(rows, starts)
 
     def shape_cast(
-        self, shape: Shape, X_WS, direction_W, *, max_distance: float = math.inf, group: int | None = None,
-        mask: int | None = None,
+        self, shape: Shape, X_WS, direction_W, *, max_distance: float = math.inf, start_normals: bool = False,
+        group: int | None = None, mask: int | None = None,
     ) -> WorldHits:
         """The first body that an outside shape touches when it is moved along a direction.
 
@@ -189,6 +189,7 @@ class World(WorldPairs):
         X_WS : (4, 4) or (N, 4, 4) its poses in the world W [m] before it moves.
         direction_W : (3,) or (N, 3) in W, of the motion; it need not be a unit vector.
         max_distance : [lengths of the direction], ≥ 0, as of `collide.shape_cast`.
+        start_normals : work out normals of bodies that touch at the start, as of `collide.shape_cast`.
         group, mask : as of `raycast`.
 
         Returns
@@ -201,6 +202,7 @@ class World(WorldPairs):
         InvalidArgument, InvalidPose, UnsupportedQuery : as of `collide.shape_cast`.
         """
         limit = checks.limit("World.shape_cast: max_distance", max_distance, "")
+        start_normals = checks.true_or_false("World.shape_cast: start_normals", start_normals)
         checked_shape("World.shape_cast: shape", shape)
         X_WS = as_poses(X_WS, "World.shape_cast: X_WS")
         directions, _ = cast_arguments.checked_directions("World.shape_cast", "direction_W", direction_W, "a cast")
@@ -208,7 +210,8 @@ class World(WorldPairs):
         cast_arguments.refuse_unbounded("World.shape_cast: shape", shape)
         which = casts.checked_filter("World.shape_cast", group, mask)
         X_WS = np.ascontiguousarray(np.broadcast_to(X_WS, (n, 4, 4)))
-        return self._hits(casts.cast_shape(self._pack(), shape, X_WS, directions.repeated(n), limit, which))
+        rows = casts.cast_shape(self._pack(), shape, X_WS, directions.repeated(n), limit, which, start_normals)
+        return self._hits(rows)
 
     def nearest(
         self, points_W, *, max_distance: float = math.inf, group: int | None = None, mask: int | None = None

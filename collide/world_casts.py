@@ -31,6 +31,10 @@ from collide.world_hits import WORLD_HIT_DTYPE, empty_hits
 POINT = ConvexHull(np.zeros((1, 3)))
 
 
+#: So much of the t of a proven hit later bodies are cast beyond it.
+_BEYOND = 2.0**-20
+
+
 class Filter(NamedTuple):
     """Bodies that a question counts: those with (group & mask_B) and (group_B & mask).   group, mask : None for all."""
 
@@ -143,9 +147,14 @@ def _as_rows(events: RayEvents, bodies: np.ndarray, origins, directions: Directi
 
 
 def cast_shape(
-    packed: PackedWorld, shape: Shape, X_WS: np.ndarray, directions: Directions, limit: float, which: Filter
+    packed: PackedWorld, shape: Shape, X_WS: np.ndarray, directions: Directions, limit: float, which: Filter,
+    start_normals: bool,
 ) -> np.ndarray:
-    """Rows of n casts of a shape at poses (n, 4, 4): the first body that each comes to."""
+    """Rows of n casts of a shape at poses (n, 4, 4): the first body that each comes to.
+
+    Bodies are asked no farther than to a little beyond what is proven of those before: there a contact is none of the
+    limit's, which would leave those open that come at the same t.
+    """
     n = len(directions.vectors)
     rows = empty_hits(n)
     if packed.tree is None or not n:
@@ -162,12 +171,16 @@ def cast_shape(
         cast, body = pairs[some].T
         of_some = Directions(directions.vectors[cast], directions.exponents[cast])
         shapes = [packed.shapes[k] for k in packed.shape_of[body].tolist()]
-        return cast_batch(shape, shapes, X_WS[cast], packed.X_WBs[body], of_some, questions[cast, 9])
+        limits = np.minimum(questions[cast, 9], beyond[cast])
+        return cast_batch(shape, shapes, X_WS[cast], packed.X_WBs[body], of_some, limits, start_normals)
 
-    best, answers = np.full(n, np.inf), []
+    best, beyond, answers = np.full(n, np.inf), np.full(n, np.inf), []
     for some in nearest_first(pairs[:, 0], bounds, best):
         got = answer(some)
-        np.minimum.at(best, pairs[some, 0], np.where(got.hit & got.proven, got.t[:, 2], np.inf))
+        known = np.flatnonzero(got.hit & got.proven)
+        cast, (_, lower, upper) = pairs[some[known], 0], got.t[known].T
+        np.minimum.at(best, cast, upper)
+        np.minimum.at(beyond, cast, upper * (1.0 + _BEYOND) + 8.0 * (upper - lower))
         answers.append((some, got))
     if answers:
         _take_first(rows, pairs, answers, directions)

@@ -11,7 +11,7 @@ distance        t of the place where it is met, in lengths of the direction; of 
 lower, upper    lower ≤ truth ≤ upper, proven where ``certified``
 point           (3,) in W [m], of the body; zeros where nothing is met
 normal          (3,) unit vector in W: outward from the body for rays, from what is cast, or the point, to the body for
-                others; zeros where nothing is met
+                others; zeros where nothing is met, and of casts at_start unless start_normals are asked for
 certified       as of `collide.raycast`, `collide.shape_cast` and `collide.distance`
 at_start        of casts: whether they touch before they move
 =============== ===================================================================================

@@ -2,37 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from collide.batches import answer_batch
 from collide.broadphase.bounding_boxes import boxes_of
-from collide.casts.convex_casts import CastRows, PairRows, answer_questions, first_contacts, joined, nothing_met
+from collide.casts.convex_casts import (
+    CastRows,
+    PairRows,
+    answer_questions,
+    earliest_contacts,
+    first_contacts,
+    joined,
+    nothing_met,
+)
 from collide.casts.directions import Directions
-from collide.casts.items_ahead import MAX_ASKED, rows_ahead
+from collide.casts.items_ahead import MAX_ASKED, rows_ahead, rows_within_sets
 from collide.casts.leaves import Leaf, leaves_of
-from collide.casts.mesh_casts import cast_leaves
+from collide.casts.mesh_casts import Casts, cast_leaves
 from collide.casts.posed_parts import PosedSides, posed_sides
 from collide.casts.region_casts import Way, are_proven, are_to_be_asked_again, limits_of
+from collide.casts.starts import Starts, item_of
 from collide.lowering.closed_regions import closed_shapes
+from collide.lowering.packed_convex import HALFSPACE
+from collide.lowering.parts import bounding_parts_of, convex_set_of
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import Question
-from collide.results import UNDECIDED
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 
 
 def cast_batch(
-    A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Directions, limits: np.ndarray
+    A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Directions, limits: np.ndarray, start_normals: bool = False
 ) -> CastRows:
     """First contacts of n casts.
 
     A, B : a shape, or n of them.   X_WA, X_WB : checked poses (n, 4, 4), or (1, 4, 4) for all.
     limits : (n,) of t, in units of the directions' vectors, as is the t of the answer.
+    start_normals : normal and point of `distance` of items that touch at the start; else a common point, no normal.
     """
+    rows = _first_contacts(A, B, X_WA, X_WB, directions, limits)
+    if start_normals and rows.at_start.any():
+        _add_start_normals(rows, A, B, X_WA, X_WB)
+    return rows
+
+
+def _add_start_normals(rows: CastRows, A, B, X_WA, X_WB) -> None:
+    """Write normals and points of the items that touch at the start, those of the same two shapes together."""
+    X_WA, X_WB = (np.broadcast_to(X, (len(rows.hit), 4, 4)) for X in (X_WA, X_WB))
+    numbers: dict[tuple[int, ...], list[int]] = {}
+    for k in np.flatnonzero(rows.at_start).tolist():
+        a, b = (side if isinstance(side, Shape) else side[k] for side in (A, B))
+        numbers.setdefault((id(a), id(b), int(rows.item_a[k]), int(rows.item_b[k])), []).append(k)
+    for (*_, i, j), some in numbers.items():
+        a, b = (side if isinstance(side, Shape) else side[some[0]] for side in (A, B))
+        pair_rows = answer_batch(
+            item_of(a, i), item_of(b, j), np.ascontiguousarray(X_WA[some]), np.ascontiguousarray(X_WB[some]),
+            Question(False, np.inf, True),
+        )
+        rows.normal[some], rows.point[some] = pair_rows["normal"], pair_rows["point_b"]
+
+
+def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Directions, limits: np.ndarray) -> CastRows:
+    """The same without normals of bodies that touch at the start."""
     n = len(limits)
     if not n:  # what no cast asks about may be a mesh, which has no parts
         return nothing_met(0)
@@ -72,7 +106,7 @@ def _with_regions(sides, X_WA, X_WB, directions: Directions, limits: np.ndarray,
         poses = np.ascontiguousarray(X_WA[which]), np.ascontiguousarray(X_WB[which])
         if ways:
             A, B = closed_shapes(A, B, *poses, len(which), ends * np.linalg.norm(vectors, axis=1))
-        return cast_batch(A, B, *poses, Directions(vectors, directions.exponents[which]), ends)
+        return _first_contacts(A, B, *poses, Directions(vectors, directions.exponents[which]), ends)
 
     ways = [
         Way(sides[0][k], X_WA[k], sides[1][k], X_WB[k], directions.vectors[k]) for k in some.tolist()
@@ -92,17 +126,10 @@ def _with_regions(sides, X_WA, X_WB, directions: Directions, limits: np.ndarray,
     return CastRows._make(np.concatenate(columns)[order] for columns in zip(*answers))
 
 
-class _Starts(NamedTuple):
-    """(n,) bool: bodies that touch at the start, and where that is proven; (n, 3) their normals and points."""
-
-    hit: np.ndarray
-    proven: np.ndarray
-    normal: np.ndarray
-    point: np.ndarray
-
-
 #: Pairs of convex parts of a cast that are asked in one kernel before any is ruled out.
 _PARTS_TOGETHER = 32
+#: Convex sets around leaves that are posed at once.
+_POSED_AT_ONCE = 1 << 15
 
 
 def _cast_parts(sides: PosedSides, vectors: np.ndarray, limits: np.ndarray) -> CastRows:
@@ -126,35 +153,67 @@ def _cast_parts(sides: PosedSides, vectors: np.ndarray, limits: np.ndarray) -> C
 
 def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np.ndarray) -> CastRows:
     """The same of two shapes of which one is a mesh or holds one."""
-    starts = _starts(A, B, X_WA, X_WB)
-    ahead = np.flatnonzero(~starts.hit)
     leaves_a, leaves_b = leaves_of(A), leaves_of(B)
+    meshed = [np.array([leaf.shape.meshed for leaf in leaves]) for leaves in (leaves_a, leaves_b)]
 
-    def answer(owner: np.ndarray, item_a: np.ndarray, item_b: np.ndarray) -> PairRows:
-        parts = []
-        for key in np.unique(item_a * len(leaves_b) + item_b).tolist():
-            i, j = divmod(key, len(leaves_b))
-            casts = owner[(item_a == i) & (item_b == j)]
-            pair = leaves_a[i], leaves_b[j], X_WA[casts], X_WB[casts], vectors[casts], limits[casts]
-            rows = cast_leaves(*pair) if leaves_a[i].shape.meshed or leaves_b[j].shape.meshed else _cast_convex(*pair)
-            k = len(rows.owner)
-            parts.append(rows._replace(owner=casts[rows.owner], item_a=np.full(k, i), item_b=np.full(k, j)))
-        return joined(parts)
+    def answer(owner: np.ndarray, item_a: np.ndarray, item_b: np.ndarray, best: np.ndarray) -> PairRows:
+        rows = []
+        for some in _answered_together(owner, item_a, item_b, leaves_b, meshed):
+            cast, i, j = owner[some], item_a[some], item_b[some]
+            X, Y = np.ascontiguousarray(X_WA[cast]), np.ascontiguousarray(X_WB[cast])
+            if meshed[0][i[0]] or meshed[1][j[0]]:
+                of_a, of_b = (
+                    [leaves[k] for k in (items if (items != items[0]).any() else items[:1]).tolist()]
+                    for leaves, items in ((leaves_a, i), (leaves_b, j))
+                )
+                # Chosen by the shapes alone: a cast has the same bits whatever else is in the batch.
+                into_a = meshed[0][i[0]] and meshed[1][j[0]] and len(leaves_a) < len(leaves_b)
+                got = cast_leaves(of_a, of_b, X, Y, Casts(cast, vectors[cast], limits[cast], best), into_a=into_a)
+            else:
+                got = _cast_convex(leaves_a[i[0]], leaves_b[j[0]], X, Y, vectors[cast], limits[cast])
+            rows.append(got._replace(owner=cast[got.owner], item_a=i[got.owner], item_b=j[got.owner]))
+        return joined(rows)
 
-    n_pairs = len(leaves_a) * len(leaves_b)
+    n, n_pairs, starts = len(limits), len(leaves_a) * len(leaves_b), Starts(A, B, (leaves_a, leaves_b), X_WA, X_WB)
     if n_pairs <= MAX_ASKED:
+        rows = [starts.of_casts(np.arange(n))]
+        ahead = np.flatnonzero(starts.are_apart)
         owner, pair = np.repeat(ahead, n_pairs), np.tile(np.arange(n_pairs), len(ahead))
-        rows = [answer(owner, *np.divmod(pair, len(leaves_b)))]
+        rows.append(answer(owner, *np.divmod(pair, len(leaves_b)), limits))
     else:
-        of_a, of_b = _boxes_at(A), _boxes_at(B)
-        rows = list(rows_ahead(ahead, lambda k: (of_a(X_WA[k]), of_b(X_WB[k])), vectors, limits, answer, 1))
-    out = first_contacts(joined(rows), len(limits))
-    hit = starts.hit
-    out.hit[hit], out.at_start[hit], out.t[hit] = True, True, 0.0
-    out.proven[hit], out.certified[hit] = starts.proven[hit], starts.proven[hit]
-    out.normal[hit], out.point[hit] = starts.normal[hit], starts.point[hit]
-    out.item_a[hit] = out.item_b[hit] = 0
-    return out
+        rows = list(_rows_of_unions(A, B, X_WA, X_WB, vectors, limits, starts, answer))
+    return first_contacts(joined(rows), n)
+
+
+def _rows_of_unions(A: Shape, B: Shape, X_WA, X_WB, vectors, limits, starts: Starts, answer) -> Iterator[PairRows]:
+    """Rows of pairs of leaves that may be first contacts of casts, in the order of sets around them."""
+    of_a, of_b = _boxes_at(A), _boxes_at(B)
+    at_once = max(1, _POSED_AT_ONCE // (len(compound_parts(A).parts) + len(compound_parts(B).parts)))
+    for first in range(0, len(limits), at_once):
+        some = np.arange(first, min(first + at_once, len(limits)))
+        sets = posed_sides(A, B, X_WA[some], X_WB[some], len(some), bounding_parts_of)
+
+        def earliest(owner, item_a, item_b, some=some, sets=sets) -> np.ndarray:
+            pairs = sets.pairs(np.searchsorted(some, owner), item_a, item_b)
+            return earliest_contacts(pairs, vectors[some], limits[some])
+
+        yield from rows_within_sets(
+            some, lambda k: (of_a(X_WA[k]), of_b(X_WB[k])), vectors, limits, earliest, starts.of_pairs, answer,
+            _PARTS_TOGETHER,
+        )
+
+
+def _answered_together(owner, item_a, item_b, leaves_b: list[Leaf], meshed) -> Iterator[np.ndarray]:
+    """Numbers of pairs of leaves that one call answers: of a mesh and all convex sets that are cast at it, or it at
+    them; of a mesh of the union with fewer leaves and all meshes of the other; else of two leaves."""
+    mesh_a, mesh_b = meshed[0][item_a], meshed[1][item_b]
+    is_plane = np.array([not leaf.shape.meshed and convex_set_of(leaf.shape).kind == HALFSPACE for leaf in leaves_b])
+    by_b = len(meshed[0]) >= len(meshed[1])
+    key_a = np.where(mesh_b & ~mesh_a, -1, np.where(mesh_a & mesh_b & by_b, -2, item_a))
+    key_b = np.where(mesh_a & ~mesh_b & ~is_plane[item_b], -1, np.where(mesh_a & mesh_b & (not by_b), -2, item_b))
+    keys = (key_a + 2) * (len(leaves_b) + 2) + key_b + 2
+    for key in np.unique(keys).tolist():
+        yield np.flatnonzero(keys == key)
 
 
 def _boxes_at(shape: Shape) -> Callable[[np.ndarray], np.ndarray]:
@@ -166,17 +225,6 @@ def _boxes_at(shape: Shape) -> Callable[[np.ndarray], np.ndarray]:
         return parts.boxes(np.frombuffer(pose).reshape(1, 4, 4))[0]
 
     return lambda X: boxes(X.tobytes())
-
-
-def _starts(A: Shape, B: Shape, X_WA, X_WB) -> _Starts:
-    n = len(X_WA)
-    starts = _Starts(answer_batch(A, B, X_WA, X_WB, Question(True)), np.ones(n, dtype=bool), *np.zeros((2, n, 3)))
-    some = np.flatnonzero(starts.hit)
-    if len(some):
-        rows = answer_batch(A, B, X_WA[some], X_WB[some], Question(False, np.inf, True))
-        starts.proven[some] = rows["how"] != UNDECIDED
-        starts.normal[some], starts.point[some] = rows["normal"], rows["point_b"]
-    return starts
 
 
 def _cast_convex(leaf_a: Leaf, leaf_b: Leaf, X_WA, X_WB, vectors: np.ndarray, limits: np.ndarray) -> PairRows:

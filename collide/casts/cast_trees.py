@@ -4,7 +4,8 @@ A box moved along a direction meets another where a ray meets a third (`broadpha
 and the units of B's tree. Pairs of boxes are opened nearest first; a pair of facets, or a facet and the convex set, is
 a cast of convex sets (`portal.py`). What is proven of one bounds how far it is worth looking (van den Bergen 2004).
 A facet that lies across the axes is far smaller than its box: what may meet it is asked along its normal and across
-its edges, too.
+its edges, too. A convex set is far smaller than its box as well: boxes and facets before it are asked along the normals
+of the casts so far, up to which it reaches.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from collide.numerics.vec3 import (
     norm1,
     put_vec3,
     rotate,
+    rotate_back,
     scale,
     sub,
     vec3_at,
@@ -46,21 +48,31 @@ from collide.support.shape_kinds import POINTS
 STACK = 4096
 #: Doubles of workspace: of a cast, two poses, the corners of two facets, and keys of what waits; integers: of a cast,
 #: and what waits.
-TREE_CAST_DOUBLES = CAST_DOUBLES + 2 * POSE + 48 + STACK
+#: Along so many vectors it is kept how far the convex set reaches, FRONT doubles each, behind their number: the
+#: direction, and normals of casts.
+FRONTS = 12
+FRONT = 5
+TREE_CAST_DOUBLES = CAST_DOUBLES + 2 * POSE + 48 + STACK + FRONT * FRONTS + 1
 TREE_CAST_INTEGERS = CAST_INTEGERS + STACK
 #: Doubles of a candidate: a row of `cast_pairs.py`, the facets of A (−1 of a convex set) and of B, and the question.
 CANDIDATE = CAST_ROW + 3
 FACET_A, FACET_B, OF_QUESTION = CAST_ROW, CAST_ROW + 1, CAST_ROW + 2
 
-# Integers of a header: addresses of A's tree (0 for a convex set) and B's, of the shape table, poses of A and of B and
-# from one question to the next, questions, candidates, and how many of them there is room for.
+# Integers of a header: addresses of the addresses of A's trees, one a question (0 for convex sets), of B's tree, of the
+# shape table, poses of A and of B and from one question to the next, questions, candidates, how many of them there is
+# room for, the row of the table that is A in each question, the cast that each is a question of, and the largest t of
+# interest in each cast, in and out.
 (
-    TREE_A, TREE_B, INTS_AT, NUMBERS_AT, POSES_A, POSES_B, STEP_A, STEP_B, QUESTIONS_AT, CANDIDATES_AT, CAPACITY,
-) = range(11)
-HEADER = 11
+    TREES_A, TREE_B, INTS_AT, NUMBERS_AT, POSES_A, POSES_B, STEP_A, STEP_B, QUESTIONS_AT, CANDIDATES_AT, CAPACITY,
+    SHAPE_OF_AT, CAST_OF_AT, BEST_AT,
+) = range(14)
+HEADER = 14
 _LOW = 0xFFFFFFFF
 #: In the count of candidates.
 CASTS = 1
+#: A normal is kept where the step along it is at least so much of what it could be: rounding then moves t by less than
+#: 2⁻³⁸ of it.
+_STEEP = 2.0**-10
 #: Of products that a vector across a facet is used in: far above what underflows.
 _LEAST = 1e-200
 
@@ -71,7 +83,8 @@ class _Sweep(NamedTuple):
     pair : both sides; a side of facets has the corners of one of them.   d : the direction.   error, size : of a cast.
     In B's frame, in units of its tree and from its centre: middle, half : the box of A, where that is a convex set.
     step, inverse : the direction there, and the inverses of its components.
-    rotation : from A's tree to it, coordinates.   shift : where the centre of A's tree is.
+    rotation : from A's tree to it, coordinates, or from W's axes.   shift : where the centre of A's tree is, or the
+    origin of the convex set.
     pad : by what boxes are widened.
     """
 
@@ -89,11 +102,12 @@ class _Sweep(NamedTuple):
 
 
 class _Work(NamedTuple):
-    """Workspace: corners of two facets, what waits with its keys, addresses of what a cast needs."""
+    """Workspace: corners of two facets, what waits with its keys, fronts of A, addresses of what a cast needs."""
 
     corners: Any
     stack: Any
     keys: Any
+    fronts: Any
     doubles_at: int
     integers_at: int
 
@@ -137,23 +151,25 @@ def _posed_pair(header, k, poses, corners_at):
     for i in range(POSE):
         poses[i] = of_a[i]
         poses[POSE + i] = of_b[i]
-    ints = view_i64(header[INTS_AT], INTS)
-    A = posed_body(ints, 0, 0)
-    if header[TREE_A] != 0:
+    shape = view_i64(header[SHAPE_OF_AT], k + 1)[k]
+    ints, numbers = view_i64(header[INTS_AT], INTS * (shape + 1)), view_f64(header[NUMBERS_AT], NUMBERS * (shape + 1))
+    A = posed_body(ints, shape, 0)
+    if header[TREES_A] != 0:
         A = _facet_body(view_f64(corners_at, 24))
     B = _facet_body(view_f64(corners_at + 8 * 24, 24))
     B = PosedBody(B.coords, 3, 8, POINTS, 0, 0, POSE, 0, 0)
     t = sub(vec3_at(poses, POSE + 9), vec3_at(poses, 9))
-    return PosedPair(A, B, view_f64(header[NUMBERS_AT], NUMBERS), poses, t)
+    return PosedPair(A, B, numbers, poses, t)
 
 
 @kernel
 def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
     """The `_Sweep` of question k.   a, b : both trees; b twice where A is none."""
     numbers, poses = pair.numbers, pair.poses
-    is_convex = header[TREE_A] == 0
-    reach_a = numbers[REACH] if is_convex else norm(vec3_at(a.numbers, TREE_REACH))
-    radius = numbers[RADIUS] if is_convex else 0.0
+    is_convex = header[TREES_A] == 0
+    at = NUMBERS * view_i64(header[SHAPE_OF_AT], k + 1)[k]
+    reach_a = numbers[at + REACH] if is_convex else norm(vec3_at(a.numbers, TREE_REACH))
+    radius = numbers[at + RADIUS] if is_convex else 0.0
     reach_a = reach_a * stretch_of_pose(poses, 0) + radius
     reach_b = norm(vec3_at(b.numbers, TREE_REACH)) * stretch_of_pose(poses, POSE)
     size = reach_a + reach_b + norm(pair.t)
@@ -164,8 +180,7 @@ def _sweep_of(header, k, a, b, pair, doubles_at, integers_at):
     centre = scale(unit, vec3_at(b.numbers, CENTRE))
     origin = sub(apply(rows, neg(pair.t)), centre)
     d = vec3_at(view_f64(header[QUESTIONS_AT] + 8 * QUESTION * k, QUESTION), 0)
-    zero = Vec3(0.0, 0.0, 0.0)
-    middle, half, shift, rotation = origin, zero, zero, rows
+    middle, half, shift, rotation = origin, Vec3(0.0, 0.0, 0.0), origin, rows
     if is_convex:
         points, ids = view_f64(doubles_at, 9), view_i64(integers_at, 2)
         high = Vec3(
@@ -216,6 +231,54 @@ def _box_of_a(sweep, a, ref_a, has_tree_a):
             dot(absolute(rotation.z), of_a.half),
         )
     return Box(middle, half)
+
+
+@kernel
+def _keep_front(sweep, work, n, radius, at):
+    """Keep how far a convex set A reaches along n, in W's axes, in front number ``at``; later ones replace the oldest
+    but for the first.
+
+    In coordinates of B's tree n is m = 2⁻ᵉ R_Bᵀ n up to its length; any vector serves. A is within m · y ≤ h, where it
+    stands, and within m · y ≤ h + t (m · step), moved: what is beyond has no contact before
+    t = (m · y − h) / (m · step).
+    """
+    poses, rows = sweep.pair.poses, sweep.rotation
+    m = rotate_back(poses, POSE, n)
+    along = dot(m, sweep.step)
+    if not along > _STEEP * norm1(m) * max_abs(sweep.step):
+        return at
+    v = add(add(scale(m.x, rows.x), scale(m.y, rows.y)), scale(m.z, rows.z))
+    points, ids = view_f64(work.doubles_at, 9), view_i64(work.integers_at, 2)
+    h = _extent_along(sweep.pair, v, radius, points, ids) + dot(m, sweep.shift)
+    slot = at if at < FRONTS else 1 + (at - 1) % (FRONTS - 1)
+    put_vec3(work.fronts, FRONT * slot + 1, m)
+    work.fronts[FRONT * slot + 4] = h
+    work.fronts[FRONT * slot + 5] = 1.0 / along
+    work.fronts[0] = float(min(at + 1, FRONTS))
+    return at + 1
+
+
+@kernel(inline=True)
+def _front_entry(sweep, fronts, centre, u, v, half):
+    """t before which A has no contact with the sums of a triangle centre, centre + u, centre + v and a box, by fronts.
+
+    Rounding moves y by the pad, as of `_entry_of`, and h by 2⁻⁴⁴ of itself; t by 2⁻³⁸ (`_STEEP`).
+    """
+    first = 0.0
+    pad = sweep.pad + 2.0**-40 * (norm1(centre) + norm1(u) + norm1(v) + norm1(half))
+    for k in range(int(fronts[0])):
+        m, h = vec3_at(fronts, FRONT * k + 1), fronts[FRONT * k + 4]
+        low = dot(m, centre) + min(0.0, min(dot(m, u), dot(m, v))) - dot(absolute(m), half)
+        t = (low - h - norm1(m) * pad - 2.0**-44 * abs(h)) * fronts[FRONT * k + 5]
+        first = max(first, t * (1.0 - 2.0**-38))
+    return first
+
+
+@kernel(inline=True)
+def _box_entry(sweep, work, box):
+    """`_front_entry` of a box."""
+    zero = Vec3(0.0, 0.0, 0.0)
+    return _front_entry(sweep, work.fronts, box.centre, zero, zero, box.half)
 
 
 @kernel(inline=True)
@@ -318,6 +381,14 @@ def _cast_facets(sweep, work, radius, limit, best, row):
 
 
 @kernel(inline=True)
+def _is_before(sweep, work, b, facet, unit, best):
+    """Whether A may meet a facet of B before ``best``, by its fronts."""
+    p = _corner_in(sweep, b, facet, 0, False, unit)
+    u, v = sub(_corner_in(sweep, b, facet, 1, False, unit), p), sub(_corner_in(sweep, b, facet, 2, False, unit), p)
+    return _front_entry(sweep, work.fronts, p, u, v, Vec3(0.0, 0.0, 0.0)) <= best
+
+
+@kernel(inline=True)
 def _push(work, top, base, word, key):
     """Put a word onto the stack, which from ``base`` on stays in order, the nearest on top."""
     at = top
@@ -349,6 +420,9 @@ def _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top):
         if not boxes[NODE * node + 3 * WIDTH + slot] >= 0.0:
             continue
         key = _entry_of(sweep, a, b, child_a, child_b, has_tree_a, best)
+        if key < math.inf and not has_tree_a:
+            key = max(key, _box_entry(sweep, work, box_at(b, child_b)))
+            key = key if key <= best else math.inf
         link = link_of(a.links, child_a) if has_tree_a else 0
         if key < math.inf and link < 0:
             key = max(key, _leaf_entry(sweep, a, ~link, True, unit_a, box_at(b, child_b), best))
@@ -366,38 +440,45 @@ def _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top):
 def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
     """Candidates for the first contacts of questions ``first`` … n − 1 that are apart at the start.
 
+    Of questions of one cast each is looked into no farther than to the contacts proven of those before it.
     header : HEADER integers.   count : how many candidates there are, and how many casts were made, in and out.
     doubles, integers : workspace (TREE_CAST_DOUBLES, TREE_CAST_INTEGERS).
     Returns how many questions are answered; fewer than n where there is no room for more candidates.
     """
     header = view_i64(header_at, HEADER)
     count = view_i64(count_at, 2)
-    has_tree_a = header[TREE_A] != 0
+    has_tree_a = header[TREES_A] != 0
     b = open_tree(header[TREE_B])
-    a = open_tree(header[TREE_A] if has_tree_a else header[TREE_B])
     poses_at = doubles_at + 8 * CAST_DOUBLES
     corners_at = poses_at + 8 * 2 * POSE
     work = _Work(
         view_f64(corners_at, 48), view_i64(integers_at + 8 * CAST_INTEGERS, STACK),
-        view_f64(corners_at + 8 * 48, STACK), doubles_at, integers_at,
+        view_f64(corners_at + 8 * 48, STACK), view_f64(corners_at + 8 * (48 + STACK), FRONT * FRONTS + 1), doubles_at,
+        integers_at,
     )
     for k in range(first, n):
         begin = count[0]
+        a = open_tree(view_i64(header[TREES_A] + 8 * k, 1)[0]) if has_tree_a else b
         question = view_f64(header[QUESTIONS_AT] + 8 * QUESTION * k, QUESTION)
         pair = _posed_pair(header, k, view_f64(poses_at, 2 * POSE), corners_at)
         sweep = _sweep_of(header, k, a, b, pair, doubles_at, integers_at)
-        if not _walk_pairs(header, sweep, work, a, b, has_tree_a, k, question[3], count):
+        cast = view_i64(header[CAST_OF_AT], k + 1)[k]
+        best = view_f64(header[BEST_AT] + 8 * cast, 1)
+        until = _walk_pairs(header, sweep, work, a, b, has_tree_a, k, question[3], best[0], count)
+        if until < 0.0:
             count[0] = begin
             return k
+        best[0] = until
     return n
 
 
 @kernel
-def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, count):
-    """All candidates of one question; False where there is no room for them."""
-    best = limit
+def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, best, count):
+    """Take down all candidates of one question; what ``best`` is then, below 0 where there is no room for them."""
     unit_a, unit_b = _unit_of(a), _unit_of(b)
-    radius = 0.0 if has_tree_a else sweep.pair.numbers[RADIUS]
+    radius = 0.0 if has_tree_a else sweep.pair.numbers[NUMBERS * view_i64(header[SHAPE_OF_AT], k + 1)[k] + RADIUS]
+    work.fronts[0] = 0.0
+    n_fronts = 0 if has_tree_a else _keep_front(sweep, work, sweep.d, radius, 0)
     top = 0
     if _entry_of(sweep, a, b, 0, 0, has_tree_a, best) < math.inf:
         work.stack[0] = 0
@@ -412,14 +493,14 @@ def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, count):
         link_b = link_of(b.links, ref_b)
         if link_a >= 0 or link_b >= 0:
             if top + WIDTH > STACK:
-                return False
+                return -1.0
             top = _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top)
             continue
         run_a, run_b = ~link_a, ~link_b
         of_a, of_b = _box_of_a(sweep, a, ref_a, has_tree_a), box_at(b, ref_b)
         n_a = run_a & 7 if has_tree_a else 1
         if count[0] + n_a * (run_b & 7) > header[CAPACITY]:
-            return False
+            return -1.0
         for i in range(n_a):
             if has_tree_a:
                 if _facet_entry(sweep, a, (run_a >> 3) + i, True, unit_a, of_b, best) == math.inf:
@@ -428,13 +509,17 @@ def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, count):
             for j in range(run_b & 7):
                 if _facet_entry(sweep, b, (run_b >> 3) + j, False, unit_b, of_a, best) == math.inf:
                     continue
+                if not (has_tree_a or _is_before(sweep, work, b, (run_b >> 3) + j, unit_b, best)):
+                    continue
                 count[CASTS] += 1
                 _put_corners(work.corners, 24, b.triangles, (run_b >> 3) + j)
                 row = view_f64(header[CANDIDATES_AT] + 8 * CANDIDATE * count[0], CANDIDATE)
                 best = _cast_facets(sweep, work, radius, limit, best, row)
+                if not has_tree_a:
+                    n_fronts = _keep_front(sweep, work, vec3_at(row, NORMAL), radius, n_fronts)
                 if row[STATUS] != MISS:
                     row[FACET_A] = a.ids[(run_a >> 3) + i] if has_tree_a else -1
                     row[FACET_B] = b.ids[(run_b >> 3) + j]
                     row[OF_QUESTION] = k
                     count[0] += 1
-    return True
+    return best

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.casts.cast_pairs import CAST_ROW, LOWER, NORMAL, QUESTION, SIZE, STATUS, TOUCHING, UPPER, VALUE, cast_pairs
-from collide.casts.exact_cast import cast_exactly
+from collide.casts.exact_cast import cast_exactly, corners_of
 from collide.casts.portal import BEHIND, HIT, LEVEL, MISS, OPEN
 from collide.casts.posed_parts import PartPairs, PosedParts
 from collide.casts.silhouette import CAST_DOUBLES, CAST_INTEGERS
@@ -84,23 +84,17 @@ def answer_questions(pairs: PartPairs, directions: np.ndarray, limits: np.ndarra
 
     directions : (n, 3), the largest component below 1 and at least ½.   limits : (n,) of t.
     """
-    questions = np.empty((len(pairs.owner), QUESTION))
-    questions[:, :3], questions[:, 3] = directions[pairs.owner], limits[pairs.owner]
-    rows, marks = answer_part_pairs(pairs.parts, pairs.pairs, questions)
+    rows, marks = answer_part_pairs(pairs.parts, pairs.pairs, _questions(pairs.owner, directions, limits))
     return PairRows(rows, marks, pairs.owner, pairs.item_a, pairs.item_b)
 
 
 def answer_part_pairs(parts: PosedParts, pairs: np.ndarray, questions: np.ndarray) -> tuple[np.ndarray, Marks]:
     """(rows (k, CAST_ROW) whose status is HIT or MISS, what is known of them) of k pairs of parts."""
     k = len(pairs)
-    rows = np.zeros((k, CAST_ROW))
+    rows = _kernel_rows(parts, pairs, questions)
     marks = Marks(np.ones(k, dtype=bool), np.ones(k, dtype=bool), np.zeros(k, dtype=bool))
     if not k:
         return rows, marks
-    cast_pairs(
-        *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(pairs),
-        address_of(questions), len(pairs), address_of(rows), *workspace(),
-    )
     _settle_starts(parts, pairs, rows, marks)
     for i in np.flatnonzero(rows[:, STATUS] == LEVEL).tolist():
         _settle_level(parts, pairs[i], questions[i], rows[i])
@@ -119,9 +113,44 @@ def answer_part_pairs(parts: PosedParts, pairs: np.ndarray, questions: np.ndarra
     return rows, marks
 
 
+def earliest_contacts(pairs: PartPairs, directions: np.ndarray, limits: np.ndarray) -> np.ndarray:
+    """(k,) t before which pairs of convex sets have no contact: infinity of those that have none within the limit.
+
+    Of bodies within the sets it bounds the first contact from below: what meets, meets within the sets. Some
+    microseconds a pair, nothing is decided exactly.
+    """
+    rows = _kernel_rows(pairs.parts, pairs.pairs, _questions(pairs.owner, directions, limits))
+    bounds = np.where(rows[:, STATUS] == LEVEL, 0.0, np.maximum(rows[:, LOWER], 0.0))  # a gap's bracket, no t
+    bounds[rows[:, STATUS] == MISS] = np.inf
+    behind = np.flatnonzero((rows[:, STATUS] == BEHIND) & (rows[:, UPPER] <= 0.0))
+    if len(behind):  # the way leads away from what they share a point with now, or never
+        hits = run_pairs(
+            pairs.parts.table, pairs.parts.poses, pairs.parts.shape_of, pairs.pairs[behind], boolean=True, limit=0.0
+        )["hit"]
+        bounds[behind] = np.where(hits, 0.0, np.inf)
+    return bounds
+
+
+def _questions(owner: np.ndarray, directions: np.ndarray, limits: np.ndarray) -> np.ndarray:
+    """(k, QUESTION) of the casts that own pairs."""
+    questions = np.empty((len(owner), QUESTION))
+    questions[:, :3], questions[:, 3] = directions[owner], limits[owner]
+    return questions
+
+
+def _kernel_rows(parts: PosedParts, pairs: np.ndarray, questions: np.ndarray) -> np.ndarray:
+    rows = np.zeros((len(pairs), CAST_ROW))
+    if len(pairs):
+        cast_pairs(
+            *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(pairs),
+            address_of(questions), len(pairs), address_of(rows), *workspace(),
+        )
+    return rows
+
+
 def _settle_starts(parts: PosedParts, pairs, rows, marks: Marks) -> None:
     """Decide by pair queries which rows touch at the start, of those BEHIND and of open ones that may; what is neither
-    behind nor touches is OPEN.
+    behind nor touches is OPEN. Rows that touch have a common point and no normal.
     """
     behind = np.flatnonzero((rows[:, STATUS] == BEHIND) | ((rows[:, STATUS] == OPEN) & (rows[:, LOWER] <= 0.0)))
     if not len(behind):
@@ -134,11 +163,13 @@ def _settle_starts(parts: PosedParts, pairs, rows, marks: Marks) -> None:
     touching = behind[start["hit"]]
     if not len(touching):
         return
-    depths = run_pairs(parts.table, parts.poses, parts.shape_of, pairs[touching], boolean=False, limit=np.inf)
+    shared = run_pairs(
+        parts.table, parts.poses, parts.shape_of, pairs[touching], boolean=False, limit=0.0, depths=False
+    )
     rows[touching, STATUS] = HIT
     rows[touching[:, None], [LOWER, VALUE, UPPER]] = 0.0
-    rows[touching, NORMAL : NORMAL + 3] = depths["normal"]
-    rows[touching, TOUCHING : TOUCHING + 3] = depths["point_b"]
+    rows[touching, NORMAL : NORMAL + 3] = 0.0
+    rows[touching, TOUCHING : TOUCHING + 3] = shared["point_b"]
     marks.at_start[touching] = True
     marks.proven[touching] = start["how"][start["hit"]] != UNDECIDED
 
@@ -163,7 +194,7 @@ def settle_exactly(parts: PosedParts, pair: np.ndarray, question: np.ndarray, ro
 def settle_points(points_a, points_b, grid: int, question: np.ndarray, row: np.ndarray) -> None:
     """Write the row of two hulls of integer points times 2^grid."""
     d, exponent = integers(question[:3])
-    contact = cast_exactly(list(points_a), list(points_b), d)
+    contact = cast_exactly(corners_of(points_a), corners_of(points_b), d)
     if contact.t is None or contact.t * Fraction(2) ** (grid - exponent) > float(question[3]):
         row[STATUS] = MISS
         return

@@ -16,6 +16,8 @@ from collide.numerics.exact_points import PlacedPoints, Point, opposite
 from collide.numerics.exact_vectors import inner, minus
 
 _ARTIFICIAL, _T = -1, -2
+#: Of so many vertices doubles choose those of which exact numbers are made; all are made of fewer.
+_MIN_BY_DOUBLES = 64
 
 
 class ExactCast(NamedTuple):
@@ -28,6 +30,11 @@ class ExactCast(NamedTuple):
     t: Fraction | None
     normal: tuple[Fraction, Fraction, Fraction]
     weights: dict[tuple[int, int], Fraction]
+
+
+def corners_of(points: Sequence[Point]) -> Sequence[Point]:
+    """Points as `cast_exactly` is quick with them: few as they are in integers, of many those that matter are made."""
+    return points if len(points) >= _MIN_BY_DOUBLES else list(points)
 
 
 class _Basis(NamedTuple):

@@ -39,9 +39,58 @@ def rows_ahead(
         best = limits.copy()
         for some in nearest_first(owner, bounds, best, first):
             pair_rows = answer(owner[some], *pairs[some].T)
-            proven = pair_rows.marks.proven & (pair_rows.rows[:, STATUS] == HIT)
-            np.minimum.at(best, pair_rows.owner[proven], pair_rows.rows[proven, UPPER])
+            take_best(best, pair_rows)
             yield pair_rows
+
+
+def rows_within_sets(
+    casts: np.ndarray, boxes_of: Callable[[int], tuple[np.ndarray, np.ndarray]], vectors: np.ndarray,
+    limits: np.ndarray, earliest: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray], starts: Answer,
+    answer: Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], PairRows], first: int,
+) -> Iterator[PairRows]:
+    """The same of items that take long to answer, in the order in which convex sets around them meet.
+
+    earliest : t before which items of A and of B (k,) have no contact in casts (k,), infinity of none at all, quickly.
+    starts : rows of pairs that touch at the start, asked of those whose sets may.
+    answer : of pairs that do not, and handed what bounds the first contact of every cast from above.
+    first : pairs of a cast whose sets are asked together.
+    A pair is answered once its bound is not above that of the boxes of all pairs whose sets were not asked: then no
+    other pair has a lower one.
+    """
+    for owner, pairs, bounds in _listed(casts, boxes_of, vectors, limits):
+        best, following = limits.copy(), np.zeros(len(limits))
+        after = np.append(np.where(np.diff(owner) == 0, bounds[1:], np.inf), np.inf)[: len(owner)]
+        waiting, until = np.zeros(0, dtype=np.int64), np.full(len(owner), np.inf)
+        for number, some in enumerate(nearest_first(owner, bounds, best, first)):
+            until[some] = np.maximum(earliest(owner[some], *pairs[some].T), bounds[some])
+            following[owner[some]] = after[some]  # of several of an owner the last one counts
+            waiting = np.concatenate([waiting, some[until[some] < np.inf]])
+            is_ready = until[waiting] <= following[owner[waiting]]
+            ready, waiting = waiting[is_ready], waiting[~is_ready]
+            ready = ready[np.lexsort((until[ready], owner[ready]))]
+            # One at first; the more were asked in vain, the more at once.
+            for next_ones in nearest_first(owner[ready], until[ready], best, 2**number):
+                asked = ready[next_ones]
+                near = asked[until[asked] <= 0.0]
+                if len(near):
+                    touching = starts(owner[near], *pairs[near].T)
+                    take_best(best, touching)
+                    yield touching
+                    asked = asked[(best >= 0.0)[owner[asked]]]
+                item_a, item_b = pairs[asked].T
+                pair_rows = answer(owner[asked], item_a, item_b, best)
+                take_best(best, pair_rows)
+                yield pair_rows
+
+
+def take_best(best: np.ndarray, pair_rows: PairRows) -> None:
+    """Lower what bounds the first contacts of casts from above; below 0 of those that are proven to touch at the start,
+    whatever else does.
+    """
+    marks = pair_rows.marks
+    proven = marks.proven & (pair_rows.rows[:, STATUS] == HIT)
+    upper = np.where(marks.at_start[proven], -np.inf, pair_rows.rows[proven, UPPER])
+    np.minimum.at(best, pair_rows.owner[proven], upper)
 
 
 def nearest_first(owner: np.ndarray, bounds: np.ndarray, best: np.ndarray, first: int = 1) -> Iterator[np.ndarray]:

@@ -47,39 +47,63 @@ _workspace = _Workspace()
 
 
 class _Side(NamedTuple):
-    """One body of n casts.
+    """One body of n questions, meshes or convex sets.
 
-    packed : of a convex set; of a mesh, None.   tree : of a mesh.   poses : (n,) rows.   X, X_item : body and item.
+    packed : the sets; none of meshes.   trees : of meshes.   which : (n,) the set or tree of each question.
+    poses : (n,) rows.   X, X_item : (n, 4, 4) body and item.   corners : of trees, once they are asked for.
     """
 
-    packed: PackedConvex | None
-    tree: MeshTree | None
+    packed: list[PackedConvex]
+    trees: list[MeshTree]
+    which: np.ndarray
     poses: PoseTable
     X: np.ndarray
     X_item: np.ndarray
+    corners: dict[int, FacetCorners]
 
-    def exact(self, k: int, facet: int, corners: FacetCorners | None) -> ExactPart | None:
-        """The body, or one of its facets, of cast k as exact numbers; None where it has none."""
-        if corners is not None:
-            return ExactPart(POINTS, corners[facet], 0.0, None, self.X[k], self.X_item)
-        assert self.packed is not None
-        if self.packed.kind != POINTS or self.packed.radius or self.packed.slop:
+    def exact(self, k: int, facet: int) -> ExactPart | None:
+        """The body, or one of its facets, of question k as exact numbers; None where it has none."""
+        if self.trees:
+            return ExactPart(POINTS, self._corners(self.which[k])[facet], 0.0, None, self.X[k], self.X_item[k])
+        packed = self.packed[self.which[k]]
+        if packed.kind != POINTS or packed.radius or packed.slop:
             return None
-        return exact_part(self.packed, self.X[k], self.X_item)
+        return exact_part(packed, self.X[k], self.X_item[k])
+
+    def _corners(self, tree: int) -> FacetCorners:
+        if tree not in self.corners:
+            self.corners[tree] = FacetCorners(self.trees[tree])
+        return self.corners[tree]
 
 
-def cast_leaves(A: Leaf, B: Leaf, X_WA, X_WB, vectors: np.ndarray, limits: np.ndarray) -> PairRows:
-    """Rows of n casts of bodies that are apart at the start, the last two fields empty.
+class Casts(NamedTuple):
+    """Casts that k questions belong to.
 
-    X_WA, X_WB : (n, 4, 4).   vectors : (n, 3).   limits : (n,) of t.
+    number : (k,) which cast.   vectors : (k, 3) directions.   limits : (k,) of t.
+    best : (n,) of all casts, what is known of their first contacts from above. Of one cast no question matters whose
+        contact is later than that of another.
     """
-    if not B.shape.meshed and convex_set_of(B.shape).kind == HALFSPACE:
-        return _onto_plane(A, B, X_WA, X_WB, vectors, limits)
+
+    number: np.ndarray
+    vectors: np.ndarray
+    limits: np.ndarray
+    best: np.ndarray
+
+
+def cast_leaves(A: list[Leaf], B: list[Leaf], X_WA, X_WB, casts: Casts, *, into_a: bool = False) -> PairRows:
+    """Rows of k questions of bodies that are apart at the start, by question, the last two fields empty.
+
+    A, B : one leaf of all questions, or one a question on one side: all meshes or all convex sets, no half-spaces. Of
+    both sides one is a mesh.   X_WA, X_WB : (k, 4, 4).   into_a : of two meshes walk the tree of A, which is one leaf.
+    """
+    if not B[0].shape.meshed and convex_set_of(B[0].shape).kind == HALFSPACE:
+        return _onto_plane(A[0], B[0], X_WA, X_WB, casts.vectors, casts.limits)
     side_a, side_b = _side(A, X_WA), _side(B, X_WB)
-    if side_b.tree is not None:
-        return _cast(side_a, side_b, vectors, limits)
-    # The mesh moves: the convex set is moved the other way instead.
-    rows = _cast(side_b, side_a, -vectors, limits)
+    if side_b.trees and not into_a:
+        return _cast(side_a, side_b, casts)
+    # The mesh moves: what stands is moved the other way instead.
+    vectors = casts.vectors
+    rows = _cast(side_b, side_a, casts._replace(vectors=-vectors))
     t = rows.rows[:, VALUE, None]
     rows.rows[:, NORMAL : NORMAL + 3] *= -1.0
     rows.rows[:, TOUCHING : TOUCHING + 3] += t * vectors[rows.owner]
@@ -100,46 +124,57 @@ def _onto_plane(A: Leaf, B: Leaf, X_WA, X_WB, vectors, limits) -> PairRows:
     return answer_questions(PartPairs(parts, pairs, np.arange(n), none, none), vectors, limits)
 
 
-def _side(leaf: Leaf, X: np.ndarray) -> _Side:
-    packed, tree = (None, body_of(leaf.shape).tree) if leaf.shape.meshed else (convex_set_of(leaf.shape), None)
-    if packed is not None:
-        reach = packed.reach
+def _side(leaves: list[Leaf], X: np.ndarray) -> _Side:
+    k = len(X)
+    X_item = np.array([leaf.X for leaf in leaves])
+    shapes = {id(leaf.shape): leaf.shape for leaf in leaves}
+    row_of = {key: row for row, key in enumerate(shapes)}
+    which = np.array([row_of[id(leaf.shape)] for leaf in leaves], dtype=np.int64)
+    packed, trees = [], []
+    if leaves[0].shape.meshed:
+        trees = [body_of(shape).tree for shape in shapes.values()]
+        reach = np.array([float(np.linalg.norm(tree.numbers[3:6])) for tree in trees])[which]
     else:
-        assert tree is not None
-        reach = float(np.linalg.norm(tree.numbers[3:6]))
-    poses = pose_table(X, np.repeat(leaf.X[None], len(X), axis=0), np.full(len(X), reach))
-    return _Side(packed, tree, poses, X, leaf.X)
+        packed = [convex_set_of(shape) for shape in shapes.values()]
+        reach = np.array([part.reach for part in packed])[which]
+    if len(leaves) < k:
+        X_item, which, reach = np.repeat(X_item, k, axis=0), np.resize(which, k), np.resize(reach, k)
+    return _Side(packed, trees, which, pose_table(X, X_item, reach, terms=False), X, X_item, {})
 
 
-def _cast(A: _Side, B: _Side, vectors: np.ndarray, limits: np.ndarray) -> PairRows:
+def _cast(A: _Side, B: _Side, casts: Casts) -> PairRows:
     """Rows of casts into a mesh B."""
-    candidates = _candidates(A, B, vectors, limits)
+    candidates = _candidates(A, B, casts)
     owner = candidates[:, OF_QUESTION].astype(np.int64)
     rows = np.ascontiguousarray(candidates[:, :CAST_ROW])
     k = len(rows)
     marks = Marks(rows[:, STATUS] == HIT, np.zeros(k, dtype=bool), np.zeros(k, dtype=bool))
-    width = PROMISE_CURVED if A.packed is not None and A.packed.kind != POINTS else PROMISE_STORED
-    _settle(A, B, candidates, rows, owner, marks, width, vectors, limits)
-    marks.certified[:] = marks.proven & (rows[:, UPPER] - rows[:, LOWER] <= width * rows[:, SIZE])
+    curved = np.array([packed.kind != POINTS for packed in A.packed] or [False] * len(A.trees))
+    width = np.where(curved[A.which[owner]], PROMISE_CURVED, PROMISE_STORED) * rows[:, SIZE]
+    _settle(A, B, candidates, rows, owner, marks, width, casts)
+    marks.certified[:] = marks.proven & (rows[:, UPPER] - rows[:, LOWER] <= width)
     none = np.zeros(k, dtype=np.int64)
     return PairRows(rows, marks, owner, none, none)
 
 
-def _candidates(A: _Side, B: _Side, vectors: np.ndarray, limits: np.ndarray) -> np.ndarray:
+def _candidates(A: _Side, B: _Side, casts: Casts) -> np.ndarray:
     """(k, CANDIDATE) what may be the first contacts."""
-    assert B.tree is not None
-    n = len(limits)
-    questions = np.ascontiguousarray(np.hstack([vectors, limits[:, None]]))
-    table = ShapeTable([A.packed if A.packed is not None else pack_points(np.zeros((1, 3)))])
-    table.build_trees(np.zeros(1, dtype=np.int64))
+    n = len(casts.limits)
+    questions = np.ascontiguousarray(np.hstack([casts.vectors, casts.limits[:, None]]))
+    table = ShapeTable(A.packed or [pack_points(np.zeros((1, 3)))])
+    table.build_trees(A.which if A.packed else np.zeros(1, dtype=np.int64))
+    trees = np.array([tree.address for tree in A.trees], dtype=np.int64)[A.which] if A.trees else None
+    shape_of = A.which if A.packed else np.zeros(n, dtype=np.int64)
+    best = casts.best.copy()
     count, done, answered = np.zeros(2, dtype=np.int64), 0, []
     capacity = 1024 + 8 * n
     while True:
         candidates = np.empty((capacity, CANDIDATE))
         header = np.array(
             [
-                0 if A.tree is None else A.tree.address, B.tree.address, *table.addresses, address_of(A.poses.rows),
-                address_of(B.poses.rows), POSE, POSE, address_of(questions), address_of(candidates), capacity,
+                0 if trees is None else address_of(trees), B.trees[0].address, *table.addresses,
+                address_of(A.poses.rows), address_of(B.poses.rows), POSE, POSE, address_of(questions),
+                address_of(candidates), capacity, address_of(shape_of), address_of(casts.number), address_of(best),
             ],
             dtype=np.int64,
         )
@@ -153,31 +188,28 @@ def _candidates(A: _Side, B: _Side, vectors: np.ndarray, limits: np.ndarray) -> 
             capacity *= 4
 
 
-def _settle(A: _Side, B: _Side, candidates, rows, owner, marks: Marks, width: float, vectors, limits) -> None:
+def _settle(A: _Side, B: _Side, candidates, rows, owner, marks: Marks, width: np.ndarray, casts: Casts) -> None:
     """Decide open candidates, nearest first, as long as they may be nearer than what is proven; drop the others."""
-    assert B.tree is not None
-    best = limits.copy()
-    np.minimum.at(best, owner[marks.proven], rows[marks.proven, UPPER])
-    rows[rows[:, LOWER] > best[owner], STATUS] = MISS
-    corners_a = None if A.tree is None else FacetCorners(A.tree)
-    corners_b = FacetCorners(B.tree)
-    wide = marks.proven & (rows[:, UPPER] - rows[:, LOWER] > width * rows[:, SIZE])
+    best, limits, cast = casts.best.copy(), casts.limits, casts.number[owner]
+    np.minimum.at(best, cast[marks.proven], rows[marks.proven, UPPER])
+    rows[rows[:, LOWER] > best[cast], STATUS] = MISS
+    wide = marks.proven & (rows[:, UPPER] - rows[:, LOWER] > width)
     unsettled = np.flatnonzero(((rows[:, STATUS] == OPEN) | wide) & (rows[:, STATUS] != MISS))
     for k in unsettled[np.argsort(rows[unsettled, LOWER], kind="stable")].tolist():
         q = owner[k]
-        if rows[k, LOWER] > best[q]:
+        if rows[k, LOWER] > best[cast[k]]:
             rows[k, STATUS] = MISS
             continue
         facet_a, facet_b = (int(candidates[k, column]) for column in (FACET_A, FACET_B))
-        exact_a, exact_b = A.exact(q, facet_a, corners_a), B.exact(q, facet_b, corners_b)
+        exact_a, exact_b = A.exact(q, facet_a), B.exact(q, facet_b)
         if exact_a is None or exact_b is None:
             if not marks.proven[k]:
                 rows[k, STATUS] = HIT
                 rows[k, [LOWER, VALUE]] = np.minimum(rows[k, [LOWER, VALUE]], limits[q])
             continue
         question = np.empty(QUESTION)
-        question[:3], question[3] = vectors[q], limits[q]
+        question[:3], question[3] = casts.vectors[q], limits[q]
         settle_points(*common_vertices(exact_a, exact_b), question, rows[k])
         if rows[k, STATUS] == HIT:
             marks.proven[k] = True
-            best[q] = min(best[q], rows[k, UPPER])
+            best[cast[k]] = min(best[cast[k]], rows[k, UPPER])

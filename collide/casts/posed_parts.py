@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from collide.certificates.exact_parts import ExactPart, exact_part
 from collide.lowering.packed_convex import PackedConvex
-from collide.lowering.parts import parts_of
+from collide.lowering.parts import Part, parts_of
 from collide.lowering.shape_table import REACH, PoseTable, ShapeTable, has_own_pose, pose_table
 from collide.shapes.shape import Shape
+
+#: Convex sets of a shape and their poses in it.
+PartsOf = Callable[[Shape], tuple[Part, ...]]
 
 
 class PosedParts(NamedTuple):
@@ -97,10 +101,11 @@ class PosedSides(NamedTuple):
         return PartPairs(self.parts, pairs, owner, item_a, item_b)
 
 
-def posed_sides(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int) -> PosedSides:
+def posed_sides(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, parts_of: PartsOf = parts_of) -> PosedSides:
     """Parts of A and B in n questions.
 
     A, B : a shape, or n of them.   X_WA, X_WB : (n, 4, 4), or (1, 4, 4) for all.
+    parts_of : convex parts of a shape, or sets around them.
     """
     packed: list[PackedConvex] = []
     rows: dict[tuple[bytes, float], int] = {}
@@ -112,7 +117,7 @@ def posed_sides(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int) -> PosedSides:
             packed.append(part)
         return rows[key]
 
-    side_a, side_b = _side(A, X_WA, n, row_of), _side(B, X_WB, n, row_of)
+    side_a, side_b = _side(A, X_WA, n, row_of, parts_of), _side(B, X_WB, n, row_of, parts_of)
     shape_of = np.concatenate([side_a.shape_of, side_b.shape_of])
     body_poses = np.concatenate([side_a.body_poses, side_b.body_poses])
     part_poses = np.concatenate([side_a.part_poses, side_b.part_poses])
@@ -127,7 +132,7 @@ def posed_sides(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int) -> PosedSides:
     )
 
 
-def _side(shapes, X: np.ndarray, n: int, row_of) -> _Side:
+def _side(shapes, X: np.ndarray, n: int, row_of, parts_of: PartsOf) -> _Side:
     if isinstance(shapes, Shape):
         parts = parts_of(shapes)
         m, k = len(parts), len(X)

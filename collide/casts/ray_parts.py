@@ -25,7 +25,7 @@ from collide.casts.cut_parts import (
     cut_parts,
 )
 from collide.casts.directions import Directions
-from collide.casts.exact_cast import cast_exactly
+from collide.casts.exact_cast import cast_exactly, corners_of
 from collide.casts.posed_parts import PosedParts
 from collide.casts.ray_chords import MET, MISSED, UNCLEAR
 from collide.casts.ray_hits import RayEvents
@@ -37,8 +37,6 @@ from collide.numerics.exact_vectors import inner
 
 #: Brackets wider than this, in units of t of the far side, are not certified.
 _MAX_WIDTH = 2.0**-36
-#: Of so many vertices doubles choose those of which exact numbers are made; all are made of fewer.
-_MIN_BY_DOUBLES = 64
 
 
 class _Workspace(local):
@@ -206,7 +204,7 @@ def _chord_of_points(parts: PosedParts, part: int, origin, direction) -> tuple[F
     unit = Fraction(2) ** (grid - d_exponent)
     # Farther than all of it is from the origin: the largest component of d is at least 1.
     far = 4 * (vertices.reach + max(map(abs, o))) + 1
-    corners = vertices if len(vertices) >= _MIN_BY_DOUBLES else list(vertices)
+    corners = corners_of(vertices)
     ends = []
     for sign in (1, -1):
         begin = (o[0] - sign * far * d[0], o[1] - sign * far * d[1], o[2] - sign * far * d[2])

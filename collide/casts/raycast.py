@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from collide import argument_checks as checks
+from collide.broadphase.box_tree import BoxTree
+from collide.broadphase.boxes_ahead import bodies_ahead
 from collide.casts.cast_arguments import checked_rays
 from collide.casts.directions import Directions
+from collide.casts.items_ahead import nearest_first
 from collide.casts.leaves import leaves_of
 from collide.casts.posed_parts import posed_parts
 from collide.casts.ray_facets import facets_met
@@ -19,10 +23,14 @@ from collide.lowering.facet_bodies import body_of
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import moved_pose
+from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.shape import IDENTITY, Shape, checked_shape
 from collide.transforms import poses_as_given
+
+#: Boxes of items that are meshes are put into a tree where there are so many for each pose that rays see them at.
+_LEAST_ITEMS = 16
 
 
 def raycast(
@@ -97,16 +105,61 @@ def surfaces_met(
     events = [
         _on_parts([items[k] for k in numbers[~meshed]], numbers[~meshed], X_WA, origins, directions, limit, every)
     ]
-    for k in numbers[meshed].tolist():
-        mesh, X_AM = items[k]
-        body = body_of(mesh)
-        reach = np.full(len(X_WA), body.reach + float(np.abs(body.centre).sum()))
-        X_WM, slop = moved_pose(X_WA, X_AM, reach)
-        met = facets_met(body, X_WM, origins, directions, limit, every)
-        # Where the product of the poses is rounded, what is exact of it is not of the mesh.
-        proven = met.proven & ~(slop > 0.0)[met.ray if len(slop) > 1 else 0]
-        events.append(met._replace(item=np.full_like(met.item, k), proven=proven, certified=proven))
+
+    def ask(k: int, ray: np.ndarray) -> RayEvents:
+        """Events of some rays, by number, and mesh k."""
+        X = X_WA[ray] if len(X_WA) > 1 else X_WA
+        of_rays = Directions(directions.vectors[ray], directions.exponents[ray])
+        met = _on_mesh(*items[k], X, origins[ray], of_rays, limit, every)
+        return met._replace(ray=ray[met.ray], item=np.full_like(met.item, k))
+
+    events += _on_meshes(shape, numbers[meshed], X_WA, origins, directions, limit, every, ask)
     return in_order(joined(events))
+
+
+def _on_mesh(
+    mesh: Shape, X_AM: np.ndarray, X_WA, origins, directions: Directions, limit: float, every: bool
+) -> RayEvents:
+    body = body_of(mesh)
+    reach = np.full(len(X_WA), body.reach + float(np.abs(body.centre).sum()))
+    X_WM, slop = moved_pose(X_WA, X_AM, reach)
+    met = facets_met(body, X_WM, origins, directions, limit, every)
+    # Where the product of the poses is rounded, what is exact of it is not of the mesh.
+    proven = met.proven & ~(slop > 0.0)[met.ray if len(slop) > 1 else 0]
+    return met._replace(proven=proven, certified=proven)
+
+
+def _on_meshes(
+    shape: Shape, numbers: np.ndarray, X_WA, origins, directions: Directions, limit: float, every: bool,
+    ask: Callable[[int, np.ndarray], RayEvents],
+) -> Iterator[RayEvents]:
+    """Events of n rays and the items of a union that are meshes, by number; of many only of those whose boxes a ray
+    comes to, the nearest first, until a wall is proven nearer than all others can be.
+    """
+    n = len(origins)
+    poses, of_ray = X_WA[:1], np.zeros(n, dtype=np.int64)
+    if len(X_WA) > 1:
+        rows, which = np.unique(X_WA.reshape(n, 16), axis=0, return_inverse=True)
+        poses, of_ray = rows.reshape(-1, 4, 4), which.ravel()
+    if len(numbers) < _LEAST_ITEMS * max(len(poses), 1):  # a tree of boxes for every pose takes longer
+        yield from (ask(k, np.arange(n)) for k in numbers.tolist())
+        return
+    for pose in range(len(poses)):
+        rays = np.flatnonzero(of_ray == pose)
+        tree = BoxTree(compound_parts(shape).boxes(poses[pose : pose + 1], numbers)[0])
+        limits = directions.limits(limit)[rays, None]
+        sweeps = np.hstack([origins[rays], origins[rays], directions.vectors[rays], limits])
+        pairs, bounds = bodies_ahead(tree, sweeps)
+        best = np.full(len(rays), np.inf)
+        for some in [np.arange(len(pairs))] if every else nearest_first(pairs[:, 0], bounds, best):
+            ray, item = pairs[some].T
+            for k in np.unique(item).tolist():
+                met = ask(int(numbers[k]), rays[ray[item == k]])
+                known = met.ray[met.proven]
+                np.minimum.at(
+                    best, np.searchsorted(rays, known), np.ldexp(met.t[met.proven, 2], directions.exponents[known])
+                )
+                yield met
 
 
 def _is_facets(shape: Shape) -> bool:

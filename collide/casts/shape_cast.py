@@ -30,13 +30,16 @@ class ShapeCasts(NamedTuple):
     distance : t of the first contact: A stands at its pose moved by t · direction, and touches B. Lengths in units of
         the direction's, metres for unit directions. ``inf`` where nothing is met; 0 where they touch at the start.
     lower, upper : lower ≤ truth ≤ upper is proven where ``certified``, or the hit is.
-    point : in W [m], of B, where A touches it then; zeros where nothing is met.
-    normal : unit normal from A to B in W there, never against the direction where t > 0; of bodies that overlap at the
-        start the one of `collide.distance`. Zeros where nothing is met.
+    point : in W [m], of B, where A touches it then; of bodies that touch at the start a point of both. Zeros where
+        nothing is met.
+    normal : unit normal from A to B in W there, never against the direction where t > 0. Zeros where nothing is met,
+        and of bodies that touch at the start, as of `collide.distance` with ``signed=False``; with ``start_normals``
+        normal and point of these are those of `collide.distance` of the two parts that touch.
     certified : that the hit or miss is proven, and of hits that the bracket is narrow: 2⁻⁴⁰ of the size of the pair
         (extents and distance) in units of the direction's length, 2⁻²⁶ where a cylinder, cone or ellipsoid takes part.
     at_start : whether they touch at t = 0.
-    item_a, item_b : numbers of the parts of `Compound`s that touch, 0 of other shapes; −1 where nothing is met.
+    item_a, item_b : numbers of the parts of `Compound`s that touch, of several that do at the start two; 0 of other
+        shapes; −1 where nothing is met.
 
     Single casts give scalars and (3,).
     """
@@ -61,6 +64,7 @@ def shape_cast(
     X_WB,
     *,
     max_distance: float = math.inf,
+    start_normals: bool = False,
     check_poses: bool = True,
     threads: int = 1,
 ) -> ShapeCasts:
@@ -77,6 +81,8 @@ def shape_cast(
     max_distance : float
         ≥ 0, [lengths of the direction], as of `collide.raycast`: how far A moves at most, t of the point
         p + t · direction. With the whole motion as direction and 1 here, t is the fraction that peers report.
+    start_normals : bool
+        Work out normals of bodies that touch at the start, which takes as long as how deep they overlap.
     check_poses : bool
         Refuse matrices that are no rotation.
     threads : int
@@ -92,7 +98,7 @@ def shape_cast(
     ------
     InvalidArgument
         Directions of length 0, not finite, or of components that differ by more than 2^500; max_distance negative or
-        NaN; arguments that are no shapes; lengths that do not match.
+        NaN; start_normals neither True nor False; arguments that are no shapes; lengths that do not match.
     InvalidPose
         Matrices that are no pose.
     UnsupportedQuery
@@ -108,10 +114,12 @@ def shape_cast(
     Unions of m and k parts: a tree of the k boxes and, of the pairs of parts whose boxes meet on the way, the nearest
     first, until a contact is proven nearer than all others can be: O((m + k) log k), some tens of 10⁶ pairs; m k where
     every part is in every other's way, and up to 64 of them without a tree. Meshes of n facets: a walk down both trees
-    by the same bounds, O(log n) and the facets that are as near as the first contact. Bodies that touch at the start
-    cost what `collide.distance` does.
+    by the same bounds, O(log n) and the facets that are as near as the first contact; of unions with meshes the convex
+    sets around the parts are cast first, and the parts in that order. Bodies that touch at the start cost what
+    `collide.collide` does.
     """
     limit = checks.limit("shape_cast: max_distance", max_distance, "")
+    start_normals = checks.true_or_false("shape_cast: start_normals", start_normals)
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     X_WA, X_WB = as_poses(X_WA, "X_WA", check=check_poses), as_poses(X_WB, "X_WB", check=check_poses)
     directions, single_direction = checked_directions("shape_cast", "direction_W", direction_W, "a cast")
@@ -124,12 +132,14 @@ def shape_cast(
             f"shape_cast: lengths do not match: {lengths}; batches must be equally long, or a single one"
         )
     refuse_unbounded("shape_cast: A", A)
-    rows = _in_threads(A, B, X_WA, X_WB, directions.repeated(n), limit, check_threads(threads))
+    rows = _in_threads(A, B, X_WA, X_WB, directions.repeated(n), limit, start_normals, check_threads(threads))
     casts = as_casts(rows, directions.repeated(n))
     return ShapeCasts._make(only_value(values) for values in casts) if single and single_direction else casts
 
 
-def _in_threads(A, B, X_WA, X_WB, directions: Directions, limit: float, threads: int) -> CastRows:
+def _in_threads(
+    A, B, X_WA, X_WB, directions: Directions, limit: float, start_normals: bool, threads: int
+) -> CastRows:
     n = len(directions.vectors)
     limits = directions.limits(limit)
 
@@ -137,7 +147,7 @@ def _in_threads(A, B, X_WA, X_WB, directions: Directions, limit: float, threads:
         A_k, B_k = (S if isinstance(S, Shape) else S[piece] for S in (A, B))
         X_WAk, X_WBk = (X if len(X) == 1 else X[piece] for X in (X_WA, X_WB))
         of_piece = Directions(directions.vectors[piece], directions.exponents[piece])
-        return cast_batch(A_k, B_k, X_WAk, X_WBk, of_piece, limits[piece])
+        return cast_batch(A_k, B_k, X_WAk, X_WBk, of_piece, limits[piece], start_normals)
 
     threads = min(threads, n // _MIN_PER_THREAD)
     if threads < 2:

@@ -45,7 +45,8 @@ def drawn(*words, n: int):
 
 
 def rows_of(A, B, X_WA, X_WB, vectors, limits) -> PairRows:
-    return mesh_casts.cast_leaves(Leaf(A, EYE), Leaf(B, EYE), X_WA, X_WB, vectors, limits)
+    casts = mesh_casts.Casts(np.arange(len(limits)), vectors, limits, limits)
+    return mesh_casts.cast_leaves([Leaf(A, EYE)], [Leaf(B, EYE)], X_WA, X_WB, casts)
 
 
 @pytest.mark.parametrize("kind", MOVERS)
@@ -104,15 +105,19 @@ class Question:
     """What the entry is handed, kept alive."""
 
     def __init__(self, A, B, X_WA, X_WB, d, capacity: int):
-        self.sides = [mesh_casts._side(Leaf(S, EYE), X) for S, X in ((A, X_WA), (B, X_WB))]
+        self.sides = [mesh_casts._side([Leaf(S, EYE)], X) for S, X in ((A, X_WA), (B, X_WB))]
         a, b = self.sides
         self.n, self.capacity = len(d), capacity
         self.questions = np.ascontiguousarray(np.hstack([d, np.full((self.n, 1), math.inf)]))
-        self.table = ShapeTable([a.packed if a.packed is not None else pack_points(np.zeros((1, 3)))])
+        self.table = ShapeTable(a.packed or [pack_points(np.zeros((1, 3)))])
+        self.trees = np.array([tree.address for tree in a.trees] * self.n)
+        self.cast, self.best = np.arange(self.n), np.full(self.n, math.inf)
         self.candidates = np.full((capacity + 1, CANDIDATE), np.nan)
         self.header = np.array([
-            0 if a.tree is None else a.tree.address, b.tree.address, *self.table.addresses, address_of(a.poses.rows),
-            address_of(b.poses.rows), POSE, POSE, address_of(self.questions), address_of(self.candidates), capacity,
+            address_of(self.trees) if a.trees else 0, b.trees[0].address, *self.table.addresses,
+            address_of(a.poses.rows), address_of(b.poses.rows), POSE, POSE, address_of(self.questions),
+            address_of(self.candidates), capacity,
+            address_of(a.which), address_of(self.cast), address_of(self.best),
         ])
         self.doubles, self.integers = np.zeros(TREE_CAST_DOUBLES), np.zeros(TREE_CAST_INTEGERS, dtype=np.int64)
 

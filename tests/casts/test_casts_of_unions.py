@@ -118,7 +118,9 @@ def test_casts_of_unions_ask_few_pairs_of_parts(monkeypatch):
 def test_casts_onto_many_meshes_walk_few_of_them(monkeypatch):
     walked = []
     cast = cast_batches.cast_leaves
-    monkeypatch.setattr(cast_batches, "cast_leaves", lambda *args: (walked.append(len(args[2])), cast(*args))[1])
+    monkeypatch.setattr(
+        cast_batches, "cast_leaves", lambda *args, **options: (walked.append(len(args[2])), cast(*args, **options))[1]
+    )
     union = clutter(("mesh",), 300, "stands")
     far = collide.shape_cast(collide.Cylinder(0.1, 0.3), collide.pose((-5.0, 0.1, 0.0)), (1, 0, 0), union, np.eye(4))
     assert far.hit and 0 < sum(walked) < 30, walked
