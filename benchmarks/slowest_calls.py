@@ -1,6 +1,6 @@
 """The slowest calls of the public interface: found by a search over bodies, sizes, placements and questions, and kept.
 
-    python benchmarks/slowest_calls.py                        # the forty kept, beside the bar; five minutes
+    python benchmarks/slowest_calls.py                        # those kept, beside the bar; five minutes
     python benchmarks/slowest_calls.py --search --seconds 600 # looks for others; prints the worst, writes no file
     python benchmarks/slowest_calls.py --case "contacts ball:80000 box 1 deep"
 
@@ -41,6 +41,7 @@ WORST = (
     "shape_cast cylinder meshes:1000 100 inside", "certify terrain:10000 hull:1000 1e-07 inside",
     "certify sheet:300 rounded:100000 1 deep", "distance meshes:1000 terrain:80000 1 inside",
     "distance terrain:80000 cans:1000 0.01 near", "contacts sheet:80000 cone 100 inside",
+    "contacts sheet:80000 cone 3 inside", "contacts terrain:80000 cylinder 1 inside",
     "shape_cast ball:80000 terrain:10000 100 near", "distance rounded:100000 terrain:300 100 inside",
     "world_minimum meshes:1000 sheet:300 1e+07 inside", "world_minimum boxes:1000 cans:1000 1e+07 touching",
     "world_distances cans:1000 boxes:1000 1e-07 far", "world_rays hull:100000 rounded:10 0.01 deep",

@@ -19,7 +19,7 @@ from collide.mesh.bvh import REACH, MeshTree
 from collide.narrowphase.facets.near_facets import Facets
 
 #: Of facets within a set the engine is asked about so many a pose, picked from so many; of no more, about all.
-MAX_ASKED, _MAX_LOOKED_AT = 256, 4096
+MAX_ASKED, _MAX_LOOKED_AT = 512, 4096
 #: Boxes of a tree that are looked at together, at most, before a mesh is taken to reach out of a set.
 _MAX_BOXES = 256
 #: Rounding of a coordinate, of the numbers met; what poses stretch slops by is in the second.

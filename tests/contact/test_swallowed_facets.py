@@ -133,7 +133,7 @@ def test_of_a_mesh_within_no_facet_is_asked(shape, asked):
 
 @pytest.mark.parametrize("solid", [True, False])
 def test_of_facets_within_some_are_asked(solid, asked):
-    """A can, a cone and an egg sunk into 20,000 facets, some thousands of which lie within: 256 of those are asked, and
+    """A can, a cone and an egg sunk into 20,000 facets, some thousands of which lie within: 512 of those are asked, and
     those that cross the surface; where no length parts, few facets are asked whether they meet."""
     mesh, vertices, faces = rough(100, solid)
     for seed in range(6):
