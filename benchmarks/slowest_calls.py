@@ -40,6 +40,7 @@ WORST = (
     "shape_cast cylinder meshes:1000 100 inside", "certify terrain:10000 hull:1000 1e-07 inside",
     "certify sheet:300 rounded:100000 1 deep", "distance meshes:1000 terrain:80000 1 inside",
     "distance terrain:80000 cans:1000 0.01 near", "contacts sheet:80000 cone 100 inside",
+    "contacts sheet:80000 cone 3 inside", "contacts terrain:80000 cylinder 1 inside",
     "shape_cast ball:80000 terrain:10000 100 near", "shape_cast meshes:1000 hull:100000 1 inside",
     "shape_cast meshes:1000 balls:1000 0.01 inside", "shape_cast sheet:80000 meshes:1000 1e-07 near",
     "shape_cast rounded:100000 sheet:80000 1e-07 far", "shape_cast hull:100000 terrain:10000 1e+07 touching",

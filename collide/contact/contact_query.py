@@ -70,9 +70,9 @@ def contacts(
     meet come apart after a short way; a shorter one may be. With B at ``X_WB[:3, 3] + apart * normal`` no facet pair of
     the patch meets, proven (`inf`: no such length is known); of convex bodies the bodies are apart but for touching.
     Bodies that grip each other have several patches, none of which need separate the bodies. Where a body lies within a
-    solid, or facets meet too deeply for a patch (deeper than the smaller body's diameter), a row of kind
-    "translation" is the answer of `distance`. A part of a mesh that lies within the other body, without facets that
-    meet, adds nothing while other facets meet.
+    solid, a mesh of more than 512 facets within a cylinder, cone or ellipsoid, or facets meet too deeply for a patch
+    (deeper than the smaller body's diameter), a row of kind "translation" is the answer of `distance`. A part of a mesh
+    that lies within the other body, without facets that meet, adds nothing while other facets meet.
 
     Two convex shapes have one patch, with the normal of `distance`: in a batch, some microseconds a pair. Parts of a
     Compound are asked pair by pair: O(k) calls for k pairs whose boxes come within the margin. Two bodies of facets

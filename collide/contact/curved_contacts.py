@@ -1,8 +1,8 @@
 """Contacts of a mesh and a curved convex set (a cylinder, cone, ellipsoid, polytope of rounded corners) from Python.
 
-Facets near the set are found for all poses together, and answered one by one by the convex engine; a kernel makes
-patches of those of each pose (`curved_manifolds.py`). How far the set has to be moved along a patch's normal is proven
-by slabs there, and tried here by asking the facets again.
+Facets near the set are found for all poses together, and answered one by one by the convex engine, of many within the
+set some (`swallowed_facets.py`); a kernel makes patches of those of each pose (`curved_manifolds.py`). How far the set
+has to be moved along a patch's normal is proven by slabs there, and tried here by asking the facets again.
 """
 
 from __future__ import annotations
@@ -23,14 +23,16 @@ from collide.contact.curved_patches import LAST_BIT
 from collide.contact.distance_contacts import with_distances
 from collide.contact.facet_topology import topology_of
 from collide.contact.support_face import ROUND
+from collide.contact.swallowed_facets import facets_asked, meshes_within
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of
-from collide.lowering.enclosures import enclosure_of
+from collide.lowering.enclosures import Enclosure, enclosure_of
 from collide.lowering.facet_bodies import Body, PosesWithSlop, as_given, body_of
 from collide.lowering.hull_faces import face_table_of
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import ShapeTable
+from collide.mesh.bvh import REACH, MeshTree
 from collide.narrowphase.facets.facet_kernel_calls import step_of
 from collide.narrowphase.facets.facets_against_curved import facet_rows
 from collide.narrowphase.facets.near_facets import near_facets
@@ -44,6 +46,8 @@ _FACETS_OF_PIECE, MAX_FACETS, _POSES_OF_PIECE = 1 << 16, 1 << 18, 256
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
 #: Lengths tried where slabs prove one longer than the depth, in depths.
 _LENGTHS = (1.0 + 2.0**-20, 1.0 + 2.0**-7, 1.25, 2.0, 4.0)
+#: Facets asked first whether a set moved clears them.
+_FIRST_ASKED = 64
 #: A length that is longer than the depth by no more than this part is as good as one can be.
 _AS_GOOD = 1.0 + 2.0**-10
 
@@ -106,35 +110,44 @@ def _of_poses(
     A: Shape, B: Shape, X_WA, X_WB, n: int, margin: float, max_contacts: int, slack: np.ndarray | None
 ) -> Rows:
     """The same of a piece of the poses, the mesh being A."""
-    body, packed = body_of(A), enclosure_of(B).packed
+    body, enclosure = body_of(A), enclosure_of(B)
+    packed = enclosure.packed
     PA, PB = (as_given(np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4)))) for X in (X_WA, X_WB))
     limit = np.full(n, margin) if slack is None else margin + slack
-    near = _near(body, packed, PA, PB, limit)
+    near = _near(body, enclosure, PA, PB, limit)
     rows, ends, lacks = _patches(body, packed, PA.X, PB.X, near, margin, max_contacts, slack)
-    rows = _shortened(body, packed, PA, PB, near, rows, ends)
+    rows = _shortened(body, enclosure, PA, PB, near, rows, ends)
     if lacks.any():
         return with_distances(A, B, PA.X, PB.X, limit, rows, ends, lacks, reach=float(limit.max()))
     return rows, ends
 
 
-def _near(body: Body, packed: PackedConvex, PA: PosesWithSlop, PB: PosesWithSlop, limit: np.ndarray) -> _Near:
-    """Facets no farther than a limit a pose [m]. Raises UnsupportedQuery."""
+def _near(body: Body, enclosure: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, limit: np.ndarray) -> _Near:
+    """Facets no farther than a limit a pose [m], none where the whole mesh is within the set and of many facets: there
+    `distance` tells. Raises UnsupportedQuery.
+    """
+    packed = enclosure.packed
+    within = meshes_within(body, packed, PA, PB)
+    upper = limit if within is None else np.where(within, -np.inf, limit)
     across = PB.X[:, :3, 3] - PA.X[:, :3, 3]
-    candidates = near_facets(body.tree, packed, PA, PB, across, limit)
-    counts = np.bincount(candidates.pose, minlength=len(limit))
+    candidates = near_facets(body.tree, packed, PA, PB, across, upper)
+    pose, place = candidates.pose, candidates.place
+    counts = np.bincount(pose, minlength=len(limit))
     if counts.max(initial=0) > MAX_FACETS:
         raise UnsupportedQuery(
             f"contacts: more than {MAX_FACETS} facets lie within {limit.max():g} m of a curved shape: ask with a "
             "smaller margin, or take a coarser mesh"
         )
-    blocks = [np.zeros(0, dtype=PAIR_DTYPE)]
-    for begin in range(0, len(candidates.pose), _FACETS_OF_PIECE):
-        some = slice(begin, begin + _FACETS_OF_PIECE)
-        pose, place = candidates.pose[some], candidates.place[some]
-        blocks.append(facet_rows(body.tree, packed, PA, PB, pose, place, boolean=False, limit=np.inf))
-    rows = np.concatenate(blocks)
-    keep = rows["lower"] <= limit[candidates.pose]
-    rows, pose, place = rows[keep], candidates.pose[keep], candidates.place[keep]
+    is_asked = facets_asked(body, enclosure, PA, PB, candidates, counts)
+    rows, keep = np.zeros(len(pose), dtype=PAIR_DTYPE), ~is_asked
+    rows["hit"] = keep  # the others' rows have no normal: these start no patch
+    asked = np.flatnonzero(is_asked)
+    for begin in range(0, len(asked), _FACETS_OF_PIECE):
+        some = asked[begin : begin + _FACETS_OF_PIECE]
+        rows[some] = facet_rows(body.tree, packed, PA, PB, pose[some], place[some], boolean=False, limit=np.inf)
+    keep[asked] = rows["lower"][asked] <= limit[pose[asked]]
+    remaining = np.flatnonzero(keep)
+    rows, pose, place = rows[remaining], pose[remaining], place[remaining]
     facets = body.tree.ids[place].astype(np.int64)
     order = np.lexsort((facets, rows["distance"], ~rows["hit"], pose))
     starts = np.concatenate([[0], np.cumsum(np.bincount(pose, minlength=len(limit)))])
@@ -170,7 +183,7 @@ def _patches(
 
 
 def _shortened(
-    body: Body, packed: PackedConvex, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, rows: np.ndarray,
+    body: Body, enclosure: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, rows: np.ndarray,
     ends: np.ndarray,
 ) -> np.ndarray:
     """Rows whose ``apart`` is no longer than what facets, asked again, prove: B moved by it clears them, and A."""
@@ -188,18 +201,20 @@ def _shortened(
         if not len(trying):
             continue
         some = begins[trying]
-        parted = _parted(body, packed, PA, PB, near, rows[some], pose[some], length[trying])
+        parted = _parted(body, enclosure, PA, PB, near, rows[some], pose[some], length[trying])
         for i in trying[parted].tolist():
             rows["apart"][begins[i] : begins[i] + sizes[i]] = length[i]
     return rows
 
 
 def _parted(
-    body: Body, packed: PackedConvex, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, rows: np.ndarray,
+    body: Body, enclosure: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, rows: np.ndarray,
     pose: np.ndarray, length: np.ndarray,
 ) -> np.ndarray:
     """(m,) bool: whether the set moved by a length along the normal of a patch is proven clear of the patch's facets,
     and so is the mesh moved against it.
+
+    The facets that stand the highest along the normal are asked first: where some of them meet the set, no others are.
     """
     parted = np.ones(len(rows), dtype=bool)
     steps = length[:, None] * rows["normal"]
@@ -208,12 +223,43 @@ def _parted(
     members = [i + np.flatnonzero(near.patches[i:j] & bit) for i, j, bit in zip(begins, ends, bits)]
     which = np.repeat(np.arange(len(rows)), [len(m) for m in members])
     places = near.places[np.concatenate(members)]
-    for X_A, X_B in ((PA.X[pose], _moved(PB.X[pose], steps)), (_moved(PA.X[pose], -steps), PB.X[pose])):
-        asked = facet_rows(
-            body.tree, packed, as_given(X_A), as_given(X_B), which, places, boolean=True, limit=0.0
-        )
-        parted[which[asked["hit"]]] = False
+    above = _heights_above(body.tree, enclosure.outer, PA.X[pose], PB.X[pose], rows["normal"], length, which, places)
+    order = np.argsort(-above, kind="stable")[: np.count_nonzero(above >= 0.0)]
+    moved = (PA.X[pose], _moved(PB.X[pose], steps)), (_moved(PA.X[pose], -steps), PB.X[pose])
+    n = _FIRST_ASKED
+    while len(order):
+        some, order, n = order[:n], order[n:], 8 * n
+        for X_A, X_B in moved:
+            some = some[parted[which[some]]]
+            asked = facet_rows(
+                body.tree, enclosure.packed, as_given(X_A), as_given(X_B), which[some], places[some], boolean=True,
+                limit=0.0,
+            )
+            parted[which[some[asked["hit"]]]] = False
+        order = order[parted[which[order]]]
     return parted
+
+
+def _heights_above(
+    tree: MeshTree, outer: Body, X_WA: np.ndarray, X_WB: np.ndarray, nhat: np.ndarray, length: np.ndarray,
+    which: np.ndarray, places: np.ndarray,
+) -> np.ndarray:
+    """(k,) how far facets reach beyond where a set moved by a length along a normal begins, each for one of m [m].
+
+    max n·p over their corners, less min n·q + length over the corners of a polytope around the set, seen from the
+    mesh's origin, rounding added: where that is negative n parts them.
+    """
+    around = outer.tree.triangles.reshape(-1, 3)
+    along_a, along_b = ((X[:, :3, :3] * nhat[:, :, None]).sum(axis=1) for X in (X_WA, X_WB))
+    shift = ((X_WB[:, :3, 3] - X_WA[:, :3, 3]) * nhat).sum(axis=1)
+    lowest = (along_b @ around.T).min(axis=1) + shift + length
+    size = tree.numbers[REACH : REACH + 3].sum() + np.abs(around).max() + length
+    size += np.abs(X_WB[:, :3, 3]).sum(axis=1) + np.abs(X_WA[:, :3, 3]).sum(axis=1)
+    highest = np.concatenate(
+        [(tree.triangles[places[which == i]].reshape(-1, 3) @ n).reshape(-1, 3).max(axis=1)
+         for i, n in enumerate(along_a)]
+    )
+    return highest - (lowest - 2.0**-44 * size)[which]
 
 
 def _moved(X: np.ndarray, steps: np.ndarray) -> np.ndarray:

@@ -184,9 +184,14 @@ def test_rows_are_what_they_promise():
 
 def judge(seed, seen) -> None:
     rng = np.random.default_rng(seed)
-    (A, vertices, faces), B, X_WA, X_WB = scene(rng)
+    posed = scene(rng)
     margin = float(rng.choice([0.0, 0.02, 0.1]))
-    where = f"scene(np.random.default_rng({seed})), margin {margin}"
+    judge_scene(posed, margin, seen, f"scene(np.random.default_rng({seed})), margin {margin}")
+
+
+def judge_scene(posed, margin, seen, where) -> None:
+    """``posed`` : as of `scene`.   seen : counts what was met.   where : the case, for messages."""
+    (A, vertices, faces), B, X_WA, X_WB = posed
     c = collide.contacts(A, B, X_WA, X_WB, margin=margin)
     r, hit = collide.distance(A, B, X_WA, X_WB), collide.collide(A, B, X_WA, X_WB)
     if hit:
