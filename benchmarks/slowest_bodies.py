@@ -189,10 +189,6 @@ def _points(A, B, X, Y, small: float):
     return collide.contains(A, X, Y[:3, 3] + small * np.random.default_rng(0).normal(size=(10, 3)))
 
 
-def _certify(A, B, X, Y, small: float):
-    return collide.distance(A, B, X, Y).certificate
-
-
 def _world_of(A, B, X, Y) -> collide.World:
     """A built World of the pair, B moved to its pose; of A alone without B."""
     world = _worlds.get((id(A), id(B)))
@@ -270,7 +266,8 @@ QUESTIONS: dict[str, Callable] = {
     "contacts_margin": lambda A, B, X, Y, small: collide.contacts(A, B, X, Y, margin=0.02 * small),
     "impact": _impact,
     "shape_cast": lambda A, B, X, Y, small: collide.shape_cast(B, Y, -ALONG, A, X),
-    "rays": _rays, "rays_through": _rays_through, "contains": _points, "certify": _certify,
+    "rays": _rays, "rays_through": _rays_through, "contains": _points,
+    "certify": lambda A, B, X, Y, small: collide.distance(A, B, X, Y).certificate,
     "facet_pairs": lambda A, B, X, Y, small: collide.facet_pairs(A, B, X, Y),
     "world_collides": _world("collides"), "world_distances": _world("distances"), "world_contacts": _world("contacts"),
     "world_minimum": _world("minimum"), "world_nearest": _world_nearest, "world_collisions": _world("collisions"),
