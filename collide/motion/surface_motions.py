@@ -40,9 +40,11 @@ from collide.motion.path_facets import earliest_by_facets, facets_on_path
 from collide.motion.span_bounds import REACH
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_rows
+from collide.narrowphase.convex_kernel_calls import run_poses
 from collide.narrowphase.facets.facet_queries import facets_within
 from collide.narrowphase.facets.mesh_batches import pair_rows
 from collide.narrowphase.facets.near_facets import near_facets_up_to
+from collide.results import PAIR_DTYPE
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Sphere
@@ -68,6 +70,10 @@ _SHORTEST = 2.0**-46
 _TIMES_SMALLER, _TOGETHER = 8.0, 8
 #: So many facets on a way are looked at, and so many pairs of them and of pieces.
 _MAX_ON_THE_WAY, _JOBS_ON_THE_WAY = 1024, 1 << 13
+#: Facets of a mesh that are few beside another mesh of so many at least: for a walk each, and for one together.
+_FEW, _MAX_FEW, _FINELY_CUT = 8, 256, 1024
+#: So many pairs of them are looked at rather than walk both trees, which costs as much as thousands.
+_JOBS_OF_FEW = 2048
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
 _BALLS_OUTWARD = 1e-2
 _ULP = 2.0**-53
@@ -156,6 +162,17 @@ def _piece(shape: Shape, of: Callable[[], Any], X_CS: np.ndarray, slop: float, n
         return Piece(of, X_CS, number, reach, slop, body.tree, body.radius, False, packed)
     tree = enclosure_of(shape).outer.tree
     return Piece(of, X_CS, number, reach, slop, tree, _thickness(shape, tree), True, packed)
+
+
+def _around(piece: Piece) -> PackedConvex:
+    """A convex set around a piece."""
+    return bounding_parts_of(piece.shape)[0][0] if piece.packed is None else piece.packed
+
+
+@kept_with_shape("_vertex_set")
+def _vertices_of(mesh: Mesh) -> PackedConvex:
+    """The vertices of a mesh's facets, whose hull is the mesh's."""
+    return pack_points(mesh.vertices[np.unique(mesh.faces)])
 
 
 def _thickness(shape: Shape, tree: MeshTree) -> float:
@@ -393,25 +410,77 @@ class _Spans(Spans):
         convex = None if self.a.is_mesh and self.b.is_mesh else self.b if self.a.is_mesh else self.a
         if convex is not None and (convex.has_many_facets or (convex.is_curved and out[REACH] < convex.radius)):
             return self._near_convex(convex, out, max_pairs)
+        few = self._few_on_the_way(begin, end) if convex is None else None
+        if few is not None:
+            near = self._near_few(few, begin, end, max_pairs)
+            if near is not None:
+                return near
+        out = self.describe(begin, end)
         X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
         reach = float(out[REACH]) + self.a.radius + self.b.radius
         near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, max_pairs)  # type: ignore[arg-type]
         return None if near is None or len(near.facets) > max_pairs < _MAX_JOBS_OF_ALL else near.facets
+
+    def _few_on_the_way(self, begin: float, end: float) -> np.ndarray | None:
+        """(k,) facets of the larger mesh on the way of the other, finely cut one, where these are few; else None.
+
+        Boxes of the small mesh all lie in the box of such a facet: a walk of both trees comes to all of them, where
+        one of the small tree leaves out all that the facet's plane is far from.
+        """
+        if not (self.a.is_mesh and self.b.is_mesh and self.is_small_beside()):
+            return None
+        large, small = self._by_size()
+        if len(small.tree.ids) < _FINELY_CUT:  # type: ignore[union-attr]
+            return None
+        side = 0 if large is self.a else 1
+        return facets_on_path(self, large.tree, side, begin, end, _MAX_FEW)  # type: ignore[arg-type]
+
+    def _near_few(self, few: np.ndarray, begin: float, end: float, max_pairs: int) -> np.ndarray | None:
+        """(k, 2) facets that may meet in a span in which few of the larger mesh's do; None where that is not told, of
+        more than ``max_pairs`` pairs.
+
+        A set that holds facets is no farther from the small mesh than they are: first all of them together, then each.
+        """
+        (large, small), out = self._by_size(), self.describe(begin, end)
+        side, corners, reach = 0 if large is self.a else 1, large.corners(few), float(out[REACH])
+        X = out[:32].reshape(2, 4, 4).copy()
+        at = as_given(X[1 - side, None]), as_given(X[side, None])
+
+        def near(of: np.ndarray) -> np.ndarray | None:
+            along = self._normal if self._normal.any() else _normals(of).sum(axis=0)[None] @ X[side, :3, :3].T
+            packed = pack_points(of.reshape(-1, 3))
+            found = near_facets_up_to(small.tree, packed, *at, along, reach, max_pairs)  # type: ignore[arg-type]
+            return None if found is None else small.tree.ids[found.place]  # type: ignore[union-attr]
+
+        together = near(corners) if len(few) else np.zeros(0, dtype=np.int64)
+        each = [together] * len(few)
+        max_pairs = max(max_pairs, _JOBS_OF_FEW)
+        if len(few) > 1 and (together is None or len(together) * len(few) > max_pairs):
+            each = [near(of[None]) for of in corners] if len(few) <= _FEW else [None]
+        if any(of is None for of in each) or sum(map(len, each)) > max_pairs:  # type: ignore[arg-type]
+            return None
+        of_large = np.repeat(few, [len(of) for of in each])  # type: ignore[arg-type]
+        of_small = np.concatenate(each) if len(few) else of_large  # type: ignore[arg-type]
+        return np.stack([of_large, of_small][:: 1 if side == 0 else -1], axis=1)
+
+    def _by_size(self) -> tuple[Piece, Piece]:
+        """The larger piece and the smaller one."""
+        return (self.a, self.b) if self.a.reach > self.b.reach else (self.b, self.a)
 
     def _near_convex(self, convex: Piece, out: np.ndarray, max_pairs: int) -> np.ndarray | None:
         """The same of a mesh and a convex piece as a whole: where the polytope around a curved one is farther from it
         than anything moves in the span, and where a facet of the mesh may be near more facets of a hull than can be
         jobs.
 
-        Planes between the two say which facets are near, those along the normal that is known too. Of a curved piece
-        the distance tells it, and whether anything is near at all; of a large hull the last `cut` does: any direction
-        is right.
+        Planes between the two say which facets are near, those along the normal that is known too: of the sets around
+        both where these first meet, then of the last `cut`; any direction is right. Where none is known of a curved
+        piece the distance tells it, and whether anything is near at all.
         """
         matrices, reach = (out[:16].reshape(1, 4, 4), out[16:32].reshape(1, 4, 4)), float(out[REACH])
         side = 0 if self.a.is_mesh else 1
         mesh: Any = self.a if side == 0 else self.b
         X_M, X_C = matrices[side].copy(), matrices[1 - side].copy()
-        if convex.is_curved:
+        if convex.is_curved and not self._normal.any():
             row = pair_rows(mesh.shape, convex.shape, X_M, X_C, limit=reach, depths=False)[0]
             if row["lower"] > reach:
                 return np.zeros((0, 2), dtype=np.int64)
@@ -424,6 +493,17 @@ class _Spans(Spans):
         facets[:, side] = mesh.tree.ids[near.place]
         return facets
 
+    def face_each_other(self, time: float) -> None:
+        """Have the normal of sets around both pieces known, as it is shortly before they meet at a time.
+
+        Where the smaller one has moved by its own size the direction is good to rounding, at the time itself it is not.
+        """
+        at = self.placed(max(time - self.scale(time, 1.0), 0.0))
+        table, row = ShapeTable([_around(self.a), _around(self.b)]), np.zeros(1, dtype=PAIR_DTYPE)
+        X = at.X_A[None], at.X_B[None]
+        run_poses(row, table, None, *X, boolean=False, limit=np.inf, check=False, axes=None, depths=False)
+        self._take_normal(row[0])
+
     def _take_normal(self, row: np.void) -> None:
         """The normal of a row becomes the one known, if it has any: of bodies that overlap it has none."""
         if row["normal"].any():
@@ -433,19 +513,33 @@ class _Spans(Spans):
         """The time in which the smaller piece may move by its own size."""
         return min(self.a.reach, self.b.reach) / float(self.describe(begin, end)[REACH]) * 0.5 * (end - begin)
 
-    def smaller_set(self) -> tuple[ShapeTable, np.ndarray, np.ndarray]:
-        """The convex set around the smaller piece, as `earliest_by_facets` takes sets."""
+    def smaller_set(self, tight: bool = False) -> tuple[ShapeTable, np.ndarray, np.ndarray]:
+        """A convex set around the smaller piece, as `earliest_by_facets` takes sets; tight: the hull of a mesh's
+        vertices, with which it touches a plane."""
         side = 1 if self.a.reach > self.b.reach else 0
         piece, row = (self.a, self.b)[side], np.zeros(1, dtype=np.int64)
-        packed = bounding_parts_of(piece.shape)[0][0] if piece.packed is None else piece.packed
+        packed = _vertices_of(piece.shape) if tight else _around(piece)
         table = ShapeTable([packed._replace(slop=packed.slop + piece.slop)])
         table.build_trees(row)
         return table, row, self.parts[side : side + 1]
 
     def is_small_beside(self) -> bool:
         """Whether one piece is small beside the other, which is a mesh."""
-        large, small = (self.a, self.b) if self.a.reach > self.b.reach else (self.b, self.a)
+        large, small = self._by_size()
         return large.is_mesh and _TIMES_SMALLER * small.reach <= large.reach
+
+    def time_on_the_way(self, begin: float, end: float, tolerance: float) -> float:
+        """A time before which the smaller piece meets none of the facets of the larger one, infinity of one that meets
+        none up to ``end``: by a set around a mesh at first, from where that meets any by its hull.
+
+        To a small part of the time in which the piece moves by its own size: a bracket may be wider than this is.
+        """
+        width = max(min(tolerance, _LEAST_CUT * self.scale(begin, end)), _SHORTEST)
+        for tight in (False, True) if self._by_size()[1].is_mesh else (False,):
+            begin = float(self.times_on_the_way(self.smaller_set(tight), begin, end, width)[0][0])
+            if not begin < end:
+                return math.inf
+        return begin
 
     def times_on_the_way(self, sets: Any, begin: float, end: float, tolerance: float) -> tuple[np.ndarray, float]:
         """((n,) times before which convex sets, all in the smaller piece, meet none of the facets of the larger one
@@ -517,6 +611,13 @@ class _Spans(Spans):
         return passed * gap / nearer if gap > 0.0 and nearer > 0.0 else math.inf
 
 
+def _normals(corners: np.ndarray) -> np.ndarray:
+    """(k, 3) unit normals of triangles (k, 3, 3); 0 of those without an area."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.sqrt((normals * normals).sum(axis=1))[:, None]
+    return np.where(lengths > 0.0, normals / np.where(lengths > 0.0, lengths, 1.0), 0.0)
+
+
 def _max_jobs(span: float) -> int:
     return int(min(_MAX_JOBS * max(_SHORT / max(span, 1e-9), 1.0), _MAX_JOBS_OF_ALL))
 
@@ -526,12 +627,14 @@ class _Span(NamedTuple):
 
     max_pairs : of more facets that may meet in it it is cut.   may_meet : whether bodies that are convex where they
     meet do so as it begins: its first part is looked at before it is cut.
+    is_timed: whether it begins when the smaller one of two bodies first meets what is on its way.
     """
 
     begin: float
     end: float
     max_pairs: int
     may_meet: bool = False
+    is_timed: bool = False
 
 
 def _search(
@@ -544,6 +647,8 @@ def _search(
     """
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
+    if earliest > 0.0:
+        spans.face_each_other(earliest)
     to_do = [_Span(max(begin, earliest), end, _max_jobs(end - begin), earliest > 0.0)]
     while to_do:
         span = to_do.pop()
@@ -551,6 +656,12 @@ def _search(
         if span.begin > span.end:
             continue
         scale, length = spans.scale(span.begin, span.end), span.end - span.begin
+        is_long = length > 4.0 * scale and spans.is_small_beside()  # of so long a way a ball holds too many facets
+        if is_long and not span.is_timed:
+            first = max(spans.time_on_the_way(span.begin, span.end, tolerance), span.begin)
+            may_meet = span.may_meet or first > span.begin + _LEAST_CUT * scale
+            to_do.append(span._replace(begin=first, may_meet=may_meet, is_timed=True))
+            continue
         if span.may_meet and length > 2.0 * scale:
             to_do.append(span._replace(may_meet=False))
             end, more = min(span.begin + max(_LEAST_CUT * scale, _SHORTEST), span.end), _MORE * span.max_pairs
@@ -559,12 +670,6 @@ def _search(
                 to_do[-1] = _Span(end, span.end, span.max_pairs)
                 _look_at(near, a, b, motion, (span.begin, end), tolerance, row, is_part)
             continue
-        is_long = length > 4.0 * scale and spans.is_small_beside()  # of so long a way a ball holds too many facets
-        if is_long:
-            later = float(spans.times_on_the_way(spans.smaller_set(), span.begin, span.end, tolerance)[0][0])
-            if later > span.begin + scale:
-                to_do.append(span._replace(begin=later, may_meet=True))
-                continue
         max_pairs, near = _MAX_JOBS_OF_ALL if length < _SHORTEST else span.max_pairs, None
         if not is_long or length < _SHORTEST:
             near = spans.near_facets(span.begin, span.end, max_pairs)
