@@ -31,9 +31,17 @@ from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.mesh.bvh import MeshTree
 from collide.motion.common_points import CommonPoints, Placed
 from collide.motion.convex_impact import CONTACT, OPEN
-from collide.motion.convex_motions import JOBS_AT_ONCE, Tables, bounds_of, earliest_times, first_pair, header_of
+from collide.motion.convex_motions import (
+    JOBS_AT_ONCE,
+    Tables,
+    bounds_of,
+    earliest_of,
+    earliest_times,
+    first_pair,
+    header_of,
+)
 from collide.motion.impact_jobs import find_impacts
-from collide.motion.impact_rows import flipped_impacts
+from collide.motion.impact_rows import flipped_impacts, free_rows
 from collide.motion.motions import Motions
 from collide.motion.parts_ahead import MAX_ASKED, Spans, parts_ahead, reach_of_union, slop_of_union
 from collide.motion.path_facets import earliest_by_facets, facets_on_path
@@ -167,6 +175,12 @@ def _piece(shape: Shape, of: Callable[[], Any], X_CS: np.ndarray, slop: float, n
 def _around(piece: Piece) -> PackedConvex:
     """A convex set around a piece."""
     return bounding_parts_of(piece.shape)[0][0] if piece.packed is None else piece.packed
+
+
+def _hull_of(piece: Piece) -> PackedConvex:
+    """The hull of a piece, and as much around it as rounding moved it by."""
+    packed = _vertices_of(piece.shape) if piece.packed is None else piece.packed
+    return packed._replace(slop=packed.slop + piece.slop)
 
 
 @kept_with_shape("_vertex_set")
@@ -513,13 +527,26 @@ class _Spans(Spans):
         """The time in which the smaller piece may move by its own size."""
         return min(self.a.reach, self.b.reach) / float(self.describe(begin, end)[REACH]) * 0.5 * (end - begin)
 
+    def time_of_hulls(self, begin: float, end: float, tolerance: float) -> float:
+        """A time before which the hulls of both pieces do not meet, infinity where they do not up to ``end``."""
+        table = ShapeTable([_hull_of(piece) for piece in (self.a, self.b)])
+        table.build_trees(np.arange(2))
+        jobs, row = np.array([[0, 0, 0, 1, 1]], dtype=np.int64), free_rows(1)
+        _do(table, 2, self.parts, self.motion, jobs, begin, end, self.fine(begin, end, tolerance), row)
+        return max(float(earliest_of(row)[0]), begin)
+
+    def fine(self, begin: float, end: float, tolerance: float) -> float:
+        """A tolerance of times that is a small part of that in which the smaller piece moves by its own size: a bracket
+        as wide as is asked for may be wider than this is."""
+        return max(min(tolerance, _LEAST_CUT * self.scale(begin, end)), _SHORTEST)
+
     def smaller_set(self, tight: bool = False) -> tuple[ShapeTable, np.ndarray, np.ndarray]:
         """A convex set around the smaller piece, as `earliest_by_facets` takes sets; tight: the hull of a mesh's
         vertices, with which it touches a plane."""
         side = 1 if self.a.reach > self.b.reach else 0
         piece, row = (self.a, self.b)[side], np.zeros(1, dtype=np.int64)
-        packed = _vertices_of(piece.shape) if tight else _around(piece)
-        table = ShapeTable([packed._replace(slop=packed.slop + piece.slop)])
+        packed = _around(piece)
+        table = ShapeTable([_hull_of(piece) if tight else packed._replace(slop=packed.slop + piece.slop)])
         table.build_trees(row)
         return table, row, self.parts[side : side + 1]
 
@@ -530,11 +557,8 @@ class _Spans(Spans):
 
     def time_on_the_way(self, begin: float, end: float, tolerance: float) -> float:
         """A time before which the smaller piece meets none of the facets of the larger one, infinity of one that meets
-        none up to ``end``: by a set around a mesh at first, from where that meets any by its hull.
-
-        To a small part of the time in which the piece moves by its own size: a bracket may be wider than this is.
-        """
-        width = max(min(tolerance, _LEAST_CUT * self.scale(begin, end)), _SHORTEST)
+        none up to ``end``: by a set around a mesh at first, from where that meets any by its hull."""
+        width = self.fine(begin, end, tolerance)
         for tight in (False, True) if self._by_size()[1].is_mesh else (False,):
             begin = float(self.times_on_the_way(self.smaller_set(tight), begin, end, width)[0][0])
             if not begin < end:
@@ -648,7 +672,8 @@ def _search(
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
     if earliest > 0.0:
-        spans.face_each_other(earliest)
+        earliest = spans.time_of_hulls(earliest, min(end, float(row["upper"][0])), tolerance)
+        spans.face_each_other(min(earliest, end))
     to_do = [_Span(max(begin, earliest), end, _max_jobs(end - begin), earliest > 0.0)]
     while to_do:
         span = to_do.pop()
