@@ -39,11 +39,12 @@ from collide.motion.convex_motions import (
     earliest_times,
     first_pair,
     header_of,
+    parts_in_turn,
 )
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts, free_rows
 from collide.motion.motions import Motions
-from collide.motion.parts_ahead import MAX_ASKED, Spans, parts_ahead, reach_of_union, slop_of_union
+from collide.motion.parts_ahead import MAX_ASKED, Spans, reach_of_union, slop_of_union
 from collide.motion.path_facets import earliest_by_facets, facets_on_path
 from collide.motion.span_bounds import REACH
 from collide.narrowphase.composite.composite_parts import compound_parts
@@ -77,7 +78,7 @@ _SHORTEST = 2.0**-46
 #: each is looked at by itself.
 _TIMES_SMALLER, _TOGETHER = 8.0, 8
 #: So many facets on a way are looked at, and so many pairs of them and of pieces.
-_MAX_ON_THE_WAY, _JOBS_ON_THE_WAY = 1024, 1 << 13
+_MAX_ON_THE_WAY, _JOBS_ON_THE_WAY = 1024, 1 << 16
 #: Facets of a mesh that are few beside another mesh of so many at least: for a walk each, and for one together.
 _FEW, _MAX_FEW, _FINELY_CUT = 8, 256, 1024
 #: So many pairs of them are looked at rather than walk both trees, which costs as much as thousands.
@@ -239,8 +240,8 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
             if _search_small([(a, b)], motion, (begin, 1.0), tolerance, row, is_part)[0]:
                 _search(a, b, motion, tolerance, row, is_part, begin)
 
-        unions = compound_parts(A), compound_parts(B)
-        for i, j in [numbers] if is_small else parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
+        ahead = [numbers] if is_small else parts_in_turn(A, B, motion, upper, _PIECES_TOGETHER, tolerance)
+        for i, j in ahead:
             # No contact of two pieces is earlier than that of the convex sets around both, nor than that of one set and
             # the facets on its way: in the order of these, the first contact found leaves out all later ones.
             earliest, some, end = np.zeros(len(i)), np.arange(len(i)), min(upper(), 1.0)
