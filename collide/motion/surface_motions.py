@@ -427,9 +427,9 @@ class _Spans(Spans):
             return self._near_convex(convex, out, max_pairs)
         few = self._few_on_the_way(begin, end) if convex is None else None
         if few is not None:
-            near = self._near_few(few, begin, end, max_pairs)
-            if near is not None:
-                return near
+            told = self._near_few(few, begin, end, max_pairs)
+            if told is not None:
+                return told
         out = self.describe(begin, end)
         X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
         reach = float(out[REACH]) + self.a.radius + self.b.radius
@@ -562,8 +562,8 @@ class _Spans(Spans):
         width = self.fine(begin, end, tolerance)
         for tight in (False, True) if self._by_size()[1].is_mesh else (False,):
             begin = float(self.times_on_the_way(self.smaller_set(tight), begin, end, width)[0][0])
-            if not begin < end:
-                return math.inf
+            if not begin < end:  # at the end there may be a contact
+                return begin
         return begin
 
     def times_on_the_way(self, sets: Any, begin: float, end: float, tolerance: float) -> tuple[np.ndarray, float]:
@@ -651,8 +651,8 @@ class _Span(NamedTuple):
     """A span of time to be looked at.
 
     max_pairs : of more facets that may meet in it it is cut.   may_meet : whether bodies that are convex where they
-    meet do so as it begins: its first part is looked at before it is cut.
-    is_timed: whether it begins when the smaller one of two bodies first meets what is on its way.
+    meet do so as it begins: its first part is looked at before it is cut.   is_timed : whether it begins where a set
+    around the smaller body first meets a facet on its way.
     """
 
     begin: float
@@ -672,10 +672,11 @@ def _search(
     """
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
-    if earliest > 0.0:
-        earliest = spans.time_of_hulls(earliest, min(end, float(row["upper"][0])), tolerance)
-        spans.face_each_other(min(earliest, end))
-    to_do = [_Span(max(begin, earliest), end, _max_jobs(end - begin), earliest > 0.0)]
+    max_pairs, begin, end = _max_jobs(end - begin), max(begin, earliest), min(end, float(row["upper"][0]))
+    if 0.0 < earliest and begin <= end and not spans.is_small_beside():  # else facets on the way tell more than a hull
+        begin = spans.time_of_hulls(begin, end, tolerance)
+        spans.face_each_other(min(begin, end))
+    to_do = [_Span(begin, end, max_pairs, earliest > 0.0)]
     while to_do:
         span = to_do.pop()
         span = span._replace(end=min(span.end, float(row["upper"][0])))
