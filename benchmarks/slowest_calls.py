@@ -1,6 +1,6 @@
 """The slowest calls of the public interface: found by a search over bodies, sizes, placements and questions, and kept.
 
-    python benchmarks/slowest_calls.py                        # the forty kept, beside the bar; five minutes
+    python benchmarks/slowest_calls.py                        # the forty-six kept, beside the bar; five minutes
     python benchmarks/slowest_calls.py --search --seconds 600 # looks for others; prints the worst, writes no file
     python benchmarks/slowest_calls.py --case "contacts ball:80000 box 1 deep"
 
@@ -50,6 +50,9 @@ WORST = (
     "impact hull:100000 terrain:80000 100 far", "impact ball:10000 hull:100000 1e+07 near",
     "impact sheet:80000 boxes:1000 1e+07 far", "impact cans:1000 slab:300 1e+07 touching",
     "impact balls:3 meshes:1000 0.01 touching", "impact hull:100000 meshes:1000 1e-07 near",
+    "impact terrain:10000 ball:80000 1e-07 touching", "impact sheet:80000 terrain:10000 1e+07 near",
+    "impact sheet:80000 cans:3 1e+07 deep", "impact cylinder slab:80000 1e-07 near",
+    "impact sheet:80000 boxes:1000 0.01 deep", "impact halfspace meshes:1000 1 deep",
 )
 
 
