@@ -80,9 +80,9 @@ _TIMES_SMALLER, _TOGETHER = 8.0, 8
 #: So many facets on a way are looked at, and so many pairs of them and of pieces.
 _MAX_ON_THE_WAY, _JOBS_ON_THE_WAY = 1024, 1 << 16
 #: Facets of a mesh that are few beside another mesh of so many at least: for a walk each, and for one together.
-_FEW, _MAX_FEW, _FINELY_CUT = 8, 256, 1024
+_MAX_EACH, _MAX_TOGETHER, _FINELY_CUT = 8, 256, 1024
 #: So many pairs of them are looked at rather than walk both trees, which costs as much as thousands.
-_JOBS_OF_FEW = 2048
+_JOBS_BEFORE_WALKS = 2048
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
 _BALLS_OUTWARD = 1e-2
 _ULP = 2.0**-53
@@ -425,19 +425,19 @@ class _Spans(Spans):
         convex = None if self.a.is_mesh and self.b.is_mesh else self.b if self.a.is_mesh else self.a
         if convex is not None and (convex.has_many_facets or (convex.is_curved and out[REACH] < convex.radius)):
             return self._near_convex(convex, out, max_pairs)
-        few = self._few_on_the_way(begin, end) if convex is None else None
-        if few is not None:
-            told = self._near_few(few, begin, end, max_pairs)
-            if told is not None:
-                return told
+        large_facets = self._large_facets_ahead(begin, end) if convex is None else None
+        if large_facets is not None:
+            pairs = self._near_large_facets(large_facets, begin, end, max_pairs)
+            if pairs is not None:
+                return pairs
         out = self.describe(begin, end)
         X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
         reach = float(out[REACH]) + self.a.radius + self.b.radius
         near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, max_pairs)  # type: ignore[arg-type]
         return None if near is None or len(near.facets) > max_pairs < _MAX_JOBS_OF_ALL else near.facets
 
-    def _few_on_the_way(self, begin: float, end: float) -> np.ndarray | None:
-        """(k,) facets of the larger mesh on the way of the other, finely cut one, where these are few; else None.
+    def _large_facets_ahead(self, begin: float, end: float) -> np.ndarray | None:
+        """(k,) facets of the larger mesh on the way of the other, finely cut one, if they are few; else None.
 
         Boxes of the small mesh all lie in the box of such a facet: a walk of both trees comes to all of them, where
         one of the small tree leaves out all that the facet's plane is far from.
@@ -448,34 +448,34 @@ class _Spans(Spans):
         if len(small.tree.ids) < _FINELY_CUT:  # type: ignore[union-attr]
             return None
         side = 0 if large is self.a else 1
-        return facets_on_path(self, large.tree, side, begin, end, _MAX_FEW)  # type: ignore[arg-type]
+        return facets_on_path(self, large.tree, side, begin, end, _MAX_TOGETHER)  # type: ignore[arg-type]
 
-    def _near_few(self, few: np.ndarray, begin: float, end: float, max_pairs: int) -> np.ndarray | None:
-        """(k, 2) facets that may meet in a span in which few of the larger mesh's do; None where that is not told, of
-        more than ``max_pairs`` pairs.
+    def _near_large_facets(self, ahead: np.ndarray, begin: float, end: float, max_pairs: int) -> np.ndarray | None:
+        """(k, 2) facets that may meet in a span, of which those of the larger mesh are ``ahead``; None where planes
+        leave more than ``max_pairs``.
 
         A set that holds facets is no farther from the small mesh than they are: first all of them together, then each.
         """
         (large, small), out = self._by_size(), self.describe(begin, end)
-        side, corners, reach = 0 if large is self.a else 1, large.corners(few), float(out[REACH])
+        side, corners, reach = 0 if large is self.a else 1, large.corners(ahead), float(out[REACH])
         X = out[:32].reshape(2, 4, 4).copy()
         at = as_given(X[1 - side, None]), as_given(X[side, None])
 
         def near(of: np.ndarray) -> np.ndarray | None:
             along = self._normal if self._normal.any() else _normals(of).sum(axis=0)[None] @ X[side, :3, :3].T
             packed = pack_points(of.reshape(-1, 3))
-            found = near_facets_up_to(small.tree, packed, *at, along, reach, max_pairs)  # type: ignore[arg-type]
-            return None if found is None else small.tree.ids[found.place]  # type: ignore[union-attr]
+            rows = near_facets_up_to(small.tree, packed, *at, along, reach, max_pairs)  # type: ignore[arg-type]
+            return None if rows is None else small.tree.ids[rows.place]  # type: ignore[union-attr]
 
-        together = near(corners) if len(few) else np.zeros(0, dtype=np.int64)
-        each = [together] * len(few)
-        max_pairs = max(max_pairs, _JOBS_OF_FEW)
-        if len(few) > 1 and (together is None or len(together) * len(few) > max_pairs):
-            each = [near(of[None]) for of in corners] if len(few) <= _FEW else [None]
+        together = near(corners) if len(ahead) else np.zeros(0, dtype=np.int64)
+        each = [together] * len(ahead)
+        max_pairs = max(max_pairs, _JOBS_BEFORE_WALKS)
+        if len(ahead) > 1 and (together is None or len(together) * len(ahead) > max_pairs):
+            each = [near(of[None]) for of in corners] if len(ahead) <= _MAX_EACH else [None]
         if any(of is None for of in each) or sum(map(len, each)) > max_pairs:  # type: ignore[arg-type]
             return None
-        of_large = np.repeat(few, [len(of) for of in each])  # type: ignore[arg-type]
-        of_small = np.concatenate(each) if len(few) else of_large  # type: ignore[arg-type]
+        of_large = np.repeat(ahead, [len(of) for of in each])  # type: ignore[arg-type]
+        of_small = np.concatenate(each) if len(ahead) else of_large  # type: ignore[arg-type]
         return np.stack([of_large, of_small][:: 1 if side == 0 else -1], axis=1)
 
     def _by_size(self) -> tuple[Piece, Piece]:

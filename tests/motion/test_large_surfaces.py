@@ -226,6 +226,18 @@ def test_a_finely_cut_mesh_that_grazes_a_large_facet_is_asked_no_distance(monkey
     assert 4 <= len(calls) <= 24, calls
 
 
+@pytest.mark.parametrize("kind", ["ball", "sheet"])
+def test_a_finely_cut_mesh_that_ends_on_a_large_facet_is_not_said_to_be_free(kind):
+    """At the end of the way it is within a billionth of its size of touching: farther it is free, else it is not."""
+    face = collide.Mesh([[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [0.0, 3.0, 0.0]], [[0, 1, 2]], solid=False)
+    small = small_mesh(kind, 1e-3)
+    low, start = float(small.vertices[:, 2].min()), collide.pose((0.0, 0.0, 0.5))
+    for above, hit in ((-1e-12, True), (0.0, True), (1e-12, False)):
+        r = collide.time_of_impact(face, small, np.eye(4), np.eye(4), start, collide.pose((0.0, 0.0, above - low)))
+        assert r.hit == hit and r.lower <= 1.0, (above, r)
+        assert (r.upper <= 1.0) == (above != 0.0), (above, r)  # touching to the last bit is left open
+
+
 def fan(n: int, rng) -> collide.Mesh:
     """n facets about a corner that stands out, by other lengths each."""
     angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, n))
@@ -249,7 +261,7 @@ def from_triangle(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("n", [5, 60])
 @pytest.mark.parametrize("side", [0, 1])
-def test_facets_near_few_large_ones_are_all_that_are_near(side, n):
+def test_facets_near_large_facets_large_ones_are_all_that_are_near(side, n):
     """Corners of small facets are measured from the large ones at the middle of a span: what is within its reach is
     listed."""
     rng = rng_of(f"near few facets {side} {n}")
@@ -266,8 +278,8 @@ def test_facets_near_few_large_ones_are_all_that_are_near(side, n):
         spans = surface_motions._Spans(*(pieces if side == 0 else pieces[::-1]), motion)
         begin = rng.uniform(0.0, 0.5)
         end = begin + rng.choice([0.03, 0.1])
-        few = spans._few_on_the_way(begin, end)
-        pairs = None if few is None else spans._near_few(few, begin, end, 1 << 20)
+        few = spans._large_facets_ahead(begin, end)
+        pairs = None if few is None else spans._near_large_facets(few, begin, end, 1 << 20)
         if pairs is None or not len(few):
             continue
         reach = spans.describe(begin, end)[32]
