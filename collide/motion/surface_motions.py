@@ -82,7 +82,7 @@ _MAX_ON_THE_WAY, _JOBS_ON_THE_WAY = 1024, 1 << 16
 #: Facets of a mesh that are few beside another mesh of so many at least: for a walk each, and for one together.
 _MAX_EACH, _MAX_TOGETHER, _FINELY_CUT = 8, 256, 1024
 #: So many pairs of them are looked at rather than walk both trees, which costs as much as thousands.
-_JOBS_BEFORE_WALKS = 2048
+_JOBS_BEFORE_WALKS = 1 << 13
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
 _BALLS_OUTWARD = 1e-2
 _ULP = 2.0**-53

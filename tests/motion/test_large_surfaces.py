@@ -259,6 +259,15 @@ def from_triangle(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return np.where(is_above, np.abs(offsets[:, 0] @ normal) / np.linalg.norm(normal), beside)
 
 
+def test_a_finely_cut_mesh_before_a_corner_of_many_facets_is_not_walked_beside_all_of_them(monkeypatch):
+    """A ball comes down on a corner of 130 facets: all pairs of these and its own nearest facets are jobs."""
+    calls, rng = counted(monkeypatch, "pair_rows", "facets_within"), rng_of("corner of many facets")
+    ends = collide.pose((0.0, 0.0, 0.5)), collide.pose((0.0, 0.0, -0.5))
+    r = collide.time_of_impact(fan(130, rng), small_mesh("ball", 1e-6), np.eye(4), np.eye(4), *ends)
+    assert r.hit and r.certified and abs(r.time - 0.5) < 1e-6
+    assert not calls, calls
+
+
 @pytest.mark.parametrize("n", [5, 60])
 @pytest.mark.parametrize("side", [0, 1])
 def test_facets_near_large_facets_large_ones_are_all_that_are_near(side, n):
