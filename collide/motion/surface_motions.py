@@ -83,6 +83,8 @@ _MAX_ON_THE_WAY, _JOBS_ON_THE_WAY = 1024, 1 << 16
 _MAX_EACH, _MAX_TOGETHER, _FINELY_CUT = 8, 256, 1024
 #: So many pairs of them are looked at rather than walk both trees, which costs as much as thousands.
 _JOBS_BEFORE_WALKS = 1 << 13
+#: Normals are asked for where sets meet in these parts of the time in which the smaller moves by its own size.
+_BEFORE_MEETING = 2.0 ** -np.array([0.0, 4.0, 7.0, 10.0])
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
 _BALLS_OUTWARD = 1e-2
 _ULP = 2.0**-53
@@ -412,7 +414,7 @@ class _Spans(Spans):
     def __init__(self, a: Piece, b: Piece, motion: Motions):
         super().__init__(_parts(a, b), (a.reach, b.reach, a.slop + b.slop), motion)
         self.a, self.b = a, b
-        self._normal = np.zeros((1, 3))
+        self._normal, self._faced = np.zeros((1, 3)), np.zeros((0, 3))
 
     def placed(self, time: float) -> Placed:
         """Where the pieces are at a time; of a span without a length the reach is what poses miss the motion by."""
@@ -487,37 +489,43 @@ class _Spans(Spans):
         than anything moves in the span, and where a facet of the mesh may be near more facets of a hull than can be
         jobs.
 
-        Planes between the two say which facets are near, those along the normal that is known too: of the sets around
-        both where these first meet, then of the last `cut`; any direction is right. Where none is known of a curved
-        piece the distance tells it, and whether anything is near at all.
+        Planes between the two say which facets are near, those along a normal that is known too, the first that leaves
+        few: of the sets around both before these first meet, or of the last `cut`; any direction is right. Where none
+        is known of a curved piece the distance tells it, and whether anything is near at all.
         """
         matrices, reach = (out[:16].reshape(1, 4, 4), out[16:32].reshape(1, 4, 4)), float(out[REACH])
         side = 0 if self.a.is_mesh else 1
         mesh: Any = self.a if side == 0 else self.b
         X_M, X_C = matrices[side].copy(), matrices[1 - side].copy()
-        if convex.is_curved and not self._normal.any():
+        if convex.is_curved and not (self._normal.any() or len(self._faced)):
             row = pair_rows(mesh.shape, convex.shape, X_M, X_C, limit=reach, depths=False)[0]
             if row["lower"] > reach:
                 return np.zeros((0, 2), dtype=np.int64)
             self._take_normal(row)
-        at = as_given(X_M), as_given(X_C), self._normal
-        near = near_facets_up_to(mesh.tree, convex.packed, *at, reach, max_pairs)  # type: ignore[arg-type]
-        if near is None:
+        at, near = (as_given(X_M), as_given(X_C)), None
+        is_known = self._normal.any() or not len(self._faced)
+        for normal in np.concatenate([self._normal, self._faced]) if is_known else self._faced:
+            near = near_facets_up_to(mesh.tree, convex.packed, *at, normal[None], reach, max_pairs)  # type: ignore[arg-type]
+            if near is not None:
+                break
+        else:
             return None
         facets = np.zeros((len(near.place), 2), dtype=np.int64)
         facets[:, side] = mesh.tree.ids[near.place]
         return facets
 
     def face_each_other(self, time: float) -> None:
-        """Have the normal of sets around both pieces known, as it is shortly before they meet at a time.
+        """Have normals of sets around both pieces known, as they are before these meet at a time.
 
-        Where the smaller one has moved by its own size the direction is good to rounding, at the time itself it is not.
+        While the smaller one moves by its own size and ever less: near an edge the normal turns until they meet, and
+        shortly before it is that of lengths that rounding makes up.
         """
-        at = self.placed(max(time - self.scale(time, 1.0), 0.0))
-        table, row = ShapeTable([_around(self.a), _around(self.b)]), np.zeros(1, dtype=PAIR_DTYPE)
-        X = at.X_A[None], at.X_B[None]
-        run_poses(row, table, None, *X, boolean=False, limit=np.inf, check=False, axes=None, depths=False)
-        self._take_normal(row[0])
+        passed = self.scale(time, 1.0) * _BEFORE_MEETING
+        placed = [self.placed(max(time - before, 0.0)) for before in passed]
+        table, rows = ShapeTable([_around(self.a), _around(self.b)]), np.zeros(len(placed), dtype=PAIR_DTYPE)
+        X = np.stack([at.X_A for at in placed]), np.stack([at.X_B for at in placed])
+        run_poses(rows, table, None, *X, boolean=False, limit=np.inf, check=False, axes=None, depths=False)
+        self._faced = rows["normal"][rows["normal"].any(axis=1)]
 
     def _take_normal(self, row: np.void) -> None:
         """The normal of a row becomes the one known, if it has any: of bodies that overlap it has none."""
@@ -691,11 +699,14 @@ def _search(
             continue
         if span.may_meet and length > 2.0 * scale:
             to_do.append(span._replace(may_meet=False))
-            end, more = min(span.begin + max(_LEAST_CUT * scale, _SHORTEST), span.end), _MORE * span.max_pairs
-            near = spans.near_facets(span.begin, end, min(more, _MAX_JOBS_OF_ALL))
-            if near is not None:
-                to_do[-1] = _Span(end, span.end, span.max_pairs)
-                _look_at(near, a, b, motion, (span.begin, end), tolerance, row, is_part)
+            more = min(_MORE * span.max_pairs, _MAX_JOBS_OF_ALL)
+            for part in (_LEAST_CUT, _LEAST_CUT / _LARGEST_CUT):  # a shorter part costs less than a distance
+                end = min(span.begin + max(part * scale, _SHORTEST), span.end)
+                near = spans.near_facets(span.begin, end, more)
+                if near is not None:
+                    to_do[-1] = _Span(end, span.end, span.max_pairs)
+                    _look_at(near, a, b, motion, (span.begin, end), tolerance, row, is_part)
+                    break
             continue
         max_pairs, near = _MAX_JOBS_OF_ALL if length < _SHORTEST else span.max_pairs, None
         if not is_long or length < _SHORTEST:

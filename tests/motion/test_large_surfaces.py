@@ -238,6 +238,21 @@ def test_a_finely_cut_mesh_that_ends_on_a_large_facet_is_not_said_to_be_free(kin
         assert (r.upper <= 1.0) == (above != 0.0), (above, r)  # touching to the last bit is left open
 
 
+def test_a_ball_of_facets_that_meets_the_rim_of_a_large_cylinder_is_asked_no_distance(monkeypatch):
+    """Normals before it meets turn with it: of several one leaves few facets."""
+    calls = counted(monkeypatch, "pair_rows")
+    ball, cylinder = small_mesh("ball", 1e-7), collide.Cylinder(0.3, 0.8)
+    rng = rng_of("rim of a cylinder")
+    for _ in range(6):
+        R, outwards = random_pose(rng, 0.0), np.array([0.3, 0.0, 0.4]) + np.append(rng.normal(size=2) * 2e-8, 0.0)
+        start, end = R.copy(), R.copy()
+        aside = rng.uniform(0.2, 0.8, 3) * (1.0, 0.5, 1.0)
+        start[:3, 3], end[:3, 3] = outwards + aside, outwards - aside
+        r = collide.time_of_impact(cylinder, ball, np.eye(4), np.eye(4), start, end)
+        assert r.hit and r.certified and abs(r.time - 0.5) < 1e-6, (start.tolist(), end.tolist())
+    assert not calls, calls
+
+
 def fan(n: int, rng) -> collide.Mesh:
     """n facets about a corner that stands out, by other lengths each."""
     angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, n))
@@ -306,7 +321,7 @@ def test_facets_near_large_facets_large_ones_are_all_that_are_near(side, n):
     assert listed >= 1000 and near >= 300, (listed, near)
 
 
-@pytest.mark.parametrize("curved", ["cylinder", "ellipsoid"])
+@pytest.mark.parametrize("curved", ["cylinder", "ellipsoid", "cone"])
 def test_a_small_mesh_beside_a_large_curved_body_is_asked_no_distance(monkeypatch, curved):
     """A flat, finely cut slab: facets are told by the normal of sets around both shortly before they meet."""
     calls, jobs = counted(monkeypatch, "pair_rows", "facets_within"), []
@@ -314,7 +329,8 @@ def test_a_small_mesh_beside_a_large_curved_body_is_asked_no_distance(monkeypatc
     monkeypatch.setattr(surface_motions, "_look_at", lambda near, *a: (jobs.append(len(near)), look(near, *a))[1])
     grid = collide.tessellate(collide.HeightField(np.zeros((9, 9)), (1 / 8, 1 / 8), bottom=-0.1))
     small = collide.Mesh(1e-7 * grid.vertices, grid.faces)
-    large = collide.Cylinder(0.3, 0.8) if curved == "cylinder" else collide.Ellipsoid((0.5, 0.3, 0.2))
+    bodies = {"cylinder": collide.Cylinder(0.3, 0.8), "ellipsoid": collide.Ellipsoid((0.5, 0.3, 0.2))}
+    large = bodies.get(curved, collide.Cone(0.4, 0.8))
     rng = rng_of(f"small beside {curved}")
     for _ in range(3):
         X_A, start = random_pose(rng, 0.0), random_pose(rng, 0.0)
