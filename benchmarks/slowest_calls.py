@@ -55,6 +55,10 @@ WORST = (
     "impact hull:100000 terrain:80000 100 far", "impact ball:10000 hull:100000 1e+07 near",
     "impact sheet:80000 boxes:1000 1e+07 far", "impact cans:1000 slab:300 1e+07 touching",
     "impact balls:3 meshes:1000 0.01 touching", "impact hull:100000 meshes:1000 1e-07 near",
+    "impact terrain:10000 ball:80000 1e-07 touching", "impact sheet:80000 terrain:10000 1e+07 near",
+    "impact sheet:80000 cans:3 1e+07 deep", "impact cylinder slab:80000 1e-07 near",
+    "impact sheet:80000 boxes:1000 0.01 deep", "impact halfspace meshes:1000 1 deep",
+    "impact cans:1000 ball:80000 1e-07 deep",
 )
 
 

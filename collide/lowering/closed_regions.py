@@ -24,7 +24,7 @@ from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
-from collide.shapes.shape import Shape
+from collide.shapes.shape import Shape, kept_with_shape
 from collide.transforms import LARGEST, ROTATION_TOLERANCE
 
 #: More than what a sum of lengths rounds, and what poses that are nearly rotations stretch.
@@ -104,6 +104,7 @@ def closed(region: Shape, size: float) -> HPolytope:
     return region.closed(size)
 
 
+@kept_with_shape("_reach")
 def reach_of(shape: Shape) -> float:
     """How far points of a shape are from its origin, at most [m]: infinite of half-spaces and regions."""
     if shape.is_region:

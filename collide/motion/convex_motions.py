@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from threading import local
 from typing import Any, NamedTuple
 
@@ -11,13 +11,15 @@ import numpy as np
 
 from collide.kernels import address_of, code_of
 from collide.lowering.compound_layout import layout_of
-from collide.lowering.shape_table import POSE, ShapeTable
+from collide.lowering.compound_table import PART
+from collide.lowering.packed_convex import pack_points
+from collide.lowering.shape_table import POSE, RANK, ShapeTable
 from collide.motion.convex_impact import CONTACT, FREE, OPEN, OPEN_START
 from collide.motion.impact_jobs import begin_single, find_impacts
 from collide.motion.impact_rows import TimeOfImpact, free_rows, single_result
 from collide.motion.motions import Motions
 from collide.motion.moving_body import BODY
-from collide.motion.parts_ahead import MAX_ASKED, parts_ahead
+from collide.motion.parts_ahead import MAX_ASKED, parts_ahead, reach_of_union, slop_of_union
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_kernel_calls import scratch
 from collide.narrowphase.pair_kernel import answer_pairs
@@ -30,6 +32,8 @@ from collide.threads import pieces_of, share
 JOBS_AT_ONCE = 1 << 16
 #: Pairs of parts of unions that are searched before a span of time is cut, to tell which of them come first.
 _PARTS_TOGETHER = 1024
+#: A union is small beside a shape that reaches so many times as far.
+_TIMES_SMALLER = 8.0
 #: A thread is handed at least so many motions.
 _MIN_MOTIONS_PER_THREAD = 200
 
@@ -147,16 +151,65 @@ class _Bodies:
 
 
     def jobs_ahead(
-        self, shapes: list[Shape], a: int, b: int, k: int, motions: Motions, rows: np.ndarray
+        self, shapes: list[Shape], a: int, b: int, k: int, motions: Motions, tolerance: float, rows: np.ndarray
     ) -> Iterator[np.ndarray]:
         """`jobs` of motion k, of shapes a and b, in which parts may meet before what its row has found, in turn."""
         motion, ranks = motions.picked(np.array([k])), (self.ranks[a : a + 1], self.ranks[b : b + 1])
         flip = bool(motion.exchanged(ranks[0] > ranks[1], ranks[0] == ranks[1])[0])
-        unions = compound_parts(shapes[a]), compound_parts(shapes[b])
-        for i, j in parts_ahead(*unions, motion, lambda: float(rows["upper"][k]), _PARTS_TOGETHER):
+        ahead = parts_in_turn(
+            shapes[a], shapes[b], motion, lambda: float(rows["upper"][k]), _PARTS_TOGETHER, tolerance
+        )
+        for i, j in ahead:
             order = np.lexsort((i, j)) if flip else np.arange(len(i))
             part_a, part_b = self.first[a] + i[order], self.first[b] + j[order]
             yield np.ascontiguousarray(np.stack([np.full(len(i), k), part_a, part_a, part_b, part_b], axis=1))
+
+
+def parts_in_turn(
+    A: Shape, B: Shape, motion: Motions, upper: Callable[[], float], max_pairs: int, tolerance: float
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """`parts_ahead` of two shapes; beside a far smaller union one part of the larger at a time, in the order in which
+    they meet a ball around the smaller: all parts of that lie within the ball, so that no contact is earlier."""
+    unions = compound_parts(A), compound_parts(B)
+    reaches = [math.inf if union.unbounded else reach_of_union(union) for union in unions]
+    large = 0 if reaches[0] > reaches[1] else 1
+    small = unions[1 - large]
+    if not (_TIMES_SMALLER * reaches[1 - large] <= reaches[large] < math.inf and len(small.parts) > 1):
+        yield from parts_ahead(*unions, motion, upper, max_pairs)
+        return
+    end = min(upper(), 1.0)
+    times = _times_of_ball(A, B, large, (reaches[1 - large], slop_of_union(small)), motion, end, tolerance)
+    every = np.arange(len(small.parts))
+    for number in np.argsort(times, kind="stable").tolist():
+        if not times[number] <= min(upper(), 1.0):
+            return
+        pair = np.full(len(every), number), every
+        yield pair if large == 0 else pair[::-1]
+
+
+def _times_of_ball(
+    A: Shape, B: Shape, large: int, ball: tuple[float, float], motion: Motions, end: float, tolerance: float
+) -> np.ndarray:
+    """(k,) times before which the parts of A, or B where ``large`` is 1, do not meet a ball around the other's origin:
+    infinity of those that do not up to ``end``.
+
+    ball : (radius, slop) of it [m].
+    """
+    bodies = bounds_of(A, B)
+    which = large if len(bodies.counts) > 1 else 0
+    k, n = int(bodies.counts[which]), len(bodies.table.packed)
+    around = ShapeTable([pack_points(np.zeros((1, 3)), ball[0])._replace(slop=ball[1])])
+    ints = np.concatenate([bodies.table.ints, around.ints])
+    numbers = np.concatenate([bodies.table.numbers, around.numbers])
+    ints[n, RANK] = n
+    parts = np.concatenate([bodies.parts, np.zeros((1, PART))])
+    parts[n, [0, 4, 8]] = 1.0
+    ends = np.full((2, k), n)
+    ends[large] = bodies.first[which] + np.arange(k)
+    jobs, rows = np.ascontiguousarray(np.stack([np.arange(k), *np.repeat(ends, 2, axis=0)], axis=1)), free_rows(k)
+    header = header_of(Tables((address_of(ints), address_of(numbers)), n + 1, parts), motion)
+    find_impacts(address_of(header), address_of(jobs), k, 0.0, end, tolerance, address_of(rows))
+    return earliest_of(rows)
 
 
 def _bodies_of(shapes: list[Shape], slot: str = "_moving") -> _Bodies:
@@ -243,7 +296,7 @@ def convex_impacts(
             some = slice(first, min(first + at_once, piece.stop))
             for jobs in (
                 [bodies.jobs(a[some], b[some], first, motions)] if per_motion <= MAX_ASKED
-                else bodies.jobs_ahead(shapes, int(a[first]), int(b[first]), first, motions, rows)
+                else bodies.jobs_ahead(shapes, int(a[first]), int(b[first]), first, motions, tolerance, rows)
             ):
                 find_impacts(address_of(header), address_of(jobs), len(jobs), 0.0, 1.0, tolerance, address_of(rows))
 

@@ -7,6 +7,7 @@ in which too many may are cut in half.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -70,7 +71,10 @@ def parts_ahead(
     parts[:, [0, 4, 8]] = 1.0
     spans = Spans(parts, (reach_of_union(A), reach_of_union(B), slop_of_union(A) + slop_of_union(B)), motion)
     least = _LEAST_MOVED * min(reach_of_union(A), reach_of_union(B))
-    begin, end = (0.0, 1.0) if A.unbounded or B.unbounded else spans.time_of_balls()
+    is_unbounded = A.unbounded or B.unbounded
+    begin, end = (0.0, 1.0) if is_unbounded else spans.time_of_balls()
+    # while balls of this size meet, parts that are spread over them are near in about the third power of the reach
+    size = math.inf if is_unbounded else reach_of_union(A) + reach_of_union(B)
     to_do = [(begin, end)] if begin <= end else []
     while to_do:
         begin, end = to_do.pop()
@@ -78,12 +82,11 @@ def parts_ahead(
         if begin > end:
             continue
         out = spans.describe(begin, end)
-        X_A, X_B = out[:16].reshape(4, 4).copy(), out[16:32].reshape(4, 4).copy()
-        reach = float(out[REACH]) + _turn_together(A, B, X_A, X_B)
-        _, a, b = boxes_near(A, B, X_A[None], X_B[None], reach)
-        is_new = ~named[a, b]
-        a, b = a[is_new], b[is_new]
-        if len(a) > max_pairs and end - begin > _SHORTEST and out[REACH] > least:
+        may_cut = end - begin > _SHORTEST and out[REACH] > least
+        near = None if may_cut and (out[REACH] / size) ** 3 * named.size > max_pairs else _boxes_near(A, B, out)
+        if near is not None:
+            a, b = near[:, ~named[near[0], near[1]]]
+        if near is None or (len(a) > max_pairs and may_cut):
             middle = 0.5 * (begin + end)
             to_do += [(middle, end), (begin, middle)]
             continue
@@ -91,6 +94,13 @@ def parts_ahead(
         if len(a):
             order = np.lexsort((b, a))
             yield a[order], b[order]
+
+
+def _boxes_near(A: CompoundParts, B: CompoundParts, out: np.ndarray) -> np.ndarray:
+    """(2, k) parts of A and of B that may meet in a span of which ``out`` tells."""
+    X_A, X_B = out[:16].reshape(4, 4).copy(), out[16:32].reshape(4, 4).copy()
+    reach = float(out[REACH]) + _turn_together(A, B, X_A, X_B)
+    return np.stack(boxes_near(A, B, X_A[None], X_B[None], reach)[1:])
 
 
 def _turn_together(A: CompoundParts, B: CompoundParts, X_A: np.ndarray, X_B: np.ndarray) -> float:

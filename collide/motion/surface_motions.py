@@ -31,18 +31,29 @@ from collide.lowering.shape_table import RANK, SLOP, ShapeTable
 from collide.mesh.bvh import MeshTree
 from collide.motion.common_points import CommonPoints, Placed
 from collide.motion.convex_impact import CONTACT, OPEN
-from collide.motion.convex_motions import JOBS_AT_ONCE, Tables, bounds_of, earliest_times, first_pair, header_of
+from collide.motion.convex_motions import (
+    JOBS_AT_ONCE,
+    Tables,
+    bounds_of,
+    earliest_of,
+    earliest_times,
+    first_pair,
+    header_of,
+    parts_in_turn,
+)
 from collide.motion.impact_jobs import find_impacts
-from collide.motion.impact_rows import flipped_impacts
+from collide.motion.impact_rows import flipped_impacts, free_rows
 from collide.motion.motions import Motions
-from collide.motion.parts_ahead import MAX_ASKED, Spans, parts_ahead, reach_of_union, slop_of_union
+from collide.motion.parts_ahead import MAX_ASKED, Spans, reach_of_union, slop_of_union
 from collide.motion.path_facets import earliest_by_facets, facets_on_path
 from collide.motion.span_bounds import REACH
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_rows
+from collide.narrowphase.convex_kernel_calls import run_poses
 from collide.narrowphase.facets.facet_queries import facets_within
 from collide.narrowphase.facets.mesh_batches import pair_rows
 from collide.narrowphase.facets.near_facets import near_facets_up_to
+from collide.results import PAIR_DTYPE
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Sphere
@@ -67,7 +78,13 @@ _SHORTEST = 2.0**-46
 #: each is looked at by itself.
 _TIMES_SMALLER, _TOGETHER = 8.0, 8
 #: So many facets on a way are looked at, and so many pairs of them and of pieces.
-_MAX_ON_THE_WAY, _JOBS_ON_THE_WAY = 1024, 1 << 13
+_MAX_ON_THE_WAY, _JOBS_ON_THE_WAY = 1024, 1 << 16
+#: Facets of a mesh that are few beside another mesh of so many at least: for a walk each, and for one together.
+_MAX_EACH, _MAX_TOGETHER, _FINELY_CUT = 8, 256, 1024
+#: So many pairs of them are looked at rather than walk both trees, which costs as much as thousands.
+_JOBS_BEFORE_WALKS = 1 << 13
+#: Normals are asked for where sets meet in these parts of the time in which the smaller moves by its own size.
+_BEFORE_MEETING = 2.0 ** -np.array([0.0, 4.0, 7.0, 10.0])
 #: Matrices at both ends may miss each other's rotation by 4e-4 an entry, and so lengthen what they place.
 _BALLS_OUTWARD = 1e-2
 _ULP = 2.0**-53
@@ -158,6 +175,23 @@ def _piece(shape: Shape, of: Callable[[], Any], X_CS: np.ndarray, slop: float, n
     return Piece(of, X_CS, number, reach, slop, tree, _thickness(shape, tree), True, packed)
 
 
+def _around(piece: Piece) -> PackedConvex:
+    """A convex set around a piece."""
+    return bounding_parts_of(piece.shape)[0][0] if piece.packed is None else piece.packed
+
+
+def _hull_of(piece: Piece) -> PackedConvex:
+    """The hull of a piece, and as much around it as rounding moved it by."""
+    packed = _vertices_of(piece.shape) if piece.packed is None else piece.packed
+    return packed._replace(slop=packed.slop + piece.slop)
+
+
+@kept_with_shape("_vertex_set")
+def _vertices_of(mesh: Mesh) -> PackedConvex:
+    """The vertices of a mesh's facets, whose hull is the mesh's."""
+    return pack_points(mesh.vertices[np.unique(mesh.faces)])
+
+
 def _thickness(shape: Shape, tree: MeshTree) -> float:
     """How far a polytope around a convex shape is from it at most, at its corners [m]; its surface is as far from the
     shape's."""
@@ -208,8 +242,8 @@ def _search_all(A: Shape, B: Shape, motions: Motions, tolerance: float, rows: np
             if _search_small([(a, b)], motion, (begin, 1.0), tolerance, row, is_part)[0]:
                 _search(a, b, motion, tolerance, row, is_part, begin)
 
-        unions = compound_parts(A), compound_parts(B)
-        for i, j in [numbers] if is_small else parts_ahead(*unions, motion, upper, _PIECES_TOGETHER):
+        ahead = [numbers] if is_small else parts_in_turn(A, B, motion, upper, _PIECES_TOGETHER, tolerance)
+        for i, j in ahead:
             # No contact of two pieces is earlier than that of the convex sets around both, nor than that of one set and
             # the facets on its way: in the order of these, the first contact found leaves out all later ones.
             earliest, some, end = np.zeros(len(i)), np.arange(len(i)), min(upper(), 1.0)
@@ -380,7 +414,7 @@ class _Spans(Spans):
     def __init__(self, a: Piece, b: Piece, motion: Motions):
         super().__init__(_parts(a, b), (a.reach, b.reach, a.slop + b.slop), motion)
         self.a, self.b = a, b
-        self._normal = np.zeros((1, 3))
+        self._normal, self._faced = np.zeros((1, 3)), np.zeros((0, 3))
 
     def placed(self, time: float) -> Placed:
         """Where the pieces are at a time; of a span without a length the reach is what poses miss the motion by."""
@@ -393,36 +427,105 @@ class _Spans(Spans):
         convex = None if self.a.is_mesh and self.b.is_mesh else self.b if self.a.is_mesh else self.a
         if convex is not None and (convex.has_many_facets or (convex.is_curved and out[REACH] < convex.radius)):
             return self._near_convex(convex, out, max_pairs)
+        large_facets = self._large_facets_ahead(begin, end) if convex is None else None
+        if large_facets is not None:
+            pairs = self._near_large_facets(large_facets, begin, end, max_pairs)
+            if pairs is not None:
+                return pairs
+        out = self.describe(begin, end)
         X_A, X_B = out[:16].reshape(4, 4), out[16:32].reshape(4, 4)
         reach = float(out[REACH]) + self.a.radius + self.b.radius
         near = facets_within(self.a.tree, self.b.tree, X_A, X_B, reach, max_pairs)  # type: ignore[arg-type]
         return None if near is None or len(near.facets) > max_pairs < _MAX_JOBS_OF_ALL else near.facets
+
+    def _large_facets_ahead(self, begin: float, end: float) -> np.ndarray | None:
+        """(k,) facets of the larger mesh on the way of the other, finely cut one, if they are few; else None.
+
+        Boxes of the small mesh all lie in the box of such a facet: a walk of both trees comes to all of them, where
+        one of the small tree leaves out all that the facet's plane is far from.
+        """
+        if not (self.a.is_mesh and self.b.is_mesh and self.is_small_beside()):
+            return None
+        large, small = self._by_size()
+        if len(small.tree.ids) < _FINELY_CUT:  # type: ignore[union-attr]
+            return None
+        side = 0 if large is self.a else 1
+        return facets_on_path(self, large.tree, side, begin, end, _MAX_TOGETHER)  # type: ignore[arg-type]
+
+    def _near_large_facets(self, ahead: np.ndarray, begin: float, end: float, max_pairs: int) -> np.ndarray | None:
+        """(k, 2) facets that may meet in a span, of which those of the larger mesh are ``ahead``; None where planes
+        leave more than ``max_pairs``.
+
+        A set that holds facets is no farther from the small mesh than they are: first all of them together, then each.
+        """
+        (large, small), out = self._by_size(), self.describe(begin, end)
+        side, corners, reach = 0 if large is self.a else 1, large.corners(ahead), float(out[REACH])
+        X = out[:32].reshape(2, 4, 4).copy()
+        at = as_given(X[1 - side, None]), as_given(X[side, None])
+
+        def near(of: np.ndarray) -> np.ndarray | None:
+            along = self._normal if self._normal.any() else _normals(of).sum(axis=0)[None] @ X[side, :3, :3].T
+            packed = pack_points(of.reshape(-1, 3))
+            rows = near_facets_up_to(small.tree, packed, *at, along, reach, max_pairs)  # type: ignore[arg-type]
+            return None if rows is None else small.tree.ids[rows.place]  # type: ignore[union-attr]
+
+        together = near(corners) if len(ahead) else np.zeros(0, dtype=np.int64)
+        each = [together] * len(ahead)
+        max_pairs = max(max_pairs, _JOBS_BEFORE_WALKS)
+        if len(ahead) > 1 and (together is None or len(together) * len(ahead) > max_pairs):
+            each = [near(of[None]) for of in corners] if len(ahead) <= _MAX_EACH else [None]
+        if any(of is None for of in each) or sum(map(len, each)) > max_pairs:  # type: ignore[arg-type]
+            return None
+        of_large = np.repeat(ahead, [len(of) for of in each])  # type: ignore[arg-type]
+        of_small = np.concatenate(each) if len(ahead) else of_large  # type: ignore[arg-type]
+        return np.stack([of_large, of_small][:: 1 if side == 0 else -1], axis=1)
+
+    def _by_size(self) -> tuple[Piece, Piece]:
+        """The larger piece and the smaller one."""
+        return (self.a, self.b) if self.a.reach > self.b.reach else (self.b, self.a)
 
     def _near_convex(self, convex: Piece, out: np.ndarray, max_pairs: int) -> np.ndarray | None:
         """The same of a mesh and a convex piece as a whole: where the polytope around a curved one is farther from it
         than anything moves in the span, and where a facet of the mesh may be near more facets of a hull than can be
         jobs.
 
-        Planes between the two say which facets are near, those along the normal that is known too. Of a curved piece
-        the distance tells it, and whether anything is near at all; of a large hull the last `cut` does: any direction
-        is right.
+        Planes between the two say which facets are near, those along a normal that is known too, the first that leaves
+        few: of the sets around both before these first meet, or of the last `cut`; any direction is right. Where none
+        is known of a curved piece the distance tells it, and whether anything is near at all.
         """
         matrices, reach = (out[:16].reshape(1, 4, 4), out[16:32].reshape(1, 4, 4)), float(out[REACH])
         side = 0 if self.a.is_mesh else 1
         mesh: Any = self.a if side == 0 else self.b
         X_M, X_C = matrices[side].copy(), matrices[1 - side].copy()
-        if convex.is_curved:
+        if convex.is_curved and not (self._normal.any() or len(self._faced)):
             row = pair_rows(mesh.shape, convex.shape, X_M, X_C, limit=reach, depths=False)[0]
             if row["lower"] > reach:
                 return np.zeros((0, 2), dtype=np.int64)
             self._take_normal(row)
-        at = as_given(X_M), as_given(X_C), self._normal
-        near = near_facets_up_to(mesh.tree, convex.packed, *at, reach, max_pairs)  # type: ignore[arg-type]
-        if near is None:
+        at, near = (as_given(X_M), as_given(X_C)), None
+        is_known = self._normal.any() or not len(self._faced)
+        for normal in np.concatenate([self._normal, self._faced]) if is_known else self._faced:
+            near = near_facets_up_to(mesh.tree, convex.packed, *at, normal[None], reach, max_pairs)  # type: ignore[arg-type]
+            if near is not None:
+                break
+        else:
             return None
         facets = np.zeros((len(near.place), 2), dtype=np.int64)
         facets[:, side] = mesh.tree.ids[near.place]
         return facets
+
+    def face_each_other(self, time: float) -> None:
+        """Have normals of sets around both pieces known, as they are before these meet at a time.
+
+        While the smaller one moves by its own size and ever less: near an edge the normal turns until they meet, and
+        shortly before it is that of lengths that rounding makes up.
+        """
+        passed = self.scale(time, 1.0) * _BEFORE_MEETING
+        placed = [self.placed(max(time - before, 0.0)) for before in passed]
+        table, rows = ShapeTable([_around(self.a), _around(self.b)]), np.zeros(len(placed), dtype=PAIR_DTYPE)
+        X = np.stack([at.X_A for at in placed]), np.stack([at.X_B for at in placed])
+        run_poses(rows, table, None, *X, boolean=False, limit=np.inf, check=False, axes=None, depths=False)
+        self._faced = rows["normal"][rows["normal"].any(axis=1)]
 
     def _take_normal(self, row: np.void) -> None:
         """The normal of a row becomes the one known, if it has any: of bodies that overlap it has none."""
@@ -433,19 +536,43 @@ class _Spans(Spans):
         """The time in which the smaller piece may move by its own size."""
         return min(self.a.reach, self.b.reach) / float(self.describe(begin, end)[REACH]) * 0.5 * (end - begin)
 
-    def smaller_set(self) -> tuple[ShapeTable, np.ndarray, np.ndarray]:
-        """The convex set around the smaller piece, as `earliest_by_facets` takes sets."""
+    def time_of_hulls(self, begin: float, end: float, tolerance: float) -> float:
+        """A time before which the hulls of both pieces do not meet, infinity where they do not up to ``end``."""
+        table = ShapeTable([_hull_of(piece) for piece in (self.a, self.b)])
+        table.build_trees(np.arange(2))
+        jobs, row = np.array([[0, 0, 0, 1, 1]], dtype=np.int64), free_rows(1)
+        _do(table, 2, self.parts, self.motion, jobs, begin, end, self.fine(begin, end, tolerance), row)
+        return max(float(earliest_of(row)[0]), begin)
+
+    def fine(self, begin: float, end: float, tolerance: float) -> float:
+        """A tolerance of times that is a small part of that in which the smaller piece moves by its own size: a bracket
+        as wide as is asked for may be wider than this is."""
+        return max(min(tolerance, _LEAST_CUT * self.scale(begin, end)), _SHORTEST)
+
+    def smaller_set(self, tight: bool = False) -> tuple[ShapeTable, np.ndarray, np.ndarray]:
+        """A convex set around the smaller piece, as `earliest_by_facets` takes sets; tight: the hull of a mesh's
+        vertices, with which it touches a plane."""
         side = 1 if self.a.reach > self.b.reach else 0
         piece, row = (self.a, self.b)[side], np.zeros(1, dtype=np.int64)
-        packed = bounding_parts_of(piece.shape)[0][0] if piece.packed is None else piece.packed
-        table = ShapeTable([packed._replace(slop=packed.slop + piece.slop)])
+        packed = _around(piece)
+        table = ShapeTable([_hull_of(piece) if tight else packed._replace(slop=packed.slop + piece.slop)])
         table.build_trees(row)
         return table, row, self.parts[side : side + 1]
 
     def is_small_beside(self) -> bool:
         """Whether one piece is small beside the other, which is a mesh."""
-        large, small = (self.a, self.b) if self.a.reach > self.b.reach else (self.b, self.a)
+        large, small = self._by_size()
         return large.is_mesh and _TIMES_SMALLER * small.reach <= large.reach
+
+    def time_on_the_way(self, begin: float, end: float, tolerance: float) -> float:
+        """A time before which the smaller piece meets none of the facets of the larger one, infinity of one that meets
+        none up to ``end``: by a set around a mesh at first, from where that meets any by its hull."""
+        width = self.fine(begin, end, tolerance)
+        for tight in (False, True) if self._by_size()[1].is_mesh else (False,):
+            begin = float(self.times_on_the_way(self.smaller_set(tight), begin, end, width)[0][0])
+            if not begin < end:  # at the end there may be a contact
+                return begin
+        return begin
 
     def times_on_the_way(self, sets: Any, begin: float, end: float, tolerance: float) -> tuple[np.ndarray, float]:
         """((n,) times before which convex sets, all in the smaller piece, meet none of the facets of the larger one
@@ -517,6 +644,13 @@ class _Spans(Spans):
         return passed * gap / nearer if gap > 0.0 and nearer > 0.0 else math.inf
 
 
+def _normals(corners: np.ndarray) -> np.ndarray:
+    """(k, 3) unit normals of triangles (k, 3, 3); 0 of those without an area."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.sqrt((normals * normals).sum(axis=1))[:, None]
+    return np.where(lengths > 0.0, normals / np.where(lengths > 0.0, lengths, 1.0), 0.0)
+
+
 def _max_jobs(span: float) -> int:
     return int(min(_MAX_JOBS * max(_SHORT / max(span, 1e-9), 1.0), _MAX_JOBS_OF_ALL))
 
@@ -525,13 +659,15 @@ class _Span(NamedTuple):
     """A span of time to be looked at.
 
     max_pairs : of more facets that may meet in it it is cut.   may_meet : whether bodies that are convex where they
-    meet do so as it begins: its first part is looked at before it is cut.
+    meet do so as it begins: its first part is looked at before it is cut.   is_timed : whether it begins where a set
+    around the smaller body first meets a facet on its way.
     """
 
     begin: float
     end: float
     max_pairs: int
     may_meet: bool = False
+    is_timed: bool = False
 
 
 def _search(
@@ -544,27 +680,34 @@ def _search(
     """
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
-    to_do = [_Span(max(begin, earliest), end, _max_jobs(end - begin), earliest > 0.0)]
+    max_pairs, begin, end = _max_jobs(end - begin), max(begin, earliest), min(end, float(row["upper"][0]))
+    if 0.0 < earliest and begin <= end and not spans.is_small_beside():  # else facets on the way tell more than a hull
+        begin = spans.time_of_hulls(begin, end, tolerance)
+        spans.face_each_other(min(begin, end))
+    to_do = [_Span(begin, end, max_pairs, earliest > 0.0)]
     while to_do:
         span = to_do.pop()
         span = span._replace(end=min(span.end, float(row["upper"][0])))
         if span.begin > span.end:
             continue
         scale, length = spans.scale(span.begin, span.end), span.end - span.begin
+        is_long = length > 4.0 * scale and spans.is_small_beside()  # of so long a way a ball holds too many facets
+        if is_long and not span.is_timed:
+            first = max(spans.time_on_the_way(span.begin, span.end, tolerance), span.begin)
+            may_meet = span.may_meet or first > span.begin + _LEAST_CUT * scale
+            to_do.append(span._replace(begin=first, may_meet=may_meet, is_timed=True))
+            continue
         if span.may_meet and length > 2.0 * scale:
             to_do.append(span._replace(may_meet=False))
-            end, more = min(span.begin + max(_LEAST_CUT * scale, _SHORTEST), span.end), _MORE * span.max_pairs
-            near = spans.near_facets(span.begin, end, min(more, _MAX_JOBS_OF_ALL))
-            if near is not None:
-                to_do[-1] = _Span(end, span.end, span.max_pairs)
-                _look_at(near, a, b, motion, (span.begin, end), tolerance, row, is_part)
+            more = min(_MORE * span.max_pairs, _MAX_JOBS_OF_ALL)
+            for part in (_LEAST_CUT, _LEAST_CUT / _LARGEST_CUT):  # a shorter part costs less than a distance
+                end = min(span.begin + max(part * scale, _SHORTEST), span.end)
+                near = spans.near_facets(span.begin, end, more)
+                if near is not None:
+                    to_do[-1] = _Span(end, span.end, span.max_pairs)
+                    _look_at(near, a, b, motion, (span.begin, end), tolerance, row, is_part)
+                    break
             continue
-        is_long = length > 4.0 * scale and spans.is_small_beside()  # of so long a way a ball holds too many facets
-        if is_long:
-            later = float(spans.times_on_the_way(spans.smaller_set(), span.begin, span.end, tolerance)[0][0])
-            if later > span.begin + scale:
-                to_do.append(span._replace(begin=later, may_meet=True))
-                continue
         max_pairs, near = _MAX_JOBS_OF_ALL if length < _SHORTEST else span.max_pairs, None
         if not is_long or length < _SHORTEST:
             near = spans.near_facets(span.begin, span.end, max_pairs)

@@ -25,8 +25,8 @@ class Shape:
 
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges", "_hulls_instead",
-        "_kind", "_laid_out", "_moving", "_moving_bounds", "_partners", "_parts", "_pieces", "_prepared", "_serial",
-        "_surface", "_topology", "_union", "_walk",
+        "_kind", "_laid_out", "_moving", "_moving_bounds", "_partners", "_parts", "_pieces", "_prepared", "_reach",
+        "_serial", "_surface", "_topology", "_union", "_vertex_set", "_walk",
     )
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -55,6 +55,10 @@ class Shape:
     _laid_out: Any
     #: Meshes and convex shapes that it is made of, with their trees (`motion/surface_motions.py`).
     _pieces: tuple
+    #: How far it reaches from its origin (`lowering/closed_regions.py`).
+    _reach: float
+    #: A mesh's vertices as one convex set, for the same.
+    _vertex_set: Any
     #: A mesh of the same facets (`solids/solid_operands.py`).
     _as_solid: Any
     #: Which facets of a mesh share which edge (`solids/facet_edges.py`).

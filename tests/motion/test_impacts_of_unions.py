@@ -8,7 +8,8 @@ from naive import random_pose, rng_of
 from reproduction import reproducing
 
 import collide
-from collide.motion import convex_motions, surface_motions
+from collide.lowering import closed_regions
+from collide.motion import convex_motions, parts_ahead, surface_motions
 
 AGAIN = (
     "import collide, numpy as np\n"
@@ -141,3 +142,80 @@ def test_the_first_contact_of_a_small_union_and_a_surface_is_that_of_all_parts_a
         if r.hit:
             assert r.lower <= each.upper.min() and each.lower.min() <= r.upper, (seed, [X.tolist() for X in poses])
     assert 2 <= sum(hits), hits
+
+
+@pytest.mark.parametrize(("meshed", "size"), [(False, 0.05), (False, 1e-5), (True, 0.05)])
+def test_the_first_contact_of_a_small_union_and_a_large_one_is_that_of_all_parts(meshed, size):
+    """All pairs of parts one by one; which union is A changes nothing; every other one is aimed at a part."""
+    rng, hits = rng_of(f"small and large unions {meshed} {size}"), []
+    for seed in map(str, range(6)):
+        large, tiny = clutter(12, meshed, seed), small(clutter(9, False, seed), size)
+        poses = [random_pose(rng, 0.0) for _ in range(4)]
+        n = rng.normal(size=3)
+        n *= 1.5 / np.linalg.norm(n)
+        poses[2][:3, 3], poses[3][:3, 3] = n, rng.normal(size=3) - n
+        if int(seed) % 2:
+            poses[1] = poses[0]
+            poses[3][:3, 3] = 2.0 * poses[0][:3, :3] @ large.items[0][1][:3, 3] - poses[2][:3, 3]
+        i, j = np.divmod(np.arange(12 * 9), 9)
+        ones = [[collide.Compound([item]) for item in union.items] for union in (large, tiny)]
+        each = collide.time_of_impact([ones[0][k] for k in i], [ones[1][k] for k in j], *poses)
+        r = collide.time_of_impact(large, tiny, *poses)
+        swapped = collide.time_of_impact(tiny, large, *poses[2:], *poses[:2])
+        at = seed, [X.tolist() for X in poses]
+        hits.append(bool(r.hit))
+        assert r.hit == each.hit.any() and r.certified, at
+        assert (swapped.hit, swapped.lower, swapped.upper) == (r.hit, r.lower, r.upper), at
+        if r.hit:
+            assert r.lower <= each.upper.min() and each.lower.min() <= r.upper, at
+    assert 2 <= sum(hits) < len(hits), hits
+
+
+def test_a_small_union_is_searched_beside_those_parts_of_a_large_one_that_a_ball_around_it_meets(monkeypatch):
+    """Through 100 boxes of a metre: one ball a part, then all parts of the small union beside the first that it meets;
+    beside a miss there is nothing more."""
+    jobs, find = [], convex_motions.find_impacts
+    monkeypatch.setattr(convex_motions, "find_impacts", lambda *args: (jobs.append(args[2]), find(*args))[1])
+    large, tiny, eye = clutter(100, False, "a"), small(clutter(120, False, "b"), 1e-6), np.eye(4)
+    x, y, _ = large.items[0][1][:3, 3]
+    ends = collide.pose((x, y, 20.0)), collide.pose((x, y, -20.0))
+    assert collide.time_of_impact(large, tiny, eye, eye, *ends).hit
+    assert 100 < sum(jobs) <= 100 + 3 * 120, jobs
+    jobs.clear()
+    ends = collide.pose((0.9, 0.0, 20.0)), collide.pose((0.0, 0.9, -20.0))
+    assert not collide.time_of_impact(large, tiny, eye, eye, *ends).hit
+    assert sum(jobs) <= 100, jobs
+
+
+def test_boxes_of_two_unions_are_not_listed_where_most_are_near(monkeypatch):
+    """150 parts beside 150 that fly through them: lists of pairs stay short."""
+    lengths, near = [], parts_ahead.boxes_near
+
+    def listed(*args):
+        found = near(*args)
+        lengths.append(len(found[0]))
+        return found
+
+    monkeypatch.setattr(parts_ahead, "boxes_near", listed)
+    ends = collide.pose((0.1, 0.0, 20.0)), collide.pose((0.0, 0.1, -20.0))
+    assert collide.time_of_impact(clutter(150, False, "a"), clutter(150, False, "b"), np.eye(4), np.eye(4), *ends).hit
+    assert lengths and max(lengths) < 0.3 * 150 * 150, lengths
+
+
+def test_parts_of_a_small_union_are_told_apart_by_the_facets_that_it_passes(monkeypatch):
+    """300 parts that come down on a rough surface: times of all beside the facets on the way leave few to search."""
+    calls = counted(monkeypatch, "_search", "_search_few")
+    union = small(clutter(300, False, "comes down"), 0.03)
+    ends = collide.pose((-1.0, 0.01, 0.12)), collide.pose((1.0, 0.02, -0.06))
+    r = collide.time_of_impact(union, rough_sheet(120), *ends, np.eye(4), np.eye(4))
+    assert r.hit and r.certified
+    assert 0 < len(calls) < 40, len(calls)
+
+
+def test_how_far_a_union_reaches_is_asked_of_its_parts_once(monkeypatch):
+    calls, of = [], closed_regions.bounding_parts_of
+    monkeypatch.setattr(closed_regions, "bounding_parts_of", lambda shape: (calls.append(1), of(shape))[1])
+    union, ends = clutter(20, False, "reach"), [np.eye(4), np.eye(4), collide.pose((0, 0, 9)), collide.pose((0, 0, -9))]
+    for _ in range(3):
+        collide.time_of_impact(union, union, *ends)
+    assert len(calls) == 1, calls

@@ -114,7 +114,7 @@ def test_impacts_of_large_surfaces_list_and_search_few_facets(monkeypatch):
 
 
 def test_impacts_of_large_meshes_list_few_spans(monkeypatch):
-    """Two spheres of 20,000 facets: spans are cut where the distance says, not in half over and over."""
+    """Two spheres of 20,000 facets: spans begin where their hulls meet, not in half over and over."""
     spans = []
     near = surface_motions._Spans.near_facets
     monkeypatch.setattr(surface_motions._Spans, "near_facets", lambda *a: (spans.append(1), near(*a))[1])
@@ -123,7 +123,7 @@ def test_impacts_of_large_meshes_list_few_spans(monkeypatch):
     start, end = collide.pose((0.3, 0.2, 1000.0)), collide.pose((0.1, 0.2, -1000.0))
     r = collide.time_of_impact(ball, ball, np.eye(4), np.eye(4), start, end)
     assert r.hit and r.certified and 0.499 < r.time < 0.5
-    assert 1 < len(spans) < 12, len(spans)
+    assert 0 < len(spans) < 6, len(spans)  # one: it begins where the hulls meet
 
 
 def test_a_small_body_that_grazes_a_large_surface_is_asked_about_the_facets_on_its_way(monkeypatch):
@@ -183,3 +183,163 @@ def test_a_body_touches_no_facet_beside_its_way(side):
             reached += bool(touched.any())
         named += len(facets) < 0.5 * len(mesh.faces)
     assert named >= 15 and reached >= 5, (named, reached)
+
+
+def counted(monkeypatch, *names: str) -> list[str]:
+    """Calls of functions of the module of surfaces, by name."""
+    calls: list[str] = []
+
+    def recorded(name: str, of):
+        return lambda *args, **options: (calls.append(name), of(*args, **options))[1]
+
+    for name in names:
+        monkeypatch.setattr(surface_motions, name, recorded(name, getattr(surface_motions, name)))
+    return calls
+
+
+def small_mesh(kind: str, size: float) -> collide.Mesh:
+    """A finely cut mesh."""
+    if kind == "ball":
+        vertices, faces = collide.tessellate(collide.Sphere(0.5 * size), tolerance=3e-4 * size)[:2]
+        return collide.Mesh(vertices, faces)
+    rough = sheet(30)
+    return collide.Mesh(size * rough.vertices, rough.faces, solid=False)
+
+
+@pytest.mark.parametrize("size", [1e-7, 1e-3])
+@pytest.mark.parametrize("kind", ["ball", "sheet"])
+def test_a_finely_cut_mesh_that_grazes_a_large_facet_is_asked_no_distance(monkeypatch, kind, size):
+    """It comes down on a face at two degrees, without turning: its lowest vertex says when, in closed form."""
+    calls = counted(monkeypatch, "pair_rows", "facets_within", "near_facets_up_to")
+    face = collide.Mesh([[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [0.0, 3.0, 0.0]], [[0, 1, 2]], solid=False)
+    rng = rng_of(f"grazes a facet {kind} {size}")
+    for _ in range(4):
+        small, R = small_mesh(kind, size), random_pose(rng, 0.0)
+        assert len(small.faces) > 1024
+        start, end = R.copy(), R.copy()
+        start[:3, 3], end[:3, 3] = (-0.5, 0.1, 0.02), (0.5, 0.1, -0.015)
+        r = collide.time_of_impact(face, small, np.eye(4), np.eye(4), start, end)
+        met = (0.02 + (small.vertices @ R[:3, :3].T)[:, 2].min()) / 0.035
+        assert r.hit and r.certified, (R.tolist(),)
+        assert r.lower - 1e-14 <= met <= r.upper + 1e-14, (R.tolist(), r, met)
+    assert "pair_rows" not in calls and "facets_within" not in calls, calls
+    assert 4 <= len(calls) <= 24, calls
+
+
+@pytest.mark.parametrize("kind", ["ball", "sheet"])
+def test_a_finely_cut_mesh_that_ends_on_a_large_facet_is_not_said_to_be_free(kind):
+    """At the end of the way it is within a billionth of its size of touching: farther it is free, else it is not."""
+    face = collide.Mesh([[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [0.0, 3.0, 0.0]], [[0, 1, 2]], solid=False)
+    small = small_mesh(kind, 1e-3)
+    low, start = float(small.vertices[:, 2].min()), collide.pose((0.0, 0.0, 0.5))
+    for above, hit in ((-1e-12, True), (0.0, True), (1e-12, False)):
+        r = collide.time_of_impact(face, small, np.eye(4), np.eye(4), start, collide.pose((0.0, 0.0, above - low)))
+        assert r.hit == hit and r.lower <= 1.0, (above, r)
+        assert (r.upper <= 1.0) == (above != 0.0), (above, r)  # touching to the last bit is left open
+
+
+def test_a_ball_of_facets_that_meets_the_rim_of_a_large_cylinder_is_asked_no_distance(monkeypatch):
+    """Normals before it meets turn with it: of several one leaves few facets."""
+    calls = counted(monkeypatch, "pair_rows")
+    ball, cylinder = small_mesh("ball", 1e-7), collide.Cylinder(0.3, 0.8)
+    rng = rng_of("rim of a cylinder")
+    for _ in range(6):
+        R, outwards = random_pose(rng, 0.0), np.array([0.3, 0.0, 0.4]) + np.append(rng.normal(size=2) * 2e-8, 0.0)
+        start, end = R.copy(), R.copy()
+        aside = rng.uniform(0.2, 0.8, 3) * (1.0, 0.5, 1.0)
+        start[:3, 3], end[:3, 3] = outwards + aside, outwards - aside
+        r = collide.time_of_impact(cylinder, ball, np.eye(4), np.eye(4), start, end)
+        assert r.hit and r.certified and abs(r.time - 0.5) < 1e-6, (start.tolist(), end.tolist())
+    assert not calls, calls
+
+
+def fan(n: int, rng) -> collide.Mesh:
+    """n facets about a corner that stands out, by other lengths each."""
+    angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, n))
+    reach = rng.uniform(0.5, 2.0, n)
+    rim = np.stack([reach * np.cos(angles), reach * np.sin(angles), -rng.uniform(0.1, 1.0, n)], axis=1)
+    at = np.arange(n)
+    faces = np.stack([np.full(n, n), at, (at + 1) % n], axis=1)
+    return collide.Mesh(np.vstack([rim, np.zeros(3)]), faces, solid=False)
+
+
+def from_triangle(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """(k,) distances of points from a triangle: from its plane where they stand above it, else from its edges."""
+    edges = np.roll(corners, -1, axis=0) - corners
+    normal = np.cross(edges[0], edges[1])
+    offsets = points[:, None] - corners
+    share = np.clip((offsets * edges).sum(axis=2) / (edges * edges).sum(axis=1), 0.0, 1.0)
+    beside = np.linalg.norm(offsets - share[:, :, None] * edges, axis=2).min(axis=1)
+    is_above = ((np.cross(edges, offsets) @ normal) > 0.0).all(axis=1)
+    return np.where(is_above, np.abs(offsets[:, 0] @ normal) / np.linalg.norm(normal), beside)
+
+
+def test_a_finely_cut_mesh_before_a_corner_of_many_facets_is_not_walked_beside_all_of_them(monkeypatch):
+    """A ball comes down on a corner of 130 facets: all pairs of these and its own nearest facets are jobs."""
+    calls, rng = counted(monkeypatch, "pair_rows", "facets_within"), rng_of("corner of many facets")
+    ends = collide.pose((0.0, 0.0, 0.5)), collide.pose((0.0, 0.0, -0.5))
+    r = collide.time_of_impact(fan(130, rng), small_mesh("ball", 1e-6), np.eye(4), np.eye(4), *ends)
+    assert r.hit and r.certified and abs(r.time - 0.5) < 1e-6
+    assert not calls, calls
+
+
+@pytest.mark.parametrize("n", [5, 60])
+@pytest.mark.parametrize("side", [0, 1])
+def test_facets_near_large_facets_large_ones_are_all_that_are_near(side, n):
+    """Corners of small facets are measured from the large ones at the middle of a span: what is within its reach is
+    listed."""
+    rng = rng_of(f"near few facets {side} {n}")
+    small, listed, near = small_mesh("sheet", 0.01), 0, 0
+    for _ in range(8 if n < 20 else 3):
+        large = fan(n, rng)
+        pieces = [surface_motions.pieces_of(of)[0] for of in (large, small)]
+        X_L, X_S = random_pose(rng, 0.0), random_pose(rng, 0.0)
+        X_S[:3, 3] = X_L[:3, :3] @ (rng.normal(size=3) * 0.002 + (0.0, 0.0, rng.uniform(-0.001, 0.002)))
+        later = X_S.copy()
+        later[:3, 3] += rng.normal(size=3) * 0.01
+        ends = [X[None] for X in (X_L, X_L, X_S, later)]
+        motion = Motions(*(ends if side == 0 else ends[2:] + ends[:2]), None, None)
+        spans = surface_motions._Spans(*(pieces if side == 0 else pieces[::-1]), motion)
+        begin = rng.uniform(0.0, 0.5)
+        end = begin + rng.choice([0.03, 0.1])
+        few = spans._large_facets_ahead(begin, end)
+        pairs = None if few is None else spans._near_large_facets(few, begin, end, 1 << 20)
+        if pairs is None or not len(few):
+            continue
+        reach = spans.describe(begin, end)[32]
+        X = X_S.copy()
+        X[:3, 3] += 0.5 * (begin + end) * (later[:3, 3] - X_S[:3, 3])
+        facets = (large.vertices @ X_L[:3, :3].T)[large.faces[few]]
+        points = (small.vertices @ X[:3, :3].T + X[:3, 3])[small.faces]
+        named = np.zeros((len(large.faces), len(small.faces)), dtype=bool)
+        named[tuple(pairs.T[:: 1 if side == 0 else -1])] = True
+        gaps = np.stack([from_triangle(points.reshape(-1, 3), of).reshape(-1, 3).min(axis=1) for of in facets])
+        is_near = gaps < reach * (1.0 - 1e-9)
+        near += int(is_near.sum())
+        listed += int((~named[few]).sum())
+        assert named[few][is_near].all(), (X_L.tolist(), X_S.tolist(), later.tolist(), begin, end)
+    assert listed >= 1000 and near >= 300, (listed, near)
+
+
+@pytest.mark.parametrize("curved", ["cylinder", "ellipsoid", "cone"])
+def test_a_small_mesh_beside_a_large_curved_body_is_asked_no_distance(monkeypatch, curved):
+    """A flat, finely cut slab: facets are told by the normal of sets around both shortly before they meet."""
+    calls, jobs = counted(monkeypatch, "pair_rows", "facets_within"), []
+    look = surface_motions._look_at
+    monkeypatch.setattr(surface_motions, "_look_at", lambda near, *a: (jobs.append(len(near)), look(near, *a))[1])
+    grid = collide.tessellate(collide.HeightField(np.zeros((9, 9)), (1 / 8, 1 / 8), bottom=-0.1))
+    small = collide.Mesh(1e-7 * grid.vertices, grid.faces)
+    bodies = {"cylinder": collide.Cylinder(0.3, 0.8), "ellipsoid": collide.Ellipsoid((0.5, 0.3, 0.2))}
+    large = bodies.get(curved, collide.Cone(0.4, 0.8))
+    rng = rng_of(f"small beside {curved}")
+    for _ in range(3):
+        X_A, start = random_pose(rng, 0.0), random_pose(rng, 0.0)
+        n, end = rng.normal(size=3), start.copy()
+        start[:3, 3], end[:3, 3] = n / np.linalg.norm(n), 0.1 * rng.normal(size=3)
+        r = collide.time_of_impact(large, small, X_A, X_A, start, end)
+        facets = [collide.ConvexHull(small.vertices[face]) for face in small.faces]
+        each = collide.time_of_impact([large] * len(facets), facets, X_A, X_A, start, end)
+        assert r.hit and r.certified and each.hit.any(), (X_A.tolist(), start.tolist(), end.tolist())
+        assert r.lower <= each.upper.min() and each.lower.min() <= r.upper, (X_A.tolist(), start.tolist(), end.tolist())
+    assert "pair_rows" not in calls, calls
+    assert 0 < sum(jobs) < 300, jobs
