@@ -1,7 +1,7 @@
 """How far a box is from a facet that is larger than it: by the facet's plane and by the half-spaces along its edges.
 
-Boxes and slabs around a leaf of large facets hold all of a small body that lies in a valley between them: facet by facet
-it is outside. Heights are those of the world's axes, from A's origin, in doubles.
+Boxes and slabs around a leaf of large facets hold all of a small body that lies in a valley between them; no facet
+does. Heights are those of the world's axes, from A's origin, in doubles.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def world_box(X, shift, tree, ref):
 def gap_to_facet(box, X, shift, triangles, facet):
     """What the distance of a box from a facet, rotated by a pose X and shifted, is at least, but for rounding.
 
-    Along a unit vector two sets are no nearer than their extents. Of unit vectors m, n with gaps g, h > 0 and |m·n| = c,
-    the vector g m + h n, at most √((g² + h²)(1 + c)) long, says √((g² + h²) / (1 + c)).
+    Along a unit vector two sets are no nearer than their extents. Of unit vectors m, n with gaps g, h > 0 and
+    |m·n| = c, the vector g m + h n, at most √((g² + h²)(1 + c)) long, says √((g² + h²) / (1 + c)).
     """
     at = triangle_at(triangles, 9 * facet)
     p, q, r = rotate_by_pose(X, at.p), rotate_by_pose(X, at.q), rotate_by_pose(X, at.r)

@@ -35,7 +35,7 @@ def nearest_on_triangle(x: np.ndarray, T: np.ndarray) -> np.ndarray:
 
 
 def distance_by_projections(low: np.ndarray, high: np.ndarray, T: np.ndarray) -> float:
-    """What a box and a triangle are apart at most: of convex sets, alternating projections come down to the distance."""
+    """What a box and a triangle are apart at most: alternating projections of convex sets come down to the distance."""
     x = 0.5 * (low + high)
     for _ in range(200):
         y = nearest_on_triangle(x, T)
@@ -75,7 +75,8 @@ def test_little_of_a_finely_cut_ball_is_looked_at_in_a_valley(exchanged):
     """Boxes and slabs around leaves of a terrain hold all of the ball, its facets do not: with a limit just below the
     distance every pair of boxes has to be left out."""
     x, y = np.meshgrid(*[np.linspace(-50.0, 50.0, 10)] * 2)
-    ground = body_of(collide.HeightField(5 * np.sin(0.09 * x) * np.cos(0.07 * y), (100 / 9, 100 / 9), bottom=-30.0)).tree
+    heights = 5 * np.sin(0.09 * x) * np.cos(0.07 * y)
+    ground = body_of(collide.HeightField(heights, (100 / 9, 100 / 9), bottom=-30.0)).tree
     vertices, faces = bumpy_sphere(4000, 1)
     ball = build_mesh_tree(vertices / np.abs(vertices).max(), faces)
     X, looked_at = collide.pose(rpy=(0.3, -0.2, 0.5)), []
