@@ -94,13 +94,14 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
     return states
 
 
-def _sets_apart(A: CompoundParts, B: CompoundParts, i, j, X_WA, X_WB) -> np.ndarray:
-    """(k,) bool: whether convex sets around parts i and j (k,) are proven apart at poses (k, 4, 4).
+def _set_gaps(A: CompoundParts, B: CompoundParts, i, j, X_WA, X_WB, within: float = 0.0) -> np.ndarray:
+    """(k,) how far parts i and j (k,) are at least at poses (k, 4, 4), looked for up to ``within`` [m], by convex sets
+    around both; not above 0 where these may meet.
 
-    A part lies in its convex set. Poses, rounded, put the sets within their slops of where they are: the sets are apart
-    where their distance is more than both.
+    A part lies in its convex set, and poses, rounded, put the sets within their slops of where they are: the parts'
+    distance is no less than the sets', less both slops.
     """
-    apart = np.zeros(len(i), dtype=bool)
+    gaps = np.zeros(len(i))
     for first in range(0, len(i), _BOUNDS_AT_ONCE):
         some = slice(first, first + _BOUNDS_AT_ONCE)
         about = _about(A, B, i[some], j[some], X_WA[some], X_WB[some])
@@ -115,10 +116,10 @@ def _sets_apart(A: CompoundParts, B: CompoundParts, i, j, X_WA, X_WB) -> np.ndar
         distances = np.zeros(len(about), dtype=PAIR_DTYPE)
         run_poses(
             distances, ShapeTable(sets), np.stack(rows, axis=1), placed[0].X, placed[1].X, boolean=False,
-            limit=float(slop.max()), check=False, depths=False,
+            limit=within + float(slop.max()), check=False, depths=False,
         )
-        apart[some] = distances["lower"] > slop
-    return apart
+        gaps[some] = distances["lower"] - slop
+    return gaps
 
 
 def _leave_out_groups(M: CompoundParts, N: CompoundParts, X_WM, X_WN, near: np.ndarray) -> np.ndarray:
@@ -156,7 +157,7 @@ def _take_states(A: CompoundParts, B: CompoundParts, i, j, poses, X_WA, X_WB, st
     states[poses[status == HIT]] = HIT
     some = np.flatnonzero((status == OPEN) & (states[poses] != HIT))
     if begins.sum() > _ASKED_FIRST and len(some) and not (A.unbounded and B.unbounded):
-        some = some[~_sets_apart(A, B, i[some], j[some], X_WA[poses[some]], X_WB[poses[some]])]
+        some = some[_set_gaps(A, B, i[some], j[some], X_WA[poses[some]], X_WB[poses[some]]) <= 0.0]
     if not len(some):
         return
     PA, PB = _placed(A, B, i[some], j[some], X_WA[poses[some]], X_WB[poses[some]])
@@ -355,6 +356,7 @@ def _part_rows(
     within = np.minimum(upper, sight)
     raised = _raise_by_balls(A, B, X_WA, X_WB, within, gaps)
     raised |= _raise_by_balls(B, A, X_WB, X_WA, within, gaps.transpose(0, 2, 1))
+    raised |= _raise_by_sets(A, B, X_WA, X_WB, within, gaps)
     if raised.any():
         left_out |= (meshed & (gaps > sight)).any(axis=(1, 2))
         others = np.where(meshed & raised[:, None, None], gaps, math.inf)
@@ -431,6 +433,26 @@ def _raise_by_balls(M: CompoundParts, N: CompoundParts, X_WM, X_WN, within: np.n
             by_balls[sides != OUTSIDE] = -math.inf
             gaps[pose, mesh, part] = np.maximum(gaps[pose, mesh, part], by_balls)
             raised[pose[by_balls > -math.inf]] = True
+    return raised
+
+
+def _raise_by_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, within: np.ndarray, gaps) -> np.ndarray:
+    """(n,) bool, where any was: raise ``gaps``, as of `_box_gaps`, in place to what convex sets around the parts say,
+    of poses at which many pairs are as near as ``within`` (n,) still.
+
+    Beyond a limit no row has a normal, and only the larger body's own faces tell the parts of a union before it apart.
+    """
+    meshed = A.columns.meshed[:, None] | B.columns.meshed
+    near = meshed & (gaps <= within[:, None, None]) & (within > 0.0)[:, None, None]
+    near &= near.sum(axis=(1, 2), keepdims=True) > _ASKED_FIRST
+    raised = np.zeros(len(gaps), dtype=bool)
+    if A.unbounded or B.unbounded or not near.any():
+        return raised
+    pose, i, j = np.nonzero(near)
+    farthest = within[pose].max()
+    by_sets = _set_gaps(A, B, i, j, X_WA[pose], X_WB[pose], float(farthest))
+    raised[pose[by_sets > gaps[pose, i, j]]] = True
+    gaps[pose, i, j] = np.maximum(gaps[pose, i, j], by_sets)
     return raised
 
 

@@ -90,7 +90,7 @@ def test_states_of_parts_are_those_of_each(monkeypatch):
     """A boolean that leaves parts out by their sets says what the parts say one by one: sticks, around which balls tell
     little."""
     rng, hits = rng_of("states of parts"), []
-    left_out = counted(monkeypatch, composite_meshes, "_sets_apart", lambda A, B, i, *_: len(i))
+    left_out = counted(monkeypatch, composite_meshes, "_set_gaps", lambda A, B, i, *_: len(i))
     for seed in range(8):
         union, slab = meshes(40, 0.01 + 0.001 * seed, 40.0), large_slab(30.0)
         X_WA, X_WB = random_pose(rng, 1.0), random_pose(rng, 1.0)
@@ -176,7 +176,7 @@ def test_groups_decide_for_their_parts_before_a_large_mesh(monkeypatch, exchange
     and sets around parts are asked about only where neither balls nor a hit tell."""
     union, sheet = meshes(300, 0.05), rough_sheet(1e5)
     balls = counted(monkeypatch, composite_meshes, "_ball_gaps", lambda M, balls, X, Y, mesh, others, *_: len(others))
-    sets = counted(monkeypatch, composite_meshes, "_sets_apart", lambda A, B, i, *_: len(i))
+    sets = counted(monkeypatch, composite_meshes, "_set_gaps", lambda A, B, i, *_: len(i))
     tried = counted(monkeypatch, composite_meshes, "_states", lambda A, B, X, Y, *_: len(X))
     X_WA, X_WB = collide.pose(rpy=(0.3, -0.2, 0.5)), collide.pose((0.006, 0.0048, 0.0064), rpy=(-0.4, 0.7, 0.1))
     row = collide.distance(*((sheet, union, X_WB, X_WA) if exchanged else (union, sheet, X_WA, X_WB)))
@@ -208,6 +208,26 @@ def test_groups_hold_their_parts():
         # Groups are of neighbours: they are smaller than the union.
         assert n < 1000 or np.median(parts.groups[-1].radii) < 0.5 * parts.groups[0].radii[0]
     assert checked > 3000
+
+
+@pytest.mark.parametrize("limit", [0.05, 3e3, np.inf])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_parts_of_a_union_before_a_large_convex_body_are_told_apart_by_sets(monkeypatch, limit, swapped):
+    """No row beyond a limit has a normal, and boxes of the large body hold all of the union."""
+    rng, union = rng_of("before a large convex body"), meshes(120, 0.05)
+    normals = rng.normal(size=(60, 3))
+    body = collide.HPolytope(normals / np.linalg.norm(normals, axis=1)[:, None], np.full(60, 1e4))
+    X_WA, X_WB = collide.pose(rpy=(0.3, -0.2, 0.5)), collide.pose(rpy=(-0.4, 0.7, 0.1))
+    n = X_WB[:3, :3] @ (normals[0] / np.linalg.norm(normals[0]))
+    X_WA[:3, 3] = (1e4 + 1.5) * n
+    asked = counted(monkeypatch, composite_meshes, "part_rows", lambda A, B, X, Y, limit: len(X.X))
+    options = {"max_distance": limit}
+    row = collide.distance(*((body, union, X_WB, X_WA) if swapped else (union, body, X_WA, X_WB)), **options)
+    assert not row.hit and row.certified and row.beyond == (limit < 0.1)
+    assert 0 < sum(asked) < 20, sum(asked)
+    if not row.beyond:
+        each = [collide.distance(collide.Compound([item]), body, X_WA, X_WB) for item in union.items]
+        assert all(getattr(row, of) == min(getattr(r, of) for r in each) for of in ("lower", "distance", "upper"))
 
 
 def test_balls_decide_most_of_many_parts_at_one_mesh(monkeypatch):
