@@ -1,6 +1,6 @@
 """The slowest calls of the public interface: found by a search over bodies, sizes, placements and questions, and kept.
 
-    python benchmarks/slowest_calls.py                        # the forty kept, beside the bar; five minutes
+    python benchmarks/slowest_calls.py                        # the forty-two kept, beside the bar; five minutes
     python benchmarks/slowest_calls.py --search --seconds 600 # looks for others; prints the worst, writes no file
     python benchmarks/slowest_calls.py --case "contacts ball:80000 box 1 deep"
 
@@ -45,7 +45,8 @@ WORST = (
     "world_minimum meshes:1000 sheet:300 1e+07 inside", "world_minimum boxes:1000 cans:1000 1e+07 touching",
     "world_distances cans:1000 boxes:1000 1e-07 far", "world_rays hull:100000 rounded:10 0.01 deep",
     "world_cast cans:1000 sheet:80000 100 deep", "world_nearest cylinder ball:10000 1e-07 deep",
-    "within meshes:1000 terrain:80000 100 deep", "rays meshes:1000 meshes:1000 1 far",
+    "within meshes:1000 terrain:80000 100 deep", "within meshes:1000 planes:300 1e+07 deep",
+    "distance meshes:1000 boxes:1000 1 inside", "rays meshes:1000 meshes:1000 1 far",
     "certify_motion hull:100000 cans:1000 1e-07 deep",
     "impact hull:100000 terrain:80000 100 far", "impact ball:10000 hull:100000 1e+07 near",
     "impact sheet:80000 boxes:1000 1e+07 far", "impact cans:1000 slab:300 1e+07 touching",

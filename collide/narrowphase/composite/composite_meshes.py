@@ -37,7 +37,7 @@ _BOUNDS_AT_ONCE = 1 << 14
 #: Of more parts at one mesh, balls around them are asked before they are.
 _AT_ONE_MESH = 4
 #: Groups are asked about at so many meshes at most: more are small beside a group.
-_FEW_MESHES = 8
+_MAX_MESHES = 8
 _POINT = Sphere(1.0)
 
 
@@ -129,7 +129,7 @@ def _leave_out_groups(M: CompoundParts, N: CompoundParts, X_WM, X_WN, near: np.n
     A group is in its ball: where this is clear of every facet, all of it is on the side that the ball's centre is on.
     """
     within = np.zeros(len(near), dtype=bool)
-    for balls in N.groups if M.columns.meshed.sum() <= _FEW_MESHES else ():
+    for balls in N.groups if M.columns.meshed.sum() <= _MAX_MESHES else ():
         members = np.zeros((len(balls.of), len(balls.radii)), dtype=np.int64)
         members[np.arange(len(balls.of)), balls.of] = 1
         for mesh in np.flatnonzero(M.columns.meshed & near.any(axis=(0, 2))).tolist():
