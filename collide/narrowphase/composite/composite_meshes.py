@@ -18,7 +18,7 @@ from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
-from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
+from collide.narrowphase.composite.composite_parts import Balls, CompoundParts, compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
 from collide.narrowphase.convex_kernel_calls import run_poses
 from collide.narrowphase.facets.collide_kernel import APART, HIT, OPEN
@@ -36,6 +36,8 @@ _ASKED_FIRST = 8
 _BOUNDS_AT_ONCE = 1 << 14
 #: Of more parts at one mesh, balls around them are asked before they are.
 _AT_ONE_MESH = 4
+#: Groups are asked about at so many meshes at most: more are small beside a group.
+_MAX_MESHES = 8
 _POINT = Sphere(1.0)
 
 
@@ -75,13 +77,13 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
     if len(poses):
         gaps = _box_gaps(A, B, X_WA[poses], X_WB[poses])
         near = meshed & (gaps <= 0.0)
-        if np.any(near, axis=0).sum() > _ASKED_FIRST and not (A.unbounded and B.unbounded):
-            if len(X_WA) == 1:
-                deepest = np.where(near[0], gaps[0], math.inf).argmin().reshape(1)
-                first_a, first_b = np.unravel_index(deepest, meshed.shape)
-                _take_states(A, B, first_a, first_b, poses, X_WA, X_WB, states)
-            if (states[poses] != HIT).any():
-                _leave_out_sets(A, B, X_WA[poses], X_WB[poses], near)
+        for M, N, X_WM, X_WN, of_both in ((A, B, X_WA, X_WB, near), (B, A, X_WB, X_WA, near.transpose(0, 2, 1))):
+            states[poses[_leave_out_groups(M, N, X_WM[poses], X_WN[poses], of_both)]] = HIT
+        near[states[poses] == HIT] = False
+        if len(X_WA) == 1 and near.sum() > _ASKED_FIRST:
+            deepest = np.where(near[0], gaps[0], math.inf).argmin().reshape(1)
+            first_a, first_b = np.unravel_index(deepest, meshed.shape)
+            _take_states(A, B, first_a, first_b, poses, X_WA, X_WB, states)
         pairs = np.argwhere(np.any(near, axis=0))
         begin, size = 0, _ASKED_FIRST
         while begin < len(pairs):  # in blocks, each larger, since poses with a hit are done with
@@ -92,30 +94,54 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
     return states
 
 
-def _leave_out_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, near: np.ndarray) -> None:
-    """Take from ``near``, (n, parts of A, parts of B) bool, in place, pairs that convex sets around both prove apart.
+def _set_gaps(A: CompoundParts, B: CompoundParts, i, j, X_WA, X_WB, within: float = 0.0) -> np.ndarray:
+    """(k,) how far parts i and j (k,) are at least at poses (k, 4, 4), looked for up to ``within`` [m], by convex sets
+    around both; not above 0 where these may meet.
 
-    A part lies in its convex set. Poses, rounded, put the sets within their slops of where they are: the sets are apart
-    where their distance is more than both.
+    A part lies in its convex set, and poses, rounded, put the sets within their slops of where they are: the parts'
+    distance is no less than the sets', less both slops.
     """
-    entries = np.argwhere(near)
-    for first in range(0, len(entries), _BOUNDS_AT_ONCE):
-        pose, i, j = some = entries[first : first + _BOUNDS_AT_ONCE].T
-        about = _about(A, B, i, j, X_WA[pose], X_WB[pose])
+    gaps = np.zeros(len(i))
+    for first in range(0, len(i), _BOUNDS_AT_ONCE):
+        some = slice(first, first + _BOUNDS_AT_ONCE)
+        about = _about(A, B, i[some], j[some], X_WA[some], X_WB[some])
         sets: list[PackedConvex] = []
-        rows, placed, slop = [], [], np.zeros(len(pose))
-        for side, parts, X in ((A, i, X_WA), (B, j, X_WB)):
+        rows, placed, slop = [], [], np.zeros(len(about))
+        for side, parts, X in ((A, i[some], X_WA[some]), (B, j[some], X_WB[some])):
             of, row = np.unique(parts, return_inverse=True)
             rows.append(row.ravel() + len(sets))
             sets += [side.parts[k].bound for k in of.tolist()]
-            placed.append(side.placed(parts, X[pose], about))
+            placed.append(side.placed(parts, X, about))
             slop += 1.001 * placed[-1].slop
-        distances = np.zeros(len(pose), dtype=PAIR_DTYPE)
+        distances = np.zeros(len(about), dtype=PAIR_DTYPE)
         run_poses(
             distances, ShapeTable(sets), np.stack(rows, axis=1), placed[0].X, placed[1].X, boolean=False,
-            limit=float(slop.max()), check=False, depths=False,
+            limit=within + float(slop.max()), check=False, depths=False,
         )
-        near[tuple(some[:, distances["lower"] > slop])] = False
+        gaps[some] = distances["lower"] - slop
+    return gaps
+
+
+def _leave_out_groups(M: CompoundParts, N: CompoundParts, X_WM, X_WN, near: np.ndarray) -> np.ndarray:
+    """(n,) bool: poses at which a group of parts of N lies within a mesh of M. From ``near``, (n, parts of M, parts of
+    N) bool, pairs are taken, in place, whose group is outside; larger groups are asked first.
+
+    A group is in its ball: where this is clear of every facet, all of it is on the side that the ball's centre is on.
+    """
+    within = np.zeros(len(near), dtype=bool)
+    for balls in N.groups if M.columns.meshed.sum() <= _MAX_MESHES else ():
+        members = np.zeros((len(balls.of), len(balls.radii)), dtype=np.int64)
+        members[np.arange(len(balls.of)), balls.of] = 1
+        for mesh in np.flatnonzero(M.columns.meshed & near.any(axis=(0, 2))).tolist():
+            pose, group = np.nonzero((near[:, mesh] @ members > 1) & ~within[:, None])
+            if not len(pose):
+                continue
+            states = _states_of(*_ball_gaps(M, balls, X_WM, X_WN, mesh, group, pose, np.zeros(len(pose))))
+            within[pose[states == HIT]] = True
+            apart = np.zeros((len(near), len(balls.radii)), dtype=bool)
+            apart[pose, group] = states == APART
+            near[:, mesh] &= ~apart[:, balls.of]
+    return within
 
 
 def _take_states(A: CompoundParts, B: CompoundParts, i, j, poses, X_WA, X_WB, states: np.ndarray) -> None:
@@ -130,6 +156,8 @@ def _take_states(A: CompoundParts, B: CompoundParts, i, j, poses, X_WA, X_WB, st
                 status[some] = _states_by_balls(*sides, number, of_other[some], poses[some])
     states[poses[status == HIT]] = HIT
     some = np.flatnonzero((status == OPEN) & (states[poses] != HIT))
+    if begins.sum() > _ASKED_FIRST and len(some) and not (A.unbounded and B.unbounded):
+        some = some[_set_gaps(A, B, i[some], j[some], X_WA[poses[some]], X_WB[poses[some]]) <= 0.0]
     if not len(some):
         return
     PA, PB = _placed(A, B, i[some], j[some], X_WA[poses[some]], X_WB[poses[some]])
@@ -149,15 +177,19 @@ def _states_by_balls(
 
     Where a part is farther from every facet than rounding moved it, all of it is on the side that its ball is on.
     """
-    gaps, sides = _ball_gaps(M, N, X_WM, X_WN, mesh, others, poses, np.zeros(len(others)))
+    return _states_of(*_ball_gaps(M, N.balls, X_WM, X_WN, mesh, others, poses, np.zeros(len(others))))
+
+
+def _states_of(gaps: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """(k,) APART, HIT or OPEN by what `_ball_gaps` gives."""
     return np.where(gaps > 0.0, np.where(sides == OUTSIDE, APART, np.where(sides == INSIDE, HIT, OPEN)), OPEN)
 
 
 def _ball_gaps(
-    M: CompoundParts, N: CompoundParts, X_WM, X_WN, mesh: int, others: np.ndarray, poses: np.ndarray, within: np.ndarray
+    M: CompoundParts, balls: Balls, X_WM, X_WN, mesh: int, others: np.ndarray, poses: np.ndarray, within: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """((k,) how far parts of N, by number, are at least from the surface of a mesh of M, at poses by number [m], looked
-    for up to ``within`` (k,), -inf where they may touch; (k,) on which side of the surface the others are).
+    """((k,) how far parts in balls of N, by number, are at least from the surface of a mesh of M, at poses by number
+    [m], looked for up to ``within`` (k,), -inf where they may touch; (k,) on which side of the surface the others are).
 
     A part is within its ball, which is moved by no more than the slop: what of it is nearest to the surface is nearer
     than the ball's centre by radius and slop at most, and while these are less than the centre's distance, no facet
@@ -166,7 +198,7 @@ def _ball_gaps(
     gaps, sides = np.full(len(others), -math.inf), np.full(len(others), OUTSIDE)
     body, unique = body_of(M.parts[mesh].shape), np.unique(poses, return_inverse=True)
     placed = M.parts[mesh].at(X_WM[unique[0]], np.zeros(len(unique[0]))).of(unique[1])
-    centres, radii = N.balls(others, X_WN[poses])
+    centres, radii = balls.at(others, X_WN[poses])
     reach = radii + placed.slop
     some = np.flatnonzero(np.isfinite(reach))
     if len(some):
@@ -324,6 +356,7 @@ def _part_rows(
     within = np.minimum(upper, sight)
     raised = _raise_by_balls(A, B, X_WA, X_WB, within, gaps)
     raised |= _raise_by_balls(B, A, X_WB, X_WA, within, gaps.transpose(0, 2, 1))
+    raised |= _raise_by_sets(A, B, X_WA, X_WB, within, gaps)
     if raised.any():
         left_out |= (meshed & (gaps > sight)).any(axis=(1, 2))
         others = np.where(meshed & raised[:, None, None], gaps, math.inf)
@@ -396,10 +429,30 @@ def _raise_by_balls(M: CompoundParts, N: CompoundParts, X_WM, X_WN, within: np.n
         entries = np.argwhere(near[:, mesh])
         for first in range(0, len(entries), _BOUNDS_AT_ONCE):
             pose, part = entries[first : first + _BOUNDS_AT_ONCE].T
-            by_balls, sides = _ball_gaps(M, N, X_WM, X_WN, mesh, part, pose, within[pose])
+            by_balls, sides = _ball_gaps(M, N.balls, X_WM, X_WN, mesh, part, pose, within[pose])
             by_balls[sides != OUTSIDE] = -math.inf
             gaps[pose, mesh, part] = np.maximum(gaps[pose, mesh, part], by_balls)
             raised[pose[by_balls > -math.inf]] = True
+    return raised
+
+
+def _raise_by_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, within: np.ndarray, gaps) -> np.ndarray:
+    """(n,) bool, where any was: raise ``gaps``, as of `_box_gaps`, in place to what convex sets around the parts say,
+    of poses at which many pairs are as near as ``within`` (n,) still.
+
+    Beyond a limit no row has a normal, and only the larger body's own faces tell the parts of a union before it apart.
+    """
+    meshed = A.columns.meshed[:, None] | B.columns.meshed
+    near = meshed & (gaps <= within[:, None, None]) & (within > 0.0)[:, None, None]
+    near &= near.sum(axis=(1, 2), keepdims=True) > _ASKED_FIRST
+    raised = np.zeros(len(gaps), dtype=bool)
+    if A.unbounded or B.unbounded or not near.any():
+        return raised
+    pose, i, j = np.nonzero(near)
+    farthest = within[pose].max()
+    by_sets = _set_gaps(A, B, i, j, X_WA[pose], X_WB[pose], float(farthest))
+    raised[pose[by_sets > gaps[pose, i, j]]] = True
+    gaps[pose, i, j] = np.maximum(gaps[pose, i, j], by_sets)
     return raised
 
 

@@ -25,6 +25,8 @@ from collide.shapes.shape import IDENTITY, Shape, held_by, kept_with_shape
 
 #: Boxes of parts that are made at once; of so few pairs of parts all are compared, of more through a box-tree.
 _BOXES_AT_ONCE, _MAX_PAIRS = 1 << 16, 256
+#: Parts of a group, and groups of a larger one.
+_OF_A_GROUP = 32
 #: Outside half-spaces: a rounded turn moves what is far away by more.
 _UP = 1 + 2.0**-40
 
@@ -75,6 +77,47 @@ def _stretch_of(R: np.ndarray) -> np.ndarray:
     """(k,) at least how much longer matrices (k, 3, 3) make a vector, and 1: the root of the norm of R^T R."""
     gram = np.abs(R.transpose(0, 2, 1) @ R).sum(axis=2).max(axis=1)
     return np.maximum(np.sqrt(gram), 1.0) * _UP
+
+
+class Balls(NamedTuple):
+    """Balls that hold a union's parts, or groups of them: centres (k, 3) and radii (k,) in its frame [m], and the ball
+    (parts,) that each part is in."""
+
+    centres: np.ndarray
+    radii: np.ndarray
+    of: np.ndarray
+
+    def at(self, which: np.ndarray, X_WB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(centres (m, 3), radii (m,) [m]) of balls (m,) by number, at the union's poses (m, 4, 4).
+
+        Three products and three sums of each coordinate are rounded.
+        """
+        R, p = X_WB[:, :3, :3], X_WB[:, :3, 3]
+        terms = R * self.centres[which, None]
+        radii = _stretch_of(R) * self.radii[which] * _UP
+        radii = radii + 2.0**-45 * (np.abs(terms).sum(axis=(1, 2)) + np.abs(p).sum(axis=1))
+        return terms.sum(axis=2) + p, radii
+
+
+def _balls_around(centres: np.ndarray, radii: np.ndarray, of: np.ndarray) -> Balls:
+    """Balls around groups of balls: what is within one of these is within its radius and the way between the
+    centres."""
+    k = int(of.max()) + 1
+    low, high = np.full((k, 3), math.inf), np.full((k, 3), -math.inf)
+    np.minimum.at(low, of, centres)
+    np.maximum.at(high, of, centres)
+    middles, around = 0.5 * (low + high), np.zeros(k)
+    np.maximum.at(around, of, (np.sqrt(np.square(centres - middles[of]).sum(axis=1)) + radii) * _UP)
+    return Balls(middles, around, of)
+
+
+def _by_place(points: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Numbers of points (k, 3), cut in two along their longest axis again and again, whole groups on one side."""
+    if len(which) <= _OF_A_GROUP:
+        return which
+    along = points[which, np.ptp(points[which], axis=0).argmax()]
+    order, half = which[np.argsort(along, kind="stable")], max(len(which) // 2 // _OF_A_GROUP, 1) * _OF_A_GROUP
+    return np.concatenate([_by_place(points, order[:half]), _by_place(points, order[half:])])
 
 
 class PartColumns(NamedTuple):
@@ -197,23 +240,23 @@ class CompoundParts:
         poses = pose_table(np.repeat(X_WB, k, axis=0), X_BP, reach, terms=False)
         return boxes_of(self._table, poses.rows, np.tile(which, n)).reshape(n, k, 6)
 
-    def balls(self, which: np.ndarray, X_WB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(centres (m, 3), radii (m,) [m]) of balls that hold parts (m,) by number, at the union's poses (m, 4, 4);
-        infinite of half-spaces.
-
-        Centres are the parts' origins, three products and three sums of each coordinate rounded.
-        """
-        columns, R, p = self.columns, X_WB[:, :3, :3], X_WB[:, :3, 3]
-        terms = R * columns.X[which, None, :3, 3]
-        reach = columns.reach[which]
-        held = self._stretch[which] * reach + columns.radius[which] + columns.slop[which]
-        held += columns.rotation[which] * reach + columns.shift[which]
-        radii = _stretch_of(R) * held * _UP + 2.0**-45 * (np.abs(terms).sum(axis=(1, 2)) + np.abs(p).sum(axis=1))
-        return terms.sum(axis=2) + p, np.where(np.isnan(columns.plane[which]), radii, math.inf)
+    @cached_property
+    def balls(self) -> Balls:
+        """Around each part's origin, as it stands in the union's frame; infinite of half-spaces."""
+        columns = self.columns
+        held = _stretch_of(columns.X[:, :3, :3]) * columns.reach + columns.radius + columns.slop
+        held += columns.rotation * columns.reach + columns.shift
+        return Balls(columns.X[:, :3, 3], np.where(np.isnan(columns.plane), held, math.inf), np.arange(len(held)))
 
     @cached_property
-    def _stretch(self) -> np.ndarray:
-        return _stretch_of(self.columns.X[:, :3, :3])
+    def groups(self) -> list[Balls]:
+        """Balls around groups of parts that are near each other, the largest groups first, each of all parts once; of
+        unions of so many parts that groups are worth it."""
+        centres, radii, _ = self.balls
+        place = np.empty(len(radii), dtype=np.int64)
+        place[_by_place(centres, np.arange(len(radii)))] = np.arange(len(radii))
+        sizes = [_OF_A_GROUP**k for k in range(1, 8) if _OF_A_GROUP**k < _OF_A_GROUP * len(radii)]
+        return [_balls_around(centres, radii, place // size) for size in reversed(sizes)] if len(sizes) > 1 else []
 
     def extents(self, X_WB: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, float]:
         """((d,) what no product of its points with each of d unit vectors exceeds, error of these), at a pose (4, 4).

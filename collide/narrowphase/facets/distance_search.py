@@ -22,7 +22,14 @@ from collide.mesh.bvh import (
 from collide.mesh.triangle import range_along
 from collide.narrowphase.facets.box_probes import set_box
 from collide.narrowphase.facets.fine_probes import move_probe
-from collide.narrowphase.facets.posed_surfaces import INVERSE_A, INVERSE_B, MAX_UNIT_EXPONENT, UNITS, rotate_by_pose
+from collide.narrowphase.facets.posed_surfaces import (
+    INVERSE_A,
+    INVERSE_B,
+    MAX_UNIT_EXPONENT,
+    UNITS,
+    extent_of,
+    rotate_by_pose,
+)
 from collide.narrowphase.facets.posed_trees import PosedTrees
 from collide.narrowphase.facets.probe_parts import put_floats
 from collide.numerics.vec3 import Vec3, absolute, add, divide, dot, max_abs, neg, put_vec3, scale, sub, vec3_at
@@ -161,6 +168,7 @@ def set_direction(query, direction):
     offset = 0.0
     terms = 0.0
     spread = 0.0
+    reach_a, reach_b = extent_of(A).reach, extent_of(B).reach
     for i in range(3):
         shift = XB[4 * i + 3] - XA[4 * i + 3]
         offset += near[DIRECTION + i] * shift
@@ -176,13 +184,13 @@ def set_direction(query, direction):
         offset += along_b * B.numbers[CENTRE + j] - along_a * A.numbers[CENTRE + j]
         near[ALONG_A + j] = along_a
         near[ALONG_B + j] = along_b * unit
-        spread += abs(along_a) + abs(along_b * unit)
+        spread += abs(along_a) * reach_a + abs(along_b * unit) * reach_b
     if unit > _MAX_UNIT:
         put_vec3(near, ALONG_B, Vec3(0.0, 0.0, 0.0))
         near[OFFSET] = -math.inf
         return
     offset *= query.unit_a
-    rounding = _FLOAT_ERROR * (abs(offset) + 1.001 * spread) + 2.0**-110 + 32.0 * U * query.unit_a * terms
+    rounding = _FLOAT_ERROR * (abs(offset) + spread) + 2.0**-110 + 32.0 * U * query.unit_a * terms
     near[OFFSET] = offset - rounding
 
 

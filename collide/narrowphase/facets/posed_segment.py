@@ -15,7 +15,7 @@ from collide.mesh.bvh import NUMBERS, TreeView
 from collide.mesh.triangle import put_triangle, triangle_at
 from collide.narrowphase.facets.exact_corners import B_LOCAL_AT, CORNERS, STATE, invalidate_pose_cache
 from collide.narrowphase.facets.exact_triangles import ExactCall, ask_exactly
-from collide.narrowphase.facets.posed_surfaces import PLACING, Extent, extent_of, place, put_in_frame_of_a
+from collide.narrowphase.facets.posed_surfaces import EXTENT, PLACING, Extent, extent_of, place, put_in_frame_of_a
 
 # Counters, integers: nodes compared with the segment, triangles tested, of them decided exactly.
 NODES, TRIANGLES, EXACT = range(3)
@@ -70,7 +70,7 @@ def place_segment(segment, exponent):
     exponent : of the unit of the segment's box.
     """
     A = extent_of(segment.tree)
-    B = Extent(segment.numbers, exponent)
+    B = Extent(segment.numbers, exponent, EXTENT)
     if not place(A, segment.XA, B, segment.XB, segment.placing, segment.frame_a, segment.frame_b):
         return False
     put_in_frame_of_a(segment.placing, segment.ends, 0, segment.corners, 9)

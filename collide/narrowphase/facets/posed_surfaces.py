@@ -41,7 +41,9 @@ _FLOAT_ERROR = 2.0**-19
 #: What sums of doubles round of a probe, of the terms; a tree's origins and facets are as good.
 _DOUBLE_ERROR = 2.0**-47
 #: Boxes of a tree stay within this, in its units.
-_EXTENT = 1.001
+EXTENT = 1.001
+#: Trees that reach less far are points: of others the unit is their size.
+_POINT = 2.0**-20
 #: Added to half lengths: products of floats may vanish.
 _TINY = 2.0**-110
 #: Trees whose units differ by more powers of two than this are compared in the larger one's only.
@@ -53,15 +55,23 @@ _MAX_RESIDUAL = 2.0**-10
 
 
 class Extent(NamedTuple):
-    """Where a tree's boxes are: its numbers (centre, reach; `mesh/bvh.py`), and the exponent of its unit."""
+    """Where a tree's boxes are: its numbers (centre, reach; `mesh/bvh.py`), the exponent of its unit, and how far boxes
+    reach from the centre, at most, in that unit."""
 
     numbers: np.ndarray
     exponent: int
+    reach: float
 
 
 @kernel(inline=True)
 def extent_of(tree):
-    return Extent(tree.numbers, tree.header[EXPONENT])
+    """The `Extent` of a tree.
+
+    A point has no size to be its unit, which may be far larger than the other tree: its boxes stay in the ball.
+    """
+    exponent = tree.header[EXPONENT]
+    of_ball = EXTENT * tree.numbers[RADIUS] * math.ldexp(1.0, int(-exponent))
+    return Extent(tree.numbers, exponent, of_ball if of_ball < _POINT else EXTENT)
 
 
 @kernel
@@ -250,12 +260,12 @@ def _set_frame(probe, node, placing, matrix, error, at, frame):
             entry = placing[matrix + 3 * i + j]
             moved += entry * node.numbers[CENTRE + j]
             size += abs(entry * node.numbers[CENTRE + j])
-            spread += abs(entry * units) * _EXTENT
+            spread += abs(entry * units) * node.reach
             placing[at + 3 * i + j] = entry * units
             frame[3 * i + j] = np.float32(entry * units)
         moved *= scale
         placing[at + 9 + i] = moved
-        terms = abs(moved) + spread + _EXTENT
+        terms = abs(moved) + spread + probe.reach
         of_pose = 2.0 * scale * (error + 8.0 * _U * size)
         placing[at + 12 + i] = _FLOAT_ERROR * terms + _TINY + of_pose
         placing[at + 15 + i] = _DOUBLE_ERROR * terms + _TINY + of_pose

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from collide.kernels import entry, kernel, view_f32, view_f64, view_i64
 from collide.mesh.box_overlap import FRAME, NEAR_PROBE, boxes_nearest
-from collide.mesh.bvh import EXPONENT, N_NODES, NODE, SLAB, SLABS_AT, WIDTH, link_of, open_tree
+from collide.mesh.bvh import EXPONENT, N_NODES, NODE, SLAB, SLABS_AT, WIDTH, box_size, link_of, open_tree
 from collide.mesh.triangle import put_triangle, triangle_at
 from collide.narrowphase.facets.distance_search import (
     ALONG_A,
@@ -58,6 +58,7 @@ from collide.narrowphase.facets.distance_search import (
     upper_bound,
 )
 from collide.narrowphase.facets.exact_corners import CORNERS
+from collide.narrowphase.facets.large_facets import gap_to_facet, world_box
 from collide.narrowphase.facets.pair_heap import pop_heap, push_heap
 from collide.narrowphase.facets.posed_surfaces import (
     PLACING,
@@ -75,6 +76,9 @@ from collide.numerics.vec3 import Vec3, add, divide, dot, max_abs, neg, put_vec3
 #: Depth first until so many pairs of leaves were met, to have a bound and a direction; then the nearest boxes first,
 #: and again depth first, which costs no heap, while the bound has not got better for so many pairs of leaves.
 _DEPTH_FIRST_LEAVES, _MAX_LEAVES_WITHOUT_IMPROVEMENT = 4, 16
+
+#: A leaf is compared with a box facet by facet where it is so many times as large.
+_LARGE = 2.0
 
 #: Points nearer than so many times the error of a coordinate give no direction: it may be off by one over that.
 _DIRECTION_RATIO = 2.0**26
@@ -110,11 +114,42 @@ def _pair_behind(query, word):
 
 
 @kernel(inline=True)
+def _is_past_large_facets(query, pair):
+    """Whether every facet of a leaf that is much larger than the other box is farther from it than the bound."""
+    trees = query.trees
+    A, B, units = trees.A, trees.B, trees.placing[UNITS]
+    origin = Vec3(0.0, 0.0, 0.0)
+    if pair.link_b < 0 and box_size(B.boxes, pair.b) > _LARGE * units * box_size(A.boxes, pair.a):
+        box = world_box(trees.XA, origin, A, pair.a)
+        return _are_farther(query.near, box, trees.XB, query.shift, B, ~pair.link_b)
+    if pair.link_a < 0 and units * box_size(A.boxes, pair.a) > _LARGE * box_size(B.boxes, pair.b):
+        box = world_box(trees.XB, query.shift, B, pair.b)
+        return _are_farther(query.near, box, trees.XA, origin, A, ~pair.link_a)
+    return False
+
+
+@kernel
+def _are_farther(near, box, X, shift, tree, run):
+    """Whether all facets of a run are farther from a box than the bound.
+
+    Corners of both are off by at most 8 E a coordinate, of a box's the rounding that made it included: along unit
+    vectors, two of which are put together, gaps by less than 64 E.
+    """
+    bound = near[BEST] + 64.0 * near[WORLD_ERROR]
+    if not bound < math.inf:
+        return False
+    for facet in range(run >> 3, (run >> 3) + (run & 7)):
+        if not gap_to_facet(box, X, shift, tree.triangles, facet) > bound:
+            return False
+    return True
+
+
+@kernel(inline=True)
 def _open_pair(query, pair, stack, top):
     """Push the children of the larger box that are nearer to the other one than the bound."""
     trees = query.trees
     A, B = trees.A, trees.B
-    if is_beyond_bound(query.near, pair):
+    if is_beyond_bound(query.near, pair) or _is_past_large_facets(query, pair):
         return top
     query.marks[NODES] += 1
     if opens_b(A, B, pair, trees.placing[UNITS]):
@@ -176,7 +211,7 @@ def _visit_leaves(query, pair):
     """Compare the facets of two leaves with the best distance so far; True where two of them meet, or are so near that
     it is enough."""
     trees, near, ints = query.trees, query.near, query.ints
-    if is_beyond_bound(near, pair):
+    if is_beyond_bound(near, pair) or _is_past_large_facets(query, pair):
         return False
     ints[LEAVES] += 1
     ints[LEAVES_WITHOUT_IMPROVEMENT] += 1

@@ -16,7 +16,7 @@ from collide.narrowphase.facets.exact_corners import (
     invalidate_pose_cache,
 )
 from collide.narrowphase.facets.exact_triangles import INTEGERS, decide_exactly
-from collide.narrowphase.facets.posed_surfaces import PLACING, Extent, place, put_in_frame_of_a
+from collide.narrowphase.facets.posed_surfaces import EXTENT, PLACING, Extent, place, put_in_frame_of_a
 
 FAMILIES = ("lattice", "coplanar", "touching", "near touching", "random", "degenerate", "in line")
 
@@ -37,7 +37,7 @@ class PosedFacets:
         self.XA, self.XB = (np.ascontiguousarray(X, dtype=float).ravel() for X in (X_WA, X_WB))
         self.placing, self.corners = self.doubles[:PLACING], self.doubles[PLACING:]
         frames = np.zeros((2, 9), dtype=np.float32)
-        A, B = Extent(numbers_of(P), 1), Extent(numbers_of(Q), 1)
+        A, B = Extent(numbers_of(P), 1, EXTENT), Extent(numbers_of(Q), 1, EXTENT)
         self.invertible = place(A, self.XA, B, self.XB, self.placing, *frames)
         self.corners[:9], self.corners[B_LOCAL_AT : B_LOCAL_AT + 9] = P.ravel(), Q.ravel()
         put_in_frame_of_a(self.placing, self.corners, B_LOCAL_AT, self.corners, 9)

@@ -14,6 +14,7 @@ from posed_facets import numbers_of
 
 from collide.narrowphase.facets.posed_surfaces import (
     ERROR,
+    EXTENT,
     INVERSE_A,
     N_ERROR,
     PLACING,
@@ -47,7 +48,8 @@ def some_pose(rng, kind: str) -> np.ndarray:
 def related(P, Q, X, Y):
     """(whether it is done, placing) of two sets of points at poses."""
     placing, frames = np.full(PLACING, np.nan), np.zeros((2, 9), dtype=np.float32)
-    done = place(Extent(numbers_of(P), 1), X.ravel(), Extent(numbers_of(Q), 3), Y.ravel(), placing, *frames)
+    A, B = Extent(numbers_of(P), 1, EXTENT), Extent(numbers_of(Q), 3, EXTENT)
+    done = place(A, X.ravel(), B, Y.ravel(), placing, *frames)
     return done, placing
 
 
