@@ -697,12 +697,16 @@ class Model:
                 yield f"{self.names([k])} is not near the box: {row}"
 
 
+#: What `collide.distance` says of pairs of which a World says −∞: no way out there is, or was found.
+WITHOUT_END = ("overlap has no end", "no translation was found")
+
+
 def asked_alone(A, B, X_WA, X_WB, limit: float):
     """A row, or `Refused`."""
     try:
         return collide.distance(A, B, X_WA, X_WB, max_distance=limit).rows[0]
     except UnsupportedQuery as error:
-        return Refused(str(error), "overlap has no end" in str(error))
+        return Refused(str(error), any(why in str(error) for why in WITHOUT_END))
 
 
 def _differing(one, other, fields) -> list[str]:
