@@ -231,10 +231,9 @@ def distance(
     an overlap is minus the length of a translation that is proven to separate the bodies, found by some hundred
     booleans, which ``signed=False`` leaves out; each ends at the first two facets that meet, or are as near as the
     radii. Gaps of meshes of n and m facets take few boxes where one pair of facets is nearest, O(n + m) where all are
-    as near as each other within rounding, n·m at worst. Of unions of m and k parts, a mesh among
-    them, each boolean compares all m·k pairs of boxes, and asks about those that overlap or come as near as the nearest
-    parts are. Curved shapes within a mesh of n facets take
-    O(n) where all its facets are near.
+    as near as each other within rounding, n·m at worst. Of unions of m and k parts, a mesh among them, each boolean
+    compares all m·k pairs of boxes, and asks about those that overlap or come as near as the nearest parts are. Curved
+    shapes within a mesh of n facets take O(n) where all its facets are near.
     """
     limit = checks.limit("max_distance", max_distance)
     if signed.__class__ is not bool:
