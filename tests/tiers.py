@@ -23,7 +23,7 @@ HERE = Path(__file__).resolve().parent
 DURATIONS = HERE / "durations.json"
 #: What the quick tier leaves out: functions whose longest case took longer [s of processor time], and what asks peers,
 #: compilers or other processes.
-AT_MOST = 0.2
+AT_MOST = 0.15
 APART = ("adapters", "c_interface", "packaging", "soak", "sweeps")
 
 

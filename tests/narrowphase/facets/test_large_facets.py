@@ -37,7 +37,7 @@ def nearest_on_triangle(x: np.ndarray, T: np.ndarray) -> np.ndarray:
 def distance_by_projections(low: np.ndarray, high: np.ndarray, T: np.ndarray) -> float:
     """What a box and a triangle are apart at most: alternating projections of convex sets come down to the distance."""
     x = 0.5 * (low + high)
-    for _ in range(200):
+    for _ in range(40):
         y = nearest_on_triangle(x, T)
         x = np.clip(y, low, high)
     return float(np.linalg.norm(x - y))
