@@ -151,15 +151,16 @@ def test_of_facets_within_some_are_asked(solid, asked):
         assert asked["meets"] <= 2 * (n_within + n_crossing), (seed, asked, n_within, n_crossing)
 
 
-def test_rows_of_fine_meshes_are_what_they_promise():
+@pytest.mark.parametrize("solid", [True, False])
+def test_rows_of_fine_meshes_are_what_they_promise(solid):
     seen: Counter = Counter()
-    meshes = [rough(40, solid) for solid in (True, False)]
-    for seed in range(30):
+    mesh = rough(40, solid)
+    for seed in range(0 if solid else 1, 30, 2):
         rng = np.random.default_rng([4, seed])
-        posed = meshes[seed % 2], curved(rng), EYE, collide.pose(rng.uniform(-0.3, 0.3, 3), rpy=rng.uniform(-3, 3, 3))
+        posed = mesh, curved(rng), EYE, collide.pose(rng.uniform(-0.3, 0.3, 3), rpy=rng.uniform(-3, 3, 3))
         margin = float(rng.choice([0.0, 0.01]))
         judge_scene(posed, margin, seen, f"default_rng([4, {seed}]), margin {margin}")
-    assert seen["parted"] > 25 and seen["hit"] > 20, seen
+    assert seen["parted"] > 10 and seen["hit"] > 10, seen
 
 
 @pytest.mark.parametrize("sunk", [1e-3, 0.01, 0.05])
