@@ -33,7 +33,7 @@ JOBS_AT_ONCE = 1 << 16
 #: Pairs of parts of unions that are searched before a span of time is cut, to tell which of them come first.
 _PARTS_TOGETHER = 1024
 #: A union is small beside a shape that reaches so many times as far.
-_TIMES_SMALLER = 8.0
+TIMES_SMALLER = 8.0
 #: A thread is handed at least so many motions.
 _MIN_MOTIONS_PER_THREAD = 200
 
@@ -174,7 +174,7 @@ def parts_in_turn(
     reaches = [math.inf if union.unbounded else reach_of_union(union) for union in unions]
     large = 0 if reaches[0] > reaches[1] else 1
     small = unions[1 - large]
-    if not (_TIMES_SMALLER * reaches[1 - large] <= reaches[large] < math.inf and len(small.parts) > 1):
+    if not (TIMES_SMALLER * reaches[1 - large] <= reaches[large] < math.inf and len(small.parts) > 1):
         yield from parts_ahead(*unions, motion, upper, max_pairs)
         return
     end = min(upper(), 1.0)

@@ -33,6 +33,7 @@ from collide.motion.common_points import CommonPoints, Placed
 from collide.motion.convex_impact import CONTACT, OPEN
 from collide.motion.convex_motions import (
     JOBS_AT_ONCE,
+    TIMES_SMALLER,
     Tables,
     bounds_of,
     earliest_of,
@@ -50,6 +51,7 @@ from collide.motion.span_bounds import REACH
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.convex_kernel_calls import run_poses
+from collide.narrowphase.facets.facet_geometry import facet_normals
 from collide.narrowphase.facets.facet_queries import facets_within
 from collide.narrowphase.facets.mesh_batches import pair_rows
 from collide.narrowphase.facets.near_facets import near_facets_up_to
@@ -74,9 +76,8 @@ _BEHIND_MEETING, _LEAST_CUT = 1 / 4, 2.0**-12
 _MORE = 4
 #: Spans shorter than this are not cut any more.
 _SHORTEST = 2.0**-46
-#: A union is small beside a mesh that reaches so many times as far. Of fewer pairs of its pieces and that mesh together
-#: each is looked at by itself.
-_TIMES_SMALLER, _TOGETHER = 8.0, 8
+#: Of fewer pairs of a small union's pieces and a mesh together each is looked at by itself.
+_TOGETHER = 8
 #: So many facets on a way are looked at, and so many pairs of them and of pieces.
 _MAX_ON_THE_WAY, _JOBS_ON_THE_WAY = 1024, 1 << 16
 #: Facets of a mesh that are few beside another mesh of so many at least: for a walk each, and for one together.
@@ -278,7 +279,7 @@ def _ask_on_the_way(
         reach = math.inf if union.unbounded else reach_of_union(union)
         for number in numbers[counts >= _TOGETHER].tolist():
             mesh = pieces[number]
-            if not mesh.is_mesh or _TIMES_SMALLER * reach > mesh.reach:
+            if not mesh.is_mesh or TIMES_SMALLER * reach > mesh.reach:
                 continue
             some = np.flatnonzero((pairs[side] == number) & (earliest <= end))
             ball = pack_points(np.zeros((1, 3)), reach)
@@ -464,7 +465,7 @@ class _Spans(Spans):
         at = as_given(X[1 - side, None]), as_given(X[side, None])
 
         def near(of: np.ndarray) -> np.ndarray | None:
-            along = self._normal if self._normal.any() else _normals(of).sum(axis=0)[None] @ X[side, :3, :3].T
+            along = self._normal if self._normal.any() else facet_normals(X[side, None], of).sum(axis=0)[None]
             packed = pack_points(of.reshape(-1, 3))
             rows = near_facets_up_to(small.tree, packed, *at, along, reach, max_pairs)  # type: ignore[arg-type]
             return None if rows is None else small.tree.ids[rows.place]  # type: ignore[union-attr]
@@ -562,7 +563,7 @@ class _Spans(Spans):
     def is_small_beside(self) -> bool:
         """Whether one piece is small beside the other, which is a mesh."""
         large, small = self._by_size()
-        return large.is_mesh and _TIMES_SMALLER * small.reach <= large.reach
+        return large.is_mesh and TIMES_SMALLER * small.reach <= large.reach
 
     def time_on_the_way(self, begin: float, end: float, tolerance: float) -> float:
         """A time before which the smaller piece meets none of the facets of the larger one, infinity of one that meets
@@ -642,13 +643,6 @@ class _Spans(Spans):
         gap = float(row["normal"] @ (row["point_b"] - row["point_a"]))
         nearer = gap - float(row["normal"] @ (moved[1] - moved[0]))
         return passed * gap / nearer if gap > 0.0 and nearer > 0.0 else math.inf
-
-
-def _normals(corners: np.ndarray) -> np.ndarray:
-    """(k, 3) unit normals of triangles (k, 3, 3); 0 of those without an area."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.sqrt((normals * normals).sum(axis=1))[:, None]
-    return np.where(lengths > 0.0, normals / np.where(lengths > 0.0, lengths, 1.0), 0.0)
 
 
 def _max_jobs(span: float) -> int:

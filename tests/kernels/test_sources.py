@@ -119,14 +119,15 @@ UNEDITED: dict[str, str] = {}
 
 def changed_by(hashes, file: Path, old: str, new: str) -> set[str]:
     """Entries whose hash changes with an edit of a file."""
-    before = UNEDITED or UNEDITED.update(hashes()) or UNEDITED
+    if not UNEDITED:
+        UNEDITED.update(hashes())
     text = file.read_text(encoding="utf-8")
     assert text.count(old) == 1, f"{old!r} is {text.count(old)} times in {file.name}"
     file.write_text(text.replace(old, new), encoding="utf-8")
     after = hashes()
     file.write_text(text, encoding="utf-8")
-    assert set(before) == set(after)
-    return {name for name in before if before[name] != after[name]}
+    assert set(UNEDITED) == set(after)
+    return {name for name in UNEDITED if UNEDITED[name] != after[name]}
 
 
 @pytest.mark.many(2)
