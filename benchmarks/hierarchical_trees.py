@@ -25,7 +25,7 @@ from collide.adapters.bench.claims import Claim, Options, Race, main
 from collide.adapters.bench.growth import Panel, groups, log2_lines, power_of
 from collide.errors import UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
-from collide.polytopes.facet_tree import Sizes
+from collide.papers.polytopes.facet_tree import Sizes
 
 #: Points of the trees that are built whole; the last is what is asked for.
 SIZES = {

@@ -26,11 +26,11 @@ import hierarchy_families as families
 import collide
 from collide.adapters.bench.claims import Claim, Options, Race, check, grid, main
 from collide.adapters.bench.growth import Panel, line_fit, log2_lines
-from collide.hierarchies.hierarchy import DEGREE_BOUND, Hierarchy, build_hierarchy
-from collide.hierarchies.hierarchy_distance import hierarchy_distance
-from collide.hierarchies.packed_hierarchy import PackedHierarchy
-from collide.hierarchies.polar_hull import polar_of_hull
 from collide.hull.exact_hull import convex_hull
+from collide.papers.hierarchies.hierarchy import DEGREE_BOUND, Hierarchy, build_hierarchy
+from collide.papers.hierarchies.hierarchy_distance import hierarchy_distance
+from collide.papers.hierarchies.packed_hierarchy import PackedHierarchy
+from collide.papers.hierarchies.polar_hull import polar_of_hull
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
 KINDS: dict[str, Callable[[int], np.ndarray]] = {

@@ -24,10 +24,10 @@ from inputs import mesh, meshes_here, rotation
 from collide import Mesh
 from collide.adapters.bench.claims import Claim, Options, Race, grid, main
 from collide.adapters.bench.growth import Panel, groups, power_of
-from collide.hierarchies.graded_tree import graded_tree
-from collide.hierarchies.graded_walk import boxes_of_graded, boxes_of_queries, count_walk
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.narrowphase.facets.facet_queries import all_hits
+from collide.papers.hierarchies.graded_tree import graded_tree
+from collide.papers.hierarchies.graded_walk import boxes_of_graded, boxes_of_queries, count_walk
 from collide.scenes.worst_cases import accordion, below, chazelle, harpsicordia
 
 SIZES = {

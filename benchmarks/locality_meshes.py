@@ -18,8 +18,8 @@ from inputs import FILES, in_unit_box, mesh, meshes_here, rotation, touching
 from collide import CollideError, Mesh
 from collide.adapters.bench.claims import Claim, Options, grid, installed, main
 from collide.adapters.bench.growth import Panel
-from collide.hierarchies.tree_figures import tree_figures
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits
+from collide.papers.hierarchies.tree_figures import tree_figures
 from collide.scenes.loaders.triangles import read_meshes
 
 #: Of pybullet_data: every so many of its files in order of names, and facets within these.

@@ -31,7 +31,7 @@ import numpy as np
 
 import collide
 from collide.adapters.bench.claims import Claim, Options, grid, installed, main
-from collide.tetrahedra.cell_overlaps import exact_overlap
+from collide.papers.tetrahedra.cell_overlaps import exact_overlap
 
 STILL, ASIDE = np.eye(4), collide.pose((0.01, 0.02, 0.03), rpy=(0.02, 0.03, 0.01))
 FACES = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]

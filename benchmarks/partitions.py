@@ -23,7 +23,7 @@ from mesh_shapes import block_ring, bumpy_sphere
 import collide
 from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
 from collide.adapters.bench.growth import groups, line_fit, power_of
-from collide.partitions.clutter import clutter
+from collide.papers.partitions.clutter import clutter
 from collide.scenes import generate
 
 

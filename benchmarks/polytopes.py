@@ -27,7 +27,7 @@ from collide import polytopes
 from collide.adapters.bench.claims import Claim, Options, Race, check, grid, installed, main
 from collide.adapters.bench.growth import Panel, groups, power_of
 from collide.errors import CollideError
-from collide.polytopes.meets_query import ALGORITHMS
+from collide.papers.polytopes.meets_query import ALGORITHMS
 
 Question = meeting_families.Question
 SIZES = (10_000, 30_000, 100_000, 300_000, 1_000_000)

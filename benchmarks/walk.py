@@ -24,9 +24,9 @@ import hierarchy_families as families
 import collide
 from collide.adapters.bench.claims import Claim, Options, Race, check, grid, main
 from collide.adapters.bench.growth import Panel, log2_lines
-from collide.hierarchies.run_walk import run_walks
-from collide.hierarchies.walk import APART
 from collide.lowering.parts import convex_set_of
+from collide.papers.hierarchies.run_walk import run_walks
+from collide.papers.hierarchies.walk import APART
 
 SIZES = (32, 128, 512, 2048, 8192, 32768, 131072, 1000000)
 KINDS = ("sphere", "pancake", "cylinder", "bipyramid", "doubling", "moment curve")

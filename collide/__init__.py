@@ -36,16 +36,18 @@ if TYPE_CHECKING:
         UnknownBody,
         UnsupportedQuery,
     )
-    from collide.hierarchies.hierarchy_queries import walk
     from collide.kernels.library import include_folder as get_include
     from collide.kernels.library import library_path as get_library
     from collide.motion.impact_query import moved_poses, poses_in_motion, time_of_impact
     from collide.motion.impact_rows import TimeOfImpact
-    from collide.partitions.cell_records import CellPlanes, ConvexCells
-    from collide.partitions.portals import Portals
-    from collide.partitions.space_partition import Located, PartitionSize, SpacePartition
-    from collide.polytopes.convex_polygon import ConvexPolygon
-    from collide.query import collide, distance
+    from collide.pairs.query import collide, distance
+    from collide.papers.hierarchies.hierarchy_queries import walk
+    from collide.papers.partitions.cell_records import CellPlanes, ConvexCells
+    from collide.papers.partitions.portals import Portals
+    from collide.papers.partitions.space_partition import Located, PartitionSize, SpacePartition
+    from collide.papers.polytopes.convex_polygon import ConvexPolygon
+    from collide.papers.tetrahedra.cell_overlaps import CellOverlaps, overlapping_cells, self_overlapping_cells
+    from collide.papers.tetrahedra.tet_mesh import TetMesh
     from collide.results import How, PairResult, WorldResult
     from collide.robots.certified_edges import CertifiedEdges
     from collide.robots.robot import Robot
@@ -80,11 +82,9 @@ if TYPE_CHECKING:
     from collide.sweeps.pair_proposal import LinkPair, Proposal, propose_disabled_pairs
     from collide.sweeps.sweep import sweep
     from collide.sweeps.sweep_results import SweepResults, read_sweep
-    from collide.tetrahedra.cell_overlaps import CellOverlaps, overlapping_cells, self_overlapping_cells
-    from collide.tetrahedra.tet_mesh import TetMesh
     from collide.transforms import pose
-    from collide.world import World
-    from collide.world_hits import WorldHits
+    from collide.worlds.hits import WorldHits
+    from collide.worlds.world import World
 
 __version__ = "0.1.0"
 
@@ -104,14 +104,14 @@ _HOMES = {
     "collide.surface_queries.contains": ("contains",),
     "collide.surface_queries.overlay": ("Overlay", "overlay"),
     "collide.surface_queries.facet_pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
-    "collide.hierarchies.hierarchy_queries": ("walk",),
+    "collide.papers.hierarchies.hierarchy_queries": ("walk",),
     "collide.motion.impact_query": ("moved_poses", "poses_in_motion", "time_of_impact"),
     "collide.motion.impact_rows": ("TimeOfImpact",),
-    "collide.polytopes.convex_polygon": ("ConvexPolygon",),
-    "collide.partitions.cell_records": ("CellPlanes", "ConvexCells"),
-    "collide.partitions.portals": ("Portals",),
-    "collide.partitions.space_partition": ("Located", "PartitionSize", "SpacePartition"),
-    "collide.query": ("collide", "distance"),
+    "collide.papers.polytopes.convex_polygon": ("ConvexPolygon",),
+    "collide.papers.partitions.cell_records": ("CellPlanes", "ConvexCells"),
+    "collide.papers.partitions.portals": ("Portals",),
+    "collide.papers.partitions.space_partition": ("Located", "PartitionSize", "SpacePartition"),
+    "collide.pairs.query": ("collide", "distance"),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robots.certified_edges": ("CertifiedEdges",),
     "collide.robots.robot": ("Robot",),
@@ -131,11 +131,11 @@ _HOMES = {
     "collide.sweeps.pair_proposal": ("LinkPair", "Proposal", "propose_disabled_pairs"),
     "collide.sweeps.sweep": ("sweep",),
     "collide.sweeps.sweep_results": ("SweepResults", "read_sweep"),
-    "collide.tetrahedra.cell_overlaps": ("CellOverlaps", "overlapping_cells", "self_overlapping_cells"),
-    "collide.tetrahedra.tet_mesh": ("TetMesh",),
+    "collide.papers.tetrahedra.cell_overlaps": ("CellOverlaps", "overlapping_cells", "self_overlapping_cells"),
+    "collide.papers.tetrahedra.tet_mesh": ("TetMesh",),
     "collide.transforms": ("pose",),
-    "collide.world": ("World",),
-    "collide.world_hits": ("WorldHits",),
+    "collide.worlds.world": ("World",),
+    "collide.worlds.hits": ("WorldHits",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 

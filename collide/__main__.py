@@ -2,7 +2,7 @@
 
 import sys
 
-from collide.cli import main
+from collide.cli.main import main
 
 if __name__ == "__main__":
     sys.exit(main())

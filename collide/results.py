@@ -43,7 +43,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 
 import collide
-from collide.tetrahedra.cell_overlaps import exact_overlap
+from collide.papers.tetrahedra.cell_overlaps import exact_overlap
 
 
 def block(cubes: int, seed: int) -> collide.TetMesh:

@@ -1,4 +1,4 @@
-/* Workspaces and queries: as `run_poses` of collide/narrowphase/convex_kernel_calls.py and `distance` of collide/query.py. */
+/* Workspaces and queries: as `run_poses` of collide/narrowphase/convex_kernel_calls.py and `distance` of collide/pairs/query.py. */
 #include "capi_contacts.h"
 
 #include <math.h>

@@ -62,7 +62,7 @@ APPLE = (Level("arm64", "apple-m1"),)
 #: together. Those that take longest are lowered first; two that share much not at once, or both would lower it.
 UNITS = {
     "convex": ("narrowphase.",),
-    "papers": ("hierarchies.", "polytopes.", "tetrahedra.", "least_distance."),
+    "papers": ("papers.", "least_distance."),
     "contacts": ("contact.",),
     "facets": ("narrowphase.facets.",),
     "motion": ("casts.", "motion."),

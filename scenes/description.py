@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
 from collide.robots.robot import LinkShape, Robot
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_pose, as_poses
-from collide.world import World
+from collide.worlds.world import World
 
 
 @dataclass

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import SceneError, brief
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import scene_yaml

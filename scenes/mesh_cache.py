@@ -20,10 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
-from collide.cache_folder import cache_folder, own_folder, read_own
+from collide.base.cache_folder import cache_folder, own_folder, read_own
+from collide.base.whole_file import whole_file
 from collide.errors import InvalidShape
 from collide.shapes.shape_files import ANY, pack, unpack
-from collide.whole_file import whole_file
 
 #: Raised with every change in what a loader stores; old entries are then never read again.
 VERSION = 4

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import SceneError, brief
 from collide.shapes.mesh import Mesh
 

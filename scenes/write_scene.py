@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
+from collide.base.whole_file import write_whole
 from collide.errors import SceneError
 from collide.scenes.description import Scene
 from collide.shapes import (
@@ -30,8 +31,7 @@ from collide.shapes import (
     Shape,
     Sphere,
 )
-from collide.whole_file import write_whole
-from collide.world import World
+from collide.worlds.world import World
 
 VERSION = 1
 #: Of groups and masks in scene files.

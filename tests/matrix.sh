@@ -10,7 +10,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 chosen=("$@")
 [ ${#chosen[@]} -gt 0 ] || chosen=(
-    tests/engine/test_closed_forms.py tests/test_batches.py tests/engine/test_exact_answers.py tests/engine/test_symmetry.py
+    tests/engine/test_closed_forms.py tests/pairs/test_batches.py tests/engine/test_exact_answers.py tests/engine/test_symmetry.py
     tests/hull/test_exact_hull.py tests/support/test_support_tree_query.py
     tests/narrowphase/facets/test_surface_distance.py tests/contact/test_mesh_contacts.py
 )

@@ -544,7 +544,7 @@ def test_numbers_are_read_while_another_thread_imports_numpys_masks(monkeypatch)
     import sys
     import types
 
-    from collide import argument_checks as checks
+    from collide.base import argument_checks as checks
 
     monkeypatch.setitem(sys.modules, "numpy.ma", types.ModuleType("numpy.ma"))
     assert checks.number(0.5) == 0.5

@@ -9,7 +9,7 @@ import pytest
 
 import collide
 from collide import Box, InvalidPose, Sphere, distance, pose
-from collide.polytopes.convex_polygon import planar_poses
+from collide.papers.polytopes.convex_polygon import planar_poses
 from collide.transforms import as_poses
 
 EYE = np.eye(4)

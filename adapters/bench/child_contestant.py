@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from collide.child_process import ChildProcess
+from collide.base.child_process import ChildProcess
 
 #: How long a child may take to be made ready [s].
 START_TIMEOUT = 60.0

@@ -29,10 +29,10 @@ from collide.adapters.bench.growth import Panel, draw
 from collide.adapters.bench.machine_stamp import file_name, machine_stamp
 from collide.adapters.bench.pareto_picture import check_picture
 from collide.adapters.bench.turns import race
+from collide.base.whole_file import write_whole
 from collide.errors import CollideError, InvalidArgument
 from collide.reports import terminal
 from collide.reports.tables import Column, Table, lay_out
-from collide.whole_file import write_whole
 
 RESULTS = FOLDER / "results"
 #: Units of times, by how many of them a second has.

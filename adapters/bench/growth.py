@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.adapters.bench.pareto_picture import check_picture
-from collide.whole_file import whole_file
+from collide.base.whole_file import whole_file
 
 Row = dict[str, Any]
 Figure = str | Callable[[Row], float]

@@ -10,8 +10,8 @@ import re
 from importlib import metadata
 from pathlib import Path
 
+from collide.base.whole_file import write_whole
 from collide.errors import CollideError
-from collide.whole_file import write_whole
 
 
 def machine_stamp() -> dict[str, str]:

@@ -13,8 +13,8 @@ from typing import Any
 
 from collide.adapters.bench.bench_classes import CLASSES
 from collide.adapters.bench.pareto import Point, quantile
+from collide.base.whole_file import whole_file
 from collide.errors import InvalidArgument, MissingExtra
-from collide.whole_file import whole_file
 
 #: Errors of 0 and below are drawn here.
 FLOOR = 1e-18

@@ -19,9 +19,9 @@ from collide.adapters.fuzzing.findings import Finding, load_finding
 from collide.adapters.fuzzing.fuzz_case import Case
 from collide.adapters.fuzzing.issue_text import body_text
 from collide.adapters.peers.question import bounds
+from collide.base.whole_file import whole_file
 from collide.errors import InvalidArgument, MissingExtra
 from collide.shapes import tessellation
-from collide.whole_file import whole_file
 
 #: A and B, told apart by everybody: Okabe and Ito.
 COLOURS = ("#0072B2", "#E69F00")

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.adapters.fuzzing.fuzz_case import Case, pair_case
+from collide.base.given_files import read_bytes
 from collide.errors import InvalidPose, InvalidShape, SceneError
-from collide.given_files import read_bytes
 from collide.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Shape, Sphere
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

@@ -19,11 +19,11 @@ from collide.adapters.fuzzing.proofs import proof
 from collide.adapters.fuzzing.simpler_cases import complexity
 from collide.adapters.peers.protocol import engine
 from collide.adapters.peers.question import Body
+from collide.base.given_files import read_text
+from collide.base.whole_file import write_whole
 from collide.errors import SceneError
-from collide.given_files import read_text
 from collide.scenes import load
 from collide.scenes.write_scene import document_text
-from collide.whole_file import write_whole
 
 #: What `collide compare` takes as the clearance by default [m].
 CLEARANCE = 0.1

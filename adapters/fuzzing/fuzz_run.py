@@ -28,9 +28,9 @@ from collide.adapters.fuzzing.invented_scenes import invent
 from collide.adapters.fuzzing.shrink import COSTLY, Shrunk, shrink
 from collide.adapters.peers.answers import HUNG
 from collide.adapters.peers.protocol import engine
+from collide.base.given_files import read_text
+from collide.base.whole_file import write_whole
 from collide.errors import InvalidArgument
-from collide.given_files import read_text
-from collide.whole_file import write_whole
 
 STATE = "fuzz.json"
 #: Changes where a state written before would be misread.

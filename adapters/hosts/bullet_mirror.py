@@ -11,7 +11,6 @@ from typing import Any, Literal
 import numpy as np
 
 from collide import World
-from collide import argument_checks as checks
 from collide.adapters.hosts.bullet_answers import (
     Tables,
     closest,
@@ -25,6 +24,7 @@ from collide.adapters.hosts.bullet_filters import CollisionFilters
 from collide.adapters.hosts.bullet_shapes import Collider
 from collide.adapters.hosts.host_numbers import real
 from collide.adapters.hosts.quaternion_poses import pose_of, poses_of
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, MissingExtra, UnknownBody, UnsupportedQuery, brief
 from collide.shapes import Shape
 

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.adapters.hosts.quaternion_poses import pose_of
+from collide.base.given_files import LARGEST_MESH, read_bytes
 from collide.errors import CollideError, UnsupportedQuery
-from collide.given_files import LARGEST_MESH, read_bytes
 from collide.scenes.loaders.mesh_file import read_mesh
 from collide.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Halfspace, Mesh, Shape, Sphere
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide import argument_checks as checks
 from collide.adapters.hosts.host_numbers import of_kind, real, shaped, whole
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument
 
 

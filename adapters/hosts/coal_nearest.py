@@ -15,7 +15,7 @@ import numpy as np
 import collide as engine
 from collide.adapters.hosts.coal_geometry import CollisionGeometry, Halfspace, Plane
 from collide.errors import UnsupportedQuery
-from collide.query import collide as hits
+from collide.pairs.query import collide as hits
 from collide.shapes.shape import Shape
 
 #: What coal says of the depth of bodies that no translation takes apart [m].

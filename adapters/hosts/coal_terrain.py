@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 
 import collide as engine
-from collide import argument_checks as checks
 from collide.adapters.hosts.coal_containers import AABB, StdVec_Vec6
 from collide.adapters.hosts.coal_enums import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.coal_geometry import CollisionGeometry
 from collide.adapters.hosts.coal_meshes import BVHModelOBB, BVHModelOBBRSS, rows_of
 from collide.adapters.hosts.host_numbers import real
 from collide.adapters.hosts.octomap_boxes import occupied_boxes, octomap_file
+from collide.base import argument_checks as checks
+from collide.base.given_files import LARGEST_MESH, read_bytes
 from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.given_files import LARGEST_MESH, read_bytes
 from collide.scenes.loaders.mesh_file import read_mesh
 
 #: How far below the lowest height a bottom lies that is not below it, in parts of the field's size.

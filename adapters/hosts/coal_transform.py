@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from collide import argument_checks as checks
 from collide.adapters.hosts.fcl_transform import Transform, quaternion_of, rotation_of
 from collide.adapters.hosts.host_numbers import of_kind, real, shaped
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument
 
 

@@ -12,11 +12,11 @@ from collections.abc import Callable
 import numpy as np
 
 import collide as engine
-from collide import argument_checks as checks
 from collide.adapters.hosts.fcl_requests import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.fcl_transform import Transform, quaternion_of, rotation_of
 from collide.adapters.hosts.host_numbers import real, rows_of_three, shaped, whole
 from collide.adapters.hosts.posed_objects import HostGeometry, HostObject
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.shapes.shape import Shape
 

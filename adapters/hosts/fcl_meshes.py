@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 import collide as engine
-from collide import argument_checks as checks
 from collide.adapters.hosts.fcl_geometry import CollisionGeometry
 from collide.adapters.hosts.fcl_requests import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.host_numbers import real, shaped
 from collide.adapters.hosts.octomap_boxes import occupied_boxes, tree_of
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 
 #: What python-fcl's model returns where calls come in a wrong order, and of none.

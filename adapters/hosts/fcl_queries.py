@@ -22,7 +22,7 @@ from collide.adapters.hosts.fcl_requests import (
 from collide.adapters.hosts.fcl_transform import Transform
 from collide.adapters.hosts.host_numbers import whole
 from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.query import collide as hits
+from collide.pairs.query import collide as hits
 
 _PLANE, _HALFSPACE = NODE_TYPE.GEOM_PLANE, NODE_TYPE.GEOM_HALFSPACE
 

@@ -12,7 +12,7 @@ from importlib import import_module, metadata
 from typing import NamedTuple
 
 from collide.adapters.hosts import Host
-from collide.child_process import ChildProcess
+from collide.base.child_process import ChildProcess
 from collide.errors import MissingExtra, UnsupportedQuery
 
 #: How long all children together may take [s].

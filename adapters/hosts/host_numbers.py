@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument
 
 

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from collide import World
-from collide import argument_checks as checks
 from collide.adapters.hosts.quaternion_poses import poses_of
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidPose, MissingExtra, UnsupportedQuery, brief
 from collide.shapes import (
     Box,

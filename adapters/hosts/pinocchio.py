@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 import collide as engine
-from collide import argument_checks as checks
 from collide.adapters.hosts.coal_nearest import nearest
 from collide.adapters.hosts.coal_queries import collide_posed
 from collide.adapters.hosts.coal_requests import CollisionResult
@@ -28,6 +27,7 @@ from collide.adapters.hosts.pinocchio_pairs import (
     meet,
     shapes_of,
 )
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, MissingExtra
 
 #: How many pairs are asked together where the first collision ends it.

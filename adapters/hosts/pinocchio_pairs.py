@@ -12,7 +12,7 @@ from collide.adapters.hosts.coal_geometry import CollisionGeometry
 from collide.adapters.hosts.coal_nearest import nearest
 from collide.adapters.hosts.pinocchio_geometry import geometry_of, numbers_of
 from collide.errors import InvalidArgument
-from collide.query import collide as hits
+from collide.pairs.query import collide as hits
 from collide.shapes.shape_set import Picked, ShapeSet
 
 #: Gaps of boxes are less than this part of their coordinates below what they are in doubles.

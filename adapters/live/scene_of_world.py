@@ -6,7 +6,7 @@ import copy
 from dataclasses import dataclass, field
 
 from collide.scenes.description import Scene, SceneBody
-from collide.world import World
+from collide.worlds.world import World
 
 
 @dataclass

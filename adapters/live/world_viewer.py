@@ -7,12 +7,12 @@ import html
 import math
 import webbrowser
 
-from collide import argument_checks as checks
 from collide.adapters.live.event_server import LiveServer
 from collide.adapters.live.page_state import Limits, WorldState
 from collide.adapters.live.scene_of_world import SceneOfWorld, scene_of_world
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, brief
-from collide.world import World
+from collide.worlds.world import World
 
 
 def view(

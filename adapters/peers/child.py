@@ -11,7 +11,7 @@ from contextlib import closing
 
 from collide.adapters.peers.answers import ABORTED, BUILDING, FAILED, HUNG, STATUSES, Event
 from collide.adapters.peers.protocol import Peer, Question, load_engine
-from collide.child_process import ChildProcess
+from collide.base.child_process import ChildProcess
 from collide.shapes import Shape
 
 #: How many children a question may use up before the rest is given up.

@@ -24,10 +24,10 @@ import collide
 from collide.adapters.peers.answers import FAILED, RAISED, UNSUPPORTED, counted
 from collide.adapters.peers.protocol import Question, check_names, complaint, engine
 from collide.adapters.peers.stress_truth import Truth, gap_along, truth
+from collide.base.whole_file import write_whole
 from collide.errors import UnsupportedQuery
 from collide.results import HOW, UNDECIDED
 from collide.scenes.families import Case, MeshCase, generate, mesh_names, names
-from collide.whole_file import write_whole
 
 #: Cases that go to a peer at a time: a child process that dies often is not given up.
 BATCH = 50

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.casts.directions import Directions
 from collide.errors import UnsupportedQuery
 from collide.lowering.packed_convex import HALFSPACE

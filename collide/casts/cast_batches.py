@@ -7,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from collide.batches import answer_batch
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.casts.convex_casts import (
     CastRows,
@@ -30,6 +29,7 @@ from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of, convex_set_of
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import Question
+from collide.pairs.batches import answer_batch
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.broadphase.box_tree import BoxTree
 from collide.broadphase.boxes_ahead import bodies_ahead
 from collide.casts.cast_arguments import checked_rays

@@ -7,16 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
+from collide.base.threads import check_threads, pieces_of, share
 from collide.casts.cast_arguments import checked_directions, refuse_unbounded
 from collide.casts.cast_batches import cast_batch
 from collide.casts.convex_casts import CastRows
 from collide.casts.directions import Directions
 from collide.errors import InvalidArgument
-from collide.pair_arguments import asked_poses
+from collide.pairs.pair_arguments import asked_poses
 from collide.results import only_value
 from collide.shapes.shape import Shape
-from collide.threads import check_threads, pieces_of, share
 from collide.transforms import as_poses
 
 #: A thread is handed at least so many casts.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.batches import answer_batch
 from collide.casts.cast_pairs import CAST_ROW, STATUS, TOUCHING
 from collide.casts.convex_casts import Marks, PairRows, joined
 from collide.casts.leaves import Leaf, leaves_of
 from collide.casts.portal import HIT
 from collide.narrowphase.convex_batches import Question
+from collide.pairs.batches import answer_batch
 from collide.results import UNDECIDED
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from collide.base.lazy_modules import lazy_module
 from collide.certificates.certificate import APART, TOGETHER, CertificateRefused
-from collide.lazy_modules import lazy_module
 from collide.least_distance.posed_sets import (
     ExactRow,
     exact_pose,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.certificates.certificate import APART, PLANE, TOGETHER, Certificate, CertificateRefused, read_certificates
 from collide.certificates.convex_proofs import flaw_of_normal, flaw_of_proof
 from collide.certificates.exact_parts import exact_parts

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.batches import answer_batch, of_one_set
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.curved_contacts import curved_contacts
@@ -18,7 +17,8 @@ from collide.lowering.shape_set_tables import tables_of
 from collide.narrowphase.composite.composite_parts import CompoundParts, PartColumns, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import Method, method_of
-from collide.pair_arguments import pose_at
+from collide.pairs.batches import answer_batch, of_one_set
+from collide.pairs.pair_arguments import pose_at
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
 from collide.transforms import as_poses

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import argument_checks as checks
-from collide.batches import length_of
+from collide.base import argument_checks as checks
+from collide.base.threads import check_threads
 from collide.contact.contact_batches import contact_batch
 from collide.contact.contact_rows import Contacts
 from collide.contact.convex_contacts import prepare_contacts
 from collide.errors import InvalidArgument
-from collide.pair_arguments import asked_poses
+from collide.pairs.batches import length_of
+from collide.pairs.pair_arguments import asked_poses
 from collide.shapes.shape import Shape
-from collide.threads import check_threads
 
 if TYPE_CHECKING:
     from collide.transforms import PoseLike

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.base.threads import pieces_of, share
 from collide.contact.contact_blocks import (
     BAD_POSE,
     BLOCK_HEADER,
@@ -47,7 +48,6 @@ from collide.narrowphase.pose_batches import HEADER as HEADER_OF_POSES
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
 from collide.results import zeroed_rows
 from collide.shapes.shape import Shape
-from collide.threads import pieces_of, share
 from collide.transforms import as_poses
 
 #: The least that a thread is handed.

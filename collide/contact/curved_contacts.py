@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.base.threads import pieces_of, share
 from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP
 from collide.contact.curved_manifolds import (
     HEADER,
@@ -38,7 +39,6 @@ from collide.narrowphase.facets.facets_against_curved import facet_rows
 from collide.narrowphase.facets.near_facets import near_facets
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
-from collide.threads import pieces_of, share
 
 #: Facets near a set that are looked at, in all poses of a piece and at most at one; poses of a piece.
 _FACETS_OF_PIECE, MAX_FACETS, _POSES_OF_PIECE = 1 << 16, 1 << 18, 256

@@ -6,6 +6,7 @@ from threading import local
 
 import numpy as np
 
+from collide.base.threads import pieces_of, share
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.distance_contacts import with_distances
@@ -34,7 +35,6 @@ from collide.narrowphase.facets.facet_kernel_calls import pair_header, step_of
 from collide.narrowphase.facets.facet_queries import not_invertible, stack_of, workspace
 from collide.narrowphase.facets.facets_within import list_near_pairs
 from collide.shapes.shape import Shape
-from collide.threads import pieces_of, share
 
 #: Pairs of facets there is space for to begin with, what of it is kept from call to call, and at most: a gigabyte.
 _FEWEST_PAIRS, _KEPT_PAIRS, MAX_PAIRS = 1 << 10, 1 << 14, 1 << 18

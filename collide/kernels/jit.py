@@ -18,10 +18,10 @@ from typing import Any
 import llvmlite.binding as llvm
 from numba.core import sigutils
 
+from collide.base.log import log
 from collide.kernels import library, object_cache, sources
 from collide.kernels.back_end import Target, host, machine_code
 from collide.kernels.front_end import Lowered, dispatcher, native_call
-from collide.log import log
 
 __all__ = ["Entry", "code_of", "entry", "kernel", "native_call"]
 

@@ -17,7 +17,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from collide.whole_file import whole_file
+from collide.base.whole_file import whole_file
 
 _DIGEST = hashlib.sha256().digest_size
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import os
 
+from collide.base.log import log
 from collide.errors import MissingExtra
 from collide.kernels import library
-from collide.log import log
 
 COMPILED, JUST_IN_TIME, PYTHON = "compiled", "just in time", "python"
 

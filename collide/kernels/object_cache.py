@@ -16,9 +16,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from collide.cache_folder import cache_folder, own_folder, read_own, say_once
-from collide.log import log
-from collide.whole_file import whole_file
+from collide.base.cache_folder import cache_folder, own_folder, read_own, say_once
+from collide.base.log import log
+from collide.base.whole_file import whole_file
 
 #: Raised with every change of what a file holds.
 _VERSION = 2

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collide.argument_checks import array
+from collide.base.argument_checks import array
 from collide.errors import InvalidArgument, brief
 from collide.least_distance.homogeneous_rows import HomogeneousRows, as_integers
 

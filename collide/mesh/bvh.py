@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.fork_safe_lock import ForkSafeLock
+from collide.base.fork_safe_lock import ForkSafeLock
 from collide.kernels import address_of, kernel, view_f32, view_f64, view_i32, view_i64
 from collide.numerics.vec3 import Vec3, add
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from collide.base.threads import pieces_of, share
 from collide.kernels import address_of, code_of
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.compound_table import PART
@@ -26,7 +27,6 @@ from collide.narrowphase.pair_kernel import answer_pairs
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
-from collide.threads import pieces_of, share
 
 #: Jobs done in one call of the kernel: their list stays small beside the motions.
 JOBS_AT_ONCE = 1 << 16

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as checks
-from collide.batches import answer_batch
+from collide.base import argument_checks as checks
+from collide.base.threads import check_threads, share_if_it_helps
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.lowering.closed_regions import reach_of
 from collide.lowering.kinds import Kind, kind_of
@@ -22,10 +22,10 @@ from collide.motion.region_motions import with_regions_closed
 from collide.motion.surface_motions import surface_impacts
 from collide.narrowphase.convex_batches import Question
 from collide.numerics.sine_cosine import LARGEST_ANGLE
-from collide.pair_arguments import checked_shapes, matched_counts
+from collide.pairs.batches import answer_batch
+from collide.pairs.pair_arguments import checked_shapes, matched_counts
 from collide.results import UNDECIDED
 from collide.shapes.shape import Shape
-from collide.threads import check_threads, share_if_it_helps
 from collide.transforms import LARGEST, SMALLEST, as_pose, poses_as_given
 
 if TYPE_CHECKING:

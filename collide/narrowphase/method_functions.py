@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide.lazy_modules import lazy_module
+from collide.base.lazy_modules import lazy_module
 from collide.lowering.kinds import kind_of
 from collide.narrowphase.convex_batches import Question, answer_parts, answer_sets, prepare_parts, prepare_sets
 from collide.narrowphase.dispatch import TABLE, Method

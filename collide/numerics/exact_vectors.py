@@ -1,7 +1,7 @@
 """Differences, products and determinants of Python integers and fractions: nothing is rounded.
 
-Judges have their own: `collide.polytopes.verify_exclusion`, the validators of hulls and hierarchies, the exact peer.
-With these a mistake would judge itself.
+Judges have their own: `collide.papers.polytopes.verify_exclusion`, the validators of hulls and hierarchies, the exact
+peer. With these a mistake would judge itself.
 """
 
 from __future__ import annotations

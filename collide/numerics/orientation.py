@@ -59,7 +59,7 @@ class CloudView(NamedTuple):
 
     scaled, originals : three doubles a row; scaled = originals · 2^−exponent.
     work, digits : workspace of `orientation`.
-    centres : row of centre 0 of a perturbation (`hierarchies/symbolic_perturbation.py`); the others follow it.
+    centres : row of centre 0 of a perturbation (`papers/hierarchies/symbolic_perturbation.py`); the others follow it.
     Where only exact tests are made, centres and exponent are not read.
     """
 

@@ -16,9 +16,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from collide.base.whole_file import write_whole
 from collide.errors import InvalidArgument, cut
 from collide.reports.json_text import pieces
-from collide.whole_file import write_whole
 
 #: The page, its style and its script.
 VIEWER = Path(__file__).resolve().parent / "viewer"

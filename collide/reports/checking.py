@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from collide.base.given_files import read_text
 from collide.errors import InvalidArgument, SceneError
-from collide.given_files import read_text
 from collide.reports import trajectory_report as trajectory
 from collide.reports.number_format import brief_length, count
 from collide.reports.report import Report

@@ -14,7 +14,7 @@ from importlib import import_module, metadata
 from pathlib import Path
 
 import collide
-from collide.cache_folder import cache_folder, why_distrusted
+from collide.base.cache_folder import cache_folder, why_distrusted
 from collide.kernels import library, mode
 from collide.reports.number_format import count, widths
 from collide.reports.progress import silent

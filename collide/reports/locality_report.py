@@ -9,9 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from collide.base.whole_file import whole_file
 from collide.errors import InvalidArgument, MissingExtra
 from collide.reports.tables import Column, Table
-from collide.whole_file import whole_file
 
 SCHEMA = "collide-locality/1"
 #: Orders that Table 1 of the paper prints; JSON has all ten.

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 import collide
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.kernels import mode
 from collide.reports import classes, overlap_volumes, proofs

@@ -9,15 +9,15 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
+from collide.base.threads import check_threads, pieces_of, share
 from collide.errors import InvalidArgument
 from collide.robots.check_tables import Setting, check_tables, surroundings_of
 from collide.robots.check_workspace import CheckWorkspace
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import bodies_around, filters_of, refuse_own_margins, robot_bodies
-from collide.threads import check_threads, pieces_of, share
 from collide.transforms import as_pose
-from collide.world import World
+from collide.worlds.world import World
 
 #: A thread is handed at least so many configurations.
 _LEAST_PIECE = 512

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from collide import query
+from collide.pairs import query
 from collide.results import PAIR_DTYPE
 from collide.robots.check_tables import BodyAround, RobotBody, without_meshes
 from collide.shapes.compound import Compound

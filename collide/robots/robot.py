@@ -21,7 +21,7 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidPose, SceneError, brief, cut, listing
 from collide.robots.forward_kinematics import joint_table, link_poses_of
 from collide.robots.kinematic_tree import (

@@ -7,17 +7,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.broadphase.filters import ASLEEP, MASKED, STATIC
 from collide.errors import InvalidArgument, brief, cut, listing
-from collide.packed_world import PackedWorld
 from collide.robots.check_tables import BodyAround, RobotBody
 from collide.robots.kinematic_tree import COLUMNS
 from collide.robots.robot import Robot
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_pose
-from collide.world import World
+from collide.worlds.packed_world import PackedWorld
+from collide.worlds.world import World
 
 #: The mask of bodies that nothing is said of, as of `World.add`.
 _ALL_GROUPS = 0xFFFF

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, brief, listing
 from collide.robots.certified_edges import SAMPLED_HALVINGS, CertifiedEdges, certify, sampled_collision
 from collide.robots.checker_scene import CheckerScene
@@ -15,7 +15,7 @@ from collide.robots.configuration_batches import check_piece, measure_piece
 from collide.robots.configuration_report import ConfigurationReport
 from collide.robots.robot import Robot
 from collide.robots.robot_distances import NEAREST_DTYPE, RobotDistances
-from collide.world import World
+from collide.worlds.world import World
 
 
 class RobotChecker(CheckerScene):

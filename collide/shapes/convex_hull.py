@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from collide.base.lazy_modules import lazy_module
+from collide.base.log import log_duration
 from collide.errors import InvalidShape
-from collide.lazy_modules import lazy_module
-from collide.log import log_duration
 from collide.shapes.shape import Shape, facet_ids, positive, rows
 from collide.shapes.shape_files import Field, read_arrays, write_arrays
 from collide.transforms import SMALLEST

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
+from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidArgument, InvalidShape
-from collide.lazy_modules import lazy_module
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape, positive, rows, scalar
 from collide.shapes.shape_files import Field, read_arrays, write_arrays

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
+from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidShape
 from collide.hull.double_description import halfspace_vertices
-from collide.lazy_modules import lazy_module
 from collide.shapes.shape import Shape, rows
 from collide.transforms import LARGEST
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidShape
 from collide.mesh import facet_pieces, localise, locality, predicted_facets
 from collide.mesh.mesh_topology import COLLAPSED

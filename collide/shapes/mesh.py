@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
+from collide.base.lazy_modules import lazy_module
+from collide.base.log import log_duration
 from collide.errors import InvalidShape
-from collide.lazy_modules import lazy_module
-from collide.log import log_duration
 from collide.shapes import mesh_formats
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh_report import MeshReport, make_report

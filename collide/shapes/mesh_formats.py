@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from collide.whole_file import whole_file
+from collide.base.whole_file import whole_file
 
 #: A facet of a binary STL file: its normal, its corners, two bytes that nobody reads.
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

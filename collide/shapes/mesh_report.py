@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from collide.lazy_modules import lazy_module
+from collide.base.lazy_modules import lazy_module
 
 if TYPE_CHECKING:
     from collide.mesh.mesh_survey import Survey

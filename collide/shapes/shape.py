@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidShape, brief
 from collide.transforms import LARGEST, SMALLEST
 

@@ -18,9 +18,9 @@ from typing import IO, TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
+from collide.base.whole_file import whole_file
 from collide.errors import InvalidShape
-from collide.whole_file import whole_file
 
 if TYPE_CHECKING:
     import zipfile

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidShape, brief
 from collide.shapes.shape import Shape
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, brief
 from collide.shapes.shape import Shape
 from collide.solids.arrangement import arrange

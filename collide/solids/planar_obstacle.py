@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, InvalidPose, brief
 from collide.numerics.exact_points import integers
 from collide.solids.limits import UNLIMITED, Limits

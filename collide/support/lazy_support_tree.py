@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.fork_safe_lock import ForkSafeLock
+from collide.base.fork_safe_lock import ForkSafeLock
+from collide.base.log import log_duration
 from collide.hull.exact_hull import convex_hull
-from collide.log import log_duration
 from collide.support.build_support_tree import build_support_tree
 from collide.support.support_tree import SupportTree
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.lowering.facet_bodies import Body, facet_body
 from collide.transforms import as_poses

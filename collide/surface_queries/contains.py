@@ -11,8 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from collide import argument_checks as checks
-from collide.batches import answer_batch
+from collide.base import argument_checks as checks
 from collide.casts.raycast import raycast
 from collide.errors import UnsupportedQuery
 from collide.lowering.facet_bodies import body_of
@@ -25,6 +24,7 @@ from collide.narrowphase.facets.facet_queries import points_in_solid, surfaces_m
 from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE, UNDECIDED
 from collide.numerics.exact_points import on_one_grid, placed
 from collide.numerics.exact_vectors import minus
+from collide.pairs.batches import answer_batch
 from collide.results import UNDECIDED as SIGN_OPEN
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits, self_hits
 from collide.shapes.mesh import Mesh

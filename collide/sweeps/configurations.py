@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, MissingExtra, SceneError, brief, listing
 from collide.robots.robot import Robot
 from collide.sweeps.content_digest import digest

@@ -11,7 +11,7 @@ import numpy as np
 from collide.robots.kinematic_tree import Joint
 from collide.robots.robot import Robot
 from collide.shapes.shape import Shape
-from collide.world import World
+from collide.worlds.world import World
 
 
 def digest(*values: Any) -> str:

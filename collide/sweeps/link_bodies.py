@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.query import collide, distance
+from collide.pairs.query import collide, distance
 from collide.robots.robot import Robot
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.query import distance
+from collide.pairs.query import distance
 from collide.sweeps.link_bodies import link_bodies, link_poses
 from collide.sweeps.pair_proposal import NEVER, Proposal
 

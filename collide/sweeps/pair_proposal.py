@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, brief
 from collide.robots.robot import Robot
 from collide.sweeps.link_bodies import LinkBody, link_bodies, link_poses, moving_columns, pair_gaps, pair_hits

@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from collide.child_process import ChildProcess
+from collide.base.child_process import ChildProcess
 from collide.errors import InvalidArgument
 
 #: A chunk at which so many processes died is given up.

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from collide import __version__
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, SceneError, brief
 from collide.robots.robot import Robot
 from collide.sweeps.configurations import DrawnConfigurations, GivenConfigurations, as_configurations

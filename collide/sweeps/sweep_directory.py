@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from collide.base.given_files import read_text
+from collide.base.log import log
+from collide.base.whole_file import whole_file
 from collide.errors import InvalidArgument, MissingExtra, SceneError, listing
-from collide.given_files import read_text
-from collide.log import log
-from collide.whole_file import whole_file
 
 #: Readers of Parquet leave out what begins with an underscore, so that the folder is one table to them.
 MANIFEST, LOCK, PARTIAL = "_sweep.json", "_sweep.lock", "_partial-"

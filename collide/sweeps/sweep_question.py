@@ -10,8 +10,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from collide.base.given_files import LARGEST_MESH, read_bytes
 from collide.errors import CollideError, InvalidArgument, SceneError
-from collide.given_files import LARGEST_MESH, read_bytes
 from collide.robots.robot import Robot
 from collide.robots.robot_checker import RobotChecker
 from collide.sweeps.content_digest import digest

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, listing
 from collide.sweeps.sweep_directory import SweepDirectory, parquet_module
 

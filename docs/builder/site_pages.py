@@ -28,9 +28,9 @@ LINK = re.compile(r"(\]\()([^)#\s]+)(#[^)\s]*)?(\))")
 #: Rooms whose public names stand on one page: page → (title, rooms). Any other room has a page under its own name.
 PAGES = {
     "shapes": ("Shapes", ("shapes",)),
-    "pairs": ("Pairs of bodies", ("query", "results", "transforms")),
-    "worlds": ("Worlds", ("world", "world_hits")),
-    "hierarchies": ("Hierarchies and the walk", ("hierarchies",)),
+    "pairs": ("Pairs of bodies", ("pairs", "results", "transforms")),
+    "worlds": ("Worlds", ("worlds",)),
+    "hierarchies": ("Hierarchies and the walk", ("papers.hierarchies",)),
     "errors": ("Errors, and where the C interface is", ("errors", "kernels")),
 }
 #: In this order; rooms that are not named come after them.
@@ -84,7 +84,8 @@ def public_names() -> dict[str, list[str]]:
     """Room → the public names of `collide` that live there, as they are imported."""
     by_room: dict[str, list[str]] = {}
     for name in collide.__all__:
-        home = getattr(collide, name).__module__.split(".")[1]
+        own = getattr(collide, name).__module__.removeprefix("collide.")
+        home = own.rpartition(".")[0] or own
         by_room.setdefault(home, []).append(name)
     return by_room
 
@@ -99,7 +100,8 @@ def _of_names() -> dict[Path, str]:
         about = inspect.getdoc(importlib.import_module(f"collide.{home}")) or home
         title, *rest = about.split("\n\n")[0].replace("\n", " ").split(": ", 1)
         text = ": ".join([title, *rest]) if rest else ""
-        pages[_api(home)] = _page(title.rstrip("."), text, [_directive("collide", name) for name in names])
+        blocks = [_directive("collide", name) for name in names]
+        pages[_api(home.rpartition(".")[2])] = _page(title.rstrip("."), text, blocks)
     named = [_directive("collide.scenes", name) for name in collide.scenes.__all__]
     pages[_api("scenes")] = _page("Scenes", "", named)
     for page, (title, modules) in MODULES.items():

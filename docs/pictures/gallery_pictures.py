@@ -24,7 +24,7 @@ import numpy as np
 
 import collide
 from collide.adapters.live.scene_of_world import scene_of_world
-from collide.cli import main as command
+from collide.cli.main import main as command
 from collide.pages.page_file import page_pieces, write_page
 from collide.pages.report_page import report_blocks
 from collide.reports import report

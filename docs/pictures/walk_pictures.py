@@ -11,8 +11,8 @@ import matplotlib
 import numpy as np
 
 import collide
-from collide.hierarchies.hierarchy_queries import walk_body
 from collide.hull.exact_hull import convex_hull
+from collide.papers.hierarchies.hierarchy_queries import walk_body
 
 matplotlib.use("Agg")
 from matplotlib import pyplot

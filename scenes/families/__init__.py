@@ -18,7 +18,7 @@ from zlib import crc32
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument
 from collide.scenes.families import (
     box_cases,

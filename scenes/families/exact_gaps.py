@@ -10,7 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from collide.lazy_modules import lazy_module
+from collide.base.lazy_modules import lazy_module
 from collide.scenes.families.case import Case
 
 #: Numbers of cases are made with its help; families can be listed and described without it.

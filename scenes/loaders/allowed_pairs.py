@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
+from collide.base.given_files import starts_like_xml
 from collide.errors import SceneError, brief, listing
-from collide.given_files import starts_like_xml
 from collide.scenes.loaders.documents import read_document
 from collide.scenes.loaders.fields import Fields
 from collide.scenes.loaders.moveit import ALLOWED, matrix_pairs
 from collide.scenes.loaders.srdf import read_srdf
-from collide.world import World
+from collide.worlds.world import World
 
 
 def read_allowed_pairs(path: str | Path, names: Iterable[str], *, prefix: str = "") -> list[tuple[str, str, str]]:

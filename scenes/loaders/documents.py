@@ -12,8 +12,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from collide.base.given_files import read_text
 from collide.errors import MissingExtra, SceneError, brief
-from collide.given_files import read_text
 from collide.scenes.loaders.files import DEEPEST, MAX_REPEATED
 
 #: A double has 309 digits before the point; Python refuses to read integers of more than 4,300.

@@ -1,4 +1,4 @@
-"""Limits on what is read out of scene and mesh files; their bytes come from `collide.given_files`.
+"""Limits on what is read out of scene and mesh files; their bytes come from `collide.base.given_files`.
 
 A packed file is unpacked piece by piece, and each refusal says the limit and what to do about it.
 """
@@ -10,8 +10,8 @@ import zlib
 from io import BytesIO
 from pathlib import Path
 
+from collide.base.given_files import LARGEST_MESH, read_bytes
 from collide.errors import SceneError
-from collide.given_files import LARGEST_MESH, read_bytes
 
 #: Lists and mappings inside one another, in YAML, JSON and the nodes of a mesh file.
 DEEPEST = 100

@@ -9,8 +9,8 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from collide.base.given_files import LARGEST_MESH, read_bytes
 from collide.errors import SceneError, brief
-from collide.given_files import LARGEST_MESH, read_bytes
 from collide.scenes.loaders.documents import read_json
 from collide.scenes.loaders.polygons import refuse
 

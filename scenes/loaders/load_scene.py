@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from collide import argument_checks as checks
 from collide import scenes
+from collide.base import argument_checks as checks
+from collide.base.given_files import starts_like_xml
 from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, brief, cut
-from collide.given_files import starts_like_xml
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody, free_name
 from collide.scenes.loaders import mesh_file as mesh_loader

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidShape, MissingExtra, SceneError
 from collide.scenes import mesh_cache as cache
 from collide.scenes.loaders.mesh_parts import MeshFile, MeshPart, described, distinct

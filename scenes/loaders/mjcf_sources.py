@@ -9,8 +9,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
 
+from collide.base.given_files import LARGEST_MESH, read_bytes
 from collide.errors import SceneError, brief
-from collide.given_files import LARGEST_MESH, read_bytes
 from collide.scenes.loaders.files import DEEPEST, MAX_INCLUDED
 from collide.scenes.loaders.xml_text import parse_xml
 

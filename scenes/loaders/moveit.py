@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from collide.base.given_files import head
 from collide.errors import InvalidPose, InvalidShape, SceneError, brief, listing
-from collide.given_files import head
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders.documents import read_document

@@ -13,8 +13,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote, urlsplit
 
+from collide.base.given_files import is_file
 from collide.errors import SceneError, brief, cut
-from collide.given_files import is_file
 
 
 class NotFound(SceneError):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import SceneError
 from collide.robots.robot import Robot
 from collide.scenes.loaders import mjcf, urdf

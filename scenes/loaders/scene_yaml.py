@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from collide.base.given_files import LARGEST_TEXT, read_text
 from collide.errors import InvalidArgument, SceneError, brief, listing
-from collide.given_files import LARGEST_TEXT, read_text
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
 from collide.scenes.loaders import mjcf, resources, shape_yaml, urdf

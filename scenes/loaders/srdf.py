@@ -7,9 +7,9 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
+from collide.base.given_files import is_file
 from collide.errors import SceneError, cut, listing
-from collide.given_files import is_file
 from collide.scenes.loaders.xml_text import parse_xml
 
 #: Elements about collisions: what a proposal of disabled pairs replaces.

@@ -17,7 +17,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from collide import argument_checks as checks
+from collide.base import argument_checks as checks
 from collide.errors import InvalidPose, InvalidShape, SceneError, cut, listing
 from collide.robots.kinematic_tree import Joint, Mimic
 from collide.robots.robot import LinkShape, Robot

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from collide.base.given_files import starts_like_xml
 from collide.errors import CollideError, cut, listing
-from collide.given_files import starts_like_xml
 from collide.robots.robot import LinkShape, Robot
 from collide.scenes.description import Placement, Scene
 from collide.scenes.loaders.urdf import Reading, link_shapes

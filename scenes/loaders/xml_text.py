@@ -6,8 +6,8 @@ import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+from collide.base.given_files import read_bytes
 from collide.errors import SceneError, listing
-from collide.given_files import read_bytes
 
 
 def parse_xml(path: Path, notes: list[str]) -> ET.Element:

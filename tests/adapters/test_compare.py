@@ -273,7 +273,7 @@ def test_parts_of_a_compound_enter_exactly():
     ],
 )
 def test_the_command_can_fail_on_a_wrong_peer(monkeypatch, capsys, options, status):
-    from collide import cli
+    from collide.cli import main as cli
 
     can = SceneBody("can", Cylinder(0.1, 0.2), pose())
     asked = Scene("two", [can, SceneBody("ball", Sphere(0.1), pose((0.3, 0, 0)))])

@@ -105,7 +105,7 @@ def test_a_union_passes_on_what_its_parts_do_not_give():
 
 
 def test_the_commands_list_engines_with_what_they_receive(wild, capsys):
-    from collide.cli_engines import engines, listing, one_engine
+    from collide.cli.engines import engines, listing, one_engine
 
     for ask in (engines, one_engine):
         with pytest.raises(SystemExit) as end:

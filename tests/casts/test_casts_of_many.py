@@ -12,10 +12,10 @@ from reproduction import reproducing
 from test_casts_of_unions import clutter
 
 import collide
-from collide import world_casts
 from collide.casts import cast_batches, convex_casts, exact_cast, mesh_casts, raycast, starts
 from collide.casts.cast_trees import CASTS
 from collide.numerics.exact_points import PlacedPoints
+from collide.worlds import casts as world_casts
 
 EYE = np.eye(4)
 

@@ -93,8 +93,12 @@ def foreign(file: Path) -> list[tuple[str, bool, int]]:
 
 
 def room(module: str) -> str:
-    """``collide.narrowphase.gjk.gjk`` → ``narrowphase``; ``collide`` itself → the empty string."""
-    return module.split(".")[1] if "." in module else ""
+    """``collide.narrowphase.gjk.gjk`` → ``narrowphase``; ``collide`` itself → the empty string.
+
+    Those of `collide.papers` are rooms of their own: ``papers.hierarchies``.
+    """
+    parts = module.split(".")
+    return ".".join(parts[1 : 3 if parts[1:2] == ["papers"] else 2])
 
 
 def none_of(wrong: Iterable[str]) -> None:

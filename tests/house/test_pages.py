@@ -44,7 +44,7 @@ def test_files_that_pages_name_exist():
 
 
 def test_commands_that_pages_show_exist():
-    from collide.cli_arguments import parser
+    from collide.cli.arguments import parser
 
     (commands,) = (set(action.choices) for action in parser()._actions if action.dest == "command")
     for page in _pages():

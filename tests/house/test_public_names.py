@@ -30,9 +30,9 @@ def fresh(code: str) -> str:
         ("shapes", "import collide; collide.Box((1, 2, 3)), collide.pose((0, 0, 1)), collide.InvalidShape"),
         ("scenes", "import collide.scenes; collide.scenes.shipped()"),
         ("adapters", "import collide.adapters.peers"),
-        ("--help", "from collide.cli import main; assert main(['--help']) == 0"),
-        ("report --help", "from collide.cli import main; assert main(['report', '--help']) == 0"),
-        ("--version", "from collide.cli import main; assert main(['--version']) == 0"),
+        ("--help", "from collide.cli.main import main; assert main(['--help']) == 0"),
+        ("report --help", "from collide.cli.main import main; assert main(['report', '--help']) == 0"),
+        ("--version", "from collide.cli.main import main; assert main(['--version']) == 0"),
     ],
 )
 def test_start_up_loads_no_compiler(what, code):

@@ -80,7 +80,7 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
         for name in ("exact", "exact_meshes", "exact_peer")
     },
     **{
-        (f"collide/hierarchies/{name}.py", "P"): "the polyhedra P and Q of Barba and Langerman"
+        (f"collide/papers/hierarchies/{name}.py", "P"): "the polyhedra P and Q of Barba and Langerman"
         for name in ("hierarchy_queries", "matrix_game", "validate_walk", "walk_steps")
     },
     ("adapters/hosts/fcl_managers.py", "clear"): "python-fcl's name",
@@ -97,11 +97,11 @@ EXCEPTIONS: dict[tuple[str, str], str] = {
     ("scenes/worst_cases.py", "left"): "beside right: two vertices of one roof",
     ("collide/reports/number_format.py", "plural"): "of English grammar",
     **{
-        (f"collide/hierarchies/{name}.py", "P"): "polytopes P and R, Q the polar of R, as Barba and Langerman name them"
+        (f"collide/papers/hierarchies/{name}.py", "P"): "polytopes P and R, Q the polar of R, of Barba and Langerman"
         for name in ("hierarchy_queries", "matrix_game", "validate_walk", "walk_steps")
     },
     **{
-        (f"collide/polytopes/{name}.py", "P"): "the polygons P and Q of Barba and Langerman"
+        (f"collide/papers/polytopes/{name}.py", "P"): "the polygons P and Q of Barba and Langerman"
         for name in ("planar_certificates", "planar_predicates")
     },
     ("collide/results.py", "SWEPT"): "swept overlap: how a pair was decided, one of `How`",

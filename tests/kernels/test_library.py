@@ -344,7 +344,7 @@ import numpy as np
 sys.path.insert(0, sys.argv[1])
 import answers_digest
 import collide
-from collide.cli import main
+from collide.cli.main import main
 
 answers_digest.told(["pairs", "hulls", "meshes", "worlds"])
 A, B, X = collide.Box((1, 1, 1)), collide.Box((1, 1, 1)), collide.pose((0, 0, 0.9))

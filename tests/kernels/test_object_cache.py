@@ -16,7 +16,7 @@ from types import SimpleNamespace
 import pytest
 from naive import rng_of
 
-from collide.cache_folder import TRUST, make_private, say_once, why_distrusted
+from collide.base.cache_folder import TRUST, make_private, say_once, why_distrusted
 from collide.kernels import object_cache
 
 needs_modes = pytest.mark.skipif(not TRUST, reason="modes of files say nothing here")
@@ -290,5 +290,5 @@ def test_folders_and_links_of_somebody_else(tmp_path):
 
 def test_where_modes_say_nothing_everything_is_trusted(tmp_path, monkeypatch):
     tmp_path.chmod(0o777)
-    monkeypatch.setattr("collide.cache_folder.TRUST", False)
+    monkeypatch.setattr("collide.base.cache_folder.TRUST", False)
     assert why_distrusted(tmp_path) is None

@@ -10,8 +10,6 @@ from mesh_families import grid, soup
 from mesh_shapes import bumpy_sphere
 from validate_bvh import validate_mesh_tree
 
-from collide.hierarchies.graded_tree import graded_tree
-from collide.hierarchies.validate_graded_tree import validate_graded_tree
 from collide.kernels import address_of, entry, view_f32
 from collide.mesh.box_overlap import (
     NEAR_PROBE,
@@ -26,6 +24,8 @@ from collide.mesh.box_overlap import (
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import NODE, NOTHING, SLAB, MeshTree
 from collide.narrowphase.facets.facet_queries import all_hits
+from collide.papers.hierarchies.graded_tree import graded_tree
+from collide.papers.hierarchies.validate_graded_tree import validate_graded_tree
 
 
 def meshes():

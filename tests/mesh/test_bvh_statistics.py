@@ -11,9 +11,9 @@ from mesh_families import soup
 from mesh_shapes import box, bumpy_sphere
 
 import collide
-from collide.cli import main
-from collide.hierarchies.tree_figures import tree_figures
+from collide.cli.main import main
 from collide.narrowphase.facets.facet_queries import all_hits
+from collide.papers.hierarchies.tree_figures import tree_figures
 from collide.scenes.worst_cases import accordion, below, chazelle, harpsicordia
 
 

@@ -13,7 +13,7 @@ from naive import rng_of
 from reproduction import reproducing
 
 import collide
-from collide import cli
+from collide.cli import main as cli
 from collide.mesh import localise
 from collide.mesh.facet_pieces import Pieces, edges_of
 from collide.mesh.locality import quiet

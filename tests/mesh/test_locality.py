@@ -13,7 +13,7 @@ import surfaces
 from naive import SHARED, rng_of
 
 import collide
-from collide import cli
+from collide.cli import main as cli
 from collide.mesh.nearest_neighbours import PointTree
 
 MESHES = SHARED / "data/meshes"

@@ -41,11 +41,11 @@ NO_CHANGE = Path(__file__).with_name("no_change.txt")
 ROOMS = {
     "robots": (["collide/robots"], ["tests/robots"]),
     "worlds": (
-        ["collide/world*.py", "collide/packed_world.py"],
-        ["tests/test_world*.py", "tests/test_packed_world.py", "tests/test_mesh_worlds.py",
+        ["collide/world*.py", "collide/worlds/packed_world.py"],
+        ["tests/test_world*.py", "tests/worlds/test_packed_world.py", "tests/worlds/test_mesh_worlds.py",
          "tests/test_regions_everywhere.py", "tests/engine/test_hollow_worlds.py"],
     ),
-    "reports": (["collide/reports"], ["tests/reports", "tests/test_cli.py"]),
+    "reports": (["collide/reports"], ["tests/reports", "tests/cli/test_cli.py"]),
     "sweeps": (["collide/sweeps"], ["tests/sweeps"]),
 }
 NEIGHBOURS = {

@@ -11,8 +11,8 @@ import pytest
 from naive import Case, random_pose, rng_of
 
 import collide
-from collide import query
 from collide.narrowphase.prepared_pairs import prepared_pair, single_calls_are_safe
+from collide.pairs import query
 
 
 def test_single_gaps_have_the_bits_of_a_batch(monkeypatch):

@@ -34,8 +34,8 @@ import numpy as np
 import collide
 import collide.scenes
 from collide import adapters, polytopes, scenes, shapes, transforms
-from collide.argument_checks import _KINDS
-from collide.argument_checks import number as float_of
+from collide.base.argument_checks import _KINDS
+from collide.base.argument_checks import number as float_of
 from collide.errors import brief
 from collide.robots.kinematic_tree import Joint
 from collide.robots.robot import LinkShape

@@ -187,10 +187,10 @@ GIVEN = {
     "worlds": "",
     "disabled-pairs": "robot = collide.Robot.load('two_links.urdf')",
     "engines": "",
-    "pages": "from collide.cli import main\nmain(['report', 'scene.yaml', '--html', 'page.html'])\n"
+    "pages": "from collide.cli.main import main\nmain(['report', 'scene.yaml', '--html', 'page.html'])\n"
     "world = collide.World(); ids = [world.add(collide.Sphere(1))]\n"
     "times, poses = (0.0, 0.1), lambda t: [collide.pose((t, 0, 0))]",
-    "report-schema": "from collide.cli import main\n"
+    "report-schema": "from collide.cli.main import main\n"
     "main(['report', 'scene.yaml', '--json', 'report.json', '--geometry'])",
     "scene-format": "",
 }

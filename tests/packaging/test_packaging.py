@@ -228,7 +228,7 @@ def test_extras_that_errors_name_exist(metadata):
 
 def test_console_script(wheel):
     (name,) = (name for name in wheel.namelist() if name.endswith(".dist-info/entry_points.txt"))
-    assert "collide = collide.cli:main" in wheel.read(name).decode()
+    assert "collide = collide.cli.main:main" in wheel.read(name).decode()
 
 
 def test_installed_wheel_imports_from_itself(wheel, tmp_path):

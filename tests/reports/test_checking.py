@@ -12,7 +12,8 @@ from slider_scene import slider_scene
 
 import collide
 import collide.scenes
-from collide import Box, Compound, Halfspace, Mesh, Sphere, cli, pose
+from collide import Box, Compound, Halfspace, Mesh, Sphere, pose
+from collide.cli import main as cli
 from collide.reports import checking, report, terminal
 from collide.reports import pair_classes as pairs
 from collide.reports import scene_geometry as geometry

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import collide
-from collide.cache_folder import TRUST
+from collide.base.cache_folder import TRUST
 from collide.reports import doctor
 from collide.reports.tables import lay_out, table_lines
 

@@ -10,7 +10,7 @@ import pytest
 from slider_scene import MEETS, slider_scene
 
 import collide.scenes
-from collide import cli
+from collide.cli import main as cli
 from collide.errors import InvalidArgument, SceneError
 from collide.reports import report
 from collide.reports import state_reports as states

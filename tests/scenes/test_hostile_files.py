@@ -20,9 +20,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from collide.cli import main
+from collide.base.given_files import LARGEST_TEXT
+from collide.cli.main import main
 from collide.errors import CollideError, InvalidPose, MissingExtra, SceneError, brief, cut, listing
-from collide.given_files import LARGEST_TEXT
 from collide.robots.robot import Robot
 from collide.scenes import load
 from collide.scenes import mesh_cache as cache

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import collide
-from collide.cache_folder import say_once
+from collide.base.cache_folder import say_once
 from collide.scenes import load
 from collide.scenes import mesh_cache as cache
 from collide.shapes.shape_files import pack

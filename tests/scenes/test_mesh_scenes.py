@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from collide import Box, Compound, ConvexHull, Cylinder, Mesh, World, collide, distance, pose
-from collide.cli import main
+from collide.cli.main import main
 from collide.mesh.convex_surface import is_own_hull
 from collide.reports import report, terminal
 from collide.scenes import load

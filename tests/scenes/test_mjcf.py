@@ -429,7 +429,7 @@ def test_models_without_geometry_say_so(write):
 
 
 def test_commands_take_models(write, capsys):
-    from collide.cli import main
+    from collide.cli.main import main
 
     file = write(
         '<worldbody><geom name="floor" type="plane" size="1 1 1"/><body name="a" pos="0 0 .05"><freejoint/>'

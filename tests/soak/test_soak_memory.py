@@ -55,7 +55,7 @@ def test_a_pair_that_holds_its_shapes_is_noticed(monkeypatch):
     def hold(A, B, pair, slot="_prepared"):
         kept.append((A, B))
 
-    monkeypatch.setattr(collide.batches, "keep_prepared", hold)
+    monkeypatch.setattr(collide.pairs.batches, "keep_prepared", hold)
     survivors, *_ = drops(60, seed=5, uses=("collide", "distance"))
     assert len(survivors) > 15 and kept
 

@@ -13,7 +13,7 @@ from soak_worlds import ASKED, Model, Tally, main, soak
 
 import collide
 from collide.broadphase import bounding_boxes
-from collide.packed_world import PackedWorld
+from collide.worlds.packed_world import PackedWorld
 
 QUESTIONS = int(os.environ.get("COLLIDE_SOAK_QUESTIONS", "250"))
 
@@ -69,7 +69,7 @@ def test_boxes_of_nan_are_noticed(monkeypatch):
             out = room + (np.abs(boxes).max(axis=1, keepdims=True) + room) * 2.0**-50 * (room > 0.0)
         return np.hstack([boxes[:, :3] - out, boxes[:, 3:] + out])
 
-    monkeypatch.setattr("collide.packed_world.widened", old)
+    monkeypatch.setattr("collide.worlds.packed_world.widened", old)
     monkeypatch.setattr("collide.broadphase.tree_over_bodies._comparable", lambda boxes: boxes)
     assert bounding_boxes.widened is not old
     lost = differing(sorts="collides collisions distances", worlds=8)

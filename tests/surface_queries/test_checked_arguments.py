@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from collide import Box, Capsule, ConvexHull, InvalidArgument, InvalidPose, Mesh, Sphere, UnsupportedQuery
-from collide.argument_checks import matched_count, refuse_rows, vectors
+from collide.base.argument_checks import matched_count, refuse_rows, vectors
 from collide.surface_queries.checked_arguments import two_bodies
 
 EYE = np.eye(4)

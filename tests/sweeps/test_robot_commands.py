@@ -10,7 +10,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from collide import cli
+from collide.cli import main as cli
 from collide.scenes import load
 from collide.sweeps.random_configurations import random_configurations
 

@@ -15,7 +15,7 @@ from plain_robots import chain, joint, robot_of
 
 import collide
 from collide import Box, SceneError, Sphere, World, pose
-from collide.cli import main
+from collide.cli.main import main
 from collide.scenes import allow_pairs
 from collide.scenes.loaders.allowed_pairs import read_allowed_pairs
 from collide.scenes.loaders.srdf import read_srdf

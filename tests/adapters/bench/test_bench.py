@@ -20,7 +20,7 @@ from collide.adapters.bench.engine_timer import EngineTimer
 from collide.adapters.bench.machine_stamp import machine_stamp, write_csv
 from collide.adapters.peers import protocol
 from collide.adapters.peers.stress_truth import truth
-from collide.cli import main
+from collide.cli.main import main
 from collide.errors import CollideError, InvalidArgument
 from collide.scenes.families.case import Body, pair
 

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from collide import Box, Ellipsoid, Sphere, cli, pose
+from collide import Box, Ellipsoid, Sphere, pose
 from collide.adapters.fuzzing.case_plate import _ridges, answer_line, body_lines, draw_findings, true_line
 from collide.adapters.fuzzing.findings import load_finding
 from collide.adapters.fuzzing.fuzz_case import pair_case
+from collide.cli import main as cli
 from collide.shapes.tessellation import tessellate
 
 CASES = Path(__file__).parent / "cases"

@@ -8,9 +8,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from collide import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Sphere, cli
+from collide import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.adapters.fuzzing.fcl_dump import answered, parse_fcl_dumps, read_fcl_dumps
 from collide.adapters.fuzzing.proofs import proof
+from collide.cli import main as cli
 from collide.errors import SceneError
 from collide.scenes import load
 

@@ -6,10 +6,11 @@ import json
 
 import pytest
 
-from collide import Box, Cylinder, Ellipsoid, Sphere, World, cli, pose
+from collide import Box, Cylinder, Ellipsoid, Sphere, World, pose
 from collide.adapters.fuzzing import fuzz_run
 from collide.adapters.fuzzing.findings import load_finding
 from collide.adapters.fuzzing.fuzz_case import pair_case
+from collide.cli import main as cli
 from collide.scenes import save
 
 

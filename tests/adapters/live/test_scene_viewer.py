@@ -17,9 +17,9 @@ import pytest
 
 from collide.adapters.live.page_state import live_block
 from collide.adapters.live.scene_viewer import SceneViewer
-from collide.cli import main
-from collide.cli_arguments import parse
-from collide.cli_view import _files, _page
+from collide.cli.main import main
+from collide.cli.main.arguments import parse
+from collide.cli.main.view import _files, _page
 from collide.errors import SceneError
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -45,7 +45,7 @@ def events(url: str, drawing: int):
 #: The command `collide`; where tests run in the background, what they start would ignore Ctrl-C.
 MINDS_CTRL_C = """
 import signal, sys
-from collide.cli import main
+from collide.cli.main import main
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.exit(main())
 """

@@ -13,7 +13,6 @@ import pytest
 from naive import Case, random_pose, rng_of
 
 import collide
-from collide import batches, query
 from collide.kernels import address_of, entry, view_f64
 from collide.lowering.compound_table import PART, lay_out
 from collide.lowering.parts import convex_set_of, parts_of
@@ -22,6 +21,7 @@ from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, TERM_RO
 from collide.narrowphase import convex_kernel_calls as run
 from collide.narrowphase.composite import composite as unions
 from collide.narrowphase.prepared_pairs import single_calls_are_safe
+from collide.pairs import batches, query
 from collide.results import EXACT, SWEPT, UNDECIDED, flipped
 
 CASES = 60

@@ -17,7 +17,6 @@ from mesh_shapes import block_ring, bumpy_sphere
 from naive_triangles import as_integers, squared_distance, triangles_meet, world_points
 
 import collide
-from collide.hierarchies.graded_tree import graded_tree
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.narrowphase.facets.facet_queries import (
     all_hits,
@@ -27,6 +26,7 @@ from collide.narrowphase.facets.facet_queries import (
     surface_distances,
     surfaces_meet,
 )
+from collide.papers.hierarchies.graded_tree import graded_tree
 
 
 def pairs_by_boxes(va, fa, X, vb, fb, Y):
@@ -182,7 +182,7 @@ import pickle, sys
 import numpy as np
 from collide import kernels
 from collide.mesh.build_bvh import build_mesh_tree
-from collide.hierarchies.graded_tree import graded_tree
+from collide.papers.hierarchies.graded_tree import graded_tree
 from collide.narrowphase.facets.facet_queries import *
 {inspect.getsource(answers)}
 assert kernels.PLAIN_PYTHON

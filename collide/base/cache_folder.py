@@ -1,0 +1,162 @@
+"""Where collide keeps what it has prepared: compiled kernels and parsed inputs."""
+
+from __future__ import annotations
+
+import os
+import stat
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+from collide.base.log import log
+
+#: Whether files have owners and modes that say who may write them. On Windows they say nothing: there a user's folders
+#: are the user's by their access lists.
+TRUST = hasattr(os, "geteuid")
+#: As many links as the system itself follows.
+_MAX_LINKS = 40
+
+
+def cache_folder(*parts: str) -> Path:
+    """The user's cache folder for collide, not necessarily existing yet.
+
+    ``COLLIDE_CACHE_DIR`` if set; else the platform's place: ``%LOCALAPPDATA%``,
+    ``~/Library/Caches``, ``$XDG_CACHE_HOME`` or ``~/.cache``.
+    """
+    folder_named = os.environ.get("COLLIDE_CACHE_DIR")
+    if folder_named:
+        # "~name" of a user whom nobody knows stays as it is, as in a shell
+        return Path(os.path.expanduser(folder_named)).joinpath(*parts)
+    home = Path(os.path.expanduser("~"))
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = home / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
+    return base.joinpath("collide", *parts)
+
+
+def make_private(folder: Path) -> None:
+    """Make a folder and those above it that are missing, for nobody but this user."""
+    if not folder.is_dir():
+        make_private(folder.parent)
+        folder.mkdir(mode=0o700, exist_ok=True)
+
+
+def why_unusable(folder: Path) -> str | None:
+    """Why nothing is to be read from a folder or kept in it; None where all is well: it is then there."""
+    try:
+        why = why_distrusted(folder)
+        if why is None:
+            make_private(folder)
+            why = why_distrusted(folder)  # somebody else may have made it meanwhile
+        return why
+    except (OSError, RuntimeError, ValueError) as error:
+        return str(error)
+
+
+def own_folder(folder: Path, what: str, use: str) -> Path | None:
+    """A folder of the cache, made where it is missing; None, and said once, where somebody else could put files there.
+
+    what : is kept there and believed as it stands, for the line that says so: "compiled kernels".
+    use : what comes of doing without: "they are compiled again in every process".
+    """
+    why = why_unusable(folder)
+    if why is None:
+        return folder
+    say_once(
+        f"{what} cannot be kept in {folder}, nor taken from there: {why}; {use}. Set COLLIDE_CACHE_DIR to a folder of "
+        "your own that can be written."
+    )
+    return None
+
+
+@cache
+def say_once(message: str) -> None:
+    """A warning of the log, the first time that it is said in this process."""
+    log.warning(message)
+
+
+def read_own(file: Path) -> bytes:
+    """What a file holds that this user alone may write. No link is followed, and no pipe waited for.
+
+    Raises FileNotFoundError where nothing is there, PermissionError where somebody else may have written it, OSError.
+    """
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    descriptor = os.open(file, flags)
+    try:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise PermissionError(f"{file} is no file")
+        if TRUST and (status.st_uid != os.geteuid() or stat.S_IMODE(status.st_mode) & 0o022):
+            raise PermissionError(f"others may have written {file}")
+        with os.fdopen(descriptor, "rb", closefd=False) as opened:
+            return opened.read()
+    finally:
+        os.close(descriptor)  # of a folder, too, of which `os.fdopen` makes no stream and leaves it open
+
+
+def why_distrusted(folder: Path) -> str | None:
+    """Who else may decide what a folder holds: "… may be written by others", or None where nobody may.
+
+    Looked at is every folder and link on the way: each must belong to this user, or to the owner of the machine, and be
+    writable to nobody else. Of a folder with the sticky bit, like /tmp, everyone may fill it and only owners move what
+    is in it, so it may stand on the way, but not be the folder itself. What does not exist yet is passed over.
+    """
+    if not TRUST:
+        return None
+    owners = {0, os.geteuid(), os.stat("/").st_uid}  # who has the root folder has all there is
+    for place, status, is_last in _way_to(folder):
+        if status.st_uid not in owners:
+            return f"{place} belongs to another user (id {status.st_uid})"
+        shared = _others_may_write(status) and (is_last or not status.st_mode & stat.S_ISVTX)
+        if shared and not stat.S_ISLNK(status.st_mode):  # of a link the mode says nothing
+            return f"{place} may be written by others (mode {stat.S_IMODE(status.st_mode):o})"
+    return None
+
+
+def _others_may_write(status: os.stat_result) -> bool:
+    return bool(status.st_mode & stat.S_IWOTH) or (
+        bool(status.st_mode & stat.S_IWGRP) and not _is_own_group(status.st_gid)
+    )
+
+
+def _is_own_group(group: int) -> bool:
+    """Whether a group is this user alone, as many systems make one for each user."""
+    import grp
+    import pwd
+
+    try:
+        name, entry = pwd.getpwuid(os.geteuid()).pw_name, grp.getgrgid(group)
+    except KeyError:
+        return False
+    return entry.gr_name == name and set(entry.gr_mem) <= {name}
+
+
+def _way_to(folder: Path) -> Iterator[tuple[Path, os.stat_result, bool]]:
+    """(folder or link, what it is, whether it is the end) from the root to a folder, as far as they exist."""
+    waiting = list(reversed((Path.cwd() / folder).parts))
+    at, links = Path(waiting.pop()), 0
+    yield at, os.lstat(at), not waiting
+    while waiting:
+        part = waiting.pop()
+        if part == "..":
+            at = at.parent
+            continue
+        try:
+            status = os.lstat(at / part)
+        except (FileNotFoundError, NotADirectoryError):
+            return
+        if stat.S_ISLNK(status.st_mode):
+            yield at / part, status, False
+            links += 1
+            if links > _MAX_LINKS:
+                raise OSError(f"{folder}: too many links")
+            target = Path(os.readlink(at / part))
+            waiting += reversed(target.parts[1:] if target.is_absolute() else target.parts)
+            at = Path(target.anchor) if target.is_absolute() else at
+        else:
+            at = at / part
+            yield at, status, not waiting

@@ -1,0 +1,334 @@
+"""The arguments of every command, and the help that teaches them.
+
+Imports the standard library alone, so that ``--help`` answers at once. `parse` gives a namespace whose ``command`` is
+the name of a command, None where none was given.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from typing import NoReturn
+
+from collide import __version__
+from collide.cli import bench as cli_bench
+from collide.cli import compare as cli_compare
+from collide.cli import engines as cli_engines
+from collide.cli import fuzz as cli_fuzz
+from collide.cli import locality as cli_locality
+from collide.cli import numbers as cli_numbers
+from collide.cli import pages as cli_pages
+from collide.cli import srdf as cli_srdf
+from collide.cli import sweep as cli_sweep
+from collide.cli import view as cli_view
+from collide.errors import InvalidArgument
+from collide.reports.number_format import UNITS, parse_length
+
+
+class UsageError(Exception):
+    """What is wrong with the arguments, in one line."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """argparse with the one-line errors of the rest, and no guessing at shortened options."""
+
+    def __init__(self, *args, **kwargs):
+        kwargs.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
+        super().__init__(*args, allow_abbrev=False, **kwargs)
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message} (see: {self.prog} --help)")
+
+
+class _Version(argparse.Action):
+    def __call__(self, parser, namespace, values, option_string=None):
+        print(f"collide {__version__}")
+        raise SystemExit(0)
+
+
+def parse(argv: list[str]) -> argparse.Namespace:
+    """The arguments of a command; UsageError where they are wrong, SystemExit after help and version."""
+    return parser().parse_args(_with_negative_states(argv))
+
+
+def _with_negative_states(argv: list[str]) -> list[str]:
+    """``--state -0.5,1`` as ``--state=-0.5,1``: argparse takes a leading minus for an option."""
+    joined: list[str] = []
+    for word in argv:
+        if joined and joined[-1] == "--state" and re.match(r"-[\d.]", word):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
+_TOP = """examples:
+  collide scenes                          the scenes that come with collide
+  collide report workcell                 a first report, nothing else needed
+  collide report panda_workbench --clearance 50mm
+  collide report part_a.stl part_b.obj    do two meshes meet?
+  collide check scene.yaml && echo free   for scripts
+  collide view panda_workbench            look at it, in a browser
+  collide doctor                          is this installation sound?
+
+exit status: 0 done or free, 1 collision found, 2 error (one line on stderr)"""
+
+_REPORT = """examples:
+  collide report workcell
+  collide report panda_workbench --clearance 50mm
+  collide report robot.urdf --srdf robot.srdf --state joints.yaml
+  collide report robot.urdf --state 0,-0.8,0,-2.4,0,1.6,0.8,0,0
+  collide report planning_scene.yaml --robot panda.urdf --state start,goal
+  collide report robot.urdf cell.yaml --trajectory plan.csv --clearance 2cm
+  collide report part_a.stl part_b.obj --scale mm --meshes pieces
+  collide report scene.yaml --json - | jq '.colliding[] | [.a, .b, .depth]'
+  collide report panda_workbench --html page.html       to look at, in a browser
+
+A scene is a file (URDF, MJCF, planning scene, mesh, scene YAML) or the name of
+a shipped one; several files make one scene.
+
+The first page holds what needs a person: collisions, then what is nearer than
+the clearance. A body that is in many pairs takes one row, contacts within
+rounding one line. --all lists everything, --proofs tells how each answer is
+known.
+
+A pair is touching where its proven bracket lower <= distance <= upper reaches
+to both sides of 0, or lies within 2^-40 (a trillionth) of the coordinates.
+
+A trajectory is looked at in samples. Nothing is certified between them, and
+the report says so.
+
+The exit status is 0 whenever a report was made: use `collide check` to branch
+on collisions. The JSON is described in docs/report-schema.md."""
+
+_CHECK = """examples:
+  collide check scene.yaml && echo free
+  collide check robot.urdf --state joints.yaml --min-depth 0.1mm
+  collide check scene.yaml | cut -f2,3       the names of the pairs
+  collide check cell.yaml --write-baseline known.json     once, then in CI:
+  collide check cell.yaml --baseline known.json --junit collisions.xml
+
+Each line of output is one pair, fields separated by tabs: `collision`,
+`shallow` or `touching`, body A, body B, signed distance in metres (negative:
+overlapping); of several states a fifth field, the state; of a trajectory the
+share of the path, where the collision begins. The verdict goes to stderr, and
+there which bodies are surfaces without an inside or not the shape the scene
+names.
+
+With a baseline, collisions that it knows are printed as `known` and do not
+count; one that got deeper counts as new and is printed as `deeper`; one that
+is no more is printed as `gone`. docs/ci.md has a workflow to copy.
+
+exit status: 0 free, 1 collision, 2 error. Pairs that touch within rounding are
+printed, and do not count as collisions unless --touching-is-collision is given."""
+
+_STRESS = """examples:
+  collide stress                                 every family, 40 cases each
+  collide stress --family needles --family flat --cases 300 --seed 7
+  collide stress --engine coal --json coal.json  the same cases asked of a peer
+  collide stress --save wrong.json               every refuted answer, as Python
+
+The families are the cases collision libraries get wrong: exact contact, flush
+and tilted boxes, gaps of one unit in the last place, needles, plates, tiny
+against huge. Each answer is judged by exact rational arithmetic that shares no
+code with the engine.
+
+exit status: 0 no answer of collide's is wrong, 1 one is, 2 error"""
+
+_SCENES = """examples:
+  collide scenes
+  collide scenes --copy workcell             to ./workcell.json, for editing
+  collide scenes --copy workcell cell.json && collide report cell.json"""
+
+_DOCTOR = """Shows versions, optional packages and the extras that bring them, where compiled
+kernels and prepared inputs are kept, and asks a few pairs with known answers.
+
+exit status: 0 sound, 1 something is broken"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of everything."""
+    made = _Parser(
+        prog="collide", epilog=_TOP,
+        description="Which bodies of a robot scene collide, how deep, how near the others are, and how that is known.",
+    )
+    made.add_argument("--version", action=_Version, nargs=0, help="show the version and leave")
+    commands = made.add_subparsers(dest="command", metavar="COMMAND", title="commands")
+    _add_report(commands)
+    _add_check(commands)
+    _add_view(commands)
+    _add_compare(commands)
+    _add_stress(commands)
+    fuzz = _add(commands, "fuzz", "search other engines for wrong answers, shrunk to small cases", cli_fuzz.EPILOG)
+    cli_fuzz.add_arguments(fuzz, cli_engines.engines)
+    bench = _add(commands, "bench", "run time against error, and against size", cli_bench.EPILOG)
+    cli_bench.add_arguments(bench, cli_engines.engines)
+    locality = _add(commands, "locality", "how local are these meshes?", cli_locality.EPILOG)
+    cli_locality.add_arguments(locality)
+    _output_arguments(locality)
+    _add_scenes(commands)
+    cli_srdf.add_arguments(_add(commands, "srdf", "which links of a robot can collide at all?", cli_srdf.EPILOG))
+    sweep = _add(commands, "sweep", "millions of configurations, to files", cli_sweep.EPILOG)
+    cli_sweep.add_arguments(sweep, _scene_arguments)
+    _add(commands, "doctor", "is this installation sound?", _DOCTOR)
+    return made
+
+
+def _add(commands, name: str, summary: str, epilog: str) -> argparse.ArgumentParser:
+    return commands.add_parser(name, help=summary, description=summary[0].upper() + summary[1:], epilog=epilog)
+
+
+def _add_stress(commands) -> None:
+    parser = _add(commands, "stress", "the hard families, judged exactly", _STRESS)
+    parser.add_argument("--family", action="append", metavar="NAME", help="only this one; may be given again")
+    parser.add_argument("--cases", type=cli_numbers.count, default=40, metavar="N", help="cases a family (40)")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds make other cases (0)")
+    parser.add_argument("--engine", type=cli_engines.one_engine, default="collide", metavar="E",
+                        help="whom to ask, such as coal or coal:nesterov; help lists them (collide)")
+    parser.add_argument("--save", metavar="FILE", help="write every refuted answer with a snippet that repeats it")
+    _output_arguments(parser)
+
+
+def _add_report(commands) -> None:
+    parser = _add(commands, "report", "what collides, what is near, and how that is known", _REPORT)
+    _scene_arguments(parser)
+    _motion_arguments(parser)
+    _clearance_argument(parser)
+    _ignore_argument(parser)
+    parser.add_argument("--all", action="store_true", help="every pair, mesh and note, and what --proofs shows")
+    parser.add_argument("--proofs", action="store_true",
+                        help="how each answer is known, which pairs were never tested, and what took how long")
+    parser.add_argument("--geometry", action="store_true",
+                        help="add poses, shapes and triangles of every body to the JSON, to draw it from")
+    _output_arguments(parser)
+    cli_pages.add_argument(parser)
+
+
+def _add_view(commands) -> None:
+    parser = _add(commands, "view", "look at a scene in a browser, while its files are edited", cli_view.EPILOG)
+    _scene_arguments(parser)
+    _motion_arguments(parser)
+    _clearance_argument(parser)
+    _ignore_argument(parser)
+    cli_view.add_arguments(parser)
+
+
+def _clearance_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--clearance", type=_length, default=0.0, metavar="D",
+                        help="list pairs nearer than this too: 0.05 (metres), 50mm, 5cm")
+
+
+def _add_check(commands) -> None:
+    parser = _add(commands, "check", "is the scene free of collisions? for scripts", _CHECK)
+    _scene_arguments(parser)
+    _motion_arguments(parser)
+    parser.add_argument("--min-depth", type=_length, default=0.0, metavar="D",
+                        help="collisions proven less deep than this do not count: 0.001 (metres), 1mm")
+    parser.add_argument("--allow-missing-meshes", action="store_true",
+                        help="with --missing-meshes skip: free counts although what was skipped is not checked")
+    parser.add_argument("--touching-is-collision", action="store_true",
+                        help="count pairs that touch within rounding as collisions")
+    _ignore_argument(parser)
+    group = parser.add_argument_group("continuous integration")
+    group.add_argument("--baseline", metavar="FILE",
+                       help="known collisions, from --write-baseline or --json: only new ones count")
+    group.add_argument("--baseline-tolerance", type=_length, default=1e-4, metavar="D",
+                       help="a known collision deeper than it was by more than this counts as new (0.1mm)")
+    group.add_argument("--write-baseline", metavar="FILE", help="write the collisions there are as known ones; exit 0")
+    group.add_argument("--junit", metavar="FILE", help="write JUnit XML, a test case for every body")
+    _output_arguments(parser)
+    cli_pages.add_argument(parser)
+
+
+def _add_compare(commands) -> None:
+    parser = _add(commands, "compare", "ask other engines about the same scene", cli_compare.EPILOG)
+    _scene_arguments(parser, at_least=0)
+    cli_compare.add_arguments(parser, _length, _part, cli_engines.engines)
+    _output_arguments(parser)
+    cli_pages.add_argument(parser)
+
+
+def _add_scenes(commands) -> None:
+    parser = _add(commands, "scenes", "the scenes that come with collide", _SCENES)
+    parser.add_argument("--copy", nargs="+", metavar=("NAME", "DEST"), help="copy a scene's file, to be changed")
+    parser.add_argument("--force", action="store_true", help="let --copy overwrite a file")
+
+
+def _scene_arguments(parser: argparse.ArgumentParser, at_least: int = 1) -> None:
+    group = parser.add_argument_group("scene")
+    group.add_argument("scenes", nargs="+" if at_least else "*", metavar="SCENE",
+                       help="a file, or the name of a shipped scene")
+    group.add_argument(
+        "--state",
+        action="append",
+        metavar="VALUES",
+        help="joint values: a state's name, a YAML or JSON file, 0,0.5,... in the order of the joints, "
+        "or joint=0.5,...; several names or files, separated by commas or given again, are several states",
+    )
+    group.add_argument("--robot", metavar="FILE", help="the robot of a planning scene, URDF or MJCF")
+    group.add_argument("--srdf", metavar="FILE", help="disabled pairs and named states (default: beside the robot)")
+    group.add_argument("--meshes", choices=("mesh", "hull", "pieces"),
+                       help="how meshes enter: as they are (default), as convex hulls, or as unions of convex pieces")
+    group.add_argument("--missing-meshes", choices=("error", "skip"),
+                       help="what to do about mesh files that are missing")
+    group.add_argument("--package-path", action="append", metavar="DIR",
+                       help="where package:// is looked for; may be given more than once")
+    group.add_argument("--scale", type=_scale, metavar="S", help="factor for mesh files, or their unit: 0.001 or mm")
+
+
+def _motion_arguments(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("motion")
+    group.add_argument("--trajectory", metavar="FILE",
+                       help="follow joint values, waypoint by waypoint: CSV, YAML or JSON, also ROS's JointTrajectory")
+    group.add_argument("--resolution", type=_resolution, default=0.02, metavar="STEP",
+                       help="no joint moves more between two samples of it: radians, or metres (0.02)")
+
+
+def _ignore_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--ignore", action="append", default=[], metavar="A,B",
+                        help="do not test this pair of bodies; may be given again, and the report says so")
+
+
+def _output_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", metavar="FILE|-", help="write JSON to a .json file, or - for standard output")
+    parser.add_argument("--quiet", action="store_true", help="no table, no progress; errors are still told")
+
+
+def _length(text: str) -> float:
+    try:
+        return parse_length(text)
+    except InvalidArgument as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _scale(text: str) -> float:
+    """A factor, or the unit that mesh files are written in."""
+    if text in UNITS:
+        return UNITS[text]
+    units = ", ".join(unit for unit in UNITS if unit.isascii() and unit)
+    number = _number(text, f"must be a number or one of the units {units}, got {text!r}")
+    if not math.isfinite(number) or number == 0:
+        raise argparse.ArgumentTypeError(f"must be a finite number other than 0, got {text!r}")
+    return number
+
+
+def _part(text: str) -> float:
+    number = _number(text, f"must be a part of the pair's size such as 1e-6, got {text!r}")
+    if not 0 <= number < math.inf:
+        raise argparse.ArgumentTypeError(f"must be finite and not negative, got {text!r}")
+    return number
+
+
+def _resolution(text: str) -> float:
+    number = _number(text, f"must be a number of radians, or metres, got {text!r}")
+    if not 0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"must be above 0 and finite, got {text!r}")
+    return number
+
+
+def _number(text: str, complaint: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(complaint) from None

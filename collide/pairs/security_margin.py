@@ -1,0 +1,96 @@
+"""Booleans with a security margin: whether two bodies come within a distance of each other.
+
+The proven bracket of the distance decides, lower > margin or upper ≤ margin. Where the margin lies inside it, in its
+last digits, the bodies are grown by the margin instead, and whether they meet is decided in integers as any boolean is.
+What is left open, next to curved surfaces, meshes and unions, counts as within.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+
+import numpy as np
+
+from collide.base import argument_checks as checks
+from collide.errors import InvalidArgument
+from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.parts import convex_set_of, is_single_convex
+from collide.narrowphase.convex_batches import Question
+from collide.pairs.batches import answer_batch
+from collide.results import UNDECIDED
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.shape import Shape
+from collide.transforms import LARGEST, SMALLEST
+
+#: (A, B, X_WA, X_WB) of a pair, poses (4, 4).
+Pair = tuple[Shape, Shape, np.ndarray, np.ndarray]
+
+
+def checked_margin(name: str, value) -> float:
+    """A margin [m] as given: 0, or of a size that a body may have. Raises InvalidArgument."""
+    margin = checks.limit(name, value)
+    if margin and not SMALLEST <= margin <= LARGEST:
+        raise InvalidArgument(f"{name} must be 0 or within [{SMALLEST:g}, {LARGEST:g}] m, got {checks.brief(value)}")
+    return margin
+
+
+def within(rows: np.ndarray, margin: float, pair: Callable[[int], Pair]) -> np.ndarray:
+    """bool[n]: which pairs of rows, asked up to a distance of at least ``margin`` [m], are at most that far apart.
+
+    pair : the question of row k; asked for those that their bracket leaves open.
+    """
+    near = rows["hit"] | (rows["lower"] <= margin)
+    for k in np.flatnonzero(near & ~rows["hit"] & (rows["upper"] > margin)).tolist():
+        near[k] = _meets_grown(*pair(k), margin)
+    return near
+
+
+def _meets_grown(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> bool:
+    grown = _grown(A, B, margin)
+    if grown is None:
+        return True
+    row = answer_batch(*grown, X_WA[None], X_WB[None], Question(False, 0.0, depths=False))[0]
+    return bool(row["hit"] or row["how"] == UNDECIDED)
+
+
+def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
+    """Two shapes that meet exactly where A and B are within the margin; None where they are not to be had.
+
+    Of two swept sets of points only the sum of the radii counts, which two doubles nearly always hold. A half-space
+    stays.
+    """
+    if A.is_region or B.is_region:
+        return _grown_beside_region(A, B, margin)
+    if not (is_single_convex(A) and is_single_convex(B)):
+        return None
+    packed = [convex_set_of(shape) for shape in (A, B)]
+    is_swept_points = [p.kind == POINTS and p.slop == 0.0 for p in packed]
+    total = Fraction(margin) + sum(Fraction(p.radius) for p in packed)
+    first = float(total)
+    if first > total:
+        first = math.nextafter(first, 0.0)
+    rest = float(total - Fraction(first))
+    if total != Fraction(first) + Fraction(rest) or 0.0 < rest < SMALLEST or first > LARGEST:
+        return None
+    if all(is_swept_points):
+        return ConvexHull(packed[0].points, radius=first), ConvexHull(packed[1].points, radius=rest)
+    if rest == 0.0 and is_swept_points[0] and packed[1].kind == HALFSPACE:
+        return ConvexHull(packed[0].points, radius=first), B
+    if rest == 0.0 and is_swept_points[1] and packed[0].kind == HALFSPACE:
+        return A, ConvexHull(packed[1].points, radius=first)
+    return None
+
+
+def _grown_beside_region(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
+    """The same of a region, which stays, and points swept by a ball."""
+    body = B if A.is_region else A
+    packed = convex_set_of(body) if is_single_convex(body) else None
+    if packed is None or packed.kind != POINTS or packed.slop:
+        return None
+    radius = packed.radius + margin
+    if Fraction(radius) != Fraction(packed.radius) + Fraction(margin) or radius > LARGEST:
+        return None
+    grown = ConvexHull(packed.points, radius=radius)
+    return (A, grown) if A.is_region else (grown, B)

@@ -1,0 +1,56 @@
+"""A binary space partition as it grows: cuts, the places below them, and what each cut holds of the facets."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.errors import UnsupportedQuery
+from collide.papers.partitions.growing_rows import GrowingRows
+
+#: What stands at a place that no cut and no leaf has taken.
+EMPTY = np.iinfo(np.int64).min
+#: Bytes of a cut and the two places below it, and of a facet that lies in one.
+_CUT_BYTES, _HELD_BYTES = 88, 16
+
+
+class PartitionTree:
+    """Places are numbered: 0 is all of space, 2 c + 1 is what lies below cut c, 2 c + 2 what lies above.
+
+    plane : (cuts,), the plane of each cut.   below : (places,), what stands there: a cut, or EMPTY for a leaf.
+    seat : (cuts, 4) a point in the cut and inside its cell, to rounding, and about how large what it was taken from is.
+    held : [(cuts (k,), facets (k,))], facets that lie in the plane of a cut and in its cell.
+    """
+
+    def __init__(self, memory: int):
+        self.memory, self.other_bytes, self.prediction = memory, 0, ""
+        self.plane, self.below = GrowingRows(np.int64), GrowingRows(np.int64)
+        self.seat = GrowingRows(float, 4)
+        self.held: list[tuple[np.ndarray, np.ndarray]] = []
+        self.below.add(np.array([EMPTY]))
+
+    def cut(self, places: np.ndarray, planes: np.ndarray, seats: np.ndarray | None = None) -> np.ndarray:
+        """Cut the cells at places by a plane each; returns the numbers of the cuts."""
+        made = self.plane.add(planes)
+        self.seat.add(np.full((len(planes), 4), np.nan) if seats is None else seats)
+        self.below.rows[places] = made
+        self.below.add(np.full(2 * len(planes), EMPTY))
+        self.check_memory()
+        return made
+
+    def hold(self, cuts: np.ndarray, facets: np.ndarray) -> None:
+        """Facets that lie in the planes of cuts."""
+        if len(cuts):
+            self.held.append((cuts, facets))
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the tree and of what is worked on."""
+        return _CUT_BYTES * self.plane.n + _HELD_BYTES * sum(len(c) for c, _ in self.held) + self.other_bytes
+
+    def check_memory(self) -> None:
+        """Refuse to grow beyond the limit, and say how far it came."""
+        if self.n_bytes > self.memory:
+            raise UnsupportedQuery(
+                f"SpacePartition: {self.plane.n + 1:,} cells so far take {self.n_bytes:,} bytes, more than "
+                f"memory={self.memory:,}; {self.prediction}raise memory, or cut the mesh into fewer facets"
+            )

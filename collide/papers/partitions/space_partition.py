@@ -1,0 +1,306 @@
+"""Space cut into convex cells that no facet of a solid passes through: `SpacePartition`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.base import argument_checks as checks
+from collide.errors import InvalidArgument
+from collide.lowering.facet_bodies import body_of
+from collide.mesh.shell_volumes import without_area
+from collide.mesh.weld import weld
+from collide.narrowphase.facets.facet_queries import surfaces_meet
+from collide.papers.partitions.cell_records import CellSource, ConvexCells, part_of_block
+from collide.papers.partitions.convex_cells import cell_blocks
+from collide.papers.partitions.cut_polygons import Edges
+from collide.papers.partitions.facet_level import cut_along_facets
+from collide.papers.partitions.finished_tree import FinishedTree
+from collide.papers.partitions.leaf_labels import leaves_inside
+from collide.papers.partitions.orthogonal_level import OrthogonalLevel
+from collide.papers.partitions.partition_tree import PartitionTree
+from collide.papers.partitions.planes import Planes
+from collide.papers.partitions.portals import Portals, portals_of_block
+from collide.papers.partitions.vertices import Vertices
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.mesh import Mesh
+from collide.surface_queries.contains import thin_facets
+from collide.transforms import LARGEST
+
+#: What a first-level cell may hold without being cut: corners of facets' boxes, and facets.
+_KAPPA, _N_SPARED = 64, 4
+_POINT = ConvexHull(np.zeros((1, 3)))
+
+
+class Located(NamedTuple):
+    """Where points lie, (k,) each.
+
+    inside : bool, whether the point belongs to the solid, as `contains` says; its surface does.
+    boundary : bool, on the solid's boundary: of every ball around the point a part belongs, and a part does not.
+    cell : int64, a leaf whose closure holds the point: one inside where there is one, the first of them.
+    """
+
+    inside: np.ndarray
+    boundary: np.ndarray
+    cell: np.ndarray
+
+
+class PartitionSize(NamedTuple):
+    """How large a partition is.
+
+    facets, thin : those with an area, and those without, which cut nothing.
+    cells, inside : leaves, and leaves inside the solid.   cuts : one fewer than leaves.
+    first_cells, pieces : cells of the first level that facets meet, and pieces of facets in them.
+    max_facets : in one cell of the first level.   kappa : corners of facets' boxes that such a cell may hold.
+    depth, mean_depth : cuts above a leaf, at most and on average.
+    integers : signs that integers decided.   fractions : leaves told inside or outside by a rational point.
+    """
+
+    facets: int
+    thin: int
+    cells: int
+    inside: int
+    cuts: int
+    first_cells: int
+    pieces: int
+    max_facets: int
+    kappa: int
+    depth: int
+    mean_depth: float
+    integers: int
+    fractions: int
+
+
+class SpacePartition:
+    """A binary space partition of a solid: convex cells that no facet passes through, all inside or all outside.
+
+    Parameters
+    ----------
+    mesh : a solid `Mesh` (it closes; inside is what its facets wind around once or more: docs/meshes.md).
+    kappa : how many corners of facets' boxes a cell of the first level may hold (de Berg's guards; the clutter factor
+        of the lemma). More make fewer and flatter cells.
+    seed : of the random order in which facets cut: the same seed, the same cells.
+    memory : bytes that the partition may take while it grows.
+    progress : called with a label, gives a context manager around long work.
+
+    Raises
+    ------
+    InvalidArgument : a mesh without an inside, with its defects and facet numbers; an argument out of range.
+    UnsupportedQuery : more than ``memory`` would be needed; it tells how far it came and what is left.
+
+    Notes
+    -----
+    Cutting planes are the facets' own and axis-parallel ones at doubles; sides are decided exactly, by doubles with
+    error bounds, by planes that name a vertex, or in integers: every cell is exactly an intersection of half-spaces.
+    Facets of no area have no plane and cut nothing.
+
+    J. Erickson, "Local polyhedra and geometric graphs" (2005), section 5: lemma 5.2's orthogonal level with κ, then
+    M. S. Paterson and F. F. Yao's planes of facets in each of its cells. A local mesh makes O(n log n) cells of depth
+    O(log n) (docs/partitions.md).
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        *,
+        kappa: int = _KAPPA,
+        seed: int = 0,
+        memory: int = 1 << 32,
+        progress: Callable[[str], AbstractContextManager] = nullcontext,
+    ):
+        _check_mesh(mesh)
+        kappa = checks.integer("SpacePartition: kappa", kappa, 1)
+        seed = checks.integer("SpacePartition: seed", seed, 0)
+        memory = checks.integer("SpacePartition: memory", memory, 0)
+        self.mesh = mesh
+        corners = weld(mesh.vertices)[mesh.faces].astype(np.int64)
+        self._facets = np.flatnonzero(~without_area(mesh.vertices, np.ascontiguousarray(corners, dtype=np.int32)))
+        planes = Planes(mesh.vertices, corners[self._facets])
+        grown, vertices, edges = PartitionTree(memory), Vertices(planes), Edges()
+        level = OrthogonalLevel(grown, vertices, edges, kappa, _N_SPARED)
+        level.grow(progress)
+        facets_in = np.bincount(level.polygons.cell)
+        facets_in = facets_in[facets_in > 0]
+        grown.prediction = _predicted(facets_in, grown.plane.n)
+        cut_along_facets(grown, vertices, edges, level.polygons, np.random.default_rng(seed), progress)
+        self._tree = FinishedTree(grown, planes)
+        with progress(f"telling which of {self._tree.n_leaves:,} cells are inside"):
+            middles = level.low.rows + 0.5 * (level.high.rows - level.low.rows)
+            self.inside, n_fractions = leaves_inside(self._tree, mesh, grown.seat.rows, middles)
+        self.size = PartitionSize(
+            planes.n, len(mesh.faces) - planes.n, self._tree.n_leaves, int(self.inside.sum()), len(self._tree.plane),
+            len(facets_in), int(facets_in.sum()), int(facets_in.max()), kappa, self._tree.depth, self._tree.mean_depth,
+            vertices.n_exact, n_fractions,
+        )
+
+    def locate(self, points) -> Located:
+        """Which cell points lie in, and whether inside, on the boundary or outside of the solid: exactly.
+
+        Parameters
+        ----------
+        points : (3,) or (k, 3) in the frame of the mesh [m], within 1e50.
+
+        Returns
+        -------
+        Located, of arrays (k,), or of single values for one point.
+
+        Notes
+        -----
+        O(depth) a point that lies on no cut. One that does is sent down both sides, and is on the boundary if cells of
+        both kinds touch it.
+        """
+        points, single = checks.vectors("locate", "points", points)
+        checks.refuse_rows("locate", "points", points, np.abs(points).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
+        touched = self._tree.touches(points)
+        leaf_inside = self.inside[touched.leaf]
+        some, all_ = np.zeros(len(points), dtype=bool), np.ones(len(points), dtype=bool)
+        some[touched.point[leaf_inside]] = True
+        all_[touched.point[~leaf_inside]] = False
+        cell = np.full(len(points), self._tree.n_leaves)
+        best = leaf_inside | ~some[touched.point]
+        np.minimum.at(cell, touched.point[best], touched.leaf[best])
+        inside = some.copy()
+        inside[self._on_facets_outside(points, touched, some)] = True
+        answer = Located(inside, inside & ~all_, cell)
+        return Located(*(column[0] for column in answer)) if single else answer
+
+    def _on_facets_outside(self, points: np.ndarray, touched, some: np.ndarray) -> np.ndarray:
+        """Rows of points that only cells outside touch, and that lie on a facet: one with nothing behind it."""
+        tree = body_of(self.mesh).tree
+        thin = thin_facets(self.mesh, tree)
+        suspects = np.zeros(len(points), dtype=bool)
+        suspects[touched.on_point] = True
+        rows = np.flatnonzero(~some & suspects) if thin is None else np.flatnonzero(~some)
+        X = np.tile(np.eye(4), (len(rows), 1, 1))
+        X[:, :3, 3] = points[rows]
+        hit = np.zeros(len(rows), dtype=bool)
+        for facets in (tree, thin):
+            if facets is not None and len(rows):
+                hit |= surfaces_meet(facets, body_of(_POINT).tree, np.eye(4), X)
+        return rows[hit]
+
+    def cells(self, box=None) -> ConvexCells:
+        """All cells within a box.
+
+        Parameters
+        ----------
+        box : (low, high), two corners [m], low < high; the mesh's own box where None.
+
+        Returns
+        -------
+        ConvexCells. Cells outside of the box are left out, others clipped by it: cells at the rim have no end.
+
+        Raises
+        ------
+        InvalidArgument : a box that is none.
+        """
+        low, high = self._box("cells", box)
+        whole = np.zeros(len(self._tree.plane), dtype=bool)
+        return self._made(np.arange(self._tree.n_leaves), low, high, whole)
+
+    def convex_pieces(self, inside: bool = True, box=None) -> ConvexCells:
+        """The solid, or the free space around it, as convex pieces that share no inner points.
+
+        Parameters
+        ----------
+        inside : of the solid; False: of the free space.
+        box : (low, high), two corners [m]: what lies in it. Free space has no end and needs one.
+
+        Returns
+        -------
+        ConvexCells. Their union is exactly the closure of what facets wind around, or that of the free space in the
+        box. Cells that a cut parted for nothing are one piece.
+
+        Raises
+        ------
+        InvalidArgument : no box for free space, or one that is none.
+        """
+        if not isinstance(inside, (bool, np.bool_)):
+            raise InvalidArgument(f"convex_pieces: inside must be True or False, got {checks.brief(inside)}")
+        if box is None and not inside:
+            raise InvalidArgument("convex_pieces: free space has no end; give box=(low, high), two corners of a box")
+        low, high = self._box("convex_pieces", box)
+        tree = self._tree
+        before = np.append(0, np.cumsum(self.inside == inside))
+        whole = before[tree.last + 1] - before[tree.first] == tree.last - tree.first + 1
+        if not inside:  # a facet with nothing behind it lies in no piece of free space
+            n_held = np.append(0, np.cumsum(np.diff(tree.held_starts)[np.argsort(tree.first, kind="stable")]))
+            firsts = np.sort(tree.first, kind="stable")
+            whole &= n_held[np.searchsorted(firsts, tree.last, "right")] == n_held[np.searchsorted(firsts, tree.first)]
+        wanted = self.inside == inside
+        follows = np.zeros(tree.n_leaves + 1, dtype=np.int64)  # all leaves of a whole cut but the first
+        np.add.at(follows, tree.first[whole] + 1, 1)
+        np.add.at(follows, tree.last[whole] + 1, -1)
+        wanted &= np.cumsum(follows)[:-1] == 0
+        return self._made(np.flatnonzero(wanted), low, high, whole)
+
+    def portals(self, cells: ConvexCells) -> Portals:
+        """Where cells of this partition open into one another: the graph of a planner.
+
+        Parameters
+        ----------
+        cells : of `cells` or `convex_pieces` of this partition.
+
+        Raises
+        ------
+        InvalidArgument : cells of another partition.
+
+        Returns
+        -------
+        Portals: pairs of cells whose closures share a piece of a face with an area, exactly, each piece once. Of cells
+        that touch in an edge or a corner there is none.
+        """
+        if not isinstance(cells, ConvexCells) or cells.source.tree is not self._tree:
+            raise InvalidArgument(
+                f"portals: cells must come from cells() or convex_pieces() of this partition, got {checks.brief(cells)}"
+            )
+        tree, leaves, low, high, whole = cells.source
+        row = np.full(tree.n_leaves, -1)
+        row[cells.cell] = np.arange(len(cells))
+        answer = [portals_of_block(tree, block, whole) for block in cell_blocks(tree, leaves, low, high, whole)]
+        if not answer:
+            return Portals(np.zeros((0, 2), dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
+        near, far, middle, area = (np.concatenate(columns) for columns in zip(*answer))
+        both = row[far] >= 0
+        pairs = np.stack((row[near[both]], row[far[both]]), axis=1)
+        return Portals(np.sort(pairs, axis=1), middle[both], area[both])
+
+    def _made(self, leaves: np.ndarray, low, high, whole) -> ConvexCells:
+        source = CellSource(self._tree, leaves, low, high, whole)
+        parts = [part_of_block(block) for block in cell_blocks(*source)]
+        return ConvexCells(self.inside, self._facets, parts, source)
+
+    def _box(self, caller: str, box) -> tuple[np.ndarray, np.ndarray]:
+        if box is None:
+            corners = self.mesh.vertices[self.mesh.faces].reshape(-1, 3)
+            return corners.min(axis=0), corners.max(axis=0)
+        corners, _ = checks.vectors(caller, "box", box)
+        if len(corners) != 2 or not (corners[0] < corners[1]).all() or np.abs(corners).max() > LARGEST:
+            raise InvalidArgument(
+                f"{caller}: box must be (low, high), corners [m] with low < high within {LARGEST:g}, "
+                f"got {checks.brief(box)}"
+            )
+        return corners[0], corners[1]
+
+
+def _check_mesh(mesh) -> None:
+    if not isinstance(mesh, Mesh):
+        raise InvalidArgument(
+            f"SpacePartition: mesh must be a collide.Mesh, got {checks.brief(mesh)}; "
+            "collide.Mesh(*collide.tessellate(shape)[:2]) makes one of a shape"
+        )
+    if not mesh.solid:
+        spoilt = "; ".join(str(defect) for defect in mesh.report.defects if defect.spoils)
+        raise InvalidArgument(f"SpacePartition: the mesh has no inside: {spoilt or 'it was made with solid=False'}")
+
+
+def _predicted(facets_in: np.ndarray, n_cuts: int) -> str:
+    """What the second level may come to: k facets make at most O(k²) cells, and k where no plane cuts another facet."""
+    least = n_cuts + 1 + int(facets_in.sum())
+    return (
+        f"the first level has {len(facets_in):,} cells with up to {int(facets_in.max()):,} facets: {least:,} cells "
+        f"where no plane cuts other facets, some {n_cuts + int((facets_in.astype(float) ** 2).sum()):,} where all do; "
+    )

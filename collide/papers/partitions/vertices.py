@@ -1,0 +1,111 @@
+"""Vertices of cut polygons: corners of the mesh, or the point in which three planes meet; the sides they lie on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.papers.partitions.growing_rows import GrowingRows
+from collide.papers.partitions.planes import Planes, meeting_points, signs_of
+
+#: Errors of vertices that are worked out in integers before they are shown, of the largest coordinate.
+_BADLY_KNOWN = 2.0**-40
+
+
+class Sides(NamedTuple):
+    """On which sides of planes vertices lie, (k,) each.
+
+    sign : int8, exact.   height, bound : what was computed, and how far it may be off: good for proportions alone.
+    """
+
+    sign: np.ndarray
+    height: np.ndarray
+    bound: np.ndarray
+
+
+class Vertices:
+    """All vertices of a partition under way. The first are the mesh's own; the others are named by three planes.
+
+    xyz : (n, 3) doubles near the vertices.   error : (n,), no coordinate is off by more.   names : (n, 3) planes.
+    n_exact : how many signs integers had to decide.
+    """
+
+    def __init__(self, planes: Planes):
+        self.planes, self.n_exact = planes, 0
+        self.xyz, self.error, self.names = GrowingRows(float, 3), GrowingRows(float), GrowingRows(np.int64, 3)
+        self.n_corners = len(planes.vertices)
+        self.add(planes.vertices, np.zeros(self.n_corners), np.full((self.n_corners, 3), -1))
+
+    def add(self, xyz: np.ndarray, error: np.ndarray, names: np.ndarray) -> np.ndarray:
+        """Numbers of new vertices."""
+        self.xyz.add(xyz)
+        self.error.add(error)
+        return self.names.add(names)
+
+    def cut_back(self, n: int) -> None:
+        """Forget all vertices from the n-th on."""
+        for rows in (self.xyz, self.error, self.names):
+            rows.cut_back(n)
+
+    def sides(self, vertex: np.ndarray, cut: np.ndarray) -> Sides:
+        """Where vertices (k,) lie of planes (k,): doubles with a bound; by their names; in integers."""
+        height, bound = self.planes.heights(self.xyz.rows[vertex], self.error.rows[vertex], cut)
+        sign = (height > bound).astype(np.int8) - (height < -bound).astype(np.int8)
+        remaining = np.flatnonzero(np.abs(height) <= bound)
+        if len(remaining):
+            remaining = remaining[~self._on_by_name(vertex[remaining], cut[remaining])]
+        if len(remaining):
+            sign[remaining] = self._exact_signs(vertex[remaining], cut[remaining])
+        return Sides(sign, height, bound)
+
+    def _on_by_name(self, vertex: np.ndarray, cut: np.ndarray) -> np.ndarray:
+        """Which vertices lie on a plane because it names them, or their facet's corner or edge."""
+        planes, names = self.planes, self.names.rows[vertex]
+        on = (names == cut[:, None]).any(axis=1)
+        rows = np.flatnonzero(~on & (cut < planes.n))
+        corners = planes.faces[cut[rows]]
+        on[rows] = (corners == vertex[rows, None]).any(axis=1)
+        for k in range(3):
+            edge = names[rows, k] - planes.n
+            of_edge = np.flatnonzero((edge >= 0) & (edge < 3 * planes.n))
+            facet, side = np.divmod(edge[of_edge], 3)
+            shared = np.ones(len(of_edge), dtype=bool)
+            for end in (side, (side + 1) % 3):
+                shared &= (corners[of_edge] == planes.faces[facet, end][:, None]).any(axis=1)
+            on[rows[of_edge]] |= shared
+        return on
+
+    def _exact_signs(self, vertex: np.ndarray, cut: np.ndarray) -> np.ndarray:
+        self.n_exact += len(vertex)
+        pairs, back = np.unique(np.stack((vertex, cut), axis=1), axis=0, return_inverse=True)
+        signs = signs_of(self.exact(pairs[:, 0]), self.planes.coefficients(pairs[:, 1]))
+        return signs[np.ravel(back)]
+
+    def exact(self, vertex: np.ndarray) -> np.ndarray:
+        """(k, 4) Python integers x, y, z, w > 0: the vertices are x / w, … in units of 2^−grid."""
+        out = np.empty((len(vertex), 4), dtype=object)
+        corner = vertex < self.n_corners
+        rows = np.flatnonzero(corner)
+        if len(rows):
+            out[rows, :3], out[rows, 3] = self.planes.grid_vertices[vertex[rows]], 1
+        rows = np.flatnonzero(~corner)
+        if len(rows):
+            names = self.names.rows[vertex[rows]]
+            out[rows] = meeting_points(self.planes.coefficients(names.ravel()).reshape(-1, 3, 4))
+        return out
+
+    def rounded(self, vertex: np.ndarray) -> tuple[np.ndarray, float]:
+        """((k, 3) doubles, how far a coordinate may be off): vertices known badly are worked out and rounded once."""
+        xyz, error = self.xyz.rows[vertex].copy(), self.error.rows[vertex].copy()
+        largest = np.abs(xyz).max(initial=0.0)
+        rows = np.flatnonzero(error > _BADLY_KNOWN * largest)
+        if len(rows):
+            exact = self.exact(vertex[rows])
+            xyz[rows] = [[x / (w << self.planes.grid) for x in p] for *p, w in exact.tolist()]
+            error[rows] = np.spacing(np.abs(xyz[rows]).max(axis=1))
+        return xyz, float(error.max(initial=0.0))
+
+    @property
+    def n_bytes(self) -> int:
+        return self.xyz.n_bytes + self.error.n_bytes + self.names.n_bytes

@@ -1,0 +1,1 @@
+"""Worlds: bodies with poses, and who meets whom, how far apart, and in which points."""

@@ -1,0 +1,325 @@
+"""The bodies of a World in columns: adding, moving and naming them makes no object a body.
+
+A `Body` is made when somebody asks for one. What a query answers about is a `Roster`, which no change of the World
+reaches: results stay true of the bodies as they stood. Rows of removed bodies stay, empty, until they are as many as
+the others: then all are closed up at once, so that a removal costs the same however many bodies there are.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.base import argument_checks as checks
+from collide.broadphase.growing_rows import GrowingRows
+from collide.errors import InvalidArgument, InvalidPose, UnknownBody
+from collide.numerics.rigid_poses import are_rigid_matrices
+from collide.shapes.shape import Shape, checked_shape
+from collide.transforms import LARGEST, SAFE_TOLERANCE, as_pose, as_poses
+
+#: Groups and masks are bit sets of this many bits.
+_BITS = 32
+_IDENTITY = np.eye(4)
+#: So many rows of removed bodies stay whatever the number of others.
+_MIN_ROWS = 64
+
+
+@dataclass(frozen=True)
+class Body:
+    """One body of a World, as it stands now.
+
+    Parameters
+    ----------
+    id : never used again in this World.   name : unique in it.
+    shape : any shape.   X_WB : (4, 4) its pose in the world [m], read-only.
+    static : never tested against other static bodies.   group, mask : bit sets of 32 bits.
+    margin : [m], as of `World.set_margin`.   sleeping : as of `World.sleep`.
+    """
+
+    id: int
+    name: str
+    shape: Shape
+    X_WB: np.ndarray
+    static: bool
+    group: int
+    mask: int
+    margin: float = 0.0
+    sleeping: bool = False
+
+    def __post_init__(self) -> None:
+        self.X_WB.flags.writeable = False  # of a copy as well
+
+    def __reduce__(self):
+        return Body, (
+            self.id, self.name, self.shape, self.X_WB, self.static, self.group, self.mask, self.margin, self.sleeping,
+        )
+
+
+class Roster(NamedTuple):
+    """Bodies by position, in the order of their ids: what stays while bodies only move. Never changed once made.
+
+    ids : (n,) int32, ascending.   names, shapes : of each; these lists may go on with bodies that came later.
+    static, group, mask : (n,) int64.   alive : (n,) bool, False of bodies that were removed.
+    margin : (n,) float64 [m].   sleeping : (n,) bool.   generation : another one once positions are others.
+    """
+
+    ids: np.ndarray
+    names: list[str]
+    shapes: list[Shape]
+    static: np.ndarray
+    group: np.ndarray
+    mask: np.ndarray
+    alive: np.ndarray
+    margin: np.ndarray
+    sleeping: np.ndarray
+    generation: int
+
+    def body(self, position: int, X_WB: np.ndarray) -> Body:
+        return Body(
+            int(self.ids[position]), self.names[position], self.shapes[position], X_WB.copy(),
+            bool(self.static[position]), int(self.group[position]), int(self.mask[position]),
+            float(self.margin[position]), bool(self.sleeping[position]),
+        )
+
+
+class BodiesAsTheyStood(dict):
+    """{id: `Body`} of those bodies of a query that its rows name, made when asked for."""
+
+    def __init__(self, roster: Roster, positions: np.ndarray, X_WBs: np.ndarray):
+        """positions : (k,) of the bodies named, ascending.   X_WBs : (k, 4, 4) their poses, kept."""
+        self._roster, self._positions, self._X_WBs = roster, positions, X_WBs
+
+    def __missing__(self, identity: int) -> Body:
+        position = int(np.searchsorted(self._roster.ids, identity))
+        body = self._roster.body(position, self._X_WBs[np.searchsorted(self._positions, position)])
+        self[identity] = body
+        return body
+
+    def __reduce__(self):
+        return BodiesAsTheyStood, (self._roster, self._positions, self._X_WBs), None, None, iter(self.items())
+
+
+class WorldBodies:
+    """Bodies in columns that grow; row k of each is one body, in the order of ids."""
+
+    def __init__(self) -> None:
+        self._row_of: dict[int, int] = {}
+        self._id_of: dict[str, int] = {}
+        self._next = self._generation = 0
+        self._ids: list[int] = []
+        self._names: list[str] = []
+        self._shapes: list[Shape] = []
+        self._flags: list[tuple[bool, int, int]] = []
+        self._X_WBs = np.empty((16, 4, 4))
+        self._moved, self._alive, self._asleep = (np.zeros(16, dtype=bool) for _ in range(3))
+        self._margins = np.zeros(16)
+        self._made: dict[int, Body] = {}
+        self._columns = _columns_of([], [])
+        self._roster: Roster | None = None
+
+    def __getstate__(self) -> dict:
+        """For copies and pickles: lists and arrays are changed in place."""
+        self._close_gaps()
+        n = len(self)
+        return {
+            "_row_of": dict(self._row_of), "_id_of": dict(self._id_of), "_next": self._next,
+            "_generation": self._generation, "_ids": list(self._ids), "_names": list(self._names),
+            "_shapes": list(self._shapes), "_flags": list(self._flags), "_X_WBs": self.poses().copy(),
+            "_moved": np.zeros(n, dtype=bool), "_alive": np.ones(n, dtype=bool), "_asleep": self._asleep[:n].copy(),
+            "_margins": self._margins[:n].copy(), "_made": {}, "_columns": _columns_of(self._ids, self._flags),
+            "_roster": None,
+        }
+
+    def __len__(self) -> int:
+        return len(self._row_of)
+
+    @property
+    def ids(self) -> list[int]:
+        return list(self._row_of)
+
+    @property
+    def names(self) -> dict[int, str]:
+        return {identity: name for name, identity in self._id_of.items()}
+
+    # --- one body -------------------------------------------------------------------------------
+
+    def add(
+        self, shape: Shape, X_WB, name: str | None, static: bool, group: int, mask: int, margin: float = 0.0
+    ) -> int:
+        """The id of a new body; arguments as of `World.add`. Raises InvalidArgument, InvalidPose."""
+        checked_shape("World.add: shape", shape, "collide.Sphere(0.1)")
+        X_WB = _IDENTITY if X_WB is None else as_pose(X_WB, "World.add: X_WB")
+        identity, row = self._next, len(self._ids)
+        if name is None:
+            name = f"body {identity}"
+        elif not isinstance(name, str) or not name:
+            raise InvalidArgument(f"World.add: name must be a non-empty string, got {checks.brief(name)}")
+        if name in self._id_of:
+            raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._id_of[name]})')
+        flags = _flag("static", static), _bits("group", group), _bits("mask", mask)
+        if row == len(self._X_WBs):
+            for column in ("_X_WBs", "_moved", "_alive", "_asleep", "_margins"):
+                rows = getattr(self, column)
+                setattr(self, column, np.concatenate([rows, np.zeros((max(16, row), *rows.shape[1:]), rows.dtype)]))
+        self._X_WBs[row], self._margins[row], self._alive[row] = X_WB, margin, True
+        self._ids.append(identity)
+        self._names.append(name)
+        self._shapes.append(shape)
+        self._flags.append(flags)
+        self._row_of[identity], self._id_of[name] = row, identity
+        self._next, self._roster = identity + 1, None
+        return identity
+
+    def remove(self, identity: int) -> None:
+        row = self._row_of.pop(identity)
+        del self._id_of[self._names[row]]
+        self._alive[row] = False
+        self._made.pop(identity, None)
+        self._roster = None
+
+    def move(self, identity: int, X_WB) -> None:
+        """Give a body another pose. Raises InvalidPose."""
+        X_WB = as_pose(X_WB, "World.set_pose: X_WB")
+        row = self._row_of[identity]
+        self._X_WBs[row] = X_WB
+        self._moved[row] = True
+        self._made.pop(identity, None)
+
+    def set_margin(self, identity: int, margin: float) -> None:
+        self._margins[self._row_of[identity]] = margin
+        self._made.pop(identity, None)
+        self._roster = None
+
+    def set_sleeping(self, bodies: Iterable[int | str], asleep: bool) -> None:
+        """Raises UnknownBody: then nothing has changed."""
+        self._asleep[self._rows_of(bodies)] = asleep
+        self._made.clear()
+        self._roster = None
+
+    def body(self, identity: int) -> Body:
+        """The same object until it is moved, or its margin or sleep changes."""
+        body = self._made.get(identity)
+        if body is None:
+            row = self._row_of[identity]
+            X_WB = self._X_WBs[row].copy()
+            margin, asleep = float(self._margins[row]), bool(self._asleep[row])
+            body = Body(identity, self._names[row], self._shapes[row], X_WB, *self._flags[row], margin, asleep)
+            self._made[identity] = body
+        return body
+
+    def id_of(self, body: int | str, what: str = "body") -> int:
+        """The id of a body by its id or name. what : the argument's name, for messages. Raises UnknownBody."""
+        if type(body) is int and body in self._row_of:
+            return body
+        if isinstance(body, str):
+            if body in self._id_of:
+                return self._id_of[body]
+            known = ", ".join(sorted(self._id_of)[:12]) or "none"
+            raise UnknownBody(
+                f"{what}: no body is named {checks.brief(body)}; there are: {known}"
+                f"{', …' if len(self._id_of) > 12 else ''}"
+            )
+        if not checks.is_integer(body):
+            raise UnknownBody(f"{what} must be the id or the name of a body, got {checks.brief(body)}")
+        if body not in self._row_of:
+            raise UnknownBody(f"{what}: no body has id {checks.brief(body)}; it may have been removed")
+        return int(body)
+
+    def name_of(self, identity: int) -> str:
+        return self._names[self._row_of[identity]]
+
+    # --- all of them ----------------------------------------------------------------------------
+
+    def move_many(self, bodies: Iterable[int | str], X_WBs) -> None:
+        """Give k bodies other poses (k, 4, 4). Raises UnknownBody, InvalidPose: then none has moved."""
+        rows = self._rows_of(bodies)
+        if not _are_rigid_matrices(X_WBs):
+            X_WBs = as_poses(X_WBs, "World.set_poses: X_WBs")
+        if len(X_WBs) != len(rows):
+            named = f"{len(rows)} bodies {checks.brief(bodies)}"
+            raise InvalidPose(f"World.set_poses: {named}, but X_WBs {X_WBs.shape} are {len(X_WBs)} poses")
+        self._X_WBs[rows] = X_WBs
+        self._moved[rows] = True
+        self._made.clear()
+
+    def take_moved(self) -> np.ndarray:
+        """Rows of the bodies that moved since this was last called, ascending."""
+        rows = np.flatnonzero(self._moved)
+        self._moved[rows] = False
+        return rows
+
+    def _rows_of(self, bodies: Iterable[int | str]) -> np.ndarray:
+        if not (isinstance(bodies, np.ndarray) and bodies.ndim == 1 and bodies.dtype.kind in "iu"):
+            bodies = checks.listed_entries("bodies", bodies, "a sequence of ids or names")
+            if set(map(type, bodies)) - {int}:
+                bodies = [self.id_of(body, "bodies") for body in bodies]
+        n = self._next
+        if len(self._row_of) == n == len(self._ids) and len(bodies):  # none was ever removed: ids are rows
+            with contextlib.suppress(OverflowError):
+                rows = np.asarray(bodies, dtype=np.int64)
+                if 0 <= rows.min() and rows.max() < n:
+                    return rows
+        return np.array([self._row_of[self.id_of(body, "bodies")] for body in bodies], dtype=np.int64)
+
+    def roster(self) -> Roster:
+        """The bodies as they are now, poses apart. Rows are positions of it, until its generation is another."""
+        if self._roster is None:
+            if len(self._ids) > _MIN_ROWS + 2 * len(self._row_of):
+                self._close_gaps()
+            n, known = len(self._ids), len(self._columns[0].rows)
+            for column, rows in zip(self._columns, _columns_of(self._ids[known:], self._flags[known:])):
+                column.extend(rows.rows)
+            ids, static, group, mask = (column.rows for column in self._columns)
+            alive, margins, asleep = (column[:n].copy() for column in (self._alive, self._margins, self._asleep))
+            self._roster = Roster(
+                ids, self._names, self._shapes, static, group, mask, alive, margins, asleep, self._generation
+            )
+        return self._roster
+
+    def poses(self) -> np.ndarray:
+        """(n, 4, 4) poses by row: a view, changed when bodies move."""
+        return self._X_WBs[: len(self._ids)]
+
+    def _close_gaps(self) -> None:
+        """Drop the rows of removed bodies."""
+        rows = list(self._row_of.values())
+        if len(rows) == len(self._ids):
+            return
+        for column in ("_X_WBs", "_moved", "_alive", "_asleep", "_margins"):
+            setattr(self, column, getattr(self, column)[rows])
+        self._ids, self._names = [self._ids[row] for row in rows], [self._names[row] for row in rows]
+        self._shapes, self._flags = [self._shapes[row] for row in rows], [self._flags[row] for row in rows]
+        self._row_of = {identity: row for row, identity in enumerate(self._ids)}
+        self._columns, self._roster = _columns_of([], []), None
+        self._generation += 1
+
+
+def _columns_of(ids: list[int], flags: list[tuple[bool, int, int]]) -> list[GrowingRows]:
+    """Columns: ids, static, group, mask."""
+    columns = np.array(flags, dtype=np.int64).reshape(-1, 3).T
+    return [GrowingRows(np.array(ids, dtype=np.int32)), *(GrowingRows(column) for column in columns)]
+
+
+def _are_rigid_matrices(X) -> bool:
+    """Whether X is an array of rigid poses for certain; all else is looked at by `as_poses`."""
+    return type(X) is np.ndarray and are_rigid_matrices(X, SAFE_TOLERANCE, LARGEST)
+
+
+def _flag(field: str, value) -> bool:
+    if value is True or value is False:
+        return value
+    if isinstance(value, np.bool_) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
+        return bool(value)
+    raise InvalidArgument(f"World.add: {field} must be True or False, got {checks.brief(value)}")
+
+
+def _bits(field: str, value) -> int:
+    if not checks.is_integer(value) or not 0 <= int(value) < 2**_BITS:
+        raise InvalidArgument(
+            f"World.add: {field} must be an integer of up to {_BITS} bits, got {checks.brief(value)}"
+        )
+    return int(value)

@@ -1,0 +1,269 @@
+"""Rays, moved shapes and points against all bodies of a World, by its box-tree."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.base import argument_checks as checks
+from collide.broadphase.bounding_boxes import boxes_of
+from collide.broadphase.box_tree import BoxTree
+from collide.broadphase.boxes_ahead import SWEEP, bodies_ahead
+from collide.casts.cast_batches import cast_batch
+from collide.casts.convex_casts import CastRows
+from collide.casts.directions import Directions
+from collide.casts.items_ahead import nearest_first
+from collide.casts.posed_parts import PosedParts, posed_parts
+from collide.casts.ray_hits import RayEvents, first_of_each, joined
+from collide.casts.ray_parts import candidate_parts, parts_met
+from collide.casts.raycast import surfaces_met
+from collide.errors import InvalidArgument
+from collide.lowering.parts import bounding_parts_of
+from collide.narrowphase.convex_batches import Question
+from collide.pairs.batches import answer_batch
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.shape import Shape
+from collide.worlds.hits import WORLD_HIT_DTYPE, empty_hits
+from collide.worlds.packed_world import PackedWorld
+
+#: A point, as a body of no extent.
+POINT = ConvexHull(np.zeros((1, 3)))
+
+
+#: So much of the t of a proven hit later bodies are cast beyond it.
+_BEYOND = 2.0**-20
+
+
+class Filter(NamedTuple):
+    """Bodies that a question counts: those with (group & mask_B) and (group_B & mask).   group, mask : None for all."""
+
+    group: int | None
+    mask: int | None
+
+    def skipped(self, packed: PackedWorld) -> np.ndarray:
+        """(n,) int64: 1 of bodies that are left out."""
+        roster = packed.roster
+        counts = np.ones(len(roster.ids), dtype=bool)
+        if self.group is not None:
+            counts &= (roster.mask & self.group) != 0
+        if self.mask is not None:
+            counts &= (roster.group & self.mask) != 0
+        return (~counts).astype(np.int64)
+
+
+def checked_filter(caller: str, group, mask) -> Filter:
+    """Raises InvalidArgument."""
+    for name, value in (("group", group), ("mask", mask)):
+        if value is not None and (not checks.is_integer(value) or not 0 <= int(value) < 2**32):
+            raise InvalidArgument(
+                f"{caller}: {name} must be an integer of up to 32 bits, or None for all bodies, "
+                f"got {checks.brief(value)}"
+            )
+    return Filter(None if group is None else int(group), None if mask is None else int(mask))
+
+
+# --- rays ---------------------------------------------------------------------------------------
+
+
+def cast_rays(
+    packed: PackedWorld, origins: np.ndarray, directions: Directions, limit: float, every: bool, which: Filter
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """(rows, starts) of n rays: the first wall of each, or every one.   limit : of t in lengths of the directions."""
+    n = len(origins)
+    skipped = which.skipped(packed)
+    parts, body_of, first = packed.posed_parts()
+    asked = np.empty((0, 2), dtype=np.int64)
+    if packed.tree is not None and n:
+        asked = _candidates(packed, parts, first, skipped, origins, directions, limit, every)
+    is_meshed = packed.meshed[body_of[asked[:, 1]]]
+    convex = np.ascontiguousarray(asked[~is_meshed])
+    events = parts_met(parts, convex, origins, directions, limit, every)
+    part = convex[events.item, 1]
+    events = events._replace(item=part - first[body_of[part]])
+    all_events, all_bodies = [events], [body_of[part]]
+    pairs = np.unique(np.stack([body_of[asked[is_meshed, 1]], asked[is_meshed, 0]], axis=1), axis=0)
+    for body_events, bodies in _on_meshes(packed, pairs, origins, directions, limit, every):
+        all_events.append(body_events)
+        all_bodies.append(bodies)
+    return _as_rows(joined(all_events), np.concatenate(all_bodies), origins, directions, every)
+
+
+def _candidates(
+    packed: PackedWorld, parts: PosedParts, first, skipped, origins, directions: Directions, limit, every
+) -> np.ndarray:
+    """(k, 2) rays and parts that may make a first wall, or any."""
+    tree, meshed = packed.tree, packed.meshed.astype(np.int64)
+    assert tree is not None
+    asked = candidate_parts(parts, tree, first, skipped, meshed, origins, directions, limit, every)
+    unbounded = tree.unbounded[skipped[tree.unbounded] == 0]
+    if len(unbounded):
+        n = len(origins)
+        of_unbounded = np.concatenate([np.arange(first[body], first[body + 1]) for body in unbounded.tolist()])
+        pairs = np.stack([np.repeat(np.arange(n), len(of_unbounded)), np.tile(of_unbounded, n)], axis=1)
+        asked = np.concatenate([asked, pairs])
+    return asked
+
+
+def _on_meshes(packed: PackedWorld, pairs: np.ndarray, origins, directions: Directions, limit: float, every: bool):
+    """(events, body of each) of pairs (body, ray) of bodies that are meshes or hold one: those of a shape together."""
+    shape_of = packed.shape_of[pairs[:, 0]]
+    for number in np.unique(shape_of).tolist():
+        some = pairs[shape_of == number]
+        body, ray = some[:, 0], some[:, 1]
+        of_some = Directions(directions.vectors[ray], directions.exponents[ray])
+        shape = packed.shapes[number]
+        events = surfaces_met(shape, packed.X_WBs[body], origins[ray], of_some, limit, every=every)
+        yield events._replace(ray=ray[events.ray]), body[events.ray]
+
+
+def _as_rows(events: RayEvents, bodies: np.ndarray, origins, directions: Directions, every: bool):
+    """(rows, starts) of events and the positions of the bodies they are of."""
+    n = len(origins)
+    # Along a ray by t, then body, item and facet.
+    order = np.lexsort((events.facet, events.item, bodies, events.t[:, 0], events.ray))
+    events, bodies = events.of(order), bodies[order]
+    starts = None
+    if every:
+        starts = np.concatenate([[0], np.cumsum(np.bincount(events.ray, minlength=n))])
+        rows = np.zeros(len(events.ray), dtype=WORLD_HIT_DTYPE)
+        at: np.ndarray | slice = slice(None)
+    else:
+        bodies = bodies[np.flatnonzero(np.diff(events.ray, prepend=-1))]
+        events = first_of_each(events)
+        rows, at = empty_hits(n), events.ray
+    step = np.ldexp(directions.vectors[events.ray], directions.exponents[events.ray, None])
+    columns = {
+        "distance": events.t[:, 0], "lower": events.t[:, 1], "upper": events.t[:, 2], "normal": events.normal,
+        "point": origins[events.ray] + events.t[:, :1] * step, "ray": events.ray, "body": bodies, "item": events.item,
+        "facet": events.facet, "hit": True, "certified": events.certified,
+    }
+    for name, values in columns.items():
+        rows[name][at] = values
+    return rows, starts
+
+
+# --- moved shapes -------------------------------------------------------------------------------
+
+
+def cast_shape(
+    packed: PackedWorld, shape: Shape, X_WS: np.ndarray, directions: Directions, limit: float, which: Filter,
+    start_normals: bool,
+) -> np.ndarray:
+    """Rows of n casts of a shape at poses (n, 4, 4): the first body that each comes to.
+
+    Bodies are asked no farther than to a little beyond what is proven of those before: there a contact is none of the
+    limit's, which would leave those open that come at the same t.
+    """
+    n = len(directions.vectors)
+    rows = empty_hits(n)
+    if packed.tree is None or not n:
+        return rows
+    questions = np.empty((n, SWEEP))
+    questions[:, :6], questions[:, 6:9], questions[:, 9] = (
+        _boxes_around(shape, X_WS), directions.vectors, directions.limits(limit)
+    )
+    pairs, bounds = bodies_ahead(packed.tree, questions)
+    counts = which.skipped(packed)[pairs[:, 1]] == 0
+    pairs, bounds = pairs[counts], bounds[counts]
+
+    def answer(some: np.ndarray) -> CastRows:
+        cast, body = pairs[some].T
+        of_some = Directions(directions.vectors[cast], directions.exponents[cast])
+        shapes = [packed.shapes[k] for k in packed.shape_of[body].tolist()]
+        limits = np.minimum(questions[cast, 9], beyond[cast])
+        return cast_batch(shape, shapes, X_WS[cast], packed.X_WBs[body], of_some, limits, start_normals)
+
+    best, beyond, answers = np.full(n, np.inf), np.full(n, np.inf), []
+    for some in nearest_first(pairs[:, 0], bounds, best):
+        got = answer(some)
+        known = np.flatnonzero(got.hit & got.proven)
+        cast, (_, lower, upper) = pairs[some[known], 0], got.t[known].T
+        np.minimum.at(best, cast, upper)
+        np.minimum.at(beyond, cast, upper * (1.0 + _BEYOND) + 8.0 * (upper - lower))
+        answers.append((some, got))
+    if answers:
+        _take_first(rows, pairs, answers, directions)
+    return rows
+
+
+def _boxes_around(shape: Shape, X_WS: np.ndarray) -> np.ndarray:
+    """(n, 6) boxes around a shape at poses (n, 4, 4)."""
+    parts = posed_parts(list(bounding_parts_of(shape)), X_WS)
+    boxes = boxes_of(parts.table, parts.poses.rows, parts.shape_of).reshape(len(X_WS), -1, 6)
+    return np.hstack([boxes[:, :, :3].min(axis=1), boxes[:, :, 3:].max(axis=1)])
+
+
+def _take_first(rows: np.ndarray, pairs: np.ndarray, answers, directions: Directions) -> None:
+    """Write the nearest hit of each cast."""
+    some = np.concatenate([numbers for numbers, _ in answers])
+    got = CastRows._make(np.concatenate(columns) for columns in zip(*(answer for _, answer in answers)))
+    hits = np.flatnonzero(got.hit)
+    cast, body = pairs[some[hits]].T
+    none = np.zeros(len(hits), dtype=np.int64)
+    events = RayEvents(
+        cast, got.t[hits], got.normal[hits], hits, got.item_b[hits], got.proven[hits], got.certified[hits]
+    )
+    order = np.lexsort((body, events.t[:, 0], cast))
+    events, body = events.of(order), body[order]
+    at = np.flatnonzero(np.diff(events.ray, prepend=-1))
+    first, row = first_of_each(events), events.ray[at]
+    t = np.ldexp(first.t, -directions.exponents[row, None])
+    columns = {
+        "distance": t[:, 0], "lower": t[:, 1], "upper": t[:, 2], "normal": first.normal,
+        "point": got.point[first.facet], "body": body[at], "item": first.item, "facet": none[at] - 1, "hit": True,
+        "certified": first.certified, "at_start": got.at_start[first.facet],
+    }
+    for name, values in columns.items():
+        rows[name][row] = values
+
+
+# --- points -------------------------------------------------------------------------------------
+
+
+def nearest_bodies(packed: PackedWorld, points: np.ndarray, limit: float, which: Filter) -> np.ndarray:
+    """Rows of the nearest body of each of n points, by signed distance.   limit : [m]."""
+    n = len(points)
+    rows = empty_hits(n)
+    if packed.tree is None or not n:
+        return rows
+    skipped = which.skipped(packed)
+    questions = np.zeros((n, SWEEP))
+    questions[:, :3], questions[:, 9] = points, limit
+    pairs = _near_boxes(packed, questions, skipped)
+    X_WP = np.tile(np.eye(4), (n, 1, 1))
+    X_WP[:, :3, 3] = points
+    point, body = pairs.T
+    if not len(point):
+        return rows
+    shapes = [packed.shapes[k] for k in packed.shape_of[body].tolist()]
+    got = answer_batch(
+        [POINT] * len(point), shapes, X_WP[point], packed.X_WBs[body], Question(False, np.inf, True)
+    )
+    order = np.lexsort((body, got["distance"], point))
+    at = order[np.flatnonzero(np.diff(point[order], prepend=-1))]
+    # Another body may be nearer where brackets overlap: what is proven is the least of both ends.
+    starts = np.flatnonzero(np.diff(point, prepend=-1))
+    lower, upper = np.full(n, np.inf), np.full(n, np.inf)
+    lower[point[starts]] = np.minimum.reduceat(got["lower"], starts)
+    upper[point[starts]] = np.minimum.reduceat(got["upper"], starts)
+    at = at[~(lower[point[at]] > limit)]
+    row = point[at]
+    for name in ("distance", "normal", "certified"):
+        rows[name][row] = got[name][at]
+    rows["lower"][row], rows["upper"][row], rows["point"][row] = lower[row], upper[row], got["point_b"][at]
+    rows["body"][row], rows["item"][row], rows["hit"][row] = body[at], got["part_b"][at], True
+    return rows
+
+
+def _near_boxes(packed: PackedWorld, questions: np.ndarray, skipped: np.ndarray) -> np.ndarray:
+    """(k, 2) points and bodies that may be nearest, by question."""
+    assert packed.tree is not None
+    if not (skipped.any() or packed.has_margins):
+        return bodies_ahead(packed.tree, questions, of_points=True)[0]
+    remaining = np.flatnonzero((skipped == 0) & packed.roster.alive)  # what is left out bounds nothing
+    if not len(remaining):
+        return np.empty((0, 2), dtype=np.int64)
+    tree = BoxTree(packed.parts.body_boxes(remaining))
+    pairs, _ = bodies_ahead(tree, questions, of_points=True)
+    return np.stack([pairs[:, 0], remaining[pairs[:, 1]]], axis=1)

@@ -1,0 +1,81 @@
+"""What casts against a World return: rows with the ids of bodies, and who these are.
+
+=============== ===================================================================================
+ray             number of the ray, cast or point of the question
+body            id of the body met, −1 where nothing is
+item            number of its part, of a Compound; 0 otherwise, −1 where nothing is met
+facet           as of `collide.raycast`; −1 for polytopes and swept hulls, for casts and for nearest bodies
+hit             whether anything is met, or there is a body
+distance        t of the place where it is met, in lengths of the direction; of nearest bodies the signed distance [m];
+                inf where nothing is met
+lower, upper    lower ≤ truth ≤ upper, proven where ``certified``
+point           (3,) in W [m], of the body; zeros where nothing is met
+normal          (3,) unit vector in W: outward from the body for rays, from what is cast, or the point, to the body for
+                others; zeros where nothing is met, and of casts at_start unless start_normals are asked for
+certified       as of `collide.raycast`, `collide.shape_cast` and `collide.distance`
+at_start        of casts: whether they touch before they move
+=============== ===================================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+WORLD_HIT_DTYPE = np.dtype(
+    [
+        ("distance", "f8"), ("lower", "f8"), ("upper", "f8"), ("normal", "f8", 3), ("point", "f8", 3),
+        ("ray", "i4"), ("body", "i4"), ("item", "i4"), ("facet", "i4"),
+        ("hit", "?"), ("certified", "?"), ("at_start", "?"),
+    ],
+    align=True,
+)
+
+
+def empty_hits(n: int) -> np.ndarray:
+    """Rows of n questions that meet nothing; bodies are positions, or ids, alike."""
+    rows = np.zeros(n, dtype=WORLD_HIT_DTYPE)
+    rows["ray"] = np.arange(n)
+    rows["body"] = rows["item"] = rows["facet"] = -1
+    rows["distance"] = rows["lower"] = rows["upper"] = np.inf
+    rows["certified"] = True
+    return rows
+
+
+class WorldHits:
+    """Rows of a cast against a World: one a question, or with ``all_hits`` one a place that a ray meets.
+
+    Parameters
+    ----------
+    rows : (n,) `WORLD_HIT_DTYPE`, as the module `collide.worlds.hits` says.
+    names : {id: name} of the bodies that are met.
+    starts : (N + 1,) where the rows of each ray begin and end, with ``all_hits``; None otherwise.
+
+    Notes
+    -----
+    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows. ``names`` are the
+    names of the bodies row by row, None where nothing is met.
+    """
+
+    __slots__ = ("_names", "rows", "starts")
+
+    def __init__(self, rows: np.ndarray, names: Mapping[int, str], starts: np.ndarray | None = None):
+        self.rows, self._names, self.starts = rows, dict(names), starts
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[np.void]:
+        return iter(self.rows)
+
+    def __getitem__(self, key):
+        return self.rows[key]
+
+    def __repr__(self) -> str:
+        return f"WorldHits({len(self.rows)} rows, {int(self.rows['hit'].sum())} of them hits)"
+
+    @property
+    def names(self) -> list[str | None]:
+        """Names of the bodies, row by row; None where nothing is met."""
+        return [self._names.get(body) for body in self.rows["body"].tolist()]

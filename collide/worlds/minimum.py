@@ -1,0 +1,106 @@
+"""The nearest pair of a World, by branch and bound: pairs in the order of how near their boxes let them be, until none
+that is left can be nearer than the best.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.worlds.packed_world import PackedWorld
+
+#: Relative: what a bound from boxes, or a distance within its bracket, may be off. Far more than either is.
+_ROUNDING = 2.0**-24
+#: Pairs that are asked at first; then twice as many each time.
+_FIRST = 16
+
+
+class _Nearest(NamedTuple):
+    """pair : (1, 2), the nearest so far, or (0, 2).   row : (1,) what is told of it; None where it is to be asked."""
+
+    pair: np.ndarray
+    row: np.ndarray | None
+
+
+def nearest_pair(packed: PackedWorld, limit: float, threads: int) -> np.ndarray:
+    """One row: of the tested pairs at most ``limit`` [m] apart the one with the least signed distance, of several the
+    one with the least positions; no row where there is none.
+    """
+    asked = np.empty(0, dtype=np.int64)
+    best, winner = np.inf, _Nearest(np.empty((0, 2), dtype=np.int64), None)
+    n = len(packed.roster.ids)
+    for margin in _margins(packed, limit):
+        candidates = packed.candidates(margin)
+        keys = candidates[:, 0] * n + candidates[:, 1]
+        is_new = ~np.isin(keys, asked)
+        asked = keys
+        best, winner = _least(packed, candidates[is_new], min(limit, best), best, winner, threads)
+        if best < np.inf:
+            break
+    if np.isfinite(best) and best > margin:  # boxes no farther apart than the best have not all been compared
+        candidates = packed.candidates(min(best * (1.0 + _ROUNDING), limit))
+        is_new = ~np.isin(candidates[:, 0] * n + candidates[:, 1], asked)
+        best, winner = _least(packed, candidates[is_new], min(limit, best), best, winner, threads)
+    if winner.row is not None:
+        return winner.row
+    return packed.answer(winner.pair, np.inf, boolean=False, stop_at_hit=False).rows
+
+
+def _margins(packed: PackedWorld, limit: float):
+    """Margins within which to look, one after another: 0, then from a thousandth of the World to all of it."""
+    yield 0.0
+    tree = packed.tree
+    if tree is None or not limit > 0.0:
+        return
+    around = tree.around
+    extent = float((around[3:] - around[:3]).max())
+    margin = extent / max(len(packed.roster.ids), 1)
+    while 0.0 < margin < min(limit, extent):
+        yield margin
+        margin *= 4.0
+    yield limit
+
+
+def _least(packed: PackedWorld, pairs: np.ndarray, limit: float, best: float, winner: _Nearest, threads: int):
+    """(least distance, its pair) among pairs (k, 2) and the best so far."""
+    bounds = _lower_bounds(packed, pairs)
+    order = np.lexsort((pairs[:, 1], pairs[:, 0], bounds))
+    pairs, bounds = pairs[order], bounds[order]
+    at, size = 0, _FIRST
+    while at < len(pairs):
+        top = best if best == np.inf else best + _ROUNDING * abs(best)
+        some = pairs[at : at + size][bounds[at : at + size] <= min(top, limit)]
+        if not len(some):
+            break
+        reach = max(min(limit, top), 0.0)
+        rows = packed.answer(some, reach, boolean=False, stop_at_hit=False, threads=threads).rows
+        rows = rows[~rows["beyond"] & (rows["distance"] <= limit)]
+        for row in rows[np.lexsort((rows["b"], rows["a"], rows["distance"]))][:1, None]:
+            pair, distance = np.array([[row["a"][0], row["b"][0]]], dtype=np.int64), float(row["distance"][0])
+            if distance < best or (distance == best and tuple(pair[0]) < tuple(winner.pair[0])):
+                # Depths have no limit: a row that hits is that of any, a gap's may be of a search that the limit cut.
+                best, winner = distance, _Nearest(pair, row if reach == np.inf or row["hit"][0] else None)
+        if best == -np.inf:  # two half-spaces
+            break
+        at, size = at + size, 2 * size
+    return best, winner
+
+
+def _lower_bounds(packed: PackedWorld, pairs: np.ndarray) -> np.ndarray:
+    """(k,) lower bounds of signed distances [m]: the gap of boxes, or how far one is to be moved along an axis to part
+    them. For what is not convex, whose depth is known from above alone, none where the boxes meet.
+    """
+    parts = packed.parts
+    boxes = parts.body_boxes(np.arange(len(parts.shape_of)))
+    a, b = boxes[pairs[:, 0]], boxes[pairs[:, 1]]
+    with np.errstate(invalid="ignore"):
+        gaps = np.maximum(a[:, :3] - b[:, 3:], b[:, :3] - a[:, 3:])
+    gaps = np.nan_to_num(gaps, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+    apart = np.sqrt(np.square(np.maximum(gaps, 0.0)).sum(axis=1))
+    deep = gaps.max(axis=1)
+    deep[~parts.single_convex[pairs].all(axis=1)] = -np.inf
+    bounds = np.where((gaps > 0.0).any(axis=1), apart, deep)
+    with np.errstate(invalid="ignore"):
+        slack = _ROUNDING * np.maximum(np.abs(bounds), np.abs(np.where(np.isfinite(a), a, 0.0)).max(axis=1))
+    return np.where(np.isfinite(bounds), bounds - slack, bounds)

@@ -1,0 +1,291 @@
+"""What a World says about all pairs of its bodies: hits, distances, contacts, the nearest pair, and statistics."""
+
+from __future__ import annotations
+
+import copy
+import math
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from collide.base import argument_checks as checks
+from collide.base.lazy_modules import lazy_module
+from collide.base.threads import check_threads
+from collide.certificates.make_certificate import certify
+from collide.contact.contact_rows import CONTACT_DTYPE, WorldContacts, no_rows
+from collide.pairs.security_margin import checked_margin, within
+from collide.results import PAIR_DTYPE, WorldResult
+from collide.worlds.minimum import nearest_pair
+from collide.worlds.packed_world import Answer, PackedWorld
+from collide.worlds.record import QueryRecord
+from collide.worlds.scene import WorldScene
+
+if TYPE_CHECKING:
+    from collide.worlds.overlaps import WorldOverlaps
+
+#: Contacts need what meshes need, which other questions about convex scenes do not.
+contact_query = lazy_module("collide.contact.contact_query")
+world_contacts = lazy_module("collide.worlds.contacts")
+world_overlaps = lazy_module("collide.worlds.overlaps")
+
+
+class WorldPairs(WorldScene):
+    """Questions about all pairs of bodies. `collide.World` adds those about shapes, rays and points from outside."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._stats: dict = {}
+        self._last_query: QueryRecord | None = None
+
+    def __getstate__(self) -> dict:
+        """What a copy or a pickle takes along: the scene and `stats`."""
+        return super().__getstate__() | {"_stats": copy.deepcopy(self.stats), "_last_query": None}
+
+    def collides(self, *, security_margin: float = 0.0, threads: int = 1) -> bool:
+        """Whether any tested pair hits; stops at the first that does.
+
+        Parameters
+        ----------
+        security_margin : [m], ≥ 0, finite: pairs at most so far apart are hits, too, decided as by `collide.collide`;
+            which those are, `distances` says. It adds to the margins of bodies and pairs (`set_margin`). Pairs that
+            have a margin are all asked.
+        threads : at most so many answer; the answers are the same bits.
+
+        Returns
+        -------
+        bool. Pairs whose sign is open count as hits, as in `collide.collide`.
+
+        Raises
+        ------
+        InvalidArgument; with a margin UnsupportedQuery for pairs that `collide.distance` does not answer.
+        """
+        margin = checked_margin("World.collides: security_margin", security_margin)
+        return bool(self._answer(margin, check_threads(threads), boolean=True).any())
+
+    def collisions(self, *, threads: int = 1) -> WorldResult:
+        """Every hitting pair with its depth.
+
+        Parameters
+        ----------
+        threads : at most so many answer; the answers are the same bits.
+
+        Returns
+        -------
+        WorldResult : rows of `collide.results.PAIR_DTYPE` sorted by (a, b), ids of the bodies. Pairs within a margin of
+            their own (`set_margin`) are among them, with ``hit`` False where they are apart.
+
+        Raises
+        ------
+        UnsupportedQuery : for pairs that `collide.distance` does not answer; `unanswerable` names them.
+        """
+        return self._result(self._answer(0.0, check_threads(threads)))
+
+    def distances(self, max_distance: float = math.inf, *, threads: int = 1) -> WorldResult:
+        """Every tested pair at most ``max_distance`` apart, hits included.
+
+        Parameters
+        ----------
+        max_distance : [m], ≥ 0; infinity for all pairs. Margins of bodies and pairs have no say.
+        threads : at most so many answer; the answers are the same bits.
+
+        Returns
+        -------
+        WorldResult : rows of `collide.results.PAIR_DTYPE` sorted by (a, b), ids of the bodies. None is left out
+            that is not proven farther apart: ``lower ≤ max_distance`` of all of them. Two half-spaces that meet have
+            distance −inf.
+
+        Raises
+        ------
+        InvalidArgument; UnsupportedQuery : for pairs that `collide.distance` does not answer; `unanswerable` names
+        them.
+        """
+        limit = checks.limit("World.distances: max_distance", max_distance)
+        return self._result(self._answer(limit, check_threads(threads), margins=False))
+
+    def minimum(self, max_distance: float = math.inf, *, threads: int = 1) -> WorldResult:
+        """The nearest tested pair: that of the least signed distance, of several the one with the least ids.
+
+        Parameters
+        ----------
+        max_distance : [m], ≥ 0: pairs farther apart do not count. Margins of bodies and pairs have no say.
+        threads : at most so many answer; the answers are the same bits.
+
+        Returns
+        -------
+        WorldResult : one row of `collide.results.PAIR_DTYPE`, or none where no tested pair is within ``max_distance``.
+            Where brackets overlap, another pair may truly be nearer by less than they are wide. Found by branch and
+            bound: pairs whose boxes cannot be as near are not asked. `stats` stays as it is.
+
+        Raises
+        ------
+        InvalidArgument; UnsupportedQuery : as of `distances`.
+        """
+        limit = checks.limit("World.minimum: max_distance", max_distance)
+        return self._result(nearest_pair(self._pack(), limit, check_threads(threads)))
+
+    def contacts(self, margin: float = 0.0, *, max_contacts: int = 8, threads: int = 1) -> WorldContacts:
+        """Contacts of every tested pair within a margin; `stats` stays as it is.
+
+        Parameters
+        ----------
+        margin : [m], ≥ 0, finite: bodies up to so far apart are in contact, too. It adds to the margins of bodies and
+            pairs (`set_margin`).
+        max_contacts : of each patch, ≥ 1.
+        threads : at most so many answer; the answers are the same bits.
+
+        Returns
+        -------
+        WorldContacts : rows of `collide.contact.contact_rows.CONTACT_DTYPE`, one a contact, sorted by (a, b). What
+            they say and promise: `collide.contacts`.
+
+        Raises
+        ------
+        InvalidArgument; UnsupportedQuery : naming the bodies, where `collide.contacts` raises it.
+        """
+        margin = contact_query.check_margin("World.contacts", margin)
+        max_contacts = contact_query.check_max_contacts("World.contacts", max_contacts)
+        threads = check_threads(threads)
+        packed = self._pack()
+        pairs = packed.candidates(margin)
+        if not len(pairs):
+            return WorldContacts(no_rows(), packed.bodies_named(pairs))
+        counts = np.zeros(len(pairs), dtype=np.int64)
+        of_groups = []
+        for some, limit in _by_margin(packed, pairs, margin):
+            rows, counts[some] = world_contacts.contacts_in_pieces(packed, pairs[some], limit, max_contacts, threads)
+            of_groups.append(rows)
+        rows = of_groups[0] if len(of_groups) == 1 else _sorted_by_pair(np.concatenate(of_groups), CONTACT_DTYPE)
+        return WorldContacts(rows, packed.bodies_named(pairs[counts > 0]))
+
+    def overlaps(self, *, threads: int = 1) -> WorldOverlaps:
+        """How much bodies overlap: volume, centroid and areas of every tested pair that hits; `stats` stays as it is.
+
+        Parameters
+        ----------
+        threads : at most so many look for pairs that hit; volumes are added up one after another.
+
+        Returns
+        -------
+        WorldOverlaps : rows of `collide.worlds.overlaps.OVERLAP_DTYPE` sorted by (a, b), as `collide.overlap_volume`
+            says. Pairs that hit and have no volume to tell, of curved shapes, surfaces and unions, are listed in
+            ``unanswered`` with the reason.
+
+        Raises
+        ------
+        UnsupportedQuery : for pairs that `collide.collide` does not answer.
+
+        Notes
+        -----
+        Milliseconds a pair, more with the number of facets that meet (docs/solids.md).
+        """
+        return world_overlaps.overlaps_of(self._pack(), check_threads(threads))
+
+    def unanswerable(self, max_distance: float = math.inf) -> list[tuple[int, int, str]]:
+        """Pairs for which `distances` raises UnsupportedQuery.
+
+        Allow these pairs, and the rest of the World is answered.
+
+        Parameters
+        ----------
+        max_distance : [m], ≥ 0, as in `distances`.
+
+        Returns
+        -------
+        [(id, id, reason), …], sorted. Such are some shapes against a mesh.
+        """
+        limit = checks.limit("World.unanswerable: max_distance", max_distance)
+        packed = self._pack()
+        ids = packed.roster.ids.tolist()
+        return [(ids[a], ids[b], reason) for a, b, reason in packed.refused(packed.candidates(limit), limit)]
+
+    @property
+    def stats(self) -> dict:
+        """What the last `collides`, `collisions` or `distances` tested, culled, skipped, decided and took.
+
+        bodies, static, sleeping : numbers of bodies.   pairs : of all bodies, n(n − 1)/2.   skipped : {reason: pairs}.
+        narrowphase : pairs of bodies answered.   convex_pairs : pairs of their convex parts answered.
+        mesh_pairs : of the pairs of bodies, those of which one is a mesh or holds one.
+        hits, undecided : pairs.   how : {argument: pairs}.   gjk_iterations, epa_iterations : sums.
+        updates : {what: number} brought up to date for the query: bodies added, removed, moved; leaves and nodes of the
+            box-tree that were given other boxes, trees made anew.
+        bytes_per_body : memory of tables and tree.   seconds : {pack, broadphase, narrowphase} [s].
+
+        sum(skipped) + narrowphase = pairs, unless `collides` stopped at a hit.
+        """
+        if self._last_query is not None:
+            self._stats, self._last_query = self._last_query.stats(), None
+        return self._stats
+
+    # --- how they are answered ------------------------------------------------------------------
+
+    def _answer(self, limit: float, threads: int, *, boolean: bool = False, margins: bool = True) -> np.ndarray:
+        """Rows of all tested pairs within the limit [m], a and b positions.
+
+        margins : add those of bodies and pairs.   boolean : bool instead, one a pair, up to a hit.
+        """
+        started = time.perf_counter()
+        packed = self._pack()
+        ready = time.perf_counter()
+        candidates = packed.candidates(limit)
+        culled = time.perf_counter()
+        wanted: list[np.ndarray] = []
+        answers: list[Answer] = []
+        for some, reach in _by_margin(packed, candidates, limit) if margins else [(slice(None), limit)]:
+            is_boolean = boolean and not reach
+            answer = packed.answer(
+                candidates[some], reach, boolean=is_boolean, stop_at_hit=is_boolean, threads=threads
+            )
+            answers.append(answer)
+            wanted.append(_wanted(packed, answer.rows, reach, boolean, margins))
+            if boolean and wanted[-1].any():
+                break
+        ended = time.perf_counter()
+        all_rows = np.concatenate([answer.rows for answer in answers]) if len(answers) > 1 else answers[0].rows
+        self._last_query = QueryRecord(
+            packed, packed.roster, packed.filters, len(candidates), all_rows["hit"].copy(), all_rows["how"].copy(),
+            all_rows["iterations"].copy(), sum(answer.convex_pairs for answer in answers),
+            sum(answer.body_pairs for answer in answers), sum(answer.mesh_pairs for answer in answers),
+            packed.take_work(),
+            {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
+        )
+        return wanted[0] if len(wanted) == 1 else np.concatenate(wanted) if boolean else _sorted_by_pair(
+            np.concatenate(wanted), PAIR_DTYPE
+        )
+
+    def _result(self, rows: np.ndarray) -> WorldResult:
+        return WorldResult(rows, self._to_ids(rows), certify)
+
+
+def _by_margin(packed: PackedWorld, pairs: np.ndarray, margin: float) -> Iterator[tuple[np.ndarray | slice, float]]:
+    """(which pairs, their margin and the one given [m]), those of the same margin together; all at least once."""
+    if not packed.has_margins:
+        yield slice(None), margin
+        return
+    limits, which = np.unique(margin + packed.margins_of(pairs), return_inverse=True)
+    if not len(limits):
+        yield slice(None), margin
+    for k, limit in enumerate(limits.tolist()):
+        yield np.flatnonzero(which.reshape(-1) == k), limit
+
+
+def _wanted(packed: PackedWorld, rows: np.ndarray, limit: float, boolean: bool, margins: bool) -> np.ndarray:
+    """The rows that a question wants, or of booleans which of all are hits."""
+    if not margins:
+        return rows[~(rows["lower"] > limit)]  # what is not proven farther, also where the bracket holds the limit
+    if not limit:
+        return rows["hit"].copy() if boolean else rows[rows["hit"]]
+    shapes, X_WBs = packed.roster.shapes, packed.X_WBs
+
+    def question(k: int):
+        a, b = int(rows["a"][k]), int(rows["b"][k])
+        return shapes[a], shapes[b], X_WBs[a], X_WBs[b]
+
+    near = within(rows, limit, question)
+    return near if boolean else rows[near]
+
+
+def _sorted_by_pair(rows: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    order = np.lexsort((np.arange(len(rows)), rows["b"], rows["a"]))
+    return rows[order].astype(dtype, copy=False)
