@@ -43,6 +43,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config.addinivalue_line("filterwarnings", "ignore::RuntimeWarning")
 
 
+@pytest.hookimpl(optionalhook=True)  # xdist is not everywhere
 def pytest_xdist_make_scheduler(config: pytest.Config, log):
     """A process a file, and for all files that read the sources of the house the same process: each source is parsed
     once."""

@@ -20,7 +20,7 @@ if [ -z "${WHEEL:-}" ]; then
     WHEEL=$(echo "$work"/*.whl)
 fi
 WHEEL=$(realpath "$WHEEL")
-cp -r tests "$work/tests"
+cp -r tests pyproject.toml "$work" # pyproject.toml: marks, and which run
 echo "wheel: $(basename "$WHEEL"), $(stat -c %s "$WHEEL" 2>/dev/null || stat -f %z "$WHEEL") bytes"
 
 # Every python3.X on the path, and those of pyenv.
@@ -56,7 +56,7 @@ print(f"Python {sys.version.split()[0]}, numpy {numpy.__version__}: kernels {mod
       f"import to first boolean {seconds:.3f} s")
 PYTHON
 # Not `python -m pytest`: that would put this folder on the path.
-"$environment/bin/pytest" -q --import-mode=importlib -p no:cacheprovider "$@" | tail -n 1
+"$environment/bin/pytest" -q -p no:cacheprovider "$@" | tail -n 1
 SHELL
 tried=0 failed=()
 for python in $(found); do

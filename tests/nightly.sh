@@ -45,15 +45,13 @@ own() {
 plain() { NUMBA_DISABLE_JIT=1 run plain python -m pytest -q tests/contact/test_facet_manifolds.py -k no_patch_may_reach; }
 matrix() { run matrix bash tests/matrix.sh; }
 soaks() {
-    { # one core
-        run soak-worlds python tests/soak/soak_worlds.py --questions 30000 --seed "$seed"
-        run soak-memory python tests/soak/soak_memory.py --shapes 30000 --seed "$seed"
-    } &
+    run fuzz collide fuzz --minutes 20 --seed "$seed" --save "$log/fuzz" --quiet & # one core
+    run soak-worlds python tests/soak/soak_worlds.py --questions 30000 --seed "$seed"
+    run soak-memory python tests/soak/soak_memory.py --shapes 30000 --seed "$seed"
     run soak-pairs python tests/soak/soak.py --minutes 6 --seed "$seed"
     run soak-contacts python tests/soak/soak_contacts.py --pairs 20000 --seed "$seed"
     run soak-motions python tests/soak/soak_motions.py --motions 5000 --seed "$seed"
     wait
-    run fuzz collide fuzz --minutes 20 --seed "$seed" --save "$log/fuzz" --quiet
 }
 faults() { run faults python tests/mutants/planted_faults.py --faults 200 --seed 1; }
 site() { run site python -m sphinx -W -q -c docs . build/site; }

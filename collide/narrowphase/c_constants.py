@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from collide.hull.first_simplex import APICES
 from collide.hull.growing_hull import FACET, PLANE, STATE
 from collide.kernels import entry, view_i64
@@ -32,23 +34,20 @@ _MESH_DOUBLES = max(module.DOUBLES + module.FLOATS for module in (surfaces, dist
 
 #: In this order: rooms of the narrowphase, layouts, rooms of hulls and of support trees; layouts and rooms of
 #: box-trees, what is found out about surfaces, rooms of questions about meshes (`native/capi_internal.h`).
-_CONSTANTS = (
+_CONSTANTS = np.array([
     DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE, APICES, HULL_DIGITS,
     WORK,
     FACET, PLANE, STATE, STACK,
     NODE, SLAB, WIDTH, TREE_INTS, TREE_NUMBERS, RECORD, TREE_WORK, DEEPEST_SPLIT,
     COUNTS, EDGES, SHELLS, OPEN | UNBALANCED | TURNED | ONE_SIDED,
     pairs.HEADER, _MESH_DOUBLES, MESH_INTEGERS, pairs.SCRATCH,
-)
+], dtype=np.int64)
 
 
 @entry("int64(int64, int64)")
 def write_constants(out_at, n):
     """Write the first n of `_CONSTANTS`; returns how many there are."""
     out = view_i64(out_at, n)
-    at = 0
-    for constant in _CONSTANTS:
-        if at < n:
-            out[at] = constant
-        at += 1
-    return at
+    for at in range(min(n, len(_CONSTANTS))):
+        out[at] = _CONSTANTS[at]
+    return len(_CONSTANTS)

@@ -121,7 +121,7 @@ def test_places_that_cannot_be_written(scene, tmp_path, capsys):
 
 def test_pages_are_loaded_where_they_are_asked_for():
     code = (
-        "import sys; from collide import main as cli; cli.main(['report', 'workcell', '--quiet'])\n"
+        "import sys; from collide.cli import main as cli; cli.main(['report', 'workcell', '--quiet'])\n"
         "assert 'collide.reports.report' in sys.modules\n"
         "print([name for name in sys.modules if name.startswith('collide.pages') or 'visual_shapes' in name])"
     )

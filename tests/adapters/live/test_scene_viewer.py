@@ -18,8 +18,8 @@ import pytest
 from collide.adapters.live.page_state import live_block
 from collide.adapters.live.scene_viewer import SceneViewer
 from collide.cli.main import main
-from collide.cli.main.arguments import parse
-from collide.cli.main.view import _files, _page
+from collide.cli.arguments import parse
+from collide.cli.view import _files, _page
 from collide.errors import SceneError
 
 ROOT = Path(__file__).resolve().parents[3]
