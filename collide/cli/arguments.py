@@ -16,11 +16,11 @@ from collide.cli import bench as cli_bench
 from collide.cli import compare as cli_compare
 from collide.cli import engines as cli_engines
 from collide.cli import fuzz as cli_fuzz
-from collide.cli import locality as cli_locality
+from collide.cli import locality_command as cli_locality
 from collide.cli import numbers as cli_numbers
 from collide.cli import pages as cli_pages
 from collide.cli import srdf as cli_srdf
-from collide.cli import sweep as cli_sweep
+from collide.cli import sweep_command as cli_sweep
 from collide.cli import view as cli_view
 from collide.errors import InvalidArgument
 from collide.reports.number_format import UNITS, parse_length

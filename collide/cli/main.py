@@ -21,11 +21,11 @@ from collide.cli import arguments
 from collide.cli import bench as cli_bench
 from collide.cli import compare as cli_compare
 from collide.cli import fuzz as cli_fuzz
-from collide.cli import locality as cli_locality
+from collide.cli import locality_command as cli_locality
 from collide.cli import pages as cli_pages
 from collide.cli import scenes as cli_scenes
 from collide.cli import srdf as cli_srdf
-from collide.cli import sweep as cli_sweep
+from collide.cli import sweep_command as cli_sweep
 from collide.cli import view as cli_view
 from collide.cli.files import check_place, copy_scene, first_words, print_lines, write_json
 from collide.errors import CollideError, InvalidArgument, UnsupportedQuery

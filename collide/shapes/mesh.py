@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from collide.mesh.bvh import MeshTree
     from collide.mesh.locality import Locality
     from collide.mesh.mesh_survey import Survey
-    from collide.shapes import localised_mesh
-    from collide.shapes.localised_mesh import LocalisedMesh
+    from collide.shapes import localised_facets
 
     class HasFacets(Protocol):
         """What carries a mesh: trimesh.Trimesh, among others."""
@@ -42,7 +41,7 @@ if not TYPE_CHECKING:
     build_bvh = lazy_module("collide.mesh.build_bvh")
     fine_boxes = lazy_module("collide.mesh.fine_boxes")
     local_stretch = lazy_module("collide.mesh.locality")
-    localised_mesh = lazy_module("collide.shapes.localised_mesh")
+    localised_facets = lazy_module("collide.shapes.localised_facets")
     mesh_survey = lazy_module("collide.mesh.mesh_survey")
     scaled_bvh = lazy_module("collide.mesh.scaled_bvh")
 
@@ -266,9 +265,15 @@ class Mesh(Shape):
         J. Erickson, "Local polyhedra and geometric graphs", Computational Geometry 31 (2005), section 8 and figure 12.
         docs/locality.md says where it pays.
         """
+        stretch, order, max_facets = localised_facets.checked(stretch, order, max_facets)
         progress = progress or local_stretch.quiet
         plain = self if type(self) is Mesh else Mesh(self.vertices, self.faces, solid=self.solid)
-        return localised_mesh.localised_mesh(plain, stretch, order, max_facets, progress)
+        before = plain.locality(progress=progress)
+        points, faces, source, moved = localised_facets.localised_facets(
+            plain.vertices, plain.survey, before, stretch, order, max_facets, progress
+        )
+        made = Mesh(points, faces, solid=plain.solid)
+        return LocalisedMesh(made, source, moved, before, made.locality(progress=progress))
 
     def save(self, path) -> None:
         """Write the mesh to a file: all of it as ``.npz``, or its triangles in a form that other programs read.
@@ -372,3 +377,20 @@ def _check_faces(faces, n: int) -> np.ndarray:
     if array.size == 0:
         raise InvalidShape(f"Mesh: no facets: faces has shape {array.shape}; at least one row of three ids is needed")
     return facet_ids("Mesh", array, n, np.int32, "vertices 0 … {last}")
+
+
+class LocalisedMesh(NamedTuple):
+    """What `Mesh.localised` returns.
+
+    mesh : the same solid or surface, a `Mesh`. Its first vertices are those of the mesh that was localised, row by row.
+    source_facets : (k,) int64, of every facet of ``mesh`` the row of the old facet that it is part of.
+    moved : no new vertex is farther than this from the point of its old facet (on an old edge: of that edge) that it
+        stands for, by rounding to doubles [the unit of the mesh]; 0 where all of them lie there exactly.
+    before, after : `Locality` of both.
+    """
+
+    mesh: Mesh
+    source_facets: np.ndarray
+    moved: float
+    before: Locality
+    after: Locality

@@ -18,7 +18,7 @@ from collide.narrowphase.method_functions import rows_of_pair
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
 from collide.worlds.packed_world import PackedWorld, batches_of_shapes
-from collide.worlds.parts import MIN_BY_TREE, runs
+from collide.worlds.world_parts import MIN_BY_TREE, runs
 
 #: Half of the engine, which scenes without meshes never load.
 mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")

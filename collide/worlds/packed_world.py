@@ -23,8 +23,8 @@ from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
 from collide.worlds.bodies import BodiesAsTheyStood, Roster
-from collide.worlds.part_pairs import PartTrees, updating
-from collide.worlds.parts import WorldParts
+from collide.worlds.world_part_pairs import PartTrees, updating
+from collide.worlds.world_parts import WorldParts
 
 #: Half of the engine, which scenes without meshes never load.
 mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")

@@ -15,7 +15,7 @@ from collide.pairs.security_margin import checked_margin
 from collide.shapes.shape import Shape
 from collide.worlds.bodies import BodiesAsTheyStood, Body, Roster, WorldBodies
 from collide.worlds.packed_world import PackedWorld, PairFilters
-from collide.worlds.part_pairs import updating
+from collide.worlds.world_part_pairs import updating
 
 
 class WorldScene:

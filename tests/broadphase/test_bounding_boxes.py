@@ -14,7 +14,7 @@ import collide
 from collide.broadphase.bounding_boxes import boxes_of, widened
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import ShapeTable, pose_table
-from collide.worlds.parts import WorldParts
+from collide.worlds.world_parts import WorldParts
 
 EYE = np.eye(4)
 

@@ -6,6 +6,9 @@ allows 487, and its contracts tell neither imports inside functions nor those un
 
 from __future__ import annotations
 
+import ast
+from collections import Counter
+
 from house_sources import (
     COMPILER_PACKAGES,
     GUARD,
@@ -14,6 +17,8 @@ from house_sources import (
     foreign,
     guarded,
     imports,
+    modules,
+    nodes,
     none_of,
     room,
     shown,
@@ -101,6 +106,9 @@ LATE = {
 }
 #: Names that say nothing about what a module is for, and names that shadow a package when run as a script.
 BAD_NAMES = {"utils", "util", "helpers", "core", "common", "misc", "fcl", "coal", "pybullet", "numba", "numpy"}
+
+#: Files of one name that are still two.
+TWICE = {"growing_rows.py"}
 
 # --- who imports whom ---------------------------------------------------------------------------
 
@@ -222,3 +230,34 @@ def test_module_names_say_something():
     )
 
 
+
+
+def named(file) -> set[str]:
+    """Modules that a file imports anywhere, for types and inside functions too."""
+    named, known = set(), modules()
+    for node in nodes(file):
+        if isinstance(node, ast.Import):
+            named.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            named.update({name for name in inner if name in known} or {node.module or ""})
+    return named
+
+
+def test_file_names_are_unique():
+    """One thing, one name: a reader who searches for a file finds one."""
+    names = Counter(file.name for file in sources("collide") if file.name != "__init__.py")
+    none_of(f"{name}: {count} files" for name, count in names.items() if count > 1 and name not in TWICE)
+
+
+def test_modules_import_in_no_circle():
+    """Not even for types: two files that need each other are one file, or cut in the wrong place."""
+    needs = {
+        dotted(file): named(file) - {dotted(file)} for file in sources("collide") if dotted(file) != "collide"
+    }  # `collide` itself names all that is public, and imports it when asked
+    needs = {name: modules & set(needs) for name, modules in needs.items()}
+    while free := [name for name, modules in needs.items() if not modules]:
+        for name in free:
+            del needs[name]
+        needs = {name: modules - {*free} for name, modules in needs.items()}
+    none_of(f"{name}: {', '.join(sorted(modules))}" for name, modules in sorted(needs.items()))

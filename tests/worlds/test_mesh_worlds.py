@@ -10,7 +10,7 @@ from naive_triangles import world_points
 from surfaces import torus
 
 import collide
-from collide.worlds.parts import WorldParts
+from collide.worlds.world_parts import WorldParts
 
 EYE = np.eye(4)
 

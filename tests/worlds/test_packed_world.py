@@ -15,8 +15,8 @@ import collide
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.errors import InvalidArgument, UnknownBody
 from collide.results import PAIR_DTYPE
-from collide.worlds import parts as world_parts
 from collide.worlds import record as world_record
+from collide.worlds import world_parts
 
 EYE = np.eye(4)
 

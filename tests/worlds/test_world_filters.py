@@ -13,8 +13,8 @@ from naive import one_of_each, pose, random_pose, rng_of
 import collide
 from collide.errors import InvalidArgument, UnknownBody
 from collide.worlds import outside as world_outside
-from collide.worlds.part_pairs import PartTrees
-from collide.worlds.parts import WorldParts
+from collide.worlds.world_part_pairs import PartTrees
+from collide.worlds.world_parts import WorldParts
 
 EYE = np.eye(4)
 
@@ -318,7 +318,7 @@ def test_parts_by_trees_are_those_of_all_parts(monkeypatch):
         for margin in (0.0, 0.2):
             answers = []
             for n_least in (0, 1 << 60):
-                monkeypatch.setattr("collide.worlds.part_pairs.MIN_BY_TREE", n_least)
+                monkeypatch.setattr("collide.worlds.world_part_pairs.MIN_BY_TREE", n_least)
                 answers.append([found.tolist() for found in PartTrees(parts).near(candidates, margin)])
             assert answers[0] == answers[1], (seed, margin)
             assert 50 < len(answers[0][0]) < 4000

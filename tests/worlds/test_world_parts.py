@@ -14,8 +14,8 @@ from collide.broadphase.growing_rows import GrowingRows
 from collide.errors import InvalidArgument, UnknownBody
 from collide.lowering.shape_table import POSE_TERMS
 from collide.worlds.outside import _some_poses, questions_of
-from collide.worlds.part_pairs import PartTrees
-from collide.worlds.parts import WorldParts, runs
+from collide.worlds.world_part_pairs import PartTrees
+from collide.worlds.world_parts import WorldParts, runs
 
 BALL, BOX = collide.Sphere(0.25), collide.Box((0.5, 0.5, 0.5))
 TURNED = collide.Compound([(BOX, random_pose(rng_of("turned part"), 0.5)), (BALL, pose(t=(0, 1.0, 0)))])

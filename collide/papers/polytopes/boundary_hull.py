@@ -1,6 +1,6 @@
 """The boundary of a hull of integral points in R^d as simplices that cover it, exactly, whatever their position.
 
-In the plane and in space by the exact hulls of `planar_hull` and `collide.hull`, above that by `growing_hull`. Flat
+In the plane and in space by the exact hulls of `planar_hull` and `collide.hull`, above that by `incremental_hull`. Flat
 faces come out triangulated, and no point has to be moved.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from collide.hull.exact_hull import convex_hull
 from collide.numerics.exact_vectors import determinant
 from collide.papers.polytopes.exact_planes import exact_planes, rounded_planes, whole_numbers
-from collide.papers.polytopes.growing_hull import grown_facets
+from collide.papers.polytopes.incremental_hull import grown_facets
 from collide.papers.polytopes.planar_hull import hull_of_points
 
 #: From so many points on the kernels for the plane and space are taken.

@@ -21,7 +21,7 @@ from collide.errors import UnsupportedQuery
 from collide.least_distance.homogeneous_rows import as_integers
 from collide.papers.polytopes.boundary_hull import Boundary, boundary_hull, first_simplex
 from collide.papers.polytopes.exact_planes import nearby_planes, rounding_errors, whole_numbers
-from collide.papers.polytopes.growing_hull import BoundaryTooLarge, bytes_a_slot
+from collide.papers.polytopes.incremental_hull import BoundaryTooLarge, bytes_a_slot
 from collide.papers.polytopes.shell_cones import cones_at
 
 _UNIT = 2.0**-53

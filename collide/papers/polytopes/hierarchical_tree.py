@@ -15,7 +15,7 @@ from collide.least_distance.interior_point import interior_point
 from collide.least_distance.pair_proposals import Work
 from collide.papers.polytopes.exact_planes import BITS
 from collide.papers.polytopes.facet_tree import FacetTree, Sizes, sizes
-from collide.papers.polytopes.growing_hull import bytes_a_slot
+from collide.papers.polytopes.incremental_hull import bytes_a_slot
 from collide.papers.polytopes.recentred_polars import recentred_spaces
 from collide.papers.polytopes.tree_size import TreeSize, max_simplices, predicted_simplices, predicted_size, size_of
 from collide.papers.polytopes.tree_walk import Grid

@@ -15,7 +15,7 @@ from collide.papers.polytopes.exact_answers import make_meeting
 from collide.papers.polytopes.exclusion import Exclusion, exclusion_of
 from collide.papers.polytopes.hierarchical_tree import HierarchicalTree
 from collide.papers.polytopes.meeting import MeetingCertificate
-from collide.papers.polytopes.posed_trees import posed_rows, relative_of
+from collide.papers.polytopes.posed_facet_trees import posed_rows, relative_of
 from collide.papers.polytopes.relative_pose import affine_map, inverse, product
 from collide.papers.polytopes.tree_walk import HIT, MISS, OPEN, TreeWalk
 

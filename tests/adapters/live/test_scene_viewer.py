@@ -17,8 +17,8 @@ import pytest
 
 from collide.adapters.live.page_state import live_block
 from collide.adapters.live.scene_viewer import SceneViewer
-from collide.cli.main import main
 from collide.cli.arguments import parse
+from collide.cli.main import main
 from collide.cli.view import _files, _page
 from collide.errors import SceneError
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from collide.base.fork_safe_lock import ForkSafeLock
 from collide.broadphase.box_tree import BoxTree
-from collide.worlds.parts import MIN_BY_TREE, WorldParts, runs
+from collide.worlds.world_parts import MIN_BY_TREE, WorldParts, runs
 
 #: Bodies that are together at most so many times as wide as the margin are asked as a pair by itself, which goes
 #: through parts from the nearest on. Of two places in a unit, drawn evenly, a share of 1 − (1 − 1/4)² is at most 1/4

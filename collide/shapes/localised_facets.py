@@ -1,8 +1,8 @@
-"""A mesh made local, as `Mesh.localised` returns it."""
+"""The facets of a mesh cut until it is local: what `Mesh.localised` refuses, and what it makes."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,53 +14,38 @@ from collide.mesh.weld import weld
 
 if TYPE_CHECKING:
     from collide.mesh.locality import Locality
-    from collide.shapes.mesh import Mesh
+    from collide.mesh.mesh_survey import Survey
 
 
-class LocalisedMesh(NamedTuple):
-    """What `Mesh.localised` returns.
+def localised_facets(
+    vertices: np.ndarray, survey: Survey, before: Locality, stretch: float, order: int, max_facets: int, progress
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Vertices, facets, of each facet the row of the old one, and how far a vertex moved, as `Mesh.localised` has them.
 
-    mesh : the same solid or surface, a `Mesh`. Its first vertices are those of the mesh that was localised, row by row.
-    source_facets : (k,) int64, of every facet of ``mesh`` the row of the old facet that it is part of.
-    moved : no new vertex is farther than this from the point of its old facet (on an old edge: of that edge) that it
-        stands for, by rounding to doubles [the unit of the mesh]; 0 where all of them lie there exactly.
-    before, after : `Locality` of both.
+    survey, before : of the mesh.   stretch, order, max_facets : as `checked` returns them.
     """
-
-    mesh: Mesh
-    source_facets: np.ndarray
-    moved: float
-    before: Locality
-    after: Locality
-
-
-def localised_mesh(mesh: Mesh, stretch: float, order: int, max_facets: int, progress) -> LocalisedMesh:
-    """Of `Mesh.localised`, which says what the arguments are."""
-    stretch, order, max_facets = _check(stretch, order, max_facets)
-    before = mesh.locality(progress=progress)
     if order >= before.distinct:
         raise InvalidArgument(
             f"Mesh.localised: order must be less than the {before.distinct} distinct vertices of the mesh, got "
             f"{order}: no vertex has so many others"
         )
-    survey = mesh.survey
     rows = np.flatnonzero(survey.flags & COLLAPSED == 0)
     if not len(rows):
         raise InvalidShape("Mesh.localised: no facet has three distinct corners")
     corners = survey.corners[rows].astype(np.int64)
     if before.local_stretches[order - 1] > stretch:
-        _refuse_too_many(mesh, corners, stretch, order, max_facets)
-    pieces = facet_pieces.Pieces(mesh.vertices, corners)
-    distinct = np.flatnonzero(weld(mesh.vertices) == np.arange(len(mesh.vertices)))
+        _refuse_too_many(vertices, corners, stretch, order, max_facets)
+    pieces = facet_pieces.Pieces(vertices, corners)
+    distinct = np.flatnonzero(weld(vertices) == np.arange(len(vertices)))
     try:
         localise.localise(pieces, distinct, stretch, order, max_facets, progress)
     except localise.Crowded as crowded:
         raise _gave_up(crowded, int(rows[crowded.facet]), stretch, order, max_facets) from None
-    made = type(mesh)(pieces.points, pieces.faces, solid=mesh.solid)
-    return LocalisedMesh(made, rows[pieces.source], pieces.moved(), before, made.locality(progress=progress))
+    return pieces.points, pieces.faces, rows[pieces.source], pieces.moved()
 
 
-def _check(stretch, order, max_facets) -> tuple[float, int, int]:
+def checked(stretch, order, max_facets) -> tuple[float, int, int]:
+    """The arguments of `Mesh.localised`, InvalidArgument where they are none."""
     value = checks.number(stretch)
     if value is None or not np.isfinite(value) or value < localise.LEAST_STRETCH:
         raise InvalidArgument(
@@ -75,9 +60,9 @@ def _check(stretch, order, max_facets) -> tuple[float, int, int]:
     return value, order, checks.integer("Mesh.localised: max_facets", max_facets, 1)
 
 
-def _refuse_too_many(mesh: Mesh, corners: np.ndarray, stretch: float, order: int, max_facets: int) -> None:
+def _refuse_too_many(vertices: np.ndarray, corners: np.ndarray, stretch: float, order: int, max_facets: int) -> None:
     ends = facet_pieces.edges_of(corners, np.arange(len(corners))).ends
-    predicted = predicted_facets.predicted_facets(mesh.vertices, ends, len(corners), stretch, order)
+    predicted = predicted_facets.predicted_facets(vertices, ends, len(corners), stretch, order)
     if predicted > max_facets:
         raise InvalidArgument(
             f"Mesh.localised: about {predicted} facets would be needed for σ_{order} ≤ {stretch:g}, more than "
