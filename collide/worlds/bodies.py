@@ -7,7 +7,6 @@ the others: then all are closed up at once, so that a removal costs the same how
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -26,6 +25,8 @@ _BITS = 32
 _IDENTITY = np.eye(4)
 #: So many rows of removed bodies stay whatever the number of others.
 _MIN_ROWS = 64
+#: What is no row of any body.
+_NO_ROWS = np.array([-1])
 
 
 @dataclass(frozen=True)
@@ -248,7 +249,7 @@ class WorldBodies:
 
     def take_moved(self) -> np.ndarray:
         """Rows of the bodies that moved since this was last called, ascending."""
-        rows = np.flatnonzero(self._moved)
+        (rows,) = self._moved.nonzero()
         self._moved[rows] = False
         return rows
 
@@ -259,10 +260,12 @@ class WorldBodies:
                 bodies = [self.id_of(body, "bodies") for body in bodies]
         n = self._next
         if len(self._row_of) == n == len(self._ids) and len(bodies):  # none was ever removed: ids are rows
-            with contextlib.suppress(OverflowError):
+            try:
                 rows = np.asarray(bodies, dtype=np.int64)
-                if 0 <= rows.min() and rows.max() < n:
-                    return rows
+            except OverflowError:
+                rows = _NO_ROWS
+            if int(rows.view(np.uint64).max()) < n:  # one below 0 is above 2⁶³ there
+                return rows
         return np.array([self._row_of[self.id_of(body, "bodies")] for body in bodies], dtype=np.int64)
 
     def roster(self) -> Roster:

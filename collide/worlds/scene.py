@@ -13,7 +13,7 @@ from collide.base.log import log_duration
 from collide.errors import InvalidArgument
 from collide.pairs.security_margin import checked_margin
 from collide.shapes.shape import Shape
-from collide.worlds.bodies import BodiesAsTheyStood, Body, Roster, WorldBodies
+from collide.worlds.bodies import Body, Roster, WorldBodies
 from collide.worlds.packed_world import PackedWorld, PairFilters
 from collide.worlds.part_pairs import updating
 
@@ -288,10 +288,3 @@ class WorldScene:
         order = np.argsort(keys)
         margins = np.fromiter(self._pair_margins.values(), dtype=np.float64)[order]
         return PairFilters(positions(self._allowed), list(self._allowed.values()), keys[order], margins)
-
-    def _to_ids(self, rows: np.ndarray) -> BodiesAsTheyStood:
-        """The bodies at the positions that rows name; in the rows, in place, their ids."""
-        packed = self._pack()
-        bodies = packed.bodies_named(rows["a"], rows["b"])
-        rows["a"], rows["b"] = packed.roster.ids[rows["a"]], packed.roster.ids[rows["b"]]
-        return bodies
