@@ -280,7 +280,8 @@ def _by_margin(packed: PackedWorld, pairs: np.ndarray, margin: float) -> Iterato
 def _wanted(packed: PackedWorld, rows: np.ndarray, limit: float, boolean: bool, margins: bool) -> np.ndarray:
     """The rows that a question wants, or of booleans which of all are hits."""
     if not margins:
-        return _picked(rows, ~(rows["lower"] > limit))  # what is not proven farther, also where the bracket holds the limit
+        not_farther = ~(rows["lower"] > limit)  # not proven to be, also where the bracket holds the limit
+        return _picked(rows, not_farther)
     if not limit:
         return rows["hit"].copy() if boolean else _picked(rows, rows["hit"])
     shapes, X_WBs = packed.roster.shapes, packed.X_WBs
