@@ -125,7 +125,7 @@ class WorldBodies:
         self._made: dict[int, Body] = {}
         self._columns = _columns_of([], [])
         self._roster: Roster | None = None
-        self._shapes_are_told = False  # whether a roster has this very list
+        self._shapes_are_shared = False  # whether a roster holds this very list
 
     def __getstate__(self) -> dict:
         """For copies and pickles: lists and arrays are changed in place."""
@@ -137,7 +137,7 @@ class WorldBodies:
             "_shapes": list(self._shapes), "_flags": list(self._flags), "_X_WBs": self.poses().copy(),
             "_moved": np.zeros(n, dtype=bool), "_alive": np.ones(n, dtype=bool), "_asleep": self._asleep[:n].copy(),
             "_margins": self._margins[:n].copy(), "_made": {}, "_columns": _columns_of(self._ids, self._flags),
-            "_roster": None, "_shapes_are_told": False,
+            "_roster": None, "_shapes_are_shared": False,
         }
 
     def __len__(self) -> int:
@@ -165,7 +165,7 @@ class WorldBodies:
             raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._id_of[name]})')
         flags = _flag("World.add: static", static), _bits("World.add: group", group), _bits("World.add: mask", mask)
         if row == len(self._X_WBs):
-            self._make_room(1)
+            self._reserve(1)
         self._X_WBs[row], self._margins[row], self._alive[row] = X_WB, margin, True
         self._ids.append(identity)
         self._names.append(name)
@@ -195,7 +195,7 @@ class WorldBodies:
         margin = _of_each(f"{caller}: margin", margin, n, checked_margin)
         row, ids = len(self._ids), range(self._next, self._next + n)
         names = self._names_of(names, ids, caller)
-        self._make_room(n)
+        self._reserve(n)
         rows = slice(row, row + n)
         self._X_WBs[rows], self._margins[rows], self._alive[rows] = X_WBs, margin, True
         self._ids.extend(ids)
@@ -227,7 +227,7 @@ class WorldBodies:
                     )
         return names
 
-    def _make_room(self, n: int) -> None:
+    def _reserve(self, n: int) -> None:
         """Memory for n more bodies at the least."""
         used = len(self._ids)
         if used + n > len(self._X_WBs):
@@ -239,8 +239,8 @@ class WorldBodies:
 
     def replace(self, identity: int, shape: Shape) -> None:
         """Give a body another shape. Rosters that were handed out keep the one that it had."""
-        if self._shapes_are_told:
-            self._shapes, self._shapes_are_told = list(self._shapes), False
+        if self._shapes_are_shared:
+            self._shapes, self._shapes_are_shared = list(self._shapes), False
         self._shapes[self._row_of[identity]] = shape
         self._made.pop(identity, None)
         self._generation += 1
@@ -349,7 +349,7 @@ class WorldBodies:
                 column.extend(rows.rows)
             ids, static, group, mask = (column.rows for column in self._columns)
             alive, margins, asleep = (column[:n].copy() for column in (self._alive, self._margins, self._asleep))
-            self._shapes_are_told = True
+            self._shapes_are_shared = True
             self._roster = Roster(
                 ids, self._names, self._shapes, static, group, mask, alive, margins, asleep, self._generation
             )

@@ -248,10 +248,11 @@ class WorldPairs(WorldScene):
             if boolean and wanted[-1].any():
                 break
         ended = time.perf_counter()
-        rows, *counts = answers[0] if len(answers) == 1 else joined(answers, boolean=True)
+        answer = answers[0] if len(answers) == 1 else joined(answers, boolean=True)
+        rows = answer.rows
         self._last_query = QueryRecord(
             packed, packed.roster, packed.filters, len(candidates), rows["hit"].copy(), rows["how"].copy(),
-            rows["iterations"].copy(), *counts, packed.take_work(),
+            rows["iterations"].copy(), answer.convex_pairs, answer.body_pairs, answer.mesh_pairs, packed.take_work(),
             {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
         )
         if len(wanted) == 1:

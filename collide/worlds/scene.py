@@ -80,7 +80,8 @@ class WorldScene:
 
         Returns
         -------
-        (N,) int64 ids, ascending. About 0.5 µs a body; of each one's own name, bits and margin, 1 µs.
+        (N,) int64 ids, ascending. About 0.7 µs a body, of each one's own name, bits and margin 1 µs; the next query
+        takes 2 µs a body for tables and tree, as after `add`.
 
         Raises
         ------

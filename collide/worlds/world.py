@@ -42,7 +42,7 @@ class World(WorldPairs):
     Packed arrays and the box-tree are made when a query first needs them, and brought up to date by the next query:
     what was added, moved or removed costs as much as there is of it, but for copies of a few bytes a body. Which pairs
     are near is kept from query to query while few bodies change. A World is not safe to change from one thread while
-    another asks.
+    another asks, but by `replace`.
     """
 
     def query(
