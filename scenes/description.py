@@ -170,11 +170,11 @@ class Scene:
         World
             A new one at each call.
         """
-        world = World()
-        for body in self.bodies:
-            world.add(
-                body.shape, body.X_WB, name=body.name, static=body.static, group=body.group, mask=body.mask
-            )
+        world, bodies = World(), self.bodies
+        if bodies:
+            X_WBs, names = [body.X_WB for body in bodies], [body.name for body in bodies]
+            traits = {trait: [getattr(body, trait) for body in bodies] for trait in ("static", "group", "mask")}
+            world.add_many([body.shape for body in bodies], X_WBs, names=names, **traits)
         for a, b, reason in self.allowed:
             world.allow(a, b, reason=reason)
         return world

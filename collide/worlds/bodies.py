@@ -8,9 +8,9 @@ the others: then all are closed up at once, so that a removal costs the same how
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,14 +18,19 @@ from collide.base import argument_checks as checks
 from collide.broadphase.growing_rows import GrowingRows
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody
 from collide.numerics.rigid_poses import are_rigid_matrices
+from collide.pairs.security_margin import checked_margin
 from collide.shapes.shape import Shape, checked_shape
 from collide.transforms import LARGEST, SAFE_TOLERANCE, as_pose, as_poses
 
 #: Groups and masks are bit sets of this many bits.
 _BITS = 32
 _IDENTITY = np.eye(4)
+#: A pose as bytes: numpy puts arrays of them twice as fast as of 16 doubles.
+_POSE = np.dtype((np.void, _IDENTITY.nbytes))
 #: So many rows of removed bodies stay whatever the number of others.
 _MIN_ROWS = 64
+#: What is no row of any body.
+_NO_ROWS = np.array([-1])
 
 
 @dataclass(frozen=True)
@@ -120,6 +125,7 @@ class WorldBodies:
         self._made: dict[int, Body] = {}
         self._columns = _columns_of([], [])
         self._roster: Roster | None = None
+        self._shapes_are_shared = False  # whether a roster holds this very list
 
     def __getstate__(self) -> dict:
         """For copies and pickles: lists and arrays are changed in place."""
@@ -131,7 +137,7 @@ class WorldBodies:
             "_shapes": list(self._shapes), "_flags": list(self._flags), "_X_WBs": self.poses().copy(),
             "_moved": np.zeros(n, dtype=bool), "_alive": np.ones(n, dtype=bool), "_asleep": self._asleep[:n].copy(),
             "_margins": self._margins[:n].copy(), "_made": {}, "_columns": _columns_of(self._ids, self._flags),
-            "_roster": None,
+            "_roster": None, "_shapes_are_shared": False,
         }
 
     def __len__(self) -> int:
@@ -154,17 +160,12 @@ class WorldBodies:
         checked_shape("World.add: shape", shape, "collide.Sphere(0.1)")
         X_WB = _IDENTITY if X_WB is None else as_pose(X_WB, "World.add: X_WB")
         identity, row = self._next, len(self._ids)
-        if name is None:
-            name = f"body {identity}"
-        elif not isinstance(name, str) or not name:
-            raise InvalidArgument(f"World.add: name must be a non-empty string, got {checks.brief(name)}")
+        name = _name_or_none("World.add: name", name) or f"body {identity}"
         if name in self._id_of:
             raise InvalidArgument(f'World.add: there is a body named "{name}" already (id {self._id_of[name]})')
-        flags = _flag("static", static), _bits("group", group), _bits("mask", mask)
+        flags = _flag("World.add: static", static), _bits("World.add: group", group), _bits("World.add: mask", mask)
         if row == len(self._X_WBs):
-            for column in ("_X_WBs", "_moved", "_alive", "_asleep", "_margins"):
-                rows = getattr(self, column)
-                setattr(self, column, np.concatenate([rows, np.zeros((max(16, row), *rows.shape[1:]), rows.dtype)]))
+            self._reserve(1)
         self._X_WBs[row], self._margins[row], self._alive[row] = X_WB, margin, True
         self._ids.append(identity)
         self._names.append(name)
@@ -173,6 +174,77 @@ class WorldBodies:
         self._row_of[identity], self._id_of[name] = row, identity
         self._next, self._roster = identity + 1, None
         return identity
+
+    def add_many(self, shapes, X_WBs, names, static, group, mask, margin) -> np.ndarray:
+        """Ids (n,) int64 of new bodies; arguments as of `World.add_many`. Raises InvalidArgument, InvalidPose: then
+        none has been added.
+        """
+        caller = "World.add_many"
+        if isinstance(shapes, Shape):
+            shapes = [shapes]
+        else:
+            shapes = checks.listed_entries(f"{caller}: shapes", shapes, "a shape or a sequence of shapes")
+            if not all(issubclass(kind, Shape) for kind in set(map(type, shapes))):
+                for k, shape in enumerate(shapes):
+                    checked_shape(f"{caller}: shapes[{k}]", shape, "collide.Sphere(0.1)")
+        if not _are_rigid_matrices(X_WBs):
+            X_WBs = as_poses(X_WBs, f"{caller}: X_WBs")
+        n = checks.matched_count(caller, shapes=len(shapes), X_WBs=len(X_WBs))
+        static = _of_each(f"{caller}: static", static, n, _flag)
+        group, mask = _of_each(f"{caller}: group", group, n, _bits), _of_each(f"{caller}: mask", mask, n, _bits)
+        margin = _of_each(f"{caller}: margin", margin, n, checked_margin)
+        row, ids = len(self._ids), range(self._next, self._next + n)
+        names = self._names_of(names, ids, caller)
+        self._reserve(n)
+        rows = slice(row, row + n)
+        self._X_WBs[rows], self._margins[rows], self._alive[rows] = X_WBs, margin, True
+        self._ids.extend(ids)
+        self._names.extend(names)
+        self._shapes.extend(shapes if len(shapes) == n else shapes * n)
+        self._flags.extend(zip(static, group, mask))
+        self._row_of.update(zip(ids, range(row, row + n)))
+        self._id_of.update(zip(names, ids))
+        self._next, self._roster = self._next + n, None
+        return np.arange(ids.start, ids.stop)
+
+    def _names_of(self, names, ids: range, caller: str) -> list[str]:
+        """A name for each of these new ids. Raises InvalidArgument."""
+        if names is None:
+            names = [f"body {identity}" for identity in ids]
+        else:
+            names = checks.listed_entries(f"{caller}: names", names, "a sequence of names, or None")
+            if len(names) != len(ids):
+                raise InvalidArgument(f"{caller}: names must be {len(ids)}, one a body, got {checks.brief(names)}")
+            names = _read(f"{caller}: names", names, _name_or_none)
+            if None in names:
+                names = [f"body {identity}" if name is None else name for name, identity in zip(names, ids)]
+        if len(set(names)) < len(names) or not self._id_of.keys().isdisjoint(names):
+            taken = dict(self._id_of)
+            for k, (name, identity) in enumerate(zip(names, ids)):
+                if taken.setdefault(name, identity) != identity:
+                    raise InvalidArgument(
+                        f'{caller}: names[{k}]: there is a body named "{name}" already (id {taken[name]})'
+                    )
+        return names
+
+    def _reserve(self, n: int) -> None:
+        """Memory for n more bodies at the least."""
+        used = len(self._ids)
+        if used + n > len(self._X_WBs):
+            for column in ("_X_WBs", "_moved", "_alive", "_asleep", "_margins"):
+                rows = getattr(self, column)
+                grown = np.zeros((used + max(n, used, 16), *rows.shape[1:]), rows.dtype)
+                grown[:used] = rows[:used]
+                setattr(self, column, grown)
+
+    def replace(self, identity: int, shape: Shape) -> None:
+        """Give a body another shape. Rosters that were handed out keep the one that it had."""
+        if self._shapes_are_shared:
+            self._shapes, self._shapes_are_shared = list(self._shapes), False
+        self._shapes[self._row_of[identity]] = shape
+        self._made.pop(identity, None)
+        self._generation += 1
+        self._roster = None
 
     def remove(self, identity: int) -> None:
         row = self._row_of.pop(identity)
@@ -242,13 +314,13 @@ class WorldBodies:
         if len(X_WBs) != len(rows):
             named = f"{len(rows)} bodies {checks.brief(bodies)}"
             raise InvalidPose(f"World.set_poses: {named}, but X_WBs {X_WBs.shape} are {len(X_WBs)} poses")
-        self._X_WBs[rows] = X_WBs
+        self._X_WBs.reshape(-1).view(_POSE)[rows] = np.ascontiguousarray(X_WBs).reshape(-1).view(_POSE)
         self._moved[rows] = True
         self._made.clear()
 
     def take_moved(self) -> np.ndarray:
         """Rows of the bodies that moved since this was last called, ascending."""
-        rows = np.flatnonzero(self._moved)
+        (rows,) = self._moved.nonzero()
         self._moved[rows] = False
         return rows
 
@@ -259,10 +331,12 @@ class WorldBodies:
                 bodies = [self.id_of(body, "bodies") for body in bodies]
         n = self._next
         if len(self._row_of) == n == len(self._ids) and len(bodies):  # none was ever removed: ids are rows
-            with contextlib.suppress(OverflowError):
+            try:
                 rows = np.asarray(bodies, dtype=np.int64)
-                if 0 <= rows.min() and rows.max() < n:
-                    return rows
+            except OverflowError:
+                rows = _NO_ROWS
+            if int(rows.view(np.uint64).max()) < n:  # one below 0 is above 2⁶³ there
+                return rows
         return np.array([self._row_of[self.id_of(body, "bodies")] for body in bodies], dtype=np.int64)
 
     def roster(self) -> Roster:
@@ -275,6 +349,7 @@ class WorldBodies:
                 column.extend(rows.rows)
             ids, static, group, mask = (column.rows for column in self._columns)
             alive, margins, asleep = (column[:n].copy() for column in (self._alive, self._margins, self._asleep))
+            self._shapes_are_shared = True
             self._roster = Roster(
                 ids, self._names, self._shapes, static, group, mask, alive, margins, asleep, self._generation
             )
@@ -309,17 +384,48 @@ def _are_rigid_matrices(X) -> bool:
     return type(X) is np.ndarray and are_rigid_matrices(X, SAFE_TOLERANCE, LARGEST)
 
 
-def _flag(field: str, value) -> bool:
+def _name_or_none(what: str, value) -> str | None:
+    if value is not None and (not isinstance(value, str) or not value):
+        raise InvalidArgument(f"{what} must be a non-empty string, got {checks.brief(value)}")
+    return value
+
+
+def _flag(what: str, value) -> bool:
     if value is True or value is False:
         return value
     if isinstance(value, np.bool_) or (isinstance(value, (int, np.integer)) and value in (0, 1)):
         return bool(value)
-    raise InvalidArgument(f"World.add: {field} must be True or False, got {checks.brief(value)}")
+    raise InvalidArgument(f"{what} must be True or False, got {checks.brief(value)}")
 
 
-def _bits(field: str, value) -> int:
+def _bits(what: str, value) -> int:
+    if value.__class__ is int and 0 <= value < 2**_BITS:
+        return value
     if not checks.is_integer(value) or not 0 <= int(value) < 2**_BITS:
-        raise InvalidArgument(
-            f"World.add: {field} must be an integer of up to {_BITS} bits, got {checks.brief(value)}"
-        )
+        raise InvalidArgument(f"{what} must be an integer of up to {_BITS} bits, got {checks.brief(value)}")
     return int(value)
+
+
+def _of_each(what: str, value, n: int, read: Callable[[str, Any], Any]) -> list:
+    """What n bodies have, as ``read(what, value)`` takes it: one for all, or a list, a tuple or an array of each one's.
+    Raises InvalidArgument, which names the place.
+    """
+    if not isinstance(value, (list, tuple)) and not (isinstance(value, np.ndarray) and value.ndim):
+        return [read(what, value)] * n
+    values = value.tolist() if isinstance(value, np.ndarray) else value
+    if len(values) != n:
+        raise InvalidArgument(f"{what} must be one for all bodies or {n}, one a body, got {checks.brief(values)}")
+    if len(kinds := set(map(type, values))) == 1 and kinds <= {bool, int, float}:  # 1 and True are equal, and two kinds
+        distinct = list(set(values))
+        with contextlib.suppress(InvalidArgument):
+            known = dict(zip(distinct, [read(what, entry) for entry in distinct]))
+            return list(map(known.__getitem__, values))
+    return _read(what, values, read)
+
+
+def _read(what: str, values, read: Callable[[str, Any], Any]) -> list:
+    """``read(what, value)`` of each. Raises InvalidArgument, which names the place."""
+    try:
+        return [read(what, value) for value in values]
+    except InvalidArgument:  # told once more by place: to write the places of all down takes as long as to read them
+        return [read(f"{what}[{k}]", value) for k, value in enumerate(values)]

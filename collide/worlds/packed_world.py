@@ -237,8 +237,15 @@ class PackedWorld:
         is_named = np.zeros(len(self.roster.ids), dtype=bool)
         for some in positions:
             is_named[some] = True
-        named = np.flatnonzero(is_named)
-        return BodiesAsTheyStood(self.roster, named, self.X_WBs[named])
+        (named,) = is_named.nonzero()
+        return BodiesAsTheyStood(self.roster, named, self.X_WBs.take(named, axis=0))
+
+    def to_ids(self, rows: np.ndarray) -> BodiesAsTheyStood:
+        """The bodies at the positions that rows name; in the rows, in place, their ids."""
+        a, b = rows["a"].astype(np.intp), rows["b"].astype(np.intp)  # what numpy would make of them at each use
+        bodies = self.bodies_named(a, b)
+        rows["a"], rows["b"] = self.roster.ids[a], self.roster.ids[b]
+        return bodies
 
     def answer(
         self, candidates: np.ndarray, limit: float, *, boolean: bool, stop_at_hit: bool, threads: int = 1
@@ -255,7 +262,7 @@ class PackedWorld:
             if answer.rows["hit"].any():
                 return answer
             rest = self._answer_in_pieces(np.delete(candidates, first, axis=0), limit, boolean, True, threads)
-            return _joined([answer, rest], boolean)
+            return joined([answer, rest], boolean)
         return self._answer_in_pieces(candidates, limit, boolean, stop_at_hit, threads)
 
     def _likeliest(self, candidates: np.ndarray) -> np.ndarray:
@@ -287,7 +294,7 @@ class PackedWorld:
                 first_hit[0] = min(first_hit[0], start)
 
         share(starts, work, threads)
-        return _joined([answers[start] for start in starts if start in answers and start <= first_hit[0]], boolean)
+        return joined([answers[start] for start in starts if start in answers and start <= first_hit[0]], boolean)
 
     def _answer_piece(self, candidates: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> Answer:
         if not self._any_meshed:
@@ -297,7 +304,7 @@ class PackedWorld:
         if stop_at_hit and convex.rows["hit"].any():
             return convex
         of_meshes = self._answer_meshes(candidates[meshed], limit, boolean, stop_at_hit)
-        return _joined([convex, Answer(of_meshes, 0, len(of_meshes), len(of_meshes))], boolean)
+        return joined([convex, Answer(of_meshes, 0, len(of_meshes), len(of_meshes))], boolean)
 
     # --- pairs with a mesh ----------------------------------------------------------------------
 
@@ -364,16 +371,17 @@ class PackedWorld:
             rows = rows_of_pair(A, B, self.X_WBs[a], self.X_WBs[b], limit)
             rows["a"], rows["b"] = a, b
             answers.append(Answer(rows, of_thread.asked - asked, len(rows), 0))
-        return answers[0] if len(answers) == 1 else _joined(answers, boolean)
+        return answers[0] if len(answers) == 1 else joined(answers, boolean)
 
     def _answer_convex(self, candidates: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> Answer:
         parts = self.parts
-        pairs, owner = self._part_trees.near(candidates, limit)
-        rows = run_pairs(
-            parts.table, parts.poses, parts.row_of, pairs, boolean=boolean, limit=limit, stop_at_hit=stop_at_hit
-        )
-        if boolean and parts.all_of_one_part:
+        if parts.all_of_one_part:  # parts are bodies, and their rows those of bodies
+            rows = self._rows_of_parts(candidates, limit, boolean, stop_at_hit)
+            if not boolean:
+                rows["a"], rows["b"] = candidates[:, 0], candidates[:, 1]
             return Answer(rows, len(rows), len(rows), 0)
+        pairs, owner = self._part_trees.near(candidates, limit)
+        rows = self._rows_of_parts(pairs, limit, boolean, stop_at_hit)
         pairs, owner = pairs[: len(rows)], owner[: len(rows)]
         starts = np.flatnonzero(np.diff(owner, prepend=-1))
         if boolean:
@@ -385,8 +393,14 @@ class PackedWorld:
         of_bodies = combine(rows, starts, spans, parts.table, parts.poses, parts.row_of)
         return Answer(of_bodies, len(rows), len(starts), 0)
 
+    def _rows_of_parts(self, pairs: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> np.ndarray:
+        parts = self.parts
+        return run_pairs(
+            parts.table, parts.poses, parts.row_of, pairs, boolean=boolean, limit=limit, stop_at_hit=stop_at_hit
+        )
 
-def _joined(answers: list[Answer], boolean: bool) -> Answer:
+
+def joined(answers: list[Answer], boolean: bool) -> Answer:
     """One answer of several: rows by a and b, but of booleans."""
     rows = np.concatenate([np.zeros(0, dtype=PAIR_DTYPE), *(answer.rows for answer in answers)])
     if not boolean:

@@ -18,7 +18,7 @@ from collide.contact.contact_rows import CONTACT_DTYPE, WorldContacts, no_rows
 from collide.pairs.security_margin import checked_margin, within
 from collide.results import PAIR_DTYPE, WorldResult
 from collide.worlds.minimum import nearest_pair
-from collide.worlds.packed_world import Answer, PackedWorld
+from collide.worlds.packed_world import Answer, PackedWorld, joined
 from collide.worlds.record import QueryRecord
 from collide.worlds.scene import WorldScene
 
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 contact_query = lazy_module("collide.contact.contact_query")
 world_contacts = lazy_module("collide.worlds.contacts")
 world_overlaps = lazy_module("collide.worlds.overlaps")
+#: Rows of `PAIR_DTYPE` without their fields.
+_BYTES = np.dtype((np.void, PAIR_DTYPE.itemsize))
 
 
 class WorldPairs(WorldScene):
@@ -62,7 +64,8 @@ class WorldPairs(WorldScene):
         InvalidArgument; with a margin UnsupportedQuery for pairs that `collide.distance` does not answer.
         """
         margin = checked_margin("World.collides: security_margin", security_margin)
-        return bool(self._answer(margin, check_threads(threads), boolean=True).any())
+        _, hits = self._answer(margin, check_threads(threads), boolean=True)
+        return bool(hits.any())
 
     def collisions(self, *, threads: int = 1) -> WorldResult:
         """Every hitting pair with its depth.
@@ -80,7 +83,7 @@ class WorldPairs(WorldScene):
         ------
         UnsupportedQuery : for pairs that `collide.distance` does not answer; `unanswerable` names them.
         """
-        return self._result(self._answer(0.0, check_threads(threads)))
+        return _result(*self._answer(0.0, check_threads(threads)))
 
     def distances(self, max_distance: float = math.inf, *, threads: int = 1) -> WorldResult:
         """Every tested pair at most ``max_distance`` apart, hits included.
@@ -102,7 +105,7 @@ class WorldPairs(WorldScene):
         them.
         """
         limit = checks.limit("World.distances: max_distance", max_distance)
-        return self._result(self._answer(limit, check_threads(threads), margins=False))
+        return _result(*self._answer(limit, check_threads(threads), margins=False))
 
     def minimum(self, max_distance: float = math.inf, *, threads: int = 1) -> WorldResult:
         """The nearest tested pair: that of the least signed distance, of several the one with the least ids.
@@ -123,7 +126,8 @@ class WorldPairs(WorldScene):
         InvalidArgument; UnsupportedQuery : as of `distances`.
         """
         limit = checks.limit("World.minimum: max_distance", max_distance)
-        return self._result(nearest_pair(self._pack(), limit, check_threads(threads)))
+        packed = self._pack()
+        return _result(packed, nearest_pair(packed, limit, check_threads(threads)))
 
     def contacts(self, margin: float = 0.0, *, max_contacts: int = 8, threads: int = 1) -> WorldContacts:
         """Contacts of every tested pair within a margin; `stats` stays as it is.
@@ -220,8 +224,10 @@ class WorldPairs(WorldScene):
 
     # --- how they are answered ------------------------------------------------------------------
 
-    def _answer(self, limit: float, threads: int, *, boolean: bool = False, margins: bool = True) -> np.ndarray:
-        """Rows of all tested pairs within the limit [m], a and b positions.
+    def _answer(
+        self, limit: float, threads: int, *, boolean: bool = False, margins: bool = True
+    ) -> tuple[PackedWorld, np.ndarray]:
+        """(what was asked, rows of all its tested pairs within the limit [m], a and b positions).
 
         margins : add those of bodies and pairs.   boolean : bool instead, one a pair, up to a hit.
         """
@@ -242,20 +248,22 @@ class WorldPairs(WorldScene):
             if boolean and wanted[-1].any():
                 break
         ended = time.perf_counter()
-        all_rows = np.concatenate([answer.rows for answer in answers]) if len(answers) > 1 else answers[0].rows
+        answer = answers[0] if len(answers) == 1 else joined(answers, boolean=True)
+        rows = answer.rows
         self._last_query = QueryRecord(
-            packed, packed.roster, packed.filters, len(candidates), all_rows["hit"].copy(), all_rows["how"].copy(),
-            all_rows["iterations"].copy(), sum(answer.convex_pairs for answer in answers),
-            sum(answer.body_pairs for answer in answers), sum(answer.mesh_pairs for answer in answers),
-            packed.take_work(),
+            packed, packed.roster, packed.filters, len(candidates), rows["hit"].copy(), rows["how"].copy(),
+            rows["iterations"].copy(), answer.convex_pairs, answer.body_pairs, answer.mesh_pairs, packed.take_work(),
             {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
         )
-        return wanted[0] if len(wanted) == 1 else np.concatenate(wanted) if boolean else _sorted_by_pair(
-            np.concatenate(wanted), PAIR_DTYPE
-        )
+        if len(wanted) == 1:
+            return packed, wanted[0]
+        all_wanted = np.concatenate(wanted)
+        return packed, all_wanted if boolean else _sorted_by_pair(all_wanted, PAIR_DTYPE)
 
-    def _result(self, rows: np.ndarray) -> WorldResult:
-        return WorldResult(rows, self._to_ids(rows), certify)
+
+def _result(packed: PackedWorld, rows: np.ndarray) -> WorldResult:
+    """Of rows whose a and b are positions, in place."""
+    return WorldResult(rows, packed.to_ids(rows), certify)
 
 
 def _by_margin(packed: PackedWorld, pairs: np.ndarray, margin: float) -> Iterator[tuple[np.ndarray | slice, float]]:
@@ -273,9 +281,10 @@ def _by_margin(packed: PackedWorld, pairs: np.ndarray, margin: float) -> Iterato
 def _wanted(packed: PackedWorld, rows: np.ndarray, limit: float, boolean: bool, margins: bool) -> np.ndarray:
     """The rows that a question wants, or of booleans which of all are hits."""
     if not margins:
-        return rows[~(rows["lower"] > limit)]  # what is not proven farther, also where the bracket holds the limit
+        not_farther = ~(rows["lower"] > limit)  # not proven to be, also where the bracket holds the limit
+        return _picked(rows, not_farther)
     if not limit:
-        return rows["hit"].copy() if boolean else rows[rows["hit"]]
+        return rows["hit"].copy() if boolean else _picked(rows, rows["hit"])
     shapes, X_WBs = packed.roster.shapes, packed.X_WBs
 
     def question(k: int):
@@ -283,7 +292,12 @@ def _wanted(packed: PackedWorld, rows: np.ndarray, limit: float, boolean: bool, 
         return shapes[a], shapes[b], X_WBs[a], X_WBs[b]
 
     near = within(rows, limit, question)
-    return near if boolean else rows[near]
+    return near if boolean else _picked(rows, near)
+
+
+def _picked(rows: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Rows (k,) of those that a mask (n,) names, byte by byte: field by field, a few take numpy 10 µs instead of 3."""
+    return rows.view(_BYTES).compress(which).view(PAIR_DTYPE)
 
 
 def _sorted_by_pair(rows: np.ndarray, dtype: np.dtype) -> np.ndarray:

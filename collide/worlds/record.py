@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +13,7 @@ from collide.worlds.bodies import Roster
 from collide.worlds.packed_world import PackedWorld, PairFilters
 
 
-@dataclass(frozen=True)
-class QueryRecord:
+class QueryRecord(NamedTuple):
     """One query of a whole World.
 
     packed : asked for its memory.   work : {what: number} of what was brought up to date for it.

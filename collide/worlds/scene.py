@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from collide.base import argument_checks as checks
 from collide.base.log import log_duration
 from collide.errors import InvalidArgument
 from collide.pairs.security_margin import checked_margin
-from collide.shapes.shape import Shape
-from collide.worlds.bodies import BodiesAsTheyStood, Body, Roster, WorldBodies
+from collide.shapes.shape import Shape, checked_shape
+from collide.worlds.bodies import Body, Roster, WorldBodies
 from collide.worlds.packed_world import PackedWorld, PairFilters
 from collide.worlds.world_part_pairs import updating
 
@@ -64,6 +64,51 @@ class WorldScene:
         if margin.__class__ is not float or margin != 0.0:
             margin = checked_margin("World.add: margin", margin)
         return self._bodies.add(shape, X_WB, name, static, group, mask, margin)
+
+    def add_many(
+        self, shapes: Shape | Sequence[Shape], X_WBs, *, names: Sequence[str | None] | None = None, static=False,
+        group=1, mask=0xFFFF, margin=0.0,
+    ) -> np.ndarray:
+        """Add N bodies at once, as `add` adds them one by one.
+
+        Parameters
+        ----------
+        shapes : any shape, of all, or N of them.
+        X_WBs : (N, 4, 4) their poses in the world W [m], or (4, 4) of all. They are copied.
+        names : (N,) as of `add`, None where a body is to be "body 7" and so on; or None for all.
+        static, group, mask, margin : as of `add`: of all, or lists, tuples or arrays (N,).
+
+        Returns
+        -------
+        (N,) int64 ids, ascending. About 0.7 µs a body, of each one's own name, bits and margin 1 µs; the next query
+        takes 2 µs a body for tables and tree, as after `add`.
+
+        Raises
+        ------
+        InvalidArgument, InvalidPose : naming the argument, the place and the value; nothing is added.
+        """
+        return self._bodies.add_many(shapes, X_WBs, names, static, group, mask, margin)
+
+    def replace(self, body: int | str, shape: Shape) -> None:
+        """Give a body another shape: later questions are answered as if it had been added with it.
+
+        Its id, name, pose, margins, filters and sleep stay. Tables and box-tree are made anew by the next question, in
+        about 2 µs a body of the World, and what another thread is just asking is answered to the end with the shape
+        that it began with: no question sees half of a change. Results keep the shape that they were made with.
+
+        Parameters
+        ----------
+        body : its id or name.
+        shape : any shape.
+
+        Raises
+        ------
+        UnknownBody, InvalidArgument
+        """
+        identity = self._bodies.id_of(body)
+        checked_shape("World.replace: shape", shape)
+        with updating():
+            self._bodies.replace(identity, shape)
 
     def remove(self, body: int | str) -> None:
         """Take a body out, and what was allowed for it.
@@ -288,10 +333,3 @@ class WorldScene:
         order = np.argsort(keys)
         margins = np.fromiter(self._pair_margins.values(), dtype=np.float64)[order]
         return PairFilters(positions(self._allowed), list(self._allowed.values()), keys[order], margins)
-
-    def _to_ids(self, rows: np.ndarray) -> BodiesAsTheyStood:
-        """The bodies at the positions that rows name; in the rows, in place, their ids."""
-        packed = self._pack()
-        bodies = packed.bodies_named(rows["a"], rows["b"])
-        rows["a"], rows["b"] = packed.roster.ids[rows["a"]], packed.roster.ids[rows["b"]]
-        return bodies

@@ -18,6 +18,7 @@ from collide.transforms import as_poses
 from collide.worlds.bodies import Body
 from collide.worlds.hits import WorldHits
 from collide.worlds.outside import answer_outside, questions_of
+from collide.worlds.packed_world import PackedWorld
 from collide.worlds.pairs import WorldPairs
 
 __all__ = ["Body", "World"]
@@ -41,7 +42,7 @@ class World(WorldPairs):
     Packed arrays and the box-tree are made when a query first needs them, and brought up to date by the next query:
     what was added, moved or removed costs as much as there is of it, but for copies of a few bytes a body. Which pairs
     are near is kept from query to query while few bodies change. A World is not safe to change from one thread while
-    another asks.
+    another asks, but by `replace`.
     """
 
     def query(
@@ -85,7 +86,7 @@ class World(WorldPairs):
         rows = rows[~(rows["lower"] > limit)]
         asked = rows["a"].copy()
         rows["a"] = rows["b"]
-        bodies = self._to_ids(rows)
+        bodies = packed.to_ids(rows)
         rows["a"] = -1 - asked
         for k in np.unique(asked).tolist() if n != 1 else [0]:
             name = "query" if n == 1 else f"query {k}"
@@ -174,8 +175,9 @@ class World(WorldPairs):
         origins, directions, _ = cast_arguments.checked_rays("World.raycast", origins_W, directions_W)
         which = casts.checked_filter("World.raycast", group, mask)
         all_hits = checks.true_or_false("World.raycast: all_hits", all_hits)
-        rows, starts = casts.cast_rays(self._pack(), origins, directions, limit, all_hits, which)
-        return self._hits(rows, starts)
+        packed = self._pack()
+        rows, starts = casts.cast_rays(packed, origins, directions, limit, all_hits, which)
+        return _hits(packed, rows, starts)
 
     def shape_cast(
         self, shape: Shape, X_WS, direction_W, *, max_distance: float = math.inf, start_normals: bool = False,
@@ -210,8 +212,10 @@ class World(WorldPairs):
         cast_arguments.refuse_unbounded("World.shape_cast: shape", shape)
         which = casts.checked_filter("World.shape_cast", group, mask)
         X_WS = np.ascontiguousarray(np.broadcast_to(X_WS, (n, 4, 4)))
-        rows = casts.cast_shape(self._pack(), shape, X_WS, directions.repeated(n), limit, which, start_normals)
-        return self._hits(rows)
+        packed = self._pack()
+        return _hits(
+            packed, casts.cast_shape(packed, shape, X_WS, directions.repeated(n), limit, which, start_normals)
+        )
 
     def nearest(
         self, points_W, *, max_distance: float = math.inf, group: int | None = None, mask: int | None = None
@@ -237,12 +241,14 @@ class World(WorldPairs):
         limit = checks.limit("World.nearest: max_distance", max_distance)
         points = cast_arguments.checked_points("World.nearest", "points_W", points_W)
         which = casts.checked_filter("World.nearest", group, mask)
-        return self._hits(casts.nearest_bodies(self._pack(), points, limit, which))
+        packed = self._pack()
+        return _hits(packed, casts.nearest_bodies(packed, points, limit, which))
 
-    def _hits(self, rows: np.ndarray, starts: np.ndarray | None = None) -> WorldHits:
-        """Rows whose bodies are positions, with their ids."""
-        roster = self._pack().roster
-        named = np.unique(rows["body"][rows["body"] >= 0])
-        met = rows["body"] >= 0
-        rows["body"][met] = roster.ids[rows["body"][met]]
-        return WorldHits(rows, {int(roster.ids[k]): roster.names[k] for k in named.tolist()}, starts)
+
+def _hits(packed: PackedWorld, rows: np.ndarray, starts: np.ndarray | None = None) -> WorldHits:
+    """Rows whose bodies are positions, with their ids."""
+    roster = packed.roster
+    named = np.unique(rows["body"][rows["body"] >= 0])
+    met = rows["body"] >= 0
+    rows["body"][met] = roster.ids[rows["body"][met]]
+    return WorldHits(rows, {int(roster.ids[k]): roster.names[k] for k in named.tolist()}, starts)

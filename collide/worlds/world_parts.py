@@ -97,7 +97,8 @@ class WorldParts:
 
     def _numbers_of(self, shapes: Sequence[Shape]) -> np.ndarray:
         """(k,) the number of each shape among the distinct ones; those that are new are added."""
-        distinct = {id(shape): shape for shape in shapes if id(shape) not in self._number_of}
+        keys, number_of = list(map(id, shapes)), self._number_of
+        distinct = {key: shape for key, shape in dict(zip(keys, shapes)).items() if key not in number_of}
         parts = [bounding_parts_of(shape) for shape in distinct.values()]
         row_of = self._rows_of([packed for of_shape in parts for packed, _ in of_shape])
         X_SP = np.array([X for of_shape in parts for _, X in of_shape]).reshape(-1, 4, 4)
@@ -110,9 +111,9 @@ class WorldParts:
         for column, rows in zip(self._shape_parts, (row_of, X_SP, reach, has_own_pose(X_SP))):
             column.extend(rows)
         for key, shape in distinct.items():
-            self._number_of[key] = len(self.shapes)
+            number_of[key] = len(self.shapes)
             self.shapes.append(shape)
-        return np.fromiter((self._number_of[id(shape)] for shape in shapes), dtype=np.int64, count=len(shapes))
+        return np.fromiter(map(number_of.__getitem__, keys), dtype=np.int64, count=len(keys))
 
     def _rows_of(self, packed: list[PackedConvex]) -> np.ndarray:
         """The table row of every convex set; those that are new are added."""

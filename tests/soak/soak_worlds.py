@@ -3,8 +3,9 @@
     python tests/soak/soak_worlds.py --questions 100000 --seed 1
     python tests/soak/soak_worlds.py --seed 1 --world 17          one World again, with what differs
 
-A World of a few bodies is changed (bodies added, moved far and to a hair's breadth of others, replaced and removed, put
-to sleep and woken, allowed, with margins of bodies and of pairs, copied and pickled) and asked everything that a World
+A World of a few bodies is changed (bodies added, one or many at once, moved far and to a hair's breadth of others,
+replaced and removed, given other shapes, put to sleep and woken, allowed, with margins of bodies and of pairs, copied
+and pickled) and asked everything that a World
 offers. What it is to answer comes from pair queries about each two of its bodies, or about a body and what asks from
 outside, and from filters, margins and sleep kept in dictionaries here: no box, tree, bound or cached pair has a say.
 Rows are compared bit by bit, hits of rays and casts within their brackets. A pair whose bracket holds the limit itself
@@ -26,7 +27,7 @@ import pickle
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "oracles"))
@@ -40,6 +41,8 @@ from collide.adapters.live.scene_of_world import scene_of_world
 from collide.reports import report
 from collide.results import PAIR_DTYPE
 
+#: What a body is added with.
+TRAITS = ("static", "group", "mask", "margin")
 #: Changes before questions, questions after them, and steps of a World.
 CHANGES, QUESTIONS, STEPS = 3, 12, 16
 #: Bodies of a World, and how many of them have no end at most.
@@ -157,7 +160,7 @@ class Model:
         what = str(random.choice(CHANGED))
         if len(self.bodies) < FEWEST:
             what = "added"
-        elif what == "added" and len(self.bodies) >= MOST:
+        elif what in ("added", "added many") and len(self.bodies) >= MOST:
             what = "removed"
         getattr(self, f"_{what.replace(' ', '_')}")()
 
@@ -168,21 +171,51 @@ class Model:
         for identity in ids:
             self.bodies[identity].changes.add(what)
 
-    def _added(self, name: str | None = None) -> int:
-        random = self.random
-        n_endless = sum(body.kind in ENDLESS for body in self.bodies.values())
-        n_slow = sum(body.kind in SLOW for body in self.bodies.values())
+    def _shape_beside(self, others: list[Body]) -> tuple[str, collide.Shape]:
+        """(its kind, a shape of a body among others)."""
+        n_endless, n_slow = (sum(body.kind in kinds for body in others) for kinds in (ENDLESS, SLOW))
         left_out = (ENDLESS if n_endless >= MOST_ENDLESS else ()) + (SLOW if n_slow >= MOST_SLOW else ())
-        kind = str(random.choice([kind for kind in WORLD_KINDS if kind not in left_out]))
-        made = shape(kind, 10.0 ** random.uniform(-0.5, 0.3), random)
-        body = Body(
-            kind, made, self._anywhere(), bool(random.uniform() < 0.2), int(random.choice([1, 1, 3, 2])),
-            int(random.choice([3, 3, 1, 2])), self._margin() if random.uniform() < 0.5 else 0.0,
+        kind = str(self.random.choice([kind for kind in WORLD_KINDS if kind not in left_out]))
+        return kind, shape(kind, 10.0 ** self.random.uniform(-0.5, 0.3), self.random)
+
+    def _body_beside(self, others: list[Body]) -> Body:
+        random = self.random
+        return Body(
+            *self._shape_beside(others), self._anywhere(), bool(random.uniform() < 0.2),
+            int(random.choice([1, 1, 3, 2])), int(random.choice([3, 3, 1, 2])),
+            self._margin() if random.uniform() < 0.5 else 0.0,
         )
-        traits = {trait: getattr(body, trait) for trait in ("static", "group", "mask", "margin")}
-        identity = self.world.add(made, body.X, name=name, **traits)
+
+    def _added(self, name: str | None = None) -> int:
+        body = self._body_beside(list(self.bodies.values()))
+        identity = self.world.add(body.shape, body.X, name=name, **{trait: getattr(body, trait) for trait in TRAITS})
         self.bodies[identity] = body
         return identity
+
+    def _added_many(self) -> None:
+        """Each with its own shape and traits, or all with those of the first."""
+        others, bodies = list(self.bodies.values()), []
+        for _ in range(int(self.random.integers(1, 4))):
+            bodies.append(self._body_beside(others + bodies))
+        first, X_WBs = bodies[0], np.array([body.X for body in bodies])
+        if first.kind not in ENDLESS + SLOW and self.random.uniform() < 0.4:
+            bodies = [replace(first, X=body.X, changes=set(first.changes)) for body in bodies]
+            shapes, traits = first.shape, {trait: getattr(first, trait) for trait in TRAITS}
+        else:
+            shapes = [body.shape for body in bodies]
+            traits = {trait: [getattr(body, trait) for body in bodies] for trait in TRAITS}
+        ids = self.world.add_many(shapes, X_WBs, **traits).tolist()
+        self.bodies |= dict(zip(ids, bodies))
+        self._note(ids, "added many")
+
+    def _shape_replaced(self) -> None:
+        """Another shape of the same body."""
+        (identity,) = self.some(1)
+        body = self.bodies[identity]
+        body.kind, body.shape = self._shape_beside([other for other in self.bodies.values() if other is not body])
+        body.version += 1
+        self.world.replace(identity, body.shape)
+        self._note([identity], "shape replaced")
 
     def _margin(self) -> float:
         return float(self.random.choice([0.0, 0.0, 0.02, 0.3])) if self.margins else 0.0
@@ -737,8 +770,8 @@ ASKED: dict[str, tuple[float, Callable[[Model], Iterator[str]]]] = {
 }
 #: Changes.
 CHANGED = (
-    "added", "moved", "moved near", "replaced", "removed", "margin set", "pair margin", "allowed pair", "put to sleep",
-    "woken", "copied",
+    "added", "added many", "moved", "moved near", "replaced", "shape replaced", "removed", "margin set", "pair margin",
+    "allowed pair", "put to sleep", "woken", "copied",
 )
 #: Cells that stay empty, and why: none.
 NEVER: dict[tuple[str, str], str] = {}
