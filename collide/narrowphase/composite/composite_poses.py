@@ -58,7 +58,7 @@ from collide.narrowphase.composite.composite_rows import (
     begin_score,
     close_score,
     copy_row,
-    first_upper_of,
+    first_reach_of,
     separate_bodies,
 )
 from collide.narrowphase.pair_kernel import SIGNATURE
@@ -190,7 +190,7 @@ def _list_others(block, boolean, depths, every):
     while header[SLOT] < header[N_POSES] and n_listed < LIST:
         k = header[SLOT]
         n_pairs = count_pairs(block, k)
-        met = not boolean and not depths and first_upper_of(block.scores, SCORE * k) <= 0.0
+        met = not boolean and not depths and first_reach_of(block.scores, SCORE * k) <= 0.0
         if n_pairs > 1 and not met and slots[SLOT_SIZE * k + FIRST_PAIR] >= 0 and slots[SLOT_SIZE * k + IS_HIT] == 0:
             n_listed = _list_others_of(block, k, boolean, every, n_listed)
         else:
@@ -213,7 +213,7 @@ def _list_others_of(block, k, boolean, every, n_listed):
     if every:
         reach = math.inf
     elif not boolean:
-        reach += max(first_upper_of(block.scores, SCORE * k), 0.0) + _BRACKET * size
+        reach += max(first_reach_of(block.scores, SCORE * k), 0.0) + _BRACKET * size
     first_pair = block.slots[SLOT_SIZE * k + FIRST_PAIR]
     start = header[PAIR]
     for i in range(start // count_b, count_a):
