@@ -6,6 +6,7 @@ cylinder, and of the half-spaces of a hull (Qhull's).
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -60,12 +61,12 @@ def planes(shape: collide.Shape) -> np.ndarray:
     """(m, 4): n · x + c ≤ 0 inside a box or a hull."""
     if isinstance(shape, collide.Box):
         return np.array([[*(s * np.eye(3)[k]), -0.5 * shape.size[k]] for k in range(3) for s in (-1.0, 1.0)])
-    if id(shape) not in _planes:
-        _planes[id(shape)] = Qhull(shape.points).equations
-    return _planes[id(shape)]
+    return _planes_of_hull(shape)
 
 
-_planes: dict[int, np.ndarray] = {}
+@cache  # by the hull's value, and it is held: by its id() a hull made later, where a dropped one stood, had its planes
+def _planes_of_hull(hull: collide.ConvexHull) -> np.ndarray:
+    return Qhull(hull.points).equations
 
 
 def face_down(kind: str, shape: collide.Shape, rng: np.random.Generator) -> np.ndarray:

@@ -16,11 +16,19 @@ from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64
 from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.shape_table import INTS, KIND, NUMBERS, POSE, POSE_SLOP, POSE_STRETCH, RADIUS, REACH, SLOP
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.gjk.minkowski_difference import NEAREST_POINT, POINT, POINT_OF_A, copy_coordinates
 from collide.narrowphase.gjk.simplex import across_simplex, nearest_of_all
 from collide.narrowphase.halfspace_convex import plane_gap
-from collide.narrowphase.posed_pair import OrderedPair, in_order, posed_pair, radius_of, reach_of_both, size_and_slop
+from collide.narrowphase.posed_pair import (
+    OrderedPair,
+    in_order,
+    posed_pair,
+    radius_of,
+    reach_of_both,
+    size_and_slop,
+)
 from collide.numerics.vec3 import (
     Vec3,
     add,
@@ -86,14 +94,20 @@ def clearing_length(parts, first_a, n_a, first_b, n_b, n, start, limit, work_at)
     barred, by `barred_length`.   work : CLEARING doubles of workspace.
 
     A step goes to the farthest length that a pair barred so far is proven to bar at most: all between is barred too, so
-    that the order of pairs has no say. O(parts of A · parts of B) a step.
+    that the order of pairs has no say. O(parts of A · parts of B) comparisons of balls a step.
     """
     length = start
     simplex = _simplex_at(work_at)
+    for k in range(max(n_a, n_b)):  # poses' stretches become known
+        pa, pb = first_a + min(k, n_a - 1), first_b + min(k, n_b - 1)
+        size_and_slop(parts.numbers, parts.poses, parts.shape_of[pa], pa, parts.shape_of[pb], pb)
     for _ in range(n_a * n_b + 1):
         farthest = length
         for pa in range(first_a, first_a + n_a):
+            held = _held_in(parts, pa)
             for pb in range(first_b, first_b + n_b):
+                if _are_balls_apart(parts, pa, pb, n, length.proven, held):
+                    continue
                 pair, line = _pair_and_line(parts, pa, pb, n)
                 if not _apart_at(pair, line, length.proven, simplex):
                     farthest = longer(farthest, _bounded_by_planes(pair, line, simplex))
@@ -110,6 +124,31 @@ def barred_length(parts, pa, pb, n, work_at):
     """The `Length` along n from which on two parts that meet are proven apart."""
     pair, line = _pair_and_line(parts, pa, pb, n)
     return _bounded_by_planes(pair, line, _simplex_at(work_at))
+
+
+@kernel(inline=True)
+def _held_in(parts, part):
+    """The radius of a ball around a part's origin that holds it, as its pose stretches it and rounding moved it [m];
+    infinite of a half-space."""
+    shape = parts.shape_of[part]
+    at, p = NUMBERS * shape, POSE * part
+    held = parts.numbers[at + REACH] * parts.poses[p + POSE_STRETCH] + parts.numbers[at + RADIUS]
+    held += parts.numbers[at + SLOP] + parts.poses[p + POSE_SLOP]
+    return math.inf if parts.ints[INTS * shape + KIND] == HALFSPACE else held
+
+
+@kernel(inline=True)
+def _are_balls_apart(parts, pa, pb, n, tau, held):
+    """Whether B's part moved by τ·n is clear of A's by the balls around both, seen before either is opened.
+
+    held : `_held_in` of A's part [m].   Both are apart where their origins are
+    farther from each other than both balls reach. `_apart_at` asks the same with an error, 2⁻⁴⁶ of a size that is no
+    more than both radii, τ and the distance of the origins: 2⁻³⁶ of these is more, and what is left out here is left
+    out there. Squares that vanish leave nothing out.
+    """
+    apart = add(scale(tau, n), sub(vec3_at(parts.poses, POSE * pb + 9), vec3_at(parts.poses, POSE * pa + 9)))
+    reach = (held + _held_in(parts, pb)) * (1 + 2.0**-36) + 2.0**-36 * tau
+    return dot(apart, apart) > reach * reach * (1 + 2.0**-36) + 1e-290
 
 
 @kernel(inline=True)

@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
-from collide.broadphase.box_tree import BoxTree
+from collide.broadphase.walk_posed_trees import PosedTree
 from collide.lowering.extents import extent_of
 from collide.lowering.facet_bodies import PosesWithSlop, is_halfspace
 from collide.lowering.packed_convex import HALFSPACE, PackedConvex
 from collide.lowering.parts import bounding_parts_of
-from collide.lowering.shape_table import REACH, ShapeTable, moved_pose, pose_table
+from collide.lowering.shape_table import RADIUS, REACH, SLOP, ShapeTable, moved_pose, pose_table
 from collide.narrowphase.bounds import ERROR
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
@@ -235,10 +235,18 @@ class CompoundParts:
         if len(X_WB) > 1 and (X_WB[1:] == X_WB[0]).all():  # one body of a depth search stands still
             return np.repeat(self.boxes(X_WB[:1], which), len(X_WB), axis=0)
         n, k = len(X_WB), len(which)
-        X_BP = np.tile(self._X_BP[which], (n, 1, 1))
-        reach = np.tile(self._table.numbers[which, REACH], n)
-        poses = pose_table(np.repeat(X_WB, k, axis=0), X_BP, reach, terms=False)
-        return boxes_of(self._table, poses.rows, np.tile(which, n)).reshape(n, k, 6)
+        return self.boxes_of(np.tile(which, n), np.repeat(X_WB, k, axis=0)).reshape(n, k, 6)
+
+    def boxes_of(self, which: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+        """(m, 6) the same of parts (m,) by number, each at a pose (m, 4, 4) of its own."""
+        poses = pose_table(X_WB, self._X_BP[which], self._table.numbers[which, REACH], terms=False)
+        return boxes_of(self._table, poses.rows, np.ascontiguousarray(which))
+
+    @cached_property
+    def tree(self) -> PosedTree:
+        """Over the parts' boxes, in the union's frame."""
+        swept = self._table.numbers[:, [RADIUS, SLOP]].sum(axis=1)
+        return PosedTree(self.boxes(IDENTITY[None])[0], float(swept.max()))
 
     @cached_property
     def balls(self) -> Balls:
@@ -291,22 +299,24 @@ def boxes_near(
     """(poses, parts of A, parts of B) whose boxes come within the margin, and a little farther.
 
     Boxes hold the parts where their poses, rounded, put them, and all that the rounding may have moved them: what is
-    apart along an axis by more than the margin is farther apart than that. So many boxes are made at once that they
-    need little memory.
+    apart along an axis by more than the margin is farther apart than that. Of many pairs a walk through both trees
+    leaves most out before: parts that are as near have nodes that are. So many boxes are made at once that they need
+    little memory.
     """
+    if len(A.parts) * len(B.parts) > _MAX_PAIRS:
+        met = [A.tree.pairs_near(B.tree, X, Y, margin) for X, Y in zip(X_WA, X_WB)]
+        pose = np.repeat(np.arange(len(met)), [len(of_pose) for of_pose in met])
+        i, j = np.concatenate([*met, np.zeros((0, 2), dtype=np.int64)]).T
+        a, b = A.boxes_of(i, X_WA[pose]), B.boxes_of(j, X_WB[pose])
+        near = np.maximum(b[:, :3] - a[:, 3:], a[:, :3] - b[:, 3:]).max(axis=1) <= _outwards(a, b, margin)
+        return pose[near], i[near], j[near]
     pairs = [np.zeros((3, 0), dtype=np.int64)]
     step = max(1, _BOXES_AT_ONCE // (len(A.parts) + len(B.parts)))
     for first in range(0, len(X_WA), step):
-        a, b = A.boxes(X_WA[first : first + step]), B.boxes(X_WB[first : first + step])
-        if len(A.parts) * len(B.parts) <= _MAX_PAIRS:
-            ends = a[:, :, None], b[:, None]
-            apart = np.maximum(ends[1][..., :3] - ends[0][..., 3:], ends[0][..., :3] - ends[1][..., 3:]).max(axis=3)
-            near = np.stack(np.nonzero(apart <= _outwards(a, b, margin)))
-            pairs.append(near + np.array([[first], [0], [0]]))
-            continue
-        for k, (boxes_a, boxes_b) in enumerate(zip(a, b), first):
-            met = BoxTree(boxes_b).boxes_met(boxes_a, _outwards(boxes_a, boxes_b, margin))
-            pairs.append(np.stack([np.full(len(met), k), *met.T]))
+        a, b = A.boxes(X_WA[first : first + step])[:, :, None], B.boxes(X_WB[first : first + step])[:, None]
+        apart = np.maximum(b[..., :3] - a[..., 3:], a[..., :3] - b[..., 3:]).max(axis=3)
+        near = np.stack(np.nonzero(apart <= _outwards(a, b, margin)))
+        pairs.append(near + np.array([[first], [0], [0]]))
     pose, i, j = np.concatenate(pairs, axis=1)
     return pose, i, j
 

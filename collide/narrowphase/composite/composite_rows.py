@@ -21,6 +21,7 @@ from collide.narrowphase.composite.clearing_translation import CLEARING, Length,
 from collide.narrowphase.composite.ways_out import MAX_PLANES, PLANE, gather_planes, is_halfspace, way_out
 from collide.narrowphase.posed_pair import in_order
 from collide.narrowphase.rows import (
+    BEYOND,
     CERTIFIED,
     DISTANCE,
     HIT,
@@ -43,10 +44,10 @@ MAX_NORMALS = 8
 _N_AXES = 12
 
 # Doubles of a score, what is known of a pair of bodies from the rows so far: the least distance, the number of its row,
-# ends of the bracket, the least lower end of a row that is not certified, rounds, whether a row is a hit, the upper end
-# of the first row, the number of overlaps kept, and the deepest of them.
+# ends of the bracket, the least lower end of a row that is not certified, rounds, whether a row is a hit, how far other
+# parts have a say by the first row, the number of overlaps kept, and the deepest of them.
 (
-    _LEAST, _NEAREST, _LOWER, _UPPER, _UNCERTIFIED, _GJK, _EPA, _HIT, _FIRST_UPPER, _N_OVERLAPS, _DEEPEST,
+    _LEAST, _NEAREST, _LOWER, _UPPER, _UNCERTIFIED, _GJK, _EPA, _HIT, _SAY, _N_OVERLAPS, _DEEPEST,
 ) = range(11)
 # Of an overlap: its distance, the number of its row, its parts, its normal and both points.
 _DISTANCE, _NUMBER, _OF_A, _OF_B, _VECTORS = range(5)
@@ -85,13 +86,15 @@ def begin_score(score, at):
     score[at + _LOWER] = math.inf
     score[at + _UPPER] = math.inf
     score[at + _UNCERTIFIED] = math.inf
-    score[at + _FIRST_UPPER] = math.inf
+    score[at + _SAY] = math.inf
 
 
 @kernel(inline=True)
-def first_upper_of(score, at):
-    """An upper bound of the bodies' distance, by the row that came first."""
-    return score[at + _FIRST_UPPER]
+def first_reach_of(score, at):
+    """Pairs of parts farther apart have no say, by the row that came first: its upper bound is one of the bodies'
+    distance; beyond the limit it has none, but its lower bound is above the limit, and pairs that are farther apart
+    change neither that nor the least lower bound."""
+    return score[at + _SAY]
 
 
 @kernel(inline=True)
@@ -116,7 +119,7 @@ def add_row(score, at, row_at, number, out_at):
         score[at + _NEAREST] = float(number)
         copy_row(row_at, out_at)
     if nearest < 0.0:
-        score[at + _FIRST_UPPER] = upper
+        score[at + _SAY] = lower if row.flags[BEYOND] != 0 else upper
     score[at + _LOWER] = min(score[at + _LOWER], lower)
     score[at + _UPPER] = min(score[at + _UPPER], upper)
     if row.flags[CERTIFIED] == 0:

@@ -1,0 +1,128 @@
+"""Pairs of boxes of two `BoxTree`s, each in a frame of its own, that come near where the frames are posed.
+
+A tree over the parts of a body is made once: the body moves, and the boxes of its nodes with it. A box with the middle
+c and the half lengths h lies, where R x + p puts it, within |R| h of R c + p along each axis of the world, whatever the
+matrix R. So two posed boxes are farther apart along an axis than their middles are, less both |R| h.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from collide.broadphase.box_tree import BoxTree
+from collide.broadphase.graded_boxes import BODY, LINK, SKIP
+from collide.broadphase.tree_in_memory import tree_in_memory
+from collide.broadphase.walk_boxes import STACK_OF_PAIRS
+from collide.kernels import address_of, entry, kernel, view_f64, view_i64
+
+# Doubles of two frames: both matrices row by row, from A's origin to B's, and how near along each axis is near.
+_OF_B, _SHIFT, _NEAR = 9, 18, 21
+#: More than what rounding takes from sums of so few products, relatively.
+_ROUNDING = 2.0**-39
+
+
+@kernel(inline=True)
+def _are_near(tree_a, a, tree_b, b, frames):
+    """Whether nodes a and b come near along all axes."""
+    p, q = 6 * a, 6 * b
+    for axis in range(3):
+        between = frames[_SHIFT + axis]
+        reach = frames[_NEAR + axis]
+        for k in range(3):
+            r, s = frames[3 * axis + k], frames[_OF_B + 3 * axis + k]
+            between += s * (0.5 * (tree_b[q + k] + tree_b[q + 3 + k])) - r * (0.5 * (tree_a[p + k] + tree_a[p + 3 + k]))
+            reach += abs(r) * (0.5 * (tree_a[p + 3 + k] - tree_a[p + k]))
+            reach += abs(s) * (0.5 * (tree_b[q + 3 + k] - tree_b[q + k]))
+        if abs(between) > reach:
+            return False
+    return True
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64)")
+def posed_boxes_met(a_at, b_at, frames_at, stack_at, pairs_at, capacity):
+    """Pairs (body of A, body of B) whose posed boxes come near; returns how many there are, no filter applies.
+
+    a, b : trees of one section, of which no body has changed.   frames : 24 doubles, as the module says.
+    stack : 2 · STACK_OF_PAIRS integers.   pairs : two integers each, of the first ``capacity``.
+    """
+    A, B = tree_in_memory(a_at), tree_in_memory(b_at)
+    frames = view_f64(frames_at, 24)
+    stack = view_i64(stack_at, 2 * STACK_OF_PAIRS)
+    pairs = view_i64(pairs_at, 2 * capacity)
+    count = top = 0
+    if A.n_nodes > 0 and B.n_nodes > 0 and _are_near(A.nodes, 0, B.nodes, 0, frames):
+        stack[0] = stack[1] = 0
+        top = 1
+    while top > 0:
+        top -= 1
+        a, b = stack[2 * top], stack[2 * top + 1]
+        end_a, end_b = A.links[LINK * a + SKIP], B.links[LINK * b + SKIP]
+        if end_a - a == 1 and end_b - b == 1:
+            if count < capacity:
+                pairs[2 * count] = A.links[LINK * a + BODY]
+                pairs[2 * count + 1] = B.links[LINK * b + BODY]
+            count += 1
+            continue
+        of_a = end_a - a >= end_b - b
+        child, end = (a + 1, end_a) if of_a else (b + 1, end_b)
+        while child < end:
+            near_a, near_b = (child, b) if of_a else (a, child)
+            if _are_near(A.nodes, near_a, B.nodes, near_b, frames):
+                stack[2 * top] = near_a
+                stack[2 * top + 1] = near_b
+                top += 1
+            child = A.links[LINK * child + SKIP] if of_a else B.links[LINK * child + SKIP]
+    return count
+
+
+class PosedTree:
+    """A tree over the parts of a body, in the body's frame.
+
+    boxes : (n, 6) of the parts, which hold their cores, swept.   swept : the largest radius swept over one, with what
+    rounding moved it by; matrices do not stretch it [m].
+    """
+
+    def __init__(self, boxes: np.ndarray, swept: float):
+        self.tree, self._swept, self.n = BoxTree(boxes), swept, len(boxes)
+        ends = self.tree.nodes[: min(self.tree.n_nodes, 1)]
+        self._size = float(np.abs(ends).max(initial=0.0))
+
+    def pairs_near(self, other: PosedTree, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> np.ndarray:
+        """(k, 2) parts of this body and of the other, ascending, at poses (4, 4): all whose boxes in the world come
+        within a margin [m] along every axis, and some that are a little farther. Parts without end are with all others.
+        """
+        frames = np.empty(24)
+        frames[:9], frames[_OF_B:_SHIFT] = X_WA[:3, :3].ravel(), X_WB[:3, :3].ravel()
+        frames[_SHIFT:_NEAR] = X_WB[:3, 3] - X_WA[:3, 3]
+        frames[_NEAR:] = margin * (1.0 + _ROUNDING) + self._beyond(X_WA) + other._beyond(X_WB)
+        stack, capacity = np.empty(2 * STACK_OF_PAIRS, dtype=np.int64), 64 + 4 * (self.n + other.n)
+        headers = address_of(self.tree.header()), address_of(other.tree.header())
+        while True:
+            pairs = np.empty((capacity, 2), dtype=np.int64)
+            count = posed_boxes_met(*headers, address_of(frames), address_of(stack), address_of(pairs), capacity)
+            if count <= capacity:
+                break
+            capacity = count
+        pairs = pairs[:count]
+        without_end = self.tree.unbounded, other.tree.unbounded
+        if len(without_end[0]) or len(without_end[1]):
+            bounded = np.setdiff1d(np.arange(self.n), without_end[0])
+            of_a, of_b = _all_of(without_end[0], np.arange(other.n)), _all_of(bounded, without_end[1])
+            pairs = np.concatenate([pairs, of_a, of_b])
+        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+    def _beyond(self, X: np.ndarray) -> np.ndarray:
+        """(3,) how far parts may reach out of their boxes |R| h in the world.
+
+        A box holds a core and r around it. The matrix moves the core alone: where the sizes of a row of R add up to
+        s < 1, |R| h has r (1 − s) less than the part. Rounding of a pose, and of the walk, is in proportion to what is
+        summed.
+        """
+        row_sums = np.abs(X[:3, :3]).sum(axis=1)
+        terms = row_sums.max() * self._size + float(np.abs(X[:3, 3]).max()) + self._swept
+        return self._swept * np.maximum(1.0 - row_sums, 0.0) + _ROUNDING * terms
+
+
+def _all_of(i: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """(len(i) · len(j), 2) each with each."""
+    return np.stack([np.repeat(i, len(j)), np.tile(j, len(i))], axis=1)
