@@ -34,3 +34,24 @@ def only_class(counts, n_classes, n):
         if counts[c] == n:
             return c
     return -1
+
+
+@kernel
+def order_by_key(keys, items, n, n_keys, starts, ordered):
+    """Put n items in the order of their keys, those of one key as they stood.   keys : of item k at k, below n_keys.
+
+    starts : (n_keys + 1,), out: where the items of a key begin.   ordered : (n,), out.   O(n + n_keys).
+    """
+    for key in range(n_keys + 1):
+        starts[key] = 0
+    for k in range(n):
+        starts[keys[items[k]] + 1] += 1
+    for key in range(n_keys):
+        starts[key + 1] += starts[key]
+    for k in range(n):
+        key = keys[items[k]]
+        ordered[starts[key]] = items[k]
+        starts[key] += 1
+    for key in range(n_keys, 0, -1):
+        starts[key] = starts[key - 1]
+    starts[0] = 0
