@@ -28,16 +28,16 @@ static collide_status make_faces(const collide_shape *shape, struct hull_faces *
     const struct collide_kernels *kernels = kernels_here();
     struct hull_faces *faces;
     struct arena arena;
-    int64_t m[MEASURES], n = shape->ints[COUNT], *memory;
+    int64_t n = shape->ints[COUNT], *memory;
     const double *points;
     void *block = NULL;
     rounding given;
-    if (kernels == NULL || !workspace_sizes(kernels, m)) return COLLIDE_NO_KERNELS;
+    if (kernels == NULL) return COLLIDE_NO_KERNELS;
     if ((faces = calloc(1, sizeof *faces)) == NULL) return COLLIDE_NO_MEMORY;
     given = round_as_kernels_do();
     arena_begin(&arena, NULL, 0);
     points = points_of(shape, &arena);
-    memory = arena_take(&arena, (size_t)(m[M_FACES_EACH] * n + m[M_FACES_FIXED]));
+    memory = arena_take(&arena, (size_t)kernels->faces_memory(n));
     if (!arena.failed && kernels->make_faces(address_of(points), n, address_of(memory)) == 0)
         block = cache_lines((size_t)memory[OF_KEPT] * sizeof(double), &faces->held);
     if (block != NULL) {

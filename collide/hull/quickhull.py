@@ -338,8 +338,9 @@ def grow_hull(points_at, count, memory_at):
     cloud = CloudView(scaled, originals, work, view_i64(digits_at, DIGITS), 0, exponent)
     hull = GrowingHull(
         cloud, view_i32(facets_at, 2 * FACET * capacity), view_f64(planes_at, 2 * PLANE * capacity),
-        view_i64(state_at, STATE), view_i32(at, capacity), view_i32(at + row, capacity), view_i32(at + 2 * row, capacity),
-        view_i32(at + 3 * row, 2 * capacity), view_i32(at + 5 * row, 2 * capacity), view_i32(at + 7 * row, capacity),
+        view_i64(state_at, STATE), view_i32(at, capacity), view_i32(at + row, capacity),
+        view_i32(at + 2 * row, capacity), view_i32(at + 3 * row, 2 * capacity),
+        view_i32(at + 5 * row, 2 * capacity), view_i32(at + 7 * row, capacity),
         view_i32(at + 8 * row, capacity), view_i32(at + 9 * row, capacity),
     )
     corners = view_i64(state_at + 8 * CORNERS, 4)

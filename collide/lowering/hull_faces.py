@@ -1,4 +1,4 @@
-"""Faces of a polytope as contacts need them, made when first asked for and kept with it: `hull_polygons.py` makes them."""
+"""Faces of a polytope as contacts need them, made by `hull_polygons.py` when first asked for, and kept."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
-from collide.lowering.hull_polygons import FACES_EACH, FACES_FIXED, LARGEST, N_DOUBLES, keep_faces, make_faces
+from collide.lowering.hull_polygons import LARGEST, N_DOUBLES, faces_memory, keep_faces, make_faces
 from collide.lowering.packed_convex import POINTS, PackedConvex, on_cache_lines
 from collide.lowering.shape_table import ShapeTable
 
@@ -56,7 +56,7 @@ def hull_faces(points: np.ndarray) -> HullFaces:
     """Faces of the hull of points (n, 3). O(n log n)."""
     points = np.ascontiguousarray(points, dtype=np.float64)
     n = len(points)
-    memory = np.empty((FACES_EACH * n + FACES_FIXED) // 8, dtype=np.int64)
+    memory = np.empty(faces_memory(n) // 8, dtype=np.int64)
     if make_faces(address_of(points), n, address_of(memory)) < 0:
         raise AssertionError("quickhull: the rim of a visible region is no simple cycle")
     block, row = on_cache_lines(int(memory[N_DOUBLES])), np.empty(FACE_INTS, dtype=np.int64)
@@ -65,11 +65,11 @@ def hull_faces(points: np.ndarray) -> HullFaces:
     places = ((row[COLUMNS_AT:] - address_of(block)) // 8).tolist()
     integers = block.view(np.int64)
     columns, ids_at, normals, flatness = places[:4]
-    return HullFaces(
+    return HullFaces._make((
         block[columns:ids_at].reshape(3, padded), integers[ids_at : ids_at + ids],
         block[normals : normals + 3 * faces].reshape(faces, 3), block[flatness : flatness + faces],
         *(integers[i:j] for i, j in zip(places[4:], [*places[5:], len(block)])), int(memory[LARGEST]),
-    )
+    ))
 
 
 def faces_of(packed: PackedConvex) -> HullFaces:

@@ -18,6 +18,14 @@ from collide.hull.quickhull import (
     VERTICES_AT,
     grow_hull,
 )
+from collide.hull.triangle_neighbours import (
+    SIDE_WORDS_FIXED,
+    SIDE_WORDS_OF_POINT,
+    SIDE_WORDS_OF_TRIANGLE,
+    SideWorkspace,
+    find_neighbours,
+    side_workspace,
+)
 from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
 from collide.numerics.counting_sort import order_by_key
 from collide.numerics.vec3 import Vec3, cross, divide, dot, neg, put_vec3, scale, sub, vec3_at
@@ -37,11 +45,6 @@ _BLOCK = 8
 #: corners of a face.
 FACES, CORNERS, IDS, N_DOUBLES, LARGEST = range(5)
 _HEADER = 8
-#: 64-bit numbers of a triangle, and of a point; a hull of n points has fewer than 2 n triangles.
-_OF_TRIANGLE, _OF_POINT = 11 + 9 + 17, 2
-#: Bytes that `make_faces` works in, of each point and besides.
-FACES_EACH = HULL_EACH + 8 * (2 * _OF_TRIANGLE + _OF_POINT)
-FACES_FIXED = HULL_FIXED + 8 * (_HEADER + 2 * _OF_TRIANGLE + _OF_POINT)
 
 
 class _Making(NamedTuple):
@@ -50,7 +53,7 @@ class _Making(NamedTuple):
     points, facets, vertices : of the hull of n points.   header : counts of what has been made.
     units, areas, longest : unit normals, twice the areas, and the longest side of each triangle.
     plane_of : the triangle whose plane each is in, −1 of slivers that are in none yet.
-    beside : the triangle across each side, −1 where none is.   component : the least triangle of the face of each.
+    sides : what is across the sides of triangles.   component : the least triangle of the face of each.
     order, starts : triangles by component.   normals ... corners : of faces, as `hull_faces.HullFaces` has them.
     ahead, behind, face_of, sizes, bent : corners of faces, linked, while some are left out (`_straighten`).
     fan_starts, fans, mark : by vertex.
@@ -64,7 +67,7 @@ class _Making(NamedTuple):
     areas: Any
     longest: Any
     plane_of: Any
-    beside: Any
+    sides: SideWorkspace
     component: Any
     order: Any
     normals: Any
@@ -84,36 +87,65 @@ class _Making(NamedTuple):
 
 
 @kernel
-def _making(points_at, n, memory_at):
-    """Where all stands in memory: a header, the hull, numbers of triangles, of points."""
-    hull_at = memory_at + 8 * _HEADER
-    hull = view_i64(hull_at, 4)
+def _making(points_at, n, memory_at, facets_at, vertices_at):
+    """(where all stands in memory, where it ends): a header, the hull, numbers of triangles, of points.
+
+    A hull of n points has fewer than 2 n triangles.
+    """
     m = 2 * n + 2
-    at = hull_at + HULL_EACH * n + HULL_FIXED
-    return _Making(
-        view_f64(points_at, 3 * n), view_i32(hull[FACETS_AT], 6 * n), view_i32(hull[VERTICES_AT], n),
-        view_i64(memory_at, _HEADER),
+    at = memory_at + 8 * _HEADER + HULL_EACH * n + HULL_FIXED
+    units, areas, longest, plane_of, component, order = (
         view_f64(at, 3 * m), view_f64(at + 24 * m, m), view_i64(at + 32 * m, m), view_i64(at + 40 * m, m),
-        view_i64(at + 48 * m, 3 * m), view_i64(at + 72 * m, m), view_i64(at + 80 * m, m),
-        view_f64(at + 88 * m, 3 * m), view_f64(at + 112 * m, m), view_i64(at + 120 * m, m), view_i64(at + 128 * m, m),
-        view_i64(at + 136 * m, 3 * m),
-        view_i64(at + 160 * m, 3 * m), view_i64(at + 184 * m, 3 * m), view_i64(at + 208 * m, 3 * m),
-        view_i64(at + 232 * m, m), view_f64(at + 240 * m, 3 * m), view_i64(at + 264 * m, 3 * m),
-        view_i64(at + 288 * m, m), view_i64(at + 296 * m, n + 1), view_i64(at + 296 * m + 8 * n + 8, n + 1),
+        view_i64(at + 48 * m, m), view_i64(at + 56 * m, m),
     )
+    at += 64 * m
+    normals, flatness, triangles, starts, corners = (
+        view_f64(at, 3 * m), view_f64(at + 24 * m, m), view_i64(at + 32 * m, m), view_i64(at + 40 * m, m),
+        view_i64(at + 48 * m, 3 * m),
+    )
+    at += 72 * m
+    ahead, behind, face_of, sizes, bent = (
+        view_i64(at, 3 * m), view_i64(at + 24 * m, 3 * m), view_i64(at + 48 * m, 3 * m), view_i64(at + 72 * m, m),
+        view_f64(at + 80 * m, 3 * m),
+    )
+    at += 104 * m
+    fans, class_starts, fan_starts, mark = (
+        view_i64(at, 3 * m), view_i64(at + 24 * m, m), view_i64(at + 32 * m, n + 1),
+        view_i64(at + 32 * m + 8 * n + 8, n + 1),
+    )
+    at += 32 * m + 16 * n + 16
+    making = _Making(
+        view_f64(points_at, 3 * n), view_i32(facets_at, 6 * n), view_i32(vertices_at, n), view_i64(memory_at, _HEADER),
+        units, areas, longest, plane_of, side_workspace(at, n, m), component, order, normals, flatness, triangles,
+        starts, corners, ahead, behind, face_of, sizes, bent, fans, class_starts, fan_starts, mark,
+    )
+    return making, at + 8 * (SIDE_WORDS_OF_TRIANGLE * m + SIDE_WORDS_OF_POINT * n + SIDE_WORDS_FIXED)
+
+
+@kernel
+def _made(points_at, n, memory_at):
+    """The same of a hull that has been made in this memory."""
+    hull = view_i64(memory_at + 8 * _HEADER, 4)
+    return _making(points_at, n, memory_at, hull[FACETS_AT], hull[VERTICES_AT])[0]
+
+
+@entry("int64(int64)")
+def faces_memory(n):
+    """Bytes that `make_faces` works in, of n points."""
+    return _making(0, n, 0, 0, 0)[1]
 
 
 @entry("int64(int64, int64, int64)")
 def make_faces(points_at, n, memory_at):
     """Make the faces of the hull of points (n, 3); −1 where `grow_hull` says so, else 0. O(n log n).
 
-    memory : FACES_EACH·n + FACES_FIXED bytes, out: what `keep_faces` copies; its header first.
+    memory : as many bytes as `faces_memory` says, out: what `keep_faces` copies; its header first.
     """
     hull_at = memory_at + 8 * _HEADER
     dimension = grow_hull(points_at, n, hull_at)
     if dimension < 0:
         return -1
-    making = _making(points_at, n, memory_at)
+    making = _made(points_at, n, memory_at)
     hull, header = view_i64(hull_at, 4), making.header
     for k in range(_HEADER):
         header[k] = 0
@@ -126,7 +158,7 @@ def make_faces(points_at, n, memory_at):
         if dimension == 2:
             _put_two_sides(making, n, n_triangles // 2)
         else:
-            _link_triangles(making, n, n_triangles)
+            find_neighbours(making.facets, n, n_triangles, making.sides)
             _join_coplanar(making, n_triangles, tolerance)
             _put_merged(making, n, n_triangles, tolerance)
         _straighten(making, n, tolerance)
@@ -198,25 +230,6 @@ def _all_off_plane(making, first, last, plane):
 
 
 @kernel
-def _link_triangles(making, n, n_triangles):
-    """Find the triangle across each side: at each vertex, sides that begin there are those of others that end there."""
-    facets, fans, mark = making.facets, making.fans, making.mark
-    for k in range(3 * n_triangles):
-        making.ahead[k] = k
-    order_by_key(facets, making.ahead, 3 * n_triangles, n, making.fan_starts, fans)
-    for vertex in range(n):
-        mark[vertex] = -1
-    for vertex in range(n):
-        for k in range(making.fan_starts[vertex], making.fan_starts[vertex + 1]):
-            side = fans[k]
-            mark[facets[side - side % 3 + (side + 1) % 3]] = side
-        for k in range(making.fan_starts[vertex], making.fan_starts[vertex + 1]):
-            side = fans[k] - fans[k] % 3 + (fans[k] + 2) % 3
-            twin = mark[facets[side]]
-            making.beside[side] = twin // 3 if twin >= 0 and facets[twin] == vertex else -1
-
-
-@kernel
 def _root_of(parent, k):
     while parent[k] != k:
         parent[k] = parent[parent[k]]
@@ -250,7 +263,7 @@ def _join_coplanar(making, n_triangles, tolerance):
     for k in range(n_triangles):
         parent[k] = k
     for side in range(3 * n_triangles):
-        neighbour = making.beside[side]
+        neighbour = making.sides.beside[side]
         if side // 3 < neighbour and _are_coplanar(making, side // 3, neighbour, tolerance):
             _join(parent, side // 3, neighbour)
     joined = 1
@@ -258,10 +271,10 @@ def _join_coplanar(making, n_triangles, tolerance):
         joined = 0
         for k in range(n_triangles):
             for side in range(3):
-                plane = plane_of[making.beside[3 * k + (making.longest[k] + side) % 3]]
+                plane = plane_of[making.sides.beside[3 * k + (making.longest[k] + side) % 3]]
                 if plane_of[k] < 0 and plane >= 0 and _off_plane(making, k, plane) <= tolerance:
                     plane_of[k] = plane
-                    _join(parent, k, making.beside[3 * k + (making.longest[k] + side) % 3])
+                    _join(parent, k, making.sides.beside[3 * k + (making.longest[k] + side) % 3])
                     joined += 1
     for k in range(n_triangles):
         parent[k] = _root_of(parent, k)
@@ -281,7 +294,7 @@ def _put_boundary(making, first, last):
     for i in range(first, last):
         triangle = making.order[i]
         for k in range(3):
-            neighbour = making.beside[3 * triangle + k]
+            neighbour = making.sides.beside[3 * triangle + k]
             if neighbour < 0 or making.component[neighbour] != component:
                 tail = facets[3 * triangle + k]
                 is_simple = is_simple and following[tail] < 0
@@ -385,7 +398,7 @@ def _is_wide(making, triangle, tolerance):
 @kernel
 def _put_two_sides(making, n, half):
     """A flat hull's polygon, and the same seen from behind: the second half of its triangles mirrors the first."""
-    _link_triangles(making, n, half)
+    find_neighbours(making.facets, n, half, making.sides)
     for k in range(half):
         making.order[k] = k
         making.component[k] = 0
@@ -528,7 +541,7 @@ def keep_faces(points_at, n, memory_at, block_at, row_at):
 
     row : FACE_INTS integers, out: counts, and where each array of `hull_faces.HullFaces` stands in the block.
     """
-    making = _making(points_at, n, memory_at)
+    making = _made(points_at, n, memory_at)
     header = making.header
     n_faces, n_corners, n_ids, padded = header[FACES], header[CORNERS], header[IDS], _padded(header)
     row = view_i64(row_at, 14)

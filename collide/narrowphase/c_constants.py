@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collide.hull.quickhull import HULL_EACH, HULL_FIXED
 from collide.kernels import entry, view_i64
-from collide.lowering.hull_polygons import FACES_EACH, FACES_FIXED
 from collide.lowering.shape_table import INTS, NUMBERS, POSE
 from collide.mesh.build_bvh import _DEEPEST_SPLIT as DEEPEST_SPLIT
 from collide.mesh.build_bvh import _RECORD as RECORD
@@ -22,7 +21,6 @@ from collide.narrowphase.facets.exact_triangles import INTEGERS as MESH_INTEGERS
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT
 from collide.narrowphase.pose_batches import BLOCK, HEADER
 from collide.narrowphase.rows import ROW
-from collide.support.candidate_lists import STACK
 from collide.support.coarse_points import COARSE
 
 #: Doubles of a walk along meshes: of whichever takes most.
@@ -32,7 +30,7 @@ _MESH_DOUBLES = max(module.DOUBLES + module.FLOATS for module in (surfaces, dist
 #: box-trees, what is found out about surfaces, rooms of questions about meshes (`native/capi_internal.h`).
 _CONSTANTS = (
     DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE,
-    HULL_EACH, HULL_FIXED, FACES_EACH, FACES_FIXED, STACK,
+    HULL_EACH, HULL_FIXED,
     NODE, SLAB, WIDTH, TREE_INTS, TREE_NUMBERS, RECORD, TREE_WORK, DEEPEST_SPLIT,
     COUNTS, EDGES, SHELLS, OPEN | UNBALANCED | TURNED | ONE_SIDED,
     pairs.HEADER, _MESH_DOUBLES, MESH_INTEGERS, pairs.SCRATCH,
