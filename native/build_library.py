@@ -34,7 +34,7 @@ BUILD = ROOT / "build" / "kernels"
 #: Modules of C in libcollide.
 C_SOURCES = [
     "kernels.c", "capi_arena.c", "capi_blake2b.c", "capi_halfspaces.c", "capi_hpolytope.c",
-    "capi_mesh.c", "capi_mesh_pairs.c", "capi_nesting.c", "capi_pairs.c", "capi_settle.c",
+    "capi_mesh.c", "capi_mesh_pairs.c", "capi_pairs.c", "capi_settle.c",
     "capi_shapes.c", "capi_status.c",
     "capi_surface.c", "capi_tree.c", "capi_bigint.c", "capi_contacts.c", "capi_axis.c", "capi_faces.c",
     "capi_contact_queries.c", "host_mujoco.c", "host_slots.c", "host_terrain.c",
