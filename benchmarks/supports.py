@@ -42,7 +42,7 @@ def measure(options: Options, kind: str, n: int) -> Race:
     hull = convex_hull(points)
 
     def build():
-        return build_support_tree(points, hull.vertices, hull.facets, lambda subset: convex_hull(subset).facets)
+        return build_support_tree(points, hull.vertices, hull.facets)
 
     tree, random = build(), np.random.default_rng(1)
     corners = points[hull.facets[random.integers(0, len(hull.facets), DIRECTIONS // 4)]]

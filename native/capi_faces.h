@@ -15,29 +15,12 @@ enum { ROUND_CORNERS = 8 };
 struct hull_faces {
     int64_t ints[FACE_INTS];
     int64_t largest; /* most corners of a face, at least ROUND_CORNERS */
-    void *held[2];
+    void *held;
 };
 
 /* The faces of a shape that any number of threads may ask about: made by the first of them, and kept with it; NULL of shapes that are
    no hulls. */
 collide_status faces_of(const collide_shape *shape, const struct hull_faces **faces);
 void free_faces(struct hull_faces *faces);
-
-/* What is made of a hull on the way: triangles, then polygons. */
-struct making {
-    struct arena arena;
-    struct hull hull;
-    const double *points; /* (n, 3) */
-    int64_t n;
-    double *units, *areas, tolerance; /* of triangles */
-    int64_t *longest;                 /* side of each: 0 from its first corner to its second */
-    unsigned char *wide;              /* whether each is no sliver */
-    int64_t n_faces, n_corners;
-    double *normals, *flatness; /* of faces */
-    int64_t *triangles, *starts, *corners;
-};
-
-/* capi_polygons.c: faces of the hull of `points`, into arrays of the arena. */
-void put_polygons(struct making *making);
 
 #endif

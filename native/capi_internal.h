@@ -38,8 +38,8 @@ enum { STACK_OF_MESHES = 8 * (2 * 136 + 4), HEAP_OF_MESHES = 1 << 14 };
 
 /* What `write_constants` writes (collide/narrowphase/c_constants.py). */
 enum {
-    M_DOUBLES, M_INTEGERS, M_REQUESTS_AT, M_WORKSPACE, M_BLOCK, M_HEADER, M_INTS, M_NUMBERS, M_POSE, M_ROW, M_COARSE, M_APICES,
-    M_HULL_DIGITS, M_WORK, M_FACET, M_PLANE, M_STATE, M_STACK,
+    M_DOUBLES, M_INTEGERS, M_REQUESTS_AT, M_WORKSPACE, M_BLOCK, M_HEADER, M_INTS, M_NUMBERS, M_POSE, M_ROW, M_COARSE,
+    M_HULL_EACH, M_HULL_FIXED,
     M_NODE, M_SLAB, M_WIDTH, M_TREE_INTS, M_TREE_NUMBERS, M_RECORD, M_TREE_WORK, M_DEEPEST_SPLIT,
     M_COUNTS, M_EDGES, M_SHELLS, M_NOT_CLOSED,
     M_MESH_HEADER, M_MESH_DOUBLES, M_MESH_INTEGERS, M_MESH_SCRATCH, MEASURES
@@ -53,7 +53,6 @@ static inline int64_t address_of(const void *place) { return (int64_t)(intptr_t)
 
 /* --- shapes -------------------------------------------------------------------------------------------------------- */
 
-struct support_tree;
 struct mesh_workspace;
 struct hull_faces;
 struct manifold_space;
@@ -64,7 +63,7 @@ struct collide_shape {
     unsigned char content[16]; /* digest of the numbers: it orders the bodies of a pair */
     double *points;            /* (n, 3), of hulls; else NULL */
     void *block;               /* holds coordinates and coarse points */
-    struct support_tree *tree; /* NULL where there is none */
+    void *tree;                /* NULL where there is none */
     struct hull_faces *volatile faces; /* NULL until contacts are asked for (capi_faces.h) */
 };
 
@@ -81,10 +80,7 @@ collide_status shape_of_points(const double *points, size_t n, double radius, do
 
 /* capi_tree.c: a support tree of n points (n, 3), which are kept; *tree stays NULL where the hull is too small for
    one. lowest : exponent of the lowest bit of the coordinates. */
-collide_status build_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest,
-                          struct support_tree **tree);
-int64_t tree_address(const struct support_tree *tree);
-void free_tree(struct support_tree *tree);
+collide_status build_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest, void **tree);
 
 /* capi_halfspaces.c: settles a row of two half-spaces whose normals are opposite within rounding. poses : rows of POSE.
    workspace : HALFSPACES_BYTES. */

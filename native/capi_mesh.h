@@ -28,11 +28,6 @@ struct surface {
 collide_status look_at_surface(const struct collide_kernels *kernels, const double *vertices, int64_t n, const int32_t *faces,
                                int64_t n_facets, struct surface *surface);
 
-/* Whether all shells of negative volume are walls of cavities (capi_nesting.c). scaled : the vertices times a power of two,
-   below 1. signs : of the shells' volumes. */
-int are_cavities(const struct collide_kernels *kernels, struct arena *arena, const struct surface *surface,
-                 const double *vertices, const double *scaled, int64_t n, const int8_t *signs);
-
 /* capi_shapes.c: the root of a sum of three squares, correctly rounded. */
 double root_of_squares(double x, double y, double z);
 

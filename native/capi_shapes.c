@@ -92,7 +92,7 @@ static collide_status build_support_tree(collide_shape *shape, size_t n)
     collide_status status;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
     status = build_tree(kernels, shape->points, n, shape->ints[LOWEST], &shape->tree);
-    if (shape->tree != NULL) shape->ints[TREE] = tree_address(shape->tree);
+    shape->ints[TREE] = address_of(shape->tree);
     return status;
 }
 
@@ -142,7 +142,7 @@ static collide_status shape_of_numbers(int kind, const double *params, size_t n,
 void collide_shape_free(collide_shape *shape)
 {
     if (shape == NULL) return;
-    free_tree(shape->tree);
+    free(shape->tree);
     free_faces(shape->faces);
     free(shape->points);
     free(shape->block);

@@ -1,14 +1,9 @@
 /* Whether facets close and enclose something: `survey_surface` of collide/mesh/mesh_survey.py, so far as a solid needs
    it. */
 #include "capi_mesh.h"
-#include "capi_bigint.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-/* As in collide/mesh/shell_volumes.py: errors of a term of a volume, of a sum, and of what underflows. */
-static const double TERM_ERROR = 1.7763568394002505e-15, UNIT = 1.1102230246251565e-16;
-#define UNDERFLOW_OF_TERMS ldexp(1.0, -1000)
 
 /* Corners by the first vertex of the same coordinates. */
 static void weld(const struct collide_kernels *kernels, struct arena *arena, const double *vertices, int64_t n,
@@ -26,65 +21,24 @@ static void weld(const struct collide_kernels *kernels, struct arena *arena, con
     for (k = 0; k < 3 * surface->n_facets; k++) surface->corners[k] = first[faces[k]];
 }
 
-/* Sign of the volume that a shell encloses, exactly. */
-static int exact_sign(struct arena *arena, const double *vertices, const struct surface *surface, int32_t shell)
-{
-    struct arena sums;
-    struct bigint total = bigint_of(arena, 0.0);
-    int64_t f;
-    arena_begin(&sums, NULL, 0);
-    for (f = 0; f < surface->n_facets; f++) {
-        struct mark mark = arena_mark(arena), nothing = {NULL, NULL, 0, 0};
-        struct bigint v[9], next = total;
-        int i;
-        if (surface->shells[f] != shell) continue;
-        for (i = 0; i < 9; i++) v[i] = bigint_of(arena, vertices[3 * (int64_t)surface->corners[3 * f + i / 3] + i % 3]);
-        for (i = 0; i < 3; i++) { /* a . (b x c) */
-            int j = (i + 1) % 3, k = (i + 2) % 3;
-            struct bigint across = bigint_difference(arena, bigint_product(arena, v[3 + j], v[6 + k]),
-                                                   bigint_product(arena, v[3 + k], v[6 + j]));
-            next = bigint_sum(arena, next, bigint_product(arena, v[i], across));
-        }
-        arena_return(&sums, nothing);
-        total = bigint_copy(&sums, next);
-        arena_return(arena, mark);
-    }
-    if (sums.failed) arena->failed = 1;
-    arena_end(&sums);
-    return total.sign;
-}
-
-/* Whether an inside can be told of a surface that closes. */
+/* Whether an inside can be told of a surface that closes: a shell of positive volume, and none inside out. */
 static int encloses(const struct collide_kernels *kernels, struct arena *arena, const double *vertices, int64_t n,
                     const struct surface *surface)
 {
-    int64_t n_shells = surface->n_shells, k;
-    double *scaled = arena_take(arena, (size_t)(3 * n) * 8), largest = 0.0;
-    double *six = arena_take(arena, (size_t)n_shells * 8), *sizes = arena_take(arena, (size_t)n_shells * 8);
-    int32_t *first = arena_take(arena, (size_t)n_shells * 4), *members = arena_take(arena, (size_t)n_shells * 4);
-    int8_t *signs = arena_take(arena, (size_t)n_shells);
-    int exponent, positive = 0, negative = 0;
+    int64_t shells = surface->n_shells, k;
+    double *volumes = arena_take(arena, (size_t)shells * 8);
+    int32_t *signs = arena_take(arena, (size_t)shells * 4), *wrong = arena_take(arena, (size_t)shells * 4);
+    void *memory = arena_take(arena, (size_t)kernels->shells_memory(n, surface->n_facets, shells));
+    int positive = 0, any_wrong = 0;
     if (arena->failed) return 0;
-    for (k = 0; k < 3 * n; k++)
-        if (fabs(vertices[k]) > largest) largest = fabs(vertices[k]);
-    frexp(largest, &exponent);
-    for (k = 0; k < 3 * n; k++) scaled[k] = ldexp(vertices[k], -exponent);
-    for (k = 0; k < n_shells; k++) {
-        six[k] = sizes[k] = 0.0;
-        first[k] = -1;
-        members[k] = 0;
+    kernels->judge_shells(address_of(vertices), n, address_of(surface->corners), surface->n_facets,
+                          address_of(surface->shells), shells, address_of(volumes), address_of(signs), address_of(wrong),
+                          address_of(memory));
+    for (k = 0; k < shells; k++) {
+        positive = positive || signs[k] > 0;
+        any_wrong = any_wrong || wrong[k];
     }
-    kernels->sum_volumes(address_of(scaled), n, address_of(surface->corners), surface->n_facets, address_of(surface->shells),
-                         n_shells, address_of(first), address_of(members), address_of(six), address_of(sizes));
-    for (k = 0; k < n_shells; k++) {
-        double margin = sizes[k] * 2.0 * (TERM_ERROR + UNIT * members[k]) + UNDERFLOW_OF_TERMS * members[k];
-        int sign = six[k] > 0.0 ? 1 : six[k] < 0.0 ? -1 : 0;
-        if (fabs(six[k]) <= margin) sign = exact_sign(arena, vertices, surface, (int32_t)k);
-        signs[k] = (int8_t)sign;
-        positive = positive || sign > 0;
-        negative = negative || sign < 0;
-    }
-    return positive && (!negative || are_cavities(kernels, arena, surface, vertices, scaled, n, signs));
+    return positive && !any_wrong;
 }
 
 static void look(const struct collide_kernels *kernels, struct arena *arena, const double *vertices, int64_t n,

@@ -67,7 +67,7 @@ UNITS = {
     "facets": ("narrowphase.facets.",),
     "motion": ("casts.", "motion."),
     "exact": ("narrowphase.exact.",),
-    "meshes": ("mesh.", "solids.", "hull."),
+    "meshes": ("mesh.", "solids.", "hull.", "lowering."),
     "worlds": ("broadphase.", "robots.", "support.", "numerics."),
 }
 
@@ -87,7 +87,7 @@ APART = (
     "contact.support_face.support_face", "contact.curved_manifolds._put_patches",
     "contact.curved_patches.grow_over", "contact.patch_rows.choose_points", "contact.clearing_length._facets_part",
     "casts.portal.cast_line", "casts.cut_parts.cut_part", "motion.kept_axis.gap_along",
-    "motion.convex_impact.search_contact",
+    "motion.convex_impact.search_contact", "hull.quickhull.grow_hull",
 )
 
 

@@ -102,7 +102,7 @@ def operations(n: int, seed: int) -> float:
     """Vertices that a settled support query looks at, the mean over random directions."""
     points = sphere(n, seed)
     hull = convex_hull(points)
-    tree = build_support_tree(points, hull.vertices, hull.facets, lambda subset: convex_hull(subset).facets)
+    tree = build_support_tree(points, hull.vertices, hull.facets)
     counters = np.zeros(COUNTERS, dtype=np.int64)
     extreme_vertices(tree, np.random.default_rng([1, n]).normal(size=(DIRECTIONS, 3)), True, counters)
     return float(counters[0] + counters[2]) / DIRECTIONS  # scanned in the nodes' lists, and looked at on the climb

@@ -6,11 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.hull.first_simplex import APICES
-from collide.hull.growing_hull import FACET, PLANE, STATE
-from collide.hull.quickhull import quickhull
+from collide.hull.quickhull import HULL_EACH, HULL_FIXED, quickhull
 from collide.kernels import address_of
-from collide.numerics.orientation import DIGITS, WORK
 
 
 class Hull(NamedTuple):
@@ -42,29 +39,13 @@ def convex_hull(points: np.ndarray) -> Hull:
         raise ValueError(f"at most {2**26 - 1} points, got {len(points_given)}")
     if not np.isfinite(points_given).all():
         raise ValueError(f"points[{int(np.argmin(np.isfinite(points_given).all(axis=1)))}] is not finite")
-    count = len(points_given)
-    capacity = count + APICES
-    originals = np.empty((capacity, 3))
-    originals[:count] = points_given
-    doubles = np.empty(3 * capacity + WORK + 2 * PLANE * capacity)
-    integers = np.empty(DIGITS + STATE, dtype=np.int64)
-    ids = np.empty((2 * FACET + 16) * capacity, dtype=np.int32)
-
-    work, digits, row = address_of(doubles), address_of(integers), 4 * capacity
-    following = address_of(ids)
-    scaled = work + 8 * WORK
-    # In rows of one int32 a point: following, orphans, starting, owner, order, region (2), rim (2), fan,
-    # surface (6), facets.
-    dimension = quickhull(
-        count, address_of(originals), scaled, work, digits, following + 16 * row, scaled + 24 * capacity,
-        following, following + row, following + 2 * row, following + 3 * row, following + 4 * row,
-        following + 5 * row, following + 7 * row, following + 9 * row, following + 10 * row, digits + 8 * DIGITS,
-    )
-    surface = ids[10 * capacity : 16 * capacity].reshape(-1, 3)
+    points = np.ascontiguousarray(points_given)
+    memory = np.empty(HULL_EACH * len(points) + HULL_FIXED, dtype=np.uint8)
+    dimension = quickhull(address_of(points), len(points), address_of(memory))
     if dimension < 0:
         raise AssertionError("quickhull: the rim of a visible region is no simple cycle")
-    facets = surface[: integers[DIGITS]].copy()
-    if dimension == 2:
-        facets = np.concatenate([facets, facets[:, ::-1]])
-    vertices = np.flatnonzero(ids[2 * capacity : 3 * capacity]).astype(np.int32)
-    return Hull(int(dimension), vertices, facets)
+    n_facets, n_vertices, facets_at, vertices_at = memory[:32].view(np.int64).tolist()
+    start = address_of(memory)
+    facets = memory[facets_at - start :][: 12 * n_facets].view(np.int32).reshape(-1, 3)
+    vertices = memory[vertices_at - start :][: 4 * n_vertices].view(np.int32)
+    return Hull(int(dimension), vertices.copy(), facets.copy())

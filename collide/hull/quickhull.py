@@ -302,41 +302,78 @@ def grow(hull, count, n_orphans):
             return False
 
 
-@entry(f"int64({', '.join(['int64'] * 17)})")
-def quickhull(
-    count, originals_at, points_at, work_at, digits_at, facets_at, planes_at, following_at, orphans_at, starting_at,
-    owner_at, order_at, region_at, rim_at, fan_at, surface_at, state_at,
-):
-    """The dimension of a cloud; its facets are left in ``surface``, their number in state[0], corners marked.
+#: Bytes that `grow_hull` works in, of each point and besides. A header; doubles: the points, the points scaled, WORK,
+#: planes; integers: digits, the state; 32-bit integers: facets, eleven rows of one a point, and the surface, six.
+HULL_EACH = 8 * (3 + 3 + 2 * PLANE) + 4 * (2 * FACET + 10 + 6)
+HULL_FIXED = APICES * HULL_EACH + 8 * (4 + WORK + DIGITS + STATE)
+#: Integers of the header: how many facets and vertices, and where their rows stand.
+N_FACETS, N_VERTICES, FACETS_AT, VERTICES_AT = range(4)
 
-    All buffers hold APICES points more than the cloud has. ``starting`` receives the marks: 1 for points
-    that are corners of the hull, else 0; of a segment or a point too. −1: the rim of a region was no
-    simple cycle, which exact tests exclude. Buffers come one by one, since C makes them, too.
+
+@kernel
+def grow_hull(points_at, count, memory_at):
+    """The dimension of a cloud of points (count, 3); −1: the rim of a region was no simple cycle, which exact tests
+    exclude.
+
+    memory : HULL_EACH·count + HULL_FIXED bytes. Its header tells where facets (f, 3) stand, of flat clouds both sides,
+    and the vertices in order, two of a segment, of a point one; 32-bit integers, rows of the points.
     """
     capacity = count + APICES
-    originals, points = view_f64(originals_at, 3 * capacity), view_f64(points_at, 3 * capacity)
+    header = view_i64(memory_at, 4)
+    originals_at = memory_at + 32
+    scaled_at = originals_at + 24 * capacity
+    work_at = scaled_at + 24 * capacity
+    planes_at = work_at + 8 * WORK
+    digits_at = planes_at + 16 * PLANE * capacity
+    state_at = digits_at + 8 * DIGITS
+    facets_at = state_at + 8 * STATE
+    at = facets_at + 8 * FACET * capacity
+    row = 4 * capacity
+    cloud_points = view_f64(points_at, 3 * count)
+    originals, scaled = view_f64(originals_at, 3 * capacity), view_f64(scaled_at, 3 * capacity)
     work = view_f64(work_at, WORK)
-    exponent = np.int64(survey(originals, points, count, work))
-    cloud = CloudView(points, originals, work, view_i64(digits_at, DIGITS), 0, exponent)
+    for k in range(3 * count):
+        originals[k] = cloud_points[k]
+    exponent = np.int64(survey(originals, scaled, count, work))
+    cloud = CloudView(scaled, originals, work, view_i64(digits_at, DIGITS), 0, exponent)
     hull = GrowingHull(
         cloud, view_i32(facets_at, 2 * FACET * capacity), view_f64(planes_at, 2 * PLANE * capacity),
-        view_i64(state_at, STATE), view_i32(following_at, capacity), view_i32(owner_at, capacity),
-        view_i32(orphans_at, capacity), view_i32(region_at, 2 * capacity), view_i32(rim_at, 2 * capacity),
-        view_i32(fan_at, capacity), view_i32(starting_at, capacity), view_i32(order_at, capacity),
+        view_i64(state_at, STATE), view_i32(at, capacity), view_i32(at + row, capacity),
+        view_i32(at + 2 * row, capacity), view_i32(at + 3 * row, 2 * capacity),
+        view_i32(at + 5 * row, 2 * capacity), view_i32(at + 7 * row, capacity),
+        view_i32(at + 8 * row, capacity), view_i32(at + 9 * row, capacity),
     )
     corners = view_i64(state_at + 8 * CORNERS, 4)
-    starting = hull.starting
+    vertices, surface = hull.starting, view_i32(at + 10 * row, 6 * capacity)
+    header[N_FACETS] = 0
+    header[N_VERTICES] = 0
+    header[FACETS_AT] = at + 10 * row
+    header[VERTICES_AT] = at + 8 * row
     dimension = first_simplex(cloud, count, corners)
-    for k in range(capacity):
-        starting[k] = 0
-    if dimension < 2:
-        starting[corners[0]] = 1
-        starting[corners[1]] = 1
-        hull.state[0] = 0
-        return dimension
-    if not grow(hull, count, begin(hull, count, corners)):
+    if dimension >= 2 and not grow(hull, count, begin(hull, count, corners)):
         return -1
     for k in range(capacity):
-        starting[k] = 0
-    hull.state[0] = write_surface(hull, count, view_i32(surface_at, 6 * capacity))
+        vertices[k] = 0
+    if dimension >= 2:
+        header[N_FACETS] = write_surface(hull, count, surface)
+    else:
+        vertices[corners[0]] = 1
+        vertices[corners[1]] = 1
+    if dimension == 2:
+        half = header[N_FACETS]
+        for k in range(3 * half):
+            surface[3 * half + k] = surface[k - k % 3 + (2 - k % 3)]
+        header[N_FACETS] = 2 * half
+    n_vertices = 0
+    for k in range(count):
+        if vertices[k] == 1:
+            vertices[n_vertices] = k
+            n_vertices += 1
+    header[N_VERTICES] = n_vertices
     return dimension
+
+
+@entry("int64(int64, int64, int64)")
+def quickhull(points_at, count, memory_at):
+    """`grow_hull`, for callers outside kernels."""
+    return grow_hull(points_at, count, memory_at)

@@ -9,8 +9,8 @@ import numpy as np
 from collide.kernels import address_of
 from collide.mesh import mesh_topology as topology
 from collide.mesh.mesh_topology import COLLAPSED, COUNTS, ONE_SIDED, OPEN, TURNED, UNBALANCED
-from collide.mesh.shell_nesting import inside_out
-from collide.mesh.shell_volumes import Shells, shell_volumes, without_area
+from collide.mesh.shell_nesting import judge_shells, shells_memory
+from collide.mesh.shell_volumes import without_area
 from collide.mesh.weld import weld
 
 # Further flags of a facet; the first ones stand in `mesh_topology.py`.
@@ -86,9 +86,13 @@ def survey_surface(vertices: np.ndarray, faces: np.ndarray) -> Survey:
 
 
 def _with_volumes(vertices: np.ndarray, survey: Survey) -> Survey:
-    parts = Shells(survey.corners, survey.shells, survey.n_shells)
-    volumes, signs = shell_volumes(vertices, parts)
-    wrong = inside_out(vertices, parts, signs)
+    points, n, n_facets, n_shells = np.ascontiguousarray(vertices), len(vertices), len(survey.corners), survey.n_shells
+    volumes, signs, wrong = np.empty(n_shells), *np.empty((2, n_shells), dtype=np.int32)
+    memory = np.empty(shells_memory(n, n_facets, n_shells) // 8 + 1, dtype=np.int64)
+    judge_shells(
+        address_of(points), n, address_of(survey.corners), n_facets, address_of(survey.shells), n_shells,
+        address_of(volumes), address_of(signs), address_of(wrong), address_of(memory),
+    )
     of_shell = np.where(wrong, INSIDE_OUT, 0) | np.where(signs == 0, EMPTY, 0)
     survey.flags[:] |= np.where(survey.shells >= 0, of_shell[survey.shells], 0).astype(np.int32)
-    return survey._replace(volumes=volumes, signs=signs)
+    return survey._replace(volumes=volumes, signs=signs.astype(np.int8))

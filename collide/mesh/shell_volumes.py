@@ -5,9 +5,12 @@ Both are computed in doubles with an error bound, and in integers where that lea
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_f64, view_i32
+from collide.numerics.digits import BITS, add_double, add_product, carry, grid_of, lowest_bit, set_zero
 from collide.numerics.vec3 import absolute, cross, dot, sub, vec3_at
 
 #: A term of a volume is the product of three rounded differences, eight roundings deep at most; twice that.
@@ -29,48 +32,6 @@ def scaled_to_one(vertices: np.ndarray) -> tuple[np.ndarray, int]:
     """The vertices times 2^-e with the largest coordinate in [1/2, 1), and e."""
     exponent = int(np.frexp(np.abs(vertices).max())[1])
     return np.ascontiguousarray(np.ldexp(vertices, -exponent)), exponent
-
-
-class Shells:
-    """Facets by shell: sorted once, so that the facets of one shell are found without a look at the others.
-
-    corners : (f, 3) int32.   shells : (f,) int32, the shell of each facet, −1 for none.   n : how many shells.
-    """
-
-    def __init__(self, corners: np.ndarray, shells: np.ndarray, n: int):
-        self.corners, self.shells, self.n = corners, shells, n
-        self.order = np.argsort(shells, kind="stable")
-        self.starts = np.searchsorted(shells[self.order], np.arange(n + 1))
-
-    def __getitem__(self, shell: int) -> np.ndarray:
-        """(k, 3) corners of a shell's facets, in the order of the facets."""
-        return self.corners[self.order[self.starts[shell] : self.starts[shell + 1]]]
-
-
-def shell_volumes(vertices: np.ndarray, parts: Shells) -> tuple[np.ndarray, np.ndarray]:
-    """(volumes, signs) of closed shells, (parts.n,) each; the signs are exact.   vertices : (n, 3)."""
-    n = parts.n
-    scaled, exponent = scaled_to_one(vertices)
-    six, sizes = np.zeros(n), np.zeros(n)
-    members, first = np.zeros(n, dtype=np.int32), np.full(n, -1, dtype=np.int32)
-    sum_volumes(
-        address_of(scaled), len(vertices), address_of(parts.corners), len(parts.corners), address_of(parts.shells), n,
-        address_of(first), address_of(members), address_of(six), address_of(sizes),
-    )
-    margin = sizes * 2.0 * (_TERM_ERROR + _UNIT * members) + _UNDERFLOW * members
-    signs = np.sign(six).astype(np.int8)
-    for shell in np.flatnonzero(np.abs(six) <= margin).tolist():
-        signs[shell] = _exact_sign(vertices, parts[shell])
-    with np.errstate(over="ignore", under="ignore"):
-        volumes = np.ldexp(six / 6.0, 3 * exponent)
-    return np.where(signs == 0, 0.0, volumes), signs
-
-
-def _exact_sign(vertices: np.ndarray, corners: np.ndarray) -> int:
-    """Sign of the volume that closed facets enclose, in Python integers."""
-    a, b, c = _exact_corners(vertices, corners)
-    total = int((a * np.cross(b, c)).sum())
-    return (total > 0) - (total < 0)
 
 
 def _exact_corners(vertices: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
@@ -102,32 +63,82 @@ def permanent(u, v, w):
     return size + u.z * (abs(v.x * w.y) + abs(w.x * v.y))
 
 
-@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def sum_volumes(points_at, n, corners_at, n_facets, shells_at, n_shells, first_at, members_at, six_at, sizes_at):
-    """Six times the volume of every shell, seen from a corner of its first facet, and its terms' magnitudes summed.
+@kernel
+def put_volumes(points, scaled, corners, parts, digits, six, signs):
+    """Six times the volume of each shell, of the scaled points, and its exact sign.
 
-    first, six, sizes : of every shell that corner, −1 at first; the volume and the magnitudes, 0 at first.
-    members : out, the facets of every shell counted.
+    A volume is summed in doubles, seen from a corner of the shell's first facet, and in integers where an error bound
+    leaves its sign open.   parts : facets by shell: their order, and where each shell begins there.
     """
-    points = view_f64(points_at, 3 * n)
-    corners = view_i32(corners_at, 3 * n_facets)
-    shells = view_i32(shells_at, n_facets)
-    first = view_i32(first_at, n_shells)
-    members = view_i32(members_at, n_shells)
-    six = view_f64(six_at, n_shells)
-    sizes = view_f64(sizes_at, n_shells)
-    for f in range(n_facets):
-        s = shells[f]
-        if s >= 0:
-            if first[s] < 0:
-                first[s] = corners[3 * f]
-            origin = vec3_at(points, 3 * first[s])
-            a = sub(vec3_at(points, 3 * corners[3 * f]), origin)
-            b = sub(vec3_at(points, 3 * corners[3 * f + 1]), origin)
-            c = sub(vec3_at(points, 3 * corners[3 * f + 2]), origin)
-            six[s] += dot(a, cross(b, c))
-            sizes[s] += permanent(a, b, c)
-            members[s] += 1
+    for shell in range(len(signs)):
+        first, end = parts.starts[shell], parts.starts[shell + 1]
+        origin = vec3_at(scaled, 3 * corners[3 * parts.order[first]])
+        total = 0.0
+        size = 0.0
+        for k in range(first, end):
+            f = 3 * parts.order[k]
+            a = sub(vec3_at(scaled, 3 * corners[f]), origin)
+            b = sub(vec3_at(scaled, 3 * corners[f + 1]), origin)
+            c = sub(vec3_at(scaled, 3 * corners[f + 2]), origin)
+            total += dot(a, cross(b, c))
+            size += permanent(a, b, c)
+        n = end - first
+        six[shell] = total
+        signs[shell] = 1 if total > 0.0 else -1 if total < 0.0 else 0
+        if abs(total) <= size * 2.0 * (_TERM_ERROR + _UNIT * n) + _UNDERFLOW * n:
+            signs[shell] = _exact_sign(points, corners, parts, first, end, digits)
+
+
+@kernel
+def _exact_sign(points, corners, parts, first, end, digits):
+    """Sign of the volume that closed facets enclose, in integers of digits."""
+    lowest = 2000
+    highest = -2000
+    for k in range(first, end):
+        for j in range(3):
+            lowest, highest = span_of(points, corners[3 * parts.order[k] + j], lowest, highest)
+    if lowest == 2000:
+        return 0
+    grid = grid_of(lowest)
+    n = (highest - BITS * grid) // BITS + 2
+    minor, total = 9 * n, 11 * n
+    n_total = 3 * n + 3  # a sum of up to 2²⁸ facets
+    set_zero(digits, total, n_total)
+    for k in range(first, end):
+        for cell in range(9):
+            set_zero(digits, cell * n, n)
+            vertex = corners[3 * parts.order[k] + cell // 3]
+            add_double(digits, cell * n, points[3 * vertex + cell % 3], grid)
+            carry(digits, cell * n, n)
+        add_determinant(digits, 0, 3 * n, 6 * n, n, minor, total)
+        carry(digits, total, n_total)
+    return carry(digits, total, n_total)
+
+
+@kernel
+def span_of(points, vertex, lowest, highest):
+    """(lowest, highest) exponent of a bit of a point's coordinates and of what came before."""
+    for axis in range(3):
+        x = points[3 * vertex + axis]
+        lowest = min(lowest, lowest_bit(x))
+        if x != 0.0:
+            highest = max(highest, math.frexp(x)[1])
+    return lowest, highest
+
+
+@kernel
+def add_determinant(digits, u, v, w, n, minor, total):
+    """Add the determinant of three vectors of n digits a component to a number of 3 n digits and more.
+
+    minor : 2 n digits of workspace.   All are carried, the sum is not.
+    """
+    for k in range(3):
+        i, j = ((k + 1) % 3) * n, ((k + 2) % 3) * n
+        set_zero(digits, minor, 2 * n)
+        add_product(digits, minor, v + i, n, w + j, n, 1)
+        add_product(digits, minor, v + j, n, w + i, n, -1)
+        carry(digits, minor, 2 * n)
+        add_product(digits, total, u + k * n, n, minor, 2 * n, 1)
 
 
 @entry("void(int64, int64, int64, int64, int64)")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.hull.first_simplex import APICES
-from collide.hull.growing_hull import FACET, PLANE, STATE
+from collide.hull.quickhull import HULL_EACH, HULL_FIXED
 from collide.kernels import entry, view_i64
 from collide.lowering.shape_table import INTS, NUMBERS, POSE
 from collide.mesh.build_bvh import _DEEPEST_SPLIT as DEEPEST_SPLIT
@@ -24,9 +23,6 @@ from collide.narrowphase.facets.exact_triangles import INTEGERS as MESH_INTEGERS
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT
 from collide.narrowphase.pose_batches import BLOCK, HEADER
 from collide.narrowphase.rows import ROW
-from collide.numerics.orientation import DIGITS as HULL_DIGITS
-from collide.numerics.orientation import WORK
-from collide.support.candidate_lists import STACK
 from collide.support.coarse_points import COARSE
 
 #: Doubles of a walk along meshes: of whichever takes most.
@@ -35,9 +31,8 @@ _MESH_DOUBLES = max(module.DOUBLES + module.FLOATS for module in (surfaces, dist
 #: In this order: rooms of the narrowphase, layouts, rooms of hulls and of support trees; layouts and rooms of
 #: box-trees, what is found out about surfaces, rooms of questions about meshes (`native/capi_internal.h`).
 _CONSTANTS = np.array([
-    DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE, APICES, HULL_DIGITS,
-    WORK,
-    FACET, PLANE, STATE, STACK,
+    DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE,
+    HULL_EACH, HULL_FIXED,
     NODE, SLAB, WIDTH, TREE_INTS, TREE_NUMBERS, RECORD, TREE_WORK, DEEPEST_SPLIT,
     COUNTS, EDGES, SHELLS, OPEN | UNBALANCED | TURNED | ONE_SIDED,
     pairs.HEADER, _MESH_DOUBLES, MESH_INTEGERS, pairs.SCRATCH,

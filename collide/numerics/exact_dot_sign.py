@@ -79,7 +79,7 @@ def _sign_of_long_sum(x, y, z, u, v, w):
 
 @kernel
 def exact_sign(a, b, g):
-    """Sign of (a − b)·g. The direction must lie in the range of `support_tree.exact_range`."""
+    """Sign of (a − b)·g. The direction must lie in the range of `tree_layout.write_range`."""
     d = difference(a, b)
     x = two_product(d.x.high, g.x)
     y = two_product(d.y.high, g.y)

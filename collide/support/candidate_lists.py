@@ -1,4 +1,4 @@
-"""Kernels that make a support tree: neighbours in cyclic order, and the candidates of coarse vertices.
+"""Kernels that make a support tree: the candidates of coarse vertices.
 
 Let W be a set of points in convex position and V a subset. In direction g the extreme point of V may be
 v, that of W is w: then w has to stand in the list of v. That is so for some g exactly if the normal cone
@@ -11,173 +11,38 @@ vertices of V that are extreme somewhere along its arc. No coarse hull is inters
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
-from collide.numerics.vec3 import Vec3, absolute, add, cross, divide, dot, max_abs, put_vec3, scale, sub, vec3_at
+from collide.kernels import kernel, view_i64
+from collide.numerics.vec3 import Vec3, absolute, add, cross, dot, scale, sub, vec3_at
+from collide.support.rings import differ, unit
 from collide.support.support_tree_query import Lists, descend_lists
 
 #: Arcs are followed between points this fraction inside their ends. At the ends themselves, which are facet
 #: normals, many coarse vertices may tie (those around the cap of a prism, say), and only the arc tells which
 #: of them are extreme for directions of any extent.
 _INSET = 2.0**-20
-#: Facets whose unit normals differ less are taken for one: the arc between them is nothing but rounding.
-SAME_NORMAL = 1e-12
 #: At most so many directions are asked about along one arc. What is left out then costs a climbing step in queries.
 _LONGEST_ARC = 4096
 #: Intervals of one arc that may be on the stack.
 STACK = 512
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def order_rings(
-    points_at, n, facets_at, n_facets, starts_at, ring_at, ring_facets_at, following_at, place_at, normals_at
-):
-    """Fill starts (n + 1), ring and ring_facets (3·n_facets) and unit normals (n_facets, 3).
-
-    Ring place i of a vertex holds neighbour i and the facet between neighbours i and i + 1. Returns 0; 1 where
-    two facets have the same directed edge, as both sides of a flat hull may; 2 where the surface is not closed
-    or a vertex joins several sheets. place (n) ends as the number of edges at a vertex whose facets have
-    different normals: fewer than 3 make no corner. following (6·n_facets) is workspace. O(n_facets).
-    """
-    points = view_f64(points_at, 3 * n)
-    facets = view_i32(facets_at, 3 * n_facets)
-    starts = view_i32(starts_at, n + 1)
-    ring = view_i32(ring_at, 3 * n_facets)
-    ring_facets = view_i32(ring_facets_at, 3 * n_facets)
-    following = view_i32(following_at, 6 * n_facets)
-    place = view_i32(place_at, n)
-    normals = view_f64(normals_at, 3 * n_facets)
-    for i in range(n + 1):
-        starts[i] = 0
-    for i in range(3 * n_facets):
-        starts[facets[i] + 1] += 1
-    for i in range(n):
-        starts[i + 1] += starts[i]
-        place[i] = starts[i]
-    for facet in range(n_facets):
-        _unit_normal(points, facets, facet, normals)
-        for k in range(3):
-            vertex = facets[3 * facet + k]
-            slot = place[vertex]
-            place[vertex] += 1
-            ring[slot] = facets[3 * facet + (k + 1) % 3]
-            following[2 * slot] = facets[3 * facet + (k + 2) % 3]
-            following[2 * slot + 1] = facet
-    for i in range(n):
-        place[i] = -1
-    for vertex in range(n):
-        status = _order_ring(starts[vertex], starts[vertex + 1], ring, ring_facets, following, place)
-        if status != 0:
-            return status
-    for vertex in range(n):
-        place[vertex] = _bends(normals, ring_facets, starts[vertex], starts[vertex + 1])
-    return 0
-
-
 @kernel
-def _bends(normals, ring_facets, begin, end):
-    """How many edges of a ring have facets of different normals on their sides."""
-    bends = 0
-    for k in range(begin, end):
-        p = 3 * ring_facets[k - 1 if k > begin else end - 1]
-        q = 3 * ring_facets[k]
-        if _differ(vec3_at(normals, p), vec3_at(normals, q)):
-            bends += 1
-    return bends
-
-
-@kernel
-def _differ(p, q):
-    """Whether two unit normals are those of different planes."""
-    return max_abs(sub(p, q)) > SAME_NORMAL
-
-
-@kernel
-def _order_ring(begin, end, ring, ring_facets, following, place):
-    """Bring one ring into cyclic order; ``place`` finds the slot of a neighbour."""
-    for slot in range(begin, end):
-        neighbour = ring[slot]
-        if begin <= place[neighbour] < end:
-            return 1
-        place[neighbour] = slot
-    slot = begin
-    for i in range(begin, end):
-        if not begin <= slot < end or (slot == begin and i > begin):
-            return 2
-        # The slot's neighbour is the follower of the slot before it: ``ring`` may be overwritten.
-        follower = following[2 * slot]
-        ring_facets[i] = following[2 * slot + 1]
-        slot = place[follower]
-        ring[i] = follower
-    if end > begin and slot != begin:
-        return 2
-    # What was written is one place late: turn it back.
-    if end > begin:
-        last = ring[end - 1]
-        for i in range(end - 1, begin, -1):
-            ring[i] = ring[i - 1]
-        ring[begin] = last
-    return 0
-
-
-@kernel
-def _unit_normal(points, facets, facet, normals):
-    """Outward unit normal, or 0 where rounding leaves nothing of it."""
-    a = vec3_at(points, 3 * facets[3 * facet])
-    b = vec3_at(points, 3 * facets[3 * facet + 1])
-    c = vec3_at(points, 3 * facets[3 * facet + 2])
-    put_vec3(normals, 3 * facet, _unit(cross(sub(b, a), sub(c, a))))
-
-
-@kernel
-def _unit(v):
-    """v of length 1; zeros where it has none."""
-    largest = max_abs(v)
-    if not largest > 0.0:
-        return Vec3(0.0, 0.0, 0.0)
-    scaled = divide(v, largest)
-    length = math.sqrt(dot(scaled, scaled))
-    return divide(scaled, length) if length > 0.0 else Vec3(0.0, 0.0, 0.0)
-
-
-@entry(
-    "int64(int64, int64, int64, int64, int64, int64, int64, int64, int64,"
-    " int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)"
-)
-def candidate_lists(
-    points_at, n, fine_at, n_fine, starts_at, ring_at, ring_facets_at, normals_at, n_facets,
-    nodes_at, entries_at, coordinates_at, n_nodes, depth, coarse_at, n_coarse, first_node,
-    pairs_at, capacity, list_starts_at, work_at,
-):
+def candidate_lists(points, n, fine, n_fine, rings, lists, coarse, n_coarse, first_node, space):
     """Candidate lists of ``n_coarse`` vertices among ``n_fine`` ones; returns how many pairs were met.
 
-    fine : rows of the fine vertices; rings and facet normals as `order_rings` gives them, which may know more
-    vertices: those are no candidates.
-    nodes, entries, coordinates, depth : the tree so far; ``depth`` scans end at node first_node + i for
-    coarse vertex i, row coarse[i].
-    pairs : ``capacity`` pairs of integers, out. Where more are met nothing is made: call again with more.
-    list_starts : (n_coarse + 1), out; the rows of list i end up at pairs[list_starts[i] : list_starts[i + 1]].
-    work : n + capacity + 2·STACK doubles of workspace.   Arguments are flat: entries are called by address, from C too.
+    fine : rows of the fine vertices.   rings : their `Rings`, which may know more vertices: those are no candidates.
+    lists : the tree so far, whose scans end at node first_node + i for coarse vertex i, row coarse[i].
+    space : a `ListWorkspace`. The rows of list i end up at pairs[list_starts[i] : list_starts[i + 1]]; where more than
+        space.capacity pairs are met nothing is made.
     """
-    fine = view_i32(fine_at, n_fine)
-    starts = view_i32(starts_at, n + 1)
-    ring = view_i32(ring_at, starts[n])
-    ring_facets = view_i32(ring_facets_at, starts[n])
-    normals = view_f64(normals_at, 3 * n_facets)
-    nodes = view_i32(nodes_at, n_nodes + 1)
-    lists = Lists(nodes, view_i32(entries_at, nodes[n_nodes]), view_f64(coordinates_at, 3 * nodes[n_nodes]), depth)
-    stamp = view_i32(work_at + 16 * STACK, n)
-    known = view_i32(work_at + 16 * STACK + 4 * n, n)
-    rows = view_i32(work_at + 16 * STACK + 8 * n, 2 * capacity)
-    list_starts = view_i32(list_starts_at, n_coarse + 1)
-    points = view_f64(points_at, 3 * n)
+    starts, ring, ring_facets, normals = rings.starts, rings.ring, rings.ring_facets, rings.normals
+    stamp, known = space.stamp, space.known
     search = ArcSearch(
-        points, lists, view_i32(coarse_at, n_coarse), first_node, _sizes(points, fine, n_fine),
-        view_f64(work_at, 2 * STACK), stamp, view_i32(pairs_at, 2 * capacity), capacity,
+        points, lists, coarse, first_node, _sizes(points, fine, n_fine), space.stack, stamp, space.pairs, space.capacity
     )
     for i in range(n):
         stamp[i] = -1
@@ -198,9 +63,25 @@ def candidate_lists(
                 before = ring_facets[k - 1 if k > begin else end - 1]
                 p, q = vec3_at(normals, 3 * before), vec3_at(normals, 3 * ring_facets[k])
                 n_pairs = _follow_edge(search, n_pairs, Edge(np.int64(a), np.int64(b), known[b] != 0), p, q)
-    if n_pairs <= capacity:
-        _sort_pairs(search.pairs, n_pairs, n, n_coarse, list_starts, stamp, rows)
+    if n_pairs <= space.capacity:
+        _sort_pairs(search.pairs, n_pairs, n, n_coarse, space.list_starts, stamp, space.rows)
     return n_pairs
+
+
+class ListWorkspace(NamedTuple):
+    """Where `candidate_lists` works, for n points and at most ``capacity`` pairs.
+
+    pairs : (2 capacity,), and list_starts : (n + 1,), out.   rows : (capacity,).   stamp, known : (n,).
+    stack : (2 STACK,) doubles.
+    """
+
+    pairs: Any
+    list_starts: Any
+    rows: Any
+    stamp: Any
+    known: Any
+    stack: Any
+    capacity: int
 
 
 class ArcSearch(NamedTuple):
@@ -265,7 +146,7 @@ def _follow_edge(search, n_pairs, edge, p, q):
         return _follow_arc(search, n_pairs, edge, p, q)
     # An arc of 90° and more, up to the 180° of a flat hull's border: through the outward normal.
     e = sub(vec3_at(search.points, 3 * edge.b), vec3_at(search.points, 3 * edge.a))
-    middle = _unit(cross(e, sub(q, p)))
+    middle = unit(cross(e, sub(q, p)))
     n_pairs = _follow_arc(search, n_pairs, edge, p, middle)
     return _follow_arc(search, n_pairs, edge, middle, q)
 
@@ -277,7 +158,7 @@ def _follow_arc(search, n_pairs, edge, p, q):
     Between two directions with different owners both are equally far in one direction: who is farthest
     there either is one of them, and nobody comes between, or splits the interval in two.
     """
-    if not _differ(q, p):
+    if not differ(q, p):
         return n_pairs
     d = sub(q, p)
     no_counters = view_i64(0, 0)

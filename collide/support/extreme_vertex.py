@@ -18,7 +18,7 @@ import numpy as np
 from collide.kernels import kernel, view_f64, view_i32, view_i64
 from collide.numerics.exact_dot_sign import exact_sign, product_and_bound, scaled_into_range
 from collide.numerics.vec3 import cross, dot, max_abs, sub, vec3_at
-from collide.support.support_tree import (
+from collide.support.tree_layout import (
     AT_POINTS,
     AT_RANGE,
     AT_RING,

@@ -48,6 +48,6 @@ def _built(points: np.ndarray) -> SupportTree | None:
     if hull.dimension < 2 or len(hull.vertices) < MIN_VERTICES:
         return None
     try:
-        return build_support_tree(points, hull.vertices, hull.facets, lambda subset: convex_hull(subset).facets)
+        return build_support_tree(points, hull.vertices, hull.facets)
     except ValueError:  # a hull so degenerate that no order of neighbours is certain: it is scanned
         return None

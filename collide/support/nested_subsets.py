@@ -9,46 +9,75 @@ much longer.
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-#: Cells of the curve along each axis, as a power of two.
-_BITS = 16
+from collide.kernels import kernel
+from collide.numerics.counting_sort import order_by_merging
+from collide.numerics.vec3 import Vec3, divide, norm1, vec3_at
+
+#: Cells of the curve along each axis, a power of two.
+_CELLS = 1 << 16
 
 
-def nested_order(vertices: np.ndarray, normals: np.ndarray, late: np.ndarray, sizes: list[int]) -> np.ndarray:
-    """The vertices so ordered that the first ``sizes[k]`` of them are subset k; sizes fall, the first is of all.
+@kernel
+def nested_order(vertices, normals, late, n, sizes, first_size, n_sizes, places, scratch, ordered):
+    """Put n vertices into ``ordered`` so that the first sizes[first_size + k] of them are subset k; sizes fall from n.
 
-    normals : (h, 3), a direction in which each vertex is extreme; of any length, 0 where there is none.
-    late : (h,) bool: vertices that only enter a subset when no others are left.
-    O(h log h), always the same.
+    normals : (n, 3), a direction in which each vertex is extreme; of any length, 0 where there is none.
+    late : (n,) not 0: vertices that only enter a subset when no others are left.   places, scratch : (n,) of workspace.
+    O(n log n), always the same.
     """
-    along = np.argsort(_place_on_curve(normals), kind="stable")
-    along = np.concatenate([along[~late[along]], along[late[along]]])
-    ordered: list[np.ndarray] = []
-    free = len(vertices) - int(late.sum())
-    for size in sizes[1:]:
-        places = ((np.arange(size) + 0.5) * (max(free, size) / size)).astype(np.int64)
-        ordered.insert(0, np.delete(along, places))
-        along, free = along[places], size
-    return vertices[np.concatenate([along, *ordered])]
+    along = ordered
+    free = 0
+    for k in range(n):
+        # Those that are late come behind the end of the curve.
+        places[k] = _place_on_curve(vec3_at(normals, 3 * k)) + (0 if late[k] == 0 else _CELLS * _CELLS)
+        free += 1 if late[k] == 0 else 0
+    order_by_merging(places, n, along, scratch)
+    n_remaining = n
+    for level in range(1, n_sizes):
+        size = sizes[first_size + level]
+        step = float(max(free, size)) / float(size)
+        n_taken = 0
+        n_left = 0
+        for k in range(n_remaining):
+            if n_taken < size and k == int((float(n_taken) + 0.5) * step):
+                scratch[n_taken] = along[k]
+                n_taken += 1
+            else:
+                scratch[size + n_left] = along[k]
+                n_left += 1
+        # What is left stands between the subset and what the finer ones have left before.
+        for k in range(n_remaining):
+            along[k] = scratch[k]
+        n_remaining = size
+        free = size
+    for k in range(n):
+        ordered[k] = vertices[ordered[k]]
 
 
-def _place_on_curve(directions: np.ndarray) -> np.ndarray:
-    """(n,) int64: how far along the Hilbert curve each direction stands."""
-    size = np.abs(directions).sum(axis=1)
-    x, y, z = (directions / np.where(size > 0, size, 1.0)[:, None]).T
-    outer = z < 0  # the lower half is folded out over the corners of the square
-    u = np.where(outer, np.copysign(1 - np.abs(y), x), x)
-    v = np.where(outer, np.copysign(1 - np.abs(x), y), y)
-    cells = 1 << _BITS
-    column, row = (np.clip((w + 1) * (0.5 * cells), 0, cells - 1).astype(np.int64) for w in (u, v))
-    place = np.zeros(len(directions), dtype=np.int64)
-    half = cells >> 1
+@kernel
+def _place_on_curve(direction):
+    """How far along the Hilbert curve a direction stands."""
+    size = norm1(direction)
+    d = divide(direction, size if size > 0.0 else 1.0)
+    if d.z < 0.0:  # the lower half is folded out over the corners of the square
+        d = Vec3(math.copysign(1.0 - abs(d.y), d.x), math.copysign(1.0 - abs(d.x), d.y), d.z)
+    column, row = _cell_of(d.x), _cell_of(d.y)
+    place = 0
+    half = _CELLS >> 1
     while half > 0:
-        right, upper = (column & half) > 0, (row & half) > 0
-        place = 4 * place + np.where(right, np.where(upper, 2, 3), upper)
-        mirrored = right & ~upper
-        column, row = (np.where(mirrored, cells - 1 - w, w) for w in (column, row))
-        column, row = np.where(upper, column, row), np.where(upper, row, column)
+        right, upper = column & half > 0, row & half > 0
+        place = 4 * place + ((2 if upper else 3) if right else (1 if upper else 0))
+        if right and not upper:
+            column = _CELLS - 1 - column
+            row = _CELLS - 1 - row
+        if not upper:
+            column, row = row, column
         half >>= 1
     return place
+
+
+@kernel
+def _cell_of(w):
+    return int(min(max((w + 1.0) * (0.5 * _CELLS), 0.0), _CELLS - 1.0))

@@ -9,20 +9,14 @@ row of the given points. Neighbours stand in cyclic order, counter-clockwise fro
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from collide.kernels import address_of
 from collide.numerics.lowest_bits import lowest_exponents
+from collide.support.tree_layout import FEWEST, exact_range
 
-#: Header entries: how many of what, then addresses.
-(POINTS, DEPTH, NODES, ENTRIES, LINKS, AT_NODES, AT_ENTRIES, AT_LIST_COORDINATES, AT_RING_STARTS, AT_RING, AT_RANGE,
- FLAT, AT_POINTS, HEADER) = range(14)
 #: No coordinate may be larger in size: products with a direction, and their halves, stay finite.
 LARGEST_COORDINATE = 2.0**480
-#: Fewest entries of a list: a block of the scan.
-FEWEST = 8
 _PARTS = ("nodes", "owners", "entries", "ring_starts", "ring")
 
 
@@ -42,14 +36,16 @@ class SupportTree:
     """
 
     def __init__(self, points, flat, depth, nodes, owners, entries, list_coordinates, ring_starts, ring):
-        self.points = _checked_points(points)
+        self.points = checked_points(points)
         self.flat, self.depth = bool(flat), int(depth)
         self.nodes, self.owners, self.entries, self.ring_starts, self.ring = (
             np.ascontiguousarray(part, dtype=np.int32) for part in (nodes, owners, entries, ring_starts, ring)
         )
         self.list_coordinates = np.ascontiguousarray(list_coordinates, dtype=np.float64).reshape(-1)
         self._check_structure()
-        self.range = exact_range(self.points)
+        self.range = np.empty(3)
+        lowest = int(lowest_exponents(self.points.ravel()))
+        exact_range(address_of(self.points), len(self.points), lowest, address_of(self.range))
         self.header = np.array(
             [len(self.points), self.depth, len(self.nodes) - 1, len(self.entries), len(self.ring),
              *(address_of(part) for part in (
@@ -125,20 +121,7 @@ def coordinate_places(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.arange(nodes[-1]) + np.repeat(2 * nodes[:-1], lengths), np.repeat(lengths, lengths)
 
 
-def exact_range(points: np.ndarray) -> np.ndarray:
-    """(3,) [least, largest, target]: a direction whose components lie between them (or are 0) is settled exactly.
-
-    Products of a component with differences of coordinates, and the rounding errors of these products,
-    are then doubles. Other directions are first scaled so that their largest component is near target.
-    """
-    lowest = int(lowest_exponents(points.ravel()))
-    highest = int(np.frexp(np.abs(points).max())[1])
-    least = max(-1020, -1020 - lowest)
-    largest = min(900, 960 - highest)
-    return np.array([math.ldexp(1.0, min(least, 1020)), math.ldexp(1.0, largest), float(largest - 1)])
-
-
-def _checked_points(points) -> np.ndarray:
+def checked_points(points) -> np.ndarray:
     points = np.ascontiguousarray(points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
         raise ValueError("points must be (n, 3) and finite")

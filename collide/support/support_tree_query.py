@@ -18,7 +18,8 @@ from collide.kernels import address_of, entry, kernel, view_f64, view_i32, view_
 from collide.numerics.vec3 import Vec3, vec3_at
 from collide.support.block_scan import farthest_listed
 from collide.support.extreme_vertex import SCANNED, climb
-from collide.support.support_tree import (
+from collide.support.support_tree import SupportTree
+from collide.support.tree_layout import (
     AT_ENTRIES,
     AT_LIST_COORDINATES,
     AT_NODES,
@@ -31,7 +32,6 @@ from collide.support.support_tree import (
     LINKS,
     NODES,
     POINTS,
-    SupportTree,
 )
 
 #: Operations counted: see `extreme_vertices`.

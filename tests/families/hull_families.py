@@ -159,7 +159,7 @@ def made(name, large=False):
     from collide.support.build_support_tree import build_support_tree
 
     points, facets = (LARGE if large else HULLS)[name]()
-    return points, facets, build_support_tree(points, np.unique(facets), facets, hull_of)
+    return points, facets, build_support_tree(points, np.unique(facets), facets)
 
 
 # --- directions and what is farthest in them ----------------------------------------------------

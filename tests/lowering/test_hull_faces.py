@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from collide.hull.exact_hull import convex_hull
+from collide.kernels import address_of
 from collide.lowering.hull_faces import hull_faces
+from collide.lowering.hull_polygons import faces_memory, make_faces
 
 
 def cloud(seed: int) -> np.ndarray:
@@ -131,3 +133,19 @@ def test_points_on_edges_but_for_rounding_are_no_corners(seed):
     faces = hull_faces(points)
     assert faces.vertex_ids.tolist() == list(range(8)) and np.diff(faces.starts).tolist() == [4] * 6
     assert len(set(faces.edges.tolist())) == 12 and faces.flatness.max() < 1e-14
+
+
+@pytest.mark.parametrize("points", [
+    np.zeros((1, 3)), np.eye(3)[:2], np.eye(3), np.eye(4)[:, :3],
+    *(np.random.default_rng(n).normal(size=(n, 3)) * (1.0, 1.0, z) for n in (5, 64, 301) for z in (1.0, 0.0)),
+    np.array([(np.cos(t), np.sin(t), z) for t in np.arange(50) for z in (0.0, 1.0)]),
+], ids=len)
+def test_making_stays_in_its_memory(points):
+    """Of spheres, discs and prisms all points are corners, and so many triangles as can be: nothing is written behind
+    the memory that is asked for."""
+    points = points / np.maximum(np.linalg.norm(points[:, :2], axis=1), 1e-9)[:, None] if len(points) > 5 else points
+    n_words = faces_memory(len(points)) // 8
+    memory = np.full(n_words + 1024, -7, dtype=np.int64)
+    points = np.ascontiguousarray(points)
+    assert make_faces(address_of(points), len(points), address_of(memory)) == 0
+    assert (memory[n_words:] == -7).all() and (memory[:n_words] != -7).any()

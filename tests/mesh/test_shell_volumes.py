@@ -10,7 +10,9 @@ from exact_simplex import determinant, exact
 from mesh_shapes import box, bumpy_sphere
 from naive import rng_of, rotation
 
-from collide.mesh.shell_volumes import Shells, exact_integers, scaled_to_one, shell_volumes, without_area
+from collide.kernels import address_of
+from collide.mesh.shell_nesting import judge_shells, shells_memory
+from collide.mesh.shell_volumes import exact_integers, scaled_to_one, without_area
 
 
 def true_volume(vertices, faces) -> Fraction:
@@ -44,6 +46,20 @@ def tilted(mesh, rng, shift: float):
     return mesh[0] @ rotation(rng).T + shift, mesh[1]
 
 
+def shell_volumes(vertices, corners, shells, n_shells) -> tuple[np.ndarray, np.ndarray]:
+    """(volumes, signs); nothing is written behind the memory that is asked for."""
+    n, f, points = len(vertices), len(corners), np.ascontiguousarray(vertices)
+    volumes, signs, wrong = np.empty(n_shells), *np.empty((2, n_shells), dtype=np.int32)
+    n_words = -(-shells_memory(n, f, n_shells) // 8)
+    memory = np.full(n_words + 4096, -7, dtype=np.int64)
+    judge_shells(
+        address_of(points), n, address_of(corners), f, address_of(shells), n_shells, address_of(volumes),
+        address_of(signs), address_of(wrong), address_of(memory),
+    )
+    assert (memory[n_words:] == -7).all()
+    return volumes, signs
+
+
 def test_volumes_and_signs():
     rng = rng_of("volumes")
     cube, sphere = box((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)), bumpy_sphere(200)
@@ -53,7 +69,7 @@ def test_volumes_and_signs():
         flattened(cube, 1e-300),
     ]
     vertices, corners, shells = together(*meshes)
-    volumes, signs = shell_volumes(vertices, Shells(corners, shells, len(meshes)))
+    volumes, signs = shell_volumes(vertices, corners, shells, len(meshes))
     doubtful = 0
     for k in range(len(meshes)):
         true = true_volume(vertices, corners[shells == k])
@@ -71,17 +87,26 @@ def test_facets_that_belong_to_no_shell_do_not_count():
     vertices, faces = box((0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
     corners = np.concatenate([faces, [[0, 1, 6]]]).astype(np.int32)
     shells = np.array([0] * len(faces) + [-1], dtype=np.int32)
-    volumes, signs = shell_volumes(vertices, Shells(corners, shells, 1))
+    volumes, signs = shell_volumes(vertices, corners, shells, 1)
     assert volumes.tolist() == [pytest.approx(6.0)] and signs.tolist() == [1]
 
 
-def test_shells_hand_out_their_facets():
-    rng = rng_of("shells")
-    shells = rng.integers(-1, 4, 50).astype(np.int32)
-    corners = rng.integers(0, 20, size=(50, 3)).astype(np.int32)
-    parts = Shells(corners, shells, 4)
-    for k in range(4):
-        assert np.array_equal(parts[k], corners[shells == k])
+@pytest.mark.parametrize("lowest, highest", [(-1074, 160), (-1074, -900), (100, 160), (0, 3)])
+def test_signs_of_volumes_of_the_widest_coordinates(lowest, highest):
+    """Flat boxes and such off by a bit, of coordinates from the smallest doubles to the largest that meshes have."""
+    rng = rng_of("wide", lowest, highest)
+    seen = set()
+    for _ in range(40):
+        vertices, faces = box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+        u, v = (np.ldexp(rng.uniform(-1, 1, 3), rng.integers(lowest, highest + 1, 3)) for _ in range(2))
+        w = [np.zeros(3), u + v, np.ldexp(rng.uniform(-1, 1, 3), lowest)][int(rng.integers(3))]
+        points = np.clip(vertices @ np.stack([u, v, w]), -1e50, 1e50)
+        faces = np.ascontiguousarray(faces, dtype=np.int32)
+        _, signs = shell_volumes(points, faces, np.zeros(len(faces), dtype=np.int32), 1)
+        true = true_volume(points, faces)
+        assert signs[0] == (true > 0) - (true < 0), points.tolist()
+        seen.add(int(signs[0]))
+    assert seen == {-1, 0, 1}, seen
 
 
 def test_facets_without_area():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from collide.numerics.counting_sort import only_class, sort_by_class
+from collide.numerics.counting_sort import only_class, order_by_key, order_by_merging, sort_by_class
 
 
 @pytest.mark.plain_kernels
@@ -29,3 +29,16 @@ def test_a_range_is_ordered_by_class_as_it_stood(n_classes):
             assert only == (found[0] if len(found) == 1 else -1)
             n_only += len(found) == 1
     assert n_only > 5
+
+
+@pytest.mark.plain_kernels
+@pytest.mark.parametrize("n, n_keys", [(0, 1), (1, 1), (7, 3), (50, 4), (50, 1000), (333, 10)])
+def test_orders_are_stable(n, n_keys):
+    rng = np.random.default_rng(n + n_keys)
+    keys, items = rng.integers(0, n_keys, n), rng.permutation(n)
+    starts, ordered, order, scratch = np.zeros(n_keys + 1, int), *np.zeros((3, n), int)
+    order_by_key(keys, items, n, n_keys, starts, ordered)
+    assert np.array_equal(ordered, items[np.argsort(keys[items], kind="stable")])
+    assert np.array_equal(starts, np.searchsorted(np.sort(keys), np.arange(n_keys + 1)))
+    order_by_merging(keys, n, order, scratch)
+    assert np.array_equal(order, np.argsort(keys, kind="stable"))

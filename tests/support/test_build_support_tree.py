@@ -8,17 +8,29 @@ import sys
 
 import numpy as np
 import pytest
-from hull_families import HULLS, LARGE, bipyramid, directions_for, ellipsoid, hull_of, made, normals_of
+from hull_families import HULLS, LARGE, bipyramid, directions_for, ellipsoid, made, normals_of
 from validate_support_tree import validate_support_tree
 
-from collide.support import build_support_tree as build
-from collide.support.build_support_tree import LONGEST_LIST, build_support_tree, subset_sizes
+from collide.kernels import address_of
+from collide.support import grow_tree as grow
+from collide.support.build_support_tree import build_support_tree
 from collide.support.extreme_vertex import LOOKED_AT, SCANNED, STEPS
+from collide.support.grow_tree import FINE_RATIO, LARGEST_SCAN, LONGEST_LIST, RATIO, SMALL_HULL
 from collide.support.nested_subsets import nested_order
 from collide.support.support_tree import SupportTree
 from collide.support.support_tree_query import COUNTERS, extreme_vertices
 
 pytest.importorskip("scipy.spatial")
+
+
+def growing(points, facets):
+    """(a tree without levels, the memory that it stands in), for kernels as Python."""
+    memory = np.zeros(grow.tree_memory(len(points), len(facets), 1 << 14) // 8, dtype=np.int64)
+    return grow._growing(address_of(memory), len(points), len(facets), 1 << 14)[0], memory
+
+
+def grown(tree, points, facets) -> int:
+    return grow._grow(tree, points.ravel(), np.arange(len(points)), len(points), facets.ravel(), len(facets))
 
 
 # --- size and speed, counted --------------------------------------------------------------------
@@ -48,8 +60,11 @@ def test_operations_grow_like_the_logarithm():
     sizes, scanned = [256, 1024, 4096, 16384], []
     for n in sizes:
         points, facets = ellipsoid(n, seed=12)
-        tree = build_support_tree(points, np.arange(n), facets, hull_of)
-        assert tree.depth == len(subset_sizes(n))
+        tree = build_support_tree(points, np.arange(n), facets)
+        subset, depth = n, 1
+        while subset > (SMALL_HULL if depth == 1 else LARGEST_SCAN):
+            subset, depth = -(-subset // (FINE_RATIO if depth == 1 else RATIO)), depth + 1
+        assert tree.depth == depth
         counters = np.zeros(COUNTERS, dtype=np.int64)
         extreme_vertices(tree, np.random.default_rng(13).normal(size=(2000, 3)), True, counters)
         scanned.append(counters[SCANNED] / 2000)
@@ -57,23 +72,35 @@ def test_operations_grow_like_the_logarithm():
     assert all(count < 14 * np.log2(n) for n, count in zip(sizes, scanned)), scanned
 
 
+@pytest.mark.plain_kernels
 def test_owners_of_long_lists_leave_the_coarse_subsets(monkeypatch):
     """What the degree alone does not show: here it is told to look at nothing."""
-    monkeypatch.setattr(build, "HIGHEST_DEGREE", 10**9)
-    usual = build.nested_order
+    points, facets = bipyramid(400)
+    n = len(points)
+    tree, _held = growing(points, facets)
+    moved = []
 
-    def apexes_first(vertices, normals, late, sizes):
-        ordered = usual(vertices, normals, late, sizes)
-        return ordered[np.argsort((ordered < 4000) | late[ordered], kind="stable")]
+    def spy(tree, n_used):
+        moved.append(usual_move(tree, n_used))
+        return moved[-1]
 
-    monkeypatch.setattr(build, "nested_order", apexes_first)
-    points, facets = bipyramid(4000)
-    tree = build_support_tree(points, np.arange(len(points)), facets, hull_of)
-    assert np.diff(tree.nodes).max() <= LONGEST_LIST
-    assert not {4000, 4001} & set(tree.owners.tolist())
-    validate_support_tree(tree, samples=50)
-    monkeypatch.setattr(build, "_ATTEMPTS", 1)
-    assert np.diff(build_support_tree(points, np.arange(len(points)), facets, hull_of).nodes).max() > 2000
+    usual_move = grow._move_owners_of_long_lists
+    monkeypatch.setattr(grow, "_move_owners_of_long_lists", spy)
+    monkeypatch.setattr(grow, "HIGHEST_DEGREE", 10**9)
+    usual = grow.nested_order
+
+    def apexes_first(vertices, normals, late, n, sizes, first, n_sizes, places, scratch, ordered):
+        usual(vertices, normals, late, n, sizes, first, n_sizes, places, scratch, ordered)
+        order = np.array(ordered[:n])
+        ordered[:n] = order[np.argsort((order < 400) | (np.array(late)[order] != 0), kind="stable")]
+
+    monkeypatch.setattr(grow, "nested_order", apexes_first)
+    assert grown(tree, points, facets) == 0 and moved == [True, False]
+    nodes, owners = tree.nodes[: tree.header[grow.N_NODES] + 1], tree.owners[: tree.header[grow.N_NODES]]
+    assert np.diff(nodes).max() <= grow.LONGEST_LIST and not {400, 401} & set(owners.tolist())
+    monkeypatch.setattr(grow, "_ATTEMPTS", 1)
+    assert grown(tree, points, facets) == 0 and np.diff(tree.nodes[: tree.header[grow.N_NODES] + 1]).max() > 390
+    assert len(owners) < n
 
 
 @pytest.mark.parametrize("name", ["sphere", "pancake", "needle", "ellipsoid"])
@@ -83,26 +110,35 @@ def test_no_list_is_much_longer_than_the_others(name):
     assert np.quantile(lengths, 0.9) < 1.4 * lengths.mean() and lengths.max() < 2.5 * lengths.mean()
 
 
+def ordered_by(vertices, normals, late, sizes) -> np.ndarray:
+    n = len(vertices)
+    places, scratch, ordered = np.zeros((3, n), dtype=np.int64)
+    nested_order(vertices, normals.ravel(), late, n, sizes, 0, len(sizes), places, scratch, ordered)
+    return ordered
+
+
+@pytest.mark.plain_kernels
 def test_subsets_are_nested_and_late_vertices_come_last():
     rng = np.random.default_rng(17)
     vertices, normals = rng.permutation(5000)[:1000], rng.normal(size=(1000, 3))
     normals[:50] = 0
     late = rng.random(1000) < 0.3
-    ordered = nested_order(vertices, normals, late, [1000, 42, 3])
+    ordered = ordered_by(vertices, normals, late, [1000, 42, 3])
     assert np.array_equal(np.sort(ordered), np.sort(vertices))
     assert not np.isin(ordered[:42], vertices[late]).any()
-    assert np.isin(nested_order(vertices, normals, np.ones(1000, dtype=bool), [1000, 42]), vertices).all()
+    assert np.isin(ordered_by(vertices, normals, np.ones(1000, dtype=bool), [1000, 42]), vertices).all()
     few = np.arange(1000) >= 20  # a subset larger than what is not late takes the first of the others
-    assert np.isin(vertices[:20], nested_order(vertices, normals, few, [1000, 42])[:42]).all()
+    assert np.isin(vertices[:20], ordered_by(vertices, normals, few, [1000, 42])[:42]).all()
 
 
+@pytest.mark.plain_kernels
 def test_neighbours_on_the_curve_are_neighbours_on_the_sphere():
-    rng = np.random.default_rng(18)
-    normals = rng.normal(size=(20_000, 3))
+    n = 4000
+    normals = np.random.default_rng(18).normal(size=(n, 3))
     normals /= np.sqrt(np.square(normals).sum(axis=1))[:, None]
-    ordered = normals[nested_order(np.arange(20_000), normals, np.zeros(20_000, dtype=bool), [20_000])]
+    ordered = normals[ordered_by(np.arange(n), normals, np.zeros(n, dtype=bool), [n])]
     steps = np.sqrt(np.square(np.diff(ordered, axis=0)).sum(axis=1))
-    assert np.median(steps) < 1.5 * np.sqrt(4 * np.pi / 20_000) and (steps > 0.2).sum() < 20
+    assert np.median(steps) < 1.5 * np.sqrt(4 * np.pi / n) and (steps > 0.45).sum() < 20
 
 
 def test_a_vertex_of_many_neighbours_is_proven_by_few():
@@ -138,8 +174,31 @@ def test_a_tree_is_read_only():
 
 def test_building_twice_gives_the_same_bytes():
     points, facets, tree = made("sphere")
-    again = parts_of(build_support_tree(points, np.arange(len(points)), facets, hull_of))
+    again = parts_of(build_support_tree(points, np.arange(len(points)), facets))
     assert all(np.array_equal(part, again[name]) for name, part in parts_of(tree).items())
+
+
+@pytest.mark.parametrize("name", HULLS)
+def test_growing_stays_in_its_memory_and_asks_for_more(name):
+    """With room for few candidates it says for how many there must be, with as many it makes the same tree; nothing is
+    written behind the memory that is asked for."""
+    points, facets, tree = made(name)
+    points, facets = np.ascontiguousarray(points), np.ascontiguousarray(facets, dtype=np.int32)
+    vertices, capacity, asked = np.unique(facets), 200, 0
+    while True:
+        n_words = grow.tree_memory(len(points), len(facets), capacity) // 8
+        memory = np.full(n_words + 4096, -7, dtype=np.int64)
+        wanted = grow.grow_tree(
+            address_of(points), len(points), address_of(vertices), len(vertices), address_of(facets), len(facets),
+            address_of(memory), capacity,
+        )
+        assert (memory[n_words:] == -7).all() and 0 <= wanted and wanted != capacity
+        if wanted == 0:
+            break
+        assert wanted > capacity
+        capacity, asked = wanted, asked + 1
+    assert memory[grow.N_ENTRIES] == len(tree.entries) and memory[grow.N_NODES] == len(tree.owners)
+    assert asked > 0 or len(tree.owners) == 1
 
 
 def changed(name, place, value):
@@ -233,7 +292,7 @@ def test_wrong_input_is_refused():
         (points, rows, facets[:, :2]),
     ):
         with pytest.raises(ValueError):
-            build_support_tree(bad_points, vertices, bad_facets, hull_of)
+            build_support_tree(bad_points, vertices, bad_facets)
 
 
 PLAIN = """
@@ -243,7 +302,7 @@ assert kernels.PLAIN_PYTHON
 from collide.support.build_support_tree import build_support_tree
 from collide.support.support_tree_query import extreme_vertices
 given = dict(np.load(sys.argv[1]))
-tree = build_support_tree(given["points"], given["vertices"], given["facets"], lambda points: given["none"])
+tree = build_support_tree(given["points"], given["vertices"], given["facets"])
 parts = {name: getattr(tree, name) for name in sys.argv[3:]}
 np.savez(sys.argv[2], ids=extreme_vertices(tree, given["directions"]), **parts)
 """
@@ -256,7 +315,7 @@ def test_without_compilation_the_bits_are_the_same(name, tmp_path):
         "small sphere": lambda: ellipsoid(100), "sphere": lambda: ellipsoid(400, seed=18),
         "bipyramid": lambda: bipyramid(250),
     }[name]()
-    tree = build_support_tree(points, np.arange(len(points)), facets, hull_of)
+    tree = build_support_tree(points, np.arange(len(points)), facets)
     directions = directions_for(points, facets, seed=19, each=10)
     directions = directions[np.abs(directions).max(axis=1) < 1e100]
     np.savez(

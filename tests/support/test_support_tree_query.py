@@ -106,11 +106,11 @@ def test_what_cannot_be_proven_is_said():
         assert -len(points) <= found < len(points)
         assert found < 0 or found in farthest_of(whole, g), g.tolist()
     tiny = points * 1e-300
-    tree = build_support_tree(tiny, np.arange(100), hull_of(points), hull_of)
+    tree = build_support_tree(tiny, np.arange(100), hull_of(points))
     found = extreme_vertices(tree, np.array([(1.0, 2.0, 3.0), (1.0, 1e-200, 0.0)]))
     assert found[0] == extreme_vertices(made("small sphere")[2], np.array([(1.0, 2.0, 3.0)]))[0]
     with pytest.raises(ValueError, match="larger"):
-        build_support_tree(points * 1e200, np.arange(100), hull_of(points), hull_of)
+        build_support_tree(points * 1e200, np.arange(100), hull_of(points))
 
 
 @pytest.mark.own_kernels

@@ -28,8 +28,8 @@ from collide.numerics import double_double as dd
 from collide.numerics.double_double import DD, DDVec3
 from collide.numerics.exact_dot_sign import exact_sign_of_dot
 from collide.numerics.vec3 import column_at, dot, sub, vec3_at
-from collide.support.support_tree import FLAT, HEADER
 from collide.support.support_tree_query import rings_of
+from collide.support.tree_layout import FLAT, HEADER
 
 #: Neighbours that may be visited on the way down; a longer way is for `lowest_of_all`.
 MAX_NEIGHBOURS = 768

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from collide.kernels import address_of
-from collide.support.candidate_lists import order_rings
+from collide.support.rings import order_rings
 
 #: A side of more corners than this is bulged.
 _LARGE_SIDE = 16

@@ -38,7 +38,7 @@ def body(points, with_tree: bool):
     tree = None
     if with_tree:
         hull = convex_hull(points)
-        tree = build_support_tree(points, hull.vertices, hull.facets, lambda subset: convex_hull(subset).facets)
+        tree = build_support_tree(points, hull.vertices, hull.facets)
     padded = (len(points) + 7) // 8 * 8
     coords = np.tile(points[0], (padded, 1))
     coords[: len(points)] = points
