@@ -82,7 +82,7 @@ if TYPE_CHECKING:
     from collide.sweeps.pair_proposal import LinkPair, Proposal, propose_disabled_pairs
     from collide.sweeps.sweep import sweep
     from collide.sweeps.sweep_results import SweepResults, read_sweep
-    from collide.transforms import pose
+    from collide.transforms import pose, poses
     from collide.worlds.hits import WorldHits
     from collide.worlds.world import World
 
@@ -133,7 +133,7 @@ _HOMES = {
     "collide.sweeps.sweep_results": ("SweepResults", "read_sweep"),
     "collide.papers.tetrahedra.cell_overlaps": ("CellOverlaps", "overlapping_cells", "self_overlapping_cells"),
     "collide.papers.tetrahedra.tet_mesh": ("TetMesh",),
-    "collide.transforms": ("pose",),
+    "collide.transforms": ("pose", "poses"),
     "collide.worlds.world": ("World",),
     "collide.worlds.hits": ("WorldHits",),
 }
@@ -155,7 +155,7 @@ __all__ = [
     "ShapeSet", "SpacePartition", "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody",
     "UnsupportedQuery", "World", "WorldHits", "WorldResult", "boolean", "certify", "collide", "combine",
     "configuration_obstacle", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library",
-    "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses_in_motion",
+    "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses", "poses_in_motion",
     "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "self_overlapping_cells", "shape_cast",
     "sweep", "tessellate", "time_of_impact", "verify", "walk",
 ]
