@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from collide.papers.polytopes.convex_polygon import ConvexPolygon
     from collide.papers.tetrahedra.cell_overlaps import CellOverlaps, overlapping_cells, self_overlapping_cells
     from collide.papers.tetrahedra.tet_mesh import TetMesh
+    from collide.pose_arrays import poses
     from collide.results import How, PairResult, WorldResult
     from collide.robots.certified_edges import CertifiedEdges
     from collide.robots.robot import Robot
@@ -82,7 +83,7 @@ if TYPE_CHECKING:
     from collide.sweeps.pair_proposal import LinkPair, Proposal, propose_disabled_pairs
     from collide.sweeps.sweep import sweep
     from collide.sweeps.sweep_results import SweepResults, read_sweep
-    from collide.transforms import pose, poses
+    from collide.transforms import pose
     from collide.worlds.hits import WorldHits
     from collide.worlds.world import World
 
@@ -112,6 +113,7 @@ _HOMES = {
     "collide.papers.partitions.portals": ("Portals",),
     "collide.papers.partitions.space_partition": ("Located", "PartitionSize", "SpacePartition"),
     "collide.pairs.query": ("collide", "distance"),
+    "collide.pose_arrays": ("poses",),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robots.certified_edges": ("CertifiedEdges",),
     "collide.robots.robot": ("Robot",),
@@ -133,7 +135,7 @@ _HOMES = {
     "collide.sweeps.sweep_results": ("SweepResults", "read_sweep"),
     "collide.papers.tetrahedra.cell_overlaps": ("CellOverlaps", "overlapping_cells", "self_overlapping_cells"),
     "collide.papers.tetrahedra.tet_mesh": ("TetMesh",),
-    "collide.transforms": ("pose", "poses"),
+    "collide.transforms": ("pose",),
     "collide.worlds.world": ("World",),
     "collide.worlds.hits": ("WorldHits",),
 }

@@ -75,14 +75,14 @@ def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=Non
         Where numbers have another shape, are not finite or make no rotation, or two rotations are given.
     """
     if rpy is None and quat_wxyz is None and quat_xyzw is None and R is None:
-        shifted = _translation(xyz)
+        shifted = _plain_shift(xyz)
         if shifted is not None:
             return shifted
     if sum(option is not None for option in (rpy, quat_wxyz, quat_xyzw, R)) > 1:
         raise InvalidPose("pose: give at most one of rpy, quat_wxyz, quat_xyzw and R")
     X = np.eye(4)
     if rpy is not None:
-        X[:3, :3] = _rotation_from_rpy(_finite("rpy", rpy, (3,)))
+        X[:3, :3] = rotation_from_rpy(_finite("rpy", rpy, (3,)))
     elif quat_wxyz is not None:
         X[:3, :3] = _rotation_from_quaternion(_finite("quat_wxyz", quat_wxyz, (4,)))
     elif quat_xyzw is not None:
@@ -93,79 +93,7 @@ def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=Non
     return as_pose(X, "pose")
 
 
-def poses(p, quat_wxyz=None, rpy=None) -> np.ndarray:
-    """Poses (N, 4, 4) from N translations and, where given, N rotations.
-
-    Parameters
-    ----------
-    p : (N, 3) or (3,) array_like, float64
-        Translations [m]. A single row goes with every row of the other argument, and the other way round.
-    quat_wxyz : (N, 4) or (4,) array_like, optional
-        Quaternions, scalar first, of any length but 0; normalised here, as `pose` does. Rows in the order of ROS and
-        scipy, scalar last, are ``quat_xyzw[:, [3, 0, 1, 2]]``.
-    rpy : (N, 3) or (3,) array_like, optional
-        Roll, pitch, yaw [rad] about fixed x, y, z axes, as URDF has them. Goes with no quat_wxyz.
-
-    Returns
-    -------
-    (N, 4, 4) float64
-        Row k is ``pose(p[k], ...)`` within rounding; N = 1 where all arguments are single rows.
-
-    Raises
-    ------
-    InvalidPose
-        Where numbers have another shape, lengths do not match, both rotations are given, or a row is not finite, too
-        large, or a quaternion of length 0: the row is named.
-
-    Notes
-    -----
-    O(N): about 0.3 µs a pose.
-    """
-    if quat_wxyz is not None and rpy is not None:
-        raise InvalidPose("poses: give at most one of quat_wxyz and rpy")
-    given = {"p": _finite_rows("p", p, 3)}
-    if quat_wxyz is not None:
-        given["quat_wxyz"] = _finite_rows("quat_wxyz", quat_wxyz, 4)
-    if rpy is not None:
-        given["rpy"] = _finite_rows("rpy", rpy, 3)
-    n = max(map(len, given.values())) if min(map(len, given.values())) else 0
-    if any(len(rows) not in (1, n) for rows in given.values()):
-        lengths = ", ".join(f"{name} {len(rows)}" for name, rows in given.items())
-        raise InvalidPose(f"poses: lengths do not match: {lengths}; give equally many rows, or a single one")
-    X = np.zeros((n, 4, 4))
-    X[:, [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
-    X[:, :3, 3] = given["p"]
-    if quat_wxyz is not None:
-        X[:, :3, :3] = _rotations_from_quaternions(given["quat_wxyz"])
-    elif rpy is not None:
-        X[:, :3, :3] = np.moveaxis(_rotation_from_rpy(given["rpy"].T), -1, 0)
-    return as_poses(X, "poses")
-
-
-def _finite_rows(name: str, values, width: int) -> np.ndarray:
-    """(n, width) finite numbers, from rows or a single one."""
-    array = checks.array(f"poses: {name}", values, f"(N, {width})", InvalidPose)
-    if array.ndim not in (1, 2) or array.shape[-1] != width:
-        raise InvalidPose(f"poses: {name} must have shape (N, {width}) or ({width},), got {array.shape}")
-    rows = array.reshape(-1, width)
-    bad = ~np.isfinite(rows).all(axis=1)
-    if bad.any():
-        k = int(np.argmax(bad))
-        raise InvalidPose(f"poses: {name}[{k}] has entries that are not finite, got {rows[k].tolist()}")
-    return rows
-
-
-def _rotations_from_quaternions(q: np.ndarray) -> np.ndarray:
-    """(n, 3, 3), from (n, 4) scalar first."""
-    largest = np.abs(q).max(axis=1, keepdims=True)
-    if not largest.all():
-        k = int(np.argmin(largest))
-        raise InvalidPose(f"poses: quat_wxyz[{k}] is of length 0 and names no rotation, got {q[k].tolist()}")
-    q = np.ldexp(q, -np.frexp(largest)[1])  # as of one quaternion
-    return np.moveaxis(_rotation_from_unit(*(q / np.linalg.norm(q, axis=1, keepdims=True)).T), -1, 0)
-
-
-def _translation(xyz) -> Pose | None:
+def _plain_shift(xyz) -> Pose | None:
     """The pose of three plain numbers that no check refuses; None of anything else, which the long way reads."""
     if xyz.__class__ is np.ndarray and xyz.dtype is _FLOAT64:
         xyz = xyz.tolist()
@@ -191,7 +119,7 @@ def _matrix_of(R):
     return R.as_matrix() if callable(getattr(R, "as_matrix", None)) else R
 
 
-def _rotation_from_rpy(rpy: np.ndarray) -> np.ndarray:
+def rotation_from_rpy(rpy: np.ndarray) -> np.ndarray:
     """(3, 3) of three angles, (3, 3, n) of three rows of n."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
     return np.array(
@@ -208,10 +136,10 @@ def _rotation_from_quaternion(q: np.ndarray) -> np.ndarray:
     if largest == 0.0:
         raise InvalidPose(f"pose: a quaternion of length 0 names no rotation, got {q.tolist()}")
     q = np.ldexp(q, -np.frexp(largest)[1])  # squares neither overflow nor vanish; a power of two rounds nothing
-    return _rotation_from_unit(*(q / np.linalg.norm(q)))
+    return rotation_from_unit(*(q / np.linalg.norm(q)))
 
 
-def _rotation_from_unit(w, x, y, z) -> np.ndarray:
+def rotation_from_unit(w, x, y, z) -> np.ndarray:
     """(3, 3) of four numbers, (3, 3, n) of four columns."""
     return np.array(
         [
@@ -228,8 +156,8 @@ def as_poses(X: PoseLike, name: str = "X", *, check: bool = True) -> np.ndarray:
     Parameters
     ----------
     X : (4, 4) or (N, 4, 4) homogeneous matrices, or their first three rows, (3, 4) or (N, 3, 4); a tuple ``(R, t)`` of
-        a (3, 3) rotation and a (3,) translation (either with a leading N); or what gives rotations (3, 3) or poses (4, 4) by
-        ``as_matrix()``, as scipy's Rotation and RigidTransform do, alone or as R.
+        a (3, 3) rotation and a (3,) translation (either with a leading N); or what gives rotations (3, 3) or poses
+        (4, 4) by ``as_matrix()``, as scipy's Rotation and RigidTransform do, alone or as R.
     name : how error messages call the argument.
     check : refuse matrices with max|RᵀR − I| > 1e-4 or det ≤ 0. Finite numbers and the last row
         are always checked.
@@ -237,7 +165,7 @@ def as_poses(X: PoseLike, name: str = "X", *, check: bool = True) -> np.ndarray:
     Raises
     ------
     InvalidPose : names the argument, the entry of the batch and the offending value; of rows of 7 numbers, translation
-        and quaternion, whose order is not told, how to call `poses`.
+        and quaternion, whose order is not told, how to call `pose_arrays.poses`.
     """
     return poses_as_given(X, name, check=check)[0]
 
