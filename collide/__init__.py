@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from collide.papers.polytopes.convex_polygon import ConvexPolygon
     from collide.papers.tetrahedra.cell_overlaps import CellOverlaps, overlapping_cells, self_overlapping_cells
     from collide.papers.tetrahedra.tet_mesh import TetMesh
+    from collide.pose_arrays import poses
     from collide.results import How, PairResult, WorldResult
     from collide.robots.certified_edges import CertifiedEdges
     from collide.robots.robot import Robot
@@ -112,6 +113,7 @@ _HOMES = {
     "collide.papers.partitions.portals": ("Portals",),
     "collide.papers.partitions.space_partition": ("Located", "PartitionSize", "SpacePartition"),
     "collide.pairs.query": ("collide", "distance"),
+    "collide.pose_arrays": ("poses",),
     "collide.results": ("How", "PairResult", "WorldResult"),
     "collide.robots.certified_edges": ("CertifiedEdges",),
     "collide.robots.robot": ("Robot",),
@@ -155,7 +157,7 @@ __all__ = [
     "ShapeSet", "SpacePartition", "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody",
     "UnsupportedQuery", "World", "WorldHits", "WorldResult", "boolean", "certify", "collide", "combine",
     "configuration_obstacle", "contacts", "contains", "distance", "facet_pairs", "get_include", "get_library",
-    "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses_in_motion",
+    "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses", "poses_in_motion",
     "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions", "self_overlapping_cells", "shape_cast",
     "sweep", "tessellate", "time_of_impact", "verify", "walk",
 ]

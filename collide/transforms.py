@@ -74,11 +74,15 @@ def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=Non
     InvalidPose
         Where numbers have another shape, are not finite or make no rotation, or two rotations are given.
     """
+    if rpy is None and quat_wxyz is None and quat_xyzw is None and R is None:
+        shifted = _plain_shift(xyz)
+        if shifted is not None:
+            return shifted
     if sum(option is not None for option in (rpy, quat_wxyz, quat_xyzw, R)) > 1:
         raise InvalidPose("pose: give at most one of rpy, quat_wxyz, quat_xyzw and R")
     X = np.eye(4)
     if rpy is not None:
-        X[:3, :3] = _rotation_from_rpy(_finite("rpy", rpy, (3,)))
+        X[:3, :3] = rotation_from_rpy(_finite("rpy", rpy, (3,)))
     elif quat_wxyz is not None:
         X[:3, :3] = _rotation_from_quaternion(_finite("quat_wxyz", quat_wxyz, (4,)))
     elif quat_xyzw is not None:
@@ -86,7 +90,21 @@ def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=Non
     elif R is not None:
         X[:3, :3] = _finite("R", _matrix_of(R), (3, 3))
     X[:3, 3] = _finite("xyz", xyz, (3,))
-    return as_poses(X, "pose")[0]
+    return as_pose(X, "pose")
+
+
+def _plain_shift(xyz) -> Pose | None:
+    """The pose of three plain numbers that no check refuses; None of anything else, which the long way reads."""
+    if xyz.__class__ is np.ndarray and xyz.dtype is _FLOAT64:
+        xyz = xyz.tolist()
+    if (xyz.__class__ is not tuple and xyz.__class__ is not list) or len(xyz) != 3:
+        return None
+    for value in xyz:
+        if (value.__class__ is not float and value.__class__ is not int) or not -LARGEST <= value <= LARGEST:
+            return None
+    X = _IDENTITY.copy()
+    X[0, 3], X[1, 3], X[2, 3] = xyz
+    return X
 
 
 def _finite(name: str, values, shape) -> np.ndarray:
@@ -101,7 +119,8 @@ def _matrix_of(R):
     return R.as_matrix() if callable(getattr(R, "as_matrix", None)) else R
 
 
-def _rotation_from_rpy(rpy: np.ndarray) -> np.ndarray:
+def rotation_from_rpy(rpy: np.ndarray) -> np.ndarray:
+    """(3, 3) of three angles, (3, 3, n) of three rows of n."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
     return np.array(
         [
@@ -117,7 +136,11 @@ def _rotation_from_quaternion(q: np.ndarray) -> np.ndarray:
     if largest == 0.0:
         raise InvalidPose(f"pose: a quaternion of length 0 names no rotation, got {q.tolist()}")
     q = np.ldexp(q, -np.frexp(largest)[1])  # squares neither overflow nor vanish; a power of two rounds nothing
-    w, x, y, z = q / np.linalg.norm(q)
+    return rotation_from_unit(*(q / np.linalg.norm(q)))
+
+
+def rotation_from_unit(w, x, y, z) -> np.ndarray:
+    """(3, 3) of four numbers, (3, 3, n) of four columns."""
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -132,16 +155,17 @@ def as_poses(X: PoseLike, name: str = "X", *, check: bool = True) -> np.ndarray:
 
     Parameters
     ----------
-    X : (4, 4) or (N, 4, 4) homogeneous matrices; a tuple ``(R, t)`` of a (3, 3) rotation and
-        a (3,) translation (either with a leading N); or what gives rotations (3, 3) or poses (4, 4) by
-        ``as_matrix()``, as scipy's Rotation and RigidTransform do, alone or as R.
+    X : (4, 4) or (N, 4, 4) homogeneous matrices, or their first three rows, (3, 4) or (N, 3, 4); a tuple ``(R, t)`` of
+        a (3, 3) rotation and a (3,) translation (either with a leading N); or what gives rotations (3, 3) or poses
+        (4, 4) by ``as_matrix()``, as scipy's Rotation and RigidTransform do, alone or as R.
     name : how error messages call the argument.
     check : refuse matrices with max|RᵀR − I| > 1e-4 or det ≤ 0. Finite numbers and the last row
         are always checked.
 
     Raises
     ------
-    InvalidPose : names the argument, the entry of the batch and the offending value.
+    InvalidPose : names the argument, the entry of the batch and the offending value; of rows of 7 numbers, translation
+        and quaternion, whose order is not told, how to call `pose_arrays.poses`.
     """
     return poses_as_given(X, name, check=check)[0]
 
@@ -163,13 +187,26 @@ def poses_as_given(X: PoseLike, name: str, *, check: bool = True) -> tuple[np.nd
     """(poses as `as_poses` gives them, whether a single one was given)."""
     check = checks.true_or_false("check_poses: check", check)
     full = _from_tuple(X, name) if isinstance(X, tuple) else _from_object(X, name)
+    if full.ndim in (2, 3) and full.shape[-2:] == (3, 4):
+        full = _from_tuple((full[..., :3], full[..., 3]), name)
     if full.ndim not in (2, 3) or full.shape[-2:] != (4, 4):
-        raise InvalidPose(f"{name} must have shape (4, 4) or (N, 4, 4), got {full.shape}")
+        raise InvalidPose(f"{name} must have shape (4, 4) or (N, 4, 4), got {full.shape}{_advice(full)}")
     batch = np.ascontiguousarray(full.reshape(-1, 4, 4))
     if check and _are_surely_poses(batch):
         return batch, full.ndim == 2
     refuse_no_pose(batch, name, check)
     return batch, full.ndim == 2
+
+
+def _advice(given: np.ndarray) -> str:
+    """How to hand in a translation and a quaternion in one row, whose order the row does not tell."""
+    if given.ndim not in (1, 2) or given.shape[-1] != 7:
+        return ""
+    return (
+        ": the order of a quaternion within a row of 7 numbers differs from library to library; say which it is, "
+        "collide.poses(rows[:, :3], quat_wxyz=rows[:, 3:]) where the scalar comes first, "
+        "quat_wxyz=rows[:, [6, 3, 4, 5]] where it comes last"
+    )
 
 
 def refuse_no_pose(batch: np.ndarray, name: str, check: bool = True, skip: str = " (check_poses=False skips this)"):
@@ -224,6 +261,7 @@ SAFE_TOLERANCE = 0.5 * ROTATION_TOLERANCE
 #: Poses checked together: their entries stay in the cache.
 _TOGETHER = 1024
 _FLOAT64 = np.dtype(np.float64)
+_IDENTITY = np.eye(4)
 
 
 def _is_surely_pose(row_x: list, row_y: list, row_z: list, last: list) -> bool:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import collide
-from collide import Box, InvalidPose, Sphere, distance, pose
+from collide import Box, InvalidPose, Sphere, distance, pose, poses
 from collide.papers.polytopes.convex_polygon import planar_poses
 from collide.transforms import as_poses
 
@@ -119,3 +120,78 @@ def test_poses_of_the_plane_and_of_space_are_refused_alike(entry, value, words):
             continue
         with pytest.raises(InvalidPose, match=rf"X_WA\[1\] .*{words}"):
             read(X, "X_WA")
+
+
+def _rotation_by_hamilton(q) -> np.ndarray:
+    """What q e q* makes of the axes e, in exact arithmetic of what is given, divided by |q|²."""
+    w, x, y, z = map(Fraction, np.asarray(q, dtype=np.float64).tolist())
+
+    def times(a, b):
+        (s, i, j, k), (t, m, n, o) = a, b
+        return (
+            s * t - i * m - j * n - k * o, s * m + i * t + j * o - k * n,
+            s * n - i * o + j * t + k * m, s * o + i * n - j * m + k * t,
+        )
+
+    length = w * w + x * x + y * y + z * z
+    axes = ((0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+    columns = [times(times((w, x, y, z), axis), (w, -x, -y, -z))[1:] for axis in axes]
+    return np.array([[float(v / length) for v in column] for column in columns]).T
+
+
+def test_poses_of_arrays():
+    rng = np.random.default_rng(5)
+    p, q, rpy = rng.normal(size=(40, 3)), rng.normal(size=(40, 4)), rng.uniform(-np.pi, np.pi, size=(40, 3))
+    by_quaternion, by_angles = poses(p, quat_wxyz=q), poses(p, rpy=rpy)
+    for k in range(40):
+        shown = f"poses({p[k].tolist()}, {q[k].tolist()}), rpy={rpy[k].tolist()}"
+        assert np.abs(by_quaternion[k, :3, :3] - _rotation_by_hamilton(q[k])).max() < 2e-15, shown
+        assert np.abs(by_angles[k] - pose(p[k], rpy=rpy[k])).max() < 2e-15, shown
+        assert by_quaternion[k, :, 3].tolist() == [*p[k], 1.0] and by_quaternion[k, 3].tolist() == [0, 0, 0, 1], shown
+    assert np.array_equal(poses(p)[7], pose(p[7])) and poses(p).shape == (40, 4, 4) and poses(p).flags.c_contiguous
+    assert np.array_equal(poses(p[0], q), poses(np.tile(p[0], (40, 1)), q)), "a single row goes with all"
+    assert np.array_equal(poses(p, q[0]), poses(p, np.tile(q[0], (40, 1))))
+    assert poses((1, 2, 3)).shape == (1, 4, 4) and poses(np.zeros((0, 3)), np.zeros((0, 4))).shape == (0, 4, 4)
+    assert np.allclose(poses((0, 0, 0), (1e-308, 0, 0, 1e-308))[0], pose(rpy=(0, 0, np.pi / 2)), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"p": np.zeros((2, 3)), "rpy": (0, 0, 0), "quat_wxyz": (1, 0, 0, 0)}, "at most one"),
+        ({"p": np.zeros((2, 3)), "quat_wxyz": np.ones((3, 4))}, "p 2, quat_wxyz 3"),
+        ({"p": np.zeros((0, 3)), "rpy": np.zeros((2, 3))}, "p 0, rpy 2"),
+        ({"p": np.zeros((2, 4))}, r"poses: p must have shape \(N, 3\)"),
+        ({"p": [[0, 0, 0], [0, np.nan, 0]]}, r"p\[1\] has entries that are not finite"),
+        ({"p": [[0, 0, 0], [0, 1e60, 0]]}, r"poses\[1\] exceeds"),
+        ({"p": (0, 0, 0), "quat_wxyz": [(1, 0, 0, 0), (0, 0, 0, 0)]}, r"quat_wxyz\[1\] is of length 0"),
+        ({"p": "abc"}, "poses: p must be real numbers"),
+    ],
+)
+def test_rows_that_make_no_poses(arguments, said):
+    with pytest.raises(InvalidPose, match=said):
+        poses(**arguments)
+
+
+def test_a_translation_is_read_as_before_it_had_a_short_way():
+    for xyz in ((1, 2.5, -3), [0.0, -0.0, 5e-324], np.array([1.0, 2, 3]), (2**60 + 1, 0, 0), np.array([1, 2, 3])):
+        want = np.eye(4)
+        want[:3, 3] = np.asarray(xyz, dtype=np.float64)
+        assert pose(xyz).tobytes() == want.tobytes(), f"pose({xyz!r})"
+    for xyz in ((1, 2), (1, 2, np.nan), (1, 2, 1e51), (1, 2, 10**60), (1, 2, "3"), (1, 2, 1j), np.zeros((3, 1)), None):
+        with pytest.raises(InvalidPose, match="pose"):
+            pose(xyz)
+    first = pose((1, 2, 3))
+    first[:] = 7.0
+    assert pose((1, 2, 3)).tolist() == [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]], "poses share no memory"
+
+
+def test_first_three_rows_are_poses_and_rows_of_seven_are_asked_to_say_their_order():
+    X = poses(np.random.default_rng(2).normal(size=(5, 3)), rpy=(0.1, 0.2, 0.3))
+    assert np.array_equal(as_poses(X[:, :3]), X) and np.array_equal(as_poses(X[0, :3]), X[:1])
+    box = Box((1, 1, 1))
+    assert distance(box, box, X[:, :3], EYE).rows.tobytes() == distance(box, box, X, EYE).rows.tobytes()
+    assert distance(box, box, X[0, :3], EYE[:3]).is_single
+    for rows in (np.zeros((5, 7)), np.zeros(7)):
+        with pytest.raises(InvalidPose, match=r"X_WA.*got .*collide\.poses\(.*scalar comes first.*last"):
+            distance(box, box, rows, EYE)

@@ -31,6 +31,7 @@ ROOMS = {
     "base": {"errors"},
     "kernels": {"errors", "base"},
     "transforms": {"errors", "base"},
+    "pose_arrays": {"errors", "base", "transforms"},
     "results": {"errors", "base"},
     "numerics": {"errors", "kernels"},
     "least_distance": {"errors", "base", "kernels", "numerics"},
