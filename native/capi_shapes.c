@@ -40,8 +40,8 @@ static collide_status lay_out(collide_shape *shape, const double *points, size_t
     const struct collide_kernels *kernels = kernels_here();
     int64_t measures[MEASURES];
     double *block;
-    if (kernels == NULL || !workspace_sizes(kernels, measures)) return COLLIDE_NO_KERNELS;
-    if (n < FEWEST_COARSE) measures[M_COARSE] = 0;
+    measures[M_COARSE] = 0;
+    if (kernels == NULL || (n >= FEWEST_COARSE && !workspace_sizes(kernels, measures))) return COLLIDE_NO_KERNELS;
     block = cache_lines((3 * padded + 4 * (size_t)measures[M_COARSE]) * sizeof *block, &shape->block);
     if (block == NULL) return COLLIDE_NO_MEMORY;
     shape->ints[COUNT] = (int64_t)n;
