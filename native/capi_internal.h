@@ -79,8 +79,8 @@ collide_status shape_of_points(const double *points, size_t n, double radius, do
                                collide_shape **out);
 
 /* capi_tree.c: a support tree of n points (n, 3), which are kept; *tree stays NULL where the hull is too small for
-   one. lowest : exponent of the lowest bit of the coordinates. */
-collide_status build_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest, void **tree);
+   one. */
+collide_status build_tree(const struct collide_kernels *kernels, const double *points, size_t n, void **tree);
 
 /* capi_halfspaces.c: settles a row of two half-spaces whose normals are opposite within rounding. poses : rows of POSE.
    workspace : HALFSPACES_BYTES. */

@@ -15,28 +15,6 @@ static const double UPWARDS = 1 + 1e-15;
 static int is_length(double value) { return value >= SMALLEST && value <= LARGEST; }
 static int is_coordinate(double value) { return fabs(value) <= LARGEST; }
 
-/* Exponent of the lowest bit set among doubles. */
-static int64_t lowest_exponent(const double *values, size_t n)
-{
-    int64_t lowest = NO_BITS;
-    size_t k;
-    for (k = 0; k < n; k++) {
-        uint64_t bits, mantissa;
-        int64_t exponent;
-        memcpy(&bits, &values[k], 8);
-        exponent = (int64_t)(bits >> 52 & 0x7ff);
-        mantissa = (bits & 0xfffffffffffffu) | (exponent ? (uint64_t)1 << 52 : 0);
-        if (mantissa == 0) continue;
-        exponent = (exponent ? exponent : 1) - 1075;
-        while (!(mantissa & 1)) {
-            mantissa >>= 1;
-            exponent++;
-        }
-        if (exponent < lowest) lowest = exponent;
-    }
-    return lowest;
-}
-
 /* Digest of kind, radius and parameters, then of the points; -0.0 and 0.0 are one number among these. */
 static void digest(collide_shape *shape, const double *points, size_t n)
 {
@@ -58,29 +36,20 @@ static void digest(collide_shape *shape, const double *points, size_t n)
 /* Coordinates axis by axis, filled up with the first point, then coarse points. */
 static collide_status lay_out(collide_shape *shape, const double *points, size_t n)
 {
-    size_t padded = (n + COORDINATES - 1) / COORDINATES * COORDINATES, axis, k, coarse = n >= FEWEST_COARSE;
-    const struct collide_kernels *kernels = NULL;
+    size_t padded = (n + COORDINATES - 1) / COORDINATES * COORDINATES;
+    const struct collide_kernels *kernels = kernels_here();
     int64_t measures[MEASURES];
-    double *block, squares = 0.0;
+    double *block;
     measures[M_COARSE] = 0;
-    if (coarse) {
-        if ((kernels = kernels_here()) == NULL || !workspace_sizes(kernels, measures)) return COLLIDE_NO_KERNELS;
-    }
+    if (kernels == NULL || (n >= FEWEST_COARSE && !workspace_sizes(kernels, measures))) return COLLIDE_NO_KERNELS;
     block = cache_lines((3 * padded + 4 * (size_t)measures[M_COARSE]) * sizeof *block, &shape->block);
     if (block == NULL) return COLLIDE_NO_MEMORY;
-    for (axis = 0; axis < 3; axis++)
-        for (k = 0; k < padded; k++) block[axis * padded + k] = points[3 * (k < n ? k : 0) + axis];
-    for (k = 0; k < n; k++) {
-        const double *p = points + 3 * k;
-        double square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
-        if (square > squares) squares = square;
-    }
-    shape->numbers[REACH] = sqrt(squares) * UPWARDS;
     shape->ints[COUNT] = (int64_t)n;
     shape->ints[PADDED] = (int64_t)padded;
     shape->ints[ADDRESS] = address_of(block);
-    shape->ints[LOWEST] = lowest_exponent(points, 3 * n);
-    if (!coarse) return COLLIDE_OK;
+    shape->ints[LOWEST] = kernels->lay_out_points(address_of(points), (int64_t)n, address_of(block), (int64_t)padded,
+                                                  address_of(&shape->numbers[REACH]));
+    if (n < FEWEST_COARSE) return COLLIDE_OK;
     shape->ints[COARSE_AT] = address_of(block + 3 * padded);
     kernels->choose_coarse(address_of(points), (int64_t)n, shape->ints[COARSE_AT]);
     return COLLIDE_OK;
@@ -91,7 +60,7 @@ static collide_status build_support_tree(collide_shape *shape, size_t n)
     const struct collide_kernels *kernels = kernels_here();
     collide_status status;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
-    status = build_tree(kernels, shape->points, n, shape->ints[LOWEST], &shape->tree);
+    status = build_tree(kernels, shape->points, n, &shape->tree);
     shape->ints[TREE] = address_of(shape->tree);
     return status;
 }

@@ -33,8 +33,11 @@ static const struct collide_kernels *kernels_of(const char **level)
 
 const struct collide_kernels *kernels_here(void)
 {
+    /* Threads that come first at once write the same. Asking the processor takes 30 us where it is a virtual one. */
+    static const struct collide_kernels *volatile known = NULL;
     const char *level = NULL;
-    return kernels_of(&level);
+    if (known == NULL) known = kernels_of(&level);
+    return known;
 }
 
 collide_status collide_level(const char **level)

@@ -21,7 +21,7 @@ struct hull hull_of(const struct collide_kernels *kernels, struct arena *arena, 
 }
 
 /* The tree of a hull in a block of its own; NULL where no order of neighbours is certain, or memory has ended. */
-static void *grow(const struct collide_kernels *kernels, struct arena *arena, const double *points, int64_t n, int64_t lowest,
+static void *grow(const struct collide_kernels *kernels, struct arena *arena, const double *points, int64_t n,
                   const struct hull *hull)
 {
     int64_t capacity = 8 * hull->n_vertices + 4096, outcome, *memory;
@@ -37,11 +37,11 @@ static void *grow(const struct collide_kernels *kernels, struct arena *arena, co
     }
     if (outcome < 0) return NULL;
     if ((block = malloc((size_t)memory[0])) == NULL) arena->failed = 1;
-    else kernels->keep_tree(address_of(points), n, hull->n_facets, lowest, address_of(memory), capacity, address_of(block));
+    else kernels->keep_tree(address_of(points), n, hull->n_facets, address_of(memory), capacity, address_of(block));
     return block;
 }
 
-collide_status build_tree(const struct collide_kernels *kernels, const double *points, size_t n, int64_t lowest, void **tree)
+collide_status build_tree(const struct collide_kernels *kernels, const double *points, size_t n, void **tree)
 {
     struct arena arena;
     struct hull hull;
@@ -49,7 +49,7 @@ collide_status build_tree(const struct collide_kernels *kernels, const double *p
     arena_begin(&arena, NULL, 0);
     hull = hull_of(kernels, &arena, points, (int64_t)n);
     if (!arena.failed && hull.dimension >= 2 && hull.n_vertices >= FEWEST_VERTICES)
-        *tree = grow(kernels, &arena, points, (int64_t)n, lowest, &hull);
+        *tree = grow(kernels, &arena, points, (int64_t)n, &hull);
     status = arena.failed ? COLLIDE_NO_MEMORY : COLLIDE_OK;
     arena_end(&arena);
     return status;

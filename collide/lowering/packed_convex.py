@@ -12,7 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide.numerics.lowest_bits import NO_BITS, lowest_exponents
+from collide.kernels import address_of
+from collide.numerics.lowest_bits import NO_BITS
+from collide.support.point_columns import lay_out_points
 from collide.support.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 
 __all__ = [
@@ -74,13 +76,12 @@ def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0, with
 
     with_tree : whether many points get a support tree when a query first needs it.
     """
-    n = len(points)
-    columns = on_cache_lines(3, -(-n // BLOCK) * BLOCK)
-    columns[:, :n] = points.T
-    columns[:, n:] = points[0][:, None]
-    # Rounded upwards: a sum of three squares and a root are good to 4 ulp.
-    reach = float(np.sqrt(np.square(points).sum(axis=1).max())) * (1 + 1e-15)
-    return _packed(POINTS, float(radius), reach, slop, (), _frozen(points), _frozen(columns), with_tree)
+    rows, n = np.ascontiguousarray(points, dtype=np.float64), len(points)
+    columns, reach = on_cache_lines(3, -(-n // BLOCK) * BLOCK), np.empty(1)
+    lowest = lay_out_points(address_of(rows), n, address_of(columns), columns.shape[1], address_of(reach))
+    return _packed(
+        POINTS, float(radius), float(reach[0]), slop, (), _frozen(points), _frozen(columns), int(lowest), with_tree
+    )
 
 
 def pack_curved(kind: int, params, reach: float) -> PackedConvex:
@@ -93,12 +94,11 @@ def pack_halfspace(normal, offset: float) -> PackedConvex:
     return _packed(HALFSPACE, 0.0, 0.0, 0.0, (*normal, offset), *_NO_POINTS)
 
 
-def _packed(kind, radius, reach, slop, params, points, coordinates, with_tree=False) -> PackedConvex:
+def _packed(kind, radius, reach, slop, params, points, coordinates, lowest=NO_BITS, with_tree=False) -> PackedConvex:
     row = np.zeros(4)
     row[: len(params)] = params
     digest = hashlib.blake2b(np.array([kind, radius, *row]).tobytes(), digest_size=16)
     digest.update((points + 0.0).tobytes())
-    lowest = int(lowest_exponents(points.ravel())) if len(points) else NO_BITS
     return PackedConvex(
         kind,
         radius,

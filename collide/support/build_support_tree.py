@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from collide.kernels import address_of
-from collide.numerics.lowest_bits import lowest_exponents
 from collide.support.grow_tree import NOT_CLOSED, UNUSED_VERTEX, grow_tree, keep_tree, tree_memory
 from collide.support.support_tree import SupportTree, checked_points
 from collide.support.tree_layout import (
@@ -39,7 +38,7 @@ def build_support_tree(points: np.ndarray, vertices: np.ndarray, facets: np.ndar
     """
     points, vertices = checked_points(points), np.ascontiguousarray(vertices, dtype=np.int32)
     facets = _checked(points, vertices, facets)
-    n, lowest, capacity = len(points), int(lowest_exponents(points.ravel())), 8 * len(vertices) + 4096
+    n, capacity = len(points), 8 * len(vertices) + 4096
     outcome = capacity
     while outcome > 0:
         capacity = outcome
@@ -51,9 +50,7 @@ def build_support_tree(points: np.ndarray, vertices: np.ndarray, facets: np.ndar
     if outcome < 0:
         raise ValueError(f"support tree: {_WHY.get(outcome, 'levels do not lead to each other')}")
     block = np.empty(int(memory[0]) // 8, dtype=np.int64)
-    keep_tree(
-        address_of(points), n, len(facets), lowest, address_of(memory), capacity, address_of(block)
-    )
+    keep_tree(address_of(points), n, len(facets), address_of(memory), capacity, address_of(block))
     return _tree_of(points, block)
 
 

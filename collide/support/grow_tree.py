@@ -432,12 +432,12 @@ def _kept_bytes(tree):
     return 8 * HEADER + 24 + 24 * n_entries + integers
 
 
-@entry("void(int64, int64, int64, int64, int64, int64, int64)")
-def keep_tree(points_at, n, n_facets, lowest, memory_at, capacity, block_at):
+@entry("void(int64, int64, int64, int64, int64, int64)")
+def keep_tree(points_at, n, n_facets, memory_at, capacity, block_at):
     """Write the tree that `grow_tree` left in memory into a block of as many bytes as its header says.
 
     The block begins with the header of `support_tree.py`; behind it stand range, coordinates, nodes, owners, entries,
-    rings. lowest : exponent of the lowest bit of the coordinates.
+    rings.
     """
     tree, _ = _growing(memory_at, n, n_facets, capacity)
     points, header = view_f64(points_at, 3 * n), view_i64(block_at, HEADER)
@@ -455,7 +455,7 @@ def keep_tree(points_at, n, n_facets, lowest, memory_at, capacity, block_at):
     header[AT_ENTRIES] = header[AT_NODES] + 2 * _padded(n_nodes + 1)
     header[AT_RING_STARTS] = header[AT_ENTRIES] + _padded(n_entries)
     header[AT_RING] = header[AT_RING_STARTS] + _padded(n + 1)
-    write_range(points, n, lowest, view_f64(header[AT_RANGE], 3))
+    write_range(points, n, view_f64(header[AT_RANGE], 3))
     coordinates = view_f64(header[AT_LIST_COORDINATES], 3 * n_entries)
     for node in range(n_nodes):
         first, end = tree.nodes[node], tree.nodes[node + 1]

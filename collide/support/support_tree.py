@@ -12,7 +12,6 @@ from __future__ import annotations
 import numpy as np
 
 from collide.kernels import address_of
-from collide.numerics.lowest_bits import lowest_exponents
 from collide.support.tree_layout import FEWEST, exact_range
 
 #: No coordinate may be larger in size: products with a direction, and their halves, stay finite.
@@ -44,8 +43,7 @@ class SupportTree:
         self.list_coordinates = np.ascontiguousarray(list_coordinates, dtype=np.float64).reshape(-1)
         self._check_structure()
         self.range = np.empty(3)
-        lowest = int(lowest_exponents(self.points.ravel()))
-        exact_range(address_of(self.points), len(self.points), lowest, address_of(self.range))
+        exact_range(address_of(self.points), len(self.points), address_of(self.range))
         self.header = np.array(
             [len(self.points), self.depth, len(self.nodes) - 1, len(self.entries), len(self.ring),
              *(address_of(part) for part in (
