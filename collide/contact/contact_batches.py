@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.contact.contact_rows import CONTACT_DTYPE
+from collide.contact.contact_rows import no_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.curved_contacts import curved_contacts
 from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
@@ -64,7 +64,7 @@ def contact_batch(
     that are no rotation. Raises InvalidPose, UnsupportedQuery.
     """
     if n == 0:
-        return np.zeros(0, dtype=CONTACT_DTYPE), np.zeros(0, dtype=np.int64)
+        return no_rows(), np.zeros(0, dtype=np.int64)
     A, B = closed_shapes(A, B, X_WA, X_WB, n, margin)
     if not (isinstance(A, Shape) and isinstance(B, Shape)):
         A, B = of_one_set(A, B, n)
@@ -81,6 +81,8 @@ def contact_batch(
         shapes, which = A.shape_set.shapes, np.stack([A.rows, B.rows], axis=1)
     singles: list[Shape] = []
     part_pairs = _part_pairs(shapes, which, X_WA, X_WB, n, margin, singles)
+    if not len(part_pairs):
+        return no_rows(), np.zeros(n, dtype=np.int64)
     rows, ends = _rows_of_parts(singles, part_pairs, margin, max_contacts, threads)
     starts = np.concatenate([[0], ends[:-1]])
     of_pair = np.repeat(part_pairs.pair, ends - starts)
@@ -162,8 +164,6 @@ def _rows_of_parts(
     singles: list[Shape], pairs: PartPairs, margin: float, max_contacts: int, threads: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """(rows, ends) of pairs of parts: the convex ones in one batch, of meshes those of two shapes."""
-    if not len(pairs):
-        return np.zeros(0, dtype=CONTACT_DTYPE), np.zeros(0, dtype=np.int64)
     kinds = [kind_of(shape) for shape in singles]
     is_convex = np.array([kind < Kind.MESH for kind in kinds])
     convex = np.flatnonzero(is_convex[pairs.A] & is_convex[pairs.B])
@@ -197,7 +197,7 @@ def _rows_of_parts(
         blocks.append(rows)
         owners.append(np.repeat(which, counts[which]))
     order = np.argsort(np.concatenate(owners), kind="stable")
-    return np.concatenate([*blocks, np.zeros(0, dtype=CONTACT_DTYPE)])[order], np.cumsum(counts)
+    return np.concatenate([*blocks, no_rows()])[order], np.cumsum(counts)
 
 
 def _number_patches(rows: np.ndarray, of_pair: np.ndarray) -> None:

@@ -88,7 +88,7 @@ def contacts(
     if threads.__class__ is not int or threads != 1:
         threads = check_threads(threads)
     try:
-        rows = A._prepared[B._serial].of_contacts.contacts(X_WA, X_WB, margin, max_contacts)  # type: ignore[union-attr]
+        rows = A._contacts[B._serial].contacts(X_WA, X_WB, margin, max_contacts)  # type: ignore[union-attr]
         if rows is not None:
             return Contacts(rows)
     except (AttributeError, KeyError, TypeError):

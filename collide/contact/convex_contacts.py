@@ -23,7 +23,7 @@ from collide.contact.contact_blocks import (
     WHICH_AT,
     contacts_of_pairs,
 )
-from collide.contact.contact_rows import CONTACT_DTYPE
+from collide.contact.contact_rows import CONTACT_DTYPE, no_rows
 from collide.contact.convex_manifolds import (
     MARGIN,
     MAX_CONTACTS,
@@ -38,18 +38,23 @@ from collide.contact.support_face import ROUND
 from collide.errors import InvalidPose, UnsupportedQuery
 from collide.kernels import address_of
 from collide.kernels.prepared import prepared_row
+from collide.lowering.compound_layout import layout_of
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.parts import is_single_convex
 from collide.lowering.shape_table import POSE, ShapeTable
+from collide.narrowphase.composite.single_composite_call import BALLS_WORK, balls_beyond
 from collide.narrowphase.convex_batches import prepare_sets, shape_table
 from collide.narrowphase.convex_kernel_calls import SinglePair, block_workspace
 from collide.narrowphase.pose_batches import BLOCK
 from collide.narrowphase.pose_batches import HEADER as HEADER_OF_POSES
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
 from collide.results import zeroed_rows
+from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_poses
 
+#: Where a shape keeps what single calls of `contacts` ask.
+_SLOT = "_contacts"
 #: The least that a thread is handed.
 _PIECE = 512
 #: Contacts a pair that there is room for at first, and of so many pairs: how many they have tells about the others.
@@ -206,15 +211,32 @@ def _addresses(
 
 
 def prepare_contacts(A, B) -> None:
-    """Have two convex sets prepared for single calls, of their distance as of their contacts."""
-    if not (isinstance(A, Shape) and isinstance(B, Shape)):
+    """Have two convex sets prepared for single calls, of their distance as of their contacts; of two bodies of which
+    one is a union, those calls at which they are far apart."""
+    if not (isinstance(A, Shape) and isinstance(B, Shape)) or prepared_pair(A, B, _SLOT) is not None:
         return
     pair = prepared_pair(A, B)
     if pair is None and is_single_convex(A) and is_single_convex(B) and single_calls_are_safe():
         pair = prepare_sets(A, B)
         keep_prepared(A, B, pair)
-    if isinstance(pair, SinglePair) and pair.of_contacts is None:
-        pair.of_contacts = SingleContacts(pair)
+    if isinstance(pair, SinglePair):
+        keep_prepared(A, B, SingleContacts(pair), _SLOT)
+    elif (isinstance(A, Compound) or isinstance(B, Compound)) and single_calls_are_safe():
+        keep_prepared(A, B, FarContacts(A, B), _SLOT)
+
+
+class FarContacts:
+    """Two bodies prepared for `contacts` of one pair of poses at a time: those that are far apart have none."""
+
+    def __init__(self, A: Shape, B: Shape):
+        self._work, self._no_row = np.zeros(BALLS_WORK), np.zeros(1, dtype=CONTACT_DTYPE)
+        self._balls = layout_of(A).ball, layout_of(B).ball
+        addresses = [address_of(of) for of in (*self._balls, self._work)]
+        self._ask = prepared_row(balls_beyond, np.array(addresses, dtype=np.int64))
+
+    def contacts(self, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
+        """No rows; None where bodies may be within the margin, or an error is called for."""
+        return None if self._ask(X_WA, X_WB, self._no_row, False, margin) is None else no_rows()
 
 
 class SingleContacts:

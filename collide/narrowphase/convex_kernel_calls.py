@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cache
 from threading import local
-from typing import Any
 
 import numpy as np
 
@@ -252,7 +251,6 @@ class SinglePair:
         table.build_trees(np.arange(2))
         self.table, self.space = table, space_of_single_calls()  # held, since kernels use their buffers
         header = self.header = self.space.header_of(table)
-        self.of_contacts: Any = None  # `contact.convex_contacts.SingleContacts`, once contacts are asked for
         self.collide, self._distance = prepared_boolean(collide_single, header), prepared_row(distance_single, header)
         self._within = prepared_row(within_single, header)
 

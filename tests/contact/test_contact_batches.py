@@ -112,3 +112,110 @@ def test_boxes_near_are_all_pairs_within_the_margin(monkeypatch):
         monkeypatch.setattr(composite_parts, "_MAX_PAIRS", few)
         found = set(zip(*(column.tolist() for column in composite_parts.boxes_near(A, B, X_WA, X_WB, 0.05))))
         assert found == set(map(tuple, np.argwhere(apart <= 0.05).tolist())) and len(found) > 20
+
+
+@pytest.mark.parametrize("rotated", [True, False])
+def test_a_walk_through_both_trees_names_what_all_pairs_of_boxes_tell(rotated, monkeypatch):
+    """At matrices that shrink, stretch and shear, far from the origin, with spheres, whose radius no matrix changes,
+    with a half-space, and of nested unions."""
+    monkeypatch.setattr(composite_parts, "_MAX_PAIRS", 0)
+    rng = np.random.default_rng(11)
+    named = asked = 0
+    for case in range(40):
+        items = [
+            (collide.Sphere(10.0 ** rng.uniform(-2, -0.3)) if k % 2 else collide.Box(rng.uniform(0.02, 0.3, 3)),
+             collide.pose(rng.uniform(-1, 1, 3), rpy=rng.uniform(-3, 3, 3)))
+            for k in range(30)
+        ]
+        if case % 4 == 0:
+            items.append((collide.Halfspace((0.0, 0.0, 1.0), -0.5), np.eye(4)))
+        A = CompoundParts(collide.Compound([(collide.Compound(items), collide.pose(rpy=rng.uniform(-3, 3, 3)))]))
+        B = CompoundParts(clutter(rng, 30, 0.3))
+        X_WA, X_WB = (collide.pose(rng.uniform(-1, 1, 3), rpy=rng.uniform(-3, 3, 3)) for _ in "ab")
+        if not rotated:
+            X_WA[:3, :3] = rng.normal(scale=0.4, size=(3, 3))
+            X_WB[:3, :3] *= rng.uniform(0.3, 2.0)
+        far = 10.0 ** rng.uniform(-3, 6) * rng.normal(size=3)
+        X_WA[:3, 3] += far
+        X_WB[:3, 3] += far
+        margin = float(rng.choice([0.0, 0.05, 0.3]))
+        a, b = A.boxes(X_WA[None])[0][:, None], B.boxes(X_WB[None])[0][None]
+        apart = np.maximum(b[..., :3] - a[..., 3:], a[..., :3] - b[..., 3:]).max(axis=-1)
+        found = set(map(tuple, A.tree.pairs_near(B.tree, X_WA, X_WB, margin).tolist()))
+        wanted = set(map(tuple, np.argwhere(apart <= margin).tolist()))
+        assert wanted <= found, (case, rotated, margin, X_WA.tolist(), X_WB.tolist(), wanted - found)
+        _, i, j = composite_parts.boxes_near(A, B, X_WA[None], X_WB[None], margin)
+        assert wanted <= set(zip(i.tolist(), j.tolist()))
+        named, asked = named + len(found), asked + len(wanted)
+    assert 500 < asked and named < 5 * asked, (named, asked)
+
+
+def test_contacts_of_many_parts_make_boxes_of_those_that_are_near_alone(monkeypatch):
+    """Of 1,000 parts no box is made where the other body is far, and as many as are near where it is not; its trees are
+    made once."""
+    rng = np.random.default_rng(12)
+    box = collide.Box((0.05, 0.04, 0.03))
+    union, other = (
+        collide.Compound([(box, collide.pose(rng.uniform(-1, 1, 3), rpy=rng.uniform(-3, 3, 3))) for _ in range(1000)])
+        for _ in "ab"
+    )
+    ask = collide.Box((0.4, 0.3, 0.2))
+    collide.contacts(union, ask, EYE, collide.pose((0.1, 0.0, 0.0)))
+    collide.contacts(union, other, EYE, collide.pose((1.8, 0.0, 0.0)))
+    made: list[int] = []
+    boxes_of = composite_parts.boxes_of
+
+    def counted(table, rows, which):
+        made.append(len(which))
+        return boxes_of(table, rows, which)
+
+    monkeypatch.setattr(composite_parts, "boxes_of", counted)
+    poses = np.array([collide.pose((2.0 + k, 0.0, 0.0)) for k in range(3)])
+    assert not len(collide.contacts(union, ask, EYE, poses)) and not sum(made)
+    parts = [composite_parts.compound_parts(shape) for shape in (union, ask, other)]
+    beside, overlapping = collide.pose((1.9, 0.1, 0)), collide.pose((0.3, 0.2, 0.1))
+    for B, body, X_WB in ((parts[1], ask, overlapping), (parts[2], other, beside)):
+        made.clear()
+        assert len(collide.contacts(union, body, EYE, X_WB)) > 0
+        n_made = sum(made)
+        near = composite_parts.boxes_near(parts[0], B, EYE[None], X_WB[None], 0.0)
+        assert 0 < len(near[0]) < 200 and n_made <= 2 * 2.5 * len(near[0]), (n_made, len(near[0]))
+
+
+def test_contacts_of_a_union_far_away_are_asked_of_balls_alone(monkeypatch):
+    """Once a pair was asked; nearer, with a margin, and at what is no pose, the long way answers the same."""
+    rng = np.random.default_rng(13)
+    union, box = clutter(rng, 40, 0.3), collide.Box((0.2, 0.2, 0.2))
+    near, far = collide.pose((0.2, 0.1, 0.0)), collide.pose((9.0, 0.0, 0.0))
+    first = collide.contacts(union, box, EYE, near)
+    assert len(first) and collide.contacts(union, box, EYE, near).rows.tobytes() == first.rows.tobytes()
+    with pytest.raises(collide.InvalidPose):
+        collide.contacts(union, box, EYE, 2.0 * far)
+    assert len(collide.contacts(union, box, EYE, far, margin=9.0))
+    monkeypatch.setattr("collide.contact.contact_query.contact_batch", None)
+    for X_WA, X_WB in ((EYE, far), (far, EYE), (far + 0.0, far @ far)):
+        result = collide.contacts(union, box, X_WA, X_WB, margin=0.5)
+        assert len(result) == 0 and len(result.starts) == 2 and len(result[0]) == 0
+    with pytest.raises(TypeError):
+        collide.contacts(union, box, EYE, near)
+
+
+def test_balls_leave_no_contact_of_a_union_out():
+    """Poses about as far as the balls of both reach, with matrices that are barely rotations."""
+    rng, hits, far = np.random.default_rng(14), 0, 0
+    for case in range(200):
+        at = rng.uniform(-1, 1, (1 + case % 2, 3))
+        sphere = collide.Compound([(collide.Sphere(0.5), collide.pose(p)) for p in at])
+        other = collide.Sphere(0.25)
+        collide.contacts(sphere, other, EYE, EYE)
+        X_WA = collide.pose(rng.normal(size=3), rpy=rng.uniform(-3, 3, 3))
+        X_WA[:3, :3] *= 1.0 + rng.uniform(-1e-5, 1e-5)
+        centre = X_WA[:3, :3] @ sphere.items[0][1][:3, 3] + X_WA[:3, 3]
+        n = rng.normal(size=3)
+        gap = rng.choice([0.0, 1e-9, 0.1])
+        X_WB = collide.pose(centre + (0.75 + gap) * n / np.linalg.norm(n))
+        found = len(collide.contacts(sphere, other, X_WA, X_WB, margin=gap * (1 + 1e-6) + 1e-12))
+        hits += found > 0
+        far += len(collide.contacts(sphere, other, X_WA, X_WB, margin=0.5 * gap)) == 0
+        assert found, (case, gap, X_WA.tolist(), X_WB.tolist())
+    assert hits == 200 and far > 100

@@ -90,17 +90,26 @@ def _shift(block, p, q):
 @kernel
 def _place_body_balls(block, k):
     """Balls 0 and 1 become those of all of A and of all of B, as seen from A; returns how large the pair is [m]."""
-    poses = block.poses
     p = POSE * block.slots[SLOT_SIZE * k + BODY_ROWS]
     q = POSE * block.slots[SLOT_SIZE * k + BODY_ROWS + 1]
     a = BODY * block.slots[SLOT_SIZE * k + BODY_NUMBERS]
     b = BODY * block.slots[SLOT_SIZE * k + BODY_NUMBERS + 1]
     numbers = view_f64(block.header[BODY_BALLS_AT], max(a, b) + BODY)
-    shift = _shift(block, p, q)
-    place_ball(poses, p, numbers, a, 0.0, 0.0, 0.0, block.balls, 0)
-    place_ball(poses, q, numbers, b, shift.x, shift.y, shift.z, block.balls, BALL_IN_WORLD)
-    reach_a = numbers[a + BODY_REACH] * max(poses[p + POSE_STRETCH], 1.0)
-    reach_b = numbers[b + BODY_REACH] * max(poses[q + POSE_STRETCH], 1.0)
+    return place_two_balls(block.poses, p, q, numbers, a, numbers, b, block.balls)
+
+
+@kernel
+def place_two_balls(poses, p, q, of_a, a, of_b, b, balls):
+    """The first two balls become those of bodies at rows of poses that begin at p and q, as seen from the first;
+    returns how large the pair is [m].
+
+    of_a, of_b : numbers of bodies, which begin at a and b.
+    """
+    shift = sub(vec3_at(poses, q + 9), vec3_at(poses, p + 9))
+    place_ball(poses, p, of_a, a, 0.0, 0.0, 0.0, balls, 0)
+    place_ball(poses, q, of_b, b, shift.x, shift.y, shift.z, balls, BALL_IN_WORLD)
+    reach_a = of_a[a + BODY_REACH] * max(poses[p + POSE_STRETCH], 1.0)
+    reach_b = of_b[b + BODY_REACH] * max(poses[q + POSE_STRETCH], 1.0)
     return reach_a + reach_b + norm1(shift)
 
 

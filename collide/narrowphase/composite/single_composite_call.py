@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 
-from collide.kernels import entry, kernel, native_call, prepared, view_i64, view_u8
+from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64, view_u8
+from collide.lowering.compound_table import BALL_IN_WORLD, BODY
+from collide.lowering.place_parts import BALL_MARGIN, gap_of_balls
+from collide.lowering.shape_table import POSE
 from collide.narrowphase.composite.composite_block import HEADER, N_DONE
-from collide.narrowphase.composite.composite_poses import COMPOUNDS_SIGNATURE
+from collide.narrowphase.composite.composite_poses import COMPOUNDS_SIGNATURE, place_two_balls
 from collide.narrowphase.finish_rows import forget_depth
+from collide.narrowphase.pose_batches import set_pose
 from collide.narrowphase.rows import BODY_B, DISTANCE, view_row
 
 answer_compounds_at = native_call(COMPOUNDS_SIGNATURE)
@@ -15,6 +19,9 @@ answer_compounds_at = native_call(COMPOUNDS_SIGNATURE)
 # Header: the kernel, where a boolean goes, then the header of `composite_block.py`.
 _KERNEL, _BYTE_AT, _HEADER = range(3)
 SINGLE_HEADER = _HEADER + HEADER
+# Header of `balls_beyond`: numbers of both bodies, and doubles to work in.
+_BALL_OF_A, _BALL_OF_B, _WORK_AT = range(3)
+BALLS_WORK = 2 * POSE + 2 * BALL_IN_WORLD
 
 
 @kernel
@@ -55,3 +62,20 @@ def distance_single_compound(header_at, XA_at, XB_at, row_at, depths, limit):
     if not depths:
         forget_depth(row)
     return -1 if row.doubles[DISTANCE] == -math.inf else 0
+
+
+@entry(prepared.ROW, nogil=False)
+def balls_beyond(header_at, XA_at, XB_at, _row_at, _flag, margin):
+    """0 where balls around two bodies are farther apart than a margin [m]; −1 elsewhere, and where one is no pose.
+
+    No part reaches out of its body's ball by more than the balls' margin of the size, so that none is within the margin
+    of another, whose product is rounded up.
+    """
+    header = view_i64(header_at, 3)
+    poses, balls = view_f64(header[_WORK_AT], 2 * POSE), view_f64(header[_WORK_AT] + 16 * POSE, 2 * BALL_IN_WORLD)
+    if not (set_pose(poses, 0, view_f64(XA_at, 16), True) and set_pose(poses, POSE, view_f64(XB_at, 16), True)):
+        return -1
+    ball_a, ball_b = view_f64(header[_BALL_OF_A], BODY), view_f64(header[_BALL_OF_B], BODY)
+    size = place_two_balls(poses, 0, POSE, ball_a, 0, ball_b, 0, balls)
+    gap = gap_of_balls(balls, 0, BALL_IN_WORLD) - BALL_MARGIN * size
+    return 0 if gap > margin * (1.0 + 2.0**-50) else -1
