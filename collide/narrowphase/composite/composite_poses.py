@@ -218,12 +218,14 @@ def _list_others_of(block, k, boolean, every, n_listed):
     count_b = body_of(block, k, 1).n_parts
     size = _place_body_balls(block, k)
     _place_part_balls(block, k)
+    first_pair = block.slots[SLOT_SIZE * k + FIRST_PAIR]
     reach = BALL_MARGIN * size
     if every:
         reach = math.inf
     elif not boolean:
-        reach += max(first_reach_of(block.scores, SCORE * k), 0.0) + _BRACKET * size
-    first_pair = block.slots[SLOT_SIZE * k + FIRST_PAIR]
+        # Others that are as near by their balls as the first: which of them came first has no say.
+        tied = _gap(block, 2 + first_pair // count_b, 2 + count_a + first_pair % count_b)
+        reach += max(first_reach_of(block.scores, SCORE * k), tied, 0.0) + _BRACKET * size
     start = header[PAIR]
     for i in range(start // count_b, count_a):
         if count_b > 1 and _gap(block, 2 + i, 1) > reach:

@@ -69,6 +69,29 @@ def test_a_ball_five_centimetres_into_the_foot_of_an_l_is_that_deep():
     assert r.normal == pytest.approx((0, 0, 1)) and 0.5 * (r.point_a + r.point_b) == pytest.approx((1.0, 0.2, 0.125))
 
 
+def test_pairs_left_out_by_balls_bar_no_way():
+    """Moved by −lower the unions are apart, and along the normal no more is asked for than slabs of all pairs say; far
+    from the origin, too."""
+    rng, opened = rng_of("balls along a way"), 0
+    for case in range(12):
+        kinds = brackets(rng)
+        A, B = kinds[case % 4], kinds[(case + 1) % 4]
+        far = 10.0 ** rng.uniform(-1, 3) * rng.normal(size=3)
+        X_WA, X_WB = random_pose(rng, 0.1), random_pose(rng, 0.1)
+        X_WA[:3, 3] += far
+        X_WB[:3, 3] += far
+        r = collide.distance(A, B, X_WA, X_WB)
+        if not r.hit or r.distance == 0.0:
+            continue
+        X_out = X_WB.copy()
+        X_out[:3, 3] -= (r.lower - 1e-12 - 1e-15 * np.abs(far).max()) * r.normal
+        assert collide.distance(A, B, X_WA, X_out).lower > -1e-11 and -r.lower <= first_clear(
+            slabs_of(Case(A, B, X_WA, X_WB)), r.normal
+        ) + 1e-9, case
+        opened += 1
+    assert opened >= 8, opened
+
+
 @pytest.mark.slow
 def test_depths_of_unions_of_boxes_lie_in_their_brackets():
     """No direction has a shorter way out than −upper; along the normal −lower is one, and none is shorter."""

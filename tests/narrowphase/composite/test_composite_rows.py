@@ -18,7 +18,7 @@ from collide.narrowphase.composite.composite_rows import (
     add_row,
     begin_score,
     close_score,
-    first_upper_of,
+    first_reach_of,
 )
 from collide.results import PAIR_DTYPE
 
@@ -42,10 +42,10 @@ def combined(rows: np.ndarray, numbers) -> tuple[np.ndarray, np.ndarray, bool]:
     score, out = np.zeros(SCORE + 5), np.zeros(1, dtype=PAIR_DTYPE)
     score[:] = np.nan
     begin_score(score, 5)
-    assert first_upper_of(score, 5) == math.inf
+    assert first_reach_of(score, 5) == math.inf
     for number in numbers:
         add_row(score, 5, address_of(rows[number : number + 1]), number, address_of(out))
-    assert first_upper_of(score, 5) == rows["upper"][numbers[0]]
+    assert first_reach_of(score, 5) == rows["upper"][numbers[0]]
     overlap = close_score(score, 5, address_of(out))
     return out[0], score[5:], overlap
 

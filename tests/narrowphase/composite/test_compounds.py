@@ -175,6 +175,32 @@ def test_booleans_of_bodies_far_apart_ask_nothing():
     assert _asked(lambda: collide.distance(A, A, np.eye(4), X)) >= len(X)
 
 
+def test_beyond_a_limit_few_parts_are_asked_and_its_bounds_hold():
+    """Beyond it no pair has an upper bound, by which others are left out; what is told of them holds for all."""
+    rng, beyond = rng_of("parts beyond a limit"), 0
+    box, ball = collide.Box((0.2, 0.1, 0.15)), collide.Sphere(0.1)
+    for case in range(6):
+        A, B = (collide.Compound([((box, ball)[k % 2], random_pose(rng, 0.7)) for k in range(40)]) for _ in "ab")
+        X_WA = np.array([random_pose(rng, 1.0) for _ in range(8)])
+        X_WB = X_WA @ np.array([collide.pose((4.0 + case, 0.3, 0.2), rpy=rng.uniform(-3, 3, 3)) for _ in range(8)])
+        rows = collide.distance(A, B, X_WA, X_WB).rows
+        for limit in (0.01, 0.999 * rows["distance"].min(), float(np.median(rows["distance"])), 1e3):
+            limit = max(float(limit), 0.0)
+            before = unions.of_thread.asked
+            within = collide.distance(A, B, X_WA, X_WB, max_distance=limit).rows
+            count = unions.of_thread.asked - before
+            assert count <= 60 * len(X_WA), (case, limit, count)
+            far = ~rows["hit"] & (rows["distance"] > limit)
+            assert (within["beyond"] == far).all(), (case, limit)
+            assert (within["lower"][far] > limit).all() and (within["lower"][far] <= rows["upper"][far]).all()
+            same = all((within[~far][of] == rows[~far][of]).all() for of in ("lower", "distance", "upper", "normal"))
+            assert same, (case, limit)
+            swapped = collide.distance(B, A, X_WB, X_WA, max_distance=limit).rows
+            assert all((swapped[of] == within[of]).all() for of in ("lower", "distance", "upper", "beyond"))
+            beyond += int(far.sum())
+    assert 60 < beyond < 160, beyond
+
+
 def test_gaps_alone_stop_at_the_first_overlap():
     """Boxes in one place: with depths each has a say, without them one is enough."""
     A = collide.Compound([(collide.Box((1, 1, 1)), collide.pose((0.01 * k, 0, 0))) for k in range(12)])
