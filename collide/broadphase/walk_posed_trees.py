@@ -78,25 +78,25 @@ def posed_boxes_met(a_at, b_at, frames_at, stack_at, pairs_at, capacity):
 class PosedTree:
     """A tree over the parts of a body, in the body's frame.
 
-    boxes : (n, 6) of the parts, which hold their cores, swept.   swept : the largest radius swept over one, with what
+    boxes : (n, 6) of the parts, which hold their cores, swept.   largest_radius : swept over one, with what
     rounding moved it by; matrices do not stretch it [m].
     """
 
-    def __init__(self, boxes: np.ndarray, swept: float):
-        self.tree, self._swept, self.n = BoxTree(boxes), swept, len(boxes)
+    def __init__(self, boxes: np.ndarray, largest_radius: float):
+        self.tree, self._largest_radius, self.n = BoxTree(boxes), largest_radius, len(boxes)
         ends = self.tree.nodes[: min(self.tree.n_nodes, 1)]
         self._size = float(np.abs(ends).max(initial=0.0))
 
-    def pairs_near(self, other: PosedTree, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> np.ndarray:
-        """(k, 2) parts of this body and of the other, ascending, at poses (4, 4): all whose boxes in the world come
+    def pairs_near(self, B: PosedTree, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> np.ndarray:
+        """(k, 2) parts of this body, A, and of B, ascending, at poses (4, 4): all whose boxes in the world come
         within a margin [m] along every axis, and some that are a little farther. Parts without end are with all others.
         """
         frames = np.empty(24)
         frames[:9], frames[_OF_B:_SHIFT] = X_WA[:3, :3].ravel(), X_WB[:3, :3].ravel()
         frames[_SHIFT:_NEAR] = X_WB[:3, 3] - X_WA[:3, 3]
-        frames[_NEAR:] = margin * (1.0 + _ROUNDING) + self._beyond(X_WA) + other._beyond(X_WB)
-        stack, capacity = np.empty(2 * STACK_OF_PAIRS, dtype=np.int64), 64 + 4 * (self.n + other.n)
-        headers = address_of(self.tree.header()), address_of(other.tree.header())
+        frames[_NEAR:] = margin * (1.0 + _ROUNDING) + self._beyond(X_WA) + B._beyond(X_WB)
+        stack, capacity = np.empty(2 * STACK_OF_PAIRS, dtype=np.int64), 64 + 4 * (self.n + B.n)
+        headers = address_of(self.tree.header()), address_of(B.tree.header())
         while True:
             pairs = np.empty((capacity, 2), dtype=np.int64)
             count = posed_boxes_met(*headers, address_of(frames), address_of(stack), address_of(pairs), capacity)
@@ -104,10 +104,10 @@ class PosedTree:
                 break
             capacity = count
         pairs = pairs[:count]
-        without_end = self.tree.unbounded, other.tree.unbounded
+        without_end = self.tree.unbounded, B.tree.unbounded
         if len(without_end[0]) or len(without_end[1]):
             bounded = np.setdiff1d(np.arange(self.n), without_end[0])
-            of_a, of_b = _all_of(without_end[0], np.arange(other.n)), _all_of(bounded, without_end[1])
+            of_a, of_b = _all_of(without_end[0], np.arange(B.n)), _all_of(bounded, without_end[1])
             pairs = np.concatenate([pairs, of_a, of_b])
         return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
@@ -119,8 +119,8 @@ class PosedTree:
         summed.
         """
         row_sums = np.abs(X[:3, :3]).sum(axis=1)
-        terms = row_sums.max() * self._size + float(np.abs(X[:3, 3]).max()) + self._swept
-        return self._swept * np.maximum(1.0 - row_sums, 0.0) + _ROUNDING * terms
+        terms = row_sums.max() * self._size + float(np.abs(X[:3, 3]).max()) + self._largest_radius
+        return self._largest_radius * np.maximum(1.0 - row_sums, 0.0) + _ROUNDING * terms
 
 
 def _all_of(i: np.ndarray, j: np.ndarray) -> np.ndarray:

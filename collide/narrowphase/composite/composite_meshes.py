@@ -18,7 +18,7 @@ from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_states
-from collide.narrowphase.composite.composite_parts import Balls, CompoundParts, compound_parts
+from collide.narrowphase.composite.composite_parts import Balls, CompoundParts, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
 from collide.narrowphase.convex_kernel_calls import run_poses
 from collide.narrowphase.facets.collide_kernel import APART, HIT, OPEN
@@ -38,6 +38,8 @@ _BOUNDS_AT_ONCE = 1 << 14
 _AT_ONE_MESH = 4
 #: Groups are asked about at so many meshes at most: more are small beside a group.
 _MAX_MESHES = 8
+#: Gaps of boxes of so many pairs of parts are worked out one and all; a walk through both trees takes as long.
+_MAX_TABLE = 1 << 12
 _POINT = Sphere(1.0)
 
 
@@ -62,7 +64,7 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
     # the most at the first of them decide most of the others, and only what they leave open is asked about all parts.
     first = np.flatnonzero(states != HIT)[:1]
     if len(first) and len(X_WA) > 1 and meshed.size > _ASKED_FIRST:
-        gaps = np.where(meshed, _box_gaps(A, B, X_WA[first], X_WB[first])[0], math.inf)
+        gaps = np.where(meshed, _overlaps(A, B, X_WA[first], X_WB[first])[0], math.inf)
         deepest = np.argsort(gaps, axis=None, kind="stable")[:_ASKED_FIRST]
         deepest = deepest[gaps.flat[deepest] <= 0.0]
         for some in (deepest[:1], deepest[1:]):
@@ -75,7 +77,7 @@ def _states(A: CompoundParts, B: CompoundParts, X_WA, X_WB, open_ones: bool = Fa
             meshed[i, j] = False
     poses = np.flatnonzero(states != HIT)
     if len(poses):
-        gaps = _box_gaps(A, B, X_WA[poses], X_WB[poses])
+        gaps = _overlaps(A, B, X_WA[poses], X_WB[poses])
         near = meshed & (gaps <= 0.0)
         for M, N, X_WM, X_WN, of_both in ((A, B, X_WA, X_WB, near), (B, A, X_WB, X_WA, near.transpose(0, 2, 1))):
             states[poses[_leave_out_groups(M, N, X_WM[poses], X_WN[poses], of_both)]] = HIT
@@ -260,6 +262,18 @@ def _box_gaps(A: CompoundParts, B: CompoundParts, X_WA, X_WB, of_a=None, of_b=No
         largest, square = np.maximum(largest, along), square + np.square(np.maximum(along, 0.0))
     length = np.sqrt(square) * (1.0 - 2.0**-40)
     return np.where(largest > 0.0, np.maximum(largest, length), largest)
+
+
+def _overlaps(A: CompoundParts, B: CompoundParts, X_WA, X_WB) -> np.ndarray:
+    """(n, parts of A, parts of B) as `_box_gaps`, where these are not above 0; of other pairs it may be infinite, as it
+    is of those among many that a walk through both trees does not name: their boxes are apart."""
+    if len(A.parts) * len(B.parts) <= _MAX_TABLE:
+        return _box_gaps(A, B, X_WA, X_WB)
+    gaps = np.full((len(X_WA), len(A.parts), len(B.parts)), math.inf)
+    pose, i, j = boxes_near(A, B, X_WA, X_WB, 0.0)
+    a, b = A.boxes_of(i, X_WA[pose]), B.boxes_of(j, X_WB[pose])
+    gaps[pose, i, j] = np.maximum(b[:, :3] - a[:, 3:], a[:, :3] - b[:, 3:]).max(axis=1)
+    return gaps
 
 
 # --- rows ---------------------------------------------------------------------------------------

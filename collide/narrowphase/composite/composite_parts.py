@@ -245,8 +245,8 @@ class CompoundParts:
     @cached_property
     def tree(self) -> PosedTree:
         """Over the parts' boxes, in the union's frame."""
-        swept = self._table.numbers[:, [RADIUS, SLOP]].sum(axis=1)
-        return PosedTree(self.boxes(IDENTITY[None])[0], float(swept.max()))
+        radii = self._table.numbers[:, [RADIUS, SLOP]].sum(axis=1)
+        return PosedTree(self.boxes(IDENTITY[None])[0], float(radii.max()))
 
     @cached_property
     def balls(self) -> Balls:
