@@ -287,6 +287,7 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
     "get_include": dict,
     "get_library": dict,
     "pose": dict,
+    "poses": lambda: {"p": np.zeros((2, 3))},
     "polytopes.hull_boundary": lambda: {"body": tree()},
     "polytopes.meets": lambda: {"points": np.eye(3), "normals": planes()[0], "offsets": planes()[1]},
     "polytopes.planar_pose": dict,
@@ -454,6 +455,8 @@ _OF_ANY = {
 EXCUSED = {
     "Shape": "the base of shapes: it has no arguments",
     "transforms.refuse_no_pose": "only ever raises, of what a check found",
+    "transforms.rotation_from_rpy": "its numbers are checked by `pose` and `poses`",
+    "transforms.rotation_from_unit": "as rotation_from_rpy",
     "How": "an enumeration of Python's own",
     "WorldResult": "made by World's queries",
     "WorldHits": "made by World's queries",
