@@ -13,7 +13,7 @@ from collide.transforms import as_poses, rotation_from_rpy, rotation_from_unit
 
 
 def poses(p, quat_wxyz=None, rpy=None) -> np.ndarray:
-    """Poses (N, 4, 4) from N translations and, where given, N rotations.
+    """Poses (N, 4, 4) from N translations and, where asked for, N rotations.
 
     Parameters
     ----------
@@ -28,12 +28,12 @@ def poses(p, quat_wxyz=None, rpy=None) -> np.ndarray:
     Returns
     -------
     (N, 4, 4) float64
-        Row k is ``pose(p[k], ...)`` within rounding; N = 1 where all arguments are single rows.
+        Row k is ``pose(p[k], ...)`` within rounding; N = 1 where all are single rows.
 
     Raises
     ------
     InvalidPose
-        Where numbers have another shape, lengths do not match, both rotations are given, or a row is not finite, too
+        Where numbers have another shape, lengths do not match, both rotations are handed in, or a row is not finite, too
         large, or a quaternion of length 0: the row is named.
 
     Notes
@@ -42,22 +42,22 @@ def poses(p, quat_wxyz=None, rpy=None) -> np.ndarray:
     """
     if quat_wxyz is not None and rpy is not None:
         raise InvalidPose("poses: give at most one of quat_wxyz and rpy")
-    given = {"p": _finite_rows("p", p, 3)}
+    arguments = {"p": _finite_rows("p", p, 3)}
     if quat_wxyz is not None:
-        given["quat_wxyz"] = _finite_rows("quat_wxyz", quat_wxyz, 4)
+        arguments["quat_wxyz"] = _finite_rows("quat_wxyz", quat_wxyz, 4)
     if rpy is not None:
-        given["rpy"] = _finite_rows("rpy", rpy, 3)
-    n = max(map(len, given.values())) if min(map(len, given.values())) else 0
-    if any(len(rows) not in (1, n) for rows in given.values()):
-        lengths = ", ".join(f"{name} {len(rows)}" for name, rows in given.items())
+        arguments["rpy"] = _finite_rows("rpy", rpy, 3)
+    n = max(map(len, arguments.values())) if min(map(len, arguments.values())) else 0
+    if any(len(rows) not in (1, n) for rows in arguments.values()):
+        lengths = ", ".join(f"{name} {len(rows)}" for name, rows in arguments.items())
         raise InvalidPose(f"poses: lengths do not match: {lengths}; give equally many rows, or a single one")
     X = np.zeros((n, 4, 4))
     X[:, [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0
-    X[:, :3, 3] = given["p"]
+    X[:, :3, 3] = arguments["p"]
     if quat_wxyz is not None:
-        X[:, :3, :3] = _rotations_from_quaternions(given["quat_wxyz"])
+        X[:, :3, :3] = _rotations_from_quaternions(arguments["quat_wxyz"])
     elif rpy is not None:
-        X[:, :3, :3] = np.moveaxis(rotation_from_rpy(given["rpy"].T), -1, 0)
+        X[:, :3, :3] = np.moveaxis(rotation_from_rpy(arguments["rpy"].T), -1, 0)
     return as_poses(X, "poses")
 
 

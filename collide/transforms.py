@@ -198,9 +198,9 @@ def poses_as_given(X: PoseLike, name: str, *, check: bool = True) -> tuple[np.nd
     return batch, full.ndim == 2
 
 
-def _advice(given: np.ndarray) -> str:
+def _advice(values: np.ndarray) -> str:
     """How to hand in a translation and a quaternion in one row, whose order the row does not tell."""
-    if given.ndim not in (1, 2) or given.shape[-1] != 7:
+    if values.ndim not in (1, 2) or values.shape[-1] != 7:
         return ""
     return (
         ": the order of a quaternion within a row of 7 numbers differs from library to library; say which it is, "
