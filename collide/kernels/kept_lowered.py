@@ -56,7 +56,8 @@ class Record(NamedTuple):
 
 def read(folder: Path, called: Called, code_hash: str) -> Record | None:
     """What is kept of a kernel; None where there is nothing, or nothing that was made of its own code as it is."""
-    with suppress(OSError):
+    # the last three: types of arguments and results are pickled by name, and an edit may have renamed a class
+    with suppress(OSError, AttributeError, ImportError, TypeError):
         place = folder / called.file_name
         content = place.read_bytes()
         rest = content[_DIGEST:]

@@ -10,9 +10,12 @@ import os
 import shutil
 import subprocess
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from installed_copy import child, copied, environment
+
+from collide.kernels import kept_lowered
 
 NATIVE = Path(__file__).resolve().parents[2] / "native"
 pytest.importorskip("numba", reason="kernels are compiled by numba: pip install 'collide-robotics[jit]'")
@@ -200,3 +203,19 @@ def test_a_damaged_file_is_made_anew(builds):
         file.unlink()
     objects, names = builds.rebuild()
     assert names == {"near"} and set(objects) == {"one", "two", "far"}
+
+
+class Renamed(NamedTuple):
+    """A type that a kernel returns, until an edit renames the class."""
+
+    x: float
+
+
+def test_a_record_of_a_class_that_was_renamed_is_as_if_it_were_not_there(tmp_path, monkeypatch):
+    """The build went no further until somebody deleted the folder."""
+    called = kept_lowered.Called(("module", "kernel", "0"), (), None, ())
+    record = kept_lowered.Record("hash", "symbol", "environment", (), Renamed(1.0), (b"code",), ())
+    kept_lowered.write(tmp_path, called, record)
+    assert kept_lowered.read(tmp_path, called, "hash") == record
+    monkeypatch.delattr(f"{__name__}.Renamed")
+    assert kept_lowered.read(tmp_path, called, "hash") is None
