@@ -33,7 +33,7 @@ def poses(p, quat_wxyz=None, rpy=None) -> np.ndarray:
     Raises
     ------
     InvalidPose
-        Where numbers have another shape, lengths do not match, both rotations are handed in, or a row is not finite, too
+        Where numbers have another shape, lengths do not match, there are two rotations, or a row is not finite, too
         large, or a quaternion of length 0: the row is named.
 
     Notes
