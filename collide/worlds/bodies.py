@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.base import argument_checks as checks
-from collide.broadphase.growing_rows import GrowingRows
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody
+from collide.numerics.growing_rows import GrowingRows
 from collide.numerics.rigid_poses import are_rigid_matrices
 from collide.shapes.shape import Shape, checked_shape
 from collide.transforms import LARGEST, SAFE_TOLERANCE, as_pose, as_poses
