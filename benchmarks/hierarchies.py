@@ -20,7 +20,7 @@ from collections.abc import Callable
 import numpy as np
 from inputs import directions, rotations, use_tests
 
-use_tests("hierarchies")
+use_tests("papers/hierarchies")
 import hierarchy_families as families
 
 import collide

@@ -18,7 +18,7 @@ from collections.abc import Callable
 import numpy as np
 from inputs import use_tests
 
-use_tests("polytopes", "oracles")
+use_tests("papers/polytopes", "oracles")
 import meeting_families
 import rational_simplex
 from polytope_peers import PEERS, linprog

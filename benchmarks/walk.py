@@ -18,7 +18,7 @@ import numpy as np
 from inputs import directions, rotations, use_tests
 from supports import cloud
 
-use_tests("hierarchies")
+use_tests("papers/hierarchies")
 import hierarchy_families as families
 
 import collide

@@ -15,7 +15,6 @@ import numpy as np
 
 from collide.broadphase.allowed_rows import allowed_rows
 from collide.broadphase.graded_boxes import BODY, LINK, STACK, grow_graded
-from collide.broadphase.growing_rows import GrowingRows
 from collide.broadphase.moved_leaves import fit_inner_nodes, fit_paths, take_boxes
 from collide.broadphase.tree_in_memory import (
     ALLOWED_AT,
@@ -28,6 +27,7 @@ from collide.broadphase.tree_in_memory import (
     STILL_BIT,
 )
 from collide.kernels import address_of
+from collide.numerics.growing_rows import GrowingRows
 
 #: A tree is made anew once all sides of its nodes, added up, have grown by this factor: in metres, or in sides of the
 #: box around all.

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.base import argument_checks as checks
-from collide.broadphase.growing_rows import GrowingRows
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody
+from collide.numerics.growing_rows import GrowingRows
 from collide.numerics.rigid_poses import are_rigid_matrices
 from collide.pairs.security_margin import checked_margin
 from collide.shapes.shape import Shape, checked_shape

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of, move_parts
-from collide.broadphase.growing_rows import GrowingRows
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.parts import bounding_parts_of, is_single_convex
 from collide.lowering.shape_table import (
@@ -24,6 +23,7 @@ from collide.lowering.shape_table import (
     has_own_pose,
     pose_table,
 )
+from collide.numerics.growing_rows import GrowingRows
 from collide.shapes.shape import Shape
 
 #: Two bodies with fewer pairs of parts than this are compared part by part.
@@ -57,7 +57,7 @@ class WorldParts:
         # body_of, row_of, X_BP, reach, has_pose, rows of poses, boxes.
         self._of_parts = _columns((np.int64,), (np.int64,), (float, 4, 4), (float,), (bool,), (float, POSE), (float, 6))
         self._first = GrowingRows(np.zeros(1, dtype=np.int64))
-        self._terms = GrowingRows(np.empty((0, TERM_ROW)))
+        self._terms = GrowingRows.empty(float, TERM_ROW)
         self.all_of_one_part, self._any_own_pose = True, False
         self._take_columns()
 
@@ -186,7 +186,7 @@ class WorldParts:
 
 def _columns(*kinds: tuple) -> list[GrowingRows]:
     """Empty columns of kinds (dtype, *shape of a row)."""
-    return [GrowingRows(np.empty((0, *shape), dtype)) for dtype, *shape in kinds]
+    return [GrowingRows.empty(dtype, *shape) for dtype, *shape in kinds]
 
 
 def runs(starts: np.ndarray, counts: np.ndarray) -> np.ndarray:

@@ -138,8 +138,9 @@ def test_a_full_disk_leaves_every_old_file(tmp_path):
     names = ["old.npz", "old.stl", "old.obj", "old.json", "old.html", "old.yaml", "old.xml"]
     for name in names:
         (tmp_path / name).write_text("the good old file")
+    # -B: Python cuts the bytecode that it keeps, and every process after this one would fail over it
     done = subprocess.run(
-        [sys.executable, "-c", FULL_DISK, str(tmp_path)], check=False, capture_output=True, text=True, timeout=200
+        [sys.executable, "-B", "-c", FULL_DISK, str(tmp_path)], check=False, capture_output=True, text=True, timeout=200
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("File too large") == 5 and done.stdout.split()[-4:] == ["2"] * 4, done.stdout + done.stderr

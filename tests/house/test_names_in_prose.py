@@ -98,7 +98,7 @@ def missing(text: str, beside: frozenset[str] | set[str] = frozenset()) -> list[
 
 def _is_member(parts: list[str]) -> bool:
     """Whether ``module.name`` is in a module of that name, where there is one, or a folder in one."""
-    if len(parts) < 2 or any(file.parent.name == parts[-1] for file in sources()):
+    if len(parts) < 2 or any(file.parent.parts[-2:] == tuple(parts[-2:]) for file in sources()):
         return True
     modules = [source for file, source in sources().items() if parts[-2] in (file.stem, file.parent.name)]
     return not modules or any(parts[-1] in source.names for source in modules)

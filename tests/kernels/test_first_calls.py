@@ -73,7 +73,7 @@ def test_kernels_are_kept_until_a_source_of_theirs_is_edited(tmp_path):
     (name,) = files
     assert re.fullmatch(r"collide\.broadphase\.bounding_boxes\.bounding_boxes\.[0-9a-f]{16}\.o", name)
     assert ask(compiled=False) == right and kept() == files
-    world = site / "collide" / "world.py"
+    world = site / "collide" / "worlds" / "world.py"
     world.write_text(world.read_text(encoding="utf-8") + "\n# a remark\n", encoding="utf-8")
     assert ask(compiled=False) == right and kept() == files
 

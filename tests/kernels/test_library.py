@@ -282,7 +282,7 @@ def test_words_in_every_source_keep_the_library(site, ask, edit):
 
 
 def test_edits_that_no_kernel_reads_keep_the_library(site, ask):
-    world = site / "collide" / "world.py"
+    world = site / "collide" / "worlds" / "world.py"
     world.write_text(world.read_text(encoding="utf-8") + "\n# a remark\n", encoding="utf-8")
     assert ask()[0]["mode"] == "compiled"
 

@@ -10,9 +10,9 @@ import pytest
 from naive import pose, random_pose, rng_of
 
 import collide
-from collide.broadphase.growing_rows import GrowingRows
 from collide.errors import InvalidArgument, UnknownBody
 from collide.lowering.shape_table import POSE_TERMS
+from collide.numerics.growing_rows import GrowingRows
 from collide.worlds.outside import _some_poses, questions_of
 from collide.worlds.world_part_pairs import PartTrees
 from collide.worlds.world_parts import WorldParts, runs

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.papers.partitions.growing_rows import GrowingRows
+from collide.numerics.growing_rows import GrowingRows
 from collide.papers.partitions.vertices import Sides, Vertices
 
 
@@ -44,7 +44,7 @@ class Edges:
     """
 
     def __init__(self) -> None:
-        self.vertex, self.carrier = GrowingRows(np.int64), GrowingRows(np.int64)
+        self.vertex, self.carrier = GrowingRows.empty(np.int64), GrowingRows.empty(np.int64)
 
     def add(self, vertex: np.ndarray, carrier: np.ndarray) -> np.ndarray:
         self.carrier.add(carrier)

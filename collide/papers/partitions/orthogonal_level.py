@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.numerics.growing_rows import GrowingRows
 from collide.papers.partitions.cut_polygons import Edges, Polygons, cut_polygons, edge_rows, joined
-from collide.papers.partitions.growing_rows import GrowingRows
 from collide.papers.partitions.partition_tree import EMPTY, PartitionTree
 from collide.papers.partitions.vertices import Vertices
 
@@ -35,7 +35,7 @@ class OrthogonalLevel:
 
     def __init__(self, tree: PartitionTree, vertices: Vertices, edges: Edges, kappa: int, n_spared: int):
         self.tree, self.vertices, self.edges, self.kappa, self.n_spared = tree, vertices, edges, kappa, n_spared
-        self.low, self.high = GrowingRows(float, 3), GrowingRows(float, 3)
+        self.low, self.high = GrowingRows.empty(float, 3), GrowingRows.empty(float, 3)
         planes = vertices.planes
         n = planes.n
         carrier = n + 3 * np.arange(n)[:, None] + np.arange(3)

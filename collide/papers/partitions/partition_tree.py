@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collide.errors import UnsupportedQuery
-from collide.papers.partitions.growing_rows import GrowingRows
+from collide.numerics.growing_rows import GrowingRows
 
 #: What stands at a place that no cut and no leaf has taken.
 EMPTY = np.iinfo(np.int64).min
@@ -23,8 +23,8 @@ class PartitionTree:
 
     def __init__(self, memory: int):
         self.memory, self.other_bytes, self.prediction = memory, 0, ""
-        self.plane, self.below = GrowingRows(np.int64), GrowingRows(np.int64)
-        self.seat = GrowingRows(float, 4)
+        self.plane, self.below = GrowingRows.empty(np.int64), GrowingRows.empty(np.int64)
+        self.seat = GrowingRows.empty(float, 4)
         self.held: list[tuple[np.ndarray, np.ndarray]] = []
         self.below.add(np.array([EMPTY]))
 

@@ -16,8 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
+from collide.numerics.growing_rows import GrowingRows
 from collide.numerics.lowest_bits import NO_BITS, lowest_exponents
-from collide.papers.partitions.growing_rows import GrowingRows
 
 #: A sign of n · (p − a) from doubles: differences and products as in `numerics/orientation.py`, and as much again for
 #: the difference of a rounded point.
@@ -40,7 +40,7 @@ class Planes:
         self.normal = np.cross(u, v)
         u, v = np.abs(u), np.abs(v)
         self.permanent = u[:, [1, 2, 0]] * v[:, [2, 0, 1]] + u[:, [2, 0, 1]] * v[:, [1, 2, 0]]
-        self.axis, self.value = GrowingRows(np.int64), GrowingRows(np.float64)
+        self.axis, self.value = GrowingRows.empty(np.int64), GrowingRows.empty(np.float64)
         low = int(lowest_exponents(vertices.reshape(1, -1))[0])
         #: Coordinates of the mesh are integers times 2^−grid.
         self.grid = 0 if low == NO_BITS else max(0, -low)
@@ -55,7 +55,7 @@ class Planes:
     def with_own_axis_planes(self) -> Planes:
         """The same planes, to which axis-parallel ones may be added that the others do not have."""
         twin = copy.copy(self)
-        twin.axis, twin.value = GrowingRows(np.int64), GrowingRows(np.float64)
+        twin.axis, twin.value = GrowingRows.empty(np.int64), GrowingRows.empty(np.float64)
         twin.add_axis_planes(self.axis.rows, self.value.rows)
         return twin
 

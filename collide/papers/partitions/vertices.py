@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.papers.partitions.growing_rows import GrowingRows
+from collide.numerics.growing_rows import GrowingRows
 from collide.papers.partitions.planes import Planes, meeting_points, signs_of
 
 #: Errors of vertices that are worked out in integers before they are shown, of the largest coordinate.
@@ -33,7 +33,8 @@ class Vertices:
 
     def __init__(self, planes: Planes):
         self.planes, self.n_exact = planes, 0
-        self.xyz, self.error, self.names = GrowingRows(float, 3), GrowingRows(float), GrowingRows(np.int64, 3)
+        self.xyz, self.names = GrowingRows.empty(float, 3), GrowingRows.empty(np.int64, 3)
+        self.error = GrowingRows.empty(float)
         self.n_corners = len(planes.vertices)
         self.add(planes.vertices, np.zeros(self.n_corners), np.full((self.n_corners, 3), -1))
 

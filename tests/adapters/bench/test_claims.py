@@ -191,6 +191,19 @@ def test_what_scripts_import_is_there():
             assert not missing, f"benchmarks/{name}.py imports {missing} from {node.module}"
 
 
+def test_folders_of_tests_that_scripts_use_are_there():
+    calls = [
+        ast.literal_eval(argument)
+        for name in SCRIPTS
+        for node in ast.walk(ast.parse((FOLDER / f"{name}.py").read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "use_tests"
+        for argument in node.args
+    ]
+    assert len(calls) > 10
+    for folder in calls:
+        assert (FOLDER.parent / "tests" / folder).is_dir(), folder
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, runs in SCRIPTS.items() if runs])
 def test_scripts_explain_themselves(name):

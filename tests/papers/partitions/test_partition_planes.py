@@ -12,7 +12,7 @@ from reproduction import reproducing
 
 import collide
 from collide.errors import UnsupportedQuery
-from collide.papers.partitions.growing_rows import GrowingRows
+from collide.numerics.growing_rows import GrowingRows
 from collide.papers.partitions.partition_tree import EMPTY, PartitionTree
 from collide.papers.partitions.planes import Planes, meeting_points, signs_of
 from collide.papers.partitions.vertices import Vertices
@@ -162,7 +162,7 @@ def test_badly_known_vertices_are_worked_out_before_they_are_shown():
 
 @pytest.mark.parametrize("shape", [(), (3,)])
 def test_rows_grow_and_are_forgotten(shape):
-    rng, rows, expected = rng_of("growing", shape), GrowingRows(float, *shape), []
+    rng, rows, expected = rng_of("growing", shape), GrowingRows.empty(float, *shape), []
     for n in (0, 1, 700, 500, 1, 3000):
         new = rng.normal(size=(n, *shape))
         assert rows.add(new).tolist() == list(range(len(expected), len(expected) + n))
