@@ -49,7 +49,7 @@ def poses(p, quat_wxyz=None, rpy=None) -> np.ndarray:
         arguments["rpy"] = _finite_rows("rpy", rpy, 3)
     n = max(map(len, arguments.values())) if min(map(len, arguments.values())) else 0
     if any(len(rows) not in (1, n) for rows in arguments.values()):
-        lengths = ", ".join(f"{name} {len(rows)}" for name, rows in arguments.items())
+        lengths = ", ".join(f"{name} {rows.shape}" for name, rows in arguments.items())
         raise InvalidPose(f"poses: lengths do not match: {lengths}; give equally many rows, or a single one")
     X = np.zeros((n, 4, 4))
     X[:, [0, 1, 2, 3], [0, 1, 2, 3]] = 1.0

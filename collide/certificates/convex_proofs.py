@@ -9,7 +9,7 @@ from fractions import Fraction
 from collide.certificates.certificate import VertexPair
 from collide.certificates.exact_parts import ExactPart, common_vertices
 from collide.certificates.nearest_to_origin import nearest_to_origin
-from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.convex_sets import HALFSPACE, POINTS
 from collide.numerics.exact_points import Point, in_integers, opposite
 from collide.numerics.exact_vectors import inner, minus
 

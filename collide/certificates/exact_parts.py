@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex
-from collide.lowering.parts import parts_of
+from collide.lowering.convex_sets import HALFSPACE, POINTS, ConvexSet, sets_of
 from collide.numerics.exact_points import PlacedPoints
 from collide.numerics.exact_vectors import cross, inner
+
+if TYPE_CHECKING:
+    from collide.lowering.packed_convex import PackedConvex
 
 IDENTITY = np.eye(4)
 
@@ -37,7 +40,7 @@ class ExactPart:
     @cached_property
     def plane(self) -> tuple[tuple[Fraction, Fraction, Fraction], Fraction]:
         """(n, offset) of the half-space {x : n·x ≤ offset} in W: n = cof(R) m, offset = det(R) offset_P + n·t."""
-        x, y, z, offset = (Fraction(v) for v in self.plane_P.tolist())
+        x, y, z, offset = (Fraction(v) for v in self.plane_P)
         n = x, y, z
         for X in self._poses:
             entries = [[Fraction(v) for v in row] for row in X[:3].tolist()]
@@ -50,11 +53,11 @@ class ExactPart:
 
 def exact_parts(shape, X_WB: np.ndarray) -> list[ExactPart]:
     """The convex parts of a shape at a pose (4, 4), in their order."""
-    return [exact_part(packed, X_WB, X_BP) for packed, X_BP in parts_of(shape)]
+    return [exact_part(part, X_WB, X_BP) for part, X_BP in sets_of(shape)]
 
 
-def exact_part(packed: PackedConvex, X_WB: np.ndarray, X_BP: np.ndarray = IDENTITY) -> ExactPart:
-    return ExactPart(packed.kind, packed.points, packed.radius, packed.params, X_WB, X_BP)
+def exact_part(part: ConvexSet | PackedConvex, X_WB: np.ndarray, X_BP: np.ndarray = IDENTITY) -> ExactPart:
+    return ExactPart(part.kind, part.points, part.radius, part.params, X_WB, X_BP)
 
 
 def has_exact_numbers(part: ExactPart) -> bool:

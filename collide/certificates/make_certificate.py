@@ -15,7 +15,7 @@ from collide.certificates.nearest_to_origin import nearest_vertex_pairs
 from collide.certificates.region_proofs import RegionCertificate, make_region_certificate
 from collide.certificates.verify import check_question
 from collide.errors import InvalidArgument, brief
-from collide.lowering.packed_convex import HALFSPACE
+from collide.lowering.convex_sets import HALFSPACE
 from collide.numerics.exact_points import in_integers
 from collide.results import UNDECIDED, PairResult, question_of_row
 from collide.transforms import as_poses

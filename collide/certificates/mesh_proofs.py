@@ -10,8 +10,7 @@ from collide.certificates.certificate import APART, INSIDE, NO_VERTEX, TOGETHER,
 from collide.certificates.convex_proofs import flaw_of_plane_proof, flaw_of_proof
 from collide.certificates.exact_parts import IDENTITY, ExactPart, exact_part, has_exact_numbers
 from collide.certificates.winding_number import winding_number
-from collide.lowering.packed_convex import HALFSPACE, POINTS
-from collide.lowering.parts import parts_of
+from collide.lowering.convex_sets import HALFSPACE, POINTS, sets_of
 from collide.numerics.exact_points import PlacedPoints
 
 
@@ -32,12 +31,12 @@ class ProofBody:
         if self.is_mesh:
             self.vertex_ids, self.has_certificates = np.flatnonzero(np.bincount(shape.faces.ravel())), True
             return
-        parts = [] if shape.meshed else parts_of(shape)
+        parts = [] if shape.meshed else sets_of(shape)
         if parts:
-            packed, X_BP = parts[0]
-            part = exact_part(packed, X)
-            self.kind, self._part = packed.kind, part
-            is_plain = len(parts) == 1 and np.array_equal(X_BP, IDENTITY) and packed.slop == 0.0
+            first, X_BP = parts[0]
+            part = exact_part(first, X)
+            self.kind, self._part = first.kind, part
+            is_plain = len(parts) == 1 and np.array_equal(X_BP, IDENTITY) and first.slop == 0.0
             self.has_certificates = is_plain and has_exact_numbers(part)
 
     def part(self, ids: Sequence[int] | np.ndarray | None = None) -> ExactPart:

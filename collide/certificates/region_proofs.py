@@ -24,9 +24,8 @@ from collide.least_distance.posed_sets import (
     point_seen_from,
     points_at,
 )
+from collide.lowering.convex_sets import ConvexSet, convex_set
 from collide.lowering.kinds import Kind, kind_of
-from collide.lowering.packed_convex import PackedConvex
-from collide.lowering.parts import convex_set_of
 from collide.numerics.exact_points import integers
 from collide.numerics.exact_vectors import dot, inner
 from collide.shapes.hpolytope import HPolytope
@@ -139,12 +138,12 @@ def _total(factors: Sequence[Fraction], values) -> Fraction:
     return sum((factor * value for factor, value in zip(factors, values)), Fraction(0))
 
 
-def _sides(A: Shape, B: Shape, X_WA, X_WB) -> tuple[HPolytope, PackedConvex, np.ndarray, np.ndarray] | None:
+def _sides(A: Shape, B: Shape, X_WA, X_WB) -> tuple[HPolytope, ConvexSet, np.ndarray, np.ndarray] | None:
     """(region, the other body, their poses) where that is points swept by a ball."""
     region, partner, X_WR, X_WO = (A, B, X_WA, X_WB) if A.is_region else (B, A, X_WB, X_WA)
     if not isinstance(region, HPolytope) or kind_of(partner) not in (Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE):
         return None
-    return region, convex_set_of(partner), X_WR, X_WO
+    return region, convex_set(partner), X_WR, X_WO
 
 
 def _read(values) -> RegionCertificate:

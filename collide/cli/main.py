@@ -108,8 +108,7 @@ def _drop_stdout() -> None:
 
 
 def _say(text: str) -> None:
-    from collide.reports.tables import printable
-    from collide.reports.terminal import write_text
+    from collide.reports.tables import printable, write_text
 
     try:
         write_text(f"collide: {printable(text)}\n", sys.stderr)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS, PackedConvex
-from collide.lowering.parts import convex_set_of
+from collide.lowering.convex_sets import ConvexSet, convex_set
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape, kept_with_shape
+from collide.support.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 
 
 class Kind(IntEnum):
@@ -39,12 +39,12 @@ def kind_of(shape: Shape) -> Kind:
         return Kind.MESH_COMPOUND if shape.meshed else Kind.COMPOUND
     if shape.is_region:
         return Kind.REGION
-    return Kind.MESH if shape.meshed else _kind_of_convex(convex_set_of(shape))
+    return Kind.MESH if shape.meshed else _kind_of_convex(convex_set(shape))
 
 
-def _kind_of_convex(packed: PackedConvex) -> Kind:
-    if packed.kind != POINTS:
-        return _CURVED[packed.kind]
-    if packed.slop != 0.0:
+def _kind_of_convex(part: ConvexSet) -> Kind:
+    if part.kind != POINTS:
+        return _CURVED[part.kind]
+    if part.slop != 0.0:
         return Kind.ROUNDED
-    return Kind(min(len(packed.points), 3) - 1)
+    return Kind(min(len(part.points), 3) - 1)

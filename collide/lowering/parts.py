@@ -1,32 +1,20 @@
 """Any shape as convex parts, each with its pose in the shape's frame: what a shape is to the rest of the engine.
 
-One function a class says what its parts are. Parts are made when first asked for and kept with the shape, which never
-changes. No kernel is imported: `certificates.verify` reads parts, too.
+`convex_sets.py` says what the parts of a class are. Parts are made when first asked for and kept with the shape, which
+never changes.
 """
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Callable
 
 import numpy as np
 
-from collide.errors import UnsupportedQuery
-from collide.lowering.packed_convex import (
-    CONE,
-    CYLINDER,
-    ELLIPSOID,
-    PackedConvex,
-    pack_curved,
-    pack_halfspace,
-    pack_points,
-)
+from collide.lowering.convex_sets import convex_set, moved
+from collide.lowering.packed_convex import PackedConvex, pack, pack_halfspace, pack_points
 from collide.shapes.compound import Compound
-from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
-from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
 
 #: A convex set and its (4, 4) pose in the shape's frame.
@@ -38,14 +26,12 @@ _ULPS_PER_PRODUCT = 8
 _ULP = 2.0**-53
 #: Points of a mesh that are their own bounds; of more, boxes of so many cells along each axis hold them.
 _MAX_OWN_BOUNDS, _CELLS = 512, 6
-#: Corners of an `HPolytope` from which it gets a support tree: no shape made of few planes has as many.
-_CORNERS_WITH_TREE = 2000
 
 
 @kept_with_shape("_parts")
 def parts_of(shape: Shape) -> tuple[Part, ...]:
     """The convex sets whose union a shape is. Raises UnsupportedQuery for meshes and regions."""
-    return _rule_for(shape)(shape)
+    return _compound(shape) if isinstance(shape, Compound) else _alone(pack(convex_set(shape)))
 
 
 def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:
@@ -73,60 +59,6 @@ def is_single_convex(shape: Shape) -> bool:
     return len(parts) == 1 and (parts[0][1] is IDENTITY or np.array_equal(parts[0][1], IDENTITY))
 
 
-# --- one function a class -----------------------------------------------------------------------
-
-
-def _sphere(shape: Sphere) -> tuple[Part, ...]:
-    return _alone(pack_points(np.zeros((1, 3)), shape.radius))
-
-
-def _box(shape: Box) -> tuple[Part, ...]:
-    signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
-    half = np.append(0.5 * shape.size, 0.0)
-    half.flags.writeable = False
-    return _alone(pack_points(signs * shape.size)._replace(params=half))
-
-
-def _capsule(shape: Capsule) -> tuple[Part, ...]:
-    half = 0.5 * shape.length
-    ends = np.array([(0.0, 0.0, -half), (0.0, 0.0, half)])[: 2 if half else 1]
-    return _alone(pack_points(ends, shape.radius))
-
-
-def _cylinder(shape: Cylinder) -> tuple[Part, ...]:
-    half = 0.5 * shape.length
-    return _alone(pack_curved(CYLINDER, (shape.radius, half), math.hypot(shape.radius, half)))
-
-
-def _cone(shape: Cone) -> tuple[Part, ...]:
-    half = 0.5 * shape.length
-    return _alone(pack_curved(CONE, (shape.radius, half), math.hypot(shape.radius, half)))
-
-
-def _ellipsoid(shape: Ellipsoid) -> tuple[Part, ...]:
-    return _alone(pack_curved(ELLIPSOID, tuple(shape.radii), float(shape.radii.max())))
-
-
-def _halfspace(shape: Halfspace) -> tuple[Part, ...]:
-    return _alone(pack_halfspace(tuple(shape.normal), shape.offset))
-
-
-def _convex_hull(shape: ConvexHull) -> tuple[Part, ...]:
-    return _alone(pack_points(shape.points, shape.radius, with_tree=True))
-
-
-def _hpolytope(shape: HPolytope) -> tuple[Part, ...]:
-    if shape.is_region:
-        raise UnsupportedQuery(
-            "HPolytope(bounded=False): a region has no corners, which this query needs; with bounded=True, closed by "
-            "half-spaces far away, it has"
-        )
-    packed = pack_points(shape.vertices, slop=shape.slop, with_tree=len(shape.vertices) > _CORNERS_WITH_TREE)
-    if shape.is_closed:
-        packed.prepared.made["planes"] = shape.normals, shape.offsets
-    return _alone(packed)
-
-
 def _half_space_around(region: HPolytope) -> PackedConvex:
     """The half-space that reaches least beyond the origin, of those that hold a region."""
     exponents = np.frexp(np.abs(region.normals).max(axis=1))[1]
@@ -135,37 +67,8 @@ def _half_space_around(region: HPolytope) -> PackedConvex:
     return pack_halfspace(tuple(normals[least]), float(offsets[least]))
 
 
-def _mesh(shape: Mesh) -> tuple[Part, ...]:
-    raise UnsupportedQuery(
-        "Mesh: a mesh is no union of convex parts, which this query needs. collide() and distance() of one mesh and "
-        "another shape, and World, take it as it is; elsewhere ConvexHull(mesh.vertices) may do instead"
-    )
-
-
 def _compound(shape: Compound, of_item: Callable[[Shape], tuple[Part, ...]] = parts_of) -> tuple[Part, ...]:
     return tuple(_placed(packed, X_CS, X_SP) for item, X_CS in shape.items for packed, X_SP in of_item(item))
-
-
-_RULES: dict[type, Callable[..., tuple[Part, ...]]] = {
-    Sphere: _sphere,
-    Box: _box,
-    Capsule: _capsule,
-    Cylinder: _cylinder,
-    Cone: _cone,
-    Ellipsoid: _ellipsoid,
-    Halfspace: _halfspace,
-    ConvexHull: _convex_hull,
-    HPolytope: _hpolytope,
-    Mesh: _mesh,
-    Compound: _compound,
-}
-
-
-def _rule_for(shape: Shape) -> Callable[..., tuple[Part, ...]]:
-    for cls in type(shape).__mro__:
-        if cls in _RULES:
-            return _RULES[cls]
-    raise TypeError(f"{type(shape).__name__} cannot be asked about: derive it from one of collide's shapes")
 
 
 def _alone(packed: PackedConvex) -> tuple[Part, ...]:
@@ -174,9 +77,9 @@ def _alone(packed: PackedConvex) -> tuple[Part, ...]:
 
 def _placed(packed: PackedConvex, X_CS: np.ndarray, X_SP: np.ndarray) -> Part:
     """A part in the compound's frame, its slop grown by what the product of poses rounds."""
-    if X_SP is IDENTITY or np.array_equal(X_SP, IDENTITY):
+    X_CP = moved(X_CS, X_SP)
+    if X_CP is X_CS:
         return packed, X_CS
-    X_CP = X_CS @ X_SP
     scale = packed.reach + np.abs(X_SP[:3, 3]).sum() + np.abs(X_CS[:3, 3]).max()
     return packed._replace(slop=packed.slop + 2 * _ULPS_PER_PRODUCT * _ULP * scale), X_CP
 

@@ -7,6 +7,7 @@ left) or a ``text`` (wrapped).
 
 from __future__ import annotations
 
+import sys
 import textwrap
 import unicodedata
 from dataclasses import dataclass, field
@@ -16,6 +17,12 @@ INDENT = 2
 _NAME_COMFORT = 20  # names are shortened to this before a number column is given up ...
 _NAME_LEAST = 6     # ... and to this once there are none left to give up
 _TEXT_LEAST = 12
+
+
+#: For terminals that cannot encode the real ones; as many cells where tables use them.
+_PLAIN = str.maketrans(
+    {"…": "~", "─": "-", "µ": "u", "→": ">", "≈": "~", "≤": "<=", "≥": ">=", "–": "-", "−": "-", "×": "x"}
+)
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,17 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def write_text(text: str, stream=None) -> None:
+    """Write text to a stream whose encoding may know ASCII only."""
+    stream = sys.stdout if stream is None else stream
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    try:
+        text.encode(encoding)
+    except UnicodeEncodeError:
+        text = text.translate(_PLAIN).encode(encoding, "backslashreplace").decode(encoding)
+    stream.write(text)
 
 
 def width_of(text: str) -> int:

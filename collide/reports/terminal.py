@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from collide.reports.number_format import count, seconds
 from collide.reports.report_tables import tables
-from collide.reports.tables import Line, Table, lay_out, missing_columns, table_lines, wrapped
+from collide.reports.tables import Line, Table, lay_out, missing_columns, table_lines, wrapped, write_text
 
 if TYPE_CHECKING:
     from collide.reports.report import Report
@@ -94,10 +94,6 @@ _STYLES = {
     "title": "bold", "head": "dim", "rule": "dim", "note": "dim", "label": "none", "text": "none",
     "name": "none", "number": "bold",
 }
-#: For terminals that cannot encode the real ones; as many cells where tables use them.
-_PLAIN = str.maketrans(
-    {"…": "~", "─": "-", "µ": "u", "→": ">", "≈": "~", "≤": "<=", "≥": ">=", "–": "-", "−": "-", "×": "x"}
-)
 
 
 def output_width(stream) -> tuple[int, bool]:
@@ -147,14 +143,3 @@ def _rich_console(stream):
         return None
     console = Console(file=stream, highlight=False, markup=False, emoji=False)
     return console if console.color_system and (console.encoding or "").lower().startswith("utf") else None
-
-
-def write_text(text: str, stream=None) -> None:
-    """Write text to a stream whose encoding may know ASCII only."""
-    stream = sys.stdout if stream is None else stream
-    encoding = getattr(stream, "encoding", None) or "utf-8"
-    try:
-        text.encode(encoding)
-    except UnicodeEncodeError:
-        text = text.translate(_PLAIN).encode(encoding, "backslashreplace").decode(encoding)
-    stream.write(text)
