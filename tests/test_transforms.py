@@ -159,8 +159,8 @@ def test_poses_of_arrays():
     ("arguments", "said"),
     [
         ({"p": np.zeros((2, 3)), "rpy": (0, 0, 0), "quat_wxyz": (1, 0, 0, 0)}, "at most one"),
-        ({"p": np.zeros((2, 3)), "quat_wxyz": np.ones((3, 4))}, "p 2, quat_wxyz 3"),
-        ({"p": np.zeros((0, 3)), "rpy": np.zeros((2, 3))}, "p 0, rpy 2"),
+        ({"p": np.zeros((2, 3)), "quat_wxyz": np.ones((3, 4))}, r"p \(2, 3\), quat_wxyz \(3, 4\)"),
+        ({"p": np.zeros((0, 3)), "rpy": np.zeros((2, 3))}, r"p \(0, 3\), rpy \(2, 3\)"),
         ({"p": np.zeros((2, 4))}, r"poses: p must have shape \(N, 3\)"),
         ({"p": [[0, 0, 0], [0, np.nan, 0]]}, r"p\[1\] has entries that are not finite"),
         ({"p": [[0, 0, 0], [0, 1e60, 0]]}, r"poses\[1\] exceeds"),

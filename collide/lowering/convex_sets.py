@@ -32,7 +32,7 @@ _CORNERS_WITH_TREE = 2000
 class ConvexSet(NamedTuple):
     """One convex set in its own frame; fields as `packed_convex.PackedConvex` has them.
 
-    reach : of a cylinder, cone or ellipsoid [m]; that of points is measured where they are packed.
+    curved_reach : reach of a cylinder, cone or ellipsoid [m]; the reach of points is measured where they are packed.
     with_tree : whether many points get a support tree when a query first needs it.
     planes : (normals, offsets) of a polytope that is kept by half-spaces.
     """
@@ -42,7 +42,7 @@ class ConvexSet(NamedTuple):
     radius: float = 0.0
     params: tuple[float, ...] = ()
     slop: float = 0.0
-    reach: float = 0.0
+    curved_reach: float = 0.0
     with_tree: bool = False
     planes: tuple[np.ndarray, np.ndarray] | None = None
 
@@ -95,16 +95,16 @@ def _capsule(shape: Capsule) -> ConvexSet:
 
 def _cylinder(shape: Cylinder) -> ConvexSet:
     half = 0.5 * shape.length
-    return ConvexSet(CYLINDER, _NO_POINTS, params=(shape.radius, half), reach=math.hypot(shape.radius, half))
+    return ConvexSet(CYLINDER, _NO_POINTS, params=(shape.radius, half), curved_reach=math.hypot(shape.radius, half))
 
 
 def _cone(shape: Cone) -> ConvexSet:
     half = 0.5 * shape.length
-    return ConvexSet(CONE, _NO_POINTS, params=(shape.radius, half), reach=math.hypot(shape.radius, half))
+    return ConvexSet(CONE, _NO_POINTS, params=(shape.radius, half), curved_reach=math.hypot(shape.radius, half))
 
 
 def _ellipsoid(shape: Ellipsoid) -> ConvexSet:
-    return ConvexSet(ELLIPSOID, _NO_POINTS, params=tuple(shape.radii), reach=float(shape.radii.max()))
+    return ConvexSet(ELLIPSOID, _NO_POINTS, params=tuple(shape.radii), curved_reach=float(shape.radii.max()))
 
 
 def _halfspace(shape: Halfspace) -> ConvexSet:

@@ -13,14 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
-from collide.lowering.convex_sets import ConvexSet
 from collide.numerics.lowest_bits import NO_BITS
 from collide.support.point_columns import lay_out_points
 from collide.support.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 
 __all__ = [
-    "BLOCK", "CONE", "CYLINDER", "ELLIPSOID", "HALFSPACE", "POINTS", "PackedConvex", "on_cache_lines", "pack",
-    "pack_curved", "pack_halfspace", "pack_points",
+    "BLOCK", "CONE", "CYLINDER", "ELLIPSOID", "HALFSPACE", "POINTS", "PackedConvex", "on_cache_lines", "pack_curved",
+    "pack_halfspace", "pack_points",
 ]
 
 #: Coordinates stand in blocks of this many doubles, so that a scan needs no remainder loop.
@@ -70,20 +69,6 @@ class PackedConvex(NamedTuple):
     prepared: PreparedStructures
     lowest: int
     content: bytes
-
-
-def pack(part: ConvexSet) -> PackedConvex:
-    """A convex set of `convex_sets.py`."""
-    if part.kind == HALFSPACE:
-        return pack_halfspace(part.params[:3], part.params[3])
-    if part.kind != POINTS:
-        return pack_curved(part.kind, part.params, part.reach)
-    packed = pack_points(part.points, part.radius, part.slop, part.with_tree)
-    if part.planes is not None:
-        packed.prepared.made["planes"] = part.planes
-    if not part.params:
-        return packed
-    return packed._replace(params=_frozen(np.array((*part.params, 0.0))))
 
 
 def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0, with_tree: bool = False) -> PackedConvex:

@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from collide.lowering.convex_sets import convex_set, moved
-from collide.lowering.packed_convex import PackedConvex, pack, pack_halfspace, pack_points
+from collide.lowering.convex_sets import ConvexSet, convex_set, moved
+from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_curved, pack_halfspace, pack_points
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
@@ -31,7 +31,7 @@ _MAX_OWN_BOUNDS, _CELLS = 512, 6
 @kept_with_shape("_parts")
 def parts_of(shape: Shape) -> tuple[Part, ...]:
     """The convex sets whose union a shape is. Raises UnsupportedQuery for meshes and regions."""
-    return _compound(shape) if isinstance(shape, Compound) else _alone(pack(convex_set(shape)))
+    return _compound(shape) if isinstance(shape, Compound) else _alone(_packed(convex_set(shape)))
 
 
 def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:
@@ -57,6 +57,22 @@ def is_single_convex(shape: Shape) -> bool:
         return False
     parts = parts_of(shape)
     return len(parts) == 1 and (parts[0][1] is IDENTITY or np.array_equal(parts[0][1], IDENTITY))
+
+
+def _packed(part: ConvexSet) -> PackedConvex:
+    """A convex set as kernels read it."""
+    if part.kind == HALFSPACE:
+        return pack_halfspace(part.params[:3], part.params[3])
+    if part.kind != POINTS:
+        return pack_curved(part.kind, part.params, part.curved_reach)
+    packed = pack_points(part.points, part.radius, part.slop, part.with_tree)
+    if part.planes is not None:
+        packed.prepared.made["planes"] = part.planes
+    if not part.params:
+        return packed
+    params = np.array((*part.params, 0.0))
+    params.flags.writeable = False
+    return packed._replace(params=params)
 
 
 def _half_space_around(region: HPolytope) -> PackedConvex:
