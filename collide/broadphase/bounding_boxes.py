@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from collide.curved.shape_kinds import POINTS
 from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.shape_table import (
@@ -26,7 +27,6 @@ from collide.lowering.shape_table import (
     ShapeTable,
 )
 from collide.numerics.vec3 import column_at, dot, neg, vec3_at
-from collide.support.shape_kinds import POINTS
 from collide.support.support_mapping import settled_vertex, support
 
 #: Each bound is moved outwards by this many units in the last place of the terms summed; the

@@ -17,6 +17,7 @@ from collide.broadphase.boxes_ahead import slab_entry
 from collide.casts.cast_pairs import CAST_ROW, LOWER, NORMAL, QUESTION, SIZE, STATUS, TOUCHING, UPPER, VALUE
 from collide.casts.portal import BEHIND, HIT, MISS, OPEN, cast_line
 from collide.casts.silhouette import CAST_DOUBLES, CAST_INTEGERS, open_cast
+from collide.curved.shape_kinds import POINTS
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_SLOP, RADIUS, REACH
 from collide.mesh.bvh import CENTRE, EXPONENT, NODE, WIDTH, Box, box_at, link_of, open_tree
@@ -42,7 +43,6 @@ from collide.numerics.vec3 import (
     sub,
     vec3_at,
 )
-from collide.support.shape_kinds import POINTS
 
 #: Boxes or pairs of them that may wait.
 STACK = 4096

@@ -1,7 +1,7 @@
 """Rays against posed convex sets, one row a question: where the ray's line enters and leaves, with proven bounds.
 
-Boxes, spheres, capsules, cylinders, cones, ellipsoids and half-spaces in closed form (`ray_chords.py`); other points,
-and these swept by a ball, as casts of a point (`portal.py`), forwards and back.
+Boxes, spheres, capsules, cylinders, cones, ellipsoids and half-spaces in closed form (`curved/`); other points, and
+these swept by a ball, as casts of a point (`portal.py`), forwards and back.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ import math
 from typing import NamedTuple
 
 from collide.casts.portal import HIT, MISS, OPEN, cast_line
-from collide.casts.ray_chords import (
+from collide.casts.silhouette import CAST_DOUBLES, open_cast
+from collide.curved.chords import (
     MET,
     MISSED,
     UNCLEAR,
@@ -19,15 +20,12 @@ from collide.casts.ray_chords import (
     ball_chord,
     box_chord,
     capsule_chord,
-    cone_chord,
-    cylinder_chord,
-    ellipsoid_chord,
     halfspace_chord,
     nothing,
 )
-from collide.casts.silhouette import CAST_DOUBLES, open_cast
+from collide.curved.curved_kinds import curved_chord, curved_normal
 from collide.kernels import entry, kernel, view_f64, view_i64
-from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
+from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_SLOP, RADIUS, REACH, SLOP
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.posed_pair import PosedBody, PosedPair, Tables, posed_body, stretch_of_pose
@@ -87,20 +85,6 @@ def _put_chord(row, chord):
     row[LAST_SIDE] = chord.last_side
 
 
-@kernel(inline=True)
-def _local_normal(kind, params, at, p, side):
-    """An outward normal of a cylinder, cone or ellipsoid at a point of a side."""
-    if kind == ELLIPSOID:
-        a, b, c = params[at], params[at + 1], params[at + 2]
-        return Vec3(p.x / a / a, p.y / b / b, p.z / c / c)
-    if side != 0:
-        return Vec3(0.0, 0.0, -1.0 if side == 1 else 1.0)
-    if kind == CYLINDER:
-        return Vec3(p.x, p.y, 0.0)
-    across = math.sqrt(p.x * p.x + p.y * p.y)
-    return Vec3(p.x, p.y, 0.5 * across * params[at] / params[at + 1])
-
-
 @kernel
 def _cut_curved(body, numbers, poses, ray, radius_slop, row):
     """Write the row of a cylinder, cone, ellipsoid or half-space."""
@@ -120,19 +104,14 @@ def _cut_curved(body, numbers, poses, ray, radius_slop, row):
         put_vec3(row, FIRST_NORMAL, normal)
         put_vec3(row, LAST_NORMAL, normal)
         return
-    if body.kind == CYLINDER:
-        chord = cylinder_chord(line, numbers[at], numbers[at + 1])
-    elif body.kind == CONE:
-        chord = cone_chord(line, numbers[at], numbers[at + 1])
-    else:
-        chord = ellipsoid_chord(line, vec3_at(numbers, at))
+    chord = curved_chord(body.kind, numbers, at, line)
     _put_chord(row, chord)
     if chord.state == MISSED:
         return
     first, last = add(o, scale(chord.first, d)), add(o, scale(chord.last, d))
-    n = _local_normal(body.kind, numbers, at, first, chord.first_side)
+    n = curved_normal(body.kind, numbers, at, first, chord.first_side)
     put_vec3(row, FIRST_NORMAL, _normal_to_world(inverse, n))
-    n = _local_normal(body.kind, numbers, at, last, chord.last_side)
+    n = curved_normal(body.kind, numbers, at, last, chord.last_side)
     put_vec3(row, LAST_NORMAL, _normal_to_world(inverse, n))
 
 

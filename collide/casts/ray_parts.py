@@ -27,9 +27,9 @@ from collide.casts.cut_parts import (
 from collide.casts.directions import Directions
 from collide.casts.exact_cast import cast_exactly, corners_of
 from collide.casts.posed_parts import PosedParts
-from collide.casts.ray_chords import MET, MISSED, UNCLEAR
 from collide.casts.ray_hits import RayEvents
 from collide.casts.rays_in_tree import TREE_RAY_DOUBLES, TREE_RAY_INTEGERS, parts_on_rays
+from collide.curved.chords import MET, MISSED, UNCLEAR
 from collide.kernels import address_of
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.numerics.exact_points import integers, rounded

@@ -22,8 +22,8 @@ from collide.casts.cut_parts import (
     STATE,
     cut_part,
 )
-from collide.casts.ray_chords import MET, MISSED
 from collide.casts.silhouette import CAST_INTEGERS
+from collide.curved.chords import MET, MISSED
 from collide.kernels import entry, kernel, view_f64, view_i64
 from collide.narrowphase.posed_pair import Tables
 

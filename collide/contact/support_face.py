@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from collide.curved.curved_kinds import curved_support
 from collide.kernels import kernel, view_f64, view_i64
 from collide.lowering.hull_faces import (
     COLUMNS_AT,
@@ -35,7 +36,7 @@ from collide.lowering.hull_faces import (
 from collide.lowering.packed_convex import CONE, CYLINDER, POINTS
 from collide.narrowphase.posed_pair import reach_of
 from collide.numerics.vec3 import Vec3, add, column_at, cross, dot, norm, put_vec3, rotate, scale, sub, vec3_at
-from collide.support.support_mapping import curved_support, settled_vertex, support_vertex
+from collide.support.support_mapping import settled_vertex, support_vertex
 from collide.support.support_tree_query import extreme_vertex_listed
 
 #: A face, or a line, is across the normal down to this cosine, or up to this sine.

@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide.curved.curved_kinds import CURVED
 from collide.lowering.enclosures import Enclosure
 from collide.lowering.facet_bodies import Body, PosesWithSlop
-from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, PackedConvex
+from collide.lowering.packed_convex import PackedConvex
 from collide.mesh.bvh import REACH, MeshTree
 from collide.narrowphase.facets.near_facets import Facets
 
@@ -51,15 +52,7 @@ class Insides:
 
     def _are_within(self, placed: np.ndarray, error) -> np.ndarray:
         """The same of points (3, m) of the set's frame whose coordinates are off by ``error``, a number or one each."""
-        (x, y, z), packed = placed, self.packed
-        if packed.kind == ELLIPSOID:
-            a, b, c = packed.params[:3].tolist()
-            return np.sqrt((x / a) ** 2 + (y / b) ** 2 + (z / c) ** 2) + 2.0 * error / min(a, b, c) <= 1.0
-        radius, half = packed.params[:2].tolist()
-        aside = np.sqrt(x * x + y * y) + 2.0 * error
-        if packed.kind == CYLINDER:
-            return (aside <= radius) & (np.abs(z) + error <= half)
-        return (aside <= radius * (half - z - error) / (2.0 * half)) & (z - error >= -half)
+        return CURVED[self.packed.kind].within(self.packed.params, placed, error)
 
     def of_meshes(self) -> np.ndarray:
         """(n,) bool: whether the whole mesh is proven within: a corner of it first, then boxes of its tree."""
@@ -96,7 +89,7 @@ def meshes_within(body: Body, packed: PackedConvex, A: PosesWithSlop, B: PosesWi
 
 def _knows(body: Body, packed: PackedConvex) -> bool:
     """Whether there are many facets, and a formula tells what is within the set."""
-    return len(body.tree.ids) > MAX_ASKED and packed.kind in (CYLINDER, CONE, ELLIPSOID)
+    return len(body.tree.ids) > MAX_ASKED and packed.kind in CURVED
 
 
 def facets_asked(

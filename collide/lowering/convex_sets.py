@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.curved.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 from collide.errors import UnsupportedQuery
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
@@ -19,7 +20,6 @@ from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import IDENTITY, Shape
-from collide.support.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 
 __all__ = [
     "CONE", "CYLINDER", "ELLIPSOID", "HALFSPACE", "POINTS", "ConvexSet", "PlacedSet", "convex_set", "moved", "sets_of",

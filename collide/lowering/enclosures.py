@@ -12,23 +12,18 @@ beyond what the geometry asks; that of a shape with planes is looked at in fract
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
+from collide.curved.curved_kinds import CURVED
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.facet_bodies import Body, made_body
-from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, PackedConvex
+from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.parts import convex_set_of
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.shape import Shape, kept_with_shape
-
-#: Corners of the rings around an axis, and times the facets of an icosahedron are cut in four.
-_SIDES, _CUTS = 32, 2
-#: Beyond what the geometry asks, relative.
-_MARGIN = 1e-12
 
 
 class Enclosure(NamedTuple):
@@ -65,42 +60,9 @@ def _body(shape: Shape, points: np.ndarray, own_point: np.ndarray) -> Body:
 
 def _polytopes(shape: Shape, packed: PackedConvex) -> tuple[np.ndarray, np.ndarray | None]:
     """Corners (n, 3) of a solid polytope around a shape, and of one within."""
-    if packed.kind in (CYLINDER, CONE):
-        radius, half = packed.params[:2].tolist()
-        return _turned(radius * (1 + _MARGIN) / np.cos(np.pi / _SIDES), half, packed.kind), _turned(
-            radius * (1 - _MARGIN), half, packed.kind
-        )
-    if packed.kind == ELLIPSOID:
-        points, least = _ball()
-        return points * ((1 + _MARGIN) / least) * packed.params[:3], points * (1 - _MARGIN) * packed.params[:3]
+    if packed.kind in CURVED:
+        return CURVED[packed.kind].polytopes(packed.params)
     return _around(packed), _within(shape, packed)
-
-
-def _turned(radius: float, half: float, kind: int) -> np.ndarray:
-    angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
-    ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(_SIDES, -half)], axis=1)
-    return np.vstack([ring, [[0.0, 0.0, half]] if kind == CONE else ring * (1.0, 1.0, -1.0)])
-
-
-@cache
-def _ball() -> tuple[np.ndarray, float]:
-    """Points (n, 3) of the unit sphere, an icosahedron's facets cut in four; least distance of their hull's planes."""
-    golden = (1 + 5**0.5) / 2
-    corners = [(0.0, s, t * golden) for s in (1.0, -1.0) for t in (1.0, -1.0)]
-    points = _unit(np.array([np.roll(p, k) for p in corners for k in range(3)]))
-    for _ in range(_CUTS):
-        facets = convex_hull(points).facets
-        edges = np.unique(
-            np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), axis=1), axis=0
-        )
-        points = np.vstack([points, _unit(points[edges].sum(axis=1))])
-    a, b, c = points[convex_hull(points).facets].transpose(1, 0, 2)
-    normals = _unit(np.cross(b - a, c - a))
-    return points, float((normals * a).sum(axis=1).min())
-
-
-def _unit(v: np.ndarray) -> np.ndarray:
-    return v / np.sqrt(np.square(v).sum(axis=1))[:, None]
 
 
 def _around(packed: PackedConvex) -> np.ndarray:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+from collide.curved.shape_kinds import HALFSPACE, NUMBERS, POINTS
 from collide.lowering.convex_sets import ConvexSet, convex_set
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape, kept_with_shape
-from collide.support.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 
 
 class Kind(IntEnum):
@@ -29,7 +29,10 @@ class Kind(IntEnum):
 
 #: Kinds whose surface is that of a hull of doubles swept by a ball, or a mesh: `facet_bodies.body_of` serves them.
 WITH_FACETS = frozenset((Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE, Kind.MESH))
-_CURVED = {CYLINDER: Kind.CYLINDER, CONE: Kind.CONE, ELLIPSOID: Kind.ELLIPSOID, HALFSPACE: Kind.HALFSPACE}
+#: Kinds that are no points, by the numbers that kernels know them by.
+_OF_NUMBER = {number: Kind[name] for name, number in NUMBERS.items() if number != POINTS}
+#: Kinds of curved sets: `curved/curved_kinds.py` has the same.
+CURVED_KINDS = frozenset(kind for number, kind in _OF_NUMBER.items() if number != HALFSPACE)
 
 
 @kept_with_shape("_kind")
@@ -44,7 +47,7 @@ def kind_of(shape: Shape) -> Kind:
 
 def _kind_of_convex(part: ConvexSet) -> Kind:
     if part.kind != POINTS:
-        return _CURVED[part.kind]
+        return _OF_NUMBER[part.kind]
     if part.slop != 0.0:
         return Kind.ROUNDED
     return Kind(min(len(part.points), 3) - 1)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from collide.lowering.kinds import Kind
+from collide.lowering.kinds import CURVED_KINDS, Kind
 
 
 class Method(Enum):
@@ -60,28 +60,27 @@ F, E, L = Method.FACETS, Method.CURVED, Method.HULL
 U, M = Method.PARTS, Method.MESH_PARTS
 R, S = Method.REGION, Method.REGIONS
 
-#: Row and column in the order of `Kind`; what stands below the diagonal is mirrored.
+#: Rows and columns in the order of `Kind`, its curved kinds taken together; what stands below the diagonal is mirrored.
 #: The column "both" is of compounds with meshes among their parts, the last of an `HPolytope` kept as planes.
 #: ROUNDED is an `HPolytope` whose corners are not doubles: to kernels it is points, to meshes it has no exact facets.
 _UPPER_HALF = (
-    #                      sphere capsule polytope rounded cylinder cone ellipsoid halfspace mesh compound both region
-    (Kind.SPHERE,         (C,     C,      G,       G,      G,       G,   G,        H,        F,   U,       M,   R)),
-    (Kind.CAPSULE,        (       C,      G,       G,      G,       G,   G,        H,        F,   U,       M,   R)),
-    (Kind.POLYTOPE,       (               G,       G,      G,       G,   G,        H,        F,   U,       M,   R)),
-    (Kind.ROUNDED,        (                        G,      G,       G,   G,        H,        E,   U,       M,   R)),
-    (Kind.CYLINDER,       (                                G,       G,   G,        H,        E,   U,       M,   R)),
-    (Kind.CONE,           (                                         G,   G,        H,        E,   U,       M,   R)),
-    (Kind.ELLIPSOID,      (                                              G,        H,        E,   U,       M,   R)),
-    (Kind.HALFSPACE,      (                                                        P,        L,   U,       M,   S)),
-    (Kind.MESH,           (                                                                  F,   M,       M,   R)),
-    (Kind.COMPOUND,       (                                                                       U,       M,   R)),
-    (Kind.MESH_COMPOUND,  (                                                                                M,   R)),
-    (Kind.REGION,         (                                                                                     S,)),
+    # sphere capsule polytope rounded curved halfspace mesh compound both region
+    (C,      C,      G,       G,      G,     H,        F,   U,       M,   R),  # sphere
+    (        C,      G,       G,      G,     H,        F,   U,       M,   R),  # capsule
+    (                G,       G,      G,     H,        F,   U,       M,   R),  # polytope
+    (                         G,      G,     H,        E,   U,       M,   R),  # rounded
+    (                                 G,     H,        E,   U,       M,   R),  # curved
+    (                                        P,        L,   U,       M,   S),  # half-space
+    (                                                  F,   M,       M,   R),  # mesh
+    (                                                       U,       M,   R),  # compound
+    (                                                                M,   R),  # both
+    (                                                                     S,),  # region
 )
-
+_ORDER = list(dict.fromkeys("curved" if kind in CURVED_KINDS else kind for kind in Kind))
+_LINES = [_ORDER.index("curved" if kind in CURVED_KINDS else kind) for kind in Kind]
 #: TABLE[kind of A][kind of B].
 TABLE: tuple[tuple[Method, ...], ...] = tuple(
-    tuple(_UPPER_HALF[min(a, b)][1][max(a, b) - min(a, b)] for b in Kind) for a in Kind
+    tuple(_UPPER_HALF[min(_LINES[a], _LINES[b])][abs(_LINES[a] - _LINES[b])] for b in Kind) for a in Kind
 )
 #: Questions that a method does not answer, and why, in the words of the error.
 REFUSED: dict[tuple[Method, str], str] = {

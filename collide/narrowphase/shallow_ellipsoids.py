@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from collide.curved.curved_kinds import curved_support
 from collide.kernels import kernel
 from collide.lowering.packed_convex import CYLINDER, ELLIPSOID, POINTS
 from collide.narrowphase.gjk.minkowski_difference import POINT_OF_A, POINT_OF_B, difference_point, height
@@ -33,7 +34,6 @@ from collide.numerics.vec3 import (
     sub,
     vec3_at,
 )
-from collide.support.support_mapping import curved_support
 
 #: Directions tried before the search is given up.
 _ROUNDS = 16

@@ -6,16 +6,15 @@ few units in the last place of |direction|·reach, as `narrowphase/bounds.py` as
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from collide.curved.curved_kinds import curved_support
+from collide.curved.shape_kinds import POINTS
 from collide.kernels import kernel, view_f64, view_i64
-from collide.numerics.vec3 import Vec3, column_at, divide, dot, max_abs
+from collide.numerics.vec3 import column_at
 from collide.support.block_scan import farthest
 from collide.support.coarse_points import COARSE
 from collide.support.extreme_vertex import settle_vertex
-from collide.support.shape_kinds import CYLINDER, ELLIPSOID, POINTS
 from collide.support.support_tree_query import SupportPoint, extreme_vertex_listed
 
 
@@ -66,37 +65,3 @@ def support(kind, coordinates, m, params, at, tree, coarse, list_id, g):
         k = support_vertex(coordinates, m, g)
         return SupportPoint(np.int64(k), column_at(coordinates, m, k), list_id)
     return SupportPoint(np.int64(-1), curved_support(kind, params, at, g), list_id)
-
-
-@kernel(inline=True)
-def curved_support(kind, params, at, g):
-    """The point of an ellipsoid, cylinder or cone farthest in direction g."""
-    p0 = params[at]
-    p1 = params[at + 1]
-    if kind == ELLIPSOID:
-        # The gradient of |D g|, D the diagonal of the radii: D² g / |D g|.
-        p2 = params[at + 2]
-        scaled = Vec3(p0 * g.x, p1 * g.y, p2 * g.z)
-        largest = max_abs(scaled)
-        if largest == 0.0:
-            return Vec3(p0, 0.0, 0.0)
-        scaled = divide(scaled, largest)
-        unit = divide(scaled, math.sqrt(dot(scaled, scaled)))
-        return Vec3(p0 * unit.x, p1 * unit.y, p2 * unit.z)
-    # Cylinder and cone: a disc of radius p0 across z, at ±p1.
-    largest = max(abs(g.x), abs(g.y))
-    x = 0.0
-    y = 0.0
-    across = 0.0
-    if largest > 0.0:
-        ux = g.x / largest
-        uy = g.y / largest
-        length = math.sqrt(ux * ux + uy * uy)
-        x = p0 * (ux / length)
-        y = p0 * (uy / length)
-        across = p0 * (length * largest)
-    if kind == CYLINDER:
-        return Vec3(x, y, p1 if g.z > 0.0 else -p1)
-    if p1 * g.z >= across - p1 * g.z:  # cone: the apex, or the rim of the base
-        return Vec3(0.0, 0.0, p1)
-    return Vec3(x, y, -p1)

@@ -13,8 +13,8 @@ from reproduction import reproducing
 import collide
 from collide.casts import cut_parts as P
 from collide.casts.posed_parts import PosedParts, posed_parts
-from collide.casts.ray_chords import MET, MISSED
 from collide.casts.silhouette import CAST_INTEGERS
+from collide.curved.chords import MET, MISSED
 from collide.kernels import address_of
 from collide.lowering.parts import parts_of
 

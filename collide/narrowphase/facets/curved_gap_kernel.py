@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from collide.curved.curved_kinds import curved_support
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import BLOCK
 from collide.lowering.shape_table import INTS, KIND, NUMBERS, PARAMS, POSE, RADIUS, REACH, SLOP
@@ -51,7 +52,6 @@ from collide.narrowphase.rows import (
     view_row,
 )
 from collide.numerics.vec3 import Vec3, absolute, dot, neg, norm, norm1, put_vec3, rotate_back, scale, sub, vec3_at
-from collide.support.support_mapping import curved_support
 
 _answer_pairs_at = native_call(SIGNATURE)
 

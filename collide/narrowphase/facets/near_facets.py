@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
+from collide.curved.curved_kinds import CURVED
 from collide.lowering.facet_bodies import PosesWithSlop
-from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, POINTS, PackedConvex
+from collide.lowering.packed_convex import POINTS, PackedConvex
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.mesh.bvh import NOTHING, REACH, WIDTH, MeshTree, leaf_runs
 
@@ -185,19 +186,11 @@ def _worth(D: np.ndarray) -> np.ndarray:
 
 def _support(packed: PackedConvex, g: np.ndarray) -> np.ndarray:
     """(…,) support values of a core along g (…, 3)."""
-    p = packed.params
     if packed.kind == POINTS and len(packed.points) > _MAX_SCANNED:
         return _support_by_tree(packed, g)
     if packed.kind == POINTS:
         return _dot(g[:, :, None], packed.points).max(axis=-1)
-    if packed.kind == ELLIPSOID:
-        scaled = g * p[:3]
-        return np.sqrt(_dot(scaled, scaled))
-    round_part = p[0] * np.sqrt(g[..., 0] * g[..., 0] + g[..., 1] * g[..., 1])
-    if packed.kind == CYLINDER:
-        return round_part + p[1] * np.abs(g[..., 2])
-    assert packed.kind == CONE
-    return np.maximum(p[1] * g[..., 2], round_part - p[1] * g[..., 2])
+    return CURVED[packed.kind].extents(packed.params, g)
 
 
 def _support_by_tree(packed: PackedConvex, g: np.ndarray) -> np.ndarray:

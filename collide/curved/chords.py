@@ -1,5 +1,6 @@
-"""The chord that a line cuts out of a convex set, in closed form: spheres, capsules, cylinders, cones, ellipsoids,
-half-spaces.
+"""The chord of a line in a convex set, in closed form: balls, capsules, boxes, half-spaces; intersections, unions.
+
+The chords of cylinders, cones and ellipsoids stand in the files of these kinds.
 
 A chord is [first, last], each end inside a proven bracket. Slabs and quadrics are cut with the line one by one and the
 intervals with each other, as E. Haines does it for the planes of a polyhedron ("Fast ray–convex polyhedron
@@ -18,7 +19,7 @@ from collide.numerics.vec3 import Vec3, add, cross, dot, norm, scale, sub
 #: What is said of a line and a set: it misses it; meets it; doubles cannot tell.
 MISSED, MET, UNCLEAR = range(3)
 
-_ROUNDING = 2.0**-49
+ROUNDING = 2.0**-49
 
 
 class Line(NamedTuple):
@@ -108,13 +109,13 @@ def ball_chord(m, g, radius, error, side):
     c = add(m, scale(middle, g))
     beside = dot(c, c)
     rest = radius * radius - beside
-    slack = (2.0 * math.sqrt(beside) + error) * error + _ROUNDING * radius * radius
+    slack = (2.0 * math.sqrt(beside) + error) * error + ROUNDING * radius * radius
     if rest < -slack:
         return nothing()
     inner = math.sqrt(max(rest - slack, 0.0) / square)
     half = math.sqrt(max(rest, 0.0) / square)
     outer = math.sqrt(max(rest + slack, 0.0) / square)
-    off = 2.0 * error / math.sqrt(square) + _ROUNDING * (abs(middle) + outer)
+    off = 2.0 * error / math.sqrt(square) + ROUNDING * (abs(middle) + outer)
     return Chord(
         MET if rest > slack else UNCLEAR, middle - outer - off, middle - half, middle - inner + off,
         middle + inner - off, middle + half, middle + outer + off, side, side,
@@ -132,8 +133,8 @@ def slab_chord(origin, step, low, high, line, low_side, high_side):
         return everything(MET if low + error < origin < high - error else UNCLEAR)
     near = (low - origin) / step
     far = (high - origin) / step
-    near_off = line.error / abs(step) + _ROUNDING * abs(near)
-    far_off = line.error / abs(step) + _ROUNDING * abs(far)
+    near_off = line.error / abs(step) + ROUNDING * abs(near)
+    far_off = line.error / abs(step) + ROUNDING * abs(far)
     if step > 0.0:
         return Chord(
             MET, near - near_off, near, near + near_off, far - far_off, far, far + far_off, low_side, high_side
@@ -174,11 +175,11 @@ def capsule_chord(line, start, end, radius):
     unit = scale(1.0 / length, axis)
     slab = slab_chord(dot(m, unit), dot(line.direction, unit), 0.0, length, line, 1, 2)
     across, step = cross(m, unit), cross(line.direction, unit)
-    return together(ends, _clipped(slab, across, step, radius, line, 0))
+    return together(ends, clipped_cylinder(slab, across, step, radius, line, 0))
 
 
 @kernel(inline=True)
-def _clipped(slab, across, step, radius, line, side):
+def clipped_cylinder(slab, across, step, radius, line, side):
     """A cylinder of endless length, |across + t step| ≤ radius, cut off by a slab.
 
     Where the line is within it at both ends of the slab it is so in between, and outside where the way between them is
@@ -187,19 +188,11 @@ def _clipped(slab, across, step, radius, line, side):
     if slab.state == MET and slab.first > -math.inf:
         a, b = add(across, scale(slab.first, step)), add(across, scale(slab.last, step))
         off = (slab.first_upper - slab.first_lower + slab.last_upper - slab.last_lower) * norm(step)
-        if max(norm(a), norm(b)) + off < radius * (1.0 - _ROUNDING) - 2.0 * line.error:
+        if max(norm(a), norm(b)) + off < radius * (1.0 - ROUNDING) - 2.0 * line.error:
             return slab
-        if norm(a) - norm(sub(b, a)) - off > radius * (1.0 + _ROUNDING) + 2.0 * line.error:
+        if norm(a) - norm(sub(b, a)) - off > radius * (1.0 + ROUNDING) + 2.0 * line.error:
             return nothing()
     return common(ball_chord(across, step, radius, 2.0 * line.error, side), slab)
-
-
-@kernel
-def cylinder_chord(line, radius, half):
-    """Of a cylinder along z from −half to half."""
-    o, d = line.origin, line.direction
-    slab = slab_chord(o.z, d.z, -half, half, line, 1, 2)
-    return _clipped(slab, Vec3(o.x, o.y, 0.0), Vec3(d.x, d.y, 0.0), radius, line, 0)
 
 
 @kernel
@@ -209,97 +202,3 @@ def box_chord(line, half):
     chord = slab_chord(o.x, d.x, -half.x, half.x, line, 1, 2)
     chord = common(chord, slab_chord(o.y, d.y, -half.y, half.y, line, 3, 4))
     return common(chord, slab_chord(o.z, d.z, -half.z, half.z, line, 5, 6))
-
-
-@kernel
-def ellipsoid_chord(line, radii):
-    """Of an ellipsoid along the axes: a unit ball in units of its radii."""
-    o, d = line.origin, line.direction
-    least = min(radii.x, radii.y, radii.z)
-    m = Vec3(o.x / radii.x, o.y / radii.y, o.z / radii.z)
-    g = Vec3(d.x / radii.x, d.y / radii.y, d.z / radii.z)
-    return ball_chord(m, g, 1.0, line.error / least + _ROUNDING * norm(m), 0)
-
-
-@kernel
-def cone_chord(line, radius, half):
-    """Of a cone with its base at z = −half and its tip at half."""
-    d = line.direction
-    slab = slab_chord(line.origin.z, d.z, -half, half, line, 1, -1)
-    if slab.state == MISSED:
-        return slab
-    slope = 0.5 * radius / half
-    if slab.state == MET and slab.first > -math.inf:
-        off = (slab.first_upper - slab.first_lower + slab.last_upper - slab.last_lower) * line.length
-        deepest = max(_outside_cone(line, slab.first, slope, half), _outside_cone(line, slab.last, slope, half))
-        if deepest + (1.0 + slope) * (off + 2.0 * line.error) < 0.0:
-            return slab
-    return common(_nappe_chord(line, slope, half), slab)
-
-
-@kernel(inline=True)
-def _outside_cone(line, t, slope, half):
-    """How far a point of the line is outside the cone, measured across z."""
-    p = add(line.origin, scale(t, line.direction))
-    return math.sqrt(p.x * p.x + p.y * p.y) - slope * (half - p.z)
-
-
-@kernel
-def _nappe_chord(line, slope, half):
-    """Of the endless cone |(x, y)| ≤ slope (half − z): where a quadratic a t² + 2 b t + c is at most 0, on one side."""
-    d = line.direction
-    middle = -dot(line.origin, d) / (line.length * line.length)
-    q = add(line.origin, scale(middle, d))
-    s = slope * (half - q.z)
-    ds = -slope * d.z
-    a = d.x * d.x + d.y * d.y - ds * ds
-    b = q.x * d.x + q.y * d.y - s * ds
-    c = q.x * q.x + q.y * q.y - s * s
-    # Errors of the three, from that of points and of the direction.
-    wide = 1.0 + slope
-    reach = math.sqrt(q.x * q.x + q.y * q.y) + abs(s)
-    off_a = 2.0**-47 * wide * wide * line.length * line.length
-    off_b = wide * line.length * (wide * line.error + 2.0**-47 * reach)
-    off_c = 2.0 * reach * wide * line.error + (wide * line.error) ** 2 + _ROUNDING * reach * reach
-    root = b * b - a * c
-    off_root = 2.0 * abs(b) * off_b + off_b * off_b + abs(a) * off_c + abs(c) * off_a + off_a * off_c
-    if root < -off_root and a > off_a:
-        return nothing()
-    if not root > 4.0 * off_root:
-        return everything(UNCLEAR)
-    root = math.sqrt(root)
-    sum_ = -(b + math.copysign(root, b))
-    near = c / sum_
-    near_off = _off_root(near, off_a, off_b, off_c, root)
-    if abs(a) <= 2.0 * off_a:  # along a generator: the other end is far away
-        far_sign = -math.copysign(1.0, b)  # where the quadratic goes to −∞
-        if s + ds * (near + far_sign * abs(near) + far_sign * reach / line.length) < 0.0:
-            return nothing()
-        return _half_line(near + middle, near_off + _ROUNDING * abs(middle), far_sign)
-    far = sum_ / a
-    far_off = _off_root(far, off_a, off_b, off_c, root)
-    if near > far:
-        near, far, near_off, far_off = far, near, far_off, near_off
-    if a > 0.0:
-        if s - ds * b / a < 0.0:
-            return nothing()
-        near, far = near + middle, far + middle
-        near_off += _ROUNDING * (abs(middle) + abs(near))
-        far_off += _ROUNDING * (abs(middle) + abs(far))
-        return Chord(MET, near - near_off, near, near + near_off, far - far_off, far, far + far_off, 0, 0)
-    if ds > 0.0:
-        return _half_line(far + middle, far_off + _ROUNDING * abs(middle), 1.0)
-    return _half_line(near + middle, near_off + _ROUNDING * abs(middle), -1.0)
-
-
-@kernel(inline=True)
-def _off_root(t, off_a, off_b, off_c, root):
-    """How far a root of the quadratic may be off: the error of its value over half its slope."""
-    return (off_a * t * t + 2.0 * off_b * abs(t) + off_c) / root + _ROUNDING * abs(t)
-
-
-@kernel(inline=True)
-def _half_line(t, off, sign):
-    if sign > 0.0:
-        return Chord(MET, t - off, t, t + off, math.inf, math.inf, math.inf, 0, -1)
-    return Chord(MET, -math.inf, -math.inf, -math.inf, t - off, t, t + off, -1, 0)

@@ -13,12 +13,15 @@ from naive import rng_of
 from reproduction import reproducing
 
 import collide
-from collide.casts import ray_chords as C
+from collide.curved import chords as C
+from collide.curved.cone import cone_chord
+from collide.curved.cylinder import cylinder_chord
+from collide.curved.ellipsoid import ellipsoid_chord
 from collide.numerics.vec3 import Vec3
 
 pytestmark = pytest.mark.plain_kernels
 
-SOURCE = "o, d = {o}, {d}  # tests/casts/test_ray_chords.py"
+SOURCE = "o, d = {o}, {d}  # tests/curved/test_chords.py"
 EYE = np.eye(4)
 
 
@@ -32,11 +35,11 @@ def chord_of(shape, o, d) -> C.Chord:
     if name == "Capsule":
         return C.capsule_chord(line, Vec3(0.0, 0.0, -half), Vec3(0.0, 0.0, half), shape.radius)
     if name == "Cylinder":
-        return C.cylinder_chord(line, shape.radius, half)
+        return cylinder_chord(line, shape.radius, half)
     if name == "Cone":
-        return C.cone_chord(line, shape.radius, half)
+        return cone_chord(line, shape.radius, half)
     if name == "Ellipsoid":
-        return C.ellipsoid_chord(line, Vec3(*shape.radii.tolist()))
+        return ellipsoid_chord(line, Vec3(*shape.radii.tolist()))
     if name == "Box":
         return C.box_chord(line, Vec3(*(0.5 * shape.size).tolist()))
     return C.halfspace_chord(line, Vec3(*shape.normal.tolist()), shape.offset, line.error)
