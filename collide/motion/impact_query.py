@@ -22,8 +22,8 @@ from collide.motion.region_motions import with_regions_closed
 from collide.motion.surface_motions import surface_impacts
 from collide.narrowphase.convex_batches import Question
 from collide.numerics.sine_cosine import LARGEST_ANGLE
-from collide.pairs.batches import answer_batch
-from collide.pairs.pair_arguments import checked_shapes, matched_counts
+from collide.pairs.batches import answer_batch, distinct_shapes
+from collide.pairs.pair_arguments import matched_counts
 from collide.results import UNDECIDED
 from collide.shapes.shape import Shape
 from collide.transforms import LARGEST, SMALLEST, as_pose, poses_as_given
@@ -108,7 +108,7 @@ def time_of_impact(
     counts = {name: len(X) for name, X in zip((*matrices, *turns), (*poses, *omegas)) if X is not None}
     n, are_shapes = matched_counts(A, B, counts)
     motions = Motions(*poses, *omegas)
-    question = _Question(*with_regions_closed(*_distinct(A, B, n), motions), motions, width, n_threads)
+    question = _Question(*with_regions_closed(*distinct_shapes(A, B, n), motions), motions, width, n_threads)
     return as_result(_answer(question), width, are_shapes and all(singles) and all(single_omegas))
 
 
@@ -262,25 +262,6 @@ class _Question(NamedTuple):
     motions: Motions
     tolerance: float
     threads: int
-
-
-def _distinct(A, B, n: int) -> tuple[list[Shape], np.ndarray, np.ndarray]:
-    """(distinct shapes, which of them A is motion by motion, and B)."""
-    numbers: dict[int, int] = {}
-    shapes: list[Shape] = []
-
-    def number(shape: Shape) -> int:
-        if id(shape) not in numbers:  # held by the list as long as this dictionary lives
-            numbers[id(shape)] = len(shapes)
-            shapes.append(shape)
-        return numbers[id(shape)]
-
-    def rows(side) -> np.ndarray:
-        if isinstance(side, Shape):
-            return np.full(n, number(side), dtype=np.int64)
-        return np.array([number(shape) for shape in checked_shapes(side)], dtype=np.int64)
-
-    return shapes, rows(A), rows(B)
 
 
 # --- answers ------------------------------------------------------------------------------------

@@ -115,6 +115,13 @@ def of_one_set(A, B, n: int):
     """Shapes of which one side or both are sequences, as picked from one set."""
     if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
         return A, B
+    shapes, rows_a, rows_b = distinct_shapes(A, B, n)
+    shape_set = ShapeSet(shapes)
+    return Picked(shape_set, rows_a), Picked(shape_set, rows_b)
+
+
+def distinct_shapes(A, B, n: int) -> tuple[list[Shape], np.ndarray, np.ndarray]:
+    """(shapes, each a single time; (n,) rows of A among the shapes, and of B).   A, B : shapes, or sequences of n."""
     numbers: dict[int, int] = {}
     shapes: list[Shape] = []
 
@@ -133,8 +140,7 @@ def of_one_set(A, B, n: int):
         return np.fromiter(map(number, side), dtype=np.int64, count=n)
 
     rows_a, rows_b = rows(A), rows(B)
-    shape_set = ShapeSet(shapes)
-    return Picked(shape_set, rows_a), Picked(shape_set, rows_b)
+    return shapes, rows_a, rows_b
 
 
 def _refuse_poses(X_WA, X_WB, check: bool) -> None:

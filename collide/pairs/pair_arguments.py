@@ -44,11 +44,6 @@ def matched_length(counts: dict[str, int]) -> int:
     return wanted
 
 
-def checked_shapes(side) -> list[Shape]:
-    """The shapes of a sequence that has been checked, one a pair."""
-    return [side[k] for k in range(len(side))]
-
-
 def _is_sequence(side) -> bool:
     """Whether it is shapes, one a pose."""
     return isinstance(side, Picked) or (
