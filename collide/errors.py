@@ -1,13 +1,13 @@
-"""The one error tree. Every message names the thing, the value, and what to do about it.
+"""The error tree. Every message names the argument, its value, and what to do about the error.
 
     CollideError
-    ├── InvalidShape      a shape was made from numbers that describe none
+    ├── InvalidShape      a shape was made from numbers that describe no shape
     ├── InvalidPose       a pose is not a finite rotation and translation
-    ├── InvalidArgument   a query or a World was asked with an argument it cannot use
-    ├── UnknownBody       a name or id that no body of the World has
-    ├── UnsupportedQuery  the question has no finite answer, or this pair of shapes cannot answer it
-    ├── SceneError        a file that describes a scene, a robot or a mesh is missing or wrong
-    └── MissingExtra      an optional package is needed; the message gives the command that installs it
+    ├── InvalidArgument   a query or a World was given an argument outside its contract
+    ├── UnknownBody       a name or id of no body in the World
+    ├── UnsupportedQuery  the question has no finite answer, or no method for this pair of shapes
+    ├── SceneError        the file of a scene, a robot or a mesh is missing or wrong
+    └── MissingExtra      an optional package is needed; the message gives the command to install the package
 """
 
 from __future__ import annotations
@@ -105,8 +105,8 @@ class MissingExtra(CollideError, ImportError):
     Parameters
     ----------
     package : what could not be imported, by its name on the package index.
-    extra : the extra of ``collide-robotics`` that brings it.
-    purpose : what it is needed for, completing the words "is needed to ...".
+    extra : the extra of ``collide-robotics`` with the package.
+    purpose : what the package is needed for, completing the words "is needed to ...".
     """
 
     def __init__(self, package: str, *, extra: str, purpose: str):

@@ -1,1 +1,1 @@
-"""Who could touch whom: a box-tree over the bodies, and the filters that keep pairs from it."""
+"""Pairs of bodies whose boxes are near: a box-tree over the bodies, and the filters of pairs never tested."""

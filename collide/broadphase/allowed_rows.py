@@ -1,8 +1,8 @@
-"""The allowed-collision matrix as rows of bits: only bodies that have allowed pairs have a row, and only over the range
-of their partners.
+"""The allowed-collision matrix as rows of bits: only bodies with allowed pairs have a row, over the range of their
+partners alone.
 
-A row of partners that are far apart in number would be mostly zeros: it is a sorted list instead. Either way memory is
-a small multiple of the number of allowed pairs.
+A row of partners far apart in number would be mostly zeros and is a sorted list instead. Memory is a small multiple of
+the number of allowed pairs in both forms.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ def is_allowed(rows, at, body):
 
 
 def allowed_rows(pairs: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """((n,) where each body's row begins, −1 of those without one; the rows one after another), int64.
+    """((n,) where each body's row begins, −1 for bodies without allowed pairs; the rows in sequence), int64.
 
-    pairs : (k, 2) bodies that are never tested with each other, each pair once.
+    pairs : (k, 2) bodies never tested with each other, each pair once.
     """
     row_at = np.full(n, -1, dtype=np.int64)
     if not len(pairs):

@@ -79,7 +79,7 @@ def _bound(ints, numbers, poses, coordinates, s, p, axis):
 
 @kernel
 def _put_box(ints_at, numbers_at, s, poses, k, boxes):
-    """Box k becomes that of shape s at pose row k; a half-space gets an infinite one."""
+    """Write the box of shape s at pose row k into row k of boxes; a half-space gets an infinite box."""
     ints = view_i64(ints_at, INTS * (s + 1))
     numbers = view_f64(numbers_at, NUMBERS * (s + 1))
     if ints[INTS * s + KIND] == HALFSPACE:
@@ -111,10 +111,10 @@ def bounding_boxes(ints_at, numbers_at, poses_at, shape_of_at, n, boxes_at):
 def move_single_parts(
     ints_at, numbers_at, shape_of_at, n_bodies, moved_at, n_moved, X_new_at, X_WBs_at, poses_at, boxes_at
 ):
-    """Take the poses of bodies that are one part each, which has none of its own: body ``k`` is shape ``shape_of[k]``.
+    """Move bodies of a single part without a pose of its own: body ``k`` is shape ``shape_of[k]``.
 
-    moved : the bodies.   X_new, X_WBs : 16 doubles a body; from the first to the second, and to pose rows as of
-    `pose_table`.   boxes : as of `bounding_boxes`.
+    moved : the bodies.   X_new : 16 doubles a body, copied to X_WBs and to pose rows as of `pose_table`.
+    boxes : as of `bounding_boxes`.
     """
     shape_of = view_i64(shape_of_at, n_bodies)
     moved = view_i64(moved_at, n_moved)
@@ -147,12 +147,12 @@ def boxes_of(table: ShapeTable, poses: np.ndarray, shape_of: np.ndarray) -> np.n
 
 
 def widened(boxes: np.ndarray, margins: np.ndarray) -> np.ndarray:
-    """(n, 6) boxes with margins (n,) [m] ≥ 0 on every side, rounded outwards; without one their own bits.
+    """(n, 6) boxes with margins (n,) [m] ≥ 0 on every side, rounded outwards; a margin of 0 keeps a box's bits.
 
     Each bound b is moved by r = margin + (|b| + margin)·2⁻⁵⁰. Three sums round, by at most 2⁻⁵³ of |b| + 2·margin each,
-    which is less than a half of the added term: fl(b − r) ≤ b − margin and fl(b + r) ≥ b + margin, and the new box
-    holds every point within the margin of the old one. An infinite bound stays as it is: its own r is infinite and
-    moves it outwards. (A single r from the largest |b| of a box would be infinite for all six bounds, and inf · 0, no
+    less than a half of the added term: fl(b − r) ≤ b − margin and fl(b + r) ≥ b + margin, and the new box
+    holds every point within the margin of the old one. An infinite bound stays infinite: its own r is infinite and
+    points outwards. (A single r from the largest |b| of a box would be infinite for all six bounds, and inf · 0, no
     number, without a margin.)
     """
     r = margins[:, None] + (np.abs(boxes) + margins[:, None]) * 2.0**-50

@@ -1,7 +1,7 @@
-"""A box-tree over bodies and the pairs that are near in it: kept from one query to the next where few have changed.
+"""A box-tree over bodies and the pairs of near bodies: kept between queries while few bodies have changed.
 
-Leaves' boxes may be larger than their bodies', so most steps of bodies change none of them. The pairs whose leaves'
-boxes meet are then the same as before, and a query compares the bodies' own boxes in these pairs alone.
+A leaf's box may be larger than its body's, so most steps of bodies change no leaf. The pairs whose leaves' boxes meet
+are then the same as before, and a query compares the bodies' own boxes in these pairs alone.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class BoxTree(TreeOverBodies):
     """The tree, and questions about it; arguments as of `TreeOverBodies`."""
 
     def pairs(self, margin: float) -> np.ndarray:
-        """(k, 2) bodies i < j, sorted, whose boxes come within ``margin`` along every axis and that filters let
-        through. Of two fixed bodies none are.
+        """(k, 2) bodies i < j, sorted, whose boxes come within ``margin`` along every axis, less filtered pairs and
+        pairs of two fixed bodies.
         """
         cached = self._cached_pairs(margin)
         if cached is not None:
@@ -49,7 +49,7 @@ class BoxTree(TreeOverBodies):
         return pairs
 
     def _cached_pairs(self, margin: float) -> CachedPairs | None:
-        """What is kept of pairs, brought up to date where it is worth it; None where it is not."""
+        """The cached pairs, brought up to date where an update pays; None where a walk of the whole tree is cheaper."""
         header = self.header()
         n, n_changed = len(self.boxes), int(header[N_CHANGED])
         cached = self._cached
@@ -88,8 +88,8 @@ class BoxTree(TreeOverBodies):
         return None if keys is None else CachedPairs(cached.margin, keys)
 
     def pairs_among(self, begin: int, end: int, margin: float) -> np.ndarray:
-        """(k, 2) bodies i < j, sorted, one of each at one of the nodes begin … end − 1 and the other behind it, as of
-        `pairs`. None of bodies without end.
+        """(k, 2) bodies i < j, sorted, as of `pairs`: a body at a node begin … end − 1 with a body at a later node.
+        Unbounded bodies are in no pair.
         """
 
         def walk(header_at: int, *target: int) -> int:
@@ -100,9 +100,10 @@ class BoxTree(TreeOverBodies):
         return _pairs_of(keys)
 
     def _collected(self, walk: Callable[..., int], capacity: int, limit: int) -> np.ndarray | None:
-        """(k,) keys that a walk finds, ascending; None where they are more than a limit.
+        """(k,) keys found by a walk, ascending; None for more keys than the limit.
 
-        walk : takes the tree, where keys go, and for how many there is room; returns how many there are.
+        walk : takes the header's address, the address of the keys, and their capacity; returns the number of keys
+            found.
         """
         header_at = address_of(self.header())
         while True:
@@ -117,7 +118,7 @@ class BoxTree(TreeOverBodies):
             capacity = count
 
     def _tested(self, keys: np.ndarray, margin: float, are_filtered: bool) -> np.ndarray:
-        """Pairs (k, 2) of those keys whose boxes are within the margin and that filters let through."""
+        """(k, 2) pairs of the keys whose bodies' boxes are within the margin, less filtered pairs."""
         pairs = np.empty((len(keys) + 1, 2), dtype=np.int64)
         count = tested_pairs(
             address_of(self.header()), address_of(keys), len(keys), margin, are_filtered, address_of(pairs)

@@ -1,6 +1,6 @@
-"""Boxes of a `BoxTree` that a moved box or a ray comes to, and those near a point: candidates, with bounds.
+"""Boxes of a `BoxTree` in the way of a moved box or a ray, and boxes near a point: candidates, with bounds.
 
-A box that is moved meets another where a ray meets their Minkowski difference, a box as well: three slabs.
+A moved box meets another where a ray meets their Minkowski difference, a box as well: three slabs.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def slab_entry(low, high, inverse, first, last):
 
 @kernel(inline=True)
 def box_entry(nodes, node, sweep, at, limit):
-    """The t at which a swept box comes to that of a node, from below; infinite where it does not within the limit."""
+    """The t at which a swept box first meets a node's box, from below; infinite beyond the limit."""
     first = 0.0
     last = limit
     for axis in range(3):
@@ -86,7 +86,7 @@ def _farthest_corner(nodes, node, point, at):
 
 @kernel(inline=True)
 def _nearest_sibling(nodes, links, node, end, point, at):
-    """Of a node and those that follow it under the same one, up to ``end``, the nearest to a point."""
+    """The nearest to a point among a node and its later siblings, up to node number ``end``."""
     nearest = node
     least = math.inf
     while node < end:
@@ -99,7 +99,8 @@ def _nearest_sibling(nodes, links, node, end, point, at):
 
 @kernel
 def _nearest_of_all(nodes, links, n_nodes, point, at):
-    """A distance within which there is a body, from above: down to a near leaf, then through what may be nearer."""
+    """An upper bound of the distance to the nearest body: down to a near leaf, then through all nodes nearer than the
+    bound."""
     node = _nearest_sibling(nodes, links, 0, n_nodes, point, at)
     while links[LINK * node + SKIP] > node + 1:
         node = _nearest_sibling(nodes, links, node + 1, links[LINK * node + SKIP], point, at)
@@ -117,11 +118,11 @@ def _nearest_of_all(nodes, links, n_nodes, point, at):
 
 @entry("int64(int64, int64, boolean, int64, int64, int64, int64, int64, int64)")
 def boxes_ahead(questions_at, n, of_points, nodes_at, links_at, n_nodes, pairs_at, bounds_at, capacity):
-    """Pairs (question, body) of boxes that are come to, with t from below; returns how many there are.
+    """Pairs (question, body) of boxes met, with lower bounds of t; returns the number of pairs.
 
-    questions : SWEEP doubles each; ``of_points``, a point is the low corner, every box is named whose distance from it
-        is at most the limit, and bounds are distances.
-    nodes, links : of a tree, or several in a row (`graded_boxes.py`).
+    questions : SWEEP doubles each. Under ``of_points`` the low corner is a point, every box at a distance up to the
+        limit makes a pair, and bounds are distances.
+    nodes, links : of a tree, or of several in sequence (`graded_boxes.py`).
     pairs : out, two integers each, of the first ``capacity``.   bounds : out, a double each.
     """
     questions = view_f64(questions_at, SWEEP * n)

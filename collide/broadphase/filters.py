@@ -1,4 +1,4 @@
-"""Which pairs are never tested, and how many of each kind there were."""
+"""Filters of pairs never tested, and the number of pairs of each reason."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ def count_skipped(
     static: np.ndarray, group: np.ndarray, mask: np.ndarray, asleep: np.ndarray, allowed: np.ndarray,
     reasons: Sequence[str],
 ) -> dict[str, int]:
-    """Pairs of n bodies that no query tests, by reason; each pair is counted once.
+    """The number of untested pairs of n bodies, by reason; each pair is counted once.
 
-    static, group, mask, asleep : (n,).   allowed : (k, 2) bodies, each pair once.   reasons : (k,) why, of each.
+    static, group, mask, asleep : (n,).   allowed : (k, 2) bodies, each pair once.   reasons : (k,) of the allowed
+        pairs.
 
-    Precedence: static–static, then group and mask, then the reason a pair was allowed for, then that none of the two is
-    awake and free to move. Counted over the distinct combinations of the four, not over all pairs.
+    Precedence: static–static, then group and mask, then the reason a pair was allowed for, then that both are asleep
+    or static. Counted over the distinct combinations of the four, not over all pairs.
     """
     traits = np.stack([static.astype(np.int64), group, mask, (asleep | (static != 0)).astype(np.int64)], axis=1)
     classes, inverse, sizes = np.unique(traits, axis=0, return_inverse=True, return_counts=True)
@@ -42,7 +43,8 @@ def count_skipped(
 
 
 def _exclusions(a: np.ndarray, b: np.ndarray) -> dict[str, np.ndarray]:
-    """{reason: bool} of traits (…, 4) of one and the other, of each pair the first that applies."""
+    """{reason: bool array}, from traits (…, 4) of both bodies of each pair; at most the first reason of a pair is
+    True."""
     both_static = (a[..., 0] != 0) & (b[..., 0] != 0)
     masked = ((a[..., 1] & b[..., 2]) == 0) | ((b[..., 1] & a[..., 2]) == 0)
     still = (a[..., 3] != 0) & (b[..., 3] != 0)

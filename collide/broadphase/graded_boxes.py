@@ -1,15 +1,15 @@
 """The graded box-tree of J. Erickson, "Local polyhedra and geometric graphs" (2005), section 3.2, over bodies' boxes.
 
-A root's control cube is the smallest cube around the boxes; control cubes are those of an octree in it. A node's
-bounding cube has its control cube's middle and twice its width; a body goes down to the child whose control cube has
-its middle, as long as that child's bounding cube holds its box. Bodies that go to no child are outliers there. Paths
-without branches are single edges, and the boxes that are compared are tight, not the cubes.
+A root's control cube is the smallest cube around the boxes; control cubes are the cells of an octree in the root's. A
+node's bounding cube has its control cube's middle and twice its width; a body goes down to the child whose control cube
+has the body's middle, as long as the child's bounding cube holds the body's box. Bodies left at a node are its
+outliers. Paths without branches are single edges, and queries compare tight boxes, not the cubes.
 
 Over bodies nothing bounds how many outliers a node has (rods as long as the world are outliers of its root), so two or
-more are one child: a tree of their own, split where the octants of the cube around their middles part them.
+more make a child: a tree of their own, split by the octants of the cube around their middles.
 
 Nodes stand in preorder, each with the number of the node after its subtree: a walk needs no stack, and trees may stand
-one after another in the same arrays.
+in sequence in the same arrays.
 """
 
 from __future__ import annotations
@@ -104,8 +104,9 @@ def _cube_around(boxes, bodies, first, last, of_middles, cube):
 
 @kernel
 def _sort_control_cube(boxes, bodies, cube, stack, at, scratch, counts):
-    """Sort a range by the children of its control cube, or of the first one below it in which it branches; whether it
-    does: else all are outliers there.
+    """Sort a range by the children of its control cube, or of the largest cube below with bodies in several classes.
+
+    Returns False where no cube has: all bodies are outliers.
     """
     n = stack[at + _LAST] - stack[at + _FIRST]
     _sort_range(boxes, bodies, cube, stack, at, False, scratch, counts)

@@ -40,7 +40,7 @@ def _around_children(links, nodes, node):
 
 @kernel(inline=True)
 def _sum_of_sides(nodes, node):
-    """Of a box; 0 of one that meets nothing."""
+    """Sum of the sides of a node's box; 0 for the empty box, which meets nothing."""
     at = 6 * node
     x, y, z = nodes[at + 3] - nodes[at], nodes[at + 4] - nodes[at + 1], nodes[at + 5] - nodes[at + 2]
     return max(x, 0.0) + max(y, 0.0) + max(z, 0.0)
@@ -135,14 +135,14 @@ def _place_leaf(tree, body, leaf, step, side, spacing):
 
 @entry("int64(int64, int64, int64, int64, float64, int64)")
 def take_boxes(tree_at, bodies_at, n, moved_at, spacing, escaped_at):
-    """Take the boxes of n bodies that moved; returns how many leaves had to be given other boxes, −1 where a body
-    without a leaf has a box with an end, or one with a leaf has not.
+    """Store the boxes of n moved bodies; returns the number of leaves whose boxes had to grow or shrink, or −1 for an
+    unbounded box of a body with a leaf, or a bounded box of a body without.
 
-    moved : 6 doubles each, their boxes now.   spacing : how far apart bodies are, about [m].
-    escaped : out, the bodies whose leaves have other boxes; they are noted as changed.
+    moved : 6 doubles each, their new boxes.   spacing : typical distance of bodies from each other [m].
+    escaped : out, the bodies whose leaves changed; they are noted as changed.
 
-    A leaf's box holds its body's. A body that moved by little, for its size or for how far it is from others, gets
-    room for some steps of this length, so that most of its steps change no node.
+    A leaf's box holds its body's. A body whose step is small against its size or its distance from others gets room for
+    several steps of this length, so that most of its steps change no node.
     """
     tree = tree_in_memory(tree_at)
     bodies = view_i64(bodies_at, n)

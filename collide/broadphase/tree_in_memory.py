@@ -23,11 +23,11 @@ TREE = 12
 
 
 class TreeInMemory(NamedTuple):
-    """A forest in preorder.
+    """A forest of box-trees in preorder, as views of its arrays.
 
-    header : its integers; kernels write the number of changed bodies alone.
-    n_fixed : nodes of the tree of bodies that stay, which comes first.   boxes, traits, leaf_of : of bodies.
-    allowed : as of `allowed_rows.py`.   changed : the bodies that have CHANGED_BIT.
+    header : TREE integers; kernels write the number of changed bodies alone.
+    n_fixed : number of nodes of the first tree, the tree of fixed bodies.   boxes, traits, leaf_of : of bodies.
+    allowed : as of `allowed_rows.py`.   changed : numbers of the bodies with CHANGED_BIT.
     """
 
     header: Any

@@ -1,9 +1,8 @@
-"""A box-tree over bodies that is brought up to date as they are moved, added and removed.
+"""A box-tree over bodies, brought up to date as bodies are moved, added and removed.
 
-It is a graded tree (`graded_boxes.py`), or rather several in a row: first that of the bodies that stay where they are,
-then one of the others, then smaller and smaller ones of bodies that were added since; a walk goes through all of them.
-A leaf's box may be larger than its body's: a body that moves within it changes nothing. What changed is known, so that
-pairs found before are kept where nothing did.
+A sequence of graded trees (`graded_boxes.py`): first the tree of fixed bodies, then a tree of the others, then smaller
+and smaller trees of bodies added later; a walk goes through all of them. A leaf's box may be larger than its body's: a
+body moving within changes nothing. Changed bodies are noted, so that pairs of the others are kept.
 """
 
 from __future__ import annotations
@@ -42,9 +41,7 @@ _EVERYTHING = -_NOTHING
 
 
 class CachedPairs(NamedTuple):
-    """Keys (k,) of pairs whose leaves' boxes are within the margin, ascending, but for those of bodies that have
-    changed since.
-    """
+    """Keys (k,) of pairs whose leaves' boxes are within the margin, ascending, less pairs of bodies changed since."""
 
     margin: float
     keys: np.ndarray
@@ -55,14 +52,14 @@ class TreeOverBodies:
 
     Parameters
     ----------
-    boxes : (n, 6), copied. Those without end (half-spaces) are kept apart and meet everything.
-    fixed : (n,) bool: bodies that stay, in a tree of their own; pairs of two of them are not looked for.
+    boxes : (n, 6), copied. Unbounded boxes (of half-spaces) are kept apart and meet every box.
+    fixed : (n,) bool: bodies that stay, in a tree of their own; no query reports pairs of two fixed bodies.
 
     Notes
     -----
-    ``nodes`` (m, 6) are boxes in preorder, ``links`` (m, LINK) as of `graded_boxes.py`, the first ``n_fixed`` those of
-    the tree of what stays. ``sections``: where each tree begins, and where the last one ends. ``leaf_of`` (n,) the node
-    of each body, −1 of those without one.
+    ``nodes`` (m, 6) are boxes in preorder, ``links`` (m, LINK) as of `graded_boxes.py`, the first ``n_fixed`` of
+        the tree of fixed bodies. ``sections``: the first node of each tree, then the number of all nodes. ``leaf_of``
+        (n,) is the node of each body, −1 for bodies without a leaf.
     """
 
     def __init__(self, boxes: np.ndarray, fixed: np.ndarray | None = None):
@@ -99,7 +96,7 @@ class TreeOverBodies:
         )
 
     def _make(self) -> None:
-        """All trees anew, of the bodies that there are."""
+        """Build all trees anew over the bodies not removed."""
         is_bounded = np.isfinite(self.boxes).all(axis=1) & self._alive
         self.unbounded = np.flatnonzero(self._alive & ~is_bounded)
         self.sections = [0]
@@ -170,7 +167,7 @@ class TreeOverBodies:
 
     @property
     def around(self) -> np.ndarray:
-        """(6,) the box around all bodies that have an end; one that meets nothing, of none."""
+        """(6,) box around all bounded bodies; without bounded bodies a box that meets nothing."""
         if len(self.sections) == 2:
             return self.nodes[0]
         roots = self.nodes[self.sections[:-1]]
@@ -185,8 +182,8 @@ class TreeOverBodies:
         self.move(np.arange(len(boxes)), boxes)
 
     def move(self, bodies: np.ndarray, boxes: np.ndarray) -> None:
-        """Take boxes (k, 6) of bodies (k,) that moved. The tree is made anew where it has become much worse than it was
-        when it was last: what is near in it is to be near in space.
+        """Store boxes (k, 6) of moved bodies (k,). The tree is built anew once its quality is much worse than after the
+        last build: bodies near in the tree are to be near in space.
         """
         bodies, boxes = np.ascontiguousarray(bodies), np.ascontiguousarray(_comparable(boxes))
         escaped = np.empty(len(bodies), dtype=np.int64)
@@ -329,8 +326,8 @@ class TreeOverBodies:
 
 
 def _comparable(boxes: np.ndarray) -> np.ndarray:
-    """(k, 6) boxes of which none has a bound that is no number: such a box is everything. Walks leave out what does not
-    compare as near, and nothing compares with NaN: a body must rather be asked too often than be lost.
+    """(k, 6) boxes with every box that holds a NaN bound replaced by the unbounded box. Walks skip boxes whose
+    comparisons fail, and comparisons with NaN fail: a body is to be tested too often rather than missed.
     """
     unknown = np.isnan(boxes)
     if not np.count_nonzero(unknown):  # a quarter of the time of `any` along rows

@@ -1,9 +1,9 @@
-"""Walks through box-trees in preorder: who meets whom among the bodies, with filters, and who meets boxes from outside.
+"""Walks through box-trees in preorder: pairs of near bodies, with filters, and bodies near boxes from outside.
 
-All pairs at once are looked for from pairs of nodes: two children of one node whose boxes meet are opened, the one with
-more nodes first, down to two leaves. A single box goes through the tree by itself: a node that it meets is followed by
-its first child, one that it does not by what comes after its subtree. Filters are asked at leaves, and the bodies' own
-boxes, which may be smaller than those of their leaves.
+A walk for all pairs starts from pairs of nodes: two siblings whose boxes meet are opened, the larger subtree
+first, down to two leaves. A single box walks through the tree: after a node whose box meets the single box follows
+the node's first child, after any other node the node behind its subtree. Filters are asked at leaves, and the
+bodies' own boxes, at times smaller than their leaves'.
 
 A pair is a key: i·2^32 + j of bodies i < j. Keys in ascending order are pairs in order.
 """
@@ -154,7 +154,7 @@ def _pairs_below(tree, stack, top, reach, margin, of_leaves, keys, count):
 
 @kernel(inline=True)
 def _note_pair(keys, count, i, j):
-    """Store a pair where there is room; how many there are."""
+    """Store a pair where the capacity allows; returns the number of pairs."""
     if count < len(keys):
         keys[count] = (min(i, j) << 32) + max(i, j)
     return count + 1
@@ -177,11 +177,11 @@ def _reach(tree, margin):
 
 @entry("int64(int64, float64, boolean, int64, int64, int64)")
 def pairs_of_all(tree_at, margin, of_leaves, stack_at, keys_at, capacity):
-    """Keys of all pairs of bodies within a margin of each other; returns how many there are, of which only the first
-    ``capacity`` are stored.
+    """Keys of all pairs of bodies within a margin of each other; returns their number. The first ``capacity`` are
+    stored.
 
-    of_leaves : compare the boxes of leaves, not the bodies' own, and let sleeping bodies through: what may become a
-        pair while no leaf is given another box.
+    of_leaves : compare the boxes of leaves, not the bodies' own, and let sleeping bodies through: all possible
+        pairs as long as no leaf's box changes.
     stack : 2 · STACK_OF_PAIRS integers.
     """
     tree = tree_in_memory(tree_at)
@@ -219,7 +219,7 @@ def pairs_of_all(tree_at, margin, of_leaves, stack_at, keys_at, capacity):
 
 @kernel(inline=True)
 def _next_leaf(tree, node, end, box):
-    """The first leaf from a node on whose box meets another; ``end`` where there is none."""
+    """The first leaf, from a node on, whose box meets another box; ``end`` where no leaf does."""
     while node < end:
         if not _meet(tree.nodes, 6 * node, box):
             node = tree.links[LINK * node + SKIP]
@@ -254,10 +254,10 @@ def pairs_among(tree_at, begin, end, margin, keys_at, capacity):
 
 @entry("int64(int64, int64, int64, float64, int64, int64)")
 def mended_pairs(tree_at, cached_at, n_cached, margin, keys_at, capacity):
-    """Keys of pairs whose leaves' boxes come within a margin, from those that there were: without those of bodies that
-    have changed, and with what these meet now. Returns how many there are; only the first ``capacity`` are stored.
+    """Keys of pairs whose leaves' boxes come within a margin: cached keys less pairs of changed bodies, and the pairs
+    of changed bodies as of now. Returns the number of keys; the first ``capacity`` are stored.
 
-    Sleeping bodies count as if they were awake. A pair of two that have changed is met once.
+    Sleeping bodies count as if they were awake. A pair of two changed bodies appears once.
     """
     tree = tree_in_memory(tree_at)
     cached = view_i64(cached_at, n_cached)
@@ -316,7 +316,7 @@ def boxes_met(tree_at, queries_at, n, margin, pairs_at, capacity):
 
 @entry("int64(int64, int64, int64, float64, boolean, int64)")
 def tested_pairs(tree_at, keys_at, n, margin, are_filtered, pairs_at):
-    """Those of n pairs whose own boxes come within a margin and that filters let through; how many these are.
+    """Write the pairs of n keys whose bodies' boxes come within a margin, less filtered pairs; returns their number.
 
     are_filtered : only sleep is left to ask.   pairs : out, two integers each.
     """

@@ -1,6 +1,6 @@
-"""Pairs of boxes of two `BoxTree`s, each in a frame of its own, that come near where the frames are posed.
+"""Pairs of boxes of two `BoxTree`s, each in a frame of its own, near each other at given poses of the frames.
 
-A tree over the parts of a body is made once: the body moves, and the boxes of its nodes with it. A box with the middle
+A tree over the parts of a body is made once; the boxes of its nodes move with the body. A box with the middle
 c and the half lengths h lies, where R x + p puts it, within |R| h of R c + p along each axis of the world, whatever the
 matrix R. So two posed boxes are farther apart along an axis than their middles are, less both |R| h.
 """
@@ -40,9 +40,9 @@ def _are_near(tree_a, a, tree_b, b, frames):
 
 @entry("int64(int64, int64, int64, int64, int64, int64)")
 def posed_boxes_met(a_at, b_at, frames_at, stack_at, pairs_at, capacity):
-    """Pairs (body of A, body of B) whose posed boxes come near; returns how many there are, no filter applies.
+    """Pairs (body of A, body of B) whose posed boxes come near, unfiltered; returns their number.
 
-    a, b : trees of one section, of which no body has changed.   frames : 24 doubles, as the module says.
+    a, b : trees of a single section, without changed bodies.   frames : 24 doubles, as the module says.
     stack : 2 · STACK_OF_PAIRS integers.   pairs : two integers each, of the first ``capacity``.
     """
     A, B = tree_in_memory(a_at), tree_in_memory(b_at)
@@ -78,8 +78,8 @@ def posed_boxes_met(a_at, b_at, frames_at, stack_at, pairs_at, capacity):
 class PosedTree:
     """A tree over the parts of a body, in the body's frame.
 
-    boxes : (n, 6) of the parts, which hold their cores, swept.   largest_radius : swept over one, with what
-    rounding moved it by; matrices do not stretch it [m].
+    boxes : (n, 6) of the parts: each holds the part's core with its ball swept.
+    largest_radius : the largest radius of these balls, with the rounding of the boxes [m]; poses do not stretch balls.
     """
 
     def __init__(self, boxes: np.ndarray, largest_radius: float):

@@ -1,28 +1,28 @@
-"""What a certificate is: vertex ids that prove that two bodies meet, or that they are apart.
+"""Certificates: vertex ids proving a hit of two bodies, or a gap between them.
 
 A certificate names vertices and carries no rounded number. Write D for the difference points a_i − b_j of its
 vertex pairs, r_A and r_B for the radii swept over the bodies:
 
 apart     v, the point of hull(D) nearest the origin (one to four pairs), is a separating axis:
           v·(a − b) > (r_A + r_B)|v| for all vertices a of A and b of B.
-together  hull(D) (one to four pairs) comes within r_A + r_B of the origin. Of a half-space and a body: a vertex named
-          lies within the body's radius of the half-space, or in it.
-plane     of two convex bodies without radii, which are apart: three whole numbers in place of vertex pairs, a normal n
+together  hull(D) (one to four pairs) comes within r_A + r_B of the origin. For a half-space and a body: a named
+          vertex lies within the body's radius of the half-space, or inside.
+plane     for two convex bodies without radii, apart: three integers in place of vertex pairs, a normal n
           with n·(a − b) > 0 for all vertices a of A and b of B.
-inside    one vertex named, −1 standing for the other body, lies in that body, a solid mesh: the winding number of
-          its facets around the vertex is positive.
+inside    a single named vertex, −1 for the other body, lies in the other body, a solid mesh: the winding number
+          of its facets around the vertex is positive.
 
-Unions of convex parts: together, one certificate names the two parts that meet; apart, there is one for each pair of
-parts. Pairs with a mesh have one certificate: together, of two facets that come within r_A + r_B of each other, whose
-corners are the vertices named (a convex shape is taken whole, its facet is 0); apart, an axis between the convex hulls.
+Unions of convex parts: together, a single certificate names the two meeting parts; apart, every pair of
+parts has its own. Pairs with a mesh have a single certificate: together, two facets within r_A + r_B of each other,
+with the named vertices as corners (a convex shape is taken whole, its facet is 0); apart, an axis between the hulls.
 
 A region of half-spaces (`HPolytope` with ``bounded=False``) and points swept by a ball have a certificate of their own
-(`region_proofs.py`), which names half-spaces.
+(`region_proofs.py`), naming half-spaces.
 
 Without a certificate are: cylinders, cones and ellipsoids; two half-spaces; regions beside
-other bodies; results whose sign is open or that are
-beyond the query's max_distance; meshes apart whose hull meets the other body (it would take an axis for every pair of
-facets).
+other bodies; results with an open sign or
+beyond the query's max_distance; meshes apart whose hull meets the other body (a proof would need an axis for every pair
+of facets).
 
 Vertex ids are rows of `PackedConvex.points`: the points of a `ConvexHull` as handed in, the corners of a `Box` by sign
 (−−−, −−+, …), the ends of a `Capsule`, the rounded ``vertices`` of an `HPolytope`; of a `Mesh` rows of its

@@ -1,5 +1,6 @@
-"""Whether vertex pairs prove that two convex parts meet, or that they are apart. Every vertex is looked at, in
-doubles: those that may be the farthest along a normal are compared in integers (`PlacedPoints.first_along`)."""
+"""Whether vertex pairs prove a hit of two convex parts, or a gap between them. Every vertex is evaluated in doubles:
+vertices possibly farthest along a normal are compared in integers (`PlacedPoints.first_along`).
+"""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from collide.numerics.exact_vectors import inner, minus
 
 
 def flaw_of_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hit: bool) -> str | None:
-    """Why vertex pairs do not prove that A and B meet (hit) or are apart; None where they do. O(vertices)."""
+    """Why vertex pairs fail to prove a hit (hit) or gap of A and B; ``None`` for a proof. O(vertices)."""
     if HALFSPACE in (A.kind, B.kind):
         return flaw_of_plane_proof(A, B, pairs, hit=hit)
     if not 1 <= len(pairs) <= 4:
@@ -39,9 +40,9 @@ def flaw_of_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hi
 
 
 def flaw_of_plane_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair], *, hit: bool) -> str | None:
-    """The same where one part is a half-space {x : n·x ≤ offset}.
+    """As `flaw_of_proof`, for a pair with a half-space {x : n·x ≤ offset}.
 
-    A vertex p reaches it where n·p − offset ≤ radius·|n|.
+    A vertex p reaches the half-space where n·p − offset ≤ radius·|n|.
     """
     if A.kind == B.kind:
         return "two half-spaces have no certificate"
@@ -64,7 +65,7 @@ def flaw_of_plane_proof(A: ExactPart, B: ExactPart, pairs: Sequence[VertexPair],
 
 
 def flaw_of_normal(A: ExactPart, B: ExactPart, normal: Point) -> str | None:
-    """Why a normal does not prove that A lies beyond B along it; None where it does. O(vertices)."""
+    """Why a normal fails to prove that A lies beyond B along the normal; ``None`` for a proof. O(vertices)."""
     if not (A.kind == B.kind == POINTS and A.radius == B.radius == 0):
         return "a plane proves something of convex bodies of vertices without radii alone"
     points_a, points_b, _ = common_vertices(A, B)

@@ -1,4 +1,4 @@
-"""Certificates of results: the vertices that decided in doubles, or those that an exact search from them ends at."""
+"""Certificates of results: the vertices decisive in doubles, or the last vertices of an exact search from them."""
 
 from __future__ import annotations
 
@@ -25,31 +25,31 @@ Certificates = tuple[Certificate, ...] | RegionCertificate | None
 
 
 def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates]:
-    """Certificates of the results of `collide.distance`: what ``r.certificate`` gives.
+    """Certificates of the results of `collide.distance`, as in ``r.certificate``.
 
     Parameters
     ----------
-    A, B : shapes of the question, or sequences of them, one a row of r.
+    A, B : shapes of the question, or sequences of them, a shape a row of r.
     X_WA, X_WB : (4, 4) or (N, 4, 4) poses of the question in the world W [m], entries taken as exact numbers.
     r : the `PairResult` of ``collide.distance(A, B, X_WA, X_WB)``.
 
     Returns
     -------
-    A tuple of `Certificate`, one for each pair of parts that the proof takes; None where the pair has none (curved
-    shapes, an open sign, beyond max_distance, …: `collide.certificates.certificate` lists them). A list of these for
+    A tuple of `Certificate`, for each pair of parts in the proof; ``None`` for pairs without a certificate (curved
+    shapes, an open sign, beyond max_distance, …: `collide.certificates.certificate` lists them). A list of tuples for
     batches.
 
     Raises
     ------
-    InvalidArgument : shapes, results or numbers of poses that do not belong together.
-    InvalidPose : poses that are no (4, 4) matrices of finite numbers.
+    InvalidArgument : shapes, results or numbers of poses of different questions.
+    InvalidPose : poses other than (4, 4) matrices of finite numbers.
 
-    The vertices that decided in doubles are tried first, O(vertices) doubles; where they prove nothing exactly,
-    Gilbert's, Johnson's and Keerthi's algorithm goes on from them, O(vertices) doubles a round: integers, which decide,
-    are made of those vertices alone that may be the farthest by a proven bound of rounding. Of meshes
-    these are the hulls' where they are apart: O(n + m) a round; two facets where they meet; where one lies inside the
-    other, O(m) a connected part of the surface. Of unions apart every pair of parts has its own: O(k l) searches for k
-    and l parts.
+    The vertices decisive in doubles are tried first, O(vertices) doubles; where they prove nothing exactly,
+    Gilbert's, Johnson's and Keerthi's algorithm goes on from them, O(vertices) doubles a round: integers decide among
+    the vertices possibly farthest by a proven bound of rounding. Meshes apart use the vertices of
+    their hulls: O(n + m) a round; meeting meshes two facets; a body inside the
+    other, O(m) a connected part of the surface. For unions apart every pair of parts has a certificate: O(k l) searches
+    for k and l parts.
     """
     shapes_a, shapes_b = (S if isinstance(S, Sequence) else [S] for S in (A, B))
     check_question("certify", shapes_a, shapes_b, r)
@@ -66,7 +66,7 @@ def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates
 
 
 def certificate_of_row(A, B, X_WA, X_WB, row) -> Certificates:
-    """The certificate of one row of `distance` at poses (1, 4, 4); None where the pair has none."""
+    """The certificate of a row of `distance` at poses (1, 4, 4); ``None`` for a pair without a certificate."""
     if row["how"] == UNDECIDED or row["beyond"]:
         return None
     if A.is_region or B.is_region:
@@ -136,7 +136,7 @@ def _of_meshes(A: ProofBody, B: ProofBody, row) -> Certificates:
 
 
 def _of_plane(A: ProofBody, B: ProofBody, hit: bool) -> Certificates:
-    """The vertex nearest the plane: it lies in the half-space or within the radius of it, or no vertex does."""
+    """The vertex nearest the plane: a hit if within the radius of the half-space or inside, else a gap."""
     halfspace, body = (A, B) if A.kind == HALFSPACE else (B, A)
     if body.kind == HALFSPACE:
         return None
@@ -147,7 +147,7 @@ def _of_plane(A: ProofBody, B: ProofBody, hit: bool) -> Certificates:
 
 
 def _apart(A: ProofBody, B: ProofBody) -> Certificates:
-    """Vertex pairs that give an axis between the hulls; None where these meet."""
+    """Vertex pairs of an axis between the hulls; ``None`` for meeting hulls."""
     part_a, part_b = A.part(), B.part()
     pairs = _search(part_a, part_b)
     if flaw_of_proof(part_a, part_b, pairs, hit=False) is not None:
@@ -156,7 +156,7 @@ def _apart(A: ProofBody, B: ProofBody) -> Certificates:
 
 
 def _together(A: ProofBody, B: ProofBody, row) -> Certificates:
-    """Two facets that meet, or a vertex of one body inside the other."""
+    """Two meeting facets, or a vertex of a body inside the other."""
     facet_a, facet_b = int(row["part_a"]) if A.is_mesh else 0, int(row["part_b"]) if B.is_mesh else 0
     ids_a, ids_b = A.corners(facet_a), B.corners(facet_b)
     part_a, part_b = A.part(ids_a), B.part(ids_b)

@@ -17,9 +17,9 @@ from collide.numerics.exact_points import PlacedPoints
 class ProofBody:
     """A mesh or a convex shape at a pose: its vertices by id, its facets.
 
-    is_mesh : False of a convex shape, which is one facet: all of it.
-    has_certificates : whether its numbers are exact, and it is no union.
-    vertex_ids : ascending, of the vertices that facets use; None of a convex shape, which uses all.
+    is_mesh : ``False`` for a convex shape, read as a single facet.
+    has_certificates : whether the body has exact numbers and is no union.
+    vertex_ids : ascending, of the vertices used by facets; ``None`` for a convex shape, where all are used.
     """
 
     def __init__(self, shape, X: np.ndarray):
@@ -66,7 +66,7 @@ class ProofBody:
         return index if ids is None else int(ids[index])
 
     def indices_of(self, vertices: Sequence[int]) -> list[int]:
-        """Places of vertex ids among the points of ``part()``; −1 for those that are none, or not in use."""
+        """Indices of vertex ids among the points of ``part()``; −1 for unknown or unused ids."""
         if self.vertex_ids is None:
             return list(vertices)
         places = {int(v): k for k, v in enumerate(self.vertex_ids)}
@@ -133,7 +133,7 @@ def _index_pairs(A: ProofBody, B: ProofBody, pairs: Sequence[VertexPair]) -> lis
 
 
 def flaw_of_inside_proof(A: ProofBody, B: ProofBody, pairs: Sequence[VertexPair]) -> str | None:
-    """Of a proof that a vertex of one body lies in the other, a solid mesh: O(facets)."""
+    """The flaw of a proof of a vertex of A or B inside the other body, a solid mesh: O(facets)."""
     if len(pairs) != 1 or sum(k == NO_VERTEX for k in pairs[0]) != 1:
         return "one vertex of one body is needed, and −1 for the other"
     i, j = pairs[0]

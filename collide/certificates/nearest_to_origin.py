@@ -23,9 +23,9 @@ class NearestPoint(NamedTuple):
 
 
 def nearest_to_origin(points: Sequence[Point]) -> NearestPoint:
-    """The point of the hull of one to four points nearest the origin.
+    """The point nearest the origin of the hull of 1 to 4 points.
 
-    Of all subsets, the one whose affine hull's nearest point v has positive weights, and to which no other point is an
+    The search takes the subset whose affine hull's nearest point v has positive weights and no point is an
     improvement: v·p ≥ v·v for all points p (Johnson's subalgorithm).
     """
     for count in range(1, len(points) + 1):

@@ -60,7 +60,7 @@ class RegionCertificate(NamedTuple):
 
 
 def make_region_certificate(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> RegionCertificate | None:
-    """The certificate of a region and another body at poses (4, 4); None where that is not points swept by a ball."""
+    """The certificate of a region and points swept by a ball, at poses (4, 4); ``None`` for other bodies."""
     sides = _sides(A, B, X_WA, X_WB)
     if sides is None:
         return None
@@ -89,9 +89,9 @@ def make_region_certificate(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarr
 
 
 def flaw_of_region_certificate(A: Shape, B: Shape, X_WA, X_WB, certificate, claim: str) -> str | None:
-    """Why a certificate does not prove that a region and another body are "together" or "apart"; None where it does.
+    """Why a certificate fails to prove a region and another body "together" or "apart"; ``None`` for a proof.
 
-    Raises CertificateRefused for what is no such certificate.
+    Raises CertificateRefused for anything but a region's certificate.
     """
     kind, vertices, weights, rows, multipliers = _read(certificate)
     sides = _sides(A, B, X_WA, X_WB)

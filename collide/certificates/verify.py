@@ -23,25 +23,25 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     Parameters
     ----------
     A, B : shapes of the question.
-    X_WA, X_WB : (4, 4) their poses in the world W [m]. Every entry is taken as an exact number; whether the matrices
-        are rotations is not asked.
-    r : `PairResult` of `collide.distance`, or what `collide.walk` returns, at one pair of poses (``r[k]`` of a batch).
-        Of it ``r.hit`` is proven, and ``r.certificate`` read.
+    X_WA, X_WB : (4, 4) their poses in the world W [m]. Every entry is taken as an exact number; the matrices
+        may be other than rotations.
+    r : `PairResult` of `collide.distance`, or a result of `collide.walk`, at a single pair of poses (``r[k]`` of a
+        batch): ``r.hit`` is proven, from ``r.certificate``.
     certificate : rows of (kind, part_a, part_b, pairs) to be checked instead of ``r.certificate``, for example read
         from a JSON file.
 
     Returns
     -------
-    None, where the certificate proves that A and B meet or are apart, whichever ``r.hit`` says.
+    ``None``, for a certificate that proves A and B meeting or apart, as ``r.hit`` says.
 
     Raises
     ------
-    CertificateRefused : the certificate does not prove it; the message says where it fails.
-    InvalidArgument : there is nothing to check: no shape, no single result, or none that has a certificate.
-    InvalidPose : poses that are no (4, 4) matrices of finite numbers.
+    CertificateRefused : the certificate proves nothing; the message names the failing step.
+    InvalidArgument : nothing to check: no shape, no single result, or a result without a certificate.
+    InvalidPose : poses other than (4, 4) matrices of finite numbers.
 
-    O(vertices) doubles a pair of parts, and integers of those vertices that these leave in doubt; O(facets) where a
-    body lies inside a solid mesh. What certificates there are, and what they prove:
+    O(vertices) doubles a pair of parts, and integers for vertices left in doubt; O(facets) where a
+    body lies inside a solid mesh. The kinds of certificates, and their proofs:
     `collide.certificates.certificate`.
     """
     check_question("verify", [A], [B], r)
@@ -80,7 +80,7 @@ def check_question(caller: str, A, B, r) -> None:
 
 
 def _flaw_of_parts(A, B, X_WA, X_WB, certificates: Sequence[Certificate], claim: str) -> str | None:
-    """Why certificates do not prove that two shapes of convex parts are "together" or "apart"; None where they do."""
+    """Why certificates fail to prove two shapes of convex parts "together" or "apart"; ``None`` for a proof."""
     parts_a, parts_b = exact_parts(A, X_WA), exact_parts(B, X_WB)
     proven = set()
     for kind, i, j, pairs in certificates:

@@ -16,10 +16,10 @@ _DIRECTIONS: tuple[Point, ...] = (
 
 
 def winding_number(points: PlacedPoints, faces: np.ndarray) -> int:
-    """Winding number of closed facets about the origin; 1 where it lies on a facet, 0 where every ray passes an edge.
+    """Winding number of closed facets about the origin; 1 for an origin on a facet, 0 if every ray passes an edge.
 
-    faces : (m, 3) numbers of points. Facets that the ray leaves from inside count 1, those it enters −1. O(m) doubles,
-    and integers of those facets that a line may meet.
+    faces : (m, 3) numbers of points. Facets where the ray leaves count 1, facets where the ray enters −1. O(m) doubles,
+    and integers for facets possibly met by the ray's line.
     """
     for direction in _DIRECTIONS:
         number = _along_ray(points, faces, direction)
@@ -29,7 +29,7 @@ def winding_number(points: PlacedPoints, faces: np.ndarray) -> int:
 
 
 def _along_ray(points: PlacedPoints, faces: np.ndarray, direction: Point) -> int | None:
-    """The winding number by one ray from the origin; None where it passes an edge or a corner."""
+    """The winding number by a single ray from the origin; ``None`` for a ray through an edge or a corner."""
     # Coordinates across the line: its facets have corners on both sides of two planes through it.
     u = -direction[1], direction[0], 0
     w = cross(direction, u)

@@ -1,7 +1,7 @@
-"""The arguments of every command, and the help that teaches them.
+"""The arguments of every command, and their help.
 
 Imports the standard library alone, so that ``--help`` answers at once. `parse` gives a namespace whose ``command`` is
-the name of a command, None where none was given.
+the name of a command, ``None`` without a command.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The command ``collide compare``: its arguments, and what it does. Imports the standard library until it runs."""
+"""The command ``collide compare``: its arguments, and its work. Imports the standard library alone before the run."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ exit status: 0 no answer of collide's is wrong, 1 one is, 2 error; with
 
 
 def add_arguments(parser: argparse.ArgumentParser, length: Callable, part: Callable, engines: Callable) -> None:
-    """Those of compare alone; the functions read a length, a part of one, and names of engines."""
+    """Add the arguments of compare alone; the functions read a length, a fraction of 1, and names of engines."""
     parser.add_argument("--engines", type=engines, default="fcl,coal,pybullet", metavar="NAMES",
                         help="engines to ask, separated by commas; all, or help for a list (%(default)s)")
     parser.add_argument("--clearance", type=length, default=0.1, metavar="D",

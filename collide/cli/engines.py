@@ -1,4 +1,4 @@
-"""Names of engines on the command line: one, several, all that are installed, or help about each."""
+"""Names of engines on the command line: a name, several, all installed engines, or help about each."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def one_engine(text: str) -> str:
 
 
 def listing(width: int = 100) -> list[str]:
-    """Every engine and setting: whether it is here, what is asked, what it receives, what it cannot answer."""
+    """A line for every engine and setting: whether installed, its questions, its input, and unsupported pairs."""
     from collide.adapters.peers.protocol import ENGINES, load_engine
 
     lines = []

@@ -35,7 +35,7 @@ def copy_scene(words: list[str], force: bool) -> str:
 
 
 def first_words(file) -> str:
-    """What a scene file says it is: its ``about``, else its first comment, else what it counts."""
+    """A scene file's description: its ``about``, else its first comment, else the counts of its elements."""
     text = file.read_text(encoding="utf-8")
     if file.suffix == ".json":
         import json

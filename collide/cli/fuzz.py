@@ -1,4 +1,4 @@
-"""The command ``collide fuzz``: its arguments, and what it does. Imports the standard library alone until it runs."""
+"""The command ``collide fuzz``: its arguments, and its work. Imports the standard library alone before the run."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 """The command ``collide``: arguments in, reports out, exit statuses for scripts.
 
-Exit statuses: 0 done (``check``: free), 1 what was asked about is so (``check``: a collision,
+Exit statuses: 0 done (``check``: free), 1 a finding (``check``: a collision,
 ``compare``, ``fuzz``: an answer of ours proven wrong, ``doctor``: something is broken), 2 an error, told in
-one line on stderr, 130 interrupted, 141 the reader of a pipe went away.
+a line on stderr, 130 interrupted, 141 the reader of a pipe went away.
 
 This module imports the standard library alone, so that ``--help`` answers at once; each command
-imports what it needs.
+imports its own modules.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ FREE, YES, ERROR, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 130, 141
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one command; never raises, never prints a traceback unless COLLIDE_TRACEBACK=1.
+    """Run a command; never raises, never prints a traceback unless COLLIDE_TRACEBACK=1.
 
-    argv : arguments without the program's name; None takes ``sys.argv``.
+    argv : arguments without the program's name; ``None`` takes ``sys.argv``.
     Returns the exit status.
     """
     try:

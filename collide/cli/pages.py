@@ -1,6 +1,6 @@
-"""The pages that commands write: ``--html`` of report, check and compare.
+"""The pages written by commands: ``--html`` of report, check and compare.
 
-Imports the standard library alone, as `cli` does; what makes pages is imported where one is asked for.
+Imports the standard library alone, as `cli` does; the makers of pages are imported on request.
 """
 
 from __future__ import annotations

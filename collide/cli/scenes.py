@@ -11,7 +11,7 @@ from collide.errors import InvalidArgument
 def reports(args, progress: Callable, started: float | None, **limits) -> list:
     """Load the scene of the arguments and report on it, in each state asked for: `state_reports.Stated`.
 
-    started : ``time.perf_counter()`` when the command began, or None.   limits : ``clearance``, ``min_depth`` [m].
+    started : ``time.perf_counter()`` when the command began, or ``None``.   limits : ``clearance``, ``min_depth`` [m].
     """
     scenes = load_states(args, progress)
     trajectory = _trajectory(args, scenes)

@@ -1,4 +1,4 @@
-"""The command ``collide srdf``: its arguments, and what it does. Imports the standard library alone until it runs."""
+"""The command ``collide srdf``: its arguments, and its work. Imports the standard library alone before the run."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace, progress: Callable) -> bool:
-    """Whether the SRDF compared with, if there was one, is right."""
+    """Whether the compared SRDF, if given, is right."""
     from pathlib import Path
 
     from collide.sweeps.pair_comparison import compare_pairs
@@ -160,7 +160,7 @@ def load_options(args: argparse.Namespace) -> dict:
 
 
 def robot_of(place: str, name: str | None, options: dict):
-    """The robot of a file or a scene; InvalidArgument where there is none, or several and no name."""
+    """The robot of a file or a scene; InvalidArgument for a file without robots, or for several robots and no name."""
     from collide.scenes import load
 
     scene = load(place, **options)

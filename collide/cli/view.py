@@ -1,4 +1,4 @@
-"""The command ``collide view``: its arguments, and what it does. Imports the standard library alone until it runs."""
+"""The command ``collide view``: its arguments, and its work. Imports the standard library alone before the run."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace, progress: Callable, started: float, say: Calla
 
 
 def _page(args: argparse.Namespace, progress: Callable, started: float | None, number: int) -> tuple[str, list[str]]:
-    """The text of the page, and the files that it was made from."""
+    """The text of the page, and its source files."""
     from collide.adapters.live.page_state import live_block
     from collide.pages.page_file import page_pieces
 
@@ -78,7 +78,7 @@ def _page(args: argparse.Namespace, progress: Callable, started: float | None, n
 
 
 def _files(args: argparse.Namespace, sources: list[str]) -> list[str]:
-    """The files named as arguments, and those that they led to, each once."""
+    """The files named as arguments, and files reached from them, each once."""
     words = [*args.scenes, *(args.state or []), args.trajectory, args.robot, args.srdf, *sources]
     return list(dict.fromkeys(os.path.abspath(word) for word in words if word and os.path.isfile(word)))
 

@@ -1,5 +1,5 @@
-"""Pages: a report as one HTML file that opens anywhere, with nothing fetched.
+"""Pages: a report as a single HTML file for any browser, with nothing fetched.
 
-`drawing` makes of a scene and its report what is drawn, `page_file` puts it into the template in ``viewer/``. Reads
-scenes and results only; nothing of it is imported where no page is asked for.
+`drawing` makes the drawn data of a scene and its report, `page_file` puts the data into the template in ``viewer/``.
+The room reads scenes and results only, and is imported by commands for pages alone.
 """

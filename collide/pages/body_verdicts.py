@@ -1,7 +1,7 @@
-"""What a page says of every body, one rule: the worst class of any pair that it is in.
+"""The verdict of a page on every body, by a single rule: the worst class of any pair with the body.
 
 A body is ``free`` where all its tested pairs are proven farther apart than the clearance, and ``never tested`` where
-every pair of it was left out: by static bodies, groups and masks, or by name.
+every pair of the body was left out: by static bodies, groups and masks, or by name.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ def body_verdicts(scene, report: Report) -> dict[str, str]:
 
 
 def bodies_in_tested_pairs(scene, ignored: Iterable[tuple[str, str]] = ()) -> set[str]:
-    """Names of the bodies that are in a tested pair, answered or not, as `collide.World` chooses its pairs.
+    """Names of the bodies in tested pairs, answered or not, as `collide.World` chooses its pairs.
 
-    Bodies with equal filters are counted together: no pair is looked at but those left out by name.
+    Bodies with equal filters are counted together; only pairs left out by name are visited.
     """
     filters = {body.name: (bool(body.static), body.group, body.mask) for body in scene.bodies}
     sizes = Counter(filters.values())

@@ -31,12 +31,12 @@ def of_scene(
     Parameters
     ----------
     scene : `collide.scenes.Scene`.
-    report : of it, by `collide.reports.report.make`: where the verdicts come from.
+    report : of the scene, by `collide.reports.report.make`: source of the verdicts.
     kind : "report", "check" or "compare".
-    looks : body name → what it looks like, where that is not the tested shape: shapes with their poses X_BS in the
+    looks : body name → its look, where other than the tested shape: shapes with their poses X_BS in the
         body's frame (4, 4).
-    notes : what the reader must know of ``looks``.
-    max_facets : about how many the page holds; larger meshes are simplified.
+    notes : for the reader, on ``looks``.
+    max_facets : approximate number of facets of the page; larger meshes are simplified.
 
     Returns
     -------
@@ -66,9 +66,9 @@ def _body(body, table: ShapeTable, looks: Mapping[str, Sequence[PosedShape]], ve
 
 
 def extent(bodies: Sequence[Mapping], boxes: Sequence[np.ndarray | None]) -> float:
-    """The longest side of the box around all bodies with an end [m]; 1 where there is none.
+    """The longest side of the box around all bounded bodies [m]; 1 without bounded bodies.
 
-    bodies : as `of_scene` gives them.   boxes : of their shapes, as `ShapeTable.boxes` does.
+    bodies : as of `of_scene`.   boxes : of their shapes, as of `ShapeTable.boxes`.
     """
     corners = []
     for body in bodies:

@@ -1,8 +1,8 @@
-"""The block of contacts: where bodies that collide or touch meet, as patches of points with one normal each.
+"""The block of contacts: contacts of colliding or touching bodies, as patches of points with a common normal each.
 
 Patches are worked out for the picture, after the tests. They cost more than a distance, above all between large meshes
-that overlap deeply, so that a page holds those of the worst pairs only, and says of how many. So does ``overlap``, the
-volume of what two solids with facets have in common; it is null where bodies are no such solids.
+with deep overlap, so a page holds patches of the worst pairs only, and says of how many. The same holds for
+``overlap``, the overlap volume of two solids with facets, null for other bodies.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ _MAX_POINTS = 8
 
 
 def of_states(made: Sequence[Stated], max_pairs: int = MAX_PAIRS) -> tuple[list[dict], dict | None]:
-    """The block, and what it covers (``drawing.contacts``); None where no bodies meet.
+    """The block, and its coverage (``drawing.contacts``); ``None`` without a hit.
 
-    made : the reports, one a state; of a trajectory the start. Collisions first, the deepest first of each state.
-    max_pairs : to work out at most.
+    made : the reports, a report a state; of a trajectory the start. Collisions first, the deepest first of each state.
+    max_pairs : the most pairs to work out.
     """
     entries: list[dict] = []
     of_all = left_out = unanswered = 0
@@ -64,7 +64,7 @@ def _meeting(made: Sequence[Stated]) -> Iterator[tuple[int, str, Pair]]:
 
 
 def _patches(A, B) -> list[dict]:
-    """Patches of two bodies, in the world; none where the library has none for them."""
+    """Patches of two bodies, in the world; an empty list for bodies without contacts in the library."""
     margin = float(classes.roundings(*classes.body_sizes([A, B])))
     try:
         manifold = contacts(A.shape, B.shape, A.X_WB, B.X_WB, margin=margin, max_contacts=_MAX_POINTS)

@@ -34,7 +34,7 @@ PosedShape = tuple[Shape, np.ndarray]
 
 
 class Triangles(NamedTuple):
-    """A shape before it is written: vertices (V, 3) in B [m], faces (F, 3), how far they are off [m], how it looks."""
+    """A shape before writing: vertices (V, 3) in B [m], faces (F, 3), their distance from the shape [m], its look."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -103,7 +103,7 @@ class ShapeTable:
         return not len(self._shapes[row].faces)
 
     def written(self) -> list[dict]:
-        """The table as plain data, simplified so that it holds about ``max_facets``."""
+        """The table as plain data, simplified to about ``max_facets`` facets."""
         cap = facet_cap([len(drawn.faces) for drawn in self._shapes], self._max_facets)
         return [_written(drawn, cap) for drawn in self._shapes]
 
@@ -118,7 +118,7 @@ def is_smooth(shape: Shape) -> bool:
 
 
 def facet_cap(counts: Iterable[int], max_facets: int = MAX_FACETS) -> int:
-    """How many facets one shape may have, so that all take ``max_facets``; small ones are whole, below a million."""
+    """The most facets a shape may have, so that all take ``max_facets``; small shapes stay whole, below a million."""
     counts = sorted(counts)
     return max(_level(counts, max_facets), min(_SMALL, _level(counts, max(max_facets, _ALL_FACETS))))
 

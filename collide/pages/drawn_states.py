@@ -1,7 +1,7 @@
 """The block of states: several states of a scene, or samples of a trajectory, to slide through.
 
-A path of more samples than a page shows loses some in between, never those at which the verdict changes, the first and
-the last, or the one where bodies come nearest; where the changes alone are more, the page says how many are left out.
+A path of more samples than a page shows loses samples in between, never samples at which the verdict changes, the
+first, the last, or the nearest approach; of too many changes, the page says how many are left out.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ PairRow = tuple[int, int, float | None, float | None, float | None]
 
 
 class ClassRows(NamedTuple):
-    """The pairs of one class in one state: those listed, and how many there are."""
+    """The pairs of a class in a state: the listed pairs, and the number of all."""
 
     rows: list[PairRow]
     size: int
@@ -60,9 +60,9 @@ def of_states(made: Sequence[Stated]) -> dict:
 
 
 def of_trajectory(stated: Stated, max_samples: int = MAX_SAMPLES) -> dict:
-    """The block of a trajectory: rows tell of pairs that it moves, verdicts of bodies also of those that it does not.
+    """The block of a trajectory: rows tell of pairs with moving bodies, verdicts of bodies of all pairs.
 
-    stated : with its ``watch``, which has followed the trajectory.   max_samples : shown at most.
+    stated : with its ``watch``, after following the trajectory.   max_samples : the most samples shown.
     """
     watch, path = stated.watch, stated.watch.path
     row_of = {body.name: row for row, body in enumerate(stated.scene.bodies)}
@@ -149,7 +149,7 @@ def _bodies_of(look: Look, names: Mapping[int, str]) -> Iterable[tuple[str, str]
 
 
 def _standing_verdicts(stated: Stated, row_of: Mapping[str, int]) -> dict[str, str]:
-    """Body → its worst class in pairs that the trajectory does not move, which stay as they are at the start."""
+    """Body → its worst class in pairs without moving bodies, constant along the trajectory."""
     report, moving = stated.report, set(stated.watch.moving)
     standing: dict[str, str] = {}
     for verdict, pairs in _named_pairs(report):
@@ -167,7 +167,7 @@ def _named_pairs(report: Report) -> Iterable[tuple[str, Iterable[tuple[str, str]
 
 
 def _least(stated: Stated) -> float | None:
-    """The signed distance of the nearest pair [m]; None where there is none, or where it is unbounded or not known."""
+    """The signed distance of the nearest pair [m]; ``None`` without a pair, or where unbounded or not known."""
     world = stated.scene.world()
     for a, b in stated.report.query["ignored"]:
         world.allow(a, b)

@@ -1,8 +1,8 @@
-"""One HTML file: the template in ``viewer/``, filled; nothing in it is fetched, and no text of a scene is markup.
+"""An HTML file: the template in ``viewer/``, filled; nothing is fetched, and no text of a scene is markup.
 
 Data stand in ``<script type="application/json">`` blocks, in ASCII and without ``<``, ``>`` and ``&``: no name can end
-its block. A policy in the page names the one script and the one style by their SHA-256, so that a browser runs and
-shows nothing else, and asks no server for anything.
+its block. A policy in the page names the only script and the only style by their SHA-256, so that a browser runs and
+shows nothing else, and sends no request to a server.
 """
 
 from __future__ import annotations
@@ -49,18 +49,18 @@ Blocks = Iterable[ReportBlock | DataBlock]
 
 
 def page_pieces(title: str, blocks: Blocks, *, live: bool = False, viewer: Path | None = None) -> Iterator[str]:
-    """The page as pieces of text that belong one after the other.
+    """The page as consecutive pieces of text.
 
     Parameters
     ----------
     title : any text.
-    blocks : what the page shows; values are plain data or `collide.reports.pair_classes.Pairs`.
-    live : the page may ask the server that it came from, and no other.
-    viewer : folder with ``page.html``, ``page.css`` and ``bundle.js``; by default the one that comes with the package.
+    blocks : data of the page; values are plain data or `collide.reports.pair_classes.Pairs`.
+    live : the page may send requests to its own server, and to no other.
+    viewer : folder with ``page.html``, ``page.css`` and ``bundle.js``; by default the package's own.
 
     Raises
     ------
-    InvalidArgument : the viewer's files are not there, or are none that can stand in a page.
+    InvalidArgument : the viewer's files are missing, or not fit for a page.
     """
     viewer = VIEWER if viewer is None else viewer
     template, style, script = (_read(viewer, name) for name in ("page.html", "page.css", "bundle.js"))
@@ -113,7 +113,7 @@ def _hash_of(text: str) -> str:
 
 
 def _text(text: str) -> str:
-    """Text as HTML has it, in ASCII; half of a surrogate pair, which no file can hold, as a reference."""
+    """Text as ASCII HTML; half of a surrogate pair, not allowed in files, becomes a character reference."""
     return html.escape(text).encode("ascii", "xmlcharrefreplace").decode()
 
 
@@ -126,7 +126,7 @@ def _block(block: ReportBlock | DataBlock) -> Iterator[str]:
 
 
 def _lines(data: dict | list) -> Iterator[str]:
-    """JSON in ASCII: entries of an array one a line, keys of an object one a line."""
+    """JSON in ASCII: a line for each entry of an array and each key of an object."""
     if isinstance(data, list):
         yield from _between("[", (_ENCODE(entry) for entry in data), "]")
         return

@@ -1,4 +1,4 @@
-"""The data of a page: the report as its JSON has it, and beside it what is drawn."""
+"""The data of a page: the report's JSON, and the drawn data beside."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def report_blocks(
 
     Parameters
     ----------
-    made : the reports, one a state.
+    made : the reports, a report a state.
     looks, notes : as of `drawing.of_scene`.
-    checks : what counts as a collision, one a state, for the page of a check.
+    checks : the counted collisions, a check a state, for the page of a check.
     """
     first = made[0]
     kind = drawing.REPORT if checks is None else drawing.CHECK

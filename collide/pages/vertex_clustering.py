@@ -1,10 +1,10 @@
-"""Fewer facets for a picture: vertices that share a cell of a grid become one. For display only.
+"""Fewer facets for a picture: vertices in the same cell of a grid are merged. For display only.
 
 J. Rossignac, P. Borrel, "Multi-resolution 3D approximations for rendering complex scenes" (1993), with the vertex of a
-cell where P. Lindstrom, "Out-of-core simplification of large polygonal models" (2000), puts it: nearest to the planes
-of the facets around, so that edges stay sharp. No package but numpy is needed, and how far anything moved is known.
-Collapses of edges by quadrics (the package fast-simplification) came as near with as many facets, measured on links of
-a robot, and say nothing about how near.
+cell where P. Lindstrom, "Out-of-core simplification of large polygonal models" (2000), puts the vertex: nearest to the
+planes of the facets around, so that edges stay sharp. No package but numpy is needed, and the displacement of every
+vertex is known. Collapses of edges by quadrics (the package fast-simplification) came as near with as many facets,
+measured on links of a robot, without a bound of the distance.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ _FLAT = 1e-3
 
 
 def simplified(vertices: np.ndarray, faces: np.ndarray, max_faces: int) -> tuple[np.ndarray, np.ndarray, float]:
-    """A surface of at most so many facets, and how far it is off.
+    """A surface of at most ``max_faces`` facets, and its distance from the given surface [m].
 
     Parameters
     ----------
     vertices : (V, 3) float64 [m].
     faces : (F, 3) integers, rows of ``vertices``.
-    max_faces : how many facets are wanted, ≥ 1.
+    max_faces : wanted number of facets, ≥ 1.
 
     Returns
     -------
-    vertices (v, 3), faces (f, 3), and a length [m]: every facet left is the image of one of ``faces`` whose corners
-    moved no farther, so that no point drawn is farther from the surface. What is thinner than a cell may be gone.
-    The surface itself, and 0, where it has no more than ``max_faces``, or nothing would be left. O((V + F) log V).
+    vertices (v, 3), faces (f, 3), and a length [m]: every facet left is the image of a row of ``faces`` whose corners
+    moved no farther, so that no point drawn is farther from the surface. Parts thinner than a cell may vanish.
+    The surface itself, and 0, for at most ``max_faces`` facets, or if all facets would vanish. O((V + F) log V).
     """
     if len(faces) <= max_faces:
         return vertices, faces, 0.0
@@ -46,7 +46,7 @@ def simplified(vertices: np.ndarray, faces: np.ndarray, max_faces: int) -> tuple
 
 
 def _clusters(vertices: np.ndarray, faces: np.ndarray, max_faces: int) -> np.ndarray | None:
-    """(V,) number of each vertex's cell, of a grid that leaves at most ``max_faces``; None where it leaves none."""
+    """(V,) number of each vertex's cell, of a grid leaving 1 to ``max_faces`` facets; ``None`` if all facets vanish."""
     low, size = vertices.min(axis=0), float(np.ptp(vertices, axis=0).max())
     if size == 0.0:
         return None
@@ -68,7 +68,7 @@ def _clusters(vertices: np.ndarray, faces: np.ndarray, max_faces: int) -> np.nda
 
 
 def _next_cell(cell: float, part: float, too_small: float, too_large: float) -> float:
-    """The cell to try next: facets fall with its square. part : of the facets wanted that this one left."""
+    """The cell size to try next: the number of facets falls with its square. part : facets left over facets wanted."""
     guess = cell * np.sqrt(max(part, 1e-3) / 0.93)
     if too_small < guess < too_large:
         return guess

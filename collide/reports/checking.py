@@ -1,7 +1,7 @@
-"""What a script wants to know of a report: which pairs count as collisions, and which of them are new.
+"""Checks of a report for scripts: pairs counted as collisions, and new pairs among them.
 
-A baseline is a JSON file of known collisions: one that `baseline_text` wrote, or any report's. A collision counts as
-known where the baseline has the pair, and it is no deeper than it was there by more than a tolerance.
+A baseline is a JSON file of known collisions: written by `baseline_text`, or any report's. A collision is known if the
+baseline has the pair and the pair is at most a tolerance deeper than in the baseline.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _CLASSES = {COLLISION: "colliding", SHALLOW: "shallow", TOUCHING: "touching"}
 
 
 class Finding(NamedTuple):
-    """One pair that a check tells of: ``what`` it is, and its signed distance [m], None where the depth is unbounded.
+    """A pair found by a check: ``what`` names its kind; signed distance [m], ``None`` for unbounded depths.
 
-    where : of a trajectory, at which share of the path it begins.   before : the depth in the baseline [m].
+    where : of a trajectory, the share of the path at the begin of contact.   before : depth in the baseline [m].
     """
 
     what: str
@@ -48,9 +48,9 @@ class Finding(NamedTuple):
 
 @dataclass
 class Check:
-    """The findings in one state, and whether they fail the check.
+    """The findings in a state, and whether they fail the check.
 
-    label : of the state, "" where none was asked for.   failing : findings that count as collisions; ``findings``
+    label : of the state, "" without a named state.   failing : findings counted as collisions; ``findings``
         begins with them.
     """
 
@@ -68,7 +68,7 @@ class Check:
         return bool(self.failing)
 
     def lines(self, several: bool) -> Iterator[str]:
-        """One line a finding, fields separated by tabs; with the state where there are several."""
+        """A line a finding, fields separated by tabs; with the state where a check has several."""
         for finding in self.findings:
             measure = "unbounded" if finding.distance is None else repr(finding.distance)
             extra = [text for text in (printable(self.label) if several else "", finding.where) if text]
@@ -95,10 +95,10 @@ def _length(depth: float | None) -> str:
 
 
 def check(report: Report, label: str, *, touching_counts: bool, known: Baseline | None, tolerance: float) -> Check:
-    """Sort the pairs of a report, and of its trajectory, into what counts and what does not.
+    """Sort the pairs of a report, and of its trajectory, into failing and other findings.
 
-    touching_counts : pairs that touch within rounding count as collisions.   known : from `read_baseline`, or None.
-    tolerance : by how much a known collision may be deeper than it was [m].
+    touching_counts : pairs touching within rounding count as collisions.   known : from `read_baseline`, or ``None``.
+    tolerance : the most a known collision may be deeper than in the baseline [m].
     """
     made = Check(label, report.scene["name"], report.bodies, report.verdict(), against_baseline=known is not None)
     made.unanswered = [*report.unanswered, *(report.trajectory or {}).get("unanswered", [])]
@@ -123,7 +123,7 @@ def check(report: Report, label: str, *, touching_counts: bool, known: Baseline 
 
 
 def _pairs(report: Report) -> Iterator[Finding]:
-    """Pairs that the trajectory meets, each in its worst class; then those of the start that it does not move."""
+    """Pairs met by the trajectory, each in its worst class; then pairs of the start without a moving body."""
     followed: dict[frozenset, Finding] = {}
     for what, name in _CLASSES.items():
         for pair in (report.trajectory or {}).get(name, []):

@@ -54,13 +54,14 @@ def is_touching(lower, upper, rounding):
 
 
 def proven_distances(rows: np.ndarray) -> np.ndarray:
-    """(n,) signed distances that pairs are ranked by [m]: of overlaps that are not certified only as deep as is proven,
-    the upper end of the bracket. A way out that happens to be long says nothing of how deep bodies are."""
+    """(n,) signed distances [m] for ranking pairs. An overlap not certified ranks by its proven depth, the upper end of
+    the bracket: the length of some separating translation is no measure of depth.
+    """
     return np.where(rows["hit"] & ~rows["certified"], rows["upper"], rows["distance"])
 
 
 def classify(rows: np.ndarray, rounding, *, clearance: float, min_depth: float) -> dict[str, np.ndarray]:
-    """Class -> indices of the rows in it, ascending; rows proven farther apart than the clearance are in none.
+    """Class -> indices of the rows in it, ascending; rows proven farther apart than the clearance are left out.
 
     rows : of `collide.results.PAIR_DTYPE`.   rounding : (n,) or a number [m].
     """

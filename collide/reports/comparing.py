@@ -1,6 +1,6 @@
-"""What several engines said about one scene, as a person reads it in a terminal.
+"""Answers of several engines about a scene, as tables for a terminal.
 
-Reads the plain data of `collide.adapters.peers.compare.Comparison.to_dict` and its table; asks nobody.
+Reads the plain data of `collide.adapters.peers.compare.Comparison.to_dict` and its table; runs no engine.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _wrong_of(summary: dict) -> str:
 
 
 def _engine_tables(data: dict, headers: list[str], rows: list[list[str]], width: int) -> list[Table]:
-    """One column per engine: fifteen counts fit below one another, not beside; further tables where lines are full."""
+    """A column per engine: fifteen counts fit below each other, not beside; further tables where lines are full."""
     skipped = {summary["engine"]: summary["skipped"] for summary in data["summaries"] if summary["skipped"]}
     groups: list[list[list[str]]] = [[]]
     free = full = width - _MARGIN - max(map(width_of, headers))

@@ -43,7 +43,7 @@ OPTIONAL = (
 
 @dataclass
 class Check:
-    """One finding: ``passed`` False means broken, None means worth knowing."""
+    """A finding: ``passed`` is ``False`` for a broken part, ``None`` for a remark."""
 
     what: str
     answer: str
@@ -137,7 +137,7 @@ def _kernels() -> list[Check]:
 
 
 def package_version(package: str) -> str | None:
-    """The installed version of a distribution, without importing it; None where there is none."""
+    """The installed version of a distribution, without importing the package; ``None`` if not installed."""
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:

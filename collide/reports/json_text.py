@@ -12,7 +12,7 @@ _CHUNK = 2048
 
 
 def pieces(items: Iterable[tuple[str, object]], *, ascii_only: bool = False) -> Iterator[str]:
-    """One JSON object as pieces of text that belong one after the other: keys indented, `Pairs` one a line.
+    """A JSON object as consecutive pieces of text: keys indented, a line for each of `Pairs`.
 
     items : (key, value) in order; values are plain data or `Pairs`.   ascii_only : for a terminal of any encoding.
     """

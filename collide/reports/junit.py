@@ -1,6 +1,6 @@
-"""Checks as JUnit XML: a test case for every body, so that a server shows which body fails, and since when.
+"""Checks as JUnit XML: a test case for every body, so that a server shows the failing bodies, and since when.
 
-A body fails where a collision counts that it is in; both bodies of the pair do, each naming the other.
+A body fails with its first counted collision; both bodies of the pair fail, each naming the other.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ _TREES = [
 
 
 class Measured(NamedTuple):
-    """One mesh: its name, the file it came from, its `Locality`, and the `TreeFigures` of the trees over it."""
+    """A measured mesh: its name, its file, its `Locality`, and the `TreeFigures` of the trees over its facets."""
 
     name: str
     path: str

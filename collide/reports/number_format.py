@@ -76,7 +76,7 @@ def _split(metres: float) -> tuple[str, str]:
 
 
 def widths(values) -> list[str]:
-    """How narrow proven brackets are [m]: one digit says it."""
+    """Widths of proven brackets [m], with a single digit."""
     return ["exact" if v == 0 else "unbounded" if not math.isfinite(v) else f"{v:.0e} m" for v in values]
 
 

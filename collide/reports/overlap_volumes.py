@@ -15,9 +15,9 @@ _NUMBERS = ("volume", "lower", "upper", "area_a", "area_b", "patch_area", "flush
 
 
 def of_pairs(scene, *groups: Pairs) -> list[dict]:
-    """Plain data of each pair that has a volume to tell, in the order of the pairs, which are a scene's.
+    """Overlap volumes of pairs as plain data, in the order of the scene's pairs.
 
-    Bodies that are no solids with facets (curved shapes, surfaces, unions) are left out, and what is beyond the limits.
+    Left out are bodies other than solids with facets (curved shapes, surfaces, unions), and pairs beyond the limits.
     """
     entries: list[dict] = []
     remaining = MAX_FACETS

@@ -18,10 +18,10 @@ _CHUNK = 4096
 
 @dataclass(frozen=True)
 class Pair:
-    """One pair of bodies; lengths in metres, vectors in the world frame.
+    """A pair of bodies; lengths in metres, vectors in the world frame.
 
-    ``distance`` is signed, ``depth`` its positive part (None where apart). ``normal`` points from
-    a to b. ``approximated`` lists which of the two bodies are not the shape the scene names.
+    ``distance`` is signed, ``depth`` is max(0, −distance) of hits (``None`` of misses). ``normal`` points
+    from a to b. ``approximated`` lists bodies of the pair read as another shape than named in the scene.
     """
 
     a: str
@@ -50,7 +50,7 @@ FIELDS = tuple(field.name for field in fields(Pair))
 
 
 class Fold(NamedTuple):
-    """Pairs that share a body, told as one: the first of them, whose body they share, and how many there are."""
+    """Pairs with a common body, told in a line: the first of them, the common body, and the number of pairs."""
 
     pair: Pair
     body: str
@@ -58,10 +58,10 @@ class Fold(NamedTuple):
 
 
 class Pairs(Sequence):
-    """A sequence of `Pair`; a million of them are arrays until somebody looks at one.
+    """A sequence of `Pair`; a million pairs stay arrays, each made a `Pair` on access.
 
-    rows : of `collide.results.PAIR_DTYPE`.   order : which of them, and in what order (n,).
-    names : name of each body, by id.   approximated : names of the bodies that stand for another shape.
+    rows : of `collide.results.PAIR_DTYPE`.   order : (n,) indices of the rows in order.
+    names : name of each body, by id.   approximated : names of bodies read as another shape than named in the scene.
     """
 
     def __init__(self, rows: np.ndarray, order: np.ndarray, names: Mapping[int, str], approximated: frozenset[str]):
@@ -138,10 +138,10 @@ class Pairs(Sequence):
         return sorted(pairs_of_body, key=lambda item: (-item[1], item[0]))
 
     def folded(self, max_pairs: int, limit: int) -> tuple[list[Fold], int]:
-        """The first ``limit`` lines that tell these pairs, and how many pairs those leave untold.
+        """The first ``limit`` lines of a listing of these pairs, and the number of pairs left untold.
 
-        A body that is in more than ``max_pairs`` of the pairs not told yet has them told in one line, at the first of
-        them; of two such bodies in one pair the one in more of them.
+        A body in more than ``max_pairs`` untold pairs has all of them told in a line, at the place of the first; of two
+        such bodies in a pair the body with more untold pairs.
         """
         a, b = (self._rows[side][self._order] for side in ("a", "b"))
         remaining = np.ones(len(a), dtype=bool)

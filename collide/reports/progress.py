@@ -1,7 +1,7 @@
-"""One line about long work, on stderr, so that a pipe of results stays clean.
+"""A line about long work, on stderr, so that a pipe of results stays clean.
 
 On a terminal the line is rewritten with the seconds passed and cleared at the end. Elsewhere a
-stage that lasts is named once when it has lasted, and once when it is done.
+stage longer than the delay is named twice: after the delay, and at its end.
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ def silent(label: str):
 class Progress:
     """``progress = Progress()``, then ``with progress("reading the scene"): ...``
 
-    Stages nest: the innermost is shown. ``with`` gives a function that changes its label, None from a silent
-    one. ``delay`` [s] is how long a stage may last unannounced
-    where stderr is no terminal.
+    Stages nest: the innermost is shown. ``with`` gives a function for changing the label, ``None`` from a silent
+    `Progress`. ``delay`` is the longest unannounced stage [s] where stderr is no terminal.
     """
 
     def __init__(self, stream=None, delay: float = 2.0):

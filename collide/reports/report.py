@@ -1,6 +1,6 @@
-"""The collision report as plain data: classes of pairs, what was skipped, why each answer holds.
+"""The collision report as plain data: classes of pairs, skipped pairs, proofs of the answers.
 
-`make` asks a scene's World one question and sorts the rows into the classes of `reports/classes.py`.
+`make` asks a scene's World a single question and sorts the rows into the classes of `reports/classes.py`.
 `Report.to_dict` is the JSON of ``schema.json`` (docs/report-schema.md explains it).
 """
 
@@ -31,10 +31,10 @@ UNANSWERED = "cannot be answered"
 
 @dataclass
 class Report:
-    """What `make` found: plain data, and the classes of pairs, which become plain data when they are looked at.
+    """The result of `make`: plain data, and the classes of pairs, made plain data on access.
 
     bodies : their names, in the order of the scene.
-    geometry, trajectory : what `geometry.of_scene` and `trajectory.follow` gave, where it was asked for.
+    geometry, trajectory : results of `geometry.of_scene` and `trajectory.follow`, where asked for.
     """
 
     scene: dict
@@ -192,7 +192,7 @@ def _known_pair(scene, pair) -> tuple[str, str]:
 
 
 def _ask(scene, limit: float):
-    """(world, its distances up to a limit [m], pairs near each other that it cannot answer, as data)."""
+    """(world, its distances up to a limit [m], near pairs without an answer as data)."""
     world = scene.world()
     try:
         return world, world.distances(max_distance=limit), []

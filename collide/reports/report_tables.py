@@ -1,8 +1,8 @@
-"""A report as tables: what a person has to look at first, the rest folded into lines.
+"""A report as tables: the findings a person has to look at first, the rest folded into lines.
 
-The first page holds verdict, collisions, pairs that are near, pairs without an answer, and a line each about
-contacts, meshes, stand-ins, pairs never tested and notes. ``everything`` gives each of those its table, ``proofs``
-adds how every answer is known.
+The first page holds verdict, collisions, near pairs, pairs without an answer, and a line each about
+contacts, meshes, stand-ins, pairs never tested and notes. ``everything`` gives each of these its table, ``proofs``
+adds the proof of every answer.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def _bracket_notes(pairs: list[Pair], measure: str, everything: bool) -> list[st
 
 
 def _is_bound(pair: Pair) -> bool:
-    """Whether no depth is known but that it is not larger: of bodies that are not convex."""
+    """Whether a depth is known as an upper bound only: the depth of bodies that are not convex."""
     return pair.depth is not None and pair.upper == 0.0 and pair.depth > 0.0
 
 
@@ -240,7 +240,7 @@ def _skip_line(report: Report) -> str:
 
 
 def _note_lines(report: Report) -> list[tuple[str, str]]:
-    """Each note on a line of its own, those of missing meshes first: any of them may be the one that matters."""
+    """A line for each note, notes of missing meshes first: any of them may matter most."""
     notes = list(dict.fromkeys([*report.missing_meshes, *report.notes]))
     lines = notes if len(notes) <= _NOTES else [*notes[: _NOTES - 1], f"… and {len(notes) - _NOTES + 1} more (--all)"]
     return [("notes" if k == 0 else "", line) for k, line in enumerate(lines)]

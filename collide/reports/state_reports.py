@@ -1,4 +1,4 @@
-"""Reports of one scene in several states, and along a trajectory: one page, one JSON."""
+"""Reports of a scene in several states, and along a trajectory: a single page, a single JSON."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _SHORT = 12
 
 
 class Stated(NamedTuple):
-    """A report, and the state it is of: its label as the user wrote it, "" where none was asked for.
+    """A report and its state: the label as the user wrote the state, "" without a named state.
 
-    watch : what followed the trajectory, where there is one (`collide.reports.trajectory_report.Watch`).
+    watch : follower of the trajectory, if any (`collide.reports.trajectory_report.Watch`).
     """
 
     label: str
@@ -40,7 +40,7 @@ def items(made: list[Stated]) -> Iterator[tuple[str, object]]:
 
 
 def render(made: list[Stated], *, everything: bool, proofs: bool, width: int, whole_names: bool) -> list[Line]:
-    """The page of one report, or a table of the states and the page of each, as `terminal.render` gives it."""
+    """The page of a single report, or a table of the states and the page of each, as given by `terminal.render`."""
     layout: dict[str, Any] = {"everything": everything, "proofs": proofs, "width": width, "whole_names": whole_names}
     if len(made) == 1:
         return _page(made[0].report, **layout)

@@ -1,7 +1,7 @@
-"""One small table model, laid out once and drawn by either renderer.
+"""A small model of tables, laid out once and drawn by either renderer.
 
-A column is a ``name`` (shortened in its middle when there is no room), a ``number`` (never
-shortened: a column that does not fit is left out whole), a ``label`` (a number that reads from the
+A column is a ``name`` (shortened in its middle in a narrow page), a ``number`` (never
+shortened: a column without space is left out whole), a ``label`` (a number aligned to the
 left) or a ``text`` (wrapped).
 """
 
@@ -204,7 +204,7 @@ def _footnotes(table: Table, width: int) -> list[str]:
 
 
 def missing_columns(titles: list[str], width: int) -> list[Line]:
-    """One remark for a whole report about the columns that found no room in its tables."""
+    """A remark for the whole report about columns left out of its tables for want of space."""
     if not titles:
         return []
     remark = f"No room at this width for: {', '.join(titles)}. A wider terminal or --json shows them."

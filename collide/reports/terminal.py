@@ -1,6 +1,6 @@
-"""The report as a person reads it in a terminal: the verdict first, then what needs a person, proofs on request.
+"""The report for a terminal: the verdict first, then findings for a person to judge, proofs on request.
 
-One set of tables, two ways to draw it: with colours through `rich` where that is installed and the
+The same tables are drawn in two ways: with colours through `rich` where installed and the
 output is a terminal, as plain aligned text everywhere else. Tables and progress are laid out without `rich`: the
 command works where numpy alone is installed, and `rich` takes 34 to 71 ms to import.
 """
@@ -46,7 +46,7 @@ def render(
 
 
 def rule(title: str, width: int) -> str:
-    """A line across the page that begins a part of it."""
+    """A line across the page, with a title, at the begin of a part."""
     return f"── {title} ".ljust(min(width, PIPE_WIDTH), "─")[: max(width, len(title) + 4)]
 
 
@@ -128,7 +128,7 @@ def write(lines: list[Line], stream=None) -> None:
 
 
 def show_table(table: Table, stream=None) -> None:
-    """Lay one table out for a stream and print it there."""
+    """Lay a table out for a stream and print the lines to the stream."""
     stream = sys.stdout if stream is None else stream
     width, whole_names = output_width(stream)
     write(table_lines(table, lay_out(table, width, whole_names), width), stream)

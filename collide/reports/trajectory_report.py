@@ -1,7 +1,7 @@
-"""A scene along a trajectory: where it first collides, and how near it comes, at samples between the waypoints.
+"""A scene along a trajectory: the first collision, and the least distances, at samples between the waypoints.
 
-Sampling proves each sample and nothing between two of them: the report says so. A body that no waypoint moves is
-taken as fixed here; whether such bodies collide with each other is what the report of the start tells.
+Sampling proves each sample and nothing between two samples: the report says so. A body moved by no waypoint is
+taken as fixed here; the report of the start has the collisions of fixed bodies with each other.
 """
 
 from __future__ import annotations
@@ -30,10 +30,11 @@ _MAX_KEPT = 20_000
 
 @dataclass
 class Path:
-    """Joint values at every sample, and where on the path each of them is.
+    """Joint values at every sample, and the place of each sample on the path.
 
     configurations : robot -> (n, dof).   share : (n,) of the length of the path, the largest change of a joint
-        counting, 0 … 1.   times : (n,) [s] or None.   waypoint : (n,) the last one passed.   notes : of joint values.
+        counting, 0 … 1.   times : (n,) [s] or ``None``.   waypoint : (n,) the last waypoint passed.   notes : of joint
+        values.
     """
 
     configurations: dict[str, np.ndarray]
@@ -44,11 +45,11 @@ class Path:
 
 
 def sample(scene, trajectory, resolution: float = RESOLUTION) -> Path:
-    """The samples of a trajectory, no joint changing by more than ``resolution`` from one to the next.
+    """The samples of a trajectory, no joint changing by more than ``resolution`` between neighbours.
 
     trajectory : with ``waypoints``, ``times`` and ``source`` (`collide.scenes.loaders.trajectories.Trajectory`).
 
-    Raises InvalidArgument for a resolution that is not above 0, SceneError for joints that no robot has.
+    Raises InvalidArgument for a resolution at or below 0, SceneError for joints of no robot.
     """
     if not (math.isfinite(resolution) and resolution > 0):
         raise InvalidArgument(f"resolution must be above 0 [rad or m], got {brief(resolution)}")
@@ -106,10 +107,10 @@ def at_start(scene, trajectory):
 def follow(
     scene, trajectory, *, clearance: float = 0.0, min_depth: float = 0.0, resolution: float = RESOLUTION, progress=None
 ) -> dict:
-    """What happens along a trajectory, as the plain data that ``schema.json`` calls ``trajectory``.
+    """Collisions and least distances along a trajectory, as the plain data ``trajectory`` of ``schema.json``.
 
-    scene : stands at the state that joints keep which the trajectory does not name.
-    clearance, min_depth : as in `report.make` [m].   progress : as there.
+    scene : at a state; joints not named in the trajectory keep its values.
+    clearance, min_depth : as in `report.make` [m].   progress : as in `report.make`.
     """
     return watched(
         scene, trajectory, clearance=clearance, min_depth=min_depth, resolution=resolution, progress=progress
@@ -140,9 +141,9 @@ def watched(
 
 
 class Look(NamedTuple):
-    """What is near at one sample: rows of `collide.results.PAIR_DTYPE`, and of each class which of them.
+    """Near pairs at a sample: rows of `collide.results.PAIR_DTYPE`, and the indices of the rows of each class.
 
-    least : signed distance of the nearest pair [m]; None where there is none, or it is not known.
+    least : signed distance of the nearest pair [m]; ``None`` without a pair, or where not known.
     """
 
     rows: np.ndarray
@@ -151,9 +152,10 @@ class Look(NamedTuple):
 
 
 class Watch:
-    """A World that follows a path, and the worst that it has seen of every pair.
+    """A World that follows a path, and the worst state seen of every pair.
 
-    verdicts : (samples,) row of the worst class in `classes.NAMES` at each, their number where nothing is in any.
+    verdicts : (samples,) row of the worst class in `classes.NAMES` at each sample, the number of classes where all
+    classes are empty.
     """
 
     def __init__(self, scene, path: Path, clearance: float, min_depth: float, max_kept: int = 0):
@@ -265,7 +267,7 @@ class Watch:
         return rows, limit
 
     def _rows(self, limit: float) -> np.ndarray:
-        """The World's answer; pairs that it cannot answer are told, once, and left out."""
+        """The World's rows; pairs without an answer are noted, once, and left out."""
         try:
             return self.world.distances(max_distance=limit).rows
         except UnsupportedQuery:
@@ -294,7 +296,7 @@ class Watch:
     # --- plain data -----------------------------------------------------------------------------
 
     def to_dict(self) -> dict:
-        """The path and the worst that was seen along it, as plain data."""
+        """The path and the worst states seen along the path, as plain data."""
         listed = {name: self._listed(name) for name in classes.NAMES}
         return {
             **self.about, "collides": self.first is not None,
@@ -340,7 +342,7 @@ class Watch:
 
 
 def _least(rows: np.ndarray) -> float:
-    """The least distance of rows [m], infinite where there is none."""
+    """The least distance of rows [m], infinite without rows."""
     return float(rows["distance"][~rows["beyond"]].min(initial=math.inf))
 
 
@@ -366,7 +368,7 @@ def verdict(trajectory: dict) -> str:
 
 
 def place(at: dict, of: str = "") -> str:
-    """Where on the path: its share, and the time where there is one."""
+    """The place on the path: its share, and the time of a path with times."""
     time = "" if at["time"] is None else f" ({at['time']:.3g} s)"
     return f"{100 * at['share']:.3g} %{of}{time}"
 

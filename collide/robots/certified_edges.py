@@ -30,20 +30,20 @@ OPEN_DTYPE = np.dtype([("edge", "i8"), ("begin", "f8"), ("end", "f8")])
 
 @dataclass(frozen=True)
 class CertifiedEdges:
-    """What is known of straight motions q(t) = Q0 + t (Q1 − Q0), 0 ≤ t ≤ 1: free, colliding, or open.
+    """Verdicts on straight motions q(t) = Q0 + t (Q1 − Q0), 0 ≤ t ≤ 1: free, colliding, or open.
 
     Parameters
     ----------
     free : (N,) bool
         Proven: no tested pair meets at any t.
     time : (N,) float64
-        A t at which the motion collides, not the first one; NaN where none was met.
+        A t at which the motion collides, not always the first; NaN where no collision was met.
     open : (k,) OPEN_DTYPE
         Intervals of t neither proven free nor hit, at the resolution asked: ``edge``, ``begin``, ``end``.
     open_names : list of (str, str)
-        Of each interval two bodies that could not be told apart there.
+        For each open interval two bodies not proven apart.
     n_checked : int
-        Configurations that were asked for proofs, samples before not counted.
+        Configurations asked for proofs; the samples before are not counted.
     """
 
     free: np.ndarray
@@ -54,7 +54,7 @@ class CertifiedEdges:
 
     @property
     def collides(self) -> np.ndarray:
-        """(N,) bool: motions for which `time` is one of a collision."""
+        """(N,) bool: motions with a collision ``time``."""
         return ~np.isnan(self.time)
 
     @property
@@ -76,10 +76,10 @@ def sampled_collision(
     q0: np.ndarray, q1: np.ndarray, step: float, collides: Callable[[np.ndarray], np.ndarray],
     n_halvings: int | None = None,
 ) -> np.ndarray:
-    """(N,) a t at which each motion collides, NaN where none of its samples does.
+    """(N,) a t at which each motion collides, NaN where all samples are free.
 
-    Ends first, then the middle, then quarters, …, until no column changes by more than ``step``; motions that were
-    hit are not asked again.   n_halvings : at most so often.
+    Ends first, then the middle, then quarters, …, until no column changes by more than ``step``; a motion is asked no
+    more after its first hit.   n_halvings : the most halvings.
     """
     times = np.full(len(q0), np.nan)
     change = np.abs(q1 - q0).max(axis=1, initial=0.0)
@@ -113,7 +113,7 @@ def certify(
 ) -> CertifiedEdges:
     """`RobotChecker.certify_edges` of checked arguments (N, dof).
 
-    times : (N,) of collisions that are known already, NaN for motions that are to be certified; filled in.
+    times : (N,) of known collisions, NaN for motions to be certified; filled in.
     """
     remaining = np.flatnonzero(np.isnan(times))
     ends = np.ascontiguousarray(q0[remaining]), np.ascontiguousarray(q1[remaining])

@@ -1,6 +1,6 @@
-"""Straight motions of meshes that are not convex: what `certify_motions` leaves to others, proven in the same way.
+"""Straight motions of meshes that are not convex: pairs left open by `certify_motions`, proven in the same way.
 
-All pairs in all their intervals are asked together, in the middle; intervals that are not done with are halved.
+All pairs in all their intervals are asked together, in the middle; intervals still open are halved.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ def settle_meshes(
     checker: CheckerScene, space: CheckWorkspace, work: MotionWorkspace, q0: np.ndarray, q1: np.ndarray,
     rows: np.ndarray, times: np.ndarray, resolution: float,
 ) -> list[np.ndarray]:
-    """Open intervals (k, OPEN_INTERVAL) that remain of pairs of bodies; ``times`` (N,) of collisions are written.
+    """Intervals (k, OPEN_INTERVAL) of pairs of bodies left open; ``times`` (N,) of collisions are written.
 
-    q0, q1 : (N, dof) ends of the motions that rows name.   rows : (k, OPEN_INTERVAL).
+    q0, q1 : (N, dof) ends of the motions named in rows.   rows : (k, OPEN_INTERVAL).
     """
     setting, still_open = checker.setting, []
     changes = np.abs(q1 - q0).max(axis=1, initial=0.0)

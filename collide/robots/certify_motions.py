@@ -1,8 +1,8 @@
-"""Straight motions between configurations, proven free: distances at some, and how far anything moves in between.
+"""Straight motions between configurations, proven free: distances at some times, and bounds of the motion in between.
 
-In the middle of an interval every pair of parts is asked whether it is farther apart than both can move within half of
-it (`motion_bounds.py`). Pairs that are, are done with; those that are not are asked again in both halves of the
-interval. A pair that meets ends the search: the motion collides there.
+In the middle of an interval the distance of every pair of parts is compared with the most both can move within half
+the interval (`motion_bounds.py`). A pair farther apart is proven apart in the whole interval; any other pair is asked
+again in both halves. A hit ends the search: the motion collides at the middle.
 """
 
 from __future__ import annotations
@@ -55,9 +55,10 @@ from collide.robots.part_pairs import BEYOND_MARGIN, HITTING, OPEN, only_holds, 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64)")
 def certify_motions(header_at, motions_at, q0_at, q1_at, dof, first, n, times_at):
-    """Write when motions from ``first`` on, of n, collide, NaN where they do not; returns the first one without.
+    """Write a time of collision of each motion from ``first`` on, of n, NaN where free; returns the first motion not
+    done.
 
-    It ends early where there may be no space for the intervals of one more that stay open.
+    The kernel ends early once the open intervals of a motion exceed the workspace.
     """
     scene = view_scene(header_at)
     words = view_i64(motions_at, MOTION_HEADER)
@@ -126,9 +127,9 @@ def _push(intervals, k, begin, end, first, n_items):
 
 @kernel
 def _gather(motion, top):
-    """Of all pairs, write those that are not done with from ``top`` on; how many, −2 where a pair meets.
+    """Write all pairs not proven apart in the interval from ``top`` on; returns their number, −2 where a pair meets.
 
-    Where there is no space: -1, and the halves gather anew.
+    Returns −1 without space: both halves then gather anew.
     """
     scene, words = motion.scene, motion.words
     n = 0
@@ -166,7 +167,8 @@ def _gather(motion, top):
 
 @kernel(inline=True)
 def _take(motion, top, n, p, q, body, partner, margin):
-    """Ask about a pair of parts and write it where it is not done with; how many are, −1, or −2 as of `_gather`."""
+    """Ask about a pair of parts; write the pair unless proven apart. Returns the number written, or −1 or −2 as
+    `_gather`."""
     state = _state(motion, p, q, body, partner, margin)
     if state == HITTING:
         return -2
@@ -199,7 +201,7 @@ def _state(motion, p, q, body, partner, margin):
 
 @kernel
 def _pass_on(motion, first, n_items, top):
-    """Of the pairs from ``first`` on, write those that are not done with from ``top`` on; returns as `_gather` does."""
+    """Write the pairs, from ``first`` on, not proven apart, from ``top`` on; returns as `_gather` does."""
     scene, words, items = motion.scene, motion.words, motion.items
     stride = words[PATH_STRIDE] + 1
     lengths = view_i64(words[PATH_LENGTHS_AT], scene.words[N_BODIES])
@@ -220,10 +222,10 @@ def _pass_on(motion, first, n_items, top):
 
 @kernel
 def _leave_interval(motion, number, begin, end, top, n_items):
-    """Note an interval that stays open, with the first of its pairs, the one that found no space where there was none;
-    what follows on the last one lengthens that.
+    """Append an open interval with the first of its pairs, or the pair without space; a continuation lengthens the last
+    interval instead.
 
-    It is counted where there is no space.
+    Without space the interval is counted alone.
     """
     words = motion.words
     out = view_f64(words[OPEN_INTERVALS_AT], OPEN_INTERVAL * words[OPEN_INTERVAL_CAPACITY])
@@ -246,7 +248,7 @@ def _leave_interval(motion, number, begin, end, top, n_items):
 
 @kernel
 def _leave_meshes(motion, body, partner):
-    """Note that others are to ask a pair of bodies in the interval at work; it is counted where there is no space."""
+    """Append a pair of bodies, for a mesh query in the current interval; without space the pair is counted alone."""
     words = motion.words
     out = view_f64(words[MESH_PAIRS_AT], OPEN_INTERVAL * words[MESH_PAIR_CAPACITY])
     at = OPEN_INTERVAL * words[N_MESH_PAIRS]

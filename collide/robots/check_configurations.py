@@ -1,6 +1,6 @@
-"""Whether configurations collide: for each, links are placed, boxes compared, and pairs asked until one is hit.
+"""Whether configurations collide: for each, links are placed, boxes compared, and pairs asked up to the first hit.
 
-Surroundings come first, bodies from the hand to the base: that is where collisions are likeliest.
+Surroundings come first, bodies from the hand to the base: the order of likely collisions.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ IS_FREE, COLLIDES, IS_OPEN = range(3)
 
 @entry("int64(int64, int64, int64, int64, int64, int64)")
 def check_configurations(header_at, q_at, dof, first, n, verdicts_at):
-    """Verdicts, a byte each, of configurations from ``first`` on, of n; returns the first one without.
+    """Write verdicts, a byte each, of configurations from ``first`` on, of n; returns the first configuration not done.
 
-    It ends early where there may be no space for what one more leaves to others.
+    The kernel ends early once the pairs a configuration leaves to others exceed the workspace.
     """
     scene = view_scene(header_at)
     words = scene.words
@@ -106,9 +106,10 @@ def _verdict(scene, q, at, number):
 
 @kernel(inline=True)
 def _state_of_bodies(scene, number, a, first_a, partner, first_b, n_b):
-    """Of a's parts and those of its partner: HITTING, OPEN (and left to others), or neither.
+    """State of a's parts against the parts of its partner: HITTING, OPEN (and left to others), or neither.
 
-    first_a : a's first part, padded or not.   partner : a body, or −1 − one around, whose parts stand already.
+    first_a : a's first part, padded or not.   partner : a body, or −1 − the number of a body around, whose parts are
+        placed already.
     """
     for p in range(first_a, first_a + scene.bodies[BODY_INTS * a + COUNT]):
         place(scene, p, a)
@@ -126,9 +127,9 @@ def _state_of_bodies(scene, number, a, first_a, partner, first_b, n_b):
 
 @kernel(inline=True)
 def leave_open(scene, number, body, partner, lower):
-    """Note a pair of bodies, at least ``lower`` apart [m], that is left to others.
+    """Append a pair of bodies, at least ``lower`` apart [m], to the pairs left to others.
 
-    N_OPEN counts on where there is no space.
+    Without space N_OPEN counts the pair alone.
     """
     words = scene.words
     at = OPEN_INTS * words[N_OPEN]

@@ -1,7 +1,8 @@
-"""What kernels read when they check a robot: links, what they carry, and the surroundings, behind one header.
+"""Input of the kernels for checking a robot: links, attached objects, and the surroundings, behind a header.
 
-A *body* is what moves with one link: its collision elements, or an object attached to it. Bodies and surroundings are
-runs of convex parts; a part that stands for a mesh holds it, so that a miss is a miss and a hit is left to others.
+A *body* moves with a link: the link's collision elements, or an object attached to the link. Bodies and surroundings
+are runs of convex parts; a mesh is read as a part around it, so a miss of the part is a miss of the mesh, and a hit is
+left to others.
 """
 
 from __future__ import annotations
@@ -166,7 +167,7 @@ def body_of_part(scene, around):
 
 @kernel(inline=True)
 def place(scene, part, body):
-    """See that the row of poses of a part of a body is that of this configuration."""
+    """Place a body's part at the current configuration, unless placed already."""
     if scene.placed[part] != scene.words[STAMP]:
         scene.placed[part] = scene.words[STAMP]
         _put_part(scene, part, POSE * scene.bodies[BODY_INTS * body + LINK])

@@ -33,10 +33,10 @@ UNBOUNDED_HALF = 1e150
 
 
 class RobotBody(NamedTuple):
-    """What moves with one link.
+    """A body of the robot, moving with a link.
 
-    name : of the link, or of the object attached to it.   link : number of the link.   shape : in the link's frame.
-    padding : by how much it is swollen against the surroundings [m].
+    name : of the link, or of the attached object.   link : number of the link.   shape : in the link's frame.
+    padding : swelling against the surroundings [m].
     """
 
     name: str
@@ -46,7 +46,7 @@ class RobotBody(NamedTuple):
 
 
 class BodyAround(NamedTuple):
-    """One body of the surroundings.   X_WB : (4, 4).   margin : by how much it is swollen against the robot [m]."""
+    """A body of the surroundings.   X_WB : (4, 4).   margin : swelling against the robot [m]."""
 
     name: str
     shape: Shape
@@ -70,10 +70,10 @@ class Surroundings(NamedTuple):
 
 
 class CheckTables(NamedTuple):
-    """Everything that stays while configurations are checked.
+    """Tables constant between configurations.
 
     bodies : (n, BODY_INTS) int64.   body_boxes : (n, BOX), in their links.   parts : (twins of) parts in their links.
-    padded : how many numbers on the padded twin of a part stands, 0 where there are none.
+    padded : offset from a part's number to the number of its padded twin, 0 without padding.
     part_boxes : (all parts, BOX), in their own frames.   is_bound : (all parts,) uint8.
     table, shape_of : shapes of all parts.   poses : (all parts, POSE), written of the surroundings.
     slack : share by which boxes are moved outwards.
@@ -94,9 +94,9 @@ class CheckTables(NamedTuple):
 class Setting(NamedTuple):
     """A robot among the bodies of a World as it stood.
 
-    bodies : what moves.   base : where the root stands, as `forward_kinematics.LINK_POSE` doubles.
-    self_pairs : (k, 2) int64 of bodies that are tested.   allowed : (bodies, around) uint8, 1 where a pair never is.
-    skipped : {reason: pairs} never tested.
+    bodies : of the robot.   base : pose of the root, as `forward_kinematics.LINK_POSE` doubles.
+    self_pairs : (k, 2) int64 of tested bodies.   allowed : (bodies, around) uint8, 1 for pairs never tested.
+    skipped : {reason: number of pairs never tested}.
     """
 
     bodies: Sequence[RobotBody]
@@ -164,16 +164,16 @@ def check_tables(bodies: Sequence[RobotBody], around: Surroundings, matrices: np
 
 @kept_with_shape("_convex_parts")
 def convex_parts_of(shape: Shape) -> _LinkParts:
-    """The convex parts that a shape is, or, with ``is_bound``, parts that hold it: those of a mesh that is not convex.
+    """The convex parts of a shape; with ``is_bound`` parts around a mesh that is not convex.
 
-    A solid mesh that is its own convex hull is that.
+    A solid mesh equal to its own convex hull is read as the hull.
     """
     same = without_meshes(shape)
     return _LinkParts(list(bounding_parts_of(shape) if same is None else parts_of(same)), same is None)
 
 
 def without_meshes(shape: Shape) -> Shape | None:
-    """A shape of convex parts that is the same set; None where there is none."""
+    """A shape of convex parts, the same set as the shape; ``None`` for a mesh that is not its own hull."""
     return _hulls_instead(shape) if shape.is_asked_whole else shape
 
 
@@ -188,7 +188,7 @@ def _hulls_instead(shape: Shape) -> Shape | None:
 
 
 def swollen(packed: PackedConvex, by: float) -> PackedConvex:
-    """A convex set and all that is at most so far from it [m]."""
+    """A convex set swollen by a ball of radius ``by`` [m]."""
     if packed.kind == POINTS:
         wider = pack_points(packed.points, packed.radius + by, packed.slop, packed.prepared.with_tree)
         if may_have_tree(packed):  # of the same points: one tree serves both, however often margins change
@@ -199,8 +199,9 @@ def swollen(packed: PackedConvex, by: float) -> PackedConvex:
 
 
 def packed_within(packed: PackedConvex, margin: float, R: np.ndarray) -> PackedConvex:
-    """A convex set, turned by R (3, 3), and all that is at most a margin from it in the world [m]; its slop says how
-    well, where the numbers of that are rounded."""
+    """A convex set, turned by R (3, 3) and swollen by a margin in the world [m]; the slop of the result bounds the
+    rounding of both [m].
+    """
     if packed.kind == HALFSPACE:
         normal, offset = packed.params[:3], float(packed.params[3])
         # Planes n·x = c are taken to n'·y = c + n'·t with n' = n R⁻¹: offsets differ by |n'| for each unit of length.
@@ -214,7 +215,8 @@ def packed_within(packed: PackedConvex, margin: float, R: np.ndarray) -> PackedC
 
 
 def box_of(packed: PackedConvex) -> np.ndarray:
-    """(BOX,) centre and half sides of a box in the set's own frame that holds it; infinite for a half-space."""
+    """(BOX,) centre and half sides of a box around a set, in the set's own frame; infinite half sides for a
+    half-space."""
     if packed.kind == HALFSPACE:
         return np.array([0.0, 0.0, 0.0, np.inf, np.inf, np.inf])
     if packed.kind == POINTS:
@@ -230,7 +232,7 @@ def _curved_half(packed: PackedConvex) -> np.ndarray:
 
 
 def _body_boxes(rows: np.ndarray, parts: np.ndarray, part_boxes: np.ndarray, padded: int) -> np.ndarray:
-    """(n, BOX) boxes of bodies in their links, around padded parts where there are such; of a body without end, half
+    """(n, BOX) boxes of bodies in their links, around the padded parts where a body has any; an unbounded body has half
     sides of UNBOUNDED_HALF.
     """
     out = np.empty((len(rows), BOX))

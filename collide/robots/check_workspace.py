@@ -1,4 +1,4 @@
-"""Buffers that one thread's kernels work on when they check a robot, and the headers that lead to them."""
+"""Buffers of a thread's kernels for checking a robot, and the headers with the addresses of these buffers."""
 
 from __future__ import annotations
 

@@ -24,9 +24,9 @@ _LEAST_PIECE = 512
 
 
 class CheckerScene:
-    """A robot among the bodies of a World; arguments are those of `RobotChecker`.
+    """A robot among the bodies of a World; arguments as of `RobotChecker`.
 
-    setting : everything as it stood when `prepare` was last called.
+    setting : robot and World as of the last `prepare`.
     """
 
     def __init__(
@@ -76,14 +76,14 @@ class CheckerScene:
         return dict(self.setting.skipped)
 
     def names_of(self, a: int, b: int) -> tuple[str, str]:
-        """Names of two bodies by the numbers that results have for them.
+        """Names of two bodies by their numbers in results.
 
         Parameters
         ----------
         a : int
             Number of a body.
         b : int
-            Number of a body, or −1 − the number of one around.
+            Number of a body, or −1 − the number of a body around.
 
         Returns
         -------
@@ -111,7 +111,7 @@ class CheckerScene:
         return self.robot.link_poses(q, self._X_WR)
 
     def prepare(self) -> None:
-        """The setting of the World as it stands now; nothing is made again while it stays."""
+        """Make the setting of the World as of now; an unchanged World keeps the last setting."""
         packed = self.world._pack()
         before, now = self._seen, (packed.roster, packed.filters, packed.X_WBs)
         if before is not None and before[0] is now[0] and before[1] is now[1] and np.array_equal(before[2], now[2]):

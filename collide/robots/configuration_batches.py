@@ -50,10 +50,10 @@ def measure_piece(
 
 
 def _nearest_rows(checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, limit: float) -> np.ndarray:
-    """(n,) rows of PAIR_DTYPE of the nearest pairs within the limit; ``a`` is NONE where there is no such pair.
+    """(n,) rows of PAIR_DTYPE of the nearest pairs within the limit; ``a`` is NONE where no pair is within.
 
-    Where a pair was left to others, and turned out to be farther than the kernel had searched, it searches once more:
-    as far as the nearest pair that is known.
+    Where a pair left to others turns out farther apart than the kernel's limit, the kernel searches once more, up to
+    the distance of the nearest known pair.
     """
     rows, within = np.zeros(len(q), dtype=PAIR_DTYPE), np.full(len(q), min(FIRST_LIMIT, limit))
     asked = _search(checker, space, q, within, rows, None, np.zeros((0, 3), dtype=np.int64), limit)
@@ -71,8 +71,9 @@ def _search(
     checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, within: np.ndarray, rows: np.ndarray,
     some: np.ndarray | None, asked: np.ndarray, limit: float,
 ) -> np.ndarray:
-    """``rows`` (n,) take the nearest pairs of configurations q (n, dof), or some of them (k,), that are known within
-    limits ``within`` (n,), which become those searched; (m, 3) pairs left to others and asked so far.
+    """Write into ``rows`` (n,) the nearest pairs of configurations q (n, dof), or of ``some`` (k,) of them, within the
+    limits ``within`` (n,); ``within`` becomes the limits searched. Returns (m, 3) all pairs left to others and asked so
+    far.
     """
     nearest = rows if some is None else np.zeros(len(some), dtype=PAIR_DTYPE)
     q_some, limits = (q, within) if some is None else (np.ascontiguousarray(q[some]), within[some])
@@ -96,9 +97,9 @@ def _search(
 def _measure_open(
     checker: CheckerScene, rows: np.ndarray, pairs: np.ndarray, asked: np.ndarray, q: np.ndarray, limit: float
 ) -> np.ndarray:
-    """Where a pair left to others is nearer than what a row tells, the row becomes its; (k, 3) all pairs asked so far.
+    """Replace each row by an open pair's where the open pair is nearer; returns (k, 3) all open pairs asked so far.
 
-    Those that may be the nearest go first: what lies beyond them need not be measured.
+    Pairs with the least lower bounds are measured first; pairs whose lower bounds exceed the result are not measured.
     """
     # A pair of bodies is left to others once for every two of their parts: the nearest of these speaks for it.
     pairs = pairs[np.lexsort((pairs[:, OPEN_LOWER].view(np.float64), *pairs[:, 2::-1].T))]

@@ -1,4 +1,4 @@
-"""One configuration explained: what collides and how deep, what is nearest, which limits are left."""
+"""A configuration explained: colliding pairs with their depths, the nearest pairs, joints outside their limits."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ class ExplainedPair(NamedTuple):
 
 @dataclass(frozen=True)
 class ConfigurationReport:
-    """What a configuration does; `str` of it is the report.
+    """Report on a configuration, printed by `str`.
 
     Parameters
     ----------
     q : (dof,) float64
     collisions, nearest : list of ExplainedPair
-        Pairs that meet, deepest first; those within 0.1 m that do not, nearest first.
+        Colliding pairs, deepest first; free pairs within 0.1 m, nearest first.
     notes : list of str
         Joints outside their limits.
     n_pairs : int

@@ -1,11 +1,11 @@
-"""How the distance of the nearest pair changes with each column of q.
+"""Derivatives of the distance of the nearest pair by each column of q.
 
-Moving with joint j, a point p of its child's subtree has velocity ω × (p − o) or along the axis; the distance of bodies
-that part changes by the normal times the difference of both witness points' velocities.
+Moving with joint j, a point p of its child's subtree has velocity ω × (p − o) or along the axis; the distance of
+separate bodies changes by the normal times the difference of both witness points' velocities.
 
-A depth has a derivative where it is the least one of all directions. That of bodies that are not convex is the length
-of a translation that was found to part them; another may be shorter, and the next configuration may find it. Such rows
-are not certified, and no row that is not certified has a gradient.
+A depth has a derivative where proven the least of all directions. The depth of bodies that are not convex is the length
+of some separating translation; a shorter translation may exist, and the next configuration may find the shorter. These
+rows are not certified, and only certified rows have a gradient.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ from collide.robots.nearest_pairs import BODY_A, NONE
 
 @entry("void(int64, int64, int64, int64, int64, int64, int64)")
 def distance_gradients(header_at, q_at, dof, n, moves_at, rows_at, out_at):
-    """(n, dof) derivatives [m/rad or m/m] for the rows of `nearest_pairs`; NaN where there is none, and
-    `RobotDistances.no_gradient` says why.
+    """(n, dof) derivatives [m/rad or m/m] for the rows of `nearest_pairs`; NaN where the distance has no derivative,
+    for the reason in `RobotDistances.no_gradient`.
 
     moves : (joints, links) bytes, 1 where a joint moves a link.
     """

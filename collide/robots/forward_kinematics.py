@@ -1,7 +1,7 @@
-"""Forward kinematics: where every link stands for given joint values, many configurations at a time.
+"""Forward kinematics: the pose of every link for given joint values, many configurations at a time.
 
 Frames as in `robot.py`: ``X_WL = X_WP @ X_PJ @ X_JL(q)``, a joint at a time from the root on. Products and sums are
-written out, so that a configuration gives the same bits alone, in a batch, and where a checker asks about it.
+written out, so that a configuration gives the same bits alone, in a batch, and in a checker.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def joint_table(
 ) -> JointTable:
     """The `JointTable` of joints sorted from the root on.
 
-    columns : joint → its first column of q.   drivers : joint → (the joint that it follows, multiplier, offset).
+    columns : joint → its first column of q.   drivers : joint → (its driving joint, multiplier, offset).
     """
     ints = np.zeros((len(joints), JOINT_INTS), dtype=np.int64)
     doubles = np.zeros((len(joints), JOINT_DOUBLES))
@@ -143,9 +143,9 @@ def pose_all_links(ints_at, doubles_at, n_joints, root, n_links, base_at, q_at, 
 
 @kernel
 def pose_links(joints, q, first, links, stride):
-    """Write the poses of all links for the configuration at ``first`` of q.
+    """Write the poses of all links for the configuration from ``first`` on of q.
 
-    links : one every ``stride`` doubles, of which LINK_POSE are written.
+    links : a pose every ``stride`` doubles, the first LINK_POSE of them written.
     """
     for k in range(LINK_POSE):
         links[stride * joints.root + k] = joints.base[k]
@@ -175,7 +175,7 @@ def pose_links(joints, q, first, links, stride):
 
 @kernel(inline=True)
 def _put_product(A, a, B, b, out, to):
-    """Pose at ``to`` becomes that at ``a`` times that at ``b``."""
+    """out[to] = A[a] @ B[b], poses of 12 doubles each."""
     for i in range(3):
         x = A[a + 3 * i]
         y = A[a + 3 * i + 1]
@@ -187,7 +187,9 @@ def _put_product(A, a, B, b, out, to):
 
 @kernel(inline=True)
 def sine_cosine_of(angle):
-    """`sine_cosine` of any angle; beyond LARGEST_ANGLE of one reduced in doubles, which lie as far apart there."""
+    """`sine_cosine` of any angle [rad]. Angles beyond LARGEST_ANGLE are first reduced in doubles, whose spacing at such
+    sizes makes the reduction no worse.
+    """
     size = abs(angle)
     if not size < math.inf:
         return SineCosine(math.nan, math.nan)
@@ -199,7 +201,8 @@ def sine_cosine_of(angle):
 
 @kernel(inline=True)
 def _rotate_columns(links, at, coordinate, sign, angle):
-    """Turn the pose at ``at`` about one of its own coordinate axes, or against it: two columns are mixed."""
+    """Turn the pose at ``at`` about its own coordinate axis, by ``sign`` times the angle [rad]: two columns are
+    mixed."""
     sine, cosine = sine_cosine_of(angle)
     sine *= sign
     u = (coordinate + 1) % 3
@@ -256,7 +259,7 @@ def _translate_across(links, at, axes, across, u, v):
 def _float(links, at, q, column):
     """Shift the pose at ``at`` by x, y, z, then turn it by yaw, pitch and roll about its own axes, in this order.
 
-    That is roll, pitch and yaw about fixed axes, as URDF has them.
+    The same rotation as roll, pitch and yaw about fixed axes, as in URDF.
     """
     for i in range(3):
         r = at + 3 * i

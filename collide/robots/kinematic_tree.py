@@ -34,11 +34,11 @@ class Mimic(NamedTuple):
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint of the tree.
+    """A joint of the tree.
 
     X_PJ : (4, 4) pose of the joint frame in the parent link.
     axis : (3,) in the joint frame; any length but zero, normalised when the robot is made.
-    lower, upper : limits [rad] or [m]; infinite where there are none.
+    lower, upper : limits [rad] or [m]; infinite for joints without limits.
     """
 
     name: str
@@ -142,7 +142,7 @@ def _chain(names: Sequence[str]) -> str:
 
 
 def broken_mimics(joints: Sequence[Joint]) -> dict[str, str]:
-    """Joint -> why it cannot follow another: there is none of that name, or they follow each other in a circle."""
+    """Joint → why its mimic fails: its driving joint does not exist, or the mimics form a cycle."""
     single = {joint.name: joint for joint in joints if len(COLUMNS[joint.type]) == 1}
     broken: dict[str, str] = {}
     for joint in joints:
@@ -182,7 +182,8 @@ def broken_note(name: str, why: str) -> str:
 
 
 def resolve_mimics(joints: Sequence[Joint]) -> dict[str, tuple[str, float, float]]:
-    """Joint of one coordinate -> (the joint that drives it, multiplier, offset), chains followed to their end."""
+    """Joint with a single coordinate → (its driving joint, multiplier, offset), chains of mimics followed to their
+    end."""
     single = {joint.name: joint for joint in joints if len(COLUMNS[joint.type]) == 1}
     drivers: dict[str, tuple[str, float, float]] = {}
     for name in single:

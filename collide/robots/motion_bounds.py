@@ -60,9 +60,9 @@ CURRENT = INTERVAL * MAX_INTERVALS
 
 
 class Motion(NamedTuple):
-    """One straight motion, and the workspace.
+    """A straight motion, and the workspace.
 
-    q0, q1 : views of both ends, from ``at`` on.   max_change : by how much the column moves that moves by most.
+    q0, q1 : views of both ends, from ``at`` on.   max_change : the largest change of a column [rad or m].
     """
 
     scene: Any
@@ -135,7 +135,7 @@ def _bound_motion(motion, body, half):
 
 @kernel(inline=True)
 def _moved_by_joint(motion, joint, c, radius, moved, half):
-    """How far a joint moves points of a ball about c that joints beyond it move by ``moved``."""
+    """Bound [m] of a joint's motion of points in a ball about c, moved by ``moved`` [m] by the joints beyond."""
     joints, links = motion.scene.joints, motion.scene.links
     at = JOINT_DOUBLES * joint
     kind = joints.ints[JOINT_INTS * joint + KIND]

@@ -1,8 +1,8 @@
-"""The nearest pair of each configuration: signed distance, witness points, and which bodies they belong to.
+"""The nearest pair of each configuration: signed distance, witness points, and the names of both bodies.
 
-Limits that grow are tried one after another: what is near is met first, and bounds all that lies beyond it. What a
-search within a limit does not name is farther apart than the limit. So a row whose distance is within the limit ends
-the search, and nothing else does: a pair that is left to others may turn out to be far away.
+Growing limits are tried in sequence: near pairs are met first, and their distances bound the search. Every pair not
+named by a search is farther apart than the limit. So only a row whose distance is within the limit ends the search:
+a pair left to others may turn out far apart.
 """
 
 from __future__ import annotations
@@ -55,12 +55,12 @@ BODY_A = BODY_B - 1
 
 @entry("int64(int64, int64, int64, int64, int64, float64, int64, int64)")
 def nearest_pairs(header_at, q_at, dof, first, n, max_distance, limits_at, rows_at):
-    """Rows of PAIR_DTYPE, zeroed, of configurations from ``first`` on, of n; returns the first one without.
+    """Rows of PAIR_DTYPE, zeroed, of configurations from ``first`` on, of n; returns the first configuration not done.
 
-    limits : (n,) the limit [m] to begin with, at most max_distance; then the one searched last. Every tested pair that
-        is neither the row's nor left to others is farther apart than that, or at least as far as the row's.
-    A row's ``a`` is a body, or NONE where nothing is known within the limit; ``b`` is another one, or −1 − the number
-    of a body around. Pairs left to others may be nearer; where there are any, no larger limit is tried.
+    limits : (n,) the limit [m] to begin with, at most max_distance; then the limit searched last. Every other tested
+        pair not left to others is farther apart than the limit, or at least as far apart as the row's pair.
+    A row's ``a`` is a body, or NONE where no pair is known within the limit; ``b`` is another body, or −1 − the number
+    of a body around. Pairs left to others may be nearer; a configuration with open pairs tries no larger limit.
     """
     scene = view_scene(header_at)
     words = scene.words
@@ -120,10 +120,10 @@ def _find_nearest(scene, row, row_at, number, limit):
 
 @kernel
 def _take_nearer(scene, p, q, a, b, number, row_at, limit):
-    """Copy the row of two parts of bodies a and b if it is nearer; returns the limit from then on.
+    """Copy the row of two parts of bodies a and b if nearer; returns the limit from then on [m].
 
-    What is left open, or belongs to a part that only holds what is meant, is left to others where it may be nearer. A
-    rival, of which the brackets do not tell which of the two is nearer, widens the row's bracket.
+    An undecided pair, or a pair with a part around a mesh, is left to others where possibly nearer. A rival (a row
+    whose bracket overlaps the nearest row's) widens the row's bracket.
     """
     within = max(limit, 0.0)
     d = Vec3(0.0, 0.0, 0.0)

@@ -1,7 +1,7 @@
-"""Pairs that the kernels of a checker leave to others: meshes that are not convex, and what doubles cannot tell.
+"""Pairs left to others by a checker's kernels: meshes that are not convex, and pairs undecided in doubles.
 
-Each is asked of `collide.collide` or `collide.distance` at the poses of its links, bodies as they were given. But where
-unions of convex parts overlap, their deepest parts are asked for: kernels know unions as their parts.
+Each pair is asked of `collide.collide` or `collide.distance` at the poses of its links, bodies as handed in. For
+overlapping unions of convex parts the deepest two parts are asked: kernels read unions as their parts.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from collide.shapes.shape import Shape
 def are_hits(
     pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround]
 ) -> np.ndarray:
-    """(k,) bool: which pairs meet, where one is around both swollen, by padding and margin.
+    """(k,) bool: pairs with a hit. A body of the robot is swollen by its padding, a body around by its margin, where
+    the pair has a body around.
 
     pairs : (k, 3 or more), configurations as rows of X_WLs (N, links, 4, 4).
     """
@@ -37,12 +38,12 @@ def distances(
     pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround], *, limit,
     by_parts: bool = False,
 ) -> np.ndarray:
-    """(k,) rows of PAIR_DTYPE of such pairs, ``a`` and ``b`` as the pairs name bodies; ``beyond`` a limit [m].
+    """(k,) rows of PAIR_DTYPE of pairs as of `are_hits`, ``a`` and ``b`` numbered as in pairs; ``beyond`` a limit [m].
 
-    limit : one of all, or (k,) of each, which may be exceeded.   by_parts : of unions of convex parts that overlap, the
-        deepest two parts; else a translation that separates the unions.
-    Where a body is swollen, its point is that of what it is swollen to, and the distance is that of the bodies less by
-    how much they are swollen: of convex bodies that is the signed distance of what they are swollen to.
+    limit : of all pairs, or (k,) of each, which may be exceeded.   by_parts : overlapping unions of convex parts give
+        their deepest two parts, else a separating translation of the unions.
+    Distances are of the swollen bodies: the distance of the bodies less padding and margin, for convex bodies exactly
+    the signed distance of the swollen bodies. Points lie on the swollen bodies.
     """
     out = np.zeros(len(pairs), dtype=PAIR_DTYPE)
     for rows, A, B, X_WA, X_WB, padding, margin in _batches(pairs, X_WLs, bodies, around):
@@ -67,10 +68,10 @@ def distances(
 
 
 def nearer_of(mine: np.ndarray, theirs: np.ndarray) -> np.ndarray:
-    """(k,) of each two rows the nearer one, its bracket that of the least distance of both; ``a`` < 0 where none is.
+    """(k,) the nearer of each two rows, its bracket a bracket of the least distance of both; ``a`` < 0 where neither
+    has a pair.
 
-    Rivals, of which the brackets do not tell which is nearer, widen the bracket: the least distance is at least the
-    less of the lower bounds.
+    Rivals, rows with overlapping brackets, widen the bracket: the least distance is at least the lesser lower bound.
     """
     is_nearer = distances_of(theirs) < distances_of(mine)
     is_rival = (mine["a"] >= 0) & (theirs["a"] >= 0)
@@ -103,7 +104,7 @@ def _rows_of(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: floa
 
 
 def _parts_as_shapes(shape: Shape) -> list[Shape]:
-    """The items of a `Compound`, each where it stands in it, nested ones one by one; any other shape is its own."""
+    """The items of a `Compound` as shapes in the compound's frame, nested compounds flattened; else [shape]."""
     if not isinstance(shape, Compound):
         return [shape]
     return [Compound([(part, X)]) for item, X in shape.items for part in _parts_as_shapes(item)]

@@ -96,9 +96,10 @@ def middle(scene, part):
 
 @kernel(inline=True)
 def boxes_are_apart(scene, p, q, d, margin):
-    """Whether a face of one of two turned boxes is farther than the margin from the other.
+    """Whether a face of a turned box is farther than the margin [m] from the other box.
 
-    d : from the centre of p's box to that of q's.   A face's axis is tested by the other box's extent along it.
+    d : from the centre of p's box to the centre of q's.   A face's axis is tested by the other box's extent along the
+        axis.
     """
     poses, boxes = scene.poses, scene.part_boxes
     at_p = POSE * p

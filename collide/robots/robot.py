@@ -43,10 +43,10 @@ _LOADER = ("collide.scenes.loaders.robot_file", "load_robot")
 
 
 class LinkShape(NamedTuple):
-    """One collision element of a link.
+    """A collision element of a link.
 
     shape : in its own frame G.   X_LG : (4, 4) pose of G in the link.
-    approximation : what the shape leaves out of the element described, None when nothing.
+    approximation : the difference between shape and element in words, ``None`` where equal.
     source : where the element is described, ``file: element``.
     """
 
@@ -57,7 +57,7 @@ class LinkShape(NamedTuple):
 
 
 class Robot:
-    """Links, joints, limits, collision geometry and the pairs that are never tested.
+    """Links, joints, limits, collision geometry and the pairs never tested.
 
     Parameters
     ----------
@@ -66,18 +66,18 @@ class Robot:
     links : sequence of str
         Names of the links, in the order of the file.
     joints : sequence of Joint
-        In the order of the file; together they make one tree. Joints that cannot follow what they are said to mimic (a
-        joint that does not exist, a cycle) become joints of their own, and a note is added for each.
+        In the order of the file; together they make a tree. Joints that cannot follow their mimicked joint (a missing
+        joint, a cycle) become joints of their own, and a note is added for each.
     geometry : mapping of str to sequence of LinkShape, optional
         Link → its collision elements; links without collision geometry may be left out.
     semantic_pairs : iterable of (link, link, reason), optional
-        From an SRDF. None: links next to each other in the tree are taken as never tested.
+        From an SRDF. ``None``: links next to each other in the tree are taken as never tested.
     states : mapping, optional
         Named joint values [rad or m], ``{"ready": {"joint1": 0.0, ...}}``.
     notes : iterable of str
-        What the person who loads the robot should know.
+        Notes for the person who loads the robot.
     missing_meshes : iterable of str
-        Elements whose mesh was not found and which were left out on demand: nothing is known of collisions with them.
+        Elements left out on demand, their meshes not found: nothing is known of collisions with them.
     sources : iterable of str
         The files read, the robot's own first.
 
@@ -94,16 +94,17 @@ class Robot:
     disabled_pairs
         [(link, link, reason)], both with collision geometry, in the order of the links.
     prefix
-        What `renamed` put before the names of links and joints that the files have.
+        Put by `renamed` before the names of links and joints in the files.
     place
-        The robot and the file it comes from, for messages.
+        The robot and its file, for messages.
     joint_table, moves
-        Joints as kernels read them, in the order of `sorted_joints`; (joints, links) uint8, 1 where one moves a link.
+        Joints as kernels read them, in the order of `sorted_joints`; (joints, links) uint8, 1 where a joint moves a
+        link.
 
     Raises
     ------
     SceneError
-        Naming the link or joint, where names repeat, geometry has no link, or the joints do not make one tree.
+        Naming the link or joint, where names repeat, geometry has no link, or the joints do not make a tree.
     """
 
     def __init__(
@@ -152,27 +153,28 @@ class Robot:
 
     @classmethod
     def load(cls, path, srdf=None, **options) -> Robot:
-        """A robot from a URDF or an MJCF file, with the SRDF beside it or the one given.
+        """A robot from a URDF or an MJCF file, with the SRDF beside the file or a given SRDF.
 
         Parameters
         ----------
         path : str or Path
-            The URDF file; or an MJCF file, which the package mujoco reads (extra ``[mujoco]``): bodies are links, the
-            root is the world, pairs that MuJoCo's filters leave out are never tested, keyframes are states.
+            The URDF file; or an MJCF file, read by the package mujoco (extra ``[mujoco]``): bodies are links, the
+            root is the world, pairs left out by MuJoCo's filters are never tested, keyframes are states.
         srdf : str, Path or bool, optional
-            The SRDF file. None looks beside the robot's, False does without. Beside MuJoCo's filters it counts, too.
+            The SRDF file. ``None`` looks beside the robot's file, ``False`` does without. An SRDF adds to MuJoCo's
+            filters.
         **options
             ``meshes``, ``package_path`` and ``missing_meshes`` as of `collide.scenes.load`.
 
         Returns
         -------
         Robot
-            With everything that the files say about collisions.
+            With all data on collisions in the files.
 
         Raises
         ------
         SceneError
-            Naming file, element and value of what cannot be read. MissingExtra for MJCF without the package mujoco.
+            Naming file, element and value of anything unreadable. MissingExtra for MJCF without the package mujoco.
         """
         return getattr(import_module(_LOADER[0]), _LOADER[1])(path, srdf=srdf, **options)
 
@@ -218,9 +220,9 @@ class Robot:
         ----------
         values : mapping of str to float
             Joint, or column of ``joint_names`` → value [rad or m]. Values outside a limit are used and noted; so are
-            values for joints that cannot take one.
+            values for joints without a value of their own.
         start : (dof,) float64, optional
-            What columns without a value keep; by default `default_configuration`.
+            Values of the other columns; by default `default_configuration`.
 
         Returns
         -------
@@ -232,7 +234,7 @@ class Robot:
         Raises
         ------
         InvalidArgument
-            For unknown joints (the known ones are listed) and for values that are not finite numbers.
+            For unknown joints (the known ones are listed) and for values other than finite numbers.
         """
         q = self.default_configuration() if start is None else self._one_configuration("start", start).copy()
         values = checks.mapping("Robot.configuration: values", values, "joint → value")
@@ -263,19 +265,19 @@ class Robot:
         return q, notes + self.limit_notes(q)
 
     def default_notes(self, names: Iterable[str], q: np.ndarray) -> list[str]:
-        """A note about the columns of a configuration that nobody gave a value.
+        """A note about the columns of a configuration without a given value.
 
         Parameters
         ----------
         names : iterable of str
-            The columns that were given one.
+            The columns with a given value.
         q : (dof,) float64
             The configuration [rad or m].
 
         Returns
         -------
         list of str
-            One note, or none.
+            A note, or an empty list.
         """
         if not isinstance(names, (set, frozenset)):
             names = checks.listed_entries("Robot.default_notes: names", names, "names of columns")
@@ -288,7 +290,7 @@ class Robot:
         return [f"robot {self.name}: no value given for {listed}: 0 taken, or the limit nearest to 0"]
 
     def joint_value(self, name: str, q: np.ndarray) -> float:
-        """The value of a joint that moves along one coordinate, mimicking ones included.
+        """The value of a joint with a single coordinate, mimicking joints included.
 
         Parameters
         ----------
@@ -305,7 +307,7 @@ class Robot:
         Raises
         ------
         InvalidArgument
-            For a name that no such joint has, and for a q of another shape.
+            For a name of no joint with a single coordinate, and for a q of another shape.
         """
         if checks.text("Robot.joint_value: name", name) not in self._drivers:
             raise InvalidArgument(
@@ -319,7 +321,7 @@ class Robot:
         return multiplier * float(q[self._columns[driver]]) + offset
 
     def _one_configuration(self, what: str, q) -> np.ndarray:
-        """(dof,) float64, the caller's own where it is that already. Raises InvalidArgument."""
+        """(dof,) float64, the caller's own array where already (dof,) float64. Raises InvalidArgument."""
         read = checks.array(f"robot {cut(self.name)}: {what}", q, f"({self.dof},)", InvalidArgument)
         if read.shape != (self.dof,):
             raise InvalidArgument(
@@ -397,13 +399,13 @@ class Robot:
     def link_poses(self, q, X_WR=None) -> np.ndarray:
         """Forward kinematics: the poses of all links.
 
-        Every row is computed alone, by the same additions and multiplications: one row gives the same bits as that row
+        Every row is computed alone, by the same additions and multiplications: a row gives the same bits alone and
         in a batch.
 
         Parameters
         ----------
         q : (dof,) or (N, dof) array_like, float64
-            Configurations [rad or m], columns as in ``joint_names``; a single one gives N = 1.
+            Configurations [rad or m], columns as in ``joint_names``; a single configuration gives N = 1.
         X_WR : (4, 4) float64, optional
             Pose of the root link R in the world W, by default the identity.
 
@@ -417,7 +419,7 @@ class Robot:
         InvalidArgument
             For configurations of another shape, or not finite.
         InvalidPose
-            Naming file, link and joint, where a link leaves the range of coordinates that poses may have.
+            Naming file, link and joint, where a link leaves the range of coordinates of poses.
         """
         q = np.ascontiguousarray(self.checked_configurations(q))
         X_WLs = link_poses_of(self.joint_table, q, np.eye(4) if X_WR is None else as_pose(X_WR, "X_WR"))

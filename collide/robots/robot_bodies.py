@@ -1,4 +1,4 @@
-"""What a robot is to a checker: bodies that move with its links, and which pairs of them are tested."""
+"""A robot as seen by a checker: bodies moving with its links, and the tested pairs of bodies."""
 
 from __future__ import annotations
 
@@ -24,10 +24,11 @@ _ALL_GROUPS = 0xFFFF
 
 
 class Attached(NamedTuple):
-    """An object that moves with a link, such as a grasped part.
+    """An object attached to a link, for example a grasped part.
 
-    name : unique among links and attached objects.   link : the link it moves with.   shape : in its own frame S.
-    X_LS : (4, 4) pose of S in the link [m].   touch : links, and bodies of the World, that it may touch.
+    name : unique among links and attached objects.   link : name of the link.   shape : in its own frame S.
+    X_LS : (4, 4) pose of S in the link [m].   touch : links, and bodies of the World, whose contact with the object is
+        allowed.
     """
 
     name: str
@@ -50,9 +51,9 @@ class Filters(NamedTuple):
 
 
 def robot_bodies(robot: Robot, attached: Iterable, padding) -> tuple[list[RobotBody], dict[str, Attached]]:
-    """Bodies from the last link to the root, attached objects before all, and these by name.
+    """Bodies from the last link to the root, attached objects before all, and attached objects by name.
 
-    Raises InvalidArgument, InvalidPose: unknown links, names used twice, a padding that is none.
+    Raises InvalidArgument, InvalidPose: unknown links, names used twice, paddings out of range.
     """
     number = {link: k for k, link in enumerate(robot.links)}
     objects: dict[str, Attached] = {}
@@ -115,13 +116,13 @@ def _checked_padding(what: str, value) -> float:
 
 
 def bodies_around(world: World, robot: Robot) -> list[BodyAround]:
-    """Bodies of a World that are not the robot's own; those are named like its links."""
+    """Bodies of a World other than the robot's own, recognised by the names of links."""
     others = [world.body(name) for name in world.names.values() if name not in robot.geometry]
     return [BodyAround(body.name, body.shape, body.X_WB, body.margin) for body in others]
 
 
 def refuse_own_margins(packed: PackedWorld, robot: Robot) -> None:
-    """Margins of links among each other are not kept, so that a World must have none of them.
+    """Refuse a World with margins of links among each other: a checker does not keep these.
 
     Raises InvalidArgument naming the link.
     """
@@ -142,11 +143,11 @@ def filters_of(
     robot: Robot, bodies: list[RobotBody], objects: dict[str, Attached], world: World, around: list[BodyAround],
     allowed: Iterable[tuple[str, str]], mobile: bool,
 ) -> Filters:
-    """Pairs that are tested, and how many are not, by reason.
+    """Tested pairs, and the number of untested pairs by reason.
 
-    Never tested: pairs that the robot disables, that ``allowed`` or the World name, links of a fixed base against
-    bodies that are static or asleep, and what groups and masks exclude: those of a body of the World that is named like
-    the link, else group 1 with all.
+    Never tested: pairs disabled by the robot, pairs named in ``allowed`` or in the World, links of a fixed base against
+    static or sleeping bodies, and pairs excluded by groups and masks: a link has group and mask of the World's body of
+    its name, else group 1 with all.
     """
     known = {body.name for body in bodies} | {body.name for body in around}
     reasons = _named_pairs(robot, objects, world, allowed, known)

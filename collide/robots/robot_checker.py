@@ -29,31 +29,31 @@ class RobotChecker(CheckerScene):
     ----------
     robot : Robot
         Its collision geometry, as given: meshes are meshes. `Robot.load(path, meshes="hull")` makes hulls of them,
-        which takes a tenth of the time where they are not convex.
+        a tenth of the time for meshes that are not convex.
     world : World, optional
-        What is around. Bodies named like links of the robot with collision geometry are the robot itself, as in
+        The surroundings. Bodies named like links of the robot with collision geometry are the robot itself, as in
         `Scene.world`: they are left out; pairs allowed for them, their groups and masks hold. Margins of the others
-        swell them against the robot; those that sleep are obstacles, too. When the World changes, the next call sees
-        it; bodies that move while a call runs stand where they stood when it began.
+        swell them against the robot; sleeping bodies are obstacles, too. The next call sees every change of the
+        World; bodies moved during a call keep their poses from the call's begin.
     X_WR : (4, 4), optional
         Pose of the robot's root in the world W [m], by default the identity.
     attached : iterable of (name, link, shape, X_LS, touch)
-        Objects that move with a link: `X_LS` is their pose in it, by default the identity, `touch` names of links and
-        bodies that they may touch. The link itself they always may.
+        Objects attached to a link: `X_LS` is their pose in the link, by default the identity, `touch` names of links
+        and bodies they may touch, beside their own link.
     padding : float or mapping of str to float
-        By how much links and attached objects are swollen against what is around [m], not against each other.
+        Swelling of links and attached objects against the surroundings [m], not against each other.
     allowed : iterable of (str, str)
-        Pairs never tested, of links, attached objects and bodies of the World by name; besides those that robot and
-        World disable.
+        Pairs never tested, of links, attached objects and bodies of the World by name; besides the pairs disabled by
+        robot and World.
     mobile : bool
-        The base moves, too: links of it are tested against static bodies.
+        The base moves, too: its links are tested against static bodies.
 
     Attributes
     ----------
     bodies, around : list of str
-        What moves and what is around, by name.
+        Names of the bodies of the robot, and of the surroundings.
     skipped : dict of str to int
-        How many pairs are never tested, by reason. ``n_pairs`` are.
+        Number of pairs never tested, by reason; ``n_pairs`` is the number of tested pairs.
 
     Raises
     ------
@@ -70,16 +70,16 @@ class RobotChecker(CheckerScene):
 
     @classmethod
     def from_scene(cls, scene, robot: str | None = None, **options) -> RobotChecker:
-        """A checker of a robot in a scene: where it stands, what it carries, and what is never tested.
+        """A checker of a robot in a scene, with its base pose, attached objects and untested pairs.
 
         Parameters
         ----------
         scene : Scene
             Of `collide.scenes.load`. Its other robots stand still.
         robot : str, optional
-            Name of the robot; may be left out where there is one.
+            Name of the robot; may be left out in a scene with a single robot.
         **options
-            Those of the class but ``X_WR`` and ``attached``.
+            Arguments of the class except ``X_WR`` and ``attached``.
 
         Returns
         -------
@@ -88,7 +88,7 @@ class RobotChecker(CheckerScene):
         Raises
         ------
         InvalidArgument
-            Where the scene has no such robot, or several and none is named.
+            For a robot not in the scene, and without a name where the scene has several robots.
         """
         if not hasattr(scene, "placements"):
             raise InvalidArgument(
@@ -181,12 +181,12 @@ class RobotChecker(CheckerScene):
         return RobotDistances(rows, gradient, self.bodies, self.around)
 
     def edge_collides(self, Q0, Q1, *, resolution: float = 0.01, threads: int = 1) -> np.ndarray:
-        """Whether straight motions collide at samples: what lies between two of them is not looked at.
+        """Whether straight motions collide at samples; motions between two samples are not checked.
 
         Parameters
         ----------
         Q0, Q1 : (N, dof) or (dof,) array_like
-            Where the motions begin and end [rad or m]; a single one goes with all of the other.
+            Where the motions begin and end [rad or m]; a single configuration goes with all of the other.
         resolution : float
             No column changes by more from one sample to the next [rad or m].
         threads : int
@@ -195,7 +195,7 @@ class RobotChecker(CheckerScene):
         Returns
         -------
         (N,) bool
-            Both ends are samples. Halves come before quarters: motions that collide are mostly known after a few.
+            Both ends are samples. Halves come before quarters: most collisions are found after a few samples.
         """
         q0, q1 = self._edges(Q0, Q1)
         step = _positive("RobotChecker.edge_collides: resolution", resolution)
@@ -204,7 +204,7 @@ class RobotChecker(CheckerScene):
     def certify_edges(
         self, Q0, Q1, *, resolution: float = 1e-3, threads: int = 1, progress: Callable[[int, int], None] | None = None
     ) -> CertifiedEdges:
-        """Proves straight motions free, all of the way, or names a time at which they collide.
+        """Proves straight motions free, all of the way, or names a time of a collision.
 
         Parameters
         ----------
@@ -212,25 +212,26 @@ class RobotChecker(CheckerScene):
             As of `edge_collides`.
         resolution : float
             Intervals in which no column changes by more [rad or m] are not halved any more: they stay open. Motions
-            that pass something at a distance d need about d / (length of the arm).
+            past an obstacle at a distance d need about d / (length of the arm).
         threads, progress
             As of `collides`.
 
         Returns
         -------
         CertifiedEdges
-            ``free`` (proven), ``time`` of a collision, ``open`` intervals: of every motion one of the three.
+            ``free`` (proven), ``time`` of a collision, ``open`` intervals: each motion is exactly free, colliding or
+            open.
 
         Notes
         -----
-        Distances in the middle of an interval against how far anything can move within half of it
-        (`motion_bounds.py` says how it is bounded). Mimicking, prismatic, planar and floating joints move straight in
+        Distances in the middle of an interval are compared with bounds of the motion within half the interval
+        (`motion_bounds.py`). Mimicking, prismatic, planar and floating joints move straight in
         their columns as well.
 
-        O(N I P) for N motions: in the middles of I intervals each, the distances of those P pairs of parts that no
-        interval around has done with. I grows as how far a point moves over the least gap, and is at most four times
-        the largest change of a column over ``resolution``, where pairs stay open. Meshes that are not convex cost what
-        `collide.distance` does in each. Before that a fixed number of samples is asked whether it collides.
+        O(N I P) for N motions: in the middles of I intervals each, the distances of the P pairs of parts not yet proven
+        apart in an interval around. I grows as the path length of a point over the least gap, and is at most four times
+        the largest change of a column over ``resolution``, where pairs stay open. Meshes that are not convex cost a
+        `collide.distance` in each. A fixed number of samples is checked for collisions first.
         """
         q0, q1 = self._edges(Q0, Q1)
         step = _positive("RobotChecker.certify_edges: resolution", resolution)
@@ -238,7 +239,7 @@ class RobotChecker(CheckerScene):
         return certify(self, q0, q1, times, step, threads, progress)
 
     def explain(self, q) -> ConfigurationReport:
-        """Which pairs of a configuration collide, how deep, and what is nearest otherwise, to be printed.
+        """Colliding pairs of a configuration with their depths, or the nearest pairs, to be printed.
 
         Parameters
         ----------
@@ -248,12 +249,12 @@ class RobotChecker(CheckerScene):
         Returns
         -------
         ConfigurationReport
-            ``collisions``, ``nearest``, ``notes`` about limits, and ``str()`` of it.
+            ``collisions``, ``nearest``, ``notes`` about limits; ``str()`` prints all.
 
         Raises
         ------
         InvalidArgument
-            For anything but one configuration.
+            For anything but a single configuration.
         """
         q, is_single = self._configurations(q, "q")
         if not is_single:

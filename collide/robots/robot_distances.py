@@ -1,4 +1,4 @@
-"""The nearest pair of each configuration as a result: which links, how far, and which way joints change it."""
+"""The nearest pair of each configuration as a result: names, signed distance, and its derivatives by the joints."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ class RobotDistances:
     ----------
     rows : (N,) NEAREST_DTYPE
         ``distance`` [m], signed, with ``lower ≤ truth ≤ upper`` proven; ``normal`` (3,) a unit vector in W from A, on
-        the robot, towards B; ``point_a``, ``point_b`` (3,) in W [m]; ``hit``, ``certified``; ``beyond`` where nothing
-        tested is within the ``max_distance`` asked: distance and upper are infinite then. ``a`` is the number of a
-        body, −1 for none; ``b`` of another, or −1 − the number of one around.
-        Of bodies that are not convex and overlap, ``distance`` is minus the length of a translation that was found to
-        separate them, the bracket reaches up to 0, and ``certified`` is False.
+        the robot, towards B; ``point_a``, ``point_b`` (3,) in W [m]; ``hit``, ``certified``; ``beyond`` where every
+        tested pair is beyond the ``max_distance`` asked: distance and upper are infinite then. ``a`` is the number of a
+        body, −1 without a pair; ``b`` of another, or −1 − the number of a body around.
+        For overlapping bodies that are not convex, ``distance`` is minus the length of some separating
+        translation, the bracket reaches up to 0, and ``certified`` is False.
     gradient : (N, dof) float64
-        How ``distance`` changes with each column of q [m/rad or m/m]; NaN where no derivative is known: `no_gradient`
-        says why. Where two pairs are equally near, it is that of the pair named.
+        Derivative of ``distance`` by each column of q [m/rad or m/m]; NaN where no derivative is known, for the reason
+        in `no_gradient`. Of two equally near pairs the gradient is the named pair's.
     bodies, around : sequence of str
-        Names of what moves, and of what is around.
+        Names of the robot's bodies, and of the bodies around.
     """
 
     def __init__(self, rows: np.ndarray, gradient: np.ndarray, bodies: Sequence[str], around: Sequence[str]):
@@ -52,7 +52,7 @@ class RobotDistances:
 
     @property
     def names(self) -> list[tuple[str, str] | None]:
-        """Both bodies of each configuration; None where there is no pair."""
+        """Names of both bodies of each configuration; ``None`` without a pair."""
         return [
             None if a < 0 else (self._bodies[a], self._bodies[b] if b >= 0 else self._around[-1 - b])
             for a, b in zip(self.rows["a"].tolist(), self.rows["b"].tolist())
@@ -60,11 +60,11 @@ class RobotDistances:
 
     @property
     def no_gradient(self) -> list[str | None]:
-        """Why a configuration's gradient is NaN, in the words of `NO_GRADIENT`; None where there is a gradient.
+        """Why a configuration's gradient is NaN, in the words of `NO_GRADIENT`; ``None`` beside a gradient.
 
         Returns
         -------
-        list of N str or None
+        list of N ``str | None``
         """
         return [_why_no_gradient(row) for row in self.rows]
 

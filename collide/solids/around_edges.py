@@ -1,7 +1,8 @@
-"""Which sides of sheets look into the same cell: around every edge, neighbours in the order in which sheets stand.
+"""Sides of sheets at the same cell: around every edge, neighbours in the angular order of the sheets.
 
 Side 2 i is the front of sheet i, side 2 i + 1 its back. Turning counter-clockwise about an edge, from its lower end to
-its higher, one leaves a sheet on its front where the edge runs upward in it, and enters it on its other side.
+its higher, the turn leaves a sheet on its front where the edge runs upward in the sheet, and enters the sheet on the
+other side.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from collide.solids.cut_points import CutPoints
 
 
 class Sheets(NamedTuple):
-    """Triangles that cross no others, each once.
+    """Triangles without crossings, each once.
 
     triangles : (k, 3) ids of points, counter-clockwise seen from the front.
-    facet : (k,) row of a facet it is part of, which has the same front; of several the first.
-    steps : (k, r) int8: by how much each body's winding number is greater behind the sheet than before it.
+    facet : (k,) row of the facet holding the triangle, with the same front; of several facets the first.
+    steps : (k, r) int8: each body's winding number behind the sheet less its winding number before.
     """
 
     triangles: np.ndarray
@@ -31,10 +32,11 @@ class Sheets(NamedTuple):
 
 
 class _HalfEdges(NamedTuple):
-    """Edges of sheets from point to point, those between the same points together.
+    """Edges of sheets from point to point, half-edges between the same points together.
 
-    keys : (m,) of both points.   sheet, upward : (m,) whose edge, and whether it runs to the point with the higher id.
-    first, counts : (g,) where the half-edges of each edge begin, and how many there are.
+    keys : (m,) of both points.   sheet, upward : (m,) the sheet of the edge, and whether the edge runs to the point
+        with the higher id.
+    first, counts : (g,) first half-edge of each edge, and the number of its half-edges.
     """
 
     keys: np.ndarray
@@ -47,9 +49,9 @@ class _HalfEdges(NamedTuple):
 def joined_sides(
     sheets: Sheets, points: CutPoints, is_cut: np.ndarray, crossings: np.ndarray, ids: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of sides that look into one cell.
+    """Pairs of sides at the same cell.
 
-    Only around edges of cut facets, and of other than two: whole facets at any other edge are of one part.
+    Only edges of cut facets, and edges of other than two sheets, are visited: other edges join whole facets of a part.
     Parameters as of `cells.cells_of`.
     """
     edges = _half_edges(sheets, points, is_cut)
@@ -92,9 +94,11 @@ def _half_edges(sheets: Sheets, points: CutPoints, is_cut: np.ndarray) -> _HalfE
 def _around_crossings(
     edges: _HalfEdges, sheets: Sheets, points: CutPoints, crossings: np.ndarray, ids: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """((k, 4) half-edges in order where two facets a, b cross clearly, (g,) bool: edges of two sheets, or these).
+    """((k, 4) half-edges in order around the edge of a clear crossing of facets a, b, (g,) bool: edges of two sheets,
+    or with such an order).
 
-    About n_a × n_b the half of a in which the edge runs that way is followed by that of b, then come the others.
+    About n_a × n_b the half of a whose edge runs along n_a × n_b is followed by the same half of b, then the other
+    halves.
     """
     is_ordered = edges.counts == 2
     four = np.flatnonzero(edges.counts == 4)

@@ -1,7 +1,7 @@
 """The arrangement of r posed solids: their facets cut where they meet, and the cells between, exactly.
 
 J. Erickson, "Local polyhedra and geometric graphs" (2005), corollary 3.2 and section 6: any boolean function of the
-bodies is a choice among its cells. Facets that meet none are cut by nothing and taken whole.
+bodies is a choice among its cells. Facets without meeting facets are taken whole.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ Rule = Callable[[np.ndarray], np.ndarray]
 
 
 class Arrangement(NamedTuple):
-    """What r solids divide space into.
+    """The cells of space between the surfaces of r solids.
 
     facets : the bodies' facets.   points : exact points by id.   sheets : triangles between cells.
-    cells : the cells on both sides of every sheet, and the bodies' winding numbers there; a body holds a cell around
-        which it winds once or more.
-    n_meeting, n_cut : pairs of facets that meet, and facets that are cut.
+    cells : the cells on both sides of every sheet, and the bodies' winding numbers there; a body holds a cell
+        of winding number 1 or more.
+    n_meeting, n_cut : number of meeting pairs of facets, and of cut facets.
     """
 
     facets: PlacedFacets
@@ -93,11 +93,12 @@ def arrange(operands: list[Operand], limits: Limits = UNLIMITED) -> Arrangement:
 
 
 def _clear_crossings(facets: PlacedFacets, points: CutPoints, pairs: np.ndarray):
-    """(clear crossings of two bodies, ids (k, 2) of their ends, which of the pairs they are (k,) bool, facets that have
-    to be cut exactly (F,) bool).
+    """(clear crossings of two bodies, ids (k, 2) of their ends, (k,) bool: pairs with a clear crossing, (F,) bool:
+    facets to be cut exactly).
 
-    Ends are points in one place where the same edge pierces the same facet. That holds of two bodies; facets that cross
-    their own body's, and those that meet them, are cut exactly, as are all facets of three bodies and more.
+    Two ends are a single point if the same edge pierces the same facet: a rule for facets of two bodies. Facets
+    crossing their own body's, their neighbours in such crossings, and all facets of three bodies and more, are cut
+    exactly.
     """
     of_one = facets.body[pairs[:, 0]] == facets.body[pairs[:, 1]]
     crossings, proven = crossing_pairs(facets, pairs[~of_one])
@@ -145,7 +146,7 @@ def _all_sheets(
 
 
 def meeting_pairs(facets: PlacedFacets) -> np.ndarray:
-    """(k, 2) rows of facets that meet: of two bodies, and of one where it crosses itself; without area left out."""
+    """(k, 2) rows of meeting facets: of two bodies, and of a body crossing itself; facets of zero area are left out."""
     rows = []
     for i, A in enumerate(facets.operands):
         hits = crossings_of(A.mesh)

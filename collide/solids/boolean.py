@@ -27,14 +27,15 @@ OPERATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 class BooleanResult(NamedTuple):
     """A boolean of two solids, or of many (`combine`).
 
-    mesh : the solid, vertices in the world W [m]; None where it has no points inside.
-    body : (k,) int64, of every facet of the mesh whose facet it is part of: 0 of A, 1 of B (of both: of A).
-    facet : (k,) int64, the number of that facet. Facets of convex shapes are numbered as in `facet_pairs`.
-    before, behind : (k, r) bool, which of the r bodies hold the points just outside each facet, and just inside: those
-        of which they differ have a surface there.
-    moved : no vertex was moved farther than this by rounding it to doubles [m].
-    n_collapsed, n_thin : triangles, and shells, so thin that rounding left nothing of them; they are not in the mesh.
-    n_meeting, n_cut : pairs of facets that meet, and facets that were cut.
+    mesh : the solid, vertices in the world W [m]; ``None`` for a result without interior points.
+    body : (k,) int64, the body of origin of every facet of the mesh: 0 for A, 1 for B (for common facets: 0).
+    facet : (k,) int64, the number of the facet of origin in its body. Facets of convex shapes are numbered as in
+        `facet_pairs`.
+    before, behind : (k, r) bool, bodies that hold the points just outside each facet, and just inside; a body with a
+        surface at the facet differs in the two.
+    moved : the farthest a vertex was moved by rounding to doubles [m].
+    n_collapsed, n_thin : number of triangles, and of shells, left out of the mesh: rounding made them flat.
+    n_meeting, n_cut : number of meeting pairs of facets, and of cut facets.
     """
 
     mesh: Mesh | None
@@ -67,30 +68,30 @@ def boolean(
 
     Parameters
     ----------
-    A, B : solids with facets: `Mesh` (closed; shells that overlap count as their union, docs/meshes.md), `Box`,
+    A, B : solids with facets: `Mesh` (closed; overlapping shells count as their union, docs/meshes.md), `Box`,
         `ConvexHull` without a radius, `HPolytope` whose corners are doubles.
     X_WA, X_WB : (4, 4) poses in the world W [m].
     op : "union", "intersection", "difference" (A without B) or "symmetric_difference".
-    check_poses : refuse matrices that are no rotation.
-    progress : callable, optional. Called with a label, gives a context manager that gives a function to change it.
-    time_limit, memory : the most seconds, and bytes, that it may take; None for no limit. What is stopped leaves
+    check_poses : refuse matrices other than rotations.
+    progress : callable, optional. Called with a label, returns a context manager of a function that changes the label.
+    time_limit, memory : the most seconds, and bytes, of the call; ``None`` for no limit. A stopped call leaves
         nothing behind.
 
     Returns
     -------
-    BooleanResult, with the solid as a `Mesh` in W. It is what the operation leaves inside, with its border: sets that
-    only touch intersect in nothing, and no wall is left between bodies that stand flush. Every edge is shared
+    BooleanResult, with the solid as a `Mesh` in W. The solid is the interior of the operation's result, with its
+    border: touching sets intersect in the empty set, and no wall is left between flush bodies. Every edge is shared
     exactly; vertices are exact points of the two surfaces, rounded once to the nearest doubles.
 
     Raises
     ------
     InvalidArgument : a surface without an inside, with its defects and facet numbers; an unknown operation.
-    InvalidPose : matrices that are no pose.
-    UnsupportedQuery : curved shapes, unions and half-spaces, by name; a limit that is reached, with what it would take.
+    InvalidPose : matrices other than poses.
+    UnsupportedQuery : curved shapes, unions and half-spaces, by name; a limit reached, with an estimate of the need.
 
     Notes
     -----
-    Facets that meet are found by the box-trees, cut along exact segments, and the cells between them told apart by
+    Meeting facets are found by the box-trees, cut along exact segments, and the cells between them told apart by
     exact winding numbers; all others are taken whole. O(n log n) for local meshes (J. Erickson, "Local polyhedra and
     geometric graphs" (2005), corollary 3.2 and theorem 3.6). docs/solids.md has the figures.
     """

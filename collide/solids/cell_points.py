@@ -57,7 +57,7 @@ class CellPoints:
         return np.flatnonzero(near_rows).tolist()
 
     def _between(self, a: Rational, b: Rational, row: int) -> bool:
-        """Whether a sheet may meet a segment; where it is certain that it does not, False."""
+        """False only if a sheet certainly misses the segment from a to b."""
         points, sheets = self.arrangement.points, self.arrangement.sheets
         facet = int(sheets.facet[row])
         n, start = points.facets.normal(facet), points.facets.exact(int(points.facets.corners[facet, 0]))

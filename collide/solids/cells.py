@@ -1,9 +1,9 @@
-"""Cells of an arrangement: which sides of its sheets look into the same part of space, and how often each body winds
-around that part.
+"""Cells of an arrangement: the sides of its sheets at the same part of space, and each body's winding number in the
+part.
 
-A sheet is a triangle that no other sheet crosses, whatever facets it is part of. Around an edge sheets are put in order
-by exact signs; neighbours in that order look into one cell. From a cell to the next the winding numbers change by what
-the sheet between them says, and one ray for each part that hangs together tells them absolutely
+A sheet is a triangle without crossing sheets, part of a facet or of several. Around an edge sheets are put in order
+by exact signs; neighbours in the order share a cell. From cell to neighbouring cell the winding numbers change by the
+steps of the sheet between them, and a ray for each connected part finds their absolute values
 (Q. Zhou, E. Grinspun, D. Zorin, A. Jacobson, "Mesh arrangements for solid geometry" (2016)).
 """
 
@@ -31,9 +31,9 @@ class Cells(NamedTuple):
 
 
 def merged_sheets(triangles: np.ndarray, facet: np.ndarray, body: np.ndarray, r: int) -> Sheets:
-    """Sheets of triangles that may coincide: one for each set of corners.   body : (k,) whose facets they are part of.
+    """Sheets of triangles that may coincide: a sheet for each set of corners.   body : (k,) of the triangles' facets.
 
-    The first of those that coincide gives the front.
+    The first of coinciding triangles gives the front.
     """
     if not len(triangles):
         return Sheets(triangles, facet, np.zeros((0, r), dtype=np.int8))
@@ -52,10 +52,10 @@ def _turns(triangles: np.ndarray) -> np.ndarray:
 
 
 def cells_of(sheets: Sheets, points: CutPoints, is_cut: np.ndarray, crossings: np.ndarray, ids: np.ndarray) -> Cells:
-    """The cells of sheets that close.
+    """The cells between closed sheets.
 
-    sheets : whole facets first.   is_cut : (F,) bool, which facets are not whole.
-    crossings : (k, 2) facets that cross clearly, and ids : (k, 2) the ends of what they share, along n_a × n_b.
+    sheets : whole facets first.   is_cut : (F,) bool, facets in several sheets.
+    crossings : (k, 2) clearly crossing facets, and ids : (k, 2) the ends of their common segment, along n_a × n_b.
     """
     facets = points.facets
     top = np.empty(len(is_cut), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Any function of r solids' memberships as one solid, all in one arrangement: `combine`."""
+"""Any function of r solids' memberships as a single solid, in a single arrangement: `combine`."""
 
 from __future__ import annotations
 
@@ -31,36 +31,37 @@ def combine(
     shapes: Sequence[Shape], poses, rule: str | MembershipRule, *, check_poses: bool = True, progress=None,
     time_limit: float | None = None, memory: int | None = None,
 ) -> BooleanResult:
-    """One solid of r posed solids, by any rule of which of them hold a point: all in one arrangement, decided exactly.
+    """A solid from r posed solids, by any rule on the set of solids holding a point; decided exactly.
 
-    Results of pairs are rounded, so that a chain of them is not the boolean of what was given; this is.
+    A chain of booleans of pairs rounds between its steps; `combine` works in a single arrangement of the bodies as
+    given.
 
     Parameters
     ----------
     shapes : r ≥ 1 solids with facets, as for `boolean`.
     poses : (r, 4, 4) in the world W [m].
-    rule : "union", "intersection", "parity" (held by an odd number), "at least k" with a number k; or a function of a
-        tuple of r bools, asked once for every combination that occurs: whether points belong that these bodies hold.
-        What no body holds must not belong.
-    check_poses : refuse matrices that are no rotation.
+    rule : "union", "intersection", "parity" (in an odd number of bodies), "at least k" with a number k; or a function
+        of a tuple of r bools, asked once for every occurring combination of bodies: whether points held by exactly
+        these belong to the result. Points outside all bodies must not belong.
+    check_poses : refuse matrices other than rotations.
     progress, time_limit, memory : as of `boolean`.
 
     Returns
     -------
-    BooleanResult; ``body`` has rows of ``shapes``. The order of the bodies changes no bit of the mesh: where surfaces
-    of several lie on one another, the facet is that of one of them whatever their order, and ``before`` and ``behind``
+    BooleanResult; ``body`` has rows of ``shapes``. The order of the bodies changes no bit of the mesh: of coinciding
+    surfaces the mesh has the facet of a single body, independent of their order, and ``before`` and ``behind``
     show all.
 
     Raises
     ------
-    InvalidArgument : no shapes, another number of poses; an unknown rule, one that raises, answers no bool or says that
-        the outside of all bodies belongs; a surface without an inside, by its place in ``shapes``.
+    InvalidArgument : no shapes, another number of poses; an unknown rule, a rule that raises, answers no bool or
+        includes the outside of all bodies; a surface without an inside, by its place in ``shapes``.
     InvalidPose, UnsupportedQuery : as `boolean`.
 
     Notes
     -----
     J. Erickson, "Local polyhedra and geometric graphs" (2005), theorem 6.1: the arrangement of r local polyhedra with n
-    facets each has O(r³ n log² n) vertices, and so much is there to be cut. docs/solids.md has the figures.
+    facets each has O(r³ n log² n) vertices, a bound of the number of cuts. docs/solids.md has the figures.
     """
     operands = _operands(shapes, poses, check_poses)
     asked = _rule(rule, len(operands))

@@ -1,4 +1,4 @@
-"""The obstacle that a translating body sees: all positions at which it would meet another, `configuration_obstacle`."""
+"""The obstacle to a translating body: all positions with a hit of another body, `configuration_obstacle`."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from collide.solids.translated_solids import TranslatedSolids
 
 
 class ConfigurationObstacle(NamedTuple):
-    """The positions x [m] at which A meets R B + x.
+    """The positions x [m] with a hit of A and R B + x.
 
-    mesh : the solid of them.
-    facets : (k, 2) int64, of every facet of the mesh a facet of A and one of B that touch at its positions: the one
-        that does, or one of those around the vertex or the edge that does.
-    moved : no vertex was moved farther by rounding it to doubles [m].
-    n_collapsed, n_thin : triangles and shells of which rounding left nothing; they are not in the mesh.
-    n_pieces, n_cells, n_asked : triangles of the convolution, cells of their arrangement, and those of which the bodies
-        themselves were asked.
+    mesh : the solid of these positions.
+    facets : (k, 2) int64, for every facet of the mesh a facet of A and a facet of B touching at its positions: the
+        touching facet, or a facet at the touching vertex or edge.
+    moved : the farthest a vertex was moved by rounding to doubles [m].
+    n_collapsed, n_thin : number of triangles and of shells left out of the mesh: rounding made them flat.
+    n_pieces, n_cells, n_asked : number of triangles of the convolution, of cells of their arrangement, and of cells
+        decided by asking the bodies at a point.
     """
 
     mesh: Mesh
@@ -64,40 +64,40 @@ class ExactObstacle(NamedTuple):
 def configuration_obstacle(
     A, B, R=None, *, check_poses: bool = True, progress=None, time_limit: float | None = None, memory: int | None = None
 ) -> ConfigurationObstacle | PlanarObstacle:
-    """All x at which A meets R B + x: the Minkowski sum of A and −R B as one solid, or polygon, decided exactly.
+    """All x with a hit of A and R B + x: the Minkowski sum of A and −R B as a solid or polygon, decided exactly.
 
-    A stands at the pose I; B's pose is (R, x). A body B that moves without turning is free of A just where the point x
+    A stands at the pose I; B's pose is (R, x). A translating body B is free of A exactly where the point x
     is outside.
 
     Parameters
     ----------
-    A, B : solids with facets, as for `boolean`, whose facets do not cross, two at every edge. In the plane lists of
-        rings (k, 2) [m]: outer ones counter-clockwise, holes clockwise, that touch nowhere.
-    R : (3, 3) rotation of B, (2, 2) in the plane; None for none.
-    check_poses : refuse matrices that are no rotation.
+    A, B : solids with facets, as for `boolean`, without crossing facets, two facets at every edge. In the plane lists
+        of rings (k, 2) [m]: outer rings counter-clockwise, holes clockwise, touching nowhere.
+    R : (3, 3) rotation of B, (2, 2) in the plane; ``None`` for the identity.
+    check_poses : refuse matrices other than rotations.
     progress, time_limit, memory : as of `boolean`.
 
     Returns
     -------
-    ConfigurationObstacle; PlanarObstacle in the plane. Which x belong is exact on the numbers given; vertices are
-    rounded once, by ``moved`` at most. It is a closed set: on its border the bodies touch. Positions that only touch,
+    ConfigurationObstacle; PlanarObstacle in the plane. The set of x is exact on the numbers given; vertices are
+    rounded once, by ``moved`` at most. The set is closed: on its border the bodies touch. Positions of mere touching,
     hemmed in on all sides, belong.
 
     Raises
     ------
-    InvalidArgument : a surface without an inside; facets that cross, edges of more than two facets and facets without
-        area, by number; rings that touch, cross or run the wrong way.
-    InvalidPose : R is no rotation.
-    UnsupportedQuery : curved shapes, unions and half-spaces, and a limit that is reached.
+    InvalidArgument : a surface without an inside; crossing facets, edges of more than two facets and facets without
+        area, by number; rings touching, crossing or in the wrong direction.
+    InvalidPose : R is not a rotation.
+    UnsupportedQuery : curved shapes, unions and half-spaces, and a limit reached.
 
     Notes
     -----
-    The border lies on sums of a facet and a vertex, and of two edges, whose normals agree (`convolution.py`), and an
-    exact arrangement of these has a winding number in each cell that is the Euler characteristic of A ∩ (R B + x):
-    where it is not 0, the bodies meet; where it is 0, they are asked themselves at a point of the cell. For N pieces
-    O(N log N + k) are looked at for k that meet; N is O(n²), a few n for solids that are nearly convex. J. Erickson,
-    "Local polyhedra and geometric graphs" (2005), theorems 7.1 and 7.2: Θ(n³) corners in the plane and Θ(n⁴) vertices
-    in space, up to logarithms, for local polygons and polyhedra. docs/configuration_obstacles.md has figures.
+    The border lies on sums of a facet and a vertex, and of two edges, whose normals agree (`convolution.py`). The
+    winding number of a cell in the exact arrangement of these pieces is the Euler characteristic of A ∩ (R B + x): not
+    0, the bodies meet; 0, the bodies are asked at a point of the cell. N pieces cost O(N log N + k) for k meeting
+    pairs; N is O(n²), a few n for nearly convex solids. J. Erickson, "Local polyhedra and geometric graphs" (2005),
+    theorems 7.1 and 7.2: Θ(n³) corners in the plane and Θ(n⁴) vertices in space, up to logarithms, for local polygons
+    and polyhedra. docs/configuration_obstacles.md has figures.
     """
     if isinstance(A, Shape) != isinstance(B, Shape):
         raise InvalidArgument(
@@ -188,7 +188,7 @@ def _checked_faces(name: str, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _as_facets(A: ExactSurface, B: ExactSurface, pieces: Pieces, grid: int) -> tuple[ExactFacets, np.ndarray]:
-    """(pieces with an area, those that cancel left out, as facets; of each the facets of A and B)."""
+    """(pieces with an area as facets, less pieces cancelled by opposite pieces; for each the facets of A and B)."""
     ids: dict[Point, int] = {}
     pairs, which = np.unique(pieces.corners.reshape(-1, 2), axis=0, return_inverse=True)
     of_pair = np.empty(len(pairs), dtype=np.int64)
@@ -203,7 +203,7 @@ def _as_facets(A: ExactSurface, B: ExactSurface, pieces: Pieces, grid: int) -> t
 
 
 def _left_over(faces: np.ndarray) -> np.ndarray:
-    """Rows of triangles that are left when those with the same corners and the other way round cancel."""
+    """Rows of the triangles left after equal triangles of opposite orientation cancel."""
     shifted = np.argmin(faces, axis=1)[:, None] + np.arange(3)
     turned = np.take_along_axis(faces, shifted % 3, axis=1)
     sense = np.where(turned[:, 1] < turned[:, 2], 1, -1)

@@ -1,14 +1,14 @@
 """The convolution of two closed surfaces: all facet + vertex, vertex + facet and edge + edge pieces, with signs.
 
-A piece is there where the outward normals of both features agree. Its sign is that of the features: an edge counts +1
-where it is convex and −1 where it is reflex, a vertex as often as its normals cover a direction. The pieces close, and
-around a point x that is on none of them they wind as often as the Euler characteristic of A ∩ (x − B) says
+A piece exists where the outward normals of both features agree. Its sign is the product of the features' signs: an edge
+counts +1 where convex and −1 where reflex, a vertex as often as its normals cover a direction. The pieces close, and
+their winding number around a point x off all pieces is the Euler characteristic of A ∩ (x − B)
 (P. Schapira, "Operations on constructible functions", 1991; in the plane L. Guibas, L. Ramshaw, J. Stolfi, "A kinetic
-framework for computational geometry", 1983). The border of A + B lies on them.
+framework for computational geometry", 1983). The border of A + B lies on the pieces.
 
-Normals that are perpendicular to edges, parallel facets and parallel edges are told apart as if B were sheared by an
-infinitely small ε: x → x + ε u (v · x). All signs are linear in ε, so none is left open where u is perpendicular to no
-normal and v to no edge. Places are those of B itself: only which pieces there are is decided so.
+Normals perpendicular to edges, parallel facets and parallel edges are told apart as if B were sheared by an
+infinitely small ε: x → x + ε u (v · x). All signs are linear in ε, so every sign is decided where u is perpendicular to
+no normal and v to no edge. The shear decides the existence of pieces alone: their places are places of B as given.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ _ERROR = 2.0**-48
 
 
 class ExactSurface(NamedTuple):
-    """A closed surface in integers: every edge has two facets, which run along it in opposite ways.
+    """A closed surface in integers: every edge has two facets, running along the edge in opposite ways.
 
-    points : by id.   faces : (F, 3) ids.   normals : (v1 − v0) × (v2 − v0) of every facet, none zero.
-    edges : (E, 2) ids.   sides : (E, 2) the facet that runs along the edge, the one that runs back.
-    bend : (E,) 1 where the surface is convex, −1 where it is reflex (0 where it is flat).
+    points : by id.   faces : (F, 3) ids.   normals : (v1 − v0) × (v2 − v0) of every facet, never zero.
+    edges : (E, 2) ids.   sides : (E, 2) the facet running along the edge, then the facet running back.
+    bend : (E,) 1 for a convex edge, −1 for a reflex edge, 0 for a flat edge.
     """
 
     points: list[Point]
@@ -46,10 +46,10 @@ class ExactSurface(NamedTuple):
 
 
 class Pieces(NamedTuple):
-    """Triangles of sums of points, so often as they count, turned where they count negatively.
+    """Triangles of sums of points, each repeated as often as counted, turned where counted negatively.
 
-    corners : (k, 3, 2) of every corner the vertex of A and that of B.   facets : (k, 2) a facet of A and one of B that
-    meet there: the one the piece is of, or one of those around the vertex or edge.
+    corners : (k, 3, 2) for every corner the vertex of A and the vertex of B.   facets : (k, 2) a facet of A and a facet
+    of B touching at the piece: the piece's own facet, or a facet at its vertex or edge.
     """
 
     corners: np.ndarray
@@ -108,7 +108,7 @@ def convolution(A: ExactSurface, B: ExactSurface) -> Pieces:
 
 
 def _generic(vectors: list[Point], seed: int) -> Point:
-    """A small vector that is perpendicular to none of these."""
+    """A small vector perpendicular to no vector of the list."""
     random = np.random.default_rng(seed)
     while True:
         x, y, z = random.integers(-1 << 20, 1 << 20, 3).tolist()
@@ -140,9 +140,10 @@ def _crossings(n1, n2, m1, m2, bend_e, bend_g) -> np.ndarray:
 def _vertex_counts(
     normals: list[Point], Q: ExactSurface, along: list[Point], of_edges: np.ndarray, shear: _Shear
 ) -> np.ndarray:
-    """(n, vertices) how often the normals at each vertex of Q cover each of the given ones.
+    """(n, vertices) how often the normals at each vertex of Q cover each of the given normals.
 
-    From one direction it is followed to the others: it changes where arcs of normals of edges are crossed.
+    The counts are found at a single direction and followed to the others: a count changes at crossings with arcs of
+    normals of edges.
     """
     start = _generic(along, 2)
     further = _generic(along, 3)
@@ -189,7 +190,7 @@ def _rings(Q: ExactSurface) -> np.ndarray:
 
 
 def _changes(Q: ExactSurface, along: list[Point], n: Point) -> np.ndarray:
-    """(vertices,) half as often as around a vertex the edges change from one side of it, along n, to the other."""
+    """(vertices,) half the number of sign changes, along n, of the edges in their order around a vertex."""
     height = np.empty(len(Q.points), dtype=object)
     height[:] = [inner(n, p) for p in Q.points]
     out = np.zeros(len(Q.points), dtype=np.int64)

@@ -1,8 +1,8 @@
-"""Pairs of facets that clearly cross: which edge of one pierces the other at either end of the segment they share.
+"""Pairs of clearly crossing facets: for either end of their common segment, the piercing edge and the pierced facet.
 
-Doubles prove it (`narrowphase/facets/facet_crossings.py`). What such a pair shares ends inside an edge and
-inside a facet on both sides, so that the edge and the facet are the point's name: two pairs have an end in common
-exactly where these are the same. All other pairs are left to `facet_cuts.py`.
+Doubles prove the crossing (`narrowphase/facets/facet_crossings.py`). Both ends of the common segment lie inside an edge
+and inside a facet, so edge and facet name the point: two pairs have a common end exactly if edge and facet are
+the same. All other pairs are left to `facet_cuts.py`.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from collide.solids.placed_facets import PlacedFacets
 
 
 class CrossingPairs(NamedTuple):
-    """The segments that k pairs (a, b) of facets share, from their lower end along n_a × n_b to their higher.
+    """The common segments of k pairs (a, b) of facets, from their lower end along n_a × n_b to their higher.
 
-    pairs : (k, 2) rows of facets.   edge : (k, 2) of either end, the edge that pierces.   facet : (k, 2) the facet.
+    pairs : (k, 2) rows of facets.   edge : (k, 2) of either end, the piercing edge.   facet : (k, 2) the pierced facet.
     place : (k, 2, 3) the ends in W [m], off by ``error`` (k,) at most.
     """
 
@@ -30,7 +30,7 @@ class CrossingPairs(NamedTuple):
 
 
 def crossing_pairs(facets: PlacedFacets, pairs: np.ndarray) -> tuple[CrossingPairs, np.ndarray]:
-    """(the pairs that clearly cross, which of the given they are (k,) bool)."""
+    """(the clearly crossing pairs, (k,) bool: given pairs among them)."""
     a, b = pairs.T
     corners = facets.local[facets.corners[a]], facets.local[facets.corners[b]]
     crossings = facet_crossings(*corners, facets.poses[facets.body[a]], facets.poses[facets.body[b]])

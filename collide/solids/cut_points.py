@@ -62,7 +62,7 @@ class CutPoints:
         return self.pierced[row].tolist() if 0 <= row < len(self.pierced) else []
 
     def place_of(self, point: int) -> int:
-        """The id of the place of such a point: where others work it out again, it is found by its coordinates."""
+        """The id of the place of a cut point; later points with the same coordinates get the same id."""
         self._exact[point] = reduced(*self.exact(point))
         return self._ids.setdefault(self._exact[point], point)
 
@@ -90,7 +90,7 @@ class CutPoints:
         return self._exact[point]
 
     def load(self, some: Iterable[int]) -> None:
-        """The vertices behind points, worked out all at once: quicker than one by one."""
+        """Work out the vertices behind points, all at once: quicker than each alone."""
         ids = np.array(list(some), dtype=np.int64)
         rows = ids[(ids >= self.n_vertices) & (ids < self.n_vertices + len(self.pierced))] - self.n_vertices
         vertices = [ids[ids < self.n_vertices], self.pierced[rows, :2].ravel()]

@@ -1,7 +1,7 @@
-"""Facets whose corners are exact points, which no doubles need be, and their arrangement.
+"""Facets whose corners are exact rational points, and their arrangement.
 
-As `placed_facets.py` and `arrangement.py` for posed meshes; all facets are of one body here, are cut exactly, and may
-lie on one another.
+As `placed_facets.py` and `arrangement.py` for posed meshes; all facets are of a single body here, are cut exactly, and
+may coincide.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def close_pairs(facets: ExactFacets) -> np.ndarray:
 
 
 def _apart(A: np.ndarray, B: np.ndarray, slack: float) -> np.ndarray:
-    """(k,) bool: all corners of one clearly on one side of the other's plane."""
+    """(k,) bool: all corners of A's triangle clearly on a side of the plane of B's."""
     error = np.full(len(A), slack)
     apart = np.zeros(len(A), dtype=bool)
     with np.errstate(all="ignore"):

@@ -1,8 +1,8 @@
-"""Where facets are cut: for every facet that meets others, the segments that they draw on it, ends and crossings exact.
+"""Cuts of facets: for every facet that meets others, the common segments, with ends and crossings exact.
 
-What two facets share (a point, a segment, a polygon of one plane) is worked out once and drawn on both. Then segments
-of one facet are split where they cross and where points of others lie on them, until nothing changes: a segment that
-several facets have is split in all of them alike, so that neighbours keep fitting together.
+The common piece of two facets (a point, a segment, a polygon of a plane) is worked out once and drawn on both. Then
+segments of a facet are split at their crossings and at points of others within, until nothing changes: a segment of
+several facets is split in all of them alike, so that neighbours keep fitting together.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ Segment = tuple[int, int]
 
 
 class FacetCuts:
-    """The segments of facets that are cut.
+    """The segments of cut facets.
 
-    pairs : (k, 2) rows of facets that meet, each once; neighbours that share no more than corners and edges are none.
-    crossings : (k, 2) pairs that are known to cross clearly, and ids : (k, 2) of the ends of what they share.
-    rows : facets to cut; of pairs both, of crossings one at least.
+    pairs : (k, 2) rows of meeting facets, each pair once, without neighbours that share corners and edges alone.
+    crossings : (k, 2) clearly crossing pairs, and ids : (k, 2) of the ends of their common segments.
+    rows : facets to cut; of pairs both, of crossings at least a facet.
     corners_of : ids of a facet's corners.   sides_of : the three segments of its border.
-    segments_of, points_of : those on a facet, its border among them.   splits : points within a segment.
+    segments_of, points_of : segments and points on a facet, its border among them.   splits : points within a segment.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class FacetCuts:
         self._changed.add(f)
 
     def _split(self, s: Segment, point: int) -> None:
-        """The point lies within the segment: all facets that have it are to know."""
+        """Split a segment at a point; all facets with the segment are noted as changed."""
         if point not in self.splits[s]:
             self.splits[s].add(point)
             for f in self._facets_of[s]:
@@ -86,7 +86,7 @@ class FacetCuts:
         self._put_piece(f, g, [self.points.add(p) for p in piece])
 
     def _put_piece(self, f: int, g: int, ids: list[int]) -> None:
-        """A point, the ends of a segment or the corners of a polygon, on those of two facets that are to be cut."""
+        """Draw a point, the ends of a segment or the corners of a polygon on the facets to be cut among f and g."""
         ring = list(zip(ids, [*ids[1:], ids[0]])) if len(ids) > 2 else [(ids[0], ids[1])] if len(ids) == 2 else []
         segments = [segment(p, q) for p, q in ring]
         self._meets[f].add(g)
@@ -101,7 +101,7 @@ class FacetCuts:
                 self._put_segment(a, s)
 
     def _cross_segments(self, f: int) -> None:
-        """Where segments cross that are drawn by facets which meet each other: others share ends at most."""
+        """Split crossing segments drawn by facets that meet each other: any other segments share ends at most."""
         pieces = self._pieces[f]
         _, u, v = axis_of(self.facets.normal(f))
         for g, drawn in pieces.items():
@@ -122,7 +122,7 @@ class FacetCuts:
         self._split(t, point)
 
     def _crossing(self, s: Segment, t: Segment, u: int, v: int) -> Rational:
-        """The point at which two segments of a plane cross, which are not parallel."""
+        """The crossing of two segments of a plane, not parallel."""
         a, b, c, d = (self.points.exact(p) for p in (*s, *t))
         line = _line(c, d, u, v)
         at_a, at_b = (line[0] * p[u] + line[1] * p[v] + line[2] * p[3] for p in (a, b))
@@ -131,7 +131,7 @@ class FacetCuts:
         return reduced(x, y, z, w)
 
     def _split_segments(self, f: int) -> None:
-        """Segments of a facet at the points of it that lie within them."""
+        """Split a facet's segments at the facet's points within them."""
         _, u, v = axis_of(self.facets.normal(f))
         for s, p in self._candidates(f, u, v):
             if self._lies_within(p, s, u, v):

@@ -1,4 +1,4 @@
-"""Which facets of a mesh share which edge, worked out once and kept with it."""
+"""Common edges of facets of a mesh, worked out once and kept with the mesh."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from collide.shapes.shape import kept_with_shape
 
 
 class FacetEdges(NamedTuple):
-    """Edges of the facets of a mesh that have an area, numbered among themselves.
+    """Edges of the facets with an area of a mesh, numbered among themselves.
 
-    rows : (n,) which facets of the mesh these are.   place : their numbers here, −1 for facets without area.
+    rows : (n,) numbers in the mesh of facets with an area.   place : their numbers here, −1 for facets without area.
     corners : (n, 3) int64 welded vertex ids.   edge : (n, 3) the edge from corner k to corner k + 1.
-    sides : (e, 2) the facets at an edge where there are two, else −1.
-    links : (2, m) int32 the same of edges with two.
+    sides : (e, 2) the facets at an edge of two, else −1.
+    links : (2, m) int32 the facets at edges of two.
     odd : half-edges 3 · facet + corner of all other edges.
     lowest_bit : exponent of the lowest bit set in any coordinate.
     """

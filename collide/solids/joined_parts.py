@@ -9,9 +9,10 @@ from collide.mesh.union_find import find, union
 
 
 def uncut_parts(links: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """(n,) int32: the least facet of each part into which whole facets fall, joined along edges of two; −1 for others.
+    """(n,) int32: for each whole facet the least facet of its part, whole facets joined along edges of two; −1 for
+    others.
 
-    links : (2, m) int32, the facets on both sides of each such edge.   whole : (n,) bool. O(n), nearly.
+    links : (2, m) int32, the facets on both sides of each edge of two.   whole : (n,) bool. O(n), nearly.
     """
     return _joined(whole, *links)
 
@@ -31,7 +32,7 @@ def _joined(wanted: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @entry("void(int64, int64, int64, int64, int64, int64)")
 def join_pairs(wanted_at, root_at, n, a_at, b_at, k):
-    """root : out, of n wanted numbers the least that pairs a – b join them with; −1 for those not wanted."""
+    """root : out, for each of n wanted numbers the least number joined by pairs a – b; −1 for unwanted numbers."""
     wanted = view_u8(wanted_at, n)
     root = view_i32(root_at, n)
     a = view_i32(a_at, k)

@@ -1,7 +1,7 @@
 """Limits of long work on solids: memory, time, and progress told on the way.
 
-Nothing is written to files and no thread is started, so that what stops half-way, by a limit, an interrupt or an error
-raised in `progress`, leaves nothing behind: what shapes keep is put there whole or not at all.
+Nothing is written to files and no thread is started, so that work stopped half-way, by a limit, an interrupt or an
+error raised in `progress`, leaves nothing behind: shapes keep finished results alone.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ _Item = TypeVar("_Item")
 
 
 class Limits:
-    """What a piece of work may take.   with Limits(…) as limits: …
+    """Limits of a piece of work.   with Limits(…) as limits: …
 
     caller : the function's name, for messages.
-    progress : called with a label, gives a context manager that gives a function to change the label; None for none.
-    time_limit : seconds, None for no limit.   memory : bytes, None for no limit.
+    progress : called with a label, returns a context manager of a function that changes the label; or ``None``.
+    time_limit : seconds, ``None`` for no limit.   memory : bytes, ``None`` for no limit.
     """
 
     def __init__(self, caller: str, progress=None, time_limit: float | None = None, memory: int | None = None):
@@ -58,7 +58,7 @@ class Limits:
             self._rename(f"{self.caller}: {label}")
 
     def watched(self, label: str, items: Collection[_Item]) -> Iterator[_Item]:
-        """The items one by one, the time and the share of them that is done watched."""
+        """The items in order; between items the time limit is checked and the share done is reported."""
         self.stage(label)
         began = time.monotonic()
         for done, item in enumerate(items):

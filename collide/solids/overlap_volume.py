@@ -14,14 +14,15 @@ from collide.solids.triangle_sums import areas, enclosed, mean_point
 
 
 class OverlapVolume(NamedTuple):
-    """What two solids have in common.
+    """The overlap of two solids.
 
-    volume, lower, upper : of the points inside both [m³], lower ≤ truth ≤ upper proven; all 0 where there are none.
-    centroid : (3,) of the overlap in W [m]; of the patch where the volume is 0; zeros where there is neither.
-    area_a, area_b : of A's surface inside B, and of B's inside A [m²].
-    patch_area : of where the surfaces lie on one another and face each other, as a box on a table [m²].
-    flush_area : of where they lie on one another and face the same way [m²].
-    n_meeting, n_cut : pairs of facets that meet, and facets that were cut.
+    volume, lower, upper : of the points inside both [m³], lower ≤ truth ≤ upper proven; all 0 without common inner
+        points.
+    centroid : (3,) of the overlap in W [m]; of the patch where the volume is 0; zeros without either.
+    area_a, area_b : area of A's surface inside B, and of B's inside A [m²].
+    patch_area : area of coinciding surfaces facing each other, as of a box on a table [m²].
+    flush_area : area of coinciding surfaces facing the same way [m²].
+    n_meeting, n_cut : number of meeting pairs of facets, and of cut facets.
     """
 
     volume: float
@@ -40,18 +41,18 @@ def overlap_volume(
     A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True, progress=None, time_limit: float | None = None,
     memory: int | None = None,
 ) -> OverlapVolume:
-    """Volume, centroid and surfaces of the overlap of two posed solids; no mesh is made of it.
+    """Volume, centroid and surfaces of the overlap of two posed solids; no mesh is made.
 
     Parameters
     ----------
     A, B : solids with facets, as for `boolean`.
     X_WA, X_WB : (4, 4) poses in the world W [m].
-    check_poses : refuse matrices that are no rotation.
+    check_poses : refuse matrices other than rotations.
     progress, time_limit, memory : as of `boolean`.
 
     Returns
     -------
-    OverlapVolume. Whether the volume is 0 is exact, and so is where surfaces lie on one another: a box that stands on
+    OverlapVolume. Whether the volume is 0 is exact, and so is the coincidence of surfaces: a box on top of
     another has volume 0 and a patch. Brackets are some 1e-12 of the volume wide, at most 2⁻³²: where doubles leave more
     open, as for the thinnest overlaps, volumes are added up in integers. Areas and centroids are rounded.
 
@@ -61,7 +62,7 @@ def overlap_volume(
 
     Notes
     -----
-    The cells are those of `boolean`, and so is what it costs but for the mesh.
+    The cells are the cells of `boolean`, at the same cost less the mesh.
     """
     operands = [
         solid_operand("overlap_volume", name, shape, X, check_poses)

@@ -1,7 +1,7 @@
-"""The facets of r posed solids, all in one world: numbers for vertices and facets, and exact coordinates on demand.
+"""The facets of r posed solids, all in the world: numbers for vertices and facets, and exact coordinates on demand.
 
-A vertex R v + t is a whole number times a power of two in every coordinate. All bodies share one such power, the grid,
-and one origin on it near the bodies, so that the integers are as short as they can be.
+Every coordinate of a vertex R v + t is an integer times a power of two. All bodies share a single power, the grid,
+and an origin on the grid near the bodies, for the shortest integers.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ class Operand(NamedTuple):
 
 
 class PlacedFacets:
-    """Facets of r bodies; those without area are left out, their corners kept as points of the edges they lie on.
+    """Facets of r bodies; facets without area are left out, their corners kept as points of the edges they lie on.
 
-    corners : (F, 3) int64 vertex ids, counter-clockwise from outside; equal vertices of a body have one id.
+    corners : (F, 3) int64 vertex ids, counter-clockwise from outside; equal vertices of a body have the same id.
     edge : (F, 3) the edges from corner k to corner k + 1.
-    body, number : (F,) int64: whose facet, and its row in that body's faces.
+    body, number : (F,) int64: the body of a facet, and the facet's row in the body's faces.
     local : (V, 3) vertices in the frames of their bodies.   body_of : (V,) int64.
-    first_facet, first_vertex, first_edge : (r + 1,) where each body's begin.   poses : (r, 4, 4).
+    first_facet, first_vertex, first_edge : (r + 1,) the first of each body.   poses : (r, 4, 4).
     grid : exponent of the unit of exact coordinates.   origin : their origin in that unit.
-    thin : ids (k, 3) of facets whose corners are distinct and lie on one line.
+    thin : ids (k, 3) of facets with distinct collinear corners.
     """
 
     def __init__(self, operands: list[Operand]):
@@ -97,7 +97,7 @@ class PlacedFacets:
         return np.where(place >= 0, place + self.first_facet[body], -1)
 
     def load(self, vertices: Iterable[int]) -> None:
-        """Work out the exact coordinates of vertices, all at once: quicker than one by one."""
+        """Work out the exact coordinates of vertices, all at once: quicker than each alone."""
         missing = np.array([v for v in vertices if v not in self._exact], dtype=np.int64)
         for k, operand in enumerate(self.operands):
             ids = missing[self.body_of[missing] == k] if len(missing) else missing

@@ -1,8 +1,9 @@
-"""The obstacle that a translating polygon sees: configuration obstacles in the plane, exactly.
+"""The obstacle to a translating polygon: configuration obstacles in the plane, exactly.
 
 As in space (`configuration_obstacle.py`): all sums of an edge and a vertex whose normals agree, with signs, are closed
-chains that wind around x as often as the Euler characteristic of A ∩ (R B + x) says (L. Guibas, L. Ramshaw, J. Stolfi,
-"A kinetic framework for computational geometry", 1983). Without holes that is the number of parts of the overlap.
+chains whose winding number around x is the Euler characteristic of A ∩ (R B + x) (L. Guibas, L. Ramshaw, J. Stolfi,
+"A kinetic framework for computational geometry", 1983). Without holes the characteristic is the number of parts of the
+overlap.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ from collide.solids.plane_arrangement import PlaneArrangement, PlanePoint, Vecto
 
 
 class PlanarObstacle(NamedTuple):
-    """The positions x [m] at which the polygon A meets R B + x.
+    """The positions x [m] with a hit of the polygons A and R B + x.
 
-    rings : the borders, (k, 2) each: outer ones counter-clockwise, holes clockwise; corners that are none are left out.
-    moved : no corner was moved farther by rounding it to doubles [m].
-    n_pieces, n_corners, n_faces, n_asked : edges of the convolution, points of their arrangement, its faces, and those
-        of which the polygons themselves were asked.
+    rings : the borders, (k, 2) each: outer rings counter-clockwise, holes clockwise; straight corners are left out.
+    moved : the farthest a corner was moved by rounding to doubles [m].
+    n_pieces, n_corners, n_faces, n_asked : edges of the convolution, points of their arrangement, its faces, and the
+        faces decided by asking the polygons at a point.
     """
 
     rings: list[np.ndarray]
@@ -51,7 +52,7 @@ class ExactPolygon(NamedTuple):
     n_rings: int
 
     def along(self) -> list[Vector]:
-        """Of every point the way to the one after it."""
+        """For every point the vector to the next point."""
         return [(self.points[j][0] - x, self.points[j][1] - y) for (x, y), j in zip(self.points, self.after)]
 
 
@@ -66,7 +67,7 @@ class ExactPlanarObstacle(NamedTuple):
 
 
 def planar_obstacle(A, B, R, limits: Limits, check: bool = True) -> PlanarObstacle:
-    """As `configuration_obstacle`, which calls it, for polygons: lists of rings (k, 2)."""
+    """`configuration_obstacle` for polygons, lists of rings (k, 2)."""
     exact = exact_planar_obstacle(A, B, R, limits, check)
     arrangement, unit = exact.arrangement, exact.grid
     rings = []
@@ -109,7 +110,8 @@ def exact_planar_obstacle(A, B, R, limits: Limits = UNLIMITED, check: bool = Tru
 
 
 def border_rings(arrangement: PlaneArrangement, keep: np.ndarray) -> list[list[int]]:
-    """Points around what belongs, which lies on the left; rings that touch in a point are parted there."""
+    """Points around the faces to keep, on the left of the rings; rings touching in a point are separated at the
+    point."""
     inside = keep[arrangement.face]
     border = inside & ~inside[np.arange(len(inside)) ^ 1]
     onward = arrangement.onward
@@ -193,10 +195,11 @@ def _turn_signs(e: list[Vector], g: list[Vector]) -> np.ndarray:
 
 
 def _corner_counts(B: ExactPolygon, along: list[Vector], after_into: np.ndarray, before_out: np.ndarray) -> np.ndarray:
-    """(edges, corners of B) int8: 1 where an edge's direction is between those at a convex corner, −1 at a reflex one.
+    """(edges, corners of B) int8: 1 where an edge's direction is between the edges at a convex corner, −1 at a reflex
+    corner.
 
     after_into : signs of (the edge into each corner) × (each direction).
-    before_out : of (each direction) × (the edge out of it).
+    before_out : of (each direction) × (the edge out of each corner).
     """
     bend = np.array([_sign(along[i], along[k]) for k, i in enumerate(B.before)], dtype=np.int8)
     between = (after_into == bend) & (before_out == bend)
@@ -278,7 +281,7 @@ def _segments_meet(a: Vector, b: Vector, c: Vector, d: Vector) -> bool:
 
 
 def _holds(points: list[Vector], after: list[int], v: Vector) -> bool:
-    """Whether rings wind around a point that is on none of them."""
+    """Whether rings wind around a point off all of them."""
     total = 0
     for (x, y), j in zip(points, after):
         u, w = points[j]

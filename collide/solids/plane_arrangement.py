@@ -29,11 +29,11 @@ _CHUNK = 1 << 21
 class PlaneArrangement:
     """The faces between closed chains of directed segments.
 
-    points : exact points by id, the given ones first.   near : the same, rounded (n, 2).
-    edges : (e, 2) ids of pieces of segments, each once, none crossed by another.   counts : (e,) how many segments run
-    along it, less those that run back, never 0.   along : of every edge the direction of its segment, in integers.
+    points : exact points by id, the given points first.   near : the same, rounded (n, 2).
+    edges : (e, 2) ids of pieces of segments, each once, without crossings.   counts : (e,) number of segments
+    along the piece, less segments back, never 0.   along : of every edge the direction of its segment, in integers.
     face : (2 e,) the face on the left of half-edges: 2 k runs along edge k, 2 k + 1 back.   onward : (2 e,) the
-    half-edge after it around its face.   winding : (faces,) int64. A face with holes has a number for each ring of its
+    next half-edge around the face.   winding : (faces,) int64. A face with holes has a number for each ring of its
     border.
     """
 
@@ -61,7 +61,7 @@ class PlaneArrangement:
     # --- crossings --------------------------------------------------------------------------------------------------
 
     def _close_pairs(self):
-        """Pairs of segments that cross, or may touch or lie on one another."""
+        """Pairs of segments that cross, or may touch or overlap."""
         ends = np.array(self._near)[self.segments]
         for a, b in _box_pairs(ends.min(axis=1), ends.max(axis=1)):
             first, second = ends[a], ends[b]
@@ -157,7 +157,7 @@ class PlaneArrangement:
         return (x, y) if h % 2 == 0 else (-x, -y)
 
     def _around(self, some: list[int]) -> list[int]:
-        """Half-edges from a point counter-clockwise, from those that point down, which is no direction, on."""
+        """Half-edges from a point in counter-clockwise order of direction, the first after straight down."""
         vectors = {h: self.direction(h) for h in some}
         half = {h: 0 if x > 0 or (x == 0 and y > 0) else 1 for h, (x, y) in vectors.items()}
 
@@ -204,7 +204,7 @@ class PlaneArrangement:
                         raise CollideError("the segments of an arrangement do not close; please report it")
 
     def winding_at(self, p: PlanePoint, some: np.ndarray) -> int:
-        """How often edges, (e,) bool which, wind around a point that is on none of them."""
+        """The winding number of edges, (e,) bool which, around a point off all edges."""
         y = p[1] / p[2]
         low, high = (self.near[self.edges[:, k], 1] for k in range(2))
         rows = np.flatnonzero(some & (np.minimum(low, high) <= y) & (np.maximum(low, high) >= y))
@@ -270,7 +270,7 @@ def _box_pairs(low: np.ndarray, high: np.ndarray):
 
 
 def _sides(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """(k,) clear signs of the orientations of points (k, 2) that are off by a rounding, 0 where none is proven."""
+    """(k,) clear signs of the orientations of rounded points (k, 2), 0 where rounding leaves the sign open."""
     d, e = q - p, r - p
     value = d[:, 0] * e[:, 1] - d[:, 1] * e[:, 0]
     size = np.maximum(np.abs(d).max(axis=1), np.abs(e).max(axis=1))

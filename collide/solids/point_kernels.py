@@ -1,5 +1,5 @@
-"""Vertices under poses, and points in which edges go through facets, as the nearest doubles: in double-doubles, with a
-bound of their error that proves most of them.
+"""Vertices under poses, and piercing points of edges in facets, as the nearest doubles: in double-doubles, with an
+error bound that proves most of them.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def _is_empty(seen, m, i, j, k, limit):
 
 @kernel
 def _best_ear(seen, m, limit):
-    """The roundest ear that is proven to be one, −1 where none is."""
+    """The roundest proven ear, −1 without a proven ear."""
     best, roundest = -1, 0.0
     for j in range(m):
         i = (j + m - 1) % m
@@ -83,7 +83,7 @@ def _best_ear(seen, m, limit):
 
 @kernel
 def _clip(ids, m, seen, error, triangles, count):
-    """Triangles of a polygon; the number of those there are then, −1 where an ear is not proven."""
+    """Append the triangles of a polygon; returns the number of triangles after, −1 where an ear is not proven."""
     size = 0.0
     for k in range(m):
         size = max(size, abs(seen[2 * k] - seen[0]), abs(seen[2 * k + 1] - seen[1]))
@@ -108,7 +108,7 @@ def _clip(ids, m, seen, error, triangles, count):
 
 @kernel
 def _walk_around(following, points, rows, seen_step, head, ids):
-    """The corners of the part around which a step leads; how many, 0 where the way does not close as it should."""
+    """The corners of the part from a step on; returns their number, 0 where the walk around the part does not close."""
     m = 0
     step = head
     while True:
@@ -130,9 +130,9 @@ def clip_parts(
     poses_at, n_bodies, local_at, n_vertices, corners_at, body_at, n_facets, place_at, error_at, n_points, following_at,
     points_at, rows_at, n, n_border, seen_at, failed_at, triangles_at, owners_at, workspace_at,
 ):
-    """How many triangles were made, those of facets that fail among them.
+    """The number of triangles made, triangles of failed facets included.
 
-    poses, local, corners, body : of `PlacedFacets`.   place, error : of the points that are no vertices, in W.
+    poses, local, corners, body : of `PlacedFacets`.   place, error : of points other than vertices, in W.
     following : (n,) from each step the next around the same part; the first ``n_border`` are along borders.
     points, rows : (n,) where a step starts, and its facet.   seen : (n,) uint8, 0 at first.
     failed : (F,) uint8, set for facets with a ring of cuts, too many corners or no proven ear.

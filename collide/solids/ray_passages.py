@@ -1,7 +1,7 @@
-"""How often rays along an axis leave a body: facets that they pass from behind, less those that they enter by.
+"""How often rays along an axis leave a body: facets passed from behind, less facets entered from the front.
 
-Boxes of the body's tree lead to the facets beside a ray. Doubles with a bound of their error count those that are
-clearly passed; the others are listed, and left to integers.
+Boxes of the body's tree lead to the facets beside a ray. Doubles with a bound of their error count clearly
+passed facets; the others are listed, and left to integers.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ _OPEN = 2
 def count_passages(
     tree: MeshTree, X: np.ndarray, points: np.ndarray, axes: np.ndarray, slack: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """((k,) int64 passages that are proven, (m, 2) rays and facets that are left open).
+    """((k,) int64 proven passages, (m, 2) rays and facets left open).
 
-    X : (4, 4), the body's pose.   points : (k, 3) in W, where rays begin.
-    axes : (k,) int64, 0, 1 or 2: along which they run, upwards.
+    X : (4, 4), the body's pose.   points : (k, 3) in W, origins of the rays.
+    axes : (k,) int64, 0, 1 or 2: the rays' axis, upwards.
     slack : bound of the errors of coordinates in W, of points and of vertices worked out in doubles, and of their
     differences. O(log n) a ray for well-shaped bodies.
     """
@@ -71,9 +71,9 @@ def _box_is_beside(tree, ref, unit, X, points, k, axis, slack):
 
 @kernel
 def _passage(T, at, X, points, k, axis, slack):
-    """1 where the ray leaves through a triangle, −1 where it enters, 0 where it passes by; _OPEN where that is unclear.
+    """1 where the ray leaves through a triangle, −1 where the ray enters, 0 where the ray misses; _OPEN where unclear.
 
-    Relative coordinates below D across the axis, off by ε each, make determinants s that are off by 4Dε + 2ε² and by
+    Relative coordinates below D across the axis, off by ε each, make determinants s off by 4Dε + 2ε² and by
     their rounding, less than Dε / 4; heights z below Z make Σ s z off by 3 (2D²ε + (Z + ε) limit), and
     by less for rounding.
     """
@@ -112,7 +112,9 @@ def _passage(T, at, X, points, k, axis, slack):
 def pass_facets(
     header_at, X_at, points_at, axes_at, n, slack, totals_at, left_at, capacity, stack_at, n_stack
 ):
-    """How many pairs of rays and facets are left open; of those that fit, ray and facet.   totals : out, per ray."""
+    """Returns the number of open pairs of rays and facets; ray and facet are written of the pairs within the capacity.
+    totals : out, per ray.
+    """
     tree = open_tree(header_at)
     X = view_f64(X_at, 16)
     points = view_f64(points_at, 3 * n)

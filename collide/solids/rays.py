@@ -15,9 +15,9 @@ _MAX_TRIES = 64
 
 
 def shoot(sheets: Sheets, points: CutPoints, rows: np.ndarray, sides: np.ndarray) -> list[tuple[int, np.ndarray]]:
-    """Of every sheet of rows (k,) the cell on one side, and how often each body winds around it, (r,) int64.
+    """For every sheet of rows (k,) the cell on a side, and each body's winding number in the cell, (r,) int64.
 
-    sides : (k, 2) the cells before and behind each.
+    sides : (k, 2) the cells before and behind each sheet.
     """
     facets = points.facets
     points.load(np.unique(sheets.triangles[rows]).tolist())
@@ -73,7 +73,7 @@ def _windings(facets: PlacedFacets, starts: list[Rational], axes: np.ndarray) ->
 
 
 def _passage(facets: PlacedFacets, f: int, p: Rational, axis: int) -> int | None:
-    """1 where a ray leaves through a facet, −1 where it enters, 0 where it does not pass; None along an edge."""
+    """1 where a ray leaves through a facet, −1 where the ray enters, 0 where the ray misses; ``None`` along an edge."""
     u, v = (axis + 1) % 3, (axis + 2) % 3
     c = facets.exact_corners(f)
     n = facets.normal(f)

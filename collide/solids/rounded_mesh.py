@@ -14,11 +14,11 @@ from collide.solids.rounded_points import rounded_points
 
 
 class RoundedMesh(NamedTuple):
-    """What is there after rounding.
+    """A triangulated surface after rounding to doubles.
 
-    mesh : a solid, None where nothing remains.   rows : (k,) which of the triangles its facets are.
-    moved : no vertex was moved farther by rounding [m].
-    n_collapsed : triangles, and n_thin shells, that rounding left without an inside: they are not in the mesh.
+    mesh : a solid, ``None`` where nothing remains.   rows : (k,) numbers of its facets among the triangles.
+    moved : the farthest a vertex was moved by rounding [m].
+    n_collapsed, n_thin : triangles, and shells, left out of the mesh: rounding made them flat.
     """
 
     mesh: Mesh | None

@@ -11,7 +11,7 @@ from collide.solids.point_kernels import round_piercings, round_vertices
 
 
 def rounded_points(points: CutPoints, ids: np.ndarray) -> tuple[np.ndarray, float]:
-    """((k, 3) points in W, each rounded once, farther than which none was moved)."""
+    """((k, 3) points in W, each rounded once, the farthest a point was moved [m])."""
     facets = points.facets
     places, off, proven = np.empty((len(ids), 3)), np.zeros(len(ids)), np.zeros(len(ids), dtype=bool)
     is_vertex = ids < points.n_vertices

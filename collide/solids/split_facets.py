@@ -1,8 +1,8 @@
-"""Facets that paths of clear crossings cut, split all at once: around every part, then into triangles.
+"""Facets cut by paths of clear crossings, split all at once: around every part, then into triangles.
 
-On such a facet a path enters through its border, turns where edges of others pierce it, and leaves through the border.
-No angle has to be compared: at a point of the border the way around a part turns inwards, at a point inside it goes on
-along the path. Facets of which doubles prove less are left to the exact sweep, among them those with a ring of cuts.
+A path enters a facet through its border, turns where edges of others pierce the facet, and leaves through the border.
+No angle has to be compared: at a point of the border the way around a part turns inwards, at a point inside the way
+goes on along the path. Facets with a step unproven in doubles, or with a ring of cuts, are left to the exact sweep.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from collide.solids.polygon_ears import WORKSPACE, clip_parts
 
 
 class _Chains(NamedTuple):
-    """The borders of facets, from corner to corner over the points that cut them.
+    """The borders of facets, from corner to corner over their cut points.
 
     facet, point : (m,) ids of points in order, facet by facet, each counter-clockwise.
-    following : (m,) the next one of the facet.   is_corner : (m,).
+    following : (m,) the next point of the facet.   is_corner : (m,).
     """
 
     facet: np.ndarray
@@ -83,7 +83,7 @@ def _clipped(
 
 
 def _borders(facets: PlacedFacets, rows, facet, start, edge, at_border, place, error) -> tuple[_Chains, np.ndarray]:
-    """(the borders of facets, those on which the order of points is not proven)."""
+    """(the borders of facets, facets with an unproven order of points)."""
     f, p = facet[at_border], start[at_border]
     slot = np.argmax(facets.edge[f] == edge[at_border][:, None], axis=1)
     corners, corner_error = _posed_corners(facets.local[facets.corners[f]], facets.poses[facets.body[f]])

@@ -17,8 +17,8 @@ def _largest(a):
 
 @entry("void(int64, int64, int64, int64, float64, int64, int64)")
 def sum_triangles(corners_at, n, faces_at, k, error, sums_at, areas_at):
-    """Of k triangles (int32) of n corners that are off by ``error``: six volumes summed, their sizes, a bound of their
-    errors but for that of the sum, and moments; areas, one a triangle.
+    """Sum over k triangles (int32) of n corners off by ``error``: six volumes, their sizes, a bound of the terms'
+    errors (without the sum's own rounding), and moments; areas, an area a triangle.
 
     a · (e × f) with a off by δ, e and f by 2δ: 6 δ |e| |f| + 12 |a| δ (|e| + |f|), and 24 u |a| |e| |f| by rounding.
     """

@@ -1,8 +1,8 @@
 """Triangles between the segments of a plane straight-line graph, by a sweep.
 
 S. Hertel, K. Mehlhorn, "Fast triangulation of simple polygons" (1983), for graphs with loose ends: between two
-neighbouring segments of the sweep line stands a chain of points that bulges forwards, the border of what is done. A
-point cuts off all triangles of the chain that it sees. O(k log k) decisions for k points.
+neighbouring segments of the sweep line stands a chain of points bulging forwards, the border of the finished part. A
+point cuts off all triangles of the chain in its sight. O(k log k) decisions for k points.
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ def triangulate(n: int, segments: list[tuple[int, int]], side: Side) -> list[Tri
 
 
 class _Sweep:
-    """lower_ends, upper_ends : the segments that the sweep line crosses, from below, by their ends.   chains : those
-    above each but the last, from the segment below to the one above."""
+    """lower_ends, upper_ends : the segments crossed by the sweep line, from below, by their ends.   chains : the chain
+    above each segment but the last, from the segment below to the segment above.
+    """
 
     def __init__(self, side: Side):
         self.side = side
@@ -98,6 +99,6 @@ class _Sweep:
         return [v, *chain[k:]]
 
     def _split(self, v: int, chain: list[int]) -> tuple[list[int], list[int]]:
-        """The chains below and above a point at which no segment ends: it sees the last point of the chain."""
+        """The chains below and above a point at which no segment ends: the point sees the last point of the chain."""
         k = chain.index(max(chain))
         return self._from_below(v, chain[: k + 1]), self._from_above(v, chain[k:])

@@ -39,7 +39,7 @@ class TranslatedSolids:
 
 
 def _holds(points: list[Point], faces: list[list[int]], p: Point) -> bool:
-    """Whether closed facets, none of which holds p, wind around it: passages of a ray along x."""
+    """Whether closed facets wind around a point p off all facets: passages of a ray along x."""
     moved = [minus(q, p) for q in points]
     total = 0
     for face in faces:

@@ -1,7 +1,7 @@
 """Whether points belong to a shape: `contains`, decided without rounding.
 
-Points are single-point hulls: what the engine proves about a shape and such a hull holds for the point. What it leaves
-open, next to curved surfaces and in nested unions, the shape's definition decides in fractions
+Points are single-point hulls: what the engine proves about a shape and such a hull holds for the point. What the engine
+leaves open, next to curved surfaces and in nested unions, the shape's definition decides in fractions
 (`inside_by_definition.py`).
 """
 
@@ -41,21 +41,21 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
 
     Parameters
     ----------
-    shape : a `Mesh` (a solid holds its facets and what they wind around; a surface its facets alone), or any other
-        shape.
-    X_WA : (4, 4) pose of the shape in the world W [m], or (N, 4, 4), one a point.
-    points_W : (3,) or (N, 3) in W [m], within 1e50.
-    check_poses : refuse matrices that are no rotation.
+    shape : a `Mesh` (a solid holds its facets and the points they wind around; a surface its facets alone), or any
+        other shape.
+    X_WA : (4, 4) pose of the shape in the world W [m], or (N, 4, 4), a pose a point.
+    points_W : (3,) or (N, 3) in W [m], coordinates within 1e50.
+    check_poses : refuse matrices other than rotations.
 
     Returns
     -------
-    bool for a single point at a single pose, bool[N] otherwise; the same one by one or in batches.
+    bool for a single point at a single pose, bool[N] otherwise; a batch gives the answers of N single calls.
 
     Raises
     ------
-    InvalidArgument : points that are not finite or beyond 1e50, lengths of batches that do not match.
-    InvalidPose : matrices that are no pose.
-    UnsupportedQuery : next to the surface of a shape that has no definition in fractions.
+    InvalidArgument : points not finite or beyond 1e50, batches of different lengths.
+    InvalidPose : matrices other than poses.
+    UnsupportedQuery : next to the surface of a shape without a definition in fractions.
 
     Notes
     -----
@@ -86,7 +86,7 @@ def _pose(X: np.ndarray, k: int) -> np.ndarray:
 
 
 def _some(X: np.ndarray, rows) -> np.ndarray:
-    """Those poses of a batch, or the single one."""
+    """Rows of a batch (N, 4, 4) of poses; of a batch of length 1 its pose (4, 4), whatever the rows."""
     return X[0] if len(X) == 1 else np.ascontiguousarray(X[rows])
 
 
@@ -115,7 +115,7 @@ def _point_tree() -> MeshTree:
 
 
 def thin_facets(mesh: Mesh, tree: MeshTree) -> MeshTree | None:
-    """A tree of the facets without area, None where there are none; kept as long as the mesh's own."""
+    """A tree of the mesh's facets of zero area, None for a mesh without them; kept as long as the mesh's own tree."""
     if tree not in _thin:
         thin = without_area(mesh.vertices, mesh.faces)
         thin = np.flatnonzero(thin) if thin.dtype == bool else thin
@@ -124,7 +124,7 @@ def thin_facets(mesh: Mesh, tree: MeshTree) -> MeshTree | None:
 
 
 def winds_around(mesh: Mesh, X_WA: np.ndarray, point: np.ndarray) -> bool:
-    """Whether a solid's facets wind around a point that is on none of them, along rays that pass no edge."""
+    """Whether a solid's facets wind around a point off all facets, by rays from the point past every edge."""
     corners = FacetCorners(body_of(mesh).tree)
     for direction in RAY_DIRECTIONS:
         met = raycast(mesh, X_WA, point[None], np.array([direction], dtype=float), all_hits=True, check_poses=False)

@@ -1,4 +1,4 @@
-"""Facets that meet: of two posed bodies, and of one mesh with itself."""
+"""Pairs of facets with a common point: of two posed bodies, and within a mesh."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from collide.surface_queries.checked_arguments import two_bodies
 
 
 class FacetPairs(NamedTuple):
-    """Pairs of facets that meet, at N pairs of poses.
+    """Pairs of facets with a common point, at N pairs of poses.
 
-    pairs : (k, 2) int64 facet numbers of A and of B; those of a pose stand together, sorted.
+    pairs : (k, 2) int64 facet numbers of A and of B; the pairs of a pose stand together, sorted.
     starts : (N + 1,) int64: the pairs of pose i are rows starts[i] to starts[i + 1].
-    counters : (N, 3) int64: nodes compared with a box (one against up to eight), pairs of facets tested, and of these
-        decided in integers.
+    counters : (N, 3) int64: nodes compared with a box (a node against up to eight boxes counts once), pairs of facets
+        tested, pairs decided in integers.
     """
 
     pairs: np.ndarray
@@ -29,10 +29,10 @@ class FacetPairs(NamedTuple):
 
 
 class SelfCollisions(NamedTuple):
-    """Pairs of facets of one mesh that share more than corners and edges they have in common.
+    """Pairs of facets of a mesh with more in common than whole corners and edges.
 
     pairs : (k, 2) int64 facet numbers, the smaller first, sorted.
-    counters : (3,) int64: nodes compared with a box, pairs of facets tested, and of these decided in integers.
+    counters : (3,) int64: nodes compared with a box, pairs of facets tested, pairs decided in integers.
     """
 
     pairs: np.ndarray
@@ -50,26 +50,26 @@ class SelfCollisions(NamedTuple):
 
 
 def facet_pairs(A: Shape, B: Shape, X_WA, X_WB, *, first: bool = False, check_poses: bool = True) -> FacetPairs:
-    """All pairs of facets of two bodies that share a point, decided exactly.
+    """All pairs of facets of two bodies with a common point, decided exactly.
 
     Parameters
     ----------
-    A, B : shapes of which one at least is a `Mesh`. A `Box` or a `ConvexHull` without a radius takes part with the
+    A, B : shapes, at least a `Mesh` among them. A `Box` or a `ConvexHull` without a radius takes part with the
         triangles of its hull, numbered as in the facets of distances.
-    X_WA, X_WB : (4, 4) poses in the world W [m], or batches (N, 4, 4); a single one goes with every pose of the other's
-        batch.
-    first : only one pair a pose, where there is any: the same one every time, several times faster.
-    check_poses : refuse matrices that are no rotation.
+    X_WA, X_WB : (4, 4) poses in the world W [m], or batches (N, 4, 4); a single pose goes with every pose of the
+        other's batch.
+    first : at most a single pair a pose, the same in every call; several times faster.
+    check_poses : refuse matrices other than rotations.
 
     Returns
     -------
-    FacetPairs. Facets are closed: touching in a point is meeting. A body wholly inside a solid has no pairs with it,
-    though `collide` is True. Swapped arguments give the same pairs, swapped; ``first`` may give another one.
+    FacetPairs. Facets are closed: touching in a point is meeting. A body wholly inside a solid has no pairs with the
+    solid, though `collide` is True. Swapped arguments give the same pairs, swapped; ``first`` may give another pair.
 
     Raises
     ------
-    InvalidArgument : no mesh among the shapes, lengths of batches that do not match.
-    InvalidPose : matrices that are no pose.
+    InvalidArgument : no mesh among the shapes, batches of different lengths.
+    InvalidPose : matrices other than poses.
     UnsupportedQuery : shapes without facets, by name.
 
     Notes
@@ -83,11 +83,11 @@ def facet_pairs(A: Shape, B: Shape, X_WA, X_WB, *, first: bool = False, check_po
 
 
 def self_collisions(mesh: Mesh) -> SelfCollisions:
-    """Pairs of facets of one mesh that share more than the corners and edges they have in common, decided exactly.
+    """Pairs of facets of a mesh with more in common than whole corners and edges, decided exactly.
 
     Parameters
     ----------
-    mesh : corners are the same where their coordinates are, as everywhere.
+    mesh : corners with equal coordinates are the same corner, as everywhere.
 
     Returns
     -------
@@ -100,9 +100,10 @@ def self_collisions(mesh: Mesh) -> SelfCollisions:
 
     Notes
     -----
-    Facets without a common corner must not meet at all. With one, neither may reach across the side opposite to it of
-    the other. With two, they must not be folded flat onto each other. With three they are one facet twice: duplicates
-    and back-to-back facets are pairs. 25 ms for 69,451 facets of a scan, O(n log n) for local meshes without any.
+    Facets without a common corner must not meet at all. With one common corner, neither may reach across the side of
+    the other opposite to the corner. With two, they must not be folded flat onto each other. With three they are the
+    same facet twice: duplicates and back-to-back facets are pairs. 25 ms for 69,451 facets of a scan, O(n log n) for
+    local meshes without pairs.
     """
     if not isinstance(mesh, Mesh):
         raise InvalidArgument(

@@ -1,6 +1,6 @@
 """Whether a point belongs to a shape, by the shape's definition, in fractions: no rounding, and no kernel decides.
 
-For the few points that the engine leaves open: next to curved surfaces, and on those of parts whose poses were
+For the few points left open by the engine: next to curved surfaces, and on surfaces of parts whose poses were
 multiplied and rounded. ``poses`` lead from the world inwards; each matrix is inverted exactly to see a point from the
 last frame.
 """

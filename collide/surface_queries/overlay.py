@@ -1,9 +1,9 @@
-"""The overlay of two surfaces: pairs of facets that meet, and what each pair shares.
+"""The overlay of two surfaces: pairs of facets with a common point, and the piece each pair shares.
 
 J. Erickson, "Local polyhedra and geometric graphs" (2005), section 3.3: transferring fields between meshes of one
-domain begins with the pairs of elements that overlap. Pairs are found by the exact walk. What a pair shares is a point,
-a segment, or, of facets in one plane, a polygon: signs that doubles prove tell which, and otherwise
-clipping one facet with the other in integers.
+domain begins with the pairs of overlapping elements. Pairs are found by the exact walk. A pair shares a point, a
+segment, or, of coplanar facets, a polygon: signs proven in doubles tell the kind, otherwise clipping a facet with the
+other in integers.
 """
 
 from __future__ import annotations
@@ -49,35 +49,35 @@ class Overlay(NamedTuple):
 
 
 def overlay(A: Shape, B: Shape, X_WA, X_WB, *, check_poses: bool = True) -> Overlay:
-    """Overlay of two surfaces: every pair of facets that meet, and the point, segment or polygon they share.
+    """Overlay of two surfaces: every pair of facets with a common point, and the point, segment or polygon they share.
 
     Parameters
     ----------
-    A, B : shapes of which one at least is a `Mesh`; a `Box` or a `ConvexHull` without a radius takes part with the
+    A, B : shapes, at least a `Mesh` among them; a `Box` or a `ConvexHull` without a radius takes part with the
         triangles of its hull.
-    X_WA, X_WB : (4, 4) poses in the world W [m], or batches (N, 4, 4); a single one goes with every pose of the other's
-        batch.
-    check_poses : refuse matrices that are no rotation.
+    X_WA, X_WB : (4, 4) poses in the world W [m], or batches (N, 4, 4); a single pose goes with every pose of the
+        other's batch.
+    check_poses : refuse matrices other than rotations.
 
     Returns
     -------
-    Overlay. Pairs and kinds are exact; coordinates are rounded, with the bound there. Lengths and areas of pieces
-    worked out in integers are good to 4 units in the last place; others to what the bound of their ends allows. Facets
-    that only touch are part of it: neighbours of a common edge of two triangulations share segments of no area. Swapped
+    Overlay. Pairs and kinds are exact; coordinates are rounded, with the bound in the fields of `Overlay`. Lengths and
+    areas of pieces worked out in integers are good to 4 units in the last place; others to what the bound of their ends
+    allows. Touching facets count: neighbours of a common edge of two triangulations share segments of no area. Swapped
     arguments give the same pieces; their polygons run the other way round where the facets face each other.
 
     Raises
     ------
-    InvalidArgument : no mesh among the shapes, lengths of batches that do not match.
-    InvalidPose : matrices that are no pose.
+    InvalidArgument : no mesh among the shapes, batches of different lengths.
+    InvalidPose : matrices other than poses.
     UnsupportedQuery : shapes without facets, by name.
 
     Notes
     -----
-    For the transfer of fields between two triangulations of one surface take the polygons: their areas add up to that
-    of the common part (J. Erickson, "Local polyhedra and geometric graphs" (2005), section 3.3). They are polygons only
-    where facets lie in one plane exactly, as handed in. Costs what `facet_pairs` does, 1 µs a pair that doubles
-    settle (two of three that cross clearly), and some 0.2 ms for any other.
+    For the transfer of fields between two triangulations of a surface take the polygons: their areas add up to the area
+    of the common part (J. Erickson, "Local polyhedra and geometric graphs" (2005), section 3.3). Only exactly coplanar
+    facets, as handed in, share polygons. Costs what `facet_pairs` does, 1 µs a pair settled in doubles
+    (two of three clearly crossing pairs), and some 0.2 ms for any other pair.
     """
     body_a, body_b, X_WA, X_WB = two_bodies("overlay", A, B, X_WA, X_WB, check_poses)
     hits = all_hits(body_a.tree, body_b.tree, X_WA, X_WB)
@@ -112,9 +112,10 @@ _Side = tuple[Point, int]
 
 
 def common_piece(A: list[Point], B: list[Point]) -> list[_Rational]:
-    """What two closed triangles share: no point, one, two ends, or the corners of a polygon in order, A's way round.
+    """What two closed triangles share: no point, a point, two ends, or the corners of a polygon in order, A's way
+    round.
 
-    A is cut by the half-spaces whose common part B is; where only B has an area, B by those of A.
+    A is cut by half-spaces with B as their common part; where only B has an area, B by the half-spaces of A.
     """
     if cross(minus(A[1], A[0]), minus(A[2], A[0])) == (0, 0, 0) != cross(minus(B[1], B[0]), minus(B[2], B[0])):
         A, B = B, A

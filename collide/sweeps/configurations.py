@@ -21,14 +21,14 @@ _MAX_DRAWN = 2**31
 
 
 class DrawnConfigurations:
-    """Random configurations of a seed: a block is drawn where it is asked for, and need not be sent there.
+    """Random configurations of a seed: each process draws its own blocks, so that no rows are sent.
 
     Parameters
     ----------
     rows : int
-        How many, at least 1.
+        Number of rows, at least 1.
     seed : int
-        Not negative; other seeds draw others. A row is the same however many there are.
+        Not negative; other seeds draw other rows. A row does not depend on the number of rows.
 
     Raises
     ------
@@ -79,12 +79,12 @@ class DrawnConfigurations:
         Parameters
         ----------
         start, stop : int
-            The first, and the first that is not among them.
+            The first row, and the row after the last.
 
         Returns
         -------
         DrawnBlock
-            Small: the rows are drawn where it is asked for them.
+            Small: the answering process draws the rows.
         """
         start, stop = checks.integer("block: start", start, 0), checks.integer("block: stop", stop, 0)
         return DrawnBlock(start, stop, self.seed)

@@ -16,16 +16,16 @@ _RETRIES = 3
 
 
 class DaskPool:
-    """Workers of a scheduler that answer chunks of one question.
+    """Workers of a scheduler, answering chunks of a question.
 
     Parameters
     ----------
     question
-        Anything that pickles and has ``answer(chunk)``.
+        Any picklable object with ``answer(chunk)``.
     scheduler : str or distributed.Client
-        Address, such as ``"tcp://10.0.0.1:8786"``, or a client that stays the caller's.
+        Address, such as ``"tcp://10.0.0.1:8786"``, or a client, left open.
     name : str
-        Tells this question from others on the same workers.
+        Name of the question, unique on these workers.
     """
 
     def __init__(self, question: Any, scheduler: Any, name: str):
@@ -79,7 +79,7 @@ class DaskPool:
         running.add(future)
 
     def _result(self, future: Any) -> Any:
-        """The answer, or None where it was lost with a worker."""
+        """The answer, or ``None`` where lost with a worker."""
         if future.status in ("cancelled", "lost"):
             return None
         try:

@@ -1,4 +1,4 @@
-"""Links as bodies: the shape of each, where it stands in the link, and a convex set that holds it."""
+"""Links as bodies: the shape of each, its pose in the link, and a convex set around the shape."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _HULL_TOLERANCE = 1e-3
 
 
 class LinkBody(NamedTuple):
-    """The collision elements of a link as one shape.
+    """The collision elements of a link as a single shape.
 
     shape : in its own frame B.   X_LB : (4, 4) pose of B in the link.
-    hull : a convex set around ``shape``, None where the shape is convex itself.
+    hull : a convex set around ``shape``, ``None`` for a convex shape.
     """
 
     link: str
@@ -68,7 +68,7 @@ def link_poses(robot: Robot, Q: np.ndarray) -> LinkPoses:
 
 
 def pair_hits(A: LinkBody, B: LinkBody, poses: LinkPoses) -> np.ndarray:
-    """(N,) bool: in which configurations two links collide. Hulls that are apart spare the shapes their test."""
+    """(N,) bool: configurations in which two links collide. Only pairs with overlapping hulls test the shapes."""
     X_WA, X_WB = poses.of(A), poses.of(B)
     if A.hull is None and B.hull is None:
         return collide(A.shape, B.shape, X_WA, X_WB)
@@ -85,14 +85,14 @@ def pair_gaps(A: LinkBody, B: LinkBody, poses: LinkPoses, rows=slice(None)) -> n
 
 
 def moving_columns(robot: Robot, bodies: list[LinkBody]) -> dict[tuple[int, int], np.ndarray]:
-    """Which columns of a configuration move two links against each other.
+    """Columns of a configuration that move two links against each other.
 
-    Asked of forward kinematics, at a configuration of no symmetry: each column is moved alone.
+    Found by forward kinematics, at a configuration without symmetry: each column is moved alone.
 
     Returns
     -------
     dict of (int, int) to (k,) int
-        Positions of two bodies, the smaller first → columns; none: the links are as one body.
+        Numbers of two bodies, the smaller first → columns; without columns the links are rigidly joined.
     """
     share = np.random.default_rng(20).uniform(0.3, 0.7, robot.dof)
     lower, upper = np.maximum(robot.lower, -1.0), np.minimum(robot.upper, 1.0)

@@ -14,12 +14,12 @@ from collide.sweeps.pair_proposal import NEVER, Proposal
 
 
 class PairDifference(NamedTuple):
-    """A pair that only one of the two disables.
+    """A pair disabled by the proposal alone or by the SRDF alone.
 
-    reason : of the one that does.   share : of the sample in which it collides.
-    wrong : the SRDF says that the pair never collides, and it does.
-    q, depth : a configuration in which it does, and how deep [m]; None where none is known.
-    gap : the least gap [m] met, None where it was not searched.
+    reason : of the disabling side.   share : share of the sample in which the pair collides.
+    wrong : the SRDF says the pair never collides, and a collision was found.
+    q, depth : a colliding configuration, and the depth of the collision [m]; ``None`` without a known collision.
+    gap : the least gap [m] met, ``None`` without a search.
     """
 
     a: str
@@ -37,8 +37,8 @@ class PairComparison:
     """Disabled pairs of a proposal and of an SRDF.
 
     both : (a, b, our reason, their reason).
-    only_theirs, only_ours : pairs of one of them.
-    not_comparable : pairs of the SRDF of which a link has no collision geometry.
+    only_theirs, only_ours : pairs of a single side.
+    not_comparable : pairs of the SRDF with a link without collision geometry.
     """
 
     both: list[tuple[str, str, str, str]] = field(default_factory=list)
@@ -48,7 +48,7 @@ class PairComparison:
 
     @property
     def wrong(self) -> list[PairDifference]:
-        """Pairs that the SRDF disables as never colliding, and that collide within the limits."""
+        """Pairs disabled by the SRDF as never colliding, with a collision within the limits."""
         return [pair for pair in self.only_theirs if pair.wrong]
 
 

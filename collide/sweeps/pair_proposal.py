@@ -31,24 +31,24 @@ _Z = 1.6448536269514722
 
 @dataclass
 class LinkPair:
-    """Two links and what a sample says of them.
+    """Two links and the figures of a sample.
 
     Parameters
     ----------
     a, b : str
         Names, in the order of the robot's links.
-    reason : str or None
-        "Adjacent", "Default", "Always" or "Never"; None where the pair has to be tested.
+    reason : str or ``None``
+        "Adjacent", "Default", "Always" or "Never"; ``None`` where the pair has to be tested.
     samples, hits : int
-        Configurations that were asked, and those in which they collide.
+        Number of configurations asked, and of collisions of the pair.
     fixed : bool
-        They cannot move against each other, so that one configuration says everything.
-    q : (dof,) float64 or None
-        A configuration in which they collide, None where none was met.
+        The links cannot move against each other, so that a single configuration decides.
+    q : (dof,) float64 or ``None``
+        A colliding configuration, ``None`` where all met were free.
     searched : bool
-        ``q`` was not in the sample but met on the way downhill.
-    nearest : (gap, q) or None
-        The least gap [m] that was met and its configuration (dof,), of pairs that were searched.
+        ``q`` was met on the way downhill, not in the sample.
+    nearest : (gap, q) or ``None``
+        The least gap [m] met and its configuration (dof,), of searched pairs.
     """
 
     a: str
@@ -69,22 +69,22 @@ class LinkPair:
 
 @dataclass
 class Proposal:
-    """Pairs of links that need no test, and what that rests on.
+    """Pairs of links that need no test, and the sample behind.
 
     Parameters
     ----------
     robot : Robot
         Whose links.
     samples, seed : int
-        How many configurations were drawn, and from what.
+        Number of configurations drawn, and the seed.
     rounds : int
-        Of the search downhill; 0: there was none.
+        Of the search downhill; 0 without a search.
     always_share : float
         Share of the sample in which an "Always" pair collides, at least.
     pairs : list of LinkPair
         All pairs of links with collision geometry, in the order of the links.
     notes : list of str
-        What the person who relies on it should know.
+        Notes for the person who relies on the proposal.
     """
 
     robot: Robot
@@ -101,7 +101,7 @@ class Proposal:
         return [pair for pair in self.pairs if pair.reason is not None]
 
     def pair(self, a: str, b: str) -> LinkPair | None:
-        """What is known of two links.
+        """The figures of two links.
 
         Parameters
         ----------
@@ -110,8 +110,8 @@ class Proposal:
 
         Returns
         -------
-        LinkPair or None
-            None where one of them has no collision geometry.
+        LinkPair or ``None``
+            ``None`` where either has no collision geometry.
         """
         wanted = {checks.text("Proposal.pair: a", a), checks.text("Proposal.pair: b", b)}
         return next((pair for pair in self.pairs if {pair.a, pair.b} == wanted), None)
@@ -129,12 +129,11 @@ def propose_disabled_pairs(
     robot: Robot, samples: int = 10_000, *, seed: int = 0, rounds: int = 24, always_share: float = 1.0,
     progress: Callable | None = None,
 ) -> Proposal:
-    """Which pairs of links need no test, as MoveIt's setup assistant proposes them: by sampling.
+    """Pairs of links that need no test, found by sampling, as in MoveIt's setup assistant.
 
     Adjacent links (joined directly, or through links without geometry), then pairs that collide at the default
-    configuration, in every sample, or in none. A pair in none is searched besides: its nearest samples are followed
-    downhill, and where that ends in a collision the pair is tested. What is left as "Never" is no proof: `LinkPair`
-    has the bounds.
+    configuration, in every sample, or in no sample. A pair free in all samples is searched besides: its nearest samples
+    are followed downhill, and a pair colliding at the end is tested. "Never" is no proof: `LinkPair` has the bounds.
 
     Parameters
     ----------
@@ -145,11 +144,11 @@ def propose_disabled_pairs(
     seed : int
         Of the sample and of the search; the same seed gives the same proposal.
     rounds : int
-        Of the search downhill, 0 for none.
+        Of the search downhill, 0 without a search.
     always_share : float
-        A pair that collides in at least this share of the sample is "Always" (MoveIt: 0.95).
+        A pair colliding in at least this share of the sample is "Always" (MoveIt: 0.95).
     progress : callable, optional
-        ``with progress(label) as rename``: is told what is done.
+        ``with progress(label) as rename``: called with each stage.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Downhill: from configurations in which two links come near each other to one in which they collide, where there is.
+"""Downhill: from configurations with two links near each other to a configuration with a collision, where found.
 
-A sample misses what is rare: two fingers that meet in one configuration of a million. The gap of two links is a
-function of the joints between them that can be followed downhill, in random steps that get shorter.
+A sample misses rare hits: two fingers that meet in a single configuration of a million. The gap of two links is a
+function of the joints between them; the search follows its decrease in random steps of shrinking size.
 """
 
 from __future__ import annotations

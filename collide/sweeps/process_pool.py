@@ -1,8 +1,9 @@
-"""Chunks answered by processes of this machine; one that dies is replaced, and its chunk alone is asked again.
+"""Chunks answered by processes of this machine; a dead process is replaced, and its chunk alone is asked again.
 
-A `distributed.LocalCluster` with `DaskPool` would hold the same, but a script that calls it needs ``if __name__ ==
-"__main__"``, and it takes 40 MB of packages. Of two workers on two cores it took 4.8 to 6.3 s for 100 rows, this pool
-1.2 to 1.8 s; for 400,000 rows in chunks of 1,000 it took 13 to 17 s, this pool 4.2 to 6.0 s.
+A `distributed.LocalCluster` with `DaskPool` would do the same, but a script calling a `LocalCluster` needs
+``if __name__ == "__main__"``, and 40 MB of packages. Measured with two workers on two cores: a `LocalCluster` took
+4.8 to 6.3 s for 100 rows, this pool 1.2 to 1.8 s; for 400,000 rows in chunks of 1,000 the times were 13 to 17 s and
+4.2 to 6.0 s.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ MAX_DEATHS = 3
 
 
 class ProcessPool:
-    """Processes that answer chunks of one question.
+    """Processes, answering chunks of a question.
 
     Parameters
     ----------
     question
-        Anything that pickles and has ``answer(chunk)``.
+        Any picklable object with ``answer(chunk)``.
     workers : int
-        How many processes.
+        Number of processes.
     """
 
     def __init__(self, question: Any, workers: int):
@@ -43,9 +44,9 @@ class ProcessPool:
             thread.start()
 
     def answers(self, chunks: Iterator) -> Iterator[tuple[Any, Any]]:
-        """(chunk, answer) for every chunk, as they come; a few are under way at a time.
+        """(chunk, answer) for every chunk, as answers come; a few chunks are under way at a time.
 
-        Raises what answering raised, and InvalidArgument naming a chunk that ends the processes that answer it.
+        Raises errors of answering, and InvalidArgument naming a chunk whose processes die.
         """
         waiting = 0
         chunks = iter(chunks)
@@ -79,7 +80,7 @@ class ProcessPool:
             thread.join(timeout=10)
 
     def _serve(self, place: int) -> None:
-        """One thread for each process: it waits where the process works."""
+        """A thread for each process: the thread waits while the process works."""
         while (chunk := self._chunks.get()) is not None:
             if self._closed:
                 break

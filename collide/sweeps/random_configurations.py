@@ -52,12 +52,12 @@ def unlimited_lengths(robot: Robot) -> list[str]:
 
 
 def random_configurations(robot: Robot, start: int, stop: int, seed: int = 0) -> np.ndarray:
-    """Rows start to stop of the one sequence of random configurations that belongs to a seed.
+    """Rows start to stop of a seed's sequence of random configurations.
 
     Parameters
     ----------
     robot : Robot
-        Whose limits are kept to, as `sampled_limits` says.
+        Rows are within its limits, as of `sampled_limits`.
     start, stop : int
         Rows; any split of a range gives the same rows.
     seed : int

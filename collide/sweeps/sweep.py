@@ -39,38 +39,38 @@ def sweep(
 ) -> SweepResults:
     """Ask a checker about many configurations, in processes or on Dask, and write the answers as Parquet.
 
-    The rows are split into chunks, whose numbers and files do not depend on who answers. Each is written once, whole.
-    A run that ends before it is done, however it ends, is gone on with by the same call: it asks what is missing.
+    The rows are split into chunks, with numbers and files independent of the answering process. Each is written once,
+    whole. An unfinished run is continued by the same call: only missing chunks are asked.
 
     Parameters
     ----------
     checker : RobotChecker
-        Robot and surroundings. It is sent to the workers once, as it is now.
+        Robot and surroundings. Sent to the workers once, in the present state.
     configurations : (N, dof) array_like, str, Path or DrawnConfigurations
         Rows [rad or m] in the order of `Robot.joint_names`; a .npy, .csv or .parquet file; or
-        ``DrawnConfigurations(rows, seed)``. Rows that are not finite get no answer and are named; rows outside the
+        ``DrawnConfigurations(rows, seed)``. Rows with numbers not finite get no answer and are named; rows outside the
         limits are answered and named.
     folder : str or Path
-        Where the files go; made where it is not there.
+        Folder of the files; made where missing.
     distances : bool
         Write the least distance and its two bodies, too.
     values : bool
         Write the configurations, too.
     workers : int, optional
-        Processes of this machine, by default one for each of its cores; 0 answers in this process.
+        Processes of this machine, by default a process for each core; 0 answers in this process.
     scheduler : str or distributed.Client, optional
         Dask: an address or a client; its workers answer, this process writes.
     chunk : int, optional
         Rows of a chunk.
     restart : bool
-        Throw away what a former run left in the folder.
+        Delete files of a former run in the folder.
     progress : callable, optional
-        ``with progress(label) as rename``: is told how far it is, how fast, and how long it will take.
+        ``with progress(label) as rename``: called with the share done, the speed, and the time left.
 
     Returns
     -------
     SweepResults
-        What there is in the folder: counts, and the rows.
+        The answers in the folder: counts, and the rows.
 
     Raises
     ------
@@ -92,11 +92,11 @@ def sweep(
 
 
 class SweepRun:
-    """One run of a sweep.
+    """A run of a sweep.
 
-    question : `OneQuestion` or `ScenesQuestion`.   n_scenes : how many scenes it has.
-    configurations : asked in every scene; None: each scene has its own.
-    look : called with whether it is the last time; gives the digest of what is asked as it is now.
+    question : `OneQuestion` or `ScenesQuestion`.   n_scenes : number of scenes.
+    configurations : asked in every scene; ``None``: each scene has its own.
+    look : called with whether the call is the last; returns the digest of the question in its present state.
     """
 
     def __init__(

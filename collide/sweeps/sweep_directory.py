@@ -40,12 +40,12 @@ def parquet_module():
 
 
 class SweepDirectory:
-    """Where a sweep keeps what it has done.
+    """Folder of a sweep's finished chunks.
 
     Parameters
     ----------
     path : Path
-        Made where it is not there.
+        Made where missing.
     """
 
     def __init__(self, path: Path):
@@ -73,24 +73,24 @@ class SweepDirectory:
             yield
 
     def begin(self, manifest: dict[str, Any], restart: bool) -> list[int]:
-        """Start, or go on: which chunks are done.
+        """Start or continue a sweep: the numbers of finished chunks.
 
         Parameters
         ----------
         manifest : dict
             Of this run, with the keys of the form and ``chunks``.
         restart : bool
-            Throw away what is there.
+            Delete the files in the folder.
 
         Returns
         -------
         list of int
-            Numbers of chunks that are complete.
+            Numbers of complete chunks.
 
         Raises
         ------
         InvalidArgument
-            Naming what differs from the run that began here, and where files are there that are no sweep's.
+            Naming the differences from the run begun here, and files of no sweep.
         """
         file = self.path / MANIFEST
         if restart and file.exists():
@@ -115,7 +115,8 @@ class SweepDirectory:
         return [number for number, _ in self.tables(manifest)]
 
     def manifest(self) -> dict[str, Any]:
-        """What the sweep asks, as it began. Raises SceneError where the folder has none, or it is another thing."""
+        """The sweep's question, as begun. Raises SceneError for a folder without a manifest, or with a broken
+        manifest."""
         file = self.path / MANIFEST
         if not file.exists():
             raise SceneError("is no folder of a sweep: it has no manifest", path=self.path)
@@ -132,10 +133,10 @@ class SweepDirectory:
         return manifest
 
     def tables(self, manifest: dict[str, Any]) -> Iterator[tuple[int, Any]]:
-        """(number, pyarrow.Table) of every chunk that is there whole, in their order.
+        """(number, pyarrow.Table) of every complete chunk, in ascending order.
 
-        Files appear whole. What a disk or a person did to one later makes it missing, and it is made again: a chunk is
-        known by what stands in it, its number, the digest of the sweep's manifest and that of its own columns.
+        Files appear whole. A file damaged later counts as missing and is made again: a chunk is known by its content,
+        its number, the digest of the sweep's manifest and the digest of its own columns.
         """
         pyarrow, parquet = parquet_module()
         of_sweep = _digest_of(manifest)
@@ -238,7 +239,7 @@ def _write_whole(file: Path, content) -> None:
 
 
 def _opened_lock(place: Path) -> Any:
-    """The file of the lock, made where it is missing; a link there is refused, for it would choose the file."""
+    """The file of the lock, made where missing; a link at its path is refused, since a link would choose the file."""
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     if place.is_symlink() or (place.exists() and not place.is_file()):
         raise InvalidArgument(f"{place} is a link or no file: remove it, or take another folder")

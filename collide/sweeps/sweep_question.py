@@ -1,4 +1,4 @@
-"""What a sweep asks, as it travels to the process that answers: a robot among bodies, or scene after scene."""
+"""The question of a sweep, as sent to the answering process: a robot among bodies, or scene after scene."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SLACK = 1e-9
 class Chunk(NamedTuple):
     """Rows start to stop of a sweep.
 
-    blocks : (scene, block of configurations, or None for those that the scene has) one after the other.
+    blocks : (scene, block of configurations, or ``None`` for the scene's own), in sequence.
     """
 
     number: int
@@ -71,10 +71,10 @@ class OneQuestion:
 
 
 class ScenesQuestion:
-    """Scene files, each asked about every configuration, or about the one that it has.
+    """Scene files, each asked about every configuration, or about its own.
 
-    paths : scene files.   options : what the loader is told.   make_checker : (path, options) → (checker, (dof,) where
-    its robot stands).
+    paths : scene files.   options : of the loader.   make_checker : (path, options) → (checker, (dof,) configuration
+    of its robot).
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class ScenesQuestion:
         return {**vars(self), "_loaded": OrderedDict()}
 
     def checker(self, scene: int) -> tuple[Any, np.ndarray]:
-        """The checker of a scene, and the configuration that it has."""
+        """The checker of a scene, and the scene's own configuration."""
         if scene not in self._loaded:
             place = self.paths[scene]
             self._refuse_change(scene)
@@ -145,10 +145,10 @@ def _joined(values: list[Any]) -> Any:
 
 
 def answer_rows(checker: Any, Q: np.ndarray, distances: bool, values: bool) -> dict[str, Any]:
-    """Columns about configurations: ``collides`` and whether it is answered, ``note``, and what was asked for besides.
+    """Columns about configurations: ``collides`` and whether answered, ``note``, and the other columns asked for.
 
-    Rows that are not numbers, or leave the range of coordinates, are not answered, and the note says which joint it
-    is. Rows outside the limits are answered and noted.
+    Rows with NaN or infinity, or outside the range of coordinates, are not answered; the note names the
+    joint. Rows outside the limits are answered and noted.
     """
     robot: Robot = checker.robot
     notes = _notes(robot, Q)
@@ -177,7 +177,7 @@ def answer_rows(checker: Any, Q: np.ndarray, distances: bool, values: bool) -> d
 
 
 def _askable(checker: Any, rows: np.ndarray, Q: np.ndarray, notes: list[str | None]) -> list[np.ndarray]:
-    """The rows in batches that have poses; forward kinematics refuses a whole batch for one row that has none."""
+    """The rows with finite poses, in batches; forward kinematics refuses a whole batch for a row without."""
     if not len(rows):
         return []
     try:

@@ -23,18 +23,18 @@ class SweepResults:
     Parameters
     ----------
     folder : Path
-        Where they are: ``chunk-00000000.parquet`` and so on.
+        Folder of the files ``chunk-00000000.parquet`` and so on.
     rows, done : int
-        Of all, and those in chunks that are there.
+        Number of all rows, and of rows in finished chunks.
     colliding, free : int
         Rows by their answers.
     unanswered : int
-        Rows that are not numbers, or have no pose.
+        Rows with NaN or infinity, or without poses.
     outside : int
-        Rows that are answered and outside the limits.
+        Answered rows outside the limits.
     named : list of (int, str)
-        The first rows that are unanswered, then those that are outside, and what is to be said of them.
-    least : (float, int, str, str) or None
+        The first unanswered rows, then rows outside the limits, each with a note.
+    least : (float, int, str, str) or ``None``
         Of sweeps with distances: the least [m], its row and its two bodies.
     """
 
@@ -54,13 +54,13 @@ class SweepResults:
         Parameters
         ----------
         columns : list of str, optional
-            By default all: ``row``, ``scene`` (of several), ``collides`` (null where there is no answer), ``distance``,
+            By default all: ``row``, ``scene`` (of several), ``collides`` (null without an answer), ``distance``,
             ``body_a`` and ``body_b`` (of sweeps with distances), ``note``, joints (of sweeps with values).
 
         Returns
         -------
         pyarrow.Table
-            The chunks one after the other.
+            The chunks in sequence.
         """
         return _read(self.folder, columns)
 
@@ -86,7 +86,7 @@ class SweepResults:
 
 
 def read_sweep(folder: str | Path) -> SweepResults:
-    """The answers that a folder holds, be the sweep done or not.
+    """The answers in a folder, of a finished or unfinished sweep.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def read_sweep(folder: str | Path) -> SweepResults:
     Raises
     ------
     SceneError
-        Where it is no folder of a sweep.
+        For any other folder.
     MissingExtra
         Where pyarrow is not installed.
     """
