@@ -2,10 +2,10 @@
 
 The chords of cylinders, cones and ellipsoids stand in the files of these kinds.
 
-A chord is [first, last], each end inside a proven bracket. Slabs and quadrics are cut with the line one by one and the
-intervals with each other, as E. Haines does it for the planes of a polyhedron ("Fast ray–convex polyhedron
-intersection", Graphics Gems II, 1991). Quadrics are worked out from the point of the line nearest their middle, where
-nothing large cancels.
+A chord is [first, last], each end inside a proven bracket. Each slab and each quadric is cut with the line, and the
+intervals with each other, as E. Haines cuts the planes of a polyhedron ("Fast ray–convex polyhedron intersection",
+Graphics Gems II, 1991). Quadrics are evaluated from the point of the line nearest their middle, where no large numbers
+cancel.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ ROUNDING = 2.0**-49
 
 
 class Line(NamedTuple):
-    """{origin + t direction}, as seen from where a shape stands.
+    """{origin + t direction} in the frame of a shape.
 
-    length : |direction|.   error : how far a point of it near the shape may be from where it was worked out.
+    length : |direction|.   error : bound of the rounding of a point of the line near the shape [m].
     """
 
     origin: Vec3
@@ -35,10 +35,10 @@ class Line(NamedTuple):
 
 
 class Chord(NamedTuple):
-    """What a line and a convex set share: t from first to last.
+    """The common points of a line and a convex set: t from first to last.
 
     state : MISSED, MET or UNCLEAR.   first_lower ≤ first ≤ first_upper, last_lower ≤ last ≤ last_upper : brackets.
-    first_side, last_side : which piece of the surface is met there: 0 round it, 1 below, 2 above.
+    first_side, last_side : the piece of the surface at each end: 0 round the side, 1 below, 2 above.
     """
 
     state: int
@@ -182,8 +182,8 @@ def capsule_chord(line, start, end, radius):
 def clipped_cylinder(slab, across, step, radius, line, side):
     """A cylinder of endless length, |across + t step| ≤ radius, cut off by a slab.
 
-    Where the line is within it at both ends of the slab it is so in between, and outside where the way between them is
-    too short to get in: nothing else is asked of a line that runs along the axis.
+    A line within the cylinder at both ends of the slab is within in between; a line outside at both ends stays outside
+    where the way between the ends is too short to get in. A line along the axis needs no more than these two tests.
     """
     if slab.state == MET and slab.first > -math.inf:
         a, b = add(across, scale(slab.first, step)), add(across, scale(slab.last, step))
