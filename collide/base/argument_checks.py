@@ -1,8 +1,9 @@
-"""Numbers, arrays and file paths as callers hand them in, read in one way: what is no number is refused by name.
+"""Numbers, arrays and file paths as callers hand them in, read by the same rules: anything but a number is refused by
+name.
 
-Anything that holds real numbers will do: Python's own, fractions and decimals, numpy's of any width, nested sequences,
+Any holder of real numbers will do: Python's own, fractions and decimals, numpy's of any width, nested sequences,
 objects with ``__array__``. Not complex numbers (a part would be lost), masked entries (they would be unmasked), text,
-dates and times, None. A number too large for a double is refused as one that is not finite, not as an overflow.
+dates and times, ``None``. A number too large for a double is refused as not finite, not as an overflow.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ _KINDS = {
 
 
 def number(value: Any) -> float | None:
-    """A real number as a double, infinite where it is too large for one; None where it is no number."""
+    """A real number as a double, infinite for numbers beyond doubles; ``None`` for anything else."""
     if isinstance(
         value, (str, bytes, bytearray, complex, np.complexfloating, np.timedelta64, np.datetime64, np.character)
     ):
@@ -44,7 +45,7 @@ def number(value: Any) -> float | None:
 
 
 def limit(what: str, value: Any, unit: str = " [m]") -> float:
-    """A limit: a number ≥ 0, infinity allowed where it is given as such. Raises InvalidArgument."""
+    """A limit: a number ≥ 0, or infinity where given as infinity. Raises InvalidArgument."""
     if type(value) is float and value >= 0.0:  # what single calls come with
         return value
     read = number(value)
@@ -70,7 +71,7 @@ def number_within(what: str, value: Any, lowest: float, highest: float, error: t
 
 
 def is_integer(value: Any) -> bool:
-    """Whether it is an integer: neither True nor a time span, which to numpy is one."""
+    """Whether the value is an integer: neither a bool nor a time span, an integer to numpy."""
     return isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
 
 
@@ -132,10 +133,10 @@ def file_path(what: str, value: Any, error: type[CollideError] = InvalidArgument
 
 
 def array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.ndarray:
-    """Real numbers as a float64 array of whatever shape; the caller's own array where it is one already.
+    """Real numbers as a float64 array of any shape; the caller's own array where already float64.
 
-    what : "Box: size", for messages.   wanted : the shape that is asked for, for messages.
-    Raises ``error`` for what does not consist of real numbers. Whether they are finite is the caller's to ask.
+    what : "Box: size", for messages.   wanted : the wanted shape, for messages.
+    Raises ``error`` for anything but real numbers. The caller has to check for finite numbers.
     """
     numbers_given = plain_array(what, value, wanted, error)
     if numbers_given.dtype == np.float64:
@@ -178,7 +179,7 @@ def vectors(caller: str, name: str, values) -> tuple[np.ndarray, bool]:
 
 
 def refuse_rows(caller: str, name: str, rows: np.ndarray, bad: np.ndarray, complaint: str) -> None:
-    """Raises InvalidArgument naming the first bad row, where there is one."""
+    """Raises InvalidArgument naming the first bad row, if any."""
     if bad.any():
         k = int(np.argmax(bad))
         raise InvalidArgument(f"{caller}: {name}[{k}] {complaint}, got {rows[k].tolist()}")
@@ -196,7 +197,7 @@ def matched_count(caller: str, **counts: int) -> int:
 
 
 def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -> np.ndarray:
-    """Anything that is an array or can be one, of any type: nothing ragged, masked, or nested without end."""
+    """Any array or array-like, of any type: nothing ragged, masked, or nested without end."""
     if _is_masked(value) or (isinstance(value, (list, tuple)) and any(map(_is_masked, value))):
         raise error(f"{what} has masked entries; fill them or leave them out ({wanted} is wanted)")
     try:

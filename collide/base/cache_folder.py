@@ -39,14 +39,14 @@ def cache_folder(*parts: str) -> Path:
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder and those above it that are missing, for nobody but this user."""
+    """Make a folder, and missing folders above, with access for this user alone."""
     if not folder.is_dir():
         make_private(folder.parent)
         folder.mkdir(mode=0o700, exist_ok=True)
 
 
 def why_unusable(folder: Path) -> str | None:
-    """Why nothing is to be read from a folder or kept in it; None where all is well: it is then there."""
+    """Why a folder cannot be used for reading and writing; ``None`` for a usable folder, made where missing."""
     try:
         why = why_distrusted(folder)
         if why is None:
@@ -58,10 +58,11 @@ def why_unusable(folder: Path) -> str | None:
 
 
 def own_folder(folder: Path, what: str, use: str) -> Path | None:
-    """A folder of the cache, made where it is missing; None, and said once, where somebody else could put files there.
+    """A folder of the cache, made where missing; ``None``, with a single warning, where other users could put files
+    inside.
 
-    what : is kept there and believed as it stands, for the line that says so: "compiled kernels".
-    use : what comes of doing without: "they are compiled again in every process".
+    what : trusted content of the folder, for the warning: "compiled kernels".
+    use : the consequence of doing without: "they are compiled again in every process".
     """
     why = why_unusable(folder)
     if why is None:
@@ -75,14 +76,14 @@ def own_folder(folder: Path, what: str, use: str) -> Path | None:
 
 @cache
 def say_once(message: str) -> None:
-    """A warning of the log, the first time that it is said in this process."""
+    """A warning of the log, only at the first call with this message in this process."""
     log.warning(message)
 
 
 def read_own(file: Path) -> bytes:
-    """What a file holds that this user alone may write. No link is followed, and no pipe waited for.
+    """The bytes of a file writable by this user alone. No link is followed, and no pipe waited for.
 
-    Raises FileNotFoundError where nothing is there, PermissionError where somebody else may have written it, OSError.
+    Raises FileNotFoundError for a missing file, PermissionError for a file writable by others, OSError.
     """
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     descriptor = os.open(file, flags)
@@ -99,11 +100,11 @@ def read_own(file: Path) -> bytes:
 
 
 def why_distrusted(folder: Path) -> str | None:
-    """Who else may decide what a folder holds: "… may be written by others", or None where nobody may.
+    """Who else may write a folder's content: "… may be written by others", or ``None`` where nobody may.
 
-    Looked at is every folder and link on the way: each must belong to this user, or to the owner of the machine, and be
-    writable to nobody else. Of a folder with the sticky bit, like /tmp, everyone may fill it and only owners move what
-    is in it, so it may stand on the way, but not be the folder itself. What does not exist yet is passed over.
+    Every folder and link on the way must belong to this user, or to the owner of the machine, and be
+    writable to nobody else. In a folder with the sticky bit, like /tmp, everyone may add files and only owners move
+    their files, so a sticky folder may stand on the way, but not be the folder itself. Missing folders are passed over.
     """
     if not TRUST:
         return None
@@ -136,7 +137,7 @@ def _is_own_group(group: int) -> bool:
 
 
 def _way_to(folder: Path) -> Iterator[tuple[Path, os.stat_result, bool]]:
-    """(folder or link, what it is, whether it is the end) from the root to a folder, as far as they exist."""
+    """(folder or link, its status, whether the end) from the root to a folder, as far as they exist."""
     waiting = list(reversed((Path.cwd() / folder).parts))
     at, links = Path(waiting.pop()), 0
     yield at, os.lstat(at), not waiting

@@ -1,8 +1,8 @@
-"""Processes that serve this one: started, asked, waited for up to a time limit, their end and its reason told.
+"""Processes serving this process: started, asked, waited for up to a time limit, the reason of their end told.
 
-A child runs ``module:function`` as ``function(requests, send, *arguments)``: ``requests`` yields what the parent sends,
+A child runs ``module:function`` as ``function(requests, send, *arguments)``: ``requests`` yields the parent's messages,
 ``send`` answers, both over a connection of `multiprocessing`. The process is a plain interpreter:
-processes of `multiprocessing` run the caller's script anew, which then needs ``if __name__ == "__main__"``.
+processes of `multiprocessing` run the caller's script anew, and the script needs ``if __name__ == "__main__"``.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ _LEAVING = 5.0
 
 
 class ChildProcess:
-    """One process, which ends with this object, or with this process, whatever ended that.
+    """A child process, ended with this object, or with this process, however this process ends.
 
-    What libraries print in the child goes to stderr. SIGINT is ignored there: the parent is interrupted, and ends it.
+    Output of libraries in the child goes to stderr. The child ignores SIGINT: the interrupted parent ends the child.
 
     Parameters
     ----------
     serve : str
         ``"module:function"``, found on this process's `sys.path`.
     *arguments
-        What the function is given; anything that pickles.
+        Arguments of the function, picklable.
     keep_stderr : bool
-        Keep what the child writes to stderr for `how_it_ended`; otherwise it is written where this process's is.
+        Keep the child's stderr for `how_it_ended`; otherwise the child writes to this process's stderr.
     """
 
     def __init__(self, serve: str, *arguments: Any, keep_stderr: bool = True):
@@ -66,7 +66,7 @@ class ChildProcess:
         return self._process.pid
 
     def send(self, message: Any) -> None:
-        """Hand over a message; it is pickled now and written by a thread, so that no child holds this process up."""
+        """Hand over a message: pickled now, written by a thread, so that no child holds this process up."""
         self._outbox.put(pickle.dumps(message, protocol=5))
 
     def receive(self, limit: float | None = None) -> Any:
@@ -75,14 +75,14 @@ class ChildProcess:
         Parameters
         ----------
         limit : float, optional
-            How long to wait for it [s]; None waits for ever.
+            The longest wait [s]; ``None`` waits for ever.
 
         Raises
         ------
         EOFError
-            Where the child has ended: `how_it_ended` tells why.
+            After the child's end: `how_it_ended` tells why.
         TimeoutError
-            Where it is silent for longer than the limit.
+            After a silence longer than the limit.
         """
         try:
             if self._connection.poll(limit):
@@ -92,7 +92,7 @@ class ChildProcess:
         raise TimeoutError
 
     def how_it_ended(self) -> str:
-        """Signal or exit code of a child that has ended, and the last words that it wrote, in one line."""
+        """Signal or exit code of an ended child, and the last words of its stderr, in a line."""
         try:
             code = self._process.wait(_LEAVING)
         except subprocess.TimeoutExpired:
@@ -108,7 +108,8 @@ class ChildProcess:
         return f"{how}: {words}" if words else how
 
     def kill(self) -> None:
-        """End the process while another thread is still waiting for what it sends; `close` is left to that thread."""
+        """End the process while another thread is still waiting for a message; `close` is left to the waiting
+        thread."""
         self._process.kill()
 
     def close(self) -> None:
@@ -129,9 +130,9 @@ class ChildProcess:
 
 
 def last_words(stderr: str) -> str:
-    """What a dead process said, in one short line without folders.
+    """The last words of a dead process, in a short line without folders.
 
-    A C++ exception that nobody caught prints its message first and what it carried after it; of
+    An uncaught C++ exception prints its message first and its details after; of
     anything else the end matters most.
     """
     text = re.sub(r"(?:/[\w.+-]+)+/(?=[\w.+-])", "", " ".join(stderr.split()))

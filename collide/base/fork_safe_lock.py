@@ -1,4 +1,4 @@
-"""A lock that a forked child finds open: the thread of the parent that may hold it does not exist there."""
+"""A lock found open by a forked child: the thread of the parent holding the lock does not exist in the child."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import threading
 
 
 class ForkSafeLock:
-    """Called, it gives the lock of this process: ``with lock(): ...``. One thread may take it more than once."""
+    """Called, gives the lock of this process: ``with lock(): ...``. A thread may take the lock more than once."""
 
     def __init__(self) -> None:
         self._renew()

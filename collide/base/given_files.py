@@ -1,5 +1,6 @@
-"""Files that users name, read within limits: what is no file (a pipe, a device, a folder) is refused before it is
-opened, and so is what is larger than is read of its kind."""
+"""Files named by users, read within limits: anything but a file (a pipe, a device, a folder) is refused before the
+opening, and so is a file larger than the limit of its kind.
+"""
 
 from __future__ import annotations
 
@@ -56,12 +57,12 @@ def as_text(content: bytes, path: Path) -> str:
 
 
 def starts_like_xml(path: Path) -> bool:
-    """Whether the first characters of a regular file are those of an element; False where it cannot be read."""
+    """Whether a regular file starts like an XML element; ``False`` for unreadable files."""
     return head(path, 256).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
 
 
 def head(path: Path, count: int) -> bytes:
-    """The first bytes of a regular file; none where it cannot be read or is something else."""
+    """The first bytes of a regular file; an empty string for unreadable or other files."""
     try:
         if not stat.S_ISREG(os.stat(path).st_mode):
             return b""
@@ -72,7 +73,7 @@ def head(path: Path, count: int) -> bytes:
 
 
 def is_file(path: Path) -> bool:
-    """Whether a regular file is there; False too for names that no file can have."""
+    """Whether a regular file exists; ``False`` too for impossible file names."""
     try:
         return stat.S_ISREG(os.stat(path).st_mode)
     except (OSError, ValueError):

@@ -1,8 +1,8 @@
-"""Modules of kernels that a light module may need later: named where it imports, loaded when first used.
+"""Modules of kernels for a light module's later use: named at the import, loaded at the first use.
 
-Shapes can be made and certificates verified without any kernel. What a shape computes on request, its hull or the tree
-over its facets, takes kernels, and these are loaded then. Scientific Python's lazy-loader has this for modules and for
-the names of a package, but would be a second package that every installation needs, where numpy is the only one.
+Shapes can be made and certificates verified without any kernel. A shape's hull or the tree
+over its facets, computed on request, takes kernels, loaded at the request. Scientific Python's lazy-loader does the
+same for modules and for the names of a package, but would be a second required package beside numpy.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 
 
 class LazyModule:
-    """Stands for the module of this name: an attribute is the module's, which is imported for it."""
+    """Stands for the module of this name: the first access of an attribute imports the module."""
 
     def __init__(self, name: str):
         self._name = name
@@ -22,5 +22,5 @@ class LazyModule:
 
 
 def lazy_module(name: str) -> Any:
-    """The module, to be imported when an attribute of it is first used. A test counts it as an import."""
+    """The module, imported at the first access of an attribute. A test counts the call as an import."""
     return LazyModule(name)

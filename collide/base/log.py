@@ -1,7 +1,7 @@
-"""What the library logs about its own work, by ``logging.getLogger("collide")``: what is slow, and done behind a call.
+"""The library's log of its own work, ``logging.getLogger("collide")``: slow work behind a call.
 
-INFO: kernels compiled or loaded, trees, surveys, hulls and tables made, each with its size and seconds. WARNING: what
-should be looked at, such as a cache that cannot be kept. Quiet by default: without a handler Python prints warnings
+INFO: kernels compiled or loaded, trees, surveys, hulls and tables made, each with its size and seconds. WARNING: faults
+for a person to look at, for example an unusable cache. Quiet by default: without a handler Python prints warnings
 alone. ``logging.basicConfig(level=logging.INFO)`` shows the rest.
 """
 

@@ -36,9 +36,9 @@ def check_threads(threads) -> int:
 
 
 def share(pieces: Iterable, work: Callable[[Any], None], workers: int) -> None:
-    """Have every piece worked on, by so many threads; returns when no piece is worked on any more.
+    """Work on every piece in ``workers`` threads; returns when no thread works on a piece any more.
 
-    An error of a piece is raised, and pieces that nobody has begun are left.
+    An error of a piece is raised, and pieces not begun are left.
     """
     waiting = iter(pieces)
 
@@ -54,10 +54,10 @@ def share(pieces: Iterable, work: Callable[[Any], None], workers: int) -> None:
 
 
 def share_if_it_helps(n: int, work: Callable[[slice], None], workers: int) -> None:
-    """As `share` of n > 0 units, where it is unknown how long they take and whether threads can work at once.
+    """As `share` of n > 0 units, where their duration is unknown, and whether threads can work at once.
 
-    The caller begins alone, with a sixteenth, and goes on alone if there is little. A helper that finds itself waiting
-    rather than at work leaves the rest to the others: no helper, no pieces.
+    The caller begins alone, with a sixteenth, and goes on alone if little is left. A helper mostly waiting
+    for the processor leaves the rest to the others; without helpers the caller takes the whole rest at once.
     """
     rest = _Rest(n)
     start = time.perf_counter()
@@ -94,7 +94,7 @@ class _Rest:
         self.helpers = 0
 
     def take(self, n_wanted: int) -> slice | None:
-        """The next so many units, or as many as are left; None where none are."""
+        """The next ``n_wanted`` units, or the rest if fewer; ``None`` without units left."""
         with self._lock:
             if not self.remaining:
                 return None
@@ -133,10 +133,10 @@ def _in_threads(
 
 
 def pieces_of(n: int, workers: int, fewest: int) -> list[slice]:
-    """What is handed out of n at a time: ever smaller shares of what is left, none smaller than pays.
+    """The pieces of n units, handed out in order: shrinking shares of the rest, at least ``fewest`` units each.
 
-    A piece costs some 30 µs beside its answers. Large ones first, there are few; small ones last, no thread waits long
-    for the others, though a core may be somebody else's now and then.
+    A piece costs some 30 µs beside its answers. Large pieces first, for few pieces; small pieces last, so that no
+    thread waits long for the others, though a core may be somebody else's now and then.
     """
     pieces, done = [], 0
     while done < n:

@@ -1,8 +1,8 @@
-"""Files that are there whole, as they were before, or not at all: for everything that `collide` writes.
+"""Files are new and complete, or as before: for everything written by `collide`.
 
-A file is written under another name in its own folder and takes its place by `os.replace`, in one step: a full disk, an
-error or a signal in between leaves the old file. `tests/base/test_whole_file.py` asserts that nothing else opens a
-file to write.
+A file is written under another name in its own folder and takes its place by `os.replace`, in a single step: a full
+disk, an error or a signal in between leaves the old file. `tests/base/test_whole_file.py` asserts that no other code
+opens a file to write.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 def whole_file(
     place: str | Path, *, private: bool = False, durable: bool = False, follow: bool = True, prefix: str = "."
 ) -> Iterator[BinaryIO]:
-    """A stream whose content becomes the file at the end of the block; an error in the block leaves what was there.
+    """A stream whose content becomes the file at the end of the block; an error in the block leaves the old file.
 
     Parameters
     ----------
-    place : the file. One that is there keeps its mode. A device or a pipe is written to as it is: nothing could be put
-        in its place.
-    private : for nobody but this user, whatever the process's mask says. A link is not followed.
-    durable : on the disk before it takes the other's place, should the machine lose power.
-    follow : whether a link stands for the file that it names; otherwise the link itself is replaced. Folders whose
-        names are ours alone (caches, sweeps) are not asked for links: whoever may put one there would choose the file.
-    prefix : begins the name of the file beside it, which a killed process leaves there.
+    place : the file. An existing file keeps its mode. A device or a pipe is written directly: no file could take
+        its place.
+    private : for nobody but this user, whatever the process's mask. A link is not followed.
+    durable : on the disk before the new file takes the old file's place, should the machine lose power.
+    follow : whether a link stands for its target; otherwise the link itself is replaced. Folders of the library's
+        own names (caches, sweeps) are not asked for links: whoever could place a link would choose the file.
+    prefix : begins the name of the temporary file beside ``place``, left over by a killed process.
 
     Raises
     ------
-    OSError : with the name of ``place``, also where a full disk told none.
+    OSError : with the name of ``place``, also where a full disk gave no name.
     """
     follow = follow and not private
     folder, name = os.path.split(os.fspath(place))
@@ -67,7 +67,7 @@ def whole_file(
 
 
 def _status(path: str) -> os.stat_result | None:
-    """What stands there, a link itself and not what it names; None where nothing does."""
+    """Status of the file, of a link itself and not of its target; ``None`` for a missing file."""
     try:
         return os.lstat(path)
     except FileNotFoundError:
