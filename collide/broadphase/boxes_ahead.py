@@ -100,7 +100,8 @@ def _nearest_sibling(nodes, links, node, end, point, at):
 @kernel
 def _nearest_of_all(nodes, links, n_nodes, point, at):
     """An upper bound of the distance to the nearest body: down to a near leaf, then through all nodes nearer than the
-    bound."""
+    bound.
+    """
     node = _nearest_sibling(nodes, links, 0, n_nodes, point, at)
     while links[LINK * node + SKIP] > node + 1:
         node = _nearest_sibling(nodes, links, node + 1, links[LINK * node + SKIP], point, at)

@@ -100,7 +100,8 @@ def certificate_from_pairs(A, B, X_WA, X_WB, pairs: Sequence[VertexPair], *, hit
 
 def certificate_from_normal(A, B, X_WA, X_WB, normal: np.ndarray) -> tuple[Certificate, ...] | None:
     """The certificate "plane" of two convex polytopes from a normal (3,) towards A, its doubles taken exactly; None
-    where the plane does not part them."""
+    where the plane does not part them.
+    """
     whole = in_integers([Fraction(float(c)) for c in normal])
     (part_a,), (part_b,) = exact_parts(A, X_WA), exact_parts(B, X_WB)
     if flaw_of_normal(part_a, part_b, whole) is not None:

@@ -103,7 +103,8 @@ def _add_joint(scene, j, q, first, direction, p_W, out):
 @kernel(cold=True)
 def _add_floating(scene, j, q, column, direction, p_W, out):
     """x, y, z along the joint frame's axes; yaw about its z, pitch about its y as yaw leaves it, roll about the child's
-    x."""
+    x.
+    """
     links = scene.links
     child = POSE * scene.joints.ints[JOINT_INTS * j + CHILD]
     arm = sub(p_W, vec3_at(links, child + 9))

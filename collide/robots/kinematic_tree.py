@@ -183,7 +183,8 @@ def broken_note(name: str, why: str) -> str:
 
 def resolve_mimics(joints: Sequence[Joint]) -> dict[str, tuple[str, float, float]]:
     """Joint with a single coordinate → (its driving joint, multiplier, offset), chains of mimics followed to their
-    end."""
+    end.
+    """
     single = {joint.name: joint for joint in joints if len(COLUMNS[joint.type]) == 1}
     drivers: dict[str, tuple[str, float, float]] = {}
     for name in single:

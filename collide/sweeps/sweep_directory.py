@@ -116,7 +116,8 @@ class SweepDirectory:
 
     def manifest(self) -> dict[str, Any]:
         """The sweep's question, as begun. Raises SceneError for a folder without a manifest, or with a broken
-        manifest."""
+        manifest.
+        """
         file = self.path / MANIFEST
         if not file.exists():
             raise SceneError("is no folder of a sweep: it has no manifest", path=self.path)

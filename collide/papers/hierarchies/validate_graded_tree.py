@@ -10,9 +10,9 @@ from collide.papers.hierarchies.graded_tree import CELL, FIRST, LAST, LEVEL, PAR
 def validate_graded_tree(tree: GradedTree, vertices: np.ndarray, faces: np.ndarray) -> None:
     """Each property of the paper's section 3.2, by its definition; raises AssertionError naming node or facet.
 
-    Cells lie in each other and are smaller from node to node; facet sets are those of the definition, from the
-    centroids and the bounding cubes of every level, also of levels that were compressed away; outliers fit no
-    child; no node is empty or has one child only; one leaf a facet; at most 2m − 1 nodes; depth as bounded.
+    Cells lie in each other and are smaller from node to node; facet sets are as defined, from the
+    centroids and the bounding cubes of every level, also of levels compressed away; outliers fit no
+    child; no node is empty or has a single child; a leaf for each facet; at most 2m − 1 nodes; depth as bounded.
     """
     corners = np.asarray(vertices, dtype=float)[np.asarray(faces)]
     m = len(corners)

@@ -1,4 +1,4 @@
-"""The walk over two meshes of tetrahedra at one pair of poses: pieces for threads, space for pairs, what came of it."""
+"""The walk over two meshes of tetrahedra at a pair of poses: pieces for threads, space for pairs, and the results."""
 
 from __future__ import annotations
 
