@@ -17,7 +17,7 @@ from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 SWEEP = 10
 #: Relative error of a t where a slab begins or ends, a product with an inverse, with a margin.
 _ROUNDING = 2.0**-50
-#: Coordinates are smaller than this; those of boxes that hold nothing are infinite.
+#: Coordinates are smaller than this bound; empty boxes have infinite coordinates.
 _LARGEST = 1e300
 
 

@@ -20,7 +20,7 @@ from collide.numerics.exact_points import in_integers
 from collide.results import UNDECIDED, PairResult, question_of_row
 from collide.transforms import as_poses
 
-#: Certificates of one pair of bodies, or that of a region and another body; None where it has none.
+#: Certificates of a pair of bodies, or of a region and another body; None without a certificate.
 Certificates = tuple[Certificate, ...] | RegionCertificate | None
 
 

@@ -91,7 +91,7 @@ def _add_joint(scene, j, q, first, direction, p_W, out):
         out[column] += multiplier * dot(axis, direction)
         return
     if kind == PLANAR:
-        # It shifts before it turns: along axes of the frame not yet turned.
+        # The joint shifts before turning: along axes of the frame before the turn.
         for k in range(2):
             across = _in_joint_frame(scene, j, vec3_at(joints.doubles, at + ACROSS + 3 * k))
             out[column + k] += dot(across, direction)

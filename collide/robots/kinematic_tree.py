@@ -80,7 +80,7 @@ def checked_joint(joint: Joint, links: Mapping[str, int]) -> Joint:
     if joint.type in ("revolute", "continuous", "prismatic", "planar"):
         if not length > 1e-9:
             raise SceneError(f"axis {axis.tolist()} has length 0 and names no direction", element=element)
-        # An axis such as (0, 0, 1) must stay as it is, bit by bit.
+        # An axis like (0, 0, 1) must keep its bits.
         axis = axis if length == 1.0 else axis / length
     if math.isnan(joint.lower) or math.isnan(joint.upper):
         raise SceneError(f"limits must be numbers, got [{joint.lower}, {joint.upper}]", element=element)

@@ -136,7 +136,7 @@ def fill_graded(
         last = stack[at + LAST]
         _sort_by_child(facets, low, width, levels, stack, at, order, scratch, counts)
         while used > 0 and only_class(counts, 8, last - first) >= 0:
-            # All facets go to one child and nothing branches: the node is that child. Only the root stays.
+            # All facets in a single child, so no branch: the node becomes the child. Only the root stays.
             child = only_class(counts, 8, last - first)
             stack[at + LEVEL] += 1
             for axis in range(3):

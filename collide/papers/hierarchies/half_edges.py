@@ -107,7 +107,8 @@ def drop_star(mesh, v):
 
 @kernel
 def plan_hole(cloud, ring, start, count, plan, stack):
-    """Triangles of the convex surface over a ring of count ≥ 3 vertices, counter-clockwise seen from outside.
+    """Triangles of the convex surface over a ring of count ≥ 3 vertices, as seen from the side where the ring runs
+    counter-clockwise.
 
     ring[start : start + count] in convex position, its edges and their chain on a convex body: the
     triangle at the edge from the last to the first is found by wrapping, then the chains on both of its

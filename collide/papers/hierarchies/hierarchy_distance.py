@@ -31,7 +31,7 @@ from collide.narrowphase.gjk.simplex import nearest_in_simplex
 from collide.numerics.vec3 import add, cross, dot, neg, put_vec3, rotate, scale, sub, vec3_at
 from collide.papers.hierarchies.packed_hierarchy import PackedHierarchy, levels_at, row_at
 
-#: Rounds of one small GJK; it ends when the distance no longer falls.
+#: Rounds of a small GJK; a round without a smaller distance ends the search.
 _ROUNDS = 200
 #: Doubles of a nearest pair: squared distance, point of A, point of B. Its ids: three vertices of each, −1 beyond.
 _PAIR, _IDS = 7, 6

@@ -33,7 +33,7 @@ def validate_graded_tree(tree: GradedTree, vertices: np.ndarray, faces: np.ndarr
     assert tree.size() <= max(2 * m - 1, 2), "too many nodes"  # a single facet hangs from a root
     assert tree.deepest_level() <= tree.levels, "deeper than the shortest edge allows"
     sizes = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1)
-    # Only facets that are points would go down for ever: it is for their sake that levels end.
+    # Only facets shrunk to points would go down for ever: levels end for their sake.
     assert (sizes == 0.0).any() or tree.deepest_level() < tree.levels or m == 1, "levels ended too early"
     _check_facet_sets(tree, corners)
 

@@ -76,7 +76,7 @@ TRACE = 20
 #: Rounds a trace has room for.
 TRACED_ROUNDS = 512
 
-#: Workspace of one thread: that of the steps, a difference point and its ids.
+#: Workspace of a thread: workspace of the steps, a difference point and its ids.
 DOUBLES, INTEGERS = STEP_DOUBLES + POINT, STEP_INTEGERS + 4
 
 

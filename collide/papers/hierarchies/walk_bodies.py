@@ -114,7 +114,7 @@ class PolarSide:
         patch = polar.groups[facet_of_triangles(Cloud(points), facets, twins_of(facets))]
         order = np.argsort(patch, kind="stable")
         self.triangles = np.ascontiguousarray(facets[order])
-        if count is not None:  # the body has no such vertices; the first one stands for them
+        if count is not None:  # vertices of the thickened body alone are replaced by the first vertex
             self.triangles[self.triangles >= count] = 0
         self.starts = np.searchsorted(patch[order], np.arange(len(polar.points) + 1)).astype(np.int64)
         self._centre = np.array([*self.origin, self.radius])
@@ -187,5 +187,5 @@ def _exact_distance(corners: np.ndarray, origin: np.ndarray) -> float:
     return math.sqrt(float(height * height / inner(normal, normal))) * (1 - 1e-12)
 
 
-#: Held while a hierarchy is built: one at a time, since that of 100,000 points takes seconds.
+#: Held while a hierarchy is built: a single build at a time, since a hierarchy of 100,000 points takes seconds.
 _build_lock = ForkSafeLock()

@@ -25,7 +25,7 @@ _BALL = 5
 
 #: A facet of more triangles than this is not searched: the walk's answer is then not proven here.
 _MAX_TRIANGLES = 256
-#: Facets stepped over in search of the one that a ray leaves by.
+#: The most facets stepped over in search of the facet pierced by a ray.
 _MAX_STEPS = 64
 
 
@@ -83,7 +83,7 @@ def planes_apart(proof, d, error):
     difference_point(proof.pair, proof.points, proof.ids, 0, n)
     if has_trees(proof.pair):
         if dot(vec3_at(proof.points, 0), n) >= 0.0:
-            return False  # a point that is there, farthest or not
+            return False  # an existing point, farthest or not
         settle_point(proof.pair, proof.points, proof.ids, 0, n)
     return -dot(vec3_at(proof.points, 0), n) > 1.000001 * error
 

@@ -17,7 +17,7 @@ from collide.papers.partitions.planes import Planes, signs_of
 from collide.shapes.mesh import Mesh
 from collide.surface_queries.contains import winds_around
 
-#: How far off a cut points are tried, in widths of the piece of facet that lies in it.
+#: Distances of tried points from a cut, in widths of the piece of facet in the cut.
 _STEPS = tuple(2.0**-k for k in (2, 5, 8, 11, 14, 18, 22, 27, 32, 40))
 
 

@@ -9,7 +9,7 @@ from collide.numerics.growing_rows import GrowingRows
 
 #: What stands at a place that no cut and no leaf has taken.
 EMPTY = np.iinfo(np.int64).min
-#: Bytes of a cut and the two places below it, and of a facet that lies in one.
+#: Bytes of a cut with its two places, and of a facet in a cut.
 _CUT_BYTES, _HELD_BYTES = 88, 16
 
 

@@ -40,7 +40,7 @@ PRIMAL, POLAR = 0, 1
 _INFLATION = 2.0**-20
 #: Every second level is at most half as large as the one before last.
 _MAX_DEPTH = 100
-#: Samples drawn in one call before it gives up.
+#: The most samples drawn in a call.
 _MAX_DRAWS = 24
 
 #: (points, half-spaces, work, rows of points, rows of half-spaces) → their nearest pair, exactly.

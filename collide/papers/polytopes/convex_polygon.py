@@ -57,7 +57,7 @@ class ConvexPolygon:
             )
         ids = planar_hull.hull_of_points(read)
         n = len(ids)
-        if n == len(read):  # in which order, if it was counter-clockwise already
+        if n == len(read):  # already counter-clockwise: keep the order
             first = int(np.argmin(ids))
             if (np.roll(ids, -first) == np.arange(n)).all():
                 ids = np.arange(n)

@@ -29,7 +29,7 @@ from collide.papers.polytopes.shell_cones import cones_at
 _UNIT = 2.0**-53
 #: Why there is no tree of a flat body.
 FLAT = "a hierarchical tree needs points or normals of a body with interior; ask polytopes.meets of flat ones"
-#: Samples drawn for one node before it gives up.
+#: The most samples drawn for a node.
 _MAX_DRAWS = 12
 #: Simplices of the smallest net; how many a net has, times d − 1, for each leaf that its node's corners would fill.
 _SMALLEST_NET, _SIMPLICES_A_LEAF = 12, 6.0

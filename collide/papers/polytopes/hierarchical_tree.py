@@ -21,7 +21,7 @@ from collide.papers.polytopes.tree_size import TreeSize, max_simplices, predicte
 from collide.papers.polytopes.tree_walk import Grid
 from collide.papers.polytopes.whole_tree import build_whole
 
-#: Bytes that one tree may take, where nothing is said.
+#: Bytes of a tree by default.
 MEMORY = 1 << 30
 
 

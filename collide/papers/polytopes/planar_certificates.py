@@ -115,7 +115,7 @@ def gap_across(A: ConvexPolygon, B: ConvexPolygon, X_WA, X_WB, certificate: Plan
     greatest = max(nx * x + ny * y for x, y in placed_vertices(A, X_WA))
     least = min(nx * x + ny * y for x, y in placed_vertices(B, X_WB))
     square = (least - greatest) ** 2 / (nx * nx + ny * ny)
-    # The root to 64 digits, by the integers that it lies between.
+    # The root to 64 digits, between two neighbouring integers.
     bits = max(0, square.denominator.bit_length() - square.numerator.bit_length()) + 128
     gap = float(Fraction(math.isqrt(square.numerator * 4**bits // square.denominator), 2**bits))
     while gap > 0.0 and Fraction(gap) ** 2 > square:

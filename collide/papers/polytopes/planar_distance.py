@@ -37,7 +37,7 @@ _ENOUGH = 2.0**-51
 _LEAST = 5e-324
 #: Up to so many vertices are scanned.
 _SCANNED = 8
-#: Rounds of GJK, none of which comes near it; steps of a binary search.
+#: Limits never reached: rounds of GJK, steps of a binary search.
 _MAX_ROUNDS, _MAX_STEPS = 200, 80
 
 

@@ -191,7 +191,7 @@ def _pair_parts(work, digits, A, edge_a, B, edge_b, error, exactly):
     f = sub(vec3_at(work, end_b), vec3_at(work, b))
     n = cross(e, f)
     terms = Vec3(abs(e.y * f.z) + abs(e.z * f.y), abs(e.z * f.x) + abs(e.x * f.z), abs(e.x * f.y) + abs(e.y * f.x))
-    # The sign of A's side where it has one, strictly for one corner at least: else the edges are parallel.
+    # The sign of A's side, if any, strict for at least a corner: else the edges are parallel.
     side = 0
     for k in range(5):
         if k < 2:
