@@ -185,10 +185,10 @@ class PairResult(Generic[Form]):
 
     @property
     def certificate(self):
-        """Plain data that proves the boolean, worked out when asked for: `collide.certify`.
+        """Plain data as proof of the boolean, worked out on request: `collide.certify`.
 
-        A tuple of `Certificate`, one for each pair of parts it takes; None where there is none. A list of these for
-        batches. `collide.verify` checks one in Python integers.
+        A tuple of `Certificate`, for each pair of parts in the proof; ``None`` for pairs without a certificate. A list
+        of tuples for batches. `collide.verify` checks a certificate in Python integers.
         """
         return self._certify(*self.question, self)
 
@@ -272,11 +272,11 @@ class WorldResult:
     ----------
     rows : (n,) `PAIR_DTYPE`, a and b the ids of bodies.
     bodies : {id: body as it stood}, with ``name``, ``shape`` and ``X_WB`` (4, 4).
-    certify : what makes certificates of a row, `collide.certify`.
+    certify : makes the certificates of a row, `collide.certify`.
 
     Notes
     -----
-    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows. ``names``
+    Indexing by the name of a field gives a column, by a number a row, by a slice or a mask rows. ``names``
     resolves the ids; ``pair(k)`` is row k as a `PairResult`, with its certificate.
     """
 

@@ -48,21 +48,21 @@ SMALLEST = 1e-50
 
 
 def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=None) -> Pose:
-    """A (4, 4) pose from a translation and one of four descriptions of a rotation.
+    """A (4, 4) pose from a translation and a rotation, described in any of four ways.
 
     Parameters
     ----------
     xyz : (3,) array_like, float64
         Translation [m].
     rpy : (3,) array_like, optional
-        Roll, pitch, yaw [rad] about fixed x, y, z axes, as URDF has them.
+        Roll, pitch, yaw [rad] about fixed x, y, z axes, as in URDF.
     quat_wxyz : (4,) array_like, optional
         Quaternion, scalar first, of any length but 0; normalised here, because a quaternion in a file carries rounded
         digits and means the rotation.
     quat_xyzw : (4,) array_like, optional
-        The same, scalar last, as ROS and scipy have it.
+        The same, scalar last, as in ROS and scipy.
     R : (3, 3) array_like, optional
-        Rotation, used as it stands; or what gives one by ``as_matrix()``, as scipy's Rotation does.
+        Rotation, used as given; or an object with ``as_matrix()``, like scipy's Rotation.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def pose(xyz=(0.0, 0.0, 0.0), *, rpy=None, quat_wxyz=None, quat_xyzw=None, R=Non
 
 
 def _plain_shift(xyz) -> Pose | None:
-    """The pose of three plain numbers that no check refuses; None of anything else, which the long way reads."""
+    """The pose of three plain numbers that pass every check; ``None`` for anything else, read by the long way."""
     if xyz.__class__ is np.ndarray and xyz.dtype is _FLOAT64:
         xyz = xyz.tolist()
     if (xyz.__class__ is not tuple and xyz.__class__ is not list) or len(xyz) != 3:
@@ -115,7 +115,7 @@ def _finite(name: str, values, shape) -> np.ndarray:
 
 
 def _matrix_of(R):
-    """The matrix of an object that has one, anything else as it is."""
+    """The matrix of an object with ``as_matrix()``, anything else unchanged."""
     return R.as_matrix() if callable(getattr(R, "as_matrix", None)) else R
 
 
@@ -171,7 +171,7 @@ def as_poses(X: PoseLike, name: str = "X", *, check: bool = True) -> np.ndarray:
 
 
 def as_pose(X: PoseLike, name: str = "X", *, check: bool = True) -> np.ndarray:
-    """One pose as a float64 matrix (4, 4), the caller's own array where it is one already; checked as by `as_poses`.
+    """A pose as a float64 matrix (4, 4), the caller's own array where already float64; checked as by `as_poses`.
 
     Raises InvalidPose. About 3 µs for a float64 array.
     """
@@ -210,10 +210,10 @@ def _advice(values: np.ndarray) -> str:
 
 
 def refuse_no_pose(batch: np.ndarray, name: str, check: bool = True, skip: str = " (check_poses=False skips this)"):
-    """Refuse what is no pose of space, (N, 4, 4), or of the plane, (N, 3, 3).
+    """Refuse batches with matrices other than poses of space, (N, 4, 4), or of the plane, (N, 3, 3).
 
-    check : refuse what is no rotation.   skip : how the caller may skip that.
-    Raises InvalidPose, which names the argument, the entry of the batch and the value.
+    check : refuse matrices other than rotations.   skip : text on skipping the check.
+    Raises InvalidPose naming the argument, the entry of the batch and the value.
     """
     d = batch.shape[-1] - 1
     last = (*(0,) * d, 1)

@@ -20,7 +20,7 @@ import numpy as np
 
 from collide.errors import CollideError, InvalidArgument, brief
 
-#: Array kinds that are read as they are; objects are read one by one.
+#: Array kinds read directly; arrays of objects are read entry by entry.
 _REAL = "fiub"
 _KINDS = {
     "c": "complex numbers", "m": "time spans", "M": "dates", "U": "text", "S": "bytes", "V": "records", "T": "text",

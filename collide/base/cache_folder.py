@@ -96,7 +96,7 @@ def read_own(file: Path) -> bytes:
         with os.fdopen(descriptor, "rb", closefd=False) as opened:
             return opened.read()
     finally:
-        os.close(descriptor)  # of a folder, too, of which `os.fdopen` makes no stream and leaves it open
+        os.close(descriptor)  # also of a folder: `os.fdopen` makes no stream of a folder and leaves the descriptor open
 
 
 def why_distrusted(folder: Path) -> str | None:

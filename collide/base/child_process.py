@@ -109,7 +109,8 @@ class ChildProcess:
 
     def kill(self) -> None:
         """End the process while another thread is still waiting for a message; `close` is left to the waiting
-        thread."""
+        thread.
+        """
         self._process.kill()
 
     def close(self) -> None:

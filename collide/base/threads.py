@@ -19,8 +19,8 @@ _MAX_INT = 2**31 - 1
 _ALONE = 50e-3
 #: It is then shared in pieces that last between these two [s]: handing over a piece costs about a millisecond.
 _SHORTEST, _LONGEST = 20e-3, 100e-3
-#: Threads that wait for each other, for Python's lock say, are no faster than one, and cost more. Helpers stop unless
-#: all threads together get so many times the processor's time that one would get.
+#: Threads waiting for each other, for example for Python's lock, are no faster than a single thread, and cost more.
+#: Helpers stop unless all threads together get this many times the processor time of a single thread.
 _GAIN = 1.3
 
 

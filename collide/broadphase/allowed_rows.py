@@ -14,7 +14,7 @@ from collide.kernels import kernel
 # A row: the first partner (down to a multiple of 64), how many words follow, and whether these are bits or a list.
 _FIRST, _WORDS, _IS_LIST = 0, 1, 2
 _HEAD = 3
-#: Words of bits that a row may have besides one a partner.
+#: A row of bits has at most this many words more than its number of partners.
 _SPARE_WORDS = 4
 
 

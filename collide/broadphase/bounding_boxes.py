@@ -32,7 +32,7 @@ from collide.support.support_mapping import settled_vertex, support
 #: Each bound is moved outwards by this many units in the last place of the terms summed; the
 #: derivation in `narrowphase/bounds.py` needs fewer.
 _OUTWARD = 32 * 2.0**-53
-#: So few points are gone through one by one: who is farthest need not be known, only how far.
+#: Up to this number of points a linear pass is used: the box needs the largest coordinate, not its point.
 _MAX_LISTED = 16
 
 

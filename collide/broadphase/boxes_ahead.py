@@ -17,7 +17,7 @@ from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 SWEEP = 10
 #: Relative error of a t where a slab begins or ends, a product with an inverse, with a margin.
 _ROUNDING = 2.0**-50
-#: Coordinates are smaller than this; those of boxes that hold nothing are infinite.
+#: Coordinates are smaller than this bound; empty boxes have infinite coordinates.
 _LARGEST = 1e300
 
 
@@ -100,7 +100,8 @@ def _nearest_sibling(nodes, links, node, end, point, at):
 @kernel
 def _nearest_of_all(nodes, links, n_nodes, point, at):
     """An upper bound of the distance to the nearest body: down to a near leaf, then through all nodes nearer than the
-    bound."""
+    bound.
+    """
     node = _nearest_sibling(nodes, links, 0, n_nodes, point, at)
     while links[LINK * node + SKIP] > node + 1:
         node = _nearest_sibling(nodes, links, node + 1, links[LINK * node + SKIP], point, at)

@@ -44,7 +44,8 @@ def count_skipped(
 
 def _exclusions(a: np.ndarray, b: np.ndarray) -> dict[str, np.ndarray]:
     """{reason: bool array}, from traits (…, 4) of both bodies of each pair; at most the first reason of a pair is
-    True."""
+    True.
+    """
     both_static = (a[..., 0] != 0) & (b[..., 0] != 0)
     masked = ((a[..., 1] & b[..., 2]) == 0) | ((b[..., 1] & a[..., 2]) == 0)
     still = (a[..., 3] != 0) & (b[..., 3] != 0)

@@ -9,8 +9,8 @@ from collide.broadphase.graded_boxes import LINK, PARENT, SKIP
 from collide.broadphase.tree_in_memory import CHANGED_BIT, FLAGS, N_CHANGED, TRAITS, tree_in_memory
 from collide.kernels import entry, kernel, view_f64, view_i64
 
-#: Room for so many steps of a body that moves, at most this share of its largest side or of what is free around it,
-#: and none for one that would be outside again after two.
+#: A moved leaf's box gets room for _STEPS steps of its body, at most _MAX_SLACK times its largest side or the free
+#: distance around; no room if fewer than _LEAST_STEPS steps would fit.
 _STEPS, _MAX_SLACK, _LEAST_STEPS = 4.0, 0.125, 2.0
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from collide.broadphase.graded_boxes import LINK
 from collide.kernels import kernel, view_f64, view_i64
 
-#: Integers of a body: bits (below), group, mask, and where its row of allowed pairs begins (−1: it has none).
+#: Integers of a body: bits (below), group, mask, and where its row of allowed pairs begins (−1: no row).
 FLAGS, GROUP, MASK, ALLOWED_AT = range(4)
 TRAITS = 4
 #: Bits of FLAGS: static; static or asleep: pairs of these are not tested; changed: since the last pairs were looked

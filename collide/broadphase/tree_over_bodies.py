@@ -31,11 +31,11 @@ from collide.numerics.growing_rows import GrowingRows
 #: A tree is made anew once all sides of its nodes, added up, have grown by this factor: in metres, or in sides of the
 #: box around all.
 _GROWN = 1.5
-#: Of fewer bodies all nodes are fitted at once; of more, the paths above those that left their leaves' boxes, where
-#: these are at most one in so many.
+#: Below this number of bodies all nodes are fitted at once; from there on the paths above changed leaves alone, if at
+#: most one leaf in _SHARE_OF_PATHS changed.
 _MIN_PATHS, _SHARE_OF_PATHS = 64, 8
 _NO_WORK = {"trees made": 0, "nodes fitted": 0, "leaves changed": 0}
-#: A box that meets nothing, and one that meets all others.
+#: A box that meets no box, and a box that meets all others.
 _NOTHING = np.array([np.inf] * 3 + [-np.inf] * 3)
 _EVERYTHING = -_NOTHING
 

@@ -20,7 +20,7 @@ from collide.numerics.exact_points import in_integers
 from collide.results import UNDECIDED, PairResult, question_of_row
 from collide.transforms import as_poses
 
-#: Certificates of one pair of bodies, or that of a region and another body; None where it has none.
+#: Certificates of a pair of bodies, or of a region and another body; None without a certificate.
 Certificates = tuple[Certificate, ...] | RegionCertificate | None
 
 
@@ -100,7 +100,8 @@ def certificate_from_pairs(A, B, X_WA, X_WB, pairs: Sequence[VertexPair], *, hit
 
 def certificate_from_normal(A, B, X_WA, X_WB, normal: np.ndarray) -> tuple[Certificate, ...] | None:
     """The certificate "plane" of two convex polytopes from a normal (3,) towards A, its doubles taken exactly; None
-    where the plane does not part them."""
+    where the plane does not part them.
+    """
     whole = in_integers([Fraction(float(c)) for c in normal])
     (part_a,), (part_b,) = exact_parts(A, X_WA), exact_parts(B, X_WB)
     if flaw_of_normal(part_a, part_b, whole) is not None:

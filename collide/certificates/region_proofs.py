@@ -33,7 +33,7 @@ from collide.shapes.shape import Shape
 
 if TYPE_CHECKING:
     from collide.least_distance import nearest_pair, pair_proposals, posed_rows
-else:  # with kernels, which making a certificate needs, and checking one does not
+else:  # with kernels, needed for making certificates, not for checking
     nearest_pair = lazy_module("collide.least_distance.nearest_pair")
     pair_proposals = lazy_module("collide.least_distance.pair_proposals")
     posed_rows = lazy_module("collide.least_distance.posed_rows")

@@ -9,7 +9,7 @@ import numpy as np
 from collide.numerics.exact_points import PlacedPoints, Point
 from collide.numerics.exact_vectors import cross, inner, minus
 
-#: Directions of the rays tried one after another, until one passes no edge and no corner.
+#: Directions of the rays, tried in sequence up to the first ray past all edges and corners.
 _DIRECTIONS: tuple[Point, ...] = (
     (7919, 104729, 1299709), (-15485863, 32452843, 49979687), (86028121, -3, 17), (5, 982451653, -373587883),
 )

@@ -29,7 +29,7 @@ _ALL_FACETS = 1_000_000
 #: Coordinates beyond are drawn there [m]: single precision ends at 3.4e38.
 _LARGEST = 1e30
 
-#: A shape, and its pose X_BS in the frame of the body that it is drawn for.
+#: A shape, and its pose X_BS in the frame of its body.
 PosedShape = tuple[Shape, np.ndarray]
 
 
@@ -54,7 +54,7 @@ class ShapeTable:
         self._size, self._max_facets = size, max_facets
         self._rows: dict[tuple, int] = {}
         self._of_bytes: dict[bytes, int] = {}
-        self._seen: list[Sequence[PosedShape]] = []  # so that no other shape gets the id of one that was seen
+        self._seen: list[Sequence[PosedShape]] = []  # kept alive, so that no other shape gets the id of a seen shape
         self._shapes: list[Triangles] = []
 
     def row(self, shapes: Sequence[PosedShape]) -> int:

@@ -23,7 +23,7 @@ from collide.reports.trajectory_report import Look, Watch
 
 #: Samples of a trajectory that a page shows.
 MAX_SAMPLES = 600
-#: Pairs of one class listed in one state.
+#: The most listed pairs of a class in a state.
 MAX_ROWS = 50
 #: Poses beyond are drawn there [m]: single precision ends at 3.4e38.
 _LARGEST = 1e30

@@ -24,7 +24,7 @@ SCHEMA = "collide-baseline/1"
 COLLISION, SHALLOW, TOUCHING, KNOWN, DEEPER, GONE = "collision", "shallow", "touching", "known", "deeper", "gone"
 #: Classes that a baseline may hold.
 _KNOWN_CLASSES = (COLLISION, TOUCHING)
-#: What a pair is called here, and the class of a report that it is in; the worst first.
+#: Names of the kinds of findings, by class of the report; the worst first.
 _CLASSES = {COLLISION: "colliding", SHALLOW: "shallow", TOUCHING: "touching"}
 
 

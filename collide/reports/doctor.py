@@ -21,7 +21,7 @@ from collide.reports.progress import silent
 from collide.reports.report import versions
 from collide.reports.tables import Column, Table
 
-#: (distribution, extra that brings it, what for)
+#: (distribution, extra with the distribution, purpose)
 OPTIONAL = (
     ("pyyaml", "robots", "scene files, joint states, planning scenes"),
     ("trimesh", "robots", "mesh files"),

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 #: Rows shown of each long list, unless all are asked for.
 SHORT = 12
-#: A body that is in more pairs of a list than this has them told in one row.
+#: A body in more pairs of a list than this number has all of them told in a row.
 MAX_PAIRS_OF_BODY = 4
 _MARK = "≈ "
 #: A depth whose bracket is wider than this part of it is told by both ends.

@@ -24,7 +24,7 @@ _MAX_HALVINGS = 30
 #: Roundings of forward kinematics, as a share of where links are and how far they reach.
 _ROUNDING = 2.0**-40
 
-#: One interval that stays open.
+#: An open interval of a motion.
 OPEN_DTYPE = np.dtype([("edge", "i8"), ("begin", "f8"), ("end", "f8")])
 
 
@@ -98,7 +98,7 @@ def sampled_collision(
             continue  # the ends are all of a motion that is not halved
         alive = np.flatnonzero(np.isnan(times) & (needed >= level))
         n_samples = 2 if level < 0 else 2 ** (level - 1)
-        for k in range(n_samples):  # one by one: there may be 2^29, and the first may be a hit
+        for k in range(n_samples):  # in sequence: up to 2^29 samples, and the first may be a hit
             t = float(k) if level < 0 else (k + 0.5) / n_samples
             alive = alive[np.isnan(times[alive])]
             if not len(alive):

@@ -168,7 +168,8 @@ def _gather(motion, top):
 @kernel(inline=True)
 def _take(motion, top, n, p, q, body, partner, margin):
     """Ask about a pair of parts; write the pair unless proven apart. Returns the number written, or −1 or −2 as
-    `_gather`."""
+    `_gather`.
+    """
     state = _state(motion, p, q, body, partner, margin)
     if state == HITTING:
         return -2

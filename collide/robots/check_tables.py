@@ -216,7 +216,8 @@ def packed_within(packed: PackedConvex, margin: float, R: np.ndarray) -> PackedC
 
 def box_of(packed: PackedConvex) -> np.ndarray:
     """(BOX,) centre and half sides of a box around a set, in the set's own frame; infinite half sides for a
-    half-space."""
+    half-space.
+    """
     if packed.kind == HALFSPACE:
         return np.array([0.0, 0.0, 0.0, np.inf, np.inf, np.inf])
     if packed.kind == POINTS:

@@ -91,7 +91,7 @@ def _add_joint(scene, j, q, first, direction, p_W, out):
         out[column] += multiplier * dot(axis, direction)
         return
     if kind == PLANAR:
-        # It shifts before it turns: along axes of the frame not yet turned.
+        # The joint shifts before turning: along axes of the frame before the turn.
         for k in range(2):
             across = _in_joint_frame(scene, j, vec3_at(joints.doubles, at + ACROSS + 3 * k))
             out[column + k] += dot(across, direction)
@@ -103,7 +103,8 @@ def _add_joint(scene, j, q, first, direction, p_W, out):
 @kernel(cold=True)
 def _add_floating(scene, j, q, column, direction, p_W, out):
     """x, y, z along the joint frame's axes; yaw about its z, pitch about its y as yaw leaves it, roll about the child's
-    x."""
+    x.
+    """
     links = scene.links
     child = POSE * scene.joints.ints[JOINT_INTS * j + CHILD]
     arm = sub(p_W, vec3_at(links, child + 9))

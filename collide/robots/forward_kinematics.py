@@ -202,7 +202,8 @@ def sine_cosine_of(angle):
 @kernel(inline=True)
 def _rotate_columns(links, at, coordinate, sign, angle):
     """Turn the pose at ``at`` about its own coordinate axis, by ``sign`` times the angle [rad]: two columns are
-    mixed."""
+    mixed.
+    """
     sine, cosine = sine_cosine_of(angle)
     sine *= sign
     u = (coordinate + 1) % 3

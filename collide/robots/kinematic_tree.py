@@ -80,7 +80,7 @@ def checked_joint(joint: Joint, links: Mapping[str, int]) -> Joint:
     if joint.type in ("revolute", "continuous", "prismatic", "planar"):
         if not length > 1e-9:
             raise SceneError(f"axis {axis.tolist()} has length 0 and names no direction", element=element)
-        # An axis such as (0, 0, 1) must stay as it is, bit by bit.
+        # An axis like (0, 0, 1) must keep its bits.
         axis = axis if length == 1.0 else axis / length
     if math.isnan(joint.lower) or math.isnan(joint.upper):
         raise SceneError(f"limits must be numbers, got [{joint.lower}, {joint.upper}]", element=element)
@@ -183,7 +183,8 @@ def broken_note(name: str, why: str) -> str:
 
 def resolve_mimics(joints: Sequence[Joint]) -> dict[str, tuple[str, float, float]]:
     """Joint with a single coordinate → (its driving joint, multiplier, offset), chains of mimics followed to their
-    end."""
+    end.
+    """
     single = {joint.name: joint for joint in joints if len(COLUMNS[joint.type]) == 1}
     drivers: dict[str, tuple[str, float, float]] = {}
     for name in single:

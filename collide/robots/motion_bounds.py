@@ -36,7 +36,7 @@ from collide.robots.forward_kinematics import (
     # workspace: a configuration; how far each body may move, joint by joint; intervals; pairs left in them, how many
     # there may be
     CONFIGURATION_AT, MOVED_AT, INTERVALS_AT, ITEMS_AT, ITEM_CAPACITY,
-    # intervals that stay open: where they are written, for how many, how many there are
+    # open intervals: address, capacity, number
     OPEN_INTERVALS_AT, OPEN_INTERVAL_CAPACITY, N_OPEN_INTERVALS, N_CHECKED,
     # pairs of bodies with meshes, which others are to ask: where they are written, for how many, how many there are
     MESH_PAIRS_AT, MESH_PAIR_CAPACITY, N_MESH_PAIRS,

@@ -15,7 +15,7 @@ NEAREST_DTYPE = np.dtype(
 )
 
 
-#: Why there is no gradient: what is the case, and what to do about it where there is anything to do.
+#: Reasons of a missing gradient: the cause, and a remedy where one exists.
 NO_GRADIENT = {
     "beyond": "no tested pair is within max_distance",
     "touching": "the bodies touch: distances have no derivative at 0",

@@ -17,7 +17,7 @@ from collide.solids.limits import Limits
 from collide.solids.placed_facets import Operand
 from collide.solids.solid_operands import solid_operand
 
-#: Of r bools, one for each body: whether points belong that just these bodies hold.
+#: From r bools, a bool a body: whether points held by exactly these bodies belong to the result.
 MembershipRule = Callable[[tuple[bool, ...]], bool]
 
 RULES: dict[str, MembershipRule] = {

@@ -132,7 +132,8 @@ def _signs(normals: list[Point], along: list[Point], shear: _Shear, at_normals: 
 
 def _crossings(n1, n2, m1, m2, bend_e, bend_g) -> np.ndarray:
     """Whether the arcs of normals of edges e and g cross, by how n1, n2 at e lie to g and m1, m2 at g to e: 0, or the
-    count of the piece e + g, turned as e × g."""
+    count of the piece e + g, turned as e × g.
+    """
     cross = (n1 != n2) & (m1 != m2) & (bend_e * n1 == -bend_g * m1)
     return np.where(cross, bend_g * n1, 0).astype(np.int8)
 

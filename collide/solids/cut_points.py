@@ -52,7 +52,8 @@ class CutPoints:
 
     def add_piercings(self, edges: np.ndarray, rows: np.ndarray) -> None:
         """Points for the first ids after those of vertices, asked once: where edges (k, 2) of vertices go through
-        facets (k,). They are worked out when asked for."""
+        facets (k,). They are worked out when asked for.
+        """
         self.pierced = np.column_stack([edges, rows])
         self._next += len(rows)
 

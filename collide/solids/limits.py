@@ -13,8 +13,8 @@ from typing import TypeVar
 
 from collide.errors import InvalidArgument, UnsupportedQuery, brief
 
-#: Bytes that a meeting pair of facets takes while it is cut exactly, with its share of points, segments and triangles:
-#: `python benchmarks/combined_solids.py --only memory` measures it.
+#: Bytes of a meeting pair of facets during exact cuts, with its share of points, segments and triangles; measured by
+#: `python benchmarks/combined_solids.py --only memory`.
 BYTES_PER_PAIR = 1000
 #: The same of a pair of segments in the plane.
 BYTES_PER_CROSSING = 500

@@ -111,7 +111,8 @@ def exact_planar_obstacle(A, B, R, limits: Limits = UNLIMITED, check: bool = Tru
 
 def border_rings(arrangement: PlaneArrangement, keep: np.ndarray) -> list[list[int]]:
     """Points around the faces to keep, on the left of the rings; rings touching in a point are separated at the
-    point."""
+    point.
+    """
     inside = keep[arrangement.face]
     border = inside & ~inside[np.arange(len(inside)) ^ 1]
     onward = arrangement.onward
@@ -159,7 +160,8 @@ def polygons_meet_at(A: ExactPolygon, B: ExactPolygon, x: PlanePoint) -> bool:
 
 def _convolution(A: ExactPolygon, B: ExactPolygon) -> tuple[list[Vector], np.ndarray]:
     """(points, directed segments (k, 2) of them): edges and corners whose normals agree, run back where the corner is
-    reflex. Parallel edges are told apart as if B were turned by an infinitely small angle."""
+    reflex. Parallel edges are told apart as if B were turned by an infinitely small angle.
+    """
     along_p, along_q = A.along(), B.along()
     turns = _turn_signs(along_p, along_q)
     at_q = _corner_counts(B, along_q, -turns[:, B.before], turns)

@@ -13,7 +13,7 @@ import numpy as np
 from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 from collide.mesh.bvh import CENTRE, EXPONENT, NODE, WIDTH, MeshTree, box_at, open_tree
 
-#: Answers of a facet: how often it is passed, or that doubles do not tell.
+#: Answers of a facet: number of passages, or open in doubles.
 _OPEN = 2
 
 

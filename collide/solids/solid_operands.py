@@ -40,7 +40,8 @@ def _why_not(shape: Shape) -> str:
 
 def _unscaled(mesh: Mesh) -> Mesh:
     """The mesh itself; for a scaled copy a mesh of its own vertices, since facets of zero area may differ from the
-    base's."""
+    base's.
+    """
     return mesh if mesh.base is mesh else _copied(mesh)
 
 

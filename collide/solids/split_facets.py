@@ -136,7 +136,7 @@ def _ways_around(chains: _Chains, facet, start, end, at_border, n_points) -> tup
     on_border = ~chains.is_corner[then]
     following[:m] = np.where(on_border, m + order[np.minimum(first, n - 1)] if n else 0, then)
     bad = [chains.facet[on_border & (count != 1)]]
-    # Segments that end on the border go on along it; those that end inside go on along the path, never back.
+    # Segments ending on the border continue along the border, segments ending inside along the path, never back.
     border_keys = chains.facet * n_points + chains.point
     border_order = np.argsort(border_keys, kind="stable")
     at = np.searchsorted(border_keys[border_order], facet * n_points + end)

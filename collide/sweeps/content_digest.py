@@ -62,7 +62,7 @@ def _update(hasher: Any, value: Any) -> None:
         raise TypeError(f"no digest of a {type(value).__name__}")
 
 
-#: Digests of shapes, which never change: id -> (the shape, so that the id stays its own; its digest).
+#: Digests of shapes, never changing: id -> (the shape, kept alive so that its id stays unique; its digest).
 _SHAPES: dict[int, tuple[Shape, str]] = {}
 _MAX_SHAPES = 20_000
 

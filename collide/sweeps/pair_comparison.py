@@ -79,7 +79,7 @@ def compare_pairs(proposal: Proposal, theirs: Iterable[tuple[str, str, str]]) ->
             if pair.reason is not None:
                 result.both.append((pair.a, pair.b, pair.reason, reason))
             else:
-                # By any other reason, or none, a person may have meant it.
+                # By any other reason, or without a reason, a person may have meant the pair.
                 wrong = pair.q is not None and reason.lower() == NEVER.lower()
                 result.only_theirs.append(_difference(pair, reason, wrong, depth_of))
     for pair in proposal.disabled:

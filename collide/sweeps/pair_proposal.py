@@ -212,7 +212,7 @@ class _Survey:
             if pair.reason == ADJACENT:
                 continue
             if pair.hits >= self.proposal.always_share * pair.samples:
-                pair.reason = ALWAYS  # also of those that collide at the default: it says more
+                pair.reason = ALWAYS  # also pairs colliding at the default: "Always" says more
             elif pair.reason is None and pair.hits == 0:
                 pair.reason = NEVER
         rare = [place for place, pair in self.pairs.items() if pair.reason == NEVER and not pair.fixed]

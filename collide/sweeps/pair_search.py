@@ -61,7 +61,7 @@ def search_downhill(
         if gaps.min() <= 0.0:
             break
         steps = random.normal(size=(len(at), N_STEPS, len(columns))) * scale[:, None, None]
-        # Some steps along one joint alone: limits make corners that a step along all of them seldom reaches.
+        # Some steps along a single joint: limits make corners, seldom reached by a step along all joints.
         steps[:, ::2] *= np.eye(len(columns))[random.integers(0, len(columns), (len(at), (N_STEPS + 1) // 2))]
         tried = np.repeat(at[:, None], N_STEPS, axis=1)
         tried[..., columns] += steps * (upper - lower)[columns]

@@ -28,7 +28,7 @@ _MIN_CHUNK, _MAX_CHUNK, _AIMED_CHUNKS = 500, 50_000, 64
 #: Of processes, of chunks, and of rows of one: numbers of chunks are listed, and the rows of a chunk are in memory.
 MAX_WORKERS = 10_000
 MAX_CHUNKS, MAX_CHUNK_ROWS = 1_000_000, 10_000_000
-#: How often it is looked whether the scene is still what it was [s].
+#: Time between two checks for a changed scene [s].
 _LOOK_EVERY = 1.0
 
 

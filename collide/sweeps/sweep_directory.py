@@ -15,7 +15,7 @@ from collide.base.log import log
 from collide.base.whole_file import whole_file
 from collide.errors import InvalidArgument, MissingExtra, SceneError, listing
 
-#: Readers of Parquet leave out what begins with an underscore, so that the folder is one table to them.
+#: Readers of Parquet leave out names with a leading underscore, so the folder reads as a single table.
 MANIFEST, LOCK, PARTIAL = "_sweep.json", "_sweep.lock", "_partial-"
 SCHEMA = "collide-sweep/2"
 #: What of a manifest a second run must share, and how a difference is told.
@@ -110,13 +110,14 @@ class SweepDirectory:
                     f"{self.path}: {complaint} since this sweep began: choose another folder, or --restart "
                     "(restart=True) to throw away what it has"
                 )
-        for leftover in self.path.glob(f"{PARTIAL}*"):  # of a run that was killed while it wrote
+        for leftover in self.path.glob(f"{PARTIAL}*"):  # of a run killed while writing
             leftover.unlink()
         return [number for number, _ in self.tables(manifest)]
 
     def manifest(self) -> dict[str, Any]:
         """The sweep's question, as begun. Raises SceneError for a folder without a manifest, or with a broken
-        manifest."""
+        manifest.
+        """
         file = self.path / MANIFEST
         if not file.exists():
             raise SceneError("is no folder of a sweep: it has no manifest", path=self.path)

@@ -217,7 +217,7 @@ def question_digest(checker: Any) -> str:
     """What of a checker decides its answers. Asked again while a sweep runs, it says whether the scene changed."""
     if not isinstance(checker, RobotChecker):
         return digest(checker.robot, *checker.state())
-    checker.collides(np.zeros((0, checker.robot.dof)))  # so that it looks at its World
+    checker.collides(np.zeros((0, checker.robot.dof)))  # makes the checker read its World
     setting = checker.setting
     around = [(body.name, body.shape, body.X_WB) for body in setting.surroundings.bodies]
     return digest(checker.robot, setting.bodies, setting.base, around, setting.self_pairs, setting.allowed)

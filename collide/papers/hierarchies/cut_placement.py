@@ -1,9 +1,9 @@
-"""Where the new vertices of a cut are put, and the proof that they are where they must be.
+"""Places of the new vertices of a cut, and the proof of the properties required of these places.
 
 Vertex w is cut by a plane perpendicular to an axis, half-way to its nearest neighbour. New vertex j belongs on the edge
 from w to its neighbour r_j, a little deeper than the plane (`vertex_cutting` says why), and is moved towards a point s
-below all facets at w. Doubles propose; exact tests prove that it is in a tetrahedron of w, r_j, the next neighbour and
-s.
+below all facets at w. Doubles propose; exact tests prove that the new vertex is in a tetrahedron of w, r_j, the next
+neighbour and s.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ _DOME = 0.25
 
 
 class Cut(NamedTuple):
-    """A vertex that is to be cut off.
+    """A vertex to be cut off.
 
     w : the vertex.   k : its degree.
     ring, outer : k each, its neighbours and the half-edges beyond them (`read_ring`).
     fresh : k rows for new vertices, in a run.   inside : the row of s.
     axis : a direction in which all neighbours are ahead of w.
-    nearest : how far the nearest is along it; −1 for no axis.
+    nearest : distance of the nearest neighbour along the axis; −1 for no axis.
     """
 
     w: int
@@ -51,7 +51,7 @@ def inset_of(attempt):
 
 @kernel
 def prove_new(cloud, cut, j, least):
-    """Write new vertex j as near to its edge as it can be proven; False where it cannot."""
+    """Write new vertex j at the smallest provable distance from its edge; ``False`` where all proofs fail."""
     for attempt in range(INSETS):
         if put_new(cloud, cut, j, inset_of(attempt) * least):
             return True
@@ -161,7 +161,8 @@ def place(cloud, cut, inset):
 def put_new(cloud, cut, j, move):
     """Write new vertex j, on the edge from w to its neighbour and moved by this part of the way to s.
 
-    Returns whether it is in a tetrahedron of w, ring[j], a neighbour of that, and s, and not on the surface; exact.
+    Returns whether the new vertex is in a tetrahedron of w, ring[j], a neighbour of ring[j], and s, and not on the
+    surface; exact.
     """
     points, ring, w, v = cloud.scaled, cut.ring, cut.w, cut.fresh[j]
     to_inner = difference(points, w, cut.inside)

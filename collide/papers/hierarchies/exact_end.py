@@ -1,10 +1,10 @@
-"""The walk's end in integers: what its last vertices prove on the poses as given, touching included.
+"""The walk's end in integers: proofs from its last vertices on the poses as given, touching included.
 
-The walk runs in doubles, and near touching no room for rounding is left to a plane or a point of doubles. The vertex of
+The walk runs in doubles, and near touching the gap is below the rounding of planes and points in doubles. The vertex of
 P and the facet of R where its planes were tangent last are then taken up exactly. Their differences are a simplex of
-P ⊖ R: where it holds the origin, P and R share a point; where its nearest point is a plane beyond which all vertices
-lie, they are apart; else the simplex goes on from there, in integers, until it is one or the other. Walks that were
-lost have no such vertices, and are not ended here.
+P ⊖ R: if the simplex holds the origin, P and R share a point; if all vertices lie beyond the plane of the simplex's
+nearest point, P and R are apart; else the simplex is improved, in integers, up to either outcome. Lost walks have no
+last vertices, and are not ended here.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from collide.results import EXACT, PAIR_DTYPE
 
 
 class ExactEnds(NamedTuple):
-    """A row a walk that was ended.
+    """A row for each ended walk.
 
-    proven, hit : (n,) bool.   rounds : (n,) int64, simplices looked at in integers.
-    vertices_p, vertices_r : (n, 4) of the deciding simplex, of which the first ``counts`` (n,) count.
+    proven, hit : (n,) bool.   rounds : (n,) int64, simplices evaluated in integers.
+    vertices_p, vertices_r : (n, 4) of the deciding simplex, the first ``counts`` (n,) in use.
     """
 
     proven: np.ndarray

@@ -1,8 +1,8 @@
-"""The hierarchy of a flat polygon, a segment or a point: what plays P where P has no interior.
+"""The hierarchy of a flat polygon, a segment or a point, as P of the walk where P has no interior.
 
-The walk asks of P's levels what Lemma 4.2 says: at most one vertex of P_i lies beyond a plane that has P_{i+1} on
-one side, and it is a neighbour of the vertex where the plane is tangent. A polygon from which every other vertex
-is taken keeps that, and a cone κ is an angle with two neighbours. So the walk of section 5 needs an interior of R
+The walk needs Lemma 4.2 for P's levels: at most a single vertex of P_i lies beyond a plane with P_{i+1} on
+a side, a neighbour of the vertex where the plane is tangent. A polygon loses every other vertex from level to level
+and keeps the property, and a cone κ is an angle with two neighbours. So the walk of section 5 needs an interior of R
 alone.
 """
 

@@ -1,11 +1,11 @@
 """The graded box-tree to the letter: J. Erickson, "Local polyhedra and geometric graphs" (2005), section 3.2.
 
-The root's control cube is the smallest cube around the mesh; control cubes are those of an octree in it. A node's
-bounding cube has its control cube's middle and twice its width. Its facet set holds the facets of its parent's that
-lie in its bounding cube and have their centroid in its control cube. A facet of a node that belongs to no child is an
-outlier there, and a leaf. Nodes without facets are left out, and paths without branches are single edges.
+The root's control cube is the smallest cube around the mesh; control cubes are the cells of an octree in the root's. A
+node's bounding cube has its control cube's middle and twice its width. Its facet set holds the facets of its parent's
+set in its bounding cube with their centroid in its control cube. A facet of a node in no child is an outlier of the
+node, and a leaf. Nodes without facets are left out, and paths without branches are single edges.
 
-This is the structure that the paper's bounds are about: depth ≤ log2(W/ℓ) + 3 levels, W the root's width and ℓ the
+The paper's bounds hold for this structure: depth ≤ log2(W/ℓ) + 3 levels, W the root's width and ℓ the
 shortest edge, and at most 2m − 1 nodes with m leaves. Queries walk another tree (`build_bvh.py`): cubes twice too wide
 cost 2 to 35 times more. Each level sorts its facets once: O(m·depth).
 """
@@ -34,12 +34,12 @@ class GradedTree(NamedTuple):
 
     low, width : (3,) and a number [m]: the root's control cube.
     nodes : (k, 7) int64: level, cell x, y, z in the grid of 2^level cells a side, parent (−1 for the root), and the
-        range of ``order`` that is the facet set; inner nodes only, parents first.
-    order : (m,) facet numbers; those of a node stand together.
-    owner : (m,) int64, the node that facet k (as numbered in the mesh) hangs from as a leaf.
-    outlier : (m,) bool, whether it hangs there as an outlier; else it is alone in a child, a path that leads to one
-        leaf.
-    levels : how far the octree may go down: ⌈log2(W/ℓ)⌉ + 3.
+        range of ``order`` of the facet set; inner nodes only, parents first.
+    order : (m,) facet numbers; the facets of a node stand together.
+    owner : (m,) int64, the parent node of facet k (as numbered in the mesh) as a leaf.
+    outlier : (m,) bool, whether the facet is an outlier of its owner; else the facet is alone in a child, a path to a
+        single leaf.
+    levels : the most levels of the octree: ⌈log2(W/ℓ)⌉ + 3.
     """
 
     low: np.ndarray
@@ -69,8 +69,8 @@ class GradedTree(NamedTuple):
 def graded_tree(vertices: np.ndarray, faces: np.ndarray) -> GradedTree:
     """The graded box-tree of facets (m, 3) over vertices (n, 3) [m]; m at least 1.
 
-    Facets that are one point, all at one place, would go down for ever: they become outliers where the shortest
-    edge that is none ends the octree.
+    Facets shrunk to a point, all at the same place, would go down for ever: they become outliers at the octree's last
+    level, set by the shortest edge of positive length.
     """
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     faces = np.ascontiguousarray(faces, dtype=np.int64)
@@ -136,7 +136,7 @@ def fill_graded(
         last = stack[at + LAST]
         _sort_by_child(facets, low, width, levels, stack, at, order, scratch, counts)
         while used > 0 and only_class(counts, 8, last - first) >= 0:
-            # All facets go to one child and nothing branches: the node is that child. Only the root stays.
+            # All facets in a single child, so no branch: the node becomes the child. Only the root stays.
             child = only_class(counts, 8, last - first)
             stack[at + LEVEL] += 1
             for axis in range(3):

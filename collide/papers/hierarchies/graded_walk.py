@@ -37,8 +37,9 @@ class BoxHierarchy(NamedTuple):
 
 
 class WalkCounts(NamedTuple):
-    """compared : pairs of boxes (a facet is its box).   meeting : of them those that meet, the walk's calls.
-    facet_pairs : of these, pairs of facets: those that would be tested."""
+    """compared : pairs of boxes (a facet is its box).   meeting : pairs of meeting boxes, the walk's calls.
+    facet_pairs : meeting pairs of facets: the pairs to be tested.
+    """
 
     compared: int
     meeting: int
@@ -98,9 +99,9 @@ def _with_facets(centres, half_lengths, parents, corners, n: int, tight: bool) -
 
 
 def count_walk(A: BoxHierarchy, B: BoxHierarchy, X_AB: np.ndarray | None = None) -> WalkCounts:
-    """Pairs that the walk looks at to find all pairs of facets of A and of B whose boxes meet.
+    """Pairs visited by the walk to find all pairs of facets of A and of B with meeting boxes.
 
-    X_AB : (4, 4) takes points of B's frame to A's; it may turn, move and scale. The identity where None.
+    X_AB : (4, 4) takes points of B's frame to A's; the map may turn, move and scale. ``None`` is the identity.
     """
     X_AB = np.eye(4) if X_AB is None else np.asarray(X_AB, dtype=float)
     scale = np.abs(np.linalg.det(X_AB[:3, :3])) ** (1 / 3)

@@ -1,8 +1,8 @@
-"""A closed surface of triangles that changes: rings of vertices, and holes filled with the hull of their rim.
+"""A closed, changing surface of triangles: rings of vertices, and holes filled with the hull of their rim.
 
-Half-edge h = 3 t + e runs from corner e of triangle t to the next one, counter-clockwise seen
-from outside. ``corners[h]`` is where it starts, ``twins[h]`` the half-edge that runs back,
-``leaving[v]`` one that starts at vertex v. Free triangles are chained through ``twins`` from ``state[FREE]``.
+Half-edge h = 3 t + e runs from corner e of triangle t to the next corner, counter-clockwise seen
+from outside. ``corners[h]`` is its start, ``twins[h]`` the opposite half-edge,
+``leaving[v]`` a half-edge from vertex v. Free triangles are chained through ``twins`` from ``state[FREE]``.
 """
 
 from __future__ import annotations
@@ -76,7 +76,8 @@ def join(mesh, g, h):
 @kernel
 def read_ring(mesh, v, ring, outer):
     """Degree of v; its neighbours counter-clockwise, and the half-edges beyond the rim: outer[k] runs from
-    ring[k + 1] to ring[k]."""
+    ring[k + 1] to ring[k].
+    """
     corners, twins, leaving = mesh.corners, mesh.twins, mesh.leaving
     first = leaving[v]
     h = first
@@ -106,13 +107,14 @@ def drop_star(mesh, v):
 
 @kernel
 def plan_hole(cloud, ring, start, count, plan, stack):
-    """Triangles of the convex surface over a ring of count ≥ 3 vertices, seen from where they run counter-clockwise.
+    """Triangles of the convex surface over a ring of count ≥ 3 vertices, as seen from the side where the ring runs
+    counter-clockwise.
 
     ring[start : start + count] in convex position, its edges and their chain on a convex body: the
     triangle at the edge from the last to the first is found by wrapping, then the chains on both of its
-    sides in turn. ``plan`` receives the places (first, apex, last) of count − 2 triangles, each one after
-    the one across its edge first–last. False where four points in line leave it open. At most count² / 2 tests, for
-    balanced surfaces count·log count.
+    sides in turn. ``plan`` receives the places (first, apex, last) of count − 2 triangles, each after
+    its neighbour across the edge first–last. ``False`` where four coplanar points leave a triangle open. At most count²
+    / 2 tests, for balanced surfaces count·log count.
     """
     made = 0
     stack[0] = 0
@@ -156,9 +158,9 @@ def push(stack, depth, i, j):
 
 @kernel
 def fill_hole(mesh, ring, start, count, outer, plan, open_edges):
-    """Put the planned triangles in; outer[start + k] is the half-edge that is to be twin of ring k → k + 1.
+    """Insert the planned triangles; outer[start + k] becomes the twin of half-edge ring k → k + 1.
 
-    open_edges : ``count`` places: the half-edge from ring[i] to a farther ring vertex that still has no twin.
+    open_edges : ``count`` places: the half-edge without a twin from ring[i] to a farther ring vertex.
     """
     for made in range(count - 2):
         i = plan[3 * made]

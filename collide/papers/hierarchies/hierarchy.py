@@ -6,13 +6,13 @@ Barba, Langerman, "Optimal detection of intersections between convex polyhedra",
 and B1–B5. Levels count from 0 here: level 0 is P_1. Each level loses an independent set of vertices; in a bounded
 hierarchy, vertices of too large a degree are cut off (`vertex_cutting`), and their cut adds vertices, inside the hull.
 
-What the walk needs is Lemma 4.2 in this form: if level i + 1 lies in the closed half-space H⁺ and
-touches its plane in a vertex v, then at most one vertex of level i is strictly outside, and it is one of
-``removed_of(v, i + 1)``. The proof: from a vertex strictly outside one can climb along edges to the farthest
-one, so those outside are connected; they are all gone in level i + 1, and those are independent; so it is
-one, and v, not being farthest, has it as its neighbour. A vertex v that a cut added is a convex combination of
-the vertex cut and its neighbours, with the vertex cut in it: if v is on the plane, the vertex cut is outside or on
-it, too, and no other can be outside.
+The walk needs Lemma 4.2 in this form: if level i + 1 lies in the closed half-space H⁺ and
+touches its plane in a vertex v, then at most a single vertex u of level i is strictly outside, and u is in
+``removed_of(v, i + 1)``. Proof: from a vertex strictly outside edges climb to the farthest
+vertex, so the vertices outside are connected; all of them are removed in level i + 1, and removed vertices are
+independent; so u is alone, and v, not farthest, has u as its neighbour. A vertex v added by a cut is a convex
+combination of the vertex cut, with positive weight, and its neighbours: if v is on the plane, the vertex cut is
+outside or on the plane, too, and no other vertex can be outside.
 """
 
 from __future__ import annotations
@@ -49,13 +49,13 @@ LEAST_BOUND = 12
 class Hierarchy(NamedTuple):
     """Levels of polyhedra by rows of ``points``; v's data at a level stand in row ``row[v] + level - birth[v]``.
 
-    points : (N, 3) float64, of the body, then vertices that cuts added, rounded into the level before.
-    degree_bound : c, or 0 where degrees are not bounded.
-    birth, last : (N,) int32, first and last level that has the vertex; −1 for a point in no level.
-    parent : (N,) int32, for an added vertex the one that was cut off; else −1.
+    points : (N, 3) float64, of the body, then vertices added by cuts, rounded into the level before.
+    degree_bound : c, or 0 for unbounded degrees.
+    birth, last : (N,) int32, first and last level with the vertex; −1 for a point in no level.
+    parent : (N,) int32, for an added vertex the vertex cut off; else −1.
     row : (N,) int64, first row of the vertex; −1.
     neighbour_start : (rows + 1,) int64; neighbours : int32, counter-clockwise seen from outside.
-    removed_start : (rows + 1,) int64; removed : int32, what can lie beyond a plane tangent at the vertex, one level
+    removed_start : (rows + 1,) int64; removed : int32, vertices possibly beyond a plane tangent at the vertex, a level
         finer.
     level_start : (depth + 1,) int64; level_vertices : (rows,) int32, ascending in each level.
     """
@@ -98,7 +98,7 @@ class Hierarchy(NamedTuple):
         return self.neighbours[self.neighbour_start[row] : self.neighbour_start[row + 1]]
 
     def removed_of(self, vertex: int, level: int) -> np.ndarray:
-        """The vertices of level − 1 that can lie beyond a plane that touches this level at the vertex."""
+        """The vertices of level − 1 possibly beyond a plane through the vertex that supports this level."""
         row = self.row_of(vertex, level)
         return self.removed[self.removed_start[row] : self.removed_start[row + 1]]
 
@@ -215,7 +215,7 @@ class _Building:
         )
 
     def _cut(self) -> None:
-        """Cut the vertices over the bound, those of the largest degree first, but for neighbours of one cut before."""
+        """Cut the vertices over the bound, largest degree first, except neighbours of vertices cut before."""
         large = self.vertices[self.degree[self.vertices] > self.bound]
         if not len(large):
             return
@@ -256,7 +256,9 @@ class _Building:
             self.twins = np.concatenate([self.twins, np.empty(short, dtype=np.int32)])
 
     def _replace_anchor(self, w: int, candidates: np.ndarray) -> bool:
-        """Where w is one of the four vertices that stay, let one of the candidates stay; whether w may now go."""
+        """If w is an anchor (a vertex that stays), make a candidate the anchor instead; returns whether w may be
+        removed.
+        """
         anchors = self.state[ANCHORS : ANCHORS + 4]
         if w not in anchors:
             return True
@@ -285,7 +287,7 @@ class _Building:
 
 
 def _anchors(cloud: Cloud, vertices: np.ndarray, triangles: np.ndarray) -> list[int]:
-    """Four vertices far apart that span space: they stay until the end, so that no level is flat."""
+    """Four anchors: vertices far apart, spanning space, kept up to the last level, so that no level is flat."""
     points = cloud.scaled[vertices]
     corners = [int(np.argmin(points[:, int(np.argmax(np.ptp(points, axis=0)))]))]
     corners.append(int(np.argmax(np.square(points - points[corners[0]]).sum(axis=1))))

@@ -4,16 +4,17 @@ Dobkin, Kirkpatrick, "Determining the separation of preprocessed polyhedra: a un
 Barba and Langerman repairs it, with hierarchies of bounded degree.
 
 Let S be a small body and T_j a level, b the point of T_j nearest S, and H the plane through b perpendicular to the
-shortest segment. Any point of T_{j−1} that is nearer S lies beyond H. By Lemma 4.2 at most one vertex p of T_{j−1}
-does, and what T_{j−1} has beyond H is in the hull of p and its neighbours. So the new distance is the smaller one of
-the old one and that from S to this hull: one small problem a level, and the distance of S from T in O(log m).
+shortest segment. Any point of T_{j−1} nearer to S lies beyond H. By Lemma 4.2 at most a single vertex p of T_{j−1}
+lies beyond H, and the part of T_{j−1} beyond H is in the hull of p and its neighbours. So the new distance is the
+smaller of the old distance and the distance from S to this hull: a small problem a level, and the distance of S from T
+in O(log m).
 
 Down the other hierarchy the same holds with T in the place of S: where a vertex p of P_{i−1} lies beyond the plane
-through the nearest point of P_i, the distance is the smaller one of the old one and that from the hull of p and
-its neighbours to T, found by a descent of its own. The nearest point of T may be anywhere then: one cannot go on from
-the one before, and this is where the second logarithm comes from.
+through the nearest point of P_i, the distance is the smaller of the old distance and the distance from the hull of p
+and its neighbours to T, found by a descent of its own. The nearest point of T may then be anywhere, far from the point
+before: hence the second logarithm.
 
-In doubles, without proof: what comes out is a proposal, which the exact stage settles (`hierarchy_queries.py`). Nearest
+In doubles, without proof: the result is a proposal, settled by the exact stage (`hierarchy_queries.py`). Nearest
 points of small hulls are found by GJK over their vertices.
 """
 
@@ -30,7 +31,7 @@ from collide.narrowphase.gjk.simplex import nearest_in_simplex
 from collide.numerics.vec3 import add, cross, dot, neg, put_vec3, rotate, scale, sub, vec3_at
 from collide.papers.hierarchies.packed_hierarchy import PackedHierarchy, levels_at, row_at
 
-#: Rounds of one small GJK; it ends when the distance no longer falls.
+#: Rounds of a small GJK; a round without a smaller distance ends the search.
 _ROUNDS = 200
 #: Doubles of a nearest pair: squared distance, point of A, point of B. Its ids: three vertices of each, −1 beyond.
 _PAIR, _IDS = 7, 6
@@ -45,9 +46,9 @@ _NEAREST = 4
 
 
 class Nearest(NamedTuple):
-    """distance (0 where they overlap), the nearest points in A's frame, the counters, and what the points lie on:
+    """distance (0 where they overlap), the nearest points in A's frame, the counters, and the vertices that span them:
 
-    vertices : (3, 2) int64, pairs of a vertex of A and one of B whose differences span the nearest one; −1 beyond.
+    vertices : (3, 2) int64, pairs of vertices of A and of B whose differences span the nearest difference; −1 beyond.
     """
 
     distance: float
@@ -60,7 +61,7 @@ class Nearest(NamedTuple):
 def hierarchy_distance(A: PackedHierarchy, B: PackedHierarchy, rotation: np.ndarray, shift: np.ndarray) -> Nearest:
     """Distance of hull A from hull B at x ↦ rotation x + shift in A's frame [m].
 
-    rotation (3, 3), shift (3,). The distance is that of what the doubles of rotation and shift place; infinite, without
+    rotation (3, 3), shift (3,). The doubles of rotation and shift are taken as exact; the distance is infinite, without
     vertices, where squares overflow or numbers are not finite. Squares that underflow count as 0. O(log n log m).
     """
     pose = np.ascontiguousarray(np.concatenate([np.asarray(rotation, float).ravel(), np.asarray(shift, float)]))
@@ -254,9 +255,9 @@ def write_pair(simplex, ids_a, ids_b, n, square, pair):
 
 @kernel
 def vertex_beyond(body, level, pair, counters):
-    """The vertex of ``level`` that lies beyond the plane through the body's nearest point of the level above, or −1.
+    """The vertex of ``level`` beyond the plane through the body's nearest point of the level above, or −1.
 
-    Vertices of the nearest point that this level has not, because a cut added them above, are replaced by the vertex
+    Vertices of the nearest point added by a cut above, hence not in this level, are replaced by the vertex
     cut.
     """
     levels = body.levels

@@ -1,8 +1,8 @@
 """The walk of Barba and Langerman, and distances along hierarchies, from Python: arguments in, answers out.
 
-Polytopes only. The body that has an interior plays R, whose polar is prepared; B where both have one, or neither: the
-walk then sees a thickened R, and its end in integers the one that was given. What doubles leave no room for, the walk's
-last vertices prove in integers (`exact_end.py`). Walks that rounding has lost go to the default narrowphase.
+Polytopes only. The body with an interior plays R, whose polar is prepared; B if both or neither have an interior: a
+flat R is thickened for the walk, and the walk's end in integers reads R as given. Answers unproven in doubles are
+proven in integers from the walk's last vertices (`exact_end.py`). Walks lost to rounding go to the default narrowphase.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ class Walks:
     """Answers of the walk, a row a pose.
 
     hit : (n,) bool.
-    walked : (n,) bool, whether the walk proved the answer; elsewhere the default narrowphase gave it.
-    exact_rounds : (n,) int64, simplices looked at in integers at the end; 0 where doubles sufficed.
+    walked : (n,) bool, whether the walk proved the answer; elsewhere the default narrowphase did.
+    exact_rounds : (n,) int64, simplices evaluated in integers at the end; 0 where doubles sufficed.
     rows : (n,) `WALK_DTYPE`: rounds, constant-size tests, small linear programs and their pivots, levels reached, and
-        the plane or the point that proves the answer. Zeros where neither body has a polar.
+        the proving plane or point. Zeros where neither body has a polar.
     exchanged : A plays R, and B plays P, since B has no interior.
-    depth_p, depth_q : levels of P's hierarchy and of that of Q = ρ0(R); 0 where no body of the two has a polar.
-    trace : of the last pose, where it was asked for: its rounds one by one.
+    depth_p, depth_q : levels of P's hierarchy and of the hierarchy of Q = ρ0(R); 0 where neither body has a polar.
+    trace : the rounds of the last pose, where asked for.
     """
 
     __slots__ = (
@@ -72,11 +72,11 @@ class Walks:
 
     @property
     def certificate(self):
-        """Of a single pose, plain data that proves the boolean: vertex pairs, as `distance` has them.
+        """Proof of the boolean of a single pose as plain data: vertex pairs, as of `distance`.
 
-        The walk's own plane where that parts the bodies exactly ("plane"), its numbers taken as they are; else the
-        simplex that its end in integers has decided by, or, for hits that a ball has proven, one found from the
-        vertices where the walk ended. ``collide.verify(A, B, X_WA, X_WB, walks)`` puts all vertices in.
+        The walk's own plane where exactly separating ("plane"), its numbers taken as exact; else the
+        deciding simplex of its end in integers, or, for hits proven by a ball, a simplex found from the
+        walk's last vertices. ``collide.verify(A, B, X_WA, X_WB, walks)`` puts all vertices in.
         """
         if len(self) != 1:
             raise InvalidArgument(f"a certificate is for one pose, and there are {len(self)}")
@@ -152,7 +152,8 @@ def collide_by_walk(A, B, X_WA, X_WB, check_poses: bool):
 
 def distance_by_descent(A, B, X_WA, X_WB, check_poses: bool, signed: bool) -> PairResult:
     """``distance(..., algorithm="dobkin-kirkpatrick")``: gaps down the hierarchies, depths by the default
-    narrowphase."""
+    narrowphase.
+    """
     for name, shape in (("A", A), ("B", B)):
         walk_body(checked_shape(f"distance: {name}", shape), "dobkin-kirkpatrick")
     X_WA, X_WB, single, ask_default = _with_default(A, B, X_WA, X_WB, check_poses)
@@ -162,9 +163,9 @@ def distance_by_descent(A, B, X_WA, X_WB, check_poses: bool, signed: bool) -> Pa
 
 
 def _with_default(A, B, X_WA, X_WB, check_poses: bool):
-    """(poses, poses, whether single, a function that asks the default algorithm at the poses of given numbers).
+    """(poses, poses, whether single, a function asking the default algorithm at the poses of given numbers).
 
-    Poses are checked and copied: a certificate worked out later is one for these.
+    Poses are checked and copied: a certificate worked out later is for these poses.
     """
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     X_WA, X_WB = (as_poses(X, name, check=check_poses).copy() for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))

@@ -107,7 +107,7 @@ def thin(
     scaled_at, originals_at, rows, work_at, digits_at, centres, corners_at, twins_at, triangles, leaving_at,
     vertices_at, count, degree_at, blocked_at, order_at, bound, max_degree, scratch_at, state_at,
 ):
-    """Remove an independent set; ``blocked`` vertices stay, and become more: neighbours of those that leave.
+    """Remove an independent set; ``blocked`` vertices stay; neighbours of removed vertices are blocked, too.
 
     degree : by row, kept up to date; 0 for a vertex removed.
     bound : no degree is raised over this.

@@ -63,9 +63,9 @@ def copy_lists(start_at, values_at, count, place_at, out_at):
 def write_removed(
     points, birth_at, last_at, parent_at, row_at, rows, start_at, neighbours_at, removed_start_at, removed_at, n_removed
 ):
-    """For each row the vertices of the finer level that are gone and were neighbours; for a new vertex its parent.
+    """Write for each row the removed neighbours in the finer level; for a new vertex its parent.
 
-    n_removed : 0 to write the number of each row behind it, else the length of ``removed``.
+    n_removed : 0 for a first pass, writing the length of each row behind the row; else the length of ``removed``.
     Arguments are flat: entries take integers, doubles and booleans alone.
     """
     birth = view_i32(birth_at, points)

@@ -1,8 +1,8 @@
 """Two constant-size polyhedra compared: CH(P*) against ρ0(Q*), by the value of a matrix game.
 
 The value of min over x ∈ CH(P*) of max over z ∈ CH(Q*) of ⟨x, z⟩ is at most 1 exactly where some x of CH(P*) has
-⟨x, q⟩ ≤ 1 for all q ∈ Q*, that is, where CH(P*) and ρ0(Q*) meet; it is more exactly where some z of CH(Q*) has
-⟨p, z⟩ > 1 for all p ∈ P*, that is, where the plane ρ(z) separates them. So one small linear program answers both
+⟨x, q⟩ ≤ 1 for all q ∈ Q*, i.e. where CH(P*) and ρ0(Q*) meet; the value is above 1 exactly where some z of CH(Q*) has
+⟨p, z⟩ > 1 for all p ∈ P*, i.e. where the plane ρ(z) separates them. So a single small linear program answers both
 questions of a round of the walk, with the witness of either: Theorem 3.7 is its duality.
 
 Solved by the simplex method on the condensed tableau (A. W. Tucker's), all in doubles: its outcome is a proposal.

@@ -1,11 +1,11 @@
-"""Which facets of a body may be left out of its polar: those that a neighbouring one stands for.
+"""Facets that may be left out of a body's polar: facets merged into a neighbouring facet.
 
-A flat side that was turned and rounded is thousands of facets in doubles. Their polar points crowd within an ulp or so
-of one another: which of them is highest along a direction is a matter of rounding, and edges from far away fan out to
-any of them. So a facet is merged into one beside it, F into G, where all corners of F lie within a part τ of G's plane,
-⟨v − o, q_G⟩ ≥ 1 − τ. Without the planes of merged facets the body grows by that part at most: let x be outside of it,
-and y in facet F where the segment from o to x leaves it. Then ⟨y − o, q_G⟩ ≥ 1 − τ, since y is among the corners of F,
-and if x is below G's plane, |x − o| ≤ |y − o| / (1 − τ).
+A flat side, turned and rounded, is thousands of facets in doubles. Their polar points crowd within an ulp or so
+of each other: the highest of them along a direction is a matter of rounding, and edges from far away fan out to
+any of them. So a facet F is merged into a facet G beside F if all corners of F lie within a part τ of G's plane,
+⟨v − o, q_G⟩ ≥ 1 − τ. Without the planes of merged facets the body grows by the part τ at most: let x be outside the
+body, and y in facet F where the segment from o to x leaves the body. Then ⟨y − o, q_G⟩ ≥ 1 − τ, since y is in the hull
+of F's corners, and if x is below G's plane, |x − o| ≤ |y − o| / (1 − τ).
 """
 
 from __future__ import annotations
@@ -32,13 +32,14 @@ def facet_of_triangles(cloud: Cloud, triangles: np.ndarray, twins: np.ndarray) -
 def merged_facets(
     cloud: Cloud, triangles: np.ndarray, origin: np.ndarray, polar: np.ndarray, weight: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(facets that stay, ascending; for each facet the place of the one that stands for it; facet of each triangle).
+    """(kept facets, ascending; for each facet the index among the kept of the facet merged into; facet of each
+    triangle).
 
     triangles : (f, 3) int32, a closed surface.   origin : (3,), inside.
     polar : (m, 3), the polar point of each true facet.   weight : (m,), Σ V_k |q_k| with |v_k − o_k| ≤ V_k.
 
-    Facets are taken by falling size, and each takes what it can of those around it. O(m log m) for facets whose corners
-    are few.
+    Facets are visited by falling size, and each absorbs all neighbours within reach. O(m log m) for facets with few
+    corners.
     """
     twins = twins_of(triangles)
     patch = facet_of_triangles(cloud, triangles, twins)
@@ -66,10 +67,11 @@ def merge_facets(
     points_at, rows, corners_at, twins_at, count, patch_at, listed_at, start_at, facets, order_at, origin_at, polar_at,
     floor_at, taken_by_at, stack_at,
 ):
-    """Write for each facet the one that stands for it, itself where none does.
+    """Merge facets: write for each facet the number of the absorbing facet, the facet's own number if kept.
 
-    listed, start : the triangles of each facet.   order : facets as they are to be taken.
-    floor : least height ⟨v − o, q⟩ of a corner that a facet's plane may stand for.
+    listed, start : the triangles of each facet.   order : facets in the order of visits.
+    floor : (facets,) the least height ⟨v − o, q⟩ of the corners of absorbed facets, q the absorbing facet's polar
+        point.
     Arguments are flat: entries take integers, doubles and booleans alone.
     """
     points = view_f64(points_at, 3 * rows)

@@ -1,8 +1,8 @@
-"""A hierarchy P_1 ⊇ P_2 ⊇ … ⊇ P_k as kernels read it, and the one step down that Lemma 4.2 allows.
+"""A hierarchy P_1 ⊇ P_2 ⊇ … ⊇ P_k as kernels read it, and the step down a level by Lemma 4.2.
 
 L. Barba and S. Langerman, "Optimal detection of intersections between convex polyhedra", sections 4 and 5. Kernels read
-the arrays of `hierarchy.Hierarchy` where they stand; levels count from 0, the body itself (the paper's P_1). A vertex
-of a level has a row there: row[v] + level − birth[v].
+the arrays of `hierarchy.Hierarchy` in place; levels count from 0, the body itself (the paper's P_1). The row of a
+vertex v of a level is row[v] + level − birth[v].
 """
 
 from __future__ import annotations
@@ -120,9 +120,9 @@ def lowest_of_level(levels, level, d):
 def one_level_finer(levels, level, v, d):
     """(vertex, height, tests): v, the lowest vertex along d of ``level``, becomes the lowest of ``level`` − 1.
 
-    Lemma 4.2: at most one vertex of the finer level lies below v, and it is one of those that went with the step
-    and were v's neighbours. A vertex that a cut added is not in the finer level (property A3 fails): the vertex
-    that was cut off is on the plane or beyond, and takes its place.
+    Lemma 4.2: at most a single vertex of the finer level lies below v, among v's neighbours removed with the
+    step. A vertex added by a cut is not in the finer level (property A3 fails): the vertex
+    cut off is on the plane or beyond, and takes its place.
     """
     if levels.birth[v] == level:
         v = levels.parent[v]

@@ -1,14 +1,14 @@
-"""Flat sides of a polar bulged a little, so that no rounding decides how they are triangulated.
+"""Flat sides of a polar bulged a little, so that their triangulation does not depend on rounding.
 
-The facets at a vertex w of R are polar to the corners of one flat side of ρ0(R), in the plane ⟨w − o, q⟩ = 1. Left so,
-rounding errors would triangulate it, and errors that change slowly along its border make a fan of it: some corner gets
-a degree that grows with the number of corners, and so close to one plane no cut mends that in doubles. So corners are
-drawn towards the origin by different amounts: the side becomes a shallow dome, in which every other corner is cut off
-by a triangle, then every other one of the rest, and so on. Its degrees are 2·log2 k for k corners.
+The facets at a vertex w of R are polar to the corners of a flat side of ρ0(R), in the plane ⟨w − o, q⟩ = 1. Left flat,
+the side would be triangulated by rounding errors, and errors changing slowly along its border make a fan: some corner
+gets a degree growing with the number of corners, and so close to a plane no cut mends the degree in doubles. So corners
+are drawn towards the origin by different amounts: the side becomes a shallow dome, in which every other corner is cut
+off by a triangle, then every other corner of the rest, and so on. Its degrees are 2·log2 k for k corners.
 
-Three corners stay. Each other one, in the middle of a chain between two that are placed, comes a step below the plane
-of the triangle beyond the chain: two planes that differ that much stay apart in doubles. A polygon that is cut off at
-the middle lies within a few times the height of that triangle, so the drops grow by about a step from one halving to
+Three corners stay. Each other corner, in the middle of a chain between two placed corners, comes a step below the plane
+of the triangle beyond the chain: two planes a step apart stay distinct in doubles. A polygon cut off at
+the middle lies within a few times the height of the triangle, so the drops grow by about a step from each halving to
 the next.
 """
 
@@ -80,9 +80,9 @@ def _large_sides(points, triangles, of_triangle) -> tuple[np.ndarray, np.ndarray
 
 
 def _steps(polar, across, start, side) -> np.ndarray:
-    """(c,) by how many steps each corner is drawn inside; 0 for three of each side.
+    """(c,) number of steps each corner is drawn inside; 0 for three corners of each side.
 
-    polar : (c, 3), corners side after side in cyclic order.   across : (c, 3), the normal of each one's side.
+    polar : (c, 3), corners side after side in cyclic order.   across : (c, 3), the normal of each corner's side.
     """
 
     def area(i, j, k):

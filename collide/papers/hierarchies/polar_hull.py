@@ -1,14 +1,14 @@
-"""The polar of a hull about a point inside it, in doubles that are proven to lie inside the true polar.
+"""The polar of a hull about an inner point, in doubles proven to lie inside the true polar.
 
 A facet with normal n through a has the polar point n / (n·(a − o)), a quotient of polynomials of degree 2 and 3. Its
 rounding to doubles could lie outside the polar Q of R − o, and the hull of such points would be the
-polar of a body that R sticks out of. Here each point is drawn towards 0 by as much as rounding can do, about 2⁻⁵¹ of it
-(the bound is at `_polar_points`). So Q' ⊆ Q exactly, and R' = o + ρ0(Q') ⊇ R exactly (Lemma 3.6). Facets that nearly
-lie in one plane share a polar point (`merged_facets`), and corners of flat sides are drawn a little more
+polar of a body smaller than R. Here each point is drawn towards 0 by the bound of its rounding, about 2⁻⁵¹ of its
+length (the bound is at `_polar_points`). So Q' ⊆ Q exactly, and R' = o + ρ0(Q') ⊇ R exactly (Lemma 3.6). Nearly
+coplanar facets share a polar point (`merged_facets`), and corners of flat sides are drawn a little more
 (`polar_domes`): of a round body, R' is larger by a part of 2⁻⁴³ at most.
 
-Barba and Langerman work with real numbers and pass over this. A plane that separates P from R'
-separates it from R. A point of P and R' has yet to be tested against R: `walk_proof` does that.
+Barba and Langerman work with real numbers, without rounding. A plane between P and R'
+separates P from R. A point of P and R' has yet to be tested against R, in `walk_proof`.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class PolarBody(NamedTuple):
     """Q' = conv(points) inside Q = ρ0(R − origin).
 
     origin : (3,) float64, strictly inside R; exact.
-    points : (m, 3) float64, 1/length; (v − origin)·q < 1 for every v of R, exactly. One for every true facet of R, or
-        for several that lie in one plane as far as doubles tell: see `merged_facets`.
-    spans : (m, 3) int32, three vertices of R, counter-clockwise from outside, in the plane of that facet.
+    points : (m, 3) float64, 1/length; (v − origin)·q < 1 for every v of R, exactly. A point for every true facet of R,
+        or for several facets coplanar in doubles: see `merged_facets`.
+    spans : (m, 3) int32, three vertices of R, counter-clockwise from outside, in the plane of the point's facet.
     hierarchy : of Q'; its vertices below m are rows of ``points``.
-    groups : (facets,) int64, for each true facet of R the row of ``points`` that stands for it.
+    groups : (facets,) int64, for each true facet of R its row of ``points``.
     """
 
     origin: np.ndarray
@@ -84,9 +84,9 @@ def polar_of_hull(
 
 
 def interior_point(cloud: Cloud, spans: np.ndarray) -> np.ndarray:
-    """Of some middles of the hull the one farthest from its facets, in doubles; strictly inside, exactly.
+    """The candidate middle of the hull farthest from its facets, in doubles; strictly inside, exactly.
 
-    Raises ValueError where none of them is.
+    Raises ValueError if no candidate is strictly inside.
     """
     used = cloud.originals[named_in(spans, cloud.count)]
     corners = cloud.originals[spans]

@@ -1,16 +1,16 @@
-"""On which side of a plane a vertex lies, with no ties: general position by symbolic perturbation.
+"""The side of a plane of a vertex, without ties: general position by symbolic perturbation.
 
-Every vertex x is moved by e(x, k)·(centre k − x) for four centres that span space. The e are
-infinitesimals, all larger than any product of two of them (as 1/N^(1 + θ), θ < 1, are for huge N), those of centre
-0 larger than those of centre 1 and so on, and, for one centre, in an order that looks random. A
-determinant that is 0 then has the sign of the first nonzero determinant in which one of its
-points is replaced by a centre: no minor is needed, only the exact test itself.
+Every vertex x is moved by e(x, k)·(centre k − x) for four centres spanning space. The e are
+infinitesimals, all larger than any product of two of them (as 1/N^(1 + θ), θ < 1, are for huge N), the e of centre
+0 larger than the e of centre 1 and so on, and, for each centre, in a pseudo-random order. A zero
+determinant then gets the sign of the first nonzero determinant with a
+point replaced by a centre: no minor is needed, only the exact test itself.
 
-That decides whenever three of the four points are not in line: they and some centre span space.
-This is Simulation of Simplicity (Edelsbrunner, Mücke 1990) with directions chosen for hulls: centre 0 is in
-the middle, vertices move inwards, and strictly extreme ones stay so. A flat facet becomes the
-triangulation in which the vertex that moves most is cut off first, the next one after it, and so on; in a
-random order that leaves O(log k) triangles at a corner of a facet with k.
+The rule decides whenever three of the four points are not collinear: they and some centre span space.
+The rule is Simulation of Simplicity (Edelsbrunner, Mücke 1990) with directions chosen for hulls: centre 0 is in
+the middle, vertices move inwards, and strictly extreme vertices stay strictly extreme. A flat facet is
+triangulated by cutting off its vertices, the largest move first; a
+random order leaves O(log k) triangles at a corner of a facet with k.
 """
 
 from __future__ import annotations

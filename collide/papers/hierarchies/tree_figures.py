@@ -11,17 +11,17 @@ from collide.shapes.mesh import Mesh
 
 
 class TreeFigures(NamedTuple):
-    """Figures of both trees over one mesh of F facets.
+    """Figures of both trees over a mesh of F facets.
 
     facets : F.
     nodes, depth, leaves : of the box-tree of the queries: nodes of eight boxes, nodes on the longest path, runs of
         facets.
     graded_size : nodes of Erickson's graded box-tree, leaves included, paths compressed; at most 2F − 1 (2 for F = 1).
     graded_depth : edges on its longest path from root to leaf.
-    graded_level : the finest level of the octree that an inner node stands on.
+    graded_level : the finest level of an inner node in the octree.
     level_bound : ⌈log2(W/ℓ)⌉ + 3, W the root's width and ℓ the shortest edge of any length: no level is finer.
-    outliers : facets that belong to no child of their node.
-    max_outliers : the largest number of them at one node, whose degree is at most 8 more.
+    outliers : facets in no child of their node.
+    max_outliers : the largest number of outliers of a node; the degree of a node is at most 8 more.
     """
 
     facets: int

@@ -1,9 +1,9 @@
-"""The true facets of an exact hull, and the triangulation of them that the perturbation chooses.
+"""The true facets of an exact hull, and their triangulation by the perturbation.
 
-`convex_hull` gives flat facets as some triangles, and may keep points that lie on a facet or an edge. Here
-triangles in one plane are put together again. A vertex where three true facets or more meet is strictly
-extreme; the others are dropped. What is left of a facet's border is a strictly convex polygon, and it is
-triangulated as `symbolic_perturbation.py` says: vertices are cut off in the order in which they move inwards.
+`convex_hull` gives flat facets as some triangles, and may keep points on a facet or an edge. Here
+coplanar triangles are merged again. A vertex where three true facets or more meet is strictly
+extreme; the others are dropped. The rest of a facet's border is a strictly convex polygon,
+triangulated as of `symbolic_perturbation.py`: vertices are cut off in the order of their moves inwards.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Cloud:
             self.scaled = np.concatenate([self.scaled, more])
 
     def add(self, point: np.ndarray) -> int:
-        """Row of one more point, for a test; the next one takes its place."""
+        """Row of an additional point, for a test; the next point overwrites the row."""
         self.reserve(self.used + 1)
         self.originals[self.used] = point
         self.scaled[self.used] = np.ldexp(point, -self.exponent)
@@ -69,7 +69,7 @@ class Cloud:
 
 
 def _centres(points: np.ndarray) -> np.ndarray:
-    """The mean, and three points beside it. Points on a lattice keep their centres on one not much finer."""
+    """The mean, and three points beside. Points of a lattice have their centres on a lattice not much finer."""
     largest = np.abs(points).max()
     unit = 2.0 ** float(np.frexp(largest)[1] - 1) if largest > 0 else 1.0
     mean = (points / len(points)).sum(axis=0)
@@ -88,8 +88,8 @@ class Facets(NamedTuple):
     """The boundary by true facets.
 
     triangles : (f, 3) int32, the perturbed hull: closed, weakly convex, all corners strictly extreme.
-    twins : (3 f,) int32, the half-edge that runs back along each, see `surface`.
-    spans : (m, 3) int32, for every true facet three of the points, counter-clockwise, that span its plane.
+    twins : (3 f,) int32, the opposite half-edge of each, see `surface`.
+    spans : (m, 3) int32, for every true facet three points spanning its plane, counter-clockwise.
     """
 
     triangles: np.ndarray
@@ -117,7 +117,7 @@ def true_facets(cloud: Cloud, hull: Hull) -> Facets:
 
 
 def twins_of(triangles: np.ndarray) -> np.ndarray:
-    """(3 f,) int32: for every half-edge of a closed surface the one that runs back."""
+    """(3 f,) int32: the opposite half-edge of every half-edge of a closed surface."""
     start = triangles.ravel().astype(np.int64)
     end = triangles[:, [1, 2, 0]].ravel().astype(np.int64)
     order = np.argsort(np.minimum(start, end) << 32 | np.maximum(start, end), kind="stable")
@@ -168,7 +168,8 @@ def _triangulated(triangles, twins, patch, n_facets, extreme, ranks) -> np.ndarr
 def settled_twins(cloud: Cloud, triangles: np.ndarray) -> np.ndarray:
     """Flip the triangles, in place, until the perturbed surface is convex; returns their twins.
 
-    They are already where centre 0 lies strictly inside the hull. In a hull thinner than rounding it may not.
+    Convex without flips if centre 0 lies strictly inside the hull. In a hull thinner than rounding centre 0 may lie
+    outside.
     """
     twins = twins_of(triangles)
     stack = np.empty(2 * len(twins), dtype=np.int64)
@@ -311,10 +312,10 @@ def cut_ears(border_at, start_at, n_polygons, order_at, before_at, after_at, mad
 def flip_until_convex(
     scaled_at, originals_at, rows, work_at, digits_at, centres, corners_at, twins_at, count, stack_at
 ):
-    """Flip edges until the perturbed surface is convex at each; returns how many, −1 if that does not end.
+    """Flip edges until the perturbed surface is convex at every edge; returns the number of flips, −1 without an end.
 
     Only edges inside a strictly convex flat facet are ever concave; any two triangles there make a convex
-    quadrilateral, and each flip lifts the perturbed surface, so that this ends.
+    quadrilateral, and each flip lifts the perturbed surface, so the flips end.
     """
     cloud = cloud_at(scaled_at, originals_at, rows, work_at, digits_at, centres, 0)
     corners = view_i32(corners_at, 3 * count)

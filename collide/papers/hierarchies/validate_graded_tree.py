@@ -10,9 +10,9 @@ from collide.papers.hierarchies.graded_tree import CELL, FIRST, LAST, LEVEL, PAR
 def validate_graded_tree(tree: GradedTree, vertices: np.ndarray, faces: np.ndarray) -> None:
     """Each property of the paper's section 3.2, by its definition; raises AssertionError naming node or facet.
 
-    Cells lie in each other and are smaller from node to node; facet sets are those of the definition, from the
-    centroids and the bounding cubes of every level, also of levels that were compressed away; outliers fit no
-    child; no node is empty or has one child only; one leaf a facet; at most 2m − 1 nodes; depth as bounded.
+    Cells lie in each other and are smaller from node to node; facet sets are as defined, from the
+    centroids and the bounding cubes of every level, also of levels compressed away; outliers fit no
+    child; no node is empty or has a single child; a leaf for each facet; at most 2m − 1 nodes; depth as bounded.
     """
     corners = np.asarray(vertices, dtype=float)[np.asarray(faces)]
     m = len(corners)
@@ -33,7 +33,7 @@ def validate_graded_tree(tree: GradedTree, vertices: np.ndarray, faces: np.ndarr
     assert tree.size() <= max(2 * m - 1, 2), "too many nodes"  # a single facet hangs from a root
     assert tree.deepest_level() <= tree.levels, "deeper than the shortest edge allows"
     sizes = (corners.max(axis=1) - corners.min(axis=1)).max(axis=1)
-    # Only facets that are points would go down for ever: it is for their sake that levels end.
+    # Only facets shrunk to points would go down for ever: levels end for their sake.
     assert (sizes == 0.0).any() or tree.deepest_level() < tree.levels or m == 1, "levels ended too early"
     _check_facet_sets(tree, corners)
 

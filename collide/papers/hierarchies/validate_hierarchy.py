@@ -1,14 +1,14 @@
-"""Checks that a hierarchy has the properties A1–A5 or B1–B5, in Python integers, with nothing of the builder's.
+"""Checks that a hierarchy has the properties A1–A5 or B1–B5, in Python integers, without code of the builder.
 
-Names are those of Barba and Langerman, section 4. Where the text leaves something open, this is what is checked:
+Names are as of Barba and Langerman, section 4. Checked where the text leaves details open:
 
-* B3 holds from ``bounded_from`` on. The text makes P simple by perturbing its facets, so that it counts P itself. Here
-  P is level 0 as it is, with any degrees;
+* B3 holds from ``bounded_from`` on. The text makes P simple by perturbing its facets, and includes P itself. Here
+  P is level 0 as given, with any degrees;
 * A4, B4: V(P_i) \\ V(P_{i+1}) is independent in P_i. The text's own levels P_{i+1} of the second kind, the same
-  polyhedron with more vertices, are left out: a cut and its removal are one level here;
+  polyhedron with more vertices, are left out: a cut and its removal are a single level here;
 * A5, B5: depth ≤ 8 + 2.5·log2 n, and at most 16 n vertices in all levels;
-* Lemma 4.2 as the walk uses it: ``removed`` names all vertices gone from the finer level that were neighbours; a vertex
-  that a cut added is in the hull of the vertex cut and its neighbours, and not in that of the neighbours alone.
+* Lemma 4.2 as the walk uses it: ``removed`` names all removed neighbours in the finer level; a vertex
+  added by a cut is in the hull of the vertex cut and its neighbours, and not in the hull of the neighbours alone.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ DEPTH_AT_MOST, DEPTH_PER_LOG, SIZE_PER_VERTEX = 8.0, 2.5, 16.0
 
 
 def validate_hierarchy(points: np.ndarray, hierarchy: Hierarchy, bounded_from: int = 1) -> None:
-    """Raise AssertionError with the name of the first property that does not hold; exact.
+    """Raise AssertionError with the name of the first violated property; exact.
 
     points : (n, 3) as given to `build_hierarchy`.
-    bounded_from : level from which on B3 is asked for; 1 unless vertices of large degree are neighbours.
+    bounded_from : first level with B3 checked; 1 unless vertices of large degree are neighbours.
 
     O(total size) for the combinatorics; inclusion tests take the new vertices of a level times its facets.
     """
@@ -52,7 +52,7 @@ def validate_hierarchy(points: np.ndarray, hierarchy: Hierarchy, bounded_from: i
 
 
 def _surface(hierarchy: Hierarchy, level: int) -> np.ndarray:
-    """(f, 3) triangles of a level, after its neighbour lists were found to be those of one closed surface."""
+    """(f, 3) triangles of a level, after a check that its neighbour lists form a single closed surface."""
     vertices = hierarchy.vertices(level).tolist()
     corners: set[tuple[int, int, int]] = set()
     for v in vertices:

@@ -89,7 +89,7 @@ def _vertices(hierarchy, level: int) -> np.ndarray:
 
 
 def _assert_inside(hierarchy, level: int, x: np.ndarray, message: str) -> None:
-    """x in one level of a hierarchy; of flat ones, which have no triangles, only their plane's box is looked at."""
+    """Check that x is in a level of a hierarchy; for a flat level, without triangles, in its plane's box alone."""
     points = hierarchy.points[_vertices(hierarchy, level)]
     slack = _SLACK * max(1.0, float(np.abs(points).max()))
     assert (x >= points.min(axis=0) - slack).all() and (x <= points.max(axis=0) + slack).all(), message

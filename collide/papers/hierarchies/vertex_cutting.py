@@ -1,20 +1,20 @@
 """Vertices of large degree are cut off: section 4's splitting, in doubles, with the new vertices proven inside.
 
-Barba and Langerman put a plane between a vertex w and all others; where it meets the edges of w, new vertices are
-made, and w goes. In doubles no new vertex would lie on its edge. Here it is rounded to a point of a
+Barba and Langerman put a plane between a vertex w and all others; new vertices are made at its crossings with the edges
+of w, and w is removed. In doubles no new vertex would lie on its edge. Here the new vertex is rounded to a point of a
 tetrahedron w, r, r', s, where r, r' follow each other around w and s is a point proven to lie among w and its
-neighbours. Exact tests decide, so the new vertex is a convex combination of w and its
-neighbours with w in it: that is all that B2 and the walk need.
+neighbours. Exact tests decide, so the new vertex is a convex combination of w, with positive weight, and its
+neighbours: enough for B2 and the walk.
 
-All new vertices in one plane would leave a facet of many corners, triangulated by rounding errors, and its
+All new vertices in a plane would leave a facet of many corners, triangulated by rounding errors, and its
 triangulation may again have vertices of large degree. So new vertex j is put a little deeper the less often 2 divides
 j: the lid over them is a shallow dome in which every other vertex is cut off by a triangle, then
-every other one of the rest, and so on. Its degrees grow like 2·log2 of the degree of w.
+every other vertex of the rest, and so on. Its degrees grow like 2·log2 of the degree of w.
 
-This surface is proven convex before it stays. Where the faces at w nearly lie in a plane, no rounded vertices
-make it so. Then w is removed, and the new vertices are inserted one by one, as many as are extreme. Where even the
-proof fails, since the edges of w differ too much in length for doubles, w stays, and its degree over the
-bound: it falls as neighbours leave.
+The surface is kept only if proven convex. Nearly coplanar faces at w have no convex surface of rounded
+vertices. Then w is removed, and the new vertices are inserted in sequence, as many as are extreme. If even the
+proof fails, since the edges of w differ too much in length for doubles, w stays, with a degree over the
+bound, falling as neighbours are removed.
 """
 
 from __future__ import annotations
@@ -107,7 +107,8 @@ def cut(
 @kernel
 def strip_and_lid(cloud, mesh, cut, workspace):
     """Put the new vertices in the place of w, as a strip along the ring and a lid; False, and nothing changed, where
-    that is not convex."""
+    that is not convex.
+    """
     k, fresh = cut.k, cut.fresh
     before = view_i64(workspace, k)
     after = view_i64(workspace + 8 * k, k)
@@ -129,9 +130,9 @@ def strip_and_lid(cloud, mesh, cut, workspace):
 
 @kernel
 def one_by_one(cloud, mesh, seen, cut, workspace):
-    """Remove w, then insert the new vertices; those that are not strictly extreme then leave.
+    """Remove w, then insert the new vertices; new vertices not strictly extreme are removed again.
 
-    False, and nothing changed, where one of them cannot be proven to be where it must, or the hole cannot be closed.
+    Returns ``False``, with the surface unchanged, for a new vertex without a proof of its place, or an open hole.
     """
     k, ring, fresh = cut.k, cut.ring, cut.fresh
     least = shortest_part(cloud, cut)

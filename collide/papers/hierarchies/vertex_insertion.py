@@ -1,6 +1,6 @@
-"""Vertices put into a convex surface one by one, by exact tests alone: what `vertex_cutting` falls back on.
+"""Vertices inserted into a convex surface in sequence, by exact tests alone: the fallback of `vertex_cutting`.
 
-The triangles a new point lies above make a connected region; a fan from the point to its rim takes their place.
+The triangles below a new point make a connected region; a fan from the point to its rim takes their place.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ def sees(cloud, mesh, t, v):
 
 @kernel
 def insert_near(cloud, mesh, seen, v, near, region, rim, stack):
-    """Put v, above a triangle at vertex ``near``, into the surface; False where it is above none of them.
+    """Put v, above a triangle at vertex ``near``, into the surface; ``False`` if v is above no triangle at ``near``.
 
-    seen : by triangle, the last vertex that was above it.
-    region, rim, stack : as many entries as there are half-edges that v can see.
-    Vertices that are no longer on the surface have −1 in ``leaving``.
+    seen : by triangle, the last vertex found above.
+    region, rim, stack : an entry for each half-edge visible from v.
+    Vertices removed from the surface have −1 in ``leaving``.
     """
     corners, twins, leaving = mesh.corners, mesh.twins, mesh.leaving
     first = np.int64(leaving[near])

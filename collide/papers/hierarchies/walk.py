@@ -76,7 +76,7 @@ TRACE = 20
 #: Rounds a trace has room for.
 TRACED_ROUNDS = 512
 
-#: Workspace of one thread: that of the steps, a difference point and its ids.
+#: Workspace of a thread: workspace of the steps, a difference point and its ids.
 DOUBLES, INTEGERS = STEP_DOUBLES + POINT, STEP_INTEGERS + 4
 
 
@@ -129,11 +129,11 @@ def _plane_in_world(state):
 
 @kernel
 def _walk_down(walk, proof, trace, early, error):
-    """(SEPARATED, INVERSE or NEITHER; whether it is proven): round after round to the bottom of one hierarchy.
+    """(SEPARATED, INVERSE or NEITHER; whether proven): round after round to the bottom of a hierarchy.
 
-    trace : doubles of a trace, or none.
+    trace : doubles of a trace, or an empty array.
     early : every new plane is tried against the whole bodies at once, every new point
-        against the ball in R, and ends the walk where that proves it.
+        against the ball in R, and a proof ends the walk.
     """
     marks, state = walk.marks, walk.state
     outcome = begin(walk)
@@ -159,7 +159,7 @@ def _walk_down(walk, proof, trace, early, error):
 
 @kernel
 def _answer(walk, proof, outcome, proven, size, error, row, counts):
-    """Status of a walk that has ended, with the plane or the point that proves it written into the row.
+    """Status of an ended walk; the proving plane or point is written into the row.
 
     row, counts : doubles and integers of the row.
     """

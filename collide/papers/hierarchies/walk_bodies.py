@@ -1,4 +1,4 @@
-"""What the walk keeps of a polytope, built when a query first needs it: its hierarchy, and its polar with a hierarchy.
+"""Structures of the walk for a polytope, built at the first query: its hierarchy, and its polar with a hierarchy.
 
 Barba and Langerman, section 5, "Preprocessing". The origin of the polar is a point inside R, fixed in R's own frame,
 so that a motion of R changes nothing.
@@ -59,8 +59,9 @@ class WalkBody:
 
     @property
     def polar(self) -> PolarSide | None:
-        """For the part of R. Where the body has no interior, or one too thin for a polar in doubles, that of a body
-        thickened by 2⁻¹² of its size; None for sizes that have no polar in ordinary doubles."""
+        """The body as R of the walk. A body without interior, or too thin for a polar in doubles, is
+        thickened by 2⁻¹² of its size; ``None`` for sizes without a polar in ordinary doubles.
+        """
         if self._polar is None and not self._has_no_polar:
             with _build_lock():
                 if self._polar is None and not self._has_no_polar:
@@ -71,7 +72,7 @@ class WalkBody:
         return self._polar
 
     def _new_polar(self) -> PolarSide:
-        """Raises ValueError where there is none."""
+        """Build the polar side; raises ValueError for a body without a polar in doubles."""
         if self.has_interior:
             try:
                 return PolarSide(self.points, self.hull)
@@ -87,19 +88,19 @@ class WalkBody:
 
     @property
     def depth_of_polar(self) -> int:
-        """Levels of the hierarchy of the polar; 0 where there is none."""
+        """Levels of the hierarchy of the polar; 0 without a polar."""
         return self.polar.hierarchy.depth if self.polar is not None else 0
 
 
 class PolarSide:
     """R as the walk reads it: the hierarchy of its polar, a ball inside, and the triangles of each facet.
 
-    points : (n, 3), with their hull.   count : of the body itself, where those behind thicken it.
+    points : (n, 3), with their hull.   count : number of the body's own points, before the points of a thickened body.
 
     body : the `PolarBody` of R.   hierarchy : of Q = ρ0(R − origin), packed.   origin : (3,), inside R.
-    radius : of a ball about it that R holds, proven [m]; 0 where rounding leaves none, and then nothing is proven by
-        it.
-    starts, triangles : the facets of R for which vertex k of Q stands are triangles[starts[k]:starts[k + 1]].
+    radius : of a ball about the origin inside R, proven [m]; 0 where rounding leaves no ball, without proofs
+        by a ball.
+    starts, triangles : the facets of R merged in vertex k of Q are triangles[starts[k]:starts[k + 1]].
     """
 
     def __init__(self, points: np.ndarray, hull: Hull, count: int | None = None):
@@ -113,7 +114,7 @@ class PolarSide:
         patch = polar.groups[facet_of_triangles(Cloud(points), facets, twins_of(facets))]
         order = np.argsort(patch, kind="stable")
         self.triangles = np.ascontiguousarray(facets[order])
-        if count is not None:  # the body has no such vertices; the first one stands for them
+        if count is not None:  # vertices of the thickened body alone are replaced by the first vertex
             self.triangles[self.triangles >= count] = 0
         self.starts = np.searchsorted(patch[order], np.arange(len(polar.points) + 1)).astype(np.int64)
         self._centre = np.array([*self.origin, self.radius])
@@ -186,5 +187,5 @@ def _exact_distance(corners: np.ndarray, origin: np.ndarray) -> float:
     return math.sqrt(float(height * height / inner(normal, normal))) * (1 - 1e-12)
 
 
-#: Held while a hierarchy is built: one at a time, since that of 100,000 points takes seconds.
+#: Held while a hierarchy is built: a single build at a time, since a hierarchy of 100,000 points takes seconds.
 _build_lock = ForkSafeLock()

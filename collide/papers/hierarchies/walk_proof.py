@@ -1,9 +1,9 @@
 """Proofs of the walk's answers, against the bodies and poses as given.
 
-The walk works with rounded numbers: the relative pose, the vertices of Q, the small linear programs. None of it is
-relied on here. A plane is proven by the extreme vertices of both bodies along it (`minkowski_difference.settle_point`).
+The walk works with rounded numbers: the relative pose, the vertices of Q, the small linear programs. No proof
+relies on them. A plane is proven by the extreme vertices of both bodies along it (`minkowski_difference.settle_point`).
 A common point is proven by a ball: R holds the ball of radius ρ about its centre c, and a triangle of its surface with
-a point f in it, so it holds the ball of radius (1 − s) ρ about (1 − s) c + s f; P holds x; x lies in that ball.
+a point f of the triangle, hence the ball of radius (1 − s) ρ about (1 − s) c + s f; P holds x; x lies in the ball.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _BALL = 5
 
 #: A facet of more triangles than this is not searched: the walk's answer is then not proven here.
 _MAX_TRIANGLES = 256
-#: Facets stepped over in search of the one that a ray leaves by.
+#: The most facets stepped over in search of the facet pierced by a ray.
 _MAX_STEPS = 64
 
 
@@ -41,9 +41,9 @@ class Ball(NamedTuple):
 
 
 class Proof(NamedTuple):
-    """What proofs read and write: the `PosedPair` of P and R, R's `Ball`, a difference point, the ids of its vertices.
+    """Input and output of proofs: the `PosedPair` of P and R, R's `Ball`, a difference point, the ids of its vertices.
 
-    ids : also three vertices of R, those of the triangle that proves a common point.
+    ids : also three vertices of R, the triangle of a proof of a common point.
     """
 
     pair: Any
@@ -53,7 +53,7 @@ class Proof(NamedTuple):
 
 
 class TriangleWeights(NamedTuple):
-    """Vertices of a triangle, and weights ≥ 0 of the sum 1 that make a point of it."""
+    """Vertices of a triangle, and weights ≥ 0 of sum 1 of a point in the triangle."""
 
     a: int
     b: int
@@ -74,7 +74,8 @@ def ball_at(address):
 @kernel
 def planes_apart(proof, d, error):
     """Whether the plane across d, from P towards R, has all of P on one side and all of R on the other, by more than
-    the error [m]. d in the world, of any length."""
+    the error [m]. d in the world, of any length.
+    """
     span = math.sqrt(dot(d, d))
     if not span > 0.0:
         return False
@@ -82,14 +83,14 @@ def planes_apart(proof, d, error):
     difference_point(proof.pair, proof.points, proof.ids, 0, n)
     if has_trees(proof.pair):
         if dot(vec3_at(proof.points, 0), n) >= 0.0:
-            return False  # a point that is there, farthest or not
+            return False  # an existing point, farthest or not
         settle_point(proof.pair, proof.points, proof.ids, 0, n)
     return -dot(vec3_at(proof.points, 0), n) > 1.000001 * error
 
 
 @kernel
 def _least_stretch(R, q):
-    """A factor by which the matrix at q shortens no vector more; 0 where it may be anything."""
+    """A lower bound of the factor by which the matrix at q changes a vector's length; 0 without a bound."""
     off = 0.0
     for i in range(3):
         row = 0.0
@@ -155,9 +156,9 @@ def _best_triangle(proof, facet, f):
 
 @kernel
 def _triangle_near(Q, proof, facet, f):
-    """As `_best_triangle`, from facet to neighbouring facet while that gets better.
+    """As `_best_triangle`, from facet to neighbouring facet while the result improves.
 
-    Rounding may have split a flat side into facets whose planes it cannot tell apart: the ray then leaves by another.
+    Rounding may have split a flat side into facets with indistinguishable planes: the ray may leave by a neighbour.
     """
     best, best_weights = _best_triangle(proof, facet, f)
     for _ in range(_MAX_STEPS):

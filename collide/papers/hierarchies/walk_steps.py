@@ -159,9 +159,9 @@ def polar_round(walk):
 def _play(walk):
     """The game of P_i* and Q_j*, its weights in the workspace.
 
-    A star too large to be loaded is one of P or R itself, an apex or a facet with thousands of neighbours: no bound
-    holds there. It is played with few of its points, and whichever vertex of the whole level contradicts the answer
-    is looked up along the hierarchy and joins them, until none does.
+    A star too large to be loaded belongs to P or R itself, an apex or a facet with thousands of neighbours, beyond
+    any bound of degrees. The game is played with few of its points, and a vertex of the whole level contradicting the
+    answer is looked up along the hierarchy and added, until no vertex contradicts.
     """
     state, marks = walk.state, walk.marks
     _load(walk, True)
@@ -284,11 +284,11 @@ def _between(state, at_star, best, t):
 
 @kernel
 def _across(points, n, a, b):
-    """How far to go from a to b while points[0] stays the lowest of all points: the t ≤ 1 where it meets the next.
+    """The largest t ≤ 1 with points[0] the lowest of all points from a up to a + t (b − a).
 
-    This is the plane tangent to the cone κ at its apex. At a the apex is the lowest, being the one point beyond the
-    plane before; at b the heights are right. The least height of the others is concave on the way, so it keeps what
-    it has at both ends, and where the apex meets it the apex has it too.
+    The direction at t is the normal of a plane tangent to the cone κ at its apex. At a the apex is lowest, as the only
+    point beyond the plane before; at b the heights are as required. The least height of the others is concave along the
+    way, so at least its bound at both ends, and where the apex meets the least height the apex has the bound, too.
     """
     apex_a = height_of(points, 0, a)
     apex_b = height_of(points, 0, b)

@@ -14,11 +14,11 @@ from collide.shapes.convex_hull import ConvexHull
 
 
 class CellPlanes(NamedTuple):
-    """The planes of one cell, exact, (f,) each; and rounded, {x : normals @ x ≤ offsets}.
+    """The planes of a cell, exact, (f,) each; and rounded, {x : normals @ x ≤ offsets}.
 
-    facet : the facet whose corners the plane goes through, −1 of one parallel to two axes.
-    axis, value : of such a plane, x[axis] = value; −1 and NaN of a facet's.
-    side : 1 where the cell lies on the side that the facet's normal points to, or of larger coordinates; else −1.
+    facet : the facet in the plane, −1 for a plane parallel to two axes.
+    axis, value : of an axis-parallel plane, x[axis] = value; −1 and NaN for a facet's plane.
+    side : 1 where the cell lies on the side of the facet's normal, or of larger coordinates; else −1.
     normals, offsets : (f, 3) unit outward normals, (f,) [m], to rounding.
     """
 
@@ -105,7 +105,7 @@ class ConvexCells:
 
         Returns
         -------
-        (k,) int64; −1 where none of the cells does.
+        (k,) int64; −1 for leaves in no cell.
         """
         leaves = checks.whole_numbers("ConvexCells.rows_of: leaves", leaves)
         if not len(self):
@@ -220,6 +220,6 @@ def part_of_block(block: CellBlock) -> _Part:
 
 
 def _chained(starts: list[np.ndarray]) -> np.ndarray:
-    """Starts of rows that follow one another, of those of the parts."""
+    """Starts of the rows of consecutive parts, from the starts in each part."""
     ends = np.cumsum([0] + [int(s[-1]) for s in starts])
     return np.concatenate([s[:-1] + end for s, end in zip(starts, ends)] + [ends[-1:]])

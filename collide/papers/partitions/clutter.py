@@ -30,16 +30,16 @@ def clutter(mesh: Mesh, cubes: int = 200, seed: int = 0) -> Clutter:
 
     Parameters
     ----------
-    mesh : facets; they need not close.
-    cubes : how many to look at, around points of chance on facets of chance.   seed : of the chance.
+    mesh : facets, not necessarily closed.
+    cubes : number of cubes, around random points on random facets.   seed : of the random points.
 
     Returns
     -------
-    Clutter. Whether a facet meets a cube is told in doubles, so that facets that nearly touch one may be counted.
+    Clutter. Hits of facets and cubes are decided in doubles, so nearly touching facets may be counted.
 
     Notes
     -----
-    The clutter factor is the largest number of objects that meet a cube with no corner of an object's axis-aligned box
+    The clutter factor is the largest number of objects meeting a cube with no corner of an object's axis-aligned box
     inside (M. de Berg, 2000): O(log n) for the facets of local meshes (J. Erickson, "Local polyhedra and geometric
     graphs", lemma 5.1). O(n) a cube.
     """
@@ -62,7 +62,9 @@ def clutter(mesh: Mesh, cubes: int = 200, seed: int = 0) -> Clutter:
 
 
 def _meets_cube(corners: np.ndarray, half: float) -> np.ndarray:
-    """Which triangles (k, 3, 3) meet the cube of half that width about the origin: no axis of thirteen parts them."""
+    """(k,) bool: triangles (k, 3, 3) that meet the cube of half width ``half`` about the origin; 13 separating axes
+    decide.
+    """
     edges = np.roll(corners, -1, axis=1) - corners
     axes = [np.broadcast_to(axis, (len(corners), 3)) for axis in _AXES]
     axes += [np.cross(edges[:, 0], edges[:, 1])]

@@ -19,9 +19,9 @@ _AT_ONCE = 8192
 class CellBlock(NamedTuple):
     """Some leaves of a partition, clipped by a box.
 
-    leaf : (c,) their numbers; of a cut taken as one cell, the first under it.
+    leaf : (c,) their numbers; for a cut taken as a cell, the first leaf below the cut.
     faces : their faces, sorted by `cell`, which counts rows of `leaf`.
-    vertices, edges : what the faces are made of; counter-clockwise seen from outside.
+    vertices, edges : of the faces; counter-clockwise seen from outside.
     """
 
     leaf: np.ndarray
@@ -33,9 +33,9 @@ class CellBlock(NamedTuple):
 def cell_blocks(
     tree: FinishedTree, leaves: np.ndarray, low: np.ndarray, high: np.ndarray, whole: np.ndarray | None = None
 ) -> Iterator[CellBlock]:
-    """Leaves (sorted numbers) within the box low … high, in blocks; those outside of it are left out.
+    """Leaves (sorted numbers) within the box low … high, in blocks; leaves outside are left out.
 
-    whole : (cuts,) bool, those below which all is one cell: of its leaves the first is to be among `leaves`.
+    whole : (cuts,) bool, cuts whose subtree is a single cell: `leaves` has the first leaf of its subtree.
     """
     if whole is None:
         whole = np.zeros(len(tree.plane), dtype=bool)
@@ -127,7 +127,7 @@ def _cut_cells(vertices, edges, faces: Polygons, cuts: np.ndarray, planes: np.nd
 
 
 def _rename_edges_in_planes(edges, faces, rows, owner, sign, mine, planes) -> None:
-    """Edges of uncut faces that lie in the cutting plane are carried by it from now on."""
+    """Set the cutting plane as the carrier of uncut faces' edges in the plane."""
     following = np.arange(1, len(rows) + 1)
     ends = np.cumsum(faces.count)
     following[ends - 1] = ends - faces.count
@@ -136,7 +136,7 @@ def _rename_edges_in_planes(edges, faces, rows, owner, sign, mine, planes) -> No
 
 
 def _caps(edges: Edges, faces: Polygons, planes: np.ndarray, side: int) -> Polygons:
-    """The face that a cut makes of each cell: the edges that its other faces have in the plane, joined to a loop."""
+    """The face made in each cell by a cut: a loop of the edges in the plane of the cell's other faces."""
     rows, owner = edge_rows(faces)
     following = rows + 1
     ends = np.cumsum(faces.count)

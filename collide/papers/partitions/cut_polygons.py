@@ -67,11 +67,11 @@ def edge_rows(polygons: Polygons) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Cut(NamedTuple):
-    """What planes made of polygons.
+    """Polygons after a cut by planes.
 
-    below, above : which polygons have points strictly on that side, (k,) bool; those with neither lie in the plane.
-    minus, plus : the pieces of those that have both, in the order of `both`.
-    both : rows of the polygons that were cut.
+    below, above : (k,) bool, polygons with points strictly on the side; polygons with neither lie in the plane.
+    minus, plus : the pieces of cut polygons, in the order of `both`.
+    both : rows of the cut polygons.
     sign : of every vertex of all polygons, in the order of `edge_rows`.
     """
 
@@ -84,9 +84,9 @@ class Cut(NamedTuple):
 
 
 def cut_polygons(vertices: Vertices, edges: Edges, polygons: Polygons, planes: np.ndarray, shared: bool = False) -> Cut:
-    """Cut each polygon by one plane. Edges and vertices of the pieces are added to `edges` and `vertices`.
+    """Cut each polygon by its plane. Edges and vertices of the pieces are added to `edges` and `vertices`.
 
-    planes : (k,).   shared : polygons are the faces of cells: two of them in one cell share a new vertex.
+    planes : (k,).   shared : polygons are the faces of cells: two faces of a cell share a new vertex.
     """
     rows, owner = edge_rows(polygons)
     vertex = edges.vertex.rows[rows]
@@ -110,7 +110,7 @@ def cut_polygons(vertices: Vertices, edges: Edges, polygons: Polygons, planes: n
 
 
 def _sides(vertices: Vertices, vertex: np.ndarray, planes: np.ndarray, shared: bool) -> Sides:
-    """Sides of vertices; those that several faces share are asked once."""
+    """Sides of vertices; the side of a vertex of several faces is found once."""
     if not shared:
         return vertices.sides(vertex, planes)
     pairs, back = np.unique(vertex + (planes << 32), return_inverse=True)

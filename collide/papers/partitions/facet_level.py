@@ -1,9 +1,9 @@
 """The second level of a space partition: each cell of the first cut along planes of the facets in it.
 
 M. S. Paterson, F. F. Yao, "Efficient binary space partitions for hidden-surface removal and solid modeling" (1990).
-Facets are taken in random order, and one that reaches from wall to wall of its cell is taken at once: its plane cuts no
-other facet that does not cross it (a free cut). k facets make O(k²) cells in expectation. No cell is left through which
-a facet passes.
+Facets are taken in random order, and a facet from wall to wall of its cell is taken at once: its plane cuts only
+facets that cross the facet (a free cut). k facets make O(k²) cells in expectation. At the end no facet
+passes through a cell.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _AT_ONCE = 200_000
 def cut_along_facets(
     tree: PartitionTree, vertices: Vertices, edges: Edges, polygons: Polygons, rng: np.random.Generator, progress
 ) -> None:
-    """Cut every cell that polygons lie in, along their planes, until none is left."""
+    """Cut every cell with polygons along the polygons' planes, until no polygon lies inside a cell."""
     polygons = polygons[np.argsort(polygons.cell, kind="stable")]
     ends = np.flatnonzero(np.append(np.diff(polygons.cell) != 0, True)) + 1
     bytes_before = tree.other_bytes
@@ -72,7 +72,7 @@ def _groups(cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _pivots(vertices, edges, polygons, rng, first, cell) -> np.ndarray:
-    """The polygon of each cell along which it is cut: one that reaches from wall to wall, or any."""
+    """The polygon of each cell whose plane cuts the cell: a polygon from wall to wall, or else a random polygon."""
     n = vertices.planes.n
     rows, owner = edge_rows(polygons)
     carrier = edges.carrier.rows[rows]

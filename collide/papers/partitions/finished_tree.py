@@ -14,7 +14,7 @@ _AT_ONCE = 1 << 16
 
 
 class Touches(NamedTuple):
-    """Which leaves points touch, and which cuts they lie on: both by rows of the points asked about.
+    """Leaves touched by points, and cuts through points: both by rows of the points.
 
     point, leaf : (k,), sorted by point.   on_point, on_cut : (m,).
     """

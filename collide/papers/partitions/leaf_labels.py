@@ -1,4 +1,4 @@
-"""Which leaves of a partition are inside its solid: facets wind around all points of a leaf alike, so one is asked."""
+"""Labels of leaves inside the solid: facets wind around all points of a leaf alike, so a single point decides."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from collide.papers.partitions.planes import Planes, signs_of
 from collide.shapes.mesh import Mesh
 from collide.surface_queries.contains import winds_around
 
-#: How far off a cut points are tried, in widths of the piece of facet that lies in it.
+#: Distances of tried points from a cut, in widths of the piece of facet in the cut.
 _STEPS = tuple(2.0**-k for k in (2, 5, 8, 11, 14, 18, 22, 27, 32, 40))
 
 
@@ -105,7 +105,7 @@ class _FacetBoxes:
         self.low, self.high = corners.min(axis=1), corners.max(axis=1)
 
     def ahead(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Facets that a ray along +x may meet that begins between low and high."""
+        """Facets in the way of a ray along +x from a point between low and high, by their boxes."""
         near = (self.low[:, 1:] <= high[1:]) & (self.high[:, 1:] >= low[1:])
         return np.flatnonzero(near.all(axis=1) & (self.high[:, 0] >= low[0]))
 
@@ -139,7 +139,9 @@ def _point_between(corners: np.ndarray, weights: list[int], walls: np.ndarray, s
 
 
 def _winding_number(planes: Planes, rows: np.ndarray, point) -> int | None:
-    """How often facets wind around a rational point, by a ray along +x that may meet the rows; None at an edge."""
+    """The winding number of facets around a rational point, by the hits of a ray along +x with the rows; ``None`` at an
+    edge.
+    """
     x, y, z, w = point
     coefficients = planes.coefficients(rows)
     above = signs_of(np.array([[x, y, z, w]], dtype=object), coefficients)

@@ -2,8 +2,8 @@
 
 J. Erickson, "Local polyhedra and geometric graphs" (2005), lemma 5.2, after M. de Berg, "Linear size binary space
 partitions for uncluttered scenes" (2000). A cube with more than κ corners of facets' axis-aligned boxes (de Berg's
-guards) is cut into eight. Where all but κ of them are in one eighth, the smallest cube at that corner that holds all
-but κ is cut off instead, so that empty levels cost nothing. Beyond the lemma, cells of few facets are left as they are.
+guards) is cut into eight. Where all but κ of them are in an eighth, the smallest cube at the eighth's corner with all
+but κ is cut off instead, so that empty levels cost nothing. Beyond the lemma, cells of few facets are not cut.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Guards(NamedTuple):
 class OrthogonalLevel:
     """Cells of the first level, and the pieces of facets in them.
 
-    low, high : (places, 3) of the cube that stands for a cell; cells at the rim go on beyond it.
+    low, high : (places, 3) of a cell's cube; cells at the rim extend beyond their cubes.
     polygons : pieces of facets, `cell` the place.
     """
 
@@ -63,7 +63,7 @@ class OrthogonalLevel:
                 active = self._cut_once(active)
 
     def _crowded(self, cells: np.ndarray) -> np.ndarray:
-        """Those of the cells that hold more than κ guards and more than a few facets, and can be cut."""
+        """The cells with more than κ guards, more than ``n_spared`` facets, and room for a cut in doubles."""
         n = self.tree.below.n
         guards = np.bincount(self.guards.cell, minlength=n)[cells]
         facets = np.bincount(self.polygons.cell, minlength=n)[cells]
@@ -73,7 +73,7 @@ class OrthogonalLevel:
         return cells[(guards > self.kappa) & (facets > self.n_spared) & wide]
 
     def _cut_once(self, cells: np.ndarray) -> np.ndarray:
-        """Cut cells once along each axis; returns the places below, of those cells that are cubes."""
+        """Cut cells once along each axis; returns the places below of the cubes among them."""
         place = np.full(self.tree.below.n, -1)
         place[cells] = np.arange(len(cells))
         row = place[self.guards.cell]

@@ -9,15 +9,15 @@ from collide.numerics.growing_rows import GrowingRows
 
 #: What stands at a place that no cut and no leaf has taken.
 EMPTY = np.iinfo(np.int64).min
-#: Bytes of a cut and the two places below it, and of a facet that lies in one.
+#: Bytes of a cut with its two places, and of a facet in a cut.
 _CUT_BYTES, _HELD_BYTES = 88, 16
 
 
 class PartitionTree:
-    """Places are numbered: 0 is all of space, 2 c + 1 is what lies below cut c, 2 c + 2 what lies above.
+    """Places are numbered: 0 is all of space, 2 c + 1 is the side below cut c, 2 c + 2 the side above.
 
-    plane : (cuts,), the plane of each cut.   below : (places,), what stands there: a cut, or EMPTY for a leaf.
-    seat : (cuts, 4) a point in the cut and inside its cell, to rounding, and about how large what it was taken from is.
+    plane : (cuts,), the plane of each cut.   below : (places,), the cut at a place, or EMPTY for a leaf.
+    seat : (cuts, 4) a point in the cut and inside its cell, to rounding, and the approximate size of its source.
     held : [(cuts (k,), facets (k,))], facets that lie in the plane of a cut and in its cell.
     """
 

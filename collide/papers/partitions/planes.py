@@ -1,11 +1,13 @@
-"""Planes that cut space, by number: the facets' own, axis-parallel ones at doubles, and those through edges of facets.
+"""Planes that cut space, by number: the facets' own, axis-parallel planes at doubles, and planes through edges of
+facets.
 
-Nothing about a plane is rounded: it is the numbers of the mesh that it goes through. Doubles with bounds of their
-errors are kept of it, and its coefficients in integers are worked out when a sign needs them.
+A plane is exact, given by numbers of the mesh. Doubles with bounds of their
+errors are kept, and the plane's coefficients in integers are worked out when a sign needs them.
 
     number f < n                  through the corners of facet f
-    n + 3 f + e                   through edge e of facet f (corners e and e + 1) and parallel to an axis that facet f's
-                                  plane is not parallel to: names the line of the edge as facet f has it; cuts nothing
+    n + 3 f + e                   through edge e of facet f (corners e and e + 1) and parallel to an axis not parallel
+    to
+                                  facet f's plane: names the line of the edge in facet f; cuts nothing
     4 n + k                       the k-th axis-parallel plane
 """
 
@@ -53,7 +55,7 @@ class Planes:
         return 4 * self.n + self.value.add(value)
 
     def with_own_axis_planes(self) -> Planes:
-        """The same planes, to which axis-parallel ones may be added that the others do not have."""
+        """The same planes, with room for further axis-parallel planes of the copy alone."""
         twin = copy.copy(self)
         twin.axis, twin.value = GrowingRows.empty(np.int64), GrowingRows.empty(np.float64)
         twin.add_axis_planes(self.axis.rows, self.value.rows)
@@ -62,7 +64,7 @@ class Planes:
     # --- doubles --------------------------------------------------------------------------------------------------
 
     def heights(self, points: np.ndarray, errors: np.ndarray, cut: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(heights, bounds of their errors) of points known to within errors, against one plane each; not scaled.
+        """(heights, bounds of their errors) of points known to within errors, against a plane each; not scaled.
 
         points : (k, 3).   errors : (k,), of each coordinate.   cut : (k,) numbers of facets' or axis-parallel planes.
         """

@@ -14,7 +14,7 @@ from collide.papers.partitions.planes import Planes
 
 
 class Portals(NamedTuple):
-    """Pieces of faces that two cells have in common, each with an area.
+    """Common pieces of faces of two cells, each with an area.
 
     cells : (m, 2) int64, rows of the `ConvexCells`.   middle : (m, 3) [m], a point of each, to rounding.
     area : (m,) [m²], to rounding.
@@ -28,8 +28,8 @@ class Portals(NamedTuple):
 def portals_of_block(tree: FinishedTree, block: CellBlock, whole: np.ndarray) -> tuple[np.ndarray, ...]:
     """(leaf of a cell (m,), leaf beyond (m,), middle (m, 3), area (m,)) of faces of a block's cells, each pair once.
 
-    A face is sent down the tree from the root: cut where it is cut, and where it lies in a cut, to the side on which
-    its cell is not. Leaves are numbered as `cell_blocks` has them, with `whole`.
+    A face is sent down the tree from the root: split by crossing cuts, and sent by a cut in its own plane to the side
+    away from its cell. Leaves are numbered as in `cell_blocks`, with `whole`.
     """
     vertices, edges = block.vertices, block.edges
     n_tree_planes = 4 * tree.planes.n + len(tree.planes.axis.rows)
@@ -61,7 +61,7 @@ def portals_of_block(tree: FinishedTree, block: CellBlock, whole: np.ndarray) ->
 
 
 def _runs_against(planes: Planes, plane: np.ndarray, cut_plane: np.ndarray) -> np.ndarray:
-    """Of planes at one place, which have normals that point the other way; exact."""
+    """(k,) bool: planes, coplanar with a cut each, with the opposite normal; exact."""
     against = np.zeros(len(plane), dtype=bool)
     rows = np.flatnonzero(plane != cut_plane)
     if len(rows):

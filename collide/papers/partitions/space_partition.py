@@ -36,11 +36,11 @@ _POINT = ConvexHull(np.zeros((1, 3)))
 
 
 class Located(NamedTuple):
-    """Where points lie, (k,) each.
+    """Places of points, (k,) each.
 
-    inside : bool, whether the point belongs to the solid, as `contains` says; its surface does.
-    boundary : bool, on the solid's boundary: of every ball around the point a part belongs, and a part does not.
-    cell : int64, a leaf whose closure holds the point: one inside where there is one, the first of them.
+    inside : bool, whether the point belongs to the solid, as of `contains`; the surface belongs.
+    boundary : bool, on the solid's boundary: every ball around the point has parts inside and outside.
+    cell : int64, the first leaf whose closure holds the point, leaves inside before others.
     """
 
     inside: np.ndarray
@@ -49,14 +49,14 @@ class Located(NamedTuple):
 
 
 class PartitionSize(NamedTuple):
-    """How large a partition is.
+    """The size of a partition.
 
-    facets, thin : those with an area, and those without, which cut nothing.
-    cells, inside : leaves, and leaves inside the solid.   cuts : one fewer than leaves.
-    first_cells, pieces : cells of the first level that facets meet, and pieces of facets in them.
-    max_facets : in one cell of the first level.   kappa : corners of facets' boxes that such a cell may hold.
+    facets, thin : number of facets with an area, and of facets without, which cut nothing.
+    cells, inside : leaves, and leaves inside the solid.   cuts : leaves − 1.
+    first_cells, pieces : cells of the first level with facets, and pieces of facets in them.
+    max_facets : in a cell of the first level.   kappa : the most corners of facets' boxes in a cell of the first level.
     depth, mean_depth : cuts above a leaf, at most and on average.
-    integers : signs that integers decided.   fractions : leaves told inside or outside by a rational point.
+    integers : signs decided in integers.   fractions : leaves labelled by a rational point.
     """
 
     facets: int
@@ -75,27 +75,27 @@ class PartitionSize(NamedTuple):
 
 
 class SpacePartition:
-    """A binary space partition of a solid: convex cells that no facet passes through, all inside or all outside.
+    """A binary space partition of a solid: convex cells, each wholly inside or outside, without facets passing through.
 
     Parameters
     ----------
-    mesh : a solid `Mesh` (it closes; inside is what its facets wind around once or more: docs/meshes.md).
-    kappa : how many corners of facets' boxes a cell of the first level may hold (de Berg's guards; the clutter factor
+    mesh : a solid `Mesh` (closed; inside are points of winding number 1 or more: docs/meshes.md).
+    kappa : the most corners of facets' boxes in a cell of the first level (de Berg's guards; the clutter factor
         of the lemma). More make fewer and flatter cells.
-    seed : of the random order in which facets cut: the same seed, the same cells.
-    memory : bytes that the partition may take while it grows.
+    seed : of the random order of cutting facets: the same seed, the same cells.
+    memory : the most bytes of the growing partition.
     progress : called with a label, gives a context manager around long work.
 
     Raises
     ------
     InvalidArgument : a mesh without an inside, with its defects and facet numbers; an argument out of range.
-    UnsupportedQuery : more than ``memory`` would be needed; it tells how far it came and what is left.
+    UnsupportedQuery : more than ``memory`` would be needed; the message has the work done and left.
 
     Notes
     -----
-    Cutting planes are the facets' own and axis-parallel ones at doubles; sides are decided exactly, by doubles with
-    error bounds, by planes that name a vertex, or in integers: every cell is exactly an intersection of half-spaces.
-    Facets of no area have no plane and cut nothing.
+    Cutting planes are the facets' own and axis-parallel planes at doubles; sides are decided exactly, by doubles with
+    error bounds, by planes through a vertex by name, or in integers: every cell is exactly an intersection of
+    half-spaces. Facets of no area have no plane and cut nothing.
 
     J. Erickson, "Local polyhedra and geometric graphs" (2005), section 5: lemma 5.2's orthogonal level with κ, then
     M. S. Paterson and F. F. Yao's planes of facets in each of its cells. A local mesh makes O(n log n) cells of depth
@@ -137,7 +137,7 @@ class SpacePartition:
         )
 
     def locate(self, points) -> Located:
-        """Which cell points lie in, and whether inside, on the boundary or outside of the solid: exactly.
+        """The cells of points, and whether inside, on the boundary or outside of the solid: exactly.
 
         Parameters
         ----------
@@ -145,12 +145,12 @@ class SpacePartition:
 
         Returns
         -------
-        Located, of arrays (k,), or of single values for one point.
+        Located, of arrays (k,), or of single values for a single point.
 
         Notes
         -----
-        O(depth) a point that lies on no cut. One that does is sent down both sides, and is on the boundary if cells of
-        both kinds touch it.
+        O(depth) a point on no cut. A point on a cut is sent down both sides, and is on the boundary if touching cells
+        are of both kinds.
         """
         points, single = checks.vectors("locate", "points", points)
         checks.refuse_rows("locate", "points", points, np.abs(points).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
@@ -168,7 +168,7 @@ class SpacePartition:
         return Located(*(column[0] for column in answer)) if single else answer
 
     def _on_facets_outside(self, points: np.ndarray, touched, some: np.ndarray) -> np.ndarray:
-        """Rows of points that only cells outside touch, and that lie on a facet: one with nothing behind it."""
+        """Rows of points on a facet without solid behind: facets touched by cells outside alone."""
         tree = body_of(self.mesh).tree
         thin = thin_facets(self.mesh, tree)
         suspects = np.zeros(len(points), dtype=bool)
@@ -187,36 +187,36 @@ class SpacePartition:
 
         Parameters
         ----------
-        box : (low, high), two corners [m], low < high; the mesh's own box where None.
+        box : (low, high), two corners [m], low < high; the mesh's own box by default.
 
         Returns
         -------
-        ConvexCells. Cells outside of the box are left out, others clipped by it: cells at the rim have no end.
+        ConvexCells. Cells outside of the box are left out, others clipped by the box: cells at the rim are unbounded.
 
         Raises
         ------
-        InvalidArgument : a box that is none.
+        InvalidArgument : a box not of two corners, low < high.
         """
         low, high = self._box("cells", box)
         whole = np.zeros(len(self._tree.plane), dtype=bool)
         return self._made(np.arange(self._tree.n_leaves), low, high, whole)
 
     def convex_pieces(self, inside: bool = True, box=None) -> ConvexCells:
-        """The solid, or the free space around it, as convex pieces that share no inner points.
+        """The solid, or the free space around it, as convex pieces without common inner points.
 
         Parameters
         ----------
-        inside : of the solid; False: of the free space.
-        box : (low, high), two corners [m]: what lies in it. Free space has no end and needs one.
+        inside : pieces of the solid; ``False``: of the free space.
+        box : (low, high), two corners [m], clips the pieces. Free space is unbounded and needs a box.
 
         Returns
         -------
-        ConvexCells. Their union is exactly the closure of what facets wind around, or that of the free space in the
-        box. Cells that a cut parted for nothing are one piece.
+        ConvexCells. Their union is exactly the closure of the interior of the solid, or of the free space in the
+        box. Cells separated by a needless cut make a single piece.
 
         Raises
         ------
-        InvalidArgument : no box for free space, or one that is none.
+        InvalidArgument : no box for free space, or a box not of two corners, low < high.
         """
         if not isinstance(inside, (bool, np.bool_)):
             raise InvalidArgument(f"convex_pieces: inside must be True or False, got {checks.brief(inside)}")
@@ -238,7 +238,7 @@ class SpacePartition:
         return self._made(np.flatnonzero(wanted), low, high, whole)
 
     def portals(self, cells: ConvexCells) -> Portals:
-        """Where cells of this partition open into one another: the graph of a planner.
+        """Common faces of cells of this partition: the graph of a planner.
 
         Parameters
         ----------
@@ -250,8 +250,8 @@ class SpacePartition:
 
         Returns
         -------
-        Portals: pairs of cells whose closures share a piece of a face with an area, exactly, each piece once. Of cells
-        that touch in an edge or a corner there is none.
+        Portals: pairs of cells whose closures share a piece of a face with an area, exactly, each piece once. Cells
+        touching in an edge or a corner have no portal.
         """
         if not isinstance(cells, ConvexCells) or cells.source.tree is not self._tree:
             raise InvalidArgument(

@@ -14,9 +14,9 @@ _BADLY_KNOWN = 2.0**-40
 
 
 class Sides(NamedTuple):
-    """On which sides of planes vertices lie, (k,) each.
+    """Sides of vertices at planes, (k,) each.
 
-    sign : int8, exact.   height, bound : what was computed, and how far it may be off: good for proportions alone.
+    sign : int8, exact.   height, bound : in doubles, and the bound of its error: good for proportions alone.
     """
 
     sign: np.ndarray
@@ -61,7 +61,9 @@ class Vertices:
         return Sides(sign, height, bound)
 
     def _on_by_name(self, vertex: np.ndarray, cut: np.ndarray) -> np.ndarray:
-        """Which vertices lie on a plane because it names them, or their facet's corner or edge."""
+        """(k,) bool: vertices on a plane by name: named by the plane, or by a corner or an edge of the plane's
+        facet.
+        """
         planes, names = self.planes, self.names.rows[vertex]
         on = (names == cut[:, None]).any(axis=1)
         rows = np.flatnonzero(~on & (cut < planes.n))

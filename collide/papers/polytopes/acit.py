@@ -1,14 +1,14 @@
 """Asymmetric convex intersection testing by primal-dual pruning with nets (Barba and Mulzer 2019, section 4).
 
-A call has points I and half-spaces J of one space. It samples the points, solves for the sample N in the polar space,
-where the two sets change their parts, adds the points of I that conflict with the answer, and repeats; it is done when
-none conflicts. Where both sets have at most α rows an exact base solver answers. Both spaces are made once, and calls
-are rows of them: the polar of the polar is the space one came from.
+A call has points I and half-spaces J of a space. The call samples the points, solves for the sample N in the polar
+space, where the two sets change their parts, adds the points of I in conflict with the answer, and repeats, up to an
+answer without conflicts. Sets of at most α rows each go to an exact base solver. Both spaces are made once, and calls
+are rows of them: the polar of the polar is the original space.
 
-Beyond the text: conflict sets are open (of closed ones the rows of N on the plane itself are always members). Sets that
-touch are apart in neither space: that is a third answer, and its rounds count as those of case 1. A sample is not
-proven to be a net: its conflict sets are counted in every round, and where one is larger than ε|I| it is drawn again,
-twice as large.
+Beyond the text: conflict sets are open (of closed ones the rows of N on the plane itself are always members). Touching
+sets are apart in neither space: a third answer, whose rounds count as rounds of case 1. A sample is not
+proven to be a net: its conflict sets are counted in every round, and a sample with a conflict set above ε|I| is drawn
+again, twice as large.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PRIMAL, POLAR = 0, 1
 _INFLATION = 2.0**-20
 #: Every second level is at most half as large as the one before last.
 _MAX_DEPTH = 100
-#: Samples drawn in one call before it gives up.
+#: The most samples drawn in a call.
 _MAX_DRAWS = 24
 
 #: (points, half-spaces, work, rows of points, rows of half-spaces) → their nearest pair, exactly.
@@ -56,10 +56,10 @@ class Sizes(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """How two sets lie.
+    """The relation of two sets.
 
-    space : PRIMAL or POLAR, in which they are apart; None where they touch in both.
-    pairs : (primal, polar) nearest pairs, None where not computed.
+    space : PRIMAL or POLAR, the space of the gap; ``None`` for touching sets.
+    pairs : (primal, polar) nearest pairs, ``None`` where not computed.
     """
 
     space: int | None
@@ -74,10 +74,10 @@ class Verdict(NamedTuple):
 
 
 def sizes(d: int) -> Sizes:
-    """ε = 1/(2(2d + 1)²(d + 1)), which makes the recurrence linear; samples of 2d/ε rows; α of two samples.
+    """ε = 1/(2(2d + 1)²(d + 1)), for a linear recurrence; samples of 2d/ε rows; α of two samples.
 
-    Of a random sample of r of n rows, d of which determine the answer, at most d(n − r)/(r + 1) conflict in the mean
-    (Clarkson 1988): with r = 2d/ε at most half of εn.
+    For a random sample of r of n rows, with an answer determined by d rows, at most d(n − r)/(r + 1) rows conflict in
+    the mean (Clarkson 1988): with r = 2d/ε at most half of εn.
     """
     inverse = 2 * (2 * d + 1) ** 2 * (d + 1)
     return Sizes(1.0 / inverse, 2 * d * inverse, 4 * d * inverse)
@@ -145,7 +145,7 @@ class PrimalDualPruning:
             net = grown
 
     def conflicts(self, space: int, verdict: Verdict, point_rows: np.ndarray) -> np.ndarray:
-        """The rows of points that conflict with the answer for the net: those strictly beyond its plane."""
+        """Rows of the points in conflict with the answer for the net: points strictly beyond its plane."""
         if verdict.space == space:  # case 2: apart here, and points nearer than the net's
             return self.spaces[space].points.negative(verdict.pair(space).plane, point_rows).rows
         pair = verdict.pair(1 - space)  # case 1: apart in the polar space, and polars that do not hold the point
@@ -164,7 +164,7 @@ class PrimalDualPruning:
 
 
 def _require(condition: bool, what: str) -> None:
-    """An invariant of the paper; where it fails the answer would be wrong, and none is given."""
+    """Check an invariant of the paper; a failure raises AssertionError, since the answer would be wrong."""
     if not condition:
         raise AssertionError(f"meets: an invariant of ACIT fails: {what}")
 
@@ -204,7 +204,7 @@ def acit(rows: InputRows, work: Work, limits: Sizes | None = None, base: BaseSol
 
 
 def _with_interior(points, halfspaces, work: Work, limits: Sizes, base: BaseSolver) -> NearestPair | None:
-    """Theorem 4.5 for a region with interior; None where it has none."""
+    """Theorem 4.5 for a region with interior; ``None`` without interior."""
     spaces = None
     for exactly in (False, True):  # a proposed point is proven inside by the offsets of all half-spaces from it
         if spaces is None and (interior := interior_point(halfspaces, work, exactly)) is not None:
@@ -227,7 +227,7 @@ def _with_interior(points, halfspaces, work: Work, limits: Sizes, base: BaseSolv
 
 
 def _centre_in_hull(primal: Space, points: HomogeneousRows, work: Work) -> NearestPair | None:
-    """The origin of the primal space, inside FH, as a common point where it is in CH; else None."""
+    """The origin of the primal space, inside FH, as a common point if in CH; else ``None``."""
     work.add("whole_programs")
     d, origin = points.dimension, _origin(points.dimension)
     proposal = propose_from_samples(primal.points, origin, work, None, None, [0], [])

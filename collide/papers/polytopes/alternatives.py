@@ -1,6 +1,6 @@
-"""What section 2 of Barba and Mulzer compares ACIT with: Clarkson's sampling, GJK, brute force.
+"""Alternatives to ACIT in section 2 of Barba and Mulzer: Clarkson's sampling, GJK, brute force.
 
-Each proposes rows from which the exact search begins, so that every answer is proven the same way.
+Each proposes first rows of the exact search, and the exact search proves all answers in the same way.
 """
 
 from __future__ import annotations
@@ -30,15 +30,16 @@ _REACH = 1e6
 
 
 def lp_type(rows: InputRows, work: Work) -> NearestPair:
-    """The nearest pair as an LP-type problem in the points, and for each sample of them one in the half-spaces.
+    """The nearest pair as an LP-type problem in the points, and for each sample of points an LP-type problem in the
+    half-spaces.
 
     Clarkson (1995), Las Vegas algorithms for linear and integer programming, the first algorithm: samples of d√n rows
-    and those retained; what violates their answer is retained, if it is at most 2√n rows. Expected O(d) rounds of each.
+    with the retained rows; violating rows are retained, if at most 2√n. Expected O(d) rounds of each.
 
     Parameters
     ----------
     rows : InputRows
-        What was asked.
+        Rows of the question.
     work : Work
         Counters and limit.
     """
@@ -189,7 +190,7 @@ def brute_force(rows: InputRows, work: Work) -> NearestPair:
 
 
 def _facets(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[tuple[int, ...]]]:
-    """(unit normals, offsets, their d points) of the planes through d points that have all points on one side."""
+    """(unit normals, offsets, their d points) of the planes through d points with all points on a single side."""
     d, normals, offsets = points.shape[1], [], []
     members: list[tuple[int, ...]] = []
     size = float(np.abs(points - points.mean(axis=0)).max())

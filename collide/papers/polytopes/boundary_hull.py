@@ -1,7 +1,8 @@
-"""The boundary of a hull of integral points in R^d as simplices that cover it, exactly, whatever their position.
+"""The boundary of a hull of integral points in R^d as simplices covering the boundary, exactly, for points in any
+position.
 
-In the plane and in space by the exact hulls of `planar_hull` and `collide.hull`, above that by `incremental_hull`. Flat
-faces come out triangulated, and no point has to be moved.
+In the plane and in space by the exact hulls of `planar_hull` and `collide.hull`, in higher dimensions by
+`incremental_hull`. Flat faces come out triangulated, and no point has to be moved.
 """
 
 from __future__ import annotations
@@ -21,11 +22,11 @@ _N_KERNEL = 400
 
 
 class Boundary(NamedTuple):
-    """Simplices that cover the boundary of a hull, and the half-spaces they span.
+    """Simplices covering the boundary of a hull, and their half-spaces.
 
     facets : (f, d) int64, rows of points, ascending in each row.
-    planes : (f, d + 1) float64, (a, b) with a·x ≤ b; each number is the exact one, times a positive factor of its row,
-        rounded; max |a| = 1.
+    planes : (f, d + 1) float64, (a, b) with a·x ≤ b; each number is the exact number, times a positive factor of its
+        row, rounded; max |a| = 1.
     """
 
     facets: np.ndarray
@@ -33,16 +34,16 @@ class Boundary(NamedTuple):
 
 
 def boundary_hull(points: np.ndarray, with_planes: bool = True, max_simplices: int | None = None) -> Boundary | None:
-    """The boundary of the hull, or None where the points lie in one hyperplane.
+    """The boundary of the hull, or ``None`` for points in a hyperplane.
 
     Parameters
     ----------
     points : (n, d) float64
-        Integers of at most `BITS` bits, d ≥ 2; doubled, inner and coplanar ones are allowed.
+        Integers of at most `BITS` bits, d ≥ 2; doubled, inner and coplanar points are allowed.
     with_planes : bool
-        Whether the half-spaces are wanted; else they are missing.
+        Whether to make the half-spaces; else they are missing.
     max_simplices : int, optional
-        In d > 3, the most simplices that there may be at any time.
+        In d > 3, the most simplices at any time.
 
     Returns
     -------
@@ -52,7 +53,7 @@ def boundary_hull(points: np.ndarray, with_planes: bool = True, max_simplices: i
     Raises
     ------
     BoundaryTooLarge
-        Where there were more than ``max_simplices``.
+        Beyond ``max_simplices``.
     """
     n, d = points.shape
     corners = first_simplex(points)
@@ -71,7 +72,7 @@ def boundary_hull(points: np.ndarray, with_planes: bool = True, max_simplices: i
 
 
 def first_simplex(points: np.ndarray) -> np.ndarray | None:
-    """d + 1 rows that span R^d, each far from those before; None where there are none."""
+    """d + 1 rows spanning R^d, each far from the rows before; ``None`` for points in a hyperplane."""
     d = points.shape[1]
     rows = [int(np.lexsort(points.T[::-1])[0])]
     rest = points - points[rows[0]]

@@ -22,15 +22,15 @@ class ConvexPolygon:
     Parameters
     ----------
     points : (n, 2) array_like, float64
-        In any order, in the frame of the polygon [m]. Points that are doubled, inside or between others on an edge
-        change nothing. All may lie on one line, or in one place.
+        In any order, in the frame of the polygon [m]. Doubled points, inner points and points between others on an edge
+        change nothing. All may lie on a line, or in a single place.
 
     Attributes
     ----------
     vertices : (m, 2) float64
-        Corners, counter-clockwise, no three on one line [m]: the points as given, where they are that already.
+        Corners, counter-clockwise, no three collinear [m]: the points as given, if already corners in order.
     ids : (m,) int64
-        Which of the points each is.
+        Index of each corner among the points.
 
     Raises
     ------
@@ -39,7 +39,7 @@ class ConvexPolygon:
 
     Notes
     -----
-    The hull is exact (`planar_hull.py`) and takes O(n log n). Nothing but the corners is kept: questions about two
+    The hull is exact (`planar_hull.py`) and takes O(n log n). Only the corners are kept: questions about two
     polygons are answered from them in O(log n + log m) (`polygons_meet`).
     """
 
@@ -57,7 +57,7 @@ class ConvexPolygon:
             )
         ids = planar_hull.hull_of_points(read)
         n = len(ids)
-        if n == len(read):  # in which order, if it was counter-clockwise already
+        if n == len(read):  # already counter-clockwise: keep the order
             first = int(np.argmin(ids))
             if (np.roll(ids, -first) == np.arange(n)).all():
                 ids = np.arange(n)

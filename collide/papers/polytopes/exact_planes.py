@@ -19,9 +19,9 @@ def exact_planes(points: np.ndarray, facets: np.ndarray, within: np.ndarray) -> 
     points : (n, d) float64
         Integers.
     facets : (f, d) integers
-        Rows of points that span a hyperplane.
+        Rows of points spanning a hyperplane.
     within : (d,) object
-        d + 1 times a point that is strictly inside each half-space, integers.
+        d + 1 times a point strictly inside each half-space, integers.
     """
     d = points.shape[1]
     corners = whole_numbers(points[facets.ravel()]).reshape(len(facets), d, d)
@@ -33,7 +33,7 @@ def exact_planes(points: np.ndarray, facets: np.ndarray, within: np.ndarray) -> 
 
 
 def nearby_planes(points: np.ndarray, facets: np.ndarray, within: np.ndarray, reach: float):
-    """The same in doubles: planes with max |a| = 1, how far heights a·x − b may be off, where that is nothing.
+    """The same in doubles: planes with max |a| = 1, error bounds of heights a·x − b, bool: planes with error 0.
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ def nearby_planes(points: np.ndarray, facets: np.ndarray, within: np.ndarray, re
     Returns
     -------
     planes, errors, is_exact : (f, d + 1) float64, (f,) float64, (f,) bool
-        Of planes of which doubles cannot tell the side of ``within``, the exact ones are taken and rounded. Where
-        numbers are so small that an error is less than half of the least height, what is within the error is 0.
+        Planes with an open side of ``within`` in doubles are replaced by the exact planes, rounded. For numbers so
+        small that an error is less than half of the least height, heights within the error are 0.
     """
     d = points.shape[1]
     corners = points[facets]

@@ -12,23 +12,23 @@ from collide.papers.polytopes.tree_walk import Plane, Walk
 
 
 class Exclusion(NamedTuple):
-    """Why the hull P of points and the region R of half-spaces are apart.
+    """Proof that the hull P of points and the region R of half-spaces are apart.
 
-    R is in S, the intersection of the half-spaces of ``planes``. The boundary of P misses S, so that S, which is
-    connected, is inside P or apart from it; and a point of S is not in P. `verify_exclusion` checks both.
+    R is in S, the intersection of the half-spaces of ``planes``. The boundary of P misses S, so that the connected
+    set S is inside P or apart from P; and a point of S is not in P. `verify_exclusion` checks both.
 
     Attributes
     ----------
     planes : tuple of Plane
         u·x ≤ c with u = Σ multipliers·normals and c = Σ multipliers·offsets, at most d rows each, multipliers ≥ 0:
-        R is in each, and every boundary simplex of P beyond one of them.
+        R is in each, and every boundary simplex of P beyond at least a plane of them.
     outside : tuple of d floats
-        A point of R, in its frame, that is not in P.
+        A point of R, in its frame, outside P.
     ray : tuple of d floats
-        A direction on the grid of P (`HullBoundary`) in which one goes from ``outside`` for ever.
+        The direction of a ray from ``outside``, on the grid of P (`HullBoundary`).
     ray_planes : tuple of d + 1 floats each
-        (a, b) on the grid of P: the ray is in a·x > b, and every boundary simplex of P in a·x ≤ b of one of them, so
-        that the ray meets P nowhere: were ``outside`` in P, the ray would leave it.
+        (a, b) on the grid of P: the ray is in a·x > b, and every boundary simplex of P in a·x ≤ b of some plane, so
+        the ray misses the boundary of P: were ``outside`` in P, the ray would cross the boundary.
     """
 
     planes: tuple[Plane, ...]
@@ -38,10 +38,10 @@ class Exclusion(NamedTuple):
 
 
 class HullBoundary(NamedTuple):
-    """The boundary of a body made from points, once for all poses; checked by `verify_boundary`.
+    """The boundary of a hull of points, made once for all poses; checked by `verify_boundary`.
 
     whole : (n, d) int64, the points on a grid: each is ``centre`` + ``unit``·whole to one unit an axis.
-    facets : (f, d) int32, rows: simplices that cover the boundary of the hull of ``whole``.
+    facets : (f, d) int32, rows: simplices covering the boundary of the hull of ``whole``.
     """
 
     whole: np.ndarray

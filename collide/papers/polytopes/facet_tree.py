@@ -1,12 +1,14 @@
-"""The hierarchical tree of a polytope (Barba and Langerman 2015, section 6): nets, shell cones, what lies outside them.
+"""The hierarchical tree of a polytope (Barba and Langerman 2015, section 6): nets, shell cones, simplices outside the
+cones.
 
-A node stands for a set F of the simplices that cover the boundary. Its net is a sample of F with a first simplex of
+A node holds a set F of the simplices covering the boundary. Its net is a sample of F with a first simplex of
 the polytope; for each shell cone σ of the net's hull the child holds F_σ̄, the simplices of F with a corner outside σ.
-A net is kept only as long as |F_σ̄| ≤ ε|F| for every cone that was looked at; else twice as many are drawn. A leaf
+A net is kept only as long as |F_σ̄| ≤ ε|F| for every visited cone; else a net twice as large is drawn. A leaf
 keeps the corners of its simplices alone: CH(F).
 
-Simplices of the boundary, not faces of every dimension: a face is in a simplex, and one that leaves σ leaves it with
-a corner. Sets are exact: planes are doubles, points integers, and what doubles leave open is decided in integers.
+Simplices of the boundary, not faces of every dimension: a face is in a simplex, and a simplex not inside σ has
+a corner outside. Sets are exact: planes are doubles, points integers, and signs open in doubles are decided in
+integers.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from collide.papers.polytopes.shell_cones import cones_at
 _UNIT = 2.0**-53
 #: Why there is no tree of a flat body.
 FLAT = "a hierarchical tree needs points or normals of a body with interior; ask polytopes.meets of flat ones"
-#: Samples drawn for one node before it gives up.
+#: The most samples drawn for a node.
 _MAX_DRAWS = 12
 #: Simplices of the smallest net; how many a net has, times d − 1, for each leaf that its node's corners would fill.
 _SMALLEST_NET, _SIMPLICES_A_LEAF = 12, 6.0
@@ -57,23 +59,23 @@ _NO_HULL = Boundary(np.empty((0, 0), dtype=np.int32), np.empty((0, 0)))
 
 
 class Node:
-    """A set of boundary simplices with the hull of its net; of a leaf their corners.
+    """A set of boundary simplices with the hull of its net; a leaf has their corners.
 
     Attributes
     ----------
     n_facets : int
-        |F|; of a root that is a leaf 0, since its boundary need not be known.
+        |F|; 0 for a root without children, whose boundary is not needed.
     facets : (k,) int32
-        Rows of the tree's simplices: F. Empty of a leaf.
+        Rows of the tree's simplices: F. Empty for a leaf.
     rows : (m,) int32
         Rows of the tree's points: of the net, or of a leaf the corners of F.
     hull : Boundary
-        Of the net, in places of ``rows``; offsets raised so that no point of the net is outside. Empty of a leaf.
+        Of the net, in places of ``rows``; offsets raised so that no point of the net is outside. Empty for a leaf.
     is_leaf : bool
     cones : dict
-        vertex → (c, d) rows of planes: the shell cones that were asked for.
+        vertex → (c, d) rows of planes: the shell cones asked for.
     children : dict
-        (vertex, cone) → Node, or None where F_σ̄ is empty.
+        (vertex, cone) → Node, or ``None`` for an empty F_σ̄.
     depth, n_draws : int
     """
 
@@ -92,7 +94,7 @@ class Node:
         return _BYTES_A_NODE + n_held + sum(cones.nbytes for cones in self.cones.values())
 
     def nodes(self) -> list[Node]:
-        """This one and all below it that were made."""
+        """This node and all nodes made below."""
         everything: list[Node] = [self]
         for node in everything:
             everything.extend(child for child in node.children.values() if child is not None)
@@ -100,28 +102,28 @@ class Node:
 
 
 class FacetTree:
-    """The tree over the boundary of a hull; nodes are made when they are first asked for.
+    """The tree over the boundary of a hull; nodes are made at their first visit.
 
     Parameters
     ----------
     points : (n, d) float64
         Integers of at most `exact_planes.BITS` bits.
     memory : int
-        The most bytes that boundary and nodes may take.
+        The most bytes of boundary and nodes.
     limits : Sizes, optional
         `sizes` of the dimension by default.
 
     Attributes
     ----------
     points : (n, d)
-    first : (d + 1,) rows of points that span R^d; they are in every net.
+    first : (d + 1,) rows of points spanning R^d, in every net.
     centre, inner_radius : (d,), float
-        The middle of the first simplex; so far from it along the axes all is in that simplex.
+        The middle of the first simplex; points at most the radius away along each axis are in the simplex.
     reach : float
         max |x| over points and axes.
     root : Node
     n_bytes, n_nodes, n_redrawn : int
-        Bytes of boundary and nodes, how many nodes, and samples that were drawn again.
+        Bytes of boundary and nodes, number of nodes, and of samples drawn again.
     """
 
     def __init__(self, points: np.ndarray, memory: int, limits: Sizes | None = None):
@@ -244,9 +246,9 @@ class FacetTree:
         return cones
 
     def child(self, node: Node, vertex: int, cone: int) -> Node | None:
-        """The child of a shell cone: None where nothing is outside it.
+        """The child of a shell cone: ``None`` where no simplex has a corner outside.
 
-        Where more than ε|F| are, the node is drawn again, and the answer is the node itself.
+        Where more than ε|F| have, the net is drawn again, and the node itself is returned.
         """
         key = vertex, cone
         if key not in node.children:
@@ -260,7 +262,7 @@ class FacetTree:
     # --- exact sets ---------------------------------------------------------------------------------------------------
 
     def outside(self, facets: np.ndarray, planes: np.ndarray) -> np.ndarray:
-        """F_σ̄: those of some simplices that have a corner outside one of some half-spaces (a, b), exactly."""
+        """F_σ̄: the given simplices with a corner outside at least a half-space (a, b), exactly."""
         corners = self.facets[facets]
         marks = np.zeros(len(self.points), dtype=bool)
         marks[corners] = True

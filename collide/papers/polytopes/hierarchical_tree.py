@@ -21,7 +21,7 @@ from collide.papers.polytopes.tree_size import TreeSize, max_simplices, predicte
 from collide.papers.polytopes.tree_walk import Grid
 from collide.papers.polytopes.whole_tree import build_whole
 
-#: Bytes that one tree may take, where nothing is said.
+#: Bytes of a tree by default.
 MEMORY = 1 << 30
 
 
@@ -31,13 +31,13 @@ class HierarchicalTree:
     Parameters
     ----------
     points : (n, d) array_like, float64, optional
-        The body is their hull, which must have interior [any unit of length].
+        The body is their hull, with interior [any unit of length].
     normals, offsets : (m, d), (m,) array_like, float64, optional
-        The body is {x : normals @ x ≤ offsets}, which must have interior; unbounded is allowed.
+        The body is {x : normals @ x ≤ offsets}, with interior; unbounded is allowed.
     whole : bool
-        Whether to make all nodes now, as `build` does; else each is made when a query first comes to it.
+        Whether to make all nodes now, as `build` does; else each is made at the first visit of a query.
     memory : int
-        The most bytes that the boundary and the nodes of the tree may take.
+        The most bytes of the boundary and the nodes of the tree.
     limits : Sizes, optional
         ε, net and leaf; chosen by dimension.
 
@@ -46,11 +46,11 @@ class HierarchicalTree:
     tree : FacetTree
         Over the boundary of the points' hull, or of the hull of the polars w of the half-spaces, {x : ⟨w, x⟩ ≤ 1}.
     grid : Grid
-        What the tree's integers stand for.
-    interior : (d,) float64 or None
-        Of half-spaces, the point of which they are polars.
-    predicted : TreeSize or None
-        What `build` predicted.
+        Scale and origin of the tree's integers.
+    interior : (d,) float64 or ``None``
+        Of half-spaces, the origin of their polars.
+    predicted : TreeSize or ``None``
+        The prediction of `build`.
 
     Raises
     ------
@@ -62,10 +62,10 @@ class HierarchicalTree:
     Notes
     -----
     L. Barba and S. Langerman, "Optimal detection of intersections between convex polyhedra" (2015), section 6. The
-    boundary has as many simplices as the hull has facets, up to n^⌊d/2⌋; it is not needed where all points fit one
-    leaf. Where the upper bound theorem allows more than ``memory`` holds, their number is predicted first, and a
-    body beyond it is refused. All nodes together are n^(⌊d/2⌋ + δ) in the paper, for n faces of all dimensions.
-    Not for several threads at once.
+    boundary has as many simplices as the hull has facets, up to n^⌊d/2⌋; a single leaf for all points
+    needs no boundary. Where the upper bound theorem allows more than ``memory`` holds, their number is predicted first,
+    and a body beyond ``memory`` is refused. All nodes together are n^(⌊d/2⌋ + δ) in the paper, for n faces of all
+    dimensions. Not for several threads at once.
     """
 
     def __init__(

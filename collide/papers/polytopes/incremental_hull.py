@@ -1,8 +1,8 @@
-"""The hull of integral points in R^d, one point after the other, exactly.
+"""The hull of integral points in R^d, point by point, exactly.
 
-The facets strictly below a point go, and those that join it to the rim of what went come in their place. A facet whose
-hyperplane goes through the point stays: that is the placing triangulation (De Loera, Rambau and Santos 2010, section
-4.3). Planes are doubles with an error bound, and integers once a point comes nearer than that.
+The facets strictly below a point are replaced by facets from the point to the rim of the hole. A facet whose
+hyperplane goes through the point stays: the placing triangulation (De Loera, Rambau and Santos 2010, section
+4.3). Planes are doubles with an error bound, and integers for points within the bound.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def bytes_a_slot(d: int) -> int:
 
 
 class BoundaryTooLarge(Exception):
-    """A hull that was stopped. n_facets : so many there were.   n_points : after so many points."""
+    """A hull stopped half-way.   n_facets : number of its facets.   n_points : number of points added."""
 
     def __init__(self, n_facets: int, n_points: int):
         super().__init__(n_facets, n_points)
@@ -26,14 +26,14 @@ class BoundaryTooLarge(Exception):
 
 
 def grown_facets(points: np.ndarray, corners: np.ndarray, max_simplices: int | None = None) -> np.ndarray:
-    """The simplices that cover the boundary, (f, d) rows of points, ascending in each.
+    """The simplices covering the boundary, (f, d) rows of points, ascending in each.
 
     Parameters
     ----------
     points : (n, d) float64
         Integers.
     corners : (d + 1,) integers
-        Rows that span R^d.
+        Rows spanning R^d.
     max_simplices : int, optional
         Beyond so many simplices `BoundaryTooLarge` is raised.
     """
@@ -46,7 +46,7 @@ def grown_facets(points: np.ndarray, corners: np.ndarray, max_simplices: int | N
 
 
 class _Growing:
-    """A hull to which points are added. Slots of facets that went are used again."""
+    """A hull under construction, point by point. Slots of removed facets are reused."""
 
     def __init__(self, points: np.ndarray, corners: np.ndarray):
         n, d = points.shape
@@ -117,7 +117,7 @@ class _Growing:
         return (self.integers[slots] * np.append(whole_numbers(point), -1)).sum(axis=1) > 0
 
     def _rim(self, facets: np.ndarray) -> np.ndarray:
-        """The ridges that one of the facets has, and no other."""
+        """Ridges of exactly a single facet of the given facets."""
         d = self.d
         ridges = facets[:, self.sides].reshape(-1, d - 1)
         if self.powers:

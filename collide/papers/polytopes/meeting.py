@@ -1,4 +1,4 @@
-"""`Meeting`: the answer of `meets`, and the certificate that proves it."""
+"""`Meeting`: the answer of `meets`, and its certificate."""
 
 from __future__ import annotations
 
@@ -44,22 +44,22 @@ class Meeting:
     Attributes
     ----------
     hit : bool
-        They have; touching is a hit.
-    point : (d,) float64 or None
+        Whether they have a common point; touching is a hit.
+    point : (d,) float64 or ``None``
         Of a hit, the common point of the certificate, rounded once [units of the points].
     distance : float
-        The least distance of a point of CH and one of FH, rounded [units of the points]: 0 of a hit, infinite where
+        The least distance of a point of CH and a point of FH, rounded [units of the points]: 0 of a hit, infinite where
         FH is empty.
-    point_p, point_h : (d,) float64 or None
-        The two nearest points, of CH and of FH, each rounded once; both ``point`` of a hit, None where FH is empty.
-    normal : (d,) float64 or None
+    point_p, point_h : (d,) float64 or ``None``
+        The two nearest points, of CH and of FH, each rounded once; both ``point`` of a hit, ``None`` where FH is empty.
+    normal : (d,) float64 or ``None``
         Of a miss, the unit vector from CH towards FH.
     lower, upper : float
-        Proven: lower ≤ the exact distance ≤ upper, at most one unit in the last place apart.
+        Proven: lower ≤ the exact distance ≤ upper, at most a unit in the last place apart.
     certificate : MeetingCertificate
-        What proves it; `verify` checks it against the input.
+        Proof of the answer; `verify` checks the proof against the input.
     counters : mapping
-        What was done, by name: rows read, rounds, pivots, rows decided in integers, and of ACIT the calls, their
+        Work done, by name: rows read, rounds, pivots, rows decided in integers, and of ACIT the calls, their
         depth and the nets redrawn.
     """
 

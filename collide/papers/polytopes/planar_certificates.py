@@ -41,10 +41,11 @@ class PlanarCertificate(NamedTuple):
     Parameters
     ----------
     hit : whether they meet.
-    point : a common point in W [m]; None where they are apart.
-    weights_a, weights_b : ((vertex, weight), …), at most three each: both make the point. Empty where they are apart.
-    normal, offset : the line normal·x = offset, A on its lower side and B on its upper, one of them clear of it. None
-        where they meet. The normal points from A to B and has any length.
+    point : a common point in W [m]; ``None`` for polygons apart.
+    weights_a, weights_b : ((vertex, weight), …), at most three each: both combinations give the point. Empty for
+        polygons apart.
+    normal, offset : the line normal·x = offset, A on its lower side and B on its upper, A or B without a point on the
+        line. ``None`` for a hit. The normal points from A to B and has any length.
     """
 
     hit: bool
@@ -66,18 +67,18 @@ def verify_polygons(A: ConvexPolygon, B: ConvexPolygon, X_WA, X_WB, certificate:
     A, B : ConvexPolygon
         The pair.
     X_WA, X_WB : (3, 3) float64
-        Where they stand in W [m].
+        Their poses in W [m].
     certificate : PlanarCertificate
-        What is claimed of them.
+        The claim on the pair.
 
     Raises
     ------
     CertificateRefused
-        Where it does not prove what it claims, with the reason.
+        For a certificate without a proof of its claim, with the reason.
 
     Notes
     -----
-    O(1) of a hit; O(n + m) of a line, which every vertex is tried against.
+    O(1) for a hit; O(n + m) for a line, checked against every vertex.
     """
     for name, polygon in (("A", A), ("B", B)):
         as_answer("verify_polygons", name, polygon, ConvexPolygon)
@@ -106,13 +107,15 @@ def verify_polygons(A: ConvexPolygon, B: ConvexPolygon, X_WA, X_WB, certificate:
 
 
 def gap_across(A: ConvexPolygon, B: ConvexPolygon, X_WA, X_WB, certificate: PlanarCertificate) -> float:
-    """A double that the gap of two polygons is at least, by the line that parts them [m]; O(n + m), in fractions."""
+    """A lower bound, as a double, of the gap of two polygons, from their separating line [m]; O(n + m), in
+    fractions.
+    """
     assert certificate.normal is not None
     nx, ny = certificate.normal
     greatest = max(nx * x + ny * y for x, y in placed_vertices(A, X_WA))
     least = min(nx * x + ny * y for x, y in placed_vertices(B, X_WB))
     square = (least - greatest) ** 2 / (nx * nx + ny * ny)
-    # The root to 64 digits, by the integers that it lies between.
+    # The root to 64 digits, between two neighbouring integers.
     bits = max(0, square.denominator.bit_length() - square.numerator.bit_length()) + 128
     gap = float(Fraction(math.isqrt(square.numerator * 4**bits // square.denominator), 2**bits))
     while gap > 0.0 and Fraction(gap) ** 2 > square:
@@ -176,7 +179,7 @@ def certificate_of_row(A: ConvexPolygon, B: ConvexPolygon, X_WA, X_WB, row: list
 
 
 def _normal_of_row(bodies: list[_Body], row: list[int]) -> tuple[PlanarPoint, int]:
-    """(a normal from P to Q, a vertex of P that is nearest to Q along it)."""
+    """(a normal from P to Q, a vertex of P nearest to Q along the normal)."""
     if row[HOW] == TWO_POINTS:
         p, q = (placed_vertices(body.polygon, body.X)[0] for body in bodies)
         return (q[0] - p[0], q[1] - p[1]), 0
@@ -223,7 +226,7 @@ def _common_point(P: list[PlanarPoint], Q: list[PlanarPoint]) -> tuple[PlanarPoi
 
 
 def _weights_in(points: list[PlanarPoint], x: PlanarPoint) -> list[tuple[int, Fraction]] | None:
-    """Positive weights of one to three of the points that make x; None where it lies outside of their hull."""
+    """Positive weights of one to three points with x as their combination; ``None`` for x outside the points' hull."""
     for k, p in enumerate(points):
         if p == x:
             return [(k, Fraction(1))]

@@ -1,18 +1,18 @@
-"""How far apart two convex polygons are, or how deep one is in the other: doubles, with a bound of their error.
+"""Gap or depth of two convex polygons: doubles, with a bound of their error.
 
 Apart: GJK on B ⊖ A, support vertices by binary search in O(log n). Meeting: the least depth over the normals of all
-edges, in O(n + m), the support vertices of one polygon running around it as the normals of the other do (M. I. Shamos,
-"Computational Geometry", 1978: rotating calipers). Whether they meet is not asked here: `planar_search.py` knows.
+edges, in O(n + m), the support vertices of a polygon running around as the normals of the other do (M. I. Shamos,
+"Computational Geometry", 1978: rotating calipers). The hit itself is decided in `planar_search.py`.
 
-u is 2⁻⁵³ and S the size of the pair: how far the polygons reach from their origins, and these from each other. A placed
-vertex is off by 3 u S, a difference of two by 7 u S, its product with a unit vector by 12 u S; a support vertex, whose
-neighbours are no farther in doubles, is behind the true one by less than 4 u times the polygon's perimeter, 8 times its
-reach. 2⁻⁴⁶ S, 128 u, covers them.
+u is 2⁻⁵³ and S the size of the pair: the reach of the polygons from their origins, and the distance of the origins. A
+placed vertex is off by 3 u S, a difference of two by 7 u S, its product with a unit vector by 12 u S; a support vertex,
+whose neighbours are no farther in doubles, is behind the true vertex by less than 4 u times the polygon's perimeter, 8
+times its reach. 2⁻⁴⁶ S, 128 u, covers them.
 
-Of polygons that are apart, the lower bound is positive. Where that of doubles is not, the support vertices across the
+For polygons apart, the lower bound is positive. Where the bound in doubles is not, the support vertices across the
 feature found are taken in double-doubles (16 u² an operation): placed vertices, shift and product are good to 2⁻⁹⁶ S,
-steps between neighbours to 2⁻¹⁰⁰ of themselves. What even they leave open is left to the line that `planar_search.py`
-parted the polygons by, in fractions (`planar_pairs.py`).
+steps between neighbours to 2⁻¹⁰⁰ of themselves. Cases open even then take the separating line of `planar_search.py`,
+in fractions (`planar_pairs.py`).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _ENOUGH = 2.0**-51
 _LEAST = 5e-324
 #: Up to so many vertices are scanned.
 _SCANNED = 8
-#: Rounds of GJK, none of which comes near it; steps of a binary search.
+#: Limits never reached: rounds of GJK, steps of a binary search.
 _MAX_ROUNDS, _MAX_STEPS = 200, 80
 
 
@@ -152,10 +152,10 @@ def _reach(polygon):
 
 
 class _Simplex(NamedTuple):
-    """Vertices i, j of A and B, one pair or two, and the point nearest to the origin of the segment of B − A that they
-    span: (1 − t) of the first and t of the second.
+    """Vertices i, j of A and B, a pair or two, and the point nearest to the origin of their segment of B − A: (1 − t)
+    of the first and t of the second.
 
-    i1 : −1 where there is one pair.
+    i1 : −1 for a single pair.
     """
 
     i0: int
@@ -192,7 +192,7 @@ def _nearest_on_segment(A, B, i0, j0, i1, j1):
 
 
 class _Gap(NamedTuple):
-    """A lower bound of a distance [m], and the unit direction from A to B across which it is proven."""
+    """A lower bound of a distance [m], and the unit direction from A to B of its proof."""
 
     lower: float
     x: float
@@ -220,7 +220,7 @@ def _dot(ax, ay, bx, by):
 
 @kernel
 def _climbed(polygon, k, x, y):
-    """The vertex farthest along a direction in double-doubles, from one that is nearly."""
+    """The vertex farthest along a direction in double-doubles, searched from a nearly farthest vertex."""
     for _ in range(polygon.n):
         after, before = (k + 1) % polygon.n, (k + polygon.n - 1) % polygon.n
         to_after, to_before = _step(polygon, k, after), _step(polygon, k, before)
@@ -359,7 +359,9 @@ def _least_depth(A, B):
 
 @kernel
 def _deepest_point(A, B, least, size):
-    """Where B is deepest in A beyond an edge of A: a vertex; of an edge parallel to it a point across from it."""
+    """The point of B deepest in A beyond an edge of A: a vertex; for an edge parallel to A's a point across from A's
+    edge.
+    """
     b = _place(B, least.vertex)
     a = _place(A, least.edge)
     length = _length(_edge(A, least.edge).x, _edge(A, least.edge).y)

@@ -1,8 +1,9 @@
-"""The signs of `planar_predicates.py` in integers, where doubles leave them open.
+"""The signs of `planar_predicates.py` in integers, where open in doubles.
 
-A vertex of P lies at R_WP p + p_WP, entries taken as they are: integers times a power of two, of two factors each. A
-side is a product of two differences of such vertices, a minor one of two sides. Numbers are signed digits in base 2²⁶
-(`numerics/digits.py`), all coordinates of one sign on one grid. Nothing overflows within the range of coordinates.
+A vertex of P lies at R_WP p + p_WP, entries taken as exact: integers times a power of two, of two factors each. A
+side is a product of two differences of these vertices, a minor a product of two sides. Numbers are signed digits in
+base 2²⁶ (`numerics/digits.py`), all coordinates of a sign on a common grid. Nothing overflows within the range of
+coordinates.
 """
 
 from __future__ import annotations

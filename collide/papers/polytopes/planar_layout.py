@@ -40,9 +40,9 @@ COMMON_POINT, ONE_LINE, TWO_LINES, TWO_POINTS, LOST = 0, 1, 2, 3, 4
 
 
 class Line(NamedTuple):
-    """A line, by slots: from ``start`` to ``end`` is its direction, ``through`` lies on it.
+    """A line, by slots: its direction is from ``start`` to ``end``, its point is ``through``.
 
-    turned : its direction is that vector turned left by a right angle.
+    turned : the direction is from ``start`` to ``end``, turned left by a right angle.
     """
 
     start: int

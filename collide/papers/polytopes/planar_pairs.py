@@ -28,7 +28,7 @@ from collide.papers.polytopes.planar_layout import DOUBLES, HIT, HOW, INTEGERS, 
 
 
 class PolygonQuestion:
-    """Pairs of polygons and where they stand, checked: what was asked.
+    """Pairs of polygons and their poses, checked: the question.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class PolygonQuestion:
     n : int
         Pairs.
     single : bool
-        Whether it is one pair, and its answers are scalars.
+        Whether the question is a single pair, with scalars as answers.
     """
 
     def __init__(self, A, B, X_WA, X_WB):
@@ -108,12 +108,12 @@ class PolygonHits:
         return len(self._rows)
 
     def certificate(self, k: int = 0) -> PlanarCertificate:
-        """What proves pair k: a common point, or a line between the polygons.
+        """The proof of pair k: a common point, or a line between the polygons.
 
         Parameters
         ----------
         k : int
-            Which pair, 0 of a single one.
+            Number of the pair, 0 for a single pair.
 
         Returns
         -------
@@ -123,7 +123,7 @@ class PolygonHits:
         Raises
         ------
         InvalidArgument
-            Where there is no pair k.
+            For k out of range.
         """
         if not checks.is_integer(k) or not 0 <= k < len(self._rows):
             raise InvalidArgument(
@@ -178,7 +178,7 @@ class PolygonDistances(PolygonHits):
     Parameters
     ----------
     question : PolygonQuestion
-        What was asked.
+        The question.
     table : (n, 24) int64
         Rows of `planar_layout.py`.
     distances : (n, 9) float64
@@ -187,9 +187,9 @@ class PolygonDistances(PolygonHits):
     Attributes
     ----------
     distance : float, or (n,) float64
-        The gap, or minus the depth, the length of the least translation that parts them [m].
+        The gap, or minus the depth, the length of the least separating translation [m].
     lower, upper : float, or (n,) float64
-        Bounds of it: no rounding error reaches beyond [m]. The sign is that of ``hit``, which is exact.
+        Bounds of the distance: no rounding error reaches beyond [m]. The sign agrees with ``hit``, exact.
     normal : (2,) or (n, 2) float64
         Unit vector in W from A towards B: moving B by −distance · normal brings them to touch.
     point_a, point_b : (2,) or (n, 2) float64
@@ -216,30 +216,30 @@ def polygon_distance(A, B, X_WA, X_WB, *, threads: int = 1) -> PolygonDistances:
     Parameters
     ----------
     A, B : ConvexPolygon, or list of n of them
-        One goes with all poses; of a list each has its own.
+        A single polygon goes with all poses; each polygon of a list has its own pose.
     X_WA, X_WB : (3, 3) or (n, 3, 3) array_like, float64
-        Poses in W, used as they stand, entry by entry [m]. A single one goes with all others.
+        Poses in W, used as given, entry by entry [m]. A single pose goes with all others.
     threads : int
-        Answer a batch in at most so many threads; the answers are the same bits.
+        The most threads for a batch; the answers have the same bits.
 
     Returns
     -------
     PolygonDistances
-        Distances with bounds, normals, points, and all that `polygons_meet` returns.
+        Distances with bounds, normals, points, and all fields of `polygons_meet`.
 
     Raises
     ------
     InvalidArgument
-        Where A or B are no polygons, numbers of polygons do not match, or threads is no integer ≥ 1.
+        For A or B other than polygons, numbers of polygons that differ, or threads not an integer ≥ 1.
     InvalidPose
-        Where a pose is not finite or no rotation, or their numbers do not match.
+        For a pose not finite or not a rotation, or numbers of poses that differ.
 
     Notes
     -----
-    Whether they meet is decided exactly, first. A gap takes O(log n + log m) a round of GJK, a depth O(n + m): there a
-    translation has to be tried along the normal of every edge. Polygons without area that meet have depth 0 where their
-    Minkowski difference has none. Distances are doubles, off by at most 2⁻⁴⁶ (1.4e-14) of the pair's size.
-    Of polygons that are apart, ``lower`` and ``distance`` are positive, unless the gap is less than the least double.
+    The hit is decided exactly, first. A gap takes O(log n + log m) a round of GJK, a depth O(n + m): a
+    translation has to be tried along the normal of every edge. Meeting polygons have depth 0 where their
+    Minkowski difference has no area. Distances are doubles, off by at most 2⁻⁴⁶ (1.4e-14) of the pair's size.
+    For polygons apart, ``lower`` and ``distance`` are positive, unless the gap is less than the least double.
     """
     threads = check_threads(threads)
     question = PolygonQuestion(A, B, X_WA, X_WB)

@@ -1,14 +1,14 @@
-"""Signs about two posed convex polygons: on which side of a line a vertex lies, and which of two crossings comes first.
+"""Signs of two posed convex polygons: the side of a line of a vertex, and the order of two crossings.
 
-A pair of polygons is P and Q; whoever calls decides which of A and B is which. Vertices that a search has read stand
-in *slots* of the workspace, and lines are named by slots. Every sign is that of the exact numbers: doubles with a bound
-of their rounding error first, integers (`planar_exact.py`) where that bound leaves it open. The bound of a vector
-between two vertices of one polygon is relative to that vector, so that short edges of large polygons do not need
+A pair of polygons is P and Q; the caller decides the roles of A and B. Vertices read by a search stand
+in *slots* of the workspace, and lines are named by slots. Every sign is exact: doubles with a bound
+of their rounding error first, integers (`planar_exact.py`) for open signs. The bound of a vector
+between two vertices of a polygon is relative to the vector's length, so that short edges of large polygons do not need
 integers.
 
 u is 2⁻⁵³. A vector within a polygon is a difference (u), turned (two products and a sum): 3 u of its magnitude. A
-posed vertex carries 3 u of its magnitude, a difference of two of them 4 u. A product of two such vectors has an error
-below 2·(3 + 4) u + 4 u of the product of their magnitudes, second orders aside; 32 u are taken.
+posed vertex carries 3 u of its magnitude, a difference of two of them 4 u. A product of two difference vectors has an
+error below 2·(3 + 4) u + 4 u of the product of their magnitudes, second orders aside; 32 u are taken.
 """
 
 from __future__ import annotations

@@ -1,24 +1,24 @@
 """Two convex polygons in O(log n + log m), nothing prepared: section 2 of Barba and Langerman, Theorem 2.1.
 
 A round compares T_P, the hull of three vertices of P, with T_Q, the intersection of the half-planes of three edges of Q
-(`planar_triangles.py`), and halves the vertices or the edges that may still matter. What holds after every round:
+(`planar_triangles.py`), and halves the vertices or the edges that may still matter. Invariants after every round:
 
-* P and Q meet if and only if CH(V*) and EH(E*) do, V* the chain of P that remains, EH(E*) the edge hull of the chain of
-  edges of Q that remains. (The paper speaks of an *edge* of E*; of a P inside Q no edge is met.)
-* If V* is not all of P, a line through one of its ends, the hot one, has Q strictly beyond and of P only points of
+* P and Q meet if and only if CH(V*) and EH(E*) do, V* the remaining chain of P, EH(E*) the edge hull of the remaining
+  chain of edges of Q. (The paper speaks of an *edge* of E*; a P inside Q meets no edge.)
+* If V* is not all of P, a line through an end of V*, the hot end, has Q strictly beyond and of P only points of
   CH(V*) beyond.
-* If E* is not all of Q, P has a point x in EH(E*) strictly beyond the chord that cuts E* off.
+* If E* is not all of Q, P has a point x in EH(E*) strictly beyond the chord of E*.
 
-Separated, a line through a vertex v of T_P, which T_P does not cross and Q lies strictly beyond, keeps the chain of P
-on its far side, or none. Where P crosses it on the side of a chain that was given up, P and Q are apart: the line and
-the hot one leave nothing of P between them. At the hot vertex the edge of P then separates; at the other end a line
-through the crossing of both does, tangent to P between the ends, found by halving the same chain on
+Separated, a line through a vertex v of T_P, not crossed by T_P, with Q strictly beyond, keeps the chain of P
+on its far side, or no chain. If P crosses the line on the side of a chain given up, P and Q are apart: no point of P is
+between the line and the hot line. At the hot vertex the edge of P then separates; at the other end a line
+through the crossing of both separates, tangent to P between the ends, found by halving the same chain on
 (`_tangent_between`).
 
-Not separated, a point x of both triangles lies in CH(e_0, e_1, e_2), which is in Q, or beyond one of its three chords.
-Those edges are kept which the chord cuts off. If P also has a point y of the new edge hull that is not beyond the
-chord, the segment xy, which is in P (the paper writes in Q), crosses the chord: that is why the other edges have no
-say, and why such a y in a later round is a hit. x need not lie on the boundary of T_Q, and T_Q may be unbounded.
+Not separated, a point x of both triangles lies in CH(e_0, e_1, e_2), a part of Q, or beyond a chord of its three
+chords. The edges cut off by the chord are kept. If P also has a point y of the new edge hull not beyond the chord, the
+segment xy, in P (the paper writes in Q), crosses the chord: hence the other edges have no say, and a point y like this
+in a later round is a hit. x need not lie on the boundary of T_Q, and T_Q may be unbounded.
 """
 
 from __future__ import annotations
@@ -80,8 +80,9 @@ _MAX_ROUNDS = 128
 
 
 class ChainOfP(NamedTuple):
-    """The chain that a pruning keeps: from T_P's vertex ``first`` to the next, and which end is hot, 0 or 2; or why the
-    search is over, in ``hot``."""
+    """The chain kept by a pruning: from T_P's vertex ``first`` to the next, and its hot end in ``hot``, 0 or 2, or the
+    reason to stop.
+    """
 
     first: int
     hot: int
@@ -144,7 +145,7 @@ def _start(pair):
 
 @kernel
 def _read_edge(pair, k, vertex):
-    """Edge k of T_Q becomes the one that begins at a vertex of Q."""
+    """Make the edge of Q from a vertex on edge k of T_Q."""
     read_vertex(pair, Q_SLOTS + 2 * k, 1, vertex)
     read_vertex(pair, Q_SLOTS + 2 * k + 1, 1, (vertex + 1) % pair.m)
 
@@ -163,7 +164,7 @@ def _compare_points(pair, out, at):
 
 @kernel
 def _write_hit(pair, relation, chain_of_q, out, at):
-    """Which vertices of P and of Q have hulls that meet."""
+    """Write vertices of P and of Q whose hulls meet."""
     doubles = pair.doubles
     out[at + HIT] = 1
     out[at + HOW] = COMMON_POINT
@@ -266,7 +267,7 @@ def _chain_beyond(pair, relation, hot, out, at):
 
 @kernel
 def _nearest_to(pair, edge, hot):
-    """The vertex of T_P nearest to the line of an edge of Q that it lies beyond; of two the hot one."""
+    """The vertex of T_P nearest to the line of an edge of Q, T_P beyond the line; of two nearest the hot vertex."""
     v = max(hot, 0)
     for i in range(min(pair.n, 3)):
         if i != v and side_of(pair, Line(edge.start, edge.end, P_SLOTS + v, edge.turned), P_SLOTS + i) > 0:
@@ -276,7 +277,7 @@ def _nearest_to(pair, edge, hot):
 
 @kernel
 def _keep_line(doubles, line):
-    """The line stays as KEPT_LINE: the slots that name it will hold others."""
+    """Copy the line to KEPT_LINE, since its own slots will be overwritten."""
     copy_slot(doubles, KEPT_LINE, line.start)
     copy_slot(doubles, KEPT_LINE + 1, line.end)
     copy_slot(doubles, KEPT_LINE + 2, line.through)

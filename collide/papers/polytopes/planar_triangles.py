@@ -1,11 +1,11 @@
 """T_P against T_Q: a triangle of three vertices of P, and the edge hull of three edges of Q.
 
-Either a point of both is found, or a line with all of T_P on one side and all of T_Q strictly on the other. The point
-is a vertex of T_P, or where one of its edges enters T_Q over the line of an edge of Q, so that it can be placed by
-signs alone. The line is that of an edge of Q or of T_P: by Helly's theorem in the plane three half-planes have no
-common point, two of them belong to one of the triangles, and the line of the third separates. T_Q may be unbounded.
+Found is either a common point, or a line with all of T_P on a side and all of T_Q strictly on the other. The point
+is a vertex of T_P, or the crossing of an edge of T_P into T_Q with the line of an edge of Q, placed by
+signs alone. The line is the line of an edge of Q or of T_P: by Helly's theorem in the plane three half-planes have no
+common point, two of them belong to the same triangle, and the line of the third separates. T_Q may be unbounded.
 
-A Q of two vertices is the intersection of four half-planes, two of them across its ends: there T_Q is Q.
+A Q of two vertices is the intersection of four half-planes, two of them across its ends: here T_Q is Q.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def _is_later(pair, k, second, i, j):
 
 @kernel
 def _entering_line(pair, i, j):
-    """The line of T_Q over which the edge from i to j enters it, of two vertices outside; −1 where it misses."""
+    """The line of T_Q crossed by the edge from i to j at its entry, both ends outside T_Q; −1 for a miss."""
     signs = pair.doubles
     enters = -1
     leaves = -1
@@ -151,9 +151,10 @@ def _misses_line(pair, i, j):
 
 @kernel
 def chord_beyond(pair, relation):
-    """Which chord of CH(e_0, e_1, e_2) a relation's point lies beyond: k for that from e_k to e_{k+1}; −1 for none.
+    """The chord of CH(e_0, e_1, e_2) with a relation's point beyond: k for the chord from e_k to e_{k+1}; −1 for a
+    point inside.
 
-    The chord of neighbouring edges is one vertex, and nothing of T_Q lies beyond it.
+    The chord of neighbouring edges is a vertex, with no point of T_Q beyond.
     """
     if pair.m <= 2:
         return -1

@@ -22,14 +22,14 @@ class Exit(NamedTuple):
 
 
 def ray_exit(offsets: np.ndarray, first: np.ndarray, ray: np.ndarray) -> Exit | None:
-    """The facet through which {t·ray : t ≥ 0} leaves a hull; None in doubt.
+    """The facet through which {t·ray : t ≥ 0} leaves a hull; ``None`` in doubt.
 
     Parameters
     ----------
     offsets : (k, d) float64
         Points, seen from a centre inside.
     first : (d + 1,) integers
-        Rows of which the centre is the mean.
+        Rows whose mean is the centre.
     ray : (d,) float64
         Not zero.
     """

@@ -40,9 +40,9 @@ class Centre(NamedTuple):
 def recentred_spaces(
     points: HomogeneousRows, halfspaces: HomogeneousRows, centre: np.ndarray
 ) -> tuple[Space, Space, Centre] | None:
-    """(primal, polar, centre) seen from a point, or None where it is not inside every half-space.
+    """(primal, polar, centre) seen from a point, or ``None`` for a point not inside every half-space.
 
-    The rows of the points of the polar are those of the half-spaces, and the other way round.
+    The points of the polar have the rows of the half-spaces, and vice versa.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def recentred_spaces(
 
 
 def _offsets(halfspaces: HomogeneousRows, centre: np.ndarray, exact_row) -> np.ndarray | None:
-    """b − a·centre > 0 to two units in the last place, in double-doubles; None where one is not > 0."""
+    """b − a·centre > 0 to two units in the last place, in double-doubles; ``None`` where any value is not > 0."""
     a, b = halfspaces.values, np.broadcast_to(halfspaces.last, len(halfspaces))
     high, low = b.copy(), np.zeros(len(b))
     size = np.abs(b)
@@ -140,9 +140,9 @@ def common_point(points: HomogeneousRows, rows: list[int], weights: list[Fractio
 
 
 def common_point_of_polar(pair: NearestPair, points: HomogeneousRows, polar: Space) -> NearestPair:
-    """The point of CH in FH that separates polars which are apart (theorem 3.6).
+    """The point of CH in FH from the separation of the polars (theorem 3.6).
 
-    u = Σ μᵢ (−pᵢ), so that Σ μᵢ pᵢ / Σ μᵢ is in CH; y·u > x·u says that every half-space holds it.
+    u = Σ μᵢ (−pᵢ), so that Σ μᵢ pᵢ / Σ μᵢ is in CH; by y·u > x·u every half-space holds the point.
     """
     d = polar.halfspaces.dimension
     weights = [

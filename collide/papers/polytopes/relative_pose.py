@@ -18,7 +18,7 @@ Rows = list[list[Fraction]]
 
 
 def affine_map(name: str, X: ArrayLike | None, d: int) -> Rows:
-    """A homogeneous matrix as fractions, entry by entry as it stands; None is the identity. Raises InvalidPose."""
+    """A homogeneous matrix as fractions, entry by entry as given; ``None`` is the identity. Raises InvalidPose."""
     if X is None:
         return [[Fraction(int(i == k)) for k in range(d + 1)] for i in range(d + 1)]
     read = array(name, X, f"({d + 1}, {d + 1})", InvalidPose)
@@ -30,7 +30,7 @@ def affine_map(name: str, X: ArrayLike | None, d: int) -> Rows:
 
 
 def inverse(name: str, X: Rows) -> Rows:
-    """The inverse map. Raises InvalidPose where there is none."""
+    """The inverse map. Raises InvalidPose for a singular map."""
     n = len(X)
     table = [[*row, *(Fraction(int(i == k)) for k in range(n))] for i, row in enumerate(X)]
     for k in range(n):

@@ -11,7 +11,7 @@ _TOLERANCE = 1e-12
 def seidel_program(
     a: np.ndarray, b: np.ndarray, objective: np.ndarray, reach: float, rng: np.random.Generator
 ) -> np.ndarray | None:
-    """A point x of {a·x ≤ b, |x| ≤ reach} with the largest objective·x; None where doubles find none.
+    """A point x of {a·x ≤ b, |x| ≤ reach} with the largest objective·x; ``None`` where infeasible in doubles.
 
     Parameters
     ----------
@@ -20,22 +20,22 @@ def seidel_program(
     b : (m,) float64
         The right-hand side.
     objective : (d,) float64
-        What is to be large.
+        The vector of the objective.
     reach : float
-        Half the edge of the cube that bounds the program.
+        Half the edge of the bounding cube.
     rng : numpy Generator
         Gives the order of the rows.
 
     Returns
     -------
-    (d,) float64 or None
-        The point. Nothing is proven.
+    (d,) float64 or ``None``
+        The point, without a proof.
 
     Notes
     -----
     Seidel (1991), Small-dimensional linear programming and convex hulls made easy: rows come in random order; where the
-    next one is violated the optimum lies on its plane, a program of d − 1 variables over the rows before it. Expected
-    O(d! m). The next violated row is looked for in one product.
+    next row is violated the optimum lies on its plane, a program of d − 1 variables over the rows before it. Expected
+    O(d! m). A single product finds the next violated row.
     """
     order = rng.permutation(len(b))
     return _solve(a[order], b[order], objective, np.full(len(objective), reach), rng)

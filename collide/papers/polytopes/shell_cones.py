@@ -1,9 +1,9 @@
 """The shell simplices at a vertex (lemma 6.1 of Barba and Langerman 2015): its normal cone, cut into simplicial cones.
 
 A plane tangent to a polytope at v has its normal in the cone of the normals of the facets at v. Cut into cones of d
-normals each, one of them holds it; the d half-spaces of these facets have v as their corner, and hold the polytope on
-the side of the plane on which it is. (The text cuts the whole polar into simplices; tangent planes are points of its
-boundary, so that d half-spaces do for each of the text's d + 1.)
+normals each, some cone holds the normal; the d half-spaces of the cone's facets have v as their corner, and their
+common part lies on the polytope's side of the plane. (The text cuts the whole polar into simplices; tangent planes are
+points of its boundary, so that d half-spaces do for each of the text's d + 1.)
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ def cones_at(vertex: int, facets: np.ndarray, planes: np.ndarray) -> np.ndarray:
 
 
 def coefficients_in(cones: np.ndarray, planes: np.ndarray, g: np.ndarray) -> np.ndarray:
-    """(c, d): a vector as combinations of the normals of cones; all ≥ 0 in a cone that holds it."""
+    """(c, d) coefficients of a vector as combinations of the normals of each cone; all ≥ 0 in a cone with the
+    vector.
+    """
     normals = planes[cones, :-1].transpose(0, 2, 1)
     return np.linalg.solve(normals, np.broadcast_to(g[:, None], (len(cones), len(g), 1)))[:, :, 0]
 
@@ -45,8 +47,8 @@ def coefficients_in(cones: np.ndarray, planes: np.ndarray, g: np.ndarray) -> np.
 def simplices_of_dual(link: np.ndarray) -> np.ndarray:
     """The dual of a simplicial sphere as simplices: (c, k + 1) rows of ``link`` (f, k), by pulling the first facets.
 
-    The dual face of a face has as its corners the facets that contain it. The least of them is joined to the
-    simplices of those of its sides that it is not in.
+    The dual face of a face has the facets around the face as its corners. Its least corner is joined to the
+    simplices of all sides without the least corner.
     """
     if link.shape[1] == 1:  # two points: an edge of the dual
         return np.array([[0, 1]])

@@ -1,8 +1,8 @@
-"""How large a hierarchical tree will be, from a model to scale, before its boundary or a node is found.
+"""Prediction of a hierarchical tree's size from a model to scale, before its boundary or a node is found.
 
-The model is the tree of a sample of the points, with leaves smaller in the same proportion, so that it has as many
-nets, cones and levels. Its boundary, and that of half of the sample, tell how simplices grow with points; of its cones
-some are drawn, each for all (Knuth 1975, "Estimating the efficiency of backtrack programs").
+The model is the tree of a sample of the points, with leaves smaller in the same proportion, so the model has as many
+nets, cones and levels. Its boundary, and the boundary of half of the sample, give the growth of simplices with points;
+some of its cones are drawn, each for all (Knuth 1975, "Estimating the efficiency of backtrack programs").
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ _CONES = 64
 
 
 class TreeSize(NamedTuple):
-    """Of a whole tree.
+    """Size of a whole tree.
 
-    simplices : that cover the boundary (0 where the root is a leaf, which does not need them).
+    simplices : of the boundary (0 for a root that is a leaf).
     nodes, depth : nodes, and levels of them.
     n_bytes : of boundary and nodes.
     """
@@ -107,7 +107,7 @@ def predicted_size(points: np.ndarray, limits: Sizes | None = None) -> TreeSize:
 
 
 class _Probe:
-    """Drawn cones of a model, each with the weight of those that it stands for."""
+    """Drawn cones of a model, each with the weight of the cones represented."""
 
     def __init__(self, tree: FacetTree, facet_scale: float, corner_scale: float, rng: np.random.Generator):
         self.tree, self.facet_scale, self.corner_scale, self.rng = tree, facet_scale, corner_scale, rng

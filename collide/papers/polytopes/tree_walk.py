@@ -3,15 +3,15 @@
 P is the hull of points, R = {x : ⟨w, x⟩ ≤ 1 for all w of Q}, with the origin inside R. A round compares the nets of two
 nodes. A point z of the net of Q with ⟨p, z⟩ > 1 on all the net of P lets P's node go down: boundary simplices of P with
 ⟨p, z⟩ > 1 at every corner do not touch R. A point x of the net of P with ⟨x, w⟩ ≤ 1 on all the net of Q lets Q's node
-go down: what lies in that half-space holds no y with ⟨p, y⟩ > 1 for all p of P.
+go down: the half-space of x holds no y with ⟨p, y⟩ > 1 for all p of P.
 
 At the end of P's tree the boundary of P misses R, so that R is apart from P, or inside. The text forgets the latter.
-Here the first rounds decide whether the origin is in P, on P's tree alone: where it is, the bodies meet, and where it
-is not, R is not inside. At the end of Q's tree no such y is on the boundary of Q, and none inside either, since it
-could be scaled up; so the bodies meet.
+Here the first rounds decide, on P's tree alone, whether the origin is in P: an origin in P is a hit, and with the
+origin outside P, R is not inside. At the end of Q's tree no y of this kind is on the boundary of Q, nor inside, since
+an inner y could be scaled up; so the bodies meet.
 
-All is done in doubles on rounded points, with a margin η in every comparison that is more than all rounding. What
-the margin leaves open is open: `trees_meet` decides it in integers.
+All comparisons are in doubles on rounded points, with a margin η above all rounding. Cases within
+the margin are open: `trees_meet` decides them in integers.
 """
 
 from __future__ import annotations
@@ -67,12 +67,14 @@ class Plane(NamedTuple):
 
 
 class Walk(NamedTuple):
-    """status : HIT, MISS or OPEN.   planes : of a miss, those that leave out the boundary of P; else those so far.
+    """status : HIT, MISS or OPEN.   planes : of a miss, the planes that exclude the boundary of P; else the planes so
+    far.
 
-    origin_planes : (a, b) on the grid of P: the origin is beyond each, and every boundary simplex of P below one.
-    origin_rounds : rounds on P's tree for the origin; rounds : those of two nets.
-    points, halfspaces : rows that the nets' answers were made of.
-    simplices_read : shell cones looked at.   net_rows : rows of nets that were looked at.
+    origin_planes : (a, b) on the grid of P: the origin is beyond each, and every boundary simplex of P below some
+        plane.
+    origin_rounds : rounds on P's tree for the origin; rounds : rounds of two nets.
+    points, halfspaces : rows behind the nets' answers.
+    simplices_read : number of shell cones read.   net_rows : number of rows of nets read.
     """
 
     status: str
@@ -121,10 +123,10 @@ class TreeWalk:
     # --- the origin ---------------------------------------------------------------------------------------------------
 
     def locate_origin(self) -> str:
-        """HIT where the origin is in P, MISS where it is not.
+        """HIT for an origin in P, MISS for an origin outside.
 
-        A plane that parts the origin from a net parts the net from the ray on which the origin goes away from a point
-        of the net. The ray is unbounded, so that it is not inside P: it meets P on the boundary, or not at all.
+        A plane between the origin and a net also separates the net from a ray from the origin, directed away from a
+        point of the net. The unbounded ray is not inside P: the ray meets P on the boundary, or not at all.
         """
         o, zeta, tree = self.relative.o, self.relative.zeta, self.hull_tree
         ray = o - tree.centre
@@ -227,7 +229,7 @@ class TreeWalk:
         self.halfspaces.extend(row for row in halfspaces if row not in self.halfspaces)
 
     def _go_down(self, tree: FacetTree, node: Node, g: np.ndarray, height: float) -> Node | str | None:
-        """The child that holds every simplex of the node with a corner at which g·x exceeds a height."""
+        """The child with every simplex of the node that has a corner with g·x above a height."""
         at_cone = find_cone(tree, node, g)
         if at_cone is None:
             return OPEN
@@ -268,9 +270,9 @@ def _no_integers(row: int) -> list[int]:
 
 
 def extreme_row(tree: FacetTree, g: np.ndarray) -> tuple[int, int, int] | None:
-    """(row, nodes, shell cones read) of a point of the tree with the largest g·x, to rounding; None in doubt.
+    """(row, nodes, shell cones read) of a point of the tree with the largest g·x, to rounding; ``None`` in doubt.
 
-    From the root down: points higher than the net's highest are outside the shell cone that holds g.
+    From the root down: points higher than the net's highest are outside the shell cone of g.
     """
     node: Node | None = tree.root
     best, best_row, n_nodes, n_read = -np.inf, -1, 0, 0

@@ -27,13 +27,13 @@ class TreeMeeting:
     Attributes
     ----------
     hit : bool
-        They have a point in common; touching is a hit.
+        Whether the bodies have a common point; touching is a hit.
     settled : bool
-        Whether the trees left it open (within some 1e-13 of touching) and integers over all rows decided it.
-    certificate : MeetingCertificate or None
-        Where it was asked for: weights of the points and multipliers of the half-spaces, checked by `verify_trees`.
-    exclusion : Exclusion or None
-        Of a miss found by the trees, the O(log n + log m) planes that leave out the hull, as the rounds came to them;
+        Whether the trees left the answer open (within some 1e-13 of touching) and integers over all rows decided.
+    certificate : MeetingCertificate or ``None``
+        Where asked for: weights of the points and multipliers of the half-spaces, checked by `verify_trees`.
+    exclusion : Exclusion or ``None``
+        Of a miss found by the trees, the O(log n + log m) planes that exclude the hull, in the order of the rounds;
         checked by `verify_exclusion`.
     counters : mapping
         ``origin_rounds``, ``rounds``, ``simplices_read``, ``net_rows``; of the certificate ``rows_read``.
@@ -62,12 +62,12 @@ def trees_meet(
     Parameters
     ----------
     A, B : HierarchicalTree
-        One of points, the other of half-spaces.
+        A tree of points and a tree of half-spaces.
     X_WA : (k, k) array_like, float64, optional
     X_WB : (k, k) array_like, float64, optional
         Their poses, k = d + 1: any invertible affine maps, entries taken as exact; the identity by default.
     certificate : bool
-        Whether to make one: an exact search over all rows, begun with those that the trees found.
+        Whether to make a certificate: an exact search over all rows, begun with the trees' rows.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def trees_meet(
     InvalidPose
         Where a map is not finite, not affine or not invertible.
     UnsupportedQuery
-        Where a tree would need more memory than it may take.
+        Where a tree would need more memory than its limit.
     """
     for name, body in (("A", A), ("B", B)):
         checks.instance(f"trees_meet: {name}", body, HierarchicalTree, "a HierarchicalTree")

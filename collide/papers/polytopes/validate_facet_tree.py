@@ -9,11 +9,11 @@ from collide.papers.polytopes.facet_tree import FacetTree, Node
 
 
 def validate_facet_tree(tree: FacetTree, whole: bool = False) -> int:
-    """Check all nodes that were made; returns how many. Raises AssertionError with what is wrong.
+    """Check all nodes made; returns their number. Raises AssertionError with the fault.
 
-    Every child is recomputed from its parent without doubles, one half-space of the shell cone after the other; every
+    Every child is recomputed from its parent without doubles, half-space by half-space of the shell cone; every
     point of a net must be in all half-spaces of the net's hull. With ``whole`` every cone at every vertex of every
-    net's hull must have been looked at.
+    net's hull must have been visited.
     """
     pending: list[tuple[Node, np.ndarray]] = [(tree.root, np.arange(len(tree.facets)))]
     n_nodes = n_bytes = 0
@@ -34,7 +34,7 @@ def validate_facet_tree(tree: FacetTree, whole: bool = False) -> int:
 
 
 def _children(tree: FacetTree, node: Node, F: np.ndarray, whole: bool) -> list[tuple[Node, np.ndarray]]:
-    """The children of a node that are there, with the sets that they should stand for."""
+    """The existing children of a node, each with its expected set of simplices."""
     everything = np.unique(np.concatenate([np.arange(0), *(cones.ravel() for cones in node.cones.values())]))
     rows = np.unique(tree.facets[F])
     corners, planes = whole_numbers(tree.points[rows]), node.hull.planes

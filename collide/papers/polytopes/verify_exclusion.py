@@ -1,8 +1,8 @@
-"""Check the planes of an `Exclusion`, and once a body the boundary they leave out, in integers and fractions.
+"""Check the planes of an `Exclusion`, and once a body the excluded boundary, in integers and fractions.
 
-Nothing of the engine is used. The boundary is that of the points on a grid; each point is within a unit of its own, so
-that planes are checked with as much to spare: if P meets R, the hull of the grid's points meets R widened by a box of
-one unit, which is in every plane widened so.
+No code of the engine is used. The boundary is of the points rounded to a grid; each point is within a unit of its grid
+point, so planes are checked with a unit to spare: if P meets R, the hull of the grid's points meets R widened by a box
+of a unit, a part of every half-space widened by the unit.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def verify_boundary(points: ArrayLike, boundary: HullBoundary) -> None:
     points : (n, d) array_like, float64
         Of the body.
     boundary : HullBoundary
-        As `hull_boundary` gives it.
+        As of `hull_boundary`.
 
     Raises
     ------
@@ -37,8 +37,9 @@ def verify_boundary(points: ArrayLike, boundary: HullBoundary) -> None:
 
     Notes
     -----
-    Each simplex lies in a hyperplane with all points on one side; every side of a simplex is a side of an even number;
-    and the middle of the first is in no other. A cycle modulo 2 on a sphere that covers one point once covers it all.
+    Checked: each simplex lies in a hyperplane with all points on a side; every side of a simplex belongs to an even
+    number of simplices; and the middle of the first is in no other. A cycle modulo 2 on a sphere that covers a point
+    once covers the whole sphere.
     """
     as_answer("verify_boundary", "boundary", boundary, HullBoundary)
     p, whole, facets = as_points("verify_boundary", points), boundary.whole, boundary.facets

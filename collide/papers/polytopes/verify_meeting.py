@@ -110,7 +110,9 @@ def _check_bracket(answer: Meeting, p: np.ndarray, a: np.ndarray, b: np.ndarray,
 
 
 def largest_value(values: np.ndarray, function: list[Fraction]) -> tuple[Fraction, int]:
-    """The largest value of a linear function over rows of doubles, exactly, and the first row that has it."""
+    """The largest value of a linear function over rows of doubles, exactly, and the first row with the largest
+    value.
+    """
     common = math.lcm(*(number.denominator for number in function))
     factors = [number.numerator * (common // number.denominator) for number in function]
     best, best_row = Fraction(0), -1

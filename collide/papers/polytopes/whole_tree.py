@@ -19,7 +19,7 @@ def build_whole(tree: FacetTree) -> None:
 
 
 def _make_children(tree: FacetTree, node: Node) -> bool:
-    """All children of a node; whether its sample is a net, so that none has more than ε of it."""
+    """Make all children of a node; returns whether its sample is a net: each child at most ε of the node."""
     rows, corners = np.unique(tree.facets[node.facets], return_inverse=True)
     corners = corners.reshape(node.n_facets, -1)
     beyond = _beyond_planes(tree, node, tree.points[rows], corners)

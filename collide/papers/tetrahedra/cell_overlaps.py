@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 class CellOverlaps(NamedTuple):
     """Pairs of cells of two tetrahedral meshes whose interiors meet, at N pairs of poses.
 
-    pairs : (k, 2) int64 cell numbers of A and of B; those of a pose stand together, sorted.
+    pairs : (k, 2) int64 cell numbers of A and of B; the pairs of a pose stand together, sorted.
     starts : (N + 1,) int64: the pairs of pose i are rows starts[i] to starts[i + 1].
-    volumes : (k,) [m³] of what each pair shares; None unless asked for.
-    volume_errors : (k,) [m³] proven bounds of |volume − truth|: at most half a unit in the last place of a volume that
-        is rounded once, which is all of them unless ``settle=False``. None unless asked for.
-    centroids : (k, 3) in W [m] of what each pair shares, off by at most 4 units in the last place of the largest
-        coordinate of its cells in W; None unless asked for.
+    volumes : (k,) [m³] of each pair's common part; ``None`` unless asked for.
+    volume_errors : (k,) [m³] proven bounds of |volume − truth|: at most half a unit in the last place of volumes
+        rounded once: all volumes unless ``settle=False``. ``None`` unless asked for.
+    centroids : (k, 3) in W [m] of each pair's common part, off by at most 4 units in the last place of the largest
+        coordinate of its cells in W; ``None`` unless asked for.
     counters : (N, 4) int64: nodes compared with the box of a cell, pairs of cells whose boxes meet, pairs decided in
         integers, volumes worked out in fractions.
     """
@@ -47,46 +47,47 @@ def overlapping_cells(
     A: TetMesh, B: TetMesh, X_WA, X_WB, *, volumes: bool = False, centroids: bool = False, settle: bool = True,
     threads: int = 1, progress: Callable | None = None, check_poses: bool = True,
 ) -> CellOverlaps:
-    """Overlay of two tetrahedral meshes: every pair of cells whose interiors meet, and the volume that they share.
+    """Overlay of two tetrahedral meshes: every pair of cells whose interiors meet, and their common volume.
 
     Parameters
     ----------
     A, B : TetMesh
         The meshes.
     X_WA, X_WB : (4, 4) poses in the world W [m], or batches (N, 4, 4)
-        A single one goes with every pose of the other's batch. Entries are taken as exact.
+        A single pose goes with every pose of the other's batch. Entries are taken as exact.
     volumes : bool
-        Also the volume of what each pair shares.
+        Also the volume of each pair's common part.
     centroids : bool
         Also its centroid, and the volume.
     settle : bool
-        False leaves the last places of volumes that double-doubles cannot round as they are, with a bound: where cells
-        overlap by less than some 1e-12 of the smaller one. True works those out in fractions, some milliseconds each.
+        ``False`` leaves volumes with an error bound above their last place, where cells overlap
+        by less than some 1e-12 of the smaller cell. ``True`` works these volumes out in fractions, some milliseconds
+        each.
     threads : int
         At most so many; answers are the same bits.
     progress : callable, optional
-        Called with a label, gives a context manager, as `collide.reports.progress.Progress` does.
+        Called with a label, returns a context manager, as `collide.reports.progress.Progress` does.
     check_poses : bool
-        Refuse matrices that are no rotation.
+        Refuse matrices other than rotations.
 
     Returns
     -------
     CellOverlaps
-        Cells that only touch, in a face, an edge or a corner, are no pair. Which are is decided exactly, and volumes
-        are exact before they are rounded. Swapped arguments give the same pairs, swapped, and the same bits.
+        Touching cells, in a face, an edge or a corner, are no pair. Pairs are decided exactly, and volumes
+        are exact before their rounding. Swapped arguments give the same pairs, swapped, and the same bits.
 
     Raises
     ------
     InvalidArgument
-        For anything but two TetMesh, and lengths of batches that do not match.
+        For anything but two TetMesh, and batches of different lengths.
     InvalidPose
-        For matrices that are no pose, and with ``check_poses=False`` for one without an inverse.
+        For matrices other than poses, and with ``check_poses=False`` for matrices without an inverse.
 
     Notes
     -----
-    The pieces of a cell of A within a mesh B that fills the space around it add up to the cell: transfer of fields
-    (J. Erickson, "Local polyhedra and geometric graphs" (2005), section 3.3; examples/27_field_transfer.py).
-    O(n log n + k) for local meshes; about 1 µs a pair, 4 µs with volumes. Doubles with error bounds settle most pairs,
+    The pieces of a cell of A within a mesh B that fills the space around the cell add up to the cell: transfer of
+    fields (J. Erickson, "Local polyhedra and geometric graphs" (2005), section 3.3; examples/27_field_transfer.py). O(n
+    log n + k) for local meshes; about 1 µs a pair, 4 µs with volumes. Doubles with error bounds settle most pairs,
     double-doubles with a proven bound the volumes, integers the rest (docs/overlays.md).
     """
     for name, mesh in (("A", A), ("B", B)):
@@ -111,7 +112,7 @@ def overlapping_cells(
 
 
 def self_overlapping_cells(mesh: TetMesh, *, threads: int = 1, progress: Callable | None = None) -> np.ndarray:
-    """Pairs of cells of one tetrahedral mesh whose interiors meet: none in a mesh that fills a body.
+    """Pairs of cells of a tetrahedral mesh whose interiors meet: an empty list for a mesh without overlap.
 
     Parameters
     ----------
@@ -120,7 +121,7 @@ def self_overlapping_cells(mesh: TetMesh, *, threads: int = 1, progress: Callabl
     threads : int
         At most so many.
     progress : callable, optional
-        As `overlapping_cells` has it.
+        As of `overlapping_cells`.
 
     Returns
     -------

@@ -26,9 +26,10 @@ _LEAST_SHARE = 1e-12
 
 @kernel(inline=True)
 def face_corner(face, k):
-    """Corner k of face number ``face``, opposite to the corner of that number; from there they run counter-clockwise.
+    """Corner k of face number ``face``, opposite to corner number ``face``; counter-clockwise seen from the opposite
+    corner.
 
-    The plane through them, b − a, c − a, x − a, is then positive on the cell's side.
+    The plane through corners a, b, c, with rows b − a, c − a, x − a, is then positive on the cell's side.
     """
     if k == 0:
         return one_of_four(face, 1, 0, 0, 0)
@@ -60,10 +61,10 @@ def bound_of(size, a, b, c, error):
 
 @kernel(inline=True)
 def lost_by_corners(a, b, c, error):
-    """How far errors of corners change a determinant, a, b, c being the sums of magnitudes in its rows.
+    """Bound of a determinant's change by errors of corners, a, b, c being the sums of magnitudes in its rows.
 
-    Components of rows are off by at most e = 2 error. One row alone changes the determinant by at most e times the
-    product of the others' sums; two or three rows change it by less than what 9e more of each row adds here.
+    Components of rows are off by at most e = 2 error. A single row changes the determinant by at most e times the
+    product of the others' sums; two or three rows by less than the 9e added to each row here.
     """
     e = 2.0 * error
     a += 9.0 * e
@@ -169,9 +170,9 @@ def face_parts_exactly(work, digits, planes, corners, heights):
 
 @kernel
 def edges_part(work, digits, A, B, error, exactly):
-    """Whether a plane along an edge of A and one of B is proven to have A on one side and B on the other.
+    """Whether a plane along an edge of A and an edge of B is proven to separate A from B.
 
-    Touching it is allowed. ``exactly`` : for cells whose corners are doubles, whatever their rounding.
+    Touching is allowed. ``exactly`` : for cells whose corners are doubles, whatever their rounding.
     """
     for edge_a in range(6):
         for edge_b in range(6):
@@ -190,7 +191,7 @@ def _pair_parts(work, digits, A, edge_a, B, edge_b, error, exactly):
     f = sub(vec3_at(work, end_b), vec3_at(work, b))
     n = cross(e, f)
     terms = Vec3(abs(e.y * f.z) + abs(e.z * f.y), abs(e.z * f.x) + abs(e.x * f.z), abs(e.x * f.y) + abs(e.y * f.x))
-    # The sign of A's side where it has one, strictly for one corner at least: else the edges are parallel.
+    # The sign of A's side, if any, strict for at least a corner: else the edges are parallel.
     side = 0
     for k in range(5):
         if k < 2:

@@ -1,15 +1,15 @@
-"""What two tetrahedra share, measured: one is cut by the planes of the other, in double-doubles with a proven bound.
+"""The common part of two tetrahedra: a cell is cut by the planes of the other, in double-doubles with a proven bound.
 
-All that is needed of the pair is the height h_j(i) of corner i of the cell over face j of the other. Over the cell a
-height is an affine function given by its four values, whatever these are: rounding them tilts a plane and does nothing
-else. So the cell is cut into simplices that carry their share of its volume, a product of ratios of positive numbers in
-which nothing cancels, and the values of the remaining heights at their corners.
+The pair is given by the heights h_j(i) of corner i of the cell over face j of the other. Over the cell a
+height is an affine function given by any four values: their rounding tilts a plane and has no other
+effect. So the cell is cut into simplices with their share of its volume, a product of ratios of positive numbers
+without cancellation, and the values of the remaining heights at their corners.
 
-**The bound.** Let heights be known to δ_j, their own rounding on the way included. The part that remains differs from
-the true one only where |h_j| ≤ δ_j for some j. Over a simplex of volume 1 the values of an affine function that runs
-from its least to its largest corner value, r apart, have a density of at most 3 / r (it is a quadratic B-spline over
+**The bound.** Let heights be known to δ_j, their own rounding on the way included. The remaining part differs from
+the true part only where |h_j| ≤ δ_j for some j. Over a simplex of volume 1 the values of an affine function, with
+least and largest corner values r apart, have a density of at most 3 / r (a quadratic B-spline over
 the four values: H. B. Curry and I. J. Schoenberg, "On Pólya frequency functions IV" (1966)). So shares are off by at
-most Σ 6 δ_j / r_j, and by the rounding of the products. A face that all corners are proven to be inside of cuts nothing
+most Σ 6 δ_j / r_j, and by the rounding of the products. A face with all corners proven inside cuts nothing
 and adds nothing.
 """
 
@@ -216,7 +216,7 @@ def _ratio(work, source, inner, outer, face):
 
 @kernel
 def _rest(work, source, inner, outer, face):
-    """One less that, without cancelling."""
+    """The other fraction, 1 − ratio, without cancellation."""
     s = _at(work, source + 2 + inner * _CORNER + 2 * face)
     t = dd.neg(_at(work, source + 2 + outer * _CORNER + 2 * face))
     return dd.div(t, dd.add(s, t))
@@ -224,7 +224,7 @@ def _rest(work, source, inner, outer, face):
 
 @kernel
 def _put_cut(work, source, inner, outer, u, v, target, slot, face, end):
-    """The point of an edge in the plane, with the values there of the functions that remain."""
+    """Write the point of an edge in the plane, with the values of the remaining functions at the point."""
     for k in range(face + 1, end):
         a = _at(work, source + 2 + inner * _CORNER + 2 * k)
         b = _at(work, source + 2 + outer * _CORNER + 2 * k)
@@ -340,7 +340,9 @@ def _cut_stump(work, source, target, face, end, a, b, c, d):
 
 @kernel
 def _finish_prism(work, target, second, third, face, end):
-    """Three simplices of a prism, each less the first corner of the one before and with one more of its own."""
+    """Write the other two simplices of a prism: each drops the first corner of the simplex before and adds a new
+    corner.
+    """
     for k in range(3):
         _copy_corner(work, target, k + 1, second, k, face, end)
     for k in range(3):

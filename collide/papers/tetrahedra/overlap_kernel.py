@@ -1,9 +1,9 @@
-"""Cells of one mesh against the box-tree of another's: pairs whose interiors meet, and the volumes that they share.
+"""Cells of a mesh against the box-tree of another mesh: pairs whose interiors meet, and their common volumes.
 
 A cell's box is taken down the tree of the other mesh, eight boxes a step. Each pair of cells whose boxes meet is
-settled by the first of these that can: boxes, faces, an edge that enters the other cell, pairs of edges, each in
-doubles with error bounds; faces exactly; the volume shared, in double-doubles; pairs of edges exactly. Where corners
-are doubles that settles all; else what is left is `OPEN`, and settled in Python integers.
+settled by the first decisive test of: boxes, faces, an edge into the other cell, pairs of edges, each in
+doubles with error bounds; faces exactly; the common volume, in double-doubles; pairs of edges exactly. Corners in
+doubles make the last test decisive; other open pairs are `OPEN`, and settled in Python integers.
 """
 
 from __future__ import annotations
@@ -91,10 +91,10 @@ class _Job(NamedTuple):
 def overlap_cells(
     job_at, begin, end, pairs_at, status_at, answers_at, capacity, stack_at, stack_size, work_at, counts_at
 ):
-    """Pairs of cells order[begin] … order[end − 1] of A; returns where it stopped for lack of space for pairs.
+    """Pairs of cells order[begin] … order[end − 1] of A; returns the first cell not done for lack of space for pairs.
 
-    A cell's pairs are all there or none. counts : pairs; then, added to what stands there, nodes compared with the box
-    of a cell, and pairs of cells whose boxes meet.
+    A cell's pairs are all written or all left out. counts : pairs; then, added to the counts before, nodes compared
+    with the box of a cell, and pairs of cells whose boxes meet.
     """
     header = view_i64(job_at, JOB)
     order = view_i32(header[ORDER_AT], header[N_CELLS_A])
@@ -237,7 +237,9 @@ def _wide_boxes_part(wide):
 
 @kernel
 def _all_below(wide, below, above):
-    """Whether all corners from ``below`` on have a coordinate that is at most any of those from ``above`` on."""
+    """Whether the four coordinates at ``below``, ``below + 3``, … are all at most the four at ``above``, ``above + 3``,
+    ….
+    """
     for i in range(below, below + 12, 3):
         for j in range(above, above + 12, 3):
             if dd.less(DD(wide[j], wide[j + 12]), DD(wide[i], wide[i + 12])):
@@ -296,7 +298,7 @@ def _settle(job, b, at):
 
 @kernel
 def _measure(job, at):
-    """The share of the smaller cell that lies in the larger one, and its determinant."""
+    """The share of the smaller cell inside the larger cell, and the smaller cell's determinant."""
     write_determinant(job.wide, _WIDE_B, job.clip, job.numbers[WIDE_ERROR])
     size = job.clip[clip.DETERMINANT]
     write_determinant(job.wide, _WIDE_A, job.clip, job.numbers[WIDE_ERROR])

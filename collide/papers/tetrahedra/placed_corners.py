@@ -1,7 +1,7 @@
-"""Corners of two meshes in one frame, as doubles in two parts, with bounds of what these leave out.
+"""Corners of two meshes in a common frame, as doubles in two parts, with bounds of the rounding of both parts.
 
-Poses are taken as exact: a coordinate is a sum of three products and a shift. Two parts hold it exactly where nothing
-turns (lattices moved by a translation), and to 2⁻¹⁰¹ of the sum's terms otherwise.
+Poses are taken as exact: a coordinate is a sum of three products and a shift. Two parts hold the sum exactly without a
+rotation (lattices moved by a translation), and to 2⁻¹⁰¹ of the sum's terms otherwise.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ _SPLIT = 134217729.0  # 2²⁷ + 1
 
 
 class PlacedCorners(NamedTuple):
-    """The corners of A and of B in one frame, divided by 2^exponent, so that the largest is about 1.
+    """The corners of A and of B in a common frame, divided by 2^exponent, so that the largest is about 1.
 
-    A, B : (n, 6) leading parts and low ones.   plain : leading parts are the corners.   exact : both parts are.
+    A, B : (n, 6) leading and low parts.   plain : leading parts are the corners.   exact : both parts together are.
     error, wide_error : bounds, of leading parts and of both.   scale : six doubles' worth of the map's determinant to
-        the world: its two parts and a bound; 1 where the frame is the world.   local : it is the meshes' own.
+        the world: its two parts and a bound; 1 for the world frame.   local : the frame is the meshes' own.
     """
 
     A: np.ndarray

@@ -101,7 +101,7 @@ class TetMesh:
 
     @classmethod
     def from_file(cls, path: str | Path) -> TetMesh:
-        """The tetrahedra of a file that meshio reads: .vtk, .vtu, .msh, .mesh, .inp, .xdmf and others.
+        """The tetrahedra of a file read by meshio: .vtk, .vtu, .msh, .mesh, .inp, .xdmf and others.
 
         Parameters
         ----------
@@ -116,11 +116,11 @@ class TetMesh:
         Raises
         ------
         SceneError
-            Where there is no such file, it cannot be read, or it holds no tetrahedra.
+            For a missing file, an unreadable file, or a file without tetrahedra.
         MissingExtra
             Without meshio: ``pip install 'collide-robotics[tets]'``.
         InvalidShape
-            As the class says.
+            As of the class.
         """
         return cls(*read_cells(path))
 
@@ -143,12 +143,12 @@ class TetMesh:
         return float(self.exact_volume())
 
     def exact_volume(self, cell: int | None = None) -> Fraction:
-        """The volume of one cell, or the sum of all, as a fraction.
+        """The volume of a cell, or the sum of all, as a fraction.
 
         Parameters
         ----------
         cell : int, optional
-            A row of ``cells``. None sums all: some 10 µs a cell.
+            A row of ``cells``. ``None`` sums all: some 10 µs a cell.
 
         Returns
         -------
@@ -166,9 +166,9 @@ class TetMesh:
 
     @property
     def boundary(self) -> Mesh:
-        """The surface: a `Mesh` of the faces that one cell alone has, facing outwards; made once, and kept.
+        """The surface: a `Mesh` of the faces of a single cell each, facing outwards; made once, and kept.
 
-        Faces are the same where their vertices are, by number. Raises InvalidShape where three cells have a face.
+        Faces with the same vertex numbers are the same face. Raises InvalidShape for a face of three cells.
         """
         if not hasattr(self, "_boundary"):
             object.__setattr__(self, "_boundary", Mesh(self.vertices, self._outer_faces()))

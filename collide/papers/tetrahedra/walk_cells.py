@@ -1,4 +1,4 @@
-"""The walk over two meshes of tetrahedra at one pair of poses: pieces for threads, space for pairs, what came of it."""
+"""The walk over two meshes of tetrahedra at a pair of poses: pieces for threads, space for pairs, and the results."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from collide.papers.tetrahedra import overlap_kernel as kernel
 from collide.papers.tetrahedra.placed_corners import PlacedCorners, map_between, place_corners
 from collide.papers.tetrahedra.tet_mesh import TetMesh
 
-#: Cells of A that one call of the kernel is given, and pairs that there is space for at first.
+#: Cells of A in a call of the kernel, and initial space for pairs a cell.
 _CELLS_A_CALL, _PAIRS_A_CELL = 4096, 32
 #: Of a query's size, beside the rounding of the map to the tree's frame: six sums and products and two differences.
 _QUERY_ERROR = 2.0**-45
