@@ -1,6 +1,5 @@
 /* Meshes from arrays, and the surfaces of polytopes: collide/shapes/mesh.py, collide/lowering/facet_bodies.py and the tree of
    collide/mesh/build_bvh.py. */
-#include "capi_blake2b.h"
 #include "capi_mesh.h"
 #include "capi_tree.h"
 
@@ -63,17 +62,11 @@ static void measure(collide_mesh *mesh, const int64_t *m, const struct filled *m
                                 (int)mesh->tree[EXPONENT]) * (1 + 2.220446049250313e-16 * 4);
 }
 
-static void digest(collide_mesh *mesh, const struct filled *made, int64_t n_facets)
+static void digest(const struct collide_kernels *kernels, collide_mesh *mesh, const struct filled *made, int64_t n_facets)
 {
-    struct blake2b hash;
-    int64_t k;
-    blake2b_begin(&hash);
-    for (k = 0; k < 9 * n_facets; k++) {
-        double value = made->triangles[k] + 0.0;
-        blake2b_add(&hash, &value, sizeof value);
-    }
-    blake2b_add(&hash, made->ids, (size_t)n_facets * sizeof *made->ids);
-    blake2b_end(&hash, mesh->content);
+    int64_t memory[DIGEST_WORDS];
+    kernels->digest_numbers(0, 0, address_of(made->triangles), 9 * n_facets, address_of(made->ids), n_facets,
+                            address_of(memory), address_of(mesh->content));
 }
 
 /* Everything that kernels read, in one block, and the slabs that distances need. */
@@ -113,7 +106,7 @@ static collide_status build_mesh(const struct collide_kernels *kernels, const do
     made = fill(kernels, &arena, m, vertices, n, faces, n_facets, mesh);
     if (!arena.failed) {
         measure(mesh, m, &made, n_facets);
-        digest(mesh, &made, n_facets);
+        digest(kernels, mesh, &made, n_facets);
         keep(kernels, &arena, m, mesh, &made, n_facets);
     }
     arena_end(&arena);

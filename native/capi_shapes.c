@@ -1,5 +1,4 @@
 /* Shapes from numbers: what collide/shapes checks and collide/lowering/packed_convex.py lays out. */
-#include "capi_blake2b.h"
 #include "capi_faces.h"
 #include "capi_mesh.h"
 
@@ -18,19 +17,13 @@ static int is_coordinate(double value) { return fabs(value) <= LARGEST; }
 /* Digest of kind, radius and parameters, then of the points; -0.0 and 0.0 are one number among these. */
 static void digest(collide_shape *shape, const double *points, size_t n)
 {
-    struct blake2b hash;
+    int64_t memory[DIGEST_WORDS];
     double head[6];
-    size_t k;
     head[0] = (double)shape->ints[KIND];
     head[1] = shape->numbers[RADIUS];
-    for (k = 0; k < 4; k++) head[2 + k] = shape->numbers[PARAMS + k];
-    blake2b_begin(&hash);
-    blake2b_add(&hash, head, sizeof head);
-    for (k = 0; k < 3 * n; k++) {
-        double value = points[k] + 0.0;
-        blake2b_add(&hash, &value, sizeof value);
-    }
-    blake2b_end(&hash, shape->content);
+    memcpy(head + 2, shape->numbers + PARAMS, 4 * sizeof *head);
+    kernels_here()->digest_numbers(address_of(head), 6, address_of(points), (int64_t)(3 * n), 0, 0, address_of(memory),
+                                   address_of(shape->content));
 }
 
 /* Coordinates axis by axis, filled up with the first point, then coarse points. */
@@ -77,8 +70,9 @@ static collide_status made_of_points(collide_shape *shape, const double *points,
     return build_support_tree(shape, n);
 }
 
-collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree,
-                               collide_shape **out)
+/* The hull of n points as given, swept; slop : how far stored points may be from those meant. */
+static collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree,
+                                      collide_shape **out)
 {
     collide_shape *shape = calloc(1, sizeof *shape);
     collide_status status;
@@ -97,8 +91,9 @@ collide_status shape_of_points(const double *points, size_t n, double radius, do
 
 static collide_status shape_of_numbers(int kind, const double *params, size_t n, double reach, collide_shape **out)
 {
-    collide_shape *shape = calloc(1, sizeof *shape);
-    if (shape == NULL) return COLLIDE_NO_MEMORY;
+    collide_shape *shape;
+    if (kernels_here() == NULL) return COLLIDE_NO_KERNELS;
+    if ((shape = calloc(1, sizeof *shape)) == NULL) return COLLIDE_NO_MEMORY;
     shape->ints[KIND] = kind;
     shape->ints[LOWEST] = NO_BITS;
     shape->numbers[REACH] = reach;
@@ -280,6 +275,57 @@ collide_status collide_hull(const double *points, size_t n, double radius, colli
     return shape_of_points(points, n, radius == 0.0 ? 0.0 : radius, 0.0, 1, shape);
 }
 
+/* The corners of m half-spaces, by collide/hull/double_description.py, in memory that grows with the rays it takes. */
+static collide_status shape_of_halfspaces(const double *normals, const double *offsets, int64_t m, collide_shape **shape)
+{
+    enum { MORE_ROOM = -2 };
+    const struct collide_kernels *kernels = kernels_here();
+    int64_t capacity = 128, n = MORE_ROOM, k;
+    collide_status status = COLLIDE_INVALID_SHAPE;
+    double *corners = NULL, slop = 0.0;
+    if (kernels == NULL) return COLLIDE_NO_KERNELS;
+    while (n == MORE_ROOM) {
+        void *memory;
+        capacity *= 2;
+        free(corners);
+        memory = malloc((size_t)kernels->corners_memory(address_of(normals), address_of(offsets), m, capacity));
+        corners = malloc((size_t)(3 * capacity) * sizeof *corners);
+        if (memory != NULL && corners != NULL)
+            n = kernels->find_corners(address_of(normals), address_of(offsets), m, address_of(memory), capacity,
+                                      address_of(corners), address_of(&slop));
+        free(memory);
+        if (memory == NULL || corners == NULL) {
+            free(corners);
+            return COLLIDE_NO_MEMORY;
+        }
+    }
+    for (k = 0; k < 3 * n && is_coordinate(corners[k]); k++) {}
+    if (n > 0 && k == 3 * n) status = shape_of_points(corners, (size_t)n, 0.0, slop, 0, shape);
+    free(corners);
+    return status;
+}
+
+collide_status collide_hpolytope(const double *normals, const double *offsets, size_t m, collide_shape **shape)
+{
+    collide_status status;
+    size_t k;
+    rounding given;
+    if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *shape = NULL;
+    if (normals == NULL || offsets == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (m == 0 || m > (size_t)1 << 20) return COLLIDE_INVALID_SHAPE;
+    given = round_as_kernels_do();
+    for (k = 0; k < m; k++) {
+        const double *n = normals + 3 * k;
+        if (!is_coordinate(n[0]) || !is_coordinate(n[1]) || !is_coordinate(n[2]) || !is_coordinate(offsets[k]) ||
+            (n[0] == 0.0 && n[1] == 0.0 && n[2] == 0.0))
+            break;
+    }
+    status = k < m ? COLLIDE_INVALID_SHAPE : shape_of_halfspaces(normals, offsets, (int64_t)m, shape);
+    round_as_before(given);
+    return status;
+}
+
 /* --- sets ---------------------------------------------------------------------------------------------------------- */
 
 struct placed {
@@ -289,7 +335,8 @@ struct placed {
 
 static int by_content(const void *one, const void *other)
 {
-    return memcmp(((const struct placed *)one)->shape->content, ((const struct placed *)other)->shape->content, 16);
+    return memcmp(((const struct placed *)one)->shape->content, ((const struct placed *)other)->shape->content,
+                  sizeof ((const struct placed *)one)->shape->content);
 }
 
 /* Rows of shapes with ranks by content: equal shapes have one rank. */
