@@ -46,7 +46,7 @@ enum {
     M_MESH_HEADER, M_MESH_DOUBLES, M_MESH_INTEGERS, M_MESH_SCRATCH, M_DIGEST, MEASURES
 };
 
-/* Integers that a digest is worked out in (collide/numerics/content_digest.py). */
+/* Integers that a digest is worked out in (collide/numerics/number_digest.py). */
 enum { DIGEST_WORDS = 40 };
 
 /* Sizes of things: nothing is larger, or a product of such would overflow. */

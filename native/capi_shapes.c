@@ -278,13 +278,13 @@ collide_status collide_hull(const double *points, size_t n, double radius, colli
 /* The corners of m half-spaces, by collide/hull/double_description.py, in memory that grows with the rays it takes. */
 static collide_status shape_of_halfspaces(const double *normals, const double *offsets, int64_t m, collide_shape **shape)
 {
-    enum { MORE_ROOM = -2 };
+    enum { TOO_FEW_RAYS = -2 };
     const struct collide_kernels *kernels = kernels_here();
-    int64_t capacity = 128, n = MORE_ROOM, k;
+    int64_t capacity = 128, n = TOO_FEW_RAYS, k;
     collide_status status = COLLIDE_INVALID_SHAPE;
     double *corners = NULL, slop = 0.0;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
-    while (n == MORE_ROOM) {
+    while (n == TOO_FEW_RAYS) {
         void *memory;
         capacity *= 2;
         free(corners);

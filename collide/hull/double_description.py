@@ -6,8 +6,9 @@ with w = 0 directions in which the set never ends.
 
 A ray is written as the 3 × 3 minors of three rows that it lies on, in integers: doubles are integers times powers of
 two, so nothing is rounded until the vertices are handed back, and no number has more than three times the digits of a
-row. Two extreme rays span a face of dimension two iff two independent rows hold both (Fukuda and Prodon, Proposition 7);
-these and a row that parts the rays give the ray between them. C calls the same two entries (`native/capi_shapes.c`).
+row. Two extreme rays span a face of dimension two iff two independent rows hold both (Fukuda and Prodon 1996,
+proposition 7); these and a row that parts the rays give the ray between them. C calls the same two entries
+(`native/capi_shapes.c`).
 """
 
 from __future__ import annotations
@@ -19,8 +20,7 @@ import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_f64, view_i64
 from collide.numerics.digits import (
-    BITS,
-    QUOTIENT_ROOM,
+    QUOTIENT_WORKSPACE,
     add_determinant,
     add_double,
     add_product,
@@ -33,7 +33,7 @@ from collide.numerics.digits import (
 )
 
 #: What `find_corners` says, besides how many corners there are.
-UNBOUNDED, MORE_ROOM = -1, -2
+UNBOUNDED, TOO_FEW_RAYS = -1, -2
 #: Rows besides the half-spaces': w ≥ 0, and both sides of the planes x = 0, y = 0, z = 0.
 _MORE_ROWS = 7
 #: Columns of a row, the first three once more behind the four: any three that follow each other stand side by side.
@@ -45,9 +45,9 @@ _WORD = 62
 class _Cone(NamedTuple):
     """Rows, and rays so far: views and places.
 
-    digits : all numbers.   n_rows, n_digits, n_minor, words : rows, digits of a row's number and of a ray's, words of a
-    set of rows.   rows, rays, work : where they begin.   tight : by ray, the set of rows that it lies on.
-    side : by ray, of the row that cuts.   order, found : rays in order, before and after a cut.   free : rays to be had.
+    digits : all numbers.   n_rows, n_digits, n_minor, words : rows, digits of a row's number and of a ray's, words of
+    a set of rows.   rows, rays, work : where they begin.   tight : by ray, the set of rows that it lies on.
+    side : by ray, of the row that cuts.   order, after : rays in order, before and after a cut.   free : unused rays.
     start : four independent rows.
     """
 
@@ -62,7 +62,7 @@ class _Cone(NamedTuple):
     tight: Any
     side: Any
     order: Any
-    found: Any
+    after: Any
     free: Any
     start: Any
 
@@ -74,7 +74,7 @@ def _cone(memory_at, m, n_digits, capacity):
     words = n_rows // _WORD + 1
     rows = _COLUMNS * n_digits * n_rows
     rays = 4 * n_minor * capacity
-    work = 8 * n_minor + QUOTIENT_ROOM + words
+    work = 8 * n_minor + QUOTIENT_WORKSPACE + words
     at = memory_at + 8 * (rows + rays + work)
     cone = _Cone(
         view_i64(memory_at, rows + rays + work), n_rows, n_digits, n_minor, words, 0, rows, rows + rays,
@@ -130,7 +130,7 @@ def find_corners(normals_at, offsets_at, m, memory_at, capacity, corners_at, slo
     capacity : rays there is room for; a cone of k rows has at most 2k, and twice that while it is cut.
     corners : out, (capacity, 3) doubles, each vertex rounded to nearest.   slop : out, a bound of how far they are off.
 
-    UNBOUNDED : the set is not empty, and has no end.   MORE_ROOM : capacity is too small.
+    UNBOUNDED : the set is not empty, and has no end.   TOO_FEW_RAYS : capacity is too small.
     """
     normals, offsets = view_f64(normals_at, 3 * m), view_f64(offsets_at, m)
     cone, _ = _cone(memory_at, m, _longest_row(normals_at, offsets_at, m), capacity)
@@ -146,7 +146,7 @@ def find_corners(normals_at, offsets_at, m, memory_at, capacity, corners_at, slo
         if not is_start and (row <= m or ((row - m) % 2 == 0 and _is_start(cone, row - 1))):
             n = _cut(cone, row, n, capacity)
             if n < 0:
-                return MORE_ROOM
+                return TOO_FEW_RAYS
     return _write_corners(cone, n, has_line, view_f64(corners_at, 3 * capacity), view_f64(slop_at, 1))
 
 
@@ -208,7 +208,7 @@ def _side(cone, row, ray):
 
 
 @kernel
-def _turn(cone, ray, row):
+def _orient(cone, ray, row):
     """Have a ray lie where a row, which it is not on, is above 0."""
     if _side(cone, row, ray) < 0:
         for column in range(4):
@@ -216,39 +216,24 @@ def _turn(cone, ray, row):
 
 
 @kernel
-def _are_parallel(cone, a, b):
-    for i in range(4):
-        for j in range(i + 1, 4):
-            n = 2 * cone.n_digits
-            set_zero(cone.digits, cone.work, n)
-            for sign in (1, -1):
-                p, q = (i, j) if sign > 0 else (j, i)
-                add_product(
-                    cone.digits, cone.work, _number(cone, a, p), cone.n_digits, _number(cone, b, q), cone.n_digits, sign
-                )
-            if carry(cone.digits, cone.work, n) != 0:
-                return False
-    return True
-
-
-@kernel
 def _choose_start(cone):
     """Choose the first four independent rows; returns the last of them."""
-    start, found = cone.start, 0
+    start, n, w = cone.start, 0, cone.n_rows - _MORE_ROWS
     for row in range(cone.n_rows):
-        is_new = found == 0
-        if found == 1:
-            is_new = not _are_parallel(cone, start[0], row)
-        elif found == 2:
+        is_new = n == 0
+        if n == 1:  # two rows are independent iff they are with one of four that span all
+            for k in (w, w + 1, w + 3, w + 5):
+                is_new = is_new or _put_ray(cone, 0, start[0], row, k)
+        elif n == 2:
             is_new = _put_ray(cone, 0, start[0], start[1], row)
-        elif found == 3:
+        elif n == 3:
             is_new = _side(cone, row, 0) != 0
         if is_new:
-            start[found] = row
-            found += 1
-        if found == 4:
+            start[n] = row
+            n += 1
+        if n == 4:
             return row
-    return cone.n_rows  # never: the last six rows and w ≥ 0 have four
+    return cone.n_rows  # never: the last seven rows have four
 
 
 @kernel
@@ -273,7 +258,7 @@ def _begin(cone, capacity):
         cone.order[apart] = apart
         a, b, c = start[1 if apart < 1 else 0], start[2 if apart < 2 else 1], start[3 if apart < 3 else 2]
         _put_ray(cone, apart, a, b, c)
-        _turn(cone, apart, start[apart])
+        _orient(cone, apart, start[apart])
         for k in range(4):
             if k != apart:
                 _mark(cone, apart, start[k])
@@ -288,7 +273,7 @@ def _cut(cone, row, n, capacity):
 
     Those that stay come first, in order, then those between two on either side, outside by outside.
     """
-    side, order, found = cone.side, cone.order, cone.found
+    side, order, after = cone.side, cone.order, cone.after
     n_found = 0
     for k in range(n):
         ray = order[k]
@@ -296,7 +281,7 @@ def _cut(cone, row, n, capacity):
         if side[ray] == 0:
             _mark(cone, ray, row)
         if side[ray] >= 0:
-            found[n_found] = ray
+            after[n_found] = ray
             n_found += 1
     n_free = capacity - n
     for i in range(n):
@@ -306,23 +291,23 @@ def _cut(cone, row, n, capacity):
                     return -1
                 if _put_between(cone, cone.free[n_free - 1], row):
                     n_free -= 1
-                    found[n_found] = cone.free[n_free]
+                    after[n_found] = cone.free[n_free]
                     n_found += 1
     for k in range(n):
         if side[order[k]] < 0:
             cone.free[n_free] = order[k]
             n_free += 1
     for k in range(n_found):
-        order[k] = found[k]
+        order[k] = after[k]
     return n_found
 
 
 @kernel
-def _shared(cone, one, other):
+def _shared(cone, ray_a, ray_b):
     """Write the rows that two rays lie on into the workspace's end; 0 if there are none, 1 of one, else 2."""
     at, n = len(cone.digits) - cone.words, 0
     for w in range(cone.words):
-        both = cone.tight[cone.words * one + w] & cone.tight[cone.words * other + w]
+        both = cone.tight[cone.words * ray_a + w] & cone.tight[cone.words * ray_b + w]
         cone.digits[at + w] = both
         if both != 0:
             n += 1 if both & (both - 1) == 0 else 2
@@ -335,14 +320,14 @@ def _put_between(cone, ray, row):
     rows."""
     at, first = len(cone.digits) - cone.words, -1
     for w in range(cone.words):
-        left = cone.digits[at + w]
-        while left != 0:
-            second = _WORD * w + math.frexp(float(left & -left))[1] - 1
-            left &= left - 1
+        remaining = cone.digits[at + w]
+        while remaining != 0:
+            second = _WORD * w + math.frexp(float(remaining & -remaining))[1] - 1
+            remaining &= remaining - 1
             if first < 0:
                 first = second
             elif _put_ray(cone, ray, first, second, row):
-                _turn_between(cone, ray)
+                _orient_between(cone, ray)
                 for k in range(cone.words):
                     cone.tight[cone.words * ray + k] = cone.digits[at + k]
                 _mark(cone, ray, row)
@@ -351,14 +336,14 @@ def _put_between(cone, ray, row):
 
 
 @kernel
-def _turn_between(cone, ray):
+def _orient_between(cone, ray):
     """Have a ray lie on the side of those that it is between: where a row of the start that not both lie on, is above
     0."""
     at = len(cone.digits) - cone.words
     for k in range(4):
         row = cone.start[k]
         if cone.digits[at + row // _WORD] >> (row % _WORD) & 1 == 0:
-            _turn(cone, ray, row)
+            _orient(cone, ray, row)
             return
 
 
@@ -368,12 +353,12 @@ def _turn_between(cone, ray):
 @kernel
 def _write_corners(cone, n, has_line, corners, slop):
     """Round the rays' vertices; returns how many, or UNBOUNDED."""
-    digits, n_corners, n_endless = cone.digits, 0, 0
+    digits, n_corners, n_unbounded = cone.digits, 0, 0
     is_exact, largest = True, 0.0
     for k in range(n):
         w = _coordinate(cone, cone.order[k], 3)
         if _is_zero(digits, w, cone.n_minor):
-            n_endless += 1
+            n_unbounded += 1
             continue
         for axis in range(3):
             x, is_it = quotient(
@@ -386,7 +371,7 @@ def _write_corners(cone, n, has_line, corners, slop):
     # Each coordinate is rounded to nearest: half an ulp, plus the smallest number there is.
     ulp = math.ldexp(1.0, max(math.frexp(largest)[1] - 53, -1074)) if largest < math.inf else math.inf
     slop[0] = 0.0 if is_exact else math.sqrt(3.0) * ulp / 2.0 * (1.0 + 1e-15)
-    return UNBOUNDED if n_corners > 0 and (n_endless > 0 or has_line) else n_corners
+    return UNBOUNDED if n_corners > 0 and (n_unbounded > 0 or has_line) else n_corners
 
 
 @kernel
@@ -413,12 +398,13 @@ def halfspace_vertices(normals: np.ndarray, offsets: np.ndarray):
     slop : upper bound of the distance between a vertex and its rounding [m]; 0 where all are exact.
     unbounded : (3,) a direction in which the set is unbounded, or None.
     """
-    normals, offsets = np.ascontiguousarray(normals, dtype=np.float64), np.ascontiguousarray(offsets, dtype=np.float64)
-    given, slop, n, capacity = (address_of(normals), address_of(offsets), len(normals)), np.zeros(1), MORE_ROOM, 128
-    while n == MORE_ROOM:
+    normals, offsets = (np.ascontiguousarray(array, dtype=np.float64) for array in (normals, offsets))
+    planes, slop = (address_of(normals), address_of(offsets), len(normals)), np.zeros(1)
+    n, capacity = TOO_FEW_RAYS, 128
+    while n == TOO_FEW_RAYS:
         capacity *= 2
-        memory, corners = np.empty(corners_memory(*given, capacity) // 8, dtype=np.int64), np.empty((capacity, 3))
-        n = find_corners(*given, address_of(memory), capacity, address_of(corners), address_of(slop))
+        memory, corners = np.empty(corners_memory(*planes, capacity) // 8, dtype=np.int64), np.empty((capacity, 3))
+        n = find_corners(*planes, address_of(memory), capacity, address_of(corners), address_of(slop))
     if n == UNBOUNDED:
         # Of the directions that no half-space ends, those in a cube: the largest have a coordinate of 1.
         sides = np.concatenate([np.eye(3), -np.eye(3)])

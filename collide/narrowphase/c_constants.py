@@ -23,7 +23,7 @@ from collide.narrowphase.facets.exact_triangles import INTEGERS as MESH_INTEGERS
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT
 from collide.narrowphase.pose_batches import BLOCK, HEADER
 from collide.narrowphase.rows import ROW
-from collide.numerics.content_digest import DIGEST_WORDS
+from collide.numerics.number_digest import DIGEST_WORDS
 from collide.support.coarse_points import COARSE
 
 #: Doubles of a walk along meshes: of whichever takes most.

@@ -39,7 +39,8 @@ _SIGN, _DEPTH, _GAP = range(3)
 
 
 @entry(
-    "void(int64, int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64)"
+    "void(int64, int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64,"
+    " int64)"
 )
 def settle_by_other_searches(
     code, ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at,

@@ -181,16 +181,16 @@ def add_determinant(digits, u, v, w, n, minor, total):
 # --- quotients ------------------------------------------------------------------------------------
 
 #: Digits of workspace of a quotient, beside twice those of the longer number.
-QUOTIENT_ROOM = 23
+QUOTIENT_WORKSPACE = 23
 
 
 @kernel
 def quotient(digits, a, na, b, nb, exponent, work):
     """(the double nearest to (number a)·2^exponent / (number b), ties to even; whether it is exactly that).
 
-    Both numbers are carried, b is not 0.   work : twice the longer one's digits and QUOTIENT_ROOM.
-    Infinite where the nearest double would be. Long division by estimates in doubles, each good to 50 bits of what is
-    left: O(na + nb) four times.
+    Both numbers are carried, b is not 0.   work : twice the longer one's digits and QUOTIENT_WORKSPACE.
+    Infinite where the nearest double would be. Long division by estimates in doubles, each good to 50 bits of what
+    remains: O(na + nb) four times.
     """
     x, x_exponent = as_double(digits, a, na)
     y, y_exponent = as_double(digits, b, nb)
@@ -203,19 +203,19 @@ def quotient(digits, a, na, b, nb, exponent, work):
     sign = _put_size(digits, rest, n, a, na, max(shift, 0)) * _put_size(digits, divisor, n, b, nb, max(-shift, 0))
     y, y_exponent = as_double(digits, divisor, n)
     q = 0
-    left = 1
-    for _ in range(3):  # what is left is at most 2⁶¹, then 2¹², then one divisor
+    remaining = 1
+    for _ in range(3):  # what remains is at most 2⁶¹, then 2¹², then one divisor
         x, x_exponent = as_double(digits, rest, n)
         estimate = math.floor(math.ldexp(x / y, int(x_exponent - y_exponent)) + 0.5)
         set_zero(digits, step, 3)
         add_double(digits, step, float(estimate), 0)
         carry(digits, step, 3)
         add_product(digits, rest, step, 3, divisor, n - 3, -1)
-        left = carry(digits, rest, n)
+        remaining = carry(digits, rest, n)
         q += int(estimate)
-    if left < 0:
+    if remaining < 0:
         q -= 1
-    size, is_exact = _nearest_double(q, left != 0, exponent - shift)
+    size, is_exact = _nearest_double(q, remaining != 0, exponent - shift)
     return sign * size, is_exact
 
 
@@ -239,7 +239,7 @@ def _put_size(digits, out, n, a, na, bits):
 
 @kernel
 def _nearest_double(q, has_more, exponent):
-    """(the double nearest to (q + a part of 1, where it has more)·2^exponent, whether that is it); q of 58 to 62 bits."""
+    """(the double nearest to q·2^exponent, or a part of 1 more for q, whether that is it); q of 58 to 62 bits."""
     last = max(math.frexp(float(q))[1] + exponent - 53, -1074)  # exponent of the double's last bit
     drop = last - exponent
     if drop > 62:

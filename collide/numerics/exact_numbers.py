@@ -1,8 +1,9 @@
 """Sums and products of doubles in kernels, exactly: numbers of as many digits as each of them takes.
 
-A number is a run of digits (`digits.py`) in a workspace that fills up from its beginning: integer 0 says how far, integer
-1 whether anything did not fit, which makes all that was found since worthless. Who works something out keeps the result
-and gives back the rest: `kept`. In `digits.py` itself places and lengths are the caller's: faster, and more to write.
+A number is a run of digits (`digits.py`) in a workspace that fills up from its beginning: integer 0 says how far,
+integer 1 whether anything did not fit, which makes all that was worked out since worthless. Whoever works something out
+keeps the result and gives back the rest: `compacted`. In `digits.py` places and lengths are the caller's: faster, and
+more to write.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ from typing import NamedTuple
 from collide.kernels import kernel
 from collide.numerics.digits import (
     BITS,
-    QUOTIENT_ROOM,
+    QUOTIENT_WORKSPACE,
     add_double,
     add_number,
     add_product,
+    as_double_double,
     carry,
     copy,
     grid_of,
@@ -24,6 +26,7 @@ from collide.numerics.digits import (
     quotient,
     set_zero,
 )
+from collide.numerics.double_double import ScaledDD
 
 _FILLED, _OVERFULL, _FIRST = range(3)
 
@@ -94,6 +97,13 @@ def number_of(space, x):
 
 
 @kernel
+def vector_of(space, values, at, stride):
+    """The `NumberVec3` that three doubles are, ``stride`` apart."""
+    x, y, z = values[at], values[at + stride], values[at + 2 * stride]
+    return NumberVec3(number_of(space, x), number_of(space, y), number_of(space, z))
+
+
+@kernel
 def times(space, a, b):
     """a·b; the shorter one of up to 1024 digits."""
     at = _taken(space, a.n + b.n)
@@ -113,7 +123,7 @@ def plus(space, a, b, sign):
 
 
 @kernel
-def kept(space, mark, a):
+def compacted(space, mark, a):
     """The number at the place that was filled up to ``mark``; what was made since is given back."""
     copy(space, mark, a.at, a.n)
     space[_FILLED] = mark + a.n
@@ -130,7 +140,7 @@ def filled(space):
 def minor(space, a, b, c, d):
     """a·b − c·d."""
     mark = space[_FILLED]
-    return kept(space, mark, plus(space, times(space, a, b), times(space, c, d), -1))
+    return compacted(space, mark, plus(space, times(space, a, b), times(space, c, d), -1))
 
 
 @kernel
@@ -138,7 +148,7 @@ def inner(space, a, b):
     """The inner product of two `NumberVec3`."""
     mark = space[_FILLED]
     sum_ = plus(space, times(space, a.x, b.x), times(space, a.y, b.y), 1)
-    return kept(space, mark, plus(space, sum_, times(space, a.z, b.z), 1))
+    return compacted(space, mark, plus(space, sum_, times(space, a.z, b.z), 1))
 
 
 @kernel
@@ -157,10 +167,17 @@ def sign_of(space, a):
 
 
 @kernel
+def scaled_dd(space, a):
+    """A number as a `ScaledDD`, to a relative 2⁻⁸⁰."""
+    rounded_to_two = as_double_double(space, a.at, a.n)
+    return ScaledDD(rounded_to_two.value, rounded_to_two.exponent + BITS * a.grid)
+
+
+@kernel
 def ratio(space, a, b):
     """The double nearest to a / b, ties to even; b is not 0."""
     mark = space[_FILLED]
-    work = _taken(space, 2 * max(a.n, b.n) + QUOTIENT_ROOM)
+    work = _taken(space, 2 * max(a.n, b.n) + QUOTIENT_WORKSPACE)
     value, _ = quotient(space, a.at, a.n, b.at, b.n, BITS * (a.grid - b.grid), work)
     space[_FILLED] = mark
     return value

@@ -22,7 +22,8 @@ def value_of(space, a) -> Fraction:
 
 
 def random_double(rng) -> float:
-    return rng.choice((0.0, 5e-324, -1.0, 1e50, rng.uniform(-1, 1), rng.uniform(-1, 1) * 2.0 ** rng.randrange(-900, 160)))
+    x = rng.uniform(-1, 1)
+    return rng.choice((0.0, 5e-324, -1.0, 1e50, x, x * 2.0 ** rng.randrange(-900, 160)))
 
 
 def test_sums_and_products():
@@ -58,8 +59,8 @@ def test_sums_and_products():
             if true:
                 assert E.ratio(space, a, last) == float_of(p / true)
             assert E.rounded(space, last) == float_of(true) and E.filled(space) == before
-            kept = E.kept(space, mark, last)
-            assert value_of(space, kept) == true and E.filled(space) == mark + kept.n
+            shortened = E.compacted(space, mark, last)
+            assert value_of(space, shortened) == true and E.filled(space) == mark + shortened.n
             assert not E.are_worthless(space)
     assert min(n_zero, n_negative) > 100
 

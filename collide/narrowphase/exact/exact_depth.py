@@ -13,13 +13,14 @@ from collide.narrowphase.rows import CERTIFIED, HIT, HOW, LOWER, ROW, UPPER, vie
 from collide.numerics.vec3 import neg
 from collide.results import EXACT
 
-
 #: How `exact_depth` is called.
 SIGNATURE = "void(int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64)"
 
 
 @entry(SIGNATURE)
-def exact_depth(ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, limit, rows_at, terms_at, n_terms, digits_at):
+def exact_depth(
+    ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, limit, rows_at, terms_at, n_terms, digits_at
+):
     """Find the depths of overlaps that `settle_hulls` has settled without one.
 
     Arguments as there, and flat as there. Rows are left as they are where the hulls are too large (`all_planes.py`).

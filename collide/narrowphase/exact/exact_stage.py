@@ -32,7 +32,8 @@ _HULLS, _HALFSPACES, _DEPTH, _CODES = range(4)
 
 
 @entry(
-    "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64, int64)"
+    "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64,"
+    " int64)"
 )
 def settle_exactly(
     codes_at, ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at,

@@ -6,10 +6,9 @@ Only exactly opposite ones can miss each other: the slightest tilt lets them mee
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from collide.kernels import kernel
-from collide.narrowphase.exact.exact_workspace import exact_pose
+from collide.narrowphase.exact.exact_halfspace import exact_half_space
 from collide.narrowphase.rows import (
     CERTIFIED,
     DISTANCE,
@@ -21,32 +20,18 @@ from collide.narrowphase.rows import (
     write_vectors,
 )
 from collide.numerics.exact_numbers import (
-    Number,
-    NumberVec3,
     are_worthless,
     begin_numbers,
     cross,
-    filled,
     inner,
-    kept,
     minor,
-    number_of,
     plus,
     ratio,
     rounded,
     sign_of,
-    times,
 )
 from collide.numerics.vec3 import Vec3, add, divide, scale
 from collide.results import EXACT
-
-
-class ExactHalfSpace(NamedTuple):
-    """{x : n·x ≤ offset} in the world; p is its frame's origin."""
-
-    n: NumberVec3
-    offset: Number
-    p: NumberVec3
 
 
 @kernel
@@ -54,7 +39,8 @@ def settle_opposite(ordered, space, row):
     """Settle the row of an `OrderedPair` of half-spaces, in place; where their numbers have no room it is left open."""
     pair, digits = ordered.pair, space.digits
     begin_numbers(digits)
-    A, B = _half_space(pair, pair.A, space), _half_space(pair, pair.B, space)
+    A = exact_half_space(pair, pair.A, space.terms, digits)
+    B = exact_half_space(pair, pair.B, space.terms, digits)
     across, along = cross(digits, A.n, B.n), inner(digits, A.n, B.n)
     is_tilted = sign_of(digits, across.x) != 0 or sign_of(digits, across.y) != 0 or sign_of(digits, across.z) != 0
     if are_worthless(digits):
@@ -91,36 +77,3 @@ def _write_gap(A, B, along, digits, row, flip):
     row.doubles[UPPER] = distance + slack
     write_vectors(row, nhat, p, add(p, scale(distance, nhat)), flip)
     return True
-
-
-@kernel
-def _half_space(pair, body, space):
-    """The half-space {y : m·y ≤ b} at a pose: n = cof(R) m, offset = b·det R + n·p
-    (`halfspace_convex.plane_in_world`)."""
-    digits, numbers, at = space.digits, pair.numbers, body.params_at
-    pose = exact_pose(pair.poses, body.pose_at, space.terms)
-    r0, r1, r2, p = (
-        _row(digits, pose, 0), _row(digits, pose, 3), _row(digits, pose, 6), _row(digits, pose, 9)
-    )
-    m = NumberVec3(number_of(digits, numbers[at]), number_of(digits, numbers[at + 1]), number_of(digits, numbers[at + 2]))
-    c0 = cross(digits, r1, r2)
-    n = NumberVec3(
-        inner(digits, c0, m), inner(digits, cross(digits, r2, r0), m), inner(digits, cross(digits, r0, r1), m)
-    )
-    height = times(digits, number_of(digits, numbers[at + 3]), inner(digits, r0, c0))
-    return ExactHalfSpace(n, plus(digits, height, inner(digits, n, p), 1), p)
-
-
-@kernel
-def _row(digits, pose, first):
-    return NumberVec3(_entry(digits, pose, first), _entry(digits, pose, first + 1), _entry(digits, pose, first + 2))
-
-
-@kernel
-def _entry(digits, pose, j):
-    """Entry j of an exact pose."""
-    mark, at = filled(digits), pose.at + pose.stride * j
-    total = number_of(digits, pose.numbers[at])
-    for i in range(1, pose.stride):
-        total = plus(digits, total, number_of(digits, pose.numbers[at + i]), 1)
-    return kept(digits, mark, total)

@@ -17,7 +17,6 @@ from collide.narrowphase.posed_pair import ordered_pair
 from collide.narrowphase.rows import EXACT_ROUNDS, HIT, HOW, LOWER, ROW, UPPER, view_row, write_verdict, write_vertices
 from collide.results import EXACT, UNDECIDED
 
-
 #: How `settle_halfspaces` is called.
 SIGNATURE = "void(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64)"
 
