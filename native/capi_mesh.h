@@ -17,17 +17,6 @@ struct collide_mesh {
     void *held;       /* nodes, triangles, ids, slabs */
 };
 
-/* Which facets a surface is of and what it encloses (capi_surface.c). corners, shells : of its facets; equal vertices have one
-   number. Both are freed by the caller. */
-struct surface {
-    int32_t *corners, *shells;
-    int64_t n_facets, n_shells;
-    int solid; /* whether an inside can be told */
-};
-
-collide_status look_at_surface(const struct collide_kernels *kernels, const double *vertices, int64_t n, const int32_t *faces,
-                               int64_t n_facets, struct surface *surface);
-
 /* capi_shapes.c: the root of a sum of three squares, correctly rounded. */
 double root_of_squares(double x, double y, double z);
 

@@ -13,7 +13,7 @@ from collide.mesh.build_bvh import _WORK as TREE_WORK
 from collide.mesh.bvh import INTS as TREE_INTS
 from collide.mesh.bvh import NODE, SLAB, WIDTH
 from collide.mesh.bvh import NUMBERS as TREE_NUMBERS
-from collide.mesh.mesh_topology import COUNTS, EDGES, ONE_SIDED, OPEN, SHELLS, TURNED, UNBALANCED
+from collide.mesh.mesh_topology import COUNTS
 from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.facets import collide_kernel as pairs
 from collide.narrowphase.facets import surface_collision as surfaces
@@ -36,7 +36,7 @@ _CONSTANTS = np.array([
     DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE,
     HULL_EACH, HULL_FIXED,
     NODE, SLAB, WIDTH, TREE_INTS, TREE_NUMBERS, RECORD, TREE_WORK, DEEPEST_SPLIT,
-    COUNTS, EDGES, SHELLS, OPEN | UNBALANCED | TURNED | ONE_SIDED,
+    COUNTS,
     pairs.HEADER, _MESH_DOUBLES, MESH_INTEGERS, pairs.SCRATCH, DIGEST_WORDS,
 ], dtype=np.int64)
 
