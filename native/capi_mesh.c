@@ -46,7 +46,8 @@ static struct filled fill(const struct collide_kernels *kernels, struct arena *a
 }
 
 /* Largest coordinates, and a ball around the root's box. */
-static void measure(collide_mesh *mesh, const int64_t *m, const struct filled *made, int64_t n_facets)
+static void measure(const struct collide_kernels *kernels, collide_mesh *mesh, const int64_t *m, const struct filled *made,
+                    int64_t n_facets)
 {
     float box[6];
     int64_t k;
@@ -57,8 +58,8 @@ static void measure(collide_mesh *mesh, const int64_t *m, const struct filled *m
             if (fabs(p[axis]) > mesh->numbers[CORNER + axis]) mesh->numbers[CORNER + axis] = fabs(p[axis]);
     }
     for (k = 0; k < 6; k++) memcpy(&box[k], made->nodes + k * m[M_WIDTH], sizeof box[k]);
-    mesh->numbers[BALL] = ldexp(root_of_squares(fabs((double)box[0]) + (double)box[3], fabs((double)box[1]) + (double)box[4],
-                                                fabs((double)box[2]) + (double)box[5]),
+    mesh->numbers[BALL] = ldexp(kernels->root_of_squares(fabs((double)box[0]) + (double)box[3], fabs((double)box[1]) + (double)box[4],
+                                                         fabs((double)box[2]) + (double)box[5]),
                                 (int)mesh->tree[EXPONENT]) * (1 + 2.220446049250313e-16 * 4);
 }
 
@@ -105,7 +106,7 @@ static collide_status build_mesh(const struct collide_kernels *kernels, const do
     arena_begin(&arena, NULL, 0);
     made = fill(kernels, &arena, m, vertices, n, faces, n_facets, mesh);
     if (!arena.failed) {
-        measure(mesh, m, &made, n_facets);
+        measure(kernels, mesh, m, &made, n_facets);
         digest(kernels, mesh, &made, n_facets);
         keep(kernels, &arena, m, mesh, &made, n_facets);
     }

@@ -17,7 +17,4 @@ struct collide_mesh {
     void *held;       /* nodes, triangles, ids, slabs */
 };
 
-/* capi_shapes.c: the root of a sum of three squares, correctly rounded. */
-double root_of_squares(double x, double y, double z);
-
 #endif

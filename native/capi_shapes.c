@@ -148,47 +148,6 @@ collide_status collide_capsule(double radius, double length, collide_shape **sha
     return shape_of_points(ends, length > 0.0 ? 2 : 1, radius, 0.0, 0, shape);
 }
 
-/* High and low part of a product (Dekker 1971). */
-static double product(double a, double b, double *low)
-{
-    double high = a * b, p = 134217729.0 * a, q = 134217729.0 * b;
-    double a_high = p - (p - a), b_high = q - (q - b);
-    double a_low = a - a_high, b_low = b - b_high;
-    *low = ((a_high * b_high - high) + a_high * b_low + a_low * b_high) + a_low * b_low;
-    return high;
-}
-
-/* The sum of two numbers, and what it is too large by, taken into *rest. */
-static double sum(double a, double b, double *rest)
-{
-    double total = a + b, other = total - a;
-    *rest += (a - (total - other)) + (b - other);
-    return total;
-}
-
-/* As Python's math.hypot has it, which is correctly rounded: a root, and what it misses in twice the precision. */
-double root_of_squares(double x, double y, double z)
-{
-    double largest = fabs(x), rest = 0.0, low, total, root, square;
-    int exponent;
-    if (fabs(y) > largest) largest = fabs(y);
-    if (fabs(z) > largest) largest = fabs(z);
-    if (largest == 0.0) return 0.0;
-    frexp(largest, &exponent);
-    x = ldexp(x, -exponent);
-    y = ldexp(y, -exponent);
-    z = ldexp(z, -exponent);
-    total = product(x, x, &rest);
-    total = sum(total, product(y, y, &low), &rest);
-    rest += low;
-    total = sum(total, product(z, z, &low), &rest);
-    rest += low;
-    root = sqrt(total);
-    square = product(root, root, &low);
-    root += ((total - square) + (rest - low)) / (2.0 * root);
-    return ldexp(root, exponent);
-}
-
 static collide_status round_shape(int kind, double radius, double length, collide_shape **shape)
 {
     double params[2];
@@ -196,10 +155,11 @@ static collide_status round_shape(int kind, double radius, double length, collid
     if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
     *shape = NULL;
     if (!is_length(radius) || !is_length(length)) return COLLIDE_INVALID_SHAPE;
+    if (kernels_here() == NULL) return COLLIDE_NO_KERNELS;
     given = round_as_kernels_do();
     params[0] = radius;
     params[1] = 0.5 * length;
-    length = root_of_squares(params[0], params[1], 0.0) * UPWARDS;
+    length = kernels_here()->root_of_squares(params[0], params[1], 0.0) * UPWARDS;
     round_as_before(given);
     return shape_of_numbers(kind, params, 2, length, shape);
 }
