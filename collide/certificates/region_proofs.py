@@ -65,7 +65,8 @@ def make_region_certificate(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarr
     if sides is None:
         return None
     region, body, X_WR, X_WO = sides
-    near = planes_near(region.normals, region.offsets, X_WR, X_WO, body.reach + body.radius)
+    reach = float(np.sqrt(np.square(body.points).sum(axis=1).max())) * (1 + 2.0**-50)  # no less: three roundings
+    near = planes_near(region.normals, region.offsets, X_WR, X_WO, reach + body.radius)
     if not len(near):
         return RegionCertificate(TOGETHER, (0,), (Fraction(1),), (), ())
     planes = planes_at(region.normals[near], region.offsets[near], exact_pose(X_WR))
