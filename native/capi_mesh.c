@@ -103,7 +103,7 @@ static collide_status build_mesh(const struct collide_kernels *kernels, const do
     int64_t m[MEASURES];
     workspace_sizes(kernels, m);
     if (m[M_TREE_INTS] != TREE_INTS || m[M_TREE_NUMBERS] != TREE_NUMBERS) return COLLIDE_NO_KERNELS;
-    arena_begin(&arena, NULL, 0);
+    arena_begin(&arena);
     made = fill(kernels, &arena, m, vertices, n, faces, n_facets, mesh);
     if (!arena.failed) {
         measure(kernels, mesh, m, &made, n_facets);
@@ -141,7 +141,7 @@ static collide_status mesh_of_facets(const double *vertices, int64_t n, const in
     codes[1] = code_at(&kernels->classify_facets);
     codes[2] = code_at(&kernels->judge_shells);
     workspace_sizes(kernels, measures);
-    arena_begin(&arena, NULL, 0);
+    arena_begin(&arena);
     corners = arena_take(&arena, (size_t)(3 * m) * 4);
     flags = arena_take(&arena, (size_t)m * 4);
     shells = arena_take(&arena, (size_t)m * 4);
@@ -242,7 +242,7 @@ static collide_status mesh_of_hull(const collide_shape *shape, collide_mesh *mes
     struct hull hull;
     double *points;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
-    arena_begin(&arena, NULL, 0);
+    arena_begin(&arena);
     points = arena_take(&arena, (size_t)(3 * n) * 8);
     for (k = 0; points != NULL && k < 3 * n; k++) points[k] = coordinates[k % 3 * padded + k / 3];
     if (points != NULL) {

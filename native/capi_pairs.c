@@ -193,7 +193,7 @@ static collide_status close_pairs(collide_workspace *space, const struct questio
 static int are_none(unsigned flags) { return (flags & ~(unsigned)(COLLIDE_TRUST_POSES | COLLIDE_UNSIGNED)) != 0; }
 
 /* One pair at one pair of poses. */
-static struct question single(collide_workspace *space, const double *X_WA, const double *X_WB, unsigned flags, int boolean)
+static struct question single(const double *X_WA, const double *X_WB, unsigned flags, int boolean)
 {
     struct question asked;
     asked.which = NULL;
@@ -223,7 +223,7 @@ collide_status collide_collide(collide_workspace *workspace, const collide_shape
     take_pair(workspace, A, B);
     result = workspace->kernels->collide_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB));
     if (result < 0) {
-        struct question asked = single(workspace, X_WA, X_WB, flags, 1);
+        struct question asked = single(X_WA, X_WB, flags, 1);
         uint8_t found = 0;
         size_t failed;
         status = answer(workspace, &asked, &found, NULL, &failed);
@@ -250,7 +250,7 @@ collide_status collide_distance(collide_workspace *workspace, const collide_shap
     result = workspace->kernels->distance_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB),
                                                  address_of(pair), !(flags & COLLIDE_UNSIGNED), max_distance);
     if (result < 0) {
-        struct question asked = single(workspace, X_WA, X_WB, flags, 0);
+        struct question asked = single(X_WA, X_WB, flags, 0);
         size_t failed;
         asked.limit = max_distance;
         memset(pair, 0, sizeof *pair);
@@ -264,7 +264,7 @@ collide_status collide_distance(collide_workspace *workspace, const collide_shap
 collide_status row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, unsigned flags,
                            collide_pair *row)
 {
-    struct question asked = single(space, X_WA, X_WB, flags, 0);
+    struct question asked = single(X_WA, X_WB, flags, 0);
     collide_status status;
     size_t failed;
     asked.limit = limit;

@@ -240,28 +240,23 @@ static collide_status shape_of_halfspaces(const double *normals, const double *o
 {
     enum { TOO_FEW_RAYS = -2 };
     const struct collide_kernels *kernels = kernels_here();
-    int64_t capacity = 128, n = TOO_FEW_RAYS, k;
+    int64_t normals_at = address_of(normals), offsets_at = address_of(offsets), capacity = 128, n = TOO_FEW_RAYS, k = 0;
     collide_status status = COLLIDE_INVALID_SHAPE;
+    struct arena arena;
     double *corners = NULL, slop = 0.0;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
-    while (n == TOO_FEW_RAYS) {
-        void *memory;
-        capacity *= 2;
-        free(corners);
-        memory = malloc((size_t)kernels->corners_memory(address_of(normals), address_of(offsets), m, capacity));
-        corners = malloc((size_t)(3 * capacity) * sizeof *corners);
-        if (memory != NULL && corners != NULL)
-            n = kernels->find_corners(address_of(normals), address_of(offsets), m, address_of(memory), capacity,
-                                      address_of(corners), address_of(&slop));
-        free(memory);
-        if (memory == NULL || corners == NULL) {
-            free(corners);
-            return COLLIDE_NO_MEMORY;
-        }
+    arena_begin(&arena);
+    while (n == TOO_FEW_RAYS && !arena.failed) {
+        void *memory = arena_take(&arena, (size_t)kernels->corners_memory(normals_at, offsets_at, m, capacity *= 2));
+        corners = arena_take(&arena, (size_t)(3 * capacity) * sizeof *corners);
+        if (!arena.failed)
+            n = kernels->find_corners(normals_at, offsets_at, m, address_of(memory), capacity, address_of(corners),
+                                      address_of(&slop));
     }
-    for (k = 0; k < 3 * n && is_coordinate(corners[k]); k++) {}
-    if (n > 0 && k == 3 * n) status = shape_of_points(corners, (size_t)n, 0.0, slop, 0, shape);
-    free(corners);
+    while (k < 3 * n && is_coordinate(corners[k])) k++;
+    if (arena.failed) status = COLLIDE_NO_MEMORY;
+    else if (n > 0 && k == 3 * n) status = shape_of_points(corners, (size_t)n, 0.0, slop, 0, shape);
+    arena_end(&arena);
     return status;
 }
 
