@@ -33,11 +33,9 @@ NATIVE = ROOT / "native"
 BUILD = ROOT / "build" / "kernels"
 #: Modules of C in libcollide.
 C_SOURCES = [
-    "kernels.c", "capi_arena.c", "capi_blake2b.c", "capi_halfspaces.c", "capi_hpolytope.c",
-    "capi_mesh.c", "capi_mesh_pairs.c", "capi_pairs.c", "capi_settle.c",
-    "capi_shapes.c", "capi_status.c",
-    "capi_surface.c", "capi_tree.c", "capi_bigint.c", "capi_contacts.c", "capi_axis.c", "capi_faces.c",
-    "capi_contact_queries.c", "host_mujoco.c", "host_slots.c", "host_terrain.c",
+    "kernels.c", "capi_arena.c", "capi_mesh.c", "capi_mesh_pairs.c", "capi_pairs.c", "capi_shapes.c", "capi_status.c",
+    "capi_tree.c", "capi_contacts.c", "capi_axis.c", "capi_faces.c", "capi_contact_queries.c",
+    "host_mujoco.c", "host_slots.c", "host_terrain.c",
     "host_terrain_bodies.c", "host_terrain_deep.c", "host_terrain_facets.c", "host_terrain_near.c",
     "host_terrain_prisms.c", "host_terrain_rows.c",
 ]

@@ -1,6 +1,7 @@
 #include "capi_arena.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 struct chunk {
     struct chunk *before;
@@ -9,15 +10,7 @@ struct chunk {
 
 enum { CHUNK = 1 << 16 };
 
-void arena_begin(struct arena *arena, void *memory, size_t size)
-{
-    arena->place = memory;
-    arena->used = 0;
-    arena->size = size;
-    arena->chunks = NULL;
-    arena->fixed = memory != NULL;
-    arena->failed = 0;
-}
+void arena_begin(struct arena *arena) { memset(arena, 0, sizeof *arena); }
 
 void *arena_take(struct arena *arena, size_t bytes)
 {
@@ -26,7 +19,7 @@ void *arena_take(struct arena *arena, size_t bytes)
     if (arena->failed) return NULL;
     if (bytes > arena->size - arena->used) {
         size_t size = bytes > CHUNK ? bytes : CHUNK;
-        struct chunk *chunk = arena->fixed ? NULL : malloc(sizeof *chunk + size);
+        struct chunk *chunk = malloc(sizeof *chunk + size);
         if (chunk == NULL) {
             arena->failed = 1;
             return NULL;
@@ -42,30 +35,11 @@ void *arena_take(struct arena *arena, size_t bytes)
     return taken;
 }
 
-struct mark arena_mark(const struct arena *arena)
+void arena_end(struct arena *arena)
 {
-    struct mark mark;
-    mark.chunks = arena->chunks;
-    mark.place = arena->place;
-    mark.used = arena->used;
-    mark.size = arena->size;
-    return mark;
-}
-
-void arena_return(struct arena *arena, struct mark mark)
-{
-    while (arena->chunks != mark.chunks) {
+    while (arena->chunks != NULL) {
         struct chunk *before = arena->chunks->before;
         free(arena->chunks);
         arena->chunks = before;
     }
-    arena->place = mark.place;
-    arena->used = mark.used;
-    arena->size = mark.size;
-}
-
-void arena_end(struct arena *arena)
-{
-    struct mark nothing = {NULL, NULL, 0, 0};
-    arena_return(arena, nothing);
 }

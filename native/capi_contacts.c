@@ -50,9 +50,6 @@ void take_table_pair(collide_workspace *space, struct manifold_space *manifold, 
         memcpy(space->ints + INTS * k, ints + INTS * which[k], INTS * sizeof *ints);
         memcpy(space->numbers + NUMBERS * k, numbers + NUMBERS * which[k], NUMBERS * sizeof *numbers);
         memcpy(manifold->faces + FACE_INTS * k, faces + FACE_INTS * which[k], FACE_INTS * sizeof *faces);
-        memcpy(manifold->shapes[k].ints, space->ints + INTS * k, sizeof manifold->shapes[k].ints);
-        memcpy(manifold->shapes[k].numbers, space->numbers + NUMBERS * k, sizeof manifold->shapes[k].numbers);
-        space->shapes[k] = &manifold->shapes[k];
     }
     space->header[INTS_AT] = address_of(space->ints);
     space->header[NUMBERS_AT] = address_of(space->numbers);

@@ -17,7 +17,6 @@ struct manifold_space {
     int64_t faces[2 * FACE_INTS];
     double poses[2 * POSE];
     int64_t shape_of[2];
-    collide_shape shapes[2]; /* rows of tables that are not shapes of this interface */
     void *held;
 };
 

@@ -35,7 +35,7 @@ static collide_status make_faces(const collide_shape *shape, struct hull_faces *
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
     if ((faces = calloc(1, sizeof *faces)) == NULL) return COLLIDE_NO_MEMORY;
     given = round_as_kernels_do();
-    arena_begin(&arena, NULL, 0);
+    arena_begin(&arena);
     points = points_of(shape, &arena);
     memory = arena_take(&arena, (size_t)kernels->faces_memory(n));
     if (!arena.failed && kernels->make_faces(address_of(points), n, address_of(memory)) == 0)

@@ -12,6 +12,7 @@
 #endif
 
 #include <math.h>
+#include <string.h>
 #define INFINITE HUGE_VAL
 
 /* --- layouts, as Python's modules have them; `workspace_sizes` compares them with what the kernels say --------------- */
@@ -41,15 +42,26 @@ enum {
     M_DOUBLES, M_INTEGERS, M_REQUESTS_AT, M_WORKSPACE, M_BLOCK, M_HEADER, M_INTS, M_NUMBERS, M_POSE, M_ROW, M_COARSE,
     M_HULL_EACH, M_HULL_FIXED,
     M_NODE, M_SLAB, M_WIDTH, M_TREE_INTS, M_TREE_NUMBERS, M_RECORD, M_TREE_WORK, M_DEEPEST_SPLIT,
-    M_COUNTS, M_EDGES, M_SHELLS, M_NOT_CLOSED,
-    M_MESH_HEADER, M_MESH_DOUBLES, M_MESH_INTEGERS, M_MESH_SCRATCH, MEASURES
+    M_COUNTS,
+    M_MESH_HEADER, M_MESH_DOUBLES, M_MESH_INTEGERS, M_MESH_SCRATCH, M_DIGEST, MEASURES
 };
+
+/* Integers that a digest is worked out in (collide/numerics/number_digest.py). */
+enum { DIGEST_WORDS = 40 };
 
 /* Sizes of things: nothing is larger, or a product of such would overflow. */
 #define LARGEST 1e50
 #define SMALLEST 1e-50
 
 static inline int64_t address_of(const void *place) { return (int64_t)(intptr_t)place; }
+
+/* A kernel's address, as other kernels take it, from where a table holds it. */
+static inline int64_t code_at(const void *function)
+{
+    int64_t code = 0;
+    memcpy(&code, function, sizeof(void (*)(void)));
+    return code;
+}
 
 /* --- shapes -------------------------------------------------------------------------------------------------------- */
 
@@ -60,10 +72,10 @@ struct manifold_space;
 struct collide_shape {
     int64_t ints[INTS];
     double numbers[NUMBERS];
-    unsigned char content[16]; /* digest of the numbers: it orders the bodies of a pair */
-    double *points;            /* (n, 3), of hulls; else NULL */
-    void *block;               /* holds coordinates and coarse points */
-    void *tree;                /* NULL where there is none */
+    int64_t content[2]; /* digest of the numbers: its bytes order the bodies of a pair */
+    double *points;     /* (n, 3), of hulls; else NULL */
+    void *block;        /* holds coordinates and coarse points */
+    void *tree;         /* NULL where there is none */
     struct hull_faces *volatile faces; /* NULL until contacts are asked for (capi_faces.h) */
 };
 
@@ -74,20 +86,9 @@ struct collide_shape_set {
     size_t count;
 };
 
-/* capi_shapes.c: the hull of n points as given, swept; slop : how far stored points may be from those meant. */
-collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree,
-                               collide_shape **out);
-
 /* capi_tree.c: a support tree of n points (n, 3), which are kept; *tree stays NULL where the hull is too small for
    one. */
 collide_status build_tree(const struct collide_kernels *kernels, const double *points, size_t n, void **tree);
-
-/* capi_halfspaces.c: settles a row of two half-spaces whose normals are opposite within rounding. poses : rows of POSE.
-   workspace : HALFSPACES_BYTES. */
-collide_status settle_halfspaces(const collide_shape *A, const double *pose_a, const collide_shape *B, const double *pose_b,
-                                 collide_pair *row, void *workspace);
-/* Bytes of workspace that it takes: numbers of up to 20,000 bits. */
-enum { HALFSPACES_BYTES = 1 << 20 };
 
 /* --- kernels and workspaces ---------------------------------------------------------------------------------------- */
 
@@ -104,18 +105,13 @@ struct collide_workspace {
     int64_t header[HEADER];
     int64_t ints[2 * INTS]; /* the table of a single pair */
     double numbers[2 * NUMBERS];
-    const collide_shape *shapes[2];
     const struct collide_kernels *kernels;
-    int64_t requests_at; /* addresses */
-    int64_t digits_at;
+    int64_t requests_at; /* an address */
     double *poses;     /* 2 * BLOCK rows */
     int64_t *shape_of; /* 2 * BLOCK */
     int64_t *pairs;    /* BLOCK pairs of parts */
     collide_pair *rows;
-    collide_pair *results;
-    int64_t *asked;    /* BLOCK pairs */
-    int64_t *undecided; /* BLOCK */
-    void *halfspaces;   /* HALFSPACES_BYTES */
+    int64_t steps[3]; /* addresses of what `settle_exactly` calls */
     struct mesh_workspace *mesh;
     struct manifold_space *manifold; /* of contacts; NULL until some are asked for */
     void *held[2];
@@ -143,11 +139,7 @@ struct question {
     int boolean, depths, check;
     double limit;
     double *axes;
-    const collide_shape *const *shapes; /* rows of the table */
 };
-
-/* capi_settle.c: settles what doubles left open of n rows of the block before. */
-collide_status settle_rows(collide_workspace *space, const struct question *asked, collide_pair *rows, size_t n, size_t *failed);
 
 /* --- how the processor rounds -------------------------------------------------------------------------------------- */
 

@@ -1,6 +1,5 @@
 /* Meshes from arrays, and the surfaces of polytopes: collide/shapes/mesh.py, collide/lowering/facet_bodies.py and the tree of
    collide/mesh/build_bvh.py. */
-#include "capi_blake2b.h"
 #include "capi_mesh.h"
 #include "capi_tree.h"
 
@@ -47,7 +46,8 @@ static struct filled fill(const struct collide_kernels *kernels, struct arena *a
 }
 
 /* Largest coordinates, and a ball around the root's box. */
-static void measure(collide_mesh *mesh, const int64_t *m, const struct filled *made, int64_t n_facets)
+static void measure(const struct collide_kernels *kernels, collide_mesh *mesh, const int64_t *m, const struct filled *made,
+                    int64_t n_facets)
 {
     float box[6];
     int64_t k;
@@ -58,22 +58,16 @@ static void measure(collide_mesh *mesh, const int64_t *m, const struct filled *m
             if (fabs(p[axis]) > mesh->numbers[CORNER + axis]) mesh->numbers[CORNER + axis] = fabs(p[axis]);
     }
     for (k = 0; k < 6; k++) memcpy(&box[k], made->nodes + k * m[M_WIDTH], sizeof box[k]);
-    mesh->numbers[BALL] = ldexp(root_of_squares(fabs((double)box[0]) + (double)box[3], fabs((double)box[1]) + (double)box[4],
-                                                fabs((double)box[2]) + (double)box[5]),
+    mesh->numbers[BALL] = ldexp(kernels->root_of_squares(fabs((double)box[0]) + (double)box[3], fabs((double)box[1]) + (double)box[4],
+                                                         fabs((double)box[2]) + (double)box[5]),
                                 (int)mesh->tree[EXPONENT]) * (1 + 2.220446049250313e-16 * 4);
 }
 
-static void digest(collide_mesh *mesh, const struct filled *made, int64_t n_facets)
+static void digest(const struct collide_kernels *kernels, collide_mesh *mesh, const struct filled *made, int64_t n_facets)
 {
-    struct blake2b hash;
-    int64_t k;
-    blake2b_begin(&hash);
-    for (k = 0; k < 9 * n_facets; k++) {
-        double value = made->triangles[k] + 0.0;
-        blake2b_add(&hash, &value, sizeof value);
-    }
-    blake2b_add(&hash, made->ids, (size_t)n_facets * sizeof *made->ids);
-    blake2b_end(&hash, mesh->content);
+    int64_t memory[DIGEST_WORDS];
+    kernels->digest_numbers(0, 0, address_of(made->triangles), 9 * n_facets, address_of(made->ids), n_facets,
+                            address_of(memory), address_of(mesh->content));
 }
 
 /* Everything that kernels read, in one block, and the slabs that distances need. */
@@ -109,11 +103,11 @@ static collide_status build_mesh(const struct collide_kernels *kernels, const do
     int64_t m[MEASURES];
     workspace_sizes(kernels, m);
     if (m[M_TREE_INTS] != TREE_INTS || m[M_TREE_NUMBERS] != TREE_NUMBERS) return COLLIDE_NO_KERNELS;
-    arena_begin(&arena, NULL, 0);
+    arena_begin(&arena);
     made = fill(kernels, &arena, m, vertices, n, faces, n_facets, mesh);
     if (!arena.failed) {
-        measure(mesh, m, &made, n_facets);
-        digest(mesh, &made, n_facets);
+        measure(kernels, mesh, m, &made, n_facets);
+        digest(kernels, mesh, &made, n_facets);
         keep(kernels, &arena, m, mesh, &made, n_facets);
     }
     arena_end(&arena);
@@ -130,81 +124,47 @@ void collide_mesh_free(collide_mesh *mesh)
 
 /* --- meshes of facets ----------------------------------------------------------------------------------------------- */
 
-static int by_number(const void *one, const void *other)
-{
-    int32_t a = *(const int32_t *)one, b = *(const int32_t *)other;
-    return (a > b) - (a < b);
-}
-
-/* A vertex of every shell, and those of collapsed facets that no other facet uses: numbers of vertices, at most n and shells. */
-static int64_t one_of_each_part(const struct surface *surface, int64_t n, int32_t *ids, uint8_t *used)
-{
-    int64_t f, n_points = 0, shells, next = 0;
-    int k;
-    memset(used, 0, (size_t)n);
-    for (f = 0; f < surface->n_facets; f++) {
-        if (surface->shells[f] < 0) continue;
-        if (surface->shells[f] == next) { /* numbered by their first facets */
-            ids[n_points++] = surface->corners[3 * f];
-            next++;
-        }
-        for (k = 0; k < 3; k++) used[surface->corners[3 * f + k]] = 1;
-    }
-    shells = n_points;
-    for (f = 0; f < surface->n_facets; f++)
-        for (k = 0; surface->shells[f] < 0 && k < 3; k++) {
-            int32_t vertex = surface->corners[3 * f + k];
-            if (used[vertex]) continue;
-            used[vertex] = 1;
-            ids[n_points++] = vertex;
-        }
-    qsort(ids + shells, (size_t)(n_points - shells), sizeof *ids, by_number);
-    return n_points;
-}
-
-static collide_status take_parts(const struct surface *surface, const double *vertices, int64_t n, collide_mesh *mesh)
-{
-    int32_t *ids = malloc((size_t)(n + surface->n_shells) * sizeof *ids);
-    uint8_t *used = malloc((size_t)n);
-    int64_t k;
-    if (ids != NULL && used != NULL) {
-        mesh->n_points = one_of_each_part(surface, n, ids, used);
-        mesh->points = malloc((size_t)(3 * mesh->n_points + 1) * sizeof *mesh->points);
-        for (k = 0; mesh->points != NULL && k < mesh->n_points; k++)
-            memcpy(mesh->points + 3 * k, vertices + 3 * (int64_t)ids[k], 3 * sizeof *vertices);
-    }
-    free(ids);
-    free(used);
-    return mesh->points != NULL ? COLLIDE_OK : COLLIDE_NO_MEMORY;
-}
-
-/* What a solid must be, as asked for. */
-static collide_status take_inside(const struct surface *surface, int solid, collide_mesh *mesh)
-{
-    if (solid == COLLIDE_SURFACE) return COLLIDE_OK;
-    if (solid == COLLIDE_SOLID && !surface->solid) return COLLIDE_INVALID_SHAPE;
-    mesh->solid = surface->solid;
-    return COLLIDE_OK;
-}
-
-static collide_status mesh_of_facets(const double *vertices, int64_t n, const int32_t *faces, int64_t n_facets, int solid,
+/* The facets, and a point of every part. solid : as asked for. */
+static collide_status mesh_of_facets(const double *vertices, int64_t n, const int32_t *faces, int64_t m, int solid,
                                      collide_mesh *mesh)
 {
     const struct collide_kernels *kernels = kernels_here();
-    struct surface surface;
-    collide_status status;
-    int64_t *wide, k;
+    collide_status status = COLLIDE_NO_MEMORY;
+    struct arena arena;
+    int64_t codes[3], measures[MEASURES], *counts, *wide, k;
+    int32_t *corners, *flags, *shells, *signs, *ids;
+    double *volumes;
+    void *memory;
+    int encloses;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
-    status = look_at_surface(kernels, vertices, n, faces, n_facets, &surface);
-    if (status == COLLIDE_OK) status = take_inside(&surface, solid, mesh);
-    if (status == COLLIDE_OK) status = take_parts(&surface, vertices, n, mesh);
-    free(surface.corners);
-    free(surface.shells);
-    if (status != COLLIDE_OK) return status;
-    if ((wide = malloc((size_t)(3 * n_facets) * sizeof *wide)) == NULL) return COLLIDE_NO_MEMORY;
-    for (k = 0; k < 3 * n_facets; k++) wide[k] = faces[k];
-    status = build_mesh(kernels, vertices, n, wide, n_facets, mesh);
-    free(wide);
+    codes[0] = code_at(&kernels->first_rows);
+    codes[1] = code_at(&kernels->classify_facets);
+    codes[2] = code_at(&kernels->judge_shells);
+    workspace_sizes(kernels, measures);
+    arena_begin(&arena);
+    corners = arena_take(&arena, (size_t)(3 * m) * 4);
+    flags = arena_take(&arena, (size_t)m * 4);
+    shells = arena_take(&arena, (size_t)m * 4);
+    signs = arena_take(&arena, (size_t)m * 4);
+    ids = arena_take(&arena, (size_t)(n + m) * 4);
+    counts = arena_take(&arena, (size_t)measures[M_COUNTS] * 8);
+    volumes = arena_take(&arena, (size_t)m * 8);
+    wide = arena_take(&arena, (size_t)(3 * m) * 8);
+    memory = arena_take(&arena, (size_t)(kernels->survey_memory(n, m) + kernels->shells_memory(n, m, m)));
+    if (!arena.failed) {
+        encloses = (int)kernels->survey_facets(address_of(codes), address_of(vertices), n, address_of(faces), m,
+                                               address_of(corners), address_of(flags), address_of(shells), address_of(counts),
+                                               address_of(volumes), address_of(signs), address_of(memory));
+        mesh->solid = solid != COLLIDE_SURFACE && encloses;
+        mesh->n_points = kernels->one_of_each_part(address_of(corners), address_of(shells), m, n, address_of(ids));
+        mesh->points = malloc((size_t)(3 * mesh->n_points + 1) * sizeof *mesh->points);
+        for (k = 0; mesh->points != NULL && k < mesh->n_points; k++)
+            memcpy(mesh->points + 3 * k, vertices + 3 * (int64_t)ids[k], 3 * sizeof *vertices);
+        for (k = 0; k < 3 * m; k++) wide[k] = faces[k];
+        if (solid == COLLIDE_SOLID && !encloses) status = COLLIDE_INVALID_SHAPE;
+        else if (mesh->points != NULL) status = build_mesh(kernels, vertices, n, wide, m, mesh);
+    }
+    arena_end(&arena);
     return status;
 }
 
@@ -282,7 +242,7 @@ static collide_status mesh_of_hull(const collide_shape *shape, collide_mesh *mes
     struct hull hull;
     double *points;
     if (kernels == NULL) return COLLIDE_NO_KERNELS;
-    arena_begin(&arena, NULL, 0);
+    arena_begin(&arena);
     points = arena_take(&arena, (size_t)(3 * n) * 8);
     for (k = 0; points != NULL && k < 3 * n; k++) points[k] = coordinates[k % 3 * padded + k / 3];
     if (points != NULL) {

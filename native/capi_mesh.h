@@ -7,28 +7,14 @@
 
 /* Facets under a box-tree, the points of which one lies in every part, and a ball swept over all. */
 struct collide_mesh {
-    int64_t tree[10];          /* the tree's header */
-    double numbers[7];         /* the tree's numbers */
-    unsigned char content[16]; /* digest of the facets */
+    int64_t tree[10];   /* the tree's header */
+    double numbers[7];  /* the tree's numbers */
+    int64_t content[2]; /* digest of the facets */
     double radius;
     double *points;
     int64_t n_points, depth;
     int solid, given; /* given : as facets, not as a convex shape */
     void *held;       /* nodes, triangles, ids, slabs */
 };
-
-/* Which facets a surface is of and what it encloses (capi_surface.c). corners, shells : of its facets; equal vertices have one
-   number. Both are freed by the caller. */
-struct surface {
-    int32_t *corners, *shells;
-    int64_t n_facets, n_shells;
-    int solid; /* whether an inside can be told */
-};
-
-collide_status look_at_surface(const struct collide_kernels *kernels, const double *vertices, int64_t n, const int32_t *faces,
-                               int64_t n_facets, struct surface *surface);
-
-/* capi_shapes.c: the root of a sum of three squares, correctly rounded. */
-double root_of_squares(double x, double y, double z);
 
 #endif

@@ -27,13 +27,6 @@ size_t mesh_workspace_bytes(const int64_t *m)
 
 #define CODE(space, name) code_at(&(space)->kernels->name)
 
-static int64_t code_at(const void *function)
-{
-    int64_t code = 0;
-    memcpy(&code, function, sizeof(void (*)(void)));
-    return code;
-}
-
 void begin_mesh_workspace(collide_workspace *space, void *memory, const int64_t *m)
 {
     struct mesh_workspace *mesh = memory;

@@ -17,14 +17,16 @@ typedef char marks_stand_last[offsetof(collide_pair, exact) == 156 ? 1 : -1];
 /* Everything of a fixed size, in one piece. */
 struct buffers {
     double poses[2 * BLOCK * POSE];
-    int64_t shape_of[2 * BLOCK], pairs[2 * BLOCK], asked[2 * BLOCK], undecided[BLOCK];
-    collide_pair rows[BLOCK], results[BLOCK];
+    int64_t shape_of[2 * BLOCK], pairs[2 * BLOCK];
+    collide_pair rows[BLOCK];
 };
 
 static void begin_header(collide_workspace *space)
 {
-    memcpy(&space->header[CORE], &space->kernels->answer_pairs, sizeof space->kernels->answer_pairs);
-    memcpy(&space->header[SETTLE], &space->kernels->settle_hulls, sizeof space->kernels->settle_hulls);
+    space->header[CORE] = code_at(&space->kernels->answer_pairs);
+    space->header[SETTLE] = space->steps[0] = code_at(&space->kernels->settle_hulls);
+    space->steps[1] = code_at(&space->kernels->settle_halfspaces);
+    space->steps[2] = code_at(&space->kernels->exact_depth);
     space->header[POSES_AT] = address_of(space->poses);
     space->header[SHAPE_OF_AT] = address_of(space->shape_of);
     space->header[PAIRS_AT] = address_of(space->pairs);
@@ -54,24 +56,20 @@ static int allocate_workspace(collide_workspace *space)
     meshes = mesh_workspace_bytes(measures);
     words = (size_t)(measures[M_DOUBLES] + measures[M_INTEGERS] + measures[M_WORKSPACE]);
     buffers = cache_lines(sizeof *buffers, &space->held[0]);
-    doubles = cache_lines(8 * words + HALFSPACES_BYTES + meshes, &space->held[1]);
+    doubles = cache_lines(8 * words + meshes, &space->held[1]);
     if (buffers == NULL || doubles == NULL) return 0;
     integers = (int64_t *)(doubles + measures[M_DOUBLES]);
     digits = integers + measures[M_INTEGERS];
     space->poses = buffers->poses;
     space->shape_of = buffers->shape_of;
     space->pairs = buffers->pairs;
-    space->asked = buffers->asked;
-    space->undecided = buffers->undecided;
     space->rows = buffers->rows;
-    space->results = buffers->results;
     begin_header(space);
     space->header[DOUBLES_AT] = address_of(doubles);
     space->header[INTEGERS_AT] = address_of(integers);
     space->requests_at = address_of(integers + measures[M_REQUESTS_AT]);
-    space->digits_at = space->header[DIGITS_AT] = address_of(digits);
-    space->halfspaces = digits + measures[M_WORKSPACE];
-    begin_mesh_workspace(space, (char *)space->halfspaces + HALFSPACES_BYTES, measures);
+    space->header[DIGITS_AT] = address_of(digits);
+    begin_mesh_workspace(space, digits + measures[M_WORKSPACE], measures);
     begin_pairs(space);
     return 1;
 }
@@ -115,8 +113,6 @@ void take_pair(collide_workspace *space, const collide_shape *A, const collide_s
     memcpy(space->numbers + NUMBERS, B->numbers, sizeof B->numbers);
     space->ints[RANK] = order > 0;
     space->ints[INTS + RANK] = order < 0;
-    space->shapes[0] = A;
-    space->shapes[1] = B;
     space->header[INTS_AT] = address_of(space->ints);
     space->header[NUMBERS_AT] = address_of(space->numbers);
     space->shape_of[0] = 0; /* a batch of a set may have left others */
@@ -130,6 +126,25 @@ static size_t first_bad(collide_workspace *space, const struct question *asked, 
     int64_t a = space->kernels->first_bad_pose(address_of(asked->X_WA), asked->step_a, from, n, (uint8_t)asked->check, pose_at);
     int64_t b = space->kernels->first_bad_pose(address_of(asked->X_WB), asked->step_b, from, n, (uint8_t)asked->check, pose_at);
     return (size_t)(a < b ? a : b);
+}
+
+/* Settle what doubles left open of n rows of the block before: as `_finish` of
+   collide/narrowphase/convex_kernel_calls.py. */
+static collide_status settle_rows(collide_workspace *space, const struct question *asked, collide_pair *rows, size_t n,
+                                  size_t *failed)
+{
+    const int64_t *header = space->header;
+    uint8_t depths = asked->depths && !asked->boolean, boolean = (uint8_t)asked->boolean;
+    for (*failed = 0; *failed < n; ++*failed)
+        if (rows[*failed].how == REFUSED) return COLLIDE_OUT_OF_RANGE;
+    if (space->kernels->settle_exactly(address_of(space->steps), header[INTS_AT], header[NUMBERS_AT], header[POSES_AT],
+                                       header[SHAPE_OF_AT], header[PAIRS_AT], (int64_t)n, boolean, depths, asked->limit,
+                                       address_of(rows), 0, 0, space->requests_at, header[DIGITS_AT]) > 0)
+        space->kernels->settle_by_other_searches(
+            header[CORE], header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT], header[PAIRS_AT],
+            (int64_t)n, boolean, depths, asked->limit, address_of(rows), header[DOUBLES_AT], header[INTEGERS_AT],
+            header[DIGITS_AT]);
+    return COLLIDE_OK;
 }
 
 /* Answer all poses into booleans, or into rows that are zeroed. */
@@ -178,7 +193,7 @@ static collide_status close_pairs(collide_workspace *space, const struct questio
 static int are_none(unsigned flags) { return (flags & ~(unsigned)(COLLIDE_TRUST_POSES | COLLIDE_UNSIGNED)) != 0; }
 
 /* One pair at one pair of poses. */
-static struct question single(collide_workspace *space, const double *X_WA, const double *X_WB, unsigned flags, int boolean)
+static struct question single(const double *X_WA, const double *X_WB, unsigned flags, int boolean)
 {
     struct question asked;
     asked.which = NULL;
@@ -191,7 +206,6 @@ static struct question single(collide_workspace *space, const double *X_WA, cons
     asked.check = !(flags & COLLIDE_TRUST_POSES);
     asked.limit = 0.0;
     asked.axes = NULL;
-    asked.shapes = space->shapes;
     return asked;
 }
 
@@ -209,7 +223,7 @@ collide_status collide_collide(collide_workspace *workspace, const collide_shape
     take_pair(workspace, A, B);
     result = workspace->kernels->collide_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB));
     if (result < 0) {
-        struct question asked = single(workspace, X_WA, X_WB, flags, 1);
+        struct question asked = single(X_WA, X_WB, flags, 1);
         uint8_t found = 0;
         size_t failed;
         status = answer(workspace, &asked, &found, NULL, &failed);
@@ -236,7 +250,7 @@ collide_status collide_distance(collide_workspace *workspace, const collide_shap
     result = workspace->kernels->distance_single(address_of(workspace->header), address_of(X_WA), address_of(X_WB),
                                                  address_of(pair), !(flags & COLLIDE_UNSIGNED), max_distance);
     if (result < 0) {
-        struct question asked = single(workspace, X_WA, X_WB, flags, 0);
+        struct question asked = single(X_WA, X_WB, flags, 0);
         size_t failed;
         asked.limit = max_distance;
         memset(pair, 0, sizeof *pair);
@@ -250,7 +264,7 @@ collide_status collide_distance(collide_workspace *workspace, const collide_shap
 collide_status row_of_pair(collide_workspace *space, const double *X_WA, const double *X_WB, double limit, unsigned flags,
                            collide_pair *row)
 {
-    struct question asked = single(space, X_WA, X_WB, flags, 0);
+    struct question asked = single(X_WA, X_WB, flags, 0);
     collide_status status;
     size_t failed;
     asked.limit = limit;
@@ -318,7 +332,6 @@ static collide_status ask_batch(collide_workspace *workspace, const collide_shap
     asked.n = longer(X_WA, X_WB);
     asked.limit = limit;
     asked.axes = axes;
-    asked.shapes = workspace->shapes;
     if (asked.n == 0) return X_WA.count > 1 || X_WB.count > 1 ? COLLIDE_INVALID_ARGUMENT : COLLIDE_OK;
     if (hits == NULL && pairs == NULL) return COLLIDE_INVALID_ARGUMENT;
     return ask(workspace, &asked, X_WA, X_WB, flags, hits, pairs, failed);
@@ -358,7 +371,6 @@ static collide_status ask_each(collide_workspace *workspace, const collide_shape
     asked.n = n;
     asked.limit = limit;
     asked.axes = axes;
-    asked.shapes = set->shapes;
     return ask(workspace, &asked, X_WA, X_WB, flags, hits, pairs, failed);
 }
 

@@ -1,5 +1,4 @@
 /* Shapes from numbers: what collide/shapes checks and collide/lowering/packed_convex.py lays out. */
-#include "capi_blake2b.h"
 #include "capi_faces.h"
 #include "capi_mesh.h"
 
@@ -18,19 +17,13 @@ static int is_coordinate(double value) { return fabs(value) <= LARGEST; }
 /* Digest of kind, radius and parameters, then of the points; -0.0 and 0.0 are one number among these. */
 static void digest(collide_shape *shape, const double *points, size_t n)
 {
-    struct blake2b hash;
+    int64_t memory[DIGEST_WORDS];
     double head[6];
-    size_t k;
     head[0] = (double)shape->ints[KIND];
     head[1] = shape->numbers[RADIUS];
-    for (k = 0; k < 4; k++) head[2 + k] = shape->numbers[PARAMS + k];
-    blake2b_begin(&hash);
-    blake2b_add(&hash, head, sizeof head);
-    for (k = 0; k < 3 * n; k++) {
-        double value = points[k] + 0.0;
-        blake2b_add(&hash, &value, sizeof value);
-    }
-    blake2b_end(&hash, shape->content);
+    memcpy(head + 2, shape->numbers + PARAMS, 4 * sizeof *head);
+    kernels_here()->digest_numbers(address_of(head), 6, address_of(points), (int64_t)(3 * n), 0, 0, address_of(memory),
+                                   address_of(shape->content));
 }
 
 /* Coordinates axis by axis, filled up with the first point, then coarse points. */
@@ -77,8 +70,9 @@ static collide_status made_of_points(collide_shape *shape, const double *points,
     return build_support_tree(shape, n);
 }
 
-collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree,
-                               collide_shape **out)
+/* The hull of n points as given, swept; slop : how far stored points may be from those meant. */
+static collide_status shape_of_points(const double *points, size_t n, double radius, double slop, int may_have_tree,
+                                      collide_shape **out)
 {
     collide_shape *shape = calloc(1, sizeof *shape);
     collide_status status;
@@ -97,8 +91,9 @@ collide_status shape_of_points(const double *points, size_t n, double radius, do
 
 static collide_status shape_of_numbers(int kind, const double *params, size_t n, double reach, collide_shape **out)
 {
-    collide_shape *shape = calloc(1, sizeof *shape);
-    if (shape == NULL) return COLLIDE_NO_MEMORY;
+    collide_shape *shape;
+    if (kernels_here() == NULL) return COLLIDE_NO_KERNELS;
+    if ((shape = calloc(1, sizeof *shape)) == NULL) return COLLIDE_NO_MEMORY;
     shape->ints[KIND] = kind;
     shape->ints[LOWEST] = NO_BITS;
     shape->numbers[REACH] = reach;
@@ -153,47 +148,6 @@ collide_status collide_capsule(double radius, double length, collide_shape **sha
     return shape_of_points(ends, length > 0.0 ? 2 : 1, radius, 0.0, 0, shape);
 }
 
-/* High and low part of a product (Dekker 1971). */
-static double product(double a, double b, double *low)
-{
-    double high = a * b, p = 134217729.0 * a, q = 134217729.0 * b;
-    double a_high = p - (p - a), b_high = q - (q - b);
-    double a_low = a - a_high, b_low = b - b_high;
-    *low = ((a_high * b_high - high) + a_high * b_low + a_low * b_high) + a_low * b_low;
-    return high;
-}
-
-/* The sum of two numbers, and what it is too large by, taken into *rest. */
-static double sum(double a, double b, double *rest)
-{
-    double total = a + b, other = total - a;
-    *rest += (a - (total - other)) + (b - other);
-    return total;
-}
-
-/* As Python's math.hypot has it, which is correctly rounded: a root, and what it misses in twice the precision. */
-double root_of_squares(double x, double y, double z)
-{
-    double largest = fabs(x), rest = 0.0, low, total, root, square;
-    int exponent;
-    if (fabs(y) > largest) largest = fabs(y);
-    if (fabs(z) > largest) largest = fabs(z);
-    if (largest == 0.0) return 0.0;
-    frexp(largest, &exponent);
-    x = ldexp(x, -exponent);
-    y = ldexp(y, -exponent);
-    z = ldexp(z, -exponent);
-    total = product(x, x, &rest);
-    total = sum(total, product(y, y, &low), &rest);
-    rest += low;
-    total = sum(total, product(z, z, &low), &rest);
-    rest += low;
-    root = sqrt(total);
-    square = product(root, root, &low);
-    root += ((total - square) + (rest - low)) / (2.0 * root);
-    return ldexp(root, exponent);
-}
-
 static collide_status round_shape(int kind, double radius, double length, collide_shape **shape)
 {
     double params[2];
@@ -201,10 +155,11 @@ static collide_status round_shape(int kind, double radius, double length, collid
     if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
     *shape = NULL;
     if (!is_length(radius) || !is_length(length)) return COLLIDE_INVALID_SHAPE;
+    if (kernels_here() == NULL) return COLLIDE_NO_KERNELS;
     given = round_as_kernels_do();
     params[0] = radius;
     params[1] = 0.5 * length;
-    length = root_of_squares(params[0], params[1], 0.0) * UPWARDS;
+    length = kernels_here()->root_of_squares(params[0], params[1], 0.0) * UPWARDS;
     round_as_before(given);
     return shape_of_numbers(kind, params, 2, length, shape);
 }
@@ -280,6 +235,52 @@ collide_status collide_hull(const double *points, size_t n, double radius, colli
     return shape_of_points(points, n, radius == 0.0 ? 0.0 : radius, 0.0, 1, shape);
 }
 
+/* The corners of m half-spaces, by collide/hull/double_description.py, in memory that grows with the rays it takes. */
+static collide_status shape_of_halfspaces(const double *normals, const double *offsets, int64_t m, collide_shape **shape)
+{
+    enum { TOO_FEW_RAYS = -2 };
+    const struct collide_kernels *kernels = kernels_here();
+    int64_t normals_at = address_of(normals), offsets_at = address_of(offsets), capacity = 128, n = TOO_FEW_RAYS, k = 0;
+    collide_status status = COLLIDE_INVALID_SHAPE;
+    struct arena arena;
+    double *corners = NULL, slop = 0.0;
+    if (kernels == NULL) return COLLIDE_NO_KERNELS;
+    arena_begin(&arena);
+    while (n == TOO_FEW_RAYS && !arena.failed) {
+        void *memory = arena_take(&arena, (size_t)kernels->corners_memory(normals_at, offsets_at, m, capacity *= 2));
+        corners = arena_take(&arena, (size_t)(3 * capacity) * sizeof *corners);
+        if (!arena.failed)
+            n = kernels->find_corners(normals_at, offsets_at, m, address_of(memory), capacity, address_of(corners),
+                                      address_of(&slop));
+    }
+    while (k < 3 * n && is_coordinate(corners[k])) k++;
+    if (arena.failed) status = COLLIDE_NO_MEMORY;
+    else if (n > 0 && k == 3 * n) status = shape_of_points(corners, (size_t)n, 0.0, slop, 0, shape);
+    arena_end(&arena);
+    return status;
+}
+
+collide_status collide_hpolytope(const double *normals, const double *offsets, size_t m, collide_shape **shape)
+{
+    collide_status status;
+    size_t k;
+    rounding given;
+    if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
+    *shape = NULL;
+    if (normals == NULL || offsets == NULL) return COLLIDE_INVALID_ARGUMENT;
+    if (m == 0 || m > (size_t)1 << 20) return COLLIDE_INVALID_SHAPE;
+    given = round_as_kernels_do();
+    for (k = 0; k < m; k++) {
+        const double *n = normals + 3 * k;
+        if (!is_coordinate(n[0]) || !is_coordinate(n[1]) || !is_coordinate(n[2]) || !is_coordinate(offsets[k]) ||
+            (n[0] == 0.0 && n[1] == 0.0 && n[2] == 0.0))
+            break;
+    }
+    status = k < m ? COLLIDE_INVALID_SHAPE : shape_of_halfspaces(normals, offsets, (int64_t)m, shape);
+    round_as_before(given);
+    return status;
+}
+
 /* --- sets ---------------------------------------------------------------------------------------------------------- */
 
 struct placed {
@@ -289,7 +290,8 @@ struct placed {
 
 static int by_content(const void *one, const void *other)
 {
-    return memcmp(((const struct placed *)one)->shape->content, ((const struct placed *)other)->shape->content, 16);
+    return memcmp(((const struct placed *)one)->shape->content, ((const struct placed *)other)->shape->content,
+                  sizeof ((const struct placed *)one)->shape->content);
 }
 
 /* Rows of shapes with ranks by content: equal shapes have one rank. */

@@ -52,7 +52,7 @@ int workspace_sizes(const struct collide_kernels *kernels, int64_t measures[MEAS
     if (kernels->write_constants(address_of(measures), MEASURES) != MEASURES) return 0;
     return measures[M_BLOCK] == BLOCK && measures[M_HEADER] == HEADER && measures[M_INTS] == INTS &&
            measures[M_NUMBERS] == NUMBERS && measures[M_POSE] == POSE && mesh_workspace_bytes(measures) > 0 &&
-           measures[M_ROW] == (int64_t)sizeof(collide_pair);
+           measures[M_ROW] == (int64_t)sizeof(collide_pair) && measures[M_DIGEST] == DIGEST_WORDS;
 }
 
 void *cache_lines(size_t bytes, void **held)

@@ -27,13 +27,11 @@ static void *grow(const struct collide_kernels *kernels, struct arena *arena, co
     int64_t capacity = 8 * hull->n_vertices + 4096, outcome, *memory;
     void *block;
     for (;; capacity = outcome) {
-        struct mark mark = arena_mark(arena);
         memory = arena_take(arena, (size_t)kernels->tree_memory(n, hull->n_facets, capacity));
         if (memory == NULL) return NULL;
         outcome = kernels->grow_tree(address_of(points), n, address_of(hull->vertices), hull->n_vertices,
                                      address_of(hull->facets), hull->n_facets, address_of(memory), capacity);
         if (outcome <= 0) break;
-        arena_return(arena, mark);
     }
     if (outcome < 0) return NULL;
     if ((block = malloc((size_t)memory[0])) == NULL) arena->failed = 1;
@@ -46,7 +44,7 @@ collide_status build_tree(const struct collide_kernels *kernels, const double *p
     struct arena arena;
     struct hull hull;
     collide_status status;
-    arena_begin(&arena, NULL, 0);
+    arena_begin(&arena);
     hull = hull_of(kernels, &arena, points, (int64_t)n);
     if (!arena.failed && hull.dimension >= 2 && hull.n_vertices >= FEWEST_VERTICES)
         *tree = grow(kernels, &arena, points, (int64_t)n, &hull);

@@ -20,7 +20,7 @@
    whether it flushes small numbers to 0: both are set for the length of a call, and put back.
 
    Processors. The kernels are those of the best level that the processor has; the environment's variable COLLIDE_CPU names
-   another one ("v2", "v3", "v4"), read when a workspace, a mesh or a shape of many points is made. */
+   another one ("v2", "v3", "v4"), read when the first workspace, mesh or shape is made. */
 #ifndef COLLIDE_H
 #define COLLIDE_H
 

@@ -68,7 +68,7 @@ void take_body(const struct task *task)
     struct manifold_space *manifold = task->manifold;
     const struct terrain_pair *pair = task->pair;
     take_table_pair(space, manifold, pair->ints, pair->numbers, pair->faces, pair->b, pair->b);
-    space->ints[INTS + RANK] = manifold->shapes[1].ints[RANK] = 1;
+    space->ints[INTS + RANK] = 1;
     manifold->shape_of[0] = 0;
     manifold->shape_of[1] = 1;
 }
@@ -94,8 +94,6 @@ static void take_points(const struct task *task, const double *columns, int64_t 
     ints[ADDRESS] = address_of(columns);
     ints[LOWEST] = lowest;
     numbers[REACH] = sqrt(square) * (1 + 1e-15);
-    memcpy(task->manifold->shapes[0].ints, ints, INTS * sizeof *ints);
-    memcpy(task->manifold->shapes[0].numbers, numbers, NUMBERS * sizeof *numbers);
 }
 
 static void take_faces(const struct task *task, const double *columns)

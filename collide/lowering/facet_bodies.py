@@ -14,11 +14,13 @@ import numpy as np
 
 from collide.errors import UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
+from collide.kernels import address_of
 from collide.lowering.kinds import WITH_FACETS, kind_of
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import REACH, MeshTree
+from collide.mesh.mesh_survey import one_of_each_part
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape, checked_shape, held_by, kept_with_shape
@@ -127,15 +129,9 @@ def _of_mesh(mesh: Mesh) -> Body:
 
 def _one_of_each_part(mesh: Mesh) -> np.ndarray:
     """Vertex ids: one of every shell, and those of collapsed facets that no other facet uses."""
-    survey = mesh.survey
-    shells, corners = survey.shells, survey.corners
-    first = np.unique(shells, return_index=True)
-    ids = corners[first[1][first[0] >= 0], 0]
-    collapsed = shells < 0
-    if collapsed.any():
-        lonely = np.setdiff1d(corners[collapsed], corners[~collapsed])
-        ids = np.concatenate([ids, lonely])
-    return ids
+    corners, shells, n = mesh.survey.corners, mesh.survey.shells, len(mesh.vertices)
+    ids = np.empty(n + len(shells), dtype=np.int32)
+    return ids[: one_of_each_part(address_of(corners), address_of(shells), len(shells), n, address_of(ids))]
 
 
 def _of_convex(shape: Shape) -> Body:

@@ -29,8 +29,8 @@ DOUBLED = 64       # an earlier facet has the same corners in the same sense
 BACK_TO_BACK = 128  # another facet has the same corners in the opposite sense
 PINCHED = 256      # at a corner of it two fans of facets touch
 
-# Counts.
-EDGES, OPEN_EDGES, SHELLS, USED, PINCHES, COUNTS = range(6)
+# Counts; vertices that equal an earlier one are counted by `mesh_survey.py`.
+EDGES, OPEN_EDGES, SHELLS, USED, PINCHES, WELDED, COUNTS = range(7)
 
 
 class _Surface(NamedTuple):

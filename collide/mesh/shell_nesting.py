@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.kernels import entry, kernel, view_f64, view_i32, view_i64
-from collide.mesh.shell_volumes import add_determinant, permanent, put_volumes, span_of
+from collide.mesh.shell_volumes import permanent, put_volumes, span_of
 from collide.numerics.counting_sort import order_by_key
-from collide.numerics.digits import BITS, add_double, carry, grid_of, set_zero
+from collide.numerics.digits import BITS, add_determinant, add_double, carry, grid_of, set_zero
 from collide.numerics.vec3 import Vec3, absolute, add, cross, dot, scale, sub, vec3_at
 
 #: Of a determinant of differences: eight roundings deep, four times that; and all that underflows.

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_f64, view_i32
-from collide.numerics.digits import BITS, add_double, add_product, carry, grid_of, lowest_bit, set_zero
+from collide.numerics.digits import BITS, add_determinant, add_double, carry, grid_of, lowest_bit, set_zero
 from collide.numerics.vec3 import absolute, cross, dot, sub, vec3_at
 
 #: A term of a volume is the product of three rounded differences, eight roundings deep at most; twice that.
@@ -124,21 +124,6 @@ def span_of(points, vertex, lowest, highest):
         if x != 0.0:
             highest = max(highest, math.frexp(x)[1])
     return lowest, highest
-
-
-@kernel
-def add_determinant(digits, u, v, w, n, minor, total):
-    """Add the determinant of three vectors of n digits a component to a number of 3 n digits and more.
-
-    minor : 2 n digits of workspace.   All are carried, the sum is not.
-    """
-    for k in range(3):
-        i, j = ((k + 1) % 3) * n, ((k + 2) % 3) * n
-        set_zero(digits, minor, 2 * n)
-        add_product(digits, minor, v + i, n, w + j, n, 1)
-        add_product(digits, minor, v + j, n, w + i, n, -1)
-        carry(digits, minor, 2 * n)
-        add_product(digits, total, u + k * n, n, minor, 2 * n, 1)
 
 
 @entry("void(int64, int64, int64, int64, int64)")

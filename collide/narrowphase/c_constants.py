@@ -13,7 +13,7 @@ from collide.mesh.build_bvh import _WORK as TREE_WORK
 from collide.mesh.bvh import INTS as TREE_INTS
 from collide.mesh.bvh import NODE, SLAB, WIDTH
 from collide.mesh.bvh import NUMBERS as TREE_NUMBERS
-from collide.mesh.mesh_topology import COUNTS, EDGES, ONE_SIDED, OPEN, SHELLS, TURNED, UNBALANCED
+from collide.mesh.mesh_topology import COUNTS
 from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.facets import collide_kernel as pairs
 from collide.narrowphase.facets import surface_collision as surfaces
@@ -23,19 +23,21 @@ from collide.narrowphase.facets.exact_triangles import INTEGERS as MESH_INTEGERS
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT
 from collide.narrowphase.pose_batches import BLOCK, HEADER
 from collide.narrowphase.rows import ROW
+from collide.numerics.number_digest import DIGEST_WORDS
 from collide.support.coarse_points import COARSE
 
 #: Doubles of a walk along meshes: of whichever takes most.
 _MESH_DOUBLES = max(module.DOUBLES + module.FLOATS for module in (surfaces, distances, inside))
 
 #: In this order: rooms of the narrowphase, layouts, rooms of hulls and of support trees; layouts and rooms of
-#: box-trees, what is found out about surfaces, rooms of questions about meshes (`native/capi_internal.h`).
+#: box-trees, what is found out about surfaces, rooms of questions about meshes and of a digest
+#: (`native/capi_internal.h`).
 _CONSTANTS = np.array([
     DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE,
     HULL_EACH, HULL_FIXED,
     NODE, SLAB, WIDTH, TREE_INTS, TREE_NUMBERS, RECORD, TREE_WORK, DEEPEST_SPLIT,
-    COUNTS, EDGES, SHELLS, OPEN | UNBALANCED | TURNED | ONE_SIDED,
-    pairs.HEADER, _MESH_DOUBLES, MESH_INTEGERS, pairs.SCRATCH,
+    COUNTS,
+    pairs.HEADER, _MESH_DOUBLES, MESH_INTEGERS, pairs.SCRATCH, DIGEST_WORDS,
 ], dtype=np.int64)
 
 

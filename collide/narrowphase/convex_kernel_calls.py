@@ -111,9 +111,10 @@ def _finish(
             requests_at=_of_thread.space.addresses[1] + 8 * REQUESTS_AT,
         )
         if not distrust_doubles:
-            shapes_and_poses = *table.addresses, address_of(poses.rows), address_of(poses.terms), address_of(shape_of)
             settle_by_other_searches(
-                rows, pairs, shapes_and_poses, _of_thread.space.addresses, boolean=boolean, depths=depths, limit=limit
+                code_of(answer_pairs), *table.addresses, address_of(poses.rows), address_of(poses.terms),
+                address_of(shape_of), address_of(pairs), len(rows), boolean, depths, limit, address_of(rows),
+                *_of_thread.space.addresses, address_of(_of_thread.space.digits),
             )
 
 

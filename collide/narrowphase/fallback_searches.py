@@ -12,8 +12,9 @@ import math
 
 import numpy as np
 
-from collide.kernels import address_of, entry, kernel, view_i64
-from collide.narrowphase.pair_kernel import answer_pairs
+from collide.kernels import entry, kernel, native_call, view_i64
+from collide.narrowphase.pair_kernel import SIGNATURE
+from collide.narrowphase.pose_batches import clear_rows
 from collide.narrowphase.rows import (
     BEYOND,
     CERTIFIED,
@@ -30,56 +31,54 @@ from collide.narrowphase.rows import (
     view_row,
 )
 from collide.numerics.vec3 import add, norm1, put_vec3, scale, sub, vec3_at
-from collide.results import PAIR_DTYPE, UNDECIDED
 
-#: (boolean, depths) of `answer_pairs`: the search for the sign, for a depth, and for a gap.
-_SIGN, _DEPTH, _GAP = (True, False), (False, True), (False, False)
+_answer_pairs_at = native_call(SIGNATURE)
+
+#: The searches of `answer_pairs`: for the sign, for a depth, and for a gap.
+_SIGN, _DEPTH, _GAP = range(3)
 
 
+@entry(
+    "void(int64, int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64,"
+    " int64)"
+)
 def settle_by_other_searches(
-    rows: np.ndarray, pairs: np.ndarray, tables: tuple[int, int, int, int, int], workspace: tuple[int, int], *,
-    boolean: bool,
-    depths: bool, limit: float,
-) -> None:
-    """Settle in place what is still open; arguments as of `run_pairs`.
+    code, ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at,
+    doubles_at, integers_at, result_at,
+):
+    """Settle in place what is still open of n rows of `answer_pairs`.
 
-    tables : addresses of the shapes' integers and numbers, the poses' rows and terms, and which shape a part is.
-    workspace : addresses of doubles and integers.
+    code : address of that.   boolean, depths : the search that has run.   result : memory of ROW bytes.
+    Other arguments as there.
     """
-    already_run = (boolean, depths and not boolean)
+    already_run = _SIGN if boolean else _DEPTH if depths else _GAP
     for search in (_SIGN, _DEPTH, _GAP):
-        open_rows = np.flatnonzero(rows["how"] == UNDECIDED)
-        n = len(open_rows)
-        if search == already_run or n == 0:
-            continue
-        results, asked = np.zeros(n, dtype=PAIR_DTYPE), np.ascontiguousarray(pairs[open_rows])
-        answer_pairs(*tables, address_of(asked), n, *search, False, limit, address_of(results), *workspace)
-        take_proven(address_of(rows), address_of(open_rows), address_of(results), n, search == _SIGN, limit)
+        for k in range(0 if search == already_run else n_pairs):
+            row = view_row(rows_at + ROW * k)
+            if is_undecided(row):
+                clear_rows(result_at, 1)
+                _answer_pairs_at(
+                    code,
+                    (
+                        ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at + 16 * k, 1, search == _SIGN,
+                        search == _DEPTH, False, limit, result_at, doubles_at, integers_at,
+                    ),
+                )
+                take_proven(rows_at + ROW * k, result_at, search == _SIGN, limit)
 
 
-@entry("int64(int64, int64, int64, int64, boolean, float64)")
-def take_proven(rows_at, open_at, results_at, n, sign, limit):
-    """Take over what another search has proven of n open rows; returns how many it has.
-
-    open : int64, the numbers of the open rows.   results : rows of `answer_pairs`.
-    sign : the search was for the sign alone.
-    """
-    open_rows = view_i64(open_at, n)
-    n_proven = 0
-    for k in range(n):
-        result_at = results_at + ROW * k
-        result = view_row(result_at)
-        if is_undecided(result):
-            continue
-        n_proven += 1
-        row_at = rows_at + ROW * open_rows[k]
-        if sign or result.flags[HIT] != 0:
-            _take_sign(view_row(row_at), result, limit)
-        else:  # a gap, with all that is known of one
-            source, target = view_i64(result_at, ROW // 8), view_i64(row_at, ROW // 8)
-            for i in range(ROW // 8):
-                target[i] = source[i]
-    return n_proven
+@kernel
+def take_proven(row_at, result_at, sign, limit):
+    """Take over what another search has proven of an open row.   sign : the search was for the sign alone."""
+    result = view_row(result_at)
+    if is_undecided(result):
+        return
+    if sign or result.flags[HIT] != 0:
+        _take_sign(view_row(row_at), result, limit)
+    else:  # a gap, with all that is known of one
+        source, target = view_i64(result_at, ROW // 8), view_i64(row_at, ROW // 8)
+        for i in range(ROW // 8):
+            target[i] = source[i]
 
 
 @kernel

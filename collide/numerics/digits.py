@@ -161,3 +161,94 @@ def negate(digits, at, n):
 def copy(digits, out, a, n):
     for k in range(n):
         digits[out + k] = digits[a + k]
+
+
+@kernel
+def add_determinant(digits, u, v, w, n, minor, total):
+    """Add the determinant of three vectors of n digits a component to a number of 3 n digits and more.
+
+    minor : 2 n digits of workspace.   All are carried, the sum is not.
+    """
+    for k in range(3):
+        i, j = ((k + 1) % 3) * n, ((k + 2) % 3) * n
+        set_zero(digits, minor, 2 * n)
+        add_product(digits, minor, v + i, n, w + j, n, 1)
+        add_product(digits, minor, v + j, n, w + i, n, -1)
+        carry(digits, minor, 2 * n)
+        add_product(digits, total, u + k * n, n, minor, 2 * n, 1)
+
+
+# --- quotients ------------------------------------------------------------------------------------
+
+#: Digits of workspace of a quotient, beside twice those of the longer number.
+QUOTIENT_WORKSPACE = 23
+
+
+@kernel
+def quotient(digits, a, na, b, nb, exponent, work):
+    """(the double nearest to (number a)·2^exponent / (number b), ties to even; whether it is exactly that).
+
+    Both numbers are carried, b is not 0.   work : twice the longer one's digits and QUOTIENT_WORKSPACE.
+    Infinite where the nearest double would be. Long division by estimates in doubles, each good to 50 bits of what
+    remains: O(na + nb) four times.
+    """
+    x, x_exponent = as_double(digits, a, na)
+    y, y_exponent = as_double(digits, b, nb)
+    if x == 0.0:
+        return 0.0, True
+    # a·2^shift / b has 59 to 61 bits: five more, at least, than a double.
+    shift = 60 - math.frexp(x)[1] - x_exponent + math.frexp(y)[1] + y_exponent
+    n = max(na, nb) + 10
+    rest, divisor, step = work, work + n, work + 2 * n
+    sign = _put_size(digits, rest, n, a, na, max(shift, 0)) * _put_size(digits, divisor, n, b, nb, max(-shift, 0))
+    y, y_exponent = as_double(digits, divisor, n)
+    q = 0
+    remaining = 1
+    for _ in range(3):  # what remains is at most 2⁶¹, then 2¹², then one divisor
+        x, x_exponent = as_double(digits, rest, n)
+        estimate = math.floor(math.ldexp(x / y, int(x_exponent - y_exponent)) + 0.5)
+        set_zero(digits, step, 3)
+        add_double(digits, step, float(estimate), 0)
+        carry(digits, step, 3)
+        add_product(digits, rest, step, 3, divisor, n - 3, -1)
+        remaining = carry(digits, rest, n)
+        q += int(estimate)
+    if remaining < 0:
+        q -= 1
+    size, is_exact = _nearest_double(q, remaining != 0, exponent - shift)
+    return sign * size, is_exact
+
+
+@kernel
+def _put_size(digits, out, n, a, na, bits):
+    """Write |number a|·2^bits in n digits, which hold it; returns the number's sign."""
+    set_zero(digits, out, n)
+    copy(digits, out, a, na)
+    sign = carry(digits, out, n)
+    if sign < 0:
+        negate(digits, out, n)
+    places, within = bits // BITS, bits % BITS
+    for k in range(n - 1, -1, -1):
+        digit = digits[out + k]
+        digits[out + k] = 0
+        if digit != 0:
+            digits[out + k + places] = digit << within
+    carry(digits, out, n)
+    return sign
+
+
+@kernel
+def _nearest_double(q, has_more, exponent):
+    """(the double nearest to q·2^exponent, or a part of 1 more for q, whether that is it); q of 58 to 62 bits."""
+    last = max(math.frexp(float(q))[1] + exponent - 53, -1074)  # exponent of the double's last bit
+    drop = last - exponent
+    if drop > 62:
+        return 0.0, False
+    rest, half = q & ((1 << drop) - 1), 1 << (drop - 1)
+    is_exact = rest == 0 and not has_more
+    q >>= drop
+    if rest > half or (rest == half and (has_more or q & 1 == 1)):
+        q += 1
+    if math.frexp(float(q))[1] + last > 1024:
+        return math.inf, False
+    return math.ldexp(float(q), int(last)), is_exact

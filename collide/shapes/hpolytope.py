@@ -11,16 +11,16 @@ import numpy as np
 from collide.base import argument_checks as checks
 from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidShape
-from collide.hull.double_description import halfspace_vertices
 from collide.shapes.shape import Shape, rows
 from collide.transforms import LARGEST
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from collide.hull import region_corners
+    from collide.hull import double_description, region_corners
     from collide.least_distance import input_rows, nearest_pair, pair_proposals
 else:  # with kernels, which those who only check certificates do not load
+    double_description = lazy_module("collide.hull.double_description")
     region_corners = lazy_module("collide.hull.region_corners")
     input_rows = lazy_module("collide.least_distance.input_rows")
     nearest_pair = lazy_module("collide.least_distance.nearest_pair")
@@ -88,7 +88,7 @@ class HPolytope(Shape):
             self._store(normals=normals, offsets=offsets, bounded=False)
             self._store(boundary_within=_boundary_within(normals, offsets))
             return
-        vertices, slop, unbounded = halfspace_vertices(normals, offsets)
+        vertices, slop, unbounded = double_description.halfspace_vertices(normals, offsets)
         if unbounded is not None:
             raise InvalidShape(
                 f"HPolytope: unbounded in direction {unbounded.tolist()}; add a half-space that ends it, or say "

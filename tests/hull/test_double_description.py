@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from fractions import Fraction
 from itertools import combinations
@@ -47,6 +48,13 @@ def random_planes(rng, kind: str) -> tuple[np.ndarray, np.ndarray]:
     if not len(normals):
         return np.eye(3)[:1], np.ones(1)
     return normals, offsets
+
+
+def float_of(value: Fraction) -> float:
+    try:
+        return float(value)  # rounds to nearest
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
 
 
 def is_way_out(direction, normals) -> bool:
@@ -99,3 +107,24 @@ def test_few_planes_are_unbounded_or_empty():
     assert len(vertices) == 0 and way_out is None
     wedge = np.array([(1.0, 1.0, 0.0), (1.0, -1.0, 0.0)])
     assert is_way_out(halfspace_vertices(wedge, np.array([1.0, 1.0]))[2], wedge)
+
+
+def test_corners_are_quotients_rounded_once():
+    """The corners of boxes are quotients of doubles: rounded to nearest, among the smallest and beyond the largest."""
+    rng = rng_of("quotients of boxes")
+    seen: Counter = Counter()
+    for _ in range(300):
+        ends = rng.normal(size=(2, 3)) * 2.0 ** rng.choice([0, 0, -600, 600], 3)
+        ends, lengths = np.sort(ends, axis=0), np.abs(rng.normal(size=3)) * 2.0 ** rng.choice([0, 0, -440, 440], 3)
+        normals = np.concatenate([np.diag(lengths), -np.diag(lengths)])
+        offsets = np.concatenate([ends[1], -ends[0]])
+        with reproducing(SOURCE, n=normals, b=offsets):
+            vertices, slop, way_out = halfspace_vertices(normals, offsets)
+            assert way_out is None and len(vertices) == 8
+            for axis in range(3):
+                true = [float_of(Fraction(float(end)) / Fraction(float(lengths[axis]))) for end in ends[:, axis]]
+                assert {*vertices[:, axis].tolist()} == {*true}
+                for x in true:
+                    seen["infinite" if np.isinf(x) else "subnormal" if abs(x) < 2.0**-1022 else "normal"] += 1
+            assert slop > 0.0
+    assert min(seen[what] for what in ("infinite", "subnormal", "normal")) >= 20, seen

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import os
 import random
+from collections import Counter
 from fractions import Fraction
 
 import numpy as np
@@ -99,3 +102,51 @@ def test_the_longest_sums_do_not_overflow():
     assert 2**59 < most < 2**63  # nothing wrapped: the largest is the middle one
     assert D.carry(digits, 2 * n, 2 * n + 2) == 1
     assert number_at(digits, 2 * n, 2 * n + 2) == 8 * (2 ** (D.BITS * n) - 1) ** 2
+
+
+def _quotient_case(rng) -> tuple[int, int, int]:
+    """(a, b, e) of a·2^e / b: any, halfway between doubles or nearly so, among the smallest, about the largest."""
+    b = rng.getrandbits(rng.randrange(1, 900)) | 1
+    kind = rng.randrange(5)
+    if kind == 0:
+        a, e = rng.getrandbits(rng.randrange(1, 900)), rng.randrange(-1200, 1100)
+    elif kind == 1:  # an odd number of 54 bits
+        a, e = (2 * (rng.getrandbits(52) | 1 << 52) + 1) * b + rng.choice((-1, 0, 0, 1)), rng.randrange(-1150, 1000)
+    elif kind == 2:
+        a, e = rng.getrandbits(rng.randrange(1, 55)) * b + rng.choice((-1, 0, 1)), rng.randrange(-1150, -1050)
+    elif kind == 3:
+        a, e = (2**54 - 1 - rng.randrange(3)) * b + rng.choice((-1, 0, 1)), 970 + rng.randrange(-2, 3)
+    else:
+        a, e = b * rng.getrandbits(60), rng.randrange(-80, 80)
+    return max(a, 0) * rng.choice((-1, 1)), b * rng.choice((-1, 1)), e
+
+
+@pytest.mark.many(3)
+@pytest.mark.parametrize("seed", range(int(os.environ.get("COLLIDE_QUOTIENTS", "3000")) // 1000))
+def test_quotients_are_those_of_fractions(seed):
+    """To nearest, ties to even, and whether nothing was rounded; digits behind the workspace stay as they are."""
+    rng = random.Random(f"quotients {seed}")
+    seen: Counter = Counter()
+    for _ in range(1000):
+        a, b, e = _quotient_case(rng)
+        na, nb = (abs(x).bit_length() // D.BITS + rng.randrange(1, 4) for x in (a, b))
+        work = na + nb
+        digits = np.full(work + 2 * max(na, nb) + D.QUOTIENT_WORKSPACE + 4, 77, dtype=np.int64)
+        put_number(digits, 0, na, a)
+        put_number(digits, na, nb, b)
+        with reproducing("a, b, e = {a}, {b}, {e}  # a·2^e / b by quotient", a=a, b=b, e=e):
+            found, is_exact = D.quotient(digits, 0, na, na, nb, e, work)
+            true = Fraction(a, b) * Fraction(2) ** e
+            try:
+                nearest = float(true)  # rounds to nearest
+            except OverflowError:
+                nearest = math.inf if true > 0 else -math.inf
+            assert found == nearest and (digits[-4:] == 77).all()
+            assert is_exact == (math.isfinite(nearest) and Fraction(nearest) == true)
+            assert number_at(digits, 0, na) == a and number_at(digits, na, nb) == b
+        above = Fraction(math.nextafter(abs(nearest), math.inf)) if abs(nearest) < 1e308 else 0
+        below = Fraction(math.nextafter(abs(nearest), 0.0)) if math.isfinite(nearest) else 0
+        seen["tie"] += 2 * abs(true) in (abs(Fraction(nearest)) + above, abs(Fraction(nearest)) + below) if above else 0
+        seen["exact"] += is_exact
+        seen["infinite" if math.isinf(nearest) else "subnormal" if abs(nearest) < 2.0**-1022 else "normal"] += 1
+    assert min(seen[what] for what in ("tie", "exact", "infinite", "subnormal", "normal")) >= 15, seen

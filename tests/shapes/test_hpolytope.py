@@ -72,6 +72,8 @@ def test_what_is_no_polytope():
         HPolytope(CUBE, np.ones(5))
     with pytest.raises(InvalidShape, match="empty"):
         HPolytope(CUBE, [1, 1, 1, -2, 1, 1])
+    with pytest.raises(InvalidShape, match="a vertex lies beyond"):  # at 1e350: beyond doubles, too
+        HPolytope(CUBE * 1e-300, np.full(6, 1e50))
 
 
 def test_flat_and_single_points_are_polytopes():

@@ -13,16 +13,83 @@ entry y_i·y_j has two, Johnson's Δ has 0, 2, 4, 6 for 1 to 4 points, the direc
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
-from collide.kernels import address_of
+from collide.kernels import address_of, code_of, entry, native_call, view_i64, view_u8
 from collide.lowering.shape_table import PoseTable, ShapeTable
-from collide.narrowphase.exact.exact_depth import exact_depth
-from collide.narrowphase.exact.opposite_halfspaces import settle_opposite_halfspaces
-from collide.narrowphase.exact.settle_halfspaces import settle_halfspaces
-from collide.narrowphase.exact.settle_hulls import settle_hulls
+from collide.narrowphase.exact import exact_depth, settle_halfspaces, settle_hulls
 from collide.narrowphase.exact.settle_regions import settle_regions
-from collide.results import EXACT, UNDECIDED
+from collide.narrowphase.rows import HOW, ROW
+from collide.results import UNDECIDED
+
+_settle_hulls_at = native_call(settle_hulls.SIGNATURE)
+_settle_halfspaces_at = native_call(settle_halfspaces.SIGNATURE)
+_exact_depth_at = native_call(exact_depth.SIGNATURE)
+#: Addresses of the three in `settle_exactly`'s list.
+_HULLS, _HALFSPACES, _DEPTH, _CODES = range(4)
+
+
+@entry(
+    "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64,"
+    " int64)"
+)
+def settle_exactly(
+    codes_at, ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at,
+    n_terms, requests_at, digits_at,
+):
+    """Settle the undecided rows of `answer_pairs`, in place; returns how many stay undecided.
+
+    What is asked, in this order, cheapest and most frequent first; a step sees what those before it have left open:
+
+    1. `settle_hulls`: two swept hulls. GJK in integers says whether they share a point; the distance of cores that are
+       apart is then known to all digits. Depths below rounding come from the facets nearest the origin that doubles
+       have named (`depth_requests.py`, `plane_depth.py`).
+    2. `settle_halfspaces`: a half-space against a swept hull, the sign of a polynomial a vertex; two half-spaces with
+       opposite normals (`opposite_halfspaces.py`). Only if 1 met such rows.
+    3. `exact_depth`: overlaps that 1 has settled without a depth, where depths are wanted and hulls are small: the
+       least extent over all planes there are (`all_planes.py`).
+
+    codes : addresses of the three.   Other arguments as of `settle_hulls`. The steps are called where they were
+    compiled, so that they are compiled once.
+    """
+    codes = view_i64(codes_at, _CODES)
+    depths = depths and not boolean
+    n_halfspaces = _settle_hulls_at(
+        codes[_HULLS],
+        (
+            ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at,
+            n_terms, requests_at, digits_at,
+        ),
+    )
+    if n_halfspaces > 0:
+        _settle_halfspaces_at(
+            codes[_HALFSPACES],
+            (
+                ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at,
+                n_terms, digits_at,
+            ),
+        )
+    if depths:
+        _exact_depth_at(
+            codes[_DEPTH],
+            (
+                ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, limit, rows_at, terms_at, n_terms,
+                digits_at,
+            ),
+        )
+    n_open = 0
+    for k in range(n_pairs):
+        n_open += 1 if view_u8(rows_at + ROW * k, ROW)[HOW] == UNDECIDED else 0
+    return n_open
+
+
+@cache
+def _codes() -> np.ndarray:
+    """What `settle_exactly` calls, once it is needed."""
+    steps = settle_hulls.settle_hulls, settle_halfspaces.settle_halfspaces, exact_depth.exact_depth
+    return np.array([code_of(step) for step in steps])
 
 
 def settle_rows(
@@ -40,17 +107,8 @@ def settle_rows(
 ) -> None:
     """Settle in place the undecided rows of pairs of posed parts.
 
-    What is asked, in this order, cheapest and most frequent first; a step sees what those before it have left open:
-
-    1. `settle_hulls`: two swept hulls. GJK in integers says whether they share a point; the distance of cores that are
-       apart is then known to all digits. Depths below rounding come from the facets nearest the origin that doubles
-       have named (`depth_requests.py`, `plane_depth.py`).
-    2. `settle_halfspaces`: a half-space against a swept hull, the sign of a polynomial a vertex. Only if 1 met such
-       rows.
-    3. `exact_depth`: overlaps that 1 has settled without a depth, where depths are wanted and hulls are small: the
-       least extent over all planes there are (`all_planes.py`). After 1, which says that they are overlaps.
-    4. `settle_opposite_halfspaces`: two half-spaces with opposite normals, in fractions.
-    5. `settle_regions`: a closed region, whose corners are rounded, against a swept hull, by its planes.
+    `settle_exactly`, then `settle_regions`: a closed region, whose corners are rounded, against a swept hull, by its
+    planes.
 
     What stays open: curved cores, other shapes whose stored numbers are rounded, and magnitudes that span more than
     1600 bits.
@@ -65,15 +123,10 @@ def settle_rows(
     """
     if not (rows["how"] == UNDECIDED).any():
         return
-    tables = *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs)
-    terms, digits_at = (address_of(poses.terms), len(poses.terms)), address_of(digits)
-    rows_at, n = address_of(rows), len(rows)
-    n_halfspaces = settle_hulls(*tables, n, boolean, depths, limit, rows_at, *terms, requests_at, digits_at)
-    if n_halfspaces:
-        settle_halfspaces(*tables, n, boolean, limit, rows_at, *terms, digits_at)
-    if depths and not boolean:
-        shallow = (rows["how"] == EXACT) & rows["hit"] & ~rows["certified"]
-        if shallow.any():
-            exact_depth(*tables, address_of(shallow), n, limit, rows_at, *terms, digits_at)
-    settle_opposite_halfspaces(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
-    settle_regions(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)
+    n_open = settle_exactly(
+        address_of(_codes()), *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs),
+        len(rows), boolean, depths, limit, address_of(rows), address_of(poses.terms), len(poses.terms), requests_at,
+        address_of(digits),
+    )
+    if n_open:
+        settle_regions(rows, np.flatnonzero(rows["how"] == UNDECIDED), pairs, table, poses, shape_of)

@@ -1,82 +1,79 @@
-"""A step of the exact stage: two half-spaces whose normals are opposite within rounding, in Python's fractions.
+"""A step of the exact stage: two half-spaces whose normals are opposite within rounding.
 
 Only exactly opposite ones can miss each other: the slightest tilt lets them meet, however far away.
-A scene has a handful of half-spaces at most, so this needs no kernel.
 """
 
 from __future__ import annotations
 
 import math
-from fractions import Fraction
-from typing import NamedTuple
 
-import numpy as np
-
-from collide.lowering.packed_convex import HALFSPACE
-from collide.lowering.shape_table import PoseTable, ShapeTable
-from collide.numerics.exact_vectors import cross, inner
+from collide.kernels import kernel
+from collide.narrowphase.exact.exact_halfspace import exact_half_space
+from collide.narrowphase.rows import (
+    CERTIFIED,
+    DISTANCE,
+    EXACT_ROUNDS,
+    HIT,
+    HOW,
+    LOWER,
+    UPPER,
+    write_vectors,
+)
+from collide.numerics.exact_numbers import (
+    are_worthless,
+    begin_numbers,
+    cross,
+    inner,
+    minor,
+    plus,
+    ratio,
+    rounded,
+    sign_of,
+)
+from collide.numerics.vec3 import Vec3, add, divide, scale
 from collide.results import EXACT
 
-_Vector = tuple[Fraction, Fraction, Fraction]
+
+@kernel
+def settle_opposite(ordered, space, row):
+    """Settle the row of an `OrderedPair` of half-spaces, in place; where their numbers have no room it is left open."""
+    pair, digits = ordered.pair, space.digits
+    begin_numbers(digits)
+    A = exact_half_space(pair, pair.A, space.terms, digits)
+    B = exact_half_space(pair, pair.B, space.terms, digits)
+    across, along = cross(digits, A.n, B.n), inner(digits, A.n, B.n)
+    is_tilted = sign_of(digits, across.x) != 0 or sign_of(digits, across.y) != 0 or sign_of(digits, across.z) != 0
+    if are_worthless(digits):
+        return
+    row.flags[HIT] = 1
+    if not is_tilted and sign_of(digits, along) < 0 and not _write_gap(A, B, along, digits, row, ordered.flip):
+        return
+    row.flags[HOW] = EXACT  # of others that meet, whose overlap has no end, the rest is as the kernel left it
+    row.flags[CERTIFIED] = 1
+    row.flags[EXACT_ROUNDS] = 1
 
 
-class _HalfSpace(NamedTuple):
-    """{x : n·x ≤ offset} in the world; p is its frame's origin."""
-
-    n: _Vector
-    offset: Fraction
-    p: _Vector
-
-
-def settle_opposite_halfspaces(
-    rows: np.ndarray,
-    undecided: np.ndarray,
-    pairs: np.ndarray,
-    table: ShapeTable,
-    poses: PoseTable,
-    shape_of: np.ndarray,
-) -> None:
-    """Settle those of the undecided rows (their numbers) that are pairs of half-spaces, in place."""
-    for k in undecided.tolist():
-        parts = [int(part) for part in pairs[k]]
-        packed = [table.packed[shape_of[part]] for part in parts]
-        if any(shape.kind != HALFSPACE for shape in packed):
-            continue
-        A, B = (_half_space(shape.params, poses.exact(part)) for shape, part in zip(packed, parts))
-        # Worked out on the same numbers whichever way the pair is asked.
-        keys = [(shape.content, poses.rows[part].tobytes()) for shape, part in zip(packed, parts)]
-        if keys[0] <= keys[1]:
-            _settle(rows[k : k + 1], A, B)
-            continue
-        _settle(rows[k : k + 1], B, A)
-        rows["normal"][k] = 0.0 - rows["normal"][k]
-        rows["point_a"][k], rows["point_b"][k] = rows["point_b"][k].copy(), rows["point_a"][k].copy()
-
-
-def _settle(row: np.ndarray, A: _HalfSpace, B: _HalfSpace) -> None:
-    row["how"], row["certified"], row["hit"], row["exact"] = EXACT, True, True, 1
-    if any(cross(A.n, B.n)) or inner(A.n, B.n) > 0:
-        return  # they meet, and the overlap has no end: as the kernel left it
-    # B.n = −c A.n: B is {x : A.n·x ≥ −b/c}, so the gap is (−b/c − a)/|A.n|.
-    square = inner(A.n, A.n)
-    c = -inner(A.n, B.n) / square
-    gap = -B.offset / c - A.offset
-    length = math.sqrt(float(square))
-    distance = float(gap) / length
-    slack = 4 * 2.0**-53 * abs(distance)
-    row["hit"] = gap <= 0
-    row["distance"], row["lower"], row["upper"] = distance, distance - slack, distance + slack
-    row["normal"] = [float(v) / length for v in A.n]
-    down = (inner(A.n, A.p) - A.offset) / square
-    row["point_a"] = [float(v - down * u) for u, v in zip(A.n, A.p)]
-    row["point_b"] = row["point_a"] + distance * row["normal"]
-
-
-def _half_space(params: np.ndarray, pose: list[Fraction]) -> _HalfSpace:
-    """The half-space {y : m·y ≤ b} at a pose: n = cof(R) m, offset = b·det R + n·p
-    (`halfspace_convex.plane_in_world`)."""
-    r0, r1, r2, p = ((pose[k], pose[k + 1], pose[k + 2]) for k in (0, 3, 6, 9))
-    cofactor = cross(r1, r2), cross(r2, r0), cross(r0, r1)
-    m = tuple(map(Fraction, params[:3].tolist()))
-    n = inner(cofactor[0], m), inner(cofactor[1], m), inner(cofactor[2], m)
-    return _HalfSpace(n, Fraction(float(params[3])) * inner(r0, cofactor[0]) + inner(n, p), p)
+@kernel
+def _write_gap(A, B, along, digits, row, flip):
+    """How far opposite half-spaces are apart; whether there was room.   along : A.n·B.n < 0."""
+    square = inner(digits, A.n, A.n)
+    # B.n = along/square A.n, so that B is {x : A.n·x ≥ B.offset·square/along}.
+    gap = minor(digits, B.offset, square, A.offset, along)  # times `along`
+    behind = plus(digits, inner(digits, A.n, A.p), A.offset, -1)
+    length = math.sqrt(rounded(digits, square))
+    distance = ratio(digits, gap, along) / length
+    nhat = divide(Vec3(rounded(digits, A.n.x), rounded(digits, A.n.y), rounded(digits, A.n.z)), length)
+    p = Vec3(
+        ratio(digits, minor(digits, A.p.x, square, behind, A.n.x), square),
+        ratio(digits, minor(digits, A.p.y, square, behind, A.n.y), square),
+        ratio(digits, minor(digits, A.p.z, square, behind, A.n.z), square),
+    )
+    if are_worthless(digits):
+        return False
+    slack = 4.0 * 2.0**-53 * abs(distance)
+    row.flags[HIT] = 1 if sign_of(digits, gap) >= 0 else 0
+    row.doubles[DISTANCE] = distance
+    row.doubles[LOWER] = distance - slack
+    row.doubles[UPPER] = distance + slack
+    write_vectors(row, nhat, p, add(p, scale(distance, nhat)), flip)
+    return True

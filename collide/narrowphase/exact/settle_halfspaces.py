@@ -1,4 +1,5 @@
-"""A step of the exact stage: rows of half-spaces against swept hulls, whose signs or last digits doubles leave open."""
+"""A step of the exact stage: rows of half-spaces against each other and against swept hulls, whose signs or last digits
+doubles leave open."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ from collide.kernels import entry, kernel, view_i64, view_u8
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.narrowphase.exact.exact_gjk import SEPARATE, TOUCHING, UNDONE
 from collide.narrowphase.exact.exact_halfspace import reach_plane_exactly
+from collide.narrowphase.exact.opposite_halfspaces import settle_opposite
 from collide.narrowphase.exact.settle_hulls import keep_proven_sign
 from collide.narrowphase.exact.settle_space import bracket_of_gap, settle_space
 from collide.narrowphase.halfspace_convex import reach_of_plane
@@ -15,18 +17,20 @@ from collide.narrowphase.posed_pair import ordered_pair
 from collide.narrowphase.rows import EXACT_ROUNDS, HIT, HOW, LOWER, ROW, UPPER, view_row, write_verdict, write_vertices
 from collide.results import EXACT, UNDECIDED
 
+#: How `settle_halfspaces` is called.
+SIGNATURE = "void(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64)"
 
-@entry("int64(int64, int64, int64, int64, int64, int64, boolean, float64, int64, int64, int64, int64)")
+
+@entry(SIGNATURE)
 def settle_halfspaces(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms, digits_at
 ):
-    """Settle the undecided rows of half-spaces against hulls, in place; returns how many.
+    """Settle the undecided rows of half-spaces, in place.
 
     Arguments as in `settle_hulls`, and flat as there.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     space = settle_space(terms_at, n_terms, digits_at)
-    n_settled = 0
     for k in range(n_pairs):
         row_at = rows_at + ROW * k
         if view_u8(row_at, ROW)[HOW] != UNDECIDED:
@@ -34,20 +38,21 @@ def settle_halfspaces(
         ordered = ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * k], pairs[2 * k + 1])
         pair = ordered.pair
         if ordered.exact_numbers and pair.A.kind == HALFSPACE and pair.B.kind == POINTS:
-            n_settled += 1 if _settle(ordered, space, row_at, boolean, limit) else 0
-    return n_settled
+            _settle(ordered, space, row_at, boolean, limit)
+        elif ordered.exact_numbers and pair.A.kind == HALFSPACE and pair.B.kind == HALFSPACE:
+            settle_opposite(ordered, space, view_row(row_at))
 
 
 @kernel(inline=True)
 def _settle(ordered, space, row_at, boolean, limit):
-    """Settle a row; whether integers could."""
+    """Settle a row of a half-space and a swept hull."""
     row = view_row(row_at)
     pair = ordered.pair
     _, skew = reach_of_plane(pair, pair.A)
     contact = reach_plane_exactly(ordered, space.terms, space.digits, skew)
     if contact.verdict == UNDONE:
         keep_proven_sign(row)
-        return False
+        return
     bracket = bracket_of_gap(contact.excess)
     upper = min(row.doubles[UPPER], bracket.upper)
     if contact.verdict == TOUCHING:
@@ -61,4 +66,3 @@ def _settle(ordered, space, row_at, boolean, limit):
     space.simplex[1] = contact.vertex
     write_vertices(row, space.simplex, 1, ordered.flip)
     row.flags[EXACT_ROUNDS] = 1
-    return True

@@ -57,12 +57,12 @@ def settle_hulls(
         if view_u8(row_at, ROW)[HOW] != UNDECIDED:
             continue
         ordered = ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * k], pairs[2 * k + 1])
-        if not ordered.exact_numbers or ordered.pair.B.kind != POINTS:
+        if not ordered.exact_numbers:
             continue
-        if ordered.pair.A.kind == POINTS:
-            _settle(ordered, space, requests, k, row_at, boolean, depths, limit)
-        elif ordered.pair.A.kind == HALFSPACE:
+        if ordered.pair.A.kind == HALFSPACE:
             n_halfspaces += 1
+        elif ordered.pair.A.kind == POINTS and ordered.pair.B.kind == POINTS:
+            _settle(ordered, space, requests, k, row_at, boolean, depths, limit)
     return n_halfspaces
 
 

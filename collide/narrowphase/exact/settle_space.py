@@ -8,13 +8,11 @@ from collide.kernels import kernel, view_f64, view_i64
 from collide.lowering.shape_table import TERM_ROW
 from collide.narrowphase.bounds import EXACT_ERROR, SMALLEST_NORMAL, SUBNORMAL
 from collide.narrowphase.exact.all_planes import DOUBLES as PLANES_DOUBLES
-from collide.narrowphase.exact.exact_halfspace import INTEGERS as HALFSPACE_DIGITS
-from collide.narrowphase.exact.exact_workspace import INTEGERS as HULL_DIGITS
+from collide.narrowphase.exact.exact_workspace import INTEGERS as _DIGITS
 from collide.numerics import double_double as dd
 from collide.numerics.error_free import two_sum
 
-#: Digits; integers for vertex pairs of a simplex and of a facet follow them, and doubles for `all_planes.py`.
-_DIGITS = max(HULL_DIGITS, HALFSPACE_DIGITS)
+#: Behind the digits: integers for vertex pairs of a simplex and of a facet, and doubles for `all_planes.py`.
 _SIMPLEX, _FACET = 16, 8
 WORKSPACE = _DIGITS + _SIMPLEX + _FACET + PLANES_DOUBLES
 

@@ -68,3 +68,26 @@ def test_gaps_of_parallel_planes():
             assert not same_bits(swapped.rows[0], r.rows[0], ("distance", "lower", "upper", "hit"))
             assert (swapped.normal == -r.normal).all() and (swapped.point_a == r.point_b).all()
     assert all(seen[what] >= 8 for what in ("apart", "in one plane", "meeting", "askew")), seen
+
+
+def test_numbers_of_all_sizes():
+    """Offsets, shifts and normals of 10⁻³⁰⁰ to 10⁴⁹: the bracket holds the gap, but for the smallest doubles."""
+    rng = rng_of("opposite halfspaces of all sizes")
+    seen: Counter = Counter()
+    for _ in range(60):
+        sizes = [*10.0 ** rng.choice([0, -300, -160, 20, 49], 2), *10.0 ** rng.choice([0, -30, 20, 49], 2)]
+        n = np.array([0.0, float(rng.uniform(1e-5, 1e5)), float(rng.normal()) * 10.0 ** rng.choice([0, -280])])
+        offsets = (rng.normal(size=2) * sizes[:2]).tolist()
+        A, B = collide.Halfspace(n, offsets[0]), collide.Halfspace(-n, offsets[1])
+        X_WA, X_WB = (pose(LATTICE_ROTATIONS[0], rng.normal(size=3) * size) for size in sizes[2:])
+        case = Case(A, B, X_WA, X_WB)
+        with reproducible(case):
+            (n_A, a), (n_B, b) = plane(A, X_WA), plane(B, X_WB)
+            gap, square = b * inner(n_A, n_A) / inner(n_A, n_B) - a, inner(n_A, n_A)
+            r = collide.distance(*case)
+            assert r.how == EXACT and r.certified and r.hit == (gap <= 0) == collide.collide(*case)
+            low, high = Fraction(r.lower), Fraction(r.upper)
+            tiny = Fraction(5e-324) ** 2 * square * 16
+            assert low * abs(low) * square - tiny <= gap * abs(gap) <= high * abs(high) * square + tiny
+            seen["apart" if gap > 0 else "meeting"] += 1
+    assert min(seen["apart"], seen["meeting"]) >= 10, seen
