@@ -47,7 +47,7 @@ def settle_by_other_searches(
     workspace : addresses of doubles and integers.
     """
     already_run = (boolean, depths and not boolean)
-    for search in (_SIGN, _DEPTH, _GAP):
+    for search in (_SIGN, _DEPTH, _GAP):  # `single_call.py` keeps this order
         open_rows = np.flatnonzero(rows["how"] == UNDECIDED)
         n = len(open_rows)
         if search == already_run or n == 0:
@@ -67,19 +67,24 @@ def take_proven(rows_at, open_at, results_at, n, sign, limit):
     open_rows = view_i64(open_at, n)
     n_proven = 0
     for k in range(n):
-        result_at = results_at + ROW * k
-        result = view_row(result_at)
-        if is_undecided(result):
-            continue
-        n_proven += 1
-        row_at = rows_at + ROW * open_rows[k]
-        if sign or result.flags[HIT] != 0:
-            _take_sign(view_row(row_at), result, limit)
-        else:  # a gap, with all that is known of one
-            source, target = view_i64(result_at, ROW // 8), view_i64(row_at, ROW // 8)
-            for i in range(ROW // 8):
-                target[i] = source[i]
+        if take_proven_row(rows_at + ROW * open_rows[k], results_at + ROW * k, sign, limit):
+            n_proven += 1
     return n_proven
+
+
+@kernel
+def take_proven_row(row_at, result_at, sign, limit):
+    """The same of one row; false where the search has proven nothing."""
+    result = view_row(result_at)
+    if is_undecided(result):
+        return False
+    if sign or result.flags[HIT] != 0:
+        _take_sign(view_row(row_at), result, limit)
+    else:  # a gap, with all that is known of one
+        source, target = view_i64(result_at, ROW // 8), view_i64(row_at, ROW // 8)
+        for i in range(ROW // 8):
+            target[i] = source[i]
+    return True
 
 
 @kernel
