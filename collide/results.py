@@ -123,8 +123,6 @@ PAIR_DTYPE = np.dtype(
 
 #: Names of the fields of a row.
 FIELDS: tuple[str, ...] = PAIR_DTYPE.names or ()
-#: The memory of a single result: its row, then the poses of A and of B.
-SINGLE_BYTES = PAIR_DTYPE.itemsize + 2 * 16 * 8
 #: How a number of a row is read from memory, and where it begins; and what vectors are of, how long, and where.
 _NUMBERS: dict[str, tuple[Callable, int]] = {}
 _VECTORS: dict[str, tuple[np.dtype, int, int]] = {}
@@ -169,7 +167,7 @@ class PairResult(Generic[Form]):
     """
 
     # A result of a single call has `_single` alone, (A, B, memory, certify), until another of these is asked for:
-    # arrays take longer to set up than two boxes' distance to find.
+    # arrays take longer to set up than two boxes' distance. Memory holds its row, then the poses of A and of B.
     __slots__ = ("_certify", "_single", "is_single", "question", "rows")
 
     if TYPE_CHECKING:

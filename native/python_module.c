@@ -332,23 +332,25 @@ static PyObject *ask_distance(PyObject *self, PyObject *const *given, Py_ssize_t
     const struct query *query = &queries[1];
     struct options read;
     PyObject *single, *memory, *answer;
+    void *X_WA, *X_WB;
     int found;
-    if (n == 4 && read_options(query, names, given + n, &read) && (read.option == Py_True || read.option == Py_False)) {
+    if (n == 4 && (X_WA = matrix_of(given[2])) != NULL && (X_WB = matrix_of(given[3])) != NULL &&
+        read_options(query, names, given + n, &read) && (read.option == Py_True || read.option == Py_False)) {
         if ((found = single_of(given[0], given[1], DISTANCE, &single)) < 0) return NULL;
         if (found && single != Py_None) {
             memory = PyByteArray_FromStringAndSize(NULL, sizeof(struct single_pair));
             if (memory == NULL) answer = NULL;
             else {
                 PyObject *arguments[5] = {given[2], given[3], memory, read.option, read.length};
-                memset(PyByteArray_AsString(memory), 0, sizeof(collide_pair));
+                struct single_pair *pair = (struct single_pair *)(void *)PyByteArray_AsString(memory);
+                memset(&pair->row, 0, sizeof pair->row);
+                memcpy(pair->X_WA, X_WA, sizeof pair->X_WA);
+                memcpy(pair->X_WB, X_WB, sizeof pair->X_WB);
                 answer = answer_of_single(Py_NewRef(single), arguments, 5);
             }
             Py_DECREF(single);
             if (answer == Py_True || answer == Py_False) {
-                struct single_pair *pair = (struct single_pair *)(void *)PyByteArray_AsString(memory);
                 Py_DECREF(answer);
-                memcpy(pair->X_WA, matrix_of(given[2]), sizeof pair->X_WA);
-                memcpy(pair->X_WB, matrix_of(given[3]), sizeof pair->X_WB);
                 answer = result_of(query, PyTuple_Pack(4, given[0], given[1], memory, query->certify));
                 Py_DECREF(memory);
                 return answer;

@@ -15,9 +15,9 @@ from functools import partial, wraps
 from typing import Any, TypeVar
 
 from collide.base import argument_checks as checks
-from collide.kernels.prepared import query_of_c
+from collide.kernels.prepared import is_matrix, query_of_c
 from collide.narrowphase.prepared_pairs import prepared_pair
-from collide.results import SINGLE_BYTES, PairResult
+from collide.results import PAIR_DTYPE, PairResult
 from collide.transforms import LARGEST, SMALLEST
 
 Function = TypeVar("Function", bound=Callable)
@@ -100,10 +100,11 @@ def _distance(certify, A, B, X_WA, X_WB, *, max_distance=math.inf, signed=True, 
     pair, limit = prepared_pair(A, B), _length("distance", max_distance)
     if pair is None or limit is None or pair.distance is None or signed.__class__ is not bool:
         return None
-    memory = bytearray(SINGLE_BYTES)
+    if not (is_matrix(X_WA) and is_matrix(X_WB)):
+        return None
+    memory = bytearray(PAIR_DTYPE.itemsize) + X_WA.tobytes() + X_WB.tobytes()
     if pair.distance(X_WA, X_WB, memory, signed, limit) is None:
         return None
-    memory[-2 * X_WA.nbytes :] = X_WA.tobytes() + X_WB.tobytes()
     single: Any = PairResult.__new__(PairResult)
     single._single = A, B, memory, certify
     return single
