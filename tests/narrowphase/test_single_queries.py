@@ -59,7 +59,7 @@ def test_signatures_and_pages_of_help(ask, options):
     assert {p.name: p.default for p in parameters if p.kind is p.KEYWORD_ONLY} == options
     assert inspect.isroutine(ask) and pickle.loads(pickle.dumps(ask)) is ask and callable(ask)
     text = pydoc.plain(pydoc.render_doc(ask))
-    assert f"{ask.__name__}(A, B, X_WA, X_WB, *, " in text and "InvalidPose" in text
+    assert f"{ask.__name__}(A" in text and "X_WB" in text and "InvalidPose" in text
     assert ask.__module__ in ("collide.pairs.query", "collide.contact.contact_query")
     assert inspect.getdoc(ask).splitlines()[0].endswith((".", "margin."))
 
