@@ -39,6 +39,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import IntEnum
+from struct import Struct
 from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 
 import numpy as np
@@ -122,6 +123,14 @@ PAIR_DTYPE = np.dtype(
 
 #: Names of the fields of a row.
 FIELDS: tuple[str, ...] = PAIR_DTYPE.names or ()
+#: How a number of a row is read from memory, and where it begins; and what vectors are of, how long, and where.
+_NUMBERS: dict[str, tuple[Callable, int]] = {}
+_VECTORS: dict[str, tuple[np.dtype, int, int]] = {}
+for _name, (_dtype, _at, *_) in (PAIR_DTYPE.fields or {}).items():
+    if _dtype.shape:
+        _VECTORS[_name] = _dtype.base, _dtype.shape[0], _at
+    else:
+        _NUMBERS[_name] = Struct("=" + _dtype.char).unpack_from, _at
 
 
 def flipped(rows: np.ndarray) -> np.ndarray:
@@ -157,7 +166,9 @@ class PairResult(Generic[Form]):
     certify : what makes certificates of it, `collide.certify`.
     """
 
-    __slots__ = ("_certify", "is_single", "question", "rows")
+    # A result of a single call has `_single` alone, (A, B, memory, certify), until another of these is asked for:
+    # arrays take longer to set up than two boxes' distance. Memory holds its row, then the poses of A and of B.
+    __slots__ = ("_certify", "_single", "is_single", "question", "rows")
 
     if TYPE_CHECKING:
         distance: Field[float, Floats]
@@ -183,6 +194,9 @@ class PairResult(Generic[Form]):
     def __init__(self, rows: np.ndarray, is_single: bool, question: Question, certify: Callable):
         self.rows, self.is_single, self.question, self._certify = rows, is_single, question, certify
 
+    def __reduce__(self):
+        return type(self), (self.rows, self.is_single, self.question, self._certify)
+
     @property
     def certificate(self):
         """Plain data as proof of the boolean, worked out on request: `collide.certify`.
@@ -206,14 +220,23 @@ class PairResult(Generic[Form]):
     if not TYPE_CHECKING:  # checkers are to know the fields above, and no others
 
         def __getattr__(self, name: str):
-            if name not in FIELDS:
-                raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
-            values = self.rows[name]
-            if not self.is_single:
-                return values
-            if name == "how":
-                return How(values[0])
-            return only_value(values)
+            if name == "_single":
+                return None
+            single = self._single
+            if name in FIELDS:
+                values = self.rows[name] if single is None else None
+                if single is None and not self.is_single:
+                    return values
+                value = only_value(values) if single is None else _read(single[2], name)
+                return How(value) if name == "how" else value
+            if single is not None and name in PairResult.__slots__:
+                self._open(*single)
+                return getattr(self, name)
+            raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
+
+        def _open(self, A, B, memory: bytearray, certify: Callable) -> None:
+            poses = np.frombuffer(memory, np.float64, 32, PAIR_DTYPE.itemsize).reshape(2, 1, 4, 4)
+            self.__init__(np.frombuffer(memory, PAIR_DTYPE, 1), True, (A, B, *poses), certify)
 
     def __dir__(self):
         return [*super().__dir__(), *FIELDS]
@@ -234,6 +257,14 @@ class PairResult(Generic[Form]):
 def zeroed_rows(n: int, dtype: np.dtype) -> np.ndarray:
     """n records of zeros: for single calls, where `np.zeros` takes half a microsecond to set up a dtype of fields."""
     return np.frombuffer(bytearray(n * dtype.itemsize), dtype)
+
+
+def _read(memory: bytearray, field: str):
+    """A field of the row that memory begins with: a number of Python's, or a vector of its own."""
+    if field in _NUMBERS:
+        unpack, at = _NUMBERS[field]
+        return unpack(memory, at)[0]
+    return np.frombuffer(memory, *_VECTORS[field]).copy()
 
 
 def only_value(column: np.ndarray):

@@ -1,4 +1,4 @@
-/* Contacts of two convex sets: as `SingleContacts` of collide/contact/convex_contacts.py, and its long way. */
+/* Contacts of two convex sets: as `contacts_single` of collide/contact/single_contact_call.py, and its long way. */
 #include "capi_contacts.h"
 
 #include <stdlib.h>
@@ -76,16 +76,14 @@ static collide_status contacts_by_rows(collide_workspace *space, struct manifold
 collide_status contacts_of_pair(collide_workspace *space, struct manifold_space *manifold, const double *X_WA, const double *X_WB,
                                 double margin, int64_t max_contacts, unsigned flags, collide_contact *rows, int64_t *n)
 {
-    int64_t *header = manifold->header + HEADER;
     collide_status status = COLLIDE_OK;
     rounding given = round_as_kernels_do();
-    *n = 0;
-    header[F_MAX_CONTACTS] = max_contacts;
-    if (space->kernels->contacts_single(address_of(manifold->header), address_of(X_WA), address_of(X_WB), address_of(rows), 0,
-                                        margin) < 0)
+    *n = space->kernels->contacts_single(address_of(manifold->header), address_of(X_WA), address_of(X_WB), address_of(rows),
+                                         max_contacts, margin);
+    if (*n < 0) {
+        *n = 0;
         status = contacts_by_rows(space, manifold, X_WA, X_WB, margin, max_contacts, flags, rows, n);
-    else
-        *n = header[F_ROWS_DONE];
+    }
     round_as_before(given);
     return status;
 }

@@ -1,5 +1,5 @@
-/* Two bodies of facets at a pair of poses: `SinglePair` of collide/narrowphase/facets/facet_kernel_calls.py. What kernels leave to Python is
-   said to be unsupported. */
+/* Two bodies of facets at a pair of poses: `prepared_facets` of collide/narrowphase/facets/facet_kernel_calls.py. What kernels leave to
+   Python is said to be unsupported. */
 #include "capi_mesh.h"
 
 #include <string.h>

@@ -13,6 +13,14 @@ _TO_PYTHON = {
     "float64": "PyFloat_FromDouble(said)",
     "boolean": "PyBool_FromLong(said)",
 }
+_ADDRESSES = ("int64",) * 3
+#: Macros of python_module.c for the kernels of single calls, by what they take (collide/kernels/prepared.py).
+_SINGLES = {
+    _ADDRESSES: "SINGLE_BOOLEAN",
+    (*_ADDRESSES, "float64"): "SINGLE_WITHIN",
+    (*_ADDRESSES, "int64", "boolean", "float64"): "SINGLE_ROW",
+    (*_ADDRESSES, "int64", "int64", "float64"): "SINGLE_CONTACTS",
+}
 
 
 def _parsed(signature: str) -> tuple[str, list[str]]:
@@ -65,9 +73,8 @@ def python_functions(entries) -> str:
         lines.append(f"    Py_BEGIN_ALLOW_THREADS {call} Py_END_ALLOW_THREADS" if nogil else f"    {call}")
         lines += ["    Py_RETURN_NONE;" if result == "void" else f"    return {_TO_PYTHON[result]};", "}"]
         text += lines
-    singles = [(name, len(_parsed(signature)[1])) for name, signature, nogil in entries if not nogil]
-    macros = {3: "SINGLE_BOOLEAN", 6: "SINGLE_ROW"}  # collide/kernels/prepared.py
-    text.append("#define SINGLES " + " ".join(f"{macros[count]}({name})" for name, count in singles))
+    singles = [(name, _SINGLES[tuple(_parsed(signature)[1])]) for name, signature, nogil in entries if not nogil]
+    text.append("#define SINGLES " + " ".join(f"{macro}({name})" for name, macro in singles))
     text.append("#define SINGLE_METHODS " + " ".join(f"SINGLE_METHOD({name})" for name, _ in singles))
     text.append("#define ENTRIES \\")
     text += [

@@ -18,6 +18,7 @@
 #include <dlfcn.h>
 #endif
 
+#include "collide.h"
 #include "kernels.h"
 #include "kernels_of_level.h"
 
@@ -83,24 +84,56 @@ static PyObject *answer_of(int64_t result)
         return answer_of(kernels->name(HEADER(self), (int64_t)(intptr_t)A, (int64_t)(intptr_t)B));                       \
     }
 
-#define SINGLE_ROW(name)                                                                                                 \
-    static PyObject *single_##name(PyObject *self, PyObject *const *given, Py_ssize_t n)                                 \
-    {                                                                                                                    \
-        void *A, *B, *out;                                                                                               \
-        double limit;                                                                                                    \
-        uint8_t flag;                                                                                                    \
-        if (n != 5) return wrong_count(#name, 5, n);                                                                     \
-        A = matrix_of(given[0]);                                                                                         \
-        B = matrix_of(given[1]);                                                                                         \
-        if (A == NULL || B == NULL) Py_RETURN_NONE;                                                                      \
-        if (!PyArray_Check(given[2]) || !PyArray_ISCARRAY((PyArrayObject *)given[2])) {                                  \
-            PyErr_SetString(PyExc_TypeError, #name ": the answer goes into a contiguous array that can be written");     \
-            return NULL;                                                                                                 \
-        }                                                                                                                \
-        out = PyArray_DATA((PyArrayObject *)given[2]);                                                                   \
-        if (truth_of(given[3], &flag) < 0 || double_of(given[4], &limit) < 0) return NULL;                               \
-        return answer_of(                                                                                                \
-            kernels->name(HEADER(self), (int64_t)(intptr_t)A, (int64_t)(intptr_t)B, (int64_t)(intptr_t)out, flag, limit)); \
+#define SINGLE_WITHIN(name)                                                                                             \
+    static PyObject *single_##name(PyObject *self, PyObject *const *given, Py_ssize_t n)                                \
+    {                                                                                                                   \
+        void *A, *B;                                                                                                    \
+        double length;                                                                                                  \
+        if (n != 3) return wrong_count(#name, 3, n);                                                                    \
+        A = matrix_of(given[0]);                                                                                        \
+        B = matrix_of(given[1]);                                                                                        \
+        if (A == NULL || B == NULL) Py_RETURN_NONE;                                                                     \
+        if (double_of(given[2], &length) < 0) return NULL;                                                              \
+        return answer_of(kernels->name(HEADER(self), (int64_t)(intptr_t)A, (int64_t)(intptr_t)B, length));              \
+    }
+
+#define SINGLE_ROW(name)                                                                                                \
+    static PyObject *single_##name(PyObject *self, PyObject *const *given, Py_ssize_t n)                                \
+    {                                                                                                                   \
+        void *A, *B;                                                                                                    \
+        double limit;                                                                                                   \
+        uint8_t flag;                                                                                                   \
+        if (n != 5) return wrong_count(#name, 5, n);                                                                    \
+        A = matrix_of(given[0]);                                                                                        \
+        B = matrix_of(given[1]);                                                                                        \
+        if (A == NULL || B == NULL) Py_RETURN_NONE;                                                                     \
+        if (!PyByteArray_CheckExact(given[2]) || PyByteArray_Size(given[2]) < (Py_ssize_t)sizeof(collide_pair)) {       \
+            PyErr_SetString(PyExc_TypeError, #name ": the answer goes into a bytearray with space for a row");          \
+            return NULL;                                                                                                \
+        }                                                                                                               \
+        if (truth_of(given[3], &flag) < 0 || double_of(given[4], &limit) < 0) return NULL;                              \
+        return answer_of(kernels->name(HEADER(self), (int64_t)(intptr_t)A, (int64_t)(intptr_t)B,                        \
+                                       (int64_t)(intptr_t)PyByteArray_AsString(given[2]), flag, limit));                \
+    }
+
+/* self : the array of a header, and that of rows to write into. */
+#define SINGLE_CONTACTS(name)                                                                                           \
+    static PyObject *single_##name(PyObject *self, PyObject *const *given, Py_ssize_t n)                                \
+    {                                                                                                                   \
+        PyArrayObject *rows = (PyArrayObject *)PyTuple_GetItem(self, 1);                                                \
+        void *A, *B;                                                                                                    \
+        double margin;                                                                                                  \
+        int64_t most, found;                                                                                            \
+        if (n != 4) return wrong_count(#name, 4, n);                                                                    \
+        A = matrix_of(given[0]);                                                                                        \
+        B = matrix_of(given[1]);                                                                                        \
+        if (A == NULL || B == NULL) Py_RETURN_NONE;                                                                     \
+        if (integer_of(given[2], &most) < 0 || double_of(given[3], &margin) < 0) return NULL;                           \
+        memset(PyArray_DATA(rows), 0, (size_t)((most < PyArray_SIZE(rows) ? most : PyArray_SIZE(rows)) * PyArray_ITEMSIZE(rows)));\
+        found = kernels->name(HEADER(PyTuple_GetItem(self, 0)), (int64_t)(intptr_t)A, (int64_t)(intptr_t)B,             \
+                              (int64_t)(intptr_t)PyArray_DATA(rows), most, margin);                                     \
+        if (found < 0) Py_RETURN_NONE;                                                                                  \
+        return PyBytes_FromStringAndSize(PyArray_DATA(rows), (Py_ssize_t)found * PyArray_ITEMSIZE(rows));               \
     }
 
 SINGLES
@@ -108,21 +141,306 @@ SINGLES
 #define SINGLE_METHOD(name) {#name, (PyCFunction)(void (*)(void))single_##name, METH_FASTCALL, NULL},
 static PyMethodDef single_methods[] = {SINGLE_METHODS{NULL, NULL, 0, NULL}};
 
-/* prepared(name, header): the function of a single call with its header, held as long as the function lives. */
+static int is_written_array(PyObject *given) { return PyArray_Check(given) && PyArray_ISCARRAY((PyArrayObject *)given); }
+
+/* prepared(name, header[, rows]): the function of a single call with its header, and of contacts the rows that the kernel writes,
+   held as long as the function lives. */
 static PyObject *prepared(PyObject *module, PyObject *arguments)
 {
     const char *name;
-    PyObject *header;
+    PyObject *header, *rows = NULL, *self, *made = NULL;
     PyMethodDef *method;
-    if (!PyArg_ParseTuple(arguments, "sO:prepared", &name, &header)) return NULL;
-    if (!PyArray_Check(header) || PyArray_TYPE((PyArrayObject *)header) != NPY_INT64 || !PyArray_ISCARRAY((PyArrayObject *)header)) {
-        PyErr_SetString(PyExc_TypeError, "prepared: the header must be a contiguous array of int64");
+    if (!PyArg_ParseTuple(arguments, "sO|O:prepared", &name, &header, &rows)) return NULL;
+    if (!is_written_array(header) || PyArray_TYPE((PyArrayObject *)header) != NPY_INT64 || (rows != NULL && !is_written_array(rows))) {
+        PyErr_SetString(PyExc_TypeError, "prepared: the header must be a contiguous array of int64, and rows one that can be written");
         return NULL;
     }
-    for (method = single_methods; method->ml_name != NULL; method++)
-        if (strcmp(method->ml_name, name) == 0) return PyCFunction_New(method, header);
-    PyErr_Format(PyExc_ValueError, "prepared: %s is no kernel of single calls", name);
-    return NULL;
+    for (method = single_methods; method->ml_name != NULL && strcmp(method->ml_name, name) != 0; method++) {}
+    if (method->ml_name == NULL) {
+        PyErr_Format(PyExc_ValueError, "prepared: %s is no kernel of single calls", name);
+        return NULL;
+    }
+    if ((self = rows == NULL ? Py_NewRef(header) : PyTuple_Pack(2, header, rows)) == NULL) return NULL;
+    made = PyCFunction_New(method, self);
+    Py_DECREF(self);
+    return made;
+}
+
+/* --- queries of two shapes at one pair of poses --------------------------------------------------------------------- */
+
+enum word {
+    PREPARED, SERIAL, SINGLE, COLLIDE, WITHIN, DISTANCE, CONTACTS, CHECK_POSES, THREADS, AXES, ALGORITHM, SECURITY_MARGIN, MAX_DISTANCE,
+    MARGIN, SIGNED, MAX_CONTACTS, WORDS
+};
+static const char *const spelled[WORDS] = {
+    "_prepared", "_serial", "_single", "collide", "within", "distance", "contacts", "check_poses", "threads", "axes", "algorithm",
+    "security_margin", "max_distance", "margin", "signed", "max_contacts",
+};
+/* The same, interned, as names of attributes and arguments are, the last one NULL; and the one number of threads. */
+static PyObject *words[WORDS + 1], *one = NULL;
+
+/* A public function of Python's. It asks the pair that is ready for single calls (collide/narrowphase/prepared_pairs.py), and leaves to
+   the function as Python has it what the pair does not answer, and whatever else is asked: collide/narrowphase/single_queries.py tells. */
+struct query {
+    PyMethodDef method;
+    enum word length, option;   /* its own arguments: a length, and one that is none (WORDS where there is no such) */
+    enum word none[2];          /* arguments that may be None */
+    double least, most;         /* of the length, unless it is 0 [m] */
+    PyObject *function, *result, *certify;
+    PyObject *usual_length, *usual_option;
+};
+
+/* What is read of a call's named arguments; each borrowed, or NULL. */
+struct options { PyObject *length, *option; };
+
+/* 1 where the arguments are those of a single call; 0 where Python has to look at them. Names are compared by identity: others of the
+   same spelling are for Python, too. */
+static int read_options(const struct query *query, PyObject *names, PyObject *const *values, struct options *read)
+{
+    Py_ssize_t k, n = names == NULL ? 0 : PyTuple_Size(names);
+    double length;
+    read->length = query->usual_length;
+    read->option = query->usual_option;
+    for (k = 0; k < n; k++) {
+        PyObject *name = PyTuple_GetItem(names, k), *value = values[k];
+        if (name == words[query->length]) read->length = value;
+        else if (name == words[query->option]) read->option = value;
+        else if (name == words[CHECK_POSES] ? value != Py_True && value != Py_False
+                 : name == words[THREADS]   ? value != one
+                 : name == words[query->none[0]] || name == words[query->none[1]] ? value != Py_None
+                                                                                   : 1)
+            return 0;
+    }
+    if (read->length == query->usual_length) return 1;
+    if (!PyFloat_Check(read->length) && !PyLong_CheckExact(read->length)) return 0;
+    length = PyFloat_AsDouble(read->length);
+    if (length == -1.0 && PyErr_Occurred() != NULL) PyErr_Clear(); /* too large: Python says so */
+    return length == 0.0 || (length >= query->least && length <= query->most);
+}
+
+/* (1, the attribute, a new reference), (0, NULL) where there is none, (-1, NULL) with an exception. */
+static int attribute_of(PyObject *owner, enum word name, PyObject **found)
+{
+    if ((*found = PyObject_GetAttr(owner, words[name])) != NULL) return 1;
+    if (!PyErr_ExceptionMatches(PyExc_AttributeError)) return -1;
+    PyErr_Clear();
+    return 0;
+}
+
+/* How the pair made ready of A and B answers a question, as `attribute_of` says; the attribute itself has to be there. */
+static int single_of(PyObject *A, PyObject *B, enum word question, PyObject **single)
+{
+    PyObject *pairs, *serial, *pair;
+    int found;
+    *single = NULL;
+    if ((found = attribute_of(A, PREPARED, &pairs)) <= 0) return found;
+    if ((found = attribute_of(B, SERIAL, &serial)) > 0) {
+        pair = PyDict_CheckExact(pairs) ? PyDict_GetItemWithError(pairs, serial) : NULL;
+        Py_DECREF(serial);
+        if (pair == NULL) found = PyErr_Occurred() == NULL ? 0 : -1;
+        else {
+            Py_INCREF(pair);
+            found = (*single = PyObject_GetAttr(pair, words[question])) == NULL ? -1 : 1;
+            Py_DECREF(pair);
+        }
+    }
+    Py_DECREF(pairs);
+    return found;
+}
+
+static PyObject *tuple_of(PyObject *const *items, Py_ssize_t n)
+{
+    PyObject *tuple = PyTuple_New(n);
+    Py_ssize_t k;
+    for (k = 0; tuple != NULL && k < n; k++) PyTuple_SetItem(tuple, k, Py_NewRef(items[k]));
+    return tuple;
+}
+
+/* What a single function says; None where there is no such function. Takes over the reference to it. */
+static PyObject *answer_of_single(PyObject *single, PyObject *const *arguments, Py_ssize_t n)
+{
+    PyObject *answer, *tuple;
+    if (single == Py_None) return single;
+    if (PyCFunction_CheckExact(single) && PyCFunction_GetFlags(single) == METH_FASTCALL) {
+        typedef PyObject *(*fast)(PyObject *, PyObject *const *, Py_ssize_t);
+        answer = ((fast)(void (*)(void))PyCFunction_GetFunction(single))(PyCFunction_GetSelf(single), arguments, n);
+    } else {
+        answer = (tuple = tuple_of(arguments, n)) == NULL ? NULL : PyObject_Call(single, tuple, NULL);
+        Py_XDECREF(tuple);
+    }
+    Py_DECREF(single);
+    return answer;
+}
+
+/* The answer of the function of Python, for the same arguments. */
+static PyObject *long_way(const struct query *query, PyObject *const *given, Py_ssize_t n, PyObject *names)
+{
+    PyObject *arguments = tuple_of(given, n), *named = names == NULL ? NULL : PyDict_New(), *answer = NULL;
+    Py_ssize_t k, n_named = names == NULL ? 0 : PyTuple_Size(names);
+    int ready = arguments != NULL && (names == NULL || named != NULL);
+    for (k = 0; ready && k < n_named; k++) ready = PyDict_SetItem(named, PyTuple_GetItem(names, k), given[n + k]) == 0;
+    if (ready) answer = PyObject_Call(query->function, arguments, named);
+    Py_XDECREF(arguments);
+    Py_XDECREF(named);
+    return answer;
+}
+
+/* A result that is opened when its fields are asked for (`_single` of collide/results.py and contact_rows.py). Takes over the
+   reference to what it is opened from. */
+static PyObject *result_of(const struct query *query, PyObject *single)
+{
+    PyObject *result = single == NULL ? NULL : PyType_GenericAlloc((PyTypeObject *)query->result, 0);
+    if (result != NULL && PyObject_SetAttr(result, words[SINGLE], single) < 0) Py_CLEAR(result);
+    Py_XDECREF(single);
+    return result;
+}
+
+static PyObject *ask_collide(PyObject *, PyObject *const *, Py_ssize_t, PyObject *);
+static PyObject *ask_distance(PyObject *, PyObject *const *, Py_ssize_t, PyObject *);
+static PyObject *ask_contacts(PyObject *, PyObject *const *, Py_ssize_t, PyObject *);
+
+#define ASKS(name) {#name, (PyCFunction)(void (*)(void))ask_##name, METH_FASTCALL | METH_KEYWORDS, NULL}
+static struct query queries[] = {
+    {.method = ASKS(collide), .length = SECURITY_MARGIN, .option = WORDS, .none = {AXES, ALGORITHM}},
+    {.method = ASKS(distance), .length = MAX_DISTANCE, .option = SIGNED, .none = {ALGORITHM, ALGORITHM}},
+    {.method = ASKS(contacts), .length = MARGIN, .option = MAX_CONTACTS, .none = {WORDS, WORDS}},
+};
+
+static PyObject *ask_collide(PyObject *self, PyObject *const *given, Py_ssize_t n, PyObject *names)
+{
+    const struct query *query = &queries[0];
+    struct options read;
+    PyObject *single, *answer;
+    int found;
+    if (n == 4 && read_options(query, names, given + n, &read)) {
+        int is_touch = read.length == query->usual_length || PyFloat_AsDouble(read.length) == 0.0;
+        PyObject *arguments[3] = {given[2], given[3], read.length};
+        if ((found = single_of(given[0], given[1], is_touch ? COLLIDE : WITHIN, &single)) < 0) return NULL;
+        if (found) {
+            if ((answer = answer_of_single(single, arguments, is_touch ? 2 : 3)) != Py_None) return answer;
+            Py_DECREF(answer);
+        }
+    }
+    return long_way(query, given, n, names);
+}
+
+/* The memory of a single distance: its row, and the poses as they were. */
+struct single_pair { collide_pair row; double X_WA[16], X_WB[16]; };
+
+static PyObject *ask_distance(PyObject *self, PyObject *const *given, Py_ssize_t n, PyObject *names)
+{
+    const struct query *query = &queries[1];
+    struct options read;
+    PyObject *single, *memory, *answer;
+    void *X_WA, *X_WB;
+    int found;
+    if (n == 4 && (X_WA = matrix_of(given[2])) != NULL && (X_WB = matrix_of(given[3])) != NULL &&
+        read_options(query, names, given + n, &read) && (read.option == Py_True || read.option == Py_False)) {
+        if ((found = single_of(given[0], given[1], DISTANCE, &single)) < 0) return NULL;
+        if (found && single != Py_None) {
+            memory = PyByteArray_FromStringAndSize(NULL, sizeof(struct single_pair));
+            if (memory == NULL) answer = NULL;
+            else {
+                PyObject *arguments[5] = {given[2], given[3], memory, read.option, read.length};
+                struct single_pair *pair = (struct single_pair *)(void *)PyByteArray_AsString(memory);
+                memset(&pair->row, 0, sizeof pair->row);
+                memcpy(pair->X_WA, X_WA, sizeof pair->X_WA);
+                memcpy(pair->X_WB, X_WB, sizeof pair->X_WB);
+                answer = answer_of_single(Py_NewRef(single), arguments, 5);
+            }
+            Py_DECREF(single);
+            if (answer == Py_True || answer == Py_False) {
+                Py_DECREF(answer);
+                answer = result_of(query, PyTuple_Pack(4, given[0], given[1], memory, query->certify));
+                Py_DECREF(memory);
+                return answer;
+            }
+            Py_XDECREF(memory);
+            if (answer == NULL) return NULL;
+            Py_DECREF(answer);
+        } else Py_XDECREF(single);
+    }
+    return long_way(query, given, n, names);
+}
+
+/* More contacts than a patch can have, and a number that kernels take. */
+#define ALL_CONTACTS 0x7fffffff
+
+static PyObject *ask_contacts(PyObject *self, PyObject *const *given, Py_ssize_t n, PyObject *names)
+{
+    const struct query *query = &queries[2];
+    struct options read;
+    PyObject *single, *answer;
+    int found;
+    if (n == 4 && read_options(query, names, given + n, &read) && PyLong_CheckExact(read.option)) {
+        long long most = PyLong_AsLongLong(read.option);
+        PyObject *arguments[4] = {given[2], given[3], read.option, read.length};
+        if (most == -1 && PyErr_Occurred() != NULL) PyErr_Clear();
+        if (most < 1 || most > ALL_CONTACTS) return long_way(query, given, n, names);
+        if ((found = single_of(given[0], given[1], CONTACTS, &single)) < 0) return NULL;
+        if (found) {
+            if ((answer = answer_of_single(single, arguments, 4)) == NULL) return NULL;
+            if (answer != Py_None) return result_of(query, answer);
+            Py_DECREF(answer);
+        }
+    }
+    return long_way(query, given, n, names);
+}
+
+static int keep(PyObject **place, PyObject *object)
+{
+    Py_XINCREF(object);
+    Py_XDECREF(*place);
+    *place = object;
+    return 1;
+}
+
+static int spell_words(void)
+{
+    int k;
+    for (k = 0; k < WORDS; k++)
+        if (words[k] == NULL && (words[k] = PyUnicode_InternFromString(spelled[k])) == NULL) return 0;
+    return one != NULL || (one = PyLong_FromLong(1)) != NULL;
+}
+
+/* query(function, doc, (least, most), (usual length, usual option), result, certify): the function of the same name as one of C's. The
+   doc begins with a line that `inspect.signature` reads. */
+static PyObject *query_of(PyObject *module, PyObject *arguments)
+{
+    PyObject *function, *name, *module_name, *usual_length, *usual_option, *result, *certify, *made = NULL;
+    const char *doc;
+    char *kept;
+    double least, most;
+    size_t k;
+    if (!PyArg_ParseTuple(arguments, "Os(dd)(OO)OO:query", &function, &doc, &least, &most, &usual_length, &usual_option, &result, &certify))
+        return NULL;
+    if (!spell_words()) return NULL;
+    name = PyObject_GetAttrString(function, "__name__");
+    module_name = PyObject_GetAttrString(function, "__module__");
+    for (k = 0; name != NULL && module_name != NULL && k < sizeof queries / sizeof *queries; k++) {
+        struct query *query = &queries[k];
+        if (PyUnicode_CompareWithASCIIString(name, query->method.ml_name) != 0) continue;
+        if ((kept = PyMem_Malloc(strlen(doc) + 1)) == NULL) {
+            PyErr_NoMemory();
+            break;
+        }
+        strcpy(kept, doc);
+        PyMem_Free((void *)query->method.ml_doc); /* of the same module, loaded once more */
+        query->method.ml_doc = kept;
+        query->least = least;
+        query->most = most;
+        keep(&query->function, function);
+        keep(&query->result, result);
+        keep(&query->certify, certify);
+        keep(&query->usual_length, usual_length);
+        keep(&query->usual_option, usual_option);
+        made = PyCFunction_NewEx(&query->method, NULL, module_name); /* without a self it pickles by its name */
+        break;
+    }
+    if (made == NULL && PyErr_Occurred() == NULL) PyErr_SetString(PyExc_ValueError, "query: collide, distance or contacts");
+    Py_XDECREF(name);
+    Py_XDECREF(module_name);
+    return made;
 }
 
 /* --- functions of Python that are builtins ------------------------------------------------------------------------- */
@@ -236,6 +554,7 @@ static PyMethodDef methods[] = {
     ENTRIES
     {"load", load, METH_VARARGS, NULL},
     {"prepared", prepared, METH_VARARGS, NULL},
+    {"query", query_of, METH_VARARGS, NULL},
     {"address_of", address_of, METH_O, NULL},
     {"code_of", code_of, METH_O, NULL},
     {"builtin_of", builtin_of, METH_VARARGS, NULL},

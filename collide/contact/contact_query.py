@@ -13,21 +13,19 @@ from collide.contact.contact_batches import contact_batch
 from collide.contact.contact_rows import Contacts
 from collide.contact.convex_contacts import prepare_contacts
 from collide.errors import InvalidArgument
+from collide.narrowphase.single_queries import ALL_CONTACTS, asks_prepared_pairs
 from collide.pairs.batches import length_of
 from collide.pairs.pair_arguments import asked_poses
 from collide.shapes.shape import Shape
+from collide.transforms import LARGEST
 
 if TYPE_CHECKING:
     from collide.transforms import PoseLike
 
     Shapes = Shape | Sequence[Shape]
 
-#: Margins beyond this are no margins, and would overflow squared.
-_LARGEST_MARGIN = 1e50
-#: More contacts than a patch can have, and a number that kernels take.
-_ALL_CONTACTS = 2**31 - 1
 
-
+@asks_prepared_pairs(Contacts)
 def contacts(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, margin: float = 0.0, max_contacts: int = 8,
     check_poses: bool = True, threads: int = 1,
@@ -81,34 +79,28 @@ def contacts(
     that overlap, within 2.5 times the depth, some microseconds a pair: n·m at worst, refused beyond 2¹⁸ pairs. A patch
     whose rim rises steeply is reduced once for each ring of points on its walls.
     """
-    if margin.__class__ is not float or not 0.0 <= margin <= _LARGEST_MARGIN:
-        margin = check_margin("contacts", margin)
-    if max_contacts.__class__ is not int or not 1 <= max_contacts <= _ALL_CONTACTS:
-        max_contacts = check_max_contacts("contacts", max_contacts)
-    if threads.__class__ is not int or threads != 1:
-        threads = check_threads(threads)
-    try:
-        rows = A._contacts[B._serial].contacts(X_WA, X_WB, margin, max_contacts)  # type: ignore[union-attr]
-        if rows is not None:
-            return Contacts(rows)
-    except (AttributeError, KeyError, TypeError):
-        pass  # not prepared, or no pair of shapes: the long way answers, or says what is wrong
-    X_WA, X_WB, _ = asked_poses(A, B, X_WA, X_WB)
+    margin = check_margin("contacts", margin)
+    max_contacts = check_max_contacts("contacts", max_contacts)
+    threads = check_threads(threads)
+    X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     n = length_of(A, B, X_WA, X_WB)
     check = checks.true_or_false("check_poses", check_poses)
+    if prepare_contacts(A, B) and single:
+        return contacts(
+            A, B, X_WA[0], X_WB[0], margin=margin, max_contacts=max_contacts, check_poses=check, threads=threads
+        )
     rows, ends = contact_batch(A, B, X_WA, X_WB, n, margin, max_contacts, check=check, threads=threads)
-    prepare_contacts(A, B)
     return Contacts(rows, np.concatenate([[0], ends]).astype(np.int64))
 
 
 def check_margin(name: str, value) -> float:
     """A margin [m]."""
     number = checks.number(value)
-    if number is None or not 0.0 <= number <= _LARGEST_MARGIN:
+    if number is None or not 0.0 <= number <= LARGEST:
         raise InvalidArgument(f"{name}: margin must be finite and ≥ 0 [m], got {checks.brief(value)}")
     return number
 
 
 def check_max_contacts(name: str, value) -> int:
     """How many contacts a patch may have; a number that no patch reaches stands for all of them."""
-    return min(checks.integer(f"{name}: max_contacts", value, 1), _ALL_CONTACTS)
+    return min(checks.integer(f"{name}: max_contacts", value, 1), ALL_CONTACTS)

@@ -128,7 +128,8 @@ class Contacts:
     ``len(starts) − 1``. Iterating gives the rows.
     """
 
-    __slots__ = ("_starts", "rows")
+    # Contacts of a single call have `_single` alone, the bytes of their rows, until they are asked for.
+    __slots__ = ("_single", "_starts", "rows")
 
     if TYPE_CHECKING:
         distance: Floats
@@ -153,6 +154,9 @@ class Contacts:
         if starts is not None:
             starts.setflags(write=False)
 
+    def __reduce__(self):
+        return type(self), (self.rows, self._starts)
+
     @property
     def starts(self) -> np.ndarray:
         """(N + 1,) int64: the contacts of pair k are ``rows[starts[k]:starts[k + 1]]``."""
@@ -164,9 +168,14 @@ class Contacts:
     if not TYPE_CHECKING:  # checkers are to know the fields above, and no others
 
         def __getattr__(self, name: str):
-            if name not in FIELDS:
-                raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
-            return self.rows[name]
+            if name == "_single":
+                return None
+            if name in FIELDS:
+                return self.rows[name]
+            if name in Contacts.__slots__ and self._single is not None:
+                self.__init__(np.frombuffer(self._single, CONTACT_DTYPE))
+                return getattr(self, name)
+            raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
 
     def __dir__(self):
         return [*super().__dir__(), *FIELDS]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from threading import local
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,24 +37,21 @@ from collide.contact.single_contact_call import SINGLE_HEADER, contacts_single
 from collide.contact.support_face import ROUND
 from collide.errors import InvalidPose, UnsupportedQuery
 from collide.kernels import address_of
-from collide.kernels.prepared import prepared_row
+from collide.kernels.prepared import prepared_contacts
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.parts import is_single_convex
 from collide.lowering.shape_table import POSE, ShapeTable
 from collide.narrowphase.composite.single_composite_call import BALLS_WORK, balls_beyond
 from collide.narrowphase.convex_batches import prepare_sets, shape_table
-from collide.narrowphase.convex_kernel_calls import SinglePair, block_workspace
+from collide.narrowphase.convex_kernel_calls import block_workspace, space_of_single_calls
 from collide.narrowphase.pose_batches import BLOCK
 from collide.narrowphase.pose_batches import HEADER as HEADER_OF_POSES
-from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
-from collide.results import zeroed_rows
+from collide.narrowphase.prepared_pairs import Prepared, Single, keep_prepared, prepared_pair, single_calls_are_safe
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_poses
 
-#: Where a shape keeps what single calls of `contacts` ask.
-_SLOT = "_contacts"
 #: The least that a thread is handed.
 _PIECE = 512
 #: Contacts a pair that there is room for at first, and of so many pairs: how many they have tells about the others.
@@ -210,63 +207,43 @@ def _addresses(
     )
 
 
-def prepare_contacts(A, B) -> None:
-    """Have two convex sets prepared for single calls, of their distance as of their contacts; of two bodies of which
-    one is a union, those calls at which they are far apart."""
-    if not (isinstance(A, Shape) and isinstance(B, Shape)) or prepared_pair(A, B, _SLOT) is not None:
-        return
+def prepare_contacts(A, B) -> bool:
+    """Make two convex sets ready for single calls of `contacts`, and of `distance` with them; two bodies of which one
+    is a union, for those calls at which they are far apart. Whether this has been done now."""
+    if not (isinstance(A, Shape) and isinstance(B, Shape) and single_calls_are_safe()):
+        return False
     pair = prepared_pair(A, B)
-    if pair is None and is_single_convex(A) and is_single_convex(B) and single_calls_are_safe():
-        pair = prepare_sets(A, B)
+    if pair is not None and pair.contacts is not None:
+        return False
+    is_convex = is_single_convex(A) and is_single_convex(B)
+    if not is_convex and not (isinstance(A, Compound) or isinstance(B, Compound)):
+        return False
+    if pair is None:
+        pair = prepare_sets(A, B) if is_convex else Prepared()
         keep_prepared(A, B, pair)
-    if isinstance(pair, SinglePair):
-        keep_prepared(A, B, SingleContacts(pair), _SLOT)
-    elif (isinstance(A, Compound) or isinstance(B, Compound)) and single_calls_are_safe():
-        keep_prepared(A, B, FarContacts(A, B), _SLOT)
+    pair.contacts, held = _single_contacts(pair.table) if is_convex else _single_far_contacts(A, B)
+    pair.held = pair.held, held
+    return prepared_pair(A, B) is pair
 
 
-class FarContacts:
-    """Two bodies prepared for `contacts` of one pair of poses at a time: those that are far apart have none."""
-
-    def __init__(self, A: Shape, B: Shape):
-        self._work, self._no_row = np.zeros(BALLS_WORK), np.zeros(1, dtype=CONTACT_DTYPE)
-        self._balls = layout_of(A).ball, layout_of(B).ball
-        addresses = [address_of(of) for of in (*self._balls, self._work)]
-        self._ask = prepared_row(balls_beyond, np.array(addresses, dtype=np.int64))
-
-    def contacts(self, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
-        """No rows; None where bodies may be within the margin, or an error is called for."""
-        return None if self._ask(X_WA, X_WB, self._no_row, False, margin) is None else no_rows()
+def _single_far_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
+    """(`Prepared.contacts` of bodies of which those that are far apart have none, what it uses)."""
+    held = layout_of(A).ball, layout_of(B).ball, np.zeros(BALLS_WORK)
+    header = np.array([address_of(of) for of in held], dtype=np.int64)
+    return prepared_contacts(balls_beyond, header, no_rows()), held
 
 
-class SingleContacts:
-    """Two convex sets prepared for `contacts` of one pair of poses at a time.
-
-    ask : a built-in function of two poses, rows and a flag; None where it leaves the answer to the long way.
-    """
-
-    def __init__(self, pair: SinglePair):
-        table, header = pair.table, pair.header
-        self._held = table, pair.space  # kernels use their buffers; the pair itself holds this
-        self._faces = face_table_of(table, ROUND)
-        self._space = _Workspace()
-        self._space.fit(self._faces.largest)
-        self.max_rows = max_corners(self._faces.largest)
-        self._header = np.zeros(SINGLE_HEADER, dtype=np.int64)
-        self._header[: len(header)] = header
-        self._of_manifold = self._header[len(header) :]
-        self._of_manifold[:PAIRS_DONE] = _addresses(
-            table, self._faces, self._space, self._space.poses, self._space.shape_of
-        )
-        self._ask = prepared_row(contacts_single, self._header)
-
-    def contacts(self, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
-        """Rows; None where more than doubles, or an error, is called for."""
-        rows = zeroed_rows(min(max_contacts, self.max_rows), CONTACT_DTYPE)
-        self._of_manifold[MAX_CONTACTS] = max_contacts
-        if self._ask(X_WA, X_WB, rows, False, margin) is None:
-            return None
-        return rows[: self._of_manifold[ROWS_DONE]]
+def _single_contacts(table: ShapeTable) -> tuple[Single, Any]:
+    """(`Prepared.contacts` of rows 0 and 1 of a table, what it uses besides)."""
+    block, faces, space = space_of_single_calls(), face_table_of(table, ROUND), _Workspace()
+    space.fit(faces.largest)
+    header = np.zeros(SINGLE_HEADER, dtype=np.int64)
+    header[:HEADER_OF_POSES] = block.header_of(table)
+    header[HEADER_OF_POSES : HEADER_OF_POSES + PAIRS_DONE] = _addresses(
+        table, faces, space, space.poses, space.shape_of
+    )
+    rows = np.zeros(max_corners(faces.largest), dtype=CONTACT_DTYPE)
+    return prepared_contacts(contacts_single, header, rows), (block, faces, space)
 
 
 class _Workspace:

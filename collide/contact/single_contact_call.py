@@ -7,9 +7,7 @@ from collide.contact.closed_form_rows import has_closed_form, put_closed_form
 from collide.contact.convex_manifolds import HEADER as MANIFOLD_HEADER
 from collide.contact.convex_manifolds import (
     INTS_AT,
-    MAX_CONTACTS,
     NUMBERS_AT,
-    ROWS_DONE,
     contacts_of_row,
 )
 from collide.contact.posed_box import has_box_row
@@ -33,17 +31,18 @@ from collide.narrowphase.pose_batches import NUMBERS_AT as BLOCK_NUMBERS_AT
 from collide.narrowphase.pose_batches import POSES_AT as BLOCK_POSES_AT
 from collide.narrowphase.posed_pair import ordered_pair
 from collide.narrowphase.rows import LOWER, is_undecided_or_refused, view_row
+from collide.narrowphase.single_call import settle_row
 
 #: Integers of the header: that of `pose_batches.py`, then that of `convex_manifolds.py`.
 SINGLE_HEADER = HEADER + MANIFOLD_HEADER
 
 
-@entry(prepared.ROW, nogil=False)
-def contacts_single(header_at, XA_at, XB_at, out_at, _unused, margin):
-    """The contacts of one pair of poses; 0, or −1 where the caller has to ask as of a batch.
+@entry(prepared.CONTACTS, nogil=False)
+def contacts_single(header_at, XA_at, XB_at, out_at, max_contacts, margin):
+    """The contacts of one pair of poses; how many, or −1 where the caller has to ask as of a batch.
 
-    header : of SINGLE_HEADER integers; how many contacts there are is left at its ROWS_DONE.
-    out : `CONTACT_DTYPE`, zeroed, room for as many rows as a manifold may have. All threads share the workspace: the
+    header : of SINGLE_HEADER integers.
+    out : `CONTACT_DTYPE`, zeroed, space for as many rows as a manifold may have. All threads share the workspace: the
     kernel keeps Python's lock.
     """
     manifold_at = header_at + 8 * HEADER
@@ -65,12 +64,12 @@ def contacts_single(header_at, XA_at, XB_at, out_at, _unused, margin):
     if not is_known:
         clear_rows(rows_at, 1)
         answer_block(block.header, 1, False, True, margin, rows_at)
-        # A half-space within another has no depth that ends.
-        if is_undecided_or_refused(row) or not row.doubles[LOWER] > -1e300:
+        if is_undecided_or_refused(row) and not settle_row(block.header, False, True, margin, rows_at):
             return -1
-    header[ROWS_DONE] = contacts_of_row(manifold_at, X_WA, X_WB, row, margin, header[MAX_CONTACTS], out_at)
-    return 0
-
+        # A half-space within another has no depth that ends.
+        if not row.doubles[LOWER] > -1e300:
+            return -1
+    return contacts_of_row(manifold_at, X_WA, X_WB, row, margin, max_contacts, out_at)
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Kernels of single calls, bound to what they were prepared for: nothing is left to do in Python but the call.
 
 Two poses come as numpy arrays; what is no C-contiguous (4, 4) array of float64 is left to the long way, which says what
-is wrong with it, or converts it.
+is wrong with it, or converts it. Functions return None for that, and for what takes more than the kernel.
 """
 
 from __future__ import annotations
@@ -13,10 +13,13 @@ import numpy as np
 from collide.kernels import address_of
 from collide.kernels.mode import COMPILED, MODE
 
-#: Signatures: addresses of the header and of two matrices; of rows, where they go, a flag of the kernel's own, and how
-#: far apart bodies may be for it to matter [m]. They return −1 where the answer is left to the long way.
+#: Signatures: addresses of the header and of two matrices; of rows where they go, and a flag of the kernel's own, of
+#: contacts how many a patch may have; how far apart bodies may be for it to matter [m]. They return −1 where the answer
+#: is left to the long way.
 BOOLEAN = "int64(int64, int64, int64)"
+WITHIN = "int64(int64, int64, int64, float64)"
 ROW = "int64(int64, int64, int64, int64, boolean, float64)"
+CONTACTS = "int64(int64, int64, int64, int64, int64, float64)"
 
 if MODE == COMPILED:
     from collide.kernels.library import glue
@@ -28,31 +31,72 @@ if MODE == COMPILED:
         """
         return glue.prepared(entry.__name__, header)
 
-    def prepared_row(entry, header: np.ndarray) -> Callable:
-        """A function of two poses, an array for the answer, a flag and a limit: the kernel's boolean, or None."""
+    def prepared_within(entry, header: np.ndarray) -> Callable:
+        """A function of two poses and a length [m], of the signature `WITHIN`: as `prepared_boolean`."""
         return glue.prepared(entry.__name__, header)
+
+    def prepared_row(entry, header: np.ndarray) -> Callable:
+        """A function of two poses, a bytearray that begins with zeros for a row, a flag and a limit [m], of the
+        signature `ROW`: the kernel's boolean, or None."""
+        return glue.prepared(entry.__name__, header)
+
+    def prepared_contacts(entry, header: np.ndarray, rows: np.ndarray) -> Callable:
+        """A function of two poses, the most contacts of a patch and a margin [m], of the signature `CONTACTS`: the
+        contacts' bytes, or None.
+
+        rows : what the kernel writes into, space for as many as there can be; held as the header is.
+        """
+        return glue.prepared(entry.__name__, header, rows)
+
+    #: ``query_of_c(function, doc, (min_length, max_length), (usual length, usual option), result, certify)``: a public
+    #: function of single calls as one of C's; None where there is no library (`narrowphase/single_queries.py`).
+    query_of_c: Callable | None = glue.query
 else:
+    query_of_c = None
 
     def prepared_boolean(entry, header: np.ndarray) -> Callable:
         def asked(X_WA, X_WB):
-            if not (_is_matrix(X_WA) and _is_matrix(X_WB)):
+            if not (is_matrix(X_WA) and is_matrix(X_WB)):
                 return None
-            status = entry(address_of(header), address_of(X_WA), address_of(X_WB))
-            return None if status < 0 else bool(status)
+            return _truth_of(entry(address_of(header), address_of(X_WA), address_of(X_WB)))
+
+        return asked
+
+    def prepared_within(entry, header: np.ndarray) -> Callable:
+        def asked(X_WA, X_WB, length):
+            if not (is_matrix(X_WA) and is_matrix(X_WB)):
+                return None
+            return _truth_of(entry(address_of(header), address_of(X_WA), address_of(X_WB), length))
 
         return asked
 
     def prepared_row(entry, header: np.ndarray) -> Callable:
-        def asked(X_WA, X_WB, out, flag, limit):
-            if not (_is_matrix(X_WA) and _is_matrix(X_WB)):
+        def asked(X_WA, X_WB, memory, flag, limit):
+            if not (is_matrix(X_WA) and is_matrix(X_WB)):
                 return None
-            status = entry(address_of(header), address_of(X_WA), address_of(X_WB), address_of(out), flag, limit)
-            return None if status < 0 else bool(status)
+            row_at = address_of(np.frombuffer(memory, np.uint8))
+            return _truth_of(entry(address_of(header), address_of(X_WA), address_of(X_WB), row_at, flag, limit))
+
+        return asked
+
+    def prepared_contacts(entry, header: np.ndarray, rows: np.ndarray) -> Callable:
+        def asked(X_WA, X_WB, max_contacts, margin):
+            if not (is_matrix(X_WA) and is_matrix(X_WB)):
+                return None
+            out = np.zeros_like(rows)
+            at = address_of(header), address_of(X_WA), address_of(X_WB), address_of(out)
+            n = entry(*at, max_contacts, margin)
+            return None if n < 0 else out[:n].tobytes()
 
         return asked
 
 
-def _is_matrix(X) -> bool:
+def _truth_of(status: int) -> bool | None:
+    return None if status < 0 else bool(status)
+
+
+def is_matrix(X) -> bool:
+    """Whether it is a pose as kernels read it; its numbers are not looked at."""
     if type(X) is not np.ndarray or X.dtype != np.float64 or X.shape != (4, 4):
         return False
     return X.flags.c_contiguous and X.flags.aligned

@@ -17,8 +17,8 @@ from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_kernel_calls
-from collide.narrowphase.composite.composite import CompoundPair, answer_compound_batch
-from collide.narrowphase.prepared_pairs import prepared_pair
+from collide.narrowphase.composite.composite import answer_compound_batch, prepared_compounds
+from collide.narrowphase.prepared_pairs import Prepared, prepared_pair
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked
@@ -80,7 +80,9 @@ def shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
     if isinstance(A, Picked):
         return tables_of(A.shape_set).convex, np.stack([A.rows, B.rows], axis=1)
     pair = prepared_pair(A, B)
-    return (pair.table if pair else ShapeTable([convex_set_of(A), convex_set_of(B)])), None
+    if pair is not None and pair.table is not None:
+        return pair.table, None
+    return ShapeTable([convex_set_of(A), convex_set_of(B)]), None
 
 
 def answer_parts(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
@@ -100,16 +102,16 @@ def _answer_compounds(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray,
     )
 
 
-def prepare_sets(A: Shape, B: Shape) -> convex_kernel_calls.SinglePair:
+def prepare_sets(A: Shape, B: Shape) -> Prepared:
     """Two convex sets in their own frames made ready for single calls."""
-    return convex_kernel_calls.SinglePair(ShapeTable([convex_set_of(A), convex_set_of(B)]))
+    return convex_kernel_calls.prepared_sets(ShapeTable([convex_set_of(A), convex_set_of(B)]))
 
 
-def prepare_parts(A: Shape, B: Shape) -> convex_kernel_calls.SinglePair | CompoundPair:
+def prepare_parts(A: Shape, B: Shape) -> Prepared:
     """Two bodies of convex parts made ready for single calls."""
     if is_single_convex(A) and is_single_convex(B):
         return prepare_sets(A, B)
-    return CompoundPair(layout_of(A), layout_of(B))
+    return prepared_compounds(layout_of(A), layout_of(B))
 
 
 def _are_single(shapes) -> bool:
@@ -123,8 +125,8 @@ def _compound_table(A, B) -> tuple[CompoundTable, np.ndarray | None]:
     """(table, bodies of it pose by pose); None for bodies 0 and 1 throughout."""
     if isinstance(A, Picked):
         return tables_of(A.shape_set).compounds, np.stack([A.rows, B.rows], axis=1)
-    prepared = prepared_pair(A, B)
-    if isinstance(prepared, CompoundPair):
-        return prepared.compounds, None
+    pair = prepared_pair(A, B)
+    if pair is not None and isinstance(pair.table, CompoundTable):  # two sets may be asked as compounds, too
+        return pair.table, None
     return CompoundTable([layout_of(A), layout_of(B)]), None
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of, code_of
-from collide.kernels.prepared import prepared_boolean, prepared_row
+from collide.kernels.prepared import prepared_boolean, prepared_row, prepared_within
 from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
 from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
 from collide.narrowphase.exact.exact_stage import settle_rows
@@ -19,6 +19,7 @@ from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finish_rows import finish_rows
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.pose_batches import ANSWERED, BAD_POSE, BLOCK, HEADER, POSES_AT, SETTLE, answer_poses
+from collide.narrowphase.prepared_pairs import Prepared
 from collide.narrowphase.single_call import collide_single, distance_single, within_single
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED, zeroed_rows
 from collide.transforms import SMALLEST
@@ -239,28 +240,12 @@ def space_of_single_calls() -> BlockWorkspace:
     return BlockWorkspace()
 
 
-#: Where a row would go.
-_NO_ROW = np.zeros(1)
-
-
-class SinglePair:
-    """Two convex sets prepared for one call at a time: nothing is left to do in Python but the call.
-
-    collide : a built-in function of two poses; None where it leaves the answer to the long way.
-    """
-
-    def __init__(self, table: ShapeTable):
-        table.build_trees(np.arange(2))
-        self.table, self.space = table, space_of_single_calls()  # held, since kernels use their buffers
-        header = self.header = self.space.header_of(table)
-        self.collide, self._distance = prepared_boolean(collide_single, header), prepared_row(distance_single, header)
-        self._within = prepared_row(within_single, header)
-
-    def distance(self, X_WA, X_WB, depths: bool, limit: float) -> np.ndarray | None:
-        """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
-        rows = zeroed_rows(1, PAIR_DTYPE)
-        return None if self._distance(X_WA, X_WB, rows, depths, limit) is None else rows
-
-    def within(self, X_WA, X_WB, margin: float) -> bool | None:
-        """Whether the bodies are at most so far apart [m]; None as there, and where the bracket does not say."""
-        return self._within(X_WA, X_WB, _NO_ROW, False, margin)
+def prepared_sets(table: ShapeTable) -> Prepared:
+    """Two convex sets ready for one call at a time: rows 0 and 1 of a table."""
+    table.build_trees(np.arange(2))
+    space = space_of_single_calls()
+    header = space.header_of(table)
+    return Prepared(
+        collide=prepared_boolean(collide_single, header), within=prepared_within(within_single, header),
+        distance=prepared_row(distance_single, header), table=table, held=space,
+    )

@@ -16,14 +16,42 @@ from typing import Any
 from collide.kernels import PLAIN_PYTHON
 from collide.shapes.shape import Shape
 
+#: Answers of a question about two poses (4, 4), or None where it is left to the long way.
+Single = Callable[..., Any]
+
 #: Numbers of shapes within this process, never used again.
 _serials = itertools.count()
 #: A shape keeps this many partners.
 _MAX_PARTNERS = 512
 
 
+class Prepared:
+    """Two shapes made ready for single calls: a function for each question, None where it is not ready.
+
+    Functions take poses X_WA, X_WB, C-contiguous (4, 4) float64, and return None where the answer is left to the long
+    way: of other arrays, of matrices that are no poses, and where it takes more than one call of a kernel.
+
+    collide(X_WA, X_WB) : whether the bodies meet.
+    within(X_WA, X_WB, margin) : whether they are at most so far apart [m].
+    distance(X_WA, X_WB, memory, depths, limit) : any bool; ``memory``, a bytearray that begins with zeros, then begins
+        with the pair's row of `PAIR_DTYPE`; depths and limit [m] as of `convex_batches.Question`.
+    contacts(X_WA, X_WB, max_contacts, margin) : bytes of the rows of `CONTACT_DTYPE`.
+    table : what batches of the pair read: a `ShapeTable` or a `CompoundTable`, or None.
+    held : what else kernels use.
+    """
+
+    __slots__ = ("__weakref__", "collide", "contacts", "distance", "held", "table", "within")
+
+    def __init__(
+        self, *, collide: Single | None = None, within: Single | None = None, distance: Single | None = None,
+        contacts: Single | None = None, table: Any = None, held: Any = None,
+    ):
+        self.collide, self.within, self.distance, self.contacts = collide, within, distance, contacts
+        self.table, self.held = table, held
+
+
 def prepared_pair(A: Shape, B: Shape, slot: str = "_prepared") -> Any:
-    """The pair, or None where it has not been prepared. `query.collide` reads the same two attributes by itself.
+    """The pair, or None where it has not been prepared. `native/python_module.c` reads the same two attributes.
 
     slot : of A, for what it was prepared.
     """

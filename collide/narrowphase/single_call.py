@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64
-from collide.lowering.shape_table import POSE
+from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.shape_table import INTS, KIND, POSE
 from collide.narrowphase.exact.settle_hulls import SIGNATURE
+from collide.narrowphase.fallback_searches import take_proven
 from collide.narrowphase.finish_rows import forget_depth
 from collide.narrowphase.pair_workspace import REQUESTS_AT
 from collide.narrowphase.pose_batches import (
@@ -33,12 +35,13 @@ from collide.narrowphase.rows import (
     HIT,
     HOW,
     LOWER,
+    ROW,
     UPPER,
     is_undecided,
     is_undecided_or_refused,
     view_row,
 )
-from collide.results import EXACT
+from collide.results import EXACT, REFUSED
 
 _settle_hulls_at = native_call(SIGNATURE)
 
@@ -48,8 +51,6 @@ def _answer(header_at, XA_at, XB_at, boolean, depths, limit, row_at):
     """One pair at one pair of poses: 0 apart, 1 hit, −1 where it takes more than this, or an error has to be raised.
 
     header : of `pose_batches.py`.   limit : of gaps beyond it no more is said than that [m].
-    What doubles leave open of two hulls, boxes that touch for example, is settled here, as `exact_stage.settle_rows`
-    does first; a depth that takes more than that is left to the long way.
     """
     block = block_of(header_at)
     good_a = set_pose(block.poses, 0, view_f64(XA_at, 16), True)
@@ -58,15 +59,68 @@ def _answer(header_at, XA_at, XB_at, boolean, depths, limit, row_at):
         return -1
     answer_block(block.header, 1, boolean, depths, limit, row_at)
     row = view_row(row_at)
-    if is_undecided(row):
-        _settle(block.header, boolean, depths, limit, row_at)
-        if depths and row.flags[HOW] == EXACT and row.flags[HIT] == 1 and row.flags[CERTIFIED] == 0:
-            return -1
-    return -1 if is_undecided_or_refused(row) else int(row.flags[HIT])
+    if is_undecided_or_refused(row) and not settle_row(block.header, boolean, depths, limit, row_at):
+        return -1
+    return int(row.flags[HIT])
 
 
 @kernel
-def _settle(header, boolean, depths, limit, row_at):
+def settle_row(header, boolean, depths, limit, row_at):
+    """Settle the row of the first pair of the block, which `answer_block` has left open, as a batch would; false where
+    the long way has to, or an error has to be raised.
+
+    header : of `pose_batches.py`; the second row of the block is written over.   boolean, depths, limit : as asked.
+    Of two hulls, boxes that touch for example, `exact_stage.settle_rows` begins with `settle_hulls`; a depth that takes
+    more than that is left to the long way. None of its steps takes a curved core, so that such a pair goes on to the
+    other searches (`fallback_searches.py`), and stays open where these prove nothing either: a can at rest on a box.
+    """
+    row = view_row(row_at)
+    if row.flags[HOW] == REFUSED:
+        return False
+    if _has_curved_core(header):
+        _search_again(header, boolean, depths, limit, row_at)
+        return row.flags[HOW] != REFUSED
+    _settle_hulls(header, boolean, depths, limit, row_at)
+    if is_undecided(row):
+        return False
+    return not (depths and row.flags[HOW] == EXACT and row.flags[HIT] == 1 and row.flags[CERTIFIED] == 0)
+
+
+@kernel(inline=True)
+def _has_curved_core(header):
+    """Whether a shape of the first pair of the block is neither points nor a half-space."""
+    shape_of = view_i64(header[SHAPE_OF_AT], BLOCK + 1)
+    for k in range(2):
+        kind = view_i64(header[INTS_AT] + 8 * INTS * shape_of[BLOCK * k], INTS)[KIND]
+        if kind != POINTS and kind != HALFSPACE:
+            return True
+    return False
+
+
+@kernel
+def _search_again(header, boolean, depths, limit, row_at):
+    """`settle_by_other_searches` of the first pair of the block: the same searches in the same order."""
+    deep = depths and not boolean
+    if not boolean:
+        _search(header, True, False, limit, row_at)
+    if not deep:
+        _search(header, False, True, limit, row_at)
+    if boolean or deep:
+        _search(header, False, False, limit, row_at)
+
+
+@kernel
+def _search(header, boolean, depths, limit, row_at):
+    """Have another search settle the row, if it is still open."""
+    if is_undecided(view_row(row_at)):
+        result_at = header[ROWS_AT] + ROW
+        clear_rows(result_at, 1)
+        answer_block(header, 1, boolean, depths, limit, result_at)
+        take_proven(row_at, result_at, boolean, limit)
+
+
+@kernel
+def _settle_hulls(header, boolean, depths, limit, row_at):
     """`settle_hulls` of the first pair of the block."""
     requests_at = header[INTEGERS_AT] + 8 * REQUESTS_AT
     _settle_hulls_at(
@@ -89,8 +143,8 @@ def collide_single(header_at, XA_at, XB_at):
     return _answer(header_at, XA_at, XB_at, True, False, 0.0, rows_at)
 
 
-@entry(prepared.ROW, nogil=False)
-def within_single(header_at, XA_at, XB_at, _unused_at, _unused, limit):
+@entry(prepared.WITHIN, nogil=False)
+def within_single(header_at, XA_at, XB_at, limit):
     """Whether the pair is at most so far apart, 0 or 1; −1 as `collide_single`, and where the bracket is too wide."""
     rows_at = view_i64(header_at, HEADER)[ROWS_AT]
     row = view_row(rows_at)

@@ -35,7 +35,6 @@ def answer_batch(
     question: Question,
     threads: int = 1,
     *,
-    prepare: bool = False,
     finish: Callable[[np.ndarray], None] | None = None,
     pose_copies: Sequence[np.ndarray] = (),
 ) -> np.ndarray:
@@ -43,7 +42,6 @@ def answer_batch(
 
     A, B : shapes, or sequences of n shapes.   X_WA, X_WB : (n, 4, 4) or (1, 4, 4).
     threads : at most so many answer; the answers are the same bits.
-    prepare : make two shapes ready for single calls, too, and keep that with A.
     finish : called with the rows of each piece when they are done, by the thread that did them.
     pose_copies : two arrays like X_WA and X_WB, to become copies of them.
     """
@@ -57,8 +55,6 @@ def answer_batch(
     answer = None
     if isinstance(A, Shape) and isinstance(B, Shape):
         answer = answer_of(A, B)
-        if prepare and prepared_pair(A, B) is None and single_calls_are_safe():
-            _prepare(A, B, answer)
     else:
         A, B = of_one_set(A, B, n)
 
@@ -95,10 +91,21 @@ def answer_batch(
     return out
 
 
-def _prepare(A: Shape, B: Shape, answer: Answer) -> None:
-    pair = answer.prepare(A, B)
-    if pair is not None:
-        keep_prepared(A, B, pair)
+def prepare_pair(A, B) -> bool:
+    """Make two shapes ready for single calls of `collide` and `distance`, and keep that with A: whether this has been
+    done now. Not of shapes that are batches of one, and of sequences."""
+    if not (isinstance(A, Shape) and isinstance(B, Shape) and single_calls_are_safe()):
+        return False
+    known = prepared_pair(A, B)
+    if known is not None and (known.collide or known.table):
+        return False
+    pair = answer_of(A, B).prepare(A, B)
+    if pair is None:
+        return False
+    if known is not None:  # asked for contacts alone
+        pair.contacts, pair.held = known.contacts, (pair.held, known.held)
+    keep_prepared(A, B, pair)
+    return prepared_pair(A, B) is pair
 
 
 def _of_one_pair(A: Picked, B: Picked) -> np.ndarray:

@@ -16,8 +16,9 @@ from collide.lowering.kinds import kind_of
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.convex_kernel_calls import finish_distances
 from collide.narrowphase.dispatch import REFUSED, Method, method_of
+from collide.narrowphase.single_queries import asks_prepared_pairs
 from collide.pairs.algorithms import named_algorithm
-from collide.pairs.batches import answer_batch, length_of
+from collide.pairs.batches import answer_batch, length_of, prepare_pair
 from collide.pairs.pair_arguments import asked_poses, pose_at, shape_at
 from collide.pairs.security_margin import checked_margin, within
 from collide.results import PairResult
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
 
     Shapes = Shape | Sequence[Shape]
 
-#: No margin: told by identity, which costs single calls nothing.
-_TOUCHING = 0.0
-
 
 @overload
 def collide(
@@ -45,13 +43,14 @@ def collide(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, security_margin: float = ..., check_poses: bool = ...,
     threads: int = ..., axes: NDArray[np.float64] | None = ..., algorithm: str | None = ...,
 ) -> Any: ...
+@asks_prepared_pairs()
 def collide(
     A,
     B,
     X_WA,
     X_WB,
     *,
-    security_margin=_TOUCHING,
+    security_margin=0.0,
     check_poses=True,
     threads=1,
     axes=None,
@@ -104,22 +103,7 @@ def collide(
     GJK (Gilbert, Johnson and Keerthi 1988) with proven bounds, in O(log n + log m) a round from 224 vertices on, after
     Dobkin and Kirkpatrick; integers where doubles leave the sign open. Pairs with meshes walk two box-trees.
     """
-    if algorithm is None and axes is None and security_margin is _TOUCHING and type(threads) is int and threads == 1:
-        try:
-            hit = A._prepared[B._serial].collide(X_WA, X_WB)
-            if hit is not None:
-                return hit
-        except (AttributeError, KeyError, TypeError):
-            pass  # not prepared yet, not single, not float64, not shapes: the long way answers, or says what is wrong
-        return _batched(A, B, X_WA, X_WB, check_poses, threads)
     margin = checked_margin("security_margin", security_margin)
-    if margin and algorithm is None and axes is None and type(threads) is int and threads == 1:
-        try:
-            hit = A._prepared[B._serial].within(X_WA, X_WB, margin)
-            if hit is not None:
-                return hit
-        except (AttributeError, KeyError, TypeError):
-            pass  # as above
     if margin and (axes is not None or algorithm is not None):
         raise InvalidArgument("security_margin goes with neither axes nor algorithm")
     answer = named_algorithm("collide", algorithm)
@@ -137,14 +121,20 @@ def collide(
 def _batched(A, B, X_WA, X_WB, check_poses: bool, threads: int):
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     question = Question(True, check=checks.true_or_false("check_poses", check_poses))
-    hits = answer_batch(A, B, X_WA, X_WB, question, threads, prepare=True)
+    if prepare_pair(A, B) and single:
+        return collide(A, B, X_WA[0], X_WB[0], check_poses=question.check, threads=threads)
+    hits = answer_batch(A, B, X_WA, X_WB, question, threads)
     return bool(hits[0]) if single else hits
 
 
 def _with_margin(A, B, X_WA, X_WB, margin: float, check_poses: bool, threads: int):
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     question = Question(False, margin, depths=False, check=checks.true_or_false("check_poses", check_poses))
-    rows = answer_batch(A, B, X_WA, X_WB, question, threads, prepare=True)
+    if prepare_pair(A, B) and single:
+        return collide(
+            A, B, X_WA[0], X_WB[0], security_margin=margin, check_poses=question.check, threads=threads
+        )
+    rows = answer_batch(A, B, X_WA, X_WB, question, threads)
     hits = within(rows, margin, lambda k: (shape_at(A, k), shape_at(B, k), pose_at(X_WA, k), pose_at(X_WB, k)))
     return bool(hits[0]) if single else hits
 
@@ -178,6 +168,7 @@ def distance(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
     check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
 ) -> PairResult: ...
+@asks_prepared_pairs(PairResult, certify)
 def distance(
     A,
     B,
@@ -236,21 +227,18 @@ def distance(
     shapes within a mesh of n facets take O(n) where all its facets are near.
     """
     limit = checks.limit("max_distance", max_distance)
-    if signed.__class__ is not bool:
-        signed = checks.true_or_false("signed", signed)
+    signed = checks.true_or_false("signed", signed)
     answer = None if algorithm is None else named_algorithm("distance", algorithm)
     if answer is not None:
         if limit != math.inf or check_threads(threads) != 1:
             raise InvalidArgument(f'algorithm="{algorithm}" takes no max_distance, and runs in one thread')
         return answer(A, B, X_WA, X_WB, check_poses, signed)
-    if threads.__class__ is int and threads == 1:
-        try:
-            rows = A._prepared[B._serial].distance(X_WA, X_WB, signed, limit)
-            if rows is not None:
-                return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]), certify)
-        except (AttributeError, KeyError, TypeError):
-            pass  # as in `collide`
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
+    question = Question(False, limit, signed, checks.true_or_false("check_poses", check_poses))
+    if prepare_pair(A, B) and single:
+        return distance(
+            A, B, X_WA[0], X_WB[0], max_distance=limit, signed=signed, check_poses=question.check, threads=threads
+        )
     pose_copies = np.empty_like(X_WA), np.empty_like(X_WB)  # a certificate worked out later is one for these poses
     unbounded = []
 
@@ -258,8 +246,7 @@ def distance(
         if finish_distances(rows, depths=signed):
             unbounded.append(True)
 
-    question = Question(False, limit, signed, checks.true_or_false("check_poses", check_poses))
-    rows = answer_batch(A, B, X_WA, X_WB, question, threads, prepare=True, finish=finish, pose_copies=pose_copies)
+    rows = answer_batch(A, B, X_WA, X_WB, question, threads, finish=finish, pose_copies=pose_copies)
     if unbounded:
         k = int(np.argmax(np.isneginf(rows["distance"])))
         where = "" if single else f" (pose {k} of the batch)"

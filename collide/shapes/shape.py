@@ -24,7 +24,7 @@ class Shape:
     """
 
     __slots__ = (
-        "__weakref__", "_as_solid", "_bounds", "_contacts", "_convex_parts", "_crossings", "_facet_edges",
+        "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges",
         "_hulls_instead", "_kind", "_laid_out", "_moving", "_moving_bounds", "_partners", "_parts", "_pieces",
         "_prepared", "_reach", "_serial", "_surface", "_topology", "_union", "_vertex_set", "_walk",
     )
@@ -40,8 +40,6 @@ class Shape:
     _serial: int
     #: Weak references to those other shapes, by the slot and their number (`narrowphase/prepared_pairs.py`).
     _partners: dict[tuple[str, int], Any]
-    #: The same for contacts (`contact/convex_contacts.py`).
-    _contacts: dict[int, Any]
     #: The same for times of impact (`motion/convex_motions.py`).
     _moving: dict[int, Any]
     _moving_bounds: dict[int, Any]

@@ -8,6 +8,7 @@ import pytest
 import collide
 from collide.narrowphase.composite import composite_meshes, composite_parts
 from collide.narrowphase.composite.composite_parts import CompoundParts
+from collide.narrowphase.prepared_pairs import single_calls_are_safe
 
 EYE = np.eye(4)
 
@@ -61,8 +62,11 @@ def test_rows_are_those_of_the_parts_one_by_one(n_a, n_b, posed_rows):
 def test_far_compounds_pose_no_part(posed_rows):
     rng = np.random.default_rng(3)
     A, B = clutter(rng, 300, 0.5), clutter(rng, 300, 0.5)
-    assert not len(collide.contacts(A, B, EYE, collide.pose((5, 0, 0)), margin=0.1))
+    far = collide.pose((5, 0, 0))
+    assert not len(collide.contacts(A, B, EYE, far[None], margin=0.1))
     assert posed_rows == [0, 0]
+    assert not len(collide.contacts(A, B, EYE, far, margin=0.1))
+    assert posed_rows == ([0, 0] if single_calls_are_safe() else [0] * 4), "a single call has balls alone to place"
 
 
 def test_half_spaces_are_near_whatever_their_boxes(posed_rows):

@@ -55,7 +55,7 @@ def test_boxes_are_prepared_for_single_calls_by_their_first_contacts():
     """Though `distance`, which prepares other pairs, is not asked for their rows."""
     A, B, X_WB = Box(1, 1, 1), Box(0.5, 0.6, 0.7), pose((0.1, 0.2, 0.849), rpy=(0, 0, 0.3))
     first = contacts(A, B, EYE, X_WB)
-    assert prepared_pair(A, B, "_contacts") is not None
+    assert prepared_pair(A, B).contacts(EYE, X_WB, 8, 0.0) is not None
     assert len(first) > 2 and first.rows.tobytes() == contacts(A, B, EYE, X_WB).rows.tobytes()
 
 

@@ -7,7 +7,8 @@ import pytest
 
 import collide
 from collide.lowering.facet_bodies import body_of
-from collide.narrowphase.facets.facet_kernel_calls import SinglePair
+from collide.narrowphase.facets.facet_kernel_calls import prepared_facets
+from collide.narrowphase.prepared_pairs import Prepared
 from collide.results import PAIR_DTYPE
 
 EYE = np.eye(4)
@@ -15,9 +16,9 @@ FAR = collide.pose((5, 0, 0))
 
 
 @pytest.fixture(scope="module")
-def pair() -> SinglePair:
+def pair() -> Prepared:
     mesh = collide.Mesh(np.eye(3), [[0, 1, 2]], solid=False)
-    return SinglePair(body_of(mesh), body_of(collide.Box((1, 1, 1))))
+    return prepared_facets(body_of(mesh), body_of(collide.Box((1, 1, 1))))
 
 
 def misaligned() -> np.ndarray:
@@ -32,13 +33,13 @@ def misaligned() -> np.ndarray:
 )
 def test_what_is_left_to_the_long_way(pair, X):
     assert pair.collide(X, EYE) is None and pair.collide(EYE, X) is None
-    assert pair.distance(X, FAR, True, np.inf) is None and pair.distance(EYE, X, True, np.inf) is None
+    assert _row(pair, X, FAR, True) is None and _row(pair, EYE, X, True) is None
 
 
 def test_matrices_are_answered(pair):
     assert pair.collide(EYE, EYE) is True and pair.collide(EYE, FAR) is False
-    row = pair.distance(EYE, FAR, True, np.inf)
-    assert row.dtype == PAIR_DTYPE and row.shape == (1,) and not row["hit"][0] and row["distance"][0] > 3
+    row = _row(pair, EYE, FAR, True)
+    assert row is not None and not row["hit"] and row["distance"] > 3
     read_only = FAR.copy()
     read_only.flags.writeable = False
     assert pair.collide(EYE, read_only) is False
@@ -46,4 +47,12 @@ def test_matrices_are_answered(pair):
 
 def test_poses_that_are_none_are_left_to_whoever_says_so(pair):
     for X in (2 * EYE, np.full((4, 4), np.nan), np.diag([1.0, 1.0, -1.0, 1.0])):
-        assert pair.collide(EYE, X) is None and pair.distance(EYE, X, False, np.inf) is None
+        assert pair.collide(EYE, X) is None and _row(pair, EYE, X, False) is None
+
+
+def _row(pair: Prepared, X_WA, X_WB, depths: bool) -> np.void | None:
+    memory = bytearray(PAIR_DTYPE.itemsize)
+    if pair.distance(X_WA, X_WB, memory, depths, np.inf) is None:
+        assert not any(memory), "the row is written"
+        return None
+    return np.frombuffer(memory, PAIR_DTYPE)[0]

@@ -10,16 +10,21 @@ from threading import local
 import numpy as np
 
 from collide.kernels import address_of, code_of
-from collide.kernels.prepared import prepared_boolean, prepared_row
+from collide.kernels.prepared import prepared_boolean, prepared_row, prepared_within
 from collide.lowering.compound_table import BALL_IN_WORLD, CompoundTable, LaidOut
 from collide.lowering.shape_table import POSE, TERM_ROW, PoseTable, ShapeTable
 from collide.narrowphase import convex_kernel_calls as run
 from collide.narrowphase.composite.composite_block import BLOCK, HEADER, LIST, N_ANSWERED, N_DONE, N_LISTED, SLOTS
 from collide.narrowphase.composite.composite_poses import BAD_POSE, answer_compounds
 from collide.narrowphase.composite.composite_rows import SCORE, SEPARATING, combine_rows
-from collide.narrowphase.composite.single_composite_call import collide_single_compound, distance_single_compound
+from collide.narrowphase.composite.single_composite_call import (
+    collide_single_compound,
+    distance_single_compound,
+    within_single_compound,
+)
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, answer_pairs
-from collide.results import PAIR_DTYPE, zeroed_rows
+from collide.narrowphase.prepared_pairs import Prepared
+from collide.results import PAIR_DTYPE
 
 # --- workspaces ---------------------------------------------------------------------------------
 
@@ -55,7 +60,7 @@ class _SingleSpace(_Workspace):
 
     def __init__(self, capacity: int):
         super().__init__(capacity)
-        self.byte = np.zeros(1, dtype=np.uint8)
+        self.byte, self.row = np.zeros(1, dtype=np.uint8), np.zeros(1, dtype=PAIR_DTYPE)
         self._pair_space = np.zeros(DOUBLES), np.zeros(INTEGERS, dtype=np.int64)
         self.scratch = address_of(self._pair_space[0]), address_of(self._pair_space[1])
 
@@ -114,53 +119,29 @@ def answer_compound_batch(
         )
 
 
-class CompoundPair:
-    """Two bodies prepared: their table, and single calls with nothing left to do in Python, as `run.SinglePair` has
-    them.
-
-    collide : a built-in function of two poses; None where it leaves the answer to the long way.
-    """
-
-    #: One for all single calls: their kernels keep Python's lock.
-    _space: _SingleSpace | None = None
-
-    def __init__(self, A: LaidOut, B: LaidOut):
-        self.compounds = CompoundTable([A, B])
-        self.compounds.build_trees(None)
-        self.collide = self._distance = _long_way
-        if self.compounds.counts.prod() > _MAX_AT_ONCE:
-            return
-        space = CompoundPair._space  # read once: another thread may put a smaller one there
-        if space is None or space.capacity < self.compounds.max_parts:
-            space = CompoundPair._space = _SingleSpace(self.compounds.max_parts)
-        self._held = space  # pairs made before have a smaller one
-        header = space.header_of(self.compounds, space.scratch)
-        words = np.array([code_of(answer_compounds), address_of(space.byte), *header.tolist()])
-        self.collide = prepared_boolean(collide_single_compound, words)
-        self._distance = prepared_row(distance_single_compound, words)
-
-    def distance(self, X_WA, X_WB, depths: bool, limit: float) -> np.ndarray | None:
-        """One row of `PAIR_DTYPE`, closed; None where more than doubles, or an error, is called for."""
-        rows = zeroed_rows(1, PAIR_DTYPE)
-        return None if self._distance(X_WA, X_WB, rows, depths, limit) is None else rows
-
-    def within(self, X_WA, X_WB, margin: float) -> bool | None:
-        """As `run.SinglePair` has it."""
-        rows = self.distance(X_WA, X_WB, False, margin)
-        if rows is None:
-            return None
-        row = rows[0]
-        if row["hit"] or row["upper"] <= margin:
-            return True
-        return False if row["lower"] > margin else None
-
-
+#: Workspace of all single calls: their kernels keep Python's lock. A larger one takes its place; pairs hold their own.
+_single_space: _SingleSpace | None = None
 #: Pairs of parts of a single call, which keeps Python's lock; more are left to the long way, which lets go of it.
 _MAX_AT_ONCE = 1024
 
 
-def _long_way(*_) -> None:
-    return None
+def prepared_compounds(A: LaidOut, B: LaidOut) -> Prepared:
+    """Two bodies ready for one call at a time, and their table for batches."""
+    global _single_space
+    table = CompoundTable([A, B])
+    table.build_trees(None)
+    if table.counts.prod() > _MAX_AT_ONCE:
+        return Prepared(table=table)
+    space = _single_space  # read once: another thread may put a smaller one there
+    if space is None or space.capacity < table.max_parts:
+        space = _single_space = _SingleSpace(table.max_parts)
+    header = space.header_of(table, space.scratch)
+    places = address_of(space.byte), address_of(space.row)
+    words = np.array([code_of(answer_compounds), *places, *header.tolist()])
+    return Prepared(
+        collide=prepared_boolean(collide_single_compound, words), within=prepared_within(within_single_compound, words),
+        distance=prepared_row(distance_single_compound, words), table=table, held=space,
+    )
 
 
 def combine(

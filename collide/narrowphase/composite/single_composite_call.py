@@ -11,13 +11,13 @@ from collide.lowering.shape_table import POSE
 from collide.narrowphase.composite.composite_block import HEADER, N_DONE
 from collide.narrowphase.composite.composite_poses import COMPOUNDS_SIGNATURE, place_two_balls
 from collide.narrowphase.finish_rows import forget_depth
-from collide.narrowphase.pose_batches import set_pose
-from collide.narrowphase.rows import BODY_B, DISTANCE, view_row
+from collide.narrowphase.pose_batches import clear_rows, set_pose
+from collide.narrowphase.rows import BODY_B, DISTANCE, HIT, LOWER, UPPER, view_row
 
 answer_compounds_at = native_call(COMPOUNDS_SIGNATURE)
 
-# Header: the kernel, where a boolean goes, then the header of `composite_block.py`.
-_KERNEL, _BYTE_AT, _HEADER = range(3)
+# Header: the kernel, where a boolean goes and a row that nobody keeps, then the header of `composite_block.py`.
+_KERNEL, _BYTE_AT, _ROW_AT, _HEADER = range(4)
 SINGLE_HEADER = _HEADER + HEADER
 # Header of `balls_beyond`: numbers of both bodies, and doubles to work in.
 _BALL_OF_A, _BALL_OF_B, _WORK_AT = range(3)
@@ -64,9 +64,23 @@ def distance_single_compound(header_at, XA_at, XB_at, row_at, depths, limit):
     return -1 if row.doubles[DISTANCE] == -math.inf else 0
 
 
-@entry(prepared.ROW, nogil=False)
-def balls_beyond(header_at, XA_at, XB_at, _row_at, _flag, margin):
-    """0 where balls around two bodies are farther apart than a margin [m]; −1 elsewhere, and where one is no pose.
+@entry(prepared.WITHIN, nogil=False)
+def within_single_compound(header_at, XA_at, XB_at, limit):
+    """Whether the pair is at most so far apart, 0 or 1; −1 as there, and where the bracket is too wide."""
+    row_at = view_i64(header_at, SINGLE_HEADER)[_ROW_AT]
+    clear_rows(row_at, 1)
+    if not _answer(header_at, XA_at, XB_at, False, False, limit, row_at):
+        return -1
+    row = view_row(row_at)
+    if row.flags[HIT] != 0 or row.doubles[UPPER] <= limit:
+        return 1
+    return 0 if row.doubles[LOWER] > limit else -1
+
+
+@entry(prepared.CONTACTS, nogil=False)
+def balls_beyond(header_at, XA_at, XB_at, _out_at, _max_contacts, margin):
+    """0 contacts where balls around two bodies are farther apart than a margin [m]; −1 elsewhere, and where one is no
+    pose.
 
     No part reaches out of its body's ball by more than the balls' margin of the size, so that none is within the margin
     of another, whose product is rounded up.

@@ -26,7 +26,8 @@ from collide.narrowphase.facets.curved_gap_kernel import (
 from collide.narrowphase.facets.facet_queries import points_in_solid
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
 from collide.narrowphase.pair_kernel import answer_pairs
-from collide.results import PAIR_DTYPE, zeroed_rows
+from collide.narrowphase.prepared_pairs import Prepared
+from collide.results import PAIR_DTYPE
 
 
 def serves(packed: PackedConvex) -> bool:
@@ -70,39 +71,33 @@ def gap_rows(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple
     return rows, is_written
 
 
-class CurvedPair:
-    """A mesh and a shape prepared for single gaps without a limit; everything else is left to the long way.
+def prepared_curved(A: Body, E: Enclosure, exchanged: bool) -> Prepared:
+    """A mesh and a shape ready for single gaps without a limit; everything else is left to the long way.
 
     exchanged : the shape stands first.
     """
+    space = space_of_single_calls()  # all threads use it, one after the other, with Python's lock
+    question = GapQuestion(A, E, space.addresses)
+    question.header[EXCHANGED] = exchanged
+    gap = prepared_row(curved_gap_single, question.header)
 
-    def __init__(self, A: Body, E: Enclosure, exchanged: bool):
-        self._space = space_of_single_calls()  # held: all threads use it, one after the other, with Python's lock
-        self._question = GapQuestion(A, E, self._space.addresses)
-        self._question.header[EXCHANGED] = exchanged
-        self._bodies, self._exchanged = (A, E), exchanged
-        self._ask = prepared_row(curved_gap_single, self._question.header)
+    def distance(X_WA, X_WB, memory: bytearray, depths: bool, limit: float) -> bool | None:
+        """True; None where the bodies may meet, and of limits."""
+        apart = gap(X_WA, X_WB, memory, depths, limit) if limit == math.inf else None
+        if apart is False and A.solid:
+            X_WM, X_WS = (X_WB, X_WA) if exchanged else (X_WA, X_WB)
+            return True if points_in_solid(A.tree, X_WM, E.outer.points[0], X_WS)[0] == OUTSIDE else None
+        return None if apart is None else True
 
-    def collide(self, X_WA, X_WB) -> bool | None:
+    def collide(X_WA, X_WB) -> bool | None:
         """False where the bodies are apart; None where they may meet: the long way says."""
-        return None if self.distance(X_WA, X_WB, False, math.inf) is None else False
+        return None if distance(X_WA, X_WB, bytearray(PAIR_DTYPE.itemsize), False, math.inf) is None else False
 
-    def distance(self, X_WA, X_WB, depths: bool, limit: float) -> np.ndarray | None:
-        """One row of `PAIR_DTYPE`, bytes as of a batch; None where the bodies may meet, and of limits."""
-        if limit < math.inf:
+    def within(X_WA, X_WB, margin: float) -> bool | None:
+        memory = bytearray(PAIR_DTYPE.itemsize)
+        if distance(X_WA, X_WB, memory, False, math.inf) is None:
             return None
-        rows = zeroed_rows(1, PAIR_DTYPE)
-        apart = self._ask(X_WA, X_WB, rows, depths, limit)
-        if apart is False and self._bodies[0].solid:
-            A, E = self._bodies
-            X_WM, X_WS = (X_WB, X_WA) if self._exchanged else (X_WA, X_WB)
-            apart = True if points_in_solid(A.tree, X_WM, E.outer.points[0], X_WS)[0] == OUTSIDE else None
-        return None if apart is None else rows
+        row = np.frombuffer(memory, PAIR_DTYPE, 1)[0]
+        return True if row["upper"] <= margin else False if row["lower"] > margin else None
 
-    def within(self, X_WA, X_WB, margin: float) -> bool | None:
-        """Whether they are at most so far apart [m]; None as there, and where the bracket does not say."""
-        rows = self.distance(X_WA, X_WB, False, math.inf)
-        if rows is None:
-            return None
-        lower, upper = rows["lower"][0], rows["upper"][0]
-        return True if upper <= margin else False if lower > margin else None
+    return Prepared(collide=collide, within=within, distance=distance, held=(space, question, A, E))

@@ -51,7 +51,8 @@ from collide.narrowphase.facets.facet_queries import (
     workspace,
 )
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
-from collide.results import FORMULA, PAIR_DTYPE, UNDECIDED, flipped, zeroed_rows
+from collide.narrowphase.prepared_pairs import Prepared
+from collide.results import FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.transforms import as_poses
 
 #: Points of parts, more than which keep single calls from holding Python's lock.
@@ -298,44 +299,38 @@ def _far_gap(A: Body, B: Body, X_WA, X_WB, limit: float) -> np.ndarray:
 # --- single calls -------------------------------------------------------------------------------
 
 
-class SinglePair:
-    """Two bodies prepared for one call at a time: nothing is left to do in Python but the call.
+#: Workspace of all single calls: their kernels keep Python's lock. A larger one takes its place where trees are deeper.
+_single_space: Workspace | None = None
 
-    collide : a function of two poses (4, 4): bool, or None where the answer is left to the long way.
-    """
 
-    #: One for all single calls: their kernels keep Python's lock. A larger one takes its place where trees are deeper.
-    _space: Workspace | None = None
+def serves_single_calls(A: Body, B: Body) -> bool:
+    """Whether single calls are short enough to keep Python's lock."""
+    return max(len(A.points) if B.solid else 0, len(B.points) if A.solid else 0) <= _MAX_POINTS
 
-    def __init__(self, A: Body, B: Body):
-        exchanged = B.key < A.key
-        if exchanged:
-            A, B = B, A
-        space, n_stack = SinglePair._space, stack_of(A.tree, B.tree)
-        if space is None or space.n_stack < n_stack:
-            space = SinglePair._space = Workspace(max(512, n_stack))
-        self._held = A, B, space  # kernels use their buffers; bodies hold their shapes weakly
-        self._has_slabs = A.radius + B.radius > 0.0
-        if self._has_slabs:
-            _make_slabs(A, B)
-        header = pair_header(A, B, exchanged, space)
-        self.collide, self._gap = prepared_boolean(meet_single, header), prepared_row(gap_single, header)
 
-    @staticmethod
-    def serves(A: Body, B: Body) -> bool:
-        """Whether single calls are short enough to keep Python's lock."""
-        return max(len(A.points) if B.solid else 0, len(B.points) if A.solid else 0) <= _MAX_POINTS
+def prepared_facets(A: Body, B: Body) -> Prepared:
+    """Two bodies ready for one call at a time: booleans, and distances without a limit."""
+    global _single_space
+    exchanged = B.key < A.key
+    if exchanged:
+        A, B = B, A
+    space, n_stack = _single_space, stack_of(A.tree, B.tree)
+    if space is None or space.n_stack < n_stack:
+        space = _single_space = Workspace(max(512, n_stack))
+    has_slabs = A.radius + B.radius > 0.0
+    if has_slabs:
+        _make_slabs(A, B)
+    header = pair_header(A, B, exchanged, space)
+    gap = prepared_row(gap_single, header)
 
-    def distance(self, X_WA, X_WB, depths: bool, limit: float) -> np.ndarray | None:
-        """One row of `PAIR_DTYPE`, bytes as of a batch; None of depths, limits, and what kernels do not complete."""
+    def distance(X_WA, X_WB, memory: bytearray, depths: bool, limit: float) -> bool | None:
+        nonlocal has_slabs
         if limit < math.inf:
             return None
-        if not self._has_slabs:
-            _make_slabs(*self._held[:2])
-            self._has_slabs = True
-        rows = zeroed_rows(1, PAIR_DTYPE)
-        return None if self._gap(X_WA, X_WB, rows, depths, limit) is None else rows
+        if not has_slabs:
+            _make_slabs(A, B)
+            has_slabs = True
+        return gap(X_WA, X_WB, memory, depths, limit)
 
-    def within(self, X_WA, X_WB, margin: float) -> bool | None:
-        """Whether they are at most so far apart [m]: left to the long way."""
-        return None
+    # Kernels use the bodies' and the workspace's buffers; bodies hold their shapes weakly.
+    return Prepared(collide=prepared_boolean(meet_single, header), distance=distance, held=(A, B, space))

@@ -20,10 +20,11 @@ from collide.narrowphase.convex_batches import convex_hits, convex_rows
 from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
 from collide.narrowphase.facets.collide_kernel import APART, OPEN
-from collide.narrowphase.facets.curved_gap_calls import CurvedPair, serves
-from collide.narrowphase.facets.facet_kernel_calls import SinglePair, balls_farther
+from collide.narrowphase.facets.curved_gap_calls import prepared_curved, serves
+from collide.narrowphase.facets.facet_kernel_calls import balls_farther, prepared_facets, serves_single_calls
 from collide.narrowphase.facets.mesh_methods import checked_poses, hull_shape, mesh_rows, mesh_states
 from collide.narrowphase.fallback_searches import lay_points_apart
+from collide.narrowphase.prepared_pairs import Prepared
 from collide.results import UNDECIDED
 from collide.shapes.shape import Shape
 
@@ -115,22 +116,22 @@ def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: f
     return rows
 
 
-def single_pair(A: Shape, B: Shape) -> SinglePair | None:
+def single_pair(A: Shape, B: Shape) -> Prepared | None:
     """Two bodies of facets made ready for single calls; None where these are batches of one: of very many parts.
 
     The pair holds trees and points, not the shapes.
     """
     bodies = body_of(A), body_of(B)
-    return SinglePair(*bodies) if SinglePair.serves(*bodies) else None
+    return prepared_facets(*bodies) if serves_single_calls(*bodies) else None
 
 
-def curved_pair(A: Shape, B: Shape) -> CurvedPair | None:
+def curved_pair(A: Shape, B: Shape) -> Prepared | None:
     """A mesh and a curved shape, in either order, made ready for single gaps; None where these are batches of one."""
     exchanged = kind_of(A) is not Kind.MESH
     if exchanged:
         A, B = B, A
     E = enclosure_of(B)
-    return CurvedPair(body_of(A), E, exchanged) if serves(E.packed) else None
+    return prepared_curved(body_of(A), E, exchanged) if serves(E.packed) else None
 
 
 def _has_compound(A: Shape, B: Shape) -> bool:

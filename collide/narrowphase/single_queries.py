@@ -1,0 +1,124 @@
+"""Public functions of two shapes at one pair of poses: the pair made ready for single calls is asked before anything
+else.
+
+In a process with the library these functions are C's (`native/python_module.c`): from the call to the result nothing is
+done in Python. Elsewhere they do the same in Python, as this module has it. What a pair leaves open, and all that is no
+such call, is for the function that is decorated: it checks arguments, answers batches, and raises.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from functools import partial, wraps
+from typing import Any, TypeVar
+
+from collide.base import argument_checks as checks
+from collide.kernels.prepared import is_matrix, query_of_c
+from collide.narrowphase.prepared_pairs import prepared_pair
+from collide.results import PAIR_DTYPE, PairResult
+from collide.transforms import LARGEST, SMALLEST
+
+Function = TypeVar("Function", bound=Callable)
+
+#: More contacts than a patch can have, and a number that kernels take.
+ALL_CONTACTS = 2**31 - 1
+
+
+def asks_prepared_pairs(result: type | None = None, certify: Callable | None = None) -> Callable[[Function], Function]:
+    """Decorates `collide`, `distance` or `contacts`.
+
+    result : the type of what is returned, which opens what it is made of when it is asked for fields; None of booleans.
+    certify : makes certificates of it.
+    """
+
+    def decorate(function: Function) -> Function:
+        if query_of_c is None:
+            return _in_python(function, result, certify)
+        name = function.__name__
+        return query_of_c(function, _described(function), _LENGTHS[name], _USUAL[name], result, certify)
+
+    return decorate
+
+
+#: The length and the option that calls have unless they say otherwise.
+_USUAL: dict[str, tuple] = {"collide": (0.0, None), "distance": (math.inf, True), "contacts": (0.0, 8)}
+#: The least and the most length [m] besides 0; others are for the decorated function to look at.
+_LENGTHS = {"collide": (SMALLEST, LARGEST), "distance": (0.0, math.inf), "contacts": (0.0, LARGEST)}
+
+
+def _described(function: Callable) -> str:
+    """Its docstring behind the line that `inspect.signature` reads of functions of C."""
+    signature = inspect.signature(function)
+    bare = [p.replace(annotation=inspect.Parameter.empty) for p in signature.parameters.values()]
+    line = str(signature.replace(parameters=bare, return_annotation=inspect.Signature.empty))
+    return f"{function.__name__}{line.replace('=inf', '=math.inf')}\n--\n\n{inspect.getdoc(function)}"
+
+
+# --- the same in Python -------------------------------------------------------------------------
+
+
+def _in_python(function: Any, result: Any, certify: Callable | None) -> Any:
+    ask = {"collide": _collide, "distance": partial(_distance, certify), "contacts": partial(_contacts, result)}
+
+    known = inspect.signature(function).parameters.keys()
+
+    @wraps(function)
+    def query(*arguments, **options):
+        is_single = options.keys() <= known and _are_plain(arguments, **options)
+        answer = ask[function.__name__](*arguments, **options) if is_single else None
+        return function(*arguments, **options) if answer is None else answer
+
+    return query
+
+
+def _are_plain(arguments: tuple, *, check_poses=True, threads=1, axes=None, algorithm=None, **_) -> bool:
+    plain = check_poses.__class__ is bool and threads.__class__ is int and threads == 1
+    return len(arguments) == 4 and plain and axes is None and algorithm is None
+
+
+def _length(question: str, value: Any) -> float | None:
+    """A length [m] as a float; None where the decorated function has to look at it."""
+    if value.__class__ is bool or not isinstance(value, (float, int)):
+        return None
+    length, (min_length, max_length) = checks.number(value), _LENGTHS[question]
+    assert length is not None
+    return length if length == value and (length == 0.0 or min_length <= length <= max_length) else None
+
+
+def _collide(A, B, X_WA, X_WB, *, security_margin=0.0, **_) -> bool | None:
+    pair, margin = prepared_pair(A, B), _length("collide", security_margin)
+    if pair is None or margin is None:
+        return None
+    if margin == 0.0:
+        return pair.collide and pair.collide(X_WA, X_WB)
+    return pair.within and pair.within(X_WA, X_WB, margin)
+
+
+def _distance(certify, A, B, X_WA, X_WB, *, max_distance=math.inf, signed=True, **_) -> PairResult | None:
+    pair, limit = prepared_pair(A, B), _length("distance", max_distance)
+    if pair is None or limit is None or pair.distance is None or signed.__class__ is not bool:
+        return None
+    if not (is_matrix(X_WA) and is_matrix(X_WB)):
+        return None
+    memory = bytearray(PAIR_DTYPE.itemsize) + X_WA.tobytes() + X_WB.tobytes()
+    if pair.distance(X_WA, X_WB, memory, signed, limit) is None:
+        return None
+    single: Any = PairResult.__new__(PairResult)
+    single._single = A, B, memory, certify
+    return single
+
+
+def _contacts(result, A, B, X_WA, X_WB, *, margin=0.0, max_contacts=8, **_) -> Any:
+    pair, length = prepared_pair(A, B), _length("contacts", margin)
+    if pair is None or length is None or pair.contacts is None or max_contacts.__class__ is not int:
+        return None
+    if not 1 <= max_contacts <= ALL_CONTACTS:
+        return None
+    rows = pair.contacts(X_WA, X_WB, max_contacts, length)
+    if rows is None:
+        return None
+    single = result.__new__(result)
+    single._single = rows
+    return single
