@@ -398,7 +398,7 @@ def halfspace_vertices(normals: np.ndarray, offsets: np.ndarray):
     -------
     vertices : (v, 3) float64, each the rounding of an exact vertex; (0, 3) where the set is empty or unbounded.
     slop : upper bound of the distance between a vertex and its rounding [m]; 0 where all are exact.
-    unbounded : (3,) a direction of unboundedness, or None.
+    unbounded : (3,) a direction of the recession cone of an unbounded set, else None.
     """
     normals, offsets = (np.ascontiguousarray(array, dtype=np.float64) for array in (normals, offsets))
     planes, slop = (address_of(normals), address_of(offsets), len(normals)), np.zeros(1)

@@ -1,7 +1,7 @@
-"""Kernels of single calls, bound to what they were prepared for: nothing is left to do in Python but the call.
+"""Kernels of single calls, bound to their pair of shapes: Python does nothing but the call.
 
-Two poses come as numpy arrays; what is no C-contiguous (4, 4) array of float64 is left to the long way, which says what
-is wrong with it, or converts it.
+Two poses come as numpy arrays; a pose other than a C-contiguous (4, 4) array of float64 is left to the long way, where
+the pose is converted, or refused with its fault named.
 """
 
 from __future__ import annotations
