@@ -1,4 +1,4 @@
-"""Two convex sets at one pair of poses: from matrices to the answer inside one kernel."""
+"""Two convex sets at a pair of poses: from matrices to the answer inside a single kernel."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ _settle_hulls_at = native_call(SIGNATURE)
 
 @kernel
 def _answer(header_at, XA_at, XB_at, boolean, depths, limit, row_at):
-    """One pair at one pair of poses: 0 apart, 1 hit, −1 where it takes more than this, or an error has to be raised.
+    """A pair at a pair of poses: 0 apart, 1 hit, −1 where the general way is needed, or an error has to be raised.
 
-    header : of `pose_batches.py`.   limit : of gaps beyond it no more is said than that [m].
-    What doubles leave open of two hulls, boxes that touch for example, is settled here, as `exact_stage.settle_rows`
-    does first; a depth that takes more than that is left to the long way.
+    header : of `pose_batches.py`.   limit : gaps beyond this [m] are not measured.
+    Rows of two hulls left open by doubles, touching boxes for example, are settled here, as `exact_stage.settle_rows`
+    does first; a depth left without a certificate goes to the general way.
     """
     block = block_of(header_at)
     good_a = set_pose(block.poses, 0, view_f64(XA_at, 16), True)
