@@ -1,14 +1,14 @@
 """Vertices of an intersection of half-spaces, exactly, by the double description method.
 
-The half-spaces {x : n·x ≤ b} become a cone {(x, w) : b·w − n·x ≥ 0, w ≥ 0} in four dimensions
-(Motzkin, Raiffa, Thompson and Thrall 1953; Fukuda and Prodon 1996). Its extreme rays with w > 0 are the vertices, those
-with w = 0 directions in which the set never ends.
+The half-spaces {x : n·x ≤ b} become a cone {(x, w) : b·w − n·x ≥ 0, w ≥ 0} in four dimensions (Motzkin, Raiffa,
+Thompson and Thrall 1953; Fukuda and Prodon 1996). Its extreme rays with w > 0 are the vertices, rays with w = 0
+directions in which the set is unbounded.
 
-A ray is written as the 3 × 3 minors of three rows that it lies on, in integers: doubles are integers times powers of
-two, so nothing is rounded until the vertices are handed back, and no number has more than three times the digits of a
-row. Two extreme rays span a face of dimension two iff two independent rows hold both (Fukuda and Prodon 1996,
-proposition 7); these and a row that parts the rays give the ray between them. C calls the same two entries
-(`native/capi_shapes.c`).
+A ray is written as the 3 × 3 minors of three rows orthogonal to the ray, in integers: doubles are integers times powers
+of two, so nothing is rounded until the vertices are handed back, and no number has more than three times the digits of
+a row. Two extreme rays span a face of dimension two iff two independent rows hold both (Fukuda and Prodon 1996,
+proposition 7); these and a row between the rays, positive on the first and negative on the second, give the new ray. C
+calls the same two entries (`native/capi_shapes.c`).
 """
 
 from __future__ import annotations
@@ -45,10 +45,11 @@ _WORD = 62
 class _Cone(NamedTuple):
     """Rows, and rays so far: views and places.
 
-    digits : all numbers.   n_rows, n_digits, n_minor, words : rows, digits of a row's number and of a ray's, words of
-    a set of rows.   rows, rays, work : where they begin.   tight : by ray, the set of rows that it lies on.
-    side : by ray, of the row that cuts.   order, after : rays in order, before and after a cut.   free : unused rays.
-    start : four independent rows.
+    digits : all numbers.   n_rows, n_digits, n_minor, words : number of rows, digits of a row's number, digits of a
+    ray's, words of a set of rows.   rows, rays, work : where they begin.   tight : by ray, the set of rows orthogonal
+    to the ray.
+    side : by ray, the sign of its product with the cutting row.   order, after : rays in order, before and after a cut.
+    free : unused rays.   start : four independent rows.
     """
 
     digits: Any
@@ -124,13 +125,13 @@ def corners_memory(normals_at, offsets_at, m, capacity):
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64)")
 def find_corners(normals_at, offsets_at, m, memory_at, capacity, corners_at, slop_at):
-    """Find the vertices of {x : normals @ x ≤ offsets}; returns how many, none of an empty set.
+    """Find the vertices of {x : normals @ x ≤ offsets}; returns their number, 0 for an empty set.
 
     normals, offsets : (m, 3), (m,) doubles, no normal zero.   memory : as many bytes as `corners_memory` says.
-    capacity : rays there is room for; a cone of k rows has at most 2k, and twice that while it is cut.
-    corners : out, (capacity, 3) doubles, each vertex rounded to nearest.   slop : out, a bound of how far they are off.
+    capacity : most rays held at a time; a cone of k rows has at most 2k, and twice as many while being cut.
+    corners : out, (capacity, 3) doubles, each vertex rounded to nearest.   slop : out, a bound of their rounding error.
 
-    UNBOUNDED : the set is not empty, and has no end.   TOO_FEW_RAYS : capacity is too small.
+    UNBOUNDED : the set is not empty, and unbounded.   TOO_FEW_RAYS : capacity is too small.
     """
     normals, offsets = view_f64(normals_at, 3 * m), view_f64(offsets_at, m)
     cone, _ = _cone(memory_at, m, _longest_row(normals_at, offsets_at, m), capacity)
@@ -177,7 +178,7 @@ def _put_row(cone, normals, offsets, m, row):
 
 @kernel
 def _put_ray(cone, ray, a, b, c):
-    """Write the vector orthogonal to three rows; whether it is not 0, as of dependent ones it is."""
+    """Write the vector orthogonal to three rows; False where the vector is 0, the rows being dependent."""
     digits, is_ray = cone.digits, False
     for column in range(4):
         at = _coordinate(cone, ray, column)
@@ -209,7 +210,7 @@ def _side(cone, row, ray):
 
 @kernel
 def _orient(cone, ray, row):
-    """Have a ray lie where a row, which it is not on, is above 0."""
+    """Negate a ray where its product with a row, not 0, is below 0."""
     if _side(cone, row, ray) < 0:
         for column in range(4):
             negate(cone.digits, _coordinate(cone, ray, column), cone.n_minor)
@@ -269,9 +270,11 @@ def _begin(cone, capacity):
 
 @kernel
 def _cut(cone, row, n, capacity):
-    """Have n rays become those of what a row leaves of their cone; returns how many, −1 where room is short.
+    """Intersect the cone of n rays with a row's half-space; returns the number of rays then, −1 where capacity is
+    short.
 
-    Those that stay come first, in order, then those between two on either side, outside by outside.
+    Rays kept come first, in order, then new rays, each between a ray outside and a ray inside, by the order of the rays
+    outside.
     """
     side, order, after = cone.side, cone.order, cone.after
     n_found = 0
@@ -304,7 +307,7 @@ def _cut(cone, row, n, capacity):
 
 @kernel
 def _shared(cone, ray_a, ray_b):
-    """Write the rows that two rays lie on into the workspace's end; 0 if there are none, 1 of one, else 2."""
+    """Write the set of rows orthogonal to both rays to the workspace's end; returns its size, 2 for two or more."""
     at, n = len(cone.digits) - cone.words, 0
     for w in range(cone.words):
         both = cone.tight[cone.words * ray_a + w] & cone.tight[cone.words * ray_b + w]
@@ -316,8 +319,8 @@ def _shared(cone, ray_a, ray_b):
 
 @kernel
 def _put_between(cone, ray, row):
-    """Write the ray on a row and on all that two rays share, as `_shared` left it; whether these have two independent
-    rows."""
+    """Write the ray orthogonal to a row and to the rows shared by two rays, as `_shared` left them; False where no two
+    shared rows are independent."""
     at, first = len(cone.digits) - cone.words, -1
     for w in range(cone.words):
         remaining = cone.digits[at + w]
@@ -337,8 +340,7 @@ def _put_between(cone, ray, row):
 
 @kernel
 def _orient_between(cone, ray):
-    """Have a ray lie on the side of those that it is between: where a row of the start that not both lie on, is above
-    0."""
+    """Orient a ray like the two rays beside: positive on a row of the start not shared by both."""
     at = len(cone.digits) - cone.words
     for k in range(4):
         row = cone.start[k]
@@ -396,7 +398,7 @@ def halfspace_vertices(normals: np.ndarray, offsets: np.ndarray):
     -------
     vertices : (v, 3) float64, each the rounding of an exact vertex; (0, 3) where the set is empty or unbounded.
     slop : upper bound of the distance between a vertex and its rounding [m]; 0 where all are exact.
-    unbounded : (3,) a direction in which the set is unbounded, or None.
+    unbounded : (3,) a direction of the recession cone of an unbounded set, else None.
     """
     normals, offsets = (np.ascontiguousarray(array, dtype=np.float64) for array in (normals, offsets))
     planes, slop = (address_of(normals), address_of(offsets), len(normals)), np.zeros(1)

@@ -14,11 +14,10 @@ class Hull(NamedTuple):
     """The hull of a cloud, by rows of the points given.
 
     dimension : 3 solid, 2 flat, 1 a segment, 0 a point; exact.
-    vertices : (h,) int32, sorted; no two are the same point. Their hull is exactly that of all
-        points. Most of them are extreme; a few may lie on a facet or an edge.
-    facets : (f, 3) int32, counter-clockwise seen from outside, none of zero area. Solid: a closed surface with
-        2 h − 4 facets. Flat: the triangles of the polygon, then the same from the other side.
-        Segment, point: none.
+    vertices : (h,) int32, sorted; no two are the same point. Their hull is exactly the hull of all points. Most of them
+    are extreme; a few may lie on a facet or an edge.
+    facets : (f, 3) int32, counter-clockwise seen from outside, of positive area. Solid: a closed surface with 2 h − 4
+    facets. Flat: the triangles of the polygon, then the same from the other side. Segment, point: f = 0.
     """
 
     dimension: int

@@ -1,8 +1,8 @@
 """Four corners to begin a hull with, and the exact dimension of the cloud.
 
-Each corner is the farthest point from those before it, so that it need not leave the hull again.
-Plain doubles choose; whether the choice spans a line, a plane, space is decided exactly, and where the
-farthest point fails every other one is tried.
+Each corner is the point farthest from the corners before, so that the hull need not lose this corner again. Plain
+doubles choose; whether the choice spans a line, a plane, space is decided exactly, and where the farthest point fails
+every other point is tried.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ APICES = 4
 
 @kernel
 def first_simplex(cloud, count, corners):
-    """The dimension of the cloud; ``corners`` receives as many of its points and one more.
+    """The dimension of the cloud; ``corners`` receives dimension + 1 of its points.
 
-    The fourth corner lies below the plane of the others, seen from where they run counter-clockwise. A
-    flat cloud is given one of the points behind it: its hull is the base of a pyramid.
+    The fourth corner lies below the plane of the others, seen from where they run counter-clockwise. To a flat cloud an
+    apex from behind the cloud's points is added: the hull of the cloud is the base of a pyramid.
     """
     points, originals = cloud.scaled, cloud.originals
     first_two(originals, count, corners)

@@ -30,13 +30,14 @@ FREE, USED, FIRST, LAST, NOW, TESTS, MADE, CURSOR, CORNERS = 0, 1, 2, 3, 4, 5, 6
 
 
 class GrowingHull(NamedTuple):
-    """A hull on its way: views of all that its steps read and write.
+    """A hull on its way: views of all memory read and written by its steps.
 
     cloud : a `CloudView`.   facets, planes : FACET integers and PLANE doubles a facet.   state : STATE integers.
-    following : by point, the next one of its list.   owner : by point, the facet whose list it stands in, or −1.
-    orphans : points that stood in lists of removed facets.   region : facets that are being removed.
+    following : by point, the next point of its list.   owner : by point, the facet of its list, or −1.
+    orphans : points from the lists of removed facets.   region : facets being removed.
     rim : two integers an edge of the region's rim, see `visible_region`.   fan : facets put in the region's place.
-    starting : by point, the facet of the fan that begins there, or −1.   order : the points shuffled (`next_corner`).
+    starting : by point, the facet of the fan with its base beginning at this point, or −1.   order : the points
+    shuffled (`next_corner`).
     """
 
     cloud: Any
@@ -120,7 +121,7 @@ def above(hull, f, i):
 
 @kernel
 def put(hull, f, i, distance):
-    """Put point i into the list of facet f: at its head if it is the farthest, else behind that."""
+    """Put point i into the list of facet f: at the head if farthest from the facet, else second."""
     facets, planes, following, state = hull.facets, hull.planes, hull.following, hull.state
     at = FACET * f
     head = np.int64(facets[at + POINT])

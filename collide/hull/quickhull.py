@@ -1,20 +1,20 @@
 """The hull of a cloud in space by quickhull, with exact tests (Barber, Dobkin, Huhdanpaa 1996).
 
-Every point still outside stands in the list of one facet it lies strictly above. A facet's farthest
-point becomes a corner: the facets it lies strictly above are removed, and a fan from the point to
-their rim is put in their place. Why this is right with exact tests, coplanar points or not:
+Every point still outside stands in the list of a facet strictly below the point. A facet's farthest point becomes a
+corner: the facets strictly below this corner are removed, and a fan from the corner to their rim is put in their place.
+Why this is right with exact tests, coplanar points or not:
 
 * the removed region is connected and its rim is a simple cycle. Each edge of the rim belongs to a
-  removed facet, so the new corner is not in line with it: no facet of the fan has zero area;
+  removed facet, so the new corner is not in line with the edge: no facet of the fan has zero area;
 * a facet coplanar with the new corner stays. Flat sides stand as triangles and are never made
-  anew as a whole, which is what keeps a side with 32,768 corners cheap;
-* a point q of a removed facet F belongs to a facet of the fan, or is not outside. Go straight to q from
-  inside F, which is inside the new hull, being strictly below the new corner. If q is outside, the
-  way leaves the hull in a point above F, so not in an old facet but in one of the fan, and q lies
-  strictly above that one.
+  anew as a whole, so a side with 32,768 corners is cheap;
+* a point q of a removed facet F lies strictly above a facet of the fan, or is not outside. Take the segment to q from
+  inside F, a start inside the new hull, F being strictly below the new corner. If q is outside, the
+  segment leaves the hull at a point above F, so not through an old facet but through a facet of the fan, and q lies
+  strictly above this facet.
 
-So the points dropped are proven to lie in the hull, and at the end no point lies above any facet.
-Distances in doubles only choose the next corner.
+So the points dropped are proven to lie in the hull, and at the end no point lies above any facet. Distances in doubles
+only choose the next corner.
 """
 
 from __future__ import annotations
@@ -80,13 +80,13 @@ def distribute(hull, n_orphans, k):
 
 @kernel
 def locate(hull, k, i):
-    """(place in the fan, whether point i is above that facet if it is above any).
+    """(place in the fan, whether certain): point i, if above any facet of the fan, is above the facet at this place.
 
-    The half-planes from the line through the fan's apex and one corner of its rim to the other corners
-    turn through at most half a circle. A point before the first of them or after the last is above
-    that one's facet. One strictly between them is between two that follow each other, and no other
-    facet bounds the cone of the fan there. One in the plane of the first or the last is tried from
-    another corner; where three do not settle it, nothing is sure.
+    The half-planes from the line through the fan's apex and a corner of its rim to the other corners turn through at
+    most half a circle. A point before the first half-plane is above the first facet, a point after the last above the
+    last. For a point strictly between two consecutive half-planes, the facet between them is the only facet bounding
+    the cone of the fan there. A point in the plane of the first or the last is tried from another corner; where three
+    corners do not settle the place, no facet is certain.
     """
     facets, fan = hull.facets, hull.fan
     apex = np.int64(facets[FACET * fan[0] + 2])
@@ -116,9 +116,9 @@ def locate(hull, k, i):
 
 @kernel
 def visible_region(hull, f, i):
-    """(facets strictly below point i, edges of their rim), from facet f on, which is one of them.
+    """(number of facets strictly below point i, number of edges of their rim), spreading from facet f, itself below i.
 
-    rim : each edge as the facet beyond it and the edge's place there.
+    rim : each edge as the facet across and the edge's place in this facet.
     """
     facets, state, region, rim = hull.facets, hull.state, hull.region, hull.rim
     state[NOW] += 1
@@ -180,11 +180,11 @@ def shuffle(order, count):
 
 @kernel
 def next_corner(hull, count):
-    """(facet, point above it) to go on with; facet −1 where no point is left.
+    """(facet, point above the facet) to go on with; facet −1 where no point is left.
 
-    The farthest point of the facet that waits longest. Crowded clouds can make that the wrong
-    choice again and again; once too many tests were spent, points are taken in a shuffled order, for
-    which the expected number of facets made is below 6 per corner whatever the cloud.
+    The farthest point of the facet longest in the queue. Crowded clouds can make this choice wrong again and again;
+    after too many tests, points are taken in a shuffled order, for which the expected number of facets made is below 6
+    per corner whatever the cloud.
     """
     order, owner, state = hull.order, hull.owner, hull.state
     if state[TESTS] <= BUDGET * count:
@@ -312,11 +312,12 @@ N_FACETS, N_VERTICES, FACETS_AT, VERTICES_AT = range(4)
 
 @kernel
 def grow_hull(points_at, count, memory_at):
-    """The dimension of a cloud of points (count, 3); −1: the rim of a region was no simple cycle, which exact tests
-    exclude.
+    """The dimension of a cloud of points (count, 3); −1: the rim of a region was no simple cycle, a case excluded by
+    exact tests.
 
-    memory : HULL_EACH·count + HULL_FIXED bytes. Its header tells where facets (f, 3) stand, of flat clouds both sides,
-    and the vertices in order, two of a segment, of a point one; 32-bit integers, rows of the points.
+    memory : HULL_EACH·count + HULL_FIXED bytes. Its header holds where facets (f, 3) begin, both sides of a flat cloud,
+    and where the vertices begin, in order, two of a segment, a single vertex of a point; 32-bit integers, rows of the
+    points.
     """
     capacity = count + APICES
     header = view_i64(memory_at, 4)

@@ -1,10 +1,10 @@
 """Corners of an intersection of half-spaces within a box, few or many.
 
-Few planes go to double description, in integers. Of many, the planes are seen from a point inside; their polars are
-rounded to doubles, and the hull of these is exact: which planes meet in a corner is known for the planes that the
-rounded polars stand for. Polars off by a part η of themselves bound a body whose distance from the region is at most η
-times the square of its size over its inner radius: to x·p ≤ 1 they add η|p||x|, |p| is at most one over the inner
-radius, and a body shrunk by that part about the point is within the other. That, and what corners round, is the slop.
+Few planes go to double description, in integers. Many planes are seen from a point inside; their polars are rounded to
+doubles, and the hull of the rounded polars is exact: the planes meeting in a corner are known for the planes of the
+rounded polars. Polars off by a part η of themselves bound a body whose distance from the region is at most η times the
+square of its size over its inner radius: to x·p ≤ 1 they add η|p||x|, |p| ≤ 1 / inner radius, and a body shrunk by this
+part about the point lies within the other. This distance plus the rounding of corners is the slop.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def _corners(normals: np.ndarray, offsets: np.ndarray, centre: np.ndarray) -> tu
 
 
 def _heights(normals: np.ndarray, offsets: np.ndarray, centre: np.ndarray) -> np.ndarray | None:
-    """offsets − normals @ centre > 0 to four units in the last place; None where one is not > 0."""
+    """offsets − normals @ centre > 0 to four units in the last place; None where any height is not > 0."""
     terms = normals * centre
     heights = offsets - terms.sum(axis=1)
     total = np.abs(offsets) + np.abs(terms).sum(axis=1)

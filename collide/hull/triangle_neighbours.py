@@ -1,4 +1,4 @@
-"""Which triangle of a surface is across each side, without sorting: by the vertices at which sides begin and end."""
+"""The triangle across each side of a surface, without sorting: by the vertices at which sides begin and end."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ SIDE_WORDS_OF_TRIANGLE, SIDE_WORDS_OF_POINT, SIDE_WORDS_FIXED = 9, 2, 1
 
 
 class SideWorkspace(NamedTuple):
-    """Where neighbours are looked for, and what is found.
+    """Workspace and result of a search for neighbours.
 
-    beside : by side (from corner k of a triangle to the next) the triangle across it, −1 where none is.
+    beside : by side (from corner k of a triangle to the next) the triangle across, −1 at a border.
     corners, sides, starts : corners by their vertices.   mark : by vertex.
     """
 
@@ -37,7 +37,7 @@ def side_workspace(at, n, n_triangles):
 
 @kernel
 def find_neighbours(facets, n, n_triangles, space):
-    """Fill ``space.beside`` for the first triangles of a surface, no directed side of which is there twice. O(n)."""
+    """Fill ``space.beside`` for the first n_triangles of a surface whose directed sides are distinct. O(n)."""
     starts, sides, mark, beside = space.starts, space.sides, space.mark, space.beside
     for k in range(3 * n_triangles):
         space.corners[k] = k

@@ -1,11 +1,10 @@
-"""Checks that a hull is what it claims to be, in Python integers, with nothing of the builder's.
+"""Checks of a hull in Python integers, without code of the builder.
 
-Solid hulls are checked after Mehlhorn, Näher, Seel, Seidel, Schilz, Schirra, Uhrig, "Checking
-geometric programs or verification of geometric structures" (1999). Every edge is run along once in each
-direction, a point lies strictly below all facets, and the ray from it through the middle of one
-facet meets no other: seen from that point the facets cover every direction exactly once. Where no
-facet lies above its neighbour's plane besides, such a surface bounds a convex body. (Convex
-edges alone are not enough: a pentagram under two apices has them, and winds twice.)
+Solid hulls are checked after Mehlhorn, Näher, Seel, Seidel, Schilz, Schirra, Uhrig, "Checking geometric programs or
+verification of geometric structures" (1999). Every edge is run along once in each direction, a point lies strictly
+below all facets, and the ray from this point through the middle of a facet meets no other: seen from the point the
+facets cover every direction exactly once. Where no facet lies above its neighbour's plane besides, the surface bounds a
+convex body. (Convex edges alone are not enough: a pentagram under two apices has convex edges, and winds twice.)
 """
 
 from __future__ import annotations
@@ -76,7 +75,7 @@ def _check_rows(points, dimension, vertices, facets) -> None:
 
 
 def _distinct(points, rows, vertices) -> np.ndarray:
-    """Of the rows, one for each point that is no vertex."""
+    """The first row of each distinct point among the rows, vertices excluded."""
     order = np.concatenate([vertices, rows])
     _, first = np.unique(points[order] + 0.0, axis=0, return_index=True)
     return order[np.sort(first)][len(vertices) :]
@@ -135,7 +134,7 @@ def _edges(facets: np.ndarray) -> np.ndarray:
 
 
 def _twins(facets: np.ndarray) -> np.ndarray:
-    """For every directed edge the one that runs back, −1 where there is none; none may stand twice."""
+    """For every directed edge the number of the reversed edge, −1 if missing; no directed edge may appear twice."""
     edges = _edges(facets)
     assert (edges[:, 0] != edges[:, 1]).all(), "a facet names a corner twice"
     key, back = edges @ [1 << 31, 1], edges @ [1, 1 << 31]
@@ -185,7 +184,8 @@ def _check_covers_once(cloud: _Cloud, planes: _Planes, facets: np.ndarray) -> No
 
 
 def _check_flat(cloud: _Cloud, facets: np.ndarray) -> _Planes:
-    """Triangles of one sense within a convex border cover it once. Returns the border's planes, square to an axis."""
+    """Triangles of equal orientation within a convex border cover its inside once. Returns the border's planes, square
+    to an axis."""
     half = len(facets) // 2
     front = facets[:half]
     assert half and np.array_equal(front, facets[half:, ::-1]), "the second half is not the first seen from behind"
@@ -208,7 +208,7 @@ def _check_flat(cloud: _Cloud, facets: np.ndarray) -> _Planes:
 
 
 def _border(front: np.ndarray) -> np.ndarray:
-    """Vertices of the one ring of edges that no other triangle runs back along."""
+    """Vertices of the single ring of edges without a reversed twin."""
     edges = _edges(front)[_twins(front) < 0]
     after = dict(edges.tolist())
     assert len(after) == len(edges), "the border passes a vertex twice"
@@ -221,7 +221,8 @@ def _border(front: np.ndarray) -> np.ndarray:
 
 
 def _check_convex_border(exact, a, b, axis, up) -> None:
-    """Left turns only, and one turn in all: of the edges' directions one run goes up and one down."""
+    """Left turns only, and a single turn in all: the edges' directions rise over a single run and fall over the other.
+    """
     along = (exact[b] - exact[a])[:, [(axis + 1) % 3, (axis + 2) % 3]]
     after = np.roll(along, -1, axis=0)
     turns = (along[:, 0] * after[:, 1] - along[:, 1] * after[:, 0]) * up[axis]

@@ -1,4 +1,4 @@
-"""The one way to write a kernel, and to call one. Nothing outside this room knows how kernels become machine code.
+"""The one way to write a kernel, and to call a kernel. Nothing outside this room knows how kernels become machine code.
 
 Rules, each measured or forced by a bug met:
 
@@ -7,22 +7,22 @@ Rules, each measured or forced by a bug met:
 * no BLAS inside kernels, no ``parallel=True`` (two Python threads on its work queue abort the process): kernels release
   the GIL and callers chunk;
 * kernels hold no Python objects and raise nothing: they take integers, doubles and booleans, and everything else behind
-  addresses, of which they make views with `view_f64` and its siblings. The caller keeps every buffer alive for the
-  length of the call. The build refuses a kernel that may raise;
-* what a kernel is compiled from stands in the sources that `sources.py` names: a stale kernel answers wrongly.
+  addresses, seen through views (`view_f64` and its siblings). The caller keeps every buffer alive for the
+  length of the call. The build refuses a kernel able to raise;
+* everything a kernel is compiled from stands in the sources named by `sources.py`: a stale kernel answers wrongly.
 
-`mode.py` says how kernels run: from the library made when the package was built, compiled just in time, or as the
-Python that they are written in.
+`mode.py` says how kernels run: from the library made when the package was built, compiled just in time, or as plain
+Python.
 
-    kernel(inline=, cold=)    a function that other kernels call. inline : copy its code to where it is called.
-        cold : it is called on few of the ways through its callers, which are made fast at its expense.
-    entry(signature, nogil=)    a kernel that Python calls, with Numba's signature of it, of int64, float64 and boolean.
-        nogil : let other Python threads run meanwhile. A kernel of a microsecond that shares one workspace among all
+    kernel(inline=, cold=)    a function called by other kernels. inline : copy its code to each call.
+        cold : few paths through its callers reach it; the compiler favours the other paths.
+    entry(signature, nogil=)    a kernel called by Python, with its Numba signature of int64, float64 and boolean.
+        nogil : let other Python threads run meanwhile. A kernel of a microsecond with a workspace shared by all
         threads keeps the lock instead.
     code_of(entry)              address of its machine code, for `native_call`
     native_call(signature)
-    a kernel ``call(address, arguments)``: runs the entry of this signature that stands there.
-        A second entry that called the kernels themselves would compile the whole narrowphase again.
+    a kernel ``call(address, arguments)``: runs the entry of this signature at the address.
+        A second entry calling the kernels themselves would compile the whole narrowphase again.
     view_f64(address, n)        n doubles at an address; siblings for other kinds of elements
     address_of(array)           of a C-contiguous array's first element
 """

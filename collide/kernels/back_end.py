@@ -1,8 +1,8 @@
-"""LLVM's code of entries to machine code: all in one module, optimised once, for one processor or level of processors.
+"""LLVM's code of entries to machine code: all in a single module, optimised once, for a processor or a level of
+processors.
 
-One module lets entries share the kernels that they call, and lets the compiler see all calls of each. Numba's own two
-rounds of passes follow one another, as numba has them: the first makes functions small and simple before they are
-inlined into each other.
+A single module lets entries share their kernels, and shows the compiler all calls of each kernel. Numba's own two
+rounds of passes follow each other in Numba's order: the first makes functions small and simple before they are inlined.
 """
 
 from __future__ import annotations
@@ -62,10 +62,10 @@ def host(position_independent: bool = True) -> Target:
 def machine_code(
     names: Iterable[str], modules: Iterable[bytes], target: Target, prefix: str = "", outside: Iterable[str] = ()
 ) -> bytes:
-    """An object file of C functions of these names, with a prefix if so wished; all else in it is its own affair.
+    """An object file of C functions of these names, with a prefix if given; all other symbols are internal.
 
-    modules : bitcode, as `front_end.Lowered` has it.   outside : functions of other object files that it calls.
-    Raises BackEndError where a kernel may raise, or needs what is not to be had without Python.
+    modules : bitcode, as `front_end.Lowered` has it.   outside : C functions of other object files called by the code.
+    Raises BackEndError where a kernel may raise, or needs a function of Python's.
     """
     machine = target.machine()
     whole = _linked(modules, target, machine)

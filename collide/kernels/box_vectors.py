@@ -32,7 +32,7 @@ def boxes_meeting_prism(_context, boxes, at, frame, probe):
 
 
 def _meeting(boxes, frame, probe, parted):
-    """Signature and code of the bits that none of the vectors ``parted`` yields has set."""
+    """Signature and code of a mask: the boxes whose bit is 0 in every vector yielded by ``parted``."""
     _check_floats(boxes, frame, probe)
     signature = types.int64(boxes, types.int64, frame, probe)
 

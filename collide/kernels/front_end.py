@@ -1,9 +1,9 @@
 """Kernels to LLVM's code, by Numba's front end: for the build of the library, and for kernels compiled just in time.
 
-Kernels are no part of Numba's own target: they have one beside it, made of subclasses of what Numba has for processors.
-So nothing of Numba's is changed for whoever uses it in the same process, and what kernels do not have need not be done:
-no counted references, no wrappers for Python, no machine code of each callee. `back_end.py` makes machine code of an
-entry and all it calls at once.
+Kernels have a target of their own beside Numba's, made of subclasses of Numba's target for processors. So Numba's
+target is unchanged for its other users in the process, and work useless to kernels is left out: counted references,
+wrappers for Python, machine code of each callee. `back_end.py` makes machine code of an entry and all its callees at
+once.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Kernels(CPU):
 
 
 class _Library(CPUCodeLibrary):
-    """The code of one kernel, as it was lowered; nothing is linked or optimised here."""
+    """The code of a kernel as lowered, neither linked nor optimised."""
 
     def __init__(self, codegen, name):
         super().__init__(codegen, name)
@@ -163,8 +163,8 @@ class _Target(CPUTarget):
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class _NameByContent(FunctionPass):
-    """A kernel's name for LLVM says what it is, not how many were compiled before it in this process: code that was
-    kept is put together with code that was not, and comes out as the same bytes."""
+    """A kernel's LLVM name depends on its content, not on the number of kernels compiled before in this process: kept
+    code is linked with new code, and the bytes come out the same."""
 
     _name = "collide_name_by_content"
 
@@ -196,7 +196,7 @@ class KernelDispatcher(Dispatcher):
 
     @cached_property
     def full_name(self) -> tuple[str, str, str]:
-        """Module, qualified name, and what tells it from others made of one source."""
+        """Module, qualified name, and a hash to tell apart kernels made of the same source."""
         return self.py_func.__module__, self.py_func.__qualname__, _made_as(self.py_func)
 
     def get_call_template(self, args, kws):
@@ -206,7 +206,7 @@ class KernelDispatcher(Dispatcher):
         )
 
     def compile(self, sig):
-        """Lower it for these types, or take what was kept of that."""
+        """Lower the kernel for these types, or take the lowered code kept before."""
         arguments, asked = sigutils.normalize_signature(sig)
         known = self.overloads.get(tuple(arguments))
         if known is not None:
@@ -228,7 +228,7 @@ class KernelDispatcher(Dispatcher):
         return compiled.entry_point
 
     def _keep(self, called: kept_lowered.Called, compiled: compiler.CompileResult) -> None:
-        """Nothing is kept of a kernel that calls itself, or what has no name from one process to the next."""
+        """Write the record, but for kernels calling themselves, or whose names change from process to process."""
         calls = [library.kept_as for library in dict.fromkeys(compiled.library.called)]
         if _folder is None or None in calls or " at 0x" in repr((called, sources.values_held(self.py_func))):
             return
@@ -242,11 +242,11 @@ class KernelDispatcher(Dispatcher):
 
 
 class _Changed(Exception):
-    """A kernel is not there any more, or gives results of other types than it did."""
+    """A kernel no longer exists, or its results have other types than before."""
 
 
 def _taken(called: kept_lowered.Called) -> compiler.CompileResult | None:
-    """A kernel as it was lowered before; None where nothing of it is kept, or its code would be another now."""
+    """A kernel as lowered before; None where no record is kept, or its code or a callee's result has changed."""
     record = kept_lowered.read(_folder, called, _own_hash(called)) if _folder else None
     if record is None or called in _being_taken:
         return None
@@ -277,7 +277,7 @@ def _taken(called: kept_lowered.Called) -> compiler.CompileResult | None:
 
 
 def _lowered_again(called: kept_lowered.Called, result: str) -> _Library:
-    """The library of a kernel that a kept one calls. Raises _Changed, or numba's errors."""
+    """The library of a kernel called by a kept kernel. Raises _Changed, or numba's errors."""
     known = _dispatcher_of(called)
     if known is not None:
         known.compile(typing.signature(called.asked, *called.arguments) if called.asked else called.arguments)
@@ -290,15 +290,15 @@ def _lowered_again(called: kept_lowered.Called, result: str) -> _Library:
 
 
 def _dispatcher_of(called: kept_lowered.Called) -> KernelDispatcher | None:
-    """The package's kernel of this name; None where there is none, and of Numba's own functions."""
+    """The package's kernel of this name; None for an unknown name, and for Numba's own functions."""
     candidates = _dispatchers.get(called.name[:2], ())
     return next((known for known in candidates if known.full_name == called.name), None)
 
 
 @cache
 def _own_hash(called: kept_lowered.Called) -> str:
-    """Of what a kernel is lowered from, beside the kernels that it calls. Of one that its values tell from others, they
-    are in its name."""
+    """Hash of a kernel's own source, its callees left out, and of the compilers' versions. Values held by a closure are
+    in its name."""
     known = _dispatcher_of(called)
     code_hash = sources.of_own_code(known.py_func) if known is not None else sources.of_compiler()
     return f"{code_hash}, {sources.compiler_versions()}"
@@ -358,10 +358,10 @@ dispatcher_registry[Kernels] = KernelDispatcher
 
 
 class Lowered:
-    """The code of entries and of the kernels that they call, each kernel once.
+    """The code of entries and of the kernels called from them, each kernel once.
 
-    apart : kernels by module and name that stand in object files of their own, "collide.narrowphase.gjk.gjk.gjk" say.
-        Where one is called, the code calls a function that is defined elsewhere.
+    apart : module and name of kernels with object files of their own, "collide.narrowphase.gjk.gjk.gjk" say.
+        A call to such a kernel calls a function defined elsewhere.
     """
 
     def __init__(self, apart: frozenset[str] = frozenset()) -> None:
@@ -373,9 +373,10 @@ class Lowered:
         self._known: set = set()
 
     def add(self, name: str, function: Callable, signature: str) -> None:
-        """Lower an entry, and what of its callees is not there yet. In LLVM's code it is a C function of this name.
+        """Lower an entry, and those of its callees not lowered yet. In LLVM's code the entry is a C function of this
+        name.
 
-        Raises numba's errors where it is no kernel.
+        Raises numba's errors for a function outside the subset of kernels.
         """
         made = dispatcher(function)
         with target_override(TARGET), global_compiler_lock:
@@ -387,7 +388,7 @@ class Lowered:
         self._add_code(compiled.library)
 
     def add_apart(self, name: str, library: _Library) -> None:
-        """A kernel that stands apart, under the name that `outside` has it by."""
+        """Add a kernel with an object file of its own, under its name in `outside`."""
         self.names.append(name)
         self.modules.append(_apart_function(name, library.description, defined=True))
         self._add_code(library)
@@ -417,8 +418,9 @@ def _name_apart(library: _Library) -> str:
 
 
 def _apart_function(name: str, description: funcdesc.FunctionDescriptor, *, defined: bool) -> bytes:
-    """Bitcode of a kernel that stands apart as a function without a status, and the other way round, for its callers:
-    the object file that it stands in was refused if the status could be an error."""
+    """Bitcode of a bridge. defined : a function without a status, calling a kernel in its own object file; else the
+    kernel's function with status 0, calling the function without: an object file with a status that may be an error was
+    refused."""
     context = KernelDispatcher.targetdescr.target_context
     module = ir.Module(name, context=ir.Context())
     module.triple = llvm.get_process_triple()
@@ -451,7 +453,7 @@ def c_function_type(context, arguments: tuple, result: types.Type) -> ir.Functio
 
 
 def _c_function(name: str, compiled, context) -> bytes:
-    """Bitcode of a C function that calls an entry; a status that is an error ends in `FAILED`."""
+    """Bitcode of a C function calling an entry; an error in the entry's status ends in `FAILED`."""
     description = compiled.fndesc
     arguments, result = description.argtypes, description.restype
     module = ir.Module(name, context=ir.Context())  # without types that others defined before
@@ -471,7 +473,7 @@ def _c_function(name: str, compiled, context) -> bytes:
 
 
 def native_call(signature: str):
-    """A kernel ``call(address, arguments)``: runs the entry of this signature that stands there."""
+    """A kernel ``call(address, arguments)``: runs the entry of this signature at the address."""
     arguments, result = sigutils.normalize_signature(signature)
 
     def make(_context, address, values):

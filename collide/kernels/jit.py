@@ -1,8 +1,8 @@
-"""Kernels compiled at their first call, and kept on disk: for those who change them.
+"""Kernels compiled at their first call, and kept on disk: for people who change kernels.
 
-The same front end and the same back end as of the library (`front_end.py`, `back_end.py`), for this very processor. An
-entry's machine code is an object file, kept under a hash of the code that it can depend on (`sources.py`). An edit
-makes stale what it touches; entries that no edit concerns are the library's, where there is one.
+The front end and back end of the library (`front_end.py`, `back_end.py`), for this very processor. An entry's machine
+code is an object file, kept under a hash of all code its result depends on (`sources.py`). An edit makes dependent
+entries stale; all other entries come from the library, if installed.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""Lowered kernels kept in a folder, so that the next build lowers those alone that an edit concerns.
+"""Lowered kernels kept in a folder, so that the next build lowers only the kernels changed by an edit.
 
-A file for each kernel and types of its arguments. It is taken where the kernel's own code is the same
-(`sources.of_own_code`), and where each kernel that it calls still gives the same types of results: what these do inside
-is no part of their callers' code. So an edit of a kernel lowers this kernel anew, and its callers only where its
-results have other types.
+A file for each kernel and types of its arguments. The file is taken where the kernel's own code is the same
+(`sources.of_own_code`), and where each callee still gives the same types of results: the inside of a callee is no part
+of its callers' code. So an edit of a kernel lowers this kernel anew, and its callers only where its results have other
+types.
 
-Files begin with a digest of the rest: one that is cut, or has a bit flipped, is as if it were not there.
+Files begin with a digest of the rest: a truncated file, or a file with a flipped bit, counts as missing.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Record(NamedTuple):
 
 
 def read(folder: Path, called: Called, code_hash: str) -> Record | None:
-    """What is kept of a kernel; None where there is nothing, or nothing that was made of its own code as it is."""
+    """The record of a kernel; None where no file is kept, the file is damaged, or its code hash differs."""
     # the last three: types of arguments and results are pickled by name, and an edit may have renamed a class
     with suppress(OSError, AttributeError, ImportError, TypeError):
         place = folder / called.file_name

@@ -1,9 +1,9 @@
-"""Eight doubles at once: a number for kernels, whose arithmetic is that of doubles in every lane.
+"""Eight doubles at once: a number for kernels, with the arithmetic of doubles in every lane.
 
-`Lanes` have the operators of numbers, so that a kernel of plain expressions compiles for them as it stands: eight
-questions of one kind are worked on in the time of one or two. What has branches says `select` instead of ``if``; the
-functions here take doubles as well, so that one source serves both. Comparisons of lanes give a mask: eight booleans,
-with ``&``, ``|`` and ``~``. No lane depends on another, and each has the bits that doubles would have.
+`Lanes` have the operators of numbers, so a kernel of plain expressions compiles for them as written: eight questions of
+the same kind take the time of one or two. A kernel with branches says `select` instead of ``if``; the functions here
+take doubles as well, so the same source serves both. Comparisons of lanes give a mask: eight booleans, with ``&``,
+``|`` and ``~``. No lane depends on another, and each has the bits of the same computation in doubles.
 
 LLVM has vectors of eight doubles whatever the processor: see `vectors.py`.
 

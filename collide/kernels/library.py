@@ -1,8 +1,8 @@
-"""The library of kernels that was made when the package was built: looked at, loaded, and its functions.
+"""The library of kernels made when the package was built: checked, loaded, and its functions.
 
-A library cut short ends the process when it is loaded, and a function of other sources answers wrongly. So sizes and
-checksums of its files are compared with those that the build wrote down, and the sources with those that it was made
-from: a few milliseconds of a start. Where sources were edited, the library serves the entries that no edit concerns.
+A truncated library ends the process when loaded, and a function of other sources answers wrongly. So sizes and
+checksums of its files are compared with the build's record, and the sources with the sources of the build: a few
+milliseconds of a start. Where sources were edited, the library serves the entries not touched by the edit.
 """
 
 from __future__ import annotations
@@ -29,9 +29,10 @@ _UNBUILT = "this installation was built without compiled kernels, for want of a 
 
 
 def load() -> str:
-    """Bring the library into this process. Why not, in words, where it is not to be used; empty where it is.
+    """Load the library into this process. Returns why the library, or some of its kernels, cannot be used; empty where
+    all can.
 
-    Raises InvalidArgument where ``COLLIDE_CPU`` names no level, or one that is not to be had here.
+    Raises InvalidArgument where ``COLLIDE_CPU`` names no level, or a level missing here.
     """
     global edited, glue, level
     wanted = os.environ.get("COLLIDE_CPU", "")
@@ -73,7 +74,7 @@ def exists() -> bool:
 
 
 def fits_sources() -> bool:
-    """Whether the sources are, byte by byte, those that the library was made from. False where there is none."""
+    """Whether the sources equal, byte by byte, the sources of the library. False without a library."""
     built = _built()
     with suppress(OSError):  # a source that has moved since
         return built is not None and sources.fingerprint(built.SOURCE_FILES) == built.SOURCES
@@ -81,7 +82,8 @@ def fits_sources() -> bool:
 
 
 def about() -> dict[str, str]:
-    """What it was made from: ``level``, ``levels``, ``compiler``, ``sources`` (a hash), ``path``; {} where none is."""
+    """Origin of the library: ``level``, ``levels``, ``compiler``, ``sources`` (a hash), ``path``; {} without a library.
+    """
     built = _built()
     if built is None:
         return {}
@@ -93,7 +95,7 @@ def about() -> dict[str, str]:
 
 
 def entries() -> tuple[str, ...]:
-    """Names of the kernels that it has; () where there is none."""
+    """Names of the library's kernels; () without a library."""
     built = _built()
     return () if built is None else tuple(built.ENTRIES)
 
@@ -143,10 +145,11 @@ def _built() -> Any:
 
 
 def _edited(built: Any) -> frozenset[str]:
-    """Entries whose code is not what the library was made from, by name. Where there are no sources, as in frozen
-    programs, nobody can have changed them.
+    """Names of entries whose code differs from the library's. An installation without sources, as a frozen program, has
+    no edits.
 
-    One checksum of all files' bytes, 2 ms, settles most starts; where it differs, the entries' own hashes do, a second.
+    A checksum of all files' bytes, 2 ms, settles most starts; where the checksum differs, the entries' own hashes
+    decide, in a second.
     """
     if not os.path.exists(os.path.join(sources.PACKAGE, "results.py")):
         return frozenset()
@@ -182,7 +185,7 @@ def entry(_signature: str, *, nogil: bool = True) -> Callable[[Callable], Callab
 
 
 def function_of(function: Callable) -> Callable | None:
-    """The library's function that was made of an entry's source as it is; None where there is none."""
+    """The library's function of an entry, if made of the entry's present source; else None."""
     name = function.__name__
     if glue is None or name in edited or not (function.__module__ or "").startswith("collide."):
         return None

@@ -1,10 +1,10 @@
-"""How kernels run in this process, decided once, before the first of them is defined.
+"""How kernels run in this process, decided once, before the first kernel is defined.
 
-COMPILED : in the library that was made when the package was built. Neither Numba nor LLVM is in the process.
-JUST_IN_TIME : compiled by Numba and LLVM at their first call, and kept on disk. For kernels that were edited since the
-    library was made, the others being its; for installations without one; and for all where ``COLLIDE_JIT=1`` asks for
-    it.
-PYTHON : as the Python that they are written in: ``NUMBA_DISABLE_JIT=1``, for coverage and debugging.
+COMPILED : in the library made when the package was built. Neither Numba nor LLVM is in the process.
+JUST_IN_TIME : compiled by Numba and LLVM at their first call, and kept on disk. For kernels edited since the
+    library was made, all others coming from the library; for installations without a library; and for all kernels with
+    ``COLLIDE_JIT=1``.
+PYTHON : as plain Python: ``NUMBA_DISABLE_JIT=1``, for coverage and debugging.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def _asked(name: str) -> bool:
 
 
 def _choose_mode() -> tuple[str, str]:
-    """(mode, why). Raises MissingExtra where there is neither a library that can be used nor a compiler."""
+    """(mode, why). Raises MissingExtra where neither a usable library nor a compiler is installed."""
     if _asked("NUMBA_DISABLE_JIT"):
         return PYTHON, "NUMBA_DISABLE_JIT is set"
     forced = _asked("COLLIDE_JIT")

@@ -1,12 +1,12 @@
-"""Machine code of entries kept on disk: object files, looked at before they are believed.
+"""Machine code of entries kept on disk: object files, checked before use.
 
-Whoever writes an object file decides what runs. So the folder must be one that nobody else may write in
-(`cache_folder.own_folder`), and a file begins with a digest of the rest: one that is cut, or has a bit flipped, is
-noticed before it is loaded, and compiled anew. The digest is no signature: whoever may write in the folder may write
-that as well.
+Whoever writes an object file decides what runs. So nobody else may be able to write in the folder
+(`cache_folder.own_folder`), and a file begins with a digest of the rest: a truncated file, or a file with a flipped
+bit, is noticed before being loaded, and compiled anew. The digest is no signature: whoever may write in the folder may
+write a matching digest as well.
 
-The cache is a convenience. Nothing that goes wrong with it is an error of the question that was asked: it is said in a
-line, and the kernel is compiled.
+The cache is a convenience. Its failures are no errors of the query: a line of the log says what failed, and the kernel
+is compiled.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ _WITHOUT = "they are compiled again in every process"
 
 
 def kept_or_made(name: str, key: str, compiled: Callable[[], bytes]) -> bytes:
-    """The object file of this key: as it was kept, else what ``compiled`` gives, which is kept.
+    """The object file of this key: from the folder, else from ``compiled``, whose result is kept.
 
-    name : for people who look into the folder.   key : all that the machine code depends on.
+    name : for people who look into the folder.   key : all inputs of the machine code.
     """
     folder = own_folder(kernel_folder(), "compiled kernels, which are code,", _WITHOUT)
     if folder is None:
@@ -56,7 +56,7 @@ def kernel_folder() -> Path:
 
 
 def _read_kept(file: Path, identity: bytes) -> bytes | None:
-    """The code in a file, None where there is none to be used."""
+    """The code in a file; None where the file is missing or damaged."""
     try:
         content = read_own(file)
         code = content[_DIGEST:]

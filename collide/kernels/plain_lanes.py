@@ -11,7 +11,7 @@ LANES = 8
 
 
 class _Eight(np.ndarray):
-    """Numbers do not change: ``a += b`` gives ``a`` another value, and nothing else that had the old one."""
+    """Eight numbers, immutable: ``a += b`` makes a new array, and other names of the old array keep its values."""
 
     def __iadd__(self, other):  # type: ignore[misc]
         return self + other

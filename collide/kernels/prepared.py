@@ -1,4 +1,4 @@
-"""Kernels of single calls, bound to what they were prepared for: nothing is left to do in Python but the call.
+"""Kernels of single calls, bound to their pair of shapes: Python does nothing but the call.
 
 Two poses come as numpy arrays; what is no C-contiguous (4, 4) array of float64 is left to the long way, which says what
 is wrong with it, or converts it. Functions return None for that, and for what takes more than the kernel.

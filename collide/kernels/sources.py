@@ -1,8 +1,9 @@
-"""Which sources a kernel's machine code depends on, and a number that changes with them.
+"""The sources a kernel's machine code depends on, and a hash that changes with them.
 
-Kernels see constants of modules, so an entry is made of its own code and of every definition that this reaches, in its
-own module and in modules that are imported there, and so on: read from the sources, nothing is imported for it. A start
-compares one checksum of the files' bytes; where that differs, `entry_hashes` tells which entries an edit concerns.
+Kernels see constants of modules, so an entry is made of its own code and of every definition reached from its code, in
+its own module and in modules imported by this module, and so on: read from the sources, nothing is imported for it. A
+start compares a checksum of the files' bytes; where the checksum differs, `entry_hashes` tells the entries touched by
+an edit.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ COMPILER_SOURCES = tuple(
 
 
 def kernel_sources() -> tuple[str, ...]:
-    """Files of the package that the library is compiled from, "results.py" say: those that define entries, what these
-    import, and so on, and what makes code of them. Found by the build, which writes the list down: a start has no time
-    to look."""
+    """Files of the package from which the library is compiled, "results.py" say: the modules of entries, their imports,
+    the imports of these, and so on, and the modules of the compiler. Found by the build, and written down: a start has
+    no time to look."""
     files = set(COMPILER_SOURCES)
     for path in _files_of_entries():
         files.update(map(_place_of, _reached(_module_of(path))))
@@ -50,7 +51,7 @@ def _place_of(module: str) -> str:
 
 
 def fingerprint(names: tuple[str, ...]) -> int:
-    """A checksum of such files. Two milliseconds. Raises OSError where one is not there."""
+    """A checksum of files of the package. Two milliseconds. Raises OSError where a file is missing."""
     checksum = 0
     for name in names:
         with open(os.path.join(PACKAGE, *name.split("/")), "rb") as file:
@@ -73,19 +74,19 @@ def entry_hashes() -> dict[str, str]:
 
 
 def of_function(function: Callable) -> str:
-    """A hash of what a function's machine code can depend on: the function's own code and values, and every definition
-    of the package that can be reached from there, as a syntax tree without docstrings, comments and blank lines.
+    """A hash of everything a function's machine code can depend on: the function's own code and values, and every
+    definition of the package reached from this code, compiled without docstrings, comments and blank lines.
 
-    A definition is reached where its name stands in code that is reached, in a module that the function's module
-    imports, or these import: names alone decide, so that a name of another thing makes a hash change too often, never
-    too seldom.
+    A definition is reached where its name stands in reached code, in the function's module or in a module imported from
+    there, directly or through others: names alone decide, so an unrelated definition of the same name makes a hash
+    change too often, never too seldom.
     """
     return _hash_of_function(function, beyond_kernels=True)
 
 
 def of_own_code(function: Callable) -> str:
-    """A hash of what a function is lowered from, the kernels that it calls being known by their results' types: as
-    `of_function`, but of those kernels the decorators and parameters alone."""
+    """A hash of everything a function is lowered from, its callees being known by their results' types: as
+    `of_function`, but of callees the decorators and parameters alone."""
     return _hash_of_function(function, beyond_kernels=False)
 
 
@@ -96,12 +97,13 @@ def of_compiler() -> str:
 
 
 def is_defined_in_module(function: Callable) -> bool:
-    """Whether a function's module and name say which it is; one made by another function holds values beside them."""
+    """Whether a function's module and name identify the function; a function made by another function holds values
+    besides."""
     return not function.__closure__ and function.__qualname__ in _parsed(function.__module__ or "").definitions
 
 
 def values_held(function: Callable) -> str:
-    """What tells a function from others that were made of one source: its code, and the values that it holds."""
+    """The difference between functions made of the same source: their code, and the values held by their closures."""
     code = function.__code__
     cells = [_named(cell.cell_contents) for cell in function.__closure__ or ()]
     parts = code.co_code.hex(), code.co_names, _constants(code), function.__defaults__, cells
@@ -127,10 +129,11 @@ def _hash_of(module: str, names: tuple[str, ...], values: str = "", *, beyond_ke
 def definitions_reached(
     module: str, names: Iterable[str], *, beyond_kernels: bool = True
 ) -> dict[tuple[str, str], _Part]:
-    """Definitions of the package that code of these names in a module can reach, by module and name; under "" what
-    stands in a module beside definitions, where any of them is reached or imported from there.
+    """Definitions of the package reached by code of these names in a module, by module and name; under "" all
+    statements beside definitions of a module, where any of its definitions is reached or the module imported.
 
-    beyond_kernels : False takes of the kernels that are reached what their callers are lowered from, and ends there.
+    beyond_kernels : False takes of a reached kernel only the inputs of its callers' lowering, and follows its code no
+    further.
     """
     modules, known = _reached(module), _definitions_seen_by(module)
     parts: dict[tuple[str, str], _Part] = {}
@@ -151,7 +154,7 @@ def definitions_reached(
 
 @cache
 def _definitions_seen_by(module: str) -> dict[str, dict[str, _Part]]:
-    """Definitions of a module and of those that it imports, by name and module."""
+    """Definitions of a module and of its imports, by name and module."""
     seen: dict[str, dict[str, _Part]] = {}
     for place in _reached(module):
         for name, part in _parsed(place).definitions.items():
@@ -278,7 +281,7 @@ def _constants(code) -> list:
 
 
 def _reached(module: str) -> set[str]:
-    """The package's modules that a module imports, those that these import, …, and itself."""
+    """A module, its imports of the package, their imports, …."""
     reached, waiting = set(), [module]
     while waiting:
         source_module = waiting.pop()
@@ -305,7 +308,7 @@ def _imported(module: str) -> tuple[str, ...]:
 
 
 def _may_matter(module: str) -> bool:
-    """Whether it is a module at all, and none that only decides how kernels run."""
+    """Whether a name is a module, and more than a decision how kernels run."""
     if _file(module) is None or module == "collide.kernels":
         return False
     return not module.startswith("collide.kernels.") or f"{module[8:].replace('.', '/')}.py" in COMPILER_SOURCES

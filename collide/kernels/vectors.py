@@ -117,7 +117,7 @@ def _scan(builder: ir.IRBuilder, values, count):
 
 
 def _scan_list(builder: ir.IRBuilder, values, count):
-    """`_scan` with fewer branches: a count that changes from one call to the next is not predicted."""
+    """`_scan` with fewer branches: a count changing from call to call is mispredicted."""
     return _scan_by_count(builder, values, count, ((6, _scan_few(6)),))
 
 
@@ -154,10 +154,10 @@ def _scan_one(builder, values, _last):
 
 
 def _scan_few(blocks):
-    """`_scan` of no more than so many blocks, the last ones perhaps the same: what is seen twice ties with itself.
+    """`_scan` of at most this many blocks, the last blocks perhaps equal: a block seen twice ties with itself.
 
-    All products stay in registers; which of them is the largest is asked when that is known. Keeping its index beside
-    the largest so far takes half as long again.
+    All products stay in registers; the largest is found first, its index afterwards. Keeping the index beside the
+    largest so far takes half as long again.
     """
 
     def scan(builder, values, last):
@@ -264,7 +264,7 @@ def _earlier_of(builder, a, b):
 
 
 def _reduced(builder, best):
-    """One value and index out of eight: the largest value, then the lowest index among the lanes that hold it.
+    """The largest of eight values, then the lowest index among the lanes holding this value.
 
     The second half waits only for a comparison; carrying pairs down three times takes twice as long.
     """

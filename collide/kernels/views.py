@@ -1,8 +1,8 @@
-"""What kernels see of a buffer, for the compiler: an address, and elements of one kind behind it.
+"""Buffers as kernels see them, for the compiler: an address, and elements of a single kind behind.
 
-A view indexes as it is told. Numba's arrays count an index below 0 from the end, so that wherever the compiler cannot
-see its sign each access compares, adds and selects; no kernel has such an index. And a view is two words where an array
-is seven: most kernels hand over the views of a pair, some fifty of those.
+A view takes an index as given. Numba's arrays count an index below 0 from the end, so wherever the compiler cannot see
+its sign each access compares, adds and selects; no kernel has a negative index. And a view is two words where an array
+is seven: most kernels hand over the views of a pair, some fifty views.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from numba.extending import intrinsic, models, register_model
 
 
 class View(types.Type):
-    """Elements of one kind, one behind the other.
+    """Elements of a single kind, side by side.
 
-    alignment : bytes of whose multiple each address is one; None for what the elements have by nature.
+    alignment : each address is a multiple of so many bytes; None for the natural alignment of the elements.
     """
 
     def __init__(self, element: types.Type, alignment: int | None = None):

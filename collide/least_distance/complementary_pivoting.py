@@ -1,10 +1,10 @@
 """Lemke's method for linear complementarity problems, in doubles to propose and in integers to decide.
 
 Given M and q: w = M z + q, w ≥ 0, z ≥ 0, w·z = 0. Where M is positive semidefinite (as of every convex quadratic
-program) the method ends at a solution, or on a ray that proves that w, z ≥ 0 have none (Cottle, Pang and Stone 1992,
+program) the method ends at a solution, or on a ray, a certificate that no w, z ≥ 0 exist (Cottle, Pang and Stone 1992,
 The linear complementarity problem, theorem 4.4.12).
 
-Variables are numbered: w₀ … wₙ₋₁, z₀ … zₙ₋₁, and the artificial one, 2n.
+Variables are numbered: w₀ … wₙ₋₁, z₀ … zₙ₋₁, and the artificial variable, 2n.
 """
 
 from __future__ import annotations

@@ -25,7 +25,9 @@ _DEDUPLICATED_FROM = 64
 
 
 class Violations(NamedTuple):
-    """rows : indices of rows at which a linear function is negative.   values : it, in doubles, scaled."""
+    """rows : indices of rows at which a linear function is negative.   values : its values at these rows, in doubles,
+    scaled.
+    """
 
     rows: np.ndarray
     values: np.ndarray

@@ -34,7 +34,7 @@ class InputRows(NamedTuple):
 
 
 def input_rows(points: ArrayLike, normals: ArrayLike, offsets: ArrayLike) -> InputRows:
-    """The rows of a question, checked, in units that keep products of doubles within their range.
+    """The rows of a question, checked, in units for which products of doubles stay in range.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def input_rows(points: ArrayLike, normals: ArrayLike, offsets: ArrayLike) -> Inp
     Raises
     ------
     InvalidArgument
-        Naming what is wrong, and where.
+        Naming the argument, its fault and the row.
     """
     p, size = read_points(points)
     a, b, sizes = read_halfspaces(normals, offsets, p.shape[1])

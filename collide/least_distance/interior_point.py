@@ -10,10 +10,10 @@ from collide.least_distance.pair_proposals import Work, propose_from_samples
 
 
 def interior_point(halfspaces: HomogeneousRows, work: Work, exactly: bool) -> np.ndarray | None:
-    """A point inside every half-space, clear of all: proposed in doubles, or exactly; None where there is none.
+    """A point strictly inside every half-space: proposed in doubles, or exactly; None where FH has no interior.
 
-    (x, s) with a·x − b·s ≤ −1 and s ≥ 0 exists where FH has interior, which then x/s is in; the shortest such vector
-    has the widest margin. It is a program in d + 1 variables over all half-spaces, as in theorem 4.5.
+    (x, s) with a·x − b·s ≤ −1 and s ≥ 0 exists where FH has interior, and x/s is then interior; the shortest vector (x,
+    s) has the widest margin, and solves a program in d + 1 variables over all half-spaces, as in theorem 4.5.
     """
     work.add("whole_programs")
     d = halfspaces.dimension
@@ -36,7 +36,8 @@ def interior_point(halfspaces: HomogeneousRows, work: Work, exactly: bool) -> np
 
 
 def _shortest(origin, lifted, work: Work, exactly: bool) -> tuple[np.ndarray | None, float]:
-    """The point of lifted half-spaces nearest the origin and what 1 is in its units; None where they have none."""
+    """(the point of the lifted half-spaces nearest the origin, the value of 1 in its units); (None, 0) where they have
+    no common point."""
     if not exactly:
         proposal = propose_from_samples(origin, lifted, work, None, None, [0], [])
         return (proposal.y - proposal.u, 1.0) if proposal.is_settled else (None, 0.0)

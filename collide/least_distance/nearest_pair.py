@@ -3,8 +3,8 @@
 The smallest |y − x| with y = Σ λᵢ pᵢ (λ ≥ 0, Σ λ = 1) and a_j·x ≤ b_j is a convex quadratic program. Its conditions of
 Karush, Kuhn and Tucker: u = y − x = Σ μ_j a_j with μ ≥ 0; μ_j > 0 only where a_j·x = b_j; u·pᵢ ≥ θ, and λᵢ > 0 only
 where u·pᵢ = θ. They are a linear complementarity problem, solved by Lemke's method over a working set of some dozens of
-rows, to which the rows that its answer violates most are added, until there is none. No row leaves the working set, so
-it ends. u = 0 is a common point; a ray of the method is a combination of half-spaces that contradict each other.
+rows. The rows most violated by its answer join the set, until no row is violated. No row leaves the working set, so the
+search ends. u = 0 is a common point; a ray of the method is a combination of contradicting half-spaces.
 """
 
 from __future__ import annotations
@@ -108,10 +108,11 @@ def finish_exactly(
     working_points: list[int],
     working_halfspaces: list[int],
 ) -> NearestPair:
-    """The nearest pair of all rows, from one of working sets, or from none: they grow until no row is violated.
+    """The nearest pair of all rows, starting from a pair of working sets, or without a pair: sets grow until no row is
+    violated.
 
-    Parameters and errors are those of `nearest_pair`; ``working_points`` and ``working_halfspaces`` hold the rows that
-    ``pair`` is of.
+    Parameters and errors as in `nearest_pair`; ``pair`` is exact for the rows ``working_points`` and
+    ``working_halfspaces``.
     """
     while True:
         if pair is not None:
@@ -125,7 +126,7 @@ def finish_exactly(
 
 
 def _add_violated(pair, points, halfspaces, point_rows, halfspace_rows, working_points, working_halfspaces, work):
-    """Add the rows that an exact answer violates to the working set; False where there is none."""
+    """Add the rows most violated by an exact answer to the working sets; False where no row is violated."""
     work.add("exact_rounds")
     violated = halfspaces.negative(pair.corner, halfspace_rows)
     _extend(working_halfspaces, violated)
@@ -152,11 +153,12 @@ def _extend(working: list[int], violated: Violations) -> None:
 def settle_basis(
     points: HomogeneousRows, halfspaces: HomogeneousRows, point_rows: list[int], halfspace_rows: list[int]
 ) -> NearestPair | None:
-    """The exact solution with these rows in the basis; None where it is singular or some number of it is negative.
+    """The exact solution with these rows in the basis; None where the basis is singular or a weight or multiplier
+    negative.
 
-    Of the rows themselves it is the nearest pair; other rows are not looked at. With p₀ + Σ λᵢ eᵢ for y, eᵢ the edges
-    from p₀, unknown are the multipliers and λ: a_j·(p₀ + Σ λᵢ eᵢ − Σ μ_k a_k) = b_j and Σ μ_j a_j·eᵢ = 0. O((s + t)³)
-    operations of integers.
+    The solution is the nearest pair of the rows of the basis; other rows are not looked at. With y = p₀ + Σ λᵢ eᵢ, eᵢ
+    the edges from p₀, the multipliers μ and the weights λ are unknown: a_j·(p₀ + Σ λᵢ eᵢ − Σ μ_k a_k) = b_j and Σ μ_j
+    a_j·eᵢ = 0. O((s + t)³) operations of integers.
     """
     d = points.dimension
     v, unit = _over_one_denominator([points.integers(row) for row in point_rows], d)
@@ -202,8 +204,8 @@ def solve_symmetric(rows: list[list[int]]) -> tuple[list[int], int] | None:
     """The solution of symmetric equations: (numerators, denominator > 0); None where a leading minor is 0.
 
     Row k holds the coefficients k … n − 1 and the right-hand side. Fraction-free elimination (Bareiss 1968), of the
-    upper half alone. Leading minors are not 0 where a positive definite block stands first, and one of zeros last of
-    which the whole is not singular.
+    upper half alone. No leading minor is 0 where the matrix is not singular, a positive definite block stands first and
+    a block of zeros last.
     """
     n, previous = len(rows), 1
     for k, line in enumerate(rows):

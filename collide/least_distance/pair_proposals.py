@@ -1,7 +1,7 @@
 """The nearest pair of points and half-spaces as doubles see it: nothing is proven here.
 
-A linear complementarity problem of a working set (see `nearest_pair`), to which the rows that its answer violates most
-are added until there is none; of many rows a sample first.
+A linear complementarity problem of a working set (see `nearest_pair`). The rows most violated by its answer join the
+set, until no row is violated; of many rows a sample is searched first.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ _CAPACITY = 40
 
 @dataclass
 class Work:
-    """What a query did, and the most it may do.
+    """Work done by a query, and its limit.
 
     Attributes
     ----------
-    limit : int or None
-        The most rows that may be read; None for no limit.
+    limit : int, optional
+        The most rows to be read; no limit if None.
     counters : dict
-        What is counted: rounds, pivots, calls, ….
+        Numbers of rounds, pivots, calls, …, by name.
     seen : list of HomogeneousRows
         Whose rows were read.
     """
@@ -91,9 +91,9 @@ class Work:
 
 
 class Proposal(NamedTuple):
-    """points, halfspaces : rows of a basis that doubles take for optimal.   y, u : the nearest pair in doubles.
+    """points, halfspaces : rows of a basis, optimal as far as doubles can tell.   y, u : the nearest pair in doubles.
 
-    is_settled : False where doubles came to no end; the rows are then those of the last step that they could make.
+    is_settled : False where doubles came to no end; the rows are then the rows of their last step.
     """
 
     points: list[int]
@@ -143,7 +143,8 @@ def _some(count: int, rows: np.ndarray | None) -> np.ndarray | None:
 
 
 def _violated(rows: HomogeneousRows, vector: np.ndarray, last: float, subset: np.ndarray | None) -> np.ndarray:
-    """The rows at which a function is negative, as far as doubles can tell; of very many those farthest from 0."""
+    """The rows at which a function is negative, as far as doubles can tell; of more than _MAX_ADDED the most negative.
+    """
     size = rows.magnitude * float(np.abs(vector).sum()) + rows.max_last * abs(last)
     at, values = rows.below(np.append(vector, last), -NOISE * size, subset)
     return at if len(at) <= _MAX_ADDED else at[np.argpartition(values, _MAX_ADDED)[:_MAX_ADDED]]
@@ -210,7 +211,7 @@ class _State:
         return self.integers[first : first + count].tolist()
 
     def proposal(self, d: int, is_settled: bool) -> Proposal:
-        """What was found; of a search that came to no end its last basis, and the rows added after it."""
+        """The basis found and its pair; of an unsettled search the last basis, and the rows added after its step."""
         n_points, n_halfspaces = self.integers[N_BASIC_POINTS : N_BASIC_HALFSPACES + 1].tolist()
         points, halfspaces = self.rows(2, n_points), self.rows(3, n_halfspaces)
         if not is_settled:
@@ -223,7 +224,7 @@ class _State:
 
 
 class _OfThread(local):
-    """The state of one thread, made when the thread first asks; a larger one from when it did not do."""
+    """The state of a thread, made when the thread first asks; replaced by a larger state when too small."""
 
     def __init__(self) -> None:
         self.state = _State(_CAPACITY)

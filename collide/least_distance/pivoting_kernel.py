@@ -77,7 +77,8 @@ def _exchange(table, basic, nonbasic, n, row, column):
 
 @kernel
 def _leaving_row(table, basic, n, column):
-    """The row of the least ratio; of equal ones the artificial variable's, else that of the safest pivot. −1: none."""
+    """The row of the least ratio; among ties the artificial variable's, else the row of the largest pivot. −1: no row.
+    """
     width = n + 2
     steepest = 0.0
     for i in range(n):

@@ -1,8 +1,8 @@
 """The nearest pair of points and half-spaces in doubles, in a kernel: a working set grows until no row violates it.
 
 The linear complementarity problem of a working set of points pᵢ and half-spaces a_j·x ≤ b_j (see `nearest_pair.py`),
-with the weight of point 0 put for those of the others: variables are the weights of points 1 …, one that says whether
-point 0 has weight, and the multipliers of the half-spaces.
+with the weight of point 0 replaced by 1 less the others' sum: variables are the weights of points 1 …, the multiplier
+of the constraint "point 0 has weight ≥ 0", and the multipliers of the half-spaces.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ def _is_new(integers, first, n, row):
 
 @kernel
 def _grow(search, points, halfspaces, s, t):
-    """Add the row of either kind that the solution violates most; False where none is added."""
+    """Add, of either kind, the row most violated by the solution; False where no row is added."""
     doubles = search.doubles
     integers = search.integers
     d = points.d

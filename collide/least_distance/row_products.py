@@ -71,8 +71,9 @@ def _row(rows, k):
 
 @kernel(inline=True)
 def _fill(rows, first, count, f, d):
-    """`_fill_block` of all rows but for their last numbers. d stands in its calls as a number, which the compiler puts
-    here; the vector is read once, since whatever is written might be a part of it."""
+    """`_fill_block` of all rows, last numbers left out. d is a literal in each call, so the compiler folds the
+    branches; the vector is read once, since the compiler must assume that a write to the block may change the vector.
+    """
     w = f.vector
     at = f.at
     w0 = w[at]

@@ -1,4 +1,4 @@
-"""Who touches whom, how far, with proof: one file per method and per special pair.
+"""Contact, gaps and depths of pairs of bodies, with proofs: a file per method and per special pair.
 
-`dispatch` shows which method answers which pair; `pair_kernel` runs it over a list of pairs.
+`dispatch` shows the method of each pair of kinds; `pair_kernel` runs the methods over a list of pairs.
 """

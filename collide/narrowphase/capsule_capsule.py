@@ -79,14 +79,14 @@ def _clamp(value, square):
 def nearest_of_segments(points, weights):
     """Distance of two segments, from the four differences of their ends.
 
-    points : difference points A0 − B0, A1 − B0, A0 − B1, A1 − B1 (equal ones for a point).
+    points : difference points A0 − B0, A1 − B0, A0 − B1, A1 − B1 (equal points for a segment of length 0).
     weights : 10 doubles out: weights of the four, the nearest point of their parallelogram, and the
         unit axis that separates best.
 
-    Returns (distance, lower bound of it from the plane through the nearest point).
+    Returns (distance, its lower bound from the plane through the nearest point).
 
-    The minimum lies inside both segments or at an end of one of them: all five candidates are
-    compared, so parallel and degenerate segments are no special cases (Ericson 2005, 5.1.9).
+    The minimum lies inside both segments or at an end of either: all five candidates are compared, so parallel and
+    degenerate segments are no special cases (Ericson 2005, 5.1.9).
     """
     p = point_at(points, 0)
     u = sub(point_at(points, 1), p)

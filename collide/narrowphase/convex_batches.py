@@ -25,14 +25,13 @@ from collide.shapes.shape_set import Picked
 
 
 class Question(NamedTuple):
-    """What is asked of a pair at every pose.
+    """The question asked of a pair at every pose.
 
-    boolean : whether they meet, and no more; else rows.
-    limit : how far apart bodies may be for their distance to matter [m].
-    depths : of rows: whether it is wanted how deep overlaps are; without it some rows may tell all the same.
-    check : refuse matrices that are no rotation.
-    axes : (n, 3) for booleans of convex sets: an axis to try first, pose by pose, replaced by one that parts the
-        bodies.
+    boolean : only whether the bodies meet; else rows.
+    limit : gaps beyond this are not measured [m].
+    depths : of rows: whether depths of overlaps are wanted; without it some rows may have a depth all the same.
+    check : refuse matrices other than rotations.
+    axes : (n, 3) for booleans of convex sets: an axis to try first, pose by pose, replaced by a separating axis.
     """
 
     boolean: bool
@@ -59,12 +58,12 @@ def convex_rows(
 
 
 def answer_sets(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
-    """Answer pairs of convex sets in their own frames; False where a pose is none, and ``out`` is to be zeroed before
-    it is used again.
+    """Answer pairs of convex sets in their own frames; False where a matrix is no pose, and ``out`` must then be zeroed
+    before its next use.
 
-    out : becomes the answers: bool[n], or n rows of `PAIR_DTYPE` that are zeroed.
-    A, B : two shapes, or shapes `Picked` from one set pose by pose.
-    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
+    out : becomes the answers: bool[n], or n rows of `PAIR_DTYPE`, zeroed before.
+    A, B : two shapes, or shapes `Picked` from a set pose by pose.
+    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose paired with all of the other body's.
     """
     if convex_kernel_calls.distrust_doubles:
         return _answer_compounds(out, A, B, X_WA, X_WB, question)
@@ -76,7 +75,7 @@ def answer_sets(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, quest
 
 
 def shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
-    """(table, rows of it pose by pose) of convex sets in their own frames; None for rows 0 and 1 throughout."""
+    """(table, its rows pose by pose) of convex sets in their own frames; no rows (None) for rows 0 and 1 throughout."""
     if isinstance(A, Picked):
         return tables_of(A.shape_set).convex, np.stack([A.rows, B.rows], axis=1)
     pair = prepared_pair(A, B)
@@ -115,14 +114,14 @@ def prepare_parts(A: Shape, B: Shape) -> Prepared:
 
 
 def _are_single(shapes) -> bool:
-    """Whether a shape, or all that are picked, are one convex set in their own frame."""
+    """Whether a shape is a single convex set in its own frame; of `Picked` shapes, whether all are."""
     if isinstance(shapes, Picked):
         return bool(tables_of(shapes.shape_set).single_convex[shapes.rows].all())
     return is_single_convex(shapes)
 
 
 def _compound_table(A, B) -> tuple[CompoundTable, np.ndarray | None]:
-    """(table, bodies of it pose by pose); None for bodies 0 and 1 throughout."""
+    """(table, its bodies pose by pose); no bodies (None) for bodies 0 and 1 throughout."""
     if isinstance(A, Picked):
         return tables_of(A.shape_set).compounds, np.stack([A.rows, B.rows], axis=1)
     pair = prepared_pair(A, B)

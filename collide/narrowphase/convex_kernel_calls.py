@@ -39,10 +39,10 @@ def run_pairs(
     stop_at_hit: bool = False,
     depths: bool = True,
 ) -> np.ndarray:
-    """Rows of `PAIR_DTYPE` for pairs (k, 2) of posed parts; fewer than k where a hit stopped it.
+    """Rows of `PAIR_DTYPE` for pairs (k, 2) of posed parts; fewer than k where a hit stopped the search.
 
     poses : of all parts.   shape_of : (parts,) int64, rows of ``table``.
-    depths : whether it is wanted how deep overlaps are.
+    depths : whether depths of overlaps are wanted.
     Fields a, b and part_a, part_b are left 0: the caller knows the bodies.
     """
     pairs = np.ascontiguousarray(pairs, dtype=np.int64)
@@ -75,10 +75,10 @@ def settle_proposals(
     *,
     boolean: bool = False,
 ) -> None:
-    """Let the exact stage settle rows in place whose vertices were found elsewhere: it begins with those.
+    """Let the exact stage settle rows in place, starting from vertices found by another search.
 
-    Arguments as in `run_pairs`; rows : with vertices, count, points and a distance that is a guess. Bodies that meet
-    are told to, without a depth.   boolean : no distance is wanted either.
+    Arguments as in `run_pairs`; rows : with vertices, count, points and a guess of the distance. Bodies that meet get a
+    hit without a depth.   boolean : no distance is wanted either.
     """
     rows["how"], rows["lower"], rows["upper"] = UNDECIDED, -np.inf, np.inf
     _of_thread.space.integers[REQUESTS_AT] = 0
@@ -120,7 +120,7 @@ def _finish(
 
 
 def number_of_poses(X_WA: np.ndarray, X_WB: np.ndarray) -> int:
-    """How many pairs two batches of poses make, of which either may be of one."""
+    """Number of pairs of two batches of poses, either of them possibly a single pose."""
     return max(len(X_WA), len(X_WB)) if min(len(X_WA), len(X_WB)) else 0
 
 
@@ -137,14 +137,14 @@ def run_poses(
     axes: np.ndarray | None = None,
     depths: bool = True,
 ) -> bool:
-    """Answer two convex sets at n pairs of poses; False where a pose is no pose.
+    """Answer two convex sets at n pairs of poses; False where a matrix is no pose.
 
-    out : becomes the answers: bool[n], or n rows of `PAIR_DTYPE` that are zeroed.
+    out : becomes the answers: bool[n], or n rows of `PAIR_DTYPE`, zeroed before.
     which : (n, 2) int64 rows of ``table`` pose by pose, or None for rows 0 and 1 throughout.
-    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
-    check : refuse matrices that are no rotation.
-    axes : (n, 3) for booleans: an axis to try first, pose by pose, replaced by one that parts the bodies.
-    depths : of rows: whether it is wanted how deep overlaps are.
+    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose paired with all of the other body's.
+    check : refuse matrices other than rotations.
+    axes : (n, 3) for booleans: an axis to try first, pose by pose, replaced by a separating axis.
+    depths : of rows: whether depths of overlaps are wanted.
     """
     n = len(out)
     table.build_trees(np.arange(2) if which is None else which)
@@ -235,8 +235,8 @@ _of_thread = _OfThread()
 
 @cache
 def space_of_single_calls() -> BlockWorkspace:
-    """One for all single calls: their kernels keep Python's lock. Two threads that ask at once may get two, and either
-    is good as long as it is held."""
+    """A workspace for all single calls: their kernels keep Python's lock. Two threads at once may get two workspaces,
+    and either works while held."""
     return BlockWorkspace()
 
 

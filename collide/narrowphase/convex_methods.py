@@ -1,4 +1,4 @@
-"""The part of the table (`dispatch.py`) that kernels need: which method answers two packed convex sets."""
+"""The kernels' part of the table (`dispatch.py`): the method of two packed convex sets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two convex cores without the balls that sweep them: a gap or a depth, the feature it comes from, and a bracket.
+"""Two convex cores without the balls around them: a gap or a depth, its feature, and a bracket.
 
 GJK, and EPA where the cores overlap; `refine_depth.py` finds the last digits of a depth. Points and segments:
 `capsule_capsule.py`.
@@ -100,11 +100,11 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
 
 @kernel(inline=True)
 def _normal_of_gap(v, distance, nhat, tolerance):
-    """The direction in which curved cores are as far apart as is proven, if their nearest points can be moved onto it.
+    """The direction along which curved cores are proven apart, if their nearest points can be moved onto its line.
 
-    The nearest point v of A ⊖ B stops at rounding: across it, it is off by the root of distance · rounding, and its
-    direction by that over the distance, so that corners far from it may come nearer along v than they are. Along the
-    normal of the plane that proves the lower bound none does.   tolerance : what the points may miss it by [m].
+    The nearest point v of A ⊖ B stops at rounding: across its direction, v is off by √(distance · rounding), and the
+    direction by this error over the distance, so corners of A ⊖ B far from v may come nearer along v than v. No corner
+    does along the normal of the plane of the lower bound.   tolerance : largest miss of the points [m].
     """
     if not distance > 0.0 or norm(add(v, scale(distance, nhat))) <= tolerance:
         return nhat
@@ -186,9 +186,9 @@ def _is_final(result, size, error, radius):
 
 @kernel(inline=True)
 def _refined_result(result, refined, error):
-    """EPA's result with the last digits of `refine`, on the surface that it left.
+    """EPA's result with the last digits of `refine`, on the surface left by `refine`.
 
-    A facet as thin as a rounding has no direction of its own; EPA's plane is then the better one.
+    A facet as thin as a rounding has no direction of its own; EPA's plane is then the better plane.
     """
     if refined.sound and refined.upper <= result.depth + 2.0 * error:
         return EpaResult(
@@ -202,9 +202,9 @@ def _refined_result(result, refined, error):
 
 @kernel(inline=True)
 def _weigh_foot(work, polytope, result, depths, with_ids, curved, tolerance, size, error):
-    """Points 0 … 2 become the facet that holds the origin's foot on the plane of the depth, weighted for the foot.
+    """Points 0 … 2 become the facet holding the origin's foot on the plane of the depth, weighted for the foot.
 
-    with_ids : name the facet's vertices, too; else the simplex that encloses the origin stays named.
+    with_ids : name the facet's vertices, too; else the simplex enclosing the origin stays named.
     """
     foot = scale(result.depth, result.nhat)
     slack = tolerance + 2.0 * error
@@ -226,7 +226,7 @@ def _weigh_foot(work, polytope, result, depths, with_ids, curved, tolerance, siz
 
 @kernel
 def request_plane(ids, request):
-    """An entry of `depth_requests.py`: the plane of three points, which may be all there is."""
+    """An entry of `depth_requests.py`: the plane of three points, perhaps all of a flat A ⊖ B."""
     request[0] = 0
     request[1] = 1
     for k in range(6):

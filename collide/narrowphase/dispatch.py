@@ -1,11 +1,11 @@
-"""THE table: which method answers which pair of shapes.
+"""THE table: the method of every pair of shapes.
 
-`Kind` is what lowering makes of a shape (`lowering/kinds.py`); `TABLE` holds a `Method` for every two kinds. Half of it
-is written, the other half is its mirror: the method is the same, A and B are exchanged. A method is carried out by the
-file that it names; `method_functions.py` says with which function each public question goes there.
+Lowering makes a `Kind` of a shape (`lowering/kinds.py`); `TABLE` holds a `Method` for every two kinds. Half of the
+table is written, the other half is its mirror: the method is the same, A and B are exchanged. A method is carried out
+by the file of its name; `method_functions.py` names its function for each public question.
 
 Kernels cannot read this table. They choose among CLOSED, PLANE, PLANES and CONVEX, the methods of two convex sets, by
-`convex_methods.method`; `tests/narrowphase/test_dispatch.py` holds both to be equal. Nothing else decides it.
+`convex_methods.method`; `tests/narrowphase/test_dispatch.py` holds both to be equal. No other code chooses a method.
 
 To add a kind or a method: CONTRIBUTING.md lists the files, "Adding things".
 """

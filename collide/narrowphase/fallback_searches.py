@@ -1,9 +1,9 @@
-"""Rows that one search of the narrowphase leaves open, and another one may settle.
+"""Rows left open by a search of the narrowphase, to be settled by the other two.
 
-A boolean, a gap and a depth are searched for differently, and where curved shapes or rounded corners are within
-rounding of touching, each proves some signs that the others do not (integers settle those of polytopes). What is proven
-is proven: an open row asks the other two searches, so that `collide` and `distance`, signed or not, never contradict
-each other.
+A boolean, a gap and a depth have a search each, and where curved shapes or rounded corners are within rounding of
+touching, each search proves some signs left open by the others (integers settle the signs of polytopes). A proven sign
+stays proven: an open row goes to the other two searches, so that `collide` and `distance`, signed or not, never
+contradict each other.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ def settle_by_other_searches(
     code, ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at,
     doubles_at, integers_at, result_at,
 ):
-    """Settle in place what is still open of n rows of `answer_pairs`.
+    """Settle in place the open rows among n rows of `answer_pairs`.
 
-    code : address of that.   boolean, depths : the search that has run.   result : memory of ROW bytes.
-    Other arguments as there.
+    code : address of `answer_pairs`.   boolean, depths : the search already run.   result : memory of ROW bytes.
+    Other arguments as in `answer_pairs`.
     """
     already_run = _SIGN if boolean else _DEPTH if depths else _GAP
     for search in (_SIGN, _DEPTH, _GAP):

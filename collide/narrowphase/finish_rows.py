@@ -1,4 +1,4 @@
-"""The last touch to rows of a pair query: which body is which, and depths that nobody asked for."""
+"""The last touch to rows of a pair query: the names of the bodies, and depths not asked for."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from collide.numerics.vec3 import Vec3, add, put_vec3, scale, vec3_at
 def finish_rows(rows_at, n, depths):
     """Name body B in n rows and, unless depths are wanted, make overlaps distance 0; whether a depth has no end.
 
-    numpy took 100 ns a row for it, as long as some gaps take.
+    numpy took 100 ns a row for the same work, as long as some gaps take.
     """
     unbounded = False
     for k in range(n):

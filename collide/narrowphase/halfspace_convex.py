@@ -58,10 +58,10 @@ def plane_in_world(pair, body):
 
 @kernel
 def reach_of_plane(pair, body):
-    """(distance of the plane from the frame's origin, skew): what a half-space adds to S, and by what errors grow.
+    """(distance of the plane from the frame's origin, skew): the half-space's share of S, and the factor of its errors.
 
-    n = cof(R) m is rounded at |row|²|m|, the offset at |row|³|b|; a matrix that is no rotation may make that much of
-    |n|.
+    n = cof(R) m is rounded at |row|²|m|, the offset at |row|³|b|; skew is |row|²|m| / |n|, at least 1, and large only
+    for a matrix far from a rotation.
     """
     plane = plane_in_world(pair, body)
     row = 0.0
@@ -75,11 +75,11 @@ def reach_of_plane(pair, body):
 
 
 class PlaneGap(NamedTuple):
-    """How far a convex set is in front of a plane, but for its last digits.
+    """Gap between a convex set and a plane, but for its last digits.
 
-    nhat : out of the half-space.   gap, error : of the set with its radius, and how far off it is [m].
-    vertex : of the core, the deepest, −1 of a curved one.   b : that point, seen from the frame's origin.
-    size, skew : what the error is made of.
+    nhat : out of the half-space.   gap, error : of the set with its radius, and a bound of its error [m].
+    vertex : the deepest of the core, −1 of a curved core.   b : the deepest point, seen from the frame's origin.
+    size, skew : inputs of the error.
     """
 
     nhat: Vec3

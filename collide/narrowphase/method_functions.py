@@ -1,4 +1,4 @@
-"""Every method of the table (`dispatch.py`) with the functions that carry it out."""
+"""Every method of the table (`dispatch.py`) with its functions."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
 
 
 class Answer(NamedTuple):
-    """How a method is asked.
+    """The functions of a method.
 
-    batch : ``batch(out, A, B, X_WA, X_WB, question)``, as `convex_batches.answer_sets` describes it.
-    prepare : ``prepare(A, B)`` gives the pair ready for single calls, or None where they are batches of one.
-    of_one_pair : whether a batch is of one pair of shapes; else shapes may be `Picked` from a set pose by pose.
+    batch : ``batch(out, A, B, X_WA, X_WB, question)``, as described in `convex_batches.answer_sets`.
+    prepare : ``prepare(A, B)`` gives the pair ready for single calls, or ``None``: a single call is then a batch of
+    size 1.
+    of_one_pair : whether a batch has a single pair of shapes; else shapes may be `Picked` from a set, pose by pose.
     """
 
     batch: Callable[..., bool]

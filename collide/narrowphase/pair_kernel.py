@@ -1,10 +1,9 @@
-"""The narrowphase over a list of pairs of convex sets: dispatch, bracket, witness points, one row a pair.
+"""The narrowphase over a list of pairs of convex sets: dispatch, bracket, witness points, a row per pair.
 
-One entry point for booleans, distances and batches, because every further one compiles the whole
-narrowphase again. The half of the pair matrix below the diagonal is answered by exchanging the
-bodies and flipping the row.
+A single entry for booleans, distances and batches, because every further entry compiles the whole narrowphase again.
+The half of the pair matrix below the diagonal is answered by exchanging the bodies and flipping the row.
 
-How a kind of pair is answered stands in the file of its name: `halfspace_halfspace.py`, `halfspace_convex.py`,
+Each kind of pair is answered in the file of its name: `halfspace_halfspace.py`, `halfspace_convex.py`,
 `capsule_capsule.py`, `convex_convex.py`; pairs of small hulls go through `gjk/mpr_batch.py` first.
 """
 
@@ -37,18 +36,18 @@ def answer_pairs(
     ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at, n_pairs, boolean, depths, stop_at_hit, limit,
     rows_at, doubles_at, integers_at,
 ):
-    """Answer pairs of posed convex sets, one row each; returns how many were answered.
+    """Answer pairs of posed convex sets, a row each; returns the number of pairs answered.
 
     ints, numbers : a `ShapeTable`.   poses : POSE doubles a part.   terms : of a `PoseTable`.
     shape_of : a shape row a part.
     pairs : two part numbers a pair.
-    boolean : only hit and how are wanted; of a decided row little else is set but the normal of a miss. A
-        normal that is there is the axis to try first.
-    stop_at_hit : stop after the first hit; where rows are wanted, begin with the normal and the vertices they name,
-        those of the same pairs at poses before.   limit : gaps larger than this [m] are not measured.
-    rows : PAIR_DTYPE, zeroed but for that.   doubles, integers : workspace, DOUBLES and INTEGERS of them.
+    boolean : only hit and how are wanted; a decided row has little else but the normal of a miss. A
+        normal given in the row is the axis to try first.
+    stop_at_hit : stop after the first hit; where rows are wanted, begin with the normal and the vertices named in the
+        rows, from the same pairs at poses before.   limit : gaps larger than this [m] are not measured.
+    rows : PAIR_DTYPE, otherwise zeroed.   doubles, integers : workspace of DOUBLES doubles and INTEGERS integers.
 
-    Fourteen arguments because it is called by address, with integers, doubles and booleans alone.
+    Fourteen arguments because the entry is called by address, with integers, doubles and booleans alone.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     query = Query(boolean, depths, limit, terms_at, stop_at_hit and not boolean)
@@ -104,7 +103,7 @@ def _answer(ordered, query, row, row_number, has_portals, work):
 
 @kernel(inline=True)
 def _take_portal(row, ids):
-    """Have the last three ids name the vertices that a row names to begin with, if it does; returns how many pairs.
+    """Copy the vertices named by a row to begin with, if any, to the last three ids; returns the number of pairs.
 
     To look costs 1 to 2 % of a gap: rows are rarely in the cache.
     """
@@ -117,7 +116,7 @@ def _take_portal(row, ids):
 
 @kernel(inline=True)
 def _take_vertices(row, ids, ordered):
-    """The same of the vertices that a row names, if they are three pairs or more of cores that are scanned."""
+    """As `_take_portal`, for a row naming three pairs or more of cores that are scanned."""
     A, B = ordered.pair.A, ordered.pair.B
     is_scanned = A.tree == 0 and B.tree == 0 and A.coarse_at == 0 and B.coarse_at == 0
     if row.flags[COUNT] < 3 or not is_scanned:

@@ -48,10 +48,10 @@ class Query(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Views and addresses of one thread's workspace.
+    """Views and addresses of the workspace of a thread.
 
-    points : five points of A ⊖ B, POINT doubles each.   weights : of four of them; from NEAREST_POINT on the
-    point that they make, nearest the origin; from AXIS on a unit axis.   ids : a vertex of A and one of B a point.
+    points : five points of A ⊖ B, POINT doubles each.   weights : of four of them; from NEAREST_POINT on their
+    weighted point, nearest the origin; from AXIS on a unit axis.   ids : a vertex of A and of B a point.
     request : an entry of `depth_requests.py`, and requests : all entries of a call.
     fine_at, nearest_at, ties_at : for last digits (`refine_depth.py`, `refine_height`).
     epa_at, epa_integers_at, queue_at, queue_integers_at : of EPA and of the queue of gaps.

@@ -1,8 +1,8 @@
 """Two convex sets at many pairs of poses: from matrices to answers inside kernels.
 
-Checking a pose, laying out a row and reading a boolean took numpy five times as long as a pair of boxes
-takes GJK. Poses go through in blocks that stay in the cache; the narrowphase is called where it was
-compiled (`kernels.native_call`), not compiled once more.
+Checking a pose, laying out a row and reading a boolean took numpy five times as long as GJK takes for a pair of boxes.
+Poses go through in blocks small enough for the cache; the narrowphase is called where compiled (`kernels.native_call`),
+not compiled once more.
 """
 
 from __future__ import annotations
@@ -123,14 +123,14 @@ def answer_poses(
 ):
     """Answer poses ``first`` … n − 1 of a pair, or of n pairs; 0, OPEN or BAD_POSE.
 
-    header : HEADER integers; [ANSWERED] becomes the number of poses answered in all. Where it stops OPEN,
-        the rows of the last block stay where the block's rows stand, for the exact stage.
+    header : HEADER integers; [ANSWERED] becomes the total number of poses answered. After OPEN, the rows of the last
+        block stay in the block's own memory, for the exact stage.
     which : 0, or two shape rows a pose.   XA, XB : matrices; step 16 or, for a single pose, 0.
-    depths : as in `answer_pairs`.   check : refuse matrices that are no rotation.
-    axes : 0, or of booleans three doubles a pose: an axis to try first, replaced by one that separates the bodies.
-    out : booleans: a byte a pose; else a row of PAIR_DTYPE a pose, zeroed, which is where rows stand.
+    depths : as in `answer_pairs`.   check : refuse matrices other than rotations.
+    axes : 0, or of booleans three doubles a pose: an axis to try first, replaced by a separating axis.
+    out : booleans: a byte a pose; else a row of PAIR_DTYPE a pose, zeroed, and written in place.
 
-    Fourteen arguments: Python and C call it, with integers, doubles and booleans alone.
+    Fourteen arguments: Python and C call this entry, with integers, doubles and booleans alone.
     """
     block = block_of(header_at)
     header = block.header
@@ -168,7 +168,7 @@ def answer_poses(
 
 @kernel(inline=True)
 def _begin_block(block, is_batch_a, is_batch_b):
-    """Pair pose k of A with pose k of B; the one pose of a body that has no batch goes with all."""
+    """Pair pose k of A with pose k of B; a body with a single pose has its pose paired with all."""
     for k in range(BLOCK):
         block.pairs[2 * k] = k if is_batch_a else 0
         block.pairs[2 * k + 1] = BLOCK + (k if is_batch_b else 0)

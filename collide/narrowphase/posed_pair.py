@@ -64,10 +64,10 @@ def in_order(ints, poses, sa, pa, sb, pb):
 
 @kernel(inline=True)
 def size_and_slop(numbers, poses, sa, pa, sb, pb):
-    """(S of `bounds.py`, how far stored points may be from those described, whether exact terms tell better).
+    """(S of `bounds.py`, distance bound between stored and described points, whether exact terms tell better).
 
-    The last one says that the numbers the exact stage reads are those described: shapes stored as they
-    are, and poses given or known as exact sums.
+    The last is True where the exact stage reads the described numbers: shapes stored as they are, and poses given or
+    known as exact sums.
     """
     p = POSE * pa
     q = POSE * pb
@@ -232,7 +232,7 @@ def stretch_of(xx, yy, zz, xy, yz, zx):
 
 @kernel(inline=True)
 def stretch_of_pose(R, p):
-    """`stretch_of` the matrix at p of a row of poses, which is not written to: other threads may read it."""
+    """`stretch_of` the matrix at p of a row of poses, without writing to the row: other threads may read the row."""
     return stretch_of(
         R[p] * R[p] + R[p + 3] * R[p + 3] + R[p + 6] * R[p + 6],
         R[p + 1] * R[p + 1] + R[p + 4] * R[p + 4] + R[p + 7] * R[p + 7],

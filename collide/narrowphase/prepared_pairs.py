@@ -1,8 +1,8 @@
-"""Pairs of shapes made ready for single calls: kept with A, by the number that B has, for as long as both live.
+"""Pairs of shapes made ready for single calls: kept with A, under B's number, for as long as both live.
 
-A pair goes with A, which holds it. It goes with B by a weak reference, which A holds as well: nothing outside of the
-two shapes knows of the pair, and what the end of B calls refers to A weakly. The trees and tables of shapes that a pair
-holds must not hold the shapes.
+A pair goes with A, its holder. The pair goes with B by a weak reference, held by A as well: nothing outside of the two
+shapes knows of the pair, and the callback at the end of B refers to A weakly. The trees and tables of a pair must not
+hold the shapes.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Prepared:
 def prepared_pair(A: Shape, B: Shape, slot: str = "_prepared") -> Any:
     """The pair, or None where it has not been prepared. `native/python_module.c` reads the same two attributes.
 
-    slot : of A, for what it was prepared.
+    slot : attribute of A for the purpose of the pair.
     """
     return getattr(A, slot, {}).get(getattr(B, "_serial", None))
 

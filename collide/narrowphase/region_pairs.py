@@ -1,9 +1,8 @@
-"""Pairs with a region of half-spaces (`HPolytope` kept as planes): closed by a box, then asked of the table again.
+"""Pairs with a region of half-spaces (`HPolytope` kept as planes): closed by a box, then sent to the table again.
 
-Two bodies without end, a region and another or a half-space, have no box that is proven to change nothing. Whether they
-meet is a program over the planes of both, exact. How far they are apart, or how deep they overlap, is told by boxes
-that grow until the points that decide are well inside: certified is the sign, and the side of the bracket that a
-smaller set can prove.
+Two bodies without end, a region and another or a half-space, have no box proven to change nothing. Whether they meet is
+a program over the planes of both, exact. Their gap or depth comes from boxes growing until the deciding points are well
+inside: certified are the sign, and the side of the bracket provable from a smaller set.
 """
 
 from __future__ import annotations
@@ -65,7 +64,7 @@ def answer_closed(
 def answer_unbounded(
     batch_of: Callable[[Shape, Shape], Batch], out: np.ndarray, A: Shape, B: Shape, poses: Poses, question: Question
 ) -> None:
-    """The same of two bodies that have none."""
+    """As `answer_closed`, for two bodies without end."""
     X_WA, X_WB = poses
     for k in range(len(out)):
         gap, is_unbounded = _state(A, B, X_WA[k], X_WB[k], with_depth=question.depths and not question.boolean)
@@ -79,9 +78,9 @@ def answer_unbounded(
 
 
 def _state(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, with_depth: bool) -> tuple[float, bool]:
-    """(a gap that there is at least [m], 0 exactly where they meet; whether their overlap has no end).
+    """(lower bound of the gap [m], 0 exactly where the bodies meet; whether their overlap has no end).
 
-    All of it from where the body of more planes stands.
+    Both computed in the frame of the body with more planes.
     """
     if len(_planes_of(A)[0]) < len(_planes_of(B)[0]):
         A, B, X_WA, X_WB = B, A, X_WB, X_WA
@@ -111,10 +110,10 @@ def _through(plane: ExactRow, v: tuple[int, ...]) -> ExactRow:
 
 
 def _gap_of(halfspaces: HomogeneousRows, n_first: int, X: np.ndarray) -> float:
-    """0 where half-spaces have a point in common, else a width [m] that is proven between the first n and the others.
+    """0 where half-spaces have a point in common, else a proven width [m] between the first n and the others.
 
-    Multipliers μ ≥ 0 with Σ μᵢ aᵢ = 0 and Σ μᵢ bᵢ < 0: with u the sum over the first, u·x ≤ c there, and in the others
-    u·x ≥ c + |Σ μᵢ bᵢ|.   X : where all stand; lengths are those of the world.
+    Multipliers μ ≥ 0 with Σ μᵢ aᵢ = 0 and Σ μᵢ bᵢ < 0: with u the sum over the first, u·x ≤ c in the first, and in the
+    others u·x ≥ c + |Σ μᵢ bᵢ|.   X : pose of all half-spaces; the width is measured in the world.
     """
     pair = nearest_pair(origin_point(3), halfspaces, Work())
     if pair.kind != EMPTY:

@@ -1,10 +1,10 @@
-"""Shallow overlaps of cylinders with each other and with boxes, without a polytope: a few normals, and one deep point.
+"""Shallow overlaps of cylinders with each other and with boxes, without a polytope: a few normals, and a deep point.
 
-A point of one body that lies d deep within the other proves a depth of d at least: the ball around it is in A ⊖ B. The
-support along any normal bounds the depth from above. Where a corner, a rim or a line of one body has sunk into a flat
-face or into the side of a cylinder, both are the same number, along the normal of that face, or along the line from the
-axis to that point. The normal of a face, or across the cylinder and a line, along which the bodies overlap least is
-tried first, then the lines from both axes. Two rims, or a rim and an edge, have no such point: they are left to EPA.
+A point of a body lying d deep within the other body proves a depth of d at least: the ball around the point is in A ⊖
+B. The support along any normal bounds the depth from above. Where a corner, a rim or a line of a body has sunk into a
+flat face or into the side of a cylinder, both bounds are equal, along the normal of the face, or along the line from
+the axis to the point. The face normal, or the normal across the cylinder and a line, with the least overlap is tried
+first, then the lines from both axes. Two rims, or a rim and an edge, have no such point: they are left to EPA.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _FACE_OF_A, _FACE_OF_B, _SIDE = range(3)
 
 
 class _Normal(NamedTuple):
-    """n : from A to B, of unit length.   depth : what the bodies overlap along it, at most the depth where it is the
-    least.   source : what it belongs to.   axis : of the box's edge or face, 2 of a cylinder."""
+    """n : from A to B, of unit length.   depth : overlap of the bodies along n, an upper bound of their depth.   source
+    : feature of the normal.   axis : of the box's edge or face, 2 of a cylinder."""
 
     n: Vec3
     depth: float
@@ -176,7 +176,7 @@ def _on_face(pair, points, ids, weights, of_a, nhat, tolerance):
 
 @kernel(inline=True)
 def _lowest(slope, half, wanted):
-    """The coordinate of a box's lowest point; of a level one that nearest to what is wanted."""
+    """The coordinate of a box's lowest point; along a level axis the coordinate nearest to ``wanted``."""
     if abs(slope) < _LEVEL:
         return min(max(wanted, -half), half)
     return -half if slope > 0.0 else half
@@ -184,9 +184,9 @@ def _lowest(slope, half, wanted):
 
 @kernel(inline=True)
 def _on_line(pair, owner, Q, t, best, of_a):
-    """The point of a line of Q, an edge of a box or one on a cylinder's side, that lies deepest within a cylinder.
+    """The point of a line of Q (an edge of a box, a line on a cylinder's side) lying deepest within a cylinder.
 
-    Seen from the cylinder's origin, as t is: from there to Q's.
+    Relative to the cylinder's origin, as t is: from the cylinder's origin to Q's.
     """
     n = best.n if of_a else neg(best.n)
     u = _column(pair, owner, 2)
@@ -213,10 +213,10 @@ def _on_line(pair, owner, Q, t, best, of_a):
 
 @kernel(inline=True)
 def _on_side(pair, points, ids, weights, of_a, nhat, tolerance):
-    """What the side of cylinder A (or B) proves with a corner of the other body, or a point of its rim or side.
+    """The depth proven by the side of cylinder A (or B) with a corner of the other body, or a point of its rim or side.
 
-    By Newton's method on the angle around the axis, within what is known to hold the root: a rim that is nearly level
-    has its lowest point here or there.
+    By Newton's method on the angle around the axis, within a bracket of the root: a nearly level rim has its lowest
+    point on either side.
     """
     owner = pair.A if of_a else pair.B
     Q = pair.B if of_a else pair.A
@@ -286,9 +286,9 @@ def _beside(pair, owner, Q, t, n, u):
 
 @kernel(inline=True)
 def _depth_within(insets):
-    """How deep a point is within planes at right angles, from how far inside each it is; minus its distance outside.
+    """Depth of a point within orthogonal planes, from its depth inside each; minus its distance if outside.
 
-    Beyond two of them at once, as beside a rim, it is farther from the body than from either.
+    Beyond two planes at once, as beside a rim, the point is farther from the body than from either plane.
     """
     x, y, z = min(insets.x, 0.0), min(insets.y, 0.0), min(insets.z, 0.0)
     least = min(min(x, y), z)
@@ -299,10 +299,11 @@ def _depth_within(insets):
 
 @kernel(inline=True)
 def _proven(pair, points, ids, weights, of_a, nhat, b, tolerance):
-    """The `ShallowDepth` of a normal and of a point of one body within the other, A if ``of_a``, seen from its origin.
+    """The `ShallowDepth` of a normal and of a point of a body within the other body, A if ``of_a``, seen from the
+    latter's origin.
 
-    The point's depth is measured in that body's own coordinates. A matrix off a rotation by δ stretches by less than
-    2δ, and moves what its transpose takes back by δ of the reach.
+    The point's depth is measured in the latter's own coordinates. A matrix off a rotation by δ stretches by less than
+    2δ, and moves points mapped back by its transpose by δ of the reach.
     """
     owner = pair.A if of_a else pair.B
     x, y, z = _column(pair, owner, 0), _column(pair, owner, 1), _column(pair, owner, 2)

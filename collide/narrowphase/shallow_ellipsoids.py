@@ -1,13 +1,14 @@
-"""Shallow overlaps with an ellipsoid, without a polytope: a ball that rolls within it, and a point of the other body.
+"""Shallow overlaps with an ellipsoid, without a polytope: a ball rolling inside the ellipsoid, and a point of the other
+body.
 
 An ellipsoid is a smaller convex set, its core here, swept by a ball as large as its sharpest curvature (Blaschke's
-rolling theorem): ρ = c²/a of its least and greatest radius. Bodies that overlap by less than ρ are apart without that
-ball, and their depth is ρ less the distance of what is left: a gap, which has no local minima and needs no proof from
-all around. That the core's point c and the other body's point x are |x − c| apart proves a depth of ρ − |x − c| at
-least; the support along their line bounds it from above, as everywhere.
+rolling theorem): ρ = c²/a of its least and greatest radius. Bodies with an overlap of less than ρ are apart once the
+ball is taken away, and their depth is ρ minus the distance of core and body: a gap, without local minima, and in no
+need of a proof over all directions. A distance |x − c| of the core's point c and the other body's point x proves a
+depth of ρ − |x − c| at least; the support along their line bounds the depth from above, as everywhere.
 
-The search is Newton's on the direction: the nearest point x of the other body gives the direction, and the feature it
-lies on says how the direction may turn. Overlaps that are deeper, or whose bracket does not close, are left to EPA.
+The search is Newton's on the direction: the nearest point x of the other body gives the direction, and the feature
+under x says how the direction may turn. Deeper overlaps, and overlaps whose bracket does not close, are left to EPA.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ class _Symmetric(NamedTuple):
 class _RollingBall(NamedTuple):
     """An ellipsoid in the world's axes.
 
-    square : R D² Rᵀ, D its radii.   radius : of a ball that rolls within it [m].
+    square : R D² Rᵀ, D its radii.   radius : of a ball rolling inside [m].
     """
 
     square: _Symmetric
@@ -91,9 +92,9 @@ class _RollingBall(NamedTuple):
 
 
 class _Nearest(NamedTuple):
-    """x : a point of the other body, from the ellipsoid's origin.   feature : what of the body it lies on.
+    """x : a point of the other body, from the ellipsoid's origin.   feature : the body's feature under x.
 
-    e : unit vector along the edge, or the axis around which the rim runs.   curvature : radius of the side or rim [m].
+    e : unit vector along the edge, or the axis of the rim.   curvature : radius of the side or rim [m].
     """
 
     x: Vec3
@@ -195,7 +196,8 @@ def _nearest(pair, X, t, c):
 
 @kernel(inline=True)
 def _newton_step(M, n, g, h):
-    """By how much to turn n, where M is the curvature across it, g the slope and h the height; 0 where none is told."""
+    """Step of n, with M the curvature across n, g the slope and h the height; 0 where the Hessian is not positive
+    definite."""
     mean = 0.5 * (M.xx + M.yy + M.zz)
     to_n = h + mean
     xx, yy, zz = M.xx - h + to_n * n.x * n.x, M.yy - h + to_n * n.y * n.y, M.zz - h + to_n * n.z * n.z
@@ -212,7 +214,7 @@ def _newton_step(M, n, g, h):
 
 @kernel(inline=True)
 def _turned(n, step):
-    """A unit vector after a step, which is shortened if it is long."""
+    """A unit vector after a step, shortened to _LARGEST_STEP if longer."""
     length = norm(step)
     if length > _LARGEST_STEP:
         step = scale(_LARGEST_STEP / length, step)
@@ -255,10 +257,10 @@ def _step_on_feature(nearest, M, n, g, h):
 
 @kernel
 def shallow_ellipsoids(pair, points, ids, weights, size, tolerance):
-    """The `ShallowDepth` of two cores, one an ellipsoid, that `is_ellipsoid_pair` tells of.
+    """The `ShallowDepth` of two cores, at least one an ellipsoid, accepted by `is_ellipsoid_pair`.
 
-    points, ids, weights : of the workspace; where it is found, point 0 holds the deepest points of both cores.
-    size : of the pair.   tolerance : how narrow the bracket is to be [m].
+    points, ids, weights : of the workspace; if the depth is found, point 0 holds the deepest points of both cores.
+    size : of the pair.   tolerance : largest width of the bracket [m].
     """
     of_a = pair.A.kind == ELLIPSOID
     E = pair.A if of_a else pair.B

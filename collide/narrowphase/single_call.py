@@ -1,4 +1,4 @@
-"""Two convex sets at one pair of poses: from matrices to the answer inside one kernel."""
+"""Two convex sets at a pair of poses: from matrices to the answer inside a single kernel."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _settle_hulls_at = native_call(SIGNATURE)
 
 @kernel
 def _answer(header_at, XA_at, XB_at, boolean, depths, limit, row_at):
-    """One pair at one pair of poses: 0 apart, 1 hit, −1 where it takes more than this, or an error has to be raised.
+    """A pair at a pair of poses: 0 apart, 1 hit, −1 where the general way is needed, or an error has to be raised.
 
     header : of `pose_batches.py`.   limit : of gaps beyond it no more is said than that [m].
     """

@@ -1,4 +1,4 @@
-"""The rule that touching is a hit: bodies are closed sets. Of facets `facets/collide_kernel.py` asks it exactly."""
+"""The rule for touching bodies, closed sets: a hit. For facets `facets/collide_kernel.py` decides touching exactly."""
 
 from __future__ import annotations
 

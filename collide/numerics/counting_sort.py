@@ -7,10 +7,10 @@ from collide.kernels import kernel
 
 @kernel
 def sort_by_class(items, first, last, n_classes, scratch, counts):
-    """Order items[first:last] by class, those of one class as they stood.
+    """Order items[first:last] by class, items of a class as they stood.
 
-    scratch : the class of item k at k; behind as many places as there are items, as many of workspace.
-    counts : out, how many there are of each class; behind them as many of workspace.   O(last − first + n_classes).
+    scratch : the class of item k at k, then as many places of workspace as items has.
+    counts : out, the number of items of each class; then n_classes places of workspace.   O(last − first + n_classes).
     """
     behind = len(items)
     for c in range(n_classes):
@@ -38,7 +38,7 @@ def only_class(counts, n_classes, n):
 
 @kernel
 def order_by_key(keys, items, n, n_keys, starts, ordered):
-    """Put n items in the order of their keys, those of one key as they stood.   keys : of item k at k, below n_keys.
+    """Put n items in the order of their keys, items of equal keys as they stood.   keys : of item k at k, below n_keys.
 
     starts : (n_keys + 1,), out: where the items of a key begin.   ordered : (n,), out.   O(n + n_keys).
     """

@@ -1,13 +1,13 @@
 """Integers of any length in kernels: runs of signed digits in an int64 workspace.
 
-A number is n consecutive digits in base 2²⁶, lowest first: value = Σ d_k 2^(26 k), times a power of two
-(its *grid*, an exponent in units of BITS) that its user keeps track of. Digits may leave their range while terms
-are summed (2¹⁰ products of two of them fit in 63 bits); `carry` brings them back, after which all but the highest
-lie in [0, 2²⁶) and the number's sign is that of its highest digit.
+A number is n consecutive digits in base 2²⁶, lowest first: value = Σ d_k 2^(26 k), times a power of two (its *grid*, an
+exponent in units of BITS, known to its user). Digits may leave their range while terms are summed (2¹⁰ products of two
+digits fit in 63 bits); `carry` brings them back, after which all but the highest lie in [0, 2²⁶) and the number's sign
+is the sign of its highest digit.
 
 Polynomials of doubles are exact this way, since a double is an integer times a power of two. Expansions of doubles
-(Priest, Shewchuk) would take seven components for a coordinate of a posed vertex, and thousands for a determinant
-of such coordinates.
+(Priest, Shewchuk) would take seven components for a coordinate of a posed vertex, and thousands for a determinant of
+posed vertices.
 """
 
 from __future__ import annotations
@@ -109,8 +109,8 @@ def carry(digits, at, n):
 def as_double(digits, at, n):
     """(x, e): the carried number is x·2^e, x rounded to nearest, so a power of two changes e alone.
 
-    From the top into 61 bits. The leading −1 of a negative number and the full digits behind it cancel
-    exactly; of lower digits only the last bit says whether there are any.
+    From the top into 61 bits. The leading −1 of a negative number and the full digits behind it cancel exactly; if a
+    bit further down is not 0, the last bit kept is set, so the rounding to 53 bits sees a tie broken.
     """
     value = 0
     k = n - 1
@@ -136,7 +136,8 @@ def as_double(digits, at, n):
 def as_double_double(digits, at, n):
     """The carried number as a `ScaledDD`, to a relative 2⁻⁸⁰.
 
-    From the top, without rounding, until 80 bits of it are there; 26 more at most fit in 106.
+    Digits are added from the top, without rounding, until their sum has 80 bits; the last digit adds at most 26, and a
+    double-double holds 106.
     """
     high = 0.0
     low = 0.0
@@ -186,11 +187,11 @@ QUOTIENT_WORKSPACE = 23
 
 @kernel
 def quotient(digits, a, na, b, nb, exponent, work):
-    """(the double nearest to (number a)·2^exponent / (number b), ties to even; whether it is exactly that).
+    """(the double nearest to (number a)·2^exponent / (number b), ties to even; whether both are equal).
 
-    Both numbers are carried, b is not 0.   work : twice the longer one's digits and QUOTIENT_WORKSPACE.
-    Infinite where the nearest double would be. Long division by estimates in doubles, each good to 50 bits of what
-    remains: O(na + nb) four times.
+    Both numbers are carried, b is not 0.   work : twice the longer number's digits and QUOTIENT_WORKSPACE.
+    Infinite where the quotient rounds to infinity. Long division by estimates in doubles, each good to 50 bits of the
+    remainder: O(na + nb) four times.
     """
     x, x_exponent = as_double(digits, a, na)
     y, y_exponent = as_double(digits, b, nb)
@@ -221,7 +222,7 @@ def quotient(digits, a, na, b, nb, exponent, work):
 
 @kernel
 def _put_size(digits, out, n, a, na, bits):
-    """Write |number a|·2^bits in n digits, which hold it; returns the number's sign."""
+    """Write |number a|·2^bits into n digits, enough to hold the product; returns the number's sign."""
     set_zero(digits, out, n)
     copy(digits, out, a, na)
     sign = carry(digits, out, n)
@@ -239,7 +240,8 @@ def _put_size(digits, out, n, a, na, bits):
 
 @kernel
 def _nearest_double(q, has_more, exponent):
-    """(the double nearest to q·2^exponent, or a part of 1 more for q, whether that is it); q of 58 to 62 bits."""
+    """(the double nearest to (q + r)·2^exponent, whether they are equal); q of 58 to 62 bits, 0 < r < 1 if has_more,
+    else r = 0."""
     last = max(math.frexp(float(q))[1] + exponent - 53, -1074)  # exponent of the double's last bit
     drop = last - exponent
     if drop > 62:

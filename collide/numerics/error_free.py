@@ -1,8 +1,8 @@
-"""Error-free transformations: sums and products of doubles with their rounding error, which is a double too.
+"""Error-free transformations: sums and products of doubles with their rounding errors, themselves doubles.
 
-D. E. Knuth's sum and T. J. Dekker's product ("A floating-point technique for extending the available
-precision", 1971): what exact signs and double-doubles are built from. Compiled, the error of a product is one
-fused instruction instead of Dekker's sixteen.
+D. E. Knuth's sum and T. J. Dekker's product ("A floating-point technique for extending the available precision", 1971),
+from which exact signs and double-doubles are built. Compiled, the error of a product is a single fused instruction
+instead of Dekker's sixteen.
 """
 
 from __future__ import annotations

@@ -106,7 +106,7 @@ def exact_sign_of_dot(a, g, terms):
 
 @kernel
 def _put_products(a, g, terms, at):
-    """Put the eight doubles whose sum is a·g at ``at``; whether it is that exactly."""
+    """Write eight doubles at ``at``, whose exact sum is a·g; False where underflow may break the equality."""
     certain = True
     for k in range(4):
         p = a.high if k < 2 else a.low
@@ -139,9 +139,9 @@ class ScaledDirection(NamedTuple):
 
 @kernel
 def scaled_into_range(least, largest_allowed, target, g):
-    """The direction times a power of two, so that its components lie in [least, largest_allowed] where they can.
+    """The direction times a power of two, its components in [least, largest_allowed] where some power allows.
 
-    target : exponent that the largest component gets.
+    target : exponent of the largest component afterwards.
     """
     x = abs(g.x)
     y = abs(g.y)

@@ -1,9 +1,9 @@
-"""Sums and products of doubles in kernels, exactly: numbers of as many digits as each of them takes.
+"""Sums and products of doubles in kernels, exactly: each number has as many digits as its value takes.
 
-A number is a run of digits (`digits.py`) in a workspace that fills up from its beginning: integer 0 says how far,
-integer 1 whether anything did not fit, which makes all that was worked out since worthless. Whoever works something out
-keeps the result and gives back the rest: `compacted`. In `digits.py` places and lengths are the caller's: faster, and
-more to write.
+A number is a run of digits (`digits.py`) in a workspace filled from its beginning: integer 0 holds the number of
+integers filled, integer 1 whether a number did not fit, after which all numbers computed are worthless. A caller of
+several steps keeps the result and gives back the rest: `compacted`. In `digits.py` places and lengths are the caller's:
+faster, and longer to write.
 """
 
 from __future__ import annotations

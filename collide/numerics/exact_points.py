@@ -1,4 +1,4 @@
-"""Points under poses as Python integers on one grid, for the few questions that doubles leave open.
+"""Points under poses as Python integers on a common grid, for the few questions left open by doubles.
 
 A double is a whole number times a power of two. So are the coordinates R v + t of a placed point, and all of a question
 can be written as integers times one power of two: nothing is rounded.
@@ -54,8 +54,8 @@ def _rows_of(X: np.ndarray, grid: int) -> tuple[list[tuple[int, int, int, int]],
 
 
 class PlacedPoints(Sequence[Point]):
-    """Points (k, 3) moved by poses (4, 4), one after the other, as integers on one grid, each made when it is asked
-    for: entries are taken as exact.
+    """Points (k, 3) moved by poses (4, 4), one pose after the other, as integers on a common grid, each point computed
+    when asked for: entries are taken as exact.
 
     grid : exponent: a point is its integers times 2^grid.
     """
@@ -124,7 +124,8 @@ class PlacedPoints(Sequence[Point]):
             yield tuple(a * x + b * y + c * z + t for a, b, c, t in self._rows)  # type: ignore[misc]
 
     def first_along(self, v: Point) -> int:
-        """The first of the points with the least product with v: O(k) doubles, integers of those that may have it."""
+        """The lowest row among the points with the least product with v: O(k) doubles, and integers of the candidates.
+        """
         candidates, along = self._lowest_along(v)
         # Of points whose coordinates along R^T v are equal, as on a side of a box, the first stands for all.
         used = self._points[candidates][:, along != 0.0]
@@ -132,7 +133,7 @@ class PlacedPoints(Sequence[Point]):
         return min(candidates[np.sort(first)].tolist(), key=lambda k: inner(v, self[k]))
 
     def lowest_along(self, v: Point) -> list[int]:
-        """Numbers, ascending, of points that may have the least product with v, all that have it among them: O(k)."""
+        """Rows, ascending, of candidates for the least product with v, all minimisers among them: O(k)."""
         return self._lowest_along(v)[0].tolist()
 
     def _lowest_along(self, v: Point) -> tuple[np.ndarray, np.ndarray]:
@@ -148,7 +149,7 @@ class PlacedPoints(Sequence[Point]):
 
 
 def _on_grid(value: float, grid: int) -> int:
-    """A double that is a multiple of 2^grid, as that multiple."""
+    """A double as a multiple of 2^grid, if its value is a multiple."""
     whole, denominator = value.as_integer_ratio()
     shift = 1 - denominator.bit_length() - grid
     return whole << shift if shift >= 0 else whole >> -shift

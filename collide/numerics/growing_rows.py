@@ -1,4 +1,4 @@
-"""An array that rows are added to: memory for more is taken by doubling, so that a row costs the same however many."""
+"""An array with rows added at its end: its memory is doubled when full, so that a row costs the same however many."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 class GrowingRows:
-    """``rows``: a contiguous view of those that there are; another one after a change, on the same memory or on new.
+    """``rows``: a contiguous view of the rows so far; every change makes a new view, on the same memory or on new.
     Rows written through the view stay.
     """
 

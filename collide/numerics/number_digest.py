@@ -1,6 +1,6 @@
-"""BLAKE2b of numbers (RFC 7693), digests of 16 bytes: what `hashlib.blake2b` gives, for C, which has no hashlib.
+"""BLAKE2b of numbers (RFC 7693), digests of 16 bytes: equal to `hashlib.blake2b`'s, for C, where hashlib is missing.
 
-Digests order the two bodies of a pair, so that C answers as Python does, bit by bit.
+Digests order the two bodies of a pair, so C and Python give the same bits.
 """
 
 from __future__ import annotations

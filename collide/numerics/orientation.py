@@ -1,21 +1,19 @@
 """The orientation predicate: on which side of a plane a point lies, exactly for any finite doubles.
 
-Four stages, each evaluated only where the one before leaves the sign open: plain doubles with an error bound;
-double-doubles with an error bound 2⁵¹ times smaller; expansions (Priest; Shewchuk, "Adaptive
-precision floating-point arithmetic and fast robust geometric predicates", 1997), which are exact
-while nothing underflows; integers of many digits (`numerics/digits.py`), which always are.
+Four stages, each evaluated only where the stage before leaves the sign open: plain doubles with an error bound;
+double-doubles with an error bound 2⁵¹ times smaller; expansions (Priest; Shewchuk, "Adaptive precision floating-point
+arithmetic and fast robust geometric predicates", 1997), exact while nothing underflows; integers of many digits
+(`numerics/digits.py`), always exact.
 
-A point cloud comes twice (`CloudView`): ``scaled`` by a power of two so that the largest coordinate lies in
-[1/2, 1), and ``originals``. Coordinates below 2⁻¹⁰²² of the largest are rounded by the
-scaling, so the last stage reads the originals. ``work`` begins with two numbers about the cloud
-(`survey`), the rest is workspace for sums:
+A point cloud comes twice (`CloudView`): ``scaled`` by a power of two so that the largest coordinate lies in [1/2, 1),
+and ``originals``. Coordinates below 2⁻¹⁰²² of the largest are rounded by the scaling, so the last stage reads the
+originals. ``work`` begins with two numbers about the cloud (`survey`), the rest is workspace for sums:
 
 * threshold: 0, or the magnitude below which a nonzero original keeps its test from the expansions;
-* quantum: where all scaled coordinates are multiples of 2^-k, k ≤ 33, a determinant is a multiple
-  of 2^-3k, and one known to be smaller is 0. That settles the ties of points on a lattice. Else 0.
+* quantum: where all scaled coordinates are multiples of 2^-k, k ≤ 33, a determinant is a multiple of 2^-3k, and so 0 if
+known to be smaller: this settles the ties of points on a lattice. Else 0.
 
-u is 2⁻⁵³, half the distance from 1 to the next double. No step may be contracted to a fused
-multiply-add.
+u is 2⁻⁵³, half the distance from 1 to the next double. No step may be contracted to a fused multiply-add.
 """
 
 from __future__ import annotations
@@ -102,11 +100,11 @@ def survey(originals, points, count, work):
 def orientation(cloud, a, b, c, d, axis):
     """Sign of (b − a) × (c − a) · (d − a): 1 where d sees a, b, c counter-clockwise, else 0 or −1.
 
-    axis : −1; or 0, 1, 2 for that unit vector in place of d − a, with d = a: the orientation of a
+    axis : −1; or 0, 1, 2 for the unit vector of this axis in place of d − a, with d = a: the orientation of a
         triangle projected along the axis.
 
-    The corner nearest to d is made the first: the terms of the determinant, and with them the
-    margins, shrink with that distance. A cloud that crowds together in one place needs this.
+    The corner nearest to d is made the first: the terms of the determinant, and with them the margins, shrink with its
+    distance from d. A cloud crowded together in one place needs this.
     """
     points, work = cloud.scaled, cloud.work
     if axis < 0:

@@ -10,8 +10,8 @@ from collide.kernels import address_of, entry, view_f64
 @entry("boolean(int64, int64, float64, float64)")
 def are_rigid(X_at, n, tolerance, largest):
     """Whether n matrices of 16 doubles end in (0, 0, 0, 1), move by at most ``largest`` along each axis, do not mirror,
-    and have columns whose products are within ``tolerance``, about, of those of a rotation. Numbers that are none fail.
-    O(n), ten nanoseconds each.
+    and have columns whose products differ from a rotation's by at most ``tolerance``, about. A NaN fails. O(n), ten
+    nanoseconds each.
     """
     X = view_f64(X_at, 16 * n)
     for k in range(n):

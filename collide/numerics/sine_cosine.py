@@ -1,7 +1,7 @@
-"""Sine and cosine in kernels: the same bits on every processor, which the C library's do not promise.
+"""Sine and cosine in kernels: the same bits on every processor, as the C library does not promise.
 
-Reduction to within π/4 in three parts and polynomials of the interval, those of fdlibm (Sun Microsystems 1993; Cody and
-Waite 1980). Good to 2 u of 1, u = 2⁻⁵³, for 0 ≤ angle ≤ LARGEST_ANGLE; tests compare with fractions.
+Reduction to within π/4 in three parts, then fdlibm's polynomials (Sun Microsystems 1993; Cody and Waite 1980). Absolute
+error ≤ 2 u, u = 2⁻⁵³, for 0 ≤ angle ≤ LARGEST_ANGLE; tests compare with fractions.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Small vectors in kernels: `Vec3`, and the products that geometry is written in.
+"""Small vectors in kernels: `Vec3`, and the products of geometry.
 
-Sums are taken from left to right, x first, with no contraction: error bounds count on it, and equal answers are equal
-bits. A Vec3 costs nothing in machine code: its three doubles are registers.
+Sums are taken from left to right, x first, with no contraction: error bounds count on this order, and equal answers are
+equal bits. A Vec3 costs nothing in machine code: its three doubles are registers.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def max_abs(a):
 
 @kernel(inline=True)
 def vec3_at(values, at):
-    """Three doubles that stand one after another."""
+    """Three consecutive doubles."""
     return Vec3(values[at], values[at + 1], values[at + 2])
 
 

@@ -47,12 +47,12 @@ _SEARCH_ALL_FROM = 64
 class EpaResult(NamedTuple):
     """status : EXPANDED or FLAT.
 
-    depth : least support value met: moving by it along nhat (plus ``error``) separates the cores;
-        negative where that plane already does.
+    depth : least support value met: moving by this depth (plus ``error``) along nhat separates the cores;
+        negative where the support plane already does.
     clearance : proven least distance of the surface from the origin (before ``error``), or −1.
-    nhat : unit normal of that support plane.
-    facet : the one nearest the origin, −1 where FLAT.   n_vertices, n_facets : how many there are. Where FLAT, the
-        first vertices span what there is.
+    nhat : unit normal of the support plane.
+    facet : the facet nearest the origin, −1 where FLAT.   n_vertices, n_facets : of the surface. Where FLAT, the first
+        n_vertices points span A ⊖ B.
     """
 
     status: int
@@ -65,12 +65,12 @@ class EpaResult(NamedTuple):
 
 
 class Seed(NamedTuple):
-    """Four points of A ⊖ B to begin with, of GJK.
+    """Four points of A ⊖ B to begin with, from GJK.
 
     points, ids : POINT doubles and two vertices a point.   enclosed : the origin is proven to lie among them.
-    well_conditioned : it does so clear of rounding by far.
-    use_capped_tetrahedron : there are so many vertices that iterations cost
-    more than the supports of a better seed.   start : how often EPA has begun elsewhere.
+    well_conditioned : the origin lies among them clear of rounding by far.
+    use_capped_tetrahedron : with so many vertices, iterations cost more than the supports of a better seed.
+    start : how often EPA has begun elsewhere.
     """
 
     points: Any
@@ -115,7 +115,7 @@ def _is_corner(ids, facets, f, k):
 
 @kernel(inline=True)
 def _vertex_fingerprint(ids, k):
-    """One bit of 64, from point k's support vertices: what has none of the bits met is new."""
+    """A bit of 64, from point k's support vertices: a point whose bit is not among the bits met is new."""
     return 1 << ((8 * ids[2 * k] + ids[2 * k + 1]) & 63)
 
 
@@ -215,11 +215,11 @@ def _flat_result(pair, points, ids, extremes):
 
 @kernel
 def facet_of(surface, n_facets, best, p, slack):
-    """The facet that holds p, the origin's foot on the final plane: for the witness points.
+    """The facet holding p, the origin's foot on the final plane: for the witness points.
 
-    It need not be the one that settled the depth, ``best``. A face of A ⊖ B with more than three corners is
-    covered by several facets; and where the bodies just touch, the foot may be a corner or lie on an
-    edge of facets in other planes.
+    This facet need not be ``best``, whose plane settled the depth. A face of A ⊖ B with more than three corners is
+    covered by several facets; and where the bodies just touch, the foot may be a corner or lie on an edge of facets in
+    other planes.
     """
     greatest = -math.inf
     for g in range(n_facets):

@@ -1,7 +1,7 @@
-"""Where EPA begins: four points of A ⊖ B that span it well, or the news that it is flat.
+"""Start of EPA: four points of A ⊖ B of ample volume, or the finding that A ⊖ B is flat.
 
-Never the last simplex of GJK where that is thin: from a simplex as thin as touching bodies leave it, a prototype
-took 27 wrong depths in 9,264 lattice poses.
+Never the last simplex of GJK where thin: from simplices as thin as GJK leaves them at touching bodies, a prototype took
+27 wrong depths in 9,264 lattice poses.
 """
 
 from __future__ import annotations
@@ -94,15 +94,17 @@ def _farthest_pair(pair, points, ids, askew):
 
 @kernel
 def capped_tetrahedron(pair, points, ids, size):
-    """Points 0..3 become three about the likely direction of least penetration and the one opposite; whether they span
-    enough.
+    """Points 0..3 become three points about the likely direction of least penetration and the opposite extreme; whether
+    their volume suffices.
 
     The likely direction leads from the middle of A ⊖ B to the origin: along the line of the frames' origins where these
-    are the bodies' centres. The three lie far enough around it for the other sides to be farther off than that.
+    are the bodies' centres. The three lie far enough around this direction for the other sides to be farther from the
+    origin than the cap.
 
-    Where there are many vertices this saves a quarter to a third of the iterations: 12.6 became 8.6 on hulls of 128 on
-    a sphere. Of long thin bodies it saves none. More iterations than from GJK's own tetrahedron were needed with a
-    corner on that direction, and with three corners 60° around it. The normal of its nearest facet is a worse guess.
+    With many vertices this saves a quarter to a third of the iterations: 12.6 became 8.6 on hulls of 128 on a sphere.
+    With long thin bodies nothing is saved. More iterations than from GJK's own tetrahedron were needed with a corner on
+    the likely direction, and with three corners 60° around. The normal of the tetrahedron's nearest facet is a worse
+    guess.
     """
     spare = EPA_VERTICES
     length = norm(pair.t)

@@ -1,11 +1,11 @@
-"""The foot of the origin on the deciding plane as a point of the surface, whatever its facets look like.
+"""The foot of the origin on the deciding plane as a point of the surface, however its facets look.
 
-One facet is not enough where faces are flat but for a rounding, or as thin as one: the foot may lie in a neighbour that
-is as level, and the area of a needle says nothing about where in it a point lies. But the ball as large as the depth
-lies within the surface and touches the plane in the foot, so some facet of a closed surface passes it to within the
-width of the bracket, and the nearest point of all of them is no farther.
+A single facet is not enough where faces are flat but for a rounding, or as thin as a rounding: the foot may lie in a
+level neighbour, and the area of a needle does not locate a point inside. But the ball as large as the depth lies within
+the surface and touches the plane in the foot, so some facet of a closed surface passes the foot to within the width of
+the bracket, and the nearest point of all facets is no farther.
 
-Weights come from an edge and the remainder across it (Gram, Schmidt), each taken of the last one's residual: they may
+Weights come from an edge and the remainder across the edge (Gram, Schmidt), each taken of the residual before: they may
 be far off where a triangle is thin, their point is not (Björck 1967).
 """
 
@@ -127,9 +127,10 @@ def load_facet(surface, f, points, ids, weights, with_ids, p):
 
 @kernel
 def weigh_nearest(surface, n_facets, facet, points, ids, weights, with_ids, p, tolerance):
-    """The facet that comes nearest p becomes points 0 … 2, weighted for its point there; returns the distance.
+    """The facet nearest p becomes points 0 … 2, weighted for its point nearest p; returns the distance.
 
-    ``facet`` is tried first, and is good if it comes within the tolerance; else the first that does, or the best.
+    ``facet`` is tried first, and taken if within the tolerance of p; else the first facet within the tolerance, or the
+    nearest of all.
     """
     best = math.inf
     for step in range(n_facets + 1):

@@ -42,20 +42,20 @@ INTEGERS = 3 * POINTS + (FACET + 1) * EPA_FACETS + 2 * EPA_VERTICES + 2 * WIDEST
 
 @kernel(inline=True)
 def number(stored):
-    """A vertex, facet or half-edge as it is stored. The mask changes nothing but what the compiler knows: an index that
-    may be negative is compared and replaced at every access."""
+    """A vertex, facet or half-edge as stored. The mask tells the compiler of an index ≥ 0, and changes nothing else: an
+    index of unknown sign is compared and replaced at every access."""
     return stored & _NUMBERS
 
 
 class Surface(NamedTuple):
     """Views of a polytope in its workspace.
 
-    points, ids : of its vertices, POINT doubles and a vertex of A and one of B each.
+    points, ids : of its vertices, POINT doubles and a vertex of A and of B each.
     planes : PLANE doubles a facet.   facets : FACET integers a facet.
-    reaches : distance of each facet's plane from the origin, ∞ where it is farther than a known separating translation.
+    reaches : distance of each facet's plane from the origin, ∞ if farther than a known separating translation.
     clearances : proven distance of each facet from the origin, seen from its inner side, or −1.
-    starts : by vertex, the new facet whose base begins there, and the apex it was made for.
-    border, patch : half-edges and facets of what is being replaced.
+    starts : by vertex, the new facet whose base begins there, and its apex.
+    border, patch : half-edges around a replaced patch, and its facets.
     """
 
     points: Any
@@ -121,10 +121,11 @@ def normal_of(surface, f):
 
 @kernel(inline=True)
 def ample(size, error):
-    """A determinant of three points of A ⊖ B above this is clear of rounding, and of ``error``, whatever their
+    """A determinant of three points of A ⊖ B above this value is clear of rounding, and of ``error``, for every
     triangle.
 
-    Coordinates of a point add up to √3·size at most, those of an edge to twice that: the bounds of `_sides` for such.
+    Coordinates of a point add up to √3·size at most, coordinates of an edge to twice as much: the bounds of `_sides` at
+    these sizes.
     """
     return 128.0 * error * size * size
 
@@ -174,8 +175,8 @@ def plane_of(a, b, c, error, enough):
 def set_facet(surface, f, i, j, k, error, enough, depth):
     """Slot f becomes the facet on vertices i, j, k, counter-clockwise from outside; returns its reach.
 
-    Eight at a time in vectors took longer than one by one: corners have to be gathered, and what is stored singly
-    is slow to load together.
+    Eight facets at a time in vectors took longer than eight in turn: corners have to be gathered, and numbers stored
+    singly are slow to load together.
     """
     points, facets = surface.points, surface.facets
     f = number(f)
@@ -244,14 +245,14 @@ class Patch(NamedTuple):
 
 
 def make_find_patch(is_behind: Callable) -> Callable:
-    """A kernel ``find_patch(planes, surface, f, apex, slack)``: the `Patch` that the apex sees, spreading from facet f
-    over shared edges; marks it as seen.
+    """A kernel ``find_patch(planes, surface, f, apex, slack)``: the `Patch` seen by the apex, spreading from facet f
+    over shared edges; marks its facets as seen.
 
-    is_behind(planes, h, apex, margin) : whether facet h has the apex beyond its plane by more than the margin, which
-        is the slack, or ∞ where the border is full. planes, apex : as the caller hands them in.
+    is_behind(planes, h, apex, margin) : whether facet h has the apex beyond its plane by more than the margin: the
+        slack, or ∞ where the border is full. planes, apex : as given by the caller.
 
     ``border`` gets the half-edges of facets that stay, ``patch`` the facets, whose reach becomes ∞. No branch depends
-    on what is seen: a mispredicted one costs more than an edge.
+    on an outcome of is_behind: a mispredicted branch costs more than an edge.
     """
 
     @kernel(inline=True)
@@ -303,9 +304,10 @@ class Cone(NamedTuple):
 
 @kernel(inline=True)
 def expand(surface, f, apex, count, seen, depth, error, enough):
-    """Replace the `Patch` ``seen`` by the apex with a cone to it, in a surface of ``count`` facets; returns a `Cone`.
+    """Replace the `Patch` ``seen`` by a cone from its border to the apex, in a surface of ``count`` facets; returns a
+    `Cone`.
 
-    Where the patch is no disc, as rounding may have it, the facet f alone is replaced.
+    Where the patch is no disc, as rounding may make the patch, facet f alone is replaced.
     """
     facets, starts, border, patch = surface.facets, surface.starts, surface.border, surface.patch
     n_facets, n_edges = seen.n_facets, seen.n_edges

@@ -1,7 +1,7 @@
-"""Facets of EPA's surface whose side doubles leave open, in double-doubles: slivers, mostly.
+"""Double-doubles for facets of EPA's surface whose orientation doubles leave open: slivers, mostly.
 
-One facet that is not known to face outwards leaves the whole surface without a proof. Of curved bodies one in a
-thousand runs ended so.
+A single facet not known to face outwards leaves the whole surface without a proof. On curved bodies 1 in 1,000 runs
+ended this way.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _ROUNDED = 4.0 * 2.0**-53
 
 @kernel
 def prove_facets(surface, n_facets):
-    """Set the clearance of facets that have none, where the origin lies behind their corners as these stand."""
+    """Set the missing clearances of facets where the origin lies behind their corners as these stand."""
     for f in range(n_facets):
         if surface.clearances[f] < 0.0:
             a = point_at(surface.points, corner(surface, f, 0))

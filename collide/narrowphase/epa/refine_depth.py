@@ -1,9 +1,9 @@
 """The last digits of a depth: the same growth in double-doubles, where the surface is nearest the origin.
 
-Doubles leave a surface that is right but for their rounding. What matters of it are the facets within that rounding
-of the nearest: their planes are taken again in double-doubles, the nearest one's support vertex is looked for among
-the vertices that are level with it, and what lies beyond is added. All others are known to be farther. Depths as
-small as touching need no other treatment: down to 2⁻⁹⁶ of the size planes are told apart.
+Doubles leave a surface correct but for their rounding. Only facets within this rounding of the nearest matter: their
+planes are computed again in double-doubles, the nearest facet's support vertex is searched among the vertices level
+with the facet, and a vertex beyond is added. All other facets are known to be farther. Depths as small as touching need
+no other treatment: down to 2⁻⁹⁶ of the size planes are told apart.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _PLANE_ERROR = 8.0 * HEIGHT_ERROR
 class RefinedDepth(NamedTuple):
     """sound : whether anything was gained.
 
-    lower, depth, upper : a proven bracket of the cores' depth, which is the distance of the facet's plane; no lower one
+    lower, depth, upper : a proven bracket of the cores' depth, the distance of the facet's plane; no lower bound
         unless the origin is proven to lie inside.   nhat : the plane's direction.   n_facets : of the surface now.
     """
 
@@ -90,7 +90,7 @@ class _Fine(NamedTuple):
 
 @kernel
 def _load(fine, v):
-    """Compute the fine point of a vertex, if it is not there."""
+    """Compute the fine point of a vertex, if missing."""
     if fine.known[v] == 0:
         ids = fine.surface.ids
         fine_point(fine.pair, fine.low, fine.points, v, ids[2 * v], ids[2 * v + 1], fine.scale)
@@ -167,9 +167,9 @@ def _find_vertex(ids, n_vertices, i, j):
 
 @kernel
 def _flip_to(surface, f, v, error):
-    """Exchange a diagonal of facet f so that vertex v, across one of its edges, becomes a corner.
+    """Exchange a diagonal of facet f so that vertex v, across an edge, becomes its corner.
 
-    Returns the neighbour that it was exchanged with, or −1.
+    Returns the neighbour in the exchange, or −1.
     """
     for e in range(3):
         t = surface.facets[FACET * f + TWIN + e]

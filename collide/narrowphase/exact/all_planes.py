@@ -147,7 +147,7 @@ def _set_points(exact, planes, at):
 
 @kernel(inline=True)
 def _of_a(k, n_a):
-    """The vertex of A that point k is; 0 for one of B, where all of a plane's points have it in common."""
+    """The vertex of A of point k; 0 for a vertex of B, A's vertex then being common to all points of the plane."""
     return k if k < n_a else 0
 
 
@@ -180,7 +180,7 @@ def _extent(exact):
 
 @kernel
 def _find_candidates(ordered, terms_at, doubles_at):
-    """Number of the planes that may decide, written into the workspace; 0 where there are too many of them."""
+    """Number of candidate planes, written into the workspace; 0 where they exceed the workspace."""
     pair = ordered.pair
     n_a, n_b = pair.A.n, pair.B.n
     low_at = doubles_at + 8 * _LOW

@@ -32,7 +32,7 @@ def add_request(requests, row, tied):
 
 @kernel
 def find_request(requests, row):
-    """Where the entry of a row begins, behind the row's number; 0 where there is none."""
+    """Place of the entry of a row, behind the row's number; 0 where the row has no entry."""
     at = 1
     while at <= requests[0] and requests[at] < row:
         at += 3 + 6 * requests[at + 2]

@@ -21,9 +21,10 @@ SIGNATURE = "void(int64, int64, int64, int64, int64, int64, float64, int64, int6
 def exact_depth(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, limit, rows_at, terms_at, n_terms, digits_at
 ):
-    """Find the depths of overlaps that `settle_hulls` has settled without one.
+    """Find the depths of overlaps settled by `settle_hulls` without a depth.
 
-    Arguments as there, and flat as there. Rows are left as they are where the hulls are too large (`all_planes.py`).
+    Arguments as in `settle_hulls`, flat for the same reason. Rows are left unchanged where the hulls are too large
+    (`all_planes.py`).
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     space = settle_space(terms_at, n_terms, digits_at)

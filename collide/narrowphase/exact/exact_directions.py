@@ -14,7 +14,7 @@ from collide.numerics.vec3 import Vec3
 
 
 class Normal(NamedTuple):
-    """A direction that is a normal of points 0, 1, 2.
+    """A direction normal to points 0, 1, 2.
 
     n : digits of a component.
     side : 1 where the origin lies behind the points as they stand counter-clockwise, −1 where

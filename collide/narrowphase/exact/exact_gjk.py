@@ -56,8 +56,8 @@ def touch_exactly(ordered, terms, digits, boolean, ids, n, radius_a, radius_b):
 
     terms : exact terms of poses that are products (`PoseTable.terms`).
     digits : workspace of `exact_workspace.INTEGERS`.
-    boolean : stop at the first plane that separates, which need not be the nearest point's.
-    ids : in, vertex pairs of a first simplex of n ≥ 1 points; out, of the deciding one.
+    boolean : stop at the first separating plane, not always the nearest point's.
+    ids : in, vertex pairs of a first simplex of n ≥ 1 points; out, of the deciding simplex.
     """
     exact = exact_pair(ordered, terms, digits, radius_a, radius_b)
     if not fits(exact):
@@ -138,11 +138,11 @@ def _try_face(exact, ids):
 
 @kernel
 def _separating_faces(exact):
-    """Which faces of points 0 … 3 through point 3 have the origin beyond them: bit k for the face across k.
+    """Faces of points 0 … 3 through point 3 with the origin beyond: bit k for the face across k.
 
-    The origin is known to lie on the inner side of the face across point 3. All three inside proves
-    that the tetrahedron holds the origin; it takes a quarter of the work of Johnson's determinants.
-    7, saying nothing, where the four points are coplanar or the origin is on a face's plane.
+    The origin is known to lie on the inner side of the face across point 3. All three inside proves that the
+    tetrahedron holds the origin, in a quarter of the work of Johnson's determinants. 7, saying nothing, where the four
+    points are coplanar or the origin is on a face's plane.
     """
     digits, d = exact.digits, exact.d
     beyond = 0

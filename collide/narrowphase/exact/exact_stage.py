@@ -1,14 +1,14 @@
 """The exact stage: rows whose sign or last digits doubles leave open are settled in integers. No rounding decides
 anything.
 
-GJK with Johnson's subalgorithm (Gilbert, Johnson and Keerthi 1988) in integers: every quantity is a
-polynomial of the doubles given (vertices, both poses, radii), which `numerics/digits.py` holds exactly.
-The exact distance of the simplex strictly decreases from round to round and there are finitely many
-simplices, so it ends, and it ends in a decision. Doubles only propose: which simplex to begin with,
-and which few vertices can be extreme in a direction (all within an error bound of the best one).
+GJK with Johnson's subalgorithm (Gilbert, Johnson and Keerthi 1988) in integers: every quantity is a polynomial of the
+doubles given (vertices, both poses, radii), exact in the integers of `numerics/digits.py`. The exact distance of the
+simplex strictly decreases from round to round and the number of simplices is finite, so the search ends, and ends in a
+decision. Doubles only propose: the first simplex, and the few vertices possibly extreme in a direction (all within an
+error bound of the best vertex).
 
-Degrees, with one coordinate of a difference point y = R_A a − R_B b − (p_WB − p_WA) as one: a Gram
-entry y_i·y_j has two, Johnson's Δ has 0, 2, 4, 6 for 1 to 4 points, the direction Σ Δ_i y_i one more.
+Degrees, with a coordinate of a difference point y = R_A a − R_B b − (p_WB − p_WA) of degree one: a Gram entry y_i·y_j
+has two, Johnson's Δ has 0, 2, 4, 6 for 1 to 4 points, the direction Σ Δ_i y_i one more.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ def settle_exactly(
 ):
     """Settle the undecided rows of `answer_pairs`, in place; returns how many stay undecided.
 
-    What is asked, in this order, cheapest and most frequent first; a step sees what those before it have left open:
+    Steps, in this order, cheapest and most frequent first; a step sees the rows left open by the steps before:
 
-    1. `settle_hulls`: two swept hulls. GJK in integers says whether they share a point; the distance of cores that are
-       apart is then known to all digits. Depths below rounding come from the facets nearest the origin that doubles
-       have named (`depth_requests.py`, `plane_depth.py`).
+    1. `settle_hulls`: two swept hulls. GJK in integers decides whether they share a point; the distance of
+       disjoint cores is then known to all digits. Depths below rounding come from the facets nearest the origin, as
+       named by doubles (`depth_requests.py`, `plane_depth.py`).
     2. `settle_halfspaces`: a half-space against a swept hull, the sign of a polynomial a vertex; two half-spaces with
-       opposite normals (`opposite_halfspaces.py`). Only if 1 met such rows.
-    3. `exact_depth`: overlaps that 1 has settled without a depth, where depths are wanted and hulls are small: the
-       least extent over all planes there are (`all_planes.py`).
+       opposite normals (`opposite_halfspaces.py`). Only if step 1 met a half-space.
+    3. `exact_depth`: overlaps settled by step 1 without a depth, where depths are wanted and hulls are small: the
+       least extent over all candidate planes (`all_planes.py`).
 
     codes : addresses of the three.   Other arguments as of `settle_hulls`. The steps are called where they were
     compiled, so that they are compiled once.

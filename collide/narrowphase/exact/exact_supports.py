@@ -14,7 +14,8 @@ from collide.support.support_tree_query import extreme_vertex, rings_of
 
 
 class SupportPair(NamedTuple):
-    """Vertices i of A and j of B whose difference is the last one against the direction; v : that as a unit vector."""
+    """Vertices i of A and j of B whose difference is extreme against the direction; v : the direction as a unit vector.
+    """
 
     i: int
     j: int
@@ -35,9 +36,9 @@ def support_pair(exact, n):
 def _extreme_vertex(exact, body, hull, n, direction, length, sign):
     """The vertex with the least sign · (v·R a), v the exact direction; the first of equals.
 
-    Doubles rule out all that are farther than twice the slack from the best; the others, usually
-    one vertex, are compared exactly. Where there is a support tree, only the vertex that it proposes and its
-    neighbours are looked at (which of equals is then up to the tree).
+    Doubles rule out all vertices farther than twice the slack from the best; the rest, usually a single vertex, are
+    compared exactly. With a support tree, only the tree's proposal and its neighbours are looked at (the choice among
+    equals is then the tree's).
     """
     slack = 2.0 * exact.error * length
     g = scale(sign, rotate_back(exact.pair.poses, hull.pose_at, direction))

@@ -1,7 +1,6 @@
-"""A pair of posed hulls in integers: where its numbers stand in the workspace, how long they are, how vertices get into
-it.
+"""A pair of posed hulls in integers: place and length of its numbers in the workspace, and the loading of vertices.
 
-All coordinates of a pair share one grid and one length of D digits; other numbers have a few times as many, by their
+All coordinates of a pair share a grid and a length of D digits; other numbers have a few times as many, by their
 degree.
 """
 

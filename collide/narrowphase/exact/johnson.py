@@ -79,11 +79,11 @@ def set_delta(exact, mask, j):
 
 @kernel
 def nearest_subset(exact, n, newest):
-    """The subset of n ≤ 4 points that holds the nearest point of their hull in its relative interior.
+    """The subset of n ≤ 4 points with the nearest point of their hull in its relative interior.
 
-    Subsets with the newest point only, where newest ≥ 0: without it there is nothing nearer than
-    before. Sets are visited smaller ones first, so that every Δ needed stands. Affinely dependent
-    points are no special case: the nearest point also lies in an independent subset.
+    Only subsets with the newest point, where newest ≥ 0: without this point nothing is nearer than before. Smaller sets
+    are visited first, so every Δ needed stands. Affinely dependent points are no special case: the nearest point also
+    lies in an independent subset.
     """
     digits, d = exact.digits, exact.d
     for i in range(n):
@@ -123,8 +123,9 @@ def _delta_sign(exact, mask, i):
 def set_direction(exact, mask):
     """A positive multiple of the nearest point of points 0 … n − 1, into the direction.
 
-    For one or two points it is the nearest point times ΣΔ. Across three it is their normal, of degree
-    two instead of five. Returns (digits of a component, whether it is zero: the origin is in the hull).
+    For one or two points the multiple is the nearest point times ΣΔ. Across three the direction is their normal, of
+    degree two instead of five. Returns (digits of a component, whether the direction is zero: the origin is in the
+    hull).
     """
     if mask == 7:
         n, side = set_normal(exact)

@@ -24,14 +24,14 @@ _SAME = 2.0**-70
 
 
 class ExactDepth(NamedTuple):
-    """The depth of cores that share a point [m], to EXACT_ERROR however small it is, if proven."""
+    """The depth of cores sharing a point [m], to a relative EXACT_ERROR however small the depth, if proven."""
 
     proven: bool
     depth: DD
 
 
 class FacetDistance(NamedTuple):
-    """Distance of the origin from a facet's plane, and on which side of it: 1 behind, −1 before, 0 in the plane."""
+    """Distance of the origin from a facet's plane, and its side: 1 behind, −1 before, 0 in the plane."""
 
     side: int
     distance: DD
@@ -43,9 +43,9 @@ def nearest_plane(ordered, terms, digits, requests, request_at):
 
     requests, request_at : where an entry of `depth_requests.py` begins, or 0.   Other arguments as in `touch_exactly`.
 
-    A plane through the origin that no vertex lies beyond settles it: nothing is less than 0. Otherwise the entry names
-    all facets of a closed surface within A ⊖ B that may be nearest; the least of their exact distances is a
-    lower bound of the depth, and an upper one if no vertex lies beyond that facet's plane.
+    A plane through the origin with no vertex beyond settles the depth: nothing is less than 0. Otherwise the entry
+    names all possibly nearest facets of a closed surface within A ⊖ B; the least of their exact distances is a lower
+    bound of the depth, and an upper bound if no vertex lies beyond this facet's plane.
     """
     if ordered.pair.A.n * ordered.pair.B.n <= 3:
         return ExactDepth(True, DD(0.0, 0.0))  # so few points span no volume

@@ -41,11 +41,12 @@ def settle_hulls(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at, n_terms,
     requests_at, digits_at,
 ):
-    """Settle the undecided rows of `answer_pairs`, in place; returns how many it leaves to `settle_halfspaces.py`.
+    """Settle the undecided rows of `answer_pairs`, in place; returns how many are left to `settle_halfspaces.py`.
 
-    Arguments as there; without depths bodies that meet get a point of both.   terms, n_terms : of the `PoseTable`.
-    requests : what `answer_pairs` wrote.   digits : workspace of WORKSPACE integers.
-    What stays open: curved cores, and shapes whose stored numbers are themselves rounded (slop).
+    Arguments as in `settle_exactly`; without depths bodies that meet get a common point.   terms, n_terms : of the
+    `PoseTable`.
+    requests : written by `answer_pairs`.   digits : workspace of WORKSPACE integers.
+    Curved cores stay open, and shapes whose stored numbers are themselves rounded (slop).
     Arguments are flat: entries are called by address, from C too.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
@@ -117,7 +118,7 @@ def _settle(ordered, space, requests, k, row_at, boolean, depths, limit):
 
 @kernel(inline=True)
 def _take_simplex(ids, row, flip):
-    """The vertex pairs that a row names, for the bodies as worked on; how many there are."""
+    """Take the vertex pairs named by a row, in the order of the bodies as worked on; returns their number."""
     ids[0] = 0  # a row decided as a boolean names no vertices (asked again only where tests distrust doubles)
     ids[1] = 0
     for j in range(row.flags[COUNT]):

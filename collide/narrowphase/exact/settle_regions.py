@@ -29,7 +29,7 @@ def settle_regions(
     poses: PoseTable,
     shape_of: np.ndarray,
 ) -> None:
-    """Settle those of the undecided rows (their numbers) that are of a closed region and swept points, in place."""
+    """Settle in place the undecided rows (given by number) of a closed region and swept points."""
     for k in undecided.tolist():
         parts = [int(part) for part in pairs[k]]
         packed = [table.packed[shape_of[part]] for part in parts]

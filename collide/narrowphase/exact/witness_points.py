@@ -1,7 +1,7 @@
-"""Normals and witness points of rows that the exact stage has settled, on the feature that decided.
+"""Normals and witness points of rows settled by the exact stage, on the deciding feature.
 
-Those that doubles have found carry the direction of a difference of nearly equal points, which says nothing where the
-gap is below rounding, and need not lie on that feature.
+Witness points from doubles carry the direction of a difference of nearly equal points, meaningless where the gap is
+below rounding, and need not lie on the deciding feature.
 
 Everywhere: row : `Row`.   ordered : the `OrderedPair`.   ids : vertex pairs of n ≤ 4 points of A ⊖ B.
 doubles_at, terms_at : of workspace, and of the `PoseTable`.
@@ -73,9 +73,9 @@ def put_points(row, ordered, terms_at, ids, n, doubles_at, distance):
 
 @kernel
 def put_common_point(row, ordered, ids, n, doubles_at):
-    """The point of both bodies at which the points of A ⊖ B, among which the origin lies, are weighed to 0.
+    """The common point of both bodies, by the weights with which the points of A ⊖ B around the origin sum to 0.
 
-    Of bodies with radii it is a point of both cores.
+    Of bodies with radii, a common point of both cores.
     """
     pair = ordered.pair
     points = view_f64(doubles_at, 4 * POINT)

@@ -1,7 +1,7 @@
-"""Where the numbers of a gap to be refined stand: the question and the answer of one pair, eight pairs side by side.
+"""Places of the numbers of a gap to be refined: the question and the answer of a pair, eight pairs side by side.
 
-A lane block is an array of `Lanes`, number k of eight pairs in element k. One pair's numbers are a `Lane` of it: every
-eighth double. Read as ``at.POSE_A``, with this module imported as ``at``.
+A lane block is an array of `Lanes`, number k of eight pairs in element k. The numbers of a single pair are a `Lane` of
+the block: every eighth double. Read as ``at.POSE_A``, with this module imported as ``at``.
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
-"""A queue of gaps to refine: rows that lack their last digits, until eight of a kind are there or the list of pairs
+"""A queue of gaps to refine: rows without their last digits, until eight of a kind are queued or the list of pairs
 ends.
 
-A row is answered in doubles first, then enqueued: what `refine_gap.py` asks of it goes into one lane of the block of
-its kind. When the block is full, or nothing else is left to do, all in it are refined at once, and their rows are
-finished. Those whose digits are not proven get what doubles say, and are left undecided: the exact stage settles them.
+A row is answered in doubles first, then enqueued: its question to `refine_gap.py` goes into a lane of the block of its
+kind. When the block is full, or nothing else is left to do, all gaps of the block are refined at once, and their rows
+are finished. Rows whose digits are not proven get the answer in doubles, and are left undecided: the exact stage
+settles them.
 
-Lanes do not see each other, so that no answer depends on which rows share a block. Lanes without a row hold the numbers
-of earlier ones, or zeros; what comes of them is not read.
+Lanes do not see each other, so no answer depends on the other rows of its block. Lanes without a row hold numbers of
+earlier rows, or zeros; their results are not read.
 """
 
 from __future__ import annotations
@@ -95,12 +96,12 @@ def clear_queue(integers_at):
 
 @kernel(inline=True)
 def enqueue(ordered, query, work, n, how, row_number, error):
-    """Put a row into the queue whose gap is to be refined; returns its kind.
+    """Put a row into the queue to have its gap refined; returns its kind.
 
     ordered, query, work : `OrderedPair`, `Query` and `Workspace` of `pair_workspace.py`.
-    n : vertex pairs of the workspace. Those with a weight are the feature; of four, where two segments cross, it takes
-        three.
-    how : what the row says if its digits are proven.   error : of a bound in doubles [m].
+    n : vertex pairs of the workspace. Pairs with a weight are the feature; of four, where two segments cross, three are
+        taken.
+    how : the row's method if its digits are proven.   error : of a bound in doubles [m].
     """
     pair = ordered.pair
     doubles_at, integers_at = work.queue_at, work.queue_integers_at
@@ -147,8 +148,8 @@ def enqueue(ordered, query, work, n, how, row_number, error):
 
 @kernel(inline=True)
 def _common_corner(feature, n_points):
-    """(first, parts): the vertex pair that has a vertex in common with each of the others, and 1; else 0 and 2, the
-    parts that edges then have."""
+    """(first, parts): the vertex pair with a vertex in common with each other pair, and 1 part per edge; if missing, 0
+    and 2 parts."""
     first = 0
     parts = 2
     for k in range(n_points):
@@ -163,7 +164,7 @@ def _common_corner(feature, n_points):
 
 @kernel(inline=True)
 def _put_geometry(pair, question, ticket, n_points, parts):
-    """Poses and vertices of a question, into one lane of it."""
+    """Write poses and vertices of a question into a lane of its block."""
     A, B, poses = pair.A, pair.B, pair.poses
     for k in range(12):
         put(question, at.POSE_A + k, poses[A.pose_at + k])
@@ -267,7 +268,8 @@ def _pair_of(ints_at, numbers_at, poses_at, ticket):
 
 @kernel
 def _widen_by_ties(pair, ids, question, answer, direction_lane, composed, doubles_at, integers_at):
-    """Set the bracket anew by the lowest vertices there are; whether it is still proven to the last digits."""
+    """Set the bracket anew by the lowest vertices of both bodies; whether the bracket is still proven to the last
+    digits."""
     low = view_f64(doubles_at + 8 * _LOWS, LOW_PARTS_OF_PAIR if composed else 0)
     direction = view_f64(doubles_at + 8 * _DIRECTION, dd.STRIDE)
     for k in range(dd.STRIDE):

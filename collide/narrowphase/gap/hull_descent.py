@@ -1,22 +1,22 @@
 """The lowest vertex of a body along a direction of double-doubles: down the edges of its hull, each step exact.
 
-A hull is convex: a vertex none of whose neighbours is lower is the lowest of all. That is no truth of rounded heights.
-Where edges nearly are opposite, as on a cap of thousands of vertices, rounding at two neighbours is a thousand times as
-much across the cap. So the direction is rounded once, to two doubles a component in the frame of the body, and along
-that one every step is certain: by doubles, by double-doubles, or by the exact sum of all products. The vertex is then
+A hull is convex: a vertex with no lower neighbour is the lowest of all. Rounded heights lack this property. Where edges
+nearly are opposite, as on a cap of thousands of vertices, rounding at two neighbours is a thousand times as much across
+the cap. So the direction is rounded once, to two doubles a component in the frame of the body, and along the rounded
+direction every step is certain: by doubles, by double-doubles, or by the exact sum of all products. The vertex is then
 the lowest along a direction off by 2⁻¹⁰⁰, wherever the vertices lie.
 
-Steps on level vertices: those of the hull that `quickhull` makes of a cap, logarithmic in their number.
+Steps on level vertices: the steps of `quickhull`'s hull of a cap, logarithmic in the number of vertices.
 
 Errors, with S, ρ and σ the sizes of `bounds.py`, d the direction in the world, g = Rᵀd, g′ as rounded, u = 2⁻⁵³:
 
 * a component of g′ is a sum of three products of double-doubles, good to 25u²·Σ|R||d|: over an edge no longer than 2ρ
-  that is 25u²·√3·2ρσ|d|, as |R| entry by entry stretches by √3·σ at most;
-* the height of a vertex v over the first one v₀ is (v − v₀)·g′, where v − v₀ is exact: 25u²·2ρσ|d|.
+  the height is good to 25u²·√3·2ρσ|d|, as |R| entry by entry stretches by √3·σ at most;
+* the height of a vertex v over the first vertex v₀ is (v − v₀)·g′, where v − v₀ is exact: 25u²·2ρσ|d|.
 
-No vertex is lower over the first one of its body than is said, by more than the sum of both; of both bodies together,
-as ρσ adds up to S at most, 2.2·2⁻¹⁰⁰ S|d|. With what the first points are off by, 1.25·2⁻⁹⁸ S|d| (`refine_gap.py`),
-that is less than `HEIGHT_ERROR`.
+No vertex of a body is lower, relative to its first vertex, than the height found by more than the sum of both errors;
+for both bodies together, as ρσ adds up to S at most, 2.2·2⁻¹⁰⁰ S|d|. With the error of the first points' height,
+1.25·2⁻⁹⁸ S|d| (`refine_gap.py`), the total is less than `HEIGHT_ERROR`.
 """
 
 from __future__ import annotations
@@ -156,8 +156,8 @@ def _compare_finely(a, b, g, error, terms):
 
 @kernel
 def lowest_of_all(coords, n, padded, first, g):
-    """The lowest of all n vertices by a scan, O(n); `n_visited` counts heights taken in double-doubles, those that
-    doubles cannot tell from the lowest so far."""
+    """The lowest of all n vertices by a scan, O(n); `n_visited` counts heights computed in double-doubles, where
+    doubles cannot tell a vertex from the lowest so far."""
     start = column_at(coords, padded, first)
     best = first
     lowest = DD(0.0, 0.0)

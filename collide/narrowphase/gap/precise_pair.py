@@ -70,9 +70,9 @@ def is_composed(poses, p):
 
 @kernel(inline=True)
 def put_low_parts(pair, terms_at, low_at):
-    """What both poses are more than their rows say, written to an address: LOW_PARTS_OF_PAIR doubles, A's first.
+    """Write the low parts of both poses, exact pose minus its row, to an address: LOW_PARTS_OF_PAIR doubles, A's first.
 
-    terms_at : of the `PoseTable`.   Returns how many doubles it wrote: none where both poses are as given.
+    terms_at : of the `PoseTable`.   Returns the number of doubles written: 0 where both poses are as given.
     """
     if not (is_composed(pair.poses, pair.A.pose_at) or is_composed(pair.poses, pair.B.pose_at)):
         return 0
@@ -211,7 +211,7 @@ def set_plane(fine, i, j, k, direction):
 def normal_of_edges(e, f):
     """e × f, of two edges e and f from a corner of a triangle.
 
-    From the two shorter of its three edges: long ones that are nearly parallel would leave little of it.
+    From the two shorter of its three edges: the product of long, nearly parallel edges would cancel.
     """
     g = dd.sub_vec3(f, e)
     ee = dot(dd.leading(e), dd.leading(e))
@@ -227,10 +227,10 @@ def normal_of_edges(e, f):
 
 @kernel
 def across_edge(w, e):
-    """The part of a point w across an edge e from it, lengthened by the edge's square.
+    """The part of a point w across an edge e from the point, lengthened by the edge's square.
 
-    Taken twice where that is short: the first time leaves what rounding at |w| makes, the second what rounding at the
-    result makes. Where the edge is not much nearer than its length, once is enough.
+    Computed twice where the part is short: the first time leaves an error of rounding at |w|, the second of rounding at
+    the result. Where the edge is not much nearer than its length, once is enough.
     """
     square = dd.inner(e, e)
     across = _reject(w, e, square)

@@ -135,13 +135,13 @@ def core_error(spread, excess, length, slop, scale):
 
 @kernel
 def refine_gaps(question, n, parts, composed, feature, direction, answer):
-    """The distances of eight pairs of cores of points that are apart, from the n ≤ 3 points nearest the origin.
+    """The distances of eight pairs of disjoint cores of points, from the n ≤ 3 points nearest the origin.
 
-    question : a lane block of `gap_layout.py`, or one pair's question as doubles.   parts : of an edge, 1 or 2.
-    composed : whether low parts of poses are there.
+    question : a lane block of `gap_layout.py`, or the question of a pair as doubles.   parts : of an edge, 1 or 2.
+    composed : whether the question has low parts of poses.
     feature, direction, answer : FEATURE, dd.STRIDE, ANSWER numbers, out.
 
-    What other vertices lie as low is for the caller to see (`tied_vertices.py`).
+    The caller looks for other vertices as low (`tied_vertices.py`).
     """
     poses = PosedDifference(question, at.POSE_A, at.POSE_B, question, at.LOW_A, at.LOW_B, composed)
     put_difference(

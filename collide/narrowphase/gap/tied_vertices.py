@@ -1,4 +1,4 @@
-"""Which vertices are the least of A ⊖ B along a direction: told apart in doubles where that is enough, else in
+"""Vertices tied for the least of A ⊖ B along a direction: told apart in doubles where these suffice, else in
 double-doubles."""
 
 from __future__ import annotations
@@ -38,11 +38,10 @@ def vertices_of(body):
 
 @kernel(inline=True)
 def is_unique_minimiser(pair, ids, n, direction, slack):
-    """Whether n ≤ 3 points, being the least of A ⊖ B along a direction, are so with tied pairs of their own vertices
-    alone.
+    """Whether n ≤ 3 points, the least of A ⊖ B along a direction, are tied only with pairs of their own vertices.
 
-    ids : their vertex pairs.   slack : how far doubles may be wrong along |direction| = 1. False also where a pair of
-    their vertices might not be tied with them: n pairs over n + 1 vertices hang together, so that it must be.
+    ids : their vertex pairs.   slack : error of doubles along |direction| = 1. False also where a pair of their
+    vertices might not be tied with them: n pairs over n + 1 vertices form a connected graph, so the pair must be tied.
     """
     n_of_a, n_of_b = distinct_vertices(ids, n)
     if n_of_a + n_of_b != n + 1:
@@ -123,10 +122,10 @@ def _has_many_neighbours(tree, padded, i, j, k):
 def tied_vertices(body, ties, g, slack):
     """(number of vertices whose product with g is at most the limit, the limit).
 
-    body : `Vertices`.   ties : the first is given; all are written, unless there are more than MAX_TIES. The limit is
-    ``slack`` above the first.
+    body : `Vertices`.   ties : the first is given; all are written, unless more than MAX_TIES. The limit is ``slack``
+    above the first.
 
-    Along hull edges where there is a support tree: the vertices of a hull below a level hang together.
+    Along hull edges with a support tree: the vertices of a hull below a level are connected by edges.
     """
     coords, padded = body.coords, body.padded
     limit = dot(column_at(coords, padded, ties[0]), g) + slack
@@ -155,7 +154,7 @@ def tied_vertices(body, ties, g, slack):
 
 @kernel(inline=True)
 def _with_tie(ties, count, i):
-    """Add vertex i to the ties unless it is one; returns their number."""
+    """Add vertex i to the ties unless already listed; returns their number."""
     for k in range(count):
         if ties[k] == i:
             return count
@@ -173,14 +172,14 @@ class LowestPair(NamedTuple):
 
 @kernel
 def lowest_pair(pair, low, ids, direction, terms_at, scale):
-    """How far the least of A ⊖ B along a direction lies beyond the first of points that nearly are the least.
+    """Height of the least of A ⊖ B along a direction over the first of points nearly the least: ``excess`` ≤ 0.
 
     low : low parts of both poses, or no doubles where both are as given.   ids : the first point's vertex pair.
-    terms_at : workspace of PRODUCT_TERMS doubles.   scale : what heights are multiplied with, a power of two.
+    terms_at : workspace of PRODUCT_TERMS doubles.   scale : factor of the heights, a power of two.
 
-    For the error, less than `HEIGHT_ERROR` with that of the first point's own height, see `hull_descent.py`.
-    Asked where they are not alone (`is_unique_minimiser`). O(log n) where there are support trees, but for vertices of
-    very many neighbours; else O(n).
+    For the error, less than `HEIGHT_ERROR` with the error of the first point's own height, see `hull_descent.py`.
+    Called where the points are not alone (`is_unique_minimiser`). O(log n) with support trees, but for vertices of very
+    many neighbours; else O(n).
     """
     of_a = _lowest(pair.A, pair.poses, ids[0], low, 0, direction, 1.0, terms_at)
     of_b = _lowest(pair.B, pair.poses, ids[1], low, 12, direction, -1.0, terms_at)

@@ -191,11 +191,12 @@ def _put_nearest(weights, n, wa, wb, wc, v):
 
 
 class _Asked(NamedTuple):
-    """How support points are asked for.
+    """How support points are searched.
 
-    coarse : of the coarse hulls.   partial : the last one was, or of lists alone: it need not be the farthest.
-    list_a, list_b : the lists of the support trees in which it was found; −1 for a walk from above.
-    u : direction against which the trees were last walked from above. Within an angle of it only the lists are asked.
+    coarse : on the coarse hulls.   partial : the last search was on coarse hulls or single lists: perhaps not the
+    farthest.
+    list_a, list_b : the lists of the support trees with the last vertices; −1 for a walk from above.
+    u : direction against which the trees were last walked from above. Within an angle of u only the lists are searched.
     """
 
     coarse: bool
@@ -206,9 +207,9 @@ class _Asked(NamedTuple):
 
 
 class _NextPoint(NamedTuple):
-    """bound : value of the plane through point D across v.   proven : the same where it is proven, else −∞.
+    """bound : value of the plane through point D across v.   proven : the same where proven, else −∞.
 
-    repeated : whether D is one of the other points.
+    repeated : whether D equals another point.
     """
 
     asked: _Asked
@@ -255,10 +256,11 @@ def _next_point(pair, points, ids, places, v, square, asked, limits, is_last):
 
 @kernel(inline=True)
 def _same_lists_cosine(pair):
-    """The squared cosine of the angle within which lists are asked again. 2, which no angle has, beside a curved core.
+    """The squared cosine of the angle within which lists are searched again; beside a curved core 2, out of reach of
+    any angle.
 
-    A curved core never repeats a point. GJK would converge to the best point of one list, then to that of the next, and
-    some runs used up their iterations.
+    A curved core never repeats a point. GJK would converge to the best point of a list, then of the next list, and some
+    runs used up their iterations.
     """
     if pair.A.kind != POINTS or pair.B.kind != POINTS:
         return 2.0

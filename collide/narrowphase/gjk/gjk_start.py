@@ -54,8 +54,7 @@ class Limits(NamedTuple):
 
 
 class _FirstDirection(NamedTuple):
-    """d : where to look first.   factor : times d is the direction as it came.   between_origins : it is p_WB −
-    p_WA."""
+    """d : where to look first.   factor : times d is the direction given.   between_origins : d is p_WB − p_WA."""
 
     d: Vec3
     factor: float
@@ -87,11 +86,11 @@ def _set_separating_axis(weights, d, length, lower):
 
 
 class Start(NamedTuple):
-    """What the first point tells.
+    """Outcome of the first point.
 
     status : APART, or NEAREST where the search goes on.   lower : bound of the distance.   d, length : first direction.
-    coarse : points are asked of the coarse hulls.   began_coarse : so was the first one.
-    list_a, list_b : the lists of the support trees in which it was found; −1 for a walk from above.
+    coarse : points are searched on the coarse hulls.   began_coarse : point 0, too, was.
+    list_a, list_b : the lists of the support trees with the vertices of point 0; −1 for a walk from above.
     """
 
     status: int
@@ -107,7 +106,7 @@ class Start(NamedTuple):
 
 @kernel(inline=True)
 def begin(pair, points, ids, weights, limits):
-    """Point 0, or a plane that already separates the bodies: most pairs that are farther apart than asked about."""
+    """Point 0, or a separating plane already: enough for most pairs farther apart than the limit."""
     first = _first_direction(pair, weights)
     d, error, radius, limit = first.d, limits.error, limits.radius, limits.limit
     length = norm(d)
@@ -170,10 +169,10 @@ def first_simplex(pair, points, ids, weights, n_start, start):
 
 @kernel(cold=True)
 def _start_from_vertices(pair, points, ids, weights):
-    """Begin with the vertices that the last three ids name; returns how many of the points are kept.
+    """Begin with the vertices named by the last three ids; returns the number of points kept.
 
-    In GJK it comes after the first point, which is not needed then: a way around that made the iterations of all other
-    pairs 5 % slower.
+    In GJK this comes after the first point, not needed then: a branch around the first point made the iterations of all
+    other pairs 5 % slower.
     """
     for k in range(3):
         place_vertices(pair, points, ids, k, ids[2 * k + 4], ids[2 * k + 5])
@@ -183,7 +182,7 @@ def _start_from_vertices(pair, points, ids, weights):
 
 @kernel(inline=True)
 def _surround_tangent(pair):
-    """How far to tilt a direction so that vertices around the one found are met; 0 for curved cores and few
+    """Tangent of the tilt at which a direction meets vertices around the last vertex; 0 for curved cores and few
     vertices."""
     n = min(pair.A.n, pair.B.n)
     polytopes = pair.A.kind == POINTS and pair.B.kind == POINTS
@@ -192,14 +191,14 @@ def _surround_tangent(pair):
 
 @kernel(cold=True)
 def _surround(pair, points, ids, weights, d, plane, tangent, list_a, list_b):
-    """Add two points on either side of where the origin lies beside point 0; returns how many are kept.
+    """Add two points on either side of the origin's foot beside point 0; returns the number of points kept.
 
-    Between bodies that nearly touch, the direction from a vertex of one to a vertex of the other is hardly more than
-    chance, and the next vertices found lie far off; half of all iterations went into coming back. A triangle of
+    Between bodies that nearly touch, the direction from a vertex of one body to a vertex of the other is hardly more
+    than chance, and the next vertices found lie far off; half of all iterations went into coming back. A triangle of
     vertices around the origin's foot has the right direction at once: on balls 5 iterations remain of 11 at n = 512.
 
-    d : the unit direction point 0 was found in.   plane : height of the plane across it.   list_a, list_b : the lists
-        of support trees to look in.   weights : the simplex that is kept, and its point nearest the origin.
+    d : the unit direction of point 0's support.   plane : height of the plane across d.   list_a, list_b : the lists
+        of support trees to search.   weights : the simplex kept, and its point nearest the origin.
     """
     u = add(point_at(points, 0), scale(plane, d))
     length = norm(u)

@@ -1,12 +1,12 @@
-"""The nearest point of a simplex that has just grown by one point.
+"""The nearest point of a simplex just grown by a point.
 
-Before, the origin's nearest point lay in the midst of all the old points; so the new one is the newest point, or lies
-on an edge or a face at it. Looking at these alone takes two thirds of the time that `simplex.nearest_in_simplex` takes
-for all faces, but rounding may have another face hold it: a prototype that trusted it was wrong by many lengths. So
-the result is checked: a point v of the simplex is its nearest one if no corner p has p·v < v·v. Where that is not so,
-or where the origin may lie inside, the caller looks at all faces.
+Before, the origin's nearest point lay in the relative interior of all the old points; so the new nearest point is the
+newest point, or lies on an edge or a face at the newest. Looking at these alone takes two thirds of the time of
+`simplex.nearest_in_simplex` over all faces, but by rounding another face may hold the nearest point: a prototype
+without a check was wrong by many lengths. So the result is checked: a point v of the simplex is its nearest point if no
+corner p has p·v < v·v. Where the check fails, or where the origin may lie inside, the caller looks at all faces.
 
-Points are passed as values: what the compiler can keep in registers it need not store and load again.
+Points are passed as values: numbers kept in registers need no store and load.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def _on_tetrahedron(A, B, C, D, error):
 
 @kernel(inline=True)
 def _on_best_edge(D, e, f, g):
-    """The nearest point of three edges from D: of the one that lies lowest, by along² / |edge|²."""
+    """The nearest point of the three edges from D: on the edge of the greatest descent along² / |edge|²."""
     along, square, rotation = max(-dot(D, e), 0.0), dot(e, e), 0
     p, q = max(-dot(D, f), 0.0), dot(f, f)
     if p * p * square > along * along * q:

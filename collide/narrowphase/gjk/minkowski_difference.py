@@ -34,13 +34,13 @@ def difference_point(pair, points, ids, k, d):
 
 @kernel(inline=True)
 def inlined_difference_point(pair, points, ids, k, d, coarse, list_a, list_b):
-    """Store as point k the one of A ⊖ B farthest in direction d; of a support tree, not proven to be.
+    """Store as point k the point of A ⊖ B farthest in direction d; with a support tree, not proven to be the farthest.
 
-    Returns the lists of the bodies' support trees in which vertices were found (`extreme_vertex_listed`).
+    Returns the lists of the bodies' support trees with the vertices found (`extreme_vertex_listed`).
 
-    pair : a `PosedPair`.   coarse : ask the coarse points alone, where there are any.
+    pair : a `PosedPair`.   coarse : search the coarse points alone, where a body has them.
     points : POINT doubles a point.   ids : two a point, the support vertices of A and of B.
-    list_a, list_b : lists to look in alone, or −1.
+    list_a, list_b : the only lists to search, or −1.
     """
     A, B = pair.A, pair.B
     e = rotate_back(pair.poses, A.pose_at, d)
@@ -93,10 +93,10 @@ def place_vertices(pair, points, ids, k, i, j):
 
 @kernel(cold=True)
 def settle_point(pair, points, ids, k, d):
-    """Make point k, found by `difference_point`, one that is farthest in direction d for certain.
+    """Make point k, found by `difference_point`, a point certainly farthest in direction d.
 
-    Support trees propose; nothing may be concluded from a plane before their vertices are settled. A curved core has no
-    vertex; its point stays as it is.
+    Support trees propose; no plane is a bound before its vertices are settled. A curved core has no vertex; its point
+    stays.
     """
     A, B = pair.A, pair.B
     i = _settled(pair, A, ids[2 * k], d)
@@ -164,7 +164,7 @@ def weighted_sum(points, weights, n, first):
 
 
 class Places(NamedTuple):
-    """Where points A, B and C of a simplex, of which n are there, and a new one, D, stand in memory."""
+    """Places in memory of points A, B and C of a simplex of n points, and of a new point D."""
 
     n: int
     a: int

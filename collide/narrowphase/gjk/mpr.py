@@ -1,15 +1,15 @@
 """Minkowski portal refinement of eight pairs of small hulls, side by side.
 
 After Snethen 2008, "XenoCollide". A ray from a point o deep in A ⊖ B to the origin leaves A ⊖ B somewhere; a portal is
-a triangle of vertices that it passes through. The vertex farthest across the portal either shows a plane that separates
-the bodies, or makes a portal farther out; once the origin lies on this side of one, it lies in A ⊖ B. An iteration is a
-support point and two cross products whatever has been found before, so that eight pairs go through it side by side
-(`kernels/lanes.py`), where the ways of GJK part and nobody foresees its branches.
+a triangle of vertices crossed by the ray. The vertex farthest across the portal either shows a separating plane, or
+makes a portal farther out; once the origin lies on this side of a portal, the origin lies in A ⊖ B. An iteration is a
+support point and two cross products whatever has been found before, so eight pairs go through it side by side
+(`kernels/lanes.py`), where the paths of GJK diverge and its branches are unpredictable.
 
 An iteration concludes nothing. In the end a plane must separate the bodies, or a tetrahedron hold the origin, by more
-than `bounds.py` allows for rounding. Points are brought into the world once, which takes one rounding more a coordinate
-than item 1 there: 11u·S; o, a mean, is good to 14u·ρ beyond that; choosing vertices by their products in the world is
-off by less than item 2 has. All within ERROR. No lane sees another.
+than `bounds.py` allows for rounding. Points are brought into the world once, a rounding more a coordinate than in its
+item 1: 11u·S; o, a mean, is good to 14u·ρ besides; choosing vertices by their products in the world is off by less than
+in its item 2. All within ERROR. No lane sees another.
 """
 
 from __future__ import annotations
@@ -63,11 +63,11 @@ class _Status(NamedTuple):
 
 @kernel
 def refine(block, n_padded, limit):
-    """Poses, vertices and errors of eight pairs are there; become known: unit directions of planes that separate
-    bodies, with their heights (0 where there is none), or clearances (−1 where there is none); and the last portals.
+    """From poses, vertices and errors of eight pairs: unit directions of separating planes, with their heights (0 if
+    missing), or clearances (−1 if missing); and the last portals.
 
     n_padded : vertices of the largest body, with padding.
-    limit : planes must leave out the origin by more; infinite if portals are to go on to the last.
+    limit : least distance of a separating plane from the origin; infinite if portals are to go on to the last.
     """
     margin = block[ERROR_OF] + limit
     status = _begin(block, n_padded, margin)
@@ -88,8 +88,8 @@ def refine(block, n_padded, limit):
 
 @kernel(inline=True)
 def _begin(block, n_padded, margin):
-    """The first two vertices: against the way from the origin to o, and across the plane of that way and the first
-    one."""
+    """The first two vertices: against the way from the origin to o, and across the plane of this way and the first
+    vertex."""
     zero = 0.0 * block[ERROR_OF]
     t = sub(vec3_at(block, POSE_B + 13), vec3_at(block, POSE_A + 13))
     a = _place(block, VERTICES, n_padded, COUNT_A, POSE_A, Vec3(zero, zero, zero))
@@ -124,8 +124,8 @@ def _begin(block, n_padded, margin):
 
 @kernel(inline=True)
 def _advance(block, n_padded, margin, status):
-    """One more vertex: of a portal, once the ray passes between the planes through o, p, r and o, q, r; then across
-    it."""
+    """The next vertex: of a portal, once the ray passes between the planes through o, p, r and o, q, r; then across the
+    portal."""
     is_open, apart, has_portal = status.is_open, status.apart, status.has_portal
     o, d = vec3_at(block, DEEP), vec3_at(block, ACROSS)
     p, q, r = vec3_at(block, _CORNER_P), vec3_at(block, _CORNER_Q), vec3_at(block, _CORNER_R)
@@ -166,7 +166,7 @@ def _select_vec3(condition, a, b):
 
 @kernel(inline=True)
 def _put_where(block, at, condition, a):
-    """A vector becomes another one where the condition holds; returns what it is then."""
+    """Write a vector where the condition holds; returns the vector then stored."""
     a = _select_vec3(condition, a, vec3_at(block, at))
     put_vec3(block, at, a)
     return a
@@ -224,7 +224,7 @@ def _support(block, n_padded):
 
 @kernel(inline=True)
 def _farthest(block, body, n_padded, d):
-    """The vertex of a body that lies farthest along d, and which one it is."""
+    """(the vertex of a body farthest along d, its number)."""
     best = Vec3(d.x, d.x, d.x)
     at = d.x
     greatest = 0.0 * d.x - math.inf
@@ -241,9 +241,10 @@ def _farthest(block, body, n_padded, d):
 
 @kernel(inline=True)
 def _clearance(block):
-    """How deep the origin lies in the tetrahedron of o and the portal at least; −1 where it is not proven to lie in it.
+    """Lower bound of the origin's depth in the tetrahedron of o and the portal; −1 unless the origin provably lies
+    inside.
 
-    Become known: the corners' weights there, ratios of volumes.
+    Writes the corners' weights at the origin, ratios of volumes.
     """
     error = block[ERROR_OF]
     o, p = vec3_at(block, DEEP), vec3_at(block, _CORNER_P)

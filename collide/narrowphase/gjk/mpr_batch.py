@@ -68,11 +68,11 @@ class _Lanes(NamedTuple):
 
 @kernel
 def answer_small_hulls(tables, pairs_at, n_pairs, boolean, limit, rows_at, doubles_at, integers_at):
-    """Answer rows of two small hulls, as far as that goes without depths, and leave the others open.
+    """Answer rows of two small hulls, as far as depths are not needed, and leave the others open.
 
-    A gap's row that is left open names three pairs of vertices to begin with, in the order worked on (`in_order`).
-    Returns how many rows were tried.   tables : `Tables`; other arguments as in `answer_pairs`.   doubles, integers :
-    workspace, DOUBLES and TICKETS of it.
+    An open row of a gap names three pairs of vertices to begin with, in the order worked on (`in_order`). Returns the
+    number of rows tried.   tables : `Tables`; other arguments as in `answer_pairs`.   doubles, integers : workspace of
+    DOUBLES doubles and TICKETS integers.
     """
     pairs = view_i64(pairs_at, 2 * n_pairs)
     block_at = (doubles_at + 8 * (LANES - 1)) // (8 * LANES) * (8 * LANES)
@@ -120,7 +120,7 @@ def answer_small_hulls(tables, pairs_at, n_pairs, boolean, limit, rows_at, doubl
 
 @kernel(inline=True)
 def _put_body(lanes, lane, count, vertices, pose, ints, shape, pose_at):
-    """Where the vertices and the pose of one body of a pair stand, and how many vertices it has."""
+    """Write the addresses of vertices and pose of a body, and its padded number of vertices, into a lane."""
     lanes.values[LANES * count + lane] = ints[INTS * shape + PADDED]
     lanes.tickets[vertices + lane] = ints[INTS * shape + ADDRESS]
     lanes.tickets[pose + lane] = pose_at
@@ -218,9 +218,9 @@ def _vec3(lanes, at, lane, stride):
 
 @kernel
 def _write_portal(lanes, lane, n_padded, clearance, row_at, limit):
-    """The row of a pair that meets, with a common point; or the portal alone, to begin with.
+    """Write the row of a pair that meets, with a common point; or the portal alone, to begin with.
 
-    clearance : of the origin in the tetrahedron of o and the portal, −1 where it is not proven to lie in it.
+    clearance : of the origin in the tetrahedron of o and the portal, −1 unless the origin provably lies inside.
     """
     row = blank_row(row_at)
     words = row.words
@@ -260,7 +260,7 @@ def _write_portal(lanes, lane, n_padded, clearance, row_at, limit):
 
 @kernel
 def _gather(lanes, vertices, count, target, n_padded):
-    """Have the vertices of eight bodies side by side; of those that have fewer, their last ones again."""
+    """Put the vertices of eight bodies side by side; bodies with fewer vertices repeat their last."""
     for axis in range(3):
         for first in range(0, n_padded, RUN):
             transpose_eight(

@@ -1,8 +1,8 @@
-"""The point of a simplex that is nearest the origin, by looking at all of its faces.
+"""The point of a simplex nearest the origin, by looking at all faces.
 
-Every candidate is a convex combination, so the best one is an upper bound of the distance however
-thin the simplex is. All faces and edges are tried: leaving out those without the newest vertex gave
-errors of many lengths in a prototype and no speed.
+Every candidate is a convex combination, so the best candidate is an upper bound of the distance however thin the
+simplex is. All faces and edges are tried: leaving out faces without the newest vertex gave errors of many lengths in a
+prototype and no speed.
 """
 
 from __future__ import annotations
@@ -106,8 +106,7 @@ def nearest_in_simplex(points, n, weights, faces):
     """Squared distance of the origin from the hull of the first n ≤ 4 points.
 
     weights : 7 doubles out: a weight for each point (0 beyond n), then the nearest point.
-    faces : of four points, the faces that may hold the nearest one (`faces_in_sight`): bit k is the one
-        across point k. Ignored for fewer.
+    faces : of four points, the candidate faces (`faces_in_sight`): bit k is the face across point k. Ignored for fewer.
     """
     for k in range(4):
         weights[k] = 0.0
@@ -168,8 +167,8 @@ def across_simplex(points, n, v):
 def face_weights(a, b, c, p):
     """Barycentric coordinates of the projection of p on the plane of three points.
 
-    All zero where the three are collinear. Measured from a, so that the error is that of the
-    points over the height of the triangle.
+    All zero where the three are collinear. Measured from a, so the error is the points' error over the height of the
+    triangle.
     """
     e, f = sub(b, a), sub(c, a)
     from_p = sub(a, p)
@@ -204,10 +203,10 @@ def height_behind(n, p, q, r, error):
 
 @kernel(inline=True)
 def faces_in_sight(points, error):
-    """(faces, clearance): which faces of the first four points the origin may lie in front of.
+    """(faces, clearance): faces of the first four points with the origin possibly in front.
 
-    Bit k of ``faces`` is the face across point k; a face the origin provably lies behind cannot hold the
-    nearest point. Where it lies behind all four, clearance is how deep it provably is in the hull, else −1.
+    Bit k of ``faces`` is the face across point k; a face provably in front of the origin cannot hold the nearest point.
+    Where the origin lies behind all four, clearance is its proven depth in the hull, else −1.
     """
     i = 1 if signed_volume(points, 0) < 0.0 else 2  # vertex 3 lies behind (0, i, j)
     j = 3 - i
@@ -246,10 +245,11 @@ def signed_volume(points, first):
 def weigh_enclosed(points, weights):
     """Weights of the first four points at the origin, which lies among them: ratios of volumes.
 
-    In a thin tetrahedron they are off by rounding over its height. What the weighted point misses the origin by is
-    therefore weighed again. In one as thin as rounding that does not help: but then all of it is near its faces.
+    In a thin tetrahedron they are off by rounding over its height. The weighted point's miss of the origin is therefore
+    weighed again. In a tetrahedron as thin as rounding this second step does not help: but then all of it is near its
+    faces.
 
-    Returns what the weighted point misses the origin by in the end (infinite if the four are flat), and the
+    Returns the final distance of the weighted point from the origin (infinite if the four are flat), and the
     tetrahedron's size.
     """
     a = point_at(points, 0)
