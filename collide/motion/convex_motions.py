@@ -230,7 +230,8 @@ def earliest_times(
     """(k,) times before which parts of A and of B, pair by pair, have no contact in a motion: infinity without contact
     up to ``end``.
 
-    pairs : parts of A and of B (k,). A mesh is replaced by the convex set around its points: time of contact of the sets ≤ time of contact of the parts. Some microseconds a pair.
+    pairs : parts of A and of B (k,). A mesh is replaced by the convex set around its points: time of contact of the
+    sets ≤ time of contact of the parts. Some microseconds a pair.
     """
     return earliest_of(_search_bounds(A, B, motion, pairs, np.arange(len(pairs[0])), end, tolerance)[1])
 

@@ -455,8 +455,8 @@ class _Spans(Spans):
         return facets_on_path(self, large.tree, side, begin, end, _MAX_TOGETHER)  # type: ignore[arg-type]
 
     def _near_large_facets(self, ahead: np.ndarray, begin: float, end: float, max_pairs: int) -> np.ndarray | None:
-        """(k, 2) facets with possible contact in a span, of the larger mesh only ``ahead``; None where planes leave more
-        than ``max_pairs``.
+        """(k, 2) facets with possible contact in a span, of the larger mesh only ``ahead``; None where planes leave
+        more than ``max_pairs``.
 
         A set around facets is no farther from the small mesh than its facets are: first all together, then each.
         """
