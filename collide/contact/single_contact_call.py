@@ -1,4 +1,4 @@
-"""Contacts of two convex sets at one pair of poses: from matrices to rows inside one kernel."""
+"""Contacts of two convex sets at a single pair of poses: from matrices to rows inside a kernel."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ SINGLE_HEADER = HEADER + MANIFOLD_HEADER
 
 @entry(prepared.ROW, nogil=False)
 def contacts_single(header_at, XA_at, XB_at, out_at, _unused, margin):
-    """The contacts of one pair of poses; 0, or −1 where the caller has to ask as of a batch.
+    """The contacts of a single pair of poses; 0, or −1 where the caller has to ask as of a batch.
 
-    header : of SINGLE_HEADER integers; how many contacts there are is left at its ROWS_DONE.
+    header : of SINGLE_HEADER integers; the number of contacts is left at its ROWS_DONE.
     out : `CONTACT_DTYPE`, zeroed, room for as many rows as a manifold may have. All threads share the workspace: the
     kernel keeps Python's lock.
     """
