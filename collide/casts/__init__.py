@@ -1,1 +1,1 @@
-"""Casts: how far a ray, or a body that is moved along a direction, gets before it touches something."""
+"""Casts: how far a ray, or a body moved along a direction, gets before touching another body."""

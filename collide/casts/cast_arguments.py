@@ -57,7 +57,7 @@ def checked_points(caller: str, name: str, values) -> np.ndarray:
 
 
 def refuse_unbounded(what: str, shapes) -> None:
-    """Raises UnsupportedQuery for half-spaces, and unions with one, that are to be moved."""
+    """Raises UnsupportedQuery for half-spaces, and unions with half-spaces, as the moved body."""
     for shape in [shapes] if isinstance(shapes, Shape) else {id(shape): shape for shape in shapes}.values():
         if any(packed.kind == HALFSPACE for packed, _ in bounding_parts_of(shape)):
             raise UnsupportedQuery(

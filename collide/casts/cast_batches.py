@@ -50,7 +50,7 @@ def cast_batch(
 
 
 def _add_start_normals(rows: CastRows, A, B, X_WA, X_WB) -> None:
-    """Write normals and points of the items that touch at the start, those of the same two shapes together."""
+    """Write normals and points of items in contact at the start, in a batch for all casts of the same two items."""
     X_WA, X_WB = (np.broadcast_to(X, (len(rows.hit), 4, 4)) for X in (X_WA, X_WB))
     numbers: dict[tuple[int, ...], list[int]] = {}
     for k in np.flatnonzero(rows.at_start).tolist():
@@ -152,7 +152,7 @@ def _cast_parts(sides: PosedSides, vectors: np.ndarray, limits: np.ndarray) -> C
 
 
 def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np.ndarray) -> CastRows:
-    """The same of two shapes of which one is a mesh or holds one."""
+    """`CastRows` of two shapes, of which A, B or both are meshes or unions with meshes."""
     leaves_a, leaves_b = leaves_of(A), leaves_of(B)
     meshed = [np.array([leaf.shape.meshed for leaf in leaves]) for leaves in (leaves_a, leaves_b)]
 
@@ -204,8 +204,8 @@ def _rows_of_unions(A: Shape, B: Shape, X_WA, X_WB, vectors, limits, starts: Sta
 
 
 def _answered_together(owner, item_a, item_b, leaves_b: list[Leaf], meshed) -> Iterator[np.ndarray]:
-    """Numbers of pairs of leaves that one call answers: of a mesh and all convex sets that are cast at it, or it at
-    them; of a mesh of the union with fewer leaves and all meshes of the other; else of two leaves."""
+    """Numbers of pairs of leaves for a call: a mesh and all convex sets cast at the mesh, or the mesh cast at them; a
+    mesh of the union with fewer leaves and all meshes of the other union; else two leaves."""
     mesh_a, mesh_b = meshed[0][item_a], meshed[1][item_b]
     is_plane = np.array([not leaf.shape.meshed and convex_set_of(leaf.shape).kind == HALFSPACE for leaf in leaves_b])
     by_b = len(meshed[0]) >= len(meshed[1])

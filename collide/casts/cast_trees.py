@@ -1,11 +1,11 @@
 """Casts against the facets of a mesh: of a convex set, or of another mesh's facets, along two box-trees.
 
-A box moved along a direction meets another where a ray meets a third (`broadphase/boxes_ahead.py`), here in the frame
-and the units of B's tree. Pairs of boxes are opened nearest first; a pair of facets, or a facet and the convex set, is
-a cast of convex sets (`portal.py`). What is proven of one bounds how far it is worth looking (van den Bergen 2004).
-A facet that lies across the axes is far smaller than its box: what may meet it is asked along its normal and across
-its edges, too. A convex set is far smaller than its box as well: boxes and facets before it are asked along the normals
-of the casts so far, up to which it reaches.
+A moved box meets another box where a ray meets the box of their summed extents (`broadphase/boxes_ahead.py`), here in
+the frame and the units of B's tree. Pairs of boxes are opened nearest first; a pair of facets, or a facet and the
+convex set, is a cast of convex sets (`portal.py`). A proven contact bounds how far later boxes are opened (van den
+Bergen 2004). A facet across the axes is far smaller than its box: extents are compared along the facet's normal and
+across its edges, too. A convex set is far smaller than its box as well: along the normals of the casts so far, boxes
+and facets are compared with the set's own extent.
 """
 
 from __future__ import annotations
@@ -78,14 +78,14 @@ _LEAST = 1e-200
 
 
 class _Sweep(NamedTuple):
-    """One question.
+    """A question, as the walk along the trees reads the numbers.
 
-    pair : both sides; a side of facets has the corners of one of them.   d : the direction.   error, size : of a cast.
-    In B's frame, in units of its tree and from its centre: middle, half : the box of A, where that is a convex set.
-    step, inverse : the direction there, and the inverses of its components.
-    rotation : from A's tree to it, coordinates, or from W's axes.   shift : where the centre of A's tree is, or the
-    origin of the convex set.
-    pad : by what boxes are widened.
+    pair : both sides; a side of facets has the corners of the facet asked.   d : the direction.
+    error, size : of a cast.
+    In B's frame, in units of its tree and from its centre: middle, half : the box of A, where A is a convex set.
+    step, inverse : the direction, and the inverses of its components.
+    rotation : from A's tree to B's, or from W's axes.
+    shift : where the centre of A's tree is, or the origin of the convex set.   pad : widening of boxes.
     """
 
     pair: Any
@@ -132,7 +132,7 @@ def _extent_along(pair, v, radius, points, ids):
 
 @kernel(inline=True)
 def _facet_body(corners):
-    """A `PosedBody` over the corners of one facet, eight columns of which five are copies."""
+    """A `PosedBody` over the corners of a facet: eight columns, five of them copies."""
     return PosedBody(corners, 3, 8, POINTS, 0, 0, 0, 0, 0)
 
 
@@ -283,7 +283,7 @@ def _box_entry(sweep, work, box):
 
 @kernel(inline=True)
 def _entry_of(sweep, a, b, ref_a, ref_b, has_tree_a, best):
-    """t at which the box of A behind a reference comes to that of B, from below; infinite for later than ``best``."""
+    """Lower bound of the t at which the box of A behind a reference meets the box of B; infinite beyond ``best``."""
     box = box_at(b, ref_b)
     of_a = _box_of_a(sweep, a, ref_a, has_tree_a)
     gap = sub(box.centre, of_a.centre)
@@ -326,13 +326,13 @@ def _facet_entry(sweep, tree, facet, is_of_a, unit, box, best):
 
 @kernel(inline=True)
 def _entry_along(n, u, v, gap, half, step, pad, first, last):
-    """(first, last) of the t in [first, last] at which the extents along n of a facet 0, u, v, moved, and of a box at
-    ``gap`` meet.
+    """(first, last): the part of [first, last] in which the extents along n of a moved facet 0, u, v and of a box at
+    ``gap`` overlap.
 
     Bodies are apart while their extents along any vector are: rounding of n itself takes nothing from the bound.
-    Rounding moves points by the pad, which is worth at most n's 1-norm times as much along n. A step along n that is 0
-    but for rounding moves less than that until the boxes have passed each other. Vectors whose products leave the range
-    of doubles say nothing.
+    Rounding moves points by the pad: by at most n's 1-norm times the pad along n. A step along n of 0 but for rounding
+    moves less than this until the boxes have passed each other. Vectors whose products leave the range of doubles say
+    nothing.
     """
     length = norm1(n)
     widening, weight = length * pad, length * max_abs(step)
@@ -438,12 +438,12 @@ def _open_pair(sweep, work, a, b, ref_a, ref_b, has_tree_a, best, top):
 
 @entry("int64(int64, int64, int64, int64, int64, int64)")
 def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
-    """Candidates for the first contacts of questions ``first`` … n − 1 that are apart at the start.
+    """Candidates for the first contacts of questions ``first`` … n − 1, of bodies apart at the start.
 
-    Of questions of one cast each is looked into no farther than to the contacts proven of those before it.
-    header : HEADER integers.   count : how many candidates there are, and how many casts were made, in and out.
+    Each question is searched no farther than to the contacts proven by earlier questions of its cast.
+    header : HEADER integers.   count : numbers of candidates and of casts made, in and out.
     doubles, integers : workspace (TREE_CAST_DOUBLES, TREE_CAST_INTEGERS).
-    Returns how many questions are answered; fewer than n where there is no room for more candidates.
+    Returns how many questions are answered; fewer than n where no more candidates fit.
     """
     header = view_i64(header_at, HEADER)
     count = view_i64(count_at, 2)
@@ -474,7 +474,7 @@ def cast_into_tree(header_at, first, n, count_at, doubles_at, integers_at):
 
 @kernel
 def _walk_pairs(header, sweep, work, a, b, has_tree_a, k, limit, best, count):
-    """Take down all candidates of one question; what ``best`` is then, below 0 where there is no room for them."""
+    """Write all candidates of a question; returns the new ``best``, below 0 where they do not fit."""
     unit_a, unit_b = _unit_of(a), _unit_of(b)
     radius = 0.0 if has_tree_a else sweep.pair.numbers[NUMBERS * view_i64(header[SHAPE_OF_AT], k + 1)[k] + RADIUS]
     work.fronts[0] = 0.0

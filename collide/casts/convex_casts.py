@@ -43,8 +43,8 @@ class CastRows(NamedTuple):
 
 
 class Marks(NamedTuple):
-    """(k,) bool each of rows: proven, that status is proven; certified, that the bracket is as narrow as promised, too;
-    at_start, whether the bodies touch before they move.
+    """(k,) bool each: proven, the row's status is proven; certified, the bracket is as narrow as promised, too;
+    at_start, the bodies touch before they move.
     """
 
     proven: np.ndarray
@@ -114,9 +114,9 @@ def answer_part_pairs(parts: PosedParts, pairs: np.ndarray, questions: np.ndarra
 
 
 def earliest_contacts(pairs: PartPairs, directions: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """(k,) t before which pairs of convex sets have no contact: infinity of those that have none within the limit.
+    """(k,) t before which pairs of convex sets have no contact: infinity without a contact within the limit.
 
-    Of bodies within the sets it bounds the first contact from below: what meets, meets within the sets. Some
+    First contacts of bodies within the sets are not earlier: where the bodies touch, so do the sets. Some
     microseconds a pair, nothing is decided exactly.
     """
     rows = _kernel_rows(pairs.parts, pairs.pairs, _questions(pairs.owner, directions, limits))
@@ -149,8 +149,8 @@ def _kernel_rows(parts: PosedParts, pairs: np.ndarray, questions: np.ndarray) ->
 
 
 def _settle_starts(parts: PosedParts, pairs, rows, marks: Marks) -> None:
-    """Decide by pair queries which rows touch at the start, of those BEHIND and of open ones that may; what is neither
-    behind nor touches is OPEN. Rows that touch have a common point and no normal.
+    """Decide by pair queries whether rows that are BEHIND, or OPEN down to t ≤ 0, touch at the start: rows apart become
+    MISS where proven behind, else OPEN; touching rows get a common point and no normal.
     """
     behind = np.flatnonzero((rows[:, STATUS] == BEHIND) | ((rows[:, STATUS] == OPEN) & (rows[:, LOWER] <= 0.0)))
     if not len(behind):

@@ -185,7 +185,7 @@ def _normal_of_side(side):
 def _cut_hull(body, numbers, poses, ray, radius, size, slop, both, row, doubles_at, integers_at):
     """Write the row of points, swept by a ball or not, as casts of the ray's origin to and fro.
 
-    both : also where it leaves, where it is proven to enter ahead.
+    both : write the exit, too, of rays proven to enter ahead.
     """
     local = view_f64(doubles_at + 8 * CAST_DOUBLES, 2 * POSE)
     for k in range(POSE):

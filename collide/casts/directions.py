@@ -1,4 +1,4 @@
-"""Directions scaled to a length that kernels can work with, and what that does to t."""
+"""Directions scaled by powers of two to lengths within kernels' range, and t scaled back."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Directions(NamedTuple):
     exponents: np.ndarray
 
     def repeated(self, n: int) -> Directions:
-        """n of them, where there is one or n."""
+        """n directions, from a single direction or n."""
         return Directions(
             np.ascontiguousarray(np.broadcast_to(self.vectors, (n, 3))),
             np.ascontiguousarray(np.broadcast_to(self.exponents, (n,))),

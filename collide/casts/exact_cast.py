@@ -1,9 +1,10 @@
 """Where a cast of polytopes first touches, in exact numbers: a linear program of four rows, with no tolerance.
 
-A + t d meets B for the least t ≥ 0 with Σ μ (a − b) + t d = 0, Σ μ = 1, μ ≥ 0, over all pairs of vertices (a, b). The
-simplex method prices them by support mappings, so that a round costs a look at every vertex, not at every pair. Ties of
-the ratio test are broken lexicographically (G. Dantzig, A. Orden and P. Wolfe, "The generalized simplex method", 1955):
-no basis comes twice, and it ends. Artificial variables that begin the basis cost infinitely more than t.
+A + t d first meets B at the least t ≥ 0 with Σ μ (a − b) + t d = 0, Σ μ = 1, μ ≥ 0, over all pairs of vertices (a, b).
+The simplex method prices the pairs by support mappings: a round costs a look at every vertex, not at every pair.
+Ties of the ratio test are broken lexicographically (G. Dantzig, A. Orden and P. Wolfe, "The generalized simplex
+method", 1955): no basis comes twice, so the method ends. Artificial variables of the first basis cost infinitely more
+than t.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ _MIN_BY_DOUBLES = 64
 
 
 class ExactCast(NamedTuple):
-    """t : the least one, None where nothing is ever met.
+    """t : of the first contact, None where A never meets B.
 
     normal : an outward normal of A ⊖ B at the point of touching, exact and of any length; zeros where t is 0.
-    weights : {(i, j): weight} of pairs of vertices that touch: Σ weight · a_i is where, before the motion.
+    weights : {(i, j): weight} of pairs of vertices: Σ weight · a_i is A's point of contact, before the motion.
     """
 
     t: Fraction | None
@@ -33,7 +34,8 @@ class ExactCast(NamedTuple):
 
 
 def corners_of(points: Sequence[Point]) -> Sequence[Point]:
-    """Points as `cast_exactly` is quick with them: few as they are in integers, of many those that matter are made."""
+    """Points in the form quickest for `cast_exactly`: few as integers; many as given, made into integers when asked
+    for."""
     return points if len(points) >= _MIN_BY_DOUBLES else list(points)
 
 
@@ -95,7 +97,7 @@ def _prices(basis: _Basis, name: int) -> list[int]:
 
 
 def _entering(A, B, d, far: list[int], near: list[int], unit: int):
-    """(name, column) of a variable that makes the sums less, the artificial one first; None at the optimum."""
+    """(name, column) of a variable to lower the cost, Σ of artificial variables before t; None at the optimum."""
     n = far[0], far[1], far[2]
     (least_a, lowest_a), (least_b, lowest_b) = _lowest(A, opposite(n)), _lowest(B, n)
     gain = far[3] - least_a - least_b
@@ -115,7 +117,7 @@ def _entering(A, B, d, far: list[int], near: list[int], unit: int):
 
 
 def _lowest(points: Sequence[Point], n: Point, some: Sequence[int] | None = None) -> tuple[int, Sequence[int]]:
-    """(least product with n of points, or of some of them, the numbers of all that have it, ascending)."""
+    """(least product with n of points, or of some of them; the numbers of all points of this product, ascending)."""
     if not any(n):
         return 0, range(len(points)) if some is None else some
     if isinstance(points, PlacedPoints) and (some is None or len(some) == len(points)):
@@ -127,7 +129,7 @@ def _lowest(points: Sequence[Point], n: Point, some: Sequence[int] | None = None
 
 
 def _leaving(rows: list[list[int]], pivots: list[int]) -> int:
-    """The row that leaves: the least of (value, inverse) over the pivot, lexicographically, where that is positive."""
+    """Row to leave the basis: the lexicographically least (value, inverse) / pivot among positive pivots."""
     best = -1
     for k in range(4):
         if pivots[k] > 0 and (best < 0 or _is_before(rows[k], pivots[k], rows[best], pivots[best])):

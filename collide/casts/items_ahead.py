@@ -1,7 +1,7 @@
-"""Pairs of items of two unions that a cast may come to: by their boxes, the nearest first.
+"""Pairs of items of two unions in the way of a cast: by their boxes, the nearest first.
 
-No item reaches out of its box, so a cast comes to a pair of items no sooner than the box of one, moved, comes to that
-of the other. Pairs are asked in the order of these bounds, until they exceed what is proven of a nearer contact.
+No item reaches out of its box, so two items touch no sooner than their boxes, A's moved. Pairs are asked in the order
+of these bounds, until the bounds exceed the upper bound of a proven contact.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ def rows_ahead(
     casts: np.ndarray, boxes_of: Callable[[int], tuple[np.ndarray, np.ndarray]], vectors: np.ndarray,
     limits: np.ndarray, answer: Answer, first: int,
 ) -> Iterator[PairRows]:
-    """Rows of pairs of items of unions, all that may be first contacts among them.
+    """Rows of pairs of items of unions, with all possible first contacts among them.
 
-    casts : (k,) numbers of casts, of whose pairs only those are asked that they may come to first.
+    casts : (k,) numbers of casts; pairs that cannot hold the first contact are not asked.
     boxes_of : of the items of A and of B in a cast, (m, 6) each.   vectors, limits : (n, 3) and (n,), of all casts.
-    first : pairs of a cast that are asked together before any is ruled out.
+    first : pairs of a cast asked together before any is ruled out.
     """
     for owner, pairs, bounds in _listed(casts, boxes_of, vectors, limits):
         best = limits.copy()
@@ -48,14 +48,14 @@ def rows_within_sets(
     limits: np.ndarray, earliest: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray], starts: Answer,
     answer: Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], PairRows], first: int,
 ) -> Iterator[PairRows]:
-    """The same of items that take long to answer, in the order in which convex sets around them meet.
+    """`rows_ahead` of items slow to answer, in the order in which convex sets around them meet.
 
-    earliest : t before which items of A and of B (k,) have no contact in casts (k,), infinity of none at all, quickly.
-    starts : rows of pairs that touch at the start, asked of those whose sets may.
-    answer : of pairs that do not, and handed what bounds the first contact of every cast from above.
+    earliest : t before which items of A and of B (k,) have no contact in casts (k,), infinity without contact; quick.
+    starts : rows of pairs in contact at the start, asked of pairs whose sets may be.
+    answer : rows of the other pairs; takes upper bounds of the first contacts of all casts, too.
     first : pairs of a cast whose sets are asked together.
-    A pair is answered once its bound is not above that of the boxes of all pairs whose sets were not asked: then no
-    other pair has a lower one.
+    A pair is answered once its bound is not above the box bound of every pair whose sets were not asked: then no other
+    pair has a lower bound.
     """
     for owner, pairs, bounds in _listed(casts, boxes_of, vectors, limits):
         best, following = limits.copy(), np.zeros(len(limits))
@@ -84,8 +84,7 @@ def rows_within_sets(
 
 
 def take_best(best: np.ndarray, pair_rows: PairRows) -> None:
-    """Lower what bounds the first contacts of casts from above; below 0 of those that are proven to touch at the start,
-    whatever else does.
+    """Lower the upper bounds of the casts' first contacts; −∞ for casts with a pair proven to touch at the start.
     """
     marks = pair_rows.marks
     proven = marks.proven & (pair_rows.rows[:, STATUS] == HIT)

@@ -11,14 +11,14 @@ from collide.shapes.shape import IDENTITY, Shape
 
 
 class Leaf(NamedTuple):
-    """A shape that is no union, and its pose (4, 4) in the one that it is an item of."""
+    """A part of a union, itself no union, and its pose (4, 4) in the union."""
 
     shape: Shape
     X: np.ndarray
 
 
 def leaves_of(shape: Shape, X_AS: np.ndarray = IDENTITY) -> list[Leaf]:
-    """The shapes of a union that are none, in the order of its parts, and their poses (4, 4) in it."""
+    """The parts of a union, unions of unions flattened, in order, with their poses (4, 4) in the union."""
     if not isinstance(shape, Compound):
         return [Leaf(shape, X_AS)]
     return [

@@ -1,4 +1,4 @@
-"""Casts of two shapes of which one is a mesh: candidates from the walk along box-trees, settled where they are open."""
+"""Casts of a mesh and another shape: candidates from the walk along box-trees, settled exactly where open."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ _workspace = _Workspace()
 
 
 class _Side(NamedTuple):
-    """One body of n questions, meshes or convex sets.
+    """A side of n questions, meshes or convex sets.
 
-    packed : the sets; none of meshes.   trees : of meshes.   which : (n,) the set or tree of each question.
-    poses : (n,) rows.   X, X_item : (n, 4, 4) body and item.   corners : of trees, once they are asked for.
+    packed : the sets; empty for meshes.   trees : of meshes.   which : (n,) the set or tree of each question.
+    poses : (n,) rows.   X, X_item : (n, 4, 4) body and item.   corners : of trees, once asked for.
     """
 
     packed: list[PackedConvex]
@@ -62,7 +62,7 @@ class _Side(NamedTuple):
     corners: dict[int, FacetCorners]
 
     def exact(self, k: int, facet: int) -> ExactPart | None:
-        """The body, or one of its facets, of question k as exact numbers; None where it has none."""
+        """The body of question k, or its facet, as exact numbers; None for curved bodies."""
         if self.trees:
             return ExactPart(POINTS, self._corners(self.which[k])[facet], 0.0, None, self.X[k], self.X_item[k])
         packed = self.packed[self.which[k]]
@@ -77,11 +77,10 @@ class _Side(NamedTuple):
 
 
 class Casts(NamedTuple):
-    """Casts that k questions belong to.
+    """Casts of k questions.
 
-    number : (k,) which cast.   vectors : (k, 3) directions.   limits : (k,) of t.
-    best : (n,) of all casts, what is known of their first contacts from above. Of one cast no question matters whose
-        contact is later than that of another.
+    number : (k,) of each question's cast.   vectors : (k, 3) directions.   limits : (k,) of t.
+    best : (n,) of all casts, upper bounds of their first contacts. A question whose contact is later does not matter.
     """
 
     number: np.ndarray
@@ -91,10 +90,10 @@ class Casts(NamedTuple):
 
 
 def cast_leaves(A: list[Leaf], B: list[Leaf], X_WA, X_WB, casts: Casts, *, into_a: bool = False) -> PairRows:
-    """Rows of k questions of bodies that are apart at the start, by question, the last two fields empty.
+    """Rows of k questions of bodies apart at the start, by question, the last two fields empty.
 
-    A, B : one leaf of all questions, or one a question on one side: all meshes or all convex sets, no half-spaces. Of
-    both sides one is a mesh.   X_WA, X_WB : (k, 4, 4).   into_a : of two meshes walk the tree of A, which is one leaf.
+    A, B : a leaf for all questions, or on a single side k leaves: all meshes or all convex sets, no half-spaces but B.
+    At least A or B is a mesh.   X_WA, X_WB : (k, 4, 4).   into_a : of two meshes walk the tree of A, a single leaf.
     """
     if not B[0].shape.meshed and convex_set_of(B[0].shape).kind == HALFSPACE:
         return _onto_plane(A[0], B[0], X_WA, X_WB, casts.vectors, casts.limits)

@@ -1,10 +1,10 @@
-"""Where a line that passes through a Minkowski difference enters it: a portal of three support points, refined.
+"""Where a line enters a Minkowski difference D: a portal of three support points, refined.
 
-The line passes through a triangle of points of D, the portal. The support point of D in the direction the line comes
-from, across the portal, makes a tetrahedron with it; the line enters this through one of three new portals, and so on
-until none is nearer (G. Snethen, "XenoCollide: complex collision made simple", Game Programming Gems 7, 2008, with a
-line that need not begin inside). Support planes bound the entry from below, portals from above: a linear program and
-its dual.
+The line passes through a triangle of points of D, the portal. The support point of D along the portal's normal, on the
+side the line comes from, makes a tetrahedron with the portal; the line enters the tetrahedron through one of three new
+portals, and so on until no support point is nearer (G. Snethen, "XenoCollide: complex collision made simple", Game
+Programming Gems 7, 2008, with a line that may begin outside). Support planes bound the entry from below, portals
+from above: a linear program and its dual.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ _MAX_ROUNDS = 120
 class Entry(NamedTuple):
     """Where the line {λ e} enters D.
 
-    status : MISS, HIT, BEHIND or OPEN.   lower, value, upper : λ, lower ≤ truth ≤ upper where it does enter.
-    normal : unit normal of D there, against the line.   point : of B, in W's axes from B's origin, where A touches it.
+    status : MISS, HIT, BEHIND or OPEN.   lower, value, upper : λ, lower ≤ truth ≤ upper of a line that enters.
+    normal : unit normal of D at the entry, against the line.   point : of B, touched by A, in W's axes from B's origin.
     """
 
     status: int
@@ -81,7 +81,7 @@ def _move_point(cast, source, target):
 
 @kernel(inline=True)
 def _first_portal(cast, n):
-    """Put the triangle of a fan of the ring through which the line passes into the last slots but one."""
+    """Put the triangle of the ring's fan that the line passes through into the last slots but the spare."""
     ring, seen = cast.ring, cast.seen
     first = ring[0]
     at = 1
@@ -108,10 +108,10 @@ def _farthest_of_ring(cast, n):
 
 @kernel(inline=True)
 def _dropped(seen, a, b, c, spare, error):
-    """Which of the portal's points (0, 1, 2) gives way to the spare one: the line passes through the new portal.
+    """Which of the portal's points (0, 1, 2) gives way to the spare point, the line passing through the new portal.
 
-    Where it passes through an edge two will do: the one that leaves the larger portal, seen along the line. A spare
-    point straight before one of the three takes its place.
+    Where the line passes through an edge two choices will do: taken is the larger portal, seen along the line. A spare
+    point straight before a point of the portal takes its place.
     """
     to_a, to_b, to_c = _cross_seen(seen, spare, a), _cross_seen(seen, spare, b), _cross_seen(seen, spare, c)
     ab, bc, ca = _cross_seen(seen, a, b), _cross_seen(seen, b, c), _cross_seen(seen, c, a)
@@ -216,7 +216,7 @@ def _across(seen, i, j, x, y):
 
 @kernel
 def cast_line(cast, limit, whole):
-    """The `Entry` of the line into D.   limit : λ up to which it counts.   whole : λ below 0 counts, too."""
+    """The `Entry` of the line into D.   limit : largest λ counted.   whole : count λ below 0, too."""
     ahead = sample(cast, 0, cast.e)
     if not whole and ahead < -cast.length * (cast.error + 2.0**-50 * cast.size):
         return _nothing(MISS)
@@ -248,8 +248,8 @@ def cast_line(cast, limit, whole):
 
 @kernel(cold=True)
 def _grazing(cast, n, ahead, least):
-    """The `Entry` of a line that doubles can neither prove to pass D nor to pass through it: somewhere along D, if it
-    does.   ahead : how far D is along e.   least : λ that counts.
+    """The `Entry` of a line whose crossing of D doubles can neither prove nor refute: λ anywhere along D.   ahead : how
+    far D reaches along e.   least : smallest λ counted.
     """
     ring, seen, points = cast.ring, cast.seen, cast.points
     nearest = 0

@@ -65,7 +65,7 @@ def posed_parts(items: list[tuple[PackedConvex, np.ndarray]], X_WA: np.ndarray) 
 
 
 class _Side(NamedTuple):
-    """One side of n questions: parts of one shape, or of one a question.
+    """A side of n questions: parts of a shape for all, or of a shape for each.
 
     shape_of, body_poses, part_poses : of all parts.   first, counts : (n,) the parts of each question.
     """

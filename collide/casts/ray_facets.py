@@ -27,7 +27,7 @@ _MIN_LIMIT = 1e-290
 def facets_met(
     body: Body, X_WA: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, every: bool
 ) -> RayEvents:
-    """The facets that n rays meet, ray by ray and in order along each; the first only, or every one.
+    """Facets met by n rays, ray by ray and in order along each; the first only, or all.
 
     X_WA : (n, 4, 4) or (1, 4, 4).   origins : (n, 3).   limit : of t, in lengths of the directions given.
     """
@@ -55,10 +55,10 @@ def _rays(body: Body, X_WA, origins, directions: Directions, limit: float) -> np
 
 
 class _MetFacets:
-    """Facets that rays meet, brackets of where, and exact values where these were needed.
+    """Facets met by rays, with brackets of t, and exact t where needed.
 
-    t : (m, 3) distance, lower, upper of each, in units of the direction's length.   order : of the rows that `settle`
-    puts ray by ray.   keep : (m,) bool, rows that are answers.
+    t : (m, 3) distance, lower, upper of each, in units of the direction's length.   order : of the rows, ray by ray,
+    from `settle`.   keep : (m,) bool, rows that are answers.
     """
 
     def __init__(self, body: Body, X_WA, rays, exponents, hits: np.ndarray, limit: float):
@@ -72,8 +72,7 @@ class _MetFacets:
         self.corners = FacetCorners(body.tree)
 
     def settle(self, every: bool) -> None:
-        """Put the hits of each ray in order, exactly, and drop those beyond the limit; keep the first only, or every
-        one.
+        """Put the hits of each ray in order, exactly, and drop hits beyond the limit; keep the first only, or all.
         """
         if not every and self.narrow.all() and (self.ray[1:] > self.ray[:-1]).all():
             self.order = np.arange(len(self.ray))
@@ -96,7 +95,7 @@ class _MetFacets:
             self.keep[remaining[is_later]] = False
 
     def _in_order(self, rows: np.ndarray) -> list[int]:
-        """Hits of one ray by their exact t, then by facet; those beyond the limit are dropped."""
+        """Hits of a ray by their exact t, then by facet; hits beyond the limit are dropped."""
         k = int(self.ray[rows[0]])
         X = self.X_WA[k if len(self.X_WA) > 1 else 0]
         direction, direction_at = integers(self.rays[k, 3:6])

@@ -1,4 +1,4 @@
-"""What rays meet, row by row, and the answers that are made of it."""
+"""What rays meet, row by row, and the answers made of these rows."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from collide.results import only_value
 class RayHits(NamedTuple):
     """Where rays first meet a body, or, with ``all_hits``, every place where they meet its surface.
 
-    hit : (N,) bool. Of meshes, polytopes and half-spaces decided exactly; where rounding leaves it open of others,
-        True.
+    hit : (N,) bool. Of meshes, polytopes and half-spaces decided exactly; for other shapes, where rounding leaves hit
+        or miss open, True.
     distance : t of the point origin + t · direction: lengths in units of the direction's, metres for unit directions.
         ``inf`` where nothing is met.
     lower, upper : lower ≤ truth ≤ upper is proven where ``certified``; then no wider apart than 2⁻³⁶ of t of the body's
@@ -52,7 +52,7 @@ class RayEvents(NamedTuple):
 
     ray : (k,) numbers of the rays.   t : (k, 3) value, from below, from above, in units of the directions given.
     normal : (k, 3) in W.   facet, item : (k,).
-    proven : (k,) bool, that it is met is proven, with t within the bracket.
+    proven : (k,) bool, the meeting is proven, with t within the bracket.
     certified : (k,) bool, the bracket is narrow, too.
     """
 

@@ -84,10 +84,10 @@ def candidate_parts(
     parts: PosedParts, tree: BoxTree, first: np.ndarray, skipped: np.ndarray, meshed: np.ndarray, origins, directions,
     limit: float, every: bool,
 ) -> np.ndarray:
-    """(k, 2) int64: rays and parts that may make a ray's first wall, or any, of the bodies of a tree that have an end.
+    """(k, 2) int64: rays and parts with a ray's possible first wall, or any wall, of the bounded bodies of a tree.
 
-    first : (bodies + 1,) the first part of each.   skipped, meshed : (bodies,) int64, 1 of those not asked, and of
-    those whose parts are only bounds.   The rest as of `parts_met`.
+    first : (bodies + 1,) the first part of each.   skipped, meshed : (bodies,) int64, 1 of bodies not asked, and of
+    bodies whose parts are only bounds.   The rest as of `parts_met`.
     """
     n = len(origins)
     rays = _as_rays(origins, directions)
@@ -118,8 +118,8 @@ def _as_rays(origins: np.ndarray, directions: Directions) -> np.ndarray:
 
 
 def _are_open(rows: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """(k,) bool: chords that doubles cannot tell for certain, or ends that they cannot place well enough: on which side
-    of the origin or of the limit.
+    """(k,) bool: chords not decided by doubles, or with ends bracketed too widely: both sides of the origin or of the
+    limit are possible.
     """
     is_open = rows[:, STATE] == UNCLEAR
     for lower, upper in ((FIRST_LOWER, FIRST_UPPER), (LAST_LOWER, LAST_UPPER)):
@@ -214,7 +214,7 @@ def _chord_of_points(parts: PosedParts, part: int, origin, direction) -> tuple[F
 
 
 def _chord_of_plane(parts: PosedParts, part: int, origin, direction) -> tuple[Fraction | None, Fraction | None]:
-    """Exact t at which a ray's line enters, or else leaves, a half-space; 0 for one that runs in its plane."""
+    """Exact t at which a ray's line enters, or else leaves, a half-space; 0 for a line in its plane."""
     normal, offset = parts.exact(part).plane
     height = inner(normal, [Fraction(v) for v in origin.tolist()]) - offset
     pace = inner(normal, [Fraction(v) for v in direction.tolist()])

@@ -1,7 +1,7 @@
-"""Rays against a region of half-spaces: where they enter and leave it, exactly.
+"""Rays against a region of half-spaces: where they enter and leave the region, exactly.
 
-Doubles name the planes that may decide, each time with a bound on what they are off; fractions decide among these. A
-facet is the row of its half-space.
+Doubles with error bounds name the planes that may decide; fractions decide among these. A facet is the row of its
+half-space.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ _ERROR = 2.0**-44
 
 
 class _Span(NamedTuple):
-    """Where a line is in a region, from t to t, and the least rows of half-spaces that say so.
+    """The interval of t in which a line is in a region, and the least rows of half-spaces at its ends.
 
-    along : the least row of a plane that the line runs in, −1 of none.
+    along : the least row of a plane through the whole line, −1 without.
     """
 
     enters: Fraction | None
@@ -77,7 +77,7 @@ def _places(span: _Span | None, every: bool) -> list[tuple[Fraction, int]]:
 
 
 def _span_of(region: HPolytope, X_WA: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> _Span | None:
-    """Where the line origin + t·direction is in a region; None where it is not, or only at t < 0."""
+    """Where the line origin + t·direction is in a region; None where nowhere, or only at t < 0."""
     rows = _candidates(region, X_WA, origin, direction)
     if rows is None:
         return None
@@ -107,7 +107,7 @@ def _span_of(region: HPolytope, X_WA: np.ndarray, origin: np.ndarray, direction:
 
 
 def _candidates(region: HPolytope, X_WA: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> np.ndarray | None:
-    """Rows of the half-spaces that may say where a ray enters or leaves; None where it surely misses."""
+    """Rows of half-spaces through whose planes a ray may enter or leave; None for a certain miss."""
     R, t = X_WA[:3, :3], X_WA[:3, 3]
     inverse = np.linalg.inv(R)
     o, v = inverse @ (origin - t), inverse @ direction

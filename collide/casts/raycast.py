@@ -48,10 +48,10 @@ def raycast(
     Parameters
     ----------
     shape : any shape. Polytopes take part with the triangles of their hulls, unions with their items.
-    X_WA : (4, 4) pose of the shape in the world W [m], or (N, 4, 4), one a ray.
+    X_WA : (4, 4) pose of the shape in the world W [m], or (N, 4, 4), a pose for each ray.
     origins_W : (3,) or (N, 3) where rays begin, in W [m], within 1e50.
-    directions_W : (3,) or (N, 3) in W; they need not be unit vectors. A single pose, origin or direction goes with
-        every one of the others.
+    directions_W : (3,) or (N, 3) in W; they need not be unit vectors. A single pose, origin or direction goes with all
+        of the others.
     max_distance : [lengths of the direction], ≥ 0: t up to which the surface counts.
     all_hits : report every place where a ray meets the surface, not only the first: all facets, both ends of the way
         through a curved shape.
@@ -59,15 +59,15 @@ def raycast(
 
     Returns
     -------
-    RayHits. Surfaces are closed sets: a ray through a common edge or corner meets all facets there, one that begins on
-        the surface meets it at 0, one that runs in a facet's plane meets it where it enters it. From inside a solid a
+    RayHits. Surfaces are closed sets: a ray through a common edge or corner meets all facets around, a ray from the
+        surface meets the surface at 0, a ray in a facet's plane meets the facet where entering. From inside a solid a
         ray meets the wall on its way out; `contains` says what is inside. In a `Compound` walls inside other items
-        count, too. The same bits one by one or in batches.
+        count, too. The same bits in single calls and in batches.
 
     Raises
     ------
-    InvalidArgument : numbers that are not finite, directions of length 0 or with components that differ by more than
-        2^500, lengths of batches that do not match.
+    InvalidArgument : numbers not finite, directions of length 0 or with components that differ by more than 2^500,
+        unequal lengths of batches.
     InvalidPose : matrices that are no pose.
 
     Notes
@@ -90,7 +90,7 @@ def surfaces_met(
 ) -> RayEvents:
     """Events of n rays and one shape at checked poses (n, 4, 4) or (1, 4, 4), in order.
 
-    every : all of them; else at least the first of each ray, and what may come before it.
+    every : all events; else at least the first of each ray, and candidates for an earlier event.
     """
     if isinstance(shape, HPolytope) and shape.is_region:
         return planes_met(shape, X_WA, origins, directions, limit, every=every)
@@ -133,8 +133,8 @@ def _on_meshes(
     shape: Shape, numbers: np.ndarray, X_WA, origins, directions: Directions, limit: float, every: bool,
     ask: Callable[[int, np.ndarray], RayEvents],
 ) -> Iterator[RayEvents]:
-    """Events of n rays and the items of a union that are meshes, by number; of many only of those whose boxes a ray
-    comes to, the nearest first, until a wall is proven nearer than all others can be.
+    """Events of n rays and a union's meshes, by number; of many meshes only where a ray enters the box, the nearest
+    first, until a wall is proven nearer than all others can be.
     """
     n = len(origins)
     poses, of_ray = X_WA[:1], np.zeros(n, dtype=np.int64)

@@ -1,7 +1,7 @@
-"""Rays through a box-tree of posed parts: which parts may be the first that a ray meets.
+"""Rays through a box-tree of posed parts: the parts a ray may meet first.
 
-Boxes are opened nearest first; a chord that is proven bounds how far it is worth looking. What comes of the candidates
-is worked out by `ray_parts.py`, and by `ray_facets.py` for meshes.
+Boxes are opened nearest first; a proven chord bounds how far the search goes. `ray_parts.py` decides the candidates,
+`ray_facets.py` meshes among them.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ TREE_OF_PARTS = 7
 class _Tree(NamedTuple):
     """Box-trees over bodies in a row, as of `graded_boxes.py`.   first : the first part of each body, and the number of
     all.
-    skipped, meshed : 1 of bodies that are not asked, and of those whose parts are only bounds.
+    skipped, meshed : 1 of bodies not asked, and of bodies whose parts are only bounds.
     """
 
     nodes: Any
@@ -53,10 +53,10 @@ class _Tree(NamedTuple):
 
 
 class _Walk(NamedTuple):
-    """One ray on its way.
+    """A ray on its way.
 
     inverse : of its direction, component by component; infinite of 0.
-    stack, keys : nodes that wait, and where it comes to their boxes.   row : of a chord.
+    stack, keys : waiting nodes, and t of the entry into their boxes.   row : of a chord.
     """
 
     ray: Any
@@ -103,8 +103,8 @@ def _nearest_wall(row, best):
 
 @kernel(inline=True)
 def _push_met(tree, walk, node, end, top, best):
-    """Put a node, and those that follow it under the same one up to ``end``, onto the stack where the
-    ray comes to them, the nearest on top. Returns its new height.
+    """Put a node and its following siblings up to ``end`` onto the stack where the ray enters their boxes, the nearest
+    on top. Returns its new height.
     """
     count = 0
     while node < end:
@@ -127,11 +127,11 @@ def parts_on_rays(
     ints_at, numbers_at, poses_at, shape_of_at, tree_at, rays_at, limits_at, n, every, pairs_at, capacity, doubles_at,
     integers_at,
 ):
-    """Pairs (ray, part) that may make the first wall of n rays, or any; returns how many there are.
+    """Pairs (ray, part) with the possible first walls of n rays, or all walls; returns their number.
 
     ints, numbers, poses, shape_of : as of `cut_parts`.   tree : TREE_OF_PARTS integers.   rays : RAY doubles each.
     limits : a double each, of t.   every : look at all walls up to the limit.
-    pairs : out, the first ``capacity`` of them; of bodies that are meshes or hold one all parts, where their box is.
+    pairs : out, the first ``capacity``; of bodies with meshes all parts whose box is met.
     """
     tree = _tree_at(tree_at)
     tables = Tables(ints_at, numbers_at, poses_at, shape_of_at)

@@ -1,8 +1,8 @@
-"""Casts onto regions of half-spaces: how far a moved body may come before nothing changes any more.
+"""Casts onto regions of half-spaces: how far a moved body may come before the rest of its way is decided.
 
-Planes that the body moves towards it is behind after a while; from then on it can only leave half-spaces. So the first
-contact is not later than that, and a box around the way so far closes the region for it. A plane that is approached
-very slowly, against its distance, is left to a second look, with a box around `_FARTHEST` times the first way.
+After a while the body is behind all planes of its approach; from then on the body can only leave half-spaces. So the
+first contact is not later, and a box around the way so far closes the region for the cast. A plane approached very
+slowly, against its distance, is left to a second look, with a box around `_FARTHEST` times the first way.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _FARTHEST = 2.0**24
 
 
 class Way:
-    """How far a body may be moved onto a region until it has met it or never will.
+    """How far a body may be moved onto a region until a contact or the proof of a miss.
 
-    near, far : t of a first and of a second look; far is not larger where the first settles it.
-    is_whole : whether nothing can be met after ``far``.   misses : whether it is proven that nothing is met at all.
+    near, far : t of a first and of a second look; far is not larger where the first look settles the cast.
+    is_whole : no first contact is after ``far``.   misses : proven to have no contact.
     """
 
     def __init__(self, A: Shape, X_WA: np.ndarray, region: HPolytope, X_WB: np.ndarray, vector: np.ndarray):
@@ -53,7 +53,7 @@ class Way:
             self._look_at(beside, region, X_WB, vector, height > reach + 2.0**-40 * (abs(start) * speed + reach))
 
     def _look_at(self, rows: np.ndarray, region: HPolytope, X_WB: np.ndarray, vector: np.ndarray, is_outside) -> None:
-        """Planes along which the body is moved, within rounding: exactly, it is approached or it is not."""
+        """Decide exactly whether planes parallel to the motion, within rounding, are approached."""
         exact = [Fraction(v) for v in vector.tolist()]
         planes = planes_at(region.normals[rows], region.offsets[rows], exact_pose(X_WB))
         for row, (*normal, _) in zip(rows.tolist(), planes):

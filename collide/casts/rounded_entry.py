@@ -1,7 +1,7 @@
-"""The entry of a line into a body swept by a ball, guessed in closed form from the features that a portal names.
+"""The entry of a line into a body swept by a ball, guessed in closed form from the features of a portal.
 
-Where a portal's three points belong to one pair of core vertices, the line enters a ball around their difference; to
-two, a cylinder around an edge; to three, a plane. A support plane at the guess proves or refutes it.
+Where a portal's three points belong to a single pair of core vertices, the line enters a ball around their difference;
+to two, a cylinder around an edge; to three, a plane. A support plane at the guess proves or refutes the guess.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from collide.numerics.vec3 import Vec3, add, cross, dot, norm, scale, sub, vec3_
 class Guess(NamedTuple):
     """A guessed entry.
 
-    exists : whether there is one.   normal : unit normal of D there.
-    w : a point of D.   touching : the point of B in W's axes from B's origin that belongs to it.
+    exists : False for no guess.   normal : unit normal of D at the entry.
+    w : a point of D.   touching : w's point of B, in W's axes from B's origin.
     """
 
     exists: bool

@@ -24,21 +24,22 @@ _MIN_PER_THREAD = 500
 
 
 class ShapeCasts(NamedTuple):
-    """Where bodies that are moved along directions first touch others.
+    """Where bodies moved along directions first touch others.
 
-    hit : (N,) bool. Of polytopes and half-spaces decided exactly; where rounding leaves it open of others, True.
+    hit : (N,) bool. Of polytopes and half-spaces decided exactly; for other shapes, where rounding leaves hit or miss
+        open, True.
     distance : t of the first contact: A stands at its pose moved by t · direction, and touches B. Lengths in units of
         the direction's, metres for unit directions. ``inf`` where nothing is met; 0 where they touch at the start.
-    lower, upper : lower ≤ truth ≤ upper is proven where ``certified``, or the hit is.
-    point : in W [m], of B, where A touches it then; of bodies that touch at the start a point of both. Zeros where
+    lower, upper : lower ≤ truth ≤ upper is proven where ``certified``, or where the hit is.
+    point : in W [m], of B at the first contact with A; a common point for bodies in contact at the start. Zeros where
         nothing is met.
-    normal : unit normal from A to B in W there, never against the direction where t > 0. Zeros where nothing is met,
-        and of bodies that touch at the start, as of `collide.distance` with ``signed=False``; with ``start_normals``
-        normal and point of these are those of `collide.distance` of the two parts that touch.
-    certified : that the hit or miss is proven, and of hits that the bracket is narrow: 2⁻⁴⁰ of the size of the pair
+    normal : unit normal from A to B in W at the contact, never against the direction where t > 0. Zeros where nothing
+        is met, and of bodies in contact at the start, as of `collide.distance` with ``signed=False``; with
+        ``start_normals`` their normal and point are as `collide.distance` has them for the two touching parts.
+    certified : the hit or miss is proven, and of hits the bracket is narrow: 2⁻⁴⁰ of the size of the pair
         (extents and distance) in units of the direction's length, 2⁻²⁶ where a cylinder, cone or ellipsoid takes part.
     at_start : whether they touch at t = 0.
-    item_a, item_b : numbers of the parts of `Compound`s that touch, of several that do at the start two; 0 of other
+    item_a, item_b : numbers of the touching parts of `Compound`s, two of several in contact at the start; 0 of other
         shapes; −1 where nothing is met.
 
     Single casts give scalars and (3,).
@@ -73,16 +74,16 @@ def shape_cast(
     Parameters
     ----------
     A, B : Shape, or sequence of Shape
-        A moves and B stands. Sequences have one shape a cast, as of `collide.distance`.
+        A moves and B stands. Sequences have a shape for each cast, as of `collide.distance`.
     X_WA, X_WB : (4, 4) or (N, 4, 4) array_like, float64
         Poses in the world W [m]: of A before it moves.
     direction_W : (3,) or (N, 3) array_like, float64
-        Of the motion, in W; it need not be a unit vector. Single poses and directions go with all of the others.
+        Of the motion, in W, of any length > 0. Single poses and directions go with all of the others.
     max_distance : float
         ≥ 0, [lengths of the direction], as of `collide.raycast`: how far A moves at most, t of the point
         p + t · direction. With the whole motion as direction and 1 here, t is the fraction that peers report.
     start_normals : bool
-        Work out normals of bodies that touch at the start, which takes as long as how deep they overlap.
+        Work out normals of bodies in contact at the start, at the cost of a penetration depth.
     check_poses : bool
         Refuse matrices that are no rotation.
     threads : int
@@ -92,17 +93,17 @@ def shape_cast(
     -------
     ShapeCasts
         Scalars for single arguments, arrays with a leading N otherwise. Touching counts: bodies that touch at the start
-        are a hit at 0 wherever A moves, and bodies that graze each other are one where they do.
+        are a hit at 0 wherever A moves, and bodies that graze each other are a hit where they graze.
 
     Raises
     ------
     InvalidArgument
         Directions of length 0, not finite, or of components that differ by more than 2^500; max_distance negative or
-        NaN; start_normals neither True nor False; arguments that are no shapes; lengths that do not match.
+        NaN; start_normals neither True nor False; arguments not of type Shape; lengths that do not match.
     InvalidPose
         Matrices that are no pose.
     UnsupportedQuery
-        A half-space as A, which has no end; by name.
+        An unbounded A: a half-space, or a union with half-spaces.
 
     Notes
     -----
@@ -113,10 +114,10 @@ def shape_cast(
 
     Unions of m and k parts: a tree of the k boxes and, of the pairs of parts whose boxes meet on the way, the nearest
     first, until a contact is proven nearer than all others can be: O((m + k) log k), some tens of 10⁶ pairs; m k where
-    every part is in every other's way, and up to 64 of them without a tree. Meshes of n facets: a walk down both trees
-    by the same bounds, O(log n) and the facets that are as near as the first contact; of unions with meshes the convex
-    sets around the parts are cast first, and the parts in that order. Bodies that touch at the start cost what
-    `collide.collide` does.
+    every part is in every other's way, and up to 64 pairs without a tree. Meshes of n facets: a walk down both trees by
+    the same bounds, O(log n) and the facets as near as the first contact; of unions with meshes the convex sets around
+    the parts are cast first, and the parts in that order. Bodies that touch at the start cost what `collide.collide`
+    does.
     """
     limit = checks.limit("shape_cast: max_distance", max_distance, "")
     start_normals = checks.true_or_false("shape_cast: start_normals", start_normals)

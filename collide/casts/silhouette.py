@@ -43,13 +43,13 @@ _SKEW = 0.17
 
 
 class Cast(NamedTuple):
-    """One cast of a pair, in W's axes.
+    """A cast of a pair, in W's axes.
 
-    pair : a `PosedPair`, A the body that moves.   points : POINT doubles a support point of D, radii included.
+    pair : a `PosedPair`, A moves.   points : POINT doubles a support point of D, radii included.
     seen : two doubles each: how far along ``across`` and ``up``.   ids : two each.   ring : the polygon's points.
-    e : against the direction of the cast.   length : |e|.   across, up : unit vectors across e, right-handed with it.
+    e : against the direction of the cast.   length : |e|.   across, up : unit vectors, (across, up, e) right-handed.
     radius_a, radius_b : of balls swept over the cores.
-    error : how far a point of D may be from where it was worked out.   size : no point of D is farther from 0.
+    error : largest distance of a computed point of D from the true point.   size : no point of D is farther from 0.
     """
 
     pair: Any
@@ -95,7 +95,7 @@ def open_cast(pair, direction, radius_a, radius_b, error, size, doubles_at, inte
 
 @kernel
 def sample(cast, k, v):
-    """Point k becomes the one of D farthest in direction v; returns how far along v it is."""
+    """Point k becomes the point of D farthest in direction v; returns its product with v."""
     points = cast.points
     difference_point(cast.pair, points, cast.ids, k, v)
     if has_trees(cast.pair):
@@ -141,7 +141,7 @@ def _side(seen, i, j, k):
 
 @kernel
 def _insert(cast, n, k):
-    """Take point k into the ring of n, which stays convex and counter-clockwise; returns how many it has then."""
+    """Take point k into the ring of n points, kept convex and counter-clockwise; returns the new n."""
     ring, seen = cast.ring, cast.seen
     if n == 0 or (n == 1 and (seen[2 * k] != seen[2 * ring[0]] or seen[2 * k + 1] != seen[2 * ring[0] + 1])):
         ring[n] = k
@@ -188,10 +188,10 @@ def _insert_third(cast, k):
 
 
 class _Edge(NamedTuple):
-    """Where the ring is nearest to the origin from inside, or has it outside.
+    """The edge of the ring nearest to the origin, from inside or outside.
 
-    inside : how far the origin is to the left of the edge.   x, y : out of the ring there: away from the edge, or
-        from the ring's nearest point to an origin outside.   reach : how far the ring is along that already.
+    inside : how far the origin is to the left of the edge.   x, y : out of the ring: away from the edge, or from the
+        ring's nearest point to an origin outside.   reach : how far the ring reaches along (x, y).
     """
 
     inside: float
@@ -247,7 +247,7 @@ def _nearest_edge(cast, n):
 
 @kernel(inline=True)
 def _first_direction(cast):
-    """A direction from D's middle to the line, seen along it and turned a little; any where it runs through."""
+    """A direction from D's middle to the line, seen along the line and turned a little; any where both coincide."""
     x = dot(cast.pair.t, cast.across)
     y = dot(cast.pair.t, cast.up)
     length = math.sqrt(x * x + y * y)

@@ -30,10 +30,10 @@ class Starts:
         self._asked = np.zeros(len(X_WA), dtype=np.int64)
 
     def of_pairs(self, casts: np.ndarray, item_a: np.ndarray, item_b: np.ndarray) -> PairRows:
-        """Rows of pairs of parts that touch, of casts (k,); of a cast with many pairs one row that stands for all.
+        """Rows of touching pairs of parts, of casts (k,); a single row of a cast with many pairs.
 
-        The unions as wholes are asked once some pairs of a cast were apart: by then parts that touch are not likely to
-        be among the next few, and one question of all takes less than many of two.
+        The unions as wholes are asked once some pairs of a cast were apart: by then touching parts are not likely to be
+        among the next few, and a question of two unions takes less than many questions of two parts.
         """
         unknown = ~self.are_apart[casts]
         np.add.at(self._asked, casts[unknown], 1)
@@ -49,14 +49,14 @@ class Starts:
         return joined(rows)
 
     def of_casts(self, casts: np.ndarray) -> PairRows:
-        """Rows of casts that touch, and the first parts that do; the others are apart from then on."""
+        """Rows of casts in contact at the start, with their first touching parts; all others are marked as apart."""
         A, B = self._shapes
         hit = answer_batch(A, B, *self._poses_of(casts), Question(True))
         self.are_apart[casts[~hit]] = True
         return self._touching(A, B, casts[hit])
 
     def _touching(self, A: Shape, B: Shape, casts: np.ndarray, i: int | None = None, j: int | None = None) -> PairRows:
-        """Rows of casts in which A and B touch, parts i and j or those that the answer names."""
+        """Rows of casts in which A and B touch, with parts i and j, or the parts the answer names."""
         hits = answer_batch(A, B, *self._poses_of(casts), Question(False, 0.0, False))
         casts, hits = casts[hits["hit"]], hits[hits["hit"]]
         rows = np.zeros((len(hits), CAST_ROW))
@@ -77,7 +77,7 @@ class Starts:
 
 
 def item_of(shape: Shape, item: int) -> Shape:
-    """A part of a union by its number, where it is in it; of any other shape the shape."""
+    """A part of a union by its number, at its pose in the union; other shapes as given."""
     if not isinstance(shape, Compound):
         return shape
     return Compound([leaves_of(shape)[item]])

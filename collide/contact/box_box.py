@@ -1,13 +1,13 @@
-"""A box and a box, a sphere or a capsule by separating axes: rows of `distance` good enough for contacts, where a face
-tells.
+"""A box and a box, a sphere or a capsule by separating axes: rows of `distance` good enough for contacts where a face
+decides.
 
-Of the 15 axes (S. Gottschalk, M. Lin, D. Manocha, "OBBTree", 1996, theorem 1) the one of least overlap, or of widest
-gap, is the normal. Where it is that of a face, the answer is proven here; edges against edges, and pairs whose matrices
-are no rotations but for rounding, are left to the general narrowphase.
+Of the 15 axes (S. Gottschalk, M. Lin, D. Manocha, "OBBTree", 1996, theorem 1) the axis of least overlap, or of widest
+gap, is the normal. Along a face's axis the answer is proven here; edges against edges, and matrices farther from a
+rotation than rounding, are left to the general narrowphase.
 
 The segment of a capsule and the centre of a sphere are boxes without width, swept by a ball. Axes that are normals of
-no facet of the Minkowski difference do no harm: along none is the gap wider than the distance, or the overlap less than
-the depth.
+no facet of the Minkowski difference do no harm: along no axis is the gap wider than the distance, or the overlap less
+than the depth.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ _WIDEST = 2.0**-40
 class EdgeAxes(NamedTuple):
     """The widest gap along axes across two edges.
 
-    gap, sine : along that axis, and of the edges' angle.   a, b : the boxes' axes along these edges.
-    upper : what no such gap exceeds.   missed : by how much one may that was left out, its edges too nearly parallel.
+    gap, sine : along the axis, and of the edges' angle.   a, b : the boxes' axes along these edges.
+    upper : bound of all gaps measured.   missed : bound of the excess of gaps left out, of edges too nearly parallel.
     """
 
     gap: float
@@ -79,8 +79,8 @@ class FaceAxis(NamedTuple):
 
 
 class BoxEnd(NamedTuple):
-    """What an axis of a box adds to its corner least along a direction, and from there to the middle of the edge along
-    that axis where it is across the direction (then is_flat is 1.0), else 0."""
+    """What an axis of a box adds to the box's lowest corner along a direction, and, for an axis across the direction
+    (is_flat 1.0), from the corner to the middle of the axis's edge; else 0."""
 
     corner: Vec3
     side: Vec3
@@ -100,10 +100,10 @@ def box_row(ints_at, numbers_at, XA_at, XB_at, limit, row_at):
 
 @kernel(inline=True)
 def put_box_row(ints_at, numbers_at, sa, sb, X_WA, X_WB, limit, row):
-    """The row of one pair, by their rows of the `ShapeTable` (`has_box_row`); False where a face does not tell.
+    """The row of one pair, by their rows of the `ShapeTable` (`has_box_row`); False where no face decides.
 
-    XA, XB : matrices.   limit : of gaps beyond it no more is said than that [m].   row : of PAIR_DTYPE, zeroed. Of a
-    decided row the numbers, the normal and two points are set that a manifold needs, no vertices.
+    XA, XB : matrices.   limit : larger gaps are said to be beyond, without bracket [m].   row : of PAIR_DTYPE, zeroed.
+    Of a decided row the numbers, the normal and two points are set, as a manifold needs, no vertices.
     """
     n = max(sa, sb) + 1
     ints, numbers = view_i64(ints_at, INTS * n), view_f64(numbers_at, NUMBERS * n)
@@ -237,9 +237,9 @@ def _wider(a, b):
 def _edges_along(A, c, b, length, h, c_of_h, k, c_of_k, t, error):
     """`EdgeAxes` of B's edges along its axis b, with A's three.
 
-    c, length : that axis in A, and B's half size along it.
-    h, k : half sizes of B along its other axes, each with the column that its product with the axis is found in:
-    of a × c with the second axis it is that of a with the third.
+    c, length : axis b in A, and B's half size along b.
+    h, k : half sizes of B along its other axes, each with a column of B in A: the product of a × c with the second axis
+    is, up to sign, a times the third column, and the reverse.
     """
     x = _edge_pair(0, b, c.y, c.z, A.half.y, A.half.z, t.y, t.z, h * abs(c_of_h.x) + k * abs(c_of_k.x), length, error)
     y = _edge_pair(1, b, c.z, c.x, A.half.z, A.half.x, t.z, t.x, h * abs(c_of_h.y) + k * abs(c_of_k.y), length, error)
@@ -249,10 +249,11 @@ def _edges_along(A, c, b, length, h, c_of_h, k, c_of_k, t, error):
 
 @kernel(inline=True)
 def _edge_pair(a, b, u, v, h_u, h_v, t_u, t_v, radius, length, error):
-    """`EdgeAxes` of an edge of A and one of B whose direction has the components (u, v) across A's.
+    """`EdgeAxes` of an edge of A and an edge of B whose direction has the components (u, v) across A's.
 
-    Nearly parallel edges span a facet of the Minkowski difference, narrow by what one of them is off the other. Were it
-    parallel, the difference would be moved by so much at most, and all its facets would be among the other axes.
+    Nearly parallel edges span a facet of the Minkowski difference, as narrow as either edge is off the other's
+    direction. With parallel edges the difference would move by this width at most, and all its facets would be among
+    the other axes.
     """
     sine = math.sqrt(u * u + v * v)
     if sine < _PARALLEL:
@@ -263,12 +264,13 @@ def _edge_pair(a, b, u, v, h_u, h_v, t_u, t_v, radius, length, error):
 
 @kernel(inline=True)
 def _put_face(F, G, face, t, error, exchanged, row):
-    """Normal and points of the row, from what of G is nearest to a face of F; whether some of it is over that face.
+    """Normal and points of the row, from the corner, edge or face of G nearest to a face of F; whether some of this
+    feature is over the face.
 
     t : from F's centre to G's.   exchanged : F is B.
-    Axes of G that lie in the face's plane, but for rounding, make an edge or a face of the nearest corner: points of it
-    are higher by twice the error an axis at most. It is over the face where no axis in the plane parts the two, their
-    own and those across the edges (S. Gottschalk et al., theorem 1, in the plane).
+    Axes of G in the face's plane, but for rounding, make an edge or a face of the nearest corner: its points are higher
+    by at most twice the error for each axis. The feature is over the face where no axis in the plane parts the two,
+    their own axes and axes across the edges (S. Gottschalk et al., theorem 1, in the plane).
     """
     i, j, k = face.axis, (face.axis + 1) % 3, (face.axis + 2) % 3
     a, e, f = _axis_of(F, i), _axis_of(F, j), _axis_of(F, k)

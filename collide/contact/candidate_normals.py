@@ -1,4 +1,4 @@
-"""Normals along which pairs of facets that meet may come apart by little: those of facets, and of crossed edges."""
+"""Normals along which meeting pairs of facets may come apart by little: of facets, and of crossed edges."""
 
 from __future__ import annotations
 
@@ -130,7 +130,8 @@ def _worth(n, n_looked_at, translations, floor):
 
 @kernel
 def _add_candidate(v, n_looked_at, translations):
-    """Make a direction a candidate, if it is one and none of those there are."""
+    """Append the unit vector along v and its worth to the candidates, unless v is 0, the vector is among them, or they
+    are full."""
     length = norm(v)
     n = translations.counts[N_CANDIDATES]
     if not length > 0.0 or n == MAX_NORMALS:
@@ -151,7 +152,7 @@ def _are_same(a, b):
 
 @kernel
 def _add_frequent(pairs, side, mean, n_looked_at, translations):
-    """The commonest normals of one body, of those that do not point away from the mean, as candidates."""
+    """Append the commonest facet normals of a body, out of normals n with n·mean ≥ 0, to the candidates."""
     sign = 1.0 if side == 0 else -1.0
     counted = translations.counted
     n = 0
@@ -210,7 +211,7 @@ def add_guesses(pairs, A, B, n_looked_at, translations):
 
 @kernel
 def _replace_worst(n, first, n_looked_at, translations):
-    """Take a unit vector among the candidates, in place of a worse one from ``first`` on where there are many."""
+    """Append a unit vector to the candidates; where these are full, replace a worse candidate from ``first`` on."""
     if dot(n, n) == 0.0:
         return
     if translations.counts[N_CANDIDATES] < MAX_NORMALS:

@@ -1,7 +1,7 @@
 """Points of a patch that may carry a body: corners of the lower convex hull of the gaps over their places.
 
-What rests touches where a plane lies on the gaps from below. On a rough surface such points are among the others, and
-not only at the rim of the patch. What no plane reaches from below touches first in no position nearby.
+A body at rest touches where a plane lies on the gaps from below. On a rough surface carrying points are inside the
+patch, too, not only at its rim. A point reached by no plane from below touches first in no position nearby.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ _ROUNDING = 1.0 + 2.0**-40
 
 @kernel
 def mark_carrying(p, n, n_corners, tolerance, space):
-    """Set ``space.remaining`` of points that are on no wall to their classes.
+    """Set ``space.remaining`` of points on no wall to their classes.
 
     Of more than MAX_CLASSED points only the lowest of each of CELLS cells are classed, the others count as PLAIN: each
-    is compared with all n, so that the work grows with n and not with its square.
+    is compared with all n: the work grows with n, not with n².
     space.corners : of the hull, ``n_corners``; they are asked first, since most points are far above them.
     """
     if n <= MAX_CLASSED:
@@ -95,14 +95,14 @@ def _mark(p, i, n, stride, n_corners, tolerance, space):
 
 @kernel
 def _slope_below(p, i, n, stride, n_corners, tolerance, space):
-    """The square of the slope of the gentlest plane through point i below all others; −1 where it is beyond 45°.
+    """The square of the slope of the gentlest plane through point i below all others; −1 for slopes beyond 45°.
 
-    tolerance : so far above, where they are not in the same place [m].   stride : 1, or the order in which the others
-    are looked at: the work grows with their number where neighbours come far from each other.
+    tolerance : height above all points elsewhere [m].   stride : 1, or the order of looking at the others: the work
+    grows with their number where neighbours come far from each other.
 
-    Each point cuts a half-plane from the slopes (u, v). Where the gentlest slope that remains violates the next one,
-    the gentlest of those that then remain is on its border (R. Seidel, "Small-dimensional linear programming and convex
-    hulls made easy", 1991, section 3; here with the distance from the origin as what is least).
+    Each point cuts a half-plane from the slopes (u, v). Where the gentlest slope remaining violates the next
+    half-plane, the new gentlest slope is on its border (R. Seidel, "Small-dimensional linear programming and convex
+    hulls made easy", 1991, section 3; here with the distance from the origin to minimise).
     """
     at_i = POINT * i
     u = v = 0.0
@@ -133,7 +133,7 @@ def _slope_below(p, i, n, stride, n_corners, tolerance, space):
 
 @kernel(inline=True)
 def _next_compared(space, k, n, stride, n_corners, walk):
-    """(The k-th of the points that one is compared with, what ``walk``, 0 before the first, is for the next.)"""
+    """(The k-th of the points to compare with, the next ``walk``, 0 before the first.)"""
     if k < n_corners:
         return space.corners[k], walk
     further = walk + stride
@@ -144,7 +144,7 @@ def _next_compared(space, k, n, stride, n_corners, walk):
 def _span_on_border(
     p, at_i, n_before, n, stride, n_corners, tolerance, space, base_u, base_v, along_u, along_v
 ):
-    """(low, high): for which t the slope base + t · along is left by the points before; low > high for none."""
+    """(low, high): bounds of t at which the earlier points leave the slope base + t · along; empty if low > high."""
     low, high = -math.inf, math.inf
     walk = 0
     for k in range(n_before):
@@ -168,8 +168,8 @@ def _span_on_border(
 def choose_carrying(p, n, n_wanted, kinds, order):
     """Numbers of ``n_wanted`` of n > n_wanted points, ascending, the first among them.
 
-    kinds : classes of the points; they are overwritten. Of the gentlest class first, one by one, the point farthest
-    from all that are taken. The work grows with n times ``n_wanted``: ``order`` holds the nearest taken one of each.
+    kinds : classes of the points; they are overwritten. Of the gentlest class first, point by point, the farthest from
+    all points taken. The work grows with n times ``n_wanted``: ``order`` holds each point's nearest taken point.
     """
     kinds[0] = -1
     for i in range(n):

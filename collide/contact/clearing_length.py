@@ -1,4 +1,4 @@
-"""Lengths by which facets that overlap are proven to be clear of each other."""
+"""Lengths of translations proven to clear overlapping facets of each other."""
 
 from __future__ import annotations
 
@@ -48,8 +48,7 @@ class Clearing(NamedTuple):
 
 @kernel
 def clearing_length(pairs, A, B, axes, depth, clearing, seen):
-    """A length [m] along the normal by which B moved is proven to clear all REACHED pairs; infinite where none is
-    known.
+    """A length [m] along the normal; B moved by the length is proven to clear all REACHED pairs; infinite if not known.
 
     Proven of the poses with the translation ``X_WB[:3, 3] + length * n``, as doubles add up, and of A moved against n
     as well. Swept bodies are clear where their cores are farther apart than both radii.

@@ -1,8 +1,8 @@
-"""Convex polygons in a plane clipped against each other, with what each corner of the result comes from.
+"""Convex polygons in a plane clipped against each other, with the sides behind each corner of the result.
 
 I. E. Sutherland, G. W. Hodgman, "Reentrant polygon clipping" (1974). Every side of the result lies on a side of one of
-the two polygons, and carries its number: a corner between two sides of the same polygon is a corner of that polygon,
-one between sides of both is their crossing.
+the two polygons, and carries its number: a corner between two sides of the same polygon is a corner of the polygon, a
+corner between sides of both is their crossing.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Tips(NamedTuple):
 
 
 class Clipped(NamedTuple):
-    """A polygon in the making: view of u, v of each corner, and of the number of the side that begins there.
+    """A polygon in the making: view of u, v of each corner, and of the number of the side begun at the corner.
 
-    Sides 0, 1, 2, … are those of A; −1, −2, … the first, second, … of B.
+    Sides 0, 1, 2, … are A's; −1, −2, … the first, second, … of B.
     """
 
     points: Any

@@ -38,9 +38,9 @@ def has_closed_form(ints_at, sa, sb):
 
 @kernel
 def put_closed_form(ordered, limit, work, row):
-    """Write the row, but for vertices; False where doubles tell neither the sign nor whether it is within the limit.
+    """Write the row, but for vertices; False where doubles tell neither the sign nor a gap beyond the limit.
 
-    limit : of gaps beyond it no more is said than that [m].   work : a `Workspace`.
+    limit : larger gaps are said to be beyond, without bracket [m].   work : a `Workspace`.
     """
     pair = ordered.pair
     A, B = pair.A, pair.B

@@ -58,10 +58,10 @@ def contact_batch(
     A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, margin: float, max_contacts: int, *, check: bool = False,
     threads: int = 1,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, ends) of n pairs: rows of `CONTACT_DTYPE`, pair after pair, and where those of each pair end.
+    """(rows, ends) of n pairs: rows of `CONTACT_DTYPE`, pair after pair, and where the rows of each pair end.
 
     A, B : shapes, or sequences of n shapes.   X_WA, X_WB : (n, 4, 4) or (1, 4, 4), finite.   check : refuse matrices
-    that are no rotation. Raises InvalidPose, UnsupportedQuery.
+    other than rotations. Raises InvalidPose, UnsupportedQuery.
     """
     if n == 0:
         return no_rows(), np.zeros(0, dtype=np.int64)
@@ -139,8 +139,8 @@ def _part_pairs(shapes, which, X_WA, X_WB, n: int, margin: float, singles: list[
 def _near_parts(A: CompoundParts, B: CompoundParts, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> PartPairs:
     """Pairs of parts that may come within the margin at n poses (n, 4, 4), without numbers of shapes.
 
-    Only parts whose boxes come near are posed. About a microsecond a part and pose, and half of one a pair of parts
-    that is near; of half-spaces all are.
+    Only parts whose boxes come near are posed. About a microsecond a part and pose, and half a microsecond a near pair
+    of parts; all pairs with half-spaces count as near.
     """
     apart = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
     pose, i, j = boxes_near(A, B, X_WA, X_WB, margin)
@@ -163,7 +163,7 @@ def _may_come_within(a: PartColumns, b: PartColumns, i, j, X_WA, X_WB, limit: np
 def _rows_of_parts(
     singles: list[Shape], pairs: PartPairs, margin: float, max_contacts: int, threads: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, ends) of pairs of parts: the convex ones in one batch, of meshes those of two shapes."""
+    """(rows, ends) of pairs of parts: convex pairs in one batch, pairs with meshes batch by batch for two shapes."""
     kinds = [kind_of(shape) for shape in singles]
     is_convex = np.array([kind < Kind.MESH for kind in kinds])
     convex = np.flatnonzero(is_convex[pairs.A] & is_convex[pairs.B])
@@ -214,7 +214,8 @@ def _number_patches(rows: np.ndarray, of_pair: np.ndarray) -> None:
 def _within_margin(rows, of_pair, A, B, X_WA, X_WB, margin: float) -> np.ndarray:
     """(k,) bool: rows of pairs within the margin.
 
-    Facets, and parts whose poses are rounded, are asked a little beyond it; where that matters, `distance` decides.
+    Facets, and parts with rounded poses, are asked a little beyond the margin; where the excess matters, `distance`
+    decides.
     """
     keep = np.ones(len(rows), dtype=bool)
     if not len(rows):

@@ -1,7 +1,7 @@
 """Contacts of many pairs of convex sets: from matrices to rows inside one kernel, a block of pairs at a time.
 
-Between the narrowphase and the manifolds nothing leaves the cache: rows of `distance` are those of one block, and
-Python is asked only where a block holds a pair that doubles leave open.
+Between the narrowphase and the manifolds nothing leaves the cache: rows of `distance` are kept for a single block, and
+Python is asked only where doubles leave a pair of the block open.
 """
 
 from __future__ import annotations
@@ -66,8 +66,9 @@ _A, _B = field_at("a", 4), field_at("b", 4)
 class _Task(NamedTuple):
     """What a call works on.
 
-    words : the header.   manifold_at, manifold : that of `convex_manifolds.py` in it, its address and words.
-    block : poses.   places : where in the block each pair has its row, and its poses: A's there, B's BLOCK behind.
+    words : the header.   manifold_at, manifold : the header of `convex_manifolds.py` inside, its address and words.
+    block : poses.   places : of each pair's row in the block, and of its poses: A's at the same place, B's BLOCK
+        behind.
     """
 
     words: Any
@@ -79,10 +80,10 @@ class _Task(NamedTuple):
 
 @entry("int64(int64, int64)")
 def contacts_of_pairs(header_at, n):
-    """Contacts of pairs from header[PAIRS_DONE] on, of n; why it ended.
+    """Contacts of pairs from header[PAIRS_DONE] on, of n; returns why the kernel ended.
 
     header : of BLOCK_HEADER integers. After OPEN the first header[N_GENERAL] rows and poses of the block are to be
-    settled, after ROWS_FULL there is to be more space: the next call goes on.
+    settled, after ROWS_FULL more space is wanted: the next call goes on.
     """
     words = view_i64(header_at, BLOCK_HEADER)
     manifold_at = header_at + 8 * HEADER

@@ -1,6 +1,6 @@
-"""Pairs of facets near each other, posed, and which of them are linked.
+"""Pairs of facets near each other, posed, and their links.
 
-Two pairs are linked where they share a corner on both bodies, or a facet on one and a corner on the other.
+Two pairs are linked where they share a corner on both bodies, or a facet on either and a corner on the other.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ class ContactPairs(NamedTuple):
     """n pairs of facets.
 
     near, facets : as `list_near_pairs` gives them.
-    corners : of both facets (18), seen from A's origin.   normals : unit ones (6), 0 of facets without area.
-    ids : numbers of the corners (6).   keys : numbers of the pairs of corners (9): linked pairs share one.
-    by_key, key_starts : pairs at key after key, and where those of each begin.   seen_keys : the last search that
-    came by each.   states : bits.   groups : of the translation that separates the pair, −1 for none.
-    queue, tried, search : of searches: pairs reached, the last one that looked at each pair, SEARCH and N_REACHED.
-    directions, slacks, gaps : of pairs that are apart, from A's nearest point to B's, what in it may be rounding, and
-    how long it is in errors of a coordinate; infinite of others.   order : numbers of pairs.
+    corners : of both facets (18), seen from A's origin.   normals : unit vectors (6), 0 of facets without area.
+    ids : numbers of the corners (6).   keys : numbers of the pairs of corners (9): linked pairs share a key.
+    by_key, key_starts : pairs at key after key, and where the pairs of each key begin.   seen_keys : the last search to
+    visit each key.   states : bits.   groups : number of the translation separating the pair, or −1.
+    queue, tried, search : of searches: pairs reached, the last search to look at each pair, SEARCH and N_REACHED.
+    directions, slacks, gaps : of pairs apart, from A's nearest point to B's, its possible rounding, and its length in
+    errors of a coordinate; infinite of other pairs.   order : numbers of pairs.
     table : of hashes.
     """
 
@@ -125,7 +125,7 @@ def _pose_facet(pairs, k, side, body):
 
 @kernel
 def move_pair(pairs, k, to):
-    """Make a pair that is posed number ``to``, which was not looked for in a search yet."""
+    """Move a posed pair to number ``to``, marked as not searched."""
     for i in range(NUMBERS_OF_PAIR):
         pairs.near[NUMBERS_OF_PAIR * to + i] = pairs.near[NUMBERS_OF_PAIR * k + i]
     for i in range(INTS_OF_PAIR):
@@ -144,7 +144,7 @@ def pair_meets(pairs, k):
 
 @kernel(inline=True)
 def facing_a(pairs, k, nhat, A):
-    """Cosine of A's facet with a direction; of a surface's two sides the one that faces it counts."""
+    """Cosine of A's facet with a direction; of an open surface the larger of its two sides' cosines."""
     cosine = dot(vec3_at(pairs.normals, 6 * k), nhat)
     return cosine if A.solid else abs(cosine)
 
@@ -225,7 +225,7 @@ def begin_search(pairs):
 
 @kernel
 def spread(pairs):
-    """Mark as REACHED all SEED pairs, and all PASSABLE ones that are linked with them through such."""
+    """Mark as REACHED all SEED pairs, and all PASSABLE pairs linked with them by chains of PASSABLE pairs."""
     number = begin_search(pairs)
     end = 0
     for k in range(pairs.n):

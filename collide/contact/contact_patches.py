@@ -1,9 +1,9 @@
-"""Patches of facet pairs that meet, or come within the margin.
+"""Patches of facet pairs in contact, or within the margin.
 
-Pairs that meet are grouped by short translations that separate them (`shallow_overlaps.py`); a pair that is apart
-starts a patch where its nearest points are local minima of the distance (`internal_edges.py`). A patch grows over
-pairs that are linked with it and face along its normal; its points are the corners of the polygons in which the
-facets overlap, seen along that normal (`contact_points.py`).
+Meeting pairs are grouped by short separating translations (`shallow_overlaps.py`); a pair apart starts a patch where
+its nearest points are local minima of the distance (`internal_edges.py`). A patch grows over linked pairs facing along
+its normal; its points are the corners of the polygons in which the facets overlap, seen along the normal
+(`contact_points.py`).
 """
 
 from __future__ import annotations
@@ -78,9 +78,9 @@ class ContactFrame(NamedTuple):
 
 
 class Patch(NamedTuple):
-    """One patch, whose pairs are REACHED.
+    """A patch, its pairs REACHED.
 
-    axes : `ContactAxes`.   n : of points.   meets : whether a pair of it meets.
+    axes : `ContactAxes`.   n : of points.   meets : whether any pair meets.
     """
 
     axes: Any
@@ -122,8 +122,8 @@ def cover_close(frame):
 
 @kernel
 def grow_patch(frame, first, axes, deepest, on_surface):
-    """Mark as REACHED the pairs linked with one that have points along a normal, −deepest ≤ gap ≤ reach; WANTED pairs
-    always belong to it. How many points.   on_surface : as in `View`.
+    """Mark as REACHED the pairs linked with ``first`` and with points along a normal, −deepest ≤ gap ≤ reach, and all
+    WANTED pairs; how many points.   on_surface : as in `View`.
     """
     pairs, A, B = frame.pairs, frame.A, frame.B
     view = _overlap_view(frame, axes, deepest, on_surface)
@@ -162,7 +162,7 @@ def grow_patch(frame, first, axes, deepest, on_surface):
 
 @kernel
 def may_be_reached(frame, k, axes, length):
-    """Whether a pair that starts no patch may be in one of a translation along ``axes`` of that length [m]."""
+    """Whether a pair that starts no patch may be in the patch of a translation along ``axes`` by ``length`` [m]."""
     view = _overlap_view(frame, axes, DEEPEST * length, True)
     if frame.A.radius + frame.B.radius > 0.0:  # ends of round edges stand on steep facets, too
         return within_gaps(frame.pairs, k, view, frame.points.seen)
@@ -195,7 +195,7 @@ def least_gap_of(points, n):
 
 
 class NearestPoint(NamedTuple):
-    """Where a patch is nearest along its normal, and of which pair that is; as a point of `PatchPoints`."""
+    """Where a patch is nearest along its normal, with the pair; as a point of `PatchPoints`."""
 
     u: float
     v: float
@@ -209,7 +209,7 @@ class NearestPoint(NamedTuple):
 
 @kernel
 def _least_point(points, n):
-    """The `NearestPoint` among n; of gap ∞ where there are none."""
+    """The `NearestPoint` among n; gap ∞ for n = 0."""
     p, least = points.manifold.points, 0
     if n == 0:
         return NearestPoint(0.0, 0.0, math.inf, 0.0, 0.0, 0, 0, 0)
@@ -225,8 +225,8 @@ def _least_point(points, n):
 
 @kernel
 def put_nearest(points, n, nearest, radius):
-    """Put the nearest point in front of n others, none of which is as near, or, of bodies with a radius, into the place
-    of one beside it, keeping its features; how many points there are then.
+    """Put the nearest point in front of n points, all farther, or, for bodies with a radius, into the place of a point
+    beside it, with the old features; returns the new number of points.
     """
     p, features = points.manifold.points, points.manifold.features
     k = _point_beside(points, n, nearest) if radius > 0.0 else -1
@@ -244,8 +244,8 @@ def put_nearest(points, n, nearest, radius):
 
 @kernel
 def _point_beside(points, n, nearest):
-    """Which of n points of the nearest one's own pair is so near to it, of all that they extend over, as to be the same
-    contact; −1 for none.
+    """Number of the point, of n, in the nearest point's own pair and within NEAR times the points' extent: both are
+    the same contact; −1 without.
     """
     p = points.manifold.points
     best, square, farthest = -1, math.inf, 0.0
@@ -435,7 +435,7 @@ def need_nearest(frame, n):
 
 @kernel
 def next_minimum(frame, first, n):
-    """Where in the order, from ``first`` on, the next local minimum is that is in no patch; n where none is left."""
+    """Place in the order, from ``first`` on, of the next local minimum in no patch; n without."""
     for i in range(first, n):
         k = frame.pairs.order[i]
         if not frame.pairs.states[k] & COVERED and _is_minimum(frame, k):

@@ -1,8 +1,8 @@
-"""Points at which facets come nearest along a direction: corners over facets, and edges that cross.
+"""Points at which facets come nearest along a direction: corners over facets, and crossing edges.
 
-Seen along the unit vector n, the gap between two facets is linear over the polygon in which they overlap, so its
-least and largest values stand at the corners of that polygon: corners of one over the other, and crossings of edges.
-Places are (u, v) across n and the height h along it (`ContactAxes`), seen from A's origin.
+Seen along the unit vector n, the gap between two facets is linear over the polygon of their overlap, so its least and
+largest values stand at the polygon's corners: corners of a facet over the other, and crossings of edges. Places are (u,
+v) across n and the height h along it (`ContactAxes`), seen from A's origin.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class View(NamedTuple):
     """Along what, and within which gaps, points are looked for.
 
     axes : `ContactAxes`.   error : of a coordinate [m].   low, high : gaps [m], but for their errors.
-    any_side : facets count whichever way they face.   on_surface : points of swept bodies are those of their surface;
-    else those of the core, moved along the normal.
+    any_side : facets count whichever way they face.   on_surface : points of swept bodies are on their surface; else on
+    the core, moved along the normal.
     """
 
     axes: Any
@@ -76,9 +76,9 @@ class View(NamedTuple):
 
 @kernel
 def put_points(pairs, k, A, B, view, points, n):
-    """Append the corners of the overlap of a pair's facets seen along a normal to n points; how many there are then.
+    """Append the corners of the overlap of a pair's facets seen along a normal to n points; returns the new number.
 
-    Facets that look the wrong way have none.
+    Facets facing the wrong way have no corners.
     """
     over_a, over_b = may_share_points(pairs, k, A, B, view, points.seen)
     if not (over_a or over_b):
@@ -100,10 +100,10 @@ def put_points(pairs, k, A, B, view, points, n):
 
 @kernel
 def may_share_points(pairs, k, A, B, view, seen):
-    """(whether corners over A's facet, over B's are to be looked for), neither where a pair has no points in a view;
-    its corners as seen where one is.
+    """(whether corners over A's facet, over B's are wanted), neither where a pair has no points in a view; else sets
+    the pair's corners as seen.
 
-    Points lie in both shadows, or off them by `_FARTHEST_OUTSIDE` and rounding: of lengths above 256 errors that is
+    Points lie in both shadows, or off them by `_FARTHEST_OUTSIDE` and rounding: of lengths above 256 errors rounding is
     below 2⁻⁸ of a facet for each of its three coordinates.
     """
     over_a = view.any_side or facing_a(pairs, k, view.axes.nhat, A) > LEAST_COSINE
@@ -142,9 +142,9 @@ def _shadows_apart(seen, axis):
 
 @kernel
 def _put_overlap(pairs, k, A, B, round_a, round_b, view, over_a, over_b, points, n):
-    """Append the corners of the overlap of a pair that is seen.
+    """Append the corners of the overlap of a pair, as seen in ``points.seen``.
 
-    round_a, round_b : radii across the edges that bodies show, 0 of sharp ones and of faces [m].
+    round_a, round_b : radii across the edges shown by the bodies, 0 of sharp edges and of faces [m].
     """
     if over_a:
         n = _corners_over(pairs, k, A, view, points, n, False)
@@ -156,11 +156,11 @@ def _put_overlap(pairs, k, A, B, round_a, round_b, view, over_a, over_b, points,
 @kernel
 def _sweep(pairs, k, side, body, view, seen):
     """Move the corners of a body's facet, seen along the normal, onto the surface of the body swept by its ball: as
-    `swept_face` does; (radius across the edge that is shown, else 0, how far the surface may be off that [m]).
+    `swept_face` does; (radius across the shown edge, else 0; how far the surface may be off the moved corners [m]).
 
-    They are moved by the radius along the facet's own normal, less the radius along nhat, so that gaps are those of
-    cores. Of a facet that is steep its least steep edge is shown, of a steep edge the corner in front: corners that are
-    not shown become NaN, and what is compared with NaN is over nothing.
+    They are moved by the radius along the facet's own normal, less the radius along nhat, so that gaps stay the cores'
+    gaps. A steep facet shows its least steep edge, a steep edge the corner in front: corners not shown become NaN:
+    comparisons with NaN are false, so nothing is over them.
     """
     radius = body.radius
     if radius == 0.0:
@@ -186,8 +186,8 @@ def _sweep(pairs, k, side, body, view, seen):
 
 @kernel
 def _sweep_edge(pairs, k, side, body, view, seen):
-    """The same where no face is across the normal: of the least steep edge, or of the corner in front, that supports
-    what is across it: the diagonal of a face does not.
+    """`_sweep` where no face is across the normal: by the least steep edge supporting the normal's part across it, not
+    the diagonal of a face, or by the corner in front.
     """
     sign = 1.0 if side == 0 else -1.0
     ids, at = 6 * k + 3 * side, 9 * side
@@ -269,7 +269,7 @@ def _within(view, gap, bound):
 
 @kernel
 def _corners_over(pairs, k, body, view, points, n, exchanged):
-    """Corners of one facet over the other, which is the body's: A's, or B's where ``exchanged``."""
+    """Append corners of the other facet over the body's facet: A's, or B's where ``exchanged``."""
     seen, error = points.seen, view.error
     face, corners = (9, 0) if exchanged else (0, 9)
     u0, v0, h0 = seen[face], seen[face + 1], seen[face + 2]
@@ -313,8 +313,8 @@ def _corners_over(pairs, k, body, view, points, n, exchanged):
 
 @kernel
 def _crossings(pairs, k, A, B, round_a, round_b, view, points, n):
-    """Where edges of A's facet cross edges of B's, seen along the normal; of a round edge along a sharp one, which may
-    be the rim of a surface, the ends of what both share.
+    """Append crossings of edges of A's facet with edges of B's, seen along the normal; for a round edge along a sharp
+    edge, even a surface's rim, the ends of their shared part.
     """
     seen, error = points.seen, view.error
     facet_a, facet_b = pairs.facets[INTS_OF_PAIR * k + FACET_A], pairs.facets[INTS_OF_PAIR * k + FACET_B]
@@ -363,11 +363,11 @@ def _crossings(pairs, k, A, B, round_a, round_b, view, points, n):
 
 @kernel(inline=True)
 def _beside(of_e, eu, ev, fu, fv, wu, wv):
-    """Parameters of the place on both edges nearest to that at ``of_e``: e and f seen along the normal, w from one's
-    begin to the other's.
+    """Parameters of the places on edges e and f nearest to the place at ``of_e``: e and f seen along the normal, w from
+    the begin of e to the begin of f.
 
-    Quotients by a small sine are off by an error over it, each by another: places read from both would be as far from
-    each other along the edges. Beside one of them the other is off by an error, wherever along it that is.
+    Quotients by a small sine are off by error / sine, each differently: places from two quotients would be as far apart
+    along the edges. The place beside a given place is off by no more than the error, wherever along the edge.
     """
     of_e = min(max(of_e, 0.0), 1.0)
     of_f = ((of_e * eu - wu) * fu + (of_e * ev - wv) * fv) / (fu * fu + fv * fv)
@@ -403,8 +403,8 @@ def _slopes_at(pairs, k, side, i, body, axes):
 
 @kernel
 def _put_ends(pairs, k, i, j, A, B, round_a, round_b, view, points, n):
-    """Append the ends of what edges i of A and j of B share where they run along each other, one round, the other
-    sharp; (whether they do, how many points there are then).
+    """Append the ends of the shared part of edges i of A and j of B, a round edge along a sharp edge; (whether they run
+    along each other, the new number of points).
     """
     a = _line_seen(pairs, k, 0, i, A, round_a, points.seen)
     b = _line_seen(pairs, k, 1, j, B, round_b, points.seen)
@@ -431,8 +431,8 @@ def _put_ends(pairs, k, i, j, A, B, round_a, round_b, view, points, n):
 
 @kernel
 def put_ends_along(pairs, k, A, B, view, points, n):
-    """Append the ends of round edges of a swept body along sharp ones of a pair's other facet, and no other points, to
-    n; how many there are then: so lines go on beside facets that are too steep to be looked at.
+    """Append the ends of round edges of a swept body along sharp edges of a pair's other facet, and no other points, to
+    n; returns the new number: so lines go on beside facets too steep to count.
     """
     if not view.on_surface or A.radius + B.radius == 0.0:
         return n
@@ -454,9 +454,9 @@ def put_ends_along(pairs, k, A, B, view, points, n):
 
 @kernel
 def depth_along(pairs, k, A, B, view, points, enough):
-    """How far B has to move along the normal for a pair's facets to come apart, but for rounding; 0 where they are.
+    """How far B has to move along the normal for a pair's facets to come apart, but for rounding; 0 where apart.
 
-    enough : what the slab between them shows to be no deeper is not measured: at most this is returned for it [m].
+    enough : a pair whose slab proves a depth ≤ ``enough`` is not measured: the slab's depth is returned [m].
     points : of one pair.   view : of any side, without bounds.
     """
     least, _ = see_pair(pairs, k, view.axes, points.seen)

@@ -34,50 +34,51 @@ def contacts(
 
     Parameters
     ----------
-    A, B : shapes; or sequences of shapes, one a pose, as in `collide.collide`: a list, or picked from a `ShapeSet`.
+    A, B : shapes; or sequences of shapes, a shape for each pose, as in `collide.collide`: a list, or picked from a
+        `ShapeSet`.
     X_WA, X_WB : (4, 4) poses in the world W [m], or batches (N, 4, 4); a single pose goes with every pose of the
         other's batch.
     margin : [m], ≥ 0, finite: bodies, and parts of them, up to so far apart are in contact, too.
-    max_contacts : of each patch, ≥ 1: the deepest is kept, then those that span the greatest area. No patch is left
+    max_contacts : of each patch, ≥ 1: the deepest is kept, then points spanning the greatest area. No patch is left
         out.
-    check_poses : refuse matrices that are no rotation.
+    check_poses : refuse matrices other than rotations.
     threads : at most so many answer; the rows are the same bits.
 
     Returns
     -------
     Contacts : columns ``normal``, ``point_a``, ``point_b``, ``distance``, ``lower``, ``upper``, ``patch``, ``kind`` …,
-    one row a contact (`contact/contact_rows.py` describes them); no rows where the bodies are farther apart than the
-    margin. Those of pair k are ``rows[starts[k]:starts[k + 1]]``, or ``result[k]``.
+    a row for each contact (`contact/contact_rows.py` describes them); no rows where the bodies are farther apart than
+    the margin. Rows of pair k are ``rows[starts[k]:starts[k + 1]]``, or ``result[k]``.
 
     Raises
     ------
-    InvalidArgument : a margin or a number of contacts out of range, lengths of batches that do not match.
+    InvalidArgument : a margin or a number of contacts out of range, unequal lengths of batches.
     InvalidPose : matrices that are no pose.
-    UnsupportedQuery : shapes that `collide.distance` refuses, two half-spaces that overlap, or more facets within the
-        margin than can be looked at.
+    UnsupportedQuery : shapes refused by `collide.distance`, two overlapping half-spaces, or more facets within the
+        margin than can be handled.
 
     Notes
     -----
     ``point_b − point_a = distance · normal``, both points within rounding of the surfaces. ``lower`` and ``upper`` hold
-    the true distance, along the normal, between the two facets named at that place.
+    the true distance, along the normal, between the two facets named, at the contact's place.
 
-    *Apart*: there is a patch for every local minimum within the margin of the distance between facets, its normal the
-    line between the nearest points; its first row is that gap.
+    *Apart*: a patch for every local minimum within the margin of the distance between facets, its normal the
+    line between the nearest points; its first row is the minimum gap.
 
-    *Overlapping*: the normal is one of those of facets, of crossed edges or their mean, along which the facets that
-    meet come apart after a short way; a shorter one may be. With B at ``X_WB[:3, 3] + apart * normal`` no facet pair of
-    the patch meets, proven (`inf`: no such length is known); of convex bodies the bodies are apart but for touching.
-    Bodies that grip each other have several patches, none of which need separate the bodies. Where a body lies within a
-    solid, a mesh of more than 512 facets within a cylinder, cone or ellipsoid, or facets meet too deeply for a patch
-    (deeper than the smaller body's diameter), a row of kind "translation" is the answer of `distance`. A part of a mesh
-    that lies within the other body, without facets that meet, adds nothing while other facets meet.
+    *Overlapping*: the normal is a facet's, two crossed edges', or a mean normal, along which the meeting facets come
+    apart after a short way; shorter ways may exist. With B at ``X_WB[:3, 3] + apart * normal`` no facet pair of the
+    patch meets, proven (`inf`: no such length is known); of convex bodies the bodies are apart but for touching. Bodies
+    that grip each other have several patches, none of which need separate the bodies. Where a body lies within a solid,
+    a mesh of more than 512 facets within a cylinder, cone or ellipsoid, or facets meet too deeply for a patch (deeper
+    than the smaller body's diameter), a row of kind "translation" is the answer of `distance`. A part of a mesh within
+    the other body, without meeting facets, adds nothing while other facets meet.
 
     Two convex shapes have one patch, with the normal of `distance`: in a batch, some microseconds a pair. Parts of a
     Compound are asked pair by pair: O(k) calls for k pairs whose boxes come within the margin. Two bodies of facets
     cost some tens of microseconds in a batch, a curved shape on a mesh a tenth of a millisecond; single calls as much
-    again, and a millisecond. Of meshes it grows as k log k with the k pairs of facets within the margin or, of bodies
-    that overlap, within 2.5 times the depth, some microseconds a pair: n·m at worst, refused beyond 2¹⁸ pairs. A patch
-    whose rim rises steeply is reduced once for each ring of points on its walls.
+    again, and a millisecond. The time for meshes grows as k log k with the k pairs of facets within the margin or, for
+    overlapping bodies, within 2.5 times the depth, some microseconds a pair: n·m at worst, refused beyond 2¹⁸ pairs. A
+    patch whose rim rises steeply is reduced once for each ring of points on its walls.
     """
     margin = check_margin("contacts", margin)
     max_contacts = check_max_contacts("contacts", max_contacts)

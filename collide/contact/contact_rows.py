@@ -1,19 +1,19 @@
-"""What `contacts` returns: one row a contact.
+"""What `contacts` returns: a row for each contact.
 
 =============== ===================================================================================
 a, b            ids of the bodies (0 and 1 for a pair query)
-part_a, part_b  which part of a Compound each is of, 0 otherwise
-patch           number of the patch among those of its pair, from 0
+part_a, part_b  number of each body's part in a Compound, 0 otherwise
+patch           number of the patch among its pair's patches, from 0
 kind            index into `KINDS`
 facet_a,facet_b facet each point lies on: of a Mesh rows of ``faces``, of a convex shape triangles of its
                 hull, −1 where a curved or a plane surface has none
 normal          (3,) unit vector nhat_AB_W, one for all contacts of a patch
-point_a,point_b (3,) a point of A's surface and one of B's [m]: point_b − point_a = distance · normal
+point_a,point_b (3,) points of A's and B's surfaces [m]: point_b − point_a = distance · normal
 distance        signed, along the normal [m]: the gap there, or minus the overlap
 lower, upper    lower ≤ true value ≤ upper: how far these two facets are apart along the normal, there, with
                 normal, poses and shapes as handed in, against rounding [m]; of "translation" those of `distance`
 apart           of overlaps: moving B by this length along the normal is proven to clear the patch's facets of
-                each other, or the bodies where they are convex, but for touching [m]; inf where no such length
+                each other, or the bodies where they are convex, but for touching [m]; inf where no length
                 is known, 0 of gaps
 =============== ===================================================================================
 
@@ -124,7 +124,7 @@ class Contacts:
 
     Notes
     -----
-    ``result[k]`` is a result of pair k alone. ``len(result)`` is the number of contacts; that of pairs is
+    ``result[k]`` is a result of pair k alone. ``len(result)`` is the number of contacts; the number of pairs is
     ``len(starts) − 1``. Iterating gives the rows.
     """
 

@@ -61,11 +61,11 @@ _USUAL, _FIRST = 8, 256
 class ConvexPairs(NamedTuple):
     """n pairs of single convex sets at their poses.
 
-    table : of all sets.   which : (n, 2) rows of it a pair, or None for rows 0 and 1 throughout.
-    X_WA, X_WB : C-contiguous matrices (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
-    of_pair : (n, 2) numbers of matrices a pair, where ``X_WA`` and ``X_WB`` are one array, or None.
-    ids : an id for each of these matrices, for columns a and b; None for 0 and 1.
-    slack : (n,) by how much rounding may have moved the bodies of a pair towards each other [m], or None.
+    table : of all sets.   which : (n, 2) rows of the table; without, rows 0 and 1 throughout.
+    X_WA, X_WB : C-contiguous matrices (n, 4, 4), or (1, 4, 4) for a single pose.
+    of_pair : (n, 2) numbers of matrices, where ``X_WA`` and ``X_WB`` are the same array.
+    ids : an id for each matrix, for columns a and b; None for 0 and 1.
+    slack : (n,) by how much rounding may have moved the bodies of a pair towards each other [m].
     """
 
     table: ShapeTable
@@ -94,12 +94,11 @@ def convex_contacts(
     A, B, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, max_contacts: int, *, slack: np.ndarray | None = None,
     check: bool = False, threads: int = 1,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, ends): contacts of pairs of single convex sets, pair after pair, and where those of each end.
+    """(rows, ends): contacts of pairs of single convex sets, pair after pair, and where the contacts of each pair end.
 
-    A, B : shapes, or shapes `Picked` from one set pose by pose.   X_WA, X_WB : C-contiguous (n, 4, 4), or (1, 4, 4) for
-    a pose that goes with all of the other's.   slack : (n,) by how much rounding may have moved the bodies of a pair
-    towards each other [m]: the margin is larger by that.   check : refuse matrices that are no rotation.
-    Raises InvalidPose, UnsupportedQuery.
+    A, B : shapes, or shapes `Picked` from a set pose by pose.   X_WA, X_WB : C-contiguous (n, 4, 4), or (1, 4, 4) for a
+    single pose.   slack : (n,) by how much rounding may have moved the bodies of a pair towards each other [m]: the
+    margin is larger by the slack.   check : refuse matrices other than rotations. Raises InvalidPose, UnsupportedQuery.
     """
     table, which = shape_table(A, B)
     pairs = ConvexPairs(table, which, X_WA, X_WB, slack=slack)
@@ -189,7 +188,7 @@ def _address_or_0(array: np.ndarray | None) -> int:
 
 
 def _with_space(rows: np.ndarray, n_rows: int, n_done: int, n: int, max_rows: int) -> np.ndarray:
-    """The first rows, those of so many of n pairs, with space for those of all others if they have as many."""
+    """The first rows, of ``n_done`` of n pairs, with space for as many rows a pair of all others."""
     share = 1.125 * n / max(n_done, 1)
     larger = np.empty(int(max(share, 1.5) * n_rows) + 2 * max_rows, dtype=CONTACT_DTYPE)
     words = CONTACT_DTYPE.itemsize // 8  # numpy copies records field by field

@@ -1,8 +1,8 @@
 """Contacts of two convex sets from their row of `distance`.
 
-The normal is that of the row. Where both bodies have a face, or an edge, across it (`support_face.py`), the corners of
-their overlap are the contacts (`manifold_points.py`); the nearest points of the row are one where no corner is as near.
-Half-spaces have no corners of their own: the support of the other body stands on the plane.
+The normal is the row's. Where both bodies have a face, or an edge, across it (`support_face.py`), the corners of
+their overlap are the contacts (`manifold_points.py`); the nearest points of the row are a contact where no corner is as
+near. Half-spaces have no corners of their own: the support of the other body stands on the plane.
 
 Every length here comes from the poses as given, seen from A's origin; `error` bounds the rounding of a coordinate, and
 every gap measured is within a few of them (`_bound`).
@@ -73,7 +73,7 @@ def workspace_integers(largest: int) -> int:
 
 
 def max_corners(largest: int) -> int:
-    """Corners that an overlap may have, and one point more."""
+    """Largest number of corners of an overlap, and one point more."""
     return 2 * largest + 8
 
 
@@ -229,8 +229,8 @@ def _points_on_plane(plane, face, manifold):
 
 @kernel(inline=True)
 def _corner_near(manifold, n, nearest, share):
-    """Which point the nearest points are so near to, in shares of the manifold's size, that they are to take its place,
-    and its features; −1 for none."""
+    """Number of the point within ``share`` of the manifold's size of the nearest points, which take its place and its
+    features; −1 without."""
     closest, square = -1, math.inf
     for k in range(n):
         du, dv = manifold.points[POINT * k] - nearest.x, manifold.points[POINT * k + V] - nearest.y
@@ -255,7 +255,7 @@ def _extent(manifold, n):
 
 @kernel
 def _write_contact(contact_at, manifold, k, is_first, axes, pair, row, flip, bound):
-    """One row, in the order in which A and B were asked for."""
+    """Write a row, with A and B in the order of the question."""
     doubles, words = view_f64(contact_at, _CONTACT // 8), view_i32(contact_at, _CONTACT // 4)
     distance = manifold.points[POINT * k + POINT_GAP]
     lower, upper = distance - bound, distance + bound

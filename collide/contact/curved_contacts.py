@@ -1,8 +1,8 @@
 """Contacts of a mesh and a curved convex set (a cylinder, cone, ellipsoid, polytope of rounded corners) from Python.
 
-Facets near the set are found for all poses together, and answered one by one by the convex engine, of many within the
-set some (`swallowed_facets.py`); a kernel makes patches of those of each pose (`curved_manifolds.py`). How far the set
-has to be moved along a patch's normal is proven by slabs there, and tried here by asking the facets again.
+Facets near the set are found for all poses together, and answered singly by the convex engine, of many within the set
+some (`swallowed_facets.py`); a kernel makes patches of each pose's facets (`curved_manifolds.py`). How far the set has
+to be moved along a patch's normal is proven by slabs in the kernel, and tried here by asking the facets again.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ Rows = tuple[np.ndarray, np.ndarray]
 
 
 class _Near(NamedTuple):
-    """Facets near the set at n poses, those that meet it first, the deepest first, then the nearest first.
+    """Facets near the set at n poses: meeting facets, the deepest first, then the others, the nearest first.
 
     facets, places : (k,) numbers in the mesh and in its tree.   rows : (k,) PAIR_DTYPE.   starts : (n + 1,).
-    patches : (k,) bits of the patches that each is in, once these are made.
+    patches : (k,) bits of each facet's patches, once made.
     """
 
     facets: np.ndarray
@@ -123,8 +123,8 @@ def _of_poses(
 
 
 def _near(body: Body, enclosure: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, limit: np.ndarray) -> _Near:
-    """Facets no farther than a limit a pose [m], none where the whole mesh is within the set and of many facets: there
-    `distance` tells. Raises UnsupportedQuery.
+    """Facets no farther than a limit a pose [m]; no facets where the whole mesh, of many facets, is within the set:
+    left to `distance`. Raises UnsupportedQuery.
     """
     packed = enclosure.packed
     within = meshes_within(body, packed, PA, PB)
@@ -211,10 +211,10 @@ def _parted(
     body: Body, enclosure: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, rows: np.ndarray,
     pose: np.ndarray, length: np.ndarray,
 ) -> np.ndarray:
-    """(m,) bool: whether the set moved by a length along the normal of a patch is proven clear of the patch's facets,
-    and so is the mesh moved against it.
+    """(m,) bool: whether the set moved by a length along a patch's normal is proven clear of the patch's facets, and
+    also the mesh moved against the normal.
 
-    The facets that stand the highest along the normal are asked first: where some of them meet the set, no others are.
+    The highest facets along the normal are asked first: where some of them meet the set, no others are.
     """
     parted = np.ones(len(rows), dtype=bool)
     steps = length[:, None] * rows["normal"]
@@ -244,10 +244,11 @@ def _heights_above(
     tree: MeshTree, outer: Body, X_WA: np.ndarray, X_WB: np.ndarray, nhat: np.ndarray, length: np.ndarray,
     which: np.ndarray, places: np.ndarray,
 ) -> np.ndarray:
-    """(k,) how far facets reach beyond where a set moved by a length along a normal begins, each for one of m [m].
+    """(k,) how far facets reach beyond the begin of a set moved by a length along a normal, each for one of m normals
+    [m].
 
     max n·p over their corners, less min n·q + length over the corners of a polytope around the set, seen from the
-    mesh's origin, rounding added: where that is negative n parts them.
+    mesh's origin, rounding added: where negative n parts them.
     """
     around = outer.tree.triangles.reshape(-1, 3)
     along_a, along_b = ((X[:, :3, :3] * nhat[:, :, None]).sum(axis=1) for X in (X_WA, X_WB))

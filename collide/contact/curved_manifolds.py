@@ -1,7 +1,7 @@
 """Contacts of a mesh and a curved convex set at many pairs of poses, from the rows of `distance` of facets near it.
 
-Patches of facets that meet the set come first, the deepest first; where none of them starts a patch, a translation
-along one of their normals that parts all of them does. Then patches of gaps, the nearest first (`curved_patches.py`).
+Patches of facets meeting the set come first, the deepest first; where no facet of them starts a patch, a translation
+along a facet's normal to part all of them does. Then patches of gaps, the nearest first (`curved_patches.py`).
 """
 
 from __future__ import annotations
@@ -181,14 +181,14 @@ def _error(reaches, pair, shift):
 def curved_manifolds(
     header_at, XA_at, step_a, XB_at, step_b, n, margin, slack_at, out_at, capacity, ends_at, lacks_at
 ):
-    """Contacts at pairs of poses from header[POSES_DONE] on, of n; 1 where there is no place for rows.
+    """Contacts at pairs of poses from header[POSES_DONE] on, of n; returns 1 where rows do not fit.
 
     XA, XB : checked matrices of the mesh and of the set; step 16 or, for a single pose, 0.   margin : [m].
-    slack : 0, or a double a pose, by which the margin is larger.   out : `CONTACT_DTYPE`, zeroed, ``capacity`` rows,
+    slack : 0, or a double a pose, added to the margin.   out : `CONTACT_DTYPE`, zeroed, ``capacity`` rows,
     filled from header[ROWS_DONE] on.   ends : where the contacts of each pose end.
-    lacks : a word a pose: no patch tells, and the row of `distance` is all there is.
+    lacks : a word a pose: no patch decides, and the row of `distance` is the only contact.
 
-    Twelve arguments: Python calls it, with integers and doubles alone.
+    Twelve arguments: called by Python, with integers and doubles alone.
     """
     header = view_i64(header_at, HEADER)
     starts = view_i64(header[STARTS_AT], n + 1)
@@ -215,7 +215,7 @@ def curved_manifolds(
 
 @kernel
 def _put_patches(task, n_rows):
-    """The rows of all patches; how many rows there are then, −1 where there is no place for them."""
+    """Append the rows of all patches; returns the new number of rows, −1 where they do not fit."""
     near = task.near
     number = 0
     n_meeting = 0
@@ -243,7 +243,7 @@ def _put_patches(task, n_rows):
 
 @kernel
 def _put_patch(task, k, nhat, feature, number, n_rows):
-    """Append the rows of the patch that facet k starts; (how many rows there are then, 1, or 0 without a point)."""
+    """Append the rows of facet k's patch; (new number of rows, 1, or 0 without a point)."""
     near, points = task.near, task.near.points
     row = view_row(near.rows_at + ROW * k)
     meets = row.flags[HIT] != 0
@@ -315,8 +315,9 @@ def _slab_length(task, axes):
 
 @kernel
 def _put_parted(task, n_meeting, n_rows):
-    """Append the rows of the patch of all facets that meet the set, along the normal of one of them, or their sum, that
-    parts all by the least translation; (how many rows there are then, 1, or 0 where none is as short as the set).
+    """Append the rows of the patch of all facets meeting the set, along a facet's normal, or the normals' sum: the
+    normal of the least translation to part all; (new number of rows, 1, or 0 where no translation is shorter than the
+    set).
     """
     near, pair = task.near, task.pair
     total = Vec3(0.0, 0.0, 0.0)

@@ -1,8 +1,8 @@
 """Patches of a mesh's facets against one curved convex set: where they begin, how they grow, and their points.
 
-A facet starts a patch where its nearest points, or those of its least translation, are local ones: no facet around
-comes nearer along the normal (`internal_edges.py`). The patch grows over facets that are linked by corners and lie over
-what of the curved set supports the normal (`support_face.py`); its points are the corners of both overlaps.
+A facet starts a patch where its nearest points, or the points of its least translation, are local minima: no facet
+around comes nearer along the normal (`internal_edges.py`). The patch grows over facets linked by corners and over the
+part of the curved set supporting the normal (`support_face.py`); its points are the corners of both overlaps.
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ def seed_of(near, k):
 
 @kernel
 def _across_lines(near, p, q, u):
-    """A normal at an edge, better known where the edge is along a cylinder's axis: it leads from one to the other."""
+    """A normal at an edge, better known where the edge is along a cylinder's axis: from the edge to the axis."""
     e, axis = sub(q, p), near.axis
     if dot(axis, axis) == 0.0 or norm(cross(e, axis)) > _SAME * norm(e):
         return u
@@ -168,7 +168,7 @@ def _across_lines(near, p, q, u):
 
 @kernel
 def _feature_at(corners, at, p):
-    """Which corners of a triangle a point of it lies on: (a corner, −1), both ends of an edge, or (−1, −1)."""
+    """Feature of a triangle under a point on its surface: (a corner, −1), both ends of an edge, or (−1, −1)."""
     longest = 0.0
     for i in range(3):
         longest = max(longest, norm(sub(_corner(corners, at, i + 1), _corner(corners, at, i))))
@@ -207,9 +207,9 @@ def _empty_face(near):
 
 @kernel
 def _face_of(near, k, axes):
-    """What of facet k is across the normal: (its `SupportFace`, a bound of the error of heights on it [m]).
+    """The feature of facet k across the normal: (its `SupportFace`, a bound of the error of its heights [m]).
 
-    The whole facet, or where that is steep the edge that is least so, or nothing.
+    The whole facet, or the least steep edge of a steep facet, or nothing.
     """
     facet = near.facets[k]
     normal = vec3_at(near.normals, 3 * k)
@@ -347,8 +347,7 @@ def _vertex_over(face, of_set, tolerance, overlap):
 
 @kernel
 def grow_over(near, n_seeds, of_set, look):
-    """Mark as REACHED the first ``n_seeds`` facets of the queue, and those linked with them that have points; how many
-    points.
+    """Mark as REACHED the first ``n_seeds`` facets of the queue, and linked facets with points; how many points.
     """
     _forget_search(near)
     n, end = 0, n_seeds

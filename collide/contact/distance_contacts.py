@@ -14,9 +14,10 @@ def with_distances(
     A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: np.ndarray, rows: np.ndarray, ends: np.ndarray,
     lacks: np.ndarray, *, reach: float = np.inf,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, ends) with those of `distance` behind the contacts of the poses that lack them.
+    """(rows, ends) with rows of `distance` behind the contacts of poses marked in ``lacks``.
 
-    limit : (n,) none is added beyond it where there are no others [m].   reach : nothing farther is looked for [m].
+    limit : (n,) largest distance of a row added to a pose without contacts [m].   reach : largest distance searched
+        [m].
     """
     poses = np.flatnonzero(lacks)
     XA, XB = (X if len(X) == 1 else np.ascontiguousarray(X[poses]) for X in (X_WA, X_WB))

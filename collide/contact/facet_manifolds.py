@@ -95,11 +95,11 @@ def workspace_words(capacity: int) -> int:
 
 
 class _Task(NamedTuple):
-    """Two bodies at their poses, in the order in which they are worked on, and what is wanted of them.
+    """Two bodies at their poses, in working order, with workspace and limits.
 
     space : of the traversals.   topology_a, topology_b : addresses.   limit : of separating translations [m].
-    margin : [m].   error : of a coordinate [m].   words_at, capacity : the workspace, and for how many pairs it is.
-    is_largest : there is no larger one.   near_code : address of `list_near_pairs`.
+    margin : [m].   error : of a coordinate [m].   words_at, capacity : the workspace, and its pairs at most.
+    is_largest : no workspace is larger.   near_code : address of `list_near_pairs`.
     """
 
     pair: PosedPair
@@ -185,14 +185,14 @@ def _open_clearing(task):
 def facet_manifolds(
     header_at, XA_at, step_a, XB_at, step_b, n, margin, slack_at, out_at, capacity, ends_at, lacks_at
 ):
-    """Contacts at pairs of poses from header[POSES_DONE] on, of n; why it ended.
+    """Contacts at pairs of poses from header[POSES_DONE] on, of n; returns why the kernel ended.
 
     XA, XB : checked matrices; step 16 or, for a single pose, 0.   margin : [m].
-    slack : 0, or a double a pose, by which the margin is larger.   out : `CONTACT_DTYPE`, zeroed, ``capacity`` rows,
+    slack : 0, or a double a pose, added to the margin.   out : `CONTACT_DTYPE`, zeroed, ``capacity`` rows,
     filled from header[ROWS_DONE] on.   ends : where the contacts of each pose end.
-    lacks : a byte a pose: the row of `distance` is to be added, or is the only one.
+    lacks : a byte a pose: the row of `distance` is to be added, perhaps as the only row.
 
-    Twelve arguments: Python calls it, with integers and doubles alone.
+    Twelve arguments: called by Python, with integers and doubles alone.
     """
     header = view_i64(header_at, CONTACT_HEADER)
     ends, lacks = view_i64(ends_at, n), view_u8(lacks_at, n)
@@ -214,8 +214,8 @@ def facet_manifolds(
 def _contacts_at(header_at, XA_at, XB_at, margin, out_at, capacity, first):
     """(status, rows then, whether a row of `distance` is lacking) of one pair of poses.
 
-    Bodies are worked on in the order of their contents, equal ones in the order of their poses, so that swapped
-    questions give the same numbers.
+    Bodies are worked on in the order of their contents, equal bodies in the order of their poses: swapped questions
+    give the same numbers.
     """
     words = view_i64(header_at, CONTACT_HEADER)
     exchanged = words[EXCHANGED] != 0
@@ -314,10 +314,10 @@ def _inside(task):
 
 @kernel
 def _list_wider(task, frame, ways, reach):
-    """(status, frame) with the pairs within a larger reach as well that a patch of a translation may reach.
+    """(status, frame) with all pairs within a larger reach, as far as a translation's patch may reach them.
 
-    What is known of those listed before stays; the others are not measured: all that meet, or are within the margin,
-    are among the first.
+    Pairs listed before keep their states; new pairs are not measured: all pairs in contact, or within the margin, are
+    among the old.
     """
     before, numbers, integers = frame.pairs, frame.points.manifold.points, frame.points.pairs
     n_before = before.n
@@ -409,8 +409,8 @@ def _put_patches(frame, ways, rows, clearing, first, is_deep):
 
 @kernel
 def _put_patch(frame, patch, rows, clearing, number, n_rows):
-    """Append the rows of a patch, whose pairs are REACHED, and take them from those that start others; how many rows
-    there are then, −1 where there is no place.
+    """Append the rows of a patch and cover its REACHED pairs, so that they start no others; returns the new number of
+    rows, −1 where they do not fit.
     """
     apart = 0.0
     if patch.meets or clearing.radius - least_gap_of(frame.points, patch.n) >= 0.0:

@@ -15,10 +15,10 @@ from collide.shapes.mesh import Mesh
 class Topology(NamedTuple):
     """Which of a body's m facets share corners, int32.
 
-    corners : (m, 3) numbers of points, equal for equal points: the first row of the shape's that is there.
+    corners : (m, 3) numbers of points, equal for equal points: the shape's first row of the point.
     places : (m,) where facet k stands in the tree.   fans : (3 m,) facets around corner after corner.
     fan_starts : (n_corners + 1,) where the fan of a corner begins.
-    edges : (m, 3) numbers of the edges from corner to corner, equal for equal edges.
+    edges : (m, 3) numbers of edges from corner to corner, equal for equal edges.
     header : words for kernels, as `contact_facets.py` numbers them.
     """
 

@@ -47,8 +47,8 @@ def _leaves(pairs, k, side, body, point, u, slack):
 
 @kernel
 def fan_allows(body, corner, end, point, u, slack):
-    """Whether u leaves a body at right angles from a point at a corner, or of the edge from there to the corner ``end``
-    (−1: none).
+    """Whether u leaves a body at right angles from a point at a corner, or on the edge from the corner to the corner
+    ``end`` (−1: no edge).
     """
     outward = Vec3(0.0, 0.0, 0.0)
     for at in range(int(body.fan_starts[corner]), int(body.fan_starts[corner + 1])):
@@ -63,11 +63,11 @@ def fan_allows(body, corner, end, point, u, slack):
 
 
 class EdgeSlopes(NamedTuple):
-    """How steeply a surface falls off from one of its edges, seen along a direction that the edge supports.
+    """How steeply a surface falls off from an edge, seen along a direction supported by the edge.
 
-    supports : no facet at the edge rises from it.
+    supports : no facet at the edge rises from the edge.
     left_slope, right_slope : the least tangent of the facets on the side of edge × direction, and on the other; ∞
-    where there is none.
+    without a facet.
     """
 
     supports: bool
@@ -176,7 +176,7 @@ def _angle(e, f):
 
 @kernel
 def _feature(corners, at, point):
-    """Which corners of a triangle a point of it lies on: (a corner, −1), both ends of an edge, or (−1, −1)."""
+    """Feature of a triangle under a point on its surface: (a corner, −1), both ends of an edge, or (−1, −1)."""
     p, q, r = vec3_at(corners, at), vec3_at(corners, at + 3), vec3_at(corners, at + 6)
     limit = _ON * max(norm(sub(q, p)), norm(sub(r, q)), norm(sub(p, r)))
     if norm(sub(point, p)) <= limit:
@@ -233,7 +233,7 @@ def _cross_of_edges(pairs, k, i):
 
 @kernel
 def cross_of_edges(corners, at, i, j):
-    """The unit vector across edge i of a triangle and edge j of the one behind it; 0 where they are parallel."""
+    """The unit vector across edge i of a triangle and edge j of the next triangle; 0 for parallel edges."""
     e = sub(vec3_at(corners, at + 3 * ((i + 1) % 3)), vec3_at(corners, at + 3 * i))
     f = sub(vec3_at(corners, at + 9 + 3 * ((j + 1) % 3)), vec3_at(corners, at + 9 + 3 * j))
     n = cross(e, f)

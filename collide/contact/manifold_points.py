@@ -76,9 +76,10 @@ class Line(NamedTuple):
 
 
 class SharedSpan(NamedTuple):
-    """What two edges share: parameters along A, and of B's edge those of A where it is 0 and 1; none where low > high.
+    """What two edges share: low, high, parameters along A; begin, end, A's parameters at B's ends; nothing where low >
+    high.
 
-    off : how far places on both are apart, at most, where both are sharp [m].
+    off : largest distance between places on both, where both are sharp [m].
     """
 
     low: float
@@ -109,11 +110,11 @@ def side_of(face, side):
 
 @kernel
 def overlap_points(face_a, face_b, tolerance, max_gap, first, second, manifold):
-    """Put the corners of the overlap of two support faces, counter-clockwise; (how many, how far gaps are off by that
-    places on both are apart [m]). None where one is a vertex.
+    """Put the corners of the overlap of two support faces, counter-clockwise; (how many, error of gaps from the
+    distance between places on both [m]). No corners where either face is a vertex.
 
     tolerance : corners so far outside count as inside [m].   max_gap : ends of a round line are looked for along the
-    sides of a face where both are within this gap [m].   first, second : room for polygons (`clip_polygons`).
+    sides of a face where both are within this gap [m].   first, second : space for polygons (`clip_polygons`).
     """
     if face_a.n < 2 or face_b.n < 2:
         return 0, 0.0
@@ -149,10 +150,10 @@ def _is_over(face_b, u, v, tolerance):
 
 @kernel
 def _put_corner(face_a, face_b, before, side, u, v, tolerance, manifold, k):
-    """Point k, between two sides of the overlap (`Clipped`), at (u, v) unless it is a corner of one of the faces.
+    """Point k, between two sides of the overlap (`Clipped`), at (u, v) or at a corner of a face.
 
-    Between two sides of A is its corner, unless these are so nearly along each other that they meet, moved out by the
-    tolerance, far from it, and it is not over B.
+    Between two sides of A the point is A's corner, unless the sides, moved out by the tolerance, meet far from the
+    corner, being nearly parallel, and the corner is not over B.
     """
     if before >= 0 and side >= 0:
         at = 3 * side
@@ -206,10 +207,10 @@ def _edge_over_face(edge, face, is_edge_of_b, tolerance, max_gap, manifold):
 
 @kernel
 def _ends_beside(edge, face, is_edge_of_b, tolerance, max_gap, n, manifold):
-    """Put the ends of what a round edge shares with a side of a face, where that is longer than what lies over the face
-    within the gap; how many points there are, n before.
+    """Put the ends of a round edge's part shared with a side of a face, where longer than the part over the face within
+    the gap; returns the number of points, n before.
 
-    A capsule along an edge of a box, turned by a hair, lies over one face with one half, over another with the other.
+    A capsule along an edge of a box, turned by a hair, lies over a face with one half, over another with the other.
     """
     line = line_of(edge)
     square = 0.0
@@ -286,8 +287,8 @@ def shared_span(a, b, tolerance):
 
 @kernel(inline=True)
 def _not_far_aside(a, b, shared, at_low, at_high):
-    """What of a `SharedSpan` is beside A's line by at_low … at_high [m], linear in between, and by no more than round
-    surfaces are looked at, as radii are there: those of cones are linear, too.
+    """Part of a `SharedSpan` beside A's line by at_low … at_high [m], linear in between, and by at most _ASIDE times
+    the radius, linear too for cones.
     """
     low, high = shared.low, shared.high
     limit_low, limit_high = _ASIDE * _radius_between(a, b, shared, low), _ASIDE * _radius_between(a, b, shared, high)
@@ -323,8 +324,9 @@ def _radius_between(a, b, shared, t):
 class PlaceBetween(NamedTuple):
     """A place (u, v) between two edges, with the heights of both surfaces and the gap there.
 
-    beside_u, beside_v : from A's line to B's, of which A's share leads to the place.
-    fall_a, fall_b : by how much the surfaces have fallen off from their lines there, ∞ where one is not there [m].
+    beside_u, beside_v : from A's line to B's; A's share of this vector leads to the place.
+    fall_a, fall_b : how much each surface has fallen off from its line at the place, ∞ where the surface does not reach
+        the place [m].
     """
 
     u: float
@@ -411,9 +413,9 @@ def _fall_of_cone(radius, taper, wu, wv, e):
 
 @kernel
 def _within_ends(a, b, shared, tolerance):
-    """A `SharedSpan` without places that are past an end of a round body by more than the tolerance [m].
+    """A `SharedSpan` cut to places past no end of a round body by more than the tolerance [m].
 
-    None where its ends are not found in some steps, or where a surface is not over them.
+    Empty where its ends are not found in _STEPS_TO_END steps, or where a surface does not reach them.
     """
     none = SharedSpan(1.0, 0.0, shared.begin, shared.end, 0.0)
     low, high = shared.low, shared.high
@@ -446,13 +448,13 @@ def _within_ends(a, b, shared, tolerance):
 
 @kernel
 def _past_end(line, s, sign, wu, wv, fall):
-    """How far past an end of its body a place (wu, wv) beside parameter s of a round line is, fallen off from it,
-    along the line [m]; below 0 within both ends.
+    """How far past an end of its body a place (wu, wv) beside a round line and fallen off from the line is, along the
+    line [m]; below 0 within both ends.
 
-    Ends are square to the axis, which is off the line by the half angle α of a cone, tan α = taper. With e the unit
-    vector along the line towards the end, z = e·nhat and a = 1 − z², a place that is w beside the line and has fallen
-    off is past a plane square to the axis there by w·e · (1 + taper · z/√a) + fall · (taper · √a − z).
-    sign : 1 for A, −1 for B, which is seen from its other side (`place_between`).
+    Ends are square to the axis, off the line by the half angle α of a cone, tan α = taper. With e the unit
+    vector along the line towards the end, z = e·nhat and a = 1 − z², a place w beside the line and fallen off is past
+    the plane of the end by w·e · (1 + taper · z/√a) + fall · (taper · √a − z).
+    sign : 1 for A, −1 for B, seen from its other side (`place_between`).
     """
     e = Vec3(line.q.x - line.p.x, line.q.y - line.p.y, line.q.z - line.p.z)
     length = math.sqrt(e.x * e.x + e.y * e.y + e.z * e.z)
@@ -496,11 +498,13 @@ def _put_shared(a, b, shared, manifold):
 
 @kernel
 def put_line_ends(a, b, is_sharp_b, slopes, tolerance, manifold, n):
-    """Append the ends of what a round line shares with a sharp edge of a surface; how many points there are then.
+    """Append the ends of the part shared by a round line and a sharp edge of a surface; returns the new number of
+    points.
 
-    is_sharp_b : the edge is B's.   slopes : `EdgeSlopes` of it, towards the line.   tolerance : rounding of a gap [m].
-    An end whose line runs over a facet beside the edge is that facet's where it is nearer there: with b how far the
-    line is beside, the facet falls off by slope · b.
+    is_sharp_b : the edge is B's.   slopes : `EdgeSlopes` of the edge, towards the line.   tolerance : rounding of a gap
+    [m].
+    An end whose line runs over a facet beside the edge is moved to the facet where this is nearer: a line beside
+    the edge by b meets a facet fallen off by slope · b.
     """
     shared = shared_span(a, b, tolerance)
     if shared.low > shared.high:
@@ -551,10 +555,11 @@ def least_gap(manifold, n):
 
 @kernel
 def drop_repeated(manifold, n, error, tolerance):
-    """Drop points nearer than the tolerance to the one before, or to the line between their neighbours; how many stay.
+    """Drop points nearer than the tolerance to the point before, or to the line between their neighbours; how many
+    stay.
 
-    Of points in one place the one of least gap stays, and so does one deeper than both its neighbours by more than the
-    error of gaps.
+    Of points in the same place the deepest stays; a point deeper than both its neighbours by more than the error of
+    gaps stays, too.
     """
     points = manifold.points
     n_kept = 0
@@ -612,7 +617,8 @@ def _is_between(points, i, j, k):
 
 @kernel
 def deepest_point(manifold, n, error):
-    """Which of n points is to come first: of those as deep as the deepest, but for the error, that of least u, v."""
+    """Number of the point to come first, of n: with the least (u, v) among points as deep as the deepest, but for the
+    error."""
     points = manifold.points
     known = least_gap(manifold, n) + 2.0 * error
     best = -1

@@ -77,11 +77,11 @@ def _rows_of_hull_points(mesh: Shape, hull: Shape) -> tuple[np.ndarray, np.ndarr
 def facet_contacts(
     A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int, slack: np.ndarray | None, threads: int
 ) -> Rows:
-    """(rows, ends) of two bodies of facets: contacts pose after pose, and where those of each end.
+    """(rows, ends) of two bodies of facets: contacts pose after pose, and where the contacts of each pose end.
 
-    X_WA, X_WB : (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's, checked.
-    slack : (n,) by how much rounding may have moved the bodies towards each other [m]: the margin is larger by that.
-    The same numbers come out when A and B are exchanged. Raises UnsupportedQuery, InvalidPose.
+    X_WA, X_WB : (n, 4, 4), or (1, 4, 4) for a single pose, checked.
+    slack : (n,) by how much rounding may have moved the bodies towards each other [m]: the margin is larger by the
+    slack. Exchanged A and B give the same numbers. Raises UnsupportedQuery, InvalidPose.
     """
     n = max(len(X_WA), len(X_WB))
     pieces = pieces_of(n, threads, _FEWEST_POSES) if threads > 1 and n >= 2 * _FEWEST_POSES else [slice(0, n)]
@@ -167,7 +167,7 @@ def _too_many(margin: float, A: Body, B: Body) -> UnsupportedQuery:
 
 
 class _OfThread(local):
-    """The workspace of one thread. Memory that nobody touches costs nothing."""
+    """The workspace of a thread. Memory never touched costs nothing."""
 
     def __init__(self) -> None:
         self._keep(_FEWEST_PAIRS)
@@ -178,15 +178,15 @@ class _OfThread(local):
 
     @property
     def described(self) -> tuple[int, int, bool]:
-        """Its address, for how many pairs it is, and whether that is the most."""
+        """Address and capacity in pairs of the workspace, and whether no workspace is larger."""
         return address_of(self._words), min(self._capacity, MAX_PAIRS), self._capacity >= MAX_PAIRS
 
     def grow(self) -> None:
         self._keep(min(4 * self._capacity, MAX_PAIRS))
 
     def shrink(self) -> None:
-        """After a call: give back what is more than a thread may keep, so that the next call begins with that much and
-        works out less anew for want of space; and what was grown so many calls ago."""
+        """After a call: shrink a workspace of more than _KEPT_PAIRS pairs to _KEPT_PAIRS, so the next call repeats less
+        for want of space; after _CALLS_KEPT calls to the least size."""
         self._calls += 1
         if self._capacity > _KEPT_PAIRS:
             self._keep(_KEPT_PAIRS)

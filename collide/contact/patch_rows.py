@@ -91,7 +91,7 @@ class RowsOf(NamedTuple):
 
 @kernel
 def put_patch(frame, patch, apart, number, space, n_rows):
-    """Append the rows of a patch; how many there are then, −1 where there is no place for them.
+    """Append the rows of a patch; returns the new number of rows, −1 where they do not fit.
 
     apart : as in the rows [m].   number : of the patch.
     """
@@ -121,10 +121,9 @@ def _faces_both(frame, pair, nhat):
 
 @kernel
 def _name_faces(frame, patch, target, k, tolerance):
-    """Where a contact is at the rim of a facet that stands along the normal, have it named by the facets that face it,
-    which share the point.
+    """Name a contact at the rim of a steep facet by a pair of facets facing along the normal at the same point.
 
-    tolerance : points nearer than this are one [m].
+    tolerance : nearer points are the same [m].
     """
     points, nhat = frame.points, patch.axes.nhat
     if _faces_both(frame, target.pairs[k], nhat):
@@ -188,8 +187,8 @@ def facet_of_row(contact_at):
 
 @kernel
 def widen_row(contact_at, distance, lower, upper):
-    """Make the gap of a row that of what is nearest in its patch, where the brackets of both overlap, and that one is
-    no wider than to hold the row's."""
+    """Give a row the distance of its patch's nearest point where the brackets of both overlap, unless the nearest
+    point's bracket holds the row's; the row's bracket becomes the union of both."""
     doubles = view_f64(contact_at, CONTACT // 8)
     if lower <= doubles[_LOWER] and doubles[_UPPER] <= upper:
         return

@@ -18,7 +18,7 @@ _U = 2.0**-53
 class PosedBox(NamedTuple):
     """Half sizes, axes in the world, and centre.   off : how far the axes are from a rotation, at most.
 
-    radius : of the ball that is swept over it [m].
+    radius : of the ball swept over the box [m].
     """
 
     radius: float

@@ -1,4 +1,4 @@
-"""Reduction of a patch: of its points the deepest, the corners of their hull, and those among them that may carry."""
+"""Reduction of a patch: of its points the deepest, the corners of their hull, and points inside that may carry."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _EXTREME = 8
 
 
 class HullSpace(NamedTuple):
-    """Views of numbers of points: those that are compared, a hull's corners, whether a point is on no wall, and the
-    lowest of each of CELLS cells."""
+    """Views of numbers of points: the points compared, a hull's corners, the class of each point (on a wall or not),
+    and the lowest of each of CELLS cells."""
 
     order: Any
     corners: Any
@@ -31,10 +31,10 @@ class HullSpace(NamedTuple):
 
 @kernel
 def hull_of_patch(points, n, tolerance, space):
-    """Put the corners of the convex hull of n points that are on no wall into ``space.corners``, counter-clockwise; how
-    many.
+    """Put the corners of the convex hull of the points on no wall, out of n, into ``space.corners``, counter-clockwise;
+    how many.
 
-    A wall is what rises steeply from a lower point. tolerance : lengths below it are rounding [m].
+    Points rising steeply from a lower point are on a wall.   tolerance : smaller lengths are rounding [m].
     """
     p = points.manifold.points
     for i in range(n):
@@ -65,9 +65,9 @@ def _standing_points(p, n, tolerance, space):
 
 @kernel
 def _drop_walls(p, n, n_corners, tolerance, space):
-    """Take corners that rise steeply from other points from what remains; whether there are any.
+    """Mark corners rising steeply from other points as ON_WALL; whether any corner was.
 
-    Each point is compared with the others once: corners that are no walls are marked until the hull is known.
+    Each point is compared with the others once: corners on no wall are marked until the hull is known.
     """
     lowest = math.inf
     for i in range(n):
@@ -92,7 +92,7 @@ def _drop_walls(p, n, n_corners, tolerance, space):
 
 @kernel
 def _extreme_points(p, n, remaining, extreme):
-    """Put the numbers of points on no wall that are farthest in eight directions, counter-clockwise, none twice in a
+    """Put the numbers of the points on no wall farthest in eight directions, counter-clockwise, without repeats in a
     row; how many."""
     first = 0
     while first < n - 1 and remaining[first] == ON_WALL:
@@ -120,7 +120,8 @@ def _extreme_points(p, n, remaining, extreme):
 
 @kernel(inline=True)
 def _farther(p, extreme, d, opposite, i, value, largest, least):
-    """Make point i extreme in a direction, or the opposite one, where it is; of equal ones the deeper counts."""
+    """Make point i extreme in a direction, or the opposite direction, where farthest; of equal points the deeper
+    counts."""
     if value > largest or (value == largest and p[POINT * i + GAP] < p[POINT * extreme[d] + GAP]):
         extreme[d] = i
     if value < least or (value == least and p[POINT * i + GAP] < p[POINT * extreme[opposite] + GAP]):
@@ -129,10 +130,10 @@ def _farther(p, extreme, d, opposite, i, value, largest, least):
 
 @kernel
 def _outer_points(p, n, tolerance, space):
-    """Put what may be corners of the hull of the points on no wall into ``space.order``; how many.
+    """Put possible corners of the hull of the points on no wall into ``space.order``; how many.
 
-    Points within the polygon of eight extreme ones, or on its sides, are none (S. G. Akl, G. T. Toussaint, "A fast
-    convex hull algorithm", 1978); in the place of an extreme point the one of least gap counts.
+    Points within the polygon of eight extreme points, or on its sides, are no corners (S. G. Akl, G. T. Toussaint, "A
+    fast convex hull algorithm", 1978); of points in the place of an extreme point the deepest counts.
     """
     extreme = space.corners
     n_extreme = _extreme_points(p, n, space.remaining, extreme)
@@ -163,11 +164,11 @@ def _is_outer(p, i, extreme, n_extreme, tolerance):
 
 @kernel
 def _hull(p, n, tolerance, space):
-    """Corners of the hull of the n points of ``space.order``, none nearer than the tolerance to the line through its
+    """Corners of the hull of the n points of ``space.order``, each farther than the tolerance from the line through its
     neighbours; how many.
 
-    A. M. Andrew, "Another efficient algorithm for convex hulls in two dimensions" (1979). Of points in one place
-    the one of least gap is taken.
+    A. M. Andrew, "Another efficient algorithm for convex hulls in two dimensions" (1979). Of points in the same place
+    the deepest is taken.
     """
     step = max(tolerance, 1e-300)
     _sort(p, space.order, n, step)
@@ -199,7 +200,7 @@ def _hull(p, n, tolerance, space):
 
 @kernel(inline=True)
 def _push(p, space, n, base, k, step):
-    """Put point k behind the chain of corners from ``base`` on, having dropped those that are none now; how many."""
+    """Put point k behind the chain of corners from ``base`` on, having dropped corners no longer convex; how many."""
     corners = space.corners
     while n >= base + 2:
         i, j = POINT * corners[n - 2], POINT * corners[n - 1]
@@ -261,10 +262,10 @@ def _sift(p, order, root, end, step):
 def reduce_patch(points, n, tolerance, max_contacts, target, space):
     """Put the contacts of a patch of n points into ``target``, in the order of ``space.order``; how many.
 
-    Corners of the convex hull, the point of least gap where no corner is as deep, and points among them that may carry.
-    The one of least gap comes first, then what is around the patch, then what is among it. Of more than
-    ``max_contacts``: where all are around it those that span the greatest area, else first those that a slight tilt
-    lets carry.
+    Corners of the convex hull, the point of least gap where no corner is as deep, and inner points that may carry. The
+    deepest comes first, then the points around the patch, then the inner points. Of more than ``max_contacts`` points:
+    without inner points the points spanning the greatest area, else first the points able to carry after the slightest
+    tilt.
     """
     n_corners = hull_of_patch(points, n, tolerance, space)
     n_ring = _put_ring(points, n, n_corners, tolerance, target, space)
@@ -279,7 +280,7 @@ def reduce_patch(points, n, tolerance, max_contacts, target, space):
 
 @kernel
 def _put_ring(points, n, n_corners, tolerance, target, space):
-    """Put the corners of the hull into ``target``, from the deepest on, which comes first though it be none; how many.
+    """Put the corners of the hull into ``target``, from the deepest point on, first even if no corner; how many.
 
     space.order : becomes the points' numbers.
     """
@@ -317,7 +318,7 @@ def _put_ring(points, n, n_corners, tolerance, target, space):
 
 @kernel
 def _put_inner(points, n, n_ring, tolerance, target, space):
-    """Append points that may carry to ``target``, where none of those around the patch is; how many there are then."""
+    """Append points that may carry to ``target``, away from all points around the patch; returns the new number."""
     p = points.manifold.points
     n_target = n_ring
     for i in range(n):

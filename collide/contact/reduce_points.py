@@ -1,4 +1,4 @@
-"""Manifold reduction: of more points than are wanted the deepest, and those that span the greatest area."""
+"""Manifold reduction: of more points than are wanted the deepest, and points spanning the greatest area."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from collide.kernels import kernel
 def select_points(manifold, n, first, max_points, order):
     """Numbers of at most ``max_points`` of n points around a polygon, beginning with ``first``; how many.
 
-    order : becomes them, counter-clockwise. Beyond ``max_points``: the first, the farthest from it, then one by one
-    those that add most area. O(n · max_points²).
+    order : becomes the numbers, counter-clockwise. Beyond ``max_points``: the first, the farthest from the first, then
+    point by point the largest added area. O(n · max_points²).
     """
     if n <= max_points:
         for k in range(n):
@@ -47,7 +47,7 @@ def select_points(manifold, n, first, max_points, order):
 
 @kernel(inline=True)
 def _added_area(points, n, first, order, n_taken, k):
-    """Area between a point and the side of a ring that it is beyond; its squared distance from a single point."""
+    """Area between a point and the side of a ring with the point outside; its squared distance from a single point."""
     p = POINT * _wrapped(first + k, n)
     if n_taken == 1:
         q = POINT * _wrapped(first, n)

@@ -1,8 +1,8 @@
-"""Separating translations of shallow overlaps: along which normals, and how far, facets that meet come apart.
+"""Separating translations of shallow overlaps: along which normals, and how far, meeting facets come apart.
 
-No single translation may separate two bodies that grip each other, so pairs of facets are separated group by group.
-Candidates for normals are those of facets and cross products of edges (`candidate_normals.py`). Two facets share points
-along a normal over an interval of translations, whose end is their depth along it (`contact_points.depth_along`).
+No single translation may separate two bodies gripping each other, so pairs of facets are separated group by group.
+Candidates are normals of facets and cross products of edges (`candidate_normals.py`). Two facets share points along a
+normal over an interval of translations, whose end is their depth along the normal (`contact_points.depth_along`).
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ STEP_ERRORS = 64.0
 
 @kernel
 def separate_pairs(pairs, A, B, error, limit, translations, points):
-    """Find translations, none longer than ``limit`` [m], that part the TOUCHING pairs, and put the number of one into
-    ``groups`` of each; whether pairs that meet have none.
+    """Find translations, no longer than ``limit`` [m], to part the TOUCHING pairs, and put the number of each pair's
+    translation into ``groups``; whether meeting pairs are left without a translation.
     """
     n_looked_at = first_candidates(pairs, translations)
     translations.counts[N_WAYS] = 0
@@ -82,7 +82,7 @@ def any_side_view(axes, error):
 
 @kernel(inline=True)
 def _is_before(pairs, k, n, A, B):
-    """Whether A's facet of the pair does not look against n, nor B's along it, by much: those come apart by going
+    """Whether A's facet of the pair does not look against n, nor B's along n, by much: other pairs come apart by going
     deeper in.
     """
     return facing_a(pairs, k, n, A) >= -_TURNED and facing_b(pairs, k, n, B) >= -_TURNED
@@ -90,7 +90,7 @@ def _is_before(pairs, k, n, A, B):
 
 @kernel
 def _part_at_once(pairs, A, B, error, limit, n, translations, points):
-    """Whether one translation along n parts all touching pairs; it is the only one then."""
+    """Whether a translation along n parts all touching pairs; stores the translation alone then."""
     view = any_side_view(axes_across(n), error)
     deepest = 0.0
     for k in range(pairs.n):
@@ -109,7 +109,7 @@ def _part_at_once(pairs, A, B, error, limit, n, translations, points):
 
 @kernel
 def _take_all(pairs, n, length, translations):
-    """Make one translation that of all touching pairs."""
+    """Assign a translation to all touching pairs."""
     _add_translation(n, length, translations)
     for k in range(pairs.n):
         if pairs.states[k] & TOUCHING:
@@ -121,10 +121,10 @@ def _take_all(pairs, n, length, translations):
 
 @kernel
 def _part_all(pairs, A, B, error, limit, translations, points):
-    """Whether `_group_pairs` would take one translation for all touching pairs; it is the only one then.
+    """Whether `_group_pairs` would take the same translation for all touching pairs; stores the translation alone then.
 
-    That is the shortest that parts all, at least half of which face along it, where it is not too long for what the
-    deepest pair needs. Most candidates are given up at the pair that was the deepest for the last.
+    Taken is the shortest translation to part all, with at least half of the pairs facing along its normal, unless too
+    long for the deepest pair's need. Most candidates are given up at the previous candidate's deepest pair.
     """
     best, best_length, best_faces_all, deepest = -1, math.inf, False, -1
     for i in range(translations.counts[N_CANDIDATES]):
@@ -153,10 +153,10 @@ def _part_all(pairs, A, B, error, limit, translations, points):
 
 @kernel
 def _length_for_all(pairs, A, B, error, max_length, n, first, points):
-    """(the length along n that parts all touching pairs, whether all face along it, which needs it); infinite beyond
-    ``max_length`` [m] and where fewer than half face along it.
+    """(the length along n to part all touching pairs, whether all face along n, the pair in need of the length);
+    infinite beyond ``max_length`` [m] and where fewer than half face along n.
 
-    first : a pair to begin with, −1 for none.
+    first : a pair to begin with, or −1.
     """
     view = any_side_view(axes_across(n), error)
     depth, deepest = 0.0, max(first, 0)
@@ -207,7 +207,7 @@ def _measure_depths(pairs, A, B, error, limit, translations, points):
 
 @kernel
 def _longest_needed(pairs, A, B, translations):
-    """The least length within which every pair that some translation separates is separated by one [m]."""
+    """The least length within which every separable pair is separated by some translation [m]."""
     longest = 0.0
     for k in range(pairs.n):
         if pairs.states[k] & TOUCHING:
@@ -223,8 +223,8 @@ def _longest_needed(pairs, A, B, translations):
 
 @kernel
 def _gain(pairs, A, B, i, limit, translations):
-    """What candidate i does for the pairs that have no group, within a length: how many it separates, by which length
-    all of them, how many of them face along it, and by which length these.
+    """Gain of candidate i for pairs without a group, within a length: (number of pairs separated, length to separate
+    them, number of these facing along the normal, length to separate these).
     """
     n = vec3_at(translations.normals, 3 * i)
     gained, needed, forward, needed_forward = 0, 0.0, 0, 0.0
@@ -241,7 +241,7 @@ def _gain(pairs, A, B, i, limit, translations):
 
 @kernel
 def _group_pairs(pairs, A, B, error, translations):
-    """Choose translations, the one that parts most pairs first, and put its number into their ``groups``."""
+    """Choose translations, always the next to part most pairs, and put its number into their ``groups``."""
     limit = _LONGER * _longest_needed(pairs, A, B, translations)
     while translations.counts[N_WAYS] < MAX_TRANSLATIONS:
         best, best_gain, best_length = -1, 0, math.inf
@@ -267,8 +267,8 @@ def _group_pairs(pairs, A, B, error, translations):
 
 @kernel
 def _take_group(pairs, A, B, i, length, translations):
-    """Make candidate i the translation of the pairs that it parts within a length and that face along it, and of those
-    linked with them, whichever way they face.
+    """Make candidate i the translation of pairs parted within a length and facing along its normal, and of parted pairs
+    linked with them, whichever way these face.
     """
     n = vec3_at(translations.normals, 3 * i)
     for k in range(pairs.n):

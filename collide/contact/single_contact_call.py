@@ -1,4 +1,4 @@
-"""Contacts of two convex sets at one pair of poses: from matrices to rows inside one kernel."""
+"""Contacts of two convex sets at a single pair of poses: from matrices to rows inside a kernel."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""What of a convex body supports the normal of a contact: a face, an edge, or a vertex.
+"""The feature of a convex body supporting the normal of a contact: a face, an edge, or a vertex.
 
-The face is the one, of those that meet at a vertex farthest along the normal, that faces it most; where none does,
-the least steep edge there counts, where none is flat enough, the vertex. Of a cylinder or a cone they are a polygon
-within an end, or a line on the side.
+Taken is, of the faces around a vertex farthest along the normal, the face most across the normal; where all are too
+steep, the least steep edge at the vertex; where all edges are too steep, the vertex. For a cylinder or a cone the
+feature is a polygon within an end, or a line on the side.
 
-Everything is seen along the normal: coordinates (u, v) across it, and the height h along it, from A's origin.
+Everything is seen along the normal: coordinates (u, v) across, and the height h along the normal, from A's origin.
 """
 
 from __future__ import annotations
@@ -66,15 +66,15 @@ class ContactAxes(NamedTuple):
 
 
 class SupportFace(NamedTuple):
-    """Corners of a body that support a direction, in a buffer: three doubles (u, v, h) each, and a feature each.
+    """Corners of a body supporting a direction, in a buffer: three doubles (u, v, h) each, and a feature each.
 
     n : of corners: 1 a vertex, 2 an edge, more a face, counter-clockwise seen from outside the body.
-    triangle : of the hull, −1 where there is none.
-    u, v, h : a point of the face's plane.   slope_u, slope_v : of the height h there; 0 but of faces.
-    flatness : how far what the corners stand for may be off that plane, or off an edge between them [m].
+    triangle : of the hull, or −1.
+    u, v, h : a point of the face's plane.   slope_u, slope_v : of the height h in the plane; 0 but of faces.
+    flatness : how far the body's true feature may be off the plane, or off an edge between the corners [m].
     round_p, round_q : radius of the body's surface across an edge at its first and its second corner, linear in
     between, 0 where the edge is sharp [m].
-    corners : view of the coordinates.   features, edges : of each corner, and of the edge from it to the next.
+    corners : view of the coordinates.   features, edges : of each corner, and of the edge from each to the next.
     feature : of the face as a whole.
     """
 
@@ -177,12 +177,13 @@ def support_face(pair, body, faces_at, axes, sign, shift, capacity, doubles_at, 
 
 @kernel
 def swept_face(face, sign, radius, error):
-    """The `SupportFace` of a body swept by a ball, from that of its core: the same corners moved by the radius along
-    the normal of the face, of an edge along what of nhat is across it, of a vertex along nhat.
+    """The `SupportFace` of a body swept by a ball, from its core's: the same corners moved by the radius along the
+    normal of a face, along nhat's part across an edge, along nhat for a vertex.
 
     The corners lie on the surface then, however far the core leans.   sign : as in `support_face`.
-    error : of a coordinate [m]. By it, or by its flatness, the direction of an edge of length l is known to 2·error/l,
-    that of a face of area A whose longest side is l to 2·error·l/A; swept, it is off by so much of the radius.
+    error : of a coordinate [m]. With this error, or the flatness, the direction of an edge of length l is known to
+    2·error/l, the normal of a face of area A and longest side l to 2·error·l/A; the swept face is off by the same share
+    of the radius.
     """
     if radius == 0.0 or face.n == 0:
         return face
@@ -242,8 +243,8 @@ def _hull_vertex(body, row, g):
 def _hull_corners(body, faces_at, g, facing, blur, corners, features, edges):
     """Put the corners of a hull's support into the buffers; (their number, triangle, normal, flatness, feature).
 
-    blur : what an end of an edge may be off by rounding [m]: an edge is as steep as it is then, so that one between
-    points that are two but for rounding never goes before a long one.
+    blur : rounding of an edge's end [m]: edges count as steep as this rounding may make them, so an edge between points
+    equal up to rounding never goes before a long edge.
     """
     row = view_i64(faces_at + 8 * FACE_INTS * body.shape, FACE_INTS)
     n_faces = row[N_FACES]
@@ -359,10 +360,10 @@ def _side_radii(pair, body):
 
 @kernel(inline=True)
 def _put_disc(x, y, radius, z, corners, features, edges):
-    """Corners of a regular octagon within a disc, one of them towards (x, y); counter-clockwise seen from outside.
+    """Corners of a regular octagon within a disc, one corner towards (x, y); counter-clockwise seen from outside.
 
-    Numbers turn with the body, and corners, too, but for the least angle that brings one of them there: at rest (x, y)
-    is the direction of a tilt of rounding size, another one each time.
+    Numbers of corners turn with the body, and so do the corners, up to the least angle to bring a corner to (x, y): at
+    rest (x, y) is the direction of a tilt of rounding size, different each time.
     """
     turn_c, turn_s = -1.0, 0.0
     for k in range(ROUND):

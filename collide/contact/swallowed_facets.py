@@ -1,11 +1,11 @@
-"""Facets of a mesh that lie wholly within a curved set, and which of them the convex engine is asked about.
+"""Facets of a mesh wholly within a curved set, and the choice of some for the convex engine.
 
-The engine tells the least translation of one facet in some tens of microseconds, and a finely cut mesh that has sunk
-into a set has ten thousands of facets within. Few of them can start a patch, and a patch needs no row of `distance` of
-the facets that it grows over. So of many the engine is asked about some, spread over the mesh: of each run of facets
-in the order of the tree the facet along whose own normal the set is left soonest. For a facet of normal n the least
-translation is no longer than h_facet(n) + h_set(−n), with h the support function (along n the two are apart by minus
-that), and exactly as long where the facet starts a patch with n.
+The engine tells the least translation of one facet in some tens of microseconds, and a finely cut mesh sunk into a set
+has ten thousands of facets within. Few of them can start a patch, and a patch grows over facets without rows of
+`distance`. So of many facets the engine is asked about some, spread over the mesh: of each run of facets in the order
+of the tree the facet along whose own normal the set is left soonest. For a facet of normal n the least translation is
+no longer than h_facet(n) + h_set(−n), with h the support function (along n the two are apart by minus this sum), and
+exactly as long where the facet starts a patch with n.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ _SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in 
 
 
 class Insides:
-    """Which points of a mesh's frame are proven within a curved set, at n pairs of poses.
+    """Proofs of points of a mesh's frame within a curved set, at n pairs of poses.
 
-    Of a point as placed in the set's frame each coordinate is off by ``errors`` (n,) at most [m]: what is within the
-    set by more than that is within it.
+    Each coordinate of a point as placed in the set's frame is off by ``errors`` (n,) at most [m]: a point deeper in the
+    set than its error is within the set.
     """
 
     def __init__(self, tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop):
@@ -80,7 +80,7 @@ class Insides:
 
 
 def meshes_within(body: Body, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop) -> np.ndarray | None:
-    """(n,) bool: whether a mesh of many facets is proven within a set, at n pairs of poses; None where it never is."""
+    """(n,) bool: whether a mesh of many facets is proven within a set, at n pairs of poses; None where at no pose."""
     # A ball around the mesh's box is less than twice as large as what holds the box.
     if not _knows(body, packed) or body.reach > 2.0 * packed.reach:
         return None
@@ -116,7 +116,7 @@ def facets_asked(
 
 def _ways_out(triangles: np.ndarray, enclosure: Enclosure, solid: bool) -> np.ndarray:
     """(m,) how far a set has to be moved along the normals of triangles (m, 3, 3) of its frame to be clear of their
-    planes, but for how far the polytope within it is from it [m]; ∞ without an area.
+    planes, but for the distance of the polytope within from the set's surface [m]; ∞ without an area.
     """
     assert enclosure.inner is not None
     points = np.unique(enclosure.inner.tree.triangles.reshape(-1, 3), axis=0)

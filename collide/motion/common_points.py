@@ -1,18 +1,18 @@
-"""When two meshes in motion are proven to meet by a point of one inside the other, a solid.
+"""When two meshes in motion are proven to meet by a facet's point of either inside the other, a solid.
 
-Facets prove a meeting where they cross clear of rounding. Facets of bodies that come together flush, face in face and
-edge on edge, never do: they touch, or lie in one plane. What is proven then is a point of a facet, its centre, inside
-the other body:
+Facets prove a meeting where they cross clear of rounding. Facets of bodies coming together flush, face in face and edge
+on edge, never do: they touch, or lie in the same plane. The proof is then a point of a facet, its centre, inside the
+other body:
 
     distance from all facets > e,   and they wind around it once or more,   at the poses as computed,
 
-where e bounds how far the true motion has the point and the facets from there. Moved in a line to where they truly
-are, facets never pass the point, so that they still wind around it as often. Points of a facet belong to a body,
-solid or not; only what is around them must be a solid.
+where e bounds how far the true point and facets are from the computed poses. Moved in a line to their true places,
+facets never pass the point, so they still wind around the point as often. Points of a facet belong to a body, solid or
+not; only the other body must be a solid.
 
-A centre is enough where bodies come together flush: a border of the region in which two faces lie on each other that
-is inside one of the faces is crossed by facets of the other body. Where no border is crossed, the region is a whole
-face of both, and the centres of its facets are within it.
+A centre is enough where bodies come together flush: where two faces lie on each other, a border of the common region
+inside either face is crossed by facets of the other body. Where no border is crossed, the region is a whole face of
+both, and the centres of its facets are within it.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Placed(NamedTuple):
 
 
 class CommonPoints:
-    """Facets of two meshes that may meet, A's and B's, and in which of the meshes points can be."""
+    """Facets of two meshes A and B that may meet, and whether points can be inside A and B."""
 
     def __init__(self, trees: list[MeshTree], corners: list[np.ndarray], are_solid: list[bool]):
         """trees : of A and B.   corners : (k, 3, 3) of facets of each.   are_solid : whether A and B are."""
@@ -56,7 +56,7 @@ class CommonPoints:
         self._centres = [some[:: -(-len(some) // _MAX_CENTRES)].mean(axis=1) for some in corners]
 
     def first_time(self, begin: float, place: Callable[[float], Placed], far: bool) -> float:
-        """The first of some times behind ``begin`` at which a centre is proven inside the other mesh, or infinity.
+        """The first of some times after ``begin`` when a centre is proven inside the other mesh, or infinity.
 
         place : where both are at a time, 0 … 1.   far : look far ahead; else next to ``begin`` only.
         """

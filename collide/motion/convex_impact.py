@@ -1,15 +1,14 @@
 """When two convex sets in motion first touch: conservative advancement along kept axes.
 
 Conservative advancement (Mirtich 1996; van den Bergen, "Collision detection in interactive 3D environments", 2004)
-goes forward in time only as far as no contact can be. A step here: GJK gives an axis between the bodies; along it the
-gap is followed, `kept_axis.py` proving each span free, until the axis is used up, and GJK gives the next. Near the
-contact steps shrink as the square of what is left. What the doubles say is a proposal; a span counts where its chord is
-proven.
+goes forward in time only as far as no contact can be. A step here: GJK gives an axis between the bodies; along the axis
+the gap is followed, `kept_axis.py` proving each span free, until the axis is used up, and GJK gives the next. Near the
+contact steps shrink as the square of the time left. Doubles propose a span; the span counts where its chord is proven.
 
-Where bodies are about to touch, the pair is asked a little later than the gap's root: if GJK proves contact there, the
-first contact is between that and the last time that is proven free.
+Where bodies are about to touch, the pair is asked a little later than the gap's root: if GJK proves contact then, the
+first contact is between the last time proven free and the time asked.
 
-Before all that, balls about the origins bound the time in which contact is possible at all.
+First of all, balls about the origins bound the time in which contact is possible at all.
 """
 
 from __future__ import annotations
@@ -115,10 +114,11 @@ def _is_contact(row):
 
 @kernel
 def search_contact(motion, asking, begin, end, tolerance):
-    """The `Search` for the first contact in begin … end; the row at ``asking.row_at`` becomes that of its lower time.
+    """The `Search` for the first contact in begin … end; the row at ``asking.row_at`` becomes the row of its lower
+    time.
 
     Before ``begin`` the pair is known to be free.
-    tolerance : the bracket's width [unit time] that is to be reached if it can be.
+    tolerance : the bracket's width to reach, if possible [unit time].
     """
     first = begin
     if not motion.is_plane:
@@ -195,9 +195,9 @@ def _is_near(gap, tolerance):
 
 @kernel(inline=True)
 def _axis_of(motion, row):
-    """The normal of a row, as it will turn while the features that are nearest stay the same.
+    """The normal of a row as an axis, turning as the normal does while the nearest features stay the same.
 
-    Of a face, or of an edge against a point, with that body; of two edges across both. Curved cores name no features.
+    With the body of a face, or of an edge against a point; across both of two edges. Curved cores name no features.
     """
     n = vec3_at(row.doubles, NORMAL)
     if motion.is_plane:
@@ -215,7 +215,8 @@ def _axis_of(motion, row):
 
 @kernel
 def _next_axis(motion, row, n_before, passed):
-    """`_axis_of`; beside a curved core, unless a face is nearest, it goes on turning as it did since the last one."""
+    """`_axis_of`; beside a curved core, unless a face is nearest, an axis turning at the mean rate since the last
+    axis."""
     axis = _axis_of(motion, row)
     if (motion.pair.A.kind == POINTS and motion.pair.B.kind == POINTS) or motion.is_plane:
         return axis
@@ -244,7 +245,7 @@ def _n_distinct(row, first, count):
 
 @kernel
 def _turn_across(motion, n, row):
-    """Ω with which n stays across an edge of A and one of B: Ω·(n × e) = ω·(n × e) for both."""
+    """Ω of an n that stays across an edge of A and an edge of B: Ω·(n × e) = ω·(n × e) for both."""
     omega_a, omega_b = omega_of(motion.a), omega_of(motion.b)
     m_a = cross(n, _edge(motion.pair, motion.pair.A, row, VERTICES_A))
     m_b = cross(n, _edge(motion.pair, motion.pair.B, row, VERTICES_B))
@@ -270,7 +271,7 @@ def _edge(pair, body, row, first):
 
 @kernel
 def _follow_axis(motion, time, gap, end):
-    """(time up to which the axis proves that the pair is free, the `AxisGap` there); the pair is placed anywhere.
+    """(time up to which the axis proves the pair free, the `AxisGap` then); leaves the pair's poses at any time.
 
     gap : at ``time``, positive.   end : no later than this.
     """
@@ -301,10 +302,10 @@ def _follow_axis(motion, time, gap, end):
 
 @kernel
 def _good_axis(motion, time, gap, last_gap, lower):
-    """The `AxisGap` of the pair as it is placed, of the better of two axes and of some between them.
+    """The largest `AxisGap` of the pair as placed, of two axes and some between them.
 
-    gap : along the normal that GJK ends with. Beside curved cores that may be worse than the plane that proved its
-    bound ``lower``: the simplex is thin, the normal that of its last sliver.
+    gap : along GJK's last normal. Beside curved cores this gap may be worse than the plane behind the proven bound
+    ``lower``: the simplex is thin, the normal is its last sliver's.
     last_gap : at the same time, or without a gap.
     """
     if gap.gap > 0.5 * lower or motion.is_plane or not last_gap.gap > -math.inf:

@@ -61,7 +61,7 @@ class _OfThread(local):
 
 
 class SinglePair:
-    """Two shapes of one convex part each, ready for motions one at a time."""
+    """Two shapes of a single convex part each, prepared for single motions."""
 
     def __init__(self, bodies: _Bodies, a: int, b: int):
         self._table, self._parts = bodies.table, bodies.parts  # the bodies hold this pair
@@ -69,8 +69,8 @@ class SinglePair:
         self._of_thread = local()
 
     def ask(self, matrices: tuple, tolerance: float) -> TimeOfImpact | None:
-        """The answer for poses (4, 4) of A and B at both ends; None where it takes more than this, as of bodies in
-        contact at the start, or an error has to be raised."""
+        """The answer for poses (4, 4) of A and B at both ends; None where the general way must answer: bodies in
+        contact at the start, undecided starts, arguments to refuse."""
         for X in matrices:
             if type(X) is not np.ndarray or X.dtype != np.float64 or X.shape != (4, 4) or not X.flags.c_contiguous:
                 return None
@@ -135,7 +135,7 @@ class _Bodies:
 
     def jobs(self, a: np.ndarray, b: np.ndarray, first: int, motions: Motions) -> np.ndarray:
         """(k, JOB) every part of A with every part of B, motion by motion, for shapes a and b of motions from ``first``
-        on; in an order that does not depend on which of them is A."""
+        on; in an order independent of the shapes' roles as A and B."""
         if self.is_simple:
             row_a, row_b = self.first[a], self.first[b]
             return np.ascontiguousarray(np.array([np.arange(first, first + len(a)), row_a, row_a, row_b, row_b]).T)
@@ -168,8 +168,8 @@ class _Bodies:
 def parts_in_turn(
     A: Shape, B: Shape, motion: Motions, upper: Callable[[], float], max_pairs: int, tolerance: float
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """`parts_ahead` of two shapes; beside a far smaller union one part of the larger at a time, in the order in which
-    they meet a ball around the smaller: all parts of that lie within the ball, so that no contact is earlier."""
+    """`parts_ahead` of two shapes; beside a far smaller union part by part of the larger union, by the time of meeting
+    a ball around the smaller: all parts of the smaller union lie within the ball, so no contact is earlier."""
     unions = compound_parts(A), compound_parts(B)
     reaches = [math.inf if union.unbounded else reach_of_union(union) for union in unions]
     large = 0 if reaches[0] > reaches[1] else 1
@@ -191,9 +191,9 @@ def _times_of_ball(
     A: Shape, B: Shape, large: int, ball: tuple[float, float], motion: Motions, end: float, tolerance: float
 ) -> np.ndarray:
     """(k,) times before which the parts of A, or B where ``large`` is 1, do not meet a ball around the other's origin:
-    infinity of those that do not up to ``end``.
+    infinity without contact up to ``end``.
 
-    ball : (radius, slop) of it [m].
+    ball : (radius, slop) [m].
     """
     bodies = bounds_of(A, B)
     which = large if len(bodies.counts) > 1 else 0
@@ -213,7 +213,8 @@ def _times_of_ball(
 
 
 def _bodies_of(shapes: list[Shape], slot: str = "_moving") -> _Bodies:
-    """Those of one pair are kept with A, in a slot: a simulator asks about the same two again and again."""
+    """Prepared bodies of a list of shapes; of a pair kept with A, in a slot: a simulator asks about the same two again
+    and again."""
     if len(shapes) > 2:
         return _Bodies(shapes)
     bodies = prepared_pair(shapes[0], shapes[-1], slot)
@@ -226,11 +227,11 @@ def _bodies_of(shapes: list[Shape], slot: str = "_moving") -> _Bodies:
 def earliest_times(
     A: Shape, B: Shape, motion: Motions, pairs: tuple[np.ndarray, np.ndarray], end: float, tolerance: float
 ) -> np.ndarray:
-    """(k,) times before which parts of A and of B, pair by pair, have no contact in one motion: infinity of those that
-    have none up to ``end``.
+    """(k,) times before which parts of A and of B, pair by pair, have no contact in a motion: infinity without contact
+    up to ``end``.
 
-    pairs : parts of A and of B (k,). Of a mesh the convex set around it is asked, which meets all that the mesh meets:
-    time of contact of the sets ≤ time of contact of the parts. Some microseconds a pair.
+    pairs : parts of A and of B (k,). A mesh is replaced by the convex set around its points: time of contact of the
+    sets ≤ time of contact of the parts. Some microseconds a pair.
     """
     return earliest_of(_search_bounds(A, B, motion, pairs, np.arange(len(pairs[0])), end, tolerance)[1])
 
@@ -238,10 +239,10 @@ def earliest_times(
 def first_pair(
     A: Shape, B: Shape, motion: Motions, pairs: tuple[np.ndarray, np.ndarray], end: float, tolerance: float
 ) -> tuple[int, float] | None:
-    """(which of some pairs of parts, as of `earliest_times`, has the convex sets that meet first; a time before which
-    none meet); None where none do.
+    """(number of the pair of parts, as of `earliest_times`, whose convex sets meet first; a lower bound of the
+    contact's time); None without a contact.
 
-    Each is searched no farther than to the first contact of those before: less work than the times of all.
+    Each pair is searched no farther than to the first contact of the pairs before: less work than the times of all.
     """
     which, row = _search_bounds(A, B, motion, pairs, np.zeros(len(pairs[0]), dtype=np.int64), end, tolerance)
     at = np.flatnonzero((which == (row["part_a"][0], row["part_b"][0])).all(axis=1)) if len(row) else row
@@ -266,13 +267,13 @@ def bounds_of(A: Shape, B: Shape) -> _Bodies:
 
 
 def earliest_of(rows: np.ndarray) -> np.ndarray:
-    """(k,) times before which rows have no contact; infinity where there is none at all."""
+    """(k,) times before which rows have no contact; infinity of rows proven free."""
     is_open = rows["status"] > OPEN_START  # nothing is known of these; what is wrong with them is for others to say
     return np.where(rows["status"] == FREE, math.inf, np.where(is_open, 0.0, rows["lower"]))
 
 
 def single_impact(A: Any, B: Any, matrices: tuple, tolerance: float) -> TimeOfImpact | None:
-    """The answer for two shapes that were asked about before; None where there is none, as in `SinglePair.ask`."""
+    """The answer for two shapes asked about before; None where not prepared, or as in `SinglePair.ask`."""
     bodies = prepared_pair(A, B, "_moving")
     return None if bodies is None or bodies.single is None else bodies.single.ask(matrices, tolerance)
 

@@ -1,4 +1,4 @@
-"""Many motions of convex parts in one kernel: one job a pair of parts, one row a motion."""
+"""Many motions of convex parts in one kernel: a job for each pair of parts, a row for each motion."""
 
 from __future__ import annotations
 
@@ -70,10 +70,11 @@ class Span(NamedTuple):
 
 @entry("int64(int64, int64, int64, float64, float64, float64, int64)")
 def find_impacts(header_at, jobs_at, n, begin, end, tolerance, rows_at):
-    """Do n jobs, those of one motion one after another, for the time begin … end; returns 0. Before they are free.
+    """Do n jobs, jobs of the same motion side by side, for the time begin … end, with all known to be free before;
+    returns 0.
 
-    rows : one a motion, as `clear_impacts` leaves it. A row keeps the earliest of what its jobs find, and what is
-    proven to be no earlier than a proven contact is not looked at.
+    rows : one for each motion, as `clear_impacts` leaves them. A row keeps the earliest contact of its jobs; times
+    proven no earlier than a proven contact are not searched.
     """
     header = view_i64(header_at, HEADER)
     motions = Motions(
@@ -89,9 +90,9 @@ def find_impacts(header_at, jobs_at, n, begin, end, tolerance, rows_at):
 
 @entry("int64(int64, int64, int64, int64, int64, int64)")
 def begin_single(header_at, XA0_at, XA1_at, XB0_at, XB1_at, row_at):
-    """Make ready for one motion: 0, or −1 where a matrix is no pose.
+    """Prepare a single motion: 0, or −1 where a matrix is no pose.
 
-    header : for `find_impacts`, which is to have the addresses of the matrices.   row : of the answer.
+    header : for `find_impacts`; gets the addresses of the matrices.   row : of the answer.
     """
     header = view_i64(header_at, HEADER)
     poses = view_f64(header[POSES_AT], 2 * POSE)

@@ -247,7 +247,7 @@ def _checked_omega(omega, name: str) -> tuple[np.ndarray | None, bool]:
 
 
 def _leads_elsewhere(name: str, start: str, end: str, has_omega: bool) -> str:
-    """What poses lack that no motion joins. name : of the angular velocity, with its value where there is one."""
+    """Why no motion joins two poses. name : of the angular velocity, with its value if given."""
     if has_omega:
         return f"{name} does not turn {start} into the orientation of {end}; collide.moved_poses makes end poses"
     return f"no rotation turns {start} into {end}: both must be rotations to 1e-4"
@@ -313,7 +313,7 @@ def _ask_start(question: _Question, rows: np.ndarray, some: np.ndarray) -> None:
 
 
 def _describe_start(question: _Question, rows: np.ndarray) -> None:
-    """Normal and points of bodies that are in contact at the start, and whether that is proven: as `distance` has
+    """Normal and points of bodies in contact at the start, and whether the contact is proven: as `distance` has
     them."""
     some = np.flatnonzero((rows["status"] == CONTACT) & (rows["upper"] == 0.0))
     if not len(some):

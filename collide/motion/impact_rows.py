@@ -25,12 +25,12 @@ IMPACT_DTYPE = np.dtype(
 class TimeOfImpact(NamedTuple):
     """First contacts of moving bodies, in units of the motions' time.
 
-    hit : (N,) bool. False: proven free of contact from 0 to 1. True: they touch, or that is open (``certified``).
-    time : ``lower`` of hits: up to it the bodies are proven apart, so moving to it never lets them overlap. 1 of free
-        motions.
+    hit : (N,) bool. False: proven free of contact from 0 to 1. True: they touch, or touching is open (``certified``).
+    time : ``lower`` of hits: the bodies are proven apart until then, so moving to ``time`` never lets them overlap. 1
+        of free motions.
     lower, upper : the first contact is at lower ≤ t ≤ upper, proven; both 0 for bodies in contact at the start, both 1
         for free motions. ``upper`` is inf where contact is not proven: the bodies come within rounding of each other
-        at ``lower``, and what follows is open.
+        at ``lower``, and the rest of the motion is open.
     certified : the answer is proven, and upper − lower is within the tolerance.
     normal : unit vector from A to B in W at ``time``; zeros for free motions, and for meshes that overlap at the start.
     point_a, point_b : nearest points of A and B in W at ``time`` [m]; zeros for free motions.
@@ -82,7 +82,8 @@ def as_result(rows: np.ndarray, tolerance: float, single: bool) -> TimeOfImpact:
 
 
 def single_result(row: np.ndarray, tolerance: float) -> TimeOfImpact | None:
-    """The same of one motion of two convex parts; None of one that begins in contact, or may, or is refused."""
+    """`TimeOfImpact` of a motion of two convex parts; None for motions with a proven or possible contact at the start,
+    or refused."""
     status, values = int(row["status"][0]), row.view(np.float64)[:DOUBLES_OF_ROW].copy()
     if status == FREE:
         lower = upper = 1.0

@@ -1,26 +1,26 @@
-"""A separating axis kept over a span of time: what two gaps along it prove about all that lies between.
+"""A separating axis kept over a span of time: what two gaps along the axis prove about the time between.
 
-Let n(τ) be a unit vector that turns with a constant angular velocity Ω: with the world (Ω = 0), with A or with B. For
+Let n(τ) be a unit vector turning with a constant angular velocity Ω: with the world (Ω = 0), with A or with B. For
 points a of A and b of B let f(τ) = n(τ)·(x_b(τ) − x_a(τ)), and F(τ) the least of all f(τ) less the radii: the gap along
 n, a lower bound of the distance. If f″ ≤ K for all points, f lies above its chord by no less than −K/2 (τ − t0)(t1 −
-τ), and so does the least of them. With s0 = F(t0) > 0 and s1 = F(t1) > 0 therefore
+τ), and so does F. With s0 = F(t0) > 0 and s1 = F(t1) > 0 therefore
 
     F > 0 on the whole of [t0, t1]   if   K (t1 − t0)² / 2  <  (√s0 + √s1)².
 
-Proof: (1 − x) s0 + x s1 − c x (1 − x), c the left side, has its minimum s0 − (s0 + c − s1)² / 4c, if that lies within
-0 < x < 1; it is positive where s0 + c − s1 < 2 √(c s0), which is (√c − √s0)² < s1. A step is long as the root of the
-gap, where motion bounds of first order (Mirtich 1996; Zhang et al. 2006, C2A: Tang, Kim and Manocha 2009) allow one in
-proportion to the gap; for translations K = 0, and one axis proves all of a motion that it separates at both ends.
-Between features that stay the same one axis serves up to the contact (Catto, "Continuous collision", 2013: axes of
-points and of faces), here by a chord that is proven instead of samples.
+Proof: (1 − x) s0 + x s1 − c x (1 − x), c the left side, has its minimum s0 − (s0 + c − s1)² / 4c, if at all within 0 <
+x < 1; the minimum is positive where s0 + c − s1 < 2 √(c s0), equivalently (√c − √s0)² < s1. Steps are as long as the
+root of the gap, where motion bounds of first order (Mirtich 1996; Zhang et al. 2006, C2A: Tang, Kim and Manocha 2009)
+allow steps in proportion to the gap; for translations K = 0, and an axis with gaps at both ends proves the whole
+motion. While the nearest features stay the same, one axis serves up to the contact (Catto, "Continuous collision",
+2013: axes of points and of faces), here by a proven chord instead of samples.
 
-Bound of f″, with x = x_b − x_a, r_a and r_b from the bodies' own origins, v the relative velocity of these, d from one
-to the other (`curvature`): differentiating twice,
+Bound of f″, with x = x_b − x_a, r_a and r_b from the bodies' own origins, v the relative velocity of these, d from A's
+to B's (`curvature`): differentiating twice,
 
     f″ = n·(x″ − 2 Ω × x′ + Ω × (Ω × x)),    x″ = ω_B × (ω_B × r_b) − ω_A × (ω_A × r_a),
 
-what multiplies r_b is (ω_B − Ω) × ((ω_B − Ω) × r_b) + (ω_B × Ω) × r_b by Jacobi's identity, likewise for r_a, and the
-rest is −2 Ω × v + Ω × (Ω × d). What D of `moving_body.py` adds is τ n·Dr: at most (2|Ω| + |Ω|²)|D r|.
+the factor of r_b is (ω_B − Ω) × ((ω_B − Ω) × r_b) + (ω_B × Ω) × r_b by Jacobi's identity, likewise for r_a, and the
+rest is −2 Ω × v + Ω × (Ω × d). D of `moving_body.py` adds τ n·Dr: at most (2|Ω| + |Ω|²)|D r|.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _OUTWARD = 1.0 + 2.0**-40
 
 
 class TurningAxis(NamedTuple):
-    """A unit vector n from A to B at some time, and the constant angular velocity Ω that it turns with.
+    """A unit vector n from A to B at some time, turning with constant angular velocity Ω.
 
     speed : |Ω|.   about : Ω / |Ω|, or 0.
     """
@@ -69,8 +69,8 @@ class TurningAxis(NamedTuple):
 
 
 class AxisGap(NamedTuple):
-    """gap : proven lower bound of F at a time [m].   rate : of the support points there, n·x less the turn of n [m in
-    unit time].   axis : the `TurningAxis` there."""
+    """gap : proven lower bound of F at a time [m].   rate : of change of n·x for the support points at the time, the
+    turn of n included [m / unit time].   axis : the `TurningAxis`."""
 
     gap: float
     rate: float
@@ -102,9 +102,9 @@ def turned_axis(axis, passed):
 
 @kernel
 def gap_along(motion, time, axis):
-    """The `AxisGap` of a pair whose poses are those at ``time``, along an axis as it is then.
+    """The `AxisGap` of a pair at its poses of ``time``, along an axis of the same time.
 
-    A half-space has one axis alone, its own, which turns with it.
+    A half-space has a single axis: its normal, turning with the body.
     """
     if motion.is_plane:
         return _gap_of_plane(motion, time)

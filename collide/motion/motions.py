@@ -19,7 +19,7 @@ class Motions(NamedTuple):
     omega_WB: np.ndarray | None
 
     def picked(self, some: np.ndarray) -> Motions:
-        """Those of these numbers; what goes with all stays as it is."""
+        """Motions by their numbers; a single pose for all stays as given."""
         columns: list[Any] = [X if X is None or len(X) == 1 else np.ascontiguousarray(X[some]) for X in self]
         return Motions(*columns)
 

@@ -1,23 +1,23 @@
-"""One body in motion, and where it is at a time: what its poses at both ends mean in between.
+"""A body in motion, and its pose at a time: what its poses at both ends mean in between.
 
-In unit time a body's origin moves on a line, and the body turns about it with constant angular velocity:
+In unit time a body's origin moves on a line, and the body turns about the origin with constant angular velocity:
 
     p(τ) = p0 + τ (p1 − p0),
     R(τ) = Rot(τω) R0 + τ D,      D = R1 − Rot(ω) R0,      0 ≤ τ ≤ 1.
 
-ω is the doubles of `rotation_between` or those given. D is what rounding, and matrices that are no rotations to the
-last digit, leave: nothing but that. It makes the motion begin and end at the very numbers given, so that these stay the
+ω is the doubles of `rotation_between` or as given. D is the remainder left by rounding, and by matrices that are no
+rotations to the last digit. With D the motion begins and ends at the very numbers given, so that these stay the
 problem. Everything else is exact reals, and the poses computed here miss them by at most the slop written down:
 
     rotation      160 u (1 + |ω|) ρ + u·drift      (ρ: how far points of the core are from the body's origin)
     translation   16 u (|d0| + |d1|)               (d: from A's origin to B's; u = 2⁻⁵³)
 
 Derivation: û is good to 4u, the angle to 3u·|ω|, sine and cosine to 2u; so an entry of Rot is good to 20u and 3u·|ω| of
-its row's turn, its product with R0 to 3u more of what it sums; Frobenius' norm of all nine is at most 70u + 3u·|ω|. D
-is off by as much at the end of the motion, in proportion before, and its sum with the rest by a rounding: 144u +
+its row's turn, its product with R0 to 3u more of the sums' terms; Frobenius' norm of all nine is at most 70u + 3u·|ω|.
+D is off by as much at the end of the motion, in proportion before, and its sum with the rest by a rounding: 144u +
 6u·|ω|. d0, d1, their difference, product with τ and sum round once each, coordinate by coordinate.
 
-Positions are taken from A's origin as it moves, so that precision does not depend on where in the world the bodies are.
+Positions are taken from A's moving origin, so that precision does not depend on where in the world the bodies are.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def set_body(body, X0, X1, omega_given, has_omega, part, at, reach):
 
     X0, X1 : views of 16 doubles, the body's poses at both ends.
     omega_given : view of three doubles, the angular velocity [rad in unit time, in W], read where ``has_omega``.
-    part : view of rows of parts, of which the one that begins at ``at`` says where the core is in the body.
+    part : view of rows of parts; the row from ``at`` on is the core's pose in the body.
     reach : greatest distance of a point of the core from its own frame's origin [m].
     """
     omega = vec3_at(omega_given, 0) if has_omega else rotation_between(X0, X1)

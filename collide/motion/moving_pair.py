@@ -27,8 +27,8 @@ _UNIT = 2.0**-53
 
 
 class BodyMotion(NamedTuple):
-    """What is said of one body's motion: views of X0 and X1 (16 doubles each), ω (3) and whether it counts; a view of
-    rows of parts, and where the row of its part begins."""
+    """A body's motion as given: views of X0 and X1 (16 doubles each), ω (3) and whether ω counts; a view of rows of
+    parts, and where the row of its part begins."""
 
     X0: Any
     X1: Any
@@ -114,7 +114,7 @@ def origin_of_b(motion, time):
 
 @kernel
 def place_pair(motion, time):
-    """The pair's poses become those at a time, from A's origin as it is then."""
+    """Set the pair's poses to the poses at a time, from A's origin then."""
     poses = motion.pair.poses
     place_body(motion.a, time, poses, 0, Vec3(0.0, 0.0, 0.0), 0.0)
     place_body(motion.b, time, poses, POSE, origin_of_b(motion, time), origin_error(motion.farthest))

@@ -1,8 +1,8 @@
-"""Pairs of parts of two unions in one motion, in the order of the spans of time in which they may first meet.
+"""Pairs of parts of two unions in a motion, in the order of the spans of time in which they may first meet.
 
-In a span of length h no point of one union comes nearer the other than μ h / 2 to where it is at the middle
-(`span_bounds.py`, for the unions as a whole). Parts whose boxes are farther apart there do not meet in the span. Spans
-in which too many may are cut in half.
+In a span of length h points of the two unions come nearer each other by at most μ h / 2 from the middle of the span on
+(`span_bounds.py`, for the unions as a whole). Parts whose boxes are farther apart at the middle do not meet in the
+span. Spans with too many remaining pairs are cut in half.
 """
 
 from __future__ import annotations
@@ -61,10 +61,10 @@ class Spans:
 def parts_ahead(
     A: CompoundParts, B: CompoundParts, motion: Motions, upper: Callable[[], float], max_pairs: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yields (parts of A, parts of B) (k,), ascending, of pairs that were not named before, span by span: all that may
+    """Yields (parts of A, parts of B) (k,), ascending, of pairs not yielded before, span by span: no other pairs
     meet before a time.
 
-    upper : that time, which may have become less meanwhile.   max_pairs : so many pairs are named before a span is cut.
+    upper : gives the time, which may shrink meanwhile.   max_pairs : a span with more pairs is cut.
     """
     named = np.zeros((len(A.parts), len(B.parts)), dtype=bool)
     parts = np.zeros((2, PART))
@@ -97,15 +97,15 @@ def parts_ahead(
 
 
 def _boxes_near(A: CompoundParts, B: CompoundParts, out: np.ndarray) -> np.ndarray:
-    """(2, k) parts of A and of B that may meet in a span of which ``out`` tells."""
+    """(2, k) parts of A and of B that may meet in a span, described by ``out``."""
     X_A, X_B = out[:16].reshape(4, 4).copy(), out[16:32].reshape(4, 4).copy()
     reach = float(out[REACH]) + _turn_together(A, B, X_A, X_B)
     return np.stack(boxes_near(A, B, X_A[None], X_B[None], reach)[1:])
 
 
 def _turn_together(A: CompoundParts, B: CompoundParts, X_A: np.ndarray, X_B: np.ndarray) -> float:
-    """Turn both, in place, so that a body of one part stands along the axes, where its box is tight; returns what
-    rounding takes from distances thereby [m]."""
+    """Turn both, in place, until a body of a single part stands along the axes, where its box is tight; returns how
+    much rounding of the turn may take from distances [m]."""
     if len(A.parts) > 1 and len(B.parts) > 1:
         return 0.0
     Q, _ = np.linalg.qr(X_B[:3, :3] if len(B.parts) == 1 else X_A[:3, :3])  # a rotation or mirror, to rounding

@@ -1,14 +1,14 @@
-"""A small body on its way past a large mesh: the facets that it may come near, and when it may first meet them.
+"""A small body on its way past a large mesh: the facets near the way, and a lower bound of the first contact.
 
 As seen from the mesh's body, the origin of a piece of the small body is at z = Rot_Lᵀ w, w = d + Rot_S a: d leads from
-one body's origin to the other's and changes by v in unit time, a from the small body's origin to its piece's. Since
-z″ = Rot_Lᵀ (w″ − 2 ω_L × w′ + ω_L × (ω_L × w)), its acceleration is at most
+the mesh body's origin to the small body's and changes by v in unit time, a from the small body's origin to its piece's.
+Since z″ = Rot_Lᵀ (w″ − 2 ω_L × w′ + ω_L × (ω_L × w)), its acceleration is at most
 
     K = |ω_S|² |a| + 2 |ω_L| (|v| + |ω_S| |a|) + |ω_L|² (|d| + |a|),
 
-and in a span of length h it is within K h² / 8 of the chord between where it is at both ends. The chord swept by a ball
-of that and of the piece's reach holds the piece all the time: facets outside are free in the span. The ball in which
-the piece moves (`span_bounds.py`) holds all facets that are as near as the way is long.
+and in a span of length h the origin is within K h² / 8 of the chord between its places at both ends. The chord swept by
+a ball of radius K h² / 8 plus the piece's reach holds the piece all the time: facets outside are free in the span. The
+ball in which the piece moves (`span_bounds.py`) holds all facets as near as the way is long.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ _ROUNDING = 2.0**-40
 def facets_on_path(
     spans: Spans, tree: MeshTree, side: int, begin: float, end: float, max_facets: int
 ) -> np.ndarray | None:
-    """(k,) facets of a mesh that the other piece may come near in a span of time; None of more than about
-    ``max_facets``, or where that leaves the chord by more than its reach.
+    """(k,) facets of a mesh near the other piece's way in a span of time; None for more than about
+    ``max_facets``, or where the piece may leave the chord by more than its reach.
 
     spans : of a mesh, its ``side`` 0 or 1, and the other piece.   tree : of the mesh.
     """
@@ -83,11 +83,12 @@ def earliest_by_facets(
     spans: Spans, corners: np.ndarray, slop: float, side: int, movers: tuple[ShapeTable, np.ndarray, np.ndarray],
     span: tuple[float, float], tolerance: float,
 ) -> np.ndarray:
-    """(n,) times before which convex sets have no contact with any of some facets: infinity of those that have none in
-    the span.
+    """(n,) times before which convex sets have no contact with any of some facets: infinity without contact in the
+    span.
 
     spans : of the mesh, its ``side`` 0 or 1, whose row of parts is read.   corners : (k, 3, 3) of the facets.
-    slop : of the mesh [m].   movers : table of the sets, which rows of it (n,), and their rows of parts (n, PART).
+    slop : of the mesh [m].   movers : table of the sets, their rows in the table (n,),
+    and their rows of parts (n, PART).
     """
     table, rows, parts = movers
     k, n = len(corners), len(rows)

@@ -1,4 +1,4 @@
-"""Where bodies in motion are: their poses at times, from one kernel, so that everybody asks about the same motion."""
+"""Where bodies in motion are: their poses at times, from one kernel, so all callers ask about the same motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motions of which a body is a region of half-spaces: closed by a box that holds the other body all the time."""
+"""Motions with a region of half-spaces as a body: the region closed by a box around the whole way of the other body."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _UP = 1 + 2.0**-20
 def with_regions_closed(
     shapes: list[Shape], a: np.ndarray, b: np.ndarray, motions: Motions
 ) -> tuple[list[Shape], np.ndarray, np.ndarray]:
-    """(shapes, numbers of A, of B) with regions closed; those of a pair of which neither has an end stay.
+    """(shapes, numbers of A, of B) with regions closed; regions of a pair of unbounded shapes stay.
 
-    shapes : distinct ones.   a, b : (n,) which of them A and B are, motion by motion.
+    shapes : distinct.   a, b : (n,) numbers of the shapes A and B, motion by motion.
     """
     is_region = np.array([shape.is_region for shape in shapes], dtype=bool)
     if not is_region.any():

@@ -36,12 +36,12 @@ def rotation_about(axis, angle):
 
 @kernel
 def rotation_between(X0, X1):
-    """The rotation vector ω of the shortest turn from the orientation of X0 to that of X1: Rot(ω) R0 = R1.
+    """The rotation vector ω of the shortest turn from the orientation of X0 to the orientation of X1: Rot(ω) R0 = R1.
 
     X0, X1 : views of 16 doubles, matrices row by row. Equal orientations give exactly 0.
-    Half a turn goes about the axis whose first coordinate that is not 0 is positive.
+    Half a turn goes about the axis whose first coordinate ≠ 0 is positive.
 
-    The quaternion of R1 R0ᵀ by its largest component (Shepperd 1978), which is well-conditioned for all angles.
+    The quaternion of R1 R0ᵀ by its largest component (Shepperd 1978): well-conditioned for all angles.
     """
     xx, xy, xz = _entry(X1, X0, 0, 0), _entry(X1, X0, 0, 1), _entry(X1, X0, 0, 2)
     yx, yy, yz = _entry(X1, X0, 1, 0), _entry(X1, X0, 1, 1), _entry(X1, X0, 1, 2)

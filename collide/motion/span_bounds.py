@@ -1,4 +1,4 @@
-"""A span of time of two pieces in motion: where they are at its middle, and how near that lets them come.
+"""A span of time of two pieces in motion: their poses at its middle, and how much nearer they may come.
 
 Facets that may meet in the span are within μ h / 2 at its middle, h its length, μ of `speed_bound.py`.
 """

@@ -1,8 +1,8 @@
 """How fast points of one body in motion come nearer the other: motion bounds of first order.
 
 Mirtich ("Impulse-based dynamic simulation of rigid body systems", 1996) bounds the speed of a body's points by |v| +
-|ω| ρ. Here it is the least of three bounds, as seen from the world, from A and from B. From A, a point r of B's, whose
-origin is at d, moves by
+|ω| ρ. Here the least of three bounds counts, as seen from the world, from A and from B. From A, a point r of B, with
+B's origin at d, moves by
 
     v + ω_B × r − ω_A × (d + r)  =  (v − ω_A × d) + (ω_B − ω_A) × r :
 

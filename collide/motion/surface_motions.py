@@ -1,12 +1,12 @@
 """Motions of bodies with meshes among their pieces: spans of time, facets that may meet in them, and a job a facet.
 
-A piece is a mesh or a convex shape at a pose in its body. In a span of length h around its middle no point of one body
-comes nearer the other than μ h / 2, μ a bound of the speed of one body seen from the world, from A or from B (motion
-bounds, Mirtich 1996). Facets farther apart than that at the middle are free in all of the span (facets_within: a
-traversal of both trees). The others, if they are few, are jobs for `impact_jobs.py`, in this span alone; else the span
-is cut in two. Spans come in order of time, so the first one with a contact holds the first contact: bodies that are
-apart at the start first meet in their surfaces, and a surface is its facets. Where facets prove no meeting, as of
-bodies that come together flush, points inside do (`common_points.py`).
+A piece is a mesh or a convex shape at a pose in its body. In a span of length h the bodies come nearer by at most μ h /
+2 on either side of its middle, μ a bound of relative speed, seen from the world, from A or from B (motion bounds,
+Mirtich 1996). Facets farther apart at the middle are free in all of the span (facets_within: a traversal of both
+trees). The others, if they are few, are jobs for `impact_jobs.py`, in this span alone; else the span is cut in two.
+Spans come in order of time, so the first span with a contact holds the first contact: bodies apart at the start first
+meet in their surfaces, and a surface is its facets. Where facets prove no meeting, as of bodies coming together flush,
+points inside do (`common_points.py`).
 
 A half-space meets a mesh where it meets the mesh's hull.
 """
@@ -98,12 +98,12 @@ _JOBS_IN_TURN = 4
 class Piece(NamedTuple):
     """A mesh or a convex shape in a body.
 
-    X_CS : (4, 4) its pose in the body.   number : which of a compound's parts it is.
+    X_CS : (4, 4) its pose in the body.   number : of the part in a compound.
     reach : greatest distance of its points from its own origin, a swept radius included [m].
-    slop : how far rounding of X_CS may have moved it.
-    tree, radius : its facets, or those of a polytope around it, and how far its surface may be from them: a swept ball,
-    or the polytope's distance. None for half-spaces.
-    is_curved : whether it is such a polytope.   packed : as a convex set; None of meshes.
+    slop : how far rounding of X_CS may have moved the piece [m].
+    tree, radius : facets of the piece, or of a polytope around the piece, and how far its surface may be from the
+    facets: a swept ball, or the polytope's distance. None for half-spaces.
+    is_curved : whether the facets belong to a polytope around the piece.   packed : as a convex set; None of meshes.
     """
 
     of: Callable[[], Any]
@@ -126,7 +126,8 @@ class Piece(NamedTuple):
 
     @property
     def has_many_facets(self) -> bool:
-        """Whether it is a hull of which a single facet of a mesh may be near more facets than are jobs of a span."""
+        """Whether the piece is a hull with more facets than a span has jobs: a single facet of a mesh may be near too
+        many."""
         return not (self.is_mesh or self.is_curved or self.tree is None) and len(self.tree.ids) > _MAX_JOBS
 
     def corners(self, facets: np.ndarray) -> np.ndarray:
@@ -182,7 +183,7 @@ def _around(piece: Piece) -> PackedConvex:
 
 
 def _hull_of(piece: Piece) -> PackedConvex:
-    """The hull of a piece, and as much around it as rounding moved it by."""
+    """The hull of a piece, widened by the rounding of its pose."""
     packed = _vertices_of(piece.shape) if piece.packed is None else piece.packed
     return packed._replace(slop=packed.slop + piece.slop)
 
@@ -270,8 +271,8 @@ def _ask_on_the_way(
     shapes: tuple[Shape, Shape], pairs: tuple[np.ndarray, np.ndarray], motion: Motions, earliest: np.ndarray,
     end: float, tolerance: float,
 ) -> float:
-    """Raise the ``earliest`` times (k,) of pairs of pieces, in place, where one is a large mesh and the other is of a
-    small union, by the facets on the union's way; returns the time until which they are known now."""
+    """Raise the ``earliest`` times (k,) of pairs of pieces, in place, of a large mesh and a piece of a small union, by
+    the facets on the union's way; returns the time until which the raised times hold."""
     bounds, known_until = bounds_of(*shapes), math.inf
     for side in (0, 1):
         pieces, union = pieces_of(shapes[side]), compound_parts(shapes[1 - side])
@@ -298,8 +299,8 @@ def _search_small(
     pairs: list[tuple[Piece, Piece]], motions: Motions, span: tuple[float, float], tolerance: float, rows: np.ndarray,
     is_part: tuple[bool, bool],
 ) -> np.ndarray:
-    """Search those pairs of pieces that are convex or of few facets, in a span of time, for all motions; returns which
-    are neither (k,)."""
+    """Search pairs of pieces that are convex or of few facets, in a span of time, for all motions; returns the other
+    pairs' mask (k,)."""
     is_large = np.zeros(len(pairs), dtype=bool)
     convex = [(a, b) for a, b in pairs if not _needs_facets(a, b)]
     for a, b in convex:
@@ -316,7 +317,7 @@ def _search_small(
 
 
 def _all_facets(a: Piece, b: Piece) -> np.ndarray | None:
-    """(k, 2) all pairs of facets, a convex piece counting as one, where they are so few that no span need be cut."""
+    """(k, 2) all pairs of facets, a convex piece counting as one, where few enough to need no cut of a span."""
     ids: list[Any] = [p.tree.ids if p.is_mesh else np.zeros(1, dtype=np.int64) for p in (a, b)]  # type: ignore[union-attr]
     if len(ids[0]) * len(ids[1]) > _MAX_JOBS:
         return None
@@ -338,7 +339,7 @@ def _search_few(
 
 
 def _come_near(motions: Motions, pieces: list[tuple[Piece, Piece]]) -> np.ndarray:
-    """(n,) bool: motions in which balls around both bodies' origins meet that hold the pieces; rounding counts as
+    """(n,) bool: motions in which balls around both bodies' origins, with all pieces inside, meet; rounding counts as
     meeting."""
     if not pieces:
         return np.zeros(1, dtype=bool)
@@ -383,14 +384,14 @@ def _convex_pieces(a: Piece, b: Piece, motions: Motions, tolerance: float, rows:
 
 
 def _clear_parts(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The parts that rows name; from now on they name none, so that what a kernel finds can be told."""
+    """The parts named by rows, which are set to −1 to tell the parts written by a kernel."""
     before = rows["part_a"].copy(), rows["part_b"].copy()
     rows["part_a"] = rows["part_b"] = -1
     return before
 
 
 def _name_parts(rows: np.ndarray, before: tuple[np.ndarray, np.ndarray], a: np.ndarray, b: np.ndarray) -> None:
-    """Rows name the parts that stand at the table's rows, a and b, where a kernel wrote any; else those before."""
+    """Rows name the parts a and b of the table's rows where a kernel wrote any; else the parts before."""
     for name, old, numbers in zip(("part_a", "part_b"), before, (a, b)):
         at = rows[name]
         rows[name] = np.where(at < 0, old, numbers[at])
@@ -410,7 +411,7 @@ def _do(table, n_shapes: int, parts, motions: Motions, jobs, begin: float, end: 
 
 
 class _Spans(Spans):
-    """Spans of one motion of two pieces, and the facets that may meet in them."""
+    """Spans of a motion of two pieces, and the facets that may meet in them."""
 
     def __init__(self, a: Piece, b: Piece, motion: Motions):
         super().__init__(_parts(a, b), (a.reach, b.reach, a.slop + b.slop), motion)
@@ -423,7 +424,7 @@ class _Spans(Spans):
         return Placed(out[:16].reshape(4, 4).copy(), out[16:32].reshape(4, 4).copy(), float(out[REACH]))
 
     def near_facets(self, begin: float, end: float, max_pairs: int) -> np.ndarray | None:
-        """(k, 2) facets that may meet in a span of time; None where there are more than ``max_pairs``."""
+        """(k, 2) facets with possible contact in a span of time; None for more than ``max_pairs``."""
         out = self.describe(begin, end)
         convex = None if self.a.is_mesh and self.b.is_mesh else self.b if self.a.is_mesh else self.a
         if convex is not None and (convex.has_many_facets or (convex.is_curved and out[REACH] < convex.radius)):
@@ -440,10 +441,10 @@ class _Spans(Spans):
         return None if near is None or len(near.facets) > max_pairs < _MAX_JOBS_OF_ALL else near.facets
 
     def _large_facets_ahead(self, begin: float, end: float) -> np.ndarray | None:
-        """(k,) facets of the larger mesh on the way of the other, finely cut one, if they are few; else None.
+        """(k,) facets of the larger mesh on the way of the other, finely cut mesh, if few; else None.
 
-        Boxes of the small mesh all lie in the box of such a facet: a walk of both trees comes to all of them, where
-        one of the small tree leaves out all that the facet's plane is far from.
+        Boxes of the small mesh all lie in the box of a large facet: a walk of both trees comes to all of these boxes,
+        where a walk of the small tree leaves out all boxes far from the facet's plane.
         """
         if not (self.a.is_mesh and self.b.is_mesh and self.is_small_beside()):
             return None
@@ -454,10 +455,10 @@ class _Spans(Spans):
         return facets_on_path(self, large.tree, side, begin, end, _MAX_TOGETHER)  # type: ignore[arg-type]
 
     def _near_large_facets(self, ahead: np.ndarray, begin: float, end: float, max_pairs: int) -> np.ndarray | None:
-        """(k, 2) facets that may meet in a span, of which those of the larger mesh are ``ahead``; None where planes
-        leave more than ``max_pairs``.
+        """(k, 2) facets with possible contact in a span, of the larger mesh only ``ahead``; None where planes leave
+        more than ``max_pairs``.
 
-        A set that holds facets is no farther from the small mesh than they are: first all of them together, then each.
+        A set around facets is no farther from the small mesh than its facets are: first all together, then each.
         """
         (large, small), out = self._by_size(), self.describe(begin, end)
         side, corners, reach = 0 if large is self.a else 1, large.corners(ahead), float(out[REACH])
@@ -486,13 +487,13 @@ class _Spans(Spans):
         return (self.a, self.b) if self.a.reach > self.b.reach else (self.b, self.a)
 
     def _near_convex(self, convex: Piece, out: np.ndarray, max_pairs: int) -> np.ndarray | None:
-        """The same of a mesh and a convex piece as a whole: where the polytope around a curved one is farther from it
-        than anything moves in the span, and where a facet of the mesh may be near more facets of a hull than can be
-        jobs.
+        """`near_facets` of a mesh and a convex piece as a whole: where the polytope around a curved piece is farther
+        from its surface than anything moves in the span, and where a facet of the mesh may be near more facets of a
+        hull than a span has jobs.
 
-        Planes between the two say which facets are near, those along a normal that is known too, the first that leaves
-        few: of the sets around both before these first meet, or of the last `cut`; any direction is right. Where none
-        is known of a curved piece the distance tells it, and whether anything is near at all.
+        Planes between the two rule facets out, also along known normals, until few are left: normals of the sets around
+        both pieces before these first meet, or of the last `cut`; any direction is right. For a curved piece without a
+        known normal the distance gives the normal, and whether anything is near at all.
         """
         matrices, reach = (out[:16].reshape(1, 4, 4), out[16:32].reshape(1, 4, 4)), float(out[REACH])
         side = 0 if self.a.is_mesh else 1
@@ -516,10 +517,10 @@ class _Spans(Spans):
         return facets
 
     def face_each_other(self, time: float) -> None:
-        """Have normals of sets around both pieces known, as they are before these meet at a time.
+        """Keep the normals between sets around both pieces at some times before the sets meet at ``time``.
 
-        While the smaller one moves by its own size and ever less: near an edge the normal turns until they meet, and
-        shortly before it is that of lengths that rounding makes up.
+        Times from the smaller piece's motion by its own size down to ever less: near an edge the normal turns until the
+        contact, and shortly before the contact rounding decides its direction.
         """
         passed = self.scale(time, 1.0) * _BEFORE_MEETING
         placed = [self.placed(max(time - before, 0.0)) for before in passed]
@@ -529,7 +530,7 @@ class _Spans(Spans):
         self._faced = rows["normal"][rows["normal"].any(axis=1)]
 
     def _take_normal(self, row: np.void) -> None:
-        """The normal of a row becomes the one known, if it has any: of bodies that overlap it has none."""
+        """Keep the normal of a row as the known normal, unless 0, as of overlapping bodies."""
         if row["normal"].any():
             self._normal = row["normal"][None].copy()
 
@@ -546,13 +547,13 @@ class _Spans(Spans):
         return max(float(earliest_of(row)[0]), begin)
 
     def fine(self, begin: float, end: float, tolerance: float) -> float:
-        """A tolerance of times that is a small part of that in which the smaller piece moves by its own size: a bracket
-        as wide as is asked for may be wider than this is."""
+        """A tolerance of times: a small part of the time in which the smaller piece moves by its own size, where the
+        tolerance asked for may be larger."""
         return max(min(tolerance, _LEAST_CUT * self.scale(begin, end)), _SHORTEST)
 
     def smaller_set(self, tight: bool = False) -> tuple[ShapeTable, np.ndarray, np.ndarray]:
         """A convex set around the smaller piece, as `earliest_by_facets` takes sets; tight: the hull of a mesh's
-        vertices, with which it touches a plane."""
+        vertices, in contact with a plane exactly when the mesh is."""
         side = 1 if self.a.reach > self.b.reach else 0
         piece, row = (self.a, self.b)[side], np.zeros(1, dtype=np.int64)
         packed = _around(piece)
@@ -561,13 +562,14 @@ class _Spans(Spans):
         return table, row, self.parts[side : side + 1]
 
     def is_small_beside(self) -> bool:
-        """Whether one piece is small beside the other, which is a mesh."""
+        """Whether a piece is small beside the other, a mesh."""
         large, small = self._by_size()
         return large.is_mesh and TIMES_SMALLER * small.reach <= large.reach
 
     def time_on_the_way(self, begin: float, end: float, tolerance: float) -> float:
-        """A time before which the smaller piece meets none of the facets of the larger one, infinity of one that meets
-        none up to ``end``: by a set around a mesh at first, from where that meets any by its hull."""
+        """A time before which the smaller piece meets no facet of the larger piece, infinity without contact up to
+        ``end``: first by a simple set around the smaller piece, then, for a mesh, from the time of this set on by its
+        hull."""
         width = self.fine(begin, end, tolerance)
         for tight in (False, True) if self._by_size()[1].is_mesh else (False,):
             begin = float(self.times_on_the_way(self.smaller_set(tight), begin, end, width)[0][0])
@@ -576,9 +578,8 @@ class _Spans(Spans):
         return begin
 
     def times_on_the_way(self, sets: Any, begin: float, end: float, tolerance: float) -> tuple[np.ndarray, float]:
-        """((n,) times before which convex sets, all in the smaller piece, meet none of the facets of the larger one
-        that this passes, infinity of those that meet none up to ``end``; the time until which these are known, infinity
-        where this is the end).
+        """((n,) times before which convex sets, all in the smaller piece, meet no facet of the larger piece on the way,
+        infinity without contact up to ``end``; the end of the time searched, infinity for ``end``).
 
         sets : as of `earliest_by_facets`.
         """
@@ -597,8 +598,9 @@ class _Spans(Spans):
         return np.minimum(np.maximum(times, begin), known), known
 
     def _facets_ahead(self, side: int, begin: float, end: float, max_facets: int) -> tuple[np.ndarray | None, float]:
-        """(facets of the mesh of a side on the way of the other piece until a time, None of more than ``max_facets``;
-        that time: the end, or as early as these are few, but not before the piece may have moved by its own size)."""
+        """(facets of the mesh of a side on the way of the other piece until a time, None for more than ``max_facets``;
+        the time: the end, or as early as the facets are few, but not before the piece may have moved by its own
+        size)."""
         mesh, until, least = (self.a, self.b)[side], end, 2.0 * self.scale(begin, end)
         while True:
             facets = facets_on_path(self, mesh.tree, side, begin, until, max_facets)  # type: ignore[arg-type]
@@ -629,8 +631,8 @@ class _Spans(Spans):
         return begin + free, begin + free + min(length, 0.5 * rest)
 
     def _time_until_met(self, row: np.void, X_0: np.ndarray, X_1: np.ndarray, begin: float, passed: float) -> float:
-        """When the points that are nearest at ``begin`` meet along the normal, by how near they are when some time has
-        passed; infinity where they do not come nearer. A guess, of which nothing that is proven makes use.
+        """When the points nearest at ``begin`` meet along the normal, extrapolated from their gap when some time has
+        passed; infinity where the gap does not shrink. A guess: no proof depends on this time.
 
         row : of the pieces at ``begin``, at poses X_0 and X_1, the mesh's first.
         """
@@ -650,11 +652,11 @@ def _max_jobs(span: float) -> int:
 
 
 class _Span(NamedTuple):
-    """A span of time to be looked at.
+    """A span of time to be searched.
 
-    max_pairs : of more facets that may meet in it it is cut.   may_meet : whether bodies that are convex where they
-    meet do so as it begins: its first part is looked at before it is cut.   is_timed : whether it begins where a set
-    around the smaller body first meets a facet on its way.
+    max_pairs : with more pairs of facets that may meet the span is cut.   may_meet : whether bodies convex at the
+    contact may meet as the span begins: its first part is searched before the cut.   is_timed : whether the span begins
+    when a set around the smaller body first meets a facet on its way.
     """
 
     begin: float
@@ -667,10 +669,10 @@ class _Span(NamedTuple):
 def _search(
     a: Piece, b: Piece, motion: Motions, tolerance: float, row: np.ndarray, is_part: tuple[bool, bool], earliest: float
 ) -> None:
-    """Look for contacts of two pieces in one motion, span by span; ``row`` keeps the earliest found so far.
+    """Search contacts of two pieces in a motion, span by span; ``row`` keeps the earliest found so far.
 
-    is_part : whether A and B are compounds, of which rows name the part; else the facet.   earliest : no contact is
-    before it.
+    is_part : whether rows name the part of A and B, compounds; else the facet.   earliest : time before which no
+    contact is.
     """
     spans = _Spans(a, b, motion)
     begin, end = spans.time_of_balls()
@@ -738,8 +740,8 @@ class _FacetJobs:
     def search(self, motions: Motions, some: np.ndarray, span: tuple[float, float], tolerance: float, rows) -> None:
         """Search motions, by their numbers (n,), in a span of time; ``rows`` keep the earliest found so far.
 
-        Beside solids, a job of two facets that are about to touch and are not proven to meet has points asked, before
-        all other such jobs look far ahead for a proof: from a meeting that is proven on none of them has to.
+        Where a mesh is solid, a job of two facets about to touch, without a proven contact, has points asked, before
+        all other jobs of this kind look far ahead for a proof: after a proven contact no job has to.
         """
         before, known = _clear_parts(rows), rows["lower"].copy()
         may_ask = self._a.is_mesh and self._b.is_mesh and any(_is_solid(p) for p in (self._a, self._b))
@@ -761,7 +763,7 @@ class _FacetJobs:
         _name_parts(rows, before, *self._names)
 
     def _ask_points(self, motion: Motions, row: np.ndarray, far: bool) -> None:
-        """A row's upper bound becomes the first time found at which one body holds a point of the other."""
+        """Lower a row's upper bound to the first time found when a body holds a point of the other."""
         a, b = self._a, self._b
         if self._points is None:
             trees: list[Any] = [a.tree, b.tree]
@@ -778,9 +780,9 @@ def _is_solid(piece: Piece) -> bool:
 
 
 def _jobs(a: Piece, b: Piece, near: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray]:
-    """(table of facets, jobs of one motion, which facet each row of the table is) for pairs of facets that are near.
+    """(table of facets, jobs of a motion, facet of each row of the table) for pairs of near facets.
 
-    A convex piece is one shape beside the facets of the mesh, not facet by facet.
+    A convex piece is a single shape beside the facets of the mesh, not facet by facet.
     """
     if a.is_mesh and b.is_mesh:
         (ids_a, which_a), (ids_b, which_b) = (np.unique(column, return_inverse=True) for column in near.T)

@@ -11,13 +11,13 @@ from collide.numerics.vec3 import add, dot, norm, scale
 
 @kernel
 def time_of_balls(d0, v, farthest, reach, begin, end):
-    """(begin, end) of the time between these in which the origins are within a reach of each other, no shorter than it
-    is; begin > end where they never are.
+    """(begin, end), bounds of the time from ``begin`` to ``end`` when the origins are within a reach of each other,
+    rounded outwards; begin > end where they never are.
 
-    d0, v : from one origin to the other at time 0, and how that changes in unit time.   farthest : bound of its length.
+    d0, v : from A's origin to B's at time 0, and its change in unit time.   farthest : bound of its length.
 
-    The distance is a convex function of time: where it is more than the reach and grows, it has passed; where it is
-    more and falls, nothing was before.
+    The distance is a convex function of time: where larger than the reach and growing, no contact follows; where larger
+    and falling, no contact was before.
     """
     reach = (reach + origin_error(farthest)) * (1.0 + 2.0**-40)
     along, square = dot(d0, v), dot(v, v)

@@ -1,7 +1,7 @@
 """Makes a support tree from a hull: nested subsets of its vertices, and candidate lists between them.
 
-Any subset of a hull's vertices is in convex position; `nested_subsets.py` chooses. What stands between two subsets
-is worked out by `candidate_lists.py`, from the edges of the hull of the finer one. Kernels do it: `grow_tree.py`.
+Any subset of a hull's vertices is in convex position; `nested_subsets.py` chooses. `candidate_lists.py` works out the
+lists between two subsets from the edges of the finer subset's hull. Kernels do both: `grow_tree.py`.
 """
 
 from __future__ import annotations

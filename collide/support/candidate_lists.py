@@ -1,12 +1,12 @@
 """Kernels that make a support tree: the candidates of coarse vertices.
 
-Let W be a set of points in convex position and V a subset. In direction g the extreme point of V may be
-v, that of W is w: then w has to stand in the list of v. That is so for some g exactly if the normal cone
-of w in the hull of W meets the normal cone of v in the hull of V. Cones are convex and the fine cone of v
-lies in its coarse cone, so a path inside the coarse cone of v, from a point it shares with the cone of w
-to the fine cone of v, leaves the cone of w through an arc: the directions between the normals of two
-facets that share an edge of w. It is therefore enough to find, for every edge of the fine hull, the
-vertices of V that are extreme somewhere along its arc. No coarse hull is intersected with anything.
+Let W be a set of points in convex position and V a subset. Where v is the extreme point of V in a direction g and w the
+extreme point of W, w has to stand in the list of v. Such a g exists exactly if the normal cone of w in the hull of W
+meets the normal cone of v in the hull of V. Cones are convex and the fine cone of v lies in its coarse cone, so a path
+inside the coarse cone of v, from a point shared with the cone of w to the fine cone of v, leaves the cone of w
+through an arc: the directions between the normals of two facets on either side of an edge of w. A search along the arc
+of every edge of the fine hull for the vertices of V extreme somewhere on the arc is therefore enough. No coarse hull is
+intersected with anything.
 """
 
 from __future__ import annotations
@@ -139,7 +139,8 @@ def _note(search, n_pairs, owner, row):
 
 @kernel
 def _follow_edge(search, n_pairs, edge, p, q):
-    """Follow the arc of one edge, from the normal p of the facet on its right to the normal q of that on its left."""
+    """Follow the arc of one edge, from the normal p of the facet on its right to the normal q of the facet on its
+    left."""
     if dot(p, p) == 0.0 or dot(q, q) == 0.0:
         return n_pairs
     if dot(p, q) > 0.0:
@@ -153,10 +154,10 @@ def _follow_edge(search, n_pairs, edge, p, q):
 
 @kernel
 def _follow_arc(search, n_pairs, edge, p, q):
-    """Note a, and b if ``both``, as candidates of every coarse vertex that is extreme along p + t·(q − p), 0 < t < 1.
+    """Note a, and b if ``both``, as candidates of every coarse vertex extreme along p + t·(q − p), 0 < t < 1.
 
-    Between two directions with different owners both are equally far in one direction: who is farthest
-    there either is one of them, and nobody comes between, or splits the interval in two.
+    Between two directions with different owners both owners are equally far in some direction: either an owner is
+    farthest there, and no vertex comes between, or the farthest vertex splits the interval in two.
     """
     if not differ(q, p):
         return n_pairs

@@ -1,7 +1,6 @@
-"""Coarse points: those of a cloud that are farthest in directions spread over the sphere, the cloud stretched to a
-cube.
+"""Coarse points: points of a cloud farthest in directions spread over the sphere, the cloud stretched to a cube.
 
-A kernel, since Python and C are to choose the same ones: numpy's sines and cosines differ from platform to platform.
+A kernel, since Python and C are to choose the same points: numpy's sines and cosines differ from platform to platform.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ _COSINE, _SINE = -0.7373688780783197, 0.6754902942615238
 def choose_coarse(points_at, n, block_at):
     """Fill a block of 4·COARSE doubles: x, y, z of COARSE points of n ≥ 1 (n, 3), and their ids as int64 bits.
 
-    A point is named once as long as there are others; returns how many different ones there are.
+    Returns how many different points are named: these come first, the rest of the block repeats them.
     """
     points = view_f64(points_at, 3 * n)
     block = view_f64(block_at, 3 * COARSE)

@@ -1,11 +1,11 @@
-"""The exact last step of a support query: prove that a vertex is extreme, or climb to one that is.
+"""The exact last step of a support query: prove a vertex extreme, or climb to an extreme vertex.
 
-A hull is convex: a vertex w is farthest in direction g exactly if no neighbour is farther, and if one
-is, climbing gets there. Signs of (neighbour − w)·g are exact (`exact_dot_sign.py`), so what is returned is
-the exact maximum over the hull, g being taken as the doubles it consists of.
+A hull is convex: a vertex w is farthest in direction g exactly if no neighbour is farther; else climbing from neighbour
+to neighbour gets there. Signs of (neighbour − w)·g are exact (`exact_dot_sign.py`), so the vertex returned has the
+exact maximum over the hull, g being taken as the doubles it consists of.
 
 A vertex of many neighbours is proven by few of them. Its normal cone is a convex spherical polygon with
-the normals of its facets as corners; seen from one corner, the others are sorted by angle. Two corners on
+the normals of its facets as corners; seen from any corner, the others are sorted by angle. Two corners on
 either side of g, certain by an error bound, leave only the edges between them to be looked at.
 """
 
@@ -46,7 +46,7 @@ class Ring(NamedTuple):
     """A vertex among its neighbours.
 
     points : three doubles a row.
-    neighbours : of all vertices; those of this one are neighbours[begin : begin + degree], in
+    neighbours : of all vertices; neighbours[begin : begin + degree] belong to this vertex, in
     cyclic order, counter-clockwise from outside.
     """
 
@@ -104,8 +104,8 @@ def climb(tree_at, vertex, g, counters):
 
 @kernel
 def _best_of(ring, first, end, g, counters):
-    """(best, level): the neighbour that looks best among those farther than the vertex, itself if none is; and
-    whether all are exactly as far.
+    """(best, level): the neighbour that looks best of all farther than the vertex, else the vertex; and whether all are
+    exactly as far.
     """
     w = vec3_at(ring.points, 3 * ring.vertex)
     best = ring.vertex
@@ -132,9 +132,9 @@ def _best_of(ring, first, end, g, counters):
 
 @kernel
 def _across_plateau(points, starts, n, vertex, g, counters):
-    """A vertex beyond the facets around this one, which all are level: farther, or the vertex itself if none is.
+    """A vertex farther than ``vertex``, which is amid level facets; ``vertex`` itself where all others are no farther.
 
-    Only a vertex in the middle of a facet comes here. The first vertex off the facet's plane decides.
+    The first vertex off the facets' plane decides.
     """
     w = vec3_at(points, 3 * vertex)
     for k in range(n):
@@ -185,7 +185,8 @@ def _narrow(ring, g, counters):
 
 @kernel
 def _side(ring, i, g):
-    """Which side of the plane of corners 0 and i the direction certainly lies on: 1 if i comes before it, −1, 0."""
+    """Which side of the plane of corners 0 and i the direction certainly lies on: 1 if i comes before the direction, −1
+    if after, 0 if open."""
     a, size_a = _corner(ring, 0)
     b, size_b = _corner(ring, i)
     value = dot(cross(a, b), g)

@@ -1,7 +1,7 @@
 """A support tree made of a hull, in kernels: nested subsets of its vertices, and candidate lists between them.
 
-Python (`build_support_tree.py`) and C (`native/capi_tree.c`) call the entries one after the other: `tree_memory` tells
-how much memory `grow_tree` works in, and `keep_tree` writes what is kept of it into a block.
+Python (`build_support_tree.py`) and C (`native/capi_tree.c`) call the entries in this order: `tree_memory` tells how
+much memory `grow_tree` works in, `grow_tree` makes the tree, and `keep_tree` writes the tree into a block.
 """
 
 from __future__ import annotations
@@ -65,11 +65,12 @@ _HEADER = SIZES + _MAX_LEVELS
 class _Growing(NamedTuple):
     """A tree while levels are added to it, coarsest first.
 
-    points : (n + 1, 3), scaled.   header : counts of what there is.   n, n_subset : points, and of the largest subset.
+    points : (n + 1, 3), scaled.   header : counts of levels, nodes, entries.   n, n_subset : points, in the largest
+    subset.
     vertices, late : (n,) of the hull, and whether each comes last.   normals : (n, 3), where each is extreme.
     places, scratch : (n,) of workspace.   ordered : (n,) vertices, subset k the first so many.   place : of each point.
-    nodes, owners, entries, coordinates : as `SupportTree` has them.   rows : of the points that entries stand for.
-    max_entries : how many entries there is room for.   subset_at, hull_at : where a subset's hull is made.
+    nodes, owners, entries, coordinates : as `SupportTree` has them.   rows : of the entries' points.
+    max_entries : the most that fit.   subset_at, hull_at : where a subset's hull is made.
     """
 
     points: Any
@@ -112,7 +113,7 @@ def _rings_at(at, n, n_facets):
 
 @kernel
 def _growing(at, n, n_facets, capacity):
-    """(a tree without levels, where its memory ends).   capacity : pairs of candidates that there is room for."""
+    """(a tree without levels, where its memory ends).   capacity : the most pairs of candidates that fit."""
     m, n_subset, max_entries = n_facets + 2, n // FINE_RATIO + 1, 2 * capacity
     header = view_i64(at, _HEADER)
     at += 8 * _HEADER
@@ -160,10 +161,10 @@ def tree_memory(n, n_facets, capacity):
 def grow_tree(points_at, n, vertices_at, n_vertices, facets_at, n_facets, memory_at, capacity):
     """Make a support tree over the hull of points (n, 3).
 
-    vertices, facets : rows of its n_vertices vertices and n_facets triangles, 32-bit integers, of a flat hull those of
-        both sides, as `exact_hull.convex_hull` gives them.
+    vertices, facets : rows of its n_vertices vertices and n_facets triangles, 32-bit integers, of a flat hull the
+        triangles of both sides, as `exact_hull.convex_hull` gives them.
     memory : as many bytes as `tree_memory` says, out: what `keep_tree` copies, its header first.
-    capacity : pairs of candidates that there is room for; 8 a vertex and some are mostly enough.
+    capacity : the most pairs of candidates that fit; 8 a vertex and some are mostly enough.
 
     Returns 0; NOT_CLOSED, UNUSED_VERTEX, UNSOUND of a surface so degenerate that no order of neighbours is certain;
     the capacity to call with again where more is wanted. Expected O(h log h).
@@ -206,7 +207,7 @@ def _scale(tree, points, vertices, n_vertices):
     """Coordinates times powers of two that make the vertices fill a cube.
 
     Cones keep their order under scaling along axes, and powers of two round nothing: normals of pancakes and needles
-    are then as good as those of balls.
+    are then as good as a ball's.
     """
     for axis in range(3):
         low = points[3 * vertices[0] + axis]
@@ -223,8 +224,8 @@ def _scale(tree, points, vertices, n_vertices):
 
 @kernel
 def _choose_vertices(tree, vertices, n_vertices):
-    """Take the vertices that are corners, where there are enough, and tell which come last; how many, 0 where a vertex
-    has no facets."""
+    """Take the vertices that are corners, all where fewer than 3 are, and mark the vertices to come last; how many, 0
+    where a vertex has no facets."""
     starts, corner = tree.rings.starts, tree.rings.corner
     n_corners = 0
     for k in range(n_vertices):
@@ -337,7 +338,7 @@ def _put_subset_rings(tree, n_fine):
 
 @kernel
 def _add_level(tree, n_lists, first):
-    """Add the lists that stand in the list workspace; False where there is not enough of the tree's.
+    """Add the lists of the list workspace; False where the tree has not enough space for them.
 
     An entry's number is ``first`` and its place in the order, or the row itself where first < 0. Short lists are filled
     up with their first entry. Owners are the first vertices, but of the coarsest list.
@@ -434,9 +435,9 @@ def _kept_bytes(tree):
 
 @entry("void(int64, int64, int64, int64, int64, int64)")
 def keep_tree(points_at, n, n_facets, memory_at, capacity, block_at):
-    """Write the tree that `grow_tree` left in memory into a block of as many bytes as its header says.
+    """Write the tree left in memory by `grow_tree` into a block of as many bytes as its header says.
 
-    The block begins with the header of `support_tree.py`; behind it stand range, coordinates, nodes, owners, entries,
+    The block begins with the header of `support_tree.py`, followed by range, coordinates, nodes, owners, entries,
     rings.
     """
     tree, _ = _growing(memory_at, n, n_facets, capacity)

@@ -24,7 +24,7 @@ class LazySupportTree:
 
     @property
     def tree(self) -> SupportTree | None:
-        """The tree; None where the hull has too few vertices for one."""
+        """The tree; None where the hull has too few vertices."""
         if self._tree is None and not self._too_small:
             with _build_lock():
                 if self._tree is None and not self._too_small:
@@ -35,7 +35,7 @@ class LazySupportTree:
 
     @property
     def address(self) -> int:
-        """What kernels take: the tree's address, 0 where there is none."""
+        """What kernels take: the tree's address, 0 without a tree."""
         return self.tree.address if self.tree is not None else 0
 
 

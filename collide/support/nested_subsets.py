@@ -21,10 +21,11 @@ _CELLS = 1 << 16
 
 @kernel
 def nested_order(vertices, normals, late, n, sizes, first_size, n_sizes, places, scratch, ordered):
-    """Put n vertices into ``ordered`` so that the first sizes[first_size + k] of them are subset k; sizes fall from n.
+    """Put n vertices into ``ordered`` so that the first sizes[first_size + k] of ``ordered`` are subset k; sizes fall
+    from n.
 
-    normals : (n, 3), a direction in which each vertex is extreme; of any length, 0 where there is none.
-    late : (n,) not 0: vertices that only enter a subset when no others are left.   places, scratch : (n,) of workspace.
+    normals : (n, 3), of any length: each vertex is extreme along its normal; 0 where not known.
+    late : (n,) not 0: vertices to enter a subset when no others are left.   places, scratch : (n,) of workspace.
     O(n log n), always the same.
     """
     along = ordered

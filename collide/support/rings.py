@@ -165,7 +165,7 @@ def _unit_normal(points, facets, facet, normals):
 
 @kernel
 def unit(v):
-    """v of length 1; zeros where it has none."""
+    """v scaled to length 1; zeros where v has no length."""
     largest = max_abs(v)
     if not largest > 0.0:
         return Vec3(0.0, 0.0, 0.0)
@@ -179,10 +179,10 @@ def unit(v):
 
 @kernel
 def _put_polygon(points, n, facets, n_facets, rings, space):
-    """Rings of a flat hull; False where its sides are no disc, triangulated in one way.
+    """Rings of a flat hull; False where its two sides are not the same triangulated disc.
 
-    One side, closed by triangles from its border to a point of its own, is a surface that can be put in order; without
-    that point, rings are those of one side. Where all vertices are corners of the border, the border alone is kept:
+    A side, closed by triangles from its border to an added point, is a surface with ordered rings; without the added
+    point, these are the rings of the side. Where all vertices are corners of the border, the border alone is kept:
     diagonals may have thousands of ends.
     """
     half = n_facets // 2
@@ -227,8 +227,8 @@ def _are_mirrored(facets, half):
 
 @kernel
 def _put_border(facets, n, half, space):
-    """Who follows whom on the border of the first half, and triangles that close it; how many, −1 where they may not
-    have space."""
+    """Write the next and previous vertex along the border of the first half's triangles, and triangles from the border
+    to point n; how many, −1 where these may not fit."""
     following, previous, closed = space.following, space.previous, space.closed
     find_neighbours(facets, n, half, space.sides)
     for k in range(n):
@@ -277,9 +277,9 @@ def _keep_border(n, rings, space):
 
 @kernel
 def _close_disc(points, n, facets, half, n_border, rings, space):
-    """Rings of one side, closed by triangles to point n, which is then forgotten; the two sides are facets 0 and 1.
+    """Rings of a side, closed by triangles to point n, then without point n; the two sides are facets 0 and 1.
 
-    A neighbour just before that point loses the facet between them: what follows is the lower side.
+    A neighbour just before point n loses the facet between the two: the lower side follows.
     """
     put_vec3(points, 3 * n, vec3_at(points, 0))
     if put_in_order(points, n + 1, space.closed, half + n_border, rings) != 0:

@@ -31,9 +31,10 @@ def support_vertex(coordinates, m, g):
 
 @kernel
 def coarse_vertex(coarse_at, g, list_id):
-    """Of the COARSE points that stand for all, the one farthest in direction g; list_id is handed through.
+    """The coarse point farthest in direction g, of the COARSE points of a cloud; list_id is handed through.
 
-    Their hull lies in the whole one: what it overlaps is overlapped; what it misses may be hit.
+    The coarse points' hull lies in the cloud's hull: a body that overlaps the coarse hull overlaps the cloud's; a body
+    apart from the coarse hull may still overlap the cloud's.
     """
     coordinates = view_f64(coarse_at, 3 * COARSE)
     k, _ = farthest(coordinates, 0, COARSE, COARSE, g.x, g.y, g.z)
@@ -43,7 +44,7 @@ def coarse_vertex(coarse_at, g, list_id):
 
 @kernel
 def settled_vertex(coordinates, m, tree, vertex, g):
-    """Id of a vertex that is farthest in direction g for certain, near one that is likely to be."""
+    """Id of a vertex proven farthest in direction g, from a vertex likely to be."""
     proven = settle_vertex(tree, vertex, g)
     return proven if proven >= 0 else support_vertex(coordinates, m, g)
 

@@ -1,10 +1,10 @@
-"""How a support tree lies in memory: an int64 header, one run of doubles, one of 32-bit integers.
+"""How a support tree lies in memory: an int64 header, a run of doubles, runs of 32-bit integers.
 
-Node 0 lists the vertices of the coarsest subset, every other node the candidates of one coarse vertex
+Node 0 lists the vertices of the coarsest subset, every other node the candidates of a coarse vertex
 in the next finer subset. Node i's entries are ``nodes[i] … nodes[i + 1]``, at least 8 of them; their
-coordinates stand together, all x, all y, all z, from double ``3·nodes[i]`` on, so that one scan reads
-one run of memory. An entry's number is a node of the next level or, in the lists of the last level, a
-row of the given points. Neighbours stand in cyclic order, counter-clockwise from outside.
+coordinates stand together, all x, all y, all z, from double ``3·nodes[i]`` on, so that a scan reads a run of memory. An
+entry's number is a node of the next level or, in the lists of the last level, a row of the given points. Neighbours
+stand in cyclic order, counter-clockwise from outside.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ _PARTS = ("nodes", "owners", "entries", "ring_starts", "ring")
 class SupportTree:
     """Candidate lists and neighbours over the vertices of a hull; read-only once made.
 
-    points : (n, 3) the points it was built on; ids are rows of it.
+    points : (n, 3) points of the hull; ids are rows of ``points``.
     nodes : (nodes + 1,) int32, where each node's entries begin.
     owners : (nodes,) int32, row of the vertex whose candidates a node lists; −1 for node 0.
     entries : (entries,) int32, node of the next level, or row of ``points`` at the last.
     list_coordinates : (3·entries,) coordinates of the entries, list by list.
     ring_starts, ring : (n + 1,), (links,) int32: the hull neighbours of row i are
         ``ring[ring_starts[i] : ring_starts[i + 1]]``.
-    flat : whether all points are in one plane, exactly: a direction across it has no farthest side.
-    depth : number of lists that a query scans.
-    address : of the header; kernels take it alone. Valid as long as the object lives.
+    flat : whether all points are in a plane, exactly: both sides are equally far along the plane's normal.
+    depth : number of lists a query scans.
+    address : of the header; kernels take no more. Valid as long as the object lives.
     """
 
     def __init__(self, points, flat, depth, nodes, owners, entries, list_coordinates, ring_starts, ring):

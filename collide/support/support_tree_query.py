@@ -103,20 +103,22 @@ def _lists_of(tree_at, list_id):
 
 @kernel
 def extreme_vertex_listed(tree_at, list_id, g, counters):
-    """`extreme_vertex`, with the last list; or the best of one of its last lists alone.
+    """`extreme_vertex`, with the last list scanned; or the best of a single last list.
 
-    list_id : such a list, or −1 for the whole descent. While directions change little the list stays the same, so that
-        one scan often finds what the descent would; whether it has is for the caller to ask in the end.
-    counters : (COUNTERS,) int64 that is added to, or empty.
+    list_id : a list of the last level, or −1 for the whole descent. While directions change little the list stays the
+        same, so that a single scan often finds the vertex of the descent; the caller has to prove the vertex in the
+        end.
+    counters : (COUNTERS,) int64 to add to, or empty.
     """
     return descend_lists(_lists_of(tree_at, list_id), max(list_id, 0), g, counters)
 
 
 @kernel(inline=True)
 def two_extreme_vertices(tree_a, list_a, g_a, tree_b, list_b, g_b):
-    """`extreme_vertex_listed` of two trees, a scan of one and a scan of the other in turns; nothing is counted.
+    """`extreme_vertex_listed` of two trees, their scans in turns; nothing is counted.
 
-    A scan waits for the one before it more than it works: in turns, both descents take hardly longer than one.
+    A scan spends more time waiting for the previous scan of its tree than working: in turns, both descents take hardly
+    longer than a single descent.
     """
     lists_a = _lists_of(tree_a, list_a)
     lists_b = _lists_of(tree_b, list_b)
@@ -177,10 +179,9 @@ def extreme_vertices(
 ) -> np.ndarray:
     """(n,) ids of vertices farthest in ``directions`` (n, 3).
 
-    settled : proven exactly; an id below 0 is then ``-1 - id`` of a vertex that could not be proven, since
-        the direction's components differ by too many powers of two (see `extreme_vertex.py`).
-    counters : (COUNTERS,) int64 that entries scanned, climbing steps, neighbours looked at and exact
-        signs are added to.
+    settled : proven exactly; an id below 0 is then ``-1 - id`` of a vertex not proven, since the direction's components
+        differ by too many powers of two (see `extreme_vertex.py`).
+    counters : (COUNTERS,) int64: entries scanned, climbing steps, neighbours looked at and exact signs are added.
     """
     directions = np.ascontiguousarray(directions, dtype=np.float64)
     if directions.ndim != 2 or directions.shape[1] != 3 or not np.isfinite(directions).all():
