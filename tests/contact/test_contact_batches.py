@@ -62,7 +62,7 @@ def test_far_compounds_pose_no_part(posed_rows):
     rng = np.random.default_rng(3)
     A, B = clutter(rng, 300, 0.5), clutter(rng, 300, 0.5)
     assert not len(collide.contacts(A, B, EYE, collide.pose((5, 0, 0)), margin=0.1))
-    assert posed_rows == [0, 0]
+    assert not posed_rows
 
 
 def test_half_spaces_are_near_whatever_their_boxes(posed_rows):
