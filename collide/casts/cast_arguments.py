@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from collide.base import argument_checks as checks
 from collide.casts.directions import Directions
 from collide.errors import UnsupportedQuery
-from collide.lowering.packed_convex import HALFSPACE
-from collide.lowering.parts import bounding_parts_of
+from collide.lowering.closed_regions import reach_of
 from collide.shapes.shape import Shape
 from collide.transforms import LARGEST
 
@@ -59,7 +60,7 @@ def checked_points(caller: str, name: str, values) -> np.ndarray:
 def refuse_unbounded(what: str, shapes) -> None:
     """Raises UnsupportedQuery for half-spaces, and unions with half-spaces, as the moved body."""
     for shape in [shapes] if isinstance(shapes, Shape) else {id(shape): shape for shape in shapes}.values():
-        if any(packed.kind == HALFSPACE for packed, _ in bounding_parts_of(shape)):
+        if reach_of(shape) == math.inf:
             raise UnsupportedQuery(
                 f"{what}: {type(shape).__name__} has no end and cannot be cast; exchange the shapes and turn the "
                 "direction round, or cast a large Box"

@@ -26,7 +26,8 @@ from collide.casts.region_casts import Way, are_proven, are_to_be_asked_again, l
 from collide.casts.starts import Starts, item_of
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.packed_convex import HALFSPACE
-from collide.lowering.parts import bounding_parts_of, convex_set_of
+from collide.lowering.parts import bounding_parts_of, convex_set_of, parts_of
+from collide.narrowphase.composite.balls_on_ways import Side, body_ball, near_on_ways, part_balls
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import Question
 from collide.pairs.batches import answer_batch
@@ -70,12 +71,24 @@ def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Direct
     n = len(limits)
     if not n:  # what no cast asks about may be a mesh, which has no parts
         return nothing_met(0)
+    if isinstance(A, Shape) and isinstance(B, Shape) and (isinstance(A, Compound) or isinstance(B, Compound)):
+        balls = body_ball(A), body_ball(B)
+        near = near_on_ways(*balls, X_WA, X_WB, n, vectors=directions.vectors, limits=limits)
+        if near is not None and not near.all():
+            out = nothing_met(n)
+            X_WA, X_WB = (X if len(X) == 1 else X[near] for X in (X_WA, X_WB))
+            of_near = Directions(directions.vectors[near], directions.exponents[near])
+            for column, values in zip(out, _first_contacts(A, B, X_WA, X_WB, of_near, limits[near])):
+                column[near] = values
+            return out
     sides = [[side] * n if isinstance(side, Shape) else side for side in (A, B)]
     onto_region = np.flatnonzero([b.is_region for b in sides[1]])
     if len(onto_region):
         return _with_regions(sides, X_WA, X_WB, directions, limits, onto_region)
     meshed = np.array([a.meshed or b.meshed for a, b in zip(*sides)], dtype=bool)
     if not meshed.any():
+        if isinstance(A, Shape) and isinstance(B, Shape) and len(parts_of(A)) * len(parts_of(B)) > MAX_ASKED:
+            return _cast_unions(A, B, X_WA, X_WB, directions.vectors, limits)
         return _cast_parts(posed_sides(A, B, X_WA, X_WB, n), directions.vectors, limits)
     X_WA, X_WB = (np.broadcast_to(X, (n, 4, 4)) for X in (X_WA, X_WB))
     numbers: dict[tuple[int, int], list[int]] = {}
@@ -149,6 +162,32 @@ def _cast_parts(sides: PosedSides, vectors: np.ndarray, limits: np.ndarray) -> C
 
         rows += rows_ahead(of_unions, boxes_of_cast, vectors, limits, answer, _PARTS_TOGETHER)
     return first_contacts(joined(rows), len(limits))
+
+
+def _cast_unions(
+    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, vectors: np.ndarray, limits: np.ndarray
+) -> CastRows:
+    """The same of two unions, of whose parts only those are posed whose balls come near the ball around the other."""
+    rows, n = [], len(limits)
+    of_a, of_b = (body_ball(A), part_balls(A)), (body_ball(B), part_balls(B))
+    for k in range(n):
+        X, Y = (poses if len(poses) == 1 else poses[k : k + 1] for poses in (X_WA, X_WB))
+        way, limit = vectors[k : k + 1], limits[k : k + 1]
+        some_a = _near_parts(of_a[1], of_b[0], of_a[1].n, X, Y, way, limit)
+        some_b = _near_parts(of_a[0], of_b[1], of_b[1].n, X, Y, way, limit)
+        if not len(some_a) or not len(some_b):
+            rows.append(nothing_met(1))
+            continue
+        row = _cast_parts(posed_sides(A, B, X, Y, 1, some=(some_a, some_b)), way, limit)
+        row.item_a[row.hit], row.item_b[row.hit] = some_a[row.item_a[row.hit]], some_b[row.item_b[row.hit]]
+        rows.append(row)
+    return CastRows._make(np.concatenate(columns) for columns in zip(*rows))
+
+
+def _near_parts(a: Side, b: Side, n: int, X_WA, X_WB, vector: np.ndarray, limit: np.ndarray) -> np.ndarray:
+    """Numbers, ascending, of those of n balls of a body that the other comes near."""
+    near = near_on_ways(a, b, X_WA, X_WB, n, vectors=np.repeat(vector, n, axis=0), limits=np.repeat(limit, n))
+    return np.arange(n) if near is None else np.flatnonzero(near)
 
 
 def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np.ndarray) -> CastRows:

@@ -101,11 +101,15 @@ class PosedSides(NamedTuple):
         return PartPairs(self.parts, pairs, owner, item_a, item_b)
 
 
-def posed_sides(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, parts_of: PartsOf = parts_of) -> PosedSides:
+def posed_sides(
+    A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, parts_of: PartsOf = parts_of,
+    some: tuple[np.ndarray | None, np.ndarray | None] = (None, None),
+) -> PosedSides:
     """Parts of A and B in n questions.
 
     A, B : a shape, or n of them.   X_WA, X_WB : (n, 4, 4), or (1, 4, 4) for all.
-    parts_of : convex parts of a shape, or sets around them.
+    parts_of : convex parts of a shape, or sets around them.   some : which of those of A, and of B, where each is one
+    shape; None of all.
     """
     packed: list[PackedConvex] = []
     rows: dict[tuple[bytes, float], int] = {}
@@ -117,7 +121,7 @@ def posed_sides(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, parts_of: Part
             packed.append(part)
         return rows[key]
 
-    side_a, side_b = _side(A, X_WA, n, row_of, parts_of), _side(B, X_WB, n, row_of, parts_of)
+    side_a, side_b = _side(A, X_WA, n, row_of, parts_of, some[0]), _side(B, X_WB, n, row_of, parts_of, some[1])
     shape_of = np.concatenate([side_a.shape_of, side_b.shape_of])
     body_poses = np.concatenate([side_a.body_poses, side_b.body_poses])
     part_poses = np.concatenate([side_a.part_poses, side_b.part_poses])
@@ -132,9 +136,11 @@ def posed_sides(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, parts_of: Part
     )
 
 
-def _side(shapes, X: np.ndarray, n: int, row_of, parts_of: PartsOf) -> _Side:
+def _side(shapes, X: np.ndarray, n: int, row_of, parts_of: PartsOf, some: np.ndarray | None) -> _Side:
     if isinstance(shapes, Shape):
         parts = parts_of(shapes)
+        if some is not None:
+            parts = tuple(parts[k] for k in some.tolist())
         m, k = len(parts), len(X)
         shape_of = np.tile(np.array([row_of(packed) for packed, _ in parts], dtype=np.int64), k)
         part_poses = np.tile(np.array([pose for _, pose in parts]).reshape(-1, 4, 4), (k, 1, 1))

@@ -14,11 +14,13 @@ from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.shape_set_tables import tables_of
+from collide.narrowphase.composite.balls_on_ways import body_ball, near_on_ways
 from collide.narrowphase.composite.composite_parts import CompoundParts, PartColumns, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import Method, method_of
 from collide.pairs.batches import answer_batch, of_one_set
 from collide.pairs.pair_arguments import pose_at
+from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
 from collide.transforms import as_poses
@@ -70,6 +72,16 @@ def contact_batch(
         A, B = of_one_set(A, B, n)
     if _all_convex(A, B):
         return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, check=check, threads=threads)
+    if isinstance(A, Shape) and isinstance(B, Shape) and (isinstance(A, Compound) or isinstance(B, Compound)):
+        near = near_on_ways(body_ball(A), body_ball(B), X_WA, X_WB, n, margin=margin, check=check)
+        if near is not None and not near.all():
+            counts = np.zeros(n, dtype=np.int64)
+            X_WA, X_WB = (X if len(X) == 1 else X[near] for X in (X_WA, X_WB))
+            rows, ends = contact_batch(
+                A, B, X_WA, X_WB, int(np.count_nonzero(near)), margin, max_contacts, threads=threads
+            )
+            counts[near] = np.diff(ends, prepend=0)
+            return rows, np.cumsum(counts)
     X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
     if isinstance(A, Shape) and isinstance(B, Shape) and (make := _OF_MESHES.get(method_of(kind_of(A), kind_of(B)))):
         rows, ends = make(A, B, X_WA, X_WB, margin, max_contacts, None, threads)

@@ -25,19 +25,27 @@ BODY_CENTRE, BODY_BALL, BODY_SWEPT, BODY_REACH = 0, 3, 4, 5
 BODY = 6
 # Doubles of a ball in the world: its centre, from where body A stands, and its radius.
 BALL_IN_WORLD = 4
-# Integers of a body: its first part, and how many there are.
-FIRST, COUNT = 0, 1
+# Integers of a body: its first part, how many there are, and its first group of parts.
+FIRST, COUNT, FIRST_GROUP = 0, 1, 2
+BODY_INTS = 3
+#: Parts that are near each other stand in groups of so many, the last one of what is left.
+GROUP = 16
+# Doubles of a group: such a ball for all of it, and the largest radius swept.
+GROUP_BALL = 5
 
 #: Radii of balls are rounded up by more than a dozen roundings.
 _OUTWARD = 1 + 2.0**-45
 
 
 class LaidOut(NamedTuple):
-    """One body: its convex parts, (parts, PART) doubles, (BODY,) doubles."""
+    """One body: its convex parts, (parts, PART) doubles, (BODY,) doubles; its parts by their places (parts,) int64, so
+    that GROUP after GROUP of them are near each other, and (groups, GROUP_BALL) doubles."""
 
     packed: tuple[PackedConvex, ...]
     parts: np.ndarray
     ball: np.ndarray
+    by_place: np.ndarray
+    groups: np.ndarray
 
 
 def lay_out(parts: Sequence[tuple[PackedConvex, np.ndarray]]) -> LaidOut:
@@ -48,9 +56,7 @@ def lay_out(parts: Sequence[tuple[PackedConvex, np.ndarray]]) -> LaidOut:
     rows[:, TURNED] = (X != np.eye(4)).any(axis=(1, 2))
     rows[:, MEASURE] = [packed.reach for packed, _ in parts] + np.abs(X[:, :3, 3]).sum(axis=1)
     rows[:, SWEPT_RADIUS] = [packed.radius for packed, _ in parts]
-    of_set = {id(packed): packed for packed, _ in parts}
-    ball_of = {key: _ball_of(packed) for key, packed in of_set.items()}
-    balls = np.array([ball_of[id(packed)] for packed, _ in parts])
+    balls = _balls_of([packed for packed, _ in parts])
     rows[:, CENTRE : CENTRE + 3] = (X[:, :3, :3] @ balls[:, :3, None])[:, :, 0] + X[:, :3, 3]
     # A matrix that passes for a rotation may lengthen a little.
     stretch = np.sqrt(np.abs(np.swapaxes(X[:, :3, :3], 1, 2) @ X[:, :3, :3]).sum(axis=2).max(axis=1))
@@ -62,17 +68,54 @@ def lay_out(parts: Sequence[tuple[PackedConvex, np.ndarray]]) -> LaidOut:
     body[BODY_SWEPT] = rows[:, SWEPT_RADIUS].max()
     reaches = np.sqrt(np.square(centres).sum(axis=1)) + radii + rows[:, SWEPT_RADIUS]
     body[BODY_REACH] = reaches[np.isfinite(reaches)].max(initial=0.0)
-    return LaidOut(tuple(packed for packed, _ in parts), rows, body)
+    by_place = _by_place(centres)
+    groups = _groups_of(centres[by_place], radii[by_place], rows[by_place, SWEPT_RADIUS])
+    return LaidOut(tuple([packed for packed, _ in parts]), rows, body, by_place, groups)
 
 
-def _ball_of(packed: PackedConvex) -> tuple[float, float, float, float]:
-    """Centre and radius of a ball that holds the core of a convex set, as it is stored and as it was described."""
-    if packed.kind == HALFSPACE:
-        return 0.0, 0.0, 0.0, np.inf
-    if packed.kind != POINTS:
-        return 0.0, 0.0, 0.0, packed.reach + packed.slop
-    centre = 0.5 * (packed.points.min(axis=0) + packed.points.max(axis=0))
-    return *centre, float(np.sqrt(np.square(packed.points - centre).sum(axis=1).max())) + packed.slop
+def _by_place(centres: np.ndarray) -> np.ndarray:
+    """(k,) numbers of points (k, 3) along Morton's curve: as they are, where they are one group."""
+    low = centres.min(axis=0)
+    span = float((centres.max(axis=0) - low).max())
+    if len(centres) <= GROUP or span == 0.0:
+        return np.arange(len(centres))
+    cells = ((centres - low) / span * 1023.0).astype(np.int64)
+    for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
+        cells = (cells | cells << shift) & mask  # ten bits, three apart
+    return np.argsort(cells[:, 0] | cells[:, 1] << 1 | cells[:, 2] << 2, kind="stable")
+
+
+def _groups_of(centres: np.ndarray, balls: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """(groups, GROUP_BALL) by radii of balls of parts, and those swept over their cores: what is in a part's ball is
+    within its radius and the way between both centres."""
+    starts = np.arange(0, len(balls), GROUP)
+    groups = np.empty((len(starts), GROUP_BALL))
+    groups[:, :3] = 0.5 * (np.minimum.reduceat(centres, starts) + np.maximum.reduceat(centres, starts))
+    across = np.sqrt(np.square(centres - np.repeat(groups[:, :3], GROUP, axis=0)[: len(balls)]).sum(axis=1))
+    groups[:, 3] = np.maximum.reduceat(across + balls, starts) * _OUTWARD
+    groups[:, 4] = np.maximum.reduceat(radii, starts)
+    return groups
+
+
+def _balls_of(sets: list[PackedConvex]) -> np.ndarray:
+    """(k, 4) centres and radii of balls that hold the cores of convex sets, as they are stored and as they were
+    described; sets of equally many points are gone through together."""
+    balls = np.zeros((len(sets), 4))
+    of_size: dict[int, list[int]] = {}
+    for k, packed in enumerate(sets):
+        of_size.setdefault(len(packed.points) if packed.kind == POINTS else -packed.kind, []).append(k)
+    for size, numbers in of_size.items():
+        some = [sets[k] for k in numbers]
+        slops = np.array([packed.slop for packed in some])
+        if size > 0:
+            points = np.array([packed.points for packed in some])
+            balls[numbers, :3] = centres = 0.5 * (points.min(axis=1) + points.max(axis=1))
+            balls[numbers, 3] = np.sqrt(np.square(points - centres[:, None]).sum(axis=2).max(axis=1)) + slops
+        elif size == -HALFSPACE:
+            balls[numbers, 3] = np.inf
+        else:
+            balls[numbers, 3] = np.array([packed.reach for packed in some]) + slops
+    return balls
 
 
 class CompoundTable:
@@ -83,11 +126,15 @@ class CompoundTable:
         self.first = np.cumsum(self.counts) - self.counts
         self.table = ShapeTable([packed for body in bodies for packed in body.packed])
         self._parts = np.concatenate([body.parts for body in bodies])
-        self._bodies = np.ascontiguousarray(np.stack([self.first, self.counts], axis=1))
+        n_groups = np.array([len(body.groups) for body in bodies])
+        self._bodies = np.ascontiguousarray(np.stack([self.first, self.counts, np.cumsum(n_groups) - n_groups], axis=1))
+        self._by_place = np.concatenate([body.by_place for body in bodies])
+        self._groups = np.concatenate([body.groups for body in bodies])
         self._balls = np.array([body.ball for body in bodies])
         #: Rows of parts that any two of these bodies take at most.
         self.max_parts = 2 * int(self.counts.max())
-        self.addresses = *self.table.addresses, *map(address_of, (self._parts, self._bodies, self._balls))
+        tables = self._parts, self._bodies, self._balls, self._by_place, self._groups
+        self.addresses = *self.table.addresses, *map(address_of, tables)
 
     def build_trees(self, which: np.ndarray | None) -> None:
         """Have the support trees of these bodies; of bodies 0 and 1 without."""

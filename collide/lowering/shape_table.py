@@ -86,19 +86,16 @@ class ShapeTable:
         """Rows behind those that there are."""
         first = len(self.packed)
         self.packed.extend(packed)
+        if packed:
+            self.ints[first : len(self.packed)] = [
+                (
+                    p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest,
+                    self._rank_of(p), 0, coarse_address(p),
+                ) for p in packed
+            ]
+            self.numbers[first : len(self.packed), :PARAMS] = [(p.radius, p.reach, p.slop) for p in packed]
+            self.numbers[first : len(self.packed), PARAMS:] = [p.params for p in packed]
         for k, p in enumerate(packed, first):
-            self.ints[k] = (
-                p.kind,
-                len(p.points),
-                p.coordinates.shape[1],
-                address_of(p.coordinates),
-                p.lowest,
-                self._rank_of(p),
-                0,
-                coarse_address(p),
-            )
-            self.numbers[k, :PARAMS] = p.radius, p.reach, p.slop
-            self.numbers[k, PARAMS:] = p.params
             if may_have_tree(p):
                 self._without_tree.add(k)
         self.addresses = address_of(self.ints), address_of(self.numbers)

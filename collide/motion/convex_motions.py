@@ -20,7 +20,7 @@ from collide.motion.impact_jobs import begin_single, find_impacts
 from collide.motion.impact_rows import TimeOfImpact, free_rows, single_result
 from collide.motion.motions import Motions
 from collide.motion.moving_body import BODY
-from collide.motion.parts_ahead import MAX_ASKED, parts_ahead, reach_of_union, slop_of_union
+from collide.motion.parts_ahead import MAX_ASKED, balls_meet, parts_ahead
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_kernel_calls import scratch
 from collide.narrowphase.pair_kernel import answer_pairs
@@ -171,14 +171,14 @@ def parts_in_turn(
     """`parts_ahead` of two shapes; beside a far smaller union part by part of the larger union, by the time of meeting
     a ball around the smaller: all parts of the smaller union lie within the ball, so no contact is earlier."""
     unions = compound_parts(A), compound_parts(B)
-    reaches = [math.inf if union.unbounded else reach_of_union(union) for union in unions]
+    reaches = [math.inf if union.unbounded else union.radius for union in unions]
     large = 0 if reaches[0] > reaches[1] else 1
     small = unions[1 - large]
     if not (TIMES_SMALLER * reaches[1 - large] <= reaches[large] < math.inf and len(small.parts) > 1):
         yield from parts_ahead(*unions, motion, upper, max_pairs)
         return
     end = min(upper(), 1.0)
-    times = _times_of_ball(A, B, large, (reaches[1 - large], slop_of_union(small)), motion, end, tolerance)
+    times = _times_of_ball(A, B, large, (reaches[1 - large], small.slop), motion, end, tolerance)
     every = np.arange(len(small.parts))
     for number in np.argsort(times, kind="stable").tolist():
         if not times[number] <= min(upper(), 1.0):
@@ -291,9 +291,16 @@ def convex_impacts(
     per_motion = max(int((bodies.counts[a] * bodies.counts[b]).max(initial=1)), 1)
     at_once = max(JOBS_AT_ONCE // per_motion, 1) if per_motion <= MAX_ASKED else 1
 
+    of_one_pair = per_motion > MAX_ASKED and (a == a[0]).all() and (b == b[0]).all()
+    near = None
+    if of_one_pair:
+        near = balls_meet(compound_parts(shapes[a[0]]), compound_parts(shapes[b[0]]), motions, n)
+
     def work(piece: slice) -> None:
         header = header_of(Tables(bodies.table.addresses, len(bodies.table.packed), bodies.parts), motions)
         for first in range(piece.start, piece.stop, at_once):
+            if near is not None and not near[first]:
+                continue
             some = slice(first, min(first + at_once, piece.stop))
             for jobs in (
                 [bodies.jobs(a[some], b[some], first, motions)] if per_motion <= MAX_ASKED

@@ -16,13 +16,17 @@ from collide.kernels import address_of
 from collide.lowering.compound_table import PART
 from collide.motion.motions import Motions
 from collide.motion.moving_body import BODY
-from collide.motion.span_bounds import BEGIN, END, OUT, REACH, WORKSPACE, describe_span
+from collide.motion.span_bounds import BEGIN, END, HEADER, OUT, REACH, WORKSPACE, balls_meet_in_motion, describe_span
 from collide.narrowphase.composite.composite_parts import CompoundParts, boxes_near
 
 #: Of so few pairs of parts all are asked.
 MAX_ASKED = 64
 #: Spans are cut until bodies move by so much of the smaller one's reach in half of them, or are so short.
 _LEAST_MOVED, _SHORTEST = 2.0**-6, 2.0**-46
+
+
+#: Doubles, or addresses, from one motion to the next: of matrices, and of angular velocities.
+_STRIDES = (16, 16, 16, 16, 3, 3)
 
 
 class Spans:
@@ -36,11 +40,11 @@ class Spans:
         self.parts, self.reaches, self.motion = parts, np.array(reaches), motion
         self._work, self._out = np.zeros(WORKSPACE), np.zeros(OUT)
         addresses = [0 if X is None else address_of(X) for X in motion]
-        self._header = np.array([*addresses, address_of(self.parts), address_of(self.reaches)], dtype=np.int64)
+        self.header = np.array([*addresses, address_of(self.parts), address_of(self.reaches)], dtype=np.int64)
 
     def describe(self, begin: float, end: float) -> np.ndarray:
         """What `describe_span` gives, until it is called again."""
-        describe_span(address_of(self._header), begin, end, address_of(self._work), address_of(self._out))
+        describe_span(address_of(self.header), begin, end, address_of(self._work), address_of(self._out))
         return self._out
 
     @property
@@ -58,6 +62,30 @@ class Spans:
         return tuple(self.describe(0.0, 1.0)[BEGIN : END + 1].tolist())
 
 
+def balls_meet(A: CompoundParts, B: CompoundParts, motions: Motions, n: int) -> np.ndarray:
+    """(n,) bool: in which of n motions balls about the origins of two unions meet; there alone `parts_ahead` has any.
+
+    About a microsecond a motion.
+    """
+    if A.unbounded or B.unbounded:
+        return np.ones(n, dtype=bool)
+    spans = _spans_of(A, B, motions)
+    strides = [0 if X is None or len(X) == 1 else 8 * doubles for X, doubles in zip(motions, _STRIDES)]
+    steps, of_motion = np.array([*strides, 0, 0], dtype=np.int64), np.empty(HEADER, dtype=np.int64)
+    work, met = np.zeros(WORKSPACE + OUT), np.empty(n, dtype=bool)
+    balls_meet_in_motion(
+        address_of(spans.header), address_of(steps), n, address_of(work), address_of(of_motion), address_of(met)
+    )
+    return met
+
+
+def _spans_of(A: CompoundParts, B: CompoundParts, motion: Motions) -> Spans:
+    """Of two unions as a whole."""
+    parts = np.zeros((2, PART))
+    parts[:, [0, 4, 8]] = 1.0
+    return Spans(parts, (A.radius, B.radius, A.slop + B.slop), motion)
+
+
 def parts_ahead(
     A: CompoundParts, B: CompoundParts, motion: Motions, upper: Callable[[], float], max_pairs: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -67,14 +95,12 @@ def parts_ahead(
     upper : gives the time, which may shrink meanwhile.   max_pairs : a span with more pairs is cut.
     """
     named = np.zeros((len(A.parts), len(B.parts)), dtype=bool)
-    parts = np.zeros((2, PART))
-    parts[:, [0, 4, 8]] = 1.0
-    spans = Spans(parts, (reach_of_union(A), reach_of_union(B), slop_of_union(A) + slop_of_union(B)), motion)
-    least = _LEAST_MOVED * min(reach_of_union(A), reach_of_union(B))
+    spans = _spans_of(A, B, motion)
+    least = _LEAST_MOVED * min(A.radius, B.radius)
     is_unbounded = A.unbounded or B.unbounded
     begin, end = (0.0, 1.0) if is_unbounded else spans.time_of_balls()
     # while balls of this size meet, parts that are spread over them are near in about the third power of the reach
-    size = math.inf if is_unbounded else reach_of_union(A) + reach_of_union(B)
+    size = math.inf if is_unbounded else A.radius + B.radius
     to_do = [(begin, end)] if begin <= end else []
     while to_do:
         begin, end = to_do.pop()
@@ -110,18 +136,4 @@ def _turn_together(A: CompoundParts, B: CompoundParts, X_A: np.ndarray, X_B: np.
         return 0.0
     Q, _ = np.linalg.qr(X_B[:3, :3] if len(B.parts) == 1 else X_A[:3, :3])  # a rotation or mirror, to rounding
     X_A[:3], X_B[:3] = Q.T @ X_A[:3], Q.T @ X_B[:3]
-    return 2.0**-44 * (reach_of_union(A) + reach_of_union(B) + float(np.abs(X_B[:3, 3]).sum()))
-
-
-def slop_of_union(union: CompoundParts) -> float:
-    """How far rounding moved any part in the union at most [m]."""
-    columns = union.columns
-    return float((columns.rotation * columns.reach + columns.shift).max()) * (1.0 + 2.0**-40)
-
-
-def reach_of_union(union: CompoundParts) -> float:
-    """How far parts that have an end reach from the union's origin, at most [m]."""
-    columns = union.columns
-    at = np.sqrt(np.square(columns.X[:, :3, 3]).sum(axis=1))
-    reach = np.where(np.isnan(columns.plane), 1.001 * (columns.reach + columns.radius + columns.slop), 0.0)
-    return float((at + reach).max()) * (1.0 + 2.0**-30)
+    return 2.0**-44 * (A.radius + B.radius + float(np.abs(X_B[:3, 3]).sum()))

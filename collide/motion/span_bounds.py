@@ -5,7 +5,7 @@ Facets that may meet in the span are within μ h / 2 at its middle, h its length
 
 from __future__ import annotations
 
-from collide.kernels import entry, kernel, view_f64, view_i64
+from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.lowering.compound_table import PART
 from collide.lowering.shape_table import POSE, POSE_SLOP
 from collide.motion.moving_body import (
@@ -39,6 +39,30 @@ def describe_span(motion_at, begin, end, work_at, out_at):
 
     motion : HEADER addresses.   work : WORKSPACE doubles.   out : OUT doubles.
     """
+    _describe(motion_at, begin, end, work_at, out_at)
+    return 0
+
+
+@entry("int64(int64, int64, int64, int64, int64, int64)")
+def balls_meet_in_motion(motion_at, steps_at, n, work_at, header_at, met_at):
+    """Write n bytes, 0 of motions in which balls about both bodies' origins never meet; returns 0.
+
+    motion : HEADER addresses, of the first motion.   steps : HEADER bytes from one motion to the next.
+    work : WORKSPACE + OUT doubles.   header : room for HEADER addresses.
+    """
+    motion, steps, header = view_i64(motion_at, HEADER), view_i64(steps_at, HEADER), view_i64(header_at, HEADER)
+    out_at = work_at + 8 * WORKSPACE
+    out, met = view_f64(out_at, OUT), view_u8(met_at, n)
+    for k in range(n):
+        for i in range(HEADER):
+            header[i] = motion[i] + k * steps[i]
+        _describe(header_at, 0.0, 1.0, work_at, out_at)
+        met[k] = 0 if out[BEGIN] > out[END] else 1
+    return 0
+
+
+@kernel
+def _describe(motion_at, begin, end, work_at, out_at):
     motion = view_i64(motion_at, HEADER)
     reaches = view_f64(motion[REACHES_AT], 3)
     a, b = view_f64(work_at, BODY), view_f64(work_at + 8 * BODY, BODY)
@@ -60,7 +84,6 @@ def describe_span(motion_at, begin, end, work_at, out_at):
     out[REACH] = (speed_bound(a, b, v, add(d0, scale(begin, v)), add(d0, scale(end, v))) * half + slop) * OUTWARD
     near = a[REACH_OF_CORE] + b[REACH_OF_CORE] + a[DRIFT_REACH] + b[DRIFT_REACH] + slop
     out[BEGIN], out[END] = time_of_balls(d0, v, farthest, near, begin, end)
-    return 0
 
 
 @kernel(inline=True)

@@ -45,7 +45,7 @@ from collide.motion.convex_motions import (
 from collide.motion.impact_jobs import find_impacts
 from collide.motion.impact_rows import flipped_impacts, free_rows
 from collide.motion.motions import Motions
-from collide.motion.parts_ahead import MAX_ASKED, Spans, reach_of_union, slop_of_union
+from collide.motion.parts_ahead import MAX_ASKED, Spans
 from collide.motion.path_facets import earliest_by_facets, facets_on_path
 from collide.motion.span_bounds import REACH
 from collide.narrowphase.composite.composite_parts import compound_parts
@@ -277,14 +277,14 @@ def _ask_on_the_way(
     for side in (0, 1):
         pieces, union = pieces_of(shapes[side]), compound_parts(shapes[1 - side])
         numbers, counts = np.unique(pairs[side][earliest <= end], return_counts=True)
-        reach = math.inf if union.unbounded else reach_of_union(union)
+        reach = math.inf if union.unbounded else union.radius
         for number in numbers[counts >= _TOGETHER].tolist():
             mesh = pieces[number]
             if not mesh.is_mesh or TIMES_SMALLER * reach > mesh.reach:
                 continue
             some = np.flatnonzero((pairs[side] == number) & (earliest <= end))
             ball = pack_points(np.zeros((1, 3)), reach)
-            body = Piece(lambda: None, IDENTITY, -1, reach, slop_of_union(union), None, 0.0, False, ball)
+            body = Piece(lambda: None, IDENTITY, -1, reach, union.slop, None, 0.0, False, ball)
             spans = _Spans(mesh, body, motion) if side == 0 else _Spans(body, mesh, motion)
             first = bounds.first[1 - side if len(bounds.first) > 1 else 0]
             rows = first + pairs[1 - side][some]

@@ -70,6 +70,27 @@ def test_balls_hold_their_parts_and_are_not_much_larger(seed):
         assert layout_of(shape) is layout_of(shape) and np.array_equal(layout_of(shape).parts, body.parts)
 
 
+@pytest.mark.parametrize("n", [1, T.GROUP, T.GROUP + 1, 700])
+def test_groups_hold_the_balls_of_their_parts_and_are_small(n):
+    """Every part stands in one group, sixteen a group; of many parts a group takes little of the union's size."""
+    rng = rng_of("groups of parts", n)
+    items = [(collide.Capsule(r, 0.02), random_pose(rng, 1.0)) for r in rng.uniform(0.01, 0.03, n)]
+    body = layout_of(collide.Compound(items))
+    assert np.array_equal(np.sort(body.by_place), np.arange(n))
+    assert body.groups.shape == (-(-n // T.GROUP), T.GROUP_BALL)
+    rows = body.parts[body.by_place]
+    for group, first in zip(body.groups, range(0, n, T.GROUP)):
+        for row in rows[first : first + T.GROUP]:
+            apart = math.dist(row[T.CENTRE : T.CENTRE + 3], group[:3])
+            assert apart + row[T.BALL] <= group[3] and row[T.SWEPT_RADIUS] <= group[4]
+    assert n < 700 or np.median(body.groups[:, 3]) < 0.4 * body.ball[T.BODY_BALL]
+
+
+def test_parts_of_one_place_keep_their_order():
+    item = collide.Sphere(0.1), collide.pose((1e-310, 2.0, 3.0))
+    assert layout_of(collide.Compound([item] * 40)).by_place.tolist() == list(range(40))
+
+
 def test_matrices_that_stretch_have_larger_balls():
     hull = collide.ConvexHull([(1, 0, 0), (-1, 0, 0), (0, 1, 0)])
     ((packed, _),) = bounding_parts_of(hull)
@@ -87,9 +108,13 @@ def test_tables_of_bodies_stand_one_behind_the_other():
     counts = [len(body.packed) for body in bodies]
     assert table.counts.tolist() == counts and table.first.tolist() == [sum(counts[:k]) for k in range(len(counts))]
     assert [p.content for p in table.table.packed] == [p.content for body in bodies for p in body.packed]
-    assert table.max_parts == 2 * max(counts) and len(table.addresses) == 5
+    assert table.max_parts == 2 * max(counts) and len(table.addresses) == 7
     assert np.array_equal(table._parts, np.concatenate([body.parts for body in bodies]))
-    assert table._bodies.tolist() == [[sum(counts[:k]), counts[k]] for k in range(len(counts))]
+    n_groups = [len(body.groups) for body in bodies]
+    expected = [[sum(counts[:k]), counts[k], sum(n_groups[:k])] for k in range(len(counts))]
+    assert table._bodies.tolist() == expected
+    assert np.array_equal(table._by_place, np.concatenate([body.by_place for body in bodies]))
+    assert np.array_equal(table._groups, np.concatenate([body.groups for body in bodies]))
 
 
 @pytest.mark.parametrize("which", [None, [1, 1], [2]])

@@ -44,8 +44,9 @@ class _Workspace:
         self.pairs, self.owners = np.zeros((LIST, 2), dtype=np.int64), np.zeros((LIST, 2), dtype=np.int64)
         self.rows = np.zeros(LIST, dtype=PAIR_DTYPE)
         self.scores, self.slots = np.zeros(BLOCK * SCORE), np.zeros(SLOTS, dtype=np.int64)
-        self.balls = np.zeros((2 + capacity, BALL_IN_WORLD))
-        buffers = *self.poses, self.shape_of, self.pairs, self.owners, self.rows, self.scores, self.slots, self.balls
+        self.balls, self.near = np.zeros((4 + 2 * capacity, BALL_IN_WORLD)), np.zeros(2 * capacity, dtype=np.int64)
+        of_slots = self.scores, self.slots, self.balls, self.near
+        buffers = *self.poses, self.shape_of, self.pairs, self.owners, self.rows, *of_slots
         self._addresses = tuple(map(address_of, buffers))
 
     def header_of(self, table: CompoundTable, scratch: tuple[int, int]) -> np.ndarray:

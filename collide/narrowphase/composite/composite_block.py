@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i64
-from collide.lowering.compound_table import BALL_IN_WORLD, COUNT, FIRST, PART, TURNED
+from collide.lowering.compound_table import BALL_IN_WORLD, BODY_INTS, COUNT, FIRST, FIRST_GROUP, PART, TURNED
 from collide.lowering.place_parts import place_part
 from collide.lowering.shape_table import POSE, TERM_ROW
 from collide.narrowphase.composite.composite_rows import SCORE
@@ -16,17 +16,17 @@ from collide.narrowphase.pose_batches import set_pose
 BLOCK = 64
 LIST = ROWS_PER_BATCH
 
-# Header: the kernel, tables of shapes, parts and bodies; the workspace, and how many rows of parts it has room for;
+# Header: the kernel, tables of shapes, parts, bodies and groups; workspace, and how many rows of parts it has room for;
 # then how far things have come, 0 to begin with: poses answered, poses of the block, stage, slot and pair of parts to
 # go on with, pairs on the list, and how many pairs of parts were answered in all.
 (
-    CORE, INTS_AT, NUMBERS_AT, PARTS_AT, BODIES_AT, BODY_BALLS_AT,
-    POSES_AT, TERMS_AT, SHAPE_OF_AT, PAIRS_AT, OWNERS_AT, ROWS_AT, SCORES_AT, SLOTS_AT, BALLS_AT, DOUBLES_AT,
+    CORE, INTS_AT, NUMBERS_AT, PARTS_AT, BODIES_AT, BODY_BALLS_AT, BY_PLACE_AT, GROUPS_AT,
+    POSES_AT, TERMS_AT, SHAPE_OF_AT, PAIRS_AT, OWNERS_AT, ROWS_AT, SCORES_AT, SLOTS_AT, BALLS_AT, NEAR_AT, DOUBLES_AT,
     INTEGERS_AT,
     CAPACITY,
     N_DONE, N_POSES, STAGE, SLOT, PAIR, N_LISTED, N_ANSWERED,
-) = range(25)
-HEADER = 25
+) = range(28)
+HEADER = 28
 
 # Integers of a slot, which is a pose of the block: both bodies, rows of poses of theirs and where those of their parts
 # begin, whether a boolean is a hit, and the pair of parts answered first, −1 where balls say that none meets.
@@ -46,15 +46,18 @@ class Block(NamedTuple):
     scores: Any
     slots: Any
     balls: Any
+    near: Any
 
 
 class Body(NamedTuple):
-    """One body of a slot: its parts in the table, and rows of poses: of its first part, and of its own."""
+    """One body of a slot: its parts in the table, and rows of poses: of its first part, and of its own; its first
+    group in the table."""
 
     first: int
     n_parts: int
     part_rows: int
     row: int
+    first_group: int
 
 
 @kernel(inline=True)
@@ -66,7 +69,8 @@ def open_block(header_at):
         view_i64(header[PAIRS_AT], 2 * LIST),
         view_i64(header[OWNERS_AT], 2 * LIST), view_f64(header[SCORES_AT], SCORE * BLOCK),
         view_i64(header[SLOTS_AT], SLOTS),
-        view_f64(header[BALLS_AT], (2 + header[CAPACITY]) * BALL_IN_WORLD),
+        view_f64(header[BALLS_AT], (4 + 2 * header[CAPACITY]) * BALL_IN_WORLD),
+        view_i64(header[NEAR_AT], 2 * header[CAPACITY]),
     )
 
 
@@ -75,10 +79,11 @@ def body_of(block, k, which):
     """Body A (0) or B (1) of slot k."""
     slot = SLOT_SIZE * k + which
     number = block.slots[slot + BODY_NUMBERS]
-    bodies = view_i64(block.header[BODIES_AT], 2 * (number + 1))
+    bodies = view_i64(block.header[BODIES_AT], BODY_INTS * (number + 1))
+    at = BODY_INTS * number
     return Body(
-        bodies[2 * number + FIRST], bodies[2 * number + COUNT], block.slots[slot + PART_ROWS],
-        block.slots[slot + BODY_ROWS]
+        bodies[at + FIRST], bodies[at + COUNT], block.slots[slot + PART_ROWS], block.slots[slot + BODY_ROWS],
+        bodies[at + FIRST_GROUP],
     )
 
 

@@ -189,7 +189,7 @@ class CompoundParts:
         radius = float((across + stretch * reach).max()) * _UP + 2.0**-40 * size
         return np.array([*centre, 0.0, 0.0, 0.0, radius])
 
-    @property
+    @cached_property
     def unbounded(self) -> bool:
         """Whether a half-space is among the parts."""
         return any(packed.kind == HALFSPACE for packed in self._bounds)
@@ -211,6 +211,20 @@ class CompoundParts:
         """How far any part reaches from the origin, at most, half-spaces apart [m]."""
         of_parts = zip(self._bounds, self._X_BP)
         return max(packed.reach + packed.radius + float(np.abs(X[:3, 3]).sum()) for packed, X in of_parts)
+
+    @cached_property
+    def radius(self) -> float:
+        """Of a ball around the union's origin that holds all parts that have an end [m]."""
+        columns = self.columns
+        at = np.sqrt(np.square(columns.X[:, :3, 3]).sum(axis=1))
+        reach = np.where(np.isnan(columns.plane), 1.001 * (columns.reach + columns.radius + columns.slop), 0.0)
+        return float((at + reach).max()) * (1.0 + 2.0**-30)
+
+    @cached_property
+    def slop(self) -> float:
+        """How far rounding moved any part in the union at most [m]."""
+        columns = self.columns
+        return float((columns.rotation * columns.reach + columns.shift).max()) * (1.0 + 2.0**-40)
 
     @cached_property
     def _table(self) -> ShapeTable:

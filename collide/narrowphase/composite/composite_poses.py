@@ -13,18 +13,22 @@ settle them and calls again: the header holds how far things have come.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from collide.kernels import entry, kernel, native_call, view_f64, view_i32, view_i64, view_u8
-from collide.lowering.compound_table import BALL_IN_WORLD, BODY, BODY_REACH, CENTRE, PART
+from collide.lowering.compound_table import BALL_IN_WORLD, BODY, BODY_REACH, CENTRE, GROUP, GROUP_BALL, PART
 from collide.lowering.place_parts import BALL_MARGIN, gap_of_balls, place_ball, write_terms
 from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_STRETCH, POSE_TERMS
 from collide.narrowphase.composite.composite_block import (
     BODY_BALLS_AT,
     BODY_NUMBERS,
     BODY_ROWS,
+    BY_PLACE_AT,
+    CAPACITY,
     CORE,
     DOUBLES_AT,
     FIRST_PAIR,
+    GROUPS_AT,
     INTEGERS_AT,
     INTS_AT,
     IS_HIT,
@@ -43,6 +47,7 @@ from collide.narrowphase.composite.composite_block import (
     SLOT_SIZE,
     STAGE,
     TERMS_AT,
+    Body,
     body_of,
     count_pairs,
     lay_out,
@@ -113,21 +118,61 @@ def place_two_balls(poses, p, q, of_a, a, of_b, b, balls):
     return reach_a + reach_b + norm1(shift)
 
 
+class Groups(NamedTuple):
+    """The groups of both bodies of a slot, and their balls in the block: of A's groups from ``a`` on, of its parts, by
+    place, from ``parts_a`` on.
+
+    cut : groups farther apart hold no pair that counts [m].   margin : how much less the distance of two parts' balls
+        may be than that of their groups' [m].
+    """
+
+    A: Body
+    B: Body
+    n_a: int
+    n_b: int
+    a: int
+    b: int
+    parts_a: int
+    parts_b: int
+    cut: float
+    margin: float
+
+
 @kernel
-def _place_part_balls(block, k):
-    """Balls 2, 3, … become those of the parts of A, then of B."""
+def _place_groups(block, k, cut, margin):
+    """Place the balls of all groups; those of their parts are placed when they are first wanted."""
     A = body_of(block, k, 0)
     B = body_of(block, k, 1)
-    _place_balls_of(block, A, 2, Vec3(0.0, 0.0, 0.0))
-    _place_balls_of(block, B, 2 + A.n_parts, _shift(block, POSE * A.row, POSE * B.row))
+    n_a = (A.n_parts + GROUP - 1) // GROUP
+    n_b = (B.n_parts + GROUP - 1) // GROUP
+    parts_b = 2 + A.n_parts
+    a = parts_b + B.n_parts
+    _place_groups_of(block, A, n_a, a, 2, Vec3(0.0, 0.0, 0.0))
+    _place_groups_of(block, B, n_b, a + n_a, parts_b, _shift(block, POSE * A.row, POSE * B.row))
+    return Groups(A, B, n_a, n_b, a, a + n_a, 2, parts_b, cut, margin)
 
 
 @kernel(inline=True)
-def _place_balls_of(block, body, first, shift):
-    parts = part_view(block, body.first + body.n_parts)
-    for k in range(body.n_parts):
-        numbers_at = PART * (body.first + k) + CENTRE
+def _place_groups_of(block, body, n, first, parts, shift):
+    groups = view_f64(block.header[GROUPS_AT], GROUP_BALL * (body.first_group + n))
+    for k in range(n):
+        numbers_at = GROUP_BALL * (body.first_group + k)
         ball_at = (first + k) * BALL_IN_WORLD
+        place_ball(block.poses, POSE * body.row, groups, numbers_at, shift.x, shift.y, shift.z, block.balls, ball_at)
+        block.balls[(parts + GROUP * k) * BALL_IN_WORLD + 3] = math.nan  # its parts are not placed yet
+
+
+@kernel
+def _open_group(block, body, group, first, shift):
+    """Have the balls of a group's parts; ``first`` is that of the body's first by place."""
+    start = GROUP * group
+    if not math.isnan(block.balls[(first + start) * BALL_IN_WORLD + 3]):
+        return
+    parts = part_view(block, body.first + body.n_parts)
+    by_place = view_i64(block.header[BY_PLACE_AT], body.first + body.n_parts)
+    for place in range(start, min(start + GROUP, body.n_parts)):
+        numbers_at = PART * (body.first + by_place[body.first + place]) + CENTRE
+        ball_at = (first + place) * BALL_IN_WORLD
         place_ball(block.poses, POSE * body.row, parts, numbers_at, shift.x, shift.y, shift.z, block.balls, ball_at)
 
 
@@ -138,8 +183,32 @@ def _gap(block, i, j):
 
 
 @kernel
+def _nearest_of_groups(block, groups, a, b, least, nearest):
+    """(least distance of balls, pair of parts) after the parts of groups a and b; of equals the first pair counts."""
+    A, B = groups.A, groups.B
+    _open_group(block, A, a, groups.parts_a, Vec3(0.0, 0.0, 0.0))
+    _open_group(block, B, b, groups.parts_b, _shift(block, POSE * A.row, POSE * B.row))
+    of_a = view_i64(block.header[BY_PLACE_AT], A.first + A.n_parts)
+    of_b = view_i64(block.header[BY_PLACE_AT], B.first + B.n_parts)
+    for i in range(GROUP * a, min(GROUP * (a + 1), A.n_parts)):
+        if _gap(block, groups.parts_a + i, groups.b + b) - groups.margin > min(least, groups.cut):
+            continue
+        for j in range(GROUP * b, min(GROUP * (b + 1), B.n_parts)):
+            gap = _gap(block, groups.parts_a + i, groups.parts_b + j)
+            if gap <= least or nearest < 0:
+                pair = of_a[A.first + i] * B.n_parts + of_b[B.first + j]
+                if gap < least or nearest < 0 or pair < nearest:
+                    least = gap
+                    nearest = pair
+    return least, nearest
+
+
+@kernel
 def _nearest_pair(block, k, boolean):
-    """The pair of parts of slot k whose balls are nearest; −1 of booleans where no balls meet."""
+    """The pair of parts of slot k whose balls are nearest; −1 of booleans where no balls meet.
+
+    Groups of parts whose balls are farther apart than the nearest pair so far hold none that is as near.
+    """
     n_pairs = count_pairs(block, k)
     if n_pairs == 1 and not boolean:
         return 0
@@ -148,20 +217,68 @@ def _nearest_pair(block, k, boolean):
         return -1
     if n_pairs == 1:
         return 0
-    count_a = body_of(block, k, 0).n_parts
-    count_b = body_of(block, k, 1).n_parts
-    _place_part_balls(block, k)
-    least = math.inf
-    nearest = -1
-    for i in range(count_a):
-        if count_b > 1 and _gap(block, 2 + i, 1) - margin > least:
+    groups = _place_groups(block, k, margin if boolean else math.inf, margin)
+    least_of_groups = math.inf
+    first_a = first_b = 0
+    for a in range(groups.n_a):
+        if _gap(block, groups.a + a, 1) > least_of_groups:
             continue
-        for j in range(count_b):
-            gap = _gap(block, 2 + i, 2 + count_a + j)
-            if gap < least or nearest < 0:
-                least = gap
-                nearest = i * count_b + j
+        for b in range(groups.n_b):
+            gap = _gap(block, groups.a + a, groups.b + b)
+            if gap < least_of_groups:
+                least_of_groups = gap
+                first_a = a
+                first_b = b
+    least, nearest = _nearest_of_groups(block, groups, first_a, first_b, math.inf, -1)
+    for a in range(groups.n_a):
+        if groups.n_b > 1 and _gap(block, groups.a + a, 1) - margin > min(least, groups.cut):
+            continue
+        for b in range(groups.n_b):
+            is_first = a == first_a and b == first_b
+            if not is_first and _gap(block, groups.a + a, groups.b + b) - margin <= min(least, groups.cut):
+                least, nearest = _nearest_of_groups(block, groups, a, b, least, nearest)
     return -1 if boolean and least > margin else nearest
+
+
+@kernel
+def _gap_of_pair(block, groups, pair):
+    """The distance of the balls of a pair of parts [m]."""
+    A, B = groups.A, groups.B
+    at = 2 + 2 * block.header[CAPACITY]
+    of_a, of_b = A.first + pair // B.n_parts, B.first + pair % B.n_parts
+    parts = part_view(block, max(of_a, of_b) + 1)
+    shift = _shift(block, POSE * A.row, POSE * B.row)
+    ball_a, ball_b = at * BALL_IN_WORLD, (at + 1) * BALL_IN_WORLD
+    place_ball(block.poses, POSE * A.row, parts, PART * of_a + CENTRE, 0.0, 0.0, 0.0, block.balls, ball_a)
+    place_ball(block.poses, POSE * B.row, parts, PART * of_b + CENTRE, shift.x, shift.y, shift.z, block.balls, ball_b)
+    return _gap(block, at, at + 1)
+
+
+@kernel
+def _list_near_parts(block, groups, of_b, reach, first):
+    """Write where the balls of the parts of A, or of B, are, from ``first`` on of the list of near ones; −1 of parts
+    that are left out.
+
+    Left out are those of groups that none of the other body's comes within the reach of, and those that the ball around
+    it does not: all balls in it are as far away.
+    """
+    body = groups.B if of_b else groups.A
+    n, at, n_others, others_at, parts = (
+        (groups.n_b, groups.b, groups.n_a, groups.a, groups.parts_b) if of_b
+        else (groups.n_a, groups.a, groups.n_b, groups.b, groups.parts_a)
+    )
+    shift = _shift(block, POSE * groups.A.row, POSE * groups.B.row) if of_b else Vec3(0.0, 0.0, 0.0)
+    by_place = view_i64(block.header[BY_PLACE_AT], body.first + body.n_parts)
+    for group in range(n):
+        is_near = False
+        if _gap(block, at + group, 0 if of_b else 1) - groups.margin <= reach:
+            for j in range(n_others):
+                is_near = is_near or _gap(block, at + group, others_at + j) - groups.margin <= reach
+        if is_near:
+            _open_group(block, body, group, parts, shift)
+        for place in range(GROUP * group, min(GROUP * (group + 1), body.n_parts)):
+            is_listed = is_near and _gap(block, parts + place, 0 if of_b else 1) - groups.margin <= reach
+            block.near[first + by_place[body.first + place]] = parts + place if is_listed else -1
 
 
 # --- lists --------------------------------------------------------------------------------------
@@ -217,22 +334,32 @@ def _list_others_of(block, k, boolean, every, n_listed):
     count_a = body_of(block, k, 0).n_parts
     count_b = body_of(block, k, 1).n_parts
     size = _place_body_balls(block, k)
-    _place_part_balls(block, k)
+    margin = BALL_MARGIN * size
+    groups = _place_groups(block, k, math.inf, margin)
     first_pair = block.slots[SLOT_SIZE * k + FIRST_PAIR]
-    reach = BALL_MARGIN * size
+    reach = margin
     if every:
         reach = math.inf
     elif not boolean:
         # Others that are as near by their balls as the first: which of them came first has no say.
-        tied = _gap(block, 2 + first_pair // count_b, 2 + count_a + first_pair % count_b)
-        reach += max(first_reach_of(block.scores, SCORE * k), tied, 0.0) + _BRACKET * size
+        reach += max(first_reach_of(block.scores, SCORE * k), _gap_of_pair(block, groups, first_pair), 0.0)
+        reach += _BRACKET * size
+    _list_near_parts(block, groups, False, reach, 0)
+    _list_near_parts(block, groups, True, reach, count_a)
+    n_near = 0
+    balls_b = header[CAPACITY]
+    for j in range(count_b):  # those of B that are near: their numbers in front, their balls in the second half
+        if block.near[count_a + j] >= 0:
+            block.near[balls_b + n_near] = block.near[count_a + j]
+            block.near[count_a + n_near] = j
+            n_near += 1
     start = header[PAIR]
     for i in range(start // count_b, count_a):
-        if count_b > 1 and _gap(block, 2 + i, 1) > reach:
+        if block.near[i] < 0:
             continue
-        for j in range(start % count_b if i == start // count_b else 0, count_b):
-            pair = i * count_b + j
-            if pair == first_pair or _gap(block, 2 + i, 2 + count_a + j) > reach:
+        for at in range(n_near):
+            pair = i * count_b + block.near[count_a + at]
+            if pair < start or pair == first_pair or _gap(block, block.near[i], block.near[balls_b + at]) > reach:
                 continue
             if n_listed == LIST:
                 header[PAIR] = pair

@@ -201,6 +201,33 @@ def test_beyond_a_limit_few_parts_are_asked_and_its_bounds_hold():
     assert 60 < beyond < 160, beyond
 
 
+@pytest.mark.parametrize("lay", ["scattered", "in a grid"])
+def test_groups_of_parts_leave_no_nearest_pair_out(lay):
+    """Two unions of many parts, far apart, near and meeting; in a grid, many pairs are equally near: the first in order
+    is named, the one that every pair asked alone tells."""
+    rng, n, hits = rng_of("groups", lay), 70, 0
+    ball = collide.Sphere(0.06)
+    if lay == "in a grid":
+        places = np.stack(np.meshgrid(range(7), range(10), [0.0], indexing="ij"), axis=-1).reshape(-1, 3) * 0.25
+        poses = [collide.pose(p) for p in rng.permutation(places)]
+    else:
+        poses = [random_pose(rng, 1.0) for _ in range(n)]
+    A, B = (collide.Compound([(ball, X) for X in some]) for some in (poses, poses[::-1]))
+    for z in (0.1, 0.3, 1.0, 6.0):
+        X_WB = collide.pose((0.0, 0.0, z), rpy=(0, 0, 0) if lay == "in a grid" else rng.uniform(-3, 3, 3))
+        r = collide.distance(A, B, np.eye(4), X_WB, signed=False)
+        at = np.array([X[:3, 3] for X in poses]), np.array([(X_WB @ X)[:3, 3] for X in poses[::-1]])
+        gaps = np.sqrt(np.square(at[0][:, None] - at[1][None]).sum(axis=2)) - 0.12
+        hits += bool(r.hit)
+        assert r.hit == (gaps.min() <= 0.0) == collide.collide(A, B, np.eye(4), X_WB)
+        if not r.hit:
+            assert abs(r.distance - gaps.min()) < 1e-12
+            assert gaps[r.part_a, r.part_b] < gaps.min() + 1e-12
+            first = np.flatnonzero(gaps.ravel() < gaps.min() + 1e-12)[0]
+            assert r.part_a * n + r.part_b == first
+    assert 1 <= hits < 4, hits
+
+
 def test_gaps_alone_stop_at_the_first_overlap():
     """Boxes in one place: with depths each has a say, without them one is enough."""
     A = collide.Compound([(collide.Box((1, 1, 1)), collide.pose((0.01 * k, 0, 0))) for k in range(12)])
