@@ -8,7 +8,6 @@ import pytest
 import collide
 from collide.narrowphase.composite import composite_meshes, composite_parts
 from collide.narrowphase.composite.composite_parts import CompoundParts
-from collide.narrowphase.prepared_pairs import single_calls_are_safe
 
 EYE = np.eye(4)
 
