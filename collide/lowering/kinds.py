@@ -30,6 +30,7 @@ class Kind(IntEnum):
 #: Kinds whose surface is that of a hull of doubles swept by a ball, or a mesh: `facet_bodies.body_of` serves them.
 WITH_FACETS = frozenset((Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE, Kind.MESH))
 _CURVED = {CYLINDER: Kind.CYLINDER, CONE: Kind.CONE, ELLIPSOID: Kind.ELLIPSOID, HALFSPACE: Kind.HALFSPACE}
+_OF_POINTS = (None, Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE)
 
 
 @kept_with_shape("_kind")
@@ -47,4 +48,4 @@ def _kind_of_convex(part: ConvexSet) -> Kind:
         return _CURVED[part.kind]
     if part.slop != 0.0:
         return Kind.ROUNDED
-    return Kind(min(len(part.points), 3) - 1)
+    return _OF_POINTS[min(len(part.points), 3)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -57,8 +58,8 @@ def answer_batch(
     answer = None
     if isinstance(A, Shape) and isinstance(B, Shape):
         answer = answer_of(A, B)
-        if prepare and prepared_pair(A, B) is None and single_calls_are_safe():
-            _prepare(A, B, answer)
+        if prepare:
+            _newly_prepared(A, B)
     else:
         A, B = of_one_set(A, B, n)
 
@@ -95,10 +96,25 @@ def answer_batch(
     return out
 
 
-def _prepare(A: Shape, B: Shape, answer: Answer) -> None:
-    pair = answer.prepare(A, B)
+def first_answer(A, B, question: str, *arguments: Any) -> Any:
+    """What two shapes that were not yet prepared for single calls answer, prepared now and kept so; None where they had
+    been, and where the long way answers, or says what is wrong.
+
+    question : "collide", "distance" or "within".   arguments : two poses, and what else the question takes.
+    """
+    pair = _newly_prepared(A, B) if isinstance(A, Shape) and isinstance(B, Shape) else None
+    ask = getattr(pair, question, None)
+    return None if ask is None else ask(*arguments)
+
+
+def _newly_prepared(A: Shape, B: Shape) -> Any:
+    """The pair ready for single calls; None where it was before, or there is nothing to make ready."""
+    if prepared_pair(A, B) is not None or not single_calls_are_safe():
+        return None
+    pair = answer_of(A, B).prepare(A, B)
     if pair is not None:
         keep_prepared(A, B, pair)
+    return pair
 
 
 def _of_one_pair(A: Picked, B: Picked) -> np.ndarray:

@@ -17,7 +17,7 @@ from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.convex_kernel_calls import finish_distances
 from collide.narrowphase.dispatch import REFUSED, Method, method_of
 from collide.pairs.algorithms import named_algorithm
-from collide.pairs.batches import answer_batch, length_of
+from collide.pairs.batches import answer_batch, first_answer, length_of
 from collide.pairs.pair_arguments import asked_poses, pose_at, shape_at
 from collide.pairs.security_margin import checked_margin, within
 from collide.results import PairResult
@@ -107,19 +107,20 @@ def collide(
     if algorithm is None and axes is None and security_margin is _TOUCHING and type(threads) is int and threads == 1:
         try:
             hit = A._prepared[B._serial].collide(X_WA, X_WB)
-            if hit is not None:
-                return hit
         except (AttributeError, KeyError, TypeError):
-            pass  # not prepared yet, not single, not float64, not shapes: the long way answers, or says what is wrong
+            # not prepared yet, not single, not float64, not shapes: the long way answers the rest, or says what is wrong
+            hit = first_answer(A, B, "collide", X_WA, X_WB) if check_poses.__class__ is bool else None
+        if hit is not None:
+            return hit
         return _batched(A, B, X_WA, X_WB, check_poses, threads)
     margin = checked_margin("security_margin", security_margin)
     if margin and algorithm is None and axes is None and type(threads) is int and threads == 1:
         try:
             hit = A._prepared[B._serial].within(X_WA, X_WB, margin)
-            if hit is not None:
-                return hit
-        except (AttributeError, KeyError, TypeError):
-            pass  # as above
+        except (AttributeError, KeyError, TypeError):  # as above
+            hit = first_answer(A, B, "within", X_WA, X_WB, margin) if check_poses.__class__ is bool else None
+        if hit is not None:
+            return hit
     if margin and (axes is not None or algorithm is not None):
         raise InvalidArgument("security_margin goes with neither axes nor algorithm")
     answer = named_algorithm("collide", algorithm)
@@ -246,10 +247,10 @@ def distance(
     if threads.__class__ is int and threads == 1:
         try:
             rows = A._prepared[B._serial].distance(X_WA, X_WB, signed, limit)
-            if rows is not None:
-                return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]), certify)
-        except (AttributeError, KeyError, TypeError):
-            pass  # as in `collide`
+        except (AttributeError, KeyError, TypeError):  # as in `collide`
+            rows = first_answer(A, B, "distance", X_WA, X_WB, signed, limit) if check_poses.__class__ is bool else None
+        if rows is not None:
+            return PairResult(rows, True, (A, B, X_WA.copy()[None], X_WB.copy()[None]), certify)
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     pose_copies = np.empty_like(X_WA), np.empty_like(X_WB)  # a certificate worked out later is one for these poses
     unbounded = []

@@ -26,9 +26,11 @@ class Shape:
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_contacts", "_convex_parts", "_crossings", "_facet_edges",
         "_hulls_instead", "_kind", "_laid_out", "_moving", "_moving_bounds", "_partners", "_parts", "_pieces",
-        "_prepared", "_reach", "_serial", "_surface", "_topology", "_union", "_vertex_set", "_walk",
+        "_prepared", "_reach", "_serial", "_set", "_surface", "_topology", "_union", "_vertex_set", "_walk",
     )
     _fields: tuple[str, ...] = ()
+    #: The shape as one convex set of numbers (`lowering/convex_sets.py`).
+    _set: Any
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
     _parts: tuple
     _bounds: tuple
