@@ -11,7 +11,7 @@ from collide.base import argument_checks as checks
 from collide.base.threads import check_threads
 from collide.contact.contact_batches import contact_batch
 from collide.contact.contact_rows import Contacts
-from collide.contact.convex_contacts import prepare_contacts
+from collide.contact.convex_contacts import newly_prepared_contacts
 from collide.errors import InvalidArgument
 from collide.pairs.batches import length_of
 from collide.pairs.pair_arguments import asked_poses
@@ -89,15 +89,16 @@ def contacts(
         threads = check_threads(threads)
     try:
         rows = A._contacts[B._serial].contacts(X_WA, X_WB, margin, max_contacts)  # type: ignore[union-attr]
-        if rows is not None:
-            return Contacts(rows)
     except (AttributeError, KeyError, TypeError):
-        pass  # not prepared, or no pair of shapes: the long way answers, or says what is wrong
+        # not prepared, or no pair of shapes: the long way answers the rest, or says what is wrong
+        pair = newly_prepared_contacts(A, B) if check_poses.__class__ is bool else None
+        rows = None if pair is None else pair.contacts(X_WA, X_WB, margin, max_contacts)
+    if rows is not None:
+        return Contacts(rows)
     X_WA, X_WB, _ = asked_poses(A, B, X_WA, X_WB)
     n = length_of(A, B, X_WA, X_WB)
     check = checks.true_or_false("check_poses", check_poses)
     rows, ends = contact_batch(A, B, X_WA, X_WB, n, margin, max_contacts, check=check, threads=threads)
-    prepare_contacts(A, B)
     return Contacts(rows, np.concatenate([[0], ends]).astype(np.int64))
 
 

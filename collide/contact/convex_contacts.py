@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from threading import local
 from typing import NamedTuple
 
@@ -210,19 +211,23 @@ def _addresses(
     )
 
 
-def prepare_contacts(A, B) -> None:
-    """Have two convex sets prepared for single calls, of their distance as of their contacts; of two bodies of which
-    one is a union, those calls at which they are far apart."""
+def newly_prepared_contacts(A, B) -> SingleContacts | FarContacts | None:
+    """Two convex sets prepared for single calls, of their distance as of their contacts; of two bodies of which one is
+    a union, for those calls at which they are far apart. None where they had been, or there is nothing to make ready.
+    """
     if not (isinstance(A, Shape) and isinstance(B, Shape)) or prepared_pair(A, B, _SLOT) is not None:
-        return
-    pair = prepared_pair(A, B)
+        return None
+    pair, made = prepared_pair(A, B), None
     if pair is None and is_single_convex(A) and is_single_convex(B) and single_calls_are_safe():
         pair = prepare_sets(A, B)
         keep_prepared(A, B, pair)
     if isinstance(pair, SinglePair):
-        keep_prepared(A, B, SingleContacts(pair), _SLOT)
+        made = SingleContacts(pair)
     elif (isinstance(A, Compound) or isinstance(B, Compound)) and single_calls_are_safe():
-        keep_prepared(A, B, FarContacts(A, B), _SLOT)
+        made = FarContacts(A, B)
+    if made is not None:
+        keep_prepared(A, B, made, _SLOT)
+    return made
 
 
 class FarContacts:
@@ -246,18 +251,15 @@ class SingleContacts:
     """
 
     def __init__(self, pair: SinglePair):
-        table, header = pair.table, pair.header
-        self._held = table, pair.space  # kernels use their buffers; the pair itself holds this
-        self._faces = face_table_of(table, ROUND)
-        self._space = _Workspace()
-        self._space.fit(self._faces.largest)
-        self.max_rows = max_corners(self._faces.largest)
-        self._header = np.zeros(SINGLE_HEADER, dtype=np.int64)
-        self._header[: len(header)] = header
-        self._of_manifold = self._header[len(header) :]
-        self._of_manifold[:PAIRS_DONE] = _addresses(
-            table, self._faces, self._space, self._space.poses, self._space.shape_of
-        )
+        table, faces = pair.table, face_table_of(pair.table, ROUND)
+        space = _space_of_single_calls().fit(faces.largest)
+        # Kernels use these buffers, whatever becomes of the workspace; a larger one is of other arrays.
+        self._held = pair, faces, space.doubles, space.integers, space.poses, space.shape_of
+        self.max_rows = max_corners(faces.largest)
+        self._header = np.empty(SINGLE_HEADER, dtype=np.int64)
+        self._header[:HEADER_OF_POSES] = pair.header
+        self._of_manifold = self._header[HEADER_OF_POSES:]
+        self._of_manifold[:PAIRS_DONE] = _addresses(table, faces, space, space.poses, space.shape_of)
         self._ask = prepared_row(contacts_single, self._header)
 
     def contacts(self, X_WA, X_WB, margin: float, max_contacts: int) -> np.ndarray | None:
@@ -295,3 +297,9 @@ class _OfThread(local):
 
 
 _of_thread = _OfThread()
+
+
+@cache
+def _space_of_single_calls() -> _Workspace:
+    """One for all single calls, as `convex_kernel_calls.space_of_single_calls`."""
+    return _Workspace()

@@ -18,7 +18,7 @@ from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
-from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
+from collide.shapes.shape import IDENTITY, Shape
 from collide.support.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 
 __all__ = [
@@ -61,10 +61,12 @@ def sets_of(shape: Shape) -> list[PlacedSet]:
     return [(convex_set(shape), IDENTITY)]
 
 
-@kept_with_shape("_set")
 def convex_set(shape: Shape) -> ConvexSet:
     """The convex set of a shape that is no Compound. Raises UnsupportedQuery for meshes and regions, TypeError for
     classes that are not derived from the library's."""
+    rule = _RULES.get(type(shape))
+    if rule is not None:
+        return rule(shape)
     for cls in type(shape).__mro__:
         if cls in _RULES:
             return _RULES[cls](shape)

@@ -6,6 +6,7 @@ from enum import IntEnum
 
 from collide.lowering.convex_sets import ConvexSet, convex_set
 from collide.shapes.compound import Compound
+from collide.shapes.primitives import Box, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import Shape, kept_with_shape
 from collide.support.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 
@@ -33,9 +34,20 @@ _CURVED = {CYLINDER: Kind.CYLINDER, CONE: Kind.CONE, ELLIPSOID: Kind.ELLIPSOID, 
 _OF_POINTS = (None, Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE)
 
 
-@kept_with_shape("_kind")
+#: Classes all of whose shapes are of one kind: new shapes are told apart without making their sets.
+_OF_CLASS = {
+    Sphere: Kind.SPHERE, Box: Kind.POLYTOPE, Cylinder: Kind.CYLINDER, Cone: Kind.CONE, Ellipsoid: Kind.ELLIPSOID,
+    Halfspace: Kind.HALFSPACE,
+}
+
+
 def kind_of(shape: Shape) -> Kind:
     """The kind of a shape."""
+    return _OF_CLASS[shape.__class__] if shape.__class__ in _OF_CLASS else _kind_by_set(shape)
+
+
+@kept_with_shape("_kind")
+def _kind_by_set(shape: Shape) -> Kind:
     if isinstance(shape, Compound):
         return Kind.MESH_COMPOUND if shape.meshed else Kind.COMPOUND
     if shape.is_region:

@@ -57,7 +57,7 @@ class ShapeTable:
         self.ints, self.numbers = np.empty((len(packed), INTS), dtype=np.int64), np.empty((len(packed), NUMBERS))
         self._without_tree: set[int] = set()
         self._contents: list[bytes] = sorted({p.content for p in packed})
-        self._ranks = list(range(len(self._contents)))
+        self._ranks: list[int] = [*range(len(self._contents))]
         self._write(packed)
 
     def append(self, packed: list[PackedConvex]) -> None:

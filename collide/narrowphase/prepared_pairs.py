@@ -49,11 +49,11 @@ def keep_prepared(A: Shape, B: Shape, pair: Any, slot: str = "_prepared") -> Non
 
 
 def _dictionary(A: Shape, slot: str) -> dict:
-    kept = getattr(A, slot, None)
-    if kept is None:
-        kept = {}
-        object.__setattr__(A, slot, kept)
-    return kept
+    entries = getattr(A, slot, None)
+    if entries is None:
+        entries = {}
+        object.__setattr__(A, slot, entries)
+    return entries
 
 
 def _forget(A: Callable[[], Shape | None], slot: str, serial: int, _: Any = None) -> None:

@@ -26,11 +26,9 @@ class Shape:
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_contacts", "_convex_parts", "_crossings", "_facet_edges",
         "_hulls_instead", "_kind", "_laid_out", "_moving", "_moving_bounds", "_partners", "_parts", "_pieces",
-        "_prepared", "_reach", "_serial", "_set", "_surface", "_topology", "_union", "_vertex_set", "_walk",
+        "_prepared", "_reach", "_serial", "_surface", "_topology", "_union", "_vertex_set", "_walk",
     )
     _fields: tuple[str, ...] = ()
-    #: The shape as one convex set of numbers (`lowering/convex_sets.py`).
-    _set: Any
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
     _parts: tuple
     _bounds: tuple
@@ -127,11 +125,11 @@ def kept_with_shape(slot: str) -> Callable[[Callable[[Any], T]], Callable[[Any],
     def decorate(make: Callable[[Any], T]) -> Callable[[Any], T]:
         @wraps(make)
         def of(shape: Any) -> T:
-            kept = getattr(shape, slot, _NOT_MADE)
-            if kept is _NOT_MADE:
-                kept = make(shape)
-                object.__setattr__(shape, slot, kept)
-            return kept
+            made = getattr(shape, slot, _NOT_MADE)
+            if made is _NOT_MADE:
+                made = make(shape)
+                object.__setattr__(shape, slot, made)
+            return made
 
         return of
 
@@ -215,13 +213,13 @@ def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndar
     if (y is None) != (z is None):
         values = brief((value, y, z))
         raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {values}")
-    given = value if y is None else (value, y, z)
-    numbers = given.tolist() if given.__class__ is np.ndarray else given
+    values = value if y is None else (value, y, z)
+    numbers = values.tolist() if values.__class__ is np.ndarray else values
     if numbers.__class__ in (tuple, list) and len(numbers) == 3 and all([_is_plain_length(v) for v in numbers]):
         lengths = np.array(numbers, dtype=np.float64)
         lengths.setflags(write=False)
         return lengths
-    lengths = rows(shape, field, given, (3,))
+    lengths = rows(shape, field, values, (3,))
     for axis, length in zip("xyz", lengths):
         positive(shape, f"{field}.{axis}", length)
     return lengths
