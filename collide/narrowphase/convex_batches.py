@@ -13,7 +13,8 @@ import numpy as np
 
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.compound_table import CompoundTable
-from collide.lowering.parts import convex_set_of, is_single_convex
+from collide.lowering.packed_convex import BLOCK
+from collide.lowering.parts import MOST_SHARED, convex_set_of, is_single_convex
 from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_kernel_calls
@@ -101,8 +102,20 @@ def _answer_compounds(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray,
 
 
 def prepare_sets(A: Shape, B: Shape) -> convex_kernel_calls.SinglePair:
-    """Two convex sets in their own frames made ready for single calls."""
-    return convex_kernel_calls.SinglePair(ShapeTable([convex_set_of(A), convex_set_of(B)]))
+    """Two convex sets in their own frames made ready for single calls: pairs of the same two small sets are one."""
+    packed = convex_set_of(A), convex_set_of(B)
+    key = id(packed[0]), id(packed[1])  # of sets that the pair's table holds for as long as it is listed
+    pair = _pairs_of_sets.get(key)
+    if pair is None:
+        pair = convex_kernel_calls.SinglePair(ShapeTable([*packed]))
+        if max(len(p.points) for p in packed) <= BLOCK:
+            if len(_pairs_of_sets) >= MOST_SHARED:
+                _pairs_of_sets.clear()
+            _pairs_of_sets[key] = pair
+    return pair
+
+
+_pairs_of_sets: dict[tuple[int, int], convex_kernel_calls.SinglePair] = {}
 
 
 def prepare_parts(A: Shape, B: Shape) -> convex_kernel_calls.SinglePair | CompoundPair:
