@@ -217,7 +217,8 @@ def newly_prepared_contacts(A, B) -> SingleContacts | FarContacts | None:
     """
     if not (isinstance(A, Shape) and isinstance(B, Shape)) or prepared_pair(A, B, _SLOT) is not None:
         return None
-    pair, made = prepared_pair(A, B), None
+    made: SingleContacts | FarContacts | None = None
+    pair = prepared_pair(A, B)
     if pair is None and is_single_convex(A) and is_single_convex(B) and single_calls_are_safe():
         pair = prepare_sets(A, B)
         keep_prepared(A, B, pair)

@@ -31,9 +31,7 @@ class Kind(IntEnum):
 #: Kinds whose surface is that of a hull of doubles swept by a ball, or a mesh: `facet_bodies.body_of` serves them.
 WITH_FACETS = frozenset((Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE, Kind.MESH))
 _CURVED = {CYLINDER: Kind.CYLINDER, CONE: Kind.CONE, ELLIPSOID: Kind.ELLIPSOID, HALFSPACE: Kind.HALFSPACE}
-_OF_POINTS = (None, Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE)
-
-
+_OF_POINTS = (Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE)
 #: Classes all of whose shapes are of one kind: new shapes are told apart without making their sets.
 _OF_CLASS = {
     Sphere: Kind.SPHERE, Box: Kind.POLYTOPE, Cylinder: Kind.CYLINDER, Cone: Kind.CONE, Ellipsoid: Kind.ELLIPSOID,
@@ -60,4 +58,4 @@ def _kind_of_convex(part: ConvexSet) -> Kind:
         return _CURVED[part.kind]
     if part.slop != 0.0:
         return Kind.ROUNDED
-    return _OF_POINTS[min(len(part.points), 3)]
+    return _OF_POINTS[min(len(part.points), 3) - 1]

@@ -6,6 +6,7 @@ never changes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable
 from operator import attrgetter
 
@@ -16,7 +17,7 @@ from collide.lowering.packed_convex import PackedConvex, pack, pack_halfspace, p
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
-from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Sphere
+from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
 
 #: A convex set and its (4, 4) pose in the shape's frame.
@@ -29,6 +30,7 @@ _NUMBERS_OF: dict[type, Callable[..., Hashable]] = {
     Sphere: attrgetter("radius"), Capsule: attrgetter("radius", "length"), Cylinder: attrgetter("radius", "length"),
     Cone: attrgetter("radius", "length"), Box: lambda shape: shape.size.tobytes(),
     Ellipsoid: lambda shape: shape.radii.tobytes(),
+    Halfspace: lambda shape: (shape.normal.tobytes(), shape.offset, math.copysign(1.0, shape.offset)),
 }
 _parts_of_numbers: dict[Hashable, tuple[Part, ...]] = {}
 
@@ -55,6 +57,11 @@ def parts_of(shape: Shape) -> tuple[Part, ...]:
             _parts_of_numbers.clear()
         parts = _parts_of_numbers[key] = _alone(pack(convex_set(shape)))
     return parts
+
+
+def shares_parts(shape: Shape) -> bool:
+    """Whether a shape has the parts of all others of its numbers: few points, which are cheap to remember."""
+    return shape.__class__ in _NUMBERS_OF
 
 
 def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:

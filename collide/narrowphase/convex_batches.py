@@ -13,8 +13,7 @@ import numpy as np
 
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.compound_table import CompoundTable
-from collide.lowering.packed_convex import BLOCK
-from collide.lowering.parts import MOST_SHARED, convex_set_of, is_single_convex
+from collide.lowering.parts import MOST_SHARED, convex_set_of, is_single_convex, shares_parts
 from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_kernel_calls
@@ -102,16 +101,16 @@ def _answer_compounds(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray,
 
 
 def prepare_sets(A: Shape, B: Shape) -> convex_kernel_calls.SinglePair:
-    """Two convex sets in their own frames made ready for single calls: pairs of the same two small sets are one."""
-    packed = convex_set_of(A), convex_set_of(B)
-    key = id(packed[0]), id(packed[1])  # of sets that the pair's table holds for as long as it is listed
+    """Two convex sets in their own frames made ready for single calls: pairs of shapes that share parts share this."""
+    packed = [convex_set_of(A), convex_set_of(B)]
+    if not (shares_parts(A) and shares_parts(B)):
+        return convex_kernel_calls.SinglePair(ShapeTable(packed))
+    key = id(packed[0]), id(packed[1])  # the pair's table holds both for as long as the pair is remembered
     pair = _pairs_of_sets.get(key)
     if pair is None:
-        pair = convex_kernel_calls.SinglePair(ShapeTable([*packed]))
-        if max(len(p.points) for p in packed) <= BLOCK:
-            if len(_pairs_of_sets) >= MOST_SHARED:
-                _pairs_of_sets.clear()
-            _pairs_of_sets[key] = pair
+        if len(_pairs_of_sets) >= MOST_SHARED:
+            _pairs_of_sets.clear()
+        pair = _pairs_of_sets[key] = convex_kernel_calls.SinglePair(ShapeTable(packed))
     return pair
 
 

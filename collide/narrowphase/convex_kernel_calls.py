@@ -19,7 +19,16 @@ from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finish_rows import finish_rows
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.pose_batches import (
-    ANSWERED, BAD_POSE, BLOCK, CORE, HEADER, INTS_AT, NUMBERS_AT, POSES_AT, SETTLE, answer_poses,
+    ANSWERED,
+    BAD_POSE,
+    BLOCK,
+    CORE,
+    HEADER,
+    INTS_AT,
+    NUMBERS_AT,
+    POSES_AT,
+    SETTLE,
+    answer_poses,
 )
 from collide.narrowphase.single_call import collide_single, distance_single, within_single
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED, zeroed_rows

@@ -108,7 +108,7 @@ def collide(
         try:
             hit = A._prepared[B._serial].collide(X_WA, X_WB)
         except (AttributeError, KeyError, TypeError):
-            # not prepared yet, not single, not float64, not shapes: the long way answers the rest, or says what is wrong
+            # not prepared yet, or not single, not float64, not shapes: then the long way answers, or says what is wrong
             hit = first_answer(A, B, "collide", X_WA, X_WB) if check_poses.__class__ is bool else None
         if hit is not None:
             return hit

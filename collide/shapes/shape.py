@@ -215,7 +215,7 @@ def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndar
         raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {values}")
     values = value if y is None else (value, y, z)
     numbers = values.tolist() if values.__class__ is np.ndarray else values
-    if numbers.__class__ in (tuple, list) and len(numbers) == 3 and all([_is_plain_length(v) for v in numbers]):
+    if numbers.__class__ in (tuple, list) and len(numbers) == 3 and all(map(_is_plain_length, numbers)):
         lengths = np.array(numbers, dtype=np.float64)
         lengths.setflags(write=False)
         return lengths
@@ -234,7 +234,7 @@ def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
     """Finite numbers of a shape (None stands for any length), as a read-only float64 copy."""
     expected = _in_words(wanted)
     array = np.array(checks.array(f"{shape}: {field}", value, expected, InvalidShape), order="C")
-    if array.ndim != len(wanted) or any([w not in (None, s) for w, s in zip(wanted, array.shape)]):
+    if array.ndim != len(wanted) or any(w not in (None, s) for w, s in zip(wanted, array.shape)):
         raise InvalidShape(f"{shape}: {field} must have shape {expected}, got {array.shape}")
     if array.shape[0] == 0:
         raise InvalidShape(f"{shape}: {field} is empty; at least one row is needed")
