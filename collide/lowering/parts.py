@@ -25,7 +25,7 @@ Part = tuple[PackedConvex, np.ndarray]
 
 #: Shapes of few numbers share parts where these are equal, zeros of different signs apart: programs that make shapes as
 #: they go make the same again and again. So many kinds of numbers are remembered, then all are forgotten.
-MOST_SHARED = 1024
+MAX_SHARED = 1024
 _NUMBERS_OF: dict[type, Callable[..., Hashable]] = {
     Sphere: attrgetter("radius"), Capsule: attrgetter("radius", "length"), Cylinder: attrgetter("radius", "length"),
     Cone: attrgetter("radius", "length"), Box: lambda shape: shape.size.tobytes(),
@@ -53,7 +53,7 @@ def parts_of(shape: Shape) -> tuple[Part, ...]:
     key = shape.__class__, numbers_of(shape)
     parts = _parts_of_numbers.get(key)
     if parts is None:
-        if len(_parts_of_numbers) >= MOST_SHARED:
+        if len(_parts_of_numbers) >= MAX_SHARED:
             _parts_of_numbers.clear()
         parts = _parts_of_numbers[key] = _alone(pack(convex_set(shape)))
     return parts

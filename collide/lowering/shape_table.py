@@ -91,10 +91,10 @@ class ShapeTable:
         self.packed.extend(packed)
         for k, p in enumerate(packed, first):
             _INT_ROW.pack_into(
-                self.ints, _INT_ROW.size * k,
+                self.ints.data, _INT_ROW.size * k,
                 p.kind, len(p.points), p.padded, p.address, p.lowest, self._rank_of(p), 0, coarse_address(p),
             )
-            _NUMBER_ROW.pack_into(self.numbers, _NUMBER_ROW.size * k, p.radius, p.reach, p.slop, *p.numbers)
+            _NUMBER_ROW.pack_into(self.numbers.data, _NUMBER_ROW.size * k, p.radius, p.reach, p.slop, *p.numbers)
             if may_have_tree(p):
                 self._without_tree.add(k)
         self.addresses = address_of(self.ints), address_of(self.numbers)

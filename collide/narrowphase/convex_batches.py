@@ -13,7 +13,7 @@ import numpy as np
 
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.compound_table import CompoundTable
-from collide.lowering.parts import MOST_SHARED, convex_set_of, is_single_convex, shares_parts
+from collide.lowering.parts import MAX_SHARED, convex_set_of, is_single_convex, shares_parts
 from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_kernel_calls
@@ -108,7 +108,7 @@ def prepare_sets(A: Shape, B: Shape) -> convex_kernel_calls.SinglePair:
     key = id(packed[0]), id(packed[1])  # the pair's table holds both for as long as the pair is remembered
     pair = _pairs_of_sets.get(key)
     if pair is None:
-        if len(_pairs_of_sets) >= MOST_SHARED:
+        if len(_pairs_of_sets) >= MAX_SHARED:
             _pairs_of_sets.clear()
         pair = _pairs_of_sets[key] = convex_kernel_calls.SinglePair(ShapeTable(packed))
     return pair

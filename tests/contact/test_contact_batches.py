@@ -61,7 +61,9 @@ def test_rows_are_those_of_the_parts_one_by_one(n_a, n_b, posed_rows):
 def test_far_compounds_pose_no_part(posed_rows):
     rng = np.random.default_rng(3)
     A, B = clutter(rng, 300, 0.5), clutter(rng, 300, 0.5)
-    assert not len(collide.contacts(A, B, EYE, collide.pose((5, 0, 0)), margin=0.1))
+    far = collide.pose((5, 0, 0))
+    assert not len(collide.contacts(A, B, EYE, far, margin=0.1)) and not posed_rows  # prepared, then told by two balls
+    assert not len(collide.contacts(A, B, EYE, far[None], margin=0.1))
     assert posed_rows == [0, 0]
 
 

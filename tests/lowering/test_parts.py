@@ -76,9 +76,9 @@ def test_shapes_of_equal_numbers_share_parts():
 
     assert P.parts_of(Ball(0.75)) is not P.parts_of(Ball(0.75))
     first = P.parts_of(collide.Sphere(0.75))
-    for k in range(P.MOST_SHARED):
+    for k in range(P.MAX_SHARED):
         P.parts_of(collide.Sphere(1.0 + k))
-    assert len(P._parts_of_numbers) <= P.MOST_SHARED
+    assert len(P._parts_of_numbers) <= P.MAX_SHARED
     assert P.parts_of(collide.Sphere(0.75)) is not first, "all are forgotten at times"
 
 
