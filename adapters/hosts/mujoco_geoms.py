@@ -92,7 +92,7 @@ def _boxes_and_extremes(table: ShapeTable, faces: HullFaceTable) -> tuple[np.nda
         if of_hull is not None:
             low, high = packed.points.min(axis=0), packed.points.max(axis=0)
             boxes[k] = *(0.5 * (low + high)), *(0.5 * (high - low) + packed.radius)
-            ids = of_hull.vertex_ids  # points within faces are no vertices, and have no edges to go on along
+            ids = of_hull.arrays.vertex_ids  # points within faces are no vertices, and have no edges to go on along
             extremes[k] = ids[(packed.points[ids] @ _DIRECTIONS.T).argmax(axis=0)]
     return boxes, extremes
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from threading import local
 from typing import Any, NamedTuple
 
@@ -234,15 +235,17 @@ def _single_far_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
 
 def _single_contacts(table: ShapeTable) -> tuple[Single, Any]:
     """(`Prepared.contacts` of rows 0 and 1 of a table, what it uses besides)."""
-    block, faces, space = space_of_single_calls(), face_table_of(table, ROUND), _Workspace()
-    space.fit(faces.largest)
+    block, faces = space_of_single_calls(), face_table_of(table, ROUND)
+    space = _space_of_contacts().fit(faces.largest)
     header = np.zeros(SINGLE_HEADER, dtype=np.int64)
     header[:HEADER_OF_POSES] = block.header_of(table)
     header[HEADER_OF_POSES : HEADER_OF_POSES + PAIRS_DONE] = _addresses(
         table, faces, space, space.poses, space.shape_of
     )
     rows = np.zeros(max_corners(faces.largest), dtype=CONTACT_DTYPE)
-    return prepared_contacts(contacts_single, header, rows), (block, faces, space)
+    # Kernels use these buffers, whatever becomes of the workspace; a larger one is of other arrays.
+    held = block, faces, space.doubles, space.integers, space.poses, space.shape_of
+    return prepared_contacts(contacts_single, header, rows), held
 
 
 class _Workspace:
@@ -271,3 +274,9 @@ class _OfThread(local):
 
 
 _of_thread = _OfThread()
+
+
+@cache
+def _space_of_contacts() -> _Workspace:
+    """One for all single calls, as `convex_kernel_calls.space_of_single_calls`."""
+    return _Workspace()

@@ -52,30 +52,52 @@ class HullFaces(NamedTuple):
     largest: int
 
 
-def hull_faces(points: np.ndarray) -> HullFaces:
+class KeptFaces(NamedTuple):
+    """The same in one block of memory.
+
+    block : what the addresses are of.   row : FACE_INTS integers.   largest : most corners of a face.
+    """
+
+    block: np.ndarray
+    row: np.ndarray
+    largest: int
+
+    @property
+    def arrays(self) -> HullFaces:
+        """Views of the block."""
+        ids, padded, faces = self.row[:COLUMNS_AT].tolist()
+        places = ((self.row[COLUMNS_AT:] - address_of(self.block)) // 8).tolist()
+        block, integers = self.block, self.block.view(np.int64)
+        columns, ids_at, normals, flatness = places[:4]
+        return HullFaces._make((
+            block[columns:ids_at].reshape(3, padded), integers[ids_at : ids_at + ids],
+            block[normals : normals + 3 * faces].reshape(faces, 3), block[flatness : flatness + faces],
+            *(integers[i:j] for i, j in zip(places[4:], [*places[5:], len(block)])), self.largest,
+        ))
+
+
+def kept_faces(points: np.ndarray) -> KeptFaces:
     """Faces of the hull of points (n, 3). O(n log n)."""
     points = np.ascontiguousarray(points, dtype=np.float64)
-    n = len(points)
+    n, points_at = len(points), address_of(points)
     memory = np.empty(faces_memory(n) // 8, dtype=np.int64)
-    if make_faces(address_of(points), n, address_of(memory)) < 0:
+    memory_at = address_of(memory)
+    if make_faces(points_at, n, memory_at) < 0:
         raise AssertionError("quickhull: the rim of a visible region is no simple cycle")
-    block, row = on_cache_lines(int(memory[N_DOUBLES])), np.empty(FACE_INTS, dtype=np.int64)
-    keep_faces(address_of(points), n, address_of(memory), address_of(block), address_of(row))
-    ids, padded, faces = row[:COLUMNS_AT].tolist()
-    places = ((row[COLUMNS_AT:] - address_of(block)) // 8).tolist()
-    integers = block.view(np.int64)
-    columns, ids_at, normals, flatness = places[:4]
-    return HullFaces._make((
-        block[columns:ids_at].reshape(3, padded), integers[ids_at : ids_at + ids],
-        block[normals : normals + 3 * faces].reshape(faces, 3), block[flatness : flatness + faces],
-        *(integers[i:j] for i, j in zip(places[4:], [*places[5:], len(block)])), int(memory[LARGEST]),
-    ))
+    block, row = on_cache_lines(memory.item(N_DOUBLES)), np.empty(FACE_INTS, dtype=np.int64)
+    keep_faces(points_at, n, memory_at, address_of(block), address_of(row))
+    return KeptFaces(block, row, memory.item(LARGEST))
 
 
-def faces_of(packed: PackedConvex) -> HullFaces:
+def hull_faces(points: np.ndarray) -> HullFaces:
+    """Faces of the hull of points (n, 3). O(n log n)."""
+    return kept_faces(points).arrays
+
+
+def faces_of(packed: PackedConvex) -> KeptFaces:
     """The faces of a packed set of points, made when first asked for and kept with it."""
     made = packed.prepared.made
-    return made["faces"] if "faces" in made else made.setdefault("faces", hull_faces(packed.points))
+    return made["faces"] if "faces" in made else made.setdefault("faces", kept_faces(packed.points))
 
 
 class HullFaceTable:
@@ -88,10 +110,9 @@ class HullFaceTable:
         self.ints = np.zeros((len(packed), FACE_INTS), dtype=np.int64)
         self.faces = [faces_of(p) if p.kind == POINTS else None for p in packed]
         self.largest = least
-        for row, faces in zip(self.ints, self.faces):
+        for k, faces in enumerate(self.faces):
             if faces is not None:
-                row[:COLUMNS_AT] = len(faces.vertex_ids), faces.columns.shape[1], len(faces.triangles)
-                row[COLUMNS_AT:] = [address_of(array) for array in faces[:-1]]
+                self.ints[k] = faces.row
                 self.largest = max(self.largest, faces.largest)
 
 

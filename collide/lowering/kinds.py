@@ -7,6 +7,7 @@ from enum import IntEnum
 from collide.curved.shape_kinds import HALFSPACE, NUMBERS, POINTS
 from collide.lowering.convex_sets import ConvexSet, convex_set
 from collide.shapes.compound import Compound
+from collide.shapes.primitives import Box, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import Shape, kept_with_shape
 
 
@@ -33,11 +34,21 @@ WITH_FACETS = frozenset((Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE, Kind.MESH))
 _OF_NUMBER = {number: Kind[name] for name, number in NUMBERS.items() if number != POINTS}
 #: Kinds of curved sets: `curved/curved_kinds.py` has the same.
 CURVED_KINDS = frozenset(kind for number, kind in _OF_NUMBER.items() if number != HALFSPACE)
+_OF_POINTS = (Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE)
+#: Classes all of whose shapes are of one kind: new shapes are told apart without making their sets.
+_OF_CLASS = {
+    Sphere: Kind.SPHERE, Box: Kind.POLYTOPE, Cylinder: Kind.CYLINDER, Cone: Kind.CONE, Ellipsoid: Kind.ELLIPSOID,
+    Halfspace: Kind.HALFSPACE,
+}
+
+
+def kind_of(shape: Shape) -> Kind:
+    """The kind of a shape."""
+    return _OF_CLASS[shape.__class__] if shape.__class__ in _OF_CLASS else _kind_by_set(shape)
 
 
 @kept_with_shape("_kind")
-def kind_of(shape: Shape) -> Kind:
-    """The kind of a shape."""
+def _kind_by_set(shape: Shape) -> Kind:
     if isinstance(shape, Compound):
         return Kind.MESH_COMPOUND if shape.meshed else Kind.COMPOUND
     if shape.is_region:
@@ -50,4 +61,4 @@ def _kind_of_convex(part: ConvexSet) -> Kind:
         return _OF_NUMBER[part.kind]
     if part.slop != 0.0:
         return Kind.ROUNDED
-    return Kind(min(len(part.points), 3) - 1)
+    return _OF_POINTS[min(len(part.points), 3) - 1]

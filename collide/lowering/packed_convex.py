@@ -6,8 +6,9 @@ half-space. Spheres are one point, capsules two, boxes eight: one kernel answers
 
 from __future__ import annotations
 
-import hashlib
 import math
+from hashlib import blake2b
+from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,70 +48,102 @@ class PackedConvex(NamedTuple):
     reach : proven upper bound of the distance of a core point from the frame's origin [m].
     slop : proven upper bound of the distance between the set described and the set stored [m];
         0 where the numbers given are stored as they are.
-    params : (4,) cylinder, cone: radius and half length; ellipsoid: three radii; half-space: normal and offset; boxes,
-        which are POINTS: half sizes; unused entries are 0.
+    numbers : four; cylinder, cone: radius and half length; ellipsoid: three radii; half-space: normal and offset;
+        boxes, which are POINTS: half sizes; unused entries are 0.
     points : (n, 3) core points for POINTS; their number is what ids in results refer to.
-    coordinates : (3, m) the same points, axis by axis, m the next multiple of BLOCK,
-        filled up with copies of the first point.
+    block, address, padded : memory with the same points axis by axis, read-only; where they begin there; how many each
+        axis has, the next multiple of BLOCK, filled up with copies of the first point.
     prepared : what is made of the points when a query first needs it.
     lowest : exponent of the lowest bit set in any coordinate (2000 where all are 0): the points are
         integers times 2 to it.
     content : digest of the numbers above; equal for equal sets, in every process. It orders the
         bodies of a pair, so that swapped questions are worked out on the same numbers.
+
+    Shapes that are asked about once pay for what is made here: views that few callers read are properties.
     """
 
     kind: int
     radius: float
     reach: float
     slop: float
-    params: np.ndarray
+    numbers: tuple[float, ...]
     points: np.ndarray
-    coordinates: np.ndarray
+    block: np.ndarray
+    address: int
+    padded: int
     prepared: PreparedStructures
     lowest: int
     content: bytes
 
+    @property
+    def params(self) -> np.ndarray:
+        """(4,) the numbers."""
+        return np.array(self.numbers)
 
-def pack_points(points: np.ndarray, radius: float = 0.0, slop: float = 0.0, with_tree: bool = False) -> PackedConvex:
+    @property
+    def coordinates(self) -> np.ndarray:
+        """(3, padded) the points, axis by axis."""
+        first = (self.address - address_of(self.block)) // self.block.itemsize
+        return self.block[first : first + 3 * self.padded].reshape(3, self.padded)
+
+
+def pack_points(
+    points: np.ndarray, radius: float = 0.0, slop: float = 0.0, with_tree: bool = False, params: tuple[float, ...] = ()
+) -> PackedConvex:
     """The hull of ``points`` (n, 3), swept by a ball of ``radius``.
 
-    with_tree : whether many points get a support tree when a query first needs it.
+    with_tree : whether many points get a support tree when a query first needs it.   params : half sizes of a box; the
+    digest leaves these out, since the points tell.
     """
     rows, n = np.ascontiguousarray(points, dtype=np.float64), len(points)
-    columns, reach = on_cache_lines(3, -(-n // BLOCK) * BLOCK), np.empty(1)
-    lowest = lay_out_points(address_of(rows), n, address_of(columns), columns.shape[1], address_of(reach))
-    return _packed(
-        POINTS, float(radius), float(reach[0]), slop, (), _frozen(points), _frozen(columns), int(lowest), with_tree
+    padded = -(-n // BLOCK) * BLOCK
+    block, first = _block_and_first(3 * padded + 1)  # the columns, then the reach
+    address = address_of(block) + _DOUBLE * first
+    lowest = lay_out_points(address_of(rows), n, address, padded, address + _DOUBLE * 3 * padded)
+    points.setflags(write=False)
+    block.setflags(write=False)
+    return PackedConvex(
+        POINTS, float(radius), block.item(first + 3 * padded), slop, _four(params), points, block, address, padded,
+        PreparedStructures(with_tree), lowest, _digest(POINTS, radius, _NO_NUMBERS, points),
     )
 
 
 def pack_curved(kind: int, params, reach: float) -> PackedConvex:
     """A cylinder, cone or ellipsoid by its numbers."""
-    return _packed(kind, 0.0, float(reach) * (1 + 1e-15), 0.0, params, *_NO_POINTS)
+    return _without_points(kind, float(reach) * (1 + 1e-15), params)
 
 
 def pack_halfspace(normal, offset: float) -> PackedConvex:
     """{x : normal·x ≤ offset}; the normal keeps the length it was given."""
-    return _packed(HALFSPACE, 0.0, 0.0, 0.0, (*normal, offset), *_NO_POINTS)
+    return _without_points(HALFSPACE, 0.0, (*normal, offset))
 
 
-def _packed(kind, radius, reach, slop, params, points, coordinates, lowest=NO_BITS, with_tree=False) -> PackedConvex:
-    row = np.zeros(4)
-    row[: len(params)] = params
-    digest = hashlib.blake2b(np.array([kind, radius, *row]).tobytes(), digest_size=16)
-    digest.update((points + 0.0).tobytes())
+def _without_points(kind: int, reach: float, params: tuple[float, ...]) -> PackedConvex:
+    numbers = _four(params)
     return PackedConvex(
-        kind,
-        radius,
-        reach,
-        slop,
-        _frozen(row),
-        points,
-        coordinates,
-        PreparedStructures(with_tree),
-        lowest,
-        digest.digest(),
+        kind, 0.0, reach, 0.0, numbers, _NO_POINTS, _NO_POINTS, address_of(_NO_POINTS), 0, PreparedStructures(False),
+        NO_BITS, _digest(kind, 0.0, numbers, _NO_POINTS),
     )
+
+
+def _four(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    return (*numbers, *_NO_NUMBERS[len(numbers) :])
+
+
+def _digest(kind: int, radius: float, numbers: tuple[float, ...], points: np.ndarray) -> bytes:
+    """Of the numbers of a set; −0 and 0 are one coordinate among those of points."""
+    data = points.tobytes()
+    if _MINUS_ZERO in data:  # or the same eight bytes across two doubles: adding 0 then changes nothing
+        data = (points + 0.0).tobytes()
+    return blake2b(_HEAD.pack(kind, radius, *numbers) + data, digest_size=16).digest()
+
+
+#: Kind, radius and four numbers, as doubles.
+_HEAD = Struct("=6d")
+_NO_NUMBERS = (0.0, 0.0, 0.0, 0.0)
+_MINUS_ZERO = Struct("=d").pack(-0.0)
+_DOUBLE = 8
+_NO_POINTS = np.frombuffer(b"").reshape(0, 3)  # read-only
 
 
 def on_cache_lines(*shape: int) -> np.ndarray:
@@ -120,14 +153,11 @@ def on_cache_lines(*shape: int) -> np.ndarray:
     128 points takes a quarter longer.
     """
     size = math.prod(shape)
-    block = np.empty(size + BLOCK - 1)
-    first = -(block.ctypes.data // block.itemsize) % BLOCK
+    block, first = _block_and_first(size)
     return block[first : first + size].reshape(shape)
 
 
-def _frozen(array: np.ndarray) -> np.ndarray:
-    array.flags.writeable = False
-    return array
-
-
-_NO_POINTS = (_frozen(np.zeros((0, 3))), _frozen(np.zeros((3, 0))))
+def _block_and_first(size: int) -> tuple[np.ndarray, int]:
+    """An empty array with space for so many doubles from where a cache line begins, and that place."""
+    block = np.empty(size + BLOCK - 1)
+    return block, -(address_of(block) // _DOUBLE) % BLOCK

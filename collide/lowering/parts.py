@@ -6,7 +6,9 @@ never changes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Hashable
+from operator import attrgetter
 
 import numpy as np
 
@@ -15,10 +17,22 @@ from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
+from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
 
 #: A convex set and its (4, 4) pose in the shape's frame.
 Part = tuple[PackedConvex, np.ndarray]
+
+#: Shapes of few numbers share parts where these are equal, zeros of different signs apart: programs that make shapes as
+#: they go make the same again and again. So many kinds of numbers are remembered, then all are forgotten.
+MAX_SHARED = 1024
+_NUMBERS_OF: dict[type, Callable[..., Hashable]] = {
+    Sphere: attrgetter("radius"), Capsule: attrgetter("radius", "length"), Cylinder: attrgetter("radius", "length"),
+    Cone: attrgetter("radius", "length"), Box: lambda shape: shape.size.tobytes(),
+    Ellipsoid: lambda shape: shape.radii.tobytes(),
+    Halfspace: lambda shape: (shape.normal.tobytes(), shape.offset, math.copysign(1.0, shape.offset)),
+}
+_parts_of_numbers: dict[Hashable, tuple[Part, ...]] = {}
 
 #: One product of two poses rounds each coordinate of a point by at most this many units in the
 #: last place of its terms: three products and three sums for the rotation, one more for the shift.
@@ -31,7 +45,23 @@ _MAX_OWN_BOUNDS, _CELLS = 512, 6
 @kept_with_shape("_parts")
 def parts_of(shape: Shape) -> tuple[Part, ...]:
     """The convex sets whose union a shape is. Raises UnsupportedQuery for meshes and regions."""
-    return _compound(shape) if isinstance(shape, Compound) else _alone(_packed(convex_set(shape)))
+    if isinstance(shape, Compound):
+        return _compound(shape)
+    numbers_of = _NUMBERS_OF.get(shape.__class__)
+    if numbers_of is None:
+        return _alone(_packed(convex_set(shape)))
+    key = shape.__class__, numbers_of(shape)
+    parts = _parts_of_numbers.get(key)
+    if parts is None:
+        if len(_parts_of_numbers) >= MAX_SHARED:
+            _parts_of_numbers.clear()
+        parts = _parts_of_numbers[key] = _alone(_packed(convex_set(shape)))
+    return parts
+
+
+def shares_parts(shape: Shape) -> bool:
+    """Whether a shape has the parts of all others of its numbers: few points, which are cheap to remember."""
+    return shape.__class__ in _NUMBERS_OF
 
 
 def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:
@@ -65,14 +95,10 @@ def _packed(part: ConvexSet) -> PackedConvex:
         return pack_halfspace(part.params[:3], part.params[3])
     if part.kind != POINTS:
         return pack_curved(part.kind, part.params, part.curved_reach)
-    packed = pack_points(part.points, part.radius, part.slop, part.with_tree)
+    packed = pack_points(part.points, part.radius, part.slop, part.with_tree, part.params)
     if part.planes is not None:
         packed.prepared.made["planes"] = part.planes
-    if not part.params:
-        return packed
-    params = np.array((*part.params, 0.0))
-    params.flags.writeable = False
-    return packed._replace(params=params)
+    return packed
 
 
 def _half_space_around(region: HPolytope) -> PackedConvex:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from fractions import Fraction
+from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,6 +37,8 @@ TERM_ROW = LOW_PARTS + 12
 #: 4√3u·reach for the rotation and as much for the shift; doubled.
 PRODUCT_SLOP = 16 * 2.0**-53
 
+#: The same two rows as Python writes them: a third of the time that numpy takes to read a tuple.
+_INT_ROW, _NUMBER_ROW = Struct(f"={INTS}q"), Struct(f"={NUMBERS}d")
 #: Once rows are added, ranks are so far apart that others go between them.
 _RANK_STEP = 1 << 32
 
@@ -51,10 +54,10 @@ class ShapeTable:
 
     def __init__(self, packed: list[PackedConvex]):
         self.packed: list[PackedConvex] = []
-        self.ints, self.numbers = np.zeros((len(packed), INTS), dtype=np.int64), np.zeros((len(packed), NUMBERS))
+        self.ints, self.numbers = np.empty((len(packed), INTS), dtype=np.int64), np.empty((len(packed), NUMBERS))
         self._without_tree: set[int] = set()
         self._contents: list[bytes] = sorted({p.content for p in packed})
-        self._ranks = list(range(len(self._contents)))
+        self._ranks: list[int] = [*range(len(self._contents))]
         self._write(packed)
 
     def append(self, packed: list[PackedConvex]) -> None:
@@ -86,16 +89,12 @@ class ShapeTable:
         """Rows behind those that there are."""
         first = len(self.packed)
         self.packed.extend(packed)
-        if packed:
-            self.ints[first : len(self.packed)] = [
-                (
-                    p.kind, len(p.points), p.coordinates.shape[1], address_of(p.coordinates), p.lowest,
-                    self._rank_of(p), 0, coarse_address(p),
-                ) for p in packed
-            ]
-            self.numbers[first : len(self.packed), :PARAMS] = [(p.radius, p.reach, p.slop) for p in packed]
-            self.numbers[first : len(self.packed), PARAMS:] = [p.params for p in packed]
         for k, p in enumerate(packed, first):
+            _INT_ROW.pack_into(
+                self.ints.data, _INT_ROW.size * k,
+                p.kind, len(p.points), p.padded, p.address, p.lowest, self._rank_of(p), 0, coarse_address(p),
+            )
+            _NUMBER_ROW.pack_into(self.numbers.data, _NUMBER_ROW.size * k, p.radius, p.reach, p.slop, *p.numbers)
             if may_have_tree(p):
                 self._without_tree.add(k)
         self.addresses = address_of(self.ints), address_of(self.numbers)

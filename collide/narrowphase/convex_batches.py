@@ -13,7 +13,7 @@ import numpy as np
 
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.compound_table import CompoundTable
-from collide.lowering.parts import convex_set_of, is_single_convex
+from collide.lowering.parts import MAX_SHARED, convex_set_of, is_single_convex, shares_parts
 from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_kernel_calls
@@ -102,8 +102,20 @@ def _answer_compounds(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray,
 
 
 def prepare_sets(A: Shape, B: Shape) -> Prepared:
-    """Two convex sets in their own frames made ready for single calls."""
-    return convex_kernel_calls.prepared_sets(ShapeTable([convex_set_of(A), convex_set_of(B)]))
+    """Two convex sets in their own frames made ready for single calls; of shapes that share parts, once."""
+    packed = [convex_set_of(A), convex_set_of(B)]
+    if not (shares_parts(A) and shares_parts(B)):
+        return convex_kernel_calls.prepared_sets(ShapeTable(packed))
+    key = id(packed[0]), id(packed[1])  # the pair's table holds both for as long as the pair is remembered
+    pair = _pairs_of_sets.get(key)
+    if pair is None:
+        if len(_pairs_of_sets) >= MAX_SHARED:
+            _pairs_of_sets.clear()
+        pair = _pairs_of_sets[key] = convex_kernel_calls.prepared_sets(ShapeTable(packed))
+    return pair
+
+
+_pairs_of_sets: dict[tuple[int, int], Prepared] = {}
 
 
 def prepare_parts(A: Shape, B: Shape) -> Prepared:

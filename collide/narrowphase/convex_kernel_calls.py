@@ -18,7 +18,18 @@ from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finish_rows import finish_rows
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
-from collide.narrowphase.pose_batches import ANSWERED, BAD_POSE, BLOCK, HEADER, POSES_AT, SETTLE, answer_poses
+from collide.narrowphase.pose_batches import (
+    ANSWERED,
+    BAD_POSE,
+    BLOCK,
+    CORE,
+    HEADER,
+    INTS_AT,
+    NUMBERS_AT,
+    POSES_AT,
+    SETTLE,
+    answer_poses,
+)
 from collide.narrowphase.prepared_pairs import Prepared
 from collide.narrowphase.single_call import collide_single, distance_single, within_single
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED, zeroed_rows
@@ -207,13 +218,14 @@ class BlockWorkspace:
         self.shape_of[BLOCK:] = 1
         buffers = self.poses.rows, self.shape_of, self.pairs, self.rows
         self._header = np.zeros(HEADER, dtype=np.int64)
+        self._header[CORE] = code_of(answer_pairs)
         self._header[POSES_AT:SETTLE] = *map(address_of, buffers), *self.addresses
         self._header[SETTLE:ANSWERED] = code_of(settle_hulls), address_of(self.digits)
 
     def header_of(self, table: ShapeTable) -> np.ndarray:
         """What `pose_batches.py` reads first: addresses of the kernel, the tables and this workspace."""
         header = self._header.copy()
-        header[:POSES_AT] = code_of(answer_pairs), *table.addresses
+        header[INTS_AT], header[NUMBERS_AT] = table.addresses
         return header
 
     def settle(self, table: ShapeTable, n: int, limit: float) -> None:
@@ -242,7 +254,8 @@ def space_of_single_calls() -> BlockWorkspace:
 
 def prepared_sets(table: ShapeTable) -> Prepared:
     """Two convex sets ready for one call at a time: rows 0 and 1 of a table."""
-    table.build_trees(np.arange(2))
+    if not table.is_built:
+        table.build_trees(np.arange(2))
     space = space_of_single_calls()
     header = space.header_of(table)
     return Prepared(

@@ -63,17 +63,25 @@ def single_calls_are_safe() -> bool:
 
 
 def keep_prepared(A: Shape, B: Shape, pair: Any, slot: str = "_prepared") -> None:
-    for name in (slot, "_partners"):
-        if not hasattr(A, name):
-            A._store(**{name: {}})
-    if not hasattr(B, "_serial"):
-        B._store(_serial=next(_serials))
-    prepared, serial = getattr(A, slot), B._serial
-    # a list: other threads add, and partners that go take
-    for oldest in list(prepared)[: max(0, len(prepared) + 1 - _MAX_PARTNERS)]:
-        _forget(lambda: A, slot, oldest)
+    prepared, partners = _dictionary(A, slot), _dictionary(A, "_partners")
+    serial = getattr(B, "_serial", None)
+    if serial is None:
+        serial = next(_serials)
+        object.__setattr__(B, "_serial", serial)
+    if len(prepared) >= _MAX_PARTNERS:
+        # a list: other threads add, and partners that go take
+        for oldest in list(prepared)[: len(prepared) + 1 - _MAX_PARTNERS]:
+            _forget(lambda: A, slot, oldest)
     prepared[serial] = pair
-    A._partners[slot, serial] = weakref.ref(B, partial(_forget, weakref.ref(A), slot, serial))
+    partners[slot, serial] = weakref.ref(B, partial(_forget, weakref.ref(A), slot, serial))
+
+
+def _dictionary(A: Shape, slot: str) -> dict:
+    entries = getattr(A, slot, None)
+    if entries is None:
+        entries = {}
+        object.__setattr__(A, slot, entries)
+    return entries
 
 
 def _forget(A: Callable[[], Shape | None], slot: str, serial: int, _: Any = None) -> None:

@@ -6,6 +6,7 @@ in metres (MuJoCo's "size" holds half lengths).
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -209,7 +210,7 @@ class Halfspace(Shape):
 
     def __init__(self, normal: ArrayLike, offset: float):
         normal = rows("Halfspace", "normal", normal, (3,))
-        length = float(np.linalg.norm(normal))
+        length = math.hypot(*normal.tolist())
         if not 1e-6 <= length <= 1e6:
             raise InvalidShape(
                 f"Halfspace: normal must have a length within [1e-6, 1e6] (1 is usual), got {length:g}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable
-from functools import wraps
+from functools import cache, wraps
 from typing import Any, TypeVar
 
 import numpy as np
@@ -113,17 +113,21 @@ class Shape:
         return f"{type(self).__name__}({fields})"
 
 
+#: Stands for what a shape does not keep: a default costs a fifth of an exception.
+_NOT_MADE: Any = object()
+
+
 def kept_with_shape(slot: str) -> Callable[[Callable[[Any], T]], Callable[[Any], T]]:
     """Decorates what makes something of a shape: made when first asked for, and kept in this slot of the shape."""
 
     def decorate(make: Callable[[Any], T]) -> Callable[[Any], T]:
         @wraps(make)
         def of(shape: Any) -> T:
-            try:
-                return getattr(shape, slot)
-            except AttributeError:
-                shape._store(**{slot: make(shape)})
-                return getattr(shape, slot)
+            made = getattr(shape, slot, _NOT_MADE)
+            if made is _NOT_MADE:
+                made = make(shape)
+                object.__setattr__(shape, slot, made)
+            return made
 
         return of
 
@@ -163,8 +167,13 @@ def _brief(value: Any) -> str:
 # --- checks, each naming shape, field and value -------------------------------------------------
 
 
+_PLAIN = float, int, np.float64
+
+
 def positive(shape: str, field: str, value: Any, *, zero: bool = False) -> float:
     """A finite length [m]: > 0, or ≥ 0 where ``zero`` allows it, of a magnitude we can square."""
+    if _is_plain_length(value):
+        return float(value)
     number = scalar(shape, field, value)
     if zero and number == 0.0:
         return 0.0
@@ -200,30 +209,47 @@ def checked_shape(what: str, value: Any, example: str = "collide.Box((1, 1, 1))"
 def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndarray:
     """Three lengths > 0 along x, y, z, given as one sequence or as three numbers."""
     if (y is None) != (z is None):
-        values = brief((value, y, z))
-        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {values}")
-    lengths = rows(shape, field, value if y is None else (value, y, z), (3,))
+        told = brief((value, y, z))
+        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {told}")
+    values = value if y is None else (value, y, z)
+    numbers = values.tolist() if values.__class__ is np.ndarray else values
+    if numbers.__class__ in (tuple, list) and len(numbers) == 3 and all(map(_is_plain_length, numbers)):
+        lengths = np.array(numbers, dtype=np.float64)
+        lengths.setflags(write=False)
+        return lengths
+    lengths = rows(shape, field, values, (3,))
     for axis, length in zip("xyz", lengths):
         positive(shape, f"{field}.{axis}", length)
     return lengths
 
 
+def _is_plain_length(value: Any) -> bool:
+    """Whether it is a number of Python's own within the range of lengths: nothing is left to check, or to say."""
+    return value.__class__ in _PLAIN and SMALLEST <= value <= LARGEST
+
+
 def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
     """Finite numbers of a shape (None stands for any length), as a read-only float64 copy."""
-    expected = "(" + ", ".join("N" if w is None else str(w) for w in wanted) + ("," if len(wanted) == 1 else "") + ")"
+    expected = _in_words(wanted)
     array = np.array(checks.array(f"{shape}: {field}", value, expected, InvalidShape), order="C")
     if array.ndim != len(wanted) or any(w not in (None, s) for w, s in zip(wanted, array.shape)):
         raise InvalidShape(f"{shape}: {field} must have shape {expected}, got {array.shape}")
     if array.shape[0] == 0:
         raise InvalidShape(f"{shape}: {field} is empty; at least one row is needed")
-    bad = ~(np.abs(array) <= LARGEST)
-    if bad.any():
+    if not np.abs(array).max(initial=0.0) <= LARGEST:  # NaN, too
+        bad = ~(np.abs(array) <= LARGEST)
         where = tuple(int(k) for k in np.argwhere(bad)[0])
         raise InvalidShape(
             f"{shape}: {field}{list(where)} is {array[where]}; entries must be finite and within ±{LARGEST:g}"
         )
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array
+
+
+@cache
+def _in_words(wanted: tuple) -> str:
+    """The shape of an array, for messages."""
+    return "(" + ", ".join("N" if w is None else str(w) for w in wanted) + ("," if len(wanted) == 1 else "") + ")"
 
 
 def facet_ids(shape: str, value: Any, n: int, dtype: type, corners: str) -> np.ndarray:

@@ -192,7 +192,7 @@ def test_faces_are_pythons():
     ball = c.CShape(collide.Sphere(1.0))
     for name, points in clouds().items():
         shape = collide.ConvexHull(points)
-        own, wanted = c.CShape(shape), faces_of(convex_set_of(shape))
+        own, wanted = c.CShape(shape), faces_of(convex_set_of(shape)).arrays
         assert asker.contacts(own, ball, np.eye(4), c.identity_at(1e9, 0, 0), 0.0, 1)[0] == c.OK
         address = ctypes.c_int64.from_address(own.handle + _FACES_AT).value
         row = (ctypes.c_int64 * FACE_INTS).from_address(address)

@@ -279,3 +279,22 @@ def test_curved_shapes_against_meshes_agree_with_their_distance(shape, height):
         assert c.lower[0] <= r.upper and r.lower <= c.upper[0]
         assert c.facet_b[0] == -1 and c.facet_a[0] >= 0
         assert np.array_equal(swapped.normal[0], -c.normal[0]) and swapped.facet_a[0] == -1
+
+
+def test_single_calls_share_a_workspace_that_grows():
+    """Pairs prepared while it was small answer as before after a face of 300 corners has made it larger."""
+    angle = np.linspace(0, 2 * np.pi, 301)[:-1]
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(300)], axis=1)
+    prism = collide.ConvexHull(np.concatenate([ring, ring + np.array((0, 0, 1))]))
+    small = [
+        (collide.Box((1, 1, 1)), collide.Box((1, 1, k / 4)), collide.pose((0.1 * k, 0.2, k / 8 + 0.4), rpy=(0, 0, k)))
+        for k in range(1, 9)
+    ]
+    before = [collide.contacts(A, B, EYE, X).rows for A, B, X in small]
+    assert min(map(len, before)) >= 3
+    large = collide.pose((0, 0, 0.999))
+    wide = collide.contacts(prism, prism, EYE, large, max_contacts=1000).rows
+    assert len(wide) == 300
+    assert collide.contacts(prism, prism, EYE, large, max_contacts=1000).rows.tobytes() == wide.tobytes()
+    for (A, B, X), rows in zip(small, before):
+        assert collide.contacts(A, B, EYE, X).rows.tobytes() == rows.tobytes()

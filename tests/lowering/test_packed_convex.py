@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from fractions import Fraction
 
 import numpy as np
@@ -53,6 +54,23 @@ def test_content_tells_sets_apart():
         P.pack_halfspace((0.0, 0.0, 1.0), 2.0),
     ]
     assert len({same, *(p.content for p in others)}) == 1 + len(others)
+
+
+def test_content_is_the_digest_of_its_numbers():
+    """Of kind, radius, four numbers, and points whose zeros have one sign: what files and other processes hold."""
+    rng = rng_of("digests")
+    straddled = np.array([0x00000000_00000000, 0x00000080_00000000, 0x3FF00000_00000000], dtype=np.uint64)
+    clouds = [
+        np.array([(0.0, -0.0, 1.0)]), np.array([(1.0, 2.0, -3.0)]), straddled.view(np.float64).reshape(1, 3),
+        np.asfortranarray(rng.normal(size=(9, 3))), rng.normal(size=(9, 6))[:, ::2],
+    ]
+    assert b"\x80" in clouds[2].tobytes() and not np.signbit(clouds[2]).any()
+    for points in clouds:
+        numbers = [0.0, 0.5, 0.0, 0.0, 0.0, 0.0, *(abs(v) if v == 0.0 else v for v in points.ravel().tolist())]
+        wanted = hashlib.blake2b(np.array(numbers).tobytes(), digest_size=16).digest()
+        assert P.pack_points(points.copy(order="K"), radius=0.5).content == wanted, points
+    wanted = hashlib.blake2b(np.array([P.CONE, 0.0, 1.0, 2.0, 0.0, 0.0]).tobytes(), digest_size=16).digest()
+    assert P.pack_curved(P.CONE, (1.0, 2.0), 3.0).content == wanted
 
 
 def test_tables_hold_what_was_packed():

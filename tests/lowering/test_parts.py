@@ -12,6 +12,7 @@ from naive import one_of_each, random_pose, rng_of
 import collide
 from collide.errors import UnsupportedQuery
 from collide.lowering import parts as P
+from collide.lowering.convex_sets import convex_set
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS, pack_points
 from collide.lowering.prepared_structures import MIN_FOR_TREE, coarse_address, may_have_tree, support_tree_of
 from collide.lowering.shape_table import COARSE_AT, INTS, NUMBERS, RANK, TREE, ShapeTable
@@ -49,6 +50,36 @@ def test_each_class_has_the_numbers_of_its_definition():
     assert packed.kind == HALFSPACE and packed.params.tolist()[3] == 2.0
     hull = collide.ConvexHull(on_sphere(rng_of("h"), 9), radius=0.25)
     assert np.array_equal(P.convex_set_of(hull).points, hull.points) and P.convex_set_of(hull).radius == 0.25
+
+
+def test_shapes_of_equal_numbers_share_parts():
+    """Of the seven classes of few numbers, for as many as are remembered; derived classes share nothing."""
+    makers = (
+        lambda r: collide.Sphere(r), lambda r: collide.Box((1.0, r, 2.0)), lambda r: collide.Capsule(r, 0.0),
+        lambda r: collide.Cylinder(r, 1.0), lambda r: collide.Cone(r, 1.0), lambda r: collide.Ellipsoid((r, 1.0, 2.0)),
+        lambda r: collide.Halfspace((0.0, 0.0, 1.0), r),
+    )
+    for make in makers:
+        assert P.parts_of(make(0.75)) is P.parts_of(make(0.75)) is not P.parts_of(make(0.5))
+        wanted = _packed(convex_set(make(0.75)))
+        for field, value, other in zip(wanted._fields, P.convex_set_of(make(0.75)), wanted):
+            if field not in ("block", "address", "prepared"):
+                assert np.array_equal(value, other), (make(0.75), field)
+    for flat in (collide.Halfspace((0.0, -0.0, 1.0), 0.75), collide.Halfspace((0.0, 0.0, 1.0), -0.75)):
+        assert P.parts_of(flat) is not P.parts_of(collide.Halfspace((0.0, 0.0, 1.0), 0.75))
+    zeros = [P.convex_set_of(collide.Halfspace((0.0, 0.0, 1.0), zero)) for zero in (0.0, -0.0)]
+    assert zeros[0] is not zeros[1] and np.signbit([packed.params[3] for packed in zeros]).tolist() == [False, True]
+    assert P.parts_of(collide.Cylinder(1.0, 2.0)) is not P.parts_of(collide.Cone(1.0, 2.0))
+
+    class Ball(collide.Sphere):
+        __slots__ = ()
+
+    assert P.parts_of(Ball(0.75)) is not P.parts_of(Ball(0.75))
+    first = P.parts_of(collide.Sphere(0.75))
+    for k in range(P.MAX_SHARED):
+        P.parts_of(collide.Sphere(1.0 + k))
+    assert len(P._parts_of_numbers) <= P.MAX_SHARED
+    assert P.parts_of(collide.Sphere(0.75)) is not first, "all are forgotten at times"
 
 
 def test_unions_hold_the_parts_of_their_items_in_order():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import threading
 from itertools import combinations_with_replacement
 
@@ -43,6 +44,72 @@ def test_single_gaps_have_the_bits_of_a_batch(monkeypatch):
     if single_calls_are_safe():
         batches = len(list(combinations_with_replacement(kinds, 2))) + 3
         assert len(long_way) - batches < 0.02 * len(hits), "single gaps go the long way"
+
+
+def test_first_calls_have_the_bits_of_a_batch(monkeypatch):
+    """Of new shapes of all kinds: what is prepared answers at once, by the one call that all later ones take."""
+    rng = rng_of("first calls")
+    kinds = [kind for kind in naive.KINDS if kind not in ("Halfspace", "Mesh", "Compound")]
+    answer_batch = query.answer_batch
+    long_way, hits = [], []
+
+    def new(shape):
+        return pickle.loads(pickle.dumps(shape))
+
+    for kind_a, kind_b in combinations_with_replacement(kinds, 2):
+        A, B = naive.one_of_each(rng)[kind_a], naive.one_of_each(rng)[kind_b]
+        X, Y = random_pose(rng, 0.8), random_pose(rng, 0.8)
+        row = collide.distance(A, B, X[None], Y[None], signed=False).rows
+        contacts = collide.contacts(A, B, X[None], Y[None], margin=0.1).rows
+        monkeypatch.setattr(
+            query, "answer_batch", lambda *args, **named: (long_way.append(1), answer_batch(*args, **named))[1]
+        )
+        with naive.reproducible(Case(A, B, X, Y)):
+            assert collide.collide(new(A), new(B), X, Y) is bool(row["hit"][0])
+            assert collide.distance(new(A), new(B), X, Y, signed=False).rows.tobytes() == row.tobytes()
+            within = collide.distance(new(A), new(B), X, Y, signed=False).upper <= 0.1
+            assert collide.collide(new(A), new(B), X, Y, security_margin=0.1) is bool(within)
+            assert collide.contacts(new(A), new(B), X, Y, margin=0.1).rows.tobytes() == contacts.tobytes()
+            assert collide.collide(new(A), new(B), X.tolist(), Y) is bool(row["hit"][0])
+        monkeypatch.undo()
+        long_way.pop()  # of the poses that are lists
+        hits.append(row["hit"][0])
+    assert 0.2 < naive.share(hits) < 0.9
+    if single_calls_are_safe():
+        assert len(long_way) <= 0.02 * len(hits), "first calls go the long way"
+
+
+def test_first_calls_refuse_what_later_ones_do():
+    A, B, X = collide.Box((1, 1, 1)), collide.Sphere(0.5), np.eye(4)
+    for ask in (collide.collide, collide.distance, collide.contacts):
+        for wrong in (2 * np.eye(4), np.full((4, 4), np.nan)):
+            with pytest.raises(collide.InvalidPose, match="X_WB"):
+                ask(collide.Box((1, 1, 1)), collide.Sphere(0.5), X, wrong)
+        with pytest.raises(collide.InvalidArgument, match="check_poses"):
+            ask(collide.Box((1, 1, 1)), collide.Sphere(0.5), X, X, check_poses="no")
+        with pytest.raises(collide.InvalidArgument, match="A must be a shape"):
+            ask(1.0, B, X, X)
+        with pytest.raises(collide.InvalidArgument, match="B must be a shape"):
+            ask(A, 1.0, X, X)
+
+
+def test_pairs_of_the_same_small_sets_are_one():
+    """Pairs of equal boxes share what single calls read, whichever shapes live; those of hulls do not, being large."""
+    if not single_calls_are_safe():
+        pytest.skip("plain kernels have no single calls")
+    X, Y = np.eye(4), collide.pose((0.9, 0.0, 0.0))
+
+    def asked(A, B):
+        assert collide.collide(A, B, X, Y) is True
+        return prepared_pair(A, B)
+
+    first = asked(collide.Box((1, 1, 1)), collide.Sphere(0.5))
+    assert asked(collide.Box((1, 1, 1)), collide.Sphere(0.5)) is first
+    assert asked(collide.Sphere(0.5), collide.Box((1, 1, 1))) is not first
+    points = rng_of("hulls of pairs").normal(size=(20, 3))
+    assert asked(collide.ConvexHull(points), collide.Sphere(0.5)) is not asked(
+        collide.ConvexHull(points), collide.Sphere(0.5)
+    )
 
 
 def test_single_gaps_of_what_has_no_depth():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -40,6 +41,29 @@ def test_three_lengths(kind, field):
     ):
         with pytest.raises(InvalidShape, match=words):
             kind(*arguments)
+
+
+def test_plain_numbers_make_what_any_numbers_make():
+    """Three of Python's own numbers are looked at one by one, all else by numpy: the same array, the same errors."""
+    wanted = np.array([1.0, 2.0, 0.5])
+    ways = (
+        (1, 2, 0.5), [1, 2.0, 0.5], wanted, wanted[::-1][::-1], wanted.astype(np.float32), tuple(wanted),
+        (Fraction(1), 2, 0.5), (np.int8(1), 2, 0.5), wanted.astype(object), (True, 2, 0.5),
+    )
+    for values in ways:
+        size = Box(values).size
+        assert type(size) is np.ndarray and size.dtype == np.float64 and size.tobytes() == wanted.tobytes(), values
+        assert not size.flags.writeable and size is not values and Box(*values).size.tobytes() == wanted.tobytes()
+    for values, words in (
+        ((1, 2, 0.0), "size.z must be > 0"), ((1, -2, 1), "size.y must be > 0"), ((10**400, 1, 1), "finite"),
+        ((1, math.nan, 1), "finite"), ((1, 2e50, 1), "size"), ((1, 1e-51, 1), "size.y must lie within"),
+        ((1, 2), "shape"), (np.ones((3, 1)), "shape"), (np.ones((3, 3)), "shape"), ((1, 2, None), "real number"),
+        ((1, 2, "3"), "real numbers"), ((1, (1,), 1), "rows of different lengths"),
+    ):
+        with pytest.raises(InvalidShape, match=words):
+            Box(values)
+    for radius in (True, 1, 1.0, np.float32(1), Fraction(1)):
+        assert type(Sphere(radius).radius) is float
 
 
 def test_numbers_must_be_such_as_can_be_squared():
