@@ -61,7 +61,7 @@ def test_shapes_of_equal_numbers_share_parts():
     )
     for make in makers:
         assert P.parts_of(make(0.75)) is P.parts_of(make(0.75)) is not P.parts_of(make(0.5))
-        wanted = _packed(convex_set(make(0.75)))
+        wanted = P._packed(convex_set(make(0.75)))
         for field, value, other in zip(wanted._fields, P.convex_set_of(make(0.75)), wanted):
             if field not in ("block", "address", "prepared"):
                 assert np.array_equal(value, other), (make(0.75), field)
