@@ -25,9 +25,11 @@ from collide.casts.posed_parts import PosedSides, posed_sides
 from collide.casts.region_casts import Way, are_proven, are_to_be_asked_again, limits_of
 from collide.casts.starts import Starts, item_of
 from collide.lowering.closed_regions import closed_shapes
+from collide.lowering.compound_layout import body_ball, part_balls
+from collide.lowering.compound_table import Balls
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of, convex_set_of, parts_of
-from collide.narrowphase.composite.balls_on_ways import Side, body_ball, near_on_ways, part_balls
+from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import Question
 from collide.pairs.batches import answer_batch
@@ -184,7 +186,7 @@ def _cast_unions(
     return CastRows._make(np.concatenate(columns) for columns in zip(*rows))
 
 
-def _near_parts(a: Side, b: Side, n: int, X_WA, X_WB, vector: np.ndarray, limit: np.ndarray) -> np.ndarray:
+def _near_parts(a: Balls, b: Balls, n: int, X_WA, X_WB, vector: np.ndarray, limit: np.ndarray) -> np.ndarray:
     """Numbers, ascending, of those of n balls of a body that the other comes near."""
     near = near_on_ways(a, b, X_WA, X_WB, n, vectors=np.repeat(vector, n, axis=0), limits=np.repeat(limit, n))
     return np.arange(n) if near is None else np.flatnonzero(near)

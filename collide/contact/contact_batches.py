@@ -12,9 +12,10 @@ from collide.contact.convex_contacts import convex_contacts
 from collide.contact.curved_contacts import curved_contacts
 from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
 from collide.lowering.closed_regions import closed_shapes
+from collide.lowering.compound_layout import body_ball
 from collide.lowering.kinds import Kind, kind_of
 from collide.lowering.shape_set_tables import tables_of
-from collide.narrowphase.composite.balls_on_ways import body_ball, near_on_ways
+from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import CompoundParts, PartColumns, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import Method, method_of

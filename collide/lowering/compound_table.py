@@ -37,6 +37,14 @@ GROUP_BALL = 5
 _OUTWARD = 1 + 2.0**-45
 
 
+class Balls(NamedTuple):
+    """Balls in the frame of a shape, ``stride`` doubles apart, from an address on; stride 0, a single ball for all."""
+
+    at: int
+    stride: int
+    n: int
+
+
 class LaidOut(NamedTuple):
     """One body: its convex parts, (parts, PART) doubles, (BODY,) doubles; its parts by their places (parts,) int64, so
     that GROUP after GROUP of them are near each other, and (groups, GROUP_BALL) doubles."""

@@ -209,8 +209,8 @@ def checked_shape(what: str, value: Any, example: str = "collide.Box((1, 1, 1))"
 def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndarray:
     """Three lengths > 0 along x, y, z, given as one sequence or as three numbers."""
     if (y is None) != (z is None):
-        told = brief((value, y, z))
-        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {told}")
+        shown = brief((value, y, z))
+        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {shown}")
     values = value if y is None else (value, y, z)
     numbers = values.tolist() if values.__class__ is np.ndarray else values
     if numbers.__class__ in (tuple, list) and len(numbers) == 3 and all(map(_is_plain_length, numbers)):

@@ -21,11 +21,12 @@ SHORT = 33
 HELD = (
     "__init__.py", "__main__.py", "base", "broadphase", "certificates", "cli", "curved", "errors.py", "hull",
     "kernels", "least_distance", "numerics", "pages", "papers", "polytopes.py", "pose_arrays.py", "reports",
-    "results.py", "robots", "solids", "surface_queries", "sweeps", "transforms.py",
+    "results.py", "robots", "solids", "support", "surface_queries", "sweeps",
+    "transforms.py",
 )
 #: Rooms and files still to be rewritten. Only to be struck out.
 OPEN = (
-    "casts", "contact", "lowering", "mesh", "motion", "narrowphase", "pairs", "shapes", "support", "worlds",
+    "casts", "contact", "lowering", "mesh", "motion", "narrowphase", "pairs", "shapes", "worlds",
 )
 
 

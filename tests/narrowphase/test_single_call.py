@@ -70,9 +70,8 @@ def test_first_calls_have_the_bits_of_a_batch(monkeypatch):
             within = collide.distance(new(A), new(B), X, Y, signed=False).upper <= 0.1
             assert collide.collide(new(A), new(B), X, Y, security_margin=0.1) is bool(within)
             assert collide.contacts(new(A), new(B), X, Y, margin=0.1).rows.tobytes() == contacts.tobytes()
+            monkeypatch.undo()
             assert collide.collide(new(A), new(B), X.tolist(), Y) is bool(row["hit"][0])
-        monkeypatch.undo()
-        long_way.pop()  # of the poses that are lists
         hits.append(row["hit"][0])
     assert 0.2 < naive.share(hits) < 0.9
     if single_calls_are_safe():

@@ -8,18 +8,14 @@ moves |d − t v| by less than 2⁻⁴⁸ |d|, far less than the balls' margin o
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from collide.kernels import address_of, entry, view_f64, view_u8
-from collide.lowering.compound_layout import layout_of
-from collide.lowering.compound_table import BALL_IN_WORLD, CENTRE, PART
+from collide.lowering.compound_table import BALL_IN_WORLD, Balls
 from collide.lowering.place_parts import BALL_MARGIN, place_ball
 from collide.lowering.shape_table import POSE, POSE_STRETCH
 from collide.narrowphase.pose_batches import set_pose
 from collide.numerics.vec3 import dot, norm, norm1, scale, sub, vec3_at
-from collide.shapes.shape import Shape
 
 #: Doubles of a ball in a body's frame: centre, radius of what the body's pose stretches, radius of what it does not.
 _BALL = 5
@@ -64,27 +60,8 @@ def balls_on_ways(
     return 0
 
 
-class Side(NamedTuple):
-    """Balls of a shape, `stride` doubles apart, from an address on; 0, one for all."""
-
-    at: int
-    stride: int
-    n: int
-
-
-def body_ball(shape: Shape) -> Side:
-    """A ball around a shape, infinite of half-spaces; the shape keeps its numbers."""
-    return Side(address_of(layout_of(shape).ball), 0, 1)
-
-
-def part_balls(shape: Shape) -> Side:
-    """Balls around its convex parts, or sets around them, by number."""
-    parts = layout_of(shape).parts
-    return Side(address_of(parts) + 8 * CENTRE, PART, len(parts))
-
-
 def near_on_ways(
-    a: Side, b: Side, X_WA: np.ndarray, X_WB: np.ndarray, n: int, *, margin: float = 0.0,
+    a: Balls, b: Balls, X_WA: np.ndarray, X_WB: np.ndarray, n: int, *, margin: float = 0.0,
     vectors: np.ndarray | None = None, limits: np.ndarray | None = None, check: bool = False,
 ) -> np.ndarray | None:
     """(n,) bool: which of n pairs of balls may come within a margin [m]; None where a matrix is no pose.

@@ -10,7 +10,8 @@ from naive import random_pose, rng_of
 from reproduction import reproducing
 
 import collide
-from collide.narrowphase.composite.balls_on_ways import body_ball, near_on_ways, part_balls
+from collide.lowering.compound_layout import body_ball, part_balls
+from collide.narrowphase.composite.balls_on_ways import near_on_ways
 
 AGAIN = (
     "import collide, numpy as np\n"
