@@ -143,8 +143,8 @@ def _are_balls_apart(parts, pa, pb, n, tau, held):
 
     held : `_held_in` of A's part [m].   Both are apart where the distance of their origins exceeds the sum of both
     balls' radii. `_apart_at` asks the same with an error, 2⁻⁴⁶ of a size of at most the sum of both radii, τ and the
-    distance of the origins: 2⁻³⁶ of the same sum is more, and a pair left out here is left out by `_apart_at`. Squares that
-    underflow leave no pair out.
+    distance of the origins: 2⁻³⁶ of the same sum is more, and a pair left out here is left out by `_apart_at`. Squares
+    that underflow leave no pair out.
     """
     apart = add(scale(tau, n), sub(vec3_at(parts.poses, POSE * pb + 9), vec3_at(parts.poses, POSE * pa + 9)))
     reach = (held + _held_in(parts, pb)) * (1 + 2.0**-36) + 2.0**-36 * tau
