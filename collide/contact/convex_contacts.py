@@ -208,8 +208,8 @@ def _addresses(
 
 
 def prepare_contacts(A, B) -> bool:
-    """Make two convex sets ready for single calls of `contacts`, and of `distance` with them; two bodies of which one
-    is a union, for those calls at which they are far apart. Whether this has been done now."""
+    """Make two convex sets ready for single calls of `contacts` and `distance`, or two bodies, a union among them, for
+    single calls of `contacts` at poses far apart. Returns whether this call has made the pair ready."""
     if not (isinstance(A, Shape) and isinstance(B, Shape) and single_calls_are_safe()):
         return False
     pair = prepared_pair(A, B)
@@ -227,7 +227,7 @@ def prepare_contacts(A, B) -> bool:
 
 
 def _single_far_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
-    """(`Prepared.contacts` of bodies of which those that are far apart have none, what it uses)."""
+    """(`Prepared.contacts` of two bodies, answering 0 contacts where their balls are far apart; the arrays in use)."""
     held = layout_of(A).ball, layout_of(B).ball, np.zeros(BALLS_WORK)
     header = np.array([address_of(of) for of in held], dtype=np.int64)
     return prepared_contacts(balls_beyond, header, no_rows()), held

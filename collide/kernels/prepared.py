@@ -1,7 +1,8 @@
 """Kernels of single calls, bound to their pair of shapes: Python does nothing but the call.
 
-Two poses come as numpy arrays; what is no C-contiguous (4, 4) array of float64 is left to the long way, which says what
-is wrong with it, or converts it. Functions return None for that, and for what takes more than the kernel.
+Two poses come as numpy arrays. Functions return ``None``, and leave the call to the long way, where an array is no
+C-contiguous (4, 4) array of float64 (the long way converts the array, or says what is wrong), and where the answer
+takes more than the kernel.
 """
 
 from __future__ import annotations
@@ -37,14 +38,14 @@ if MODE == COMPILED:
 
     def prepared_row(entry, header: np.ndarray) -> Callable:
         """A function of two poses, a bytearray that begins with zeros for a row, a flag and a limit [m], of the
-        signature `ROW`: the kernel's boolean, or None."""
+        signature `ROW`: returns the kernel's boolean, or ``None``."""
         return glue.prepared(entry.__name__, header)
 
     def prepared_contacts(entry, header: np.ndarray, rows: np.ndarray) -> Callable:
         """A function of two poses, the most contacts of a patch and a margin [m], of the signature `CONTACTS`: the
-        contacts' bytes, or None.
+        contacts' bytes, or ``None``.
 
-        rows : what the kernel writes into, space for as many as there can be; held as the header is.
+        rows : the kernel's output, with space for the most contacts of a call; kept alive as the header is.
         """
         return glue.prepared(entry.__name__, header, rows)
 
@@ -96,7 +97,7 @@ def _truth_of(status: int) -> bool | None:
 
 
 def is_matrix(X) -> bool:
-    """Whether it is a pose as kernels read it; its numbers are not looked at."""
+    """Whether X is laid out as kernels read a pose: aligned, C-contiguous float64 (4, 4). Entries are not looked at."""
     if type(X) is not np.ndarray or X.dtype != np.float64 or X.shape != (4, 4):
         return False
     return X.flags.c_contiguous and X.flags.aligned

@@ -26,18 +26,18 @@ _MAX_PARTNERS = 512
 
 
 class Prepared:
-    """Two shapes made ready for single calls: a function for each question, None where it is not ready.
+    """Two shapes made ready for single calls: a function for each question, ``None`` where the question is not ready.
 
-    Functions take poses X_WA, X_WB, C-contiguous (4, 4) float64, and return None where the answer is left to the long
-    way: of other arrays, of matrices that are no poses, and where it takes more than one call of a kernel.
+    Functions take poses X_WA, X_WB, C-contiguous (4, 4) float64, and return ``None`` where the answer is left to the
+    long way: of other arrays, of invalid poses, and where the answer takes more than one call of a kernel.
 
     collide(X_WA, X_WB) : whether the bodies meet.
     within(X_WA, X_WB, margin) : whether they are at most so far apart [m].
     distance(X_WA, X_WB, memory, depths, limit) : any bool; ``memory``, a bytearray that begins with zeros, then begins
         with the pair's row of `PAIR_DTYPE`; depths and limit [m] as of `convex_batches.Question`.
     contacts(X_WA, X_WB, max_contacts, margin) : bytes of the rows of `CONTACT_DTYPE`.
-    table : what batches of the pair read: a `ShapeTable` or a `CompoundTable`, or None.
-    held : what else kernels use.
+    table : read by batches of the pair: a `ShapeTable` or a `CompoundTable`, or ``None``.
+    held : other objects in use by kernels.
     """
 
     __slots__ = ("__weakref__", "collide", "contacts", "distance", "held", "table", "within")
@@ -51,7 +51,7 @@ class Prepared:
 
 
 def prepared_pair(A: Shape, B: Shape, slot: str = "_prepared") -> Any:
-    """The pair, or None where it has not been prepared. `native/python_module.c` reads the same two attributes.
+    """The pair, or ``None`` where not prepared. `native/python_module.c` reads the same two attributes.
 
     slot : attribute of A for the purpose of the pair.
     """

@@ -50,7 +50,7 @@ _settle_hulls_at = native_call(SIGNATURE)
 def _answer(header_at, XA_at, XB_at, boolean, depths, limit, row_at):
     """A pair at a pair of poses: 0 apart, 1 hit, −1 where the general way is needed, or an error has to be raised.
 
-    header : of `pose_batches.py`.   limit : of gaps beyond it no more is said than that [m].
+    header : of `pose_batches.py`.   limit : larger gaps are known only to be larger [m].
     """
     block = block_of(header_at)
     good_a = set_pose(block.poses, 0, view_f64(XA_at, 16), True)
@@ -66,13 +66,13 @@ def _answer(header_at, XA_at, XB_at, boolean, depths, limit, row_at):
 
 @kernel
 def settle_row(header, boolean, depths, limit, row_at):
-    """Settle the row of the first pair of the block, which `answer_block` has left open, as a batch would; false where
-    the long way has to, or an error has to be raised.
+    """Settle the row of the first pair of the block, left open by `answer_block`, as a batch would; false where the
+    long way has to, or an error has to be raised.
 
     header : of `pose_batches.py`; the second row of the block is written over.   boolean, depths, limit : as asked.
-    Of two hulls, boxes that touch for example, `exact_stage.settle_rows` begins with `settle_hulls`; a depth that takes
-    more than that is left to the long way. None of its steps takes a curved core, so that such a pair goes on to the
-    other searches (`fallback_searches.py`), and stays open where these prove nothing either: a can at rest on a box.
+    Of two hulls, boxes that touch for example, `exact_stage.settle_rows` begins with `settle_hulls`; a depth left open
+    is for the long way. No step of the exact stage takes a curved core, so a pair with a curved core goes on to
+    the other searches (`fallback_searches.py`), and stays open where they prove nothing either: a can at rest on a box.
     """
     row = view_row(row_at)
     if row.flags[HOW] == REFUSED:

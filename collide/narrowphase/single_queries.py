@@ -1,9 +1,8 @@
-"""Public functions of two shapes at one pair of poses: the pair made ready for single calls is asked before anything
-else.
+"""Public functions of two shapes at a pair of poses: the pair made ready for single calls is asked first.
 
-In a process with the library these functions are C's (`native/python_module.c`): from the call to the result nothing is
-done in Python. Elsewhere they do the same in Python, as this module has it. What a pair leaves open, and all that is no
-such call, is for the function that is decorated: it checks arguments, answers batches, and raises.
+In a process with the library these functions are C's (`native/python_module.c`): no Python runs between the call and
+the result. Elsewhere this module does the same in Python. Questions left open by the pair, and calls of other forms,
+go to the decorated function, which checks arguments, answers batches, and raises.
 """
 
 from __future__ import annotations
@@ -29,8 +28,8 @@ ALL_CONTACTS = 2**31 - 1
 def asks_prepared_pairs(result: type | None = None, certify: Callable | None = None) -> Callable[[Function], Function]:
     """Decorates `collide`, `distance` or `contacts`.
 
-    result : the type of what is returned, which opens what it is made of when it is asked for fields; None of booleans.
-    certify : makes certificates of it.
+    result : the type of the returned object, whose row is opened when fields are asked for; ``None`` of booleans.
+    certify : makes certificates of results.
     """
 
     def decorate(function: Function) -> Function:
@@ -79,7 +78,7 @@ def _are_plain(arguments: tuple, *, check_poses=True, threads=1, axes=None, algo
 
 
 def _length(question: str, value: Any) -> float | None:
-    """A length [m] as a float; None where the decorated function has to look at it."""
+    """A length [m] as a float; ``None`` where the decorated function has to look at the value."""
     if value.__class__ is bool or not isinstance(value, (float, int)):
         return None
     length, (min_length, max_length) = checks.number(value), _LENGTHS[question]

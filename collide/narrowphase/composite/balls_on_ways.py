@@ -1,9 +1,9 @@
-"""Bodies, or their parts, that come near each other while one is moved straight: by balls, before any part is posed.
+"""Bodies, or their parts, that come near each other while the first moves straight: by balls, before a part is posed.
 
-With d from the centre of one ball to that of the other, and v along which the first is moved t times, what both hold is
-apart by more than a margin while |d − t v| exceeds both radii and the margin. This is a convex function of t: where it
-is more at its least in [0, limit], at d·v / v² or at the end next to it, it is more on all the way. Rounding of that t
-moves |d − t v| by less than 2⁻⁴⁸ |d|, far less than the balls' margin of the size.
+With d from the centre of the first ball to the centre of the second, and the first ball moved by t v, the contents of
+the balls are farther apart than a margin while |d − t v| exceeds the sum of both radii and the margin. |d − t v| is
+convex in t: where its least value in [0, limit], at d·v / v² or at the nearer end, exceeds the sum, so do all others.
+Rounding of t moves |d − t v| by less than 2⁻⁴⁸ |d|, far less than the balls' margin of the size.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ def balls_on_ways(
     of_a_at, stride_a, XA_at, step_a, of_b_at, stride_b, XB_at, step_b, n, vectors_at, limits_at, margin, check,
     work_at, out_at,
 ):
-    """Write n bytes, 0 where two balls stay farther apart than a margin [m]; −1 where a pose is none, else 0.
+    """Write n bytes, 0 where two balls stay farther apart than a margin [m]; returns −1 at an invalid pose, else 0.
 
-    of_a, of_b : balls in their bodies' frames, a stride of doubles from one to the next; 0, one for all.
-    XA, XB : matrices; step 16 or, for a single pose, 0.   vectors, limits : 0, or three doubles and one a row.
+    of_a, of_b : balls in their bodies' frames, a stride of doubles from each ball to the next; 0 for a single ball.
+    XA, XB : matrices; step 16 or, for a single pose, 0.   vectors, limits : 0, or three doubles and a double a row.
     check : refuse matrices that are no rotation.   work : 2 · POSE + 2 · BALL_IN_WORLD doubles.
     """
     poses, balls = view_f64(work_at, 2 * POSE), view_f64(work_at + 16 * POSE, 2 * BALL_IN_WORLD)
@@ -64,10 +64,10 @@ def near_on_ways(
     a: Balls, b: Balls, X_WA: np.ndarray, X_WB: np.ndarray, n: int, *, margin: float = 0.0,
     vectors: np.ndarray | None = None, limits: np.ndarray | None = None, check: bool = False,
 ) -> np.ndarray | None:
-    """(n,) bool: which of n pairs of balls may come within a margin [m]; None where a matrix is no pose.
+    """(n,) bool: which of n pairs of balls may come within a margin [m]; ``None`` where a matrix is no pose.
 
-    a, b : one ball for all, or n.   X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for all.
-    vectors : (n, 3) along which A is moved, of which the largest component is at least ½, as `Directions` has them.
+    a, b : a single ball for all, or n.   X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for all.
+    vectors : (n, 3) translations of A at t = 1, their largest component at least ½, as `Directions` has them.
     limits : (n,) of t.   check : refuse matrices that are no rotation.   About 0.05 µs a pair.
     """
     out, work = np.empty(n, dtype=bool), np.empty(_WORK)

@@ -1,12 +1,12 @@
 """Along a direction: how far a union of convex parts has to be moved until no part of it meets a part of the other.
 
-B moved by τ·n meets A only where τ·n lies in A ⊖ B of a pair of parts. A plane across m, above which no point of that
-set swept by both radii lies, h(m) = max m·w + r, proves the pair apart wherever τ·(m·n) > h(m) + error. So a pair bars
-the way from some length on, and up to a length that planes bound from above; the union is clear at the first length
-that no pair bars. Planes are those of GJK, seen from the point τ·n, which comes down along the line as planes are found
-(van den Bergen, "Ray casting against general convex objects with application to continuous collision detection", 2004).
-However the search goes, what planes prove holds. A half-space has one plane, and bars the way without end unless that
-faces the direction.
+B moved by τ·n meets A only where τ·n lies in A ⊖ B of a pair of parts. A plane across m at the height
+h(m) = max m·w + r, with w in A ⊖ B and r the sum of both radii, has no point of the swept set above, and proves the
+pair apart wherever τ·(m·n) > h(m) + error. So a pair bars the way from some length on, up to a length bounded from
+above by planes; the union is clear at the first length barred by no pair. Planes come from GJK, seen from the point
+τ·n, which comes down along the line as planes are found (van den Bergen, "Ray casting against general convex objects
+with application to continuous collision detection", 2004). However the search goes, the bounds of planes hold. A
+half-space has a single plane, and bars the way without end unless the plane faces the direction.
 """
 
 from __future__ import annotations
@@ -88,13 +88,13 @@ class _Line(NamedTuple):
 
 @kernel
 def clearing_length(parts, first_a, n_a, first_b, n_b, n, start, limit, work_at):
-    """The `Length` along the unit vector n that clears B of A, both infinite where it is not less than the limit.
+    """The `Length` along the unit vector n that clears B of A, both numbers infinite if not less than the limit.
 
-    parts : `PosedParts`.   first, n : each body's parts there.   start : a `Length` to which the way is
-    barred, by `barred_length`.   work : CLEARING doubles of workspace.
+    parts : `PosedParts`.   first, n : the first part and the number of parts of each body.   start : a `Length` up to
+    which the way is barred, by `barred_length`.   work : CLEARING doubles of workspace.
 
-    A step goes to the farthest length that a pair barred so far is proven to bar at most: all between is barred too, so
-    that the order of pairs has no say. O(parts of A · parts of B) comparisons of balls a step.
+    A step goes to the greatest of the proven bounds of the pairs still barring the way: all lengths between are barred
+    too, so the order of pairs has no say. O(parts of A · parts of B) comparisons of balls a step.
     """
     length = start
     simplex = _simplex_at(work_at)
@@ -121,15 +121,15 @@ def clearing_length(parts, first_a, n_a, first_b, n_b, n, start, limit, work_at)
 
 @kernel
 def barred_length(parts, pa, pb, n, work_at):
-    """The `Length` along n from which on two parts that meet are proven apart."""
+    """The `Length` along n from which on two meeting parts are proven apart."""
     pair, line = _pair_and_line(parts, pa, pb, n)
     return _bounded_by_planes(pair, line, _simplex_at(work_at))
 
 
 @kernel(inline=True)
 def _held_in(parts, part):
-    """The radius of a ball around a part's origin that holds it, as its pose stretches it and rounding moved it [m];
-    infinite of a half-space."""
+    """Radius [m] of a ball around a part's origin that holds the posed part, stretch and rounding included; infinite of
+    a half-space."""
     shape = parts.shape_of[part]
     at, p = NUMBERS * shape, POSE * part
     held = parts.numbers[at + REACH] * parts.poses[p + POSE_STRETCH] + parts.numbers[at + RADIUS]
@@ -141,10 +141,10 @@ def _held_in(parts, part):
 def _are_balls_apart(parts, pa, pb, n, tau, held):
     """Whether B's part moved by τ·n is clear of A's by the balls around both, seen before either is opened.
 
-    held : `_held_in` of A's part [m].   Both are apart where their origins are
-    farther from each other than both balls reach. `_apart_at` asks the same with an error, 2⁻⁴⁶ of a size that is no
-    more than both radii, τ and the distance of the origins: 2⁻³⁶ of these is more, and what is left out here is left
-    out there. Squares that vanish leave nothing out.
+    held : `_held_in` of A's part [m].   Both are apart where the distance of their origins exceeds the sum of both
+    balls' radii. `_apart_at` asks the same with an error, 2⁻⁴⁶ of a size of at most the sum of both radii, τ and the
+    distance of the origins: 2⁻³⁶ of the same sum is more, and a pair left out here is left out by `_apart_at`. Squares
+    that underflow leave no pair out.
     """
     apart = add(scale(tau, n), sub(vec3_at(parts.poses, POSE * pb + 9), vec3_at(parts.poses, POSE * pa + 9)))
     reach = (held + _held_in(parts, pb)) * (1 + 2.0**-36) + 2.0**-36 * tau
@@ -164,7 +164,7 @@ def _simplex_at(work_at):
 
 @kernel
 def _pair_and_line(parts, pa, pb, n):
-    """Two parts as a `PosedPair`, and the `_Line` along which B of that pair is moved against A."""
+    """Two parts as a `PosedPair`, and the `_Line` along which the B of the `PosedPair` is moved against its A."""
     ints, numbers, poses = parts.ints, parts.numbers, parts.poses
     sa, pa, sb, pb, flip = in_order(ints, poses, parts.shape_of[pa], pa, parts.shape_of[pb], pb)
     pair = posed_pair(ints, numbers, poses, sa, pa, sb, pb)

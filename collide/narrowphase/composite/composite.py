@@ -1,6 +1,6 @@
 """Bodies that are unions of convex parts: questions to the kernels of `narrowphase/composite/composite_poses.py`.
 
-How one answer is made of those of the parts is told in `narrowphase/composite/composite_rows.py`.
+How the bodies' answer is made of the answers of their parts is told in `narrowphase/composite/composite_rows.py`.
 """
 
 from __future__ import annotations
@@ -96,9 +96,9 @@ def answer_compound_batch(
     check: bool,
     depths: bool,
 ) -> bool:
-    """Answer two bodies at n pairs of poses; False where a pose is no pose. Arguments as in `run.run_poses`.
+    """Answer two bodies at n pairs of poses; False at an invalid pose. Arguments as in `run.run_poses`.
 
-    which : (n, 2) int64 bodies of ``table`` pose by pose, or None for bodies 0 and 1 throughout.
+    which : (n, 2) int64 bodies of ``table`` pose by pose, or ``None`` for bodies 0 and 1 throughout.
     """
     table.build_trees(which)
     space = of_thread.space_for(table)

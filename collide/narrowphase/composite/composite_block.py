@@ -36,7 +36,7 @@ SLOTS = SLOT_SIZE * BLOCK
 
 
 class Block(NamedTuple):
-    """Views of a header, and of the workspace that it names."""
+    """Views of a header, and of the workspace at the addresses in the header."""
 
     header: Any
     poses: Any

@@ -1,8 +1,8 @@
-"""One part of a union against another body, one of the two a mesh, at poses that may be rounded products.
+"""A part of a union against another body, the part or the body a mesh, at poses that may be rounded products.
 
-Poses that are exact are answered as any pair is. Where a product of two poses was rounded, a part stands within its
-slop of where the rounded one would put it: gaps wider than that are proven, and so are facets that cross each other
-by more, and what lies deeper inside. The rest is open.
+Exact poses are answered as for any pair. Where a product of two poses was rounded, a part stands within its slop of
+its rounded place: gaps wider than the slop are proven, and so are facets crossing each other by more, and points
+deeper inside. All else stays open.
 """
 
 from __future__ import annotations
@@ -184,10 +184,10 @@ def loose_states(A: Body, B: Body, PA: PosesWithSlop, PB: PosesWithSlop) -> np.n
 
 
 def _crossing(A: Body, B: Body, pairs: np.ndarray, X_WA: np.ndarray, X_WB: np.ndarray, slop: np.ndarray) -> np.ndarray:
-    """(k,) whether an edge of one facet passes through the other by more than rounding and the slop can undo.
+    """(k,) bool: whether an edge of either facet passes through the other by more than rounding and the slop can undo.
 
-    pairs : (k, 2) facets, at poses (k, 4, 4). The signs that say so are determinants of differences of corners; each is
-    bounded away from 0 by what moving the corners can change.
+    pairs : (k, 2) facets, at poses (k, 4, 4). The deciding signs are determinants of differences of corners; each
+    determinant is bounded away from 0 by the most that moved corners can change.
     """
     shift = X_WB[:, :3, 3] - X_WA[:, :3, 3]
     U, V = _corners(A, pairs[:, 0], X_WA, np.zeros_like(shift)), _corners(B, pairs[:, 1], X_WB, shift)

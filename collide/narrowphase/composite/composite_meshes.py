@@ -1,8 +1,8 @@
 """Unions with meshes: a `Compound` against a mesh, a mesh among the parts of a `Compound`, to any nesting.
 
-Apart, the distance is the least one of the parts. Convex parts of both sides are answered together, as unions of
-convex parts always are (`collide/narrowphase/composite/composite.py`); a pair of parts with a mesh in it is asked about
-only where their boxes come as near as what is known already. Overlapping, the row holds a translation that is proven to
+Apart, the distance is the least distance of the parts. Convex parts of both sides are answered together, as for
+unions of convex parts (`collide/narrowphase/composite/composite.py`); a pair of parts with a mesh is asked about only
+where the boxes of both come as near as the distance known already. Overlapping, the row holds a translation proven to
 separate the unions.
 """
 
@@ -125,10 +125,10 @@ def _set_gaps(A: CompoundParts, B: CompoundParts, i, j, X_WA, X_WB, within: floa
 
 
 def _leave_out_groups(M: CompoundParts, N: CompoundParts, X_WM, X_WN, near: np.ndarray) -> np.ndarray:
-    """(n,) bool: poses at which a group of parts of N lies within a mesh of M. From ``near``, (n, parts of M, parts of
-    N) bool, pairs are taken, in place, whose group is outside; larger groups are asked first.
+    """(n,) bool: poses at which a group of parts of N lies within a mesh of M. Clears ``near``, (n, parts of M, parts
+    of N) bool, in place, for pairs whose group is outside the mesh; larger groups are asked first.
 
-    A group is in its ball: where this is clear of every facet, all of it is on the side that the ball's centre is on.
+    A ball holds its group: where the ball is clear of every facet, the group is on the side of the ball's centre.
     """
     within = np.zeros(len(near), dtype=bool)
     for balls in N.groups if M.columns.meshed.sum() <= _MAX_MESHES else ():
@@ -175,9 +175,9 @@ def _take_states(A: CompoundParts, B: CompoundParts, i, j, poses, X_WA, X_WB, st
 def _states_by_balls(
     M: CompoundParts, N: CompoundParts, X_WM, X_WN, mesh: int, others: np.ndarray, poses: np.ndarray
 ) -> np.ndarray:
-    """(k,) what balls around parts of N tell of them and a mesh of M, at poses by number: APART or HIT, OPEN otherwise.
+    """(k,) APART, HIT or OPEN by the balls around parts of N, before a mesh of M, at poses by number.
 
-    Where a part is farther from every facet than rounding moved it, all of it is on the side that its ball is on.
+    A part farther from every facet than rounding moved the part is wholly on the side of its ball's centre.
     """
     return _states_of(*_ball_gaps(M, N.balls, X_WM, X_WN, mesh, others, poses, np.zeros(len(others))))
 
@@ -190,12 +190,12 @@ def _states_of(gaps: np.ndarray, sides: np.ndarray) -> np.ndarray:
 def _ball_gaps(
     M: CompoundParts, balls: Balls, X_WM, X_WN, mesh: int, others: np.ndarray, poses: np.ndarray, within: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """((k,) how far parts in balls of N, by number, are at least from the surface of a mesh of M, at poses by number
-    [m], looked for up to ``within`` (k,), -inf where they may touch; (k,) on which side of the surface the others are).
+    """((k,) lower bounds [m] of the gaps between parts in balls of N, by number, and the surface of a mesh of M, at
+    poses by number, looked for up to ``within`` (k,), -inf where a part may touch; (k,) the sides of the other parts).
 
-    A part is within its ball, which is moved by no more than the slop: what of it is nearest to the surface is nearer
-    than the ball's centre by radius and slop at most, and while these are less than the centre's distance, no facet
-    parts it from the centre.
+    A ball holds its part, and rounding moves the ball by no more than the slop: the part's nearest point to the surface
+    is nearer than the ball's centre by radius and slop at most, and while radius and slop are less than the centre's
+    distance, no facet parts the point from the centre.
     """
     gaps, sides = np.full(len(others), -math.inf), np.full(len(others), OUTSIDE)
     body, unique = body_of(M.parts[mesh].shape), np.unique(poses, return_inverse=True)
@@ -224,7 +224,7 @@ def _point() -> Body:
 
 
 def _mesh_pairs(A: CompoundParts, B: CompoundParts, wanted: np.ndarray) -> list[list[int]]:
-    """Numbers of those parts of which one at least is a mesh, of the pairs (parts of A, parts of B) that are wanted."""
+    """Numbers [part of A, part of B] of the wanted pairs with a mesh."""
     return np.argwhere(wanted & (A.columns.meshed[:, None] | B.columns.meshed)).tolist()
 
 
@@ -265,8 +265,8 @@ def _box_gaps(A: CompoundParts, B: CompoundParts, X_WA, X_WB, of_a=None, of_b=No
 
 
 def _overlaps(A: CompoundParts, B: CompoundParts, X_WA, X_WB) -> np.ndarray:
-    """(n, parts of A, parts of B) as `_box_gaps`, where these are not above 0; of other pairs it may be infinite, as it
-    is of those among many that a walk through both trees does not name: their boxes are apart."""
+    """(n, parts of A, parts of B) gaps [m] as of `_box_gaps` where at most 0. Gaps above 0 may be infinite: of many
+    pairs only the pairs named by a walk through both trees are measured, and the boxes of all others are apart."""
     if len(A.parts) * len(B.parts) <= _MAX_TABLE:
         return _box_gaps(A, B, X_WA, X_WB)
     gaps = np.full((len(X_WA), len(A.parts), len(B.parts)), math.inf)
@@ -404,11 +404,12 @@ def _part_rows(
 def _raise_along_normals(
     A: CompoundParts, B: CompoundParts, X_WA, X_WB, poses: np.ndarray, rows: np.ndarray, upper: np.ndarray, gaps
 ) -> None:
-    """Raise ``gaps``, as of `_box_gaps`, in place to what boxes say whose axis is the normal of a row that is known.
+    """Raise ``gaps``, as of `_box_gaps`, in place to the gaps of boxes with an axis along the normal of a known row.
 
-    The world's boxes say little of a body that is large and turned: all parts of a small union before its face are as
-    near. A frame whose first axis is the normal tells them apart. Its rotation and the poses in it are rounded, which
-    moves what is 1 m from A's origin by some 2⁻⁵⁰ m: 2⁻⁴⁴ of the size of the boxes is taken off.
+    Boxes along the world's axes say little of a large, turned body: all parts of a small union before its face are as
+    near. Boxes in a frame whose first axis is the normal tell the parts apart. The frame's rotation and the poses in
+    the frame are rounded, which moves a point 1 m from A's origin by some 2⁻⁵⁰ m: 2⁻⁴⁴ of the size of the boxes is
+    taken off.
     """
     for k, row in zip(poses.tolist(), rows):
         near = gaps[k] <= upper[k]
@@ -429,12 +430,12 @@ def _raise_along_normals(
 
 
 def _raise_by_balls(M: CompoundParts, N: CompoundParts, X_WM, X_WN, within: np.ndarray, gaps) -> np.ndarray:
-    """(n,) bool, where any was: raise ``gaps``, as of `_box_gaps`, in place to what balls around many parts of N say
-    before one mesh of M.
+    """Raise ``gaps``, as of `_box_gaps`, in place to the gaps of balls around many parts of N before one mesh of M;
+    returns (n,) bool, the poses with a raised gap.
 
-    Neither boxes nor a normal tell the parts of a small union apart that is beside a rough mesh, or in a valley of it.
-    Only parts that are outside are farther than their balls are from the surface. within : (n,) [m] what is known;
-        poses at which it is 0 are left as they are, since a pair that meets ends the search there.
+    Neither boxes nor a normal tell the parts of a small union apart beside a rough mesh, or in a valley of the mesh.
+    Only outside the mesh is a part as far from the surface as its ball. within : (n,) distances known so far [m];
+        poses at 0 are left as they are, since a pair that meets ends the search of a pose.
     """
     near = (gaps <= within[:, None, None]) & M.columns.meshed[:, None] & (within > 0.0)[:, None, None]
     near &= near.sum(axis=2, keepdims=True) > _ASKED_FIRST
@@ -451,10 +452,10 @@ def _raise_by_balls(M: CompoundParts, N: CompoundParts, X_WM, X_WN, within: np.n
 
 
 def _raise_by_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, within: np.ndarray, gaps) -> np.ndarray:
-    """(n,) bool, where any was: raise ``gaps``, as of `_box_gaps`, in place to what convex sets around the parts say,
-    of poses at which many pairs are as near as ``within`` (n,) still.
+    """Raise ``gaps``, as of `_box_gaps`, in place to the gaps of convex sets around the parts, at poses with many pairs
+    as near as ``within`` (n,) [m] still; returns (n,) bool, the poses with a raised gap.
 
-    Beyond a limit no row has a normal, and only the larger body's own faces tell the parts of a union before it apart.
+    Rows beyond a limit have no normal, and only the larger body's own faces tell the parts of a union before it apart.
     """
     meshed = A.columns.meshed[:, None] | B.columns.meshed
     near = meshed & (gaps <= within[:, None, None]) & (within > 0.0)[:, None, None]
@@ -473,9 +474,9 @@ def _raise_by_sets(A: CompoundParts, B: CompoundParts, X_WA, X_WB, within: np.nd
 def _nearest_first(
     gaps: np.ndarray, sight: np.ndarray, rows_of
 ) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
-    """{(part of A, part of B): (poses, their rows)}: at each pose the pair whose boxes are nearest, if it is in sight.
+    """{(part of A, part of B): (poses, their rows)}: at each pose the pair with the nearest boxes, if in sight.
 
-    gaps : (n, parts of A, parts of B), infinite of pairs that are not asked about here.   sight : (n,) [m].
+    gaps : (n, parts of A, parts of B) [m], infinite of pairs not asked about here.   sight : (n,) [m].
     """
     n = len(gaps)
     nearest = gaps.reshape(n, -1).argmin(axis=1)
@@ -510,7 +511,7 @@ def _least(rows: np.ndarray, limit: float, left_out: bool) -> np.ndarray:
 def _overlap(
     A: CompoundParts, B: CompoundParts, X_WA, X_WB, out: np.ndarray, meeting: np.ndarray, rows, depths: bool
 ) -> None:
-    """The row of two unions that meet, or may: at the parts that are proven deepest."""
+    """Write the row of two unions that meet, or may meet: at the parts proven deepest."""
     row = meeting[np.lexsort((meeting["distance"], meeting["upper"]))[0]].copy()
     certain = row["how"] != UNDECIDED
     point = 0.5 * (row["point_a"] + row["point_b"])
@@ -566,8 +567,8 @@ _FARTHEST = (4.0, 64.0, 1024.0)
 
 
 def _way_out(A: CompoundParts, B: CompoundParts, X_WA, X_WB, meeting: np.ndarray) -> SeparatingTranslation:
-    """A translation of B that separates two unions of which one has half-spaces, proven; infinite where none was found,
-    as of two half-spaces."""
+    """A proven translation of B out of A, at least one of the unions with half-spaces; infinite where no translation
+    was found, as of two half-spaces."""
     nothing = SeparatingTranslation(math.inf, math.inf, np.array([0.0, 0.0, 1.0]))
     if A.unbounded and B.unbounded:
         return nothing
@@ -615,9 +616,9 @@ def _planes(A: CompoundParts, B: CompoundParts, X_WA, X_WB) -> tuple[np.ndarray,
 
 
 def _shortest_way(normals: np.ndarray, depths: np.ndarray) -> np.ndarray | None:
-    """The shortest x with normals · x ≥ depths, but for rounding, that is not 0; None where there is none.
+    """The shortest x other than 0 with normals · x ≥ depths, but for rounding; ``None`` where no x is found.
 
-    It lies on one, two or three of the planes, as near 0 as these let it.
+    The shortest x is the nearest point to 0 of a plane, or of the intersection of two or three planes.
     """
     best = None
     for n in (1, 2, 3):

@@ -57,7 +57,7 @@ class Part(NamedTuple):
 
     @property
     def bound(self) -> PackedConvex:
-        """A convex set that holds it, in its own frame."""
+        """A convex set that holds the part, in the part's own frame."""
         return bounding_parts_of(self.shape)[0][0]
 
 
@@ -80,8 +80,8 @@ def _stretch_of(R: np.ndarray) -> np.ndarray:
 
 
 class Balls(NamedTuple):
-    """Balls that hold a union's parts, or groups of them: centres (k, 3) and radii (k,) in its frame [m], and the ball
-    (parts,) that each part is in."""
+    """Balls that hold a union's parts, or groups of parts: centres (k, 3) and radii (k,) in the union's frame [m], and
+    (parts,) the number of each part's ball."""
 
     centres: np.ndarray
     radii: np.ndarray
@@ -138,10 +138,11 @@ class PartColumns(NamedTuple):
 
 
 class CompoundParts:
-    """A shape as a union: of one part, where it is none.
+    """A shape as a list of convex sets and meshes, each at its pose in the shape's frame.
 
-    parts : single bodies in the order of the items.   numbers : of those among them that are no meshes.
-    is_union, is_halfspace : whether the shape is a Compound, and whether it is a half-space.
+    parts : a `Part` for each leaf of a `Compound`, in the order of the items; of any other shape, the shape alone.
+    numbers : places in ``parts`` of the convex sets.
+    is_union, is_halfspace : whether the shape is a `Compound`, and whether the shape is a half-space.
     """
 
     def __init__(self, shape: Shape):
@@ -157,7 +158,7 @@ class CompoundParts:
 
     @property
     def convex(self) -> Shape | None:
-        """The parts that are no meshes as one shape; None where there are none."""
+        """The parts that are no meshes as a single shape; ``None`` where all are meshes."""
         return None if self._convex is None else self._convex()
 
     @cached_property
@@ -175,7 +176,7 @@ class CompoundParts:
 
     @cached_property
     def ball(self) -> np.ndarray | None:
-        """(7,) numbers as of a `MeshTree`, of which centre and radius of a ball around all parts count; None of
+        """(7,) numbers as of a `MeshTree`: centre, zeros and radius of a ball around all parts [m]; ``None`` of
         half-spaces."""
         if self.unbounded:
             return None
@@ -214,7 +215,7 @@ class CompoundParts:
 
     @cached_property
     def radius(self) -> float:
-        """Of a ball around the union's origin that holds all parts that have an end [m]."""
+        """Radius [m] of a ball around the union's origin that holds all bounded parts."""
         columns = self.columns
         at = np.sqrt(np.square(columns.X[:, :3, 3]).sum(axis=1))
         reach = np.where(np.isnan(columns.plane), 1.001 * (columns.reach + columns.radius + columns.slop), 0.0)
@@ -272,8 +273,8 @@ class CompoundParts:
 
     @cached_property
     def groups(self) -> list[Balls]:
-        """Balls around groups of parts that are near each other, the largest groups first, each of all parts once; of
-        unions of so many parts that groups are worth it."""
+        """Balls around groups of parts near each other, the largest groups first, all parts in each `Balls`; empty of
+        unions with too few parts for groups to pay."""
         centres, radii, _ = self.balls
         place = np.empty(len(radii), dtype=np.int64)
         place[_by_place(centres, np.arange(len(radii)))] = np.arange(len(radii))
@@ -310,12 +311,11 @@ def compound_parts(shape: Shape) -> CompoundParts:
 def boxes_near(
     A: CompoundParts, B: CompoundParts, X_WA: np.ndarray, X_WB: np.ndarray, margin: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(poses, parts of A, parts of B) whose boxes come within the margin, and a little farther.
+    """(poses, parts of A, parts of B) by number, with boxes within the margin [m], or a little farther apart.
 
-    Boxes hold the parts where their poses, rounded, put them, and all that the rounding may have moved them: what is
-    apart along an axis by more than the margin is farther apart than that. Of many pairs a walk through both trees
-    leaves most out before: parts that are as near have nodes that are. So many boxes are made at once that they need
-    little memory.
+    Boxes hold the parts at their rounded poses, and all that rounding may have moved the parts by: parts whose boxes
+    are apart along an axis by more than the margin are farther apart than the margin. Of many pairs a walk through both
+    trees leaves out most beforehand: near parts have near nodes. Boxes are made in blocks of little memory.
     """
     if len(A.parts) * len(B.parts) > _MAX_PAIRS:
         met = [A.tree.pairs_near(B.tree, X, Y, margin) for X, Y in zip(X_WA, X_WB)]
@@ -342,7 +342,8 @@ def _outwards(a: np.ndarray, b: np.ndarray, margin: float) -> float:
 
 
 def _leaves(shape: Shape, X: np.ndarray | list[list[Fraction]] | None):
-    """Yields (single body, its exact pose in the outermost frame: rows of four, a matrix where it is one as given)."""
+    """Yields (single body, its exact pose in the outermost frame: a given matrix, rows of four fractions of a product,
+    or ``None`` for the identity)."""
     if not isinstance(shape, Compound):
         yield shape, X
         return
@@ -359,7 +360,8 @@ def _times(X: list[list[Fraction]], Y: list[list[Fraction]]) -> list[list[Fracti
 
 
 def _rounded(X: np.ndarray | list[list[Fraction]] | None) -> tuple[np.ndarray, float, float]:
-    """(pose rounded once, what that turns a metre by, what it shifts), the last two rounded upwards."""
+    """(pose rounded once, how far rounding turns a point 1 m from the origin [m], how far rounding shifts the origin
+    [m]), the last two rounded upwards."""
     if X is None:
         return IDENTITY, 0.0, 0.0
     if isinstance(X, np.ndarray):

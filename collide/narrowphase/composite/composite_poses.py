@@ -1,13 +1,13 @@
 """Two bodies of several convex parts at many pairs of poses: from matrices to answers inside kernels.
 
-Most pairs of parts are far apart, and balls around them say so. The pair whose balls are nearest is answered first;
-then those that may be nearer than its answer, or may overlap; of booleans, those whose balls overlap, and none after a
-hit, nor where no depth is wanted.
-Which pairs a pose has answered depends on that pose alone, and so does its answer.
+Most pairs of parts are far apart, and balls around them say so. The pair with the nearest balls is answered first;
+then the pairs that may be nearer than its answer, or may overlap; of booleans, pairs with overlapping balls. A hit
+ends a boolean, and a query without depths.
+The pairs answered at a pose depend on the pose alone, and so does the answer.
 
-Pairs of parts are put on a list, which the narrowphase answers where it was compiled (`kernels.native_call`). A list
-goes over many poses, since gaps are refined eight at a time. Where rows of it are undecided, Python has the exact stage
-settle them and calls again: the header holds how far things have come.
+Pairs of parts are put on a list, answered by the narrowphase where it was compiled (`kernels.native_call`). A list
+goes over many poses, since gaps are refined eight at a time. Where rows of a list are undecided, Python has the exact
+stage settle them and calls again: the header holds the progress.
 """
 
 from __future__ import annotations
@@ -105,10 +105,9 @@ def _place_body_balls(block, k):
 
 @kernel
 def place_two_balls(poses, p, q, of_a, a, of_b, b, balls):
-    """The first two balls become those of bodies at rows of poses that begin at p and q, as seen from the first;
-    returns how large the pair is [m].
+    """Place the balls of two bodies as the first two, relative to the first body's origin; returns the pair's size [m].
 
-    of_a, of_b : numbers of bodies, which begin at a and b.
+    p, q : where the bodies' rows of poses begin.   of_a, of_b : numbers of bodies, from places a and b on.
     """
     shift = sub(vec3_at(poses, q + 9), vec3_at(poses, p + 9))
     place_ball(poses, p, of_a, a, 0.0, 0.0, 0.0, balls, 0)
@@ -119,11 +118,11 @@ def place_two_balls(poses, p, q, of_a, a, of_b, b, balls):
 
 
 class Groups(NamedTuple):
-    """The groups of both bodies of a slot, and their balls in the block: of A's groups from ``a`` on, of its parts, by
-    place, from ``parts_a`` on.
+    """The groups of both bodies of a slot, and places of balls in the block: of A's groups from ``a`` on, of A's parts,
+    by place, from ``parts_a`` on; of B's likewise.
 
     cut : groups farther apart hold no pair that counts [m].   margin : how much less the distance of two parts' balls
-        may be than that of their groups' [m].
+        may be than the distance of their groups' balls [m].
     """
 
     A: Body
@@ -205,9 +204,9 @@ def _nearest_of_groups(block, groups, a, b, least, nearest):
 
 @kernel
 def _nearest_pair(block, k, boolean):
-    """The pair of parts of slot k whose balls are nearest; −1 of booleans where no balls meet.
+    """The pair of parts of slot k with the nearest balls; −1 of booleans where no balls meet.
 
-    Groups of parts whose balls are farther apart than the nearest pair so far hold none that is as near.
+    Groups of parts whose balls are farther apart than the nearest pair so far hold no nearer pair.
     """
     n_pairs = count_pairs(block, k)
     if n_pairs == 1 and not boolean:
@@ -256,11 +255,11 @@ def _gap_of_pair(block, groups, pair):
 
 @kernel
 def _list_near_parts(block, groups, of_b, reach, first):
-    """Write where the balls of the parts of A, or of B, are, from ``first`` on of the list of near ones; −1 of parts
-    that are left out.
+    """Write the places of the balls of A's parts, or of B's, into the list of near parts, from ``first`` on; −1 of
+    parts left out.
 
-    Left out are those of groups that none of the other body's comes within the reach of, and those that the ball around
-    it does not: all balls in it are as far away.
+    A part is left out where its group is farther than ``reach`` [m] from all groups of the other body, and where its
+    ball is farther from the ball around the other body: all balls in the body's ball are as far away.
     """
     body = groups.B if of_b else groups.A
     n, at, n_others, others_at, parts = (
@@ -295,7 +294,7 @@ def _list_pair(block, k, count_b, pair, boolean, n_listed):
 
 @kernel
 def _list_nearest(block, boolean, every):
-    """List one pair of parts a pose; returns how many there are."""
+    """List a pair of parts a pose; returns the list's length."""
     n_listed = 0
     for k in range(block.header[N_POSES]):
         pair = 0 if every else _nearest_pair(block, k, boolean)
@@ -329,7 +328,7 @@ def _list_others(block, boolean, depths, every):
 
 @kernel
 def _list_others_of(block, k, boolean, every, n_listed):
-    """The same of one pose, from PAIR on; PAIR becomes the one to go on with."""
+    """List the other pairs of a pose, from PAIR on; PAIR becomes the pair to go on with. Returns the list's length."""
     header = block.header
     count_a = body_of(block, k, 0).n_parts
     count_b = body_of(block, k, 1).n_parts
@@ -476,12 +475,12 @@ def answer_compounds(
 ):
     """Answer n pairs of poses of two bodies, or of n pairs of bodies; 0, OPEN or BAD_POSE.
 
-    header : HEADER integers. Where it stops OPEN, the first [N_LISTED] rows and pairs of the list are for the exact
-        stage, and the next call goes on.
+    header : HEADER integers. After OPEN, the first [N_LISTED] rows and pairs of the list are for the exact stage, and
+        the next call goes on.
     which : 0 for bodies 0 and 1, or two bodies a pose.   XA, XB : matrices; step 16 or, for a single pose, 0.
-    depths : as in `answer_pairs`; without them bodies that overlap get the row of parts that do.
+    depths : as in `answer_pairs`; without depths overlapping bodies get the row of overlapping parts.
     limit : larger distances are not looked for [m].   check : refuse matrices that are no rotation.
-    every : leave nothing to balls, and stop after every list: tests want the exact stage to have it all.
+    every : list all pairs whatever their balls, and stop after every list: tests of the exact stage.
     out : booleans: a byte a pose; else a row of PAIR_DTYPE a pose, zeroed.
     Arguments are flat: single calls come by address.
     """

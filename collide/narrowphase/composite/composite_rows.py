@@ -1,11 +1,11 @@
-"""One row a pair of bodies from rows of their parts.
+"""A row of a pair of bodies from the rows of their parts.
 
-Apart, the distance of two unions is the least one of their parts. Overlapping, the smallest
-separating translation has no such formula. Proven of it are two bounds: each overlapping pair of
-parts must come apart, so it is at least as long as the depth of the deepest pair; and along the
-normals of overlapping parts and the axes of the deepest two the unions are clear from a length on
-(`clearing_translation.py`), the least of which is reported. Half-spaces among the parts may bar all of
-these without end: of such unions the ways out of all half-spaces are tried, too (`ways_out.py`).
+Apart, the distance of two unions is the least distance of their parts. Overlapping, the length of the smallest
+separating translation has no formula; two bounds are proven. Each overlapping pair of parts must come apart, so the
+length is at least the depth of the deepest pair. Along the normals of overlapping parts and the axes of the deepest
+two the unions are clear from a length on (`clearing_translation.py`); the least of these lengths is reported.
+Half-spaces among the parts may bar all these directions without end: for unions with half-spaces the ways out of all
+half-spaces are tried, too (`ways_out.py`).
 """
 
 from __future__ import annotations
@@ -91,9 +91,9 @@ def begin_score(score, at):
 
 @kernel(inline=True)
 def first_reach_of(score, at):
-    """Pairs of parts farther apart have no say, by the row that came first: its upper bound is one of the bodies'
-    distance; beyond the limit it has none, but its lower bound is above the limit, and pairs that are farther apart
-    change neither that nor the least lower bound."""
+    """Distance [m] beyond which pairs of parts cannot change the answer, by the first row. The row's upper bound is an
+    upper bound of the bodies' distance. A row beyond the limit has no upper bound, but a lower bound above the limit:
+    pairs farther apart leave the bodies beyond the limit, and the least lower bound as before."""
     return score[at + _SAY]
 
 
@@ -183,9 +183,10 @@ def close_score(score, at, out_at):
 def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_at):
     """Replace distance, lower, normal and points by the shortest translation found that separates both bodies.
 
-    parts : `PosedParts`.   first, n : each body's parts there.   work : SEPARATING doubles of workspace.
+    parts : `PosedParts`.   first, n : the first part and the number of parts of each body.   work : SEPARATING doubles
+    of workspace.
 
-    Against one half-space the row of the deepest part is the answer: there is one translation for all.
+    Against a single half-space the row of the deepest part is the answer: its translation clears all parts.
     """
     if _is_halfspace(parts, first_a, n_a) or _is_halfspace(parts, first_b, n_b):
         return
@@ -247,7 +248,7 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
 
 @kernel
 def _way_past_overlaps(score, at, parts, first_a, first_b, n, limit, work_at):
-    """The `Length` along n to which the overlaps that are kept bar the way, or one of them does beyond the limit."""
+    """The `Length` along n up to which the kept overlaps bar the way, or a single overlap does beyond the limit."""
     length = Length(0.0, 0.0)
     for k in range(int(score[at + _N_OVERLAPS])):
         overlap = at + _DEEPEST + _OVERLAP * k

@@ -1,4 +1,4 @@
-"""Two bodies of several convex parts at one pair of poses: from matrices to the answer inside one kernel."""
+"""Two bodies of several convex parts at a pair of poses: from matrices to the answer inside a single kernel."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BALLS_WORK = 2 * POSE + 2 * BALL_IN_WORLD
 
 @kernel
 def _answer(header_at, XA_at, XB_at, boolean, depths, limit, out_at):
-    """Answer one pair of poses; false where it takes more than doubles, or an error has to be raised."""
+    """Answer a pair of poses; false where doubles do not suffice, or an error has to be raised."""
     header = view_i64(header_at, SINGLE_HEADER)
     for k in range(_HEADER + N_DONE, SINGLE_HEADER):
         header[k] = 0
@@ -53,8 +53,8 @@ def collide_single_compound(header_at, XA_at, XB_at):
 
 @entry(prepared.ROW, nogil=False)
 def distance_single_compound(header_at, XA_at, XB_at, row_at, depths, limit):
-    """ROW zero bytes become the pair's row, without a depth unless those are wanted; −1 as there, else 0. −1, too,
-    where the depth is infinite.   limit : the query's max_distance [m]."""
+    """Write the pair's row over ROW zero bytes, without a depth unless depths are wanted; returns 0, or −1 where
+    `_answer` is false or the depth is infinite.   limit : the query's max_distance [m]."""
     if not _answer(header_at, XA_at, XB_at, False, depths, limit, row_at):
         return -1
     row = view_row(row_at)
@@ -79,11 +79,10 @@ def within_single_compound(header_at, XA_at, XB_at, limit):
 
 @entry(prepared.CONTACTS, nogil=False)
 def balls_beyond(header_at, XA_at, XB_at, _out_at, _max_contacts, margin):
-    """0 contacts where balls around two bodies are farther apart than a margin [m]; −1 elsewhere, and where one is no
-    pose.
+    """0 contacts where balls around two bodies are farther apart than a margin [m]; −1 elsewhere, or at invalid poses.
 
-    No part reaches out of its body's ball by more than the balls' margin of the size, so that none is within the margin
-    of another, whose product is rounded up.
+    No part reaches out of its body's ball by more than the balls' margin of the size, so no two parts are within the
+    margin, whose product is rounded up.
     """
     header = view_i64(header_at, 3)
     poses, balls = view_f64(header[_WORK_AT], 2 * POSE), view_f64(header[_WORK_AT] + 16 * POSE, 2 * BALL_IN_WORLD)

@@ -1,8 +1,9 @@
-"""Ways out of half-spaces: the shortest translation of B that clears it of those among the parts of a union.
+"""Ways out of half-spaces: the shortest translation of B that clears the half-spaces among the parts of a union.
 
-A half-space with outward normal m, into which a body reaches d deep, is clear of it once m·x ≥ d; a translation x
-clears all where each of these holds. The shortest one lies on one, two or three of the planes m·x = d, as near 0 as
-these let it. With λ ≥ 0 every translation y that clears all is at least as long as Σ λ d / |Σ λ m|: Σ λ d ≤ (Σ λ m)·y.
+A body reaching d deep into a half-space with outward normal m is clear once m·x ≥ d; a translation x clears all
+half-spaces where every inequality holds. The shortest x lies on one, two or three of the planes m·x = d, at their
+nearest point to 0. With λ ≥ 0 every translation y out of all half-spaces is at least Σ λ d / |Σ λ m| long, since
+Σ λ d ≤ (Σ λ m)·y.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ _DEGENERATE = 2.0**-30
 
 
 class WayOut(NamedTuple):
-    """x : a translation of B that clears it of all half-spaces, but for rounding; 0 where there is none [m].
-    least : every translation that clears all of them is proven to be at least as long [m]."""
+    """x : a translation of B that clears all half-spaces, but for rounding; 0 where no translation was found [m].
+    least : a proven lower bound of the length of every translation out of all half-spaces [m]."""
 
     x: Vec3
     least: float
@@ -111,7 +112,7 @@ def way_out(planes, n, with_depths):
 
 
 class _Solution(NamedTuple):
-    """Of which of the planes i, j, k: the first one, two or three."""
+    """The first n of the planes i, j, k."""
 
     i: Any
     j: Any
@@ -121,13 +122,14 @@ class _Solution(NamedTuple):
 
 @kernel(inline=True)
 def _depth(planes, k, with_depths):
-    """How far B is to go along a plane's normal: deeper by twice the error, so that planes prove it clear there."""
+    """How far B is to go along a plane's normal [m]: the depth and twice the error, so that planes prove B clear; 1
+    without depths."""
     return planes[PLANE * k + _DEPTH] + 2.0 * planes[PLANE * k + _ERROR] if with_depths else 1.0
 
 
 @kernel
 def _solution(planes, of, with_depths):
-    """(the shortest x on one, two or three planes, 0 where they have none; what no translation is shorter than)."""
+    """(the shortest x on all n planes, 0 of dependent planes; a lower bound of the length of any translation)."""
     zero = Vec3(0.0, 0.0, 0.0)
     m, d = vec3_at(planes, PLANE * of.i), _depth(planes, of.i, with_depths)
     if of.n == 1:

@@ -1,7 +1,7 @@
-"""Probes: a box or a triangle of one tree as the boxes of the other tree are compared with it (`mesh/box_overlap.py`).
+"""Probes: a box or a triangle of one tree as compared with the boxes of the other tree (`mesh/box_overlap.py`).
 
-All lengths are in the units of the probe's tree, all half lengths and half-spaces enlarged by bounds of what rounding
-to floats and the relation of the frames (`posed_surfaces.py`) can do.
+All lengths are in the units of the probe's tree. Half lengths and half-spaces are enlarged by bounds of the errors of
+rounding to floats and of the relation of the frames (`posed_surfaces.py`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _FLOAT_ERROR = 2.0**-19
 
 @kernel(inline=True)
 def set_box(placing, which, box, probe):
-    """Make a box the probe.   which : 0 for a box of A, 1 for one of B."""
+    """Make a box the probe.   which : 0 for a box of A, 1 for a box of B."""
     to_probe = FRAMES + FRAME_SIZE * which
     to_node = FRAMES + FRAME_SIZE * (1 - which)
     for i in range(3):

@@ -1,9 +1,9 @@
 """Two bodies of facets at one pair of poses or at many: from matrices to booleans inside one kernel.
 
 Bodies whose balls are apart are apart. Else their surfaces are tested (`surface_collision.py`), then a point of every
-part of either body against the inside of the other (`winding_numbers.py`): without radii, that decides exactly. Bodies
-swept by balls take the distance of the surfaces (`surface_distance.py`). The traversals are called where they were
-compiled (`kernels.native_call`). Rows are written by `distance_kernel.py`.
+part of either body against the inside of the other (`winding_numbers.py`): without radii, both tests decide exactly.
+Bodies swept by balls take the distance of the surfaces (`surface_distance.py`). The traversals are called where they
+were compiled (`kernels.native_call`). Rows are written by `distance_kernel.py`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ FARTHER = 1 + 1e-9
 
 
 class FacetBody(NamedTuple):
-    """One body: its tree, whether it is solid, one point of every part (3 doubles each), the radius of its ball [m]."""
+    """A body: its tree, whether the body is solid, a point of every part (3 doubles each), the swept ball's radius
+    [m]."""
 
     tree_at: int
     solid: int
@@ -126,7 +127,7 @@ def is_rigid(X_at, check):
 
 @kernel
 def are_poses(XA_at, step_a, XB_at, step_b, k, first, check):
-    """Whether the matrices of pose k are poses; one that goes with all of the other's is looked at first only."""
+    """Whether the matrices of pose k are poses; a matrix shared by all poses is looked at first only."""
     good = (step_a == 0 and k > first) or is_rigid(XA_at + 8 * step_a * k, check)
     return good and ((step_b == 0 and k > first) or is_rigid(XB_at + 8 * step_b * k, check))
 
@@ -149,9 +150,9 @@ def _may_hold(X, numbers, Y, point):
 
 @kernel
 def _point_inside(space, body, X_at, points_at, n_points, Y_at):
-    """Number of the first point, of n in a frame at Y, that lies in the body at X; −1 where none does.
+    """Number of the first of n points, in a frame at Y, inside the body at X; −1 where no point is inside.
 
-    −2 where the matrix X places no mesh. A point that every segment tried leaves open counts as inside.
+    −2 where the matrix X is singular, or nearly so. A point left open by every segment tried counts as inside.
     """
     X = view_f64(X_at, 16)
     Y = view_f64(Y_at, 16)
@@ -199,7 +200,8 @@ def inside_state(space, A, XA_at, B, XB_at, inside_at):
 def cores_state(space, pair, inside_at):
     """APART, HIT or SINGULAR: whether bodies meet without their radii, exactly.
 
-    inside : 0, or three doubles: a point of the world that lies in both where no surfaces meet; else left as they are.
+    inside : 0, or three doubles: becomes a point of the world in both bodies where a part of either lies inside the
+    other, and stays unchanged otherwise.
     """
     starts_at = space.scratch_at + 8 * KEYS
     words = view_i64(starts_at, COUNTERS)

@@ -36,9 +36,9 @@ def serves(packed: PackedConvex) -> bool:
 
 
 class GapQuestion:
-    """A mesh and a shape as the kernel reads them, and what it writes into.
+    """A mesh and a shape as the kernel reads them, and the kernel's output.
 
-    workspace : addresses of doubles and integers that `answer_pairs` works in.
+    workspace : addresses of the doubles and integers that `answer_pairs` works in.
     """
 
     def __init__(self, A: Body, E: Enclosure, workspace: tuple[int, int]):
@@ -57,9 +57,9 @@ class GapQuestion:
 
 
 def gap_rows(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, (n,) bool whether they are written) of a mesh and a shape at n poses (n, 4, 4) at which they are apart.
+    """(rows, (n,) bool whether they are written) of a mesh and a shape, apart at n poses (n, 4, 4).
 
-    Rows that are not written are to be asked about in another way.
+    Unwritten rows need another method.
     """
     n = len(X_WA)
     rows, is_written = np.zeros(n, dtype=PAIR_DTYPE), np.zeros(n, dtype=bool)

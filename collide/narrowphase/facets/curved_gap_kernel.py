@@ -93,11 +93,12 @@ class _Walk(NamedTuple):
 
 
 class _Nearest(NamedTuple):
-    """Of the facets asked about so far.
+    """The nearest of the facets asked about so far.
 
-    key, place : of the best row, which stands first among the rows.   lower, upper : least of all [m].
-    open_lower : least of those that are not certified.   along, above : the mesh's direction in which the shape is
-    looked for, and how high its lowest point is.   failed : a facet has no proven gap.
+    key, place : of the best row, the first of the rows.   lower, upper : least bounds of all facets [m].
+    open_lower : least lower bound of the facets without a certificate [m].   along, above : direction in the mesh's
+    frame in which the shape is looked for, and height of the shape's lowest point [m].
+    failed : a facet has no proven gap.
     """
 
     key: float
@@ -148,7 +149,7 @@ def _box_of_facet(tree, place):
 
 @kernel
 def _ask_facet(walk, place):
-    """The row of one facet and the shape, written behind the best one."""
+    """The row of a facet and the shape, written behind the best row."""
     words, tree = walk.words, walk.tree
     coordinates = view_f64(words[COORDINATES_AT], 3 * BLOCK)
     reach = 0.0

@@ -1,7 +1,7 @@
-"""Rows of two bodies of facets at one pair of poses or at many, from matrices to the row inside one kernel.
+"""Rows of two bodies of facets at one pair of poses or at many, from matrices to rows inside a kernel.
 
-What kernels leave to Python (depths, directions of bodies that all but touch, gaps that boxes of floats cannot measure)
-is reported as bits of what a row lacks, for `facet_kernel_calls.py` to complete.
+Work left to Python (depths, directions of bodies all but touching, gaps too small for boxes of floats) is reported as
+bits of what a row lacks, for `facet_kernel_calls.py` to complete.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ FARTHEST = 1e20
 
 @kernel(inline=True)
 def _step(row_at, field, up):
-    """Make a number of a row, if it is positive, the next double above it or below it; make it 0 where it is not."""
+    """Replace a positive number of a row by the next double above or below; 0 by the least positive double if ``up``;
+    all other numbers by 0."""
     value = view_f64(row_at + 8 * field, 1)
     bits = view_i64(row_at + 8 * field, 1)
     if value[0] > 0.0:
@@ -108,11 +109,12 @@ def _set_bracket(row_at, result, radius):
 
 @kernel
 def _write_gap(space, pair, limit, hull_at, exchanged, row_at):
-    """The row of bodies whose cores are apart, from their distance in the scratch; returns what it lacks.
+    """Write the row of bodies whose cores are apart, from their distance in the scratch; returns what the row lacks.
 
-    hull : 0, or the row of the bodies' hulls, A and B as they are asked about.   exchanged : these are worked on in the
-    other order. Of facets that all but touch rounding leaves many directions, and the pair found may be one around the
-    corner of two faces that lie on each other: hulls as far apart, as far as is proven, know the bodies' direction.
+    hull : 0, or the row of the bodies' hulls, A and B as they are asked about.   exchanged : the kernel works on A and
+    B in the other order. Between facets all but touching rounding leaves many directions, and the pair found may be
+    around the corner of two faces in contact: the normal comes from the hulls where they may be as far apart as the
+    bodies.
     """
     result, marks = result_of(space)
     row, words, flags = blank_row(row_at)
@@ -155,8 +157,7 @@ def _write_gap(space, pair, limit, hull_at, exchanged, row_at):
 
 @kernel
 def _write_points(pair, result, normal, by_hulls, row):
-    """Witness points of a row, whose distance is that of its bracket; by_hulls: the normal is not that of the
-    facets."""
+    """Write witness points as far apart as the row's distance; by_hulls: the normal comes from the hulls."""
     point_a = add(vec3_at(result, surface_distance.POINT_A), scale(pair.A.radius, normal))
     point_b = sub(vec3_at(result, surface_distance.POINT_B), scale(pair.B.radius, normal))
     if by_hulls:  # lay the points as far apart along it, about their middle
@@ -184,10 +185,10 @@ def _write_unseen(pair, limit, normal, middle_a, middle_b, row_at):
 
 @kernel
 def _write_row(space, pair, limit, reach, depths, hull_at, exchanged, row_at):
-    """The row of two bodies, A and B as worked on; returns what it lacks.
+    """Write the row of two bodies, A and B as worked on; returns what the row lacks.
 
-    reach : how far cores are looked for, above the limit and the radii [m].   depths : whether it is wanted how deep
-    overlaps are.   hull, exchanged : as of `_write_gap`.
+    reach : how far cores are looked for, above the limit and the radii [m].   depths : whether depths of overlaps are
+    wanted.   hull, exchanged : as of `_write_gap`.
     """
     radius = pair.A.radius + pair.B.radius
     if balls_farther_than(pair, reach):
@@ -218,7 +219,7 @@ def _write_row(space, pair, limit, reach, depths, hull_at, exchanged, row_at):
 
 @kernel
 def _set_unseen(space, reach):
-    """Make the scratch what the traversal leaves of surfaces that are farther than it looks."""
+    """Make the scratch the traversal's result for surfaces farther apart than ``reach`` [m]."""
     result, marks = result_of(space)
     for i in range(RESULT):
         result[i] = 0.0
@@ -231,9 +232,9 @@ def _set_unseen(space, reach):
 
 @kernel
 def _write_core_hit(space, pair, depths, row_at):
-    """The row of bodies whose cores meet, at a common point; returns what it lacks.
+    """Write the row of bodies whose cores meet, at a common point; returns what the row lacks.
 
-    The row's point A is one of a part that lies inside the other body, NaN where surfaces meet.
+    The row's point A is in both bodies where a part of either lies inside the other, NaN where surfaces meet.
     """
     row, words, flags = view_row(row_at)
     flags[rows.HIT] = 1
@@ -283,10 +284,10 @@ def _exchange(row_at):
 
 @kernel
 def _row_at_poses(header_at, space, XA_at, XB_at, limit, reach, depths, hull_at, row_at):
-    """A row of the bodies as they are asked about; returns what it lacks.
+    """Write a row of the bodies as they are asked about; returns what the row lacks.
 
-    Bodies are worked on in the order of their contents, equal ones in the order of their poses, so that swapped
-    questions give the same numbers.
+    Bodies are worked on in the order of their contents, equal bodies in the order of their poses, so swapped questions
+    give the same numbers.
     """
     words = view_i64(header_at, HEADER)
     exchanged = words[EXCHANGED] != 0
@@ -317,10 +318,10 @@ def gap_single(header_at, XA_at, XB_at, row_at, depths, _unlimited):
 def gap_poses(
     header_at, XA_at, step_a, XB_at, step_b, first, n, check, limit, reach, depths, hulls_at, rows_at, lacks_at
 ):
-    """Rows of bodies at poses ``first`` … n − 1; returns how many are done: of one that is not, ``lacks`` says why.
+    """Rows of bodies at poses ``first`` … n − 1; returns n, or the first pose without a row, told by ``lacks``.
 
-    XA, XB, check : as of `meet_poses`.   limit : beyond it only a lower bound is wanted [m].   reach : how far cores
-    are looked for: next above the limit and the radii [m].   depths : whether it is wanted how deep overlaps are.
+    XA, XB, check : as of `meet_poses`.   limit : beyond the limit only a lower bound is wanted [m].   reach : how far
+    cores are looked for: next above the limit and the radii [m].   depths : whether depths of overlaps are wanted.
     hulls : 0, or rows of the bodies' hulls, for directions.   rows : of PAIR_DTYPE, zeroed.
     lacks : a byte a pose, bits of what a row lacks; or ROW_NO_POSE, ROW_SINGULAR.
     Arguments are flat: entries take integers, doubles and booleans alone.

@@ -1,8 +1,8 @@
 """Six corners of two posed triangles as exact integers, and the signs of polynomials in their coordinates.
 
-A sign is computed in doubles first. Where their error bound leaves it open it is computed in `numerics/digits.py`, from
-coordinates that are loaded once a pair: where B lies in A's frame without rounding (equal poses, or poses that rotate
-by right angles) from doubles in A's frame, two or three digits each; otherwise from R v + t in the world, six to eight.
+A sign is computed in doubles first. A sign left open by the error bound is computed in `numerics/digits.py`, from
+coordinates loaded once a pair: where B lies in A's frame without rounding (equal poses, or poses that rotate by right
+angles) from doubles in A's frame, two or three digits each; otherwise from R v + t in the world, six to eight.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ DIGITS = _DOT + 3 * LONGEST
 class ExactPair(NamedTuple):
     """Two triangles for the exact stage: views of corners, placing (`posed_surfaces.py`), digits and state; both poses.
 
-    All signs of a pair are those in one frame, that of the exact points.
+    All signs of a pair are signs in the frame of the exact points.
     """
 
     corners: np.ndarray
@@ -77,7 +77,7 @@ class ExactPair(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Where numbers have digits: the exponent of the lowest one, and how many from there on."""
+    """Where numbers have digits: the exponent of the lowest digit, and the number of digits from the lowest on."""
 
     lowest: int
     length: int

@@ -1,8 +1,8 @@
-"""Whether two triangles meet, without rounding, whatever they are: proper, segments, points, in one plane or not.
+"""Whether two triangles meet, without rounding, of all kinds: proper, segments, points, in a common plane or not.
 
-Closed triangles meet exactly if an edge of one meets the other: surfaces that cross do so at the border of one of
-them, and of two in one plane one may hold the other, edges and all. A triangle without area is its edges. So
-everything comes down to segments against triangles and, where both have no area, against segments.
+Closed triangles meet exactly if an edge of either meets the other: crossing surfaces cross at the border of at least
+one triangle, and in a common plane either triangle may hold the other, edges and all. A triangle without area is its
+edges. So all cases are segments against triangles and, where both have no area, segments against segments.
 """
 
 from __future__ import annotations
@@ -140,7 +140,8 @@ def _passing_exactly(pair):
 
 @kernel
 def _overlapping_exactly(pair):
-    """Whether triangles on one edge lie in one plane, on one side of it; of a triangle without area the edge is all."""
+    """Whether triangles on a common edge lie in one plane, on the same side of the edge; False of a triangle without
+    area, no more than the edge itself."""
     if sign3(pair, 0, 1, 2, 5) != 0:
         return False
     axis = _proper_axis(pair, 0)
@@ -193,7 +194,7 @@ def _edge_crosses(pair, which, k):
 
 @kernel
 def _proper_axis(pair, base):
-    """An axis along which the triangle's projection has an area; −1 where it has none along any."""
+    """An axis along which the triangle's projection has an area; −1 of a triangle without area."""
     corners = pair.corners
     choose_exact_frame(pair)
     best = 0
@@ -219,7 +220,7 @@ def _proper_axis(pair, base):
 
 @kernel
 def _coplanar_triangles_meet(pair, axis):
-    """Of two triangles with area in one plane: apart exactly if the line along an edge of one separates them."""
+    """Whether triangles with area in a common plane meet: apart exactly if the line along an edge separates them."""
     for base in range(0, 6, 3):
         orientation = sign2(pair, axis, base, base + 1, base + 2)
         for k in range(3):

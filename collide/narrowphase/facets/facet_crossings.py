@@ -1,6 +1,6 @@
-"""What pairs of facets share where they clearly cross, in doubles: a segment, its ends edges of one through the other.
+"""What clearly crossing pairs of facets share, in doubles: a segment, each end on an edge of one through the other.
 
-Signs and orders are taken only where bounds of the errors prove them; pairs of which that is not so are left open.
+Signs and orders are taken only where bounds of the errors prove them; other pairs are left open.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def _heights(p, n, edge, a, b, c, error):
 
 @kernel
 def _alone(heights, limit):
-    """The corner that is clearly on one side while the others are on the other, −1 where that is not proven."""
+    """Number of the corner proven alone on its side, both others on the other; −1 where no corner is."""
     if not (abs(heights.x) > limit and abs(heights.y) > limit and abs(heights.z) > limit):
         return -1
     x, y, z = heights.x > 0.0, heights.y > 0.0, heights.z > 0.0
@@ -130,7 +130,7 @@ def _end(a, s, b, t, limit):
 
 @kernel
 def _put(slots, place, row, end, which, corner_a, corner_b, a, b, c, d):
-    """End number ``which`` of both pieces, 0 and 1 of A and 2 and 3 of B, as one of the segment.
+    """Put end number ``which`` of both pieces, 0 and 1 of A and 2 and 3 of B, as an end of the segment.
 
     corner_a, corner_b : the corners alone on their sides, from which the first side and the last go.
     """

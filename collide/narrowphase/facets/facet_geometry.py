@@ -62,10 +62,10 @@ def facet_normals(X: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
 
 def ray_crossing(direction: Direction, a: Vector, b: Vector, c: Vector) -> int | None:
-    """What a facet adds to the winding number of a ray's origin, exactly. a, b, c : its corners less the origin.
+    """The exact contribution of a facet to the winding number of a ray's origin. a, b, c : its corners less the origin.
 
-    1 where the ray leaves through it, −1 where it enters, 0 where it passes beside; None where the line of the ray
-    passes an edge or a corner, or runs along the facet.
+    1 where the ray leaves through the facet, −1 where the ray enters, 0 where the ray passes beside; ``None`` where the
+    line of the ray passes an edge or a corner, or runs along the facet.
     """
     sides = [inner(direction, cross(p, q)) for p, q in ((a, b), (b, c), (c, a))]
     if max(sides) > 0 > min(sides):

@@ -142,7 +142,7 @@ def _states(
 def _ask_all(
     ask_from: Callable[[int, bool], int], n: int, X_WA, X_WB, check: bool, is_no_pose: Callable[[int], bool]
 ) -> None:
-    """Have a kernel answer n poses. It stops at a matrix that is none, or places no mesh: raises InvalidPose."""
+    """Have a kernel answer n poses. The kernel stops at an invalid or singular matrix: raises InvalidPose."""
     done = ask_from(0, check)
     while done < n:
         if not is_no_pose(done):
@@ -156,7 +156,7 @@ def _ask_all(
 
 
 def step_of(X: np.ndarray) -> int:
-    """Doubles from one pose to the next: none for one that goes with all of the other's."""
+    """Doubles from each pose to the next: 16, or 0 for a single pose that goes with all of the other body's."""
     return 16 * (len(X) > 1)
 
 
@@ -251,7 +251,7 @@ def hull_rows(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, limit: float
 
 
 def _completed(A: Body, B: Body, X_WA, X_WB, row: np.ndarray, lacks: int, limit: float) -> np.ndarray:
-    """The row (1,) of one pair of poses (4, 4), whole: worked on in the order that the kernel took."""
+    """The completed row (1,) of a pair of poses (4, 4), worked on in the kernel's order of the bodies."""
     if B.key < A.key or (B.key == A.key and X_WA[:3].tolist() > X_WB[:3].tolist()):
         return flipped(_completed_in_order(B, A, X_WB, X_WA, flipped(row), lacks, limit))
     return _completed_in_order(A, B, X_WA, X_WB, row.copy(), lacks, limit)

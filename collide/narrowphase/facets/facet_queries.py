@@ -1,8 +1,8 @@
 """Questions about two mesh trees from Python: poses in, arrays out.
 
-Bodies are taken in the order of their contents, so that swapped questions are worked out on the same numbers; of two
-equal ones the kernels look at the poses. Workspaces are kept, one a thread: making them anew, and asking numpy for
-their addresses, takes longer than most booleans.
+Bodies are taken in the order of their contents, so swapped questions are worked out on the same numbers; of equal
+bodies the kernels look at the poses. Every thread keeps its workspaces: making them anew, and asking numpy for their
+addresses, takes longer than most booleans.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ HEAP = 1 << 14
 class SurfacePairs(NamedTuple):
     """Pairs of facets that meet, at N pairs of poses.
 
-    pairs : (k, 2) int64 facet numbers of A and of B, those of a pose sorted.
+    pairs : (k, 2) int64 facet numbers of A and of B, sorted pose by pose.
     starts : (N + 1,) int64, where the pairs of each pose begin and end.
-    counters : (N, 3) int64: nodes compared with a box (one against up to eight), pairs of triangles tested, of them
-        decided exactly.
+    counters : (N, 3) int64: nodes compared with a box (a node holds up to eight boxes), pairs of triangles tested, and
+        pairs of triangles decided exactly.
     """
 
     pairs: np.ndarray
@@ -93,10 +93,10 @@ def surfaces_meet(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) 
 
 
 def first_hits(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> SurfacePairs:
-    """One pair of facets that meet for each pair of poses, if any does: the same one every time.
+    """The first pair of meeting facets, if any, for each pair of poses: the same pair every time.
 
-    X_WA, X_WB : (4, 4) or (N, 4, 4) float64, one of them or both; entries are exact reals. Surfaces only: a
-    mesh inside another meets nothing. Raises InvalidPose where a matrix is singular or nearly so.
+    X_WA, X_WB : (4, 4) or (N, 4, 4) float64, either or both; entries are exact reals. Surfaces only: a mesh inside
+    another meets nothing. Raises InvalidPose where a matrix is singular or nearly so.
     """
     if B.content < A.content:
         keys, starts, counters = _hit_keys(B, A, X_WB, X_WA, True)
@@ -106,7 +106,7 @@ def first_hits(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> 
 
 
 def all_hits(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> SurfacePairs:
-    """All pairs of facets that meet; parameters as for `first_hits`. None is lost, however many there are."""
+    """All pairs of meeting facets; parameters as for `first_hits`. No pair is lost, however many meet."""
     if B.content < A.content:
         keys, starts, counters = _hit_keys(B, A, X_WB, X_WA, False)
         b, a = np.divmod(keys, len(A.ids))
@@ -179,9 +179,9 @@ def _near(A: MeshTree, B: MeshTree, X_WA, X_WB, n: int, limit: float) -> tuple[n
 def facets_within(
     A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, reach: float, max_pairs: int
 ) -> NearPairs | None:
-    """All pairs of facets at most ``reach`` [m] apart, and a few that are farther by rounding; poses (4, 4).
+    """All pairs of facets at most ``reach`` [m] apart, and a few farther apart by rounding; poses (4, 4).
 
-    max_pairs : None is returned where there are more than about this. Raises InvalidPose where a matrix is singular.
+    max_pairs : ``None`` is returned for more pairs than about this. Raises InvalidPose where a matrix is singular.
     Costs about 0.1 µs a pair of boxes and 0.3 µs a pair listed.
     """
     X_WA, X_WB = (np.ascontiguousarray(X, dtype=np.float64) for X in (X_WA, X_WB))
@@ -233,10 +233,10 @@ def points_in_solid(A: MeshTree, X_WA, points: np.ndarray, X_WB) -> np.ndarray:
 
 
 def self_hits(tree: MeshTree) -> tuple[np.ndarray, np.ndarray]:
-    """((k, 2) sorted facet pairs i < j of one surface that share more than common corners and edges, counters (3,)).
+    """((k, 2) sorted facet pairs i < j of a surface that share more than common corners and edges, counters (3,)).
 
-    Decided exactly on the coordinates given; corners are common where their coordinates are equal. Facets that are
-    one facet twice are among the pairs.
+    Decided exactly on the coordinates given; corners are common where their coordinates are equal. Two facets with the
+    same three corners are among the pairs.
     """
     keys = np.empty(4096, dtype=np.int64)
     counters, progress = np.zeros(3, dtype=np.int64), np.zeros(2, dtype=np.int64)
@@ -257,7 +257,7 @@ def facets_on_rays(A: MeshTree, X_WA, rays_T: np.ndarray, first_only: bool) -> t
     """(hits (k, rays.HIT), counters (N, 3): nodes, triangles, exact decisions) of N rays, each ray's together.
 
     X_WA : (4, 4) or (N, 4, 4).   rays_T : (N, rays.RAY) as `rays.cast_rays` takes them, t in units of T.
-    first_only : only facets that may be the first of their ray, by brackets; all that are met otherwise.
+    first_only : only facets that may be the first of their ray, by brackets; otherwise all facets met.
     """
     X_WA = np.ascontiguousarray(X_WA, dtype=np.float64)
     n = len(rays_T)

@@ -1,8 +1,7 @@
-"""Facets of a mesh one by one against a curved convex set (a cylinder, cone, ellipsoid): rows of the convex engine.
+"""Single facets of a mesh against a curved convex set (a cylinder, cone, ellipsoid): rows of the convex engine.
 
-Every facet is a hull of three points, and stands before the convex set, whichever way the pair is asked
-(`lowering/facet_table.py`). Poses may be rounded products: how far they may be off is counted in (`PoseTable`, column
-POSE_SLOP).
+Every facet is a hull of three points, and stands before the convex set, in either order of the pair
+(`lowering/facet_table.py`). Poses may be rounded products, whose slop is counted in (`PoseTable`, column POSE_SLOP).
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ def facet_rows(
 ) -> np.ndarray:
     """Rows (PAIR_DTYPE) of k facets, each at one of n pairs of poses, against a convex set; the facet is A.
 
-    pose, place : (k,) which poses, and which triangles in the order of the tree.
+    pose, place : (k,) numbers of poses, and numbers of triangles in the order of the tree.
     boolean, limit, depths : as of `run_pairs`.
     """
     triangles, triangle_of = np.unique(place, return_inverse=True)

@@ -59,12 +59,12 @@ _U = 2.0**-53
 
 
 class _Query(NamedTuple):
-    """reach : distance that pairs are listed within [m].   error : bound of the error of a coordinate in the world.
+    """reach : pairs at most so far apart are listed [m].   error : bound of the error of a coordinate in the world.
 
     shift : t_B − t_A.
-    leaf : triangles of a leaf of A, and one of B, with boxes.
-    out, facets : doubles and integers of the pairs listed, room for ``capacity`` of them.
-    measures : whether they are measured.
+    leaf : triangles of a leaf of A, and a triangle of B, with boxes.
+    out, facets : doubles and integers of the pairs listed, room for ``capacity`` pairs.
+    measures : whether the pairs are measured.
     """
 
     trees: PosedTrees
@@ -240,12 +240,12 @@ def list_near_pairs(
     header_a_at, header_b_at, XA_at, XB_at, reach, out_at, facets_at, capacity, stack_at, n_stack, doubles_at,
     integers_at, exact_at, measures,
 ):
-    """How many pairs of facets come within ``reach`` at one pair of poses (16 doubles each); −FULL, −SINGULAR.
+    """How many pairs of facets come within ``reach`` at a pair of poses (16 doubles each); −FULL, −SINGULAR.
 
-    Every pair whose distance is at most ``reach`` is listed; a few that are farther by rounding may be.
-    measures : otherwise distances are infinite, no pair meets, and more pairs may be listed that are farther.
-    out, facets : NUMBERS_OF_PAIR doubles and INTS_OF_PAIR integers a pair, room for ``capacity`` of them.
-    Arguments are flat, as those of all entries.
+    Every pair at most ``reach`` apart is listed; a few pairs farther apart by rounding may be.
+    measures : if False, distances are infinite, no pair meets, and more pairs farther apart may be listed.
+    out, facets : NUMBERS_OF_PAIR doubles and INTS_OF_PAIR integers a pair, room for ``capacity`` pairs.
+    Arguments are flat, as of all entries.
     """
     A = open_tree(header_a_at)
     B = open_tree(header_b_at)

@@ -75,7 +75,7 @@ def meeting_in_doubles(A, a, B, b, error):
 
 @kernel(inline=True)
 def sign_error(reach, error):
-    """Error of the orientation of four corners, none farther than ``reach`` from one point along an axis.
+    """Error of the orientation of four corners, all within ``reach`` of a common point along every axis.
 
     Differences are off by f = 2E + 2uD and at most 2D: 72 D²f, and 240 uD³ by rounding.
     """
@@ -84,9 +84,9 @@ def sign_error(reach, error):
 
 @kernel
 def _intervals_overlap(A, a, sides_a, B, b, sides_b, limit):
-    """The planes cross, and both triangles cross the line: whether they overlap on it.
+    """APART, MEETING or AMBIGUOUS: whether triangles overlap on the line of their planes, which both cross.
 
-    sides_a : on which sides of B's plane A's corners are, all certain; sides_b likewise.
+    sides_a : the certain sides of A's corners at B's plane; sides_b likewise.
     """
     # The corner of A that is alone on its side of B's plane comes first; B is turned over so that it lies above.
     i = _alone(sides_a)
@@ -112,7 +112,7 @@ def _intervals_overlap(A, a, sides_a, B, b, sides_b, limit):
 
 @kernel(inline=True)
 def _alone(a):
-    """Which of three numbers, none 0 and not all of one sign, has a sign of its own."""
+    """Position of the number whose sign neither other has; all three are nonzero, and both signs occur."""
     if (a.y > 0.0) == (a.z > 0.0):
         return 0
     return 1 if (a.x > 0.0) == (a.z > 0.0) else 2

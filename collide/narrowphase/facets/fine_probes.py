@@ -77,9 +77,9 @@ def set_fine_prism(placing, which, tree, facet, nodes, node, probe):
 
 @kernel
 def move_probe(nodes, node, frame, probe, moved):
-    """A probe from the centre of a tree that has origins as one from the origin of a node; it may be the same array.
+    """A probe from the centre of a tree with origins as a probe from the origin of a node; both may be the same array.
 
-    It stays as large: enlarged for floats from the tree's centre, it holds two roundings more.
+    The probe keeps its size: enlarged for floats from the tree's centre, the probe holds two roundings more.
     """
     o = origin_of(nodes.links, node)
     for k in range(PROBE):
@@ -92,7 +92,7 @@ def move_probe(nodes, node, frame, probe, moved):
 
 @kernel(inline=True)
 def probe_of_node(nodes, node, frame, probe, workspace):
-    """A probe from a tree's centre as a node's boxes are compared with it; ``workspace`` holds one that must move."""
+    """A probe from a tree's centre as compared with a node's boxes; ``workspace`` holds a probe that must move."""
     if nodes.header[HAS_ORIGINS] == 0:
         return probe
     move_probe(nodes, node, frame, probe, workspace)

@@ -1,7 +1,7 @@
-"""How far a box is from a facet that is larger than it: by the facet's plane and by the half-spaces along its edges.
+"""How far a box is from a larger facet: by the facet's plane and by the half-spaces along its edges.
 
-Boxes and slabs around a leaf of large facets hold all of a small body that lies in a valley between them; no facet
-does. Heights are those of the world's axes, from A's origin, in doubles.
+Boxes and slabs around a leaf of large facets hold all of a small body in a valley between the facets; no facet does.
+Coordinates are in the world's axes, from A's origin, in doubles.
 """
 
 from __future__ import annotations

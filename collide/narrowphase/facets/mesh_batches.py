@@ -30,11 +30,11 @@ from collide.shapes.shape import Shape
 
 
 def pair_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> np.ndarray:
-    """(n,) bool: whether two shapes share a point; True where that is open.
+    """(n,) bool: whether two shapes share a point; True where the answer is open.
 
-    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose that goes with all of the other's.
+    X_WA, X_WB : C-contiguous float64 (n, 4, 4), or (1, 4, 4) for a pose shared by all pairs.
     check : refuse matrices that are no rotation. Raises InvalidPose, UnsupportedQuery.
-    Costs 0.2 µs a pose of bodies of facets that are far apart.
+    Costs 0.2 µs a pose of bodies of facets far apart.
     """
     return _states(A, B, X_WA, X_WB, check, parts_open=False) != APART
 
@@ -59,7 +59,7 @@ def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool,
 
 
 def _compound_states(A: Shape, B: Shape, X_WA, X_WB, check: bool, parts_open: bool) -> np.ndarray:
-    """States of compounds, of which only those are taken apart that balls around them leave open."""
+    """States of compounds; only compounds left open by the balls around them are taken apart."""
     parts_a, parts_b = compound_parts(A), compound_parts(B)
     if parts_a.ball is None or parts_b.ball is None:
         return compound_states(A, B, *checked_poses(X_WA, X_WB, check), open_ones=parts_open)
@@ -98,10 +98,10 @@ def pair_rows(
 
 
 def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
-    """What `pair_rows` gives for checked poses, but that pairs beyond ``limit`` [m] may have any proven bound.
+    """Rows as of `pair_rows` for checked poses; rows of pairs beyond ``limit`` [m] may have any proven bound.
 
-    Hulls that are proven farther apart answer for the bodies in them: then no facet is looked at, and no tree is built.
-    Raises UnsupportedQuery where the hulls are not enough and the shapes are not answered.
+    Hulls proven farther apart answer for the bodies in them: no facet is looked at, and no tree is built. Raises
+    UnsupportedQuery where the hulls are not enough and the shapes are not answered.
     """
     covers = _convex_covers(A, B) if limit < math.inf else None
     if covers is None:
@@ -117,7 +117,7 @@ def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: f
 
 
 def single_pair(A: Shape, B: Shape) -> Prepared | None:
-    """Two bodies of facets made ready for single calls; None where these are batches of one: of very many parts.
+    """Two bodies of facets made ready for single calls; ``None`` of bodies of very many parts, answered as batches.
 
     The pair holds trees and points, not the shapes.
     """
@@ -126,7 +126,7 @@ def single_pair(A: Shape, B: Shape) -> Prepared | None:
 
 
 def curved_pair(A: Shape, B: Shape) -> Prepared | None:
-    """A mesh and a curved shape, in either order, made ready for single gaps; None where these are batches of one."""
+    """A mesh and a curved shape, in either order, made ready for single gaps; ``None`` of pairs answered as batches."""
     exchanged = kind_of(A) is not Kind.MESH
     if exchanged:
         A, B = B, A
@@ -140,7 +140,7 @@ def _has_compound(A: Shape, B: Shape) -> bool:
 
 
 def _convex_covers(A: Shape, B: Shape) -> tuple[Shape, Shape] | None:
-    """Two shapes of convex parts that hold the given ones, where there are such."""
+    """Two shapes of convex parts that hold the given shapes; ``None`` where a shape has no cover."""
     cover_a, cover_b = _convex_cover(A), _convex_cover(B)
     return None if cover_a is None or cover_b is None else (cover_a, cover_b)
 

@@ -1,8 +1,8 @@
 """Meshes against convex shapes without exact facets: cylinders, cones, ellipsoids, polytopes with rounded corners.
 
-A polytope around the shape and one inside it decide without rounding wherever the surface of the mesh does not pass
-between them. There facets are asked about one by one, those that may be near enough, nearest first: the convex engine
-proves a bracket for each, and the mesh's is the least of them. Signs that these brackets leave open stay open.
+A polytope around the shape and a polytope inside decide without rounding wherever the surface of the mesh does not
+pass between them. Elsewhere facets that may be near enough are asked about, nearest first: the convex engine proves a
+bracket for each, and the mesh's bracket is the least. Signs left open by the brackets stay open.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class CurvedStates(NamedTuple):
     """n poses of a mesh A and a shape B.
 
     state : (n,) APART, HIT or OPEN.   how : (n,) index into `results.HOW`.
-    point : (n, 3) of the world, in both bodies where one lies inside the other, else NaN.
-    place : (n,) the triangle that meets B, or may, in the order of the tree; −1 where none was looked for.
+    point : (n, 3) of the world, in both bodies where either lies inside the other, else NaN.
+    place : (n,) the triangle that meets B, or may, in the order of the tree; −1 where no triangle was looked for.
     """
 
     state: np.ndarray
@@ -87,7 +87,7 @@ def settle_curved(
 def _settle_by_polytopes(
     A: Body, E: Enclosure, X_WA, X_WB, poses: np.ndarray, states: CurvedStates, outer_meets: bool
 ) -> None:
-    """Apart from the polytope around the shape is apart, meeting the one inside it is a hit."""
+    """APART where the mesh misses the polytope around the shape, HIT where the mesh meets the polytope inside."""
     if not outer_meets:
         meets = core_hits(A, E.outer, X_WA[poses], X_WB[poses]).core
         states.state[poses[~meets]] = APART
@@ -101,10 +101,11 @@ def _settle_by_polytopes(
 def _settle_by_facets(
     A: Body, E: Enclosure, X_WA: PosesWithSlop, X_WB: PosesWithSlop, poses: np.ndarray, states: CurvedStates
 ) -> None:
-    """Ask about every facet that may touch, until one does. Where many may, as of a mesh that lies wholly between the
-    polytopes, a likely one is asked first, and then the mesh's hull, before all are gone through.
+    """Ask about every facet that may touch, until a facet does. Where many may, as of a mesh wholly between the
+    polytopes, a likely facet is asked first, then the mesh's hull, before all facets are gone through.
 
-    A mesh is within its hull: where this is farther from the shape than rounding moved the two, both are apart.
+    A mesh is within its hull: where the hull is farther from the shape than rounding moved both, mesh and shape are
+    apart.
     """
     n, PA, PB = len(poses), X_WA.of(poses), X_WB.of(poses)
     hit, ambiguous = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
@@ -222,11 +223,11 @@ def _gaps(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, reach: fl
 
 
 def _first_facets(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, reach: float) -> np.ndarray:
-    """(n,) a facet of the mesh that is near the shape; −1 where every facet is proven farther away than ``reach`` [m].
+    """(n,) a facet of the mesh near the shape; −1 where every facet is proven farther away than ``reach`` [m].
 
-    Known by the surface of the polytope around the shape: what comes nearer to the shape than the limit either comes as
-    near to that surface, or lies inside it. So a part of the mesh that is wholly inside, however far from the surface,
-    is not beyond the limit; one point of every part says whether there is one.
+    Known by the surface of the polytope around the shape: a point nearer to the shape than the reach either is as near
+    to the polytope's surface, or lies inside the polytope. So a part of the mesh wholly inside, however far from the
+    surface, is not beyond the reach; a point of every part tells whether a part is inside.
     """
     facets = surface_distances(A.tree, E.outer.tree, PA.X, PB.X, math.nextafter(reach, math.inf)).facets[:, 0].copy()
     unseen = np.flatnonzero(facets < 0)
@@ -239,9 +240,9 @@ def _first_facets(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, r
 
 
 def _nearest(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, facets: np.ndarray) -> np.ndarray:
-    """Rows of the nearest facets of bodies that are apart; ``facets`` (n,) are numbers of near ones.
+    """Rows of the nearest facets of bodies that are apart; ``facets`` (n,) are numbers of near facets.
 
-    Exact poses go through one kernel each; what that leaves is asked about round by round.
+    Exact poses go through a kernel each; poses left open by the kernel are asked about round by round.
     """
     exact = np.flatnonzero((PA.slop == 0.0) & (PB.slop == 0.0)) if serves(E.packed) else np.zeros(0, dtype=np.int64)
     rows, remaining = np.zeros(len(facets), dtype=PAIR_DTYPE), np.ones(len(facets), dtype=bool)
@@ -281,7 +282,7 @@ def _nearest_by_rounds(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSl
 
 
 def _least(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, pose, place, rows, upper) -> np.ndarray:
-    """One row a pose from those of its facets."""
+    """A row for each pose from the rows of its facets."""
     # The nearest by its upper bound and the width of its bracket: where that is wide, distance and points are guesses.
     order = np.lexsort((place, 2.0 * rows["upper"] - rows["lower"], pose))
     best = order[np.flatnonzero(np.diff(pose[order], prepend=-1))]
@@ -343,7 +344,7 @@ def _beyond(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray, limit: fl
 def _write_overlap(
     row, A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, states: CurvedStates, k: int, depths: bool
 ) -> None:
-    """Make a row that of bodies that meet, or may, in place; one pair of poses, number k of the states."""
+    """Make a row the row of bodies that meet, or may meet, in place; a single pair of poses, number k of the states."""
     proven = states.state[k] == HIT
     row["hit"], row["how"] = True, states.how[k] if proven else UNDECIDED
     point, place = states.point[k], states.place[k : k + 1]

@@ -42,7 +42,7 @@ def mesh_rows(
     A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float, depths: bool = True, check: bool = False,
     out: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Rows (PAIR_DTYPE) for poses (n, 4, 4) or (1, 4, 4); part_a and part_b are facets, 0 where none decided.
+    """Rows (PAIR_DTYPE) for poses (n, 4, 4) or (1, 4, 4); part_a and part_b are facets, 0 where no facet decided.
 
     limit, depths : as in `distance`.   check : refuse matrices that are no rotation.   out : rows to fill, zeroed,
     where both are bodies of facets. Raises InvalidPose, UnsupportedQuery.

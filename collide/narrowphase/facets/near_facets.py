@@ -1,8 +1,9 @@
-"""Which facets of a mesh may be within some distance of a convex set: a walk down the box-tree, many poses at once.
+"""Facets of a mesh that may be within some distance of a convex set: a walk down the box-tree, many poses at once.
 
-Boxes and triangles are parted from the set along a few directions a pose: the mesh's axes, the set's, and one that
-the caller knows. Three gaps along the axes of a frame add up as a diagonal does, less how far the axes are from
-right angles. All of it is a lower bound of the distance, rounding taken off: facets are left out only where proven.
+Boxes and triangles are parted from the set along a few directions a pose: the mesh's axes, the set's, and a direction
+known to the caller. Three gaps along the axes of a frame add up as a diagonal does, less how far the axes are from
+right angles. The result is a lower bound of the distance, rounding taken off: facets are left out only where proven
+farther.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def near_facets_up_to(
     tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: float,
     max_facets: int,
 ) -> Facets | None:
-    """`near_facets` at one pair of poses; None where more than about ``max_facets`` are near, after few of them."""
+    """`near_facets` at a pair of poses; ``None``, after few facets, where more than about ``max_facets`` are near."""
     facets, exceeds = near_facets_if_few(tree, packed, A, B, along, np.array([upper]), max_facets)
     return None if exceeds[0] else facets
 
@@ -54,7 +55,7 @@ def near_facets_if_few(
     tree: MeshTree, packed: PackedConvex, A: PosesWithSlop, B: PosesWithSlop, along: np.ndarray, upper: np.ndarray,
     max_facets: int,
 ) -> tuple[Facets, np.ndarray]:
-    """(`near_facets` but of poses that have more than about ``max_facets``, (n,) bool: which these are)."""
+    """(`near_facets` of the poses with at most about ``max_facets``, (n,) bool: the poses with more)."""
     spans, exceeds = _Spans(tree, packed, A, B, along), np.zeros(len(upper), dtype=bool)
     pose, place, bound = map(
         np.concatenate, zip(*_walk(tree, spans, upper, np.arange(len(upper)), (max_facets, exceeds)))
@@ -96,8 +97,8 @@ def likely_facets(
 def _walk(tree: MeshTree, spans: _Spans, upper: np.ndarray, poses: np.ndarray, limit: tuple | None = None):
     """Yields (pose, place, bound) of the facets that may be near enough, block by block.
 
-    limit : (how many boxes a pose may have, of which each holds a facet; mask (n,) of poses that have more, which are
-        marked and left out).
+    limit : (how many boxes a pose may have, each with a facet inside; mask (n,) of poses with more, marked by the walk
+        and left out).
     """
     links = tree.links()
     pose, at = poses, np.zeros(len(poses), dtype=np.int64)

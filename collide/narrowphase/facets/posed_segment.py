@@ -1,6 +1,7 @@
-"""A segment and one posed tree: what rays and winding numbers have in common.
+"""A segment and a posed tree: what rays and winding numbers have in common.
 
-The segment is a body of its own: a frame in which its ends are doubles, and a pose. So it is posed without rounding.
+The segment is a body of its own: a frame in which its ends are doubles, and a pose. So the segment is posed without
+rounding.
 """
 
 from __future__ import annotations
@@ -26,12 +27,13 @@ SEGMENT_FLOATS = 2 * FRAME + 2 * PROBE
 
 
 class PosedSegment(NamedTuple):
-    """A tree, a segment, and what every question about them works on.
+    """A tree, a segment, and the arrays that every question about them works on.
 
     XA, XB : poses of the tree and of the segment's frame, 16 doubles each.
-    ends : both ends in that frame, and one of them again (9).   numbers : the segment's, as of a tree (`mesh/bvh.py`).
+    ends : both ends in the segment's frame, and an end again (9).   numbers : the segment's, as of a tree
+        (`mesh/bvh.py`).
     placing, corners, frame_a, frame_b, probe, exact : as in `posed_trees.PosedTrees`; corners 3 and 4 are the ends.
-    moved : room for the probe of a node that has an origin.
+    moved : room for the probe of a node with an origin.
     """
 
     tree: TreeView
@@ -51,7 +53,7 @@ class PosedSegment(NamedTuple):
 
 @kernel(inline=True)
 def open_segment(tree, XA_at, XB_at, doubles_at, floats_at, integers_at, exact_at, counters_at):
-    """The record of a tree, two poses and a workspace; it remains to set the ends and numbers, and to place it."""
+    """The record of a tree, two poses and a workspace; ends and numbers have to be set, and the segment placed."""
     invalidate_pose_cache(view_i64(integers_at, STATE))
     corners_at = doubles_at + 8 * PLACING
     return PosedSegment(

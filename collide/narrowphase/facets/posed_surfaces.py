@@ -149,7 +149,8 @@ def is_swapped_order(XA, XB):
 
 @kernel
 def _inverse(X, out, at):
-    """The inverse C of a pose's matrix R (9) and the bound of the largest row sum of |C R − I|, which it returns."""
+    """Write the inverse C of a pose's matrix R (9) and the bound of the largest row sum of |C R − I|; returns the
+    bound, infinite unless det R > 0."""
     for i in range(3):
         for j in range(3):
             a = 4 * ((j + 1) % 3)

@@ -1,4 +1,4 @@
-"""Two posed box-trees as the traversals of pairs see them: their record, one test of facets, one way to open a node."""
+"""Two posed box-trees as the traversals of pairs see them: their record, a test of facets, a way to open a node."""
 
 from __future__ import annotations
 
@@ -76,9 +76,9 @@ def facets_meet(trees, a, b, counters, exact_at):
 
 
 def make_open_larger(widen_probe: Callable) -> Callable:
-    """`open_pair` of a traversal that opens the larger box and keeps the children that the other one meets.
+    """`open_pair` of a traversal that opens the larger box and keeps the children meeting the other box.
 
-    widen_probe(query, which, probe) : may enlarge the probe of a box of A (``which`` 0) or of B (1).
+    widen_probe(query, …, probe) : may enlarge the probe of a box of A (``which`` 0) or of B (1).
     """
 
     @kernel(inline=True)

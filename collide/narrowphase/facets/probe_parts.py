@@ -38,7 +38,7 @@ def box_of_triangle(triangle):
 
 @kernel(inline=True)
 def unit_of(n):
-    """Scaled so that its largest component is 1; 0 where it is next to nothing."""
+    """n over its largest component in size; 0 where n is next to 0."""
     size = max_abs(n)
     if not size > TINY:
         return Vec3(0.0, 0.0, 0.0)

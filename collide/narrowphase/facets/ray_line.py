@@ -46,9 +46,9 @@ _EXTENT = 1.01
 class RayLine(NamedTuple):
     """A ray's segment from its origin to T times its direction.
 
-    direction : in A's frame, as long as to T.   error : bound of the error of a coordinate there.
+    direction : in A's frame, as long as the segment.   error : bound of the error of a coordinate in A's frame.
     In units of the boxes, from the tree's centre:
-    start, to_end : origin, and from there to the end.   box_error : bound of the error of a point's coordinate.
+    start, to_end : origin, and from the origin to the end.   box_error : bound of the error of a point's coordinate.
     size : the largest component of to_end.   first, last : t between which boxes may be met.
     """
 
@@ -84,7 +84,7 @@ def line_of(segment):
 
 @kernel(inline=True)
 def _clip(start, step, half, size, first, last):
-    """(first, last) t of a line within −half … half along an axis, and within those given; last is −1 for none."""
+    """(first, last) t of a line within −half … half along an axis and within the given bounds; last is −1 for no t."""
     if abs(step) > 2.0**-60 * size:
         near = (-half - start) / step
         far = (half - start) / step

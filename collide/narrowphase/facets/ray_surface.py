@@ -1,12 +1,12 @@
-"""Rays against one posed surface: every facet a ray meets, or those that may be the first.
+"""Rays against one posed surface: every facet a ray meets, or the facets that may be the first.
 
 A ray is {o + t d, t ≥ 0} with o and d exact reals. Its segment to T d, T a power of two beyond the surface, is posed
-without rounding: by the shift o, with ends 0 and T d. So whether it meets a closed facet is decided as for any two
-triangles, in doubles with error bounds and then in integers: no ray slips between facets that share an edge.
+without rounding: by the shift o, with ends 0 and T d. So whether the segment meets a closed facet is decided as for
+any two triangles, in doubles with error bounds and then in integers: no ray slips between facets that share an edge.
 
 Boxes are parted from the segment along their own axes and the cross products of these with the ray: nothing else can
 part a segment from a box (S. Gottschalk, M. Lin and D. Manocha, "OBBTree", 1996). The nearest box is opened first, and
-what begins beyond the nearest hit is left.
+boxes beginning beyond the nearest hit are left.
 
 Where a ray crosses a facet's plane is a quotient n·(a − o) / n·d with proven errors of both: a bracket. Callers
 settle in exact arithmetic which of several overlapping brackets comes first.
@@ -70,10 +70,10 @@ FLOATS = SEGMENT_FLOATS
 
 
 class _Query(NamedTuple):
-    """One ray.
+    """A ray.
 
     along : to_end over its largest component.
-    height, pace, slack : heights along it, of the start, of a step of t = 1, and the bound of their error.
+    height, pace, slack : heights along ``along``, of the start, of a step of t = 1, and the bound of their error.
     keys : the heights at which the boxes on the stack begin.   best : _BEST, then a bracket.
     hits : out, room for ``capacity``.   progress : as above.
     """
@@ -95,7 +95,7 @@ class _Query(NamedTuple):
 
 @kernel
 def _test_facet(query, a):
-    """Add facet a to the hits where the ray meets it and may meet it first."""
+    """Add facet a to the hits where the ray meets the facet and no nearer hit is proven."""
     segment, line, out = query.segment, query.line, query.best
     triangles, corners = segment.tree.triangles, segment.corners
     segment.counters[TRIANGLES] += 1
@@ -147,7 +147,7 @@ def _visit_leaf(query, pair):
 
 @kernel(inline=True)
 def _open_box(query, pair, stack, top):
-    """Push the children that the ray may meet, the one that begins first on top."""
+    """Push the children that the ray may meet, the child beginning first on top."""
     keys, segment = query.keys, query.segment
     segment.counters[NODES] += 1
     probe = probe_of_node(segment.tree, pair.link_a, segment.frame_b, segment.probe, segment.moved)
@@ -173,7 +173,7 @@ _traverse = make_traversal(_nearest_box, box_of_tree, _visit_leaf, _open_box)
 
 @kernel
 def _cast(query, stack):
-    """All candidates of one ray; False where there is no room for more hits."""
+    """List all candidates of a ray; False where the room for hits is used up."""
     begin = query.progress[N_HITS]
     stack[0] = 0
     query.keys[0] = -math.inf
@@ -220,11 +220,11 @@ def cast_rays(
     header_at, XA_at, step_a, rays_at, n, first_only, hits_at, capacity, counters_at, progress_at, stack_at, n_stack,
     doubles_at, integers_at, exact_at,
 ):
-    """Facets that n rays (RAY doubles each, in the world) meet, from where an earlier call stopped.
+    """Facets met by n rays (RAY doubles each, in the world), from where an earlier call stopped.
 
-    Returns DONE, FULL or SINGULAR. Arguments are flat, as those of all entries.
-    first_only : of each ray only those that may be met first, by their brackets of t.
-    hits : out, HIT doubles each, those of a ray together; t in units of T.   counters : COUNTERS integers a ray.
+    Returns DONE, FULL or SINGULAR. Arguments are flat, as of all entries.
+    first_only : of each ray only facets that may be met first, by their brackets of t.
+    hits : out, HIT doubles each, a ray's hits together; t in units of T.   counters : COUNTERS integers a ray.
     """
     tree = open_tree(header_at)
     hits = view_f64(hits_at, HIT * capacity)

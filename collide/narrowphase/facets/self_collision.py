@@ -1,10 +1,11 @@
 """A surface against itself: pairs of facets that share more than the corners and edges they have in common.
 
-Corners are the same where their coordinates are. Facets with no common corner must not meet at all. With one, v, they
-share more exactly if the edge opposite v of one meets the other: whatever point besides v both have, the ray from v
-through it leaves one of them over that edge. With two, they overlap exactly if they lie in one plane on one side of the
-common edge. With three they are one facet twice. Common corners are points, each counted once. A facet without area is
-the segment or the point that its corners span: an edge that a neighbour has too is nothing more, a longer one is.
+Corners are the same where their coordinates are. Facets with no common corner must not meet at all. Facets with a
+single common corner v share more exactly if the edge opposite v of either meets the other: from v the ray through any
+further common point leaves one of them first, over its edge opposite v. Facets with two common corners overlap exactly
+if they lie in one plane on the same side of the common edge. Facets with three are equal. Common corners are points,
+each counted once. A facet without area is the segment or the point spanned by its corners: a segment equal to an edge
+of a neighbour shares nothing more, a longer segment does.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ class _Query(NamedTuple):
 
 @kernel(inline=True)
 def _common_corners(points, a, b):
-    """(how many points are corners of both, which corner of a the last one is, and which of b)."""
+    """(number of points that are corners of both facets, the last common corner's number in a, and in b)."""
     count = 0
     of_a = -1
     of_b = -1
@@ -138,9 +139,9 @@ def _edge_meets(query, p, q, b):
 
 @kernel(inline=True)
 def _certainly_one_side(points, v, face, i, facet, j):
-    """Whether the corners of a facet besides the common one, its corner j, are certainly on one side of a face's plane.
+    """Whether the corners of a facet besides its common corner j are certainly on one side of a face's plane.
 
-    v : the common corner, which is corner i of the face.
+    v : the common corner, corner i of the face.
     """
     common = vec3_at(points, v)
     c = sub(vec3_at(points, face + 3 * ((i + 1) % 3)), common)
@@ -203,7 +204,7 @@ def _conflict_at_edge(query, a, b):
 
 @kernel
 def _uncommon_corner(points, a, b):
-    """The corner of a that is none of b's; −1 where all are."""
+    """The corner of a that is no corner of b; −1 where all corners are common."""
     for i in range(3):
         common = False
         for j in range(3):
@@ -239,11 +240,11 @@ def _coincide(p, q):
 
 @kernel(inline=True)
 def _off_plane(points, planes, face, facet, reach):
-    """Whether a facet has corners besides a face's, and all those are certainly on one side of the face's plane.
+    """Whether a facet has corners besides a face's, all certainly on one side of the face's plane.
 
-    Then the facet has the common corners in that plane, and what is between them: no more. Coordinates are exact, so
-    with edges up to L a side at distance w is off by 64 u L² w, as in `filtered_triangles.py`. reach : no w is more,
-    along any axis.
+    Then the facet meets the plane only in the common corners and the points between them. Coordinates are exact, so
+    with edges up to L a side at distance w is off by 64 u L² w, as in `filtered_triangles.py`. reach : bound of all w
+    along every axis.
     """
     of_face = triangle_at(points, 9 * face)
     facet_b = triangle_at(points, 9 * facet)
@@ -264,10 +265,10 @@ def _off_plane(points, planes, face, facet, reach):
 
 @kernel
 def _beyond_a_side(points, planes, face, facet, reach):
-    """Whether, seen along a face's normal, a facet's corners are certainly beyond some side of it, or that side's ends.
+    """Whether, seen along a face's normal, a facet's corners are certainly beyond some side of the face, or its ends.
 
     Facets around a vertex of a smooth surface are so. The wall on a side holds nothing of the face but the side, and of
-    the facet its common corners with it. Sides of points at distance w: 256 u L³ w.
+    the facet its common corners with the side. Sides of points at distance w: 256 u L³ w.
     """
     n = vec3_at(planes, PLANE * face)
     square = planes[PLANE * face + 3]
@@ -325,7 +326,7 @@ def _visit_leaves(query, pair):
 
 @kernel(inline=True)
 def _children_meeting(query, ref, node):
-    """Mask of the boxes of a node that the one behind a reference meets: in one tree only its own axes separate."""
+    """Mask of a node's boxes that meet the box behind a reference: in a common tree only its own axes separate."""
     trees = query.trees
     probe = trees.probe
     query.counters[NODES] += 1
@@ -376,9 +377,9 @@ def walk_itself(
     header_at, pairs_at, capacity, counters_at, progress_at, planes_at, stack_at, n_stack, doubles_at, integers_at,
     exact_at
 ):
-    """Pairs of facets of one surface that share more than corners and edges; DONE or FULL, then to be called again.
+    """Pairs of facets of a surface that share more than corners and edges; DONE or FULL, then to be called again.
 
-    Arguments are flat, as those of all entries.
+    Arguments are flat, as of all entries.
     planes : room for PLANE doubles a facet, kept between calls.
     pairs : out, the smaller facet number times the number of facets plus the larger.
     """

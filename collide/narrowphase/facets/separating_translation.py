@@ -1,8 +1,8 @@
-"""How deep two overlapping bodies of facets are: a translation that separates them, proven, and as short as was found.
+"""How deep two overlapping bodies of facets are: a translation proven to separate them, as short as was found.
 
-The shortest one has no formula. A translation is proven to separate two bodies where the exact test finds them apart
-after it, whatever led to it; so directions are guessed, and lengths tried. What separates the hulls separates the
-bodies, too: that is the longest answer given.
+The shortest separating translation has no formula. A translation is proven where the exact test finds the bodies
+apart after the move, whatever led to the translation; so directions are guessed, and lengths tried. A translation that
+separates the hulls separates the bodies, too, and is the longest answer given.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Hits = Callable[[Body, Body, np.ndarray, np.ndarray], np.ndarray]
 
 
 class SeparatingTranslation(NamedTuple):
-    """A translation of B that separates it from A: its length, the same rounded upwards [m], and a unit direction
+    """A translation of B that separates the bodies: its length, the length rounded upwards [m], and a unit direction
     (3,)."""
 
     length: float
@@ -42,7 +42,7 @@ class SeparatingTranslation(NamedTuple):
 def separating_translation(
     A: Body, B: Body, X_WA, X_WB, hull_row: np.ndarray, candidates: list[np.ndarray], hits: Hits
 ) -> SeparatingTranslation:
-    """A translation that separates two bodies that meet, at poses (4, 4).
+    """A translation that separates two meeting bodies, at poses (4, 4).
 
     hull_row : the row of their hulls.   candidates : translations (3,) to be tried first.   hits : whether bodies meet.
     """
@@ -55,7 +55,7 @@ def separating_translation(
 
 
 def write_depth(row: np.ndarray, point: np.ndarray, translation: SeparatingTranslation) -> None:
-    """Make a row of bodies that meet as deep as a translation is long, in place; point: (3,) a common one."""
+    """Make the depth of a row of meeting bodies a translation's length, in place; point: a common point (3,)."""
     length, bound, normal = translation
     row["distance"], row["lower"], row["normal"] = 0.0 - length, 0.0 - bound, normal + 0.0
     row["point_a"], row["point_b"] = point + 0.5 * length * normal, point - 0.5 * length * normal
@@ -65,15 +65,15 @@ def write_depth(row: np.ndarray, point: np.ndarray, translation: SeparatingTrans
 def shortened(
     meet: Callable, X_WA, X_WB, known: SeparatingTranslation, directions: np.ndarray, candidates: list[np.ndarray]
 ) -> SeparatingTranslation:
-    """The shortest translation found that separates two bodies, at most as long as one that is known to.
+    """The shortest translation found that separates two bodies, at most as long as a known separating translation.
 
     meet : (n, 4, 4), (n, 4, 4) → (n,) bool, False only where the bodies are proven apart.   directions : (k, 3) unit
-    vectors that are tried.   candidates : translations (3,) to be tried first.
+    vectors to be tried.   candidates : translations (3,) to be tried first.
     """
     best, bound, normal = known
 
     def try_shorter(steps: np.ndarray) -> np.ndarray | None:
-        """The shortest of these translations (n, 3) that separates, if shorter than the best, which it becomes."""
+        """The shortest separating step of (n, 3), now the best, if shorter than the best so far; else ``None``."""
         nonlocal best, bound
         shortest = _shortest_separating(meet, X_WA, X_WB, steps, best)
         if shortest is not None:
@@ -101,14 +101,14 @@ def shortened(
 
 
 def _shortest_separating(meet: Callable, X_WA, X_WB, steps: np.ndarray, below: float) -> np.ndarray | None:
-    """The shortest of the translations (n, 3) that separates the bodies and is shorter than ``below`` [m], as the pose
-    it leads to really moves them; None where none does.
+    """The shortest of the translations (n, 3) that separates the bodies and is shorter than ``below`` [m], as the
+    rounded pose really moves B; ``None`` where no translation does.
 
-    The shortest half is asked about first, then half of the rest: what is longer than a translation that separates is
-    not asked about. Those are the dear ones: bodies that are apart have to be proven apart everywhere.
+    The shorter half is asked about first, then half of the rest: translations longer than a separating translation are
+    not asked about. Long translations are the dear ones: bodies apart have to be proven apart everywhere.
 
-    Far from the world's origin a short step rounds to nothing: what is told of the bodies there is told of them as they
-    stand, and no direction can be read off it.
+    Far from the world's origin a short step rounds to 0: the moved bodies would stand as before, and a step of 0 has no
+    direction.
     """
     moved = np.repeat(X_WB[None], len(steps), axis=0)
     moved[:, :3, 3] += steps
@@ -132,7 +132,7 @@ def _length(step: np.ndarray) -> tuple[float, float]:
 
 
 def _directions(A: Body, B: Body, X_WA, X_WB, first: list[np.ndarray]) -> np.ndarray:
-    """(k, 3) unit vectors along which a separating translation may be short: of hulls, of facets that meet, of axes."""
+    """(k, 3) unit vectors along which a separating translation may be short: of hulls, of meeting facets, of axes."""
     pairs = all_hits(A.tree, B.tree, X_WA, X_WB).pairs
     guesses = list(first)
     if len(pairs):

@@ -1,10 +1,10 @@
-"""Which of a node's boxes a facet of the other tree misses, in doubles: of bodies so much smaller than the facet's that
-floats of its size cannot tell their boxes apart.
+"""Which of a node's boxes a facet of the other tree misses, in doubles: for bodies so much smaller than the facet's
+body that floats of the larger size cannot tell their boxes apart.
 
-Axes are those of a triangle and a box (T. Akenine-Möller, "Fast 3D triangle-box overlap testing", 2001): the box's own,
-the triangle's normal and the box's axes across the triangle's edges. With E the error of a corner or of a side of the
-box, u = 2⁻⁵³ and D the largest component of a difference of two points of triangle or box: the normal's heights are off
-by `sign_error`, those across an edge by 16 (D + E)(E + 2uD): edges and differences are off by 2E + uD each.
+Axes are the axes of a triangle and a box (T. Akenine-Möller, "Fast 3D triangle-box overlap testing", 2001): the box's
+own, the triangle's normal and the box's axes across the triangle's edges. With E the error of a corner or of a side of
+the box, u = 2⁻⁵³ and D the largest component of a difference of two points of triangle or box: the normal's heights
+are off by `sign_error`, heights across an edge by 16 (D + E)(E + 2uD): edges and differences are off by 2E + uD each.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ def is_small(size, unit):
 
 @kernel
 def without_missed(placing, which, tree, facet, nodes, node, mask):
-    """A mask of eight boxes of a node without those that a facet certainly misses.
+    """A mask of eight boxes of a node without the boxes certainly missed by a facet.
 
-    placing : of `posed_surfaces.py`.   which : 0 for a facet of A and boxes of B, 1 for the other way.
+    placing : of `posed_surfaces.py`.   which : 0 for a facet of A and boxes of B, 1 for the reverse.
     """
     placed = _placed(placing, which, tree, facet, nodes)
     centre = vec3_at(nodes.numbers, CENTRE)

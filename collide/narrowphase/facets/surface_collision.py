@@ -1,9 +1,9 @@
-"""Two posed surfaces: whether they meet, and every pair of facets that does.
+"""Two posed surfaces: whether they meet, and every pair of meeting facets.
 
-The traversal goes depth first and opens the larger box. A leaf much larger than the box that it is compared with
-becomes its triangles; boxes that floats of its tree's size cannot tell apart are compared with them in doubles
-(`small_boxes.py`). Leaves end in pairs of triangles, which are tested in doubles with error bounds and exactly where
-these leave it open. The order is fixed, so the first pair found is, too.
+The traversal goes depth first and opens the larger box. A leaf much larger than the box compared with the leaf becomes
+its triangles; boxes too small to be told apart in floats of the leaf's tree are compared with the triangles in doubles
+(`small_boxes.py`). Leaves end in pairs of triangles, tested in doubles with error bounds, and exactly where the bounds
+leave the answer open. The order is fixed, so the first pair found is, too.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _pair_behind(query, word):
 
 @kernel(inline=True)
 def _visit_leaves(query, pair):
-    """Find the facet pairs of two leaves that meet; whether that ends the traversal."""
+    """Find the meeting facet pairs of two leaves; returns whether the traversal ends."""
     trees, progress = query.trees, query.progress
     A, B = trees.A, trees.B
     run_a = ~pair.link_a

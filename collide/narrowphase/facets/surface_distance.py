@@ -115,7 +115,7 @@ def _pair_behind(query, word):
 
 @kernel(inline=True)
 def _is_past_large_facets(query, pair):
-    """Whether every facet of a leaf that is much larger than the other box is farther from it than the bound."""
+    """Whether every facet of a leaf much larger than the other box is farther from the other box than the bound."""
     trees = query.trees
     A, B, units = trees.A, trees.B, trees.placing[UNITS]
     origin = Vec3(0.0, 0.0, 0.0)
@@ -132,8 +132,8 @@ def _is_past_large_facets(query, pair):
 def _are_farther(near, box, X, shift, tree, run):
     """Whether all facets of a run are farther from a box than the bound.
 
-    Corners of both are off by at most 8 E a coordinate, of a box's the rounding that made it included: along unit
-    vectors, two of which are put together, gaps by less than 64 E.
+    Corners of both are off by at most 8 E a coordinate, the rounding in the making of the box included: gaps along unit
+    vectors, two of them combined, are off by less than 64 E.
     """
     bound = near[BEST] + 64.0 * near[WORLD_ERROR]
     if not bound < math.inf:
@@ -146,7 +146,7 @@ def _are_farther(near, box, X, shift, tree, run):
 
 @kernel(inline=True)
 def _open_pair(query, pair, stack, top):
-    """Push the children of the larger box that are nearer to the other one than the bound."""
+    """Push the children of the larger box that are nearer to the other box than the bound."""
     trees = query.trees
     A, B = trees.A, trees.B
     if is_beyond_bound(query.near, pair) or _is_past_large_facets(query, pair):
@@ -208,8 +208,8 @@ def _next_pair(query, stack, top):
 
 @kernel(inline=True)
 def _visit_leaves(query, pair):
-    """Compare the facets of two leaves with the best distance so far; True where two of them meet, or are so near that
-    it is enough."""
+    """Compare the facets of two leaves with the best distance so far; True where two facets meet, or are near enough to
+    end the search."""
     trees, near, ints = query.trees, query.near, query.ints
     if is_beyond_bound(near, pair) or _is_past_large_facets(query, pair):
         return False
@@ -280,12 +280,12 @@ _traverse = make_traversal(_next_pair, _pair_behind, _visit_leaves, _open_pair)
 
 @kernel
 def _direction_between(query):
-    """The unit vector from A to B along which the nearest triangles are apart; zeros where none can be told.
+    """The unit vector from A to B along which the nearest triangles are apart; zeros where no direction can be told.
 
-    The line between the nearest points, unless rounding has turned it. Points nearer than `_DIRECTION_RATIO` errors are
-    compared with the normals and edges of both triangles, and the widest slab decides; within rounding, one of these.
-    The points are then laid along that, through their middle: how far this moves them is how far they were from being
-    the nearest.
+    The line between the nearest points, unless rounding has turned the line. Points nearer than `_DIRECTION_RATIO`
+    errors are compared with the normals and edges of both triangles, and the widest slab decides; within rounding, a
+    slab of the triangles. The points are then laid along the slab's normal, through their middle: how far this moves
+    them is how far they were from being the nearest.
     """
     trees, near, marks, T = query.trees, query.near, query.marks, query.triangles
     point_a = vec3_at(near, POINTS)
@@ -358,11 +358,11 @@ def near_surfaces(
     header_a_at, header_b_at, XA_at, step_a, XB_at, step_b, n, same_tree, limit, enough, results_at, marks_at,
     stack_at, n_stack, heap_at, n_heap, doubles_at, integers_at, exact_at,
 ):
-    """Distances of two surfaces at n pairs of poses; returns how many were done (fewer: that matrix is singular).
+    """Distances of two surfaces at n pairs of poses; returns how many were done (fewer: the next matrix is singular).
 
     Arguments are flat: entries are called by address, from C too.
-    limit : nothing farther than this is looked for; where nothing is found, facets are −1 and LOWER is it.
-    enough : a search ends at an UPPER of no more than this, LOWER being 0 then; IN_FULL at none.
+    limit : larger distances are not looked for; where nothing is found, facets are −1 and LOWER is the limit.
+    enough : a search ends at an UPPER of no more than this, LOWER being 0 then; never at IN_FULL.
     results, marks : RESULT doubles and MARKS integers, zeros at first, a pose.   stack : 2·n_stack words and 8 more.
     """
     A = open_tree(header_a_at)

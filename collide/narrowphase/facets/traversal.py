@@ -1,12 +1,11 @@
-"""The traversal of eight-wide box-trees that all questions about facets share.
+"""The traversal of eight-wide box-trees shared by all questions about facets.
 
 A stack holds pairs of references: to a box of A and to a box of B (`mesh/bvh.py`), packed into a word. The pair on top
-is taken off. Where both boxes hold leaves, their facets are visited. Otherwise one of the two nodes is opened, and what
-a probe of the other box does not cull of its eight children goes onto the stack. A question about one tree alone (a
-ray, a segment) has pairs with a leaf in the place of B.
+is taken off. Where both boxes hold leaves, their facets are visited. Otherwise a node of the pair is opened, and the
+children (of eight) not culled by a probe of the other box go onto the stack. A question about a single tree (a ray, a
+segment) has pairs with a leaf in the place of B.
 
-What a question does at each of these steps are kernels of its own, its visitors; `make_traversal` compiles them into
-one loop.
+A question does each of these steps in kernels of its own, its visitors; `make_traversal` compiles them into one loop.
 """
 
 from __future__ import annotations
@@ -84,9 +83,9 @@ def box_of_tree(query, word):
 
 @kernel(inline=True)
 def opens_b(A, B, pair, units):
-    """Whether B's node of a pair is opened rather than A's: the larger box, or the only one that is no leaf.
+    """Whether B's node of a pair is opened rather than A's: the larger box, or the only box that is no leaf.
 
-    units : unit of A's boxes over that of B's.
+    units : unit of A's boxes over the unit of B's.
     """
     return pair.link_a < 0 or (pair.link_b >= 0 and box_size(B.boxes, pair.b) > units * box_size(A.boxes, pair.a))
 

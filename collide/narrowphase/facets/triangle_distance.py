@@ -26,8 +26,8 @@ _INSIDE = 2.0**-30
 def nearest_points(T, out):
     """(distance, slab) of two triangles that do not meet; out becomes a point of A's and a point of B's (6 doubles).
 
-    The slab is the width of the one across the line between the points; once it is as wide as they are apart,
-    nothing nearer can be found.
+    The slab is the width of the slab across the line between the points; a slab as wide as the points are apart proves
+    them nearest.
     """
     best = _over_face(T, 9, 0, _over_face(T, 0, 9, math.inf, out), out)
     length = math.sqrt(best)
@@ -79,10 +79,10 @@ def separated_by(T, bound):
 
 @kernel
 def common_point(T, length, out):
-    """A point of both of two triangles that meet, so far as doubles can tell, in either half of ``out``.
+    """A common point of two meeting triangles, so far as doubles can tell, in either half of ``out``.
 
-    ``out`` holds nearest points of their features, ``length`` apart: right for triangles that touch or lie in one
-    plane. Elsewhere an edge of one goes through the inside of the other.
+    ``out`` holds nearest points of their features, ``length`` apart: right for triangles that touch or lie in a common
+    plane. Elsewhere an edge of either goes through the inside of the other.
     """
     best = -_INSIDE
     for face in range(0, 18, 9):
@@ -133,9 +133,9 @@ def _face_separates(T, face, corners, bound):
 
 @kernel(inline=True)
 def _nearest_on_segments(ee, ff, ef, ew, fw):
-    """Where the nearest points of two segments are, each from 0 to 1 along it; either may be a point.
+    """Where the nearest points of two segments are, each from 0 to 1 along its segment; a segment may be a point.
 
-    e, f : the segments.   w : from the start of f to that of e; the arguments are products of these.
+    e, f : the segments.   w : from the start of f to the start of e; the arguments are products of these.
     """
     if ee <= 0.0:
         return 0.0, (min(max(fw / ff, 0.0), 1.0) if ff > 0.0 else 0.0)

@@ -1,11 +1,12 @@
-"""Whether points are inside a closed surface: how often it winds around them, by the facets that a segment passes.
+"""Whether points are inside a closed surface: how often the surface winds around them, by the facets on a segment.
 
-A segment that leaves counts one for every facet passed from behind, and one less for every facet passed from its
-front. Around points inside the surface winds once or more: parts that overlap are one body, cavities are none of it.
+A segment out of the surface counts 1 for every facet passed from behind, and −1 for every facet passed from its front.
+Around points inside the surface winds once or more: parts that overlap are one body, cavities are no part of the body.
 
-The segment goes from the point to one beyond the surface's box, in the frame the point is given in, along an axis of
-it; ends are doubles there, so both are posed without rounding. Where it passes an edge or a corner, or runs in a
-facet's plane, another is tried, slightly off the axis. Signs are those of `exact_corners.py`: never wrong.
+The segment goes from the point to a point beyond the surface's box, along an axis of the point's frame; both ends are
+doubles in the point's frame, and so are posed without rounding. Where the segment passes an edge or a corner, or runs
+in a facet's plane, another segment is tried, slightly off the axis. Signs are those of `exact_corners.py`: never
+wrong.
 """
 
 from __future__ import annotations
@@ -130,7 +131,7 @@ def _how_passed(segment, a):
 
 @kernel(inline=True)
 def _visit_leaf(query, pair):
-    """Count the facets of a leaf that the segment passes; True where it starts on one."""
+    """Count the facets of a leaf on the segment; True where the segment starts on a facet."""
     run = ~pair.link_a
     passed = query.passed
     for a in range(run >> 3, (run >> 3) + (run & 7)):
@@ -159,7 +160,7 @@ _traverse = make_traversal(any_pair, box_of_tree, _visit_leaf, _open_box)
 
 @kernel
 def _winding(query, stack):
-    """OUTSIDE or INSIDE by the facets that the segment passes; ON_SURFACE; UNDECIDED where it passes an edge."""
+    """OUTSIDE or INSIDE by the facets on the segment; ON_SURFACE; UNDECIDED where the segment passes an edge."""
     passed = query.passed
     passed[_WINDING] = 0
     passed[_IS_UNCLEAR] = 0
