@@ -6,8 +6,8 @@ volume          of what is inside both [m³]
 lower, upper    lower ≤ volume ≤ upper, proven
 centroid        (3,) of the overlap in W [m]; of the patch where the volume is 0
 area_a, area_b  of a's surface inside b, and of b's inside a [m²]
-patch_area      of where both surfaces lie on one another and face each other [m²]
-flush_area      of where they lie on one another and face the same way [m²]
+patch_area      of where both surfaces lie on each other and face each other [m²]
+flush_area      of where they lie on each other and face the same way [m²]
 =============== ===================================================================================
 """
 
@@ -42,7 +42,7 @@ class WorldOverlaps:
 
     Notes
     -----
-    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows. ``names``
+    Indexing by the name of a field gives a column, by a number a row, by a slice or a mask rows. ``names``
     resolves the ids.
     """
 
