@@ -96,7 +96,7 @@ def shells_memory(n, n_facets, n_shells):
 def judge_shells(points_at, n, corners_at, n_facets, shells_at, n_shells, volumes_at, signs_at, wrong_at, memory_at):
     """Volumes of the shells of a closed surface of n points, their exact signs, and which shells are inside out.
 
-    shells : (f,) int32 of each facet, −1 without a shell.   volumes : (n_shells,) doubles out, in the unit of length cubed.
+    shells : (f,) int32 of each facet, −1 without one.   volumes : (n_shells,) doubles out, in the unit of length cubed.
     signs, wrong : (n_shells,) int32 out; wrong is 1 of shells of negative volume but for walls of cavities.
     memory : as many bytes as `shells_memory` says.
 
@@ -319,7 +319,7 @@ def _sign_of_determinant(digits, u, v, w, n):
 
 @kernel
 def _proven_sign(u, v, w, slack_u, slack):
-    """Sign of the determinant of u, v, w, whose entries are off by the slacks at most; 0 where they leave the sign open."""
+    """Sign of the determinant of u, v, w, whose entries are off by the slacks at most; 0 where these leave doubt."""
     value = dot(u, cross(v, w))
     size = permanent(u, v, w)
     margin = _ERROR * size + _UNDERFLOW

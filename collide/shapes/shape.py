@@ -135,9 +135,10 @@ def kept_with_shape(slot: str) -> Callable[[Callable[[Any], T]], Callable[[Any],
 
 
 def held_by(owner: Shape, shape: Shape) -> Callable[[], Any]:
-    """How what is kept with ``owner`` refers to a shape: to the owner weakly, to others as they are.
+    """How what is kept with ``owner`` refers to a shape: to the owner weakly, to others strongly.
 
-    A shape that referred to itself by what it keeps would stay, with its tables and trees, until cycles are looked for.
+    A shape with references to itself in what the shape keeps would stay, with its tables and trees, until cycles are
+    collected.
     """
     return weakref.ref(shape) if shape is owner else lambda: shape
 

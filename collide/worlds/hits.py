@@ -44,8 +44,7 @@ def empty_hits(n: int) -> np.ndarray:
 
 
 class WorldHits:
-    """Rows of a cast against a World: a row for each question, or with ``all_hits`` for each place where a ray meets a
-    body.
+    """Rows of a cast against a World: a row a question, or with ``all_hits`` a row for each place on a ray.
 
     Parameters
     ----------

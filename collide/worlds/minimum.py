@@ -48,7 +48,7 @@ def nearest_pair(packed: PackedWorld, limit: float, threads: int) -> np.ndarray:
 
 
 def _margins(packed: PackedWorld, limit: float):
-    """Margins within which to look, in turn: 0, then from the World's extent over its number of bodies, times 4 each."""
+    """Margins to look within, in turn: 0, the World's extent over its number of bodies, 4 times the last, ``limit``."""
     yield 0.0
     tree = packed.tree
     if tree is None or not limit > 0.0:
@@ -89,7 +89,7 @@ def _least(packed: PackedWorld, pairs: np.ndarray, limit: float, best: float, wi
 
 def _lower_bounds(packed: PackedWorld, pairs: np.ndarray) -> np.ndarray:
     """(k,) lower bounds of signed distances [m]: the gap of boxes, or minus the shortest shift along an axis to part
-    them; −inf where boxes of a body meet whose depth, not being convex, is known from above alone.
+    them. With a body not convex, whose depth is known from above alone, −inf where the boxes meet.
     """
     parts = packed.parts
     boxes = parts.body_boxes(np.arange(len(parts.shape_of)))

@@ -37,8 +37,8 @@ class WorldOverlaps:
     Parameters
     ----------
     rows : (n,) `OVERLAP_DTYPE`, as the module `collide.worlds.overlaps` says.
-    bodies : {id: body as it stood}.
-    unanswered : [(id, id, reason), …] pairs that hit and have no volume to tell: curved shapes, surfaces, unions.
+    bodies : {id: body at the time of the query}.
+    unanswered : [(id, id, reason), …] hits without a volume to tell: curved shapes, surfaces, unions.
 
     Notes
     -----

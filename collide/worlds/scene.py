@@ -287,7 +287,7 @@ class WorldScene:
 
         Returns
         -------
-        Body : ``id``, ``name``, ``shape``, ``X_WB``, ``static``, ``group`` and ``mask``; later moves change none of these.
+        Body : ``id``, ``name``, ``shape``, ``X_WB``, ``static``, ``group`` and ``mask``; later moves do not reach them.
 
         Raises
         ------
