@@ -46,8 +46,8 @@ class ConvexHull(Shape):
 
     Notes
     -----
-    Ids in results are rows of ``points`` as given. From 224 points on, a hull gets a support tree, to
-    find the extreme vertex in O(log n); built when a query first needs the tree (4 to 6 µs a point) and kept with the
+    Ids in results are rows of ``points`` as given. From 224 points on, a support tree finds the extreme vertex in
+    O(log n). The tree is built when a query first needs it (4 to 6 µs a point) and kept with the
     shape. Files and pickles hold the points alone: proofs rest on the tree, so a tree is built from the points and
     never believed.
     """
