@@ -187,7 +187,7 @@ def _cast_unions(
 
 
 def _near_parts(a: Balls, b: Balls, n: int, X_WA, X_WB, vector: np.ndarray, limit: np.ndarray) -> np.ndarray:
-    """Numbers, ascending, of those of n balls of a body that the other comes near."""
+    """Numbers, ascending, of the balls near the other body's way, of n balls of a body."""
     near = near_on_ways(a, b, X_WA, X_WB, n, vectors=np.repeat(vector, n, axis=0), limits=np.repeat(limit, n))
     return np.arange(n) if near is None else np.flatnonzero(near)
 

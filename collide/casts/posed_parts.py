@@ -108,8 +108,8 @@ def posed_sides(
     """Parts of A and B in n questions.
 
     A, B : a shape, or n of them.   X_WA, X_WB : (n, 4, 4), or (1, 4, 4) for all.
-    parts_of : convex parts of a shape, or sets around them.   some : which of those of A, and of B, where each is one
-    shape; None of all.
+    parts_of : convex parts of a shape, or sets around them.   some : numbers of parts of A, and of B, where each is a
+    single shape; ``None`` for all.
     """
     packed: list[PackedConvex] = []
     rows: dict[tuple[bytes, float], int] = {}

@@ -1,13 +1,13 @@
 """Regions of half-spaces, closed by a box that changes no answer.
 
-A region FH keeps its planes. For a question it becomes K = FH ∩ [−s, s]³, an `HPolytope` with corners, which every
-method of the pair table takes. Write ρ for a bound of how far points of the other body B lie from the origin of the
-region's frame, and m for `HPolytope.boundary_within`. With s ≥ 2ρ + m answers are those of FH:
+A region FH keeps its planes. For a question it becomes K = FH ∩ [−s, s]³, an `HPolytope` with corners, taken by every
+method of the pair table. Write ρ for a bound of how far points of the other body B lie from the origin of the
+region's frame, and m for `HPolytope.boundary_within`. With s ≥ 2ρ + m answers are the answers of FH:
 
-- Apart: FH has a point within m of the origin or holds the origin, so that the gap is at most ρ + m, and the point of
-  FH nearest B within 2ρ + m of the origin: it is in K.
-- Meeting: one plane is within m of the origin, so that B has to move by at most ρ + m to be behind it. Wherever B goes
-  that far it stays in the box, where K and FH are the same: a translation separates B from both or from neither.
+- Apart: FH has a point within m of the origin or holds the origin, so the gap is at most ρ + m, and the point of
+  FH nearest B within 2ρ + m of the origin, in K.
+- Meeting: a plane is within m of the origin, so B has to move by at most ρ + m to be behind the plane. Over any motion
+  of this length B stays in the box, where K and FH are the same: a translation separates B from both or from neither.
 
 Sizes s are powers of two, and K is kept with the region (`HPolytope.closed`).
 """
@@ -32,9 +32,9 @@ _UP = 1 + 4 * ROTATION_TOLERANCE
 
 
 def closings(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> Iterator[tuple[Shape, Shape, np.ndarray]]:
-    """(A or what closes it, B or what closes it, numbers of the poses that this is for) of a region and another body.
+    """(A or A closed, B or B closed, numbers of the poses served) of a region and another body.
 
-    X_WA, X_WB : (n, 4, 4).   Raises UnsupportedQuery where the other body has no end either, or is too far away.
+    X_WA, X_WB : (n, 4, 4).   Raises UnsupportedQuery where the other body is unbounded, too, or too far away.
     """
     sizes = sizes_at(A, B, X_WA, X_WB)
     for size in np.unique(sizes).tolist():
@@ -43,10 +43,10 @@ def closings(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> Iterator
 
 
 def closed_shapes(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, leeway: np.ndarray | float = 0.0):
-    """(A, B) of n pairs with regions closed: as they are where there are none, else sequences of n shapes.
+    """(A, B) of n pairs with regions closed: unchanged without regions, else sequences of n shapes.
 
     A, B : shapes, or sequences of n.   X_WA, X_WB : poses (n, 4, 4) or (1, 4, 4).
-    leeway : or (n,): how far A may be moved from where it is, or what is within this of it matters, too [m].
+    leeway : a number or (n,): A may be moved this far, or bodies up to this far from A matter, too [m].
     Raises as `closings`.
     """
     sides = [[S] * n if isinstance(S, Shape) else S for S in (A, B)]
@@ -120,7 +120,7 @@ def box_sizes(region: HPolytope, distances: np.ndarray) -> np.ndarray:
     """(n,) half the edges of boxes that close a region for bodies with no point farther than ``distances`` (n,) from
     the origin of its frame [m].
 
-    Raises UnsupportedQuery where that is out of range.
+    Raises UnsupportedQuery where a size is out of range.
     """
     wanted = _UP * (2.0 * distances + region.boundary_within)
     if not (wanted <= LARGEST / 4.0).all():

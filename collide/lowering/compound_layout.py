@@ -1,4 +1,4 @@
-"""A shape's bounding parts in the rows that kernels of compounds read: made when first asked for, and kept with it."""
+"""A shape's bounding parts in the rows of the compound kernels: made when first asked for, and kept with the shape."""
 
 from __future__ import annotations
 

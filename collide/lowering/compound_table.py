@@ -1,7 +1,7 @@
-"""Bodies of several convex parts as the kernels read them: one row a part, one a body.
+"""Bodies of several convex parts as the kernels read them: a row for each part, a row for each body.
 
-Rows of parts hold where each stands in its body, and a ball around it: most pairs of parts are far apart, and balls
-say so before anything is worked out.
+Rows of parts hold the part's pose in its body, and a ball around the part: most pairs of parts are far apart, and
+balls say so before any further work.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class Balls(NamedTuple):
 
 
 class LaidOut(NamedTuple):
-    """One body: its convex parts, (parts, PART) doubles, (BODY,) doubles; its parts by their places (parts,) int64, so
-    that GROUP after GROUP of them are near each other, and (groups, GROUP_BALL) doubles."""
+    """A body: its convex parts, (parts, PART) doubles, (BODY,) doubles; its parts by their places (parts,) int64, each
+    GROUP in turn of parts near each other, and (groups, GROUP_BALL) doubles."""
 
     packed: tuple[PackedConvex, ...]
     parts: np.ndarray

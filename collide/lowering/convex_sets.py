@@ -33,8 +33,8 @@ class ConvexSet(NamedTuple):
     """One convex set in its own frame; fields as `packed_convex.PackedConvex` has them.
 
     curved_reach : reach of a cylinder, cone or ellipsoid [m]; the reach of points is measured where they are packed.
-    with_tree : whether many points get a support tree when a query first needs it.
-    planes : (normals, offsets) of a polytope that is kept by half-spaces.
+    with_tree : whether many points get a support tree at the first query in need.
+    planes : (normals, offsets) of a polytope kept by half-spaces.
     """
 
     kind: int
@@ -62,8 +62,8 @@ def sets_of(shape: Shape) -> list[PlacedSet]:
 
 
 def convex_set(shape: Shape) -> ConvexSet:
-    """The convex set of a shape that is no Compound. Raises UnsupportedQuery for meshes and regions, TypeError for
-    classes that are not derived from the library's."""
+    """The convex set of a shape other than a Compound. Raises UnsupportedQuery for meshes and regions, TypeError for
+    classes not derived from the library's."""
     rule = _RULES.get(type(shape))
     if rule is not None:
         return rule(shape)

@@ -1,12 +1,12 @@
 """Convex shapes without exact facets, as meshes meet them: between a polytope inside and one around.
 
 Cylinders, cones and ellipsoids are curved; the corners of an `HPolytope` may be rounded. A polytope around the shape
-and one inside it, both made of doubles, decide most questions without rounding: what does not meet the outer one does
-not meet the shape, what meets the inner one does. The rest is for the convex engine, facet by facet
+and a polytope inside, both made of doubles, decide most questions without rounding: a miss of the outer polytope is a
+miss of the shape, a hit of the inner polytope a hit of the shape. The rest is for the convex engine, facet by facet
 (`facets_against_curved.py`).
 
 Both polytopes are right by more than rounding: rings and corners are drawn in or pushed out by 1e-12 of the size
-beyond what the geometry asks; that of a shape with planes is looked at in fractions.
+beyond what the geometry asks; corners are checked against a shape's planes in fractions.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from collide.shapes.shape import Shape, kept_with_shape
 class Enclosure(NamedTuple):
     """A convex shape between two polytopes, in its own frame.
 
-    outer : the polytope around it, a solid body whose hull (`hull_of`) is the shape itself.
-    inner : a polytope within the shape; None where none was found.
+    outer : the polytope around the shape, a solid body whose hull (`hull_of`) is the shape itself.
+    inner : a polytope within the shape; ``None`` where not found.
     packed : the shape as the convex engine reads it.
     """
 

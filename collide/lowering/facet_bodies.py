@@ -1,7 +1,7 @@
-"""Shapes as meshes meet them: facets under a box-tree, a ball swept over them, and whether there is an inside.
+"""Shapes as meshes meet them: facets under a box-tree, a ball swept over them, and whether they enclose an inside.
 
-A convex polytope is the surface of its hull and what is inside; a sphere is one facet without area and a radius, a
-capsule a segment and one. A cylinder, cone or ellipsoid has no facets: see `enclosures.py`.
+A convex polytope is the surface of its hull and what is inside; a sphere is a facet without area and a radius, a
+capsule a segment and a radius. A cylinder, cone or ellipsoid has no facets: see `enclosures.py`.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from collide.shapes.shape import Shape, checked_shape, held_by, kept_with_shape
 
 
 class Body(NamedTuple):
-    """A set in its own frame: facets, the points they enclose where it is solid, and a ball swept over all.
+    """A set in its own frame: facets, the points they enclose where solid, and a ball swept over all.
 
-    of : the shape, which keeps the body and is therefore held weakly.
-    tree : the facets.   points : (k, 3), one of every part that hangs together.
-    centre, reach : of a ball that holds the facets, the reach rounded upwards [m].
+    of : the shape, held weakly because the shape keeps the body.
+    tree : the facets.   points : (k, 3), a point of every connected part.
+    centre, reach : of a ball around the facets, the reach rounded upwards [m].
     """
 
     of: Callable[[], Any]
@@ -56,7 +56,7 @@ class Body(NamedTuple):
 class PosesWithSlop(NamedTuple):
     """Poses of one body.
 
-    X : (n, 4, 4) matrices.   slop : (n,) how far a point of the body may really be from where they put it [m].
+    X : (n, 4, 4) matrices.   slop : (n,) how far a point of the body may really be from its place by the matrix [m].
     """
 
     X: np.ndarray
@@ -78,13 +78,13 @@ def is_halfspace(shape: Shape) -> bool:
 
 
 def has_facets(shape: Shape) -> bool:
-    """Whether a mesh, or a convex set whose surface is that of a hull of doubles, and a radius: `body_of` serves it."""
+    """Whether a shape is a mesh, or the hull of doubles with a ball swept over it: `body_of` then serves the shape."""
     return kind_of(shape) in WITH_FACETS
 
 
 @kept_with_shape("_surface")
 def body_of(shape: Shape) -> Body:
-    """The body of a mesh or of a convex shape that `has_facets`, made when first asked for and kept with it."""
+    """The body of a mesh or of a convex shape that `has_facets`, made when first asked for and kept with the shape."""
     return _of_mesh(shape) if isinstance(shape, Mesh) else _of_convex(shape)
 
 
@@ -128,7 +128,7 @@ def _of_mesh(mesh: Mesh) -> Body:
 
 
 def _one_of_each_part(mesh: Mesh) -> np.ndarray:
-    """Vertex ids: one of every shell, and those of collapsed facets that no other facet uses."""
+    """Vertex ids: a vertex of every shell, and the vertices of collapsed facets alone."""
     corners, shells, n = mesh.survey.corners, mesh.survey.shells, len(mesh.vertices)
     ids = np.empty(n + len(shells), dtype=np.int32)
     return ids[: one_of_each_part(address_of(corners), address_of(shells), len(shells), n, address_of(ids))]

@@ -1,6 +1,6 @@
 """Triangles as convex sets, written straight into the tables that kernels read: no Python object each.
 
-The triangles stand first, the convex set that they are asked about behind them, also in rank: swapped questions are
+The triangles stand first, the convex set asked about stands last, also in rank: swapped questions are
 worked out on the same numbers.
 """
 
@@ -52,7 +52,7 @@ class FacetTable(Facets):
         self.packed = [_FACET] * k + [packed]
 
     def build_trees(self, rows: np.ndarray) -> None:
-        """Have the support tree of the convex set, if it is large enough for one; triangles are scanned."""
+        """Build the support tree of the convex set, if large enough; triangles are scanned."""
         packed = self.packed[-1]
         if may_have_tree(packed):
             self.ints[-1, TREE] = support_tree_of(packed).address

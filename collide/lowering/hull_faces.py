@@ -20,17 +20,17 @@ FACE_INTS = 14
 
 
 class HullFaces(NamedTuple):
-    """The polygons that bound a hull of n points; ids are rows of those points. Of a segment, one polygon of two, and
-    so of a hull all of whose triangles are slivers.
+    """The polygons around a hull of n points; ids are rows of the points. A segment has a single polygon, of two
+    corners, and so has a hull of slivers alone.
 
-    Vertices that two faces share alone, and that lie on the line between their neighbours but for rounding, are left
-    out: an edge has two ends.
+    Vertices of two faces alone, on the line between their neighbours but for rounding, are left out: an edge has two
+    ends.
 
     columns : (3, m) coordinates of the vertices, axis by axis, m a multiple of BLOCK, filled up with the first.
     vertex_ids : (h,) their ids.
     normals : (f, 3) unit normals, outward; 0 of a segment, and of slivers that no face takes in.
-    flatness : (f,) how far the hull's points there are from the polygon's plane and edges at most, measured [m].
-    triangles : (f,) the first of the hull's triangles (`exact_hull.convex_hull`) that makes up the face.
+    flatness : (f,) how far the face's points are from the polygon's plane and edges at most, measured [m].
+    triangles : (f,) the first of the face's triangles in the hull (`exact_hull.convex_hull`).
     starts : (f + 1,) where the corners of a face begin.   corners : ids, counter-clockwise seen from outside.
     edges : number of the edge from each corner to the next, the same from both of its faces.
     face_of : the face of each corner.
@@ -101,9 +101,9 @@ def faces_of(packed: PackedConvex) -> KeptFaces:
 
 
 class HullFaceTable:
-    """A row of FACE_INTS integers a convex set, as kernels read them; 0 of sets that are no hulls of points.
+    """A row of FACE_INTS integers a convex set, as kernels read them; 0 of sets other than hulls of points.
 
-    largest : most corners that a face of these has, at least as many as a curved set's end has (`support_face.py`).
+    largest : most corners of a face of these sets, at least as many as a curved set's end has (`support_face.py`).
     """
 
     def __init__(self, packed: list[PackedConvex], least: int):

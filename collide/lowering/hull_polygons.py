@@ -1,7 +1,7 @@
-"""Polygons of coplanar hull triangles, and which of them meet at a vertex, in kernels: what `hull_faces.py` keeps.
+"""Polygons of coplanar hull triangles, and the polygons at each vertex, in kernels: what `hull_faces.py` keeps.
 
-Python and C (`native/capi_faces.c`) call the two entries one after the other: `make_faces` works in memory that is
-given, and tells how much of it is to be kept; `keep_faces` writes that into a block, and where each array stands.
+Python and C (`native/capi_faces.c`) call the two entries in turn: `make_faces` works in the caller's memory, and tells
+how many bytes to keep; `keep_faces` writes the faces into a block, and where each array stands.
 """
 
 from __future__ import annotations
@@ -255,9 +255,9 @@ def _are_coplanar(making, a, b, tolerance):
 
 @kernel
 def _join_coplanar(making, n_triangles, tolerance):
-    """Name of each triangle the least one of its face: neighbours joined where coplanar.
+    """Name each triangle by the least triangle of its face: neighbours joined where coplanar.
 
-    A sliver joins one face beside it, whose plane its corners do not leave, and so never two of them.
+    A sliver joins a single face beside it, whose plane its corners do not leave, and so never joins two faces.
     """
     parent, plane_of = making.component, making.plane_of
     for k in range(n_triangles):
@@ -282,7 +282,7 @@ def _join_coplanar(making, n_triangles, tolerance):
 
 @kernel
 def _put_boundary(making, first, last):
-    """Write the corners around the triangles of one component behind those of all faces, from the least on.
+    """Append the corners around the triangles of a component to the corners of all faces, from the least on.
 
     Returns how many; 0 where they are no simple loop.
     """
@@ -361,7 +361,7 @@ def _put_triangle_loop(making, triangle):
 
 @kernel
 def _put_merged(making, n, n_triangles, tolerance):
-    """Faces of a hull with an inside: triangles that make up no polygon, or a curved one, are a face each."""
+    """Faces of a hull with an inside: triangles of no simple polygon, or of a curved polygon, are a face each."""
     order = making.order
     for k in range(n_triangles):
         making.ahead[k] = k
@@ -416,7 +416,7 @@ def _put_two_sides(making, n, half):
 
 @kernel
 def _put_segment(making, n_vertices):
-    """The two ends of a hull that is a line but for rounding, as its one face; no face of a single point."""
+    """The two ends of a hull on a line but for rounding, as its single face; no face of a single point."""
     points, vertices = making.points, making.vertices
     if n_vertices < 2:
         return
@@ -456,10 +456,10 @@ def _off_line(making, vertex, start, end):
 
 @kernel
 def _straighten(making, n, tolerance):
-    """Leave out corners of two faces alone that lie on the line between their neighbours, but for rounding.
+    """Leave out corners of two faces alone, on the line between their neighbours but for rounding.
 
-    What was left out before lies within ``bent`` of a side that the corner ends, and the side within the corner's
-    distance of the new one, of which it has one end: the new one is off all by no more than the sum.
+    Corners left out before lie within ``bent`` of a side at the corner. This side lies within the corner's distance of
+    the new side, since the two share an end: the new side is off all left-out corners by no more than the sum.
     """
     corners, starts, ahead, behind = making.corners, making.starts, making.ahead, making.behind
     face_of, sizes, bent, flatness = making.face_of, making.sizes, making.bent, making.flatness
@@ -582,7 +582,7 @@ def _copy(integers, n, at):
 
 @kernel
 def _put_columns(making, n, padded, ids, columns):
-    """Vertices that have corners, or one where no vertex has, and their coordinates axis by axis."""
+    """Vertices with corners, or the first vertex where no vertex has corners, and their coordinates axis by axis."""
     n_ids = 0
     for vertex in range(n):
         if making.fan_starts[vertex + 1] > making.fan_starts[vertex]:

@@ -1,7 +1,7 @@
-"""A convex set as the kernels read it: a kind, a few numbers, a block of coordinates.
+"""A convex set in the layout of the kernels: a kind, a few numbers, a block of coordinates.
 
-Every convex shape is a core (points, or one of three curved sets) swept by a ball, or a
-half-space. Spheres are one point, capsules two, boxes eight: one kernel answers them all.
+Every convex shape is a core (points, or a curved set of three kinds) swept by a ball, or a
+half-space. Spheres are one point, capsules two, boxes eight: the same kernel answers them all.
 """
 
 from __future__ import annotations
@@ -41,25 +41,25 @@ class PreparedStructures:
 
 
 class PackedConvex(NamedTuple):
-    """One convex set, in its own frame.
+    """A convex set, in its own frame.
 
     kind : POINTS, CYLINDER, CONE, ELLIPSOID or HALFSPACE.
     radius : of the ball swept over the core, in the world [m].
     reach : proven upper bound of the distance of a core point from the frame's origin [m].
     slop : proven upper bound of the distance between the set described and the set stored [m];
-        0 where the numbers given are stored as they are.
+        0 where the numbers given are stored unchanged.
     numbers : four; cylinder, cone: radius and half length; ellipsoid: three radii; half-space: normal and offset;
         boxes, which are POINTS: half sizes; unused entries are 0.
     points : (n, 3) core points for POINTS; their number is what ids in results refer to.
     block, address, padded : memory with the same points axis by axis, read-only; where they begin there; how many each
         axis has, the next multiple of BLOCK, filled up with copies of the first point.
-    prepared : what is made of the points when a query first needs it.
+    prepared : structures made of the points when a query first needs them.
     lowest : exponent of the lowest bit set in any coordinate (2000 where all are 0): the points are
-        integers times 2 to it.
-    content : digest of the numbers above; equal for equal sets, in every process. It orders the
-        bodies of a pair, so that swapped questions are worked out on the same numbers.
+        integers times 2 to this power.
+    content : digest of the numbers above; equal for equal sets, in every process. The digest orders the
+        bodies of a pair, so swapped questions are worked out on the same numbers.
 
-    Shapes that are asked about once pay for what is made here: views that few callers read are properties.
+    Shapes asked about once pay for what is made here: views that few callers read are properties.
     """
 
     kind: int
@@ -131,7 +131,7 @@ def _four(numbers: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _digest(kind: int, radius: float, numbers: tuple[float, ...], points: np.ndarray) -> bytes:
-    """Of the numbers of a set; −0 and 0 are one coordinate among those of points."""
+    """Digest of the numbers of a set; −0 and 0 are the same coordinate of a point."""
     data = points.tobytes()
     if _MINUS_ZERO in data:  # or the same eight bytes across two doubles: adding 0 then changes nothing
         data = (points + 0.0).tobytes()
@@ -147,10 +147,10 @@ _NO_POINTS = np.frombuffer(b"").reshape(0, 3)  # read-only
 
 
 def on_cache_lines(*shape: int) -> np.ndarray:
-    """An empty array of doubles that begins where a cache line does.
+    """An empty array of doubles, aligned to a cache line.
 
-    A block of eight is then read from one line. Where two are touched, as numpy's own arrays mostly have it, a scan of
-    128 points takes a quarter longer.
+    A block of eight is then read from a single line. Blocks across two lines, as mostly in numpy's own arrays, make a
+    scan of 128 points take a quarter longer.
     """
     size = math.prod(shape)
     block, first = _block_and_first(size)

@@ -65,7 +65,7 @@ def shares_parts(shape: Shape) -> bool:
 
 
 def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:
-    """Convex sets that hold a shape: its parts, or something larger and simpler where it has none. For culling."""
+    """Convex sets that hold a shape: its parts, or larger, simpler sets for shapes without parts. For culling."""
     return _bounds_around(shape) if shape.is_asked_whole else parts_of(shape)
 
 
@@ -102,7 +102,7 @@ def _packed(part: ConvexSet) -> PackedConvex:
 
 
 def _half_space_around(region: HPolytope) -> PackedConvex:
-    """The half-space that reaches least beyond the origin, of those that hold a region."""
+    """The half-space of least reach beyond the origin, among the half-spaces of a region."""
     exponents = np.frexp(np.abs(region.normals).max(axis=1))[1]
     normals, offsets = np.ldexp(region.normals, -exponents[:, None]), np.ldexp(region.offsets, -exponents)
     least = int(np.argmin(offsets / np.sqrt(np.square(normals).sum(axis=1))))

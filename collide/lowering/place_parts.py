@@ -1,7 +1,7 @@
-"""Parts of posed bodies: where they stand, and balls that hold them.
+"""Parts of posed bodies: their poses in the world, and balls around them.
 
-A body is a run of parts, each with a pose in the body's frame. Where a part stands is the product of two poses: what
-`shape_table.pose_table` makes of many at once, made here of one when somebody asks about it, the same bits.
+A body is a run of parts, each with a pose in the body's frame. The pose of a part in the world is the product of two
+poses: `shape_table.pose_table` makes many at once, this module makes a single product on demand, the same bits.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class ShapeSetTables:
 
     @cached_property
     def single_convex(self) -> np.ndarray:
-        """(shapes,) bool: which are one convex set in their own frame."""
+        """(shapes,) bool: whether a shape is a single convex set in its own frame."""
         return np.array([is_single_convex(shape) for shape in self._shapes])
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Layout of the flat tables that kernels read: one row a shape, one row a posed part.
+"""Layout of the kernels' flat tables: a row a shape, a row a posed part.
 
 Rows are flat because nine arrays cost 500 ns a call in Python and four addresses cost 170.
 """
@@ -48,8 +48,8 @@ class ShapeTable:
 
     Support trees are made when a row is first to be asked about: `plant`.
 
-    ``rank`` orders the rows by content, so that a pair is worked on in the same order whichever
-    way it is asked: that makes swapped answers the exact mirror of each other.
+    ``rank`` orders the rows by content, so a pair and its swapped pair are worked on in the same order: swapped
+    answers are the exact mirror of each other.
     """
 
     def __init__(self, packed: list[PackedConvex]):
@@ -61,7 +61,7 @@ class ShapeTable:
         self._write(packed)
 
     def append(self, packed: list[PackedConvex]) -> None:
-        """Add rows: O(log n) each, and that of moving what there is where memory has run out."""
+        """Add rows: O(log n) each, and the copy of all rows where memory has run out."""
         n = len(self.packed) + len(packed)
         if n > len(self.ints):
             capacity = n + max(len(self.packed), 16)
@@ -86,7 +86,7 @@ class ShapeTable:
             self.ints[: len(self.packed), RANK] = [self._rank_of(p) for p in self.packed]
 
     def _write(self, packed: list[PackedConvex]) -> None:
-        """Rows behind those that there are."""
+        """Rows behind the present rows."""
         first = len(self.packed)
         self.packed.extend(packed)
         for k, p in enumerate(packed, first):
@@ -131,7 +131,7 @@ class PoseTable(NamedTuple):
         return len(self.rows)
 
     def followed_by(self, following: PoseTable) -> PoseTable:
-        """One table of both, this one's parts first."""
+        """A table of both, with the parts of this table first."""
         rows = np.concatenate([self.rows, following.rows])
         moved = rows[len(self) :, POSE_TERMS]
         moved[moved >= 0.0] += len(self.terms)
@@ -152,7 +152,7 @@ def pose_table(
     """Poses of k parts in the world.
 
     X_WB : (k, 4, 4) body poses.   X_BP : (k, 4, 4) the parts' poses in their bodies.   reach : (k,).
-    has_pose : (k,) whether X_BP is not the identity, where that is known.   terms : False where only rounded poses and
+    has_pose : (k,) whether X_BP is not the identity, where known.   terms : False where only rounded poses and
     their slops are read, as boxes do.
 
     A part without a pose of its own keeps the numbers given, bit by bit, and so does one of a body at
@@ -206,7 +206,7 @@ def moved_pose(X_WB: np.ndarray, X_BP: np.ndarray, reach: np.ndarray) -> tuple[n
     """(poses (n, 4, 4) of parts in the world, (n,) how far rounding may have moved their points [m]).
 
     X_WB : (n, 4, 4) body poses.   X_BP : (4, 4) the part's pose in it, or (n, 4, 4) of n parts.   reach : (n,) of its
-    points from the part's origin. The products are those of `pose_table`; 0 where they are exact, shifts and right
+    points from the part's origin. The products are as in `pose_table`; 0 where they are exact, shifts and right
     angles among them.
     """
     is_body = (X_BP == np.eye(4)).all(axis=(-2, -1))
@@ -245,7 +245,7 @@ def _product(A: np.ndarray, B: np.ndarray) -> np.ndarray:
 def _terms(R: np.ndarray, p: np.ndarray, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """((k, 12, TERMS) doubles that add up to each entry of the product, whether they do exactly).
 
-    Error-free products after Dekker 1971. They are exact unless the low part of one underflows.
+    Error-free products after Dekker 1971. They are exact unless a low part underflows.
     """
     k = len(R)
     terms = np.zeros((k, 12, TERMS))

@@ -2,8 +2,8 @@
 
 The axes are the three of each frame (S. Gottschalk's other nine cost more than they cull) and, where distances are
 computed, the line between the centres and the direction of the nearest points so far. Floats round here; whoever
-fills the probe enlarges its half lengths by a bound of that, so that no boxes that meet are culled, and no bound is
-above the distance. Sums go from left to right, so compiled and plain code give the same bits.
+fills the probe enlarges its half lengths by a bound of this rounding, so boxes that meet are never culled, and no bound
+is above the distance. Sums go from left to right, so compiled and plain code give the same bits.
 """
 
 from __future__ import annotations

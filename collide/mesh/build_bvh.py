@@ -1,15 +1,15 @@
 """Building the tree that mesh queries traverse: binned surface-area splits, eight boxes to a node.
 
 I. Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007), for the splits. A node is filled
-by splitting the largest of its boxes until it has eight, so no binary tree is made and folded. O(n log n) for
-meshes whose facets do not all lie at one place; ranges that bins cannot split are halved, which bounds the depth.
+by splitting the largest of its boxes until there are eight, so no binary tree is made and folded. O(n log n) for
+meshes whose facets do not all lie at the same place; ranges that bins cannot split are halved to bound the depth.
 
 What was slower, on teapot, bunny, a dragon of 203,000 facets and env/rob (tight boxes, eight wide, two facets a leaf):
 splitting ranges at the middle of the graded tree's control cubes visited 10 to 20 % more boxes and built up to 25 %
-faster; with outliers packed in ranges of their own it visited as many again and built no faster.
+faster; with outliers packed in ranges of their own traversals visited as many again and builds were no faster.
 
-Boxes stand in floats relative to the mesh's middle, rounded outwards: each coordinate is moved by more than one
-unit in the last place before it is rounded to nearest.
+Boxes stand in floats relative to the mesh's middle, rounded outwards: each coordinate is moved by more than a
+unit in the last place before rounding to nearest.
 """
 
 from __future__ import annotations
@@ -240,7 +240,7 @@ def _set_box(build, node, slot):
 
 @kernel
 def _fill_node(build, node, first, last, level, top, used):
-    """Split a range into up to eight, the largest first; those that are no leaves become nodes on the stack.
+    """Split a range into up to eight, the largest first; ranges larger than a leaf become nodes on the stack.
 
     Returns the stack's height and the nodes used.
     """
@@ -297,7 +297,7 @@ def _area(work, at):
 def _split(build, first, last, level, row, new):
     """Split a range where the sum of area times number of both parts is least, by bins; where the second part begins.
 
-    row, new : of the range, which become those of the parts.
+    row, new : rows of ``work``: ``row`` measures the range, then the first part; ``new`` the second part.
     """
     floats, pairs, work = build.floats, build.pairs, build.work
     at = _ROW * row
@@ -335,7 +335,7 @@ def _split(build, first, last, level, row, new):
 
 @kernel
 def _best_cut(floats, first, last, work, axis, origin, scale, bins):
-    """The bin after which to cut; −1 where all centres fall into one."""
+    """The bin after which to cut; −1 where all centres fall into a single bin."""
     for b in range(bins):
         at = _BINS_AT + 7 * b
         work[at] = 0.0

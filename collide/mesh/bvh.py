@@ -1,15 +1,15 @@
 """The tree that mesh queries walk: nodes of eight boxes, triangles in the order of the leaves.
 
 A node is 56 words of 32 bits: eight boxes as centres x, y, z and half lengths x, y, z, eight floats each,
-then eight links. A link ≥ 0 is a node, a negative one a leaf (`leaf_link`): a run of triangles. Node 0 has one
-box, that of the whole mesh. A slot that is not used has a half length of −1e30, so that nothing meets it.
+then eight links. A link ≥ 0 is a node, a negative link a leaf (`leaf_link`): a run of triangles. Node 0 has a single
+box, around the whole mesh. An unused slot has a half length of −1e30, so no probe meets its box.
 
 Boxes are held relative to ``centre`` and in units of 2^exponent, rounded outwards: floats are then as good for
-a mesh of microns far from its origin as for one of kilometres. Triangles are the doubles given, unrounded.
+a mesh of microns far from its origin as for a mesh of kilometres. Triangles are the doubles given, unrounded.
 
-Where that is too coarse, since details are small beside the whole mesh (`fine_boxes.py`), the boxes of a tree are held
-relative to an *origin* of their node (``has_origins``). It stands in the lowest bytes of the node's half lengths, four
-for each coordinate, so that a node is as large as without.
+Where these floats are too coarse, since details are small beside the whole mesh (`fine_boxes.py`), the boxes of a tree
+are held relative to an *origin* of their node (``has_origins``). The origin stands in the lowest bytes of the node's
+half lengths, four bytes for each coordinate, so a node is as large as without.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class MeshTree:
         return self._places
 
     def need_slabs(self, make) -> None:
-        """Make the slabs that distances need (``make``: `bvh_slabs.make_slabs`) unless they are there."""
+        """Make the slabs for distances (``make``: `bvh_slabs.make_slabs`), unless the tree has them."""
         if self._slabs is None:
             with _making():
                 if self._slabs is None:

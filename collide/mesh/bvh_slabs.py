@@ -1,7 +1,7 @@
-"""A slab for every box of a tree: what lies in the box lies between two planes across its mean normal.
+"""A slab for every box of a tree: the facets in the box lie between two planes across their mean normal.
 
-A box around a patch that is flat and lies across its axes is thick in the direction that counts, that of the
-patch's normal: as thick as the patch is long. Its slab is as thick as the patch bends, which is quadratically less.
+A box around a flat patch askew to the axes is thick in the direction that counts, along the patch's
+normal: as thick as the patch is long. Its slab is as thick as the patch bends, which is quadratically less.
 Distances use them: along a direction g, with any number a, a point y of the patch has
 g·y = a n·y + (g − a n)·y, the first held by the slab, the second by the box. They are made when first asked for.
 """

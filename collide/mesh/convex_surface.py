@@ -1,7 +1,7 @@
 """Whether a solid's facets are the surface of its own convex hull, decided exactly.
 
-A facet whose plane has no vertex beyond it lies in the surface of the hull. A closed surface that lies there winds
-around all points inside the hull equally often, so a solid all of whose facets do is its hull: the same set.
+A facet with no vertex beyond its plane lies in the surface of the hull. A closed surface within the hull's surface
+winds around all points inside the hull equally often, so a solid with all facets there is its hull: the same set.
 Signs are those of doubles with an error bound (Shewchuk, "Adaptive precision floating-point arithmetic", 1997,
 section 4.3), and of Python integers where these cannot tell.
 """
@@ -26,8 +26,8 @@ _ERROR = 1e-15
 def is_own_hull(vertices: np.ndarray, faces: np.ndarray) -> bool:
     """Whether every facet (m, 3) of a solid has all vertices (n, 3), finite, on its inner side or in its plane.
 
-    Facets without area say nothing. True is proven; False may also mean that the mesh is too large for this to be
-    looked at (`MAX_SIGNS`, `MAX_EXACT_SIGNS`). O(m n), and most meshes that are not convex show it at once.
+    Facets without area do not count. True is proven; False may also mean that the mesh is too large to decide
+    (`MAX_SIGNS`, `MAX_EXACT_SIGNS`). O(m n), with an exit at the first vertex beyond a facet.
     """
     used, ids = np.unique(faces, return_inverse=True)
     points, facets = vertices[used], ids.reshape(-1, 3)

@@ -1,10 +1,10 @@
 """Facets cut into pieces: points in facets and on edges by weights of corners, cut edges, flipped edges.
 
-A new vertex stands for a point of one old facet, told by three weights of its corners. On an edge of the old facet the
-third weight is 0, so that pieces on both sides share the vertex and lie on the edge. Pieces tile the old facet exactly
+A new vertex is a point of an old facet, given by three weights of its corners. On an edge of the old facet the
+third weight is 0, so pieces on both sides share the vertex and lie on the edge. Pieces tile the old facet exactly
 in these weights; places in space are rounded once from the old corners.
 
-An edge is fixed where it is part of an edge of an old facet: it can be cut, not flipped.
+A part of an old facet's edge is fixed: cut at most, never flipped.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _MAX_FLIPS = 60
 
 class Edges(NamedTuple):
     """Edges of e pieces: ends (e, 2), edge_of (k, 3) of every side of k pieces, fixed (e,) bool,
-    sides (e, 2): two half-edges that run along it, the same one twice at a border."""
+    sides (e, 2): the two half-edges along each edge, the same half-edge twice at a border."""
 
     ends: np.ndarray
     edge_of: np.ndarray
@@ -36,8 +36,8 @@ class Edges(NamedTuple):
 class Pieces:
     """Pieces of m facets over n points, which grow.
 
-    corners : (m, 3) of the facets, distinct.   n_old : points that were given.
-    points : (n, 3).   hosts, weights : (n, 3) old vertices and what each weighs in the point; of an old one itself.
+    corners : (m, 3) of the facets, distinct.   n_old : number of points given.
+    points : (n, 3).   hosts, weights : (n, 3) old vertices and their weights in the point; an old vertex hosts itself.
     faces : (k, 3) points of the pieces.   source : (k,) rows of ``corners``.
     """
 
@@ -67,7 +67,7 @@ class Pieces:
         return base + (shares[:, :, None] * (corners - base[:, None])).sum(axis=1)
 
     def moved(self) -> float:
-        """No new vertex is farther than this from the point of its facet that it stands for; 0 where all are exact."""
+        """Upper bound of the distances of new vertices from their exact points in the facets; 0 where all are exact."""
         new = slice(self.n_old, None)
         weights, hosts = self.weights[new], self.hosts[new]
         if not len(hosts):
@@ -85,9 +85,9 @@ class Pieces:
         return float(np.sqrt(np.square(off).sum(axis=1).max()) * (1 + 2.0**-40))
 
     def cut(self, edges: Edges, cut_rows: np.ndarray, shares: np.ndarray) -> np.ndarray:
-        """Cut edges at shares of their length, at most one a piece; returns which of ``cut_rows`` could be cut.
+        """Cut edges at shares of their length, at most an edge a piece; returns a mask of the ``cut_rows`` cut.
 
-        One cannot where rounding of the weights would turn a piece over: edges within facets alone, of thin pieces.
+        An edge is left where rounding of the weights would turn a piece over: within facets alone, of thin pieces.
         """
         side = edges.sides[cut_rows]
         facet = self.source[side[:, 0] // 3]
@@ -135,7 +135,7 @@ class Pieces:
         self.faces[rows] = faces
 
     def _to_flip(self, faces: np.ndarray, source: np.ndarray, side: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(rows of side (e, 2) that are flipped, no piece twice; (c, 2, 3) the pieces that replace theirs)."""
+        """(rows of side (e, 2) to flip, no piece twice; (c, 2, 3) the pieces in place of theirs)."""
         pieces, at = side // 3, side % 3
         a, b, c = (faces[pieces[:, 0], (at[:, 0] + k) % 3] for k in range(3))
         d = faces[pieces[:, 1], (at[:, 1] + 2) % 3]

@@ -1,12 +1,12 @@
 """Boxes relative to their nodes, for meshes whose details are small beside the whole.
 
-Floats relative to a mesh's middle tell places 2⁻²⁴ of its width apart, and queries enlarge boxes by some 2⁻¹⁸ of it. Of
-ordinary meshes that is nothing: a million facets around a body are still 2⁻¹⁰ of it wide. It is something where
-strings of a worst case lie side by side, or where a whole plant is one mesh. The boxes of such trees are computed anew,
-from the facets' doubles, relative to an origin of their node near its middle.
+Floats relative to a mesh's middle tell places 2⁻²⁴ of its width apart, and queries enlarge boxes by some 2⁻¹⁸ of the
+width. Ordinary meshes lose nothing: a million facets around a body are still 2⁻¹⁰ of its width wide. The loss counts
+where strings of a worst case lie side by side, or where a whole plant is a single mesh. The boxes of such trees are
+computed anew, from the facets' doubles, relative to an origin of their node near its middle.
 
-Then neither depends on the size of the mesh what a box is too large by: with the box c ± h of a node and v = 2⁻²⁴ the
-half length stored is at least h + 16 v (h + |c|), which covers what comparisons in floats round of it
+Then the excess of a box does not depend on the size of the mesh: with the box c ± h of a node and v = 2⁻²⁴ the
+half length stored is at least h + 16 v (h + |c|), which covers the rounding of comparisons in floats
 (`narrowphase/facets/fine_probes.py`).
 """
 
@@ -32,10 +32,9 @@ _FLOATS, _DOUBLES, _BYTE = 2.0**-20, 2.0**-50, 2.0**-14
 
 
 def with_origins_if_needed(tree: MeshTree) -> MeshTree:
-    """The tree, or, where floats from the mesh's middle are too coarse, one with the same nodes and finer boxes.
+    """The tree, or, where floats from the mesh's middle are too coarse, a tree with the same nodes and finer boxes.
 
-    Judged by a sample of its nodes; trees of a few hundred facets stay as they are, since there is little to be looked
-    at.
+    Judged by a sample of its nodes; trees of a few hundred facets have little to visit, and stay as they are.
     """
     step = max(1, len(tree.nodes) // _SAMPLE)
     return with_origins(tree) if len(tree.nodes) >= _MIN_NODES and _is_too_coarse(tree, slice(1, None, step)) else tree

@@ -1,18 +1,18 @@
 """Meshes made local: long edges with near neighbours are cut until no local stretch exceeds a bound.
 
 J. Erickson, "Local polyhedra and geometric graphs" (2005), section 8: any polyhedron can be localised by decomposing
-each facet with a graded mesh. How is left open there. Here, in rounds:
+each facet with a graded mesh. The paper leaves open how. Here, in rounds:
 
-1. an edge is too long where it exceeds the stretch times the distance from an end of it to the nearest other vertex of
-   the mesh, whether of the same facet or not;
-2. of these, every edge that is the longest of its facets' is cut, both its facets with it: no T-joints. The cut stands
-   where the nearest vertex is farthest, in the middle part of the edge, so that vertices of edges that run side by
-   side alternate (figure 12 of the paper) and do not make each other too near;
+1. an edge is too long above the stretch times the distance from an end to the nearest other vertex of the mesh,
+   whether of the same facet or not;
+2. of these, every edge that is the longest of both its facets is cut, and the facets with the edge: no T-joints. The
+   cut stands where the nearest vertex is farthest, in the middle part of the edge, so vertices of edges side by side
+   alternate (figure 12 of the paper) and do not come too near each other;
 3. edges within an old facet are flipped to be Delaunay's.
 
 A cut leaves at least 5/16 of an edge longer than stretch · d, d the nearest distance at its end: with a stretch of 16/5
-or more no cut brings a vertex nearer to the ends of its own edge than others are. What can is other edges that are
-packed closely: there the rounds need not end, and `Crowded` tells where.
+or more no cut brings a vertex nearer to the ends of its own edge than others are. Other edges, closely packed, can:
+around them the rounds need not end, and `Crowded` tells where.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ _CROWDED = 1 / 256
 class Crowded(Exception):
     """Cutting was given up.
 
-    vertex : where stretches stay above the bound, the old vertex that is a corner there.   facet : the old facet.
-    n_facets, stretch : how many facets had been made, and the local stretch that they had.
+    vertex : the old vertex at a corner where stretches stay above the bound.   facet : the old facet.
+    n_facets, stretch : how many facets had been made, and their local stretch.
     """
 
     def __init__(self, vertex: int, facet: int, n_facets: int, stretch: float):
@@ -91,7 +91,7 @@ def _nearest(pieces: Pieces, rows: np.ndarray, order: int) -> np.ndarray:
 
 
 def _longest(edges: Edges, lengths: np.ndarray, long: np.ndarray) -> np.ndarray:
-    """Too long edges that are the longest such edge of all their pieces, the longest first."""
+    """Too long edges, each the longest too long edge of all its pieces, the longest first."""
     order = np.lexsort((np.arange(len(lengths)), np.where(long, lengths, -1.0)))
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
@@ -103,7 +103,7 @@ def _longest(edges: Edges, lengths: np.ndarray, long: np.ndarray) -> np.ndarray:
 
 
 def _cut(pieces: Pieces, rows: np.ndarray, edges: Edges, cut_rows: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Cut these edges but those whose best places are too near each other; returns those that were cut."""
+    """Cut edges, save where their best places are too near each other; returns the rows of the edges cut."""
     exponent = 500 - int(np.frexp(np.abs(pieces.points).max())[1])
     ends = np.ldexp(pieces.points[edges.ends[cut_rows]], exponent)
     scaled = np.ldexp(lengths[cut_rows], exponent)

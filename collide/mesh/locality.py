@@ -1,13 +1,13 @@
 """How local a mesh is: the stretches of Erickson, "Local polyhedra and geometric graphs" (2003), sections 2.1 and 8.
 
 The vertices are points, the facets' sides are edges. The local stretch σ(v) is the longest edge at v over
-the distance to the nearest other vertex, whether an edge leads there or not; σ_k(v) has the k-th
-nearest in its place; σ_k is the largest of them; the global stretch Σ is the longest edge over the shortest.
+the distance to the nearest other vertex, joined to v by an edge or not; σ_k(v) has the k-th
+nearest in its place; σ_k is the largest σ_k(v); the global stretch Σ is the longest edge over the shortest.
 Cheap collision detection is proven for meshes whose σ_k are small.
 
-All vertices count, those that no facet uses too. Vertices are distinct points there: rows with the same
-coordinates are one vertex with the edges of all of them, and edges of no length are none. Table 1 of the
-paper counts otherwise (its dragon has 2,100 repeated rows): ``repeated=True`` does as it does.
+All vertices count, also vertices without a facet. Vertices are distinct points: rows with the same
+coordinates are one vertex with the edges of all, and edges of no length do not count. Table 1 of the
+paper counts otherwise (its dragon has 2,100 repeated rows): ``repeated=True`` counts as the table does.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ ORDERS = 10
 class Locality:
     """What `locality` found of a mesh.
 
-    vertices, distinct, in_use : rows given, distinct points among them, and those with an edge.
+    vertices, distinct, in_use : rows given, distinct points among them, and distinct points with an edge.
     facets : given.
     shortest, longest : edges [the unit of the mesh]; edges of no length do not count.
     global_stretch : Σ, their ratio.
-    stretches : (in_use, 10) σ_k of every vertex with an edge, k = 1 … 10; 0 where there are not k others.
+    stretches : (in_use, 10) σ_k of every vertex with an edge, k = 1 … 10; 0 with fewer than k others.
     ids : (in_use,) their rows.
     """
 
@@ -69,7 +69,7 @@ class Locality:
         return self.stretches.mean(axis=0)
 
     def quantiles(self, shares) -> np.ndarray:
-        """(len(shares), 10) stretches that such shares of the vertices do not exceed."""
+        """(len(shares), 10) stretches σ_k, each not exceeded by the given share of the vertices."""
         return np.quantile(self.stretches, shares, axis=0)
 
     def histogram(self, bins_an_octave: int = 4) -> tuple[np.ndarray, np.ndarray]:
@@ -128,7 +128,7 @@ def locality(
 
 
 def _edge_squares(points: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, float]:
-    """Squared length of the longest edge at each point (n,), 0 where there is none, and of the shortest of all."""
+    """Squared length of the longest edge at each point (n,), 0 without an edge, and of the shortest of all."""
     longest, shortest = np.zeros(len(points)), math.inf
     for k in range(3):
         a, b = corners[:, k], corners[:, (k + 1) % 3]
@@ -140,7 +140,7 @@ def _edge_squares(points: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _stretches(points: np.ndarray, longest: np.ndarray, progress) -> np.ndarray:
-    """(n, ORDERS) σ_k of every point, 0 where it has no edge or there are not k others."""
+    """(n, ORDERS) σ_k of every point, 0 without an edge or with fewer than k others."""
     result = np.zeros((len(points), ORDERS))
     with progress("sorting vertices"):
         tree = PointTree(points)

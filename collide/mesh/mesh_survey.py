@@ -1,4 +1,4 @@
-"""What a triangle surface must be before it may stand for a body: welding, topology, volumes, in one pass."""
+"""What a triangle surface must be before standing for a body: welding, topology, volumes, in one pass."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class Survey(NamedTuple):
         themselves where no two vertices are equal.
     flags : (f,) int32, bits of `mesh_topology.py` and of this module.
     shells : (f,) int32, parts that close by themselves, numbered by their first facets; −1 for
-        facets with two equal corners. Parts that touch along edges or at vertices only stay apart.
+        facets with two equal corners. Parts in touch along edges or at vertices only stay apart.
     volumes, signs : (shells,) float64 [m³] and int8; empty unless the surface is closed. Signs are exact.
-    edges, open_edges, pinches, used : how many edges, edges with one facet, vertices at which fans
-        of facets touch, and distinct vertices that facets use.
+    edges, open_edges, pinches, used : how many edges, edges with a single facet, vertices where fans
+        of facets touch, and distinct vertices of facets.
     welded : how many vertices equal an earlier one.
     """
 
@@ -75,7 +75,7 @@ def _table_size(n):
 
 @entry("int64(int64, int64)")
 def survey_memory(n, n_facets):
-    """Bytes that `survey_facets` works in, beside those of `shells_memory` for as many shells as facets."""
+    """Bytes of memory for `survey_facets`, beside the bytes of `shells_memory` for as many shells as facets."""
     return 4 * n_facets + 8 + max(28 * n + 4 * _table_size(n), 4 * (12 * n_facets + 4 * n + 1))
 
 
@@ -84,12 +84,12 @@ def survey_facets(
     codes_at, vertices_at, n, faces_at, n_facets, corners_at, flags_at, shells_at, counts_at, volumes_at, signs_at,
     memory_at,
 ):
-    """Survey a surface, for Python and C; returns 1 if there is an inside: closed, a shell of positive volume, and none
-    inside out. Else 0.
+    """Survey a surface, for Python and C; returns 1 if there is an inside: closed, a shell of positive volume, and no
+    shell inside out. Else 0.
 
-    codes : addresses of `first_rows`, `classify_facets`, `judge_shells`, which are called where they were compiled.
-    faces : (f, 3) int32.   corners, flags, shells, counts : out, as of `classify_facets`.   volumes, signs : f numbers,
-    of which those of a closed surface's shells are written, as of `judge_shells`.   memory : as many bytes as
+    codes : addresses of the compiled `first_rows`, `classify_facets`, `judge_shells`, to call.
+    faces : (f, 3) int32.   corners, flags, shells, counts : out, as of `classify_facets`.   volumes, signs : room for f
+    numbers; a closed surface writes an entry for each shell, as `judge_shells`.   memory : as many bytes as
     `survey_memory` and `shells_memory` say together.
     """
     codes, vertices, counts = view_i64(codes_at, 3), view_f64(vertices_at, 3 * n), view_i64(counts_at, COUNTS)
@@ -134,10 +134,10 @@ def survey_facets(
 
 @entry("int64(int64, int64, int64, int64, int64)")
 def one_of_each_part(corners_at, shells_at, n_facets, n, ids_at):
-    """Write a vertex of every shell, in order, then those of collapsed facets that no other facet uses, ascending;
-    returns how many.
+    """Write a vertex of every shell, in order, then the vertices of collapsed facets alone, ascending; returns how
+    many.
 
-    corners, shells : of a survey of n vertices.   ids : int32, room for n and for as many as there are shells.
+    corners, shells : of a survey of n vertices.   ids : int32, room for n ids and for an id of every shell.
     """
     corners, shells = view_i32(corners_at, 3 * n_facets), view_i32(shells_at, n_facets)
     ids = view_i32(ids_at, n + n_facets)

@@ -1,8 +1,8 @@
 """Which facets meet along which edges, and what follows: borders, orientation, fans, shells.
 
-A surface is read as a chain of oriented triangles. It bounds something exactly where every edge is run
-along as often one way as the other; then the number of times it winds around a point is defined, and
-constant off the surface. More than two facets at an edge, or two fans at a vertex, do not hinder that.
+A surface is read as a chain of oriented triangles. The chain bounds a set exactly where every edge is run
+along as often forwards as backwards; then its winding number around a point is defined, and
+constant off the surface. More than two facets at an edge, or two fans at a vertex, do no harm.
 
 Facets with two corners in the same place ("collapsed") add nothing to the chain and are left out.
 
@@ -36,10 +36,10 @@ EDGES, OPEN_EDGES, SHELLS, USED, PINCHES, WELDED, COUNTS = range(7)
 class _Surface(NamedTuple):
     """n facets over n_vertices vertices.
 
-    corners : three a facet.   flags : one a facet, out.   counts : COUNTS, out.
-    order : the half-edges of facets that are not collapsed, those of an edge together.
-    fan : parents of the facets' corners in classes of those around a vertex that share edges.
-    parent, parity : of the facets in classes of neighbours, and which are turned over against each other.
+    corners : three a facet.   flags : an integer a facet, out.   counts : COUNTS, out.
+    order : the half-edges of facets that are not collapsed, grouped by edge.
+    fan : parents of the facets' corners, in classes of corners around a vertex joined by edges.
+    parent, parity : of the facets in classes of neighbours; a parity of 1 is turned over against the parent.
     tally, spare : room for an integer a facet, and a half-edge.
     per_vertex, stamp, upward, downward : room for an integer a vertex.
     """
@@ -68,7 +68,7 @@ def _next_half_edge(e):
 
 @kernel
 def _end(corners, e):
-    """The vertex at which half-edge e ends; it starts at corners[e]."""
+    """The vertex at the end of half-edge e, whose start is ``corners[e]``."""
     return corners[_next_half_edge(e)]
 
 
@@ -89,7 +89,7 @@ def _runs_upward(corners, e):
 
 @kernel
 def _sum_counts(count, n):
-    """From how many there are of each to where each begins, the counts standing one place further on."""
+    """Prefix sums in place: from ``count[k + 1]``, how many items have key k, to ``count[k]``, where key k begins."""
     for k in range(n):
         count[k + 1] += count[k]
 
@@ -98,7 +98,7 @@ def _sum_counts(count, n):
 def _sort_half_edges(surface):
     """Half-edges of all facets that are not collapsed, by lower and then by higher end; returns how many.
 
-    Two counting sorts, so that a vertex of very many facets costs no more than others.
+    Two counting sorts, so a vertex of very many facets costs no more than other vertices.
     """
     corners, count, spare, order = surface.corners, surface.per_vertex, surface.spare, surface.order
     n_half_edges = 0
@@ -171,10 +171,10 @@ def _set_flag(surface, start, end, bit):
 
 @kernel
 def _flag_doubles(surface, start, end):
-    """Facets at one edge with the same third corner.
+    """Flag the facets at an edge with the same third corner.
 
-    stamp : of a third corner, the edge at which it was met last.   upward, downward : the first half-edge there that
-    runs that way, −1 for none.
+    stamp : of a third corner, the last edge where the corner was met.   upward, downward : at this edge, the first
+    half-edge opposite the third corner to run upward or downward, −1 without.
     """
     corners, order, stamp, edge = surface.corners, surface.order, surface.stamp, surface.counts[EDGES]
     upward, downward = surface.upward, surface.downward
@@ -198,7 +198,7 @@ def _flag_doubles(surface, start, end):
 
 @kernel
 def _join_fans(surface, start, end):
-    """The corners that facets at an edge have in common belong to one fan."""
+    """Join the corners common to facets at an edge into a fan."""
     corners, order, fan = surface.corners, surface.order, surface.fan
     first = order[start]
     at_low = first if _runs_upward(corners, first) else _next_half_edge(first)
@@ -227,7 +227,7 @@ def _flag_turned(surface):
 
 @kernel
 def _join_shells(surface, n_half_edges, part):
-    """Where several facets meet at an edge and those of one part do not cancel, the parts there are one shell.
+    """Where several facets meet at an edge and the facets of a part do not cancel, join the parts into a shell.
 
     part : room for an integer a facet. Parts are taken as they were before any was joined, whatever the order of edges.
     """
@@ -254,7 +254,7 @@ def _join_shells(surface, n_half_edges, part):
 
 @kernel
 def _count_fans(surface):
-    """Vertices in use, those at which fans touch, and the facets there."""
+    """Count vertices in use and vertices where fans touch; flag the facets at vertices where fans touch."""
     corners, flags, counts, n_fans = surface.corners, surface.flags, surface.counts, surface.per_vertex
     for v in range(surface.n_vertices):
         n_fans[v] = 0
@@ -285,7 +285,7 @@ def _number_shells(surface, shells):
 
 @kernel
 def _start(surface):
-    """Every facet in a class of its own; flags of those that are collapsed."""
+    """Every facet in a class of its own; flags of collapsed facets."""
     corners = surface.corners
     for f in range(surface.n):
         a = corners[3 * f]

@@ -39,7 +39,7 @@ class PointTree:
 
     def nearest(self, k: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """For all points, in chunks: their numbers (m,), and the squared distances (m, k) to their k nearest
-        others, ascending; infinite where there are not as many. Each point counts once for every row it has."""
+        others, ascending; infinite where others are fewer. A point counts once for every row with its coordinates."""
         if not 1 <= k <= MAX_NEIGHBOURS:
             raise ValueError(f"k must lie within 1 … {MAX_NEIGHBOURS}, got {k}")
         n = len(self.points)
@@ -73,9 +73,9 @@ def _swap(points, order, i, j):
 
 @kernel
 def _split_at(points, order, low, high, middle, axis):
-    """Order low … high − 1 so that those before ``middle`` lie no farther along the axis than those from it on.
+    """Order rows low … high − 1: rows before ``middle`` lie no farther along the axis than rows from ``middle`` on.
 
-    Hoare's selection; equal coordinates go to both sides, so that lattices do no harm.
+    Hoare's selection; equal coordinates go to both sides, so lattices do no harm.
     """
     high -= 1
     while low < high:

@@ -1,7 +1,7 @@
-"""The tree of a mesh that is a scaled copy: the same nodes, their boxes scaled and rounded outwards.
+"""The tree of a scaled copy of a mesh: the same nodes, their boxes scaled and rounded outwards.
 
-No facet is sorted again. A corner of the copy is a corner times the factor, rounded once, at most 2⁻⁵³ of itself off;
-so is the centre that boxes are relative to. What floats round is 2⁻²⁴ of a box's centre and half length.
+No facet is sorted again. A corner of the copy is a corner times the factor, rounded once, by at most 2⁻⁵³ of itself;
+so is the centre that boxes are relative to. Floats round 2⁻²⁴ of a box's centre and half length.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collide.mesh.fine_boxes import with_origins
 
 
 def scaled_tree(tree: MeshTree, vertices: np.ndarray, faces: np.ndarray, factor: float) -> MeshTree:
-    """The tree over faces (m, 3) of ``vertices`` (n, 3), which are those of ``tree`` times ``factor`` > 0, rounded.
+    """The tree over faces (m, 3) of ``vertices`` (n, 3), the vertices of ``tree`` times ``factor`` > 0, rounded.
 
     By a power of two nothing is rounded, and the nodes are the same array. O(m), without sorting.
     """

@@ -1,8 +1,8 @@
 """Which shells with a negative volume are cavities, and which are inside out: exact winding numbers.
 
-A shell that runs the wrong way round is the wall of a cavity where everything else winds around it at
-least once, and inside out where it does not. Rays are cast from one of its points in fixed directions, in
-doubles with an error bound, and in integers for the facets where that leaves a sign open.
+A shell of negative volume is the wall of a cavity where all else winds around the shell at least
+once, and otherwise inside out. Rays are cast from a point of the shell in fixed directions, in doubles
+with an error bound, and in integers for facets where the bound leaves a sign open.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _DIGITS = 17 * 86
 
 
 class _Parts(NamedTuple):
-    """Facets by shell, those of none behind all.   shell_of : of each.   order, starts, items : `order_by_key`."""
+    """Facets by shell, facets without a shell last.   shell_of : of each.   order, starts, items : `order_by_key`."""
 
     shell_of: Any
     order: Any
@@ -43,9 +43,9 @@ class _Nesting(NamedTuple):
     """A closed surface of n points, and what is found out about its shells: views.
 
     points, scaled : as they are, and times a power of two.   low, high : boxes of shells.
-    owner, shared : by point, a shell, and whether there are several: such lie on other shells' facets, so rays from
+    owner, shared : by point, a shell, and whether the point has several: points on other shells' facets, so rays from
         them decide nothing.   gathered : facets of shells whose boxes meet a point.
-    ambiguous : facets that doubles leave undecided.   row : the points in whose middle a ray begins.
+    ambiguous : facets left undecided by doubles.   row : the points in whose middle a ray begins.
     ray : `_cast_ray`.   digits : workspace.
     """
 
@@ -96,11 +96,11 @@ def shells_memory(n, n_facets, n_shells):
 def judge_shells(points_at, n, corners_at, n_facets, shells_at, n_shells, volumes_at, signs_at, wrong_at, memory_at):
     """Volumes of the shells of a closed surface of n points, their exact signs, and which shells are inside out.
 
-    shells : (f,) int32 of each facet, −1 for none.   volumes : (n_shells,) doubles out, in the unit of length cubed.
-    signs, wrong : (n_shells,) int32 out; wrong is 1 of shells of negative volume that are not the wall of a cavity.
+    shells : (f,) int32 of each facet, −1 without one.   volumes : (n_shells,) doubles out, in the unit of length cubed.
+    signs, wrong : (n_shells,) int32 out; wrong is 1 of shells of negative volume but for walls of cavities.
     memory : as many bytes as `shells_memory` says.
 
-    Shells are taken not to cross each other; then one point of each decides. A shell none of whose points is clear of
+    Shells are taken not to cross each other; then a single point of each decides. A shell without a point clear of
     the others' facets counts as inside out.
     """
     nesting, _ = _nesting(points_at, n, corners_at, n_facets, signs_at, n_shells, memory_at)
@@ -189,7 +189,7 @@ def _is_cavity(nesting, shell):
 
 @kernel
 def _next_unshared(nesting, first, end, above):
-    """The least vertex above a number that some facets have and other shells have not; −1 where none is."""
+    """The least vertex above a number in places first … end − 1 of the order, in no other shell; −1 without."""
     least = -1
     for k in range(3 * first, 3 * end):
         vertex = nesting.corners[3 * nesting.parts.order[k // 3] + k % 3]
@@ -281,8 +281,8 @@ def _direction(k, axis):
 
 @kernel
 def _exact_signs(nesting, at, n_row):
-    """Seen from the middle of the first vertices of ``row``, in integers: on which side of each edge of a facet the ray
-    passes, and on which side of the facet the point lies.   at : where its corners stand among those gathered."""
+    """Seen from the middle of the first vertices of ``row``, in integers: the side of each edge of a facet where the
+    ray passes, and the side of the facet where the point lies.   at : place of its corners in ``gathered``."""
     points, facet, row, digits = nesting.points, nesting.gathered, nesting.row, nesting.digits
     lowest = 2000
     highest = -2000
@@ -319,7 +319,7 @@ def _sign_of_determinant(digits, u, v, w, n):
 
 @kernel
 def _proven_sign(u, v, w, slack_u, slack):
-    """Sign of the determinant of u, v, w, whose entries are off by the slacks at most; 0 where that leaves it open."""
+    """Sign of the determinant of u, v, w, whose entries are off by the slacks at most; 0 where these leave doubt."""
     value = dot(u, cross(v, w))
     size = permanent(u, v, w)
     margin = _ERROR * size + _UNDERFLOW
@@ -338,10 +338,10 @@ def _widened(a, slack):
 
 @kernel
 def _cast_ray(points, corners, n_facets, ray, ambiguous):
-    """(how many facets are undecided, those that a ray certainly passes, +1 outwards and −1 inwards).
+    """(how many facets are undecided, the sum over facets the ray certainly passes of +1 outwards and −1 inwards).
 
-    ray : eight doubles: the sum of some points, the direction, how many points, and how far that sum may be off.
-    ambiguous : (n_facets,) out, which.
+    ray : eight doubles: the sum of some points, the direction, how many points, and how far their sum may be off.
+    ambiguous : (n_facets,) out, the undecided facets.
     """
     start = vec3_at(ray, 0)
     d = vec3_at(ray, 3)

@@ -1,6 +1,6 @@
-"""The volume of each shell, its sign proven, and which facets have no area.
+"""The volume of each shell, its sign proven, and the facets without area.
 
-Both are computed in doubles with an error bound, and in integers where that leaves a sign open.
+Both are computed in doubles with an error bound, and in integers where the bound leaves a sign open.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ class Triangle(NamedTuple):
 
 @kernel(inline=True)
 def triangle_at(values, at):
-    """Three corners that stand one after another."""
+    """Three corners stored in sequence."""
     return Triangle(vec3_at(values, at), vec3_at(values, at + 3), vec3_at(values, at + 6))
 
 

@@ -19,7 +19,7 @@ def find(parent, k):
 
 @kernel
 def union(parent, i, j):
-    """Make one class of those of i and j."""
+    """Merge the classes of i and j."""
     i = find(parent, i)
     j = find(parent, j)
     if i < j:
@@ -42,9 +42,9 @@ def find_with_parity(parent, parity, k):
 
 @kernel
 def union_with_parity(parent, parity, i, j, against):
-    """Make one class of those of i and j, whose parities differ (against = 1) or not (0).
+    """Merge the classes of i and j, whose parities differ (against = 1) or not (0).
 
-    Returns False where they already are in one class that contradicts this.
+    Returns False where i and j already share a class with parities in contradiction to ``against``.
     """
     i, parity_i = find_with_parity(parent, parity, i)
     j, parity_j = find_with_parity(parent, parity, j)

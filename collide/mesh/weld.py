@@ -1,6 +1,6 @@
 """Vertices with equal coordinates: files such as STL name each vertex once for every facet.
 
-Coordinates are compared as numbers, exactly, without a tolerance: vertices that the file keeps apart stay apart.
+Coordinates are compared as numbers, exactly, without a tolerance: vertices kept apart by the file stay apart.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _MULTIPLIER = 0x2C1B3C6D
 
 
 def weld(vertices: np.ndarray) -> np.ndarray:
-    """(n,) int32: for every vertex the first row with the same coordinates, itself where there is none before.
+    """(n,) int32: for every vertex the first row with the same coordinates, its own row without an earlier.
 
     vertices : (n, 3) finite; −0.0 and 0.0 are one number. O(n).
     """

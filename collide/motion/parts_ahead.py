@@ -63,7 +63,8 @@ class Spans:
 
 
 def balls_meet(A: CompoundParts, B: CompoundParts, motions: Motions, n: int) -> np.ndarray:
-    """(n,) bool: in which of n motions balls about the origins of two unions meet; there alone `parts_ahead` has any.
+    """(n,) bool: in which of n motions balls about the origins of two unions meet; `parts_ahead` is empty in all
+    others.
 
     About a microsecond a motion.
     """

@@ -45,9 +45,9 @@ def describe_span(motion_at, begin, end, work_at, out_at):
 
 @entry("int64(int64, int64, int64, int64, int64, int64)")
 def balls_meet_in_motion(motion_at, steps_at, n, work_at, header_at, met_at):
-    """Write n bytes, 0 of motions in which balls about both bodies' origins never meet; returns 0.
+    """Write n bytes, 0 for motions where balls about both bodies' origins never meet; returns 0.
 
-    motion : HEADER addresses, of the first motion.   steps : HEADER bytes from one motion to the next.
+    motion : HEADER addresses, of the first motion.   steps : HEADER bytes from each motion to the next.
     work : WORKSPACE + OUT doubles.   header : room for HEADER addresses.
     """
     motion, steps, header = view_i64(motion_at, HEADER), view_i64(steps_at, HEADER), view_i64(header_at, HEADER)

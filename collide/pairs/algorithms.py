@@ -1,6 +1,6 @@
 """Algorithms that a pair query may be asked for by name, in place of the default narrowphase.
 
-The core knows their names and where they are found, and imports none of them: a module is loaded when its algorithm is
+The core knows their names and where they are found, without importing them: a module is loaded when its algorithm is
 first asked for.
 """
 
@@ -23,9 +23,9 @@ _ALGORITHMS = {
 
 
 def named_algorithm(query: str, name: object) -> Callable | None:
-    """The function that answers a query by the algorithm of this name; None for the default.
+    """The function that answers a query by the algorithm of this name; ``None`` for the default.
 
-    Raises InvalidArgument, with the names to choose from, where the query has no such algorithm.
+    Raises InvalidArgument, with the names to choose from, where the query has no algorithm of this name.
     """
     if name is None or (isinstance(name, str) and name == DEFAULT):
         return None

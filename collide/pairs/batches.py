@@ -92,8 +92,8 @@ def answer_batch(
 
 
 def prepare_pair(A, B) -> bool:
-    """Make two shapes ready for single calls of `collide` and `distance`, and keep that with A: whether this has been
-    done now. Not of shapes that are batches of one, and of sequences."""
+    """Make two shapes ready for single calls of `collide` and `distance`, and keep the pair with A: whether this has
+    been done now. Never for sequences, and for shapes whose single calls are batches."""
     if not (isinstance(A, Shape) and isinstance(B, Shape) and single_calls_are_safe()):
         return False
     known = prepared_pair(A, B)
@@ -114,12 +114,12 @@ def _of_one_pair(A: Picked, B: Picked) -> np.ndarray:
 
 
 def _pairs_together(A, B) -> np.ndarray | None:
-    """(n,) numbers of the poses, those of the same two shapes one after another; None where all are of one pair."""
+    """(n,) numbers of the poses, grouped by pairs of shapes; ``None`` where all poses are of the same pair."""
     return np.argsort(A.rows * len(A.shape_set) + B.rows, kind="stable") if isinstance(A, Picked) else None
 
 
 def of_one_set(A, B, n: int):
-    """Shapes of which one side or both are sequences, as picked from one set."""
+    """Shapes, on either side or both in sequences, as picked from a single set."""
     if isinstance(A, Picked) and isinstance(B, Picked) and A.shape_set is B.shape_set:
         return A, B
     shapes, rows_a, rows_b = distinct_shapes(A, B, n)
@@ -173,7 +173,7 @@ def _answer_into(out: np.ndarray, A, B, X_WA, X_WB, question: Question, answer: 
 
 
 def _answer_pair_by_pair(out: np.ndarray, A: Picked, B: Picked, X_WA, X_WB, question: Question) -> None:
-    """The same for shapes of which some are meshes, checked poses: each distinct pair that asks for it is one batch."""
+    """The same for shapes with meshes among them, checked poses: a batch for each distinct pair in need of its own."""
     X_WA, X_WB = (np.broadcast_to(X, (len(out), 4, 4)) for X in (X_WA, X_WB))
     keys = np.where(_of_one_pair(A, B), A.rows * len(A.shape_set) + B.rows, -1)
     for key in np.unique(keys).tolist():

@@ -21,7 +21,7 @@ def asked_poses(A, B, X_WA, X_WB) -> tuple[np.ndarray, np.ndarray, bool]:
 def matched_counts(A, B, counts: dict[str, int]) -> tuple[int, bool]:
     """(the length of a batch, whether A and B are two shapes), of checked shapes and arguments of these lengths.
 
-    counts : by name; single arguments, of length 1, go with all of the others.   A, B : None where there are none.
+    counts : by name; single arguments, of length 1, go with all of the others.   A, B : ``None`` without shapes.
     Raises InvalidArgument where lengths do not match, whatever arguments have them.
     """
     single = True
@@ -45,7 +45,7 @@ def matched_length(counts: dict[str, int]) -> int:
 
 
 def _is_sequence(side) -> bool:
-    """Whether it is shapes, one a pose."""
+    """Whether a side is a sequence of shapes, a shape for each pose."""
     return isinstance(side, Picked) or (
         isinstance(side, (list, tuple)) and all(isinstance(shape, Shape) for shape in side)
     )

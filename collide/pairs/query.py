@@ -61,25 +61,25 @@ def collide(
     Parameters
     ----------
     A, B : Shape, or sequence of Shape
-        Two shapes; or, one a pose, sequences of shapes (a list, or picked from a `ShapeSet`): X_WA and X_WB are then
-        batches of that length.
+        Two shapes; or, a shape for each pose, sequences of shapes (a list, or picked from a `ShapeSet`): X_WA and X_WB
+        are then batches of this length.
     X_WA, X_WB : (4, 4) or (N, 4, 4) array_like, float64
         Poses of A and B in the world W [m]; a single pose goes with every pose of the other's batch. ``(R, t)`` tuples
         and scipy's rotations are accepted (`transforms.as_poses`).
     security_margin : float
         [m], ≥ 0, finite: bodies at most so far apart count as hits, too. Decided by the proven bracket of the distance,
-        and where the margin lies within it by growing one body (`security_margin.py`): exactly between polytopes and
-        balls swept over them. Goes with neither axes nor algorithm, and costs what `distance` does.
+        and where the margin lies within the bracket by growing a body (`security_margin.py`): exactly between polytopes
+        and balls swept over them. Goes with neither axes nor algorithm, and costs what `distance` does.
     check_poses : bool
         Refuse matrices that are no rotation.
     threads : int
         Answer a batch in at most so many threads; the answers are the same bits.
     axes : (N, 3) float64, optional
-        Warm start: for each pose an axis that may separate the bodies, zeros where none is known. Tried first, and
-        replaced where the bodies are apart by an axis that does: hand the same array to the next call, when they have
-        moved a little. It can only save time; answers are the same.
+        Warm start: for each pose an axis that may separate the bodies, zeros where unknown. Tried first, and replaced,
+        where the bodies are apart, by a separating axis: hand the same array to the next call, when the bodies have
+        moved a little. Warm starts can only save time; answers are the same.
     algorithm : str, optional
-        "gjk" (or None), the default; or "barba-langerman", for two convex polytopes and one thread: the walk along
+        "gjk" (or ``None``), the default; or "barba-langerman", for two convex polytopes and one thread: the walk along
         bounded hierarchies, in O(log n + log m) rounds (docs/barba-langerman.md). The answers are the same; the default
         is faster. The hierarchies are built when first needed, and kept with the shapes.
 
@@ -190,17 +190,16 @@ def distance(
     X_WA, X_WB : (4, 4) or (N, 4, 4) array_like, float64
         Poses of A and B in the world W [m], as of `collide`.
     max_distance : float
-        [m], ≥ 0. Beyond it only a proven lower bound is computed, and ``beyond`` is set.
+        [m], ≥ 0. Beyond this distance only a proven lower bound is computed, and ``beyond`` is set.
     signed : bool
-        False where gaps are all that is wanted: bodies that meet are then at distance 0, with a zero normal and a
-        bracket that is 0, too, unless the sign is open. Depths are not computed, which saves most of the time of
-        overlapping pairs.
+        False where only gaps are wanted: bodies that meet are then at distance 0, with a zero normal and a bracket of
+        0, too, unless the sign is open. Depths are not computed, to save most of the time of overlapping pairs.
     check_poses, threads
         As of `collide`.
     algorithm : str, optional
-        "gjk" (or None), the default; or "dobkin-kirkpatrick", for two convex polytopes, one thread and no max_distance:
-        gaps are found down bounded hierarchies, and settled in integers. The same numbers to their last digit, and
-        slower (docs/barba-langerman.md).
+        "gjk" (or ``None``), the default; or "dobkin-kirkpatrick", for two convex polytopes, one thread and no
+        max_distance: gaps are found down bounded hierarchies, and settled in integers. The same numbers to their last
+        digit, and slower (docs/barba-langerman.md).
 
     Returns
     -------
@@ -210,7 +209,7 @@ def distance(
     Raises
     ------
     InvalidArgument
-        As of `collide`, and for a max_distance that is negative or NaN.
+        As of `collide`, and for a negative or NaN max_distance.
     InvalidPose
         Naming the pose of the batch that is no rigid transform.
     UnsupportedQuery
@@ -219,11 +218,11 @@ def distance(
     Notes
     -----
     GJK for gaps, their last digits in double-doubles; EPA (van den Bergen 2001) for depths. Where a body is not convex,
-    an overlap is minus the length of a translation that is proven to separate the bodies, found by some hundred
-    booleans, which ``signed=False`` leaves out; each ends at the first two facets that meet, or are as near as the
-    radii. Gaps of meshes of n and m facets take few boxes where one pair of facets is nearest, O(n + m) where all are
-    as near as each other within rounding, n·m at worst. Of unions of m and k parts, a mesh among them, each boolean
-    compares all m·k pairs of boxes, and asks about those that overlap or come as near as the nearest parts are. Curved
+    an overlap is minus the length of a translation proven to separate the bodies, found by some hundred booleans,
+    left out with ``signed=False``; each ends at the first two facets that meet, or are as near as the
+    radii. Gaps of meshes of n and m facets take few boxes where a single pair of facets is nearest, O(n + m) where all
+    are as near as each other within rounding, n·m at worst. Of unions of m and k parts, a mesh among them, each boolean
+    compares all m·k pairs of boxes, and asks about pairs that overlap or come as near as the nearest parts are. Curved
     shapes within a mesh of n facets take O(n) where all its facets are near.
     """
     limit = checks.limit("max_distance", max_distance)

@@ -37,9 +37,9 @@ def checked_margin(name: str, value) -> float:
 
 
 def within(rows: np.ndarray, margin: float, pair: Callable[[int], Pair]) -> np.ndarray:
-    """bool[n]: which pairs of rows, asked up to a distance of at least ``margin`` [m], are at most that far apart.
+    """bool[n]: whether pairs of rows, asked up to a distance of at least ``margin`` [m], are at most ``margin`` apart.
 
-    pair : the question of row k; asked for those that their bracket leaves open.
+    pair : the question of row k; called for rows left open by their bracket.
     """
     near = rows["hit"] | (rows["lower"] <= margin)
     for k in np.flatnonzero(near & ~rows["hit"] & (rows["upper"] > margin)).tolist():
@@ -56,10 +56,10 @@ def _meets_grown(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin:
 
 
 def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
-    """Two shapes that meet exactly where A and B are within the margin; None where they are not to be had.
+    """Two shapes that meet exactly where A and B are within the margin; ``None`` where they are not to be had.
 
-    Of two swept sets of points only the sum of the radii counts, which two doubles nearly always hold. A half-space
-    stays.
+    Of two swept sets of points only the sum of the radii counts, nearly always the exact sum of two doubles. A
+    half-space stays.
     """
     if A.is_region or B.is_region:
         return _grown_beside_region(A, B, margin)

@@ -21,17 +21,17 @@ class Compound(Shape):
     Raises
     ------
     InvalidShape
-        Where items are no pairs that begin with a shape, or there are none.
+        Where items are empty, or not pairs with a shape first.
     InvalidPose
-        Where a pose is not one (4, 4) rigid transform.
+        Where a pose is not a single (4, 4) rigid transform.
 
     Notes
     -----
     Nested poses are multiplied out in float64, and every bracket accounts for the rounding. Against a convex shape or
-    another compound only pairs of parts that come near are tested: a compound costs about as much as its parts one by
-    one where it has two, and less the more it has. Making one of k parts, and its first query, are O(k log k). Balls
+    another compound only pairs of nearby parts are tested: a compound of two parts costs about as much as the parts one
+    by one, a compound of more parts less. Making a compound of k parts, and its first query, are O(k log k). Balls
     around whole bodies leave far poses out of contacts, casts and times of impact; balls around groups of 16 parts, and
-    then those of the parts, find the pairs that count.
+    then around the parts, find the pairs to test.
     """
 
     __slots__ = ("items", "meshed")
@@ -65,7 +65,7 @@ class Compound(Shape):
 
 
 def _all_checked(pairs: list) -> tuple[tuple[Shape, np.ndarray], ...] | None:
-    """The items, their matrices checked together; None where one of them has to be looked at alone."""
+    """The items, their matrices checked together; ``None`` where an item has to be checked alone."""
     for shape, X in pairs:
         if not isinstance(shape, Shape) or shape.is_region:
             return None

@@ -30,7 +30,7 @@ class ConvexHull(Shape):
     Parameters
     ----------
     points : (n, 3) array_like, float64
-        In any order, in the frame of the shape [m]: a solid, a flat or a straight set, one point. Points that are
+        In any order, in the frame of the shape [m]: a solid, a flat or a straight set, a single point. Points that are
         doubled, collinear, coplanar or inside change nothing.
     faces : (m, 3) array_like of int, optional
         Rows of ``points``. The set does not depend on them: they are checked for shape and range here, and by
@@ -41,15 +41,15 @@ class ConvexHull(Shape):
     Raises
     ------
     InvalidShape
-        Where points are missing, not finite or out of range, faces name points that are not there, or the radius is
+        Where points are missing, not finite or out of range, faces name rows beyond ``points``, or the radius is
         negative.
 
     Notes
     -----
-    Ids in results are rows of ``points`` as given. From 224 points on, a hull gets a support tree, which
-    finds the extreme vertex in O(log n); it is built when a query first needs it (4 to 6 µs a point) and kept with the
-    shape. Files and pickles hold the points alone: proofs rest on the tree, so it is built from them and never
-    believed.
+    Ids in results are rows of ``points`` as given. From 224 points on, a support tree finds the extreme vertex in
+    O(log n). The tree is built when a query first needs it (4 to 6 µs a point) and kept with the
+    shape. Files and pickles hold the points alone: proofs rest on the tree, so a tree is built from the points and
+    never believed.
     """
 
     __slots__ = ("_hull", "faces", "points", "radius")
@@ -100,7 +100,7 @@ class ConvexHull(Shape):
         Raises
         ------
         InvalidShape
-            With the defect and where it is.
+            With the defect and its place.
         """
         given_surface = self.hull._replace(facets=self.faces) if self.faces is not None else None
         for what, surface in (("hull", self.hull), ("faces", given_surface)):
@@ -120,7 +120,7 @@ class ConvexHull(Shape):
         Parameters
         ----------
         path : str or Path
-            The file, ending in ``.npz`` or without a suffix; one that exists is replaced, by all of the new file or
+            The file, ending in ``.npz`` or without a suffix; an existing file is replaced, by all of the new file or
             not at all.
 
         Raises
@@ -135,7 +135,7 @@ class ConvexHull(Shape):
 
     @classmethod
     def load(cls, path) -> ConvexHull:
-        """A hull from a file that `save` wrote.
+        """A hull from a file written by `save`.
 
         Parameters
         ----------
@@ -145,12 +145,12 @@ class ConvexHull(Shape):
         Returns
         -------
         ConvexHull
-            Equal to the one that was saved.
+            Equal to the saved hull.
 
         Raises
         ------
         InvalidShape
-            Where the file is another one, or damaged.
+            Where the file is of another kind, or damaged.
         """
         arrays = read_arrays("ConvexHull", path, _FILE_FORMAT, _FILE_FIELDS, "tree_")
         try:

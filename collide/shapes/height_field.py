@@ -26,12 +26,12 @@ if not TYPE_CHECKING:
 
 
 class GridCells(NamedTuple):
-    """Cells of a `HeightField` that facets lie in: three arrays of one shape, or three integers for one facet.
+    """Cells of a `HeightField` around facets: three arrays of the same shape, or three integers for a single facet.
 
     row, column : of the cell, whose corners are the grid points ``heights[row : row + 2, column : column + 2]``.
     triangle : 0 on the side of greater x, between the grid points (row, column), (row, column + 1) and
         (row + 1, column + 1); 1 on the side of greater y.
-    All three are −1 for facets of walls and bottom, and for −1, by which results say that there is no facet.
+    All three are −1 for facets of walls and bottom, and for −1, the sign of results for no facet.
     """
 
     row: Any
@@ -49,28 +49,29 @@ class HeightField(Mesh):
         as ``numpy.meshgrid(x, y)`` lays them out: ``heights[i, j]`` is at x = (j − (c − 1)/2)·dx,
         y = (i − (r − 1)/2)·dy, and the field's middle at x = y = 0.
     cell : float or (2,) array_like, float64
-        Sides of a cell [m], > 0: of a square one, or (dx, dy).
+        Sides of a cell [m], > 0: of a square cell, or (dx, dy).
     bottom : float, optional
-        z of the bottom [m], below all heights. By default it lies below the lowest height by as much as heights differ
-        and the longer side of the field together: a body that is no taller than the field is wide and reaches up to
-        the lowest height has its shorter way out upwards.
+        z of the bottom [m], below all heights. By default the bottom lies below the lowest height by as much as heights
+        differ and the longer side of the field together: a body no taller than the field is wide, and reaching up to
+        the lowest height, has its shorter way out upwards.
 
     Raises
     ------
     InvalidShape
-        For heights that are not finite, out of range, fewer than 2 × 2 or more than a box-tree holds (2²⁸ facets);
-        cells that are not above 0; a bottom that is not below all heights.
+        For heights not finite, out of range, fewer than 2 × 2 or more than a box-tree holds (2²⁸ facets);
+        cells not above 0; a bottom not below all heights.
 
     Notes
     -----
-    It is a solid `Mesh`, and whatever answers for meshes answers for it: ``vertices``, ``faces`` and ``tree`` are those
-    of its surface. Each cell is two triangles, cut from the grid point (i, j) to (i + 1, j + 1); between grid points
-    the surface is that of the triangles, z no rounded interpolation. Facet 2·(i·(c − 1) + j) + t is triangle t of cell
-    (i, j); walls and bottom follow (`cells_of` tells them apart). Vertex i·c + j is the grid point (i, j).
+    A height field is a solid `Mesh`, and every query for meshes takes height fields: ``vertices``, ``faces`` and
+    ``tree`` describe the surface. Each cell is two triangles, cut from the grid point (i, j) to (i + 1, j + 1); between
+    grid points the surface is the triangles themselves, z no rounded interpolation. Facet 2·(i·(c − 1) + j) + t is
+    triangle t of cell (i, j); walls and bottom follow (`cells_of` tells them apart). Vertex i·c + j is the grid point
+    (i, j).
 
     The surface closes by construction, so nothing is welded and no edge is looked for: O(r c), 0.15 µs a facet. Its
     box-tree is built when a query first needs it and costs ten times as much: seconds for a million cells. Files and
-    pickles hold heights, cell and bottom alone. `scaled` copies are meshes; their facets are numbered as those of their
+    pickles hold heights, cell and bottom alone. `scaled` copies are meshes; their facets are numbered as in their
     ``base``.
     """
 
@@ -104,7 +105,7 @@ class HeightField(Mesh):
         Parameters
         ----------
         facets : int or array_like of int
-            Numbers of facets, as results name them; −1 stands for none.
+            Numbers of facets, as results name them; −1 stands for no facet.
 
         Returns
         -------
@@ -139,7 +140,7 @@ class HeightField(Mesh):
         Parameters
         ----------
         path : str or Path
-            The file, ending in ``.npz`` or without a suffix; one that exists is replaced, by all of the new file or
+            The file, ending in ``.npz`` or without a suffix; an existing file is replaced, by all of the new file or
             not at all.
 
         Raises
@@ -152,7 +153,7 @@ class HeightField(Mesh):
 
     @classmethod
     def load(cls, path) -> HeightField:
-        """A height field from a file that `save` wrote.
+        """A height field from a file written by `save`.
 
         Parameters
         ----------
@@ -162,12 +163,12 @@ class HeightField(Mesh):
         Returns
         -------
         HeightField
-            Equal to the one that was saved.
+            Equal to the saved height field.
 
         Raises
         ------
         InvalidShape
-            Where the file is another one, or damaged, or tells of no height field.
+            Where the file is of another kind, or damaged, or describes no height field.
         """
         arrays = read_arrays("HeightField", path, _FILE_FORMAT, _FILE_FIELDS, "tree_")
         try:
@@ -212,7 +213,7 @@ def _check_cell(cell) -> np.ndarray:
 
 
 def _grid_line(n: int, side: float, name: str) -> np.ndarray:
-    """Coordinates (n,) of grid points along one axis, each rounded once, so that the two halves mirror each other."""
+    """Coordinates (n,) of grid points along an axis, each rounded once, so the two halves mirror each other."""
     places = 0.5 * (np.arange(1 - n, n, 2) * side)
     if not places[-1] <= LARGEST:
         raise InvalidShape(
@@ -251,10 +252,10 @@ def _check_bottom(bottom, heights: np.ndarray, x: np.ndarray, y: np.ndarray) -> 
 
 
 def _closed_surface(x: np.ndarray, y: np.ndarray, heights: np.ndarray, bottom: float) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and faces (m, 3), read-only: grid points and cells, then walls, then a fan that is the bottom.
+    """Vertices (n, 3) and faces (m, 3), read-only: grid points and cells, then walls, then the fan of the bottom.
 
-    Every point of the rim has one below it, so that walls are two triangles an edge and vertical in doubles; the bottom
-    is a fan around the point below the middle, which is on no edge of the rim.
+    Every point of the rim has a point below, so walls are two triangles an edge and vertical in doubles; the bottom
+    is a fan around the point below the middle, on no edge of the rim.
     """
     row_count, columns = heights.shape
     n = row_count * columns

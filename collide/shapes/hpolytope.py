@@ -40,7 +40,7 @@ class HPolytope(Shape):
     offsets : (m,) array_like, float64
         In the units of normals·x: metres, where normals have length 1.
     bounded : bool
-        True: refused where it has no end; its corners are found now. False: a region that may have none, kept as the
+        True: an unbounded set is refused; corners are found now. False: a region, bounded or not, kept as the
         planes given: frusta, corridors, workspace limits (docs/polytopes.md, "Regions in scenes").
 
     Raises
@@ -52,12 +52,12 @@ class HPolytope(Shape):
     Notes
     -----
     Bounded: the vertices are found exactly, by double description in integers (Motzkin, Raiffa, Thompson and Thrall
-    1953), and rounded once to float64; ``vertices`` (v, 3) holds them, and every bracket counts that rounding in. About
-    O(m v²) integer operations: meant for m up to a few hundred.
+    1953), and rounded once to float64; ``vertices`` (v, 3) holds them, and every bracket counts their rounding in.
+    About O(m v²) integer operations: meant for m up to a few hundred.
 
-    Otherwise an exact least-distance program says whether there is a point in it, in O(m) for each of a few rounds:
+    Otherwise an exact least-distance program decides whether the region has a point, in O(m) for each of a few rounds:
     0.1 s for 100,000 half-spaces. ``boundary_within`` [m] is how far the boundary is from the frame's origin, at most.
-    It has no ``vertices``: a pair query closes it by a box that is proven to change nothing
+    A region has no ``vertices``: a pair query closes the region by a box proven to change nothing
     (`lowering/closed_regions.py`).
     """
 
@@ -114,7 +114,7 @@ class HPolytope(Shape):
         Returns
         -------
         HPolytope
-            Its ``vertices`` within ``slop`` [m] of those of the planes as given.
+            Its ``vertices`` within ``slop`` [m] of the corners of the planes as given.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The facets of a mesh cut until it is local: what `Mesh.localised` refuses, and what it makes."""
+"""The facets of a mesh cut until the mesh is local: what `Mesh.localised` refuses, and makes."""
 
 from __future__ import annotations
 

@@ -52,14 +52,14 @@ class Mesh(Shape):
     Parameters
     ----------
     vertices : (n, 3) array_like, float64, or an object with ``vertices`` and ``faces``
-        [m], in the frame of the shape. Equal ones are welded, so that the loose triangles of an STL close; some may be
+        [m], in the frame of the shape. Equal vertices are welded, so the loose triangles of an STL close; some may be
         unused. With no ``faces``, an object such as a trimesh.Trimesh.
     faces : (m, 3) array_like of int
         Rows of ``vertices``, counter-clockwise seen from outside.
     solid : bool, optional
-        None takes a mesh that closes as a solid and any other as a surface: ``mesh.solid`` says which, ``mesh.report``
-        why. True insists: a mesh without an inside is refused, with its defects and facet numbers. False takes the
-        surface alone.
+        ``None`` takes a mesh that closes as a solid and any other as a surface: ``mesh.solid`` says which,
+        ``mesh.report`` why. True insists: a mesh without an inside is refused, with its defects and facet numbers.
+        False takes the surface alone.
 
     Raises
     ------
@@ -69,10 +69,10 @@ class Mesh(Shape):
 
     Notes
     -----
-    A **solid** is its facets and all points around which they wind once or more: parts may overlap, and a part that
-    runs the other way round within another is a cavity. A **surface** is its facets. Facets need not be manifold for
-    that: every edge must be run along as often one way as the other. Whether the facets of a solid cross each other is
-    not checked here (`collide.self_collisions`).
+    A **solid** is its facets and all points around which they wind once or more: parts may overlap, and a part of
+    opposite orientation within another is a cavity. A **surface** is its facets. Facets of a solid need not be
+    manifold: every edge must be run along as often forwards as backwards. Whether the facets of a solid cross each
+    other is not checked here (`collide.self_collisions`).
 
     Ids in results are rows of ``faces``, as given. Surveying a mesh takes about 0.3 µs a facet; its box-tree (`tree`)
     is built when a query first needs it (about 0.6 µs a facet) and kept. Files and pickles hold vertices, faces and the
@@ -110,12 +110,12 @@ class Mesh(Shape):
 
     @classmethod
     def _from_fields(cls, vertices, faces, solid, scale) -> Mesh:
-        """The mesh that a pickle or a file tells of: what it says is a solid must be one."""
+        """The mesh of a pickle or a file: a mesh stored as a solid must be a solid."""
         return cls(vertices, faces, solid=bool(solid)).scaled(scale)
 
     @classmethod
     def _known(cls, vertices, faces, solid: bool) -> Mesh:
-        """A mesh whose ``solid`` a cache knows: it is surveyed again when a query first needs that."""
+        """A mesh whose ``solid`` a cache knows: surveyed again when a query first needs the survey."""
         made = cls(vertices, faces, solid=False)
         made._store(solid=bool(solid))
         return made
@@ -149,7 +149,7 @@ class Mesh(Shape):
 
     @property
     def base(self) -> Mesh:
-        """The mesh that this one is a scaled copy of, and whose search tree it shares; itself where it is none."""
+        """The original of a scaled copy, whose search tree the copy shares; the mesh itself where not a copy."""
         return self if self._copied is None else self._copied
 
     @property
@@ -231,7 +231,7 @@ class Mesh(Shape):
     def localised(
         self, stretch: float = 10.0, order: int = 1, *, max_facets: int = 200_000, progress=None
     ) -> LocalisedMesh:
-        """The same solid or surface with facets cut until it is local: no σ_order exceeds ``stretch``.
+        """The same solid or surface with facets cut until the mesh is local: no σ_order exceeds ``stretch``.
 
         Parameters
         ----------
@@ -240,22 +240,22 @@ class Mesh(Shape):
         order : int
             1 … 10: which σ_k is bounded. From 2 on some vertices may nearly coincide, and fewer cuts are needed.
         max_facets : int
-            More are not made. How many it would take is estimated before the first cut.
+            More are not made. The number needed is estimated before the first cut.
         progress : callable, optional
             Called with a label, gives a context manager; for long work.
 
         Returns
         -------
         LocalisedMesh
-            The mesh, of every facet the old one that it is part of, how far rounding moved the farthest new vertex, and
-            the locality before and after. An edge that is cut is cut for all its facets: what closes still closes, and
+            The mesh, for every facet the old facet around it, how far rounding moved the farthest new vertex, and
+            the locality before and after. An edge is cut for all its facets: what closes still closes, and
             what is solid is solid. Facets with two equal corners are left out.
 
         Raises
         ------
         InvalidArgument
             For arguments out of range; where more than ``max_facets`` would be needed, with the number; where edges
-            crowd so that vertices come ever nearer to each other, with facet and vertex.
+            crowd and vertices come ever nearer to each other, with facet and vertex.
         InvalidShape
             Where no facet has three distinct corners.
 
@@ -276,15 +276,15 @@ class Mesh(Shape):
         return LocalisedMesh(made, source, moved, before, made.locality(progress=progress))
 
     def save(self, path) -> None:
-        """Write the mesh to a file: all of it as ``.npz``, or its triangles in a form that other programs read.
+        """Write the mesh to a file: whole as ``.npz``, or its triangles in a form for other programs.
 
         Parameters
         ----------
         path : str or Path
             The file. ``.npz``, or no suffix: vertices, faces, ``solid`` and ``scale``, which `load` reads. ``.ply``,
             ``.obj`` and ``.stl``: the triangles, which ``collide.scenes.load`` reads as the same doubles; STL is
-            binary where its numbers of 32 bits are the coordinates, else text. A file that exists is replaced, by all
-            of the new one or not at all.
+            binary where its numbers of 32 bits are the coordinates, else text. An existing file is replaced, by all
+            of the new file or not at all.
 
         Raises
         ------
@@ -302,7 +302,7 @@ class Mesh(Shape):
 
     @classmethod
     def load(cls, path) -> Mesh:
-        """A mesh from a file that `save` wrote.
+        """A mesh from a file written by `save`.
 
         Parameters
         ----------
@@ -312,12 +312,12 @@ class Mesh(Shape):
         Returns
         -------
         Mesh
-            Equal to the one that was saved.
+            Equal to the saved mesh.
 
         Raises
         ------
         InvalidShape
-            Where the file is another one, or damaged, or says solid of a mesh that has no inside.
+            Where the file is of another kind, or damaged, or says solid of a mesh without an inside.
         """
         arrays = read_arrays("Mesh", path, _FILE_FORMAT, _FILE_FIELDS, "mesh_")
         try:
@@ -338,7 +338,7 @@ _FILE_FIELDS = {
 
 
 def _what_spoils(vertices: int, survey: Survey) -> str:
-    """Why a mesh of so many vertices is no solid, in words; empty where it is one."""
+    """Why a mesh of so many vertices is no solid, in words; empty for a solid."""
     report = make_report(vertices, True, survey)
     spoilt = [str(defect) for defect in report.defects if defect.spoils] or (
         [] if survey.edges else ["no facet has three distinct corners"]
@@ -350,7 +350,7 @@ def _what_spoils(vertices: int, survey: Survey) -> str:
 
 
 def _vertices_and_faces(mesh) -> tuple[ArrayLike, ArrayLike]:
-    """Of an object that has them, such as a trimesh.Trimesh."""
+    """Vertices and faces of an object, for example of a trimesh.Trimesh."""
     try:
         return mesh.vertices, mesh.faces
     except AttributeError:
@@ -382,10 +382,10 @@ def _check_faces(faces, n: int) -> np.ndarray:
 class LocalisedMesh(NamedTuple):
     """What `Mesh.localised` returns.
 
-    mesh : the same solid or surface, a `Mesh`. Its first vertices are those of the mesh that was localised, row by row.
-    source_facets : (k,) int64, of every facet of ``mesh`` the row of the old facet that it is part of.
-    moved : no new vertex is farther than this from the point of its old facet (on an old edge: of that edge) that it
-        stands for, by rounding to doubles [the unit of the mesh]; 0 where all of them lie there exactly.
+    mesh : the same solid or surface, a `Mesh`. Its first vertices are the vertices of the old mesh, row by row.
+    source_facets : (k,) int64, for every facet of ``mesh`` the row of the old facet around it.
+    moved : upper bound of the distances of new vertices from their exact points in old facets (on an old edge: in the
+        edge), by rounding to doubles [the unit of the mesh]; 0 where all of them are exact.
     before, after : `Locality` of both.
     """
 

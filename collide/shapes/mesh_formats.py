@@ -16,9 +16,9 @@ _PLY_FACE = np.dtype([("count", "u1"), ("ids", "<i4", 3)])
 def write_triangles(path, vertices: np.ndarray, faces: np.ndarray, suffix: str) -> None:
     """Write triangles to a file, by its suffix, one of `SUFFIXES`.
 
-    path : the file; one that exists is replaced, by all of the new one or not at all.
+    path : the file; an existing file is replaced, by all of the new file or not at all.
     vertices : (n, 3) float64 [m].   faces : (m, 3) ids.
-    Raises OSError where it cannot be written.
+    Raises OSError where the file cannot be written.
     """
     with whole_file(path) as file:
         file.writelines(SUFFIXES[suffix](vertices, faces))
@@ -58,7 +58,7 @@ def _ply(vertices: np.ndarray, faces: np.ndarray) -> Iterator[bytes]:
 
 
 def _obj(vertices: np.ndarray, faces: np.ndarray) -> Iterator[bytes]:
-    """Text of all digits, so that reading it gives the same doubles."""
+    """Text of all digits: readers get the same doubles."""
     for x, y, z in vertices.tolist():
         yield f"v {x!r} {y!r} {z!r}\n".encode()
     for a, b, c in (faces + 1).tolist():

@@ -19,11 +19,11 @@ _MAX_LISTED = 6
 
 
 class Defect(NamedTuple):
-    """One kind of defect of a mesh.
+    """A kind of defect of a mesh.
 
-    name : what it is, the same words for every mesh.
-    facets : (k,) rows of ``mesh.faces`` that show it, sorted.
-    spoils : whether an inside cannot be told because of it; such a mesh is no solid.
+    name : the same words for every mesh.
+    facets : (k,) rows of ``mesh.faces`` with the defect, sorted.
+    spoils : whether the defect leaves an inside undefined; the mesh is then no solid.
     meaning : what these facets are.
     """
 
@@ -37,11 +37,11 @@ class Defect(NamedTuple):
 
 
 class MeshReport(NamedTuple):
-    """What `Mesh.report` says; printed, it is text for a person.
+    """What `Mesh.report` says; printed, text for a person.
 
     solid : whether the mesh is taken as a solid.   why : the reason, in words.
-    vertices, facets : as given.   used : distinct vertices that facets use.   welded : vertices that
-    equal an earlier one.   edges : of the welded mesh.   shells : parts that close, or hang together, by themselves.
+    vertices, facets : as given.   used : distinct vertices of facets.   welded : vertices
+    equal to an earlier one.   edges : of the welded mesh.   shells : parts that close, or hang together, by themselves.
     euler : distinct vertices − edges + facets.   volume : enclosed [m³], cavities taken off; 0 where not closed.
     defects : everything found wrong, what spoils a solid first.
     """

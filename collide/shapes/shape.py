@@ -135,9 +135,10 @@ def kept_with_shape(slot: str) -> Callable[[Callable[[Any], T]], Callable[[Any],
 
 
 def held_by(owner: Shape, shape: Shape) -> Callable[[], Any]:
-    """How what is kept with ``owner`` refers to a shape: to the owner weakly, to others as they are.
+    """How what is kept with ``owner`` refers to a shape: to the owner weakly, to others strongly.
 
-    A shape that referred to itself by what it keeps would stay, with its tables and trees, until cycles are looked for.
+    A shape with references to itself in what the shape keeps would stay, with its tables and trees, until cycles are
+    collected.
     """
     return weakref.ref(shape) if shape is owner else lambda: shape
 
@@ -209,8 +210,8 @@ def checked_shape(what: str, value: Any, example: str = "collide.Box((1, 1, 1))"
 def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndarray:
     """Three lengths > 0 along x, y, z, given as one sequence or as three numbers."""
     if (y is None) != (z is None):
-        shown = brief((value, y, z))
-        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {shown}")
+        got = brief((value, y, z))
+        raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {got}")
     values = value if y is None else (value, y, z)
     numbers = values.tolist() if values.__class__ is np.ndarray else values
     if numbers.__class__ in (tuple, list) and len(numbers) == 3 and all(map(_is_plain_length, numbers)):

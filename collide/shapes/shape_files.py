@@ -2,9 +2,9 @@
 everything.
 
 A file holds what a shape is made from and nothing that proofs rest on: hulls, trees and what is known of an inside are
-worked out anew from it, so a file can describe another shape but not make the library lie about the one it describes.
-The digest tells damage; it is no signature. Before any array is read its header is held against what the format has,
-and its length against the file's: arrays are stored as they are, so a small file cannot ask for much memory.
+worked out anew, so a file can describe another shape but not make the library lie about the shape described.
+The digest tells damage, but is no signature. Before any array is read its header is held against what the format has,
+and its length against the file's: arrays are stored uncompressed, so a small file cannot ask for much memory.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 
 class Field(NamedTuple):
-    """An array of a format: its type ("f8", or "i" for integers of any width) and shape, None for any length; whether
-    it must be there."""
+    """An array of a format: its type ("f8", or "i" for integers of any width) and shape, ``None`` for any length;
+    whether every file must have the array."""
 
     type: str
     shape: tuple[int | None, ...]
@@ -43,9 +43,9 @@ _LONGEST_HEADER = 1024
 
 
 def shape_suffix(who: str, path, *others: str) -> str:
-    """The suffix of a file that a shape is saved to, in small letters: ".npz", none, or one of the others.
+    """The suffix of a file to save a shape to, in small letters: ".npz", empty, or from ``others``.
 
-    who : the class that asks, for messages.
+    who : the calling class, for messages.
     Raises InvalidShape for any other: a file named like a mesh would hold arrays that no mesh reader takes.
     """
     suffix = checks.file_path(f"{who}.save: path", path, InvalidShape).suffix.lower()
@@ -69,7 +69,7 @@ def refused_as_shape(what: str, path) -> Iterator[None]:
 
 
 def write_arrays(who: str, path, version: int, arrays: dict[str, np.ndarray]) -> None:
-    """Write arrays to a file, all of it or none. who : the class that asks, for messages."""
+    """Write arrays to a file, whole or not at all. who : the calling class, for messages."""
     shape_suffix(who, path)
     with refused_as_shape(f"{who}.save", path), whole_file(path) as file:
         pack(file, version, arrays)
@@ -84,8 +84,8 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
     """The arrays of a file that `write_arrays` wrote.
 
     version : changes whenever files written before would be read wrongly.   fields : what the format has.
-    dropped : prefix of arrays that older files have besides; they count for the digest alone.
-    Raises InvalidShape where the file is another one, of another version, or damaged.
+    dropped : prefix of further arrays in older files; they count for the digest alone.
+    Raises InvalidShape where the file is of another kind or version, or damaged.
     """
     path = checks.file_path(f"{who}.load: path", path, InvalidShape)
     named = f"{who}.load: {path}"
@@ -112,11 +112,11 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
 def unpack(
     file: IO[bytes], version: int, named: str, field_of: Callable[[str], Field | None], needed: Iterable[str] = ()
 ) -> dict[str, np.ndarray]:
-    """The arrays that `pack` wrote, once every header fits its field and the file's length, and all their digest.
+    """The arrays written by `pack`, once every header fits its field and the file's length, and all their digest.
 
-    named : what is read, for messages.   field_of : the field of this name; None for what the format has not.
-    needed : names that must be there.
-    Raises InvalidShape where it is something else, of another version, or damaged.
+    named : what is read, for messages.   field_of : the field of this name; ``None`` for what the format has not.
+    needed : names of arrays to insist on.
+    Raises InvalidShape where the file is of another kind or version, or damaged.
     """
     import zipfile  # here, and below: a start of the library need not load it
 

@@ -1,7 +1,7 @@
 """Shapes as triangles, to draw them or to hand them to programs that know triangles alone.
 
-Every convex shape becomes a closed polyhedron inside it, its vertices on the surface (rounded once), facets
-counter-clockwise seen from outside; no point of the shape is farther from it than the tolerance.
+Every convex shape becomes a closed polyhedron inside the shape, its vertices on the surface (rounded once), facets
+counter-clockwise seen from outside; no point of the shape is farther from the polyhedron than the tolerance.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ def _square(shape: Halfspace, size: float | None) -> Tessellation:
 
 
 def _hull(points: np.ndarray) -> Tessellation:
-    """The hull of points, without those that are no corner of it."""
+    """The hull of points, over its corners alone."""
     surface = ConvexHull(points).hull
     corners = surface.vertices
     row = np.zeros(len(points), dtype=np.int64)
@@ -158,10 +158,10 @@ def _box(shape: Box, _) -> Tessellation:
 
 
 def _swept_hull(points: np.ndarray, radius: float, tolerance: float | None) -> Tessellation:
-    """The hull of points, and a ball along it: the hull of what the ball's own tessellation covers.
+    """The hull of points with a ball swept over it: the hull of what the ball's own tessellation covers.
 
-    The sum of two sets is off by as much as the one of them that is. Of the vertices of the sum only those are made
-    that may be corners: a point and a direction whose facets both are extreme in some direction near.
+    The sum of an exact set and a set off by the ball's deviation is off by the same deviation. Sums are made only where
+    they may be corners: of a point and a direction both extreme in some direction nearby.
     """
     if radius == 0.0:
         return _hull(points)

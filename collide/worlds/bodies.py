@@ -1,8 +1,8 @@
 """The bodies of a World in columns: adding, moving and naming them makes no object a body.
 
-A `Body` is made when somebody asks for one. What a query answers about is a `Roster`, which no change of the World
-reaches: results stay true of the bodies as they stood. Rows of removed bodies stay, empty, until they are as many as
-the others: then all are closed up at once, so that a removal costs the same however many bodies there are.
+A `Body` is made on demand. A query answers about a `Roster`, beyond the reach of changes of the World: results stay
+true of the bodies as they stood. Rows of removed bodies stay, empty, until they are as many as the others: then all
+are closed up at once, so the cost of a removal does not grow with the number of bodies.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ _NO_ROWS = np.array([-1])
 
 @dataclass(frozen=True)
 class Body:
-    """One body of a World, as it stands now.
+    """A body of a World, in its present state.
 
     Parameters
     ----------
-    id : never used again in this World.   name : unique in it.
+    id : never used again in this World.   name : unique in the World.
     shape : any shape.   X_WB : (4, 4) its pose in the world [m], read-only.
     static : never tested against other static bodies.   group, mask : bit sets of 32 bits.
     margin : [m], as of `World.set_margin`.   sleeping : as of `World.sleep`.
@@ -67,9 +67,9 @@ class Body:
 class Roster(NamedTuple):
     """Bodies by position, in the order of their ids: what stays while bodies only move. Never changed once made.
 
-    ids : (n,) int32, ascending.   names, shapes : of each; these lists may go on with bodies that came later.
-    static, group, mask : (n,) int64.   alive : (n,) bool, False of bodies that were removed.
-    margin : (n,) float64 [m].   sleeping : (n,) bool.   generation : another one once positions are others.
+    ids : (n,) int32, ascending.   names, shapes : of each; these lists may go on with bodies added later.
+    static, group, mask : (n,) int64.   alive : (n,) bool, False of removed bodies.
+    margin : (n,) float64 [m].   sleeping : (n,) bool.   generation : a number that changes with the positions.
     """
 
     ids: np.ndarray
@@ -92,7 +92,7 @@ class Roster(NamedTuple):
 
 
 class BodiesAsTheyStood(dict):
-    """{id: `Body`} of those bodies of a query that its rows name, made when asked for."""
+    """{id: `Body`} of the bodies named in a query's rows, made when asked for."""
 
     def __init__(self, roster: Roster, positions: np.ndarray, X_WBs: np.ndarray):
         """positions : (k,) of the bodies named, ascending.   X_WBs : (k, 4, 4) their poses, kept."""
@@ -109,7 +109,7 @@ class BodiesAsTheyStood(dict):
 
 
 class WorldBodies:
-    """Bodies in columns that grow; row k of each is one body, in the order of ids."""
+    """Bodies in columns that grow; row k of every column is the same body, in the order of ids."""
 
     def __init__(self) -> None:
         self._row_of: dict[int, int] = {}
@@ -238,7 +238,7 @@ class WorldBodies:
                 setattr(self, column, grown)
 
     def replace(self, identity: int, shape: Shape) -> None:
-        """Give a body another shape. Rosters that were handed out keep the one that it had."""
+        """Give a body another shape. Rosters handed out keep the former shape."""
         if self._shapes_are_shared:
             self._shapes, self._shapes_are_shared = list(self._shapes), False
         self._shapes[self._row_of[identity]] = shape
@@ -407,8 +407,8 @@ def _bits(what: str, value) -> int:
 
 
 def _of_each(what: str, value, n: int, read: Callable[[str, Any], Any]) -> list:
-    """What n bodies have, as ``read(what, value)`` takes it: one for all, or a list, a tuple or an array of each one's.
-    Raises InvalidArgument, which names the place.
+    """What n bodies have, by ``read(what, value)``: a value for all, or a list, a tuple or an array of n values.
+    Raises InvalidArgument, naming the place.
     """
     if not isinstance(value, (list, tuple)) and not (isinstance(value, np.ndarray) and value.ndim):
         return [read(what, value)] * n

@@ -36,7 +36,7 @@ _BEYOND = 2.0**-20
 
 
 class Filter(NamedTuple):
-    """Bodies that a question counts: those with (group & mask_B) and (group_B & mask).   group, mask : None for all."""
+    """Bodies counted by a question: (group & mask_B) and (group_B & mask).   group, mask : ``None`` for all."""
 
     group: int | None
     mask: int | None
@@ -106,7 +106,7 @@ def _candidates(
 
 
 def _on_meshes(packed: PackedWorld, pairs: np.ndarray, origins, directions: Directions, limit: float, every: bool):
-    """(events, body of each) of pairs (body, ray) of bodies that are meshes or hold one: those of a shape together."""
+    """(events, body of each) of pairs (body, ray) of meshes and bodies with a mesh, a shape's pairs together."""
     shape_of = packed.shape_of[pairs[:, 0]]
     for number in np.unique(shape_of).tolist():
         some = pairs[shape_of == number]
@@ -150,10 +150,10 @@ def cast_shape(
     packed: PackedWorld, shape: Shape, X_WS: np.ndarray, directions: Directions, limit: float, which: Filter,
     start_normals: bool,
 ) -> np.ndarray:
-    """Rows of n casts of a shape at poses (n, 4, 4): the first body that each comes to.
+    """Rows of n casts of a shape at poses (n, 4, 4): the first body reached by each cast.
 
-    Bodies are asked no farther than to a little beyond what is proven of those before: there a contact is none of the
-    limit's, which would leave those open that come at the same t.
+    Limits of later bodies are a little beyond the t proven for earlier bodies: a contact at the same t then lies
+    before the limit, where the limit does not leave the contact open.
     """
     n = len(directions.vectors)
     rows = empty_hits(n)

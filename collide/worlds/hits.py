@@ -44,18 +44,18 @@ def empty_hits(n: int) -> np.ndarray:
 
 
 class WorldHits:
-    """Rows of a cast against a World: one a question, or with ``all_hits`` one a place that a ray meets.
+    """Rows of a cast against a World: a row a question, or with ``all_hits`` a row for each place on a ray.
 
     Parameters
     ----------
     rows : (n,) `WORLD_HIT_DTYPE`, as the module `collide.worlds.hits` says.
-    names : {id: name} of the bodies that are met.
-    starts : (N + 1,) where the rows of each ray begin and end, with ``all_hits``; None otherwise.
+    names : {id: name} of the bodies met.
+    starts : (N + 1,) where the rows of each ray begin and end, with ``all_hits``; ``None`` otherwise.
 
     Notes
     -----
-    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows. ``names`` are the
-    names of the bodies row by row, None where nothing is met.
+    Indexing by the name of a field gives a column, by a number a row, by a slice or a mask rows. ``names`` are the
+    names of the bodies row by row, ``None`` where nothing is met.
     """
 
     __slots__ = ("_names", "rows", "starts")

@@ -1,5 +1,5 @@
-"""The nearest pair of a World, by branch and bound: pairs in the order of how near their boxes let them be, until none
-that is left can be nearer than the best.
+"""The nearest pair of a World, by branch and bound: pairs in the order of how near their boxes let them be, until no
+remaining pair can be nearer than the best.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ _FIRST = 16
 
 
 class _Nearest(NamedTuple):
-    """pair : (1, 2), the nearest so far, or (0, 2).   row : (1,) what is told of it; None where it is to be asked."""
+    """pair : (1, 2), the nearest so far, or (0, 2).   row : (1,) its answer; ``None`` before the pair is asked."""
 
     pair: np.ndarray
     row: np.ndarray | None
 
 
 def nearest_pair(packed: PackedWorld, limit: float, threads: int) -> np.ndarray:
-    """One row: of the tested pairs at most ``limit`` [m] apart the one with the least signed distance, of several the
-    one with the least positions; no row where there is none.
+    """The row of the tested pair with the least signed distance, at most ``limit`` [m], of several pairs with the least
+    positions; no row without a pair within the limit.
     """
     asked = np.empty(0, dtype=np.int64)
     best, winner = np.inf, _Nearest(np.empty((0, 2), dtype=np.int64), None)
@@ -48,7 +48,7 @@ def nearest_pair(packed: PackedWorld, limit: float, threads: int) -> np.ndarray:
 
 
 def _margins(packed: PackedWorld, limit: float):
-    """Margins within which to look, one after another: 0, then from a thousandth of the World to all of it."""
+    """Margins to look within, in turn: 0, the World's extent over its number of bodies, 4 times the last, ``limit``."""
     yield 0.0
     tree = packed.tree
     if tree is None or not limit > 0.0:
@@ -88,8 +88,8 @@ def _least(packed: PackedWorld, pairs: np.ndarray, limit: float, best: float, wi
 
 
 def _lower_bounds(packed: PackedWorld, pairs: np.ndarray) -> np.ndarray:
-    """(k,) lower bounds of signed distances [m]: the gap of boxes, or how far one is to be moved along an axis to part
-    them. For what is not convex, whose depth is known from above alone, none where the boxes meet.
+    """(k,) lower bounds of signed distances [m]: the gap of boxes, or minus the shortest shift along an axis to part
+    them. With a body not convex, whose depth is known from above alone, −inf where the boxes meet.
     """
     parts = packed.parts
     boxes = parts.body_boxes(np.arange(len(parts.shape_of)))

@@ -6,8 +6,8 @@ volume          of what is inside both [m³]
 lower, upper    lower ≤ volume ≤ upper, proven
 centroid        (3,) of the overlap in W [m]; of the patch where the volume is 0
 area_a, area_b  of a's surface inside b, and of b's inside a [m²]
-patch_area      of where both surfaces lie on one another and face each other [m²]
-flush_area      of where they lie on one another and face the same way [m²]
+patch_area      of where both surfaces lie on each other and face each other [m²]
+flush_area      of where they lie on each other and face the same way [m²]
 =============== ===================================================================================
 """
 
@@ -37,12 +37,12 @@ class WorldOverlaps:
     Parameters
     ----------
     rows : (n,) `OVERLAP_DTYPE`, as the module `collide.worlds.overlaps` says.
-    bodies : {id: body as it stood}.
-    unanswered : [(id, id, reason), …] pairs that hit and have no volume to tell: curved shapes, surfaces, unions.
+    bodies : {id: body at the time of the query}.
+    unanswered : [(id, id, reason), …] hits without a volume to tell: curved shapes, surfaces, unions.
 
     Notes
     -----
-    Indexing by the name of a field gives that column, by a number one row, by a slice or a mask rows. ``names``
+    Indexing by the name of a field gives a column, by a number a row, by a slice or a mask rows. ``names``
     resolves the ids.
     """
 

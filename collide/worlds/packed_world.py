@@ -1,4 +1,4 @@
-"""A World as the kernels see it: flat tables of shapes, posed parts, boxes, and a box-tree, brought up to date as it
+"""A World as the kernels read worlds: flat tables of shapes, posed parts, boxes, and a box-tree, brought up to date on
 changes.
 """
 
@@ -52,10 +52,10 @@ class Answer(NamedTuple):
 
 
 class PairFilters(NamedTuple):
-    """What is said of pairs of bodies, by position; another object once it changes.
+    """What is said of pairs of bodies, by position; a new object after every change.
 
     allowed : (k, 2) pairs that are never tested, i < j.   reasons : why, of each.
-    margin_keys, margins : (m,) i·2^32 + j of pairs with a margin of their own, i < j, ascending, and that [m].
+    margin_keys, margins : (m,) i·2^32 + j of pairs with a margin of their own, i < j, ascending, and the margins [m].
     """
 
     allowed: np.ndarray
@@ -67,8 +67,8 @@ class PairFilters(NamedTuple):
 class PackedWorld:
     """Bodies by position (0 … n − 1), each a run of convex parts.
 
-    roster : the bodies.   filters : of pairs.   parts : the parts.   tree : the box-tree over bodies; None before there
-    is any.   has_margins : whether any body or pair has.
+    roster : the bodies.   filters : of pairs.   parts : the parts.   tree : the box-tree over bodies; ``None`` before
+    the first body.   has_margins : whether any body or pair has.
     """
 
     def __init__(self, roster: Roster, X_WBs: np.ndarray, filters: PairFilters):
@@ -183,7 +183,7 @@ class PackedWorld:
 
     @property
     def meshed(self) -> np.ndarray:
-        """(n,) bool: bodies that have no convex parts: meshes, what holds one, regions."""
+        """(n,) bool: bodies without convex parts: meshes, bodies with a mesh, regions."""
         return self.parts.meshed
 
     def take_work(self) -> dict:
@@ -229,7 +229,7 @@ class PackedWorld:
         return self._shape_set[self.shape_of[a]], self._shape_set[self.shape_of[b]], X_WA, X_WB
 
     def convex_sets_of(self, pairs: np.ndarray) -> tuple[ShapeTable, np.ndarray]:
-        """(table, (k, 2) rows of it) of pairs (k, 2) of positions of bodies that are single convex sets."""
+        """(table, (k, 2) rows of the table) of pairs (k, 2) of positions of bodies, all single convex sets."""
         return self.parts.table, self.parts.row_of[self.parts.first[pairs]]
 
     def bodies_named(self, *positions: np.ndarray) -> BodiesAsTheyStood:
@@ -309,7 +309,7 @@ class PackedWorld:
     # --- pairs with a mesh ----------------------------------------------------------------------
 
     def _answer_meshes(self, pairs: np.ndarray, limit: float, boolean: bool, stop_at_hit: bool) -> np.ndarray:
-        """Rows of pairs of bodies with a mesh: those of the same two shapes are one batch."""
+        """Rows of pairs of bodies with a mesh: pairs of the same two shapes share a batch."""
         answered = [np.zeros(0, dtype=PAIR_DTYPE)]
         chunk = _FIRST_CHUNK if stop_at_hit else len(pairs)
         for batch in batches_of_shapes(pairs, self.shape_of, len(self.shapes), chunk):

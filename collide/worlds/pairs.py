@@ -46,13 +46,13 @@ class WorldPairs(WorldScene):
         return super().__getstate__() | {"_stats": copy.deepcopy(self.stats), "_last_query": None}
 
     def collides(self, *, security_margin: float = 0.0, threads: int = 1) -> bool:
-        """Whether any tested pair hits; stops at the first that does.
+        """Whether any tested pair hits; stops at the first hit.
 
         Parameters
         ----------
         security_margin : [m], ≥ 0, finite: pairs at most so far apart are hits, too, decided as by `collide.collide`;
-            which those are, `distances` says. It adds to the margins of bodies and pairs (`set_margin`). Pairs that
-            have a margin are all asked.
+            `distances` names the pairs. Added to the margins of bodies and pairs (`set_margin`). Pairs
+            with a margin are all asked.
         threads : at most so many answer; the answers are the same bits.
 
         Returns
@@ -95,8 +95,8 @@ class WorldPairs(WorldScene):
 
         Returns
         -------
-        WorldResult : rows of `collide.results.PAIR_DTYPE` sorted by (a, b), ids of the bodies. None is left out
-            that is not proven farther apart: ``lower ≤ max_distance`` of all of them. Two half-spaces that meet have
+        WorldResult : rows of `collide.results.PAIR_DTYPE` sorted by (a, b), ids of the bodies. Only pairs proven
+            farther apart are left out: ``lower ≤ max_distance`` of all rows. Two half-spaces that meet have
             distance −inf.
 
         Raises
@@ -108,7 +108,7 @@ class WorldPairs(WorldScene):
         return _result(*self._answer(limit, check_threads(threads), margins=False))
 
     def minimum(self, max_distance: float = math.inf, *, threads: int = 1) -> WorldResult:
-        """The nearest tested pair: that of the least signed distance, of several the one with the least ids.
+        """The tested pair of least signed distance, of several pairs with the least ids.
 
         Parameters
         ----------
@@ -117,9 +117,9 @@ class WorldPairs(WorldScene):
 
         Returns
         -------
-        WorldResult : one row of `collide.results.PAIR_DTYPE`, or none where no tested pair is within ``max_distance``.
-            Where brackets overlap, another pair may truly be nearer by less than they are wide. Found by branch and
-            bound: pairs whose boxes cannot be as near are not asked. `stats` stays as it is.
+        WorldResult : a single row of `collide.results.PAIR_DTYPE`, or no row without a tested pair within
+            ``max_distance``. Where brackets overlap, another pair may truly be nearer by less than their width. Found
+            by branch and bound: pairs whose boxes cannot be as near are not asked. `stats` stays unchanged.
 
         Raises
         ------
@@ -130,23 +130,23 @@ class WorldPairs(WorldScene):
         return _result(packed, nearest_pair(packed, limit, check_threads(threads)))
 
     def contacts(self, margin: float = 0.0, *, max_contacts: int = 8, threads: int = 1) -> WorldContacts:
-        """Contacts of every tested pair within a margin; `stats` stays as it is.
+        """Contacts of every tested pair within a margin; `stats` stays unchanged.
 
         Parameters
         ----------
-        margin : [m], ≥ 0, finite: bodies up to so far apart are in contact, too. It adds to the margins of bodies and
+        margin : [m], ≥ 0, finite: bodies up to so far apart are in contact, too. Added to the margins of bodies and
             pairs (`set_margin`).
         max_contacts : of each patch, ≥ 1.
         threads : at most so many answer; the answers are the same bits.
 
         Returns
         -------
-        WorldContacts : rows of `collide.contact.contact_rows.CONTACT_DTYPE`, one a contact, sorted by (a, b). What
+        WorldContacts : rows of `collide.contact.contact_rows.CONTACT_DTYPE`, a row a contact, sorted by (a, b). What
             they say and promise: `collide.contacts`.
 
         Raises
         ------
-        InvalidArgument; UnsupportedQuery : naming the bodies, where `collide.contacts` raises it.
+        InvalidArgument; UnsupportedQuery : naming the bodies, where `collide.contacts` raises the error.
         """
         margin = contact_query.check_margin("World.contacts", margin)
         max_contacts = contact_query.check_max_contacts("World.contacts", max_contacts)
@@ -164,16 +164,16 @@ class WorldPairs(WorldScene):
         return WorldContacts(rows, packed.bodies_named(pairs[counts > 0]))
 
     def overlaps(self, *, threads: int = 1) -> WorldOverlaps:
-        """How much bodies overlap: volume, centroid and areas of every tested pair that hits; `stats` stays as it is.
+        """How much bodies overlap: volume, centroid and areas of every tested pair that hits; `stats` stays unchanged.
 
         Parameters
         ----------
-        threads : at most so many look for pairs that hit; volumes are added up one after another.
+        threads : at most so many look for hits; volumes are added up in sequence.
 
         Returns
         -------
         WorldOverlaps : rows of `collide.worlds.overlaps.OVERLAP_DTYPE` sorted by (a, b), as `collide.overlap_volume`
-            says. Pairs that hit and have no volume to tell, of curved shapes, surfaces and unions, are listed in
+            says. Hits without a volume to tell, of curved shapes, surfaces and unions, are listed in
             ``unanswered`` with the reason.
 
         Raises
@@ -182,7 +182,7 @@ class WorldPairs(WorldScene):
 
         Notes
         -----
-        Milliseconds a pair, more with the number of facets that meet (docs/solids.md).
+        Milliseconds a pair, more with the number of facets in contact (docs/solids.md).
         """
         return world_overlaps.overlaps_of(self._pack(), check_threads(threads))
 
@@ -197,7 +197,7 @@ class WorldPairs(WorldScene):
 
         Returns
         -------
-        [(id, id, reason), …], sorted. Such are some shapes against a mesh.
+        [(id, id, reason), …], sorted; for instance some shapes against a mesh.
         """
         limit = checks.limit("World.unanswerable: max_distance", max_distance)
         packed = self._pack()
@@ -210,10 +210,10 @@ class WorldPairs(WorldScene):
 
         bodies, static, sleeping : numbers of bodies.   pairs : of all bodies, n(n − 1)/2.   skipped : {reason: pairs}.
         narrowphase : pairs of bodies answered.   convex_pairs : pairs of their convex parts answered.
-        mesh_pairs : of the pairs of bodies, those of which one is a mesh or holds one.
+        mesh_pairs : pairs of bodies with a mesh on either side, whole or as a part.
         hits, undecided : pairs.   how : {argument: pairs}.   gjk_iterations, epa_iterations : sums.
         updates : {what: number} brought up to date for the query: bodies added, removed, moved; leaves and nodes of the
-            box-tree that were given other boxes, trees made anew.
+            box-tree with new boxes, trees made anew.
         bytes_per_body : memory of tables and tree.   seconds : {pack, broadphase, narrowphase} [s].
 
         sum(skipped) + narrowphase = pairs, unless `collides` stopped at a hit.
@@ -227,9 +227,9 @@ class WorldPairs(WorldScene):
     def _answer(
         self, limit: float, threads: int, *, boolean: bool = False, margins: bool = True
     ) -> tuple[PackedWorld, np.ndarray]:
-        """(what was asked, rows of all its tested pairs within the limit [m], a and b positions).
+        """(the packed World asked, rows of all its tested pairs within the limit [m], a and b positions).
 
-        margins : add those of bodies and pairs.   boolean : bool instead, one a pair, up to a hit.
+        margins : add the margins of bodies and pairs.   boolean : instead of rows a bool for each pair, up to a hit.
         """
         started = time.perf_counter()
         packed = self._pack()
@@ -267,7 +267,7 @@ def _result(packed: PackedWorld, rows: np.ndarray) -> WorldResult:
 
 
 def _by_margin(packed: PackedWorld, pairs: np.ndarray, margin: float) -> Iterator[tuple[np.ndarray | slice, float]]:
-    """(which pairs, their margin and the one given [m]), those of the same margin together; all at least once."""
+    """(rows of pairs with the same margin, this margin plus the margin given [m]); at least a single group."""
     if not packed.has_margins:
         yield slice(None), margin
         return
@@ -279,7 +279,7 @@ def _by_margin(packed: PackedWorld, pairs: np.ndarray, margin: float) -> Iterato
 
 
 def _wanted(packed: PackedWorld, rows: np.ndarray, limit: float, boolean: bool, margins: bool) -> np.ndarray:
-    """The rows that a question wants, or of booleans which of all are hits."""
+    """The rows wanted by a question, or for booleans whether each row is a hit."""
     if not margins:
         not_farther = ~(rows["lower"] > limit)  # not proven to be, also where the bracket holds the limit
         return _picked(rows, not_farther)
@@ -296,7 +296,7 @@ def _wanted(packed: PackedWorld, rows: np.ndarray, limit: float, boolean: bool, 
 
 
 def _picked(rows: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Rows (k,) of those that a mask (n,) names, byte by byte: field by field, a few take numpy 10 µs instead of 3."""
+    """Rows (k,) picked by a mask (n,), byte by byte: field by field, a few rows take numpy 10 µs instead of 3."""
     return rows.view(_BYTES).compress(which).view(PAIR_DTYPE)
 
 

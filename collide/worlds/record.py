@@ -14,9 +14,9 @@ from collide.worlds.packed_world import PackedWorld, PairFilters
 
 
 class QueryRecord(NamedTuple):
-    """One query of a whole World.
+    """A query of a whole World.
 
-    packed : asked for its memory.   work : {what: number} of what was brought up to date for it.
+    packed : asked for its memory.   work : {what: number} of what was brought up to date for the query.
     """
 
     packed: PackedWorld

@@ -19,7 +19,7 @@ from collide.worlds.world_part_pairs import updating
 
 
 class WorldScene:
-    """Bodies that may touch, and the pairs of them that are never tested. `collide.World` adds the questions."""
+    """Bodies that may touch, and pairs of bodies never to test. `collide.World` adds the questions."""
 
     def __init__(self) -> None:
         self._bodies = WorldBodies()
@@ -46,16 +46,16 @@ class WorldScene:
         Parameters
         ----------
         shape : any shape.
-        X_WB : (4, 4) pose of the body in the world W [m], or what `collide.transforms.as_poses` takes for one; the
-            identity if left out. It is copied.
+        X_WB : (4, 4) pose of the body in the world W [m], or what `collide.transforms.as_poses` takes for a pose; the
+            identity if left out. Copied.
         name : not empty, unique in this World; "body 7" and so on if left out.
         static : never tested against other static bodies.
-        group, mask : bit sets of up to 32 bits: the groups it is in, and those it is tested against.
+        group, mask : bit sets of up to 32 bits: the groups of the body, and the groups to test the body against.
         margin : [m], ≥ 0: as of `set_margin`.
 
         Returns
         -------
-        The body's id, an integer that is never used again. Ids ascend. About 3 µs.
+        The body's id, an integer never used again. Ids ascend. About 3 µs.
 
         Raises
         ------
@@ -69,18 +69,18 @@ class WorldScene:
         self, shapes: Shape | Sequence[Shape], X_WBs, *, names: Sequence[str | None] | None = None, static=False,
         group=1, mask=0xFFFF, margin=0.0,
     ) -> np.ndarray:
-        """Add N bodies at once, as `add` adds them one by one.
+        """Add N bodies at once, as N calls of `add`.
 
         Parameters
         ----------
         shapes : any shape, of all, or N of them.
         X_WBs : (N, 4, 4) their poses in the world W [m], or (4, 4) of all. They are copied.
-        names : (N,) as of `add`, None where a body is to be "body 7" and so on; or None for all.
+        names : (N,) as of `add`, ``None`` where a body is to be "body 7" and so on; or ``None`` for all.
         static, group, mask, margin : as of `add`: of all, or lists, tuples or arrays (N,).
 
         Returns
         -------
-        (N,) int64 ids, ascending. About 0.7 µs a body, of each one's own name, bits and margin 1 µs; the next query
+        (N,) int64 ids, ascending. About 0.7 µs a body, with names, bits and margins of their own 1 µs; the next query
         takes 2 µs a body for tables and tree, as after `add`.
 
         Raises
@@ -90,11 +90,11 @@ class WorldScene:
         return self._bodies.add_many(shapes, X_WBs, names, static, group, mask, margin)
 
     def replace(self, body: int | str, shape: Shape) -> None:
-        """Give a body another shape: later questions are answered as if it had been added with it.
+        """Give a body another shape: later questions are answered as if the body had been added with this shape.
 
         Its id, name, pose, margins, filters and sleep stay. Tables and box-tree are made anew by the next question, in
-        about 2 µs a body of the World, and what another thread is just asking is answered to the end with the shape
-        that it began with: no question sees half of a change. Results keep the shape that they were made with.
+        about 2 µs a body of the World. A question of another thread in progress is answered to the end with the former
+        shape: no question sees half of a change. Results keep the shape of their time.
 
         Parameters
         ----------
@@ -158,9 +158,9 @@ class WorldScene:
         self._bodies.move_many(bodies, X_WBs)
 
     def sleep(self, bodies: Iterable[int | str]) -> None:
-        """Put bodies to sleep: pairs of which both are asleep or static are not tested until one is woken.
+        """Put bodies to sleep: a pair of two bodies asleep or static is not tested until one of them is woken.
 
-        They stay where they are for all other questions, and may be moved; that does not wake them.
+        Sleeping bodies count in all other questions, and may be moved without waking.
 
         Parameters
         ----------
@@ -168,12 +168,12 @@ class WorldScene:
 
         Raises
         ------
-        UnknownBody : then none has been put to sleep.
+        UnknownBody : then no body has been put to sleep.
         """
         self._bodies.set_sleeping(bodies, True)
 
     def wake(self, bodies: Iterable[int | str]) -> None:
-        """Wake bodies that were put to sleep; others stay as they are.
+        """Wake sleeping bodies; others stay as they are.
 
         Parameters
         ----------
@@ -181,21 +181,21 @@ class WorldScene:
 
         Raises
         ------
-        UnknownBody : then none has been woken.
+        UnknownBody : then no body has been woken.
         """
         self._bodies.set_sleeping(bodies, False)
 
     def set_margin(self, body: int | str, margin: float | None, *, partner: int | str | None = None) -> None:
         """Count a body as hit already at a distance.
 
-        A pair hits in `collides` and `collisions`, and has contacts in `contacts`, where it is at most its margin
-        apart: the sum of both bodies' margins, unless the pair has one of its own. What distances are told is the same.
+        A pair hits in `collides` and `collisions`, and has contacts in `contacts`, at a distance of at most its
+        margin: the sum of both bodies' margins, unless the pair has a margin of its own. Distances are told unchanged.
 
         Parameters
         ----------
         body : id or name.
-        margin : [m], 0 or within 1e-50 … 1e50; None, with ``partner``: the pair has none of its own any more.
-        partner : id or name of another body: the margin is that of the pair.
+        margin : [m], 0 or within 1e-50 … 1e50; ``None``, with ``partner``: the pair loses its own margin.
+        partner : id or name of another body: the margin is for the pair.
 
         Raises
         ------
@@ -224,7 +224,7 @@ class WorldScene:
         ----------
         a, b : ids or names of two bodies; or a alone, a symmetric boolean matrix (n, n) over the n bodies in the order
             of `ids`, True for pairs that are not tested.
-        reason : a few words; `stats` counts skipped pairs under it. A pair keeps its first.
+        reason : a few words; `stats` counts skipped pairs by reason. A pair keeps its first.
 
         Raises
         ------
@@ -279,7 +279,7 @@ class WorldScene:
         return self._bodies.names
 
     def body(self, body: int | str) -> Body:
-        """The body of this id or name, as it stands now.
+        """The body of this id or name, in its present state.
 
         Parameters
         ----------
@@ -287,7 +287,7 @@ class WorldScene:
 
         Returns
         -------
-        Body : ``id``, ``name``, ``shape``, ``X_WB``, ``static``, ``group`` and ``mask``; later moves do not reach it.
+        Body : ``id``, ``name``, ``shape``, ``X_WB``, ``static``, ``group`` and ``mask``; later moves do not reach them.
 
         Raises
         ------

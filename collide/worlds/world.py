@@ -29,7 +29,7 @@ cast_arguments = lazy_module("collide.casts.cast_arguments")
 
 
 class World(WorldPairs):
-    """Bodies that may touch, and the questions one asks of them.
+    """Bodies that may touch, and questions about them.
 
     A pair of bodies is tested unless both are static or asleep, their groups and masks exclude each other
     (tested when ``(group_A & mask_B) and (group_B & mask_A)``), or `allow` names the pair.
@@ -39,10 +39,10 @@ class World(WorldPairs):
         world.add(collide.Sphere(0.1), pose_of_ball, name="ball")
         for row, (a, b) in zip(rows := world.distances(max_distance=0.05), rows.names): ...
 
-    Packed arrays and the box-tree are made when a query first needs them, and brought up to date by the next query:
-    what was added, moved or removed costs as much as there is of it, but for copies of a few bytes a body. Which pairs
-    are near is kept from query to query while few bodies change. A World is not safe to change from one thread while
-    another asks, but by `replace`.
+    Packed arrays and the box-tree are made when a query first needs them, and brought up to date by the next query, at
+    a cost in proportion to the bodies added, moved or removed, but for copies of a few bytes a body. The list of near
+    pairs is kept from query to query while few bodies change. A World is not safe to change from a thread while
+    another thread asks, but by `replace`.
     """
 
     def query(
@@ -53,7 +53,7 @@ class World(WorldPairs):
         Parameters
         ----------
         shape : any shape, or N of them.
-        X_WS : (4, 4) or (N, 4, 4) poses in the world W [m]. A single shape or pose goes with every one of the others.
+        X_WS : (4, 4) or (N, 4, 4) poses in the world W [m]. A single shape or pose goes with all of the others.
         max_distance : [m], ≥ 0.
         threads : at most so many answer; the answers are the same bits.
 
@@ -61,8 +61,7 @@ class World(WorldPairs):
         -------
         WorldResult : rows sorted by question and b, the body's id; a is −1 for the first question, −2 for the second
             and so on, and normals point from the outside shape to the body. Filters, margins and sleep do not apply,
-            and `stats` stays that of the last query of the whole World. O(log n) a question for bodies that are spread
-            out.
+            and `stats` still tells of the last query of the whole World. O(log n) a question for bodies spread out.
 
         Raises
         ------
@@ -98,13 +97,13 @@ class World(WorldPairs):
 
         Parameters
         ----------
-        low_W, high_W : (3,) corners of the box in W [m], low ≤ high; infinite where it has no end.
+        low_W, high_W : (3,) corners of the box in W [m], low ≤ high; infinite where the box has no end.
         margin : [m], ≥ 0: along every axis.
 
         Returns
         -------
-        Ids, ascending. Boxes are rounded outwards by a few units in the last place; those of half-spaces have no end,
-        and are near everything. O(log n) for bodies that are spread out.
+        Ids, ascending. Boxes are rounded outwards by a few units in the last place; boxes of half-spaces have no end,
+        and are near everything. O(log n) for bodies spread out.
 
         Raises
         ------
@@ -145,23 +144,23 @@ class World(WorldPairs):
         self, origins_W, directions_W, *, max_distance: float = math.inf, all_hits: bool = False,
         group: int | None = None, mask: int | None = None,
     ) -> WorldHits:
-        """What rays meet first, or everything that they meet.
+        """What rays meet first, or everything on their way.
 
         Parameters
         ----------
         origins_W : (3,) or (N, 3) where rays begin, in W [m].
-        directions_W : (3,) or (N, 3) in W; they need not be unit vectors. A single origin or direction goes with every
-            one of the others.
+        directions_W : (3,) or (N, 3) in W; they need not be unit vectors. A single origin or direction goes with all
+            of the others.
         max_distance : [lengths of the direction], ≥ 0, as of `collide.raycast`.
         all_hits : every place where a ray meets the surface of a body, not only the first.
-        group, mask : bit sets: bodies count with ``(group & mask_B) and (group_B & mask)``; None: all of them. Whether
-            bodies are static, and which pairs are allowed, has no say.
+        group, mask : bit sets: bodies count with ``(group & mask_B) and (group_B & mask)``; ``None``: all of them.
+            Static bodies and allowed pairs count like all others.
 
         Returns
         -------
-        WorldHits : a row a ray, ``body`` the id of the first body it meets, −1 for none; with ``all_hits`` a row for
+        WorldHits : a row a ray, ``body`` the id of the first body met, −1 without a body; with ``all_hits`` a row for
             every place, by ray, distance and body, and ``starts``. What the rest means and promises:
-            `collide.raycast`. `stats` stays as it is.
+            `collide.raycast`. `stats` stays unchanged.
 
         Raises
         ------
@@ -169,7 +168,7 @@ class World(WorldPairs):
 
         Notes
         -----
-        Rays go through the box-tree, nearest box first: about O(log n) a ray for bodies that are spread out.
+        Rays go through the box-tree, nearest box first: about O(log n) a ray for bodies spread out.
         """
         limit = checks.limit("World.raycast: max_distance", max_distance, "")
         origins, directions, _ = cast_arguments.checked_rays("World.raycast", origins_W, directions_W)
@@ -183,21 +182,21 @@ class World(WorldPairs):
         self, shape: Shape, X_WS, direction_W, *, max_distance: float = math.inf, start_normals: bool = False,
         group: int | None = None, mask: int | None = None,
     ) -> WorldHits:
-        """The first body that an outside shape touches when it is moved along a direction.
+        """The first body touched by an outside shape in motion along a direction.
 
         Parameters
         ----------
         shape : any shape but half-spaces.
-        X_WS : (4, 4) or (N, 4, 4) its poses in the world W [m] before it moves.
-        direction_W : (3,) or (N, 3) in W, of the motion; it need not be a unit vector.
+        X_WS : (4, 4) or (N, 4, 4) its poses in the world W [m] before the motion.
+        direction_W : (3,) or (N, 3) in W, of the motion; need not be a unit vector.
         max_distance : [lengths of the direction], ≥ 0, as of `collide.shape_cast`.
         start_normals : work out normals of bodies that touch at the start, as of `collide.shape_cast`.
         group, mask : as of `raycast`.
 
         Returns
         -------
-        WorldHits : a row a cast, ``body`` the id of the first body touched, −1 for none. Of several touched at the same
-            place the one with the smallest id. What the rest means and promises: `collide.shape_cast`.
+        WorldHits : a row a cast, ``body`` the id of the first body touched, −1 without a body. Of several touched at
+            the same place, the smallest id. What the rest means and promises: `collide.shape_cast`.
 
         Raises
         ------
@@ -230,9 +229,9 @@ class World(WorldPairs):
 
         Returns
         -------
-        WorldHits : a row a point: ``body`` the id of the body with the least signed distance, −1 for none, ``distance``
-            [m] to it, below 0 for points inside, ``point`` its nearest point, ``normal`` from the point to it.
-            What these mean and promise: `collide.distance` of a point and a body.
+        WorldHits : a row a point: ``body`` the id of the body with the least signed distance, −1 without a body,
+            ``distance`` [m] to the body, below 0 for points inside, ``point`` its nearest point, ``normal`` from the
+            point to the body. What these mean and promise: `collide.distance` of a point and a body.
 
         Raises
         ------

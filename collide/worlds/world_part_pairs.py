@@ -1,7 +1,7 @@
 """Pairs of parts of two bodies whose boxes come near: every part against every other where they are few, through a
 box-tree over the parts of a body where they are many.
 
-Such a tree is made when it is first needed, and fitted to where the parts are when they have moved.
+A tree is made when first needed, and fitted anew when the parts have moved.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class PartTrees:
         return ((low[i] - margin <= high[j]) & (low[j] - margin <= high[i])).all(axis=1)
 
     def _by_tree(self, a: int, b: int, margin: float) -> np.ndarray:
-        """(m, 2) pairs of parts of two bodies that may be within margin: parts of one in the tree over the other's."""
+        """(m, 2) pairs of parts of two bodies, perhaps within margin: parts of a body in the tree of the other body."""
         parts = self._parts
         is_flipped = bool(parts.counts[a] > parts.counts[b])
         if is_flipped:

@@ -1,7 +1,7 @@
-"""The convex parts of a World's bodies as kernels read them: tables, poses and boxes, one body after another.
+"""The convex parts of a World's bodies as kernels read them: tables, poses and boxes, body after body.
 
-What is added goes behind what is there, so that adding costs the same however much there is; parts of bodies that were
-removed stay where they are.
+New parts go behind the present parts, so the cost of adding does not grow with their number; parts of removed bodies
+stay in place.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class WorldParts:
     Attributes
     ----------
     shapes : the distinct shapes.   shape_of : (n,) which of them each body has.   X_WBs : (n, 4, 4) poses, copied.
-    meshed, single_convex : (n,) bool: bodies that are asked as a whole, meshes above all; that are one convex set in
+    meshed, single_convex : (n,) bool: bodies asked as a whole, meshes above all; bodies with a single convex set in
         their own frame.
     counts, first : (n,), (n + 1,) how many parts each body has, and where they begin.   body_of : (parts,).
     table, row_of, poses : as `run_pairs` takes them.   X_BP : (parts, 4, 4).   boxes : (parts, 6).
@@ -96,7 +96,7 @@ class WorldParts:
         self._take_columns()
 
     def _numbers_of(self, shapes: Sequence[Shape]) -> np.ndarray:
-        """(k,) the number of each shape among the distinct ones; those that are new are added."""
+        """(k,) the number of each shape among the distinct shapes; new shapes are added."""
         keys, number_of = list(map(id, shapes)), self._number_of
         distinct = {key: shape for key, shape in dict(zip(keys, shapes)).items() if key not in number_of}
         parts = [bounding_parts_of(shape) for shape in distinct.values()]
@@ -116,7 +116,7 @@ class WorldParts:
         return np.fromiter(map(number_of.__getitem__, keys), dtype=np.int64, count=len(keys))
 
     def _rows_of(self, packed: list[PackedConvex]) -> np.ndarray:
-        """The table row of every convex set; those that are new are added."""
+        """The table row of every convex set; new sets are added."""
         new: list[PackedConvex] = []
         row_of = np.empty(len(packed), dtype=np.int64)
         for k, part in enumerate(packed):
