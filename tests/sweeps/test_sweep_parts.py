@@ -199,6 +199,7 @@ def test_arrays_and_files_of_arrays(tmp_path):
     given = as_configurations(str(tmp_path / "q.npy"), robot)
     assert given.block(1, 3).of(robot).tolist() == [[2.0, 3.0], [4.0, 5.0]]
     assert given.about() == as_configurations(Q, robot).about() and given.about()["rows"] == 3
+    assert given.about()["digest"] not in (None, GivenConfigurations(Q + 1.0).about()["digest"])
     assert as_configurations(given, robot) is given
     for wrong in (Q[:, :1], Q[0]):
         with pytest.raises(InvalidArgument, match=r"must have shape \(N, 2\), one column for each of x, y"):
@@ -231,6 +232,7 @@ def test_a_manifest_has_counts_that_agree(tmp_path):
     assert _is_manifest(good) and _is_manifest({**good, "rows": 9, "chunks": 3}) and _is_manifest({**good, "more": 1})
     wrong = (
         {"schema": "other"}, {"rows": 0}, {"rows": -1}, {"rows": True}, {"rows": 10.0}, {"rows": 2**62}, {"chunks": 3},
+        {"rows": 2**62, "chunk": 2**62, "chunks": 1},
         {"chunks": 5}, {"chunk": None}, {"columns": None}, {"columns": {"distances": False}},
         {"columns": {"distances": 0, "values": True}}, {"columns": {"distances": False, "values": True, "more": 1}},
     )
