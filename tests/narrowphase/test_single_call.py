@@ -105,6 +105,12 @@ def test_pairs_of_the_same_small_sets_are_one():
     first = asked(collide.Box((1, 1, 1)), collide.Sphere(0.5))
     assert asked(collide.Box((1, 1, 1)), collide.Sphere(0.5)) is first
     assert asked(collide.Sphere(0.5), collide.Box((1, 1, 1))) is not first
+    kept = []
+    for _ in range(3):  # what contacts need is made once, and nothing is added to what the pair holds
+        A, B = collide.Box((1, 1, 1)), collide.Sphere(0.5)
+        assert len(collide.contacts(A, B, X, Y).rows) == 1 and prepared_pair(A, B) is first
+        kept.append((first.contacts, first.held))
+    assert kept[0] == kept[1] == kept[2] and kept[0][1] is kept[2][1]
     points = rng_of("hulls of pairs").normal(size=(20, 3))
     assert asked(collide.ConvexHull(points), collide.Sphere(0.5)) is not asked(
         collide.ConvexHull(points), collide.Sphere(0.5)
