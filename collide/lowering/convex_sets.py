@@ -64,9 +64,6 @@ def sets_of(shape: Shape) -> list[PlacedSet]:
 def convex_set(shape: Shape) -> ConvexSet:
     """The convex set of a shape other than a Compound. Raises UnsupportedQuery for meshes and regions, TypeError for
     classes not derived from the library's."""
-    rule = _RULES.get(type(shape))
-    if rule is not None:
-        return rule(shape)
     for cls in type(shape).__mro__:
         if cls in _RULES:
             return _RULES[cls](shape)

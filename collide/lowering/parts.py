@@ -119,7 +119,7 @@ def _alone(packed: PackedConvex) -> tuple[Part, ...]:
 
 def _placed(packed: PackedConvex, X_CS: np.ndarray, X_SP: np.ndarray) -> Part:
     """A part in the compound's frame, its slop grown by what the product of poses rounds."""
-    X_CP = X_CS if X_SP is IDENTITY else moved(X_CS, X_SP)
+    X_CP = moved(X_CS, X_SP)
     if X_CP is X_CS:
         return packed, X_CS
     scale = packed.reach + np.abs(X_SP[:3, 3]).sum() + np.abs(X_CS[:3, 3]).max()
