@@ -22,6 +22,7 @@ from collide.shapes.shape import Shape
 DEEPEST = -sys.float_info.max
 #: Distances beyond this are without bound to the engine [m].
 _FAR = 1e50
+_FLATS = (Plane, Halfspace)
 
 
 class Nearest(NamedTuple):
@@ -44,24 +45,37 @@ class Nearest(NamedTuple):
     facets_2: np.ndarray | None = None
 
 
-def nearest(
-    g1: CollisionGeometry, X1: np.ndarray, g2: CollisionGeometry, X2: np.ndarray, margin: float, limit: float,
-    is_signed: bool,
-) -> Nearest:
+class GeometryPair:
+    """Two geometries at poses (4, 4), with the shapes and swept radii [m] that they have now."""
+
+    __slots__ = ("X1", "X2", "g1", "g2", "radius_1", "radius_2", "shapes_1", "shapes_2")
+
+    def __init__(self, g1: CollisionGeometry, X1: np.ndarray, g2: CollisionGeometry, X2: np.ndarray):
+        self.g1, self.X1, self.g2, self.X2 = g1, X1, g2, X2
+        self.shapes_1, self.shapes_2 = g1._shapes, g2._shapes
+        self.radius_1, self.radius_2 = g1._radius_swept, g2._radius_swept
+
+    def is_of_two_shapes(self) -> bool:
+        """Whether each geometry is one shape, and one of the two has an end."""
+        has_end = self.g1._box is not None or self.g2._box is not None
+        return has_end and len(self.shapes_1) == len(self.shapes_2) == 1
+
+
+def nearest(pair: GeometryPair, margin: float, limit: float, is_signed: bool) -> Nearest:
     """How far two geometries are apart.
 
     margin : what counts as within [m].   limit : farther pairs need a lower bound alone [m].   is_signed : whether
     depths are worked out. Raises what `collide.distance` raises.
     """
-    if len(g1._shapes) == len(g2._shapes) == 1:
-        return _of_shapes((g1._shapes[0], g2._shapes[0]), g1, X1, g2, X2, margin, limit, is_signed)
-    if isinstance(g1, (Plane, Halfspace)) and isinstance(g2, (Plane, Halfspace)):
-        return _of_flats(g1, X1, g2, X2, margin)
+    if len(pair.shapes_1) == len(pair.shapes_2) == 1:
+        return _of_shapes((pair.shapes_1[0], pair.shapes_2[0]), pair, margin, limit, is_signed)
+    if isinstance(pair.g1, _FLATS) and isinstance(pair.g2, _FLATS):
+        return _of_flats(pair, margin)
     answers = []
-    for (shapes_1, facets_1), (shapes_2, facets_2) in ((p, q) for p in _connected(g1) for q in _connected(g2)):
-        sides = [
-            _of_shapes((A, B), g1, X1, g2, X2, margin, limit, is_signed) for A in shapes_1 for B in shapes_2
-        ]
+    for (shapes_1, facets_1), (shapes_2, facets_2) in (
+        (p, q) for p in _connected(pair.g1) for q in _connected(pair.g2)
+    ):
+        sides = [_of_shapes((A, B), pair, margin, limit, is_signed) for A in shapes_1 for B in shapes_2]
         farthest = max(sides, key=lambda side: side.distance)
         answers.append(farthest._replace(
             is_within=all(side.is_within for side in sides), lower=max(side.lower for side in sides),
@@ -80,9 +94,10 @@ def _connected(g: CollisionGeometry) -> list[tuple[tuple[Shape, ...], np.ndarray
     return [((shape,), facets) for shape, facets in g._pieces()]
 
 
-def _of_shapes(shapes, g1, X1, g2, X2, margin: float, limit: float, is_signed: bool) -> Nearest:
+def _of_shapes(shapes, pair: GeometryPair, margin: float, limit: float, is_signed: bool) -> Nearest:
     A, B = shapes
-    swept_1, swept_2 = g1._radius_swept, g2._radius_swept
+    g1, X1, g2, X2 = pair.g1, pair.X1, pair.g2, pair.X2
+    swept_1, swept_2 = pair.radius_1, pair.radius_2
     radii = swept_1 + swept_2
     total = margin + radii
     try:
@@ -93,9 +108,9 @@ def _of_shapes(shapes, g1, X1, g2, X2, margin: float, limit: float, is_signed: b
         else:
             row = engine.distance(A, B, X1, X2, signed=is_signed).rows[0]
     except UnsupportedQuery:
-        if not (isinstance(g1, (Plane, Halfspace)) and isinstance(g2, (Plane, Halfspace))):
+        if not (isinstance(g1, _FLATS) and isinstance(g2, _FLATS)):
             raise
-        return _without_end(shapes, g1, X1, g2, X2)
+        return _without_end(shapes, X1, X2)
     distance, lower, is_hit = float(row["distance"]), float(row["lower"]), bool(row["hit"])
     if total > 0.0:
         is_within = lower <= total and (row["upper"] <= total or hits(A, B, X1, X2, security_margin=total))
@@ -111,16 +126,14 @@ def _of_shapes(shapes, g1, X1, g2, X2, margin: float, limit: float, is_signed: b
     return Nearest(distance, lower, normal, point_1, point_2, part_1, part_2, bool(is_within), shapes)
 
 
-def _of_flats(g1, X1, g2, X2, margin: float) -> Nearest:
+def _of_flats(pair: GeometryPair, margin: float) -> Nearest:
     """Of planes and half-spaces, which have no end: the farthest of their sides."""
-    sides = [
-        _of_shapes((A, B), g1, X1, g2, X2, margin, math.inf, True) for A in g1._shapes for B in g2._shapes
-    ]
+    sides = [_of_shapes((A, B), pair, margin, math.inf, True) for A in pair.shapes_1 for B in pair.shapes_2]
     farthest = max(sides, key=lambda side: side.distance)
     return farthest._replace(is_within=all(side.is_within for side in sides))
 
 
-def _without_end(shapes, g1, X1, g2, X2) -> Nearest:
+def _without_end(shapes, X1, X2) -> Nearest:
     """Of half-spaces that no translation takes apart: a point that they share, and coal's number for the depth."""
     normals = np.array([X[:3, :3] @ shape.normal for shape, X in zip(shapes, (X1, X2))])
     offsets = np.array([n @ X[:3, 3] + shape.offset for n, shape, X in zip(normals, shapes, (X1, X2))])

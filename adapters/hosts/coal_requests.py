@@ -17,6 +17,7 @@ from collide.adapters.hosts.coal_enums import (
     GJKVariant,
 )
 from collide.adapters.hosts.coal_transform import Transform3s
+from collide.adapters.hosts.fields_when_read import FieldsWhenRead
 from collide.adapters.hosts.host_numbers import real, shaped, whole
 from collide.errors import InvalidArgument
 
@@ -91,13 +92,16 @@ class DistanceRequest(QueryRequest):
         self.rel_err, self.abs_err = rel_err, abs_err
 
 
-class Contact:
+class Contact(FieldsWhenRead):
     """A contact of geometries o1 and o2: ``normal`` (3,) from o1 to o2 in the world, ``pos`` (3,) between the surfaces
     [m], ``penetration_depth`` the signed distance [m], below 0 where they overlap; ``b1`` and ``b2`` facets of meshes,
     −1 elsewhere.
 
-    ``Contact()``, ``Contact(o1, o2, b1, b2)``, ``Contact(o1, o2, b1, b2, pos, normal, depth)``.
+    ``Contact()``, ``Contact(o1, o2, b1, b2)``, ``Contact(o1, o2, b1, b2, pos, normal, depth)``. Fields of a contact
+    that `collide` found are worked out when one of them is first read, of the poses that were asked.
     """
+
+    _later = ("b1", "b2", "normal", "penetration_depth", "nearest_points", "pos")
 
     def __init__(self, o1=None, o2=None, b1=-1, b2=-1, pos=None, normal=None, depth=_MAX):
         self.o1, self.o2, self.b1, self.b2 = o1, o2, whole("b1", b1), whole("b2", b2)
@@ -143,7 +147,18 @@ class CollisionResult(QueryResult):
     def clear(self):
         """As new."""
         self._contacts = StdVec_Contact()
-        self.distance_lower_bound = _MAX
+        self._bound, self._bounds_to_come = _MAX, []
+
+    @property
+    def distance_lower_bound(self):
+        """[m]; of pairs that were asked since it was last read, it is worked out now."""
+        while self._bounds_to_come:
+            self._bound = min(self._bound, self._bounds_to_come.pop()())
+        return self._bound
+
+    @distance_lower_bound.setter
+    def distance_lower_bound(self, value):
+        self._bound, self._bounds_to_come = value, []
 
     def isCollision(self):
         """Whether there is a contact."""
@@ -171,8 +186,15 @@ class CollisionResult(QueryResult):
         return None
 
 
-class DistanceResult(QueryResult):
+def _nothing() -> tuple:
+    """The fields `DistanceResult._later` before a query."""
+    return np.full(3, np.nan), [np.full(3, np.nan), np.full(3, np.nan)], -1, -1
+
+
+class DistanceResult(FieldsWhenRead, QueryResult):
     """What `distance` found last: ``min_distance`` [m], ``normal`` (3,) from the first body to the second."""
+
+    _later = ("normal", "nearest_points", "b1", "b2")
 
     def __init__(self):
         super().__init__()
@@ -181,10 +203,8 @@ class DistanceResult(QueryResult):
     def clear(self):
         """As new."""
         self.min_distance = _MAX
-        self.normal = np.full(3, np.nan)
-        self.nearest_points = [np.full(3, np.nan), np.full(3, np.nan)]
         self.o1 = self.o2 = None
-        self.b1 = self.b2 = -1
+        self._postpone(_nothing)
 
     def getNearestPoint1(self):
         """A copy (3,): of the first body."""

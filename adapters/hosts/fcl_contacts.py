@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 import collide as engine
-from collide.adapters.hosts.fcl_facets import facet_contact, facet_contacts, new_contact
+from collide.adapters.hosts.fcl_facets import contact_when_read, facet_contact, facet_contacts, new_contact
 from collide.adapters.hosts.fcl_geometry import CollisionObject
 from collide.adapters.hosts.fcl_requests import NODE_TYPE, OBJECT_TYPE, Contact
 from collide.errors import CollideError
@@ -44,12 +44,15 @@ def contacts_of(o1: CollisionObject, o2: CollisionObject, limit: int, with_geome
         return [new_contact(g1, g2, -1, -1, np.zeros(3), np.zeros(3), math.inf)]
     if _is_one_facet(o1, o2, limit):
         return [facet_contact(o1, o2, True)]
+    if limit == 1 and len(g1._shapes) == len(g2._shapes) == 1:
+        X_WA, X_WB = o1._X.copy(), o2._X.copy()
+        return [contact_when_read(g1, g2, _only_contact, g1, g2, g1._shapes[0], g2._shapes[0], X_WA, X_WB)]
     A, B = nearest_sides(o1, o2)
+    if limit == 1:
+        return [new_contact(g1, g2, *_only_contact(g1, g2, A, B, o1._X, o2._X))]
     rows = engine.contacts(A, B, o1._X, o2._X, max_contacts=limit).rows
-    if len(rows) == 1:
-        return [_of_row(rows, o1, o2)]
     if not len(rows):
-        return [_touching(A, B, o1, o2)]
+        return [new_contact(g1, g2, *_touching(g1, g2, A, B, o1._X, o2._X))]
     rows = rows[np.argsort(rows["distance"], kind="stable")[:limit]]
     return _of_rows(rows, [(o1, o2)] * len(rows))
 
@@ -105,15 +108,22 @@ def _is_one_facet(o1: CollisionObject, o2: CollisionObject, limit: int) -> bool:
     return limit == 1 and g1._object_type == _MESH and g2._object_type == _PLAIN and g2._node_type not in FLAT
 
 
-def _of_row(rows: np.ndarray, o1: CollisionObject, o2: CollisionObject) -> Contact:
-    """The contact of one row."""
-    g1, g2 = o1._geometry, o2._geometry
+def _only_contact(g1, g2, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple:
+    """The fields `Contact._later` of shapes that meet, where one contact is wanted."""
+    rows = engine.contacts(A, B, X_WA, X_WB, max_contacts=1).rows
+    if not len(rows):
+        return _touching(g1, g2, A, B, X_WA, X_WB)
+    return _of_row(g1, g2, rows, ("facet_a", "facet_b"))
+
+
+def _of_row(g1, g2, rows: np.ndarray, facets: tuple[str, str]) -> tuple:
+    """The fields `Contact._later` of one row; facets : the names of the columns that have facets' numbers."""
     pos = 0.5 * rows["point_a"][0] + 0.5 * rows["point_b"][0]
     b1 = b2 = -1
     if g1._object_type != _PLAIN:  # which stands first
-        b1 = _number(g1, rows["facet_a"].item(), rows["part_a"].item())
-        b2 = _number(g2, rows["facet_b"].item(), rows["part_b"].item())
-    return new_contact(g1, g2, b1, b2, rows["normal"][0].copy(), pos, max(0.0, -rows["distance"].item()))
+        b1 = _number(g1, rows[facets[0]].item(), rows["part_a"].item())
+        b2 = _number(g2, rows[facets[1]].item(), rows["part_b"].item())
+    return b1, b2, rows["normal"][0].copy(), pos, max(0.0, -rows["distance"].item())
 
 
 def _of_rows(rows: np.ndarray, pairs: list) -> list[Contact]:
@@ -131,14 +141,9 @@ def _of_rows(rows: np.ndarray, pairs: list) -> list[Contact]:
     return contacts
 
 
-def _touching(A, B, o1: CollisionObject, o2: CollisionObject) -> Contact:
-    """The contact of bodies that touch within rounding, where no facets say where."""
-    rows = engine.distance(A, B, o1._X, o2._X).rows
-    pos = 0.5 * rows["point_a"][0] + 0.5 * rows["point_b"][0]
-    g1, g2 = o1._geometry, o2._geometry
-    part_a, part_b = rows["part_a"].item(), rows["part_b"].item()
-    b1, b2 = _number(g1, part_a, part_a), _number(g2, part_b, part_b)
-    return new_contact(g1, g2, b1, b2, rows["normal"][0].copy(), pos, max(0.0, -rows["distance"].item()))
+def _touching(g1, g2, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple:
+    """The fields `Contact._later` of bodies that touch within rounding, where no facets say where."""
+    return _of_row(g1, g2, engine.distance(A, B, X_WA, X_WB).rows, ("part_a", "part_b"))
 
 
 def _number(geometry, facet: int, part: int) -> int:

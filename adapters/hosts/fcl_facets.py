@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from collide.adapters.hosts.fcl_requests import OBJECT_TYPE, Contact
 
 #: The corner after each of three, and the one after that.
 _FOLLOWING, _LAST = [1, 2, 0], [2, 0, 1]
-_WORKED_OUT = ("normal", "pos", "penetration_depth")
 
 
 def new_contact(g1, g2, b1: int, b2: int, normal, pos, depth: float) -> Contact:
@@ -23,25 +23,12 @@ def new_contact(g1, g2, b1: int, b2: int, normal, pos, depth: float) -> Contact:
     return contact
 
 
-class FacetContact(Contact):
-    """A contact whose normal, place and depth are worked out when one of them is first read.
-
-    Programs that ask for one contact of meshes mostly want to know whose it is, and geometry takes ten times as long.
-    """
-
-    def __init__(self, g1, g2, b1: int, b2: int, geometry: Callable[[], tuple]):
-        self.o1, self.o2, self.b1, self.b2 = g1, g2, b1, b2
-        self._geometry = geometry
-
-    def __getattr__(self, name):  # of what is not there yet
-        if name not in _WORKED_OUT:
-            raise AttributeError(f"a Contact has no {name}")
-        self.normal, self.pos, self.penetration_depth = self._geometry()
-        del self._geometry
-        return self.__dict__[name]
-
-    def __reduce__(self):
-        return new_contact, (self.o1, self.o2, self.b1, self.b2, self.normal, self.pos, self.penetration_depth)
+def contact_when_read(g1, g2, work: Callable[..., tuple], *question) -> Contact:
+    """A contact with fields ``work(*question)``, in the order of `Contact._later`, when one of them is first read."""
+    contact = Contact.__new__(Contact)
+    contact.o1, contact.o2 = g1, g2
+    contact._postpone(partial(work, *question))
+    return contact
 
 
 def facet_contact(o1: CollisionObject, o2: CollisionObject, with_geometry: bool) -> Contact:
@@ -49,16 +36,20 @@ def facet_contact(o1: CollisionObject, o2: CollisionObject, with_geometry: bool)
     themselves; one of those that `facet_contacts` has.
     """
     g1, g2 = o1._geometry, o2._geometry
-    A, B = g1._shape, g2._shape
-    rows = engine.distance(A, B, o1._X, o2._X, signed=False).rows
-    i = rows["part_a"].item()
-    j = rows["part_b"].item() if g2._object_type == OBJECT_TYPE.OT_BVH else -1
+    are_meshes = g2._object_type == OBJECT_TYPE.OT_BVH
+    question = g1._shape, g2._shape, o1._X.copy(), o2._X.copy(), are_meshes, with_geometry
+    return contact_when_read(g1, g2, _of_deciding_facets, *question)
+
+
+def _of_deciding_facets(A, B, X_WA: np.ndarray, X_WB: np.ndarray, are_meshes: bool, with_geometry: bool) -> tuple:
+    """The fields `Contact._later` of a mesh and a mesh or a solid."""
+    answer = engine.distance(A, B, X_WA, X_WB, signed=False)
+    i, j = answer.part_a, answer.part_b if are_meshes else -1
     if not with_geometry:
-        return new_contact(g1, g2, i, j, np.zeros(3), np.zeros(3), 0.0)
-    X_WA, X_WB = o1._X.copy(), o2._X.copy()
-    if j < 0:
-        return FacetContact(g1, g2, i, j, lambda: _of_facet_and_solid(A.vertices[A.faces[i]], B, X_WA, X_WB))
-    return FacetContact(g1, g2, i, j, lambda: _of_facet_pairs(A, B, X_WA, X_WB, np.array([[i, j]]))[0])
+        return i, j, np.zeros(3), np.zeros(3), 0.0
+    if are_meshes:
+        return i, j, *_of_facet_pairs(A, B, X_WA, X_WB, np.array([[i, j]]))[0]
+    return i, j, *_of_facet_and_solid(A.vertices[A.faces[i]], B, X_WA, X_WB)
 
 
 def facet_contacts(o1: CollisionObject, o2: CollisionObject, limit: int, with_geometry: bool) -> list[Contact]:

@@ -6,6 +6,8 @@ came first; results collect over calls.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 import collide as engine
@@ -122,23 +124,29 @@ def distance(o1, o2, request=None, result=None):
     if not (g1._shapes and g2._shapes):
         _refuse_unfinished(g1, g2)
     if len(g1._shapes) == len(g2._shapes) == 1:
-        rows = engine.distance(g1._shapes[0], g2._shapes[0], o1._X, o2._X, signed=signed).rows
+        A, B = g1._shapes[0], g2._shapes[0]
     elif is_plane_with_pieces(o1, o2):
         return _plane_distance(o1, o2, signed, result)
     else:
         A, B = nearest_sides(o1, o2)
-        rows = engine.distance(A, B, o1._X, o2._X, signed=signed).rows
-    value = rows["distance"].item()
-    if not signed and rows["hit"].item():
+    answer = engine.distance(A, B, o1._X, o2._X, signed=signed)
+    value = answer.distance
+    if not signed and answer.hit:
         value = 0.0 if both_meshes else -1.0
     if result is not None and result.min_distance > value:
-        result.min_distance = value
-        result.nearest_points = [rows["point_a"][0].copy(), rows["point_b"][0].copy()]
-        result.o1, result.o2, result.b1, result.b2 = g1, g2, -1, -1
-        if g1._object_type != OBJECT_TYPE.OT_GEOM:  # which stands first
-            result.b1 = rows["part_a"].item()
-            result.b2 = rows["part_b"].item() if g2._object_type != OBJECT_TYPE.OT_GEOM else -1
+        result.min_distance, result.o1, result.o2 = value, g1, g2
+        result._postpone(partial(_of_result, answer, g1._object_type, g2._object_type))
     return value
+
+
+def _of_result(answer, kind_1: int, kind_2: int) -> tuple:
+    """The fields `DistanceResult._later` of a result of `collide.distance`."""
+    rows = answer.rows
+    b1 = b2 = -1
+    if kind_1 != OBJECT_TYPE.OT_GEOM:  # which stands first
+        b1 = rows["part_a"].item()
+        b2 = rows["part_b"].item() if kind_2 != OBJECT_TYPE.OT_GEOM else -1
+    return [rows["point_a"][0].copy(), rows["point_b"][0].copy()], b1, b2
 
 
 def _plane_distance(o1: CollisionObject, o2: CollisionObject, signed: bool, result) -> float:

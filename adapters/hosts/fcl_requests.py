@@ -6,6 +6,8 @@ import sys
 
 import numpy as np
 
+from collide.adapters.hosts.fields_when_read import FieldsWhenRead
+
 
 class OBJECT_TYPE:
     """What `CollisionObject.getObjectType` returns."""
@@ -41,10 +43,12 @@ class GJKSolverType:
     GST_LIBCCD, GST_INDEP = range(2)
 
 
-class Contact:
+class Contact(FieldsWhenRead):
     """A contact of geometries o1 and o2: ``normal`` (3,) from o1 to o2 in the world, ``pos`` (3,) between the two
     surfaces [m], ``penetration_depth`` ≥ 0 [m], ``b1`` and ``b2`` facets of meshes or boxes of octrees, −1 elsewhere.
     """
+
+    _later = ("b1", "b2", "normal", "pos", "penetration_depth")
 
     def __init__(self):
         self.o1 = self.o2 = None
@@ -118,8 +122,10 @@ class DistanceRequest:
         self.gjk_solver_type = gjk_solver_type
 
 
-class DistanceResult:
+class DistanceResult(FieldsWhenRead):
     """The least distance of the calls that it was handed to."""
+
+    _later = ("nearest_points", "b1", "b2")
 
     def __init__(self, min_distance_=sys.float_info.max):
         self.min_distance = min_distance_

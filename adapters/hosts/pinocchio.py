@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 import collide as engine
-from collide.adapters.hosts.coal_nearest import nearest
+from collide.adapters.hosts.coal_nearest import GeometryPair, nearest
 from collide.adapters.hosts.coal_queries import collide_posed
 from collide.adapters.hosts.coal_requests import CollisionResult
 from collide.adapters.hosts.host_numbers import of_kind
@@ -223,7 +223,7 @@ def distances(model, data, geom_model, geom_data, q) -> PairDistances:
     for row in np.flatnonzero(~in_batch).tolist():
         g1, X1, g2, X2 = _bodies(known, X, which[row])
         are_meshes = g1._has_parts and g2._has_parts
-        answer_of_pair = nearest(g1, X1, g2, X2, 0.0, np.inf, bool(is_signed[row]) and not are_meshes)
+        answer_of_pair = nearest(GeometryPair(g1, X1, g2, X2), 0.0, np.inf, bool(is_signed[row]) and not are_meshes)
         for name in PairDistances._fields[1:]:
             getattr(answer, name)[row] = getattr(answer_of_pair, name)
     return answer

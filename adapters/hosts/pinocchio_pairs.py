@@ -9,7 +9,7 @@ import numpy as np
 
 import collide as engine
 from collide.adapters.hosts.coal_geometry import CollisionGeometry
-from collide.adapters.hosts.coal_nearest import nearest
+from collide.adapters.hosts.coal_nearest import GeometryPair, nearest
 from collide.adapters.hosts.pinocchio_geometry import geometry_of, numbers_of
 from collide.errors import InvalidArgument
 from collide.pairs.query import collide as hits
@@ -134,5 +134,5 @@ def meet(known: KnownPairs, X_1: np.ndarray, X_2: np.ndarray, which: np.ndarray,
             is_hit[row] = hits(g1._shapes[0], g2._shapes[0], X_1[row], X_2[row])
         else:
             margin = float(margins[row])
-            is_hit[row] = nearest(g1, X_1[row], g2, X_2[row], margin, 0.0, margin < 0.0).is_within
+            is_hit[row] = nearest(GeometryPair(g1, X_1[row], g2, X_2[row]), margin, 0.0, margin < 0.0).is_within
     return is_hit
