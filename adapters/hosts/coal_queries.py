@@ -104,6 +104,8 @@ class _Asked(GeometryPair):
     __slots__ = ("_answer", "_question")
 
     _answer: tuple[list[tuple], float] | None
+    #: Whether contacts are wanted, the margin [m], the distance beyond which a bound is enough [m].
+    _question: tuple[bool, float, float]
 
     def keep(self, *question) -> None:
         """Takes copies of the poses, which programs change in place; shapes are never changed."""
