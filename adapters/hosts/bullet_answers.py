@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 
@@ -18,7 +19,7 @@ BREAKING_THRESHOLD = 0.02
 #: Bullet's manifolds have at most so many points.
 MAX_CONTACTS = 4
 #: Up to so many pairs are asked one by one; more are a batch of those that are near.
-_ONE_BY_ONE = 4
+ONE_BY_ONE = 4
 #: Spheres around links are this much larger, for rounding.
 _SLACK = 1e-9
 #: The first of a result's numbers: distance, lower, upper, normal, and the two points.
@@ -50,9 +51,28 @@ class Tables:
         self.centers, self.reaches = _balls(boxes)
         centers, reaches = _balls(boxes_of(self.shapes, self.X_BS))
         self.thresholds = BREAKING_THRESHOLD * (np.sqrt(np.square(centers).sum(axis=1)) + reaches)
+        moving = np.array([not geom.fixed for geom in geoms], dtype=bool) & np.isfinite(self.thresholds)
+        #: The largest gap at which Bullet keeps a contact of a body that moves [m].
+        self.largest_threshold = float(self.thresholds[moving].max(initial=0.0))
         self.rows_of: dict[int, list[int]] = {}
         for row in sorted(range(len(geoms)), key=lambda k: geoms[k].link):
             self.rows_of.setdefault(geoms[row].body, []).append(row)
+
+    def margins_of(self, a: int, b: int) -> tuple[float, float]:
+        """What Bullet adds to each of two links [m]: nothing against balls."""
+        return float(self.margins[a] * (not self.spheres[b])), float(self.margins[b] * (not self.spheres[a]))
+
+    def threshold_of(self, a: int, b: int) -> float:
+        """The gap up to which Bullet keeps contacts of two links [m]: 0 of two boxes and of two balls."""
+        if (self.boxes[a] and self.boxes[b]) or (self.spheres[a] and self.spheres[b]):
+            return 0.0
+        return min(float(self.thresholds[a]), float(self.thresholds[b]))
+
+    def moved_to(self, X_WSs: np.ndarray) -> Tables:
+        """The same colliders at other poses (n, 4, 4)."""
+        tables = copy.copy(self)
+        tables.X_WS = X_WSs
+        return tables
 
     def place(self, row: int) -> tuple[int, int]:
         """Body and link."""
@@ -73,11 +93,11 @@ def closest(A: Tables, rows_a: Sequence[int], B: Tables, rows_b: Sequence[int], 
     reach = max(limit, 0.0)
     if A.any_margin or B.any_margin:
         reach += float(A.margins.max(initial=0.0) + B.margins.max(initial=0.0))
-    if len(pairs) > _ONE_BY_ONE:
+    if len(pairs) > ONE_BY_ONE:
         i, j = np.array(pairs).T
         near = _gaps(A, i, B, j) <= reach
         pairs, i, j = [pair for pair, is_near in zip(pairs, near.tolist()) if is_near], i[near], j[near]
-    if len(pairs) > _ONE_BY_ONE:
+    if len(pairs) > ONE_BY_ONE:
         assert A.shape_set is not None and B.shape_set is not None  # there are rows
         r = collide.distance(A.shape_set[i], B.shape_set[j], A.X_WS[i], B.X_WS[j], max_distance=reach)
         answers = _numbers(r)
@@ -124,31 +144,48 @@ def contact_points(world: World, tables: Tables, contact_margin: float | None) -
     """
     if not tables.geoms:
         return []
-    if contact_margin is not None:
-        margin = contact_margin
-    else:
-        moving = [row for row, geom in enumerate(tables.geoms) if not geom.fixed]
-        bounded = tables.thresholds[moving][np.isfinite(tables.thresholds[moving])]
-        margin = float(bounded.max(initial=0.0))
-    margin += 2.0 * float(tables.margins.max(initial=0.0))
-    rows = world.contacts(margin, max_contacts=MAX_CONTACTS).rows
-    a, b = rows["a"], rows["b"]
-    margin_a, margin_b = tables.margins[a] * ~tables.spheres[b], tables.margins[b] * ~tables.spheres[a]
-    distances = rows["distance"] - margin_a - margin_b
-    limits = np.minimum(tables.thresholds[a], tables.thresholds[b])
-    if contact_margin is not None:
-        limits[:] = contact_margin
-    else:
-        limits[(tables.boxes[a] & tables.boxes[b]) | (tables.spheres[a] & tables.spheres[b])] = 0.0
-    near = np.flatnonzero(distances <= limits)
-    normals = rows["normal"][near]
-    points_a = rows["point_a"][near] + margin_a[near, None] * normals
-    points_b = rows["point_b"][near] - margin_b[near, None] * normals
-    columns = (a[near], b[near], points_a, points_b, 0.0 - normals, distances[near])
-    return [
-        _row(tables.place(i), tables.place(j), tuple(point_a), tuple(point_b), tuple(normal), distance)
-        for i, j, point_a, point_b, normal, distance in zip(*(column.tolist() for column in columns))
-    ]
+    rows = world.contacts(_largest_gap(tables, contact_margin), max_contacts=MAX_CONTACTS).rows
+    return _contacts_of(rows, rows["a"].tolist(), rows["b"].tolist(), tables, contact_margin)
+
+
+def contact_points_of(pairs: Sequence[tuple[int, int]], tables: Tables, contact_margin: float | None) -> list[tuple]:
+    """The same of some pairs of rows, each with the smaller row first: what the World has of them."""
+    margin, contacts = _largest_gap(tables, contact_margin), []
+    for i, j in pairs:
+        X_i, X_j = tables.X_WS[i], tables.X_WS[j]
+        rows = collide.contacts(
+            tables.shapes[i], tables.shapes[j], X_i, X_j, margin=margin, max_contacts=MAX_CONTACTS
+        ).rows
+        if len(rows):
+            contacts += _contacts_of(rows, [i] * len(rows), [j] * len(rows), tables, contact_margin)
+    return contacts
+
+
+def _largest_gap(tables: Tables, contact_margin: float | None) -> float:
+    """The margin [m] with which shapes are asked for contacts."""
+    margin = tables.largest_threshold if contact_margin is None else contact_margin
+    return margin + 2.0 * float(tables.margins.max(initial=0.0)) if tables.any_margin else margin
+
+
+def _contacts_of(
+    rows: np.ndarray, a: list[int], b: list[int], tables: Tables, contact_margin: float | None
+) -> list[tuple]:
+    """pybullet's tuples of rows of contacts between rows a and b (n,) of the tables, where they count."""
+    limits: dict[tuple[int, int], float] = {}
+    contacts = []
+    columns = (rows[name].tolist() for name in ("distance", "normal", "point_a", "point_b"))
+    for i, j, distance, normal, point_a, point_b in zip(a, b, *columns):
+        if (i, j) not in limits:
+            limits[i, j] = tables.threshold_of(i, j) if contact_margin is None else contact_margin
+        if tables.any_margin:
+            margin_a, margin_b = tables.margins_of(i, j)
+            distance = distance - margin_a - margin_b
+            point_a = [x + margin_a * n for x, n in zip(point_a, normal)]
+            point_b = [x - margin_b * n for x, n in zip(point_b, normal)]
+        if distance <= limits[i, j]:
+            to_a = (0.0 - normal[0], 0.0 - normal[1], 0.0 - normal[2])
+            contacts.append(_row(tables.place(i), tables.place(j), tuple(point_a), tuple(point_b), to_a, distance))
+    return contacts
 
 
 def exchanged(row: tuple) -> tuple:

@@ -53,6 +53,17 @@ class CollisionFilters:
         """Whether a World's rule for groups and masks gives what Bullet's gives: nothing was set."""
         return not self._group_masks and not any(self._pairs.values())
 
+    def tests(self, A: Geom, B: Geom) -> bool:
+        """Whether two links are tested against each other; the rule of `never_tested` and `incompatible` for a pair."""
+        is_on = self._pairs.get(frozenset(((A.body, A.link), (B.body, B.link))))
+        if A.body == B.body and not _links_meet(A, B, self._self_flags.get(A.body, 0)):
+            return False
+        if is_on is not None:
+            return is_on
+        (group_a, mask_a), (group_b, mask_b) = self.bits(A), self.bits(B)
+        forth, back = group_a & mask_b != 0, group_b & mask_a != 0
+        return forth and back if self.needs_both else forth or back
+
     def never_tested(self, geoms: Sequence[Geom]) -> list[tuple[int, int, str]]:
         """(row, row, reason) of pairs that are left out, besides those that groups and masks exclude."""
         rows = {(geom.body, geom.link): row for row, geom in enumerate(geoms)}

@@ -12,9 +12,11 @@ import numpy as np
 
 from collide import World
 from collide.adapters.hosts.bullet_answers import (
+    ONE_BY_ONE,
     Tables,
     closest,
     contact_points,
+    contact_points_of,
     exchanged,
     overlapping,
     ray_hits,
@@ -86,6 +88,7 @@ class Mirror:
         self.filters = CollisionFilters()
         #: Shapes without a body, by the numbers that createCollisionShape gave.
         self.collision_shapes: dict[int, Shape] = {}
+        self._lone_shapes: dict[int, Tables] = {}
         self._bodies = ClientBodies(pybullet, client, margins, shapes)
         self._tables = Tables([], np.empty((0, 4, 4)))
         self._coordinates = np.empty((0, 7))
@@ -151,6 +154,7 @@ class Mirror:
         """The simulation was reset: no body has filters or shapes."""
         self.filters.clear_all()
         self.collision_shapes.clear()
+        self._lone_shapes.clear()
         self._bodies.spare_shapes.clear()
         self._bodies.forget()
         self._stale_filters = True
@@ -216,11 +220,16 @@ class Mirror:
         wanted = tuple(_integers(bodyA=bodyA, bodyB=bodyB, linkIndexA=linkIndexA, linkIndexB=linkIndexB))
         if self._stale_filters:
             self._fill_world()
-        if self._contacts is None:
-            self._contacts = contact_points(self.world, self._tables, self.contact_margin)
         for body in wanted[:2]:
             if body >= 0:
                 self._rows(body, EVERY_LINK)
+        if self._contacts is None and min(wanted[:2]) >= 0:
+            pairs = self._tested_pairs(*wanted)
+            if len(pairs) <= ONE_BY_ONE:
+                rows = contact_points_of(pairs, self._tables, self.contact_margin)
+                return tuple(row if row[1] == wanted[0] else exchanged(row) for row in rows)
+        if self._contacts is None:
+            self._contacts = contact_points(self.world, self._tables, self.contact_margin)
         if wanted == (-1, -1, EVERY_LINK, EVERY_LINK):
             return tuple(self._contacts)
         rows = []
@@ -315,8 +324,18 @@ class Mirror:
                 f"getClosestPoints: shape {number} is not known; pybullet does not give shapes without bodies back: "
                 "make it through attach(), or put it into Mirror.collision_shapes"
             )
-        geom = Geom(-1, EVERY_LINK, "shape", Collider(self.collision_shapes[number], None, 0.0, ""), (), False)
-        return Tables([geom], pose_of(position, orientation)[None]), [0]
+        shape = self.collision_shapes[number]
+        known = self._lone_shapes.get(number)
+        if known is None or known.shapes[0] is not shape:
+            geom = Geom(-1, EVERY_LINK, "shape", Collider(shape, None, 0.0, ""), (), False)
+            known = self._lone_shapes[number] = Tables([geom], np.eye(4)[None])
+        return known.moved_to(pose_of(position, orientation)[None]), [0]
+
+    def _tested_pairs(self, body_a: int, body_b: int, link_a: int, link_b: int) -> list[tuple[int, int]]:
+        """Pairs of rows (i, j), i < j, sorted, of links of two bodies that filters let meet."""
+        geoms = self._tables.geoms
+        pairs = {(min(a, b), max(a, b)) for a in self._rows(body_a, link_a) for b in self._rows(body_b, link_b)}
+        return sorted((i, j) for i, j in pairs if i != j and self.filters.tests(geoms[i], geoms[j]))
 
     def _rows(self, body: int, link: int) -> list[int]:
         """Rows of a body's links, or of one. Raises UnknownBody, UnsupportedQuery."""

@@ -45,6 +45,7 @@ _CLIENT_AT = {
     "setCollisionFilterGroupMask": 4, "changeDynamics": 24, "setPhysicsEngineParameter": 99, "connect": 99,
 }
 _CLIENT_AT_OF_QUESTIONS = dict(zip(QUESTIONS, (11, 4, 2, 4, 8)))
+_BODIES_OF_QUESTIONS = {"getClosestPoints": (("bodyA", "bodyB"), 1), "getContactPoints": (("bodyA", "bodyB"), 2)}
 #: Where flags stand among those of what loads bodies.
 _FLAGS_AT = {"createMultiBody": BODY_ARGUMENTS.index("flags"), "loadURDF": 5, "loadMJCF": 1}
 
@@ -218,6 +219,8 @@ class _StandIn(ModuleType):
 
     def _answering(self, name: str) -> Callable:
         method, place = getattr(Mirror, name), _CLIENT_AT_OF_QUESTIONS[name]
+        #: Arguments that name bodies, and of how many the answer is about these bodies alone.
+        sides, n_needed = _BODIES_OF_QUESTIONS.get(name, ((), 1))
 
         @functools.wraps(method)
         def answer(*values, **keywords):
@@ -225,9 +228,10 @@ class _StandIn(ModuleType):
             if self._client is not None and client not in (None, self._client):
                 return getattr(self.__wrapped__, name)(*values, **keywords)
             mirror = self._mirror(client)
-            if name == "getClosestPoints":
-                bodies = named(("bodyA", "bodyB"), values, keywords)
-                mirror.update_bodies(*{bodies[side] for side in ("bodyA", "bodyB") if bodies.get(side, -1) >= 0})
+            bodies = [keywords.get(side, values[k] if len(values) > k else -1) for k, side in enumerate(sides)]
+            known = [body for body in bodies if body >= 0]
+            if known and len(known) >= n_needed:
+                mirror.update_bodies(*known)
             else:
                 mirror.update()
             return method(mirror, *values, **keywords)

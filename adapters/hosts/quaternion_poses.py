@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from collide.adapters.hosts.host_numbers import shaped
@@ -9,7 +11,15 @@ from collide.adapters.hosts.host_numbers import shaped
 
 def pose_of(position, quaternion) -> np.ndarray:
     """(4, 4) pose of a position and a quaternion x, y, z, w."""
-    return poses_of(np.append(shaped("position", position, (3,)), shaped("orientation", quaternion, (4,)))[None])[0]
+    (p_x, p_y, p_z), q = shaped("position", position, (3,)).tolist(), shaped("orientation", quaternion, (4,)).tolist()
+    length = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+    scale = math.sqrt(2.0 / length) if length else math.nan
+    x, y, z, w = q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale
+    return np.array([
+        (1.0 - (y * y + z * z), x * y - z * w, x * z + y * w, p_x),
+        (x * y + z * w, 1.0 - (x * x + z * z), y * z - x * w, p_y),
+        (x * z - y * w, y * z + x * w, 1.0 - (x * x + y * y), p_z), (0.0, 0.0, 0.0, 1.0),
+    ])
 
 
 def poses_of(coordinates: np.ndarray) -> np.ndarray:

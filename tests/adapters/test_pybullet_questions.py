@@ -8,7 +8,7 @@ import pytest
 from collide.adapters.hosts.pybullet_mirror import Mirror, attach
 
 p = pytest.importorskip("pybullet", reason="pybullet is not installed: pip install 'collide-robotics[pybullet]'")
-from bullet_scenes import DATA, body, pairs_of, quaternion, sphere_of
+from bullet_scenes import CORNERS, DATA, body, pairs_of, quaternion, sphere_of
 
 # --- contacts and filters -----------------------------------------------------------------------
 
@@ -69,6 +69,42 @@ def test_pairs_that_filters_leave_out_are_those_of_bullet(client, mode):
         assert pairs_of(row for row in ours if row[8] < -1e-6) <= theirs
         seen += len(theirs)
     assert seen > 500
+
+
+def test_contacts_of_two_bodies_are_those_among_all(client):
+    """Pairs are asked alone where not all contacts are known: with the rows, and the filters, that the World has."""
+    random = np.random.default_rng(11)
+    stand_in = attach(p, client)
+    kinds = [
+        {"shapeType": p.GEOM_SPHERE, "radius": 0.5}, {"shapeType": p.GEOM_BOX, "halfExtents": [0.4, 0.5, 0.6]},
+        {"shapeType": p.GEOM_CAPSULE, "radius": 0.3, "height": 0.8},
+        {"shapeType": p.GEOM_MESH, "vertices": CORNERS, "meshScale": [0.8, 0.9, 1.0]},
+    ]
+    bodies = [body(client, 0.0, shapeType=p.GEOM_PLANE, planeNormal=[0, 0, 1])]
+    for k in range(24):
+        place = [*random.uniform(-1.2, 1.2, 2), random.uniform(0.2, 1.0)]
+        bodies.append(body(client, float(k % 5 > 0), place, quaternion(random), **kinds[k % 4]))
+    stand_in.loadURDF(f"{DATA}/cube.urdf", [0.1, 0.2, 0.5], physicsClientId=client)
+    bodies.append(stand_in.loadURDF(
+        f"{DATA}/kuka_iiwa/model.urdf", [0.3, 0.3, 0.2], flags=p.URDF_USE_SELF_COLLISION, physicsClientId=client
+    ))
+    n_pairs = n_asked = n_contacts = 0
+    for step in range(3):
+        for _ in range(20 * (step > 0)):
+            a, b = random.choice(bodies, 2, replace=False).tolist()
+            stand_in.setCollisionFilterPair(a, b, -1, -1, int(random.integers(2)), physicsClientId=client)
+        for number in random.choice(bodies, 4, replace=False).tolist() if step == 2 else ():
+            bits = random.integers(1, 4, 2).tolist()
+            stand_in.setCollisionFilterGroupMask(number, -1, *bits, physicsClientId=client)
+        mirror = stand_in.mirror_of(client)
+        for a, b in random.choice(bodies, (100, 2)).tolist():
+            mirror._contacts = None
+            alone = mirror.getContactPoints(a, b)
+            n_asked += mirror._contacts is None
+            mirror.getContactPoints()
+            assert alone == mirror.getContactPoints(a, b), (step, a, b)
+            n_pairs, n_contacts = n_pairs + 1, n_contacts + bool(alone)
+    assert n_asked > 0.8 * n_pairs and n_contacts > 0.05 * n_pairs
 
 
 @pytest.mark.parametrize("flags", [0, 8, 8 | 16, 8 | 32, 8 | 8192])
