@@ -60,7 +60,7 @@ def compute_collisions(model, data, geom_model, geom_data, q, stop_at_first=Fals
 
     Parameters
     ----------
-    model, data, geom_model, geom_data : Pinocchio's.
+    model, data, geom_model, geom_data : Pinocchio's; without q, model and data may be None.
     q : (nq,) configuration; None for placements as they stand in ``geom_data.oMg``.
     stop_at_first : bool
         Pairs after the first that collides are left as they were.
@@ -112,12 +112,26 @@ def compute_collisions(model, data, geom_model, geom_data, q, stop_at_first=Fals
     return bool(is_hit[:last].any())
 
 
-def compute_distances(model, data, geom_model, geom_data, q) -> int:
+def collide_pair(geom_model, geom_data, k: int, request=None) -> bool:
+    """Whether pair ``k`` collides at the placements as they stand; ``pinocchio.computeCollision`` by collide.
+
+    request : coal's, in place of the pair's own. The pair's result is emptied, and takes the contacts.
+    """
+    known, X = _asked(None, None, geom_model, geom_data, None)
+    result = list(geom_data.collisionResults)[k]
+    result.clear()
+    request = geom_data.collisionRequests[k] if request is None else request
+    _add_contacts(_coal(), known, geom_model, X, k, request, result)
+    return result.isCollision()
+
+
+def compute_distances(model, data, geom_model, geom_data, q, *, only: int | None = None) -> int:
     """Distances of all active pairs; ``pinocchio.computeDistances`` by collide.
 
     Parameters
     ----------
     model, data, geom_model, geom_data, q : as of `compute_collisions`.
+    only : a pair's number: no other pair is asked, and this one whether it is active or not.
 
     Returns
     -------
@@ -133,7 +147,7 @@ def compute_distances(model, data, geom_model, geom_data, q) -> int:
     ------
     InvalidArgument, InvalidShape, UnsupportedQuery, MissingExtra : as of `compute_collisions`.
     """
-    answer = distances(model, data, geom_model, geom_data, q)
+    answer = distances(model, data, geom_model, geom_data, q, only=only)
     write, results = _PointWriter(_coal()), geom_data.distanceResults
     for k, distance, normal, point_1, point_2, b1, b2 in zip(
         answer.pair.tolist(), answer.distance.tolist(), answer.normal, answer.point_1, answer.point_2,
@@ -168,7 +182,7 @@ def collides(model, data, geom_model, geom_data, Q) -> np.ndarray:
     ------
     InvalidArgument, InvalidShape, UnsupportedQuery, MissingExtra : as of `compute_collisions`.
     """
-    pin = _pinocchio()
+    pin = genuine()
     _check(pin, model, data, geom_model, geom_data)
     Q = checks.array("Q", Q, f"(N, {model.nq})", InvalidArgument)
     if Q.ndim != 2 or Q.shape[1] != model.nq:
@@ -187,12 +201,12 @@ def collides(model, data, geom_model, geom_data, Q) -> np.ndarray:
     return ~is_free
 
 
-def distances(model, data, geom_model, geom_data, q) -> PairDistances:
+def distances(model, data, geom_model, geom_data, q, *, only: int | None = None) -> PairDistances:
     """How far the bodies of every active pair are apart, and where; nothing is written but placements.
 
     Parameters
     ----------
-    model, data, geom_model, geom_data, q : as of `compute_collisions`.
+    model, data, geom_model, geom_data, q, only : as of `compute_distances`.
 
     Returns
     -------
@@ -203,7 +217,7 @@ def distances(model, data, geom_model, geom_data, q) -> PairDistances:
     InvalidArgument, InvalidShape, UnsupportedQuery, MissingExtra : as of `compute_collisions`.
     """
     known, X = _asked(model, data, geom_model, geom_data, q)
-    which = active_pairs(known, geom_model, geom_data)
+    which = active_pairs(known, geom_model, geom_data) if only is None else np.array([only])
     wanted = [bool(request.enable_signed_distance) for request in geom_data.distanceRequests]
     is_signed = np.array(wanted, dtype=bool)[which]
     n = len(which)
@@ -234,9 +248,10 @@ def distances(model, data, geom_model, geom_data, q) -> PairDistances:
 
 def _asked(model, data, geom_model, geom_data, q) -> tuple[KnownPairs, np.ndarray]:
     """What is known of the geometries, and their placements (g, 4, 4), brought up to date with q."""
-    pin = _pinocchio()
+    pin = genuine()
     _check(pin, model, data, geom_model, geom_data)
     if q is not None:
+        of_kind("model", model, pin.Model)
         q = checks.array("q", q, f"({model.nq},)", InvalidArgument)
         if q.shape != (model.nq,):
             raise InvalidArgument(f"q must have shape ({model.nq},), the model's nq, got {q.shape}")
@@ -245,20 +260,23 @@ def _asked(model, data, geom_model, geom_data, q) -> tuple[KnownPairs, np.ndarra
 
 
 def _check(pin, model, data, geom_model, geom_data) -> None:
-    """Raises TypeError, as Pinocchio's bindings do, and InvalidArgument."""
+    """Raises TypeError, as Pinocchio's bindings do, and InvalidArgument.   model, data : None without q."""
     kinds = {"model": pin.Model, "data": pin.Data, "geom_model": pin.GeometryModel, "geom_data": pin.GeometryData}
-    for (name, kind), value in zip(kinds.items(), (model, data, geom_model, geom_data)):
-        of_kind(name, value, kind)
+    if model is None and data is None:
+        del kinds["model"], kinds["data"]
+    values = {"model": model, "data": data, "geom_model": geom_model, "geom_data": geom_data}
+    for name, kind in kinds.items():
+        of_kind(name, values[name], kind)
     check_models(model, data, geom_model, geom_data)
 
 
-def _pinocchio():
-    """Pinocchio's module. Raises MissingExtra."""
+def genuine():
+    """Pinocchio itself, also while `pinocchio_module.install` has put ours in its place. Raises MissingExtra."""
     try:
         import pinocchio
     except ImportError:
         raise MissingExtra("pin", extra="pinocchio", purpose="ask the pairs of a Pinocchio model") from None
-    return pinocchio
+    return getattr(pinocchio, "__wrapped__", pinocchio)
 
 
 def _placements(pin, model, data, geom_model, geom_data, q) -> np.ndarray:
@@ -319,7 +337,7 @@ class _PointWriter:
 
 def _coal():
     """The coal that Pinocchio works with, whoever stands in for it in ``sys.modules``."""
-    pin = _pinocchio()
+    pin = genuine()
     return pin.coal if hasattr(pin, "coal") else pin.hppfcl
 
 
@@ -331,7 +349,7 @@ def check() -> str:
     MissingExtra : without Pinocchio.
     RuntimeError : what does not hold.
     """
-    pin = _pinocchio()
+    pin = genuine()
     model, geom_model = pin.Model(), pin.GeometryModel()
     for k in range(2):
         placement = pin.SE3(np.eye(3), np.array([2.0 * k, 0.0, 0.0]))

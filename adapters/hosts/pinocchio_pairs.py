@@ -54,6 +54,8 @@ def check_models(model, data, geom_model, geom_data) -> None:
             f"geom_data knows {len(geom_data.activeCollisionPairs)} pairs and geom_model {n_pairs}: make it anew after "
             "pairs were added or removed, geom_model.createData()"
         )
+    if model is None:
+        return
     if len(data.oMi) != model.njoints:
         raise InvalidArgument(f"data has {len(data.oMi)} joints and model {model.njoints}: model.createData()")
     for geometry_object in geom_model.geometryObjects:
