@@ -77,8 +77,8 @@ class _Surface:
         return numbers, grazed & np.array([number is not None for number in numbers])
 
     def _near(self, some: np.ndarray, ray: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs of points and triangles that no projection parts. Across the ray the line of a point is one value, which
-        a triangle that it meets has between its corners' values; along the ray some corner must not be behind. The
+        """Pairs of points and triangles that no projection parts. Across the ray the line of a point is one value, and
+        a triangle that it meets has that between its corners' values; along the ray some corner is not behind. The
         axes are exact; of |x| ≤ 1 an inner product with e is off by at most 4 u ‖e‖₁, the corners' rounding included.
         """
         x, y, z = ray

@@ -47,7 +47,8 @@ def cases() -> list:
         corners = tetrahedra(rng, kind)
         points = points_of(rng, as_doubles(corners), 24)
         # times three, for `as_integers` multiplies by a power of two
-        listed = [[[3 * Fraction(v) for v in p] for p in some] for some in (sum(corners, []), points.tolist())]
+        listed = [[[3 * Fraction(v) for v in p] for p in some]
+                  for some in ([p for t in corners for p in t], points.tolist())]
         whole, at = as_integers(*listed)
         truth = [winding([whole[k : k + 3] for k in range(0, len(whole), 3)], p) for p in at]
         made.append((f"default_rng({seed}), {kind!r}", corners, points, truth))
