@@ -7,7 +7,7 @@ goes on behind it.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 
 from collide.adapters.peers.answers import ABORTED, BUILDING, FAILED, HUNG, STATUSES, Event
 from collide.adapters.peers.protocol import Peer, Question, load_engine
@@ -31,7 +31,7 @@ class IsolatedPeer(Peer):
     """
 
     isolated = True
-    #: Whether the child stays from question to question, until `close`.
+    #: Whether the child stays from question to question, until `close`: always, or within `staying`.
     _stays = False
     #: Whether only children that answered nothing count for `max_restarts`.
     _counts_idle_deaths = False
@@ -113,6 +113,15 @@ class IsolatedPeer(Peer):
             return Event(_ENDED, 0, reason=child.how_it_ended(), mishap=ABORTED)
         self._started = True
         return event
+
+    @contextmanager
+    def staying(self) -> Iterator[None]:
+        stayed, self._stays = self._stays, True
+        try:
+            yield
+        finally:
+            self._stays = stayed
+            self.close()
 
     def close(self) -> None:
         """End the child."""

@@ -25,8 +25,8 @@ from collide.adapters.peers.exact import cross, dot, gjk, minus, world_points
 
 #: Boxes are grown by this part of the largest coordinate of a body.
 _MARGIN = 1e-12
-#: Cells in a leaf of the search.
-_LEAF = 4
+#: Pairs of cells in a leaf of the search, looked at together.
+_LEAF = 1024
 #: Pairs of cells looked at in one go, after the first few.
 _FIRST_CHUNK, _CHUNK = 64, 4096
 _DIGITS = 40
@@ -125,9 +125,11 @@ def _candidates(A: Cells, B: Cells, within: float) -> Iterator[tuple[int, int]]:
         size = _CHUNK
 
 
-def _not_parted(A: Cells, B: Cells, pairs: list[tuple[int, int]], within: float) -> list[tuple[int, int]]:
+def _not_parted(
+    A: Cells, B: Cells, pairs: list[tuple[int, int]] | np.ndarray, within: float
+) -> list[tuple[int, int]]:
     """Pairs of cells that no guessed axis parts by more than a length and far more than what doubles may be off."""
-    remaining = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    remaining = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
     slack = within + 1e-9 * max(A.size, B.size)
     open_ = np.ones(len(remaining), dtype=bool)
     for axis in _guesses(A, B, remaining):
@@ -172,13 +174,8 @@ def _near_cells(A: Cells, B: Cells, within: float) -> Iterator[tuple[int, int]]:
         some, others = todo.pop()
         if _between(_around(A, some), _around(B, others)) > within:
             continue
-        if max(len(some), len(others)) <= _LEAF:
-            yield from (
-                (i, j)
-                for i in some.tolist()
-                for j in others.tolist()
-                if _between(A.boxes[i].tolist(), B.boxes[j].tolist()) <= within
-            )
+        if len(some) * len(others) <= _LEAF:
+            yield from map(tuple, _pairs_within(A, B, some, others, within).tolist())
         elif len(some) >= len(others):
             todo += [(half, others) for half in _split(A, some)]
         else:
@@ -193,6 +190,14 @@ def _around(body: Cells, cells: np.ndarray) -> list[float]:
 def _finer(points, shift: int) -> list[tuple[int, ...]]:
     """Integer points in a unit that is smaller by 2**shift."""
     return [tuple(x << shift for x in point) for point in points]
+
+
+def _pairs_within(A: Cells, B: Cells, some: np.ndarray, others: np.ndarray, within: float) -> np.ndarray:
+    """(k, 2) pairs of cells whose boxes come within a length of each other: of all others `_between` says more."""
+    p, q = A.boxes[some][:, None], B.boxes[others]
+    steps = np.maximum(np.maximum(p[..., :3] - q[:, 3:], q[:, :3] - p[..., 3:]), 0.0)
+    i, j = np.nonzero(np.sqrt((steps**2).sum(axis=2)) * (1 - 1e-12) <= within)
+    return np.stack([some[i], others[j]], axis=1)
 
 
 def _between(low: list[float], high: list[float]) -> float:
@@ -216,14 +221,17 @@ def _gap(A: Cells, B: Cells, reach: Fraction) -> float:
     queue = [(0.0, count, np.arange(len(A.faces)), np.arange(len(B.faces)))]
     while queue and queue[0][0] <= limit:
         _, _, some, others = heapq.heappop(queue)
-        if len(some) == 1 and len(others) == 1:
-            if best is not None and _parted_by(A, B, int(some[0]), int(others[0]), axis, limit):
-                continue
-            squared = _squared(A, B, int(some[0]), int(others[0]), False)
-            if best is None or squared < best:
-                best = squared
-                axis = _towards(A, B, int(some[0]), int(others[0]))
-                limit = float(_root(squared)) * (1 + 1e-9)
+        if len(some) * len(others) <= _LEAF:
+            pairs = _by_middles(A, B, _pairs_within(A, B, some, others, limit))
+            if best is not None:
+                pairs = _not_beyond(A, B, pairs, axis, limit)
+            while len(pairs):
+                (i, j), pairs = pairs[0].tolist(), pairs[1:]
+                squared = _squared(A, B, i, j, False)
+                if best is None or squared < best:
+                    best, axis = squared, _towards(A, B, i, j)
+                    limit = float(_root(squared)) * (1 + 1e-9)
+                    pairs = _not_beyond(A, B, pairs, axis, limit)
             continue
         if len(some) >= len(others):
             parts = [(half, others) for half in _split(A, some)]
@@ -251,13 +259,20 @@ def _towards(A: Cells, B: Cells, i: int, j: int) -> np.ndarray:
     return n / (np.sqrt((n**2).sum()) or 1.0)
 
 
-def _parted_by(A: Cells, B: Cells, i: int, j: int, axis: np.ndarray, limit: float) -> bool:
-    """Whether two cells are clearly farther apart than a length, along an axis or a guessed one."""
-    p, q = A.placed[A.faces[i]], B.placed[B.faces[j]]
-    slack = 1e-11 * max(np.abs(p).max(), np.abs(q).max(), A.size, B.size)
-    if float((q * axis).sum(axis=1).min() - (p * axis).sum(axis=1).max()) * (1 - 1e-12) - slack > limit:
-        return True
-    return not _not_parted(A, B, [(i, j)], limit)
+def _by_middles(A: Cells, B: Cells, pairs: np.ndarray) -> np.ndarray:
+    """Pairs of cells (k, 2) whose boxes' middles are nearest first: an early short distance rules out more."""
+    p, q = (body.boxes[ids, :3] + body.boxes[ids, 3:] for body, ids in ((A, pairs[:, 0]), (B, pairs[:, 1])))
+    return pairs[np.argsort(((p - q) ** 2).sum(axis=1), kind="stable")]
+
+
+def _not_beyond(A: Cells, B: Cells, pairs: np.ndarray, axis: np.ndarray, limit: float) -> np.ndarray:
+    """Pairs of cells (k, 2) that are not clearly farther apart than a length, along an axis or a guessed one: two sets
+    are no nearer each other than their projections on a line are."""
+    slack = 1e-11 * max(A.size, B.size, np.abs(A.placed).max(), np.abs(B.placed).max())
+    low = (B.placed[B.faces[pairs[:, 1]]] * axis).sum(axis=2).min(axis=1)
+    high = (A.placed[A.faces[pairs[:, 0]]] * axis).sum(axis=2).max(axis=1)
+    pairs = pairs[(low - high) * (1 - 1e-12) - slack <= limit]
+    return np.array(_not_parted(A, B, pairs, limit), dtype=np.int64).reshape(-1, 2)
 
 
 def _root(squared: Fraction) -> Decimal:

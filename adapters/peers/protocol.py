@@ -13,6 +13,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from importlib import import_module, metadata
 from importlib.util import find_spec
@@ -245,6 +246,17 @@ class Peer:
             if event.kind in STATUSES:
                 table.record(event)
         return table
+
+
+    def staying(self) -> AbstractContextManager[None]:
+        """Keep what answers, such as a child process, from question to question.
+
+        Returns
+        -------
+        context manager
+            At its end what was kept is let go.
+        """
+        return nullcontext()
 
 
 class PairwisePeer(Peer):

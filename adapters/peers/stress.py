@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import collide
 from collide.adapters.peers.answers import FAILED, RAISED, UNSUPPORTED, counted
-from collide.adapters.peers.protocol import Question, check_names, complaint, engine
+from collide.adapters.peers.protocol import Peer, Question, check_names, complaint, engine
 from collide.adapters.peers.stress_truth import Truth, gap_along, truth
 from collide.base.whole_file import write_whole
 from collide.errors import UnsupportedQuery
@@ -271,37 +271,37 @@ def run(
     )
     for family in wanted:
         generate(family, 0, seed)  # complain before the work begins
-    ask, version = _asker(engine, timeout)
-    table = StressTable(engine, version, n, seed, [], [])
-    for family in wanted:
-        cases = generate(family, n, seed)
-        result = FamilyResult(family)
-        for case, reply in zip(cases, ask(cases)):
-            table.findings += _judge(result, engine, case, truth(case), reply)
-        table.families.append(result)
-        if progress is not None:
-            progress(result)
+    peer = _peer(engine, timeout)
+    table = StressTable(engine, peer.version, n, seed, [], [])
+    with peer.staying():
+        for family in wanted:
+            cases = generate(family, n, seed)
+            result = FamilyResult(family)
+            for case, reply in zip(cases, _ask(peer, cases)):
+                table.findings += _judge(result, engine, case, truth(case), reply)
+            table.families.append(result)
+            if progress is not None:
+                progress(result)
     return table
 
 
 # --- asking ---------------------------------------------------------------------------------------
 
 
-def _asker(name: str, timeout: float) -> tuple[Callable[[list[Case | MeshCase]], list[Reply]], str]:
-    """A function from cases to replies, and the engine's version."""
+def _peer(name: str, timeout: float) -> Peer:
     peer = engine(name, timeout=timeout)
     peer.require()
-    if name == "collide":
-        return (lambda cases: [_ask_collide(case) for case in cases]), peer.version
+    return peer
 
-    def ask(cases: list[Case | MeshCase]) -> list[Reply]:
-        replies: list[Reply] = []
-        for start in range(0, len(cases), BATCH):
-            table = peer.answer(Question.from_pairs([case.shapes() for case in cases[start : start + BATCH]]))
-            replies += map(_from_row, table.rows, table.reasons, table.mishaps)
-        return replies
 
-    return ask, peer.version
+def _ask(peer: Peer, cases: list[Case | MeshCase]) -> list[Reply]:
+    if peer.name == "collide":
+        return [_ask_collide(case) for case in cases]
+    replies: list[Reply] = []
+    for start in range(0, len(cases), BATCH):
+        table = peer.answer(Question.from_pairs([case.shapes() for case in cases[start : start + BATCH]]))
+        replies += map(_from_row, table.rows, table.reasons, table.mishaps)
+    return replies
 
 
 def _from_row(row, reason: str, mishap: str) -> Reply:

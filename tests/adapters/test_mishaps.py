@@ -10,7 +10,7 @@ import math
 import pytest
 
 from collide import Sphere, pose
-from collide.adapters.peers import protocol
+from collide.adapters.peers import protocol, stress
 from collide.adapters.peers.answers import ABORTED, HUNG, MISHAPS, NO_LENGTH, NOT_A_NUMBER, RAISED, Reply, nearest
 from collide.adapters.peers.compare import compare
 from collide.adapters.peers.protocol import Question, engine
@@ -94,6 +94,16 @@ def test_the_hard_families_count_them_too(wild):
     headers, rows = table.table()
     assert rows[0][headers.index("mishaps")] == "6 NaN"
     assert run(["rand_pen"], n=2, seed=1).families[0].mishaps == {}
+
+
+def test_the_hard_families_start_an_engine_once(wild, monkeypatch):
+    """Not once a family, for most engines take longer to start than to answer; it has ended afterwards."""
+    peer = engine("silent")
+    monkeypatch.setattr(stress, "engine", lambda name, *, timeout: peer)
+    run(["rand_pen", "rand_sep", "near_pen"], n=2, seed=1, engine="silent")
+    assert peer.starts == 1 and peer._child is None
+    peer.answer(Question.from_pairs(pairs()[:1]))
+    assert peer.starts == 2 and peer._child is None  # a question by itself has a child of its own
 
 
 def test_a_union_passes_on_what_its_parts_do_not_give():
