@@ -14,7 +14,7 @@ simplex. The signs are those of Johnson's Δ, written for what they mean:
   rounding would hide.
 * The nearest point of four independent points has positive weights for a single subset: any subset proven is the one.
 
-`plane_touches` proves a depth of 0 the same way.
+`side_of_facets` proves the same way which facet's plane is nearest to the origin of an overlap.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ from collide.numerics.vec3 import Vec3, column_at, dot, norm, norm1, rotate_back
 
 #: How a search ends: a sign is left to integers; the cores share a point; they do not.
 OPEN, MEET, APART = range(3)
+#: Of facets that may be nearest: nothing is proven; one lies in a plane through the origin with no vertex beyond it, so
+#: that the depth is 0; the only one is nearest, the origin behind it and no vertex beyond its plane.
+NOTHING, THROUGH_ORIGIN, OUTERMOST = range(3)
 #: Rounds after which integers take over.
 _ROUNDS = 16
 #: Doubles of a point; doubles of workspace.
@@ -138,6 +141,8 @@ def _search(ordered, ids, points):
             beyond = _separating_faces(points)
             if beyond == 0:
                 return FilteredSearch(MEET, 4, rounds)
+            if beyond >= 8:
+                return FilteredSearch(OPEN, n, rounds)
             if beyond & (beyond - 1) == 0:
                 n = _reduce(points, ids, 15 & ~beyond, 4) - 1
         mask = _nearest_subset(points, n + 1, n) if n < 3 else _nearest_of_four(points, beyond)
@@ -226,7 +231,8 @@ def _nearest_subset(points, n, newest):
 def _nearest_of_four(points, beyond):
     """`johnson.nearest_subset` of four independent points if it is a face with the last point; else 0.
 
-    beyond : of `_separating_faces`; only over such a face is the origin.
+    beyond : of `_separating_faces`. The points lie behind such a face, the origin before it: the origin's foot on its
+        plane is nearest of all where it lies within the face.
     """
     for k in range(3):
         if (beyond >> k) & 1:
@@ -307,7 +313,7 @@ def _direction(points, n):
 
 @kernel
 def _separating_faces(points):
-    """`exact_gjk._separating_faces`; 7 also where a sign is not proven."""
+    """`exact_gjk._separating_faces`; 8 or more where a sign is 0 or not proven."""
     apex = _point(points, 3)
     e, f, g = (
         bounded.sub_vec3(_point(points, 0), apex), bounded.sub_vec3(_point(points, 1), apex),
@@ -315,8 +321,7 @@ def _separating_faces(points):
     )
     beyond = _is_beyond(apex, f, g, e)
     beyond |= _is_beyond(apex, g, e, f) << 1
-    beyond |= _is_beyond(apex, e, f, g) << 2
-    return beyond if beyond < 8 else 7
+    return beyond | _is_beyond(apex, e, f, g) << 2
 
 
 @kernel
@@ -464,32 +469,40 @@ def _axes_of_errors(v):
     return (1 if v.x.error > 0.0 else 0) | (2 if v.y.error > 0.0 else 0) | (4 if v.z.error > 0.0 else 0)
 
 
-# --- depths of 0 ----------------------------------------------------------------------------------
+# --- depths ---------------------------------------------------------------------------------------
 
 
 @kernel
-def plane_touches(ordered, requests, request_at, points):
-    """Whether a facet asked for (`depth_requests.py`) is proven to lie in a plane through the origin with no vertex of
-    A ⊖ B beyond it: then cores that meet have the depth 0.   Arguments as in `nearest_plane` and `search_filtered`."""
-    pair = ordered.pair
-    for k in range(requests[request_at + 1]):
-        at = request_at + 2 + 6 * k
+def side_of_facets(ordered, requests, request_at, points):
+    """What is proven of the facets asked for, as `nearest_plane` judges them: NOTHING, THROUGH_ORIGIN or OUTERMOST.
+
+    Arguments as in `nearest_plane` and `search_filtered`. Vertices of both bodies are judged apart: (i, j) is extreme
+    among all pairs where i is among the vertices of A and j among those of B.
+    """
+    pair, n_facets = ordered.pair, requests[request_at + 1]
+    for k in range(n_facets):
+        facet = Simplex(requests, request_at + 2 + 6 * k, 3)
         for corner in range(3):
-            _put_point(pair, points, corner, requests[at + 2 * corner], requests[at + 2 * corner + 1])
-        p = _point(points, 0)
-        edge = bounded.sub_vec3(_point(points, 1), p)
-        normal = bounded.cross(edge, bounded.sub_vec3(_point(points, 2), _point(points, 1)))
-        is_plane = abs(bounded.sign(normal.x)) == 1 or abs(bounded.sign(normal.y)) == 1
-        is_plane = is_plane or abs(bounded.sign(normal.z)) == 1
-        if is_plane and bounded.sign(bounded.dot(normal, p)) == 0:
-            outwards, facet = normal, Simplex(requests, at, 3)
-            for _ in range(2):
-                outwards = bounded.neg_vec3(outwards)
-                if _is_extreme(pair, 0, facet, outwards, requests[at], 1) and _is_extreme(
-                    pair, 1, facet, outwards, requests[at + 1], -1
-                ):
-                    return True
-    return False
+            at = facet.at + 2 * corner
+            _put_point(pair, points, corner, requests[at], requests[at + 1])
+        p, q = _point(points, 0), _point(points, 1)
+        outwards = bounded.cross(bounded.sub_vec3(q, p), bounded.sub_vec3(_point(points, 2), q))
+        side = bounded.sign(bounded.dot(outwards, p))
+        if side == 1 and n_facets == 1 and requests[request_at] == 1:
+            return OUTERMOST if _is_outermost(pair, facet, outwards) else NOTHING
+        x, y, z = bounded.sign(outwards.x), bounded.sign(outwards.y), bounded.sign(outwards.z)
+        if side != 0 or not (abs(x) == 1 or abs(y) == 1 or abs(z) == 1):
+            continue
+        if _is_outermost(pair, facet, outwards) or _is_outermost(pair, facet, bounded.neg_vec3(outwards)):
+            return THROUGH_ORIGIN
+    return NOTHING
+
+
+@kernel
+def _is_outermost(pair, facet, normal):
+    """Whether no vertex of A ⊖ B is proven to lie beyond a facet along its normal."""
+    i, j = facet.ids[facet.at], facet.ids[facet.at + 1]
+    return _is_extreme(pair, 0, facet, normal, i, 1) and _is_extreme(pair, 1, facet, normal, j, -1)
 
 
 @kernel

@@ -78,6 +78,16 @@ def nearest_plane(ordered, terms, digits, requests, request_at):
 
 
 @kernel
+def depth_of_facet(ordered, terms, digits, requests, request_at):
+    """The `ExactDepth` by the first facet of an entry, proven to be nearest.   Arguments as in `nearest_plane`."""
+    exact = exact_pair(ordered, terms, digits, 0.0, 0.0)
+    if not fits(exact):
+        return ExactDepth(False, DD(0.0, 0.0))
+    load_poses(exact)
+    return ExactDepth(True, _set_facet(exact, requests, request_at + 2).distance)
+
+
+@kernel
 def _set_facet(exact, requests, at):
     """Points 0, 1, 2 and the direction become a facet, counter-clockwise from outside, and its normal.
 

@@ -8,9 +8,17 @@ from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.narrowphase.exact.depth_requests import REQUESTS, find_request
 from collide.narrowphase.exact.exact_gjk import SEPARATE, TOUCHING, UNDONE, gap_of_face, sign_only, touch_exactly
-from collide.narrowphase.exact.filtered_gjk import APART, MEET, is_filtered, plane_touches, search_filtered
+from collide.narrowphase.exact.filtered_gjk import (
+    APART,
+    MEET,
+    OUTERMOST,
+    THROUGH_ORIGIN,
+    is_filtered,
+    search_filtered,
+    side_of_facets,
+)
 from collide.narrowphase.exact.filtered_gjk import DOUBLES as FILTER_DOUBLES
-from collide.narrowphase.exact.plane_depth import ExactDepth, nearest_plane
+from collide.narrowphase.exact.plane_depth import ExactDepth, depth_of_facet, nearest_plane
 from collide.narrowphase.exact.settle_space import bracket_of_depth, bracket_of_gap, settle_space
 from collide.narrowphase.exact.witness_points import points_miss, put_common_point, put_normal_and_points, put_points
 from collide.narrowphase.gap.precise_pair import is_refinable
@@ -139,10 +147,13 @@ def _search(ordered, space, boolean, n, radius_a, radius_b, is_in_reach):
 
 @kernel
 def _depth(ordered, space, requests, request_at, is_in_reach):
-    """The `ExactDepth` of `nearest_plane`, without integers where double-doubles prove a depth of 0."""
+    """The `ExactDepth` of `nearest_plane`, by double-doubles as far as these prove sides."""
     if is_in_reach and request_at > 0:
-        if plane_touches(ordered, requests, request_at, view_f64(space.doubles_at, FILTER_DOUBLES)):
+        side = side_of_facets(ordered, requests, request_at, view_f64(space.doubles_at, FILTER_DOUBLES))
+        if side == THROUGH_ORIGIN:
             return ExactDepth(True, DD(0.0, 0.0))
+        if side == OUTERMOST:
+            return depth_of_facet(ordered, space.terms, space.digits, requests, request_at)
     return nearest_plane(ordered, space.terms, space.digits, requests, request_at)
 
 
