@@ -9,6 +9,7 @@ contradict each other.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,8 +35,22 @@ from collide.numerics.vec3 import add, norm1, put_vec3, scale, sub, vec3_at
 
 _answer_pairs_at = native_call(SIGNATURE)
 
-#: The searches of `answer_pairs`: for the sign, for a depth, and for a gap.
-_SIGN, _DEPTH, _GAP = range(3)
+#: The searches of `answer_pairs`, in the order in which they are run: for the sign, for a depth, and for a gap.
+_SEARCHES = 3
+_SIGN, _DEPTH, _GAP = range(_SEARCHES)
+
+
+class Core(NamedTuple):
+    """Where `answer_pairs` is, what it reads, and where it works: addresses, as in its arguments."""
+
+    code: int
+    ints_at: int
+    numbers_at: int
+    poses_at: int
+    terms_at: int
+    shape_of_at: int
+    doubles_at: int
+    integers_at: int
 
 
 @entry(
@@ -51,20 +66,26 @@ def settle_by_other_searches(
     code : address of `answer_pairs`.   boolean, depths : the search already run.   result : memory of ROW bytes.
     Other arguments as in `answer_pairs`.
     """
+    core = Core(code, ints_at, numbers_at, poses_at, terms_at, shape_of_at, doubles_at, integers_at)
+    for k in range(n_pairs):
+        settle_row_by_other_searches(core, pairs_at + 16 * k, boolean, depths, limit, rows_at + ROW * k, result_at)
+
+
+@kernel
+def settle_row_by_other_searches(core, pair_at, boolean, depths, limit, row_at, result_at):
+    """`settle_by_other_searches` of a single pair and its row."""
     already_run = _SIGN if boolean else _DEPTH if depths else _GAP
-    for search in (_SIGN, _DEPTH, _GAP):
-        for k in range(0 if search == already_run else n_pairs):
-            row = view_row(rows_at + ROW * k)
-            if is_undecided(row):
-                clear_rows(result_at, 1)
-                _answer_pairs_at(
-                    code,
-                    (
-                        ints_at, numbers_at, poses_at, terms_at, shape_of_at, pairs_at + 16 * k, 1, search == _SIGN,
-                        search == _DEPTH, False, limit, result_at, doubles_at, integers_at,
-                    ),
-                )
-                take_proven(rows_at + ROW * k, result_at, search == _SIGN, limit)
+    for search in range(_SEARCHES):
+        if search != already_run and is_undecided(view_row(row_at)):
+            clear_rows(result_at, 1)
+            _answer_pairs_at(
+                core.code,
+                (
+                    core.ints_at, core.numbers_at, core.poses_at, core.terms_at, core.shape_of_at, pair_at, 1,
+                    search == _SIGN, search == _DEPTH, False, limit, result_at, core.doubles_at, core.integers_at,
+                ),
+            )
+            take_proven(row_at, result_at, search == _SIGN, limit)
 
 
 @kernel

@@ -8,12 +8,14 @@ from collide.kernels import entry, kernel, native_call, prepared, view_f64, view
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.shape_table import INTS, KIND, POSE
 from collide.narrowphase.exact.settle_hulls import SIGNATURE
-from collide.narrowphase.fallback_searches import take_proven
+from collide.narrowphase.fallback_searches import Core, settle_row_by_other_searches
 from collide.narrowphase.finish_rows import forget_depth
 from collide.narrowphase.pair_workspace import REQUESTS_AT
 from collide.narrowphase.pose_batches import (
     BLOCK,
+    CORE,
     DIGITS_AT,
+    DOUBLES_AT,
     HEADER,
     INTEGERS_AT,
     INTS_AT,
@@ -78,7 +80,12 @@ def settle_row(header, boolean, depths, limit, row_at):
     if row.flags[HOW] == REFUSED:
         return False
     if _has_curved_core(header):
-        _search_again(header, boolean, depths, limit, row_at)
+        core = Core(
+            header[CORE], header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT],
+            header[DOUBLES_AT], header[INTEGERS_AT],
+        )
+        result_at = header[ROWS_AT] + ROW
+        settle_row_by_other_searches(core, header[PAIRS_AT], boolean, depths, limit, row_at, result_at)
         return row.flags[HOW] != REFUSED
     _settle_hulls(header, boolean, depths, limit, row_at)
     if is_undecided(row):
@@ -95,28 +102,6 @@ def _has_curved_core(header):
         if kind != POINTS and kind != HALFSPACE:
             return True
     return False
-
-
-@kernel
-def _search_again(header, boolean, depths, limit, row_at):
-    """`settle_by_other_searches` of the first pair of the block: the same searches in the same order."""
-    deep = depths and not boolean
-    if not boolean:
-        _search(header, True, False, limit, row_at)
-    if not deep:
-        _search(header, False, True, limit, row_at)
-    if boolean or deep:
-        _search(header, False, False, limit, row_at)
-
-
-@kernel
-def _search(header, boolean, depths, limit, row_at):
-    """Have another search settle the row, if it is still open."""
-    if is_undecided(view_row(row_at)):
-        result_at = header[ROWS_AT] + ROW
-        clear_rows(result_at, 1)
-        answer_block(header, 1, boolean, depths, limit, result_at)
-        take_proven(row_at, result_at, boolean, limit)
 
 
 @kernel

@@ -6,7 +6,16 @@ from typing import NamedTuple
 
 from collide.kernels import kernel
 from collide.narrowphase.bounds import EXACT_ROUNDS
-from collide.narrowphase.exact.exact_directions import edge_at, set_cross, set_edge, set_normal, side_of
+from collide.narrowphase.exact.exact_directions import (
+    direction_double,
+    direction_length,
+    edge_at,
+    height_along,
+    set_cross,
+    set_edge,
+    set_normal,
+    side_of,
+)
 from collide.narrowphase.exact.exact_supports import support_pair
 from collide.narrowphase.exact.exact_workspace import exact_pair, fits, load_poses, point_at, scratch_at, set_point
 from collide.narrowphase.exact.johnson import (
@@ -19,7 +28,7 @@ from collide.narrowphase.exact.johnson import (
 )
 from collide.numerics.digits import add_product, carry, set_zero
 from collide.numerics.double_double import DD
-from collide.numerics.vec3 import Vec3
+from collide.numerics.vec3 import Vec3, divide, norm
 
 #: Verdicts of the exact stage. UNDONE: the magnitudes span more bits than the workspace holds.
 TOUCHING, SEPARATE, UNDONE = range(3)
@@ -46,7 +55,7 @@ class ExactAnswer(NamedTuple):
 
 
 @kernel(inline=True)
-def _sign_only(verdict, n, rounds):
+def sign_only(verdict, n, rounds):
     return ExactAnswer(verdict, n, False, DD(0.0, 0.0), Vec3(0.0, 0.0, 0.0), rounds)
 
 
@@ -61,7 +70,7 @@ def touch_exactly(ordered, terms, digits, boolean, ids, n, radius_a, radius_b):
     """
     exact = exact_pair(ordered, terms, digits, radius_a, radius_b)
     if not fits(exact):
-        return _sign_only(UNDONE, n, 0)
+        return sign_only(UNDONE, n, 0)
     load_poses(exact)
     for k in range(n):
         set_point(exact, k, ids[2 * k], ids[2 * k + 1])
@@ -69,7 +78,7 @@ def touch_exactly(ordered, terms, digits, boolean, ids, n, radius_a, radius_b):
     if sign_of_cores and n == 3:
         verdict, n_deciding = _try_face(exact, ids)
         if verdict != UNDONE:
-            return _sign_only(verdict, n_deciding, 1)
+            return sign_only(verdict, n_deciding, 1)
     for k in range(n):
         set_gram(exact, k)
     mask = nearest_subset(exact, n, -1)
@@ -77,10 +86,10 @@ def touch_exactly(ordered, terms, digits, boolean, ids, n, radius_a, radius_b):
         n = reduce_simplex(exact, ids, mask, n)
         mask = (1 << n) - 1
         if n == 4:
-            return _sign_only(TOUCHING, n, rounds)
+            return sign_only(TOUCHING, n, rounds)
         length, zero = set_direction(exact, mask)
         if zero:
-            return _sign_only(TOUCHING, n, rounds)
+            return sign_only(TOUCHING, n, rounds)
         i, j, v = support_pair(exact, length)
         is_in_simplex = _has_pair(ids, n, i, j)
         if not is_in_simplex:
@@ -89,7 +98,7 @@ def touch_exactly(ordered, terms, digits, boolean, ids, n, radius_a, radius_b):
             set_point(exact, n, i, j)
             # The last point against the direction still lies along it: then all do.
             if sign_of_cores and side_of(exact, length, n) > 0:
-                return _sign_only(SEPARATE, n, rounds)
+                return sign_only(SEPARATE, n, rounds)
             set_gram(exact, n)
         if is_in_simplex or set_delta(exact, mask, n) <= 0:
             within, excess = within_radius(exact, mask, radius_a, radius_b)
@@ -97,13 +106,32 @@ def touch_exactly(ordered, terms, digits, boolean, ids, n, radius_a, radius_b):
         if n == 3:
             separating = _separating_faces(exact)
             if separating == 0:
-                return _sign_only(TOUCHING, 4, rounds)
+                return sign_only(TOUCHING, 4, rounds)
             if separating & (separating - 1) == 0:
                 # Beyond one face alone: the nearest point is on it, and the vertex across goes.
                 n = reduce_simplex(exact, ids, 15 & ~separating, 4) - 1
         mask = nearest_subset(exact, n + 1, n)
         n += 1
-    return _sign_only(UNDONE, n, EXACT_ROUNDS)
+    return sign_only(UNDONE, n, EXACT_ROUNDS)
+
+
+@kernel
+def gap_of_face(ordered, terms, digits, ids, rounds):
+    """The `ExactAnswer` of cores without radii known to be apart, whose nearest point lies within the face ``ids``.
+
+    The distance is the height of the face over its plane's foot, of degree three over two, where Johnson's takes eight
+    over six.   rounds : that have found the face.   Other arguments as of `touch_exactly`.
+    """
+    exact = exact_pair(ordered, terms, digits, 0.0, 0.0)
+    if not fits(exact):
+        return sign_only(UNDONE, 3, 0)
+    load_poses(exact)
+    for k in range(3):
+        set_point(exact, k, ids[2 * k], ids[2 * k + 1])
+    n, _ = set_normal(exact)
+    direction = direction_double(exact, n)
+    excess = height_along(exact, n, direction_length(exact, n), 0)
+    return ExactAnswer(SEPARATE, 3, True, excess, divide(direction, norm(direction)), rounds)
 
 
 @kernel

@@ -136,8 +136,10 @@ def lowest_and_largest(numbers, at, n):
     largest = -_NO_BIT
     for k in range(at, at + n):
         if numbers[k] != 0.0:
-            lowest = min(lowest, lowest_bit(numbers[k]))
-            largest = max(largest, math.frexp(numbers[k])[1])
+            exponent = math.frexp(numbers[k])[1]
+            largest = max(largest, exponent)
+            if exponent - 53 < lowest:  # no bit of a double is lower
+                lowest = min(lowest, lowest_bit(numbers[k]))
     return lowest, largest
 
 

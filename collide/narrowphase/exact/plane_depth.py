@@ -68,11 +68,23 @@ def nearest_plane(ordered, terms, digits, requests, request_at):
     if not complete:
         return ExactDepth(False, DD(0.0, 0.0))
     for k in range(n_facets):
-        _, distance = _set_facet(exact, requests, request_at + 2 + 6 * k)
+        distance = least
+        if n_facets > 1:  # a single facet still stands
+            _, distance = _set_facet(exact, requests, request_at + 2 + 6 * k)
         is_least = (distance.high - least.high) + (distance.low - least.low) <= _SAME * least.high
         if is_least and _is_outermost(exact):
             return ExactDepth(True, least)
     return ExactDepth(False, DD(0.0, 0.0))
+
+
+@kernel
+def depth_of_facet(ordered, terms, digits, requests, request_at):
+    """The `ExactDepth` by the first facet of an entry, proven to be nearest.   Arguments as in `nearest_plane`."""
+    exact = exact_pair(ordered, terms, digits, 0.0, 0.0)
+    if not fits(exact):
+        return ExactDepth(False, DD(0.0, 0.0))
+    load_poses(exact)
+    return ExactDepth(True, _set_facet(exact, requests, request_at + 2).distance)
 
 
 @kernel

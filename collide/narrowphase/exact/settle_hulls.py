@@ -4,11 +4,21 @@ from __future__ import annotations
 
 import math
 
-from collide.kernels import entry, kernel, view_i64, view_u8
+from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.narrowphase.exact.depth_requests import REQUESTS, find_request
-from collide.narrowphase.exact.exact_gjk import SEPARATE, TOUCHING, UNDONE, touch_exactly
-from collide.narrowphase.exact.plane_depth import nearest_plane
+from collide.narrowphase.exact.exact_gjk import SEPARATE, TOUCHING, UNDONE, gap_of_face, sign_only, touch_exactly
+from collide.narrowphase.exact.filtered_gjk import (
+    APART,
+    MEET,
+    OUTERMOST,
+    THROUGH_ORIGIN,
+    is_filtered,
+    search_filtered,
+    side_of_facets,
+)
+from collide.narrowphase.exact.filtered_gjk import DOUBLES as FILTER_DOUBLES
+from collide.narrowphase.exact.plane_depth import ExactDepth, depth_of_facet, nearest_plane
 from collide.narrowphase.exact.settle_space import bracket_of_depth, bracket_of_gap, settle_space
 from collide.narrowphase.exact.witness_points import points_miss, put_common_point, put_normal_and_points, put_points
 from collide.narrowphase.gap.precise_pair import is_refinable
@@ -28,6 +38,7 @@ from collide.narrowphase.rows import (
     write_verdict,
     write_vertices,
 )
+from collide.numerics.double_double import DD
 from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 
 #: How `settle_hulls` is called.
@@ -74,7 +85,8 @@ def _settle(ordered, space, requests, k, row_at, boolean, depths, limit):
     ids = space.simplex
     radius_a, radius_b = radius_of(ordered.pair, ordered.pair.A), radius_of(ordered.pair, ordered.pair.B)
     n = _take_simplex(ids, row, ordered.flip)
-    answer = touch_exactly(ordered, space.terms, space.digits, boolean, ids, n, radius_a, radius_b)
+    is_in_reach = n == 3 and is_filtered(ordered)
+    answer = _search(ordered, space, boolean, n, radius_a, radius_b, is_in_reach)
     if answer.verdict == UNDONE:
         keep_proven_sign(row)
         return
@@ -94,7 +106,7 @@ def _settle(ordered, space, requests, k, row_at, boolean, depths, limit):
     if touching and not answer.cores_apart:
         distance = min(distance, 0.0)
         if not boolean:
-            has_depth, depth = nearest_plane(ordered, space.terms, space.digits, requests, find_request(requests, k))
+            has_depth, depth = _depth(ordered, space, requests, find_request(requests, k), is_in_reach)
             if has_depth:
                 bracket = bracket_of_depth(depth, radius_a, radius_b)
                 distance = bracket.nearest
@@ -114,6 +126,35 @@ def _settle(ordered, space, requests, k, row_at, boolean, depths, limit):
         row.flags[HOW] = EXACT
     write_vertices(row, ids, answer.n, ordered.flip)
     row.flags[EXACT_ROUNDS] = min(answer.rounds, 255)
+
+
+@kernel
+def _search(ordered, space, boolean, n, radius_a, radius_b, is_in_reach):
+    """The `ExactAnswer` of `touch_exactly`, by double-doubles as far as these prove signs.
+
+    is_in_reach : of the filter.
+    """
+    ids = space.simplex
+    is_swept = radius_a != 0.0 or radius_b != 0.0
+    if is_in_reach and (is_swept or not boolean):
+        found = search_filtered(ordered, ids, view_f64(space.doubles_at, FILTER_DOUBLES))
+        if found.end == MEET:
+            return sign_only(TOUCHING, found.n, found.rounds)
+        if found.end == APART and found.n == 3 and not is_swept:
+            return gap_of_face(ordered, space.terms, space.digits, ids, found.rounds)
+    return touch_exactly(ordered, space.terms, space.digits, boolean, ids, n, radius_a, radius_b)
+
+
+@kernel
+def _depth(ordered, space, requests, request_at, is_in_reach):
+    """The `ExactDepth` of `nearest_plane`, by double-doubles as far as these prove sides."""
+    if is_in_reach and request_at > 0:
+        side = side_of_facets(ordered, requests, request_at, view_f64(space.doubles_at, FILTER_DOUBLES))
+        if side == THROUGH_ORIGIN:
+            return ExactDepth(True, DD(0.0, 0.0))
+        if side == OUTERMOST:
+            return depth_of_facet(ordered, space.terms, space.digits, requests, request_at)
+    return nearest_plane(ordered, space.terms, space.digits, requests, request_at)
 
 
 @kernel(inline=True)
