@@ -26,7 +26,8 @@ enum { POINTS, CYLINDER, CONE, ELLIPSOID, HALFSPACE };
 enum { COORDINATES = 8, NO_BITS = 2000 };
 /* Header of queries (collide/narrowphase/pose_batches.py), poses that go through together, and what `answer_poses` says. */
 enum {
-    CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT, SETTLE, DIGITS_AT, ANSWERED,
+    CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT, SETTLE, STEPS_AT, DIGITS_AT,
+    ANSWERED,
     HEADER
 };
 enum { BLOCK = 64, OPEN = 1, BAD_POSE = 2 };

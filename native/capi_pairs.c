@@ -24,7 +24,9 @@ struct buffers {
 static void begin_header(collide_workspace *space)
 {
     space->header[CORE] = code_at(&space->kernels->answer_pairs);
-    space->header[SETTLE] = space->steps[0] = code_at(&space->kernels->settle_hulls);
+    space->header[SETTLE] = code_at(&space->kernels->settle_exactly);
+    space->header[STEPS_AT] = address_of(space->steps);
+    space->steps[0] = code_at(&space->kernels->settle_hulls);
     space->steps[1] = code_at(&space->kernels->settle_halfspaces);
     space->steps[2] = code_at(&space->kernels->exact_depth);
     space->header[POSES_AT] = address_of(space->poses);

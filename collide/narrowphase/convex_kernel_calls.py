@@ -12,8 +12,7 @@ from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row, prepared_within
 from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
 from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
-from collide.narrowphase.exact.exact_stage import settle_rows
-from collide.narrowphase.exact.settle_hulls import settle_hulls
+from collide.narrowphase.exact.exact_stage import settle_exactly, settle_rows, step_codes
 from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finish_rows import finish_rows
@@ -220,7 +219,8 @@ class BlockWorkspace:
         self._header = np.zeros(HEADER, dtype=np.int64)
         self._header[CORE] = code_of(answer_pairs)
         self._header[POSES_AT:SETTLE] = *map(address_of, buffers), *self.addresses
-        self._header[SETTLE:ANSWERED] = code_of(settle_hulls), address_of(self.digits)
+        steps = code_of(settle_exactly), address_of(step_codes()), address_of(self.digits)
+        self._header[SETTLE:ANSWERED] = steps
 
     def header_of(self, table: ShapeTable) -> np.ndarray:
         """What `pose_batches.py` reads first: addresses of the kernel, the tables and this workspace."""

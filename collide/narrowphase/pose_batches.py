@@ -26,14 +26,14 @@ BLOCK = 64
 OPEN, BAD_POSE = range(1, 3)
 
 # Header: 64-bit integers, the address of `answer_pairs` and of everything that it works on (`BlockWorkspace` in
-# `convex_kernel_calls.py` and C write them); the same of `settle_hulls`, for single calls; then how many poses are
+# `convex_kernel_calls.py` and C write them); the same of `settle_exactly`, for single calls; then how many poses are
 # answered.
 (
     CORE, INTS_AT, NUMBERS_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROWS_AT, DOUBLES_AT, INTEGERS_AT,
-    SETTLE, DIGITS_AT, ANSWERED,
-) = range(12)
+    SETTLE, STEPS_AT, DIGITS_AT, ANSWERED,
+) = range(13)
 #: Integers of the header.
-HEADER = 12
+HEADER = 13
 
 
 class PoseBlock(NamedTuple):

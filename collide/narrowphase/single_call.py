@@ -7,7 +7,7 @@ import math
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.shape_table import INTS, KIND, POSE
-from collide.narrowphase.exact.settle_hulls import SIGNATURE
+from collide.narrowphase.exact.exact_stage import SIGNATURE
 from collide.narrowphase.fallback_searches import Core, settle_row_by_other_searches
 from collide.narrowphase.finish_rows import forget_depth
 from collide.narrowphase.pair_workspace import REQUESTS_AT
@@ -25,6 +25,7 @@ from collide.narrowphase.pose_batches import (
     ROWS_AT,
     SETTLE,
     SHAPE_OF_AT,
+    STEPS_AT,
     answer_block,
     block_of,
     clear_rows,
@@ -45,7 +46,7 @@ from collide.narrowphase.rows import (
 )
 from collide.results import EXACT, REFUSED
 
-_settle_hulls_at = native_call(SIGNATURE)
+_settle_exactly_at = native_call(SIGNATURE)
 
 
 @kernel
@@ -72,8 +73,8 @@ def settle_row(header, boolean, depths, limit, row_at):
     long way has to, or an error has to be raised.
 
     header : of `pose_batches.py`; the second row of the block is written over.   boolean, depths, limit : as asked.
-    Of two hulls, boxes that touch for example, `exact_stage.settle_rows` begins with `settle_hulls`; a depth left open
-    is for the long way. No step of the exact stage takes a curved core, so a pair with a curved core goes on to
+    Hulls and half-spaces, boxes that touch for example, go through the exact stage; a depth that it leaves open is for
+    the long way. No step of the exact stage takes a curved core, so a pair with a curved core goes on to
     the other searches (`fallback_searches.py`), and stays open where they prove nothing either: a can at rest on a box.
     """
     row = view_row(row_at)
@@ -87,8 +88,7 @@ def settle_row(header, boolean, depths, limit, row_at):
         result_at = header[ROWS_AT] + ROW
         settle_row_by_other_searches(core, header[PAIRS_AT], boolean, depths, limit, row_at, result_at)
         return row.flags[HOW] != REFUSED
-    _settle_hulls(header, boolean, depths, limit, row_at)
-    if is_undecided(row):
+    if _settle_exactly(header, boolean, depths, limit, row_at) > 0:
         return False
     return not (depths and row.flags[HOW] == EXACT and row.flags[HIT] == 1 and row.flags[CERTIFIED] == 0)
 
@@ -105,13 +105,13 @@ def _has_curved_core(header):
 
 
 @kernel
-def _settle_hulls(header, boolean, depths, limit, row_at):
-    """`settle_hulls` of the first pair of the block."""
+def _settle_exactly(header, boolean, depths, limit, row_at):
+    """`settle_exactly` of the first pair of the block; returns 1 where the row stays open."""
     requests_at = header[INTEGERS_AT] + 8 * REQUESTS_AT
-    _settle_hulls_at(
+    return _settle_exactly_at(
         header[SETTLE],
         (
-            header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
+            header[STEPS_AT], header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
             depths, limit, row_at, 0, 0, requests_at, header[DIGITS_AT],
         ),
     )

@@ -31,10 +31,14 @@ _exact_depth_at = native_call(exact_depth.SIGNATURE)
 _HULLS, _HALFSPACES, _DEPTH, _CODES = range(4)
 
 
-@entry(
+#: How `settle_exactly` is called.
+SIGNATURE = (
     "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, float64, int64, int64, int64, int64,"
     " int64)"
 )
+
+
+@entry(SIGNATURE)
 def settle_exactly(
     codes_at, ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, depths, limit, rows_at, terms_at,
     n_terms, requests_at, digits_at,
@@ -86,7 +90,7 @@ def settle_exactly(
 
 
 @cache
-def _codes() -> np.ndarray:
+def step_codes() -> np.ndarray:
     """What `settle_exactly` calls, once it is needed."""
     steps = settle_hulls.settle_hulls, settle_halfspaces.settle_halfspaces, exact_depth.exact_depth
     return np.array([code_of(step) for step in steps])
@@ -124,7 +128,7 @@ def settle_rows(
     if not (rows["how"] == UNDECIDED).any():
         return
     n_open = settle_exactly(
-        address_of(_codes()), *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs),
+        address_of(step_codes()), *table.addresses, address_of(poses.rows), address_of(shape_of), address_of(pairs),
         len(rows), boolean, depths, limit, address_of(rows), address_of(poses.terms), len(poses.terms), requests_at,
         address_of(digits),
     )
