@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Sequence
-from datetime import date
 
 import pytest
 
@@ -21,16 +19,6 @@ def sizes(small: int, large: int):
     """Parametrises ``n``."""
     asked = int(os.environ.get("COLLIDE_DIFFERENTIAL", large))
     return pytest.mark.parametrize("n", [small, pytest.param(asked, marks=pytest.mark.slow)])
-
-
-def share(cases: Sequence, parts: int) -> Sequence:
-    """Every parts-th of the cases, others each day: of a sample that takes longer than a night's tests may.
-
-    All of them where COLLIDE_DIFFERENTIAL asks for a size, and of samples that are smaller than ``parts``.
-    """
-    if "COLLIDE_DIFFERENTIAL" in os.environ or len(cases) < parts:
-        return cases
-    return cases[date.today().toordinal() % parts :: parts]
 
 
 def told(title: str, counts: Counter) -> None:
