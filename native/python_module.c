@@ -166,15 +166,15 @@ static PyObject *prepared(PyObject *module, PyObject *arguments)
     return made;
 }
 
-/* --- queries of two shapes at one pair of poses --------------------------------------------------------------------- */
+/* --- queries of two shapes at one pair of poses, and at many -------------------------------------------------------- */
 
 enum word {
-    PREPARED, SERIAL, SINGLE, COLLIDE, WITHIN, DISTANCE, CONTACTS, CHECK_POSES, THREADS, AXES, ALGORITHM, SECURITY_MARGIN, MAX_DISTANCE,
-    MARGIN, SIGNED, MAX_CONTACTS, WORDS
+    PREPARED, SERIAL, SINGLE, COLLIDE, WITHIN, DISTANCE, CONTACTS, COLLIDE_POSES, DISTANCE_POSES, CHECK_POSES, THREADS, AXES, ALGORITHM,
+    SECURITY_MARGIN, MAX_DISTANCE, MARGIN, SIGNED, MAX_CONTACTS, WORDS
 };
 static const char *const spelled[WORDS] = {
-    "_prepared", "_serial", "_single", "collide", "within", "distance", "contacts", "check_poses", "threads", "axes", "algorithm",
-    "security_margin", "max_distance", "margin", "signed", "max_contacts",
+    "_prepared", "_serial", "_single", "collide", "within", "distance", "contacts", "collide_poses", "distance_poses", "check_poses",
+    "threads", "axes", "algorithm", "security_margin", "max_distance", "margin", "signed", "max_contacts",
 };
 /* The same, interned, as names of attributes and arguments are, the last one NULL; and the one number of threads. */
 static PyObject *words[WORDS + 1], *one = NULL;
@@ -272,6 +272,27 @@ static PyObject *answer_of_single(PyObject *single, PyObject *const *arguments, 
     return answer;
 }
 
+/* The poses of an array that kernels read as it is, (n, 4, 4) or (4, 4), C-contiguous and of float64; 0 of anything else. */
+static Py_ssize_t poses_of(PyObject *given, int *is_batch)
+{
+    PyArrayObject *array = (PyArrayObject *)given;
+    int axes;
+    if (!PyArray_CheckExact(given) || PyArray_TYPE(array) != NPY_DOUBLE || !PyArray_ISCARRAY_RO(array)) return 0;
+    axes = PyArray_NDIM(array);
+    if ((axes != 2 && axes != 3) || PyArray_DIM(array, axes - 2) != 4 || PyArray_DIM(array, axes - 1) != 4) return 0;
+    if (axes == 2) return 1;
+    *is_batch = 1;
+    return PyArray_DIM(array, 0);
+}
+
+/* Whether two arrays are a batch of poses, either of them perhaps a single pose that goes with all of the other's. */
+static int are_batch(PyObject *X_WA, PyObject *X_WB)
+{
+    int is_batch = 0;
+    Py_ssize_t a = poses_of(X_WA, &is_batch), b = poses_of(X_WB, &is_batch);
+    return is_batch && a > 0 && b > 0 && (a == b || a == 1 || b == 1);
+}
+
 /* The answer of the function of Python, for the same arguments. */
 static PyObject *long_way(const struct query *query, PyObject *const *given, Py_ssize_t n, PyObject *names)
 {
@@ -314,14 +335,27 @@ static PyObject *ask_collide(PyObject *self, PyObject *const *given, Py_ssize_t 
     int found;
     if (n == 4 && read_options(query, names, given + n, &read)) {
         int is_touch = read.length == query->usual_length || PyFloat_AsDouble(read.length) == 0.0;
+        enum word question = !is_touch ? WITHIN : are_batch(given[2], given[3]) ? COLLIDE_POSES : COLLIDE;
         PyObject *arguments[3] = {given[2], given[3], read.length};
-        if ((found = single_of(given[0], given[1], is_touch ? COLLIDE : WITHIN, &single)) < 0) return NULL;
+        if ((found = single_of(given[0], given[1], question, &single)) < 0) return NULL;
         if (found) {
             if ((answer = answer_of_single(single, arguments, is_touch ? 2 : 3)) != Py_None) return answer;
             Py_DECREF(answer);
         }
     }
     return long_way(query, given, n, names);
+}
+
+/* A result of many poses, from (rows, poses of A, poses of B) as the pair's function gives them. Takes over the reference to these. */
+static PyObject *result_of_poses(const struct query *query, PyObject *A, PyObject *B, PyObject *answer)
+{
+    PyObject *rows, *X_WA, *X_WB, *question, *result = NULL;
+    if (!PyArg_ParseTuple(answer, "OOO:distance_poses", &rows, &X_WA, &X_WB)) question = NULL;
+    else question = PyTuple_Pack(4, A, B, X_WA, X_WB);
+    if (question != NULL) result = PyObject_CallFunctionObjArgs(query->result, rows, Py_False, question, query->certify, NULL);
+    Py_XDECREF(question);
+    Py_DECREF(answer);
+    return result;
 }
 
 /* The memory of a single distance: its row, and the poses as they were. */
@@ -359,6 +393,15 @@ static PyObject *ask_distance(PyObject *self, PyObject *const *given, Py_ssize_t
             if (answer == NULL) return NULL;
             Py_DECREF(answer);
         } else Py_XDECREF(single);
+    } else if (n == 4 && are_batch(given[2], given[3]) && read_options(query, names, given + n, &read) &&
+               (read.option == Py_True || read.option == Py_False)) {
+        PyObject *arguments[4] = {given[2], given[3], read.option, read.length};
+        if ((found = single_of(given[0], given[1], DISTANCE_POSES, &single)) < 0) return NULL;
+        if (found) {
+            if ((answer = answer_of_single(single, arguments, 4)) == NULL) return NULL;
+            if (answer != Py_None) return result_of_poses(query, given[0], given[1], answer);
+            Py_DECREF(answer);
+        }
     }
     return long_way(query, given, n, names);
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -114,6 +115,12 @@ def as_hits(events: RayEvents, origins: np.ndarray, directions: Directions, *, e
         if into is not None:
             into[ray] = values
     return RayHits._make(None if values is None else only_value(values) for values in full) if single else full
+
+
+def no_hit() -> RayHits:
+    """Of a single ray that meets nothing."""
+    inf, nothing = math.inf, np.zeros((2, 3))
+    return RayHits(False, inf, inf, inf, nothing[0], nothing[1], -1, None, True, -1)  # type: ignore[arg-type]
 
 
 def _nothing(n: int) -> RayHits:

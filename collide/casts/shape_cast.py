@@ -14,8 +14,12 @@ from collide.casts.cast_batches import cast_batch
 from collide.casts.convex_casts import CastRows
 from collide.casts.directions import Directions
 from collide.errors import InvalidArgument
+from collide.lowering.compound_layout import layout_of
+from collide.narrowphase.composite.balls_on_ways import SingleWay
+from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
 from collide.pairs.pair_arguments import asked_poses
 from collide.results import only_value
+from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_poses
 
@@ -119,6 +123,11 @@ def shape_cast(
     the parts are cast first, and the parts in that order. Bodies that touch at the start cost what `collide.collide`
     does.
     """
+    is_plain = check_poses is True and start_normals is False and threads.__class__ is int and threads == 1
+    if is_plain and max_distance.__class__ is float and max_distance >= 0.0:
+        way = prepared_pair(A, B, "_way")
+        if way is not None and way.body_misses(X_WA, X_WB, direction_W, max_distance):
+            return _single_miss()
     limit = checks.limit("shape_cast: max_distance", max_distance, "")
     start_normals = checks.true_or_false("shape_cast: start_normals", start_normals)
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
@@ -133,9 +142,23 @@ def shape_cast(
             f"shape_cast: lengths do not match: {lengths}; batches must be equally long, or a single one"
         )
     refuse_unbounded("shape_cast: A", A)
+    if single and single_direction:
+        _prepare_way(A, B)
     rows = _in_threads(A, B, X_WA, X_WB, directions.repeated(n), limit, start_normals, check_threads(threads))
     casts = as_casts(rows, directions.repeated(n))
     return ShapeCasts._make(only_value(values) for values in casts) if single and single_direction else casts
+
+
+def _single_miss() -> ShapeCasts:
+    inf, nothing = math.inf, np.zeros((2, 3))
+    return ShapeCasts(False, inf, inf, inf, nothing[0], nothing[1], True, False, -1, -1)  # type: ignore[arg-type]
+
+
+def _prepare_way(A: Shape, B: Shape) -> None:
+    """Have single casts of a union and another body look at the balls around both bodies first."""
+    is_union = isinstance(A, Compound) or isinstance(B, Compound)
+    if is_union and not B.is_region and single_calls_are_safe() and prepared_pair(A, B, "_way") is None:
+        keep_prepared(A, B, SingleWay(layout_of(A).ball, layout_of(B).ball), "_way")
 
 
 def _in_threads(

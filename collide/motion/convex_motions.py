@@ -17,16 +17,17 @@ from collide.lowering.packed_convex import pack_points
 from collide.lowering.shape_table import POSE, RANK, ShapeTable
 from collide.motion.convex_impact import CONTACT, FREE, OPEN, OPEN_START
 from collide.motion.impact_jobs import begin_single, find_impacts
-from collide.motion.impact_rows import TimeOfImpact, free_rows, single_result
+from collide.motion.impact_rows import TimeOfImpact, free_rows, no_impact, single_result
 from collide.motion.motions import Motions
 from collide.motion.moving_body import BODY
-from collide.motion.parts_ahead import MAX_ASKED, balls_meet, parts_ahead
-from collide.narrowphase.composite.composite_parts import compound_parts
+from collide.motion.parts_ahead import MAX_ASKED, balls_meet, parts_ahead, spans_of
+from collide.motion.span_bounds import HEADER, OUT, WORKSPACE, stays_free
+from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
 from collide.narrowphase.convex_kernel_calls import scratch
 from collide.narrowphase.pair_kernel import answer_pairs
-from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair
+from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
 from collide.results import PAIR_DTYPE
-from collide.shapes.shape import Shape
+from collide.shapes.shape import IDENTITY, Shape
 
 #: Jobs done in one call of the kernel: their list stays small beside the motions.
 JOBS_AT_ONCE = 1 << 16
@@ -58,6 +59,8 @@ class _Workspace:
 class _OfThread(local):
     def __init__(self) -> None:
         self.space = _Workspace()
+        self.span = np.zeros(WORKSPACE + OUT + HEADER)
+        self.span_at = address_of(self.span)
 
 
 class SinglePair:
@@ -87,6 +90,27 @@ class SinglePair:
         space = _SingleSpace(header, row, address_of(header), address_of(self._jobs), address_of(row))
         self._of_thread.space = space
         return space
+
+
+class SingleUnions:
+    """Two bodies of several convex parts, prepared for single motions in which balls about their origins never meet."""
+
+    def __init__(self, A: CompoundParts, B: CompoundParts):
+        here = IDENTITY[None]
+        self._spans = spans_of(A, B, Motions(here, here, here, here, None, None))
+        self._at = address_of(self._spans.parts), address_of(self._spans.reaches)
+
+    def ask(self, matrices: tuple, tolerance: float) -> TimeOfImpact | None:
+        """As of `SinglePair`; None where the balls meet."""
+        for X in matrices:
+            if X.__class__ is not np.ndarray or X.dtype is not _FLOAT64 or X.shape != (4, 4) or not X.flags.carray:
+                return None
+        if not stays_free(*map(address_of, matrices), *self._at, _of_thread.span_at):
+            return None
+        return no_impact()
+
+
+_FLOAT64 = np.dtype(np.float64)
 
 
 class _SingleSpace(NamedTuple):
@@ -131,7 +155,13 @@ class _Bodies:
         self.parts = np.ascontiguousarray(np.concatenate([layout.parts for layout in layouts]))
         self.table = ShapeTable([packed for layout in layouts for packed in layout.packed])
         self.table.build_trees(np.arange(len(self.table.packed)))
-        self.single = SinglePair(self, 0, len(shapes) - 1) if self.is_simple and len(shapes) <= 2 else None
+        self.single: SinglePair | SingleUnions | None = None
+        if len(shapes) <= 2 and self.is_simple:
+            self.single = SinglePair(self, 0, len(shapes) - 1)
+        elif len(shapes) <= 2 and int(self.counts[0] * self.counts[-1]) > MAX_ASKED and single_calls_are_safe():
+            unions = [compound_parts(shape) for shape in (shapes[0], shapes[-1])]
+            if not any(union.unbounded for union in unions):
+                self.single = SingleUnions(*unions)
 
     def jobs(self, a: np.ndarray, b: np.ndarray, first: int, motions: Motions) -> np.ndarray:
         """(k, JOB) every part of A with every part of B, motion by motion, for shapes a and b of motions from ``first``

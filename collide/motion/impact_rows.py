@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -79,6 +79,12 @@ def as_result(rows: np.ndarray, tolerance: float, single: bool) -> TimeOfImpact:
             "normal", "point_a", "point_b", "part_a", "part_b", "queries")),
     )
     return TimeOfImpact(*(only_value(column) if single else column for column in columns))
+
+
+def no_impact() -> TimeOfImpact:
+    """Of a single motion without any contact."""
+    values: tuple[Any, ...] = False, 1.0, 1.0, 1.0, True, *np.zeros((3, 3)), 0, 0, 0
+    return TimeOfImpact(*values)
 
 
 def single_result(row: np.ndarray, tolerance: float) -> TimeOfImpact | None:

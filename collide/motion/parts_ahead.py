@@ -70,7 +70,7 @@ def balls_meet(A: CompoundParts, B: CompoundParts, motions: Motions, n: int) -> 
     """
     if A.unbounded or B.unbounded:
         return np.ones(n, dtype=bool)
-    spans = _spans_of(A, B, motions)
+    spans = spans_of(A, B, motions)
     strides = [0 if X is None or len(X) == 1 else 8 * doubles for X, doubles in zip(motions, _STRIDES)]
     steps, of_motion = np.array([*strides, 0, 0], dtype=np.int64), np.empty(HEADER, dtype=np.int64)
     work, met = np.zeros(WORKSPACE + OUT), np.empty(n, dtype=bool)
@@ -80,7 +80,7 @@ def balls_meet(A: CompoundParts, B: CompoundParts, motions: Motions, n: int) -> 
     return met
 
 
-def _spans_of(A: CompoundParts, B: CompoundParts, motion: Motions) -> Spans:
+def spans_of(A: CompoundParts, B: CompoundParts, motion: Motions) -> Spans:
     """Of two unions as a whole."""
     parts = np.zeros((2, PART))
     parts[:, [0, 4, 8]] = 1.0
@@ -96,7 +96,7 @@ def parts_ahead(
     upper : gives the time, which may shrink meanwhile.   max_pairs : a span with more pairs is cut.
     """
     named = np.zeros((len(A.parts), len(B.parts)), dtype=bool)
-    spans = _spans_of(A, B, motion)
+    spans = spans_of(A, B, motion)
     least = _LEAST_MOVED * min(A.radius, B.radius)
     is_unbounded = A.unbounded or B.unbounded
     begin, end = (0.0, 1.0) if is_unbounded else spans.time_of_balls()

@@ -36,17 +36,23 @@ class Prepared:
     distance(X_WA, X_WB, memory, depths, limit) : any bool; ``memory``, a bytearray that begins with zeros, then begins
         with the pair's row of `PAIR_DTYPE`; depths and limit [m] as of `convex_batches.Question`.
     contacts(X_WA, X_WB, max_contacts, margin) : bytes of the rows of `CONTACT_DTYPE`.
-    table : read by batches of the pair: a `ShapeTable` or a `CompoundTable`, or ``None``.
+    collide_poses(X_WA, X_WB) : of a batch, (N, 4, 4) both or a single pose (4, 4) with it: (N,) bool.
+    distance_poses(X_WA, X_WB, depths, limit) : of a batch: its finished rows, and copies (N or 1, 4, 4) of the poses.
+    table : read by batches of the pair: a `ShapeTable`, a `CompoundTable` or a `FacetPair`, or ``None``.
     held : other objects in use by kernels.
     """
 
-    __slots__ = ("__weakref__", "collide", "contacts", "distance", "held", "table", "within")
+    __slots__ = (
+        "__weakref__", "collide", "collide_poses", "contacts", "distance", "distance_poses", "held", "table", "within",
+    )
 
     def __init__(
         self, *, collide: Single | None = None, within: Single | None = None, distance: Single | None = None,
-        contacts: Single | None = None, table: Any = None, held: Any = None,
+        contacts: Single | None = None, collide_poses: Single | None = None, distance_poses: Single | None = None,
+        table: Any = None, held: Any = None,
     ):
         self.collide, self.within, self.distance, self.contacts = collide, within, distance, contacts
+        self.collide_poses, self.distance_poses = collide_poses, distance_poses
         self.table, self.held = table, held
 
 

@@ -1,8 +1,8 @@
-"""Public functions of two shapes at a pair of poses: the pair made ready for single calls is asked first.
+"""Public functions of two shapes at a pair of poses, or at many: the pair made ready for such calls is asked first.
 
 In a process with the library these functions are C's (`native/python_module.c`): no Python runs between the call and
 the result. Elsewhere this module does the same in Python. Questions left open by the pair, and calls of other forms,
-go to the decorated function, which checks arguments, answers batches, and raises.
+go to the decorated function, which checks arguments, answers the other batches, and raises.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import math
 from collections.abc import Callable
 from functools import partial, wraps
 from typing import Any, TypeVar
+
+import numpy as np
 
 from collide.base import argument_checks as checks
 from collide.kernels.prepared import is_matrix, query_of_c
@@ -77,6 +79,20 @@ def _are_plain(arguments: tuple, *, check_poses=True, threads=1, axes=None, algo
     return len(arguments) == 4 and plain and axes is None and algorithm is None
 
 
+def _are_batch(X_WA: Any, X_WB: Any) -> bool:
+    """Whether two arrays are a batch of poses as kernels read them, either perhaps a single pose for all of the
+    other's."""
+    lengths = {_n_poses(X_WA), _n_poses(X_WB)} - {1}
+    return len(lengths) < 2 and 0 not in lengths and max(X_WA.ndim, X_WB.ndim) == 3
+
+
+def _n_poses(X: Any) -> int:
+    """Of a batch or a single pose; 0 of what kernels do not read."""
+    if type(X) is not np.ndarray or X.shape[-2:] != (4, 4) or X.ndim not in (2, 3) or not X.size:
+        return 0
+    return X.size // 16 if is_matrix(X.reshape(-1, 4, 4)[0]) and X.flags.c_contiguous else 0
+
+
 def _length(question: str, value: Any) -> float | None:
     """A length [m] as a float; ``None`` where the decorated function has to look at the value."""
     if value.__class__ is bool or not isinstance(value, (float, int)):
@@ -91,13 +107,19 @@ def _collide(A, B, X_WA, X_WB, *, security_margin=0.0, **_) -> bool | None:
     if pair is None or margin is None:
         return None
     if margin == 0.0:
-        return pair.collide and pair.collide(X_WA, X_WB)
+        ask = pair.collide_poses if _are_batch(X_WA, X_WB) else pair.collide
+        return ask and ask(X_WA, X_WB)
     return pair.within and pair.within(X_WA, X_WB, margin)
 
 
 def _distance(certify, A, B, X_WA, X_WB, *, max_distance=math.inf, signed=True, **_) -> PairResult | None:
     pair, limit = prepared_pair(A, B), _length("distance", max_distance)
-    if pair is None or limit is None or pair.distance is None or signed.__class__ is not bool:
+    if pair is None or limit is None or signed.__class__ is not bool:
+        return None
+    if _are_batch(X_WA, X_WB):
+        answer = pair.distance_poses and pair.distance_poses(X_WA, X_WB, signed, limit)
+        return answer and PairResult(answer[0], False, (A, B, *answer[1:]), certify)
+    if pair.distance is None:
         return None
     if not (is_matrix(X_WA) and is_matrix(X_WB)):
         return None

@@ -25,8 +25,9 @@ class Shape:
 
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges",
-        "_hulls_instead", "_kind", "_laid_out", "_moving", "_moving_bounds", "_partners", "_parts", "_pieces",
-        "_prepared", "_reach", "_serial", "_surface", "_topology", "_union", "_vertex_set", "_walk",
+        "_hulls_instead", "_kind", "_laid_out", "_leaves", "_meshed_leaves", "_moving", "_moving_bounds", "_partners",
+        "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_surface", "_topology", "_union",
+        "_vertex_set", "_walk", "_way",
     )
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -43,6 +44,12 @@ class Shape:
     #: The same for times of impact (`motion/convex_motions.py`).
     _moving: dict[int, Any]
     _moving_bounds: dict[int, Any]
+    #: The same for casts, and for rays, that miss by the balls around bodies (`composite/balls_on_ways.py`).
+    _way: dict[int, Any]
+    _ray_way: Any
+    #: What a union comes down to, and which of that are meshes (`casts/leaves.py`).
+    _leaves: list
+    _meshed_leaves: Any
     #: Hierarchies for the walk of Barba and Langerman, made when it is first asked for (`hierarchy_queries.py`).
     _walk: Any
     #: The shape as meshes meet it: facets under a tree, and a radius (`lowering/facet_bodies.py`), or two polytopes.

@@ -138,17 +138,27 @@ class Groups(NamedTuple):
 
 
 @kernel
-def _place_groups(block, k, cut, margin):
-    """Place the balls of all groups; those of their parts are placed when they are first wanted."""
+def _groups_of(block, k, cut, margin):
+    """The groups of both bodies of slot k, whether placed or not."""
     A = body_of(block, k, 0)
     B = body_of(block, k, 1)
     n_a = (A.n_parts + GROUP - 1) // GROUP
     n_b = (B.n_parts + GROUP - 1) // GROUP
     parts_b = 2 + A.n_parts
     a = parts_b + B.n_parts
-    _place_groups_of(block, A, n_a, a, 2, Vec3(0.0, 0.0, 0.0))
-    _place_groups_of(block, B, n_b, a + n_a, parts_b, _shift(block, POSE * A.row, POSE * B.row))
     return Groups(A, B, n_a, n_b, a, a + n_a, 2, parts_b, cut, margin)
+
+
+@kernel
+def _place_groups(block, k, cut, margin):
+    """Place the balls of all groups; those of their parts are placed when they are first wanted."""
+    groups = _groups_of(block, k, cut, margin)
+    A, B = groups.A, groups.B
+    _place_groups_of(block, A, groups.n_a, groups.a, groups.parts_a, Vec3(0.0, 0.0, 0.0))
+    _place_groups_of(
+        block, B, groups.n_b, groups.b, groups.parts_b, _shift(block, POSE * A.row, POSE * B.row)
+    )
+    return groups
 
 
 @kernel(inline=True)
@@ -254,9 +264,30 @@ def _gap_of_pair(block, groups, pair):
 
 
 @kernel
+def _sort_near(near, first, n, half):
+    """Sort n numbers of the list of near parts from ``first`` on, and with them their balls' places, ``half`` behind:
+    Shell's sort with Knuth's gaps, O(n^1.5)."""
+    gap = 1
+    while gap < n:
+        gap = 3 * gap + 1
+    while gap > 1:
+        gap //= 3
+        for k in range(gap, n):
+            number = near[first + k]
+            place = near[half + first + k]
+            j = k
+            while j >= gap and near[first + j - gap] > number:
+                near[first + j] = near[first + j - gap]
+                near[half + first + j] = near[half + first + j - gap]
+                j -= gap
+            near[first + j] = number
+            near[half + first + j] = place
+
+
+@kernel
 def _list_near_parts(block, groups, of_b, reach, first):
-    """Write the places of the balls of A's parts, or of B's, into the list of near parts, from ``first`` on; −1 of
-    parts left out.
+    """List the near parts of A, or of B: their numbers, ascending, from ``first`` on, and the places of their balls in
+    the list's second half; returns how many they are.
 
     A part is left out where its group is farther than ``reach`` [m] from all groups of the other body, and where its
     ball is farther from the ball around the other body: all balls in the body's ball are as far away.
@@ -268,16 +299,25 @@ def _list_near_parts(block, groups, of_b, reach, first):
     )
     shift = _shift(block, POSE * groups.A.row, POSE * groups.B.row) if of_b else Vec3(0.0, 0.0, 0.0)
     by_place = view_i64(block.header[BY_PLACE_AT], body.first + body.n_parts)
+    half = block.header[CAPACITY]
+    n_near = 0
     for group in range(n):
         is_near = False
         if _gap(block, at + group, 0 if of_b else 1) - groups.margin <= reach:
             for j in range(n_others):
-                is_near = is_near or _gap(block, at + group, others_at + j) - groups.margin <= reach
-        if is_near:
-            _open_group(block, body, group, parts, shift)
+                if _gap(block, at + group, others_at + j) - groups.margin <= reach:
+                    is_near = True
+                    break
+        if not is_near:
+            continue
+        _open_group(block, body, group, parts, shift)
         for place in range(GROUP * group, min(GROUP * (group + 1), body.n_parts)):
-            is_listed = is_near and _gap(block, parts + place, 0 if of_b else 1) - groups.margin <= reach
-            block.near[first + by_place[body.first + place]] = parts + place if is_listed else -1
+            if _gap(block, parts + place, 0 if of_b else 1) - groups.margin <= reach:
+                block.near[first + n_near] = by_place[body.first + place]
+                block.near[half + first + n_near] = parts + place
+                n_near += 1
+    _sort_near(block.near, first, n_near, half)
+    return n_near
 
 
 # --- lists --------------------------------------------------------------------------------------
@@ -334,7 +374,9 @@ def _list_others_of(block, k, boolean, every, n_listed):
     count_b = body_of(block, k, 1).n_parts
     size = _place_body_balls(block, k)
     margin = BALL_MARGIN * size
-    groups = _place_groups(block, k, math.inf, margin)
+    # The groups of a single pose stand where `_nearest_pair` has placed them just now.
+    is_placed = header[N_POSES] == 1 and header[PAIR] == 0 and not every
+    groups = _groups_of(block, k, math.inf, margin) if is_placed else _place_groups(block, k, math.inf, margin)
     first_pair = block.slots[SLOT_SIZE * k + FIRST_PAIR]
     reach = margin
     if every:
@@ -343,22 +385,15 @@ def _list_others_of(block, k, boolean, every, n_listed):
         # Others that are as near by their balls as the first: which of them came first has no say.
         reach += max(first_reach_of(block.scores, SCORE * k), _gap_of_pair(block, groups, first_pair), 0.0)
         reach += _BRACKET * size
-    _list_near_parts(block, groups, False, reach, 0)
-    _list_near_parts(block, groups, True, reach, count_a)
-    n_near = 0
-    balls_b = header[CAPACITY]
-    for j in range(count_b):  # those of B that are near: their numbers in front, their balls in the second half
-        if block.near[count_a + j] >= 0:
-            block.near[balls_b + n_near] = block.near[count_a + j]
-            block.near[count_a + n_near] = j
-            n_near += 1
+    n_near_a = _list_near_parts(block, groups, False, reach, 0)
+    n_near_b = _list_near_parts(block, groups, True, reach, count_a)
+    balls = header[CAPACITY]
     start = header[PAIR]
-    for i in range(start // count_b, count_a):
-        if block.near[i] < 0:
-            continue
-        for at in range(n_near):
-            pair = i * count_b + block.near[count_a + at]
-            if pair < start or pair == first_pair or _gap(block, block.near[i], block.near[balls_b + at]) > reach:
+    for i in range(n_near_a):
+        for j in range(count_a, count_a + n_near_b):
+            pair = block.near[i] * count_b + block.near[j]
+            gap = _gap(block, block.near[balls + i], block.near[balls + j])
+            if pair < start or pair == first_pair or gap > reach:
                 continue
             if n_listed == LIST:
                 header[PAIR] = pair

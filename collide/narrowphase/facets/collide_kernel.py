@@ -315,12 +315,13 @@ def meet_poses(header_at, XA_at, step_a, XB_at, step_b, first, n, check, cores, 
 
     XA, XB : matrices; step 16 or, for a single pose, 0.   check : refuse matrices that are no rotation.
     cores : leave radii out.   inside : 0, or three doubles a pose: a point of the world in both bodies, where a part of
-    one lies inside the other; else left as they are.   states : a byte a pose.
+    one lies inside the other; else left as they are.   states : n + 1 bytes, zeroed; the last becomes OPEN where some
+    are.
     Arguments are flat: entries take integers, doubles and booleans alone.
     """
     space = open_space(header_at)
     exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
-    states = view_u8(states_at, n)
+    states = view_u8(states_at, n + 1)
     for k in range(first, n):
         if not are_poses(XA_at, step_a, XB_at, step_b, k, first, check):
             states[k] = NO_POSE
@@ -335,6 +336,8 @@ def meet_poses(header_at, XA_at, step_a, XB_at, step_b, first, n, check, cores, 
         states[k] = state
         if state == SINGULAR:
             return k
+        if state == OPEN:
+            states[n] = OPEN
     return n
 
 

@@ -41,10 +41,11 @@ from collide.numerics.vec3 import Vec3, add, dot, put_vec3, scale, sub, vec3_at
 from collide.results import EXACT, FORMULA, UNDECIDED
 
 # What a row still lacks, as bits: the depth and points of bodies whose cores meet, or that only their radii make meet
-# (or may); the direction of bodies that all but touch; the gap of bodies too far apart for boxes of floats.
-CORES_MEET, RADII_MEET, NEARLY_TOUCH, TOO_FAR = 1, 2, 4, 8
+# (or may); the direction of bodies that all but touch; the gap of bodies too far apart for boxes of floats; the sign of
+# bodies without depths that their radii may make meet.
+CORES_MEET, RADII_MEET, NEARLY_TOUCH, TOO_FAR, LEFT_OPEN = 1, 2, 4, 8, 16
 #: A row that is none: a matrix is no pose, or singular. Above all bits.
-ROW_NO_POSE, ROW_SINGULAR = 16, 32
+ROW_NO_POSE, ROW_SINGULAR = 32, 64
 
 #: Surfaces nearer than this share of the pair's size leave their direction to rounding.
 NEARLY_TOUCHING = 2.0**-24
@@ -214,7 +215,7 @@ def _write_row(space, pair, limit, reach, depths, hull_at, exchanged, row_at):
     if depths or lacks != 0:
         return lacks | RADII_MEET
     _forget_gap(row_at, state == HIT)
-    return 0
+    return 0 if state == HIT else LEFT_OPEN
 
 
 @kernel
@@ -323,11 +324,11 @@ def gap_poses(
     XA, XB, check : as of `meet_poses`.   limit : beyond the limit only a lower bound is wanted [m].   reach : how far
     cores are looked for: next above the limit and the radii [m].   depths : whether depths of overlaps are wanted.
     hulls : 0, or rows of the bodies' hulls, for directions.   rows : of PAIR_DTYPE, zeroed.
-    lacks : a byte a pose, bits of what a row lacks; or ROW_NO_POSE, ROW_SINGULAR.
+    lacks : n + 1 bytes, zeroed: bits of what a row lacks, or ROW_NO_POSE, ROW_SINGULAR; last what any row lacks.
     Arguments are flat: entries take integers, doubles and booleans alone.
     """
     space = open_space(header_at)
-    lacks = view_u8(lacks_at, n)
+    lacks = view_u8(lacks_at, n + 1)
     for k in range(first, n):
         if not are_poses(XA_at, step_a, XB_at, step_b, k, first, check):
             lacks[k] = ROW_NO_POSE
@@ -339,4 +340,5 @@ def gap_poses(
         )
         if lacks[k] == ROW_SINGULAR:
             return k
+        lacks[n] |= lacks[k]
     return n

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from collide.narrowphase.facets.collide_kernel import (
 )
 from collide.narrowphase.facets.distance_kernel import (
     FARTHEST,
+    LEFT_OPEN,
     NEARLY_TOUCH,
     PROMISE,
     RADII_MEET,
@@ -76,7 +77,7 @@ def core_hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bo
     check : as in `states`.
     """
     inside = np.full((number_of_poses(X_WA, X_WB), 3), np.nan)
-    return Hits(_states(A, B, False, X_WA, X_WB, check=check, inside=inside) != APART, inside)
+    return Hits(FacetPair(A, B, exchanged=False).states(X_WA, X_WB, check=check, inside=inside)[0] != APART, inside)
 
 
 def balls_farther(
@@ -109,9 +110,7 @@ def states(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool 
 
     check : refuse matrices that are no rotation. Raises InvalidPose.
     """
-    if B.key < A.key:
-        return _states(B, A, True, X_WA, X_WB, check=check)
-    return _states(A, B, False, X_WA, X_WB, check=check)
+    return pair_of(A, B).states(X_WA, X_WB, check=check)[0]
 
 
 def hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
@@ -119,24 +118,84 @@ def hits(A: Body, B: Body, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     return states(A, B, X_WA, X_WB) != APART
 
 
-def _states(
-    A: Body, B: Body, exchanged: bool, X_WA, X_WB, *, check: bool, inside: np.ndarray | None = None
-) -> np.ndarray:
-    """States of bodies; exchanged: the poses are those of B and A.   inside : as of `Hits`, of bodies without radii."""
-    n = number_of_poses(X_WA, X_WB)
-    out = np.zeros(n, dtype=np.uint8)
-    if A.radius + B.radius > 0.0 and inside is None:
-        _make_slabs(A, B)
-    header = pair_header(A, B, exchanged, workspace(stack_of(A.tree, B.tree)))
+class FacetPair:
+    """Two bodies of facets for questions about many poses; the kernels' header is written once a thread.
 
-    def ask_from(first: int, check: bool) -> int:
-        return meet_poses(
-            address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), first, n, check,
-            inside is not None, 0 if inside is None else address_of(inside), address_of(out),
-        )
+    A, B : in the order in which kernels work on bodies.   exchanged : callers name B first, and its poses.
+    """
 
-    _ask_all(ask_from, n, X_WA, X_WB, check, lambda k: out[k] == NO_POSE)
-    return out
+    __slots__ = ("A", "B", "_has_slabs", "_laid_out", "_n_stack", "exchanged")
+
+    def __init__(self, A: Body, B: Body, *, exchanged: bool):
+        self.A, self.B, self.exchanged = A, B, exchanged
+        self._n_stack = stack_of(A.tree, B.tree)
+        self._laid_out: tuple[Any, Any] = None, None
+        self._has_slabs = False
+
+    def need_slabs(self) -> None:
+        """Distances look at slabs around the boxes' facets, made at most once."""
+        if not self._has_slabs:
+            self.A.tree.need_slabs(make_slabs)
+            self.B.tree.need_slabs(make_slabs)
+            self._has_slabs = True
+
+    def header(self) -> np.ndarray:
+        """What kernels read first, with this thread's workspace."""
+        space = workspace(self._n_stack)
+        laid_out = self._laid_out  # read once: other threads put their own there
+        if laid_out[0] is not space:
+            laid_out = self._laid_out = space, pair_header(self.A, self.B, self.exchanged, space)
+        return laid_out[1]
+
+    def states(
+        self, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool, inside: np.ndarray | None = None
+    ) -> tuple[np.ndarray, bool]:
+        """((n,) uint8 APART, HIT or OPEN, whether some are OPEN); arguments as of `states`.
+
+        inside : as of `Hits`, of bodies without radii.
+        """
+        n = number_of_poses(X_WA, X_WB)
+        out = np.zeros(n + 1, dtype=np.uint8)
+        if self.A.radius + self.B.radius > 0.0 and inside is None:
+            self.need_slabs()
+        header = self.header()
+
+        def ask_from(first: int, check: bool) -> int:
+            return meet_poses(
+                address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), first, n, check,
+                inside is not None, 0 if inside is None else address_of(inside), address_of(out),
+            )
+
+        _ask_all(ask_from, n, X_WA, X_WB, check, lambda k: out[k] == NO_POSE)
+        return out[:n], bool(out[n])
+
+    def rows(
+        self, rows: np.ndarray, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float, depths: bool, check: bool,
+        hulls: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """(n + 1,) uint8: what rows lack (`gap_poses`), and last what any row lacks, having written them.
+
+        rows : (n,) zeroed.   hulls : their hulls' rows, for directions.
+        """
+        n = len(rows)
+        lacks = np.zeros(n + 1, dtype=np.uint8)
+        self.need_slabs()
+        header, reach = self.header(), _reach_of_search(self.A, self.B, limit)
+
+        def ask_from(first: int, check: bool) -> int:
+            return gap_poses(
+                address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), first, n, check,
+                limit, reach, depths, 0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
+            )
+
+        _ask_all(ask_from, n, X_WA, X_WB, check, lambda k: lacks[k] == ROW_NO_POSE)
+        return lacks
+
+
+def pair_of(A: Body, B: Body) -> FacetPair:
+    """Two bodies as asked about, worked on in the order of their contents."""
+    exchanged = B.key < A.key
+    return FacetPair(B, A, exchanged=True) if exchanged else FacetPair(A, B, exchanged=False)
 
 
 def _ask_all(
@@ -158,12 +217,6 @@ def _ask_all(
 def step_of(X: np.ndarray) -> int:
     """Doubles from each pose to the next: 16, or 0 for a single pose that goes with all of the other body's."""
     return 16 * (len(X) > 1)
-
-
-def _make_slabs(A: Body, B: Body) -> None:
-    """Distances look at slabs around the boxes' facets, made at most once."""
-    A.tree.need_slabs(make_slabs)
-    B.tree.need_slabs(make_slabs)
 
 
 def pair_header(A: Body, B: Body, exchanged: bool, space: Workspace) -> np.ndarray:
@@ -194,45 +247,34 @@ def body_rows(
 
     limit, depths : as in `distance`.   check : as in `states`.   out : rows to fill, zeroed. Raises InvalidPose.
     """
-    n = number_of_poses(X_WA, X_WB)
-    rows = np.zeros(n, dtype=PAIR_DTYPE) if out is None else out
-    lacks = _fill_rows(rows, A, B, X_WA, X_WB, limit, depths, check)
-    if lacks.any():
-        near = np.flatnonzero(lacks & NEARLY_TOUCH)
-        if len(near):
-            XA, XB = _poses_of(X_WA, near), _poses_of(X_WB, near)
-            again = np.zeros(len(near), dtype=PAIR_DTYPE)
-            lacks[near] = _fill_rows(again, A, B, XA, XB, limit, depths, False, hull_rows(A, B, XA, XB, math.inf))
-            rows[near] = again
-        for k in np.flatnonzero(lacks).tolist():
-            XA, XB = (X[k if len(X) > 1 else 0] for X in (X_WA, X_WB))
-            rows[k] = _completed(A, B, XA, XB, rows[k : k + 1], int(lacks[k]), limit)
+    rows = np.zeros(number_of_poses(X_WA, X_WB), dtype=PAIR_DTYPE) if out is None else out
+    write_rows(rows, pair_of(A, B), X_WA, X_WB, limit=limit, depths=depths, check=check)
     return rows
+
+
+def write_rows(
+    rows: np.ndarray, pair: FacetPair, X_WA: np.ndarray, X_WB: np.ndarray, *, limit: float, depths: bool, check: bool
+) -> bool:
+    """`body_rows` of a pair into rows, zeroed; whether some may be undecided."""
+    lacks = pair.rows(rows, X_WA, X_WB, limit=limit, depths=depths, check=check)
+    if not lacks[-1]:
+        return False
+    lacks = lacks[:-1]
+    A, B = (pair.B, pair.A) if pair.exchanged else (pair.A, pair.B)
+    near = np.flatnonzero(lacks & NEARLY_TOUCH)
+    if len(near):
+        XA, XB = _poses_of(X_WA, near), _poses_of(X_WB, near)
+        again, hulls = np.zeros(len(near), dtype=PAIR_DTYPE), hull_rows(A, B, XA, XB, math.inf)
+        lacks[near] = pair.rows(again, XA, XB, limit=limit, depths=depths, check=False, hulls=hulls)[:-1]
+        rows[near] = again
+    for k in np.flatnonzero(lacks & ~np.uint8(LEFT_OPEN)).tolist():
+        XA, XB = (X[k if len(X) > 1 else 0] for X in (X_WA, X_WB))
+        rows[k] = _completed(A, B, XA, XB, rows[k : k + 1], int(lacks[k]), limit)
+    return True
 
 
 def _poses_of(X: np.ndarray, some: np.ndarray) -> np.ndarray:
     return X if len(X) == 1 else X[some]
-
-
-def _fill_rows(
-    rows: np.ndarray, A: Body, B: Body, X_WA, X_WB, limit: float, depths: bool, check: bool,
-    hulls: np.ndarray | None = None,
-) -> np.ndarray:
-    """(n,) uint8: what rows lack (`gap_poses`), having written them. hulls : their hulls' rows, for directions."""
-    lacks = np.zeros(len(rows), dtype=np.uint8)
-    exchanged = B.key < A.key
-    _make_slabs(A, B)
-    header = pair_header(*((B, A) if exchanged else (A, B)), exchanged, workspace(stack_of(A.tree, B.tree)))
-    reach = _reach_of_search(A, B, limit)
-
-    def ask_from(first: int, check: bool) -> int:
-        return gap_poses(
-            address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), first, len(rows),
-            check, limit, reach, depths, 0 if hulls is None else address_of(hulls), address_of(rows), address_of(lacks),
-        )
-
-    _ask_all(ask_from, len(rows), X_WA, X_WB, check, lambda k: lacks[k] == ROW_NO_POSE)
-    return lacks
 
 
 def _reach_of_search(A: Body, B: Body, limit: float) -> float:
@@ -311,25 +353,20 @@ def serves_single_calls(A: Body, B: Body) -> bool:
 def prepared_facets(A: Body, B: Body) -> Prepared:
     """Two bodies ready for one call at a time: booleans, and distances without a limit."""
     global _single_space
-    exchanged = B.key < A.key
-    if exchanged:
-        A, B = B, A
+    pair = pair_of(A, B)
+    A, B = pair.A, pair.B
     space, n_stack = _single_space, stack_of(A.tree, B.tree)
     if space is None or space.n_stack < n_stack:
         space = _single_space = Workspace(max(512, n_stack))
-    has_slabs = A.radius + B.radius > 0.0
-    if has_slabs:
-        _make_slabs(A, B)
-    header = pair_header(A, B, exchanged, space)
+    if A.radius + B.radius > 0.0:
+        pair.need_slabs()
+    header = pair_header(A, B, pair.exchanged, space)
     gap = prepared_row(gap_single, header)
 
     def distance(X_WA, X_WB, memory: bytearray, depths: bool, limit: float) -> bool | None:
-        nonlocal has_slabs
         if limit < math.inf:
             return None
-        if not has_slabs:
-            _make_slabs(A, B)
-            has_slabs = True
+        pair.need_slabs()
         return gap(X_WA, X_WB, memory, depths, limit)
 
     # Kernels use the bodies' and the workspace's buffers; bodies hold their shapes weakly.

@@ -8,24 +8,33 @@ rounding them.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
+from collide.errors import InvalidPose
 from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import body_of
 from collide.lowering.kinds import Kind, kind_of
 from collide.narrowphase.composite.composite_meshes import compound_rows, compound_states
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
-from collide.narrowphase.convex_kernel_calls import number_of_poses
+from collide.narrowphase.convex_kernel_calls import finish_distances, number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
 from collide.narrowphase.facets.collide_kernel import APART, OPEN
 from collide.narrowphase.facets.curved_gap_calls import prepared_curved, serves
-from collide.narrowphase.facets.facet_kernel_calls import balls_farther, prepared_facets, serves_single_calls
+from collide.narrowphase.facets.facet_kernel_calls import (
+    FacetPair,
+    balls_farther,
+    pair_of,
+    prepared_facets,
+    serves_single_calls,
+    write_rows,
+)
 from collide.narrowphase.facets.mesh_methods import checked_poses, hull_shape, mesh_rows, mesh_states
 from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.narrowphase.prepared_pairs import Prepared
-from collide.results import UNDECIDED
+from collide.results import PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 
 
@@ -50,12 +59,17 @@ def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool,
         states = _compound_states(A, B, X_WA, X_WB, check, parts_open)
     else:
         states = mesh_states(A, B, X_WA, X_WB, check=check)
+    _settle_states(states, A, B, X_WA, X_WB)
+    return states
+
+
+def _settle_states(states: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> None:
+    """Bodies left open whose hulls are apart are apart."""
     undecided = np.flatnonzero(states == OPEN)
     covers = _convex_covers(A, B) if len(undecided) else None  # a mesh's hull is made when it is first needed
     if covers is not None:
         hulls_meet = convex_hits(*covers, _poses_of(X_WA, undecided), _poses_of(X_WB, undecided))
         states[undecided[~hulls_meet]] = APART
-    return states
 
 
 def _compound_states(A: Shape, B: Shape, X_WA, X_WB, check: bool, parts_open: bool) -> np.ndarray:
@@ -84,6 +98,15 @@ def pair_rows(
         rows = compound_rows(A, B, *checked_poses(X_WA, X_WB, check), limit=limit, depths=depths)
     else:
         rows = mesh_rows(A, B, X_WA, X_WB, limit=limit, depths=depths, check=check, out=out)
+    _settle_rows(rows, A, B, X_WA, X_WB, limit)
+    if out is not None and rows is not out:
+        out[:] = rows
+        rows = out
+    return rows
+
+
+def _settle_rows(rows: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> None:
+    """Rows of bodies left undecided whose hulls are apart become gaps."""
     undecided = np.flatnonzero(rows["how"] == UNDECIDED)
     covers = _convex_covers(A, B) if len(undecided) else None
     if covers is not None:
@@ -91,10 +114,6 @@ def pair_rows(
         hulls = convex_rows(*covers, *poses, depths=False)
         apart = hulls["lower"] > 0.0
         _make_gaps(rows, undecided[apart], hulls[apart], limit)
-    if out is not None and rows is not out:
-        out[:] = rows
-        rows = out
-    return rows
 
 
 def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float) -> np.ndarray:
@@ -116,13 +135,55 @@ def rows_within(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: f
     return rows
 
 
-def single_pair(A: Shape, B: Shape) -> Prepared | None:
-    """Two bodies of facets made ready for single calls; ``None`` of bodies of very many parts, answered as batches.
+def single_pair(A: Shape, B: Shape) -> Prepared:
+    """Two bodies of facets made ready for batches and, unless they are of very many parts, for single calls.
 
     The pair holds trees and points, not the shapes.
     """
     bodies = body_of(A), body_of(B)
-    return prepared_facets(*bodies) if serves_single_calls(*bodies) else None
+    prepared = prepared_facets(*bodies) if serves_single_calls(*bodies) else Prepared()
+    pair = prepared.table = pair_of(*bodies)
+    prepared.collide_poses, prepared.distance_poses = partial(_hits_of_batch, pair), partial(_rows_of_batch, pair)
+    return prepared
+
+
+def _hits_of_batch(pair: FacetPair, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray | None:
+    """`Prepared.collide_poses`; ``None`` where a matrix is no pose, for the long way to say which."""
+    X_WA, X_WB = _as_batch(X_WA), _as_batch(X_WB)
+    try:
+        states, some_open = pair.states(X_WA, X_WB, check=True)
+    except InvalidPose:
+        return None
+    if not some_open:
+        return states.view(np.bool_)
+    _settle_states(states, *_shapes_of(pair), X_WA, X_WB)
+    return states != APART
+
+
+def _rows_of_batch(
+    pair: FacetPair, X_WA: np.ndarray, X_WB: np.ndarray, depths: bool, limit: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """`Prepared.distance_poses`; ``None`` as of `_hits_of_batch`."""
+    X_WA, X_WB = _as_batch(X_WA).copy(), _as_batch(X_WB).copy()
+    rows = np.zeros(number_of_poses(X_WA, X_WB), dtype=PAIR_DTYPE)
+    try:
+        some_open = write_rows(rows, pair, X_WA, X_WB, limit=limit, depths=depths, check=True)
+    except InvalidPose:
+        return None
+    if some_open:
+        _settle_rows(rows, *_shapes_of(pair), X_WA, X_WB, limit)
+    finish_distances(rows, depths=depths)  # no depth of bounded bodies is without end
+    return rows, X_WA, X_WB
+
+
+def _as_batch(X: np.ndarray) -> np.ndarray:
+    return X if X.ndim == 3 else X[None]
+
+
+def _shapes_of(pair: FacetPair) -> tuple[Shape, Shape]:
+    """As asked about, and alive while they are."""
+    bodies = (pair.B, pair.A) if pair.exchanged else (pair.A, pair.B)
+    return bodies[0].shape, bodies[1].shape
 
 
 def curved_pair(A: Shape, B: Shape) -> Prepared | None:

@@ -5,7 +5,9 @@ Every boolean is proven by its certificate in Python integers, which multiplies 
 
 from __future__ import annotations
 
+import itertools
 from fractions import Fraction
+from functools import partial
 
 import naive
 import numpy as np
@@ -366,3 +368,27 @@ def test_more_pairs_of_parts_than_a_list_holds():
     for k in range(6):
         assert collide.distance(A, A, np.eye(4), X[k : k + 1]).rows.tobytes() == rows[k].tobytes()
         assert collide.collide(A, A, np.eye(4), X[k]) == rows["hit"][k] == bool(k % 2)
+
+
+def test_near_parts_are_listed_in_the_order_of_their_numbers():
+    """Listed as groups are opened, and sorted: a single pose, whose groups are placed once, has the bytes of a batch,
+    and the distance of the nearest part."""
+    rng, n_far = rng_of("near parts in order"), 0
+    A = collide.Compound([(collide.Sphere(float(rng.uniform(0.02, 0.1))), random_pose(rng, 0.7)) for _ in range(300)])
+    B = collide.Compound([(collide.Box(rng.uniform(0.05, 0.2, 3)), random_pose(rng, 0.3)) for _ in range(3)])
+    X = np.stack([random_pose(rng, 0.1) for _ in range(12)])
+    Y = np.stack([random_pose(rng, 0.1) @ collide.pose(rng.normal(size=3) * 0.3 * k) for k in range(12)])
+    for ask in (collide.distance, partial(collide.distance, signed=False), partial(collide.distance, max_distance=0.3)):
+        batch = ask(A, B, X, Y)
+        for k in range(12):
+            single = ask(A, B, X[k], Y[k])
+            assert single.rows.tobytes() == batch[k].rows.tobytes(), k
+    gaps = collide.distance(A, B, X, Y, signed=False)
+    for k in range(12):
+        parts = min(
+            collide.distance(a, b, X[k] @ X_A, Y[k] @ X_B, signed=False).distance
+            for (a, X_A), (b, X_B) in itertools.product(A.items, B.items)
+        )
+        assert gaps.lower[k] - 1e-12 <= parts <= gaps.upper[k] + 1e-12, k
+        n_far += parts > 0.5
+    assert 3 <= n_far <= 11, n_far
