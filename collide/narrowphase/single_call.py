@@ -40,7 +40,6 @@ from collide.narrowphase.rows import (
     LOWER,
     ROW,
     UPPER,
-    is_undecided,
     is_undecided_or_refused,
     view_row,
 )
@@ -111,8 +110,8 @@ def _settle_exactly(header, boolean, depths, limit, row_at):
     return _settle_exactly_at(
         header[SETTLE],
         (
-            header[STEPS_AT], header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT], header[PAIRS_AT], 1, boolean,
-            depths, limit, row_at, 0, 0, requests_at, header[DIGITS_AT],
+            header[STEPS_AT], header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], header[SHAPE_OF_AT],
+            header[PAIRS_AT], 1, boolean, depths, limit, row_at, 0, 0, requests_at, header[DIGITS_AT],
         ),
     )
 
