@@ -41,7 +41,7 @@ _SIGN, _DEPTH, _GAP = range(_SEARCHES)
 
 
 class Core(NamedTuple):
-    """Where `answer_pairs` is, what it reads, and where it works: addresses, as in its arguments."""
+    """Addresses of `answer_pairs`, of the tables read and of the workspace: as the arguments of `answer_pairs`."""
 
     code: int
     ints_at: int

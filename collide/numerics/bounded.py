@@ -1,13 +1,13 @@
-"""Double-doubles that know how far off they are: a sum of two doubles and a bound of its error, for filters.
+"""Double-doubles with a bound of their own error, for filters: a sum of two doubles, and how far off the sum may be.
 
-The bound is no a-priori one: it adds up what the operations themselves have rounded off, known from error-free
-transformations. So it is 0 wherever nothing was rounded, and a filter made of these numbers proves zeros, too: those of
-coordinates of few bits, and sums whose terms vanish, as for faces across an axis of the world. Other floating-point
-filters (S. Fortune, C. J. Van Wyk, "Efficient exact arithmetic for computational geometry", 1993) leave every zero to
-integers.
+Each operation adds to the bound what the operation itself has rounded off, known from error-free transformations. So
+the bound is 0 wherever nothing was rounded, and a filter made of these numbers proves zeros, too: zeros of coordinates
+of few bits, and of sums whose terms vanish, as for faces across an axis of the world. Filters with bounds known
+beforehand (S. Fortune, C. J. Van Wyk, "Efficient exact arithmetic for computational geometry", 1993) leave every zero
+to integers.
 
-What the operations ask for: no product and no part of one may underflow, nothing may overflow. The caller sees to it by
-the lowest bits and the sizes of what goes in.
+The operations ask: no product and no part of a product may underflow, nothing may overflow. The caller sees to both by
+the lowest bits and the sizes of the numbers given.
 """
 
 from __future__ import annotations

@@ -47,8 +47,9 @@ def settle_exactly(
 
     Steps, in this order, cheapest and most frequent first; a step sees the rows left open by the steps before:
 
-    1. `settle_hulls`: two swept hulls. GJK in integers decides whether they share a point; the distance of
-       disjoint cores is then known to all digits. Depths below rounding come from the facets nearest the origin, as
+    1. `settle_hulls`: two swept hulls. GJK in double-doubles with proven bounds (`filtered_gjk.py`), and in integers
+       where a sign stays unproven, decides whether they share a point; integers then know the distance of disjoint
+       cores to all digits. Depths below rounding come from the facets nearest the origin, as
        named by doubles (`depth_requests.py`, `plane_depth.py`).
     2. `settle_halfspaces`: a half-space against a swept hull, the sign of a polynomial a vertex; two half-spaces with
        opposite normals (`opposite_halfspaces.py`). Only if step 1 met a half-space.

@@ -1,18 +1,18 @@
-"""The search of `exact_gjk.py` in double-doubles with proven bounds: integers are asked only what these leave open.
+"""The search of `exact_gjk.py` in double-doubles with proven bounds: integers are asked where a sign stays unproven.
 
-Step by step the same search: the same subsets of the simplex, the same vertices, the same end, or none at all. Every
-sign it goes by is proven (`bounded.sign`), and a sign that is not ends it, after which integers begin from the first
-simplex. The signs are those of Johnson's Δ, written for what they mean:
+Step by step the same search: the same subsets of the simplex, the same vertices, the same end. Every sign is proven
+(`bounded.sign`); an unproven sign ends the search, and integers begin from the first simplex. The signs are Johnson's
+Δ, written for their meaning:
 
 * Δ_j(X ∪ j) = ΣΔ · v·(y_k − y_j), v the nearest point of the plane, the line or the point spanned by X and k in X. The
-  direction d is a positive multiple of v, so the sign is that of d·(y_k − y_j): of degree 3, 4 or 2 instead of 6, 4, 2.
-* Three points with Δ_i > 0 for all three are independent (ΣΔ is the square of twice their area), their nearest point is
-  a sum of them with positive weights in a single way, and no smaller subset can have it.
+  direction d is a positive multiple of v, so the sign is the sign of d·(y_k − y_j): of degree 3, 4 or 2 instead of 6,
+  4, 2.
+* Three points with Δ_i > 0 for all three are independent (ΣΔ is the square of twice the area), the nearest point is a
+  sum with positive weights in a single way, and no smaller subset can have the nearest point.
 * d is across the simplex, so an axis of a body's frame is across d where differences of the simplex's points say so to
-  the last bit (`_axes_across`): those of vertices of one face of a box, and of boxes turned alike. Vertices that differ
-  along such axes alone are level, as are vertices of two points with the same vertex of the other body: zeros that
-  rounding would hide.
-* The nearest point of four independent points has positive weights for a single subset: any subset proven is the one.
+  the last bit (`_axes_across`): vertices of a face of a box, and boxes turned alike. Vertices that differ along these
+  axes alone are level, as are vertices of two points with the same vertex of the other body: zeros, hidden by rounding.
+* The nearest point of four independent points has positive weights for a single subset: any proven subset will do.
 
 `side_of_facets` proves the same way which facet's plane is nearest to the origin of an overlap.
 """
@@ -40,8 +40,8 @@ _ROUNDS = 16
 #: Doubles of a point; doubles of workspace.
 _POINT = 9
 DOUBLES = 4 * _POINT
-#: Where an original simplex is kept behind the simplex.
-_KEPT = 8
+#: Where the first simplex stands behind the simplex.
+_FIRST_AT = 8
 # What goes in: entries of poses are 0 or at least so large, with no bit below 2⁻¹¹³; no bit of a vertex is below
 # 2^_LOWEST_BIT. So no bit of a point is below 2⁻²¹³, and of no product of four points, the highest degree here, below
 # 2⁻⁸⁵². Bounds of errors are sums of bits rounded off, and of parts 2⁻⁵¹ of those: none is below 2⁻⁹⁶⁰ but 0.
@@ -94,18 +94,18 @@ def _is_plain(poses, p):
 
 @kernel
 def search_filtered(ordered, ids, points):
-    """The `FilteredSearch` of an `OrderedPair` that `is_filtered`.
+    """The `FilteredSearch` of an `OrderedPair` taken by `is_filtered`.
 
     ids : in, three vertex pairs; out, the vertex pairs of the deciding simplex, in the order of `touch_exactly`; as
     before where the end is OPEN.   points : view of DOUBLES doubles.
     """
     for k in range(6):
-        ids[_KEPT + k] = ids[k]
-    found = _search(ordered, ids, points)
-    if found.end == OPEN:
+        ids[_FIRST_AT + k] = ids[k]
+    search = _search(ordered, ids, points)
+    if search.end == OPEN:
         for k in range(6):
-            ids[k] = ids[_KEPT + k]
-    return found
+            ids[k] = ids[_FIRST_AT + k]
+    return search
 
 
 @kernel
@@ -229,10 +229,10 @@ def _nearest_subset(points, n, newest):
 
 @kernel
 def _nearest_of_four(points, beyond):
-    """`johnson.nearest_subset` of four independent points if it is a face with the last point; else 0.
+    """`johnson.nearest_subset` of four independent points if the subset is a face with the last point; else 0.
 
-    beyond : of `_separating_faces`. The points lie behind such a face, the origin before it: the origin's foot on its
-        plane is nearest of all where it lies within the face.
+    beyond : of `_separating_faces`. The points lie behind a face named here, the origin before the face: the origin's
+        foot on the plane is the nearest point if the foot lies within the face.
     """
     for k in range(3):
         if (beyond >> k) & 1:
@@ -256,7 +256,7 @@ def _has_foot(normal, p, q, r):
 
 @kernel
 def _is_nearest(points, n, mask):
-    """1 if the nearest point of n points is that of one or two of them alone, both with Δ > 0; else 0, or UNKNOWN."""
+    """1 if the nearest point of n points lies in a subset of a point or two, with every Δ > 0; else 0, or UNKNOWN."""
     i = 0 if mask & 1 else 1 if mask & 2 else 2
     j = i if mask == 1 << i else 2 if mask & 4 else 1
     d = _point(points, i)
@@ -289,7 +289,7 @@ def _both(a, b):
 
 @kernel
 def _direction(points, n):
-    """The `Direction` of n points, of which none may be left out."""
+    """The `Direction` of n points, every point with Δ > 0."""
     p = _point(points, 0)
     d = p
     if n == 2:
@@ -436,14 +436,14 @@ def _axes_across(pair, body, simplex):
     A difference of two points is R w where their vertices of the other body are the same, or both bodies are turned
     alike. If only one coordinate of w is not 0, its axis is across; and two are, if w of three points has no third.
     """
-    axes, found = 0, 0
+    axes, axes_of_all = 0, 0
     for k in range(simplex.n):
         others = _axes_between(pair, body, simplex, k, k + 1 if k + 1 < simplex.n else 0)
         if others == 1 or others == 2 or others == 4:
             axes |= others
-        found |= others
-    if simplex.n == 3 and found < 7:  # 3, 5, 6: of one axis alone three points are not independent
-        axes |= found
+        axes_of_all |= others
+    if simplex.n == 3 and axes_of_all < 7:  # 3, 5, 6: three points along a single axis are not independent
+        axes |= axes_of_all
     return axes
 
 

@@ -137,11 +137,11 @@ def _search(ordered, space, boolean, n, radius_a, radius_b, is_in_reach):
     ids = space.simplex
     is_swept = radius_a != 0.0 or radius_b != 0.0
     if is_in_reach and (is_swept or not boolean):
-        found = search_filtered(ordered, ids, view_f64(space.doubles_at, FILTER_DOUBLES))
-        if found.end == MEET:
-            return sign_only(TOUCHING, found.n, found.rounds)
-        if found.end == APART and found.n == 3 and not is_swept:
-            return gap_of_face(ordered, space.terms, space.digits, ids, found.rounds)
+        search = search_filtered(ordered, ids, view_f64(space.doubles_at, FILTER_DOUBLES))
+        if search.end == MEET:
+            return sign_only(TOUCHING, search.n, search.rounds)
+        if search.end == APART and search.n == 3 and not is_swept:
+            return gap_of_face(ordered, space.terms, space.digits, ids, search.rounds)
     return touch_exactly(ordered, space.terms, space.digits, boolean, ids, n, radius_a, radius_b)
 
 
