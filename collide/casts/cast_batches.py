@@ -199,7 +199,7 @@ def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np
 
     def answer(owner: np.ndarray, item_a: np.ndarray, item_b: np.ndarray, best: np.ndarray) -> PairRows:
         rows = []
-        for some in _answered_together(owner, item_a, item_b, leaves_b, meshed):
+        for some in _answered_together(item_a, item_b, leaves_b, meshed):
             cast, i, j = owner[some], item_a[some], item_b[some]
             X, Y = np.ascontiguousarray(X_WA[cast]), np.ascontiguousarray(X_WB[cast])
             if meshed[0][i[0]] or meshed[1][j[0]]:
@@ -244,7 +244,7 @@ def _rows_of_unions(A: Shape, B: Shape, X_WA, X_WB, vectors, limits, starts: Sta
         )
 
 
-def _answered_together(owner, item_a, item_b, leaves_b: list[Leaf], meshed) -> Iterator[np.ndarray]:
+def _answered_together(item_a, item_b, leaves_b: list[Leaf], meshed) -> Iterator[np.ndarray]:
     """Numbers of pairs of leaves for a call: a mesh and all convex sets cast at the mesh, or the mesh cast at them; a
     mesh of the union with fewer leaves and all meshes of the other union; else two leaves."""
     mesh_a, mesh_b = meshed[0][item_a], meshed[1][item_b]
