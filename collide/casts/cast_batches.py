@@ -27,14 +27,18 @@ from collide.casts.starts import Starts, item_of
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.compound_layout import body_ball, part_balls
 from collide.lowering.compound_table import Balls
+from collide.lowering.kinds import kind_of
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of, convex_set_of, parts_of
 from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import Question
+from collide.narrowphase.dispatch import OF_FACETS, OF_UNIONS, cells_of, method_of
 from collide.pairs.batches import answer_batch
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
+
+_LOOKS_AT_FACETS = cells_of(OF_FACETS)
 
 
 def cast_batch(
@@ -73,7 +77,9 @@ def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Direct
     n = len(limits)
     if not n:  # what no cast asks about may be a mesh, which has no parts
         return nothing_met(0)
-    if isinstance(A, Shape) and isinstance(B, Shape) and (isinstance(A, Compound) or isinstance(B, Compound)):
+    kind_a, kind_b = (kind_of(S) if isinstance(S, Shape) else np.array([kind_of(s) for s in S]) for S in (A, B))
+    are_two = isinstance(A, Shape) and isinstance(B, Shape)
+    if are_two and method_of(kind_a, kind_b) in OF_UNIONS:
         balls = body_ball(A), body_ball(B)
         near = near_on_ways(*balls, X_WA, X_WB, n, vectors=directions.vectors, limits=limits)
         if near is not None and not near.all():
@@ -87,9 +93,9 @@ def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Direct
     onto_region = np.flatnonzero([b.is_region for b in sides[1]])
     if len(onto_region):
         return _with_regions(sides, X_WA, X_WB, directions, limits, onto_region)
-    meshed = np.array([a.meshed or b.meshed for a, b in zip(*sides)], dtype=bool)
+    meshed = np.broadcast_to(_LOOKS_AT_FACETS[kind_a, kind_b], n)
     if not meshed.any():
-        if isinstance(A, Shape) and isinstance(B, Shape) and len(parts_of(A)) * len(parts_of(B)) > MAX_ASKED:
+        if are_two and len(parts_of(A)) * len(parts_of(B)) > MAX_ASKED:
             return _cast_unions(A, B, X_WA, X_WB, directions.vectors, limits)
         return _cast_parts(posed_sides(A, B, X_WA, X_WB, n), directions.vectors, limits)
     X_WA, X_WB = (np.broadcast_to(X, (n, 4, 4)) for X in (X_WA, X_WB))
