@@ -31,8 +31,8 @@ class Method(Enum):
     PLANES = "halfspace_halfspace", "two planes: they meet unless exactly opposite"
     CONVEX = (
         "convex_convex",
-        "GJK, EPA where cores overlap; MPR first for small hulls; last digits of gaps in double-doubles "
-        + "(gap/refine_gap); exact integers where doubles leave a sign open (exact/exact_stage)",
+        "GJK, EPA where cores overlap; MPR first for small hulls, box_sphere for its booleans; last digits of gaps in "
+        + "double-doubles (gap/refine_gap); exact integers where doubles leave a sign open (exact/exact_stage)",
     )
     FACETS = "facets/mesh_methods", "two BVHs of facets traversed together, exact triangle tests"
     CURVED = "facets/mesh_curved", "facets against a polytope inside and one around, then facet by facet with GJK"

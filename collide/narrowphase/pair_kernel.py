@@ -5,13 +5,14 @@ The half of the pair matrix below the diagonal is answered by exchanging the bod
 
 Each kind of pair is answered in the file of its name: `halfspace_halfspace.py`, `halfspace_convex.py`,
 `sphere_sphere.py`, `sphere_capsule.py`, `capsule_capsule.py`, `convex_convex.py`; pairs of small hulls go through
-`gjk/mpr_batch.py` first.
+`gjk/mpr_batch.py` first, booleans of a box and a sphere through `box_sphere.py`.
 """
 
 from __future__ import annotations
 
 from collide.kernels import entry, kernel, view_i64, view_u8
 from collide.kernels.lanes import LANES
+from collide.narrowphase.box_sphere import decide_box_sphere, is_box_and_sphere
 from collide.narrowphase.convex_convex import convex_convex
 from collide.narrowphase.convex_methods import HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.gap.gap_queue import KINDS, clear_queue, refine_queued
@@ -98,6 +99,8 @@ def _answer(ordered, query, row, row_number, has_portals, work):
         return -1
     if how == HALFSPACE_CONVEX:
         halfspace_convex(ordered, query, row, work)
+        return -1
+    if query.boolean and is_box_and_sphere(ordered.pair) and decide_box_sphere(ordered, query.limit, row):
         return -1
     return convex_convex(ordered, how, query, row, row_number, n_start, work)
 
