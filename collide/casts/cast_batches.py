@@ -33,12 +33,12 @@ from collide.lowering.parts import bounding_parts_of, convex_set_of, parts_of
 from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import Question
-from collide.narrowphase.dispatch import OF_FACETS, OF_UNIONS, cells_of, method_of
+from collide.narrowphase.dispatch import OF_FACETS, OF_UNIONS, cells_of
 from collide.pairs.batches import answer_batch
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 
-_LOOKS_AT_FACETS = cells_of(OF_FACETS)
+_LOOKS_AT_FACETS, _ARE_TAKEN_APART = cells_of(OF_FACETS), cells_of(OF_UNIONS)
 
 
 def cast_batch(
@@ -79,7 +79,7 @@ def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Direct
         return nothing_met(0)
     kind_a, kind_b = (kind_of(S) if isinstance(S, Shape) else np.array([kind_of(s) for s in S]) for S in (A, B))
     are_two = isinstance(A, Shape) and isinstance(B, Shape)
-    if are_two and method_of(kind_a, kind_b) in OF_UNIONS:
+    if are_two and _ARE_TAKEN_APART[kind_a, kind_b]:
         balls = body_ball(A), body_ball(B)
         near = near_on_ways(*balls, X_WA, X_WB, n, vectors=directions.vectors, limits=limits)
         if near is not None and not near.all():

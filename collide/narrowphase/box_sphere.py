@@ -18,7 +18,7 @@ from collide.results import FORMULA
 
 @kernel(inline=True)
 def is_box_and_sphere(pair):
-    """Whether one core is a point and the other that of a `Box`, whose half sizes stand among its numbers."""
+    """Whether a core is a point, and the other core a `Box`: half sizes stand among the numbers of a box."""
     A, B = pair.A, pair.B
     if A.n != 1 and B.n != 1:
         return False

@@ -18,7 +18,7 @@ _CELLS = sum(
     for i, a in enumerate(_COLUMNS) for j, b in enumerate(_COLUMNS)
 )
 _N_COLUMNS, _MASK = len(_COLUMNS), 2**_BITS - 1
-_OF_HALFSPACE, _MOST_POINTS = _COLUMNS.index(Kind.HALFSPACE), _COLUMNS.index(Kind.POLYTOPE) + 1
+_OF_HALFSPACE, _MAX_POINTS = _COLUMNS.index(Kind.HALFSPACE), _COLUMNS.index(Kind.POLYTOPE) + 1
 
 
 @kernel(inline=True)
@@ -32,4 +32,4 @@ def method(kind_a, n_a, kind_b, n_b):
 def _column(kind, n):
     if kind == HALFSPACE:
         return _OF_HALFSPACE
-    return min(n, _MOST_POINTS) - 1 if kind == POINTS else _MOST_POINTS - 1
+    return min(n, _MAX_POINTS) - 1 if kind == POINTS else _MAX_POINTS - 1

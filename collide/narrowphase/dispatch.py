@@ -57,7 +57,7 @@ class Method(Enum):
         return self.value[1]
 
 
-O, I, C = Method.SPHERES, Method.SPHERE_CAPSULE, Method.CAPSULES
+D, I, C = Method.SPHERES, Method.SPHERE_CAPSULE, Method.CAPSULES
 H, P, G = Method.PLANE, Method.PLANES, Method.CONVEX
 F, E, L = Method.FACETS, Method.CURVED, Method.HULL
 U, M = Method.PARTS, Method.MESH_PARTS
@@ -68,7 +68,7 @@ R, S = Method.REGION, Method.REGIONS
 #: ROUNDED is an `HPolytope` whose corners are not doubles: to kernels it is points, to meshes it has no exact facets.
 _UPPER_HALF = (
     # sphere capsule polytope rounded curved halfspace mesh compound both region
-    (O,      I,      G,       G,      G,     H,        F,   U,       M,   R),  # sphere
+    (D,      I,      G,       G,      G,     H,        F,   U,       M,   R),  # sphere
     (        C,      G,       G,      G,     H,        F,   U,       M,   R),  # capsule
     (                G,       G,      G,     H,        F,   U,       M,   R),  # polytope
     (                         G,      G,     H,        E,   U,       M,   R),  # rounded
@@ -87,7 +87,7 @@ TABLE: tuple[tuple[Method, ...], ...] = tuple(
 )
 #: Methods of two convex sets, in the order of the numbers that kernels know them by; of unions, which are taken apart;
 #: and of pairs with a mesh.
-OF_SETS, OF_UNIONS, OF_FACETS = (O, I, C, H, P, G), (U, M), (F, E, L, M)
+OF_SETS, OF_UNIONS, OF_FACETS = (D, I, C, H, P, G), (U, M), (F, E, L, M)
 
 #: Questions that a method does not answer, and why, in the words of the error.
 REFUSED: dict[tuple[Method, str], str] = {

@@ -12,7 +12,7 @@ from collide.numerics.vec3 import Vec3, divide, dot, neg, norm
 
 @kernel
 def point_cores(pair, work, error):
-    """The `CoreDistance` of two cores that are points; of coinciding points along z, as any direction is as good.
+    """The `CoreDistance` of two points; of coinciding points along z, because every direction is as good.
 
     The plane across p = a − b has p·p / |p| on one side of it: both bounds are |p| but for rounding (`bounds.py`).
     """

@@ -62,20 +62,20 @@ def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     half-space and a region stay.
     """
     sets = [None if S.is_region or not is_single_convex(S) else convex_set_of(S) for S in (A, B)]
-    swept = [packed for packed in sets if packed is not None and packed.kind == POINTS and packed.slop == 0.0]
+    points = [packed for packed in sets if packed is not None and packed.kind == POINTS and packed.slop == 0.0]
     stay = [S.is_region or (packed is not None and packed.kind == HALFSPACE) for S, packed in zip((A, B), sets)]
-    if not swept or len(swept) + sum(stay) < 2:
+    if not points or len(points) + sum(stay) < 2:
         return None
-    total = Fraction(margin) + sum(Fraction(packed.radius) for packed in swept)
+    total = Fraction(margin) + sum(Fraction(packed.radius) for packed in points)
     first = float(total)
     if first > total:
         first = math.nextafter(first, 0.0)
     rest = float(total - Fraction(first))
     if total != Fraction(first) + Fraction(rest) or 0.0 < rest < SMALLEST or first > LARGEST:
         return None
-    if len(swept) == 2:
-        return ConvexHull(swept[0].points, radius=first), ConvexHull(swept[1].points, radius=rest)
+    if len(points) == 2:
+        return ConvexHull(points[0].points, radius=first), ConvexHull(points[1].points, radius=rest)
     if rest != 0.0:
         return None
-    grown = ConvexHull(swept[0].points, radius=first)
+    grown = ConvexHull(points[0].points, radius=first)
     return (A, grown) if stay[0] else (grown, B)
