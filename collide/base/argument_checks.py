@@ -186,7 +186,7 @@ def refuse_rows(caller: str, name: str, rows: np.ndarray, bad: np.ndarray, compl
 
 
 def matched_count(caller: str, **counts: int) -> int:
-    """The length of a batch: of all arguments, or of all but single arguments; sequences of shapes, A and B, are never
+    """The length of a batch, given or single in every argument; sequences of shapes, A and B, are never
     single. Raises InvalidArgument, naming the caller if given."""
     n = max(counts.values()) if min(counts.values()) else 0
     if any(count != n and (count != 1 or name in ("A", "B")) for name, count in counts.items()):
