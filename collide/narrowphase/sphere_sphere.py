@@ -12,9 +12,9 @@ from collide.numerics.vec3 import Vec3, divide, dot, neg, norm
 
 @kernel
 def point_cores(pair, work, error):
-    """The `CoreDistance` of two points; of coinciding points along z, because every direction is as good.
+    """The `CoreDistance` of two points, along z where the points coincide and every direction is as good.
 
-    The plane across p = a − b has p·p / |p| on one side of it: both bounds are |p| but for rounding (`bounds.py`).
+    p·p / |p| is the offset of the plane across p = a − b: both bounds are |p| but for rounding (`bounds.py`).
     """
     place_vertices(pair, work.points, work.ids, 0, 0, 0)
     for k in range(1, 4):  # a row names four pairs of vertices, as of two segments
