@@ -186,13 +186,13 @@ def refuse_rows(caller: str, name: str, rows: np.ndarray, bad: np.ndarray, compl
 
 
 def matched_count(caller: str, **counts: int) -> int:
-    """The length of a batch: that of all arguments, or of all but single ones. Raises InvalidArgument."""
+    """The length of a batch, given or single in every argument; sequences of shapes, A and B, are never
+    single. Raises InvalidArgument, naming the caller if given."""
     n = max(counts.values()) if min(counts.values()) else 0
-    if any(count not in (1, n) for count in counts.values()):
+    if any(count != n and (count != 1 or name in ("A", "B")) for name, count in counts.items()):
         lengths = ", ".join(f"{name} {count}" for name, count in counts.items())
-        raise InvalidArgument(
-            f"{caller}: lengths do not match: {lengths}; batches must be equally long, or a single one"
-        )
+        by = f"{caller}: " if caller else ""
+        raise InvalidArgument(f"{by}lengths do not match: {lengths}; batches must be equally long, or a single one")
     return n
 
 

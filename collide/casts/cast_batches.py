@@ -27,14 +27,18 @@ from collide.casts.starts import Starts, item_of
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.compound_layout import body_ball, part_balls
 from collide.lowering.compound_table import Balls
+from collide.lowering.kinds import kind_of
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of, convex_set_of, parts_of
 from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import Question
+from collide.narrowphase.dispatch import OF_FACETS, OF_UNIONS, cells_of
 from collide.pairs.batches import answer_batch
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
+
+_LOOKS_AT_FACETS, _ARE_TAKEN_APART = cells_of(OF_FACETS), cells_of(OF_UNIONS)
 
 
 def cast_batch(
@@ -73,7 +77,9 @@ def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Direct
     n = len(limits)
     if not n:  # what no cast asks about may be a mesh, which has no parts
         return nothing_met(0)
-    if isinstance(A, Shape) and isinstance(B, Shape) and (isinstance(A, Compound) or isinstance(B, Compound)):
+    kind_a, kind_b = (kind_of(S) if isinstance(S, Shape) else np.array([kind_of(s) for s in S]) for S in (A, B))
+    are_two = isinstance(A, Shape) and isinstance(B, Shape)
+    if are_two and _ARE_TAKEN_APART[kind_a, kind_b]:
         balls = body_ball(A), body_ball(B)
         near = near_on_ways(*balls, X_WA, X_WB, n, vectors=directions.vectors, limits=limits)
         if near is not None and not near.all():
@@ -87,9 +93,9 @@ def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Direct
     onto_region = np.flatnonzero([b.is_region for b in sides[1]])
     if len(onto_region):
         return _with_regions(sides, X_WA, X_WB, directions, limits, onto_region)
-    meshed = np.array([a.meshed or b.meshed for a, b in zip(*sides)], dtype=bool)
+    meshed = np.broadcast_to(_LOOKS_AT_FACETS[kind_a, kind_b], n)
     if not meshed.any():
-        if isinstance(A, Shape) and isinstance(B, Shape) and len(parts_of(A)) * len(parts_of(B)) > MAX_ASKED:
+        if are_two and len(parts_of(A)) * len(parts_of(B)) > MAX_ASKED:
             return _cast_unions(A, B, X_WA, X_WB, directions.vectors, limits)
         return _cast_parts(posed_sides(A, B, X_WA, X_WB, n), directions.vectors, limits)
     X_WA, X_WB = (np.broadcast_to(X, (n, 4, 4)) for X in (X_WA, X_WB))
@@ -199,7 +205,7 @@ def _cast_meshed(A: Shape, B: Shape, X_WA, X_WB, vectors: np.ndarray, limits: np
 
     def answer(owner: np.ndarray, item_a: np.ndarray, item_b: np.ndarray, best: np.ndarray) -> PairRows:
         rows = []
-        for some in _answered_together(owner, item_a, item_b, leaves_b, meshed):
+        for some in _answered_together(item_a, item_b, leaves_b, meshed):
             cast, i, j = owner[some], item_a[some], item_b[some]
             X, Y = np.ascontiguousarray(X_WA[cast]), np.ascontiguousarray(X_WB[cast])
             if meshed[0][i[0]] or meshed[1][j[0]]:
@@ -244,7 +250,7 @@ def _rows_of_unions(A: Shape, B: Shape, X_WA, X_WB, vectors, limits, starts: Sta
         )
 
 
-def _answered_together(owner, item_a, item_b, leaves_b: list[Leaf], meshed) -> Iterator[np.ndarray]:
+def _answered_together(item_a, item_b, leaves_b: list[Leaf], meshed) -> Iterator[np.ndarray]:
     """Numbers of pairs of leaves for a call: a mesh and all convex sets cast at the mesh, or the mesh cast at them; a
     mesh of the union with fewer leaves and all meshes of the other union; else two leaves."""
     mesh_a, mesh_b = meshed[0][item_a], meshed[1][item_b]

@@ -13,11 +13,10 @@ from collide.casts.cast_arguments import checked_directions, refuse_unbounded
 from collide.casts.cast_batches import cast_batch
 from collide.casts.convex_casts import CastRows
 from collide.casts.directions import Directions
-from collide.errors import InvalidArgument
 from collide.lowering.compound_layout import layout_of
 from collide.narrowphase.composite.balls_on_ways import SingleWay
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
-from collide.pairs.pair_arguments import asked_poses
+from collide.pairs.pair_arguments import asked_poses, matched_counts
 from collide.results import only_value
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
@@ -134,13 +133,7 @@ def shape_cast(
     X_WA, X_WB = as_poses(X_WA, "X_WA", check=check_poses), as_poses(X_WB, "X_WB", check=check_poses)
     directions, single_direction = checked_directions("shape_cast", "direction_W", direction_W, "a cast")
     counts = {"X_WA": len(X_WA), "X_WB": len(X_WB), "direction_W": len(directions.vectors)}
-    counts.update({name: len(side) for name, side in (("A", A), ("B", B)) if not isinstance(side, Shape)})
-    n = max(counts.values()) if min(counts.values()) else 0
-    if any(count not in (1, n) for count in counts.values()):
-        lengths = ", ".join(f"{name} {count}" for name, count in counts.items())
-        raise InvalidArgument(
-            f"shape_cast: lengths do not match: {lengths}; batches must be equally long, or a single one"
-        )
+    n, _ = matched_counts(A, B, counts)
     refuse_unbounded("shape_cast: A", A)
     if single and single_direction:
         _prepare_way(A, B)

@@ -108,7 +108,7 @@ def _print(proposal, comparison, args: argparse.Namespace, carried: list[tuple[s
     say(pair_tables.summary(proposal))
     tables = pair_tables.proposal_tables(proposal, args.all)
     if comparison is not None:
-        tables += pair_tables.comparison_tables(proposal, comparison, os.path.basename(args.compare))
+        tables += pair_tables.comparison_tables(comparison, os.path.basename(args.compare))
     for table in tables:
         terminal.write_text("\n")
         terminal.show_table(table)

@@ -7,12 +7,10 @@ for it.
 from __future__ import annotations
 
 from collide.kernels import kernel, view_i64
-from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.shape_table import COUNT, INTS, KIND
 from collide.narrowphase.bounds import ERROR
-from collide.narrowphase.capsule_capsule import segment_cores
-from collide.narrowphase.convex_convex import write_witness_points
-from collide.narrowphase.convex_methods import CAPSULES, HALFSPACE_CONVEX, method
+from collide.narrowphase.convex_convex import closed_form_cores, write_witness_points
+from collide.narrowphase.convex_methods import CONVEX, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.halfspace_convex import plane_gap, write_plane_points
 from collide.narrowphase.posed_pair import radius_of
 from collide.narrowphase.rows import write_decision
@@ -31,9 +29,8 @@ def has_closed_form(ints_at, sa, sb):
     capsules.
     """
     a, b = view_i64(ints_at + 8 * INTS * sa, INTS), view_i64(ints_at + 8 * INTS * sb, INTS)
-    if a[KIND] == HALFSPACE or b[KIND] == HALFSPACE:
-        return a[KIND] != b[KIND]
-    return method(a[KIND], a[COUNT], b[KIND], b[COUNT]) == CAPSULES
+    how = method(a[KIND], a[COUNT], b[KIND], b[COUNT])
+    return how != CONVEX and how != HALFSPACES
 
 
 @kernel
@@ -46,7 +43,8 @@ def put_closed_form(ordered, limit, work, row):
     A, B = pair.A, pair.B
     if 0.0 < ordered.size < SMALLEST:
         return False
-    if method(A.kind, A.n, B.kind, B.n) == HALFSPACE_CONVEX:
+    how = method(A.kind, A.n, B.kind, B.n)
+    if how == HALFSPACE_CONVEX:
         deepest = plane_gap(ordered)
         gap, error = deepest.gap, deepest.error
         if not _put_bracket(gap, gap - error, gap + error, deepest.size, limit, row):
@@ -55,7 +53,7 @@ def put_closed_form(ordered, limit, work, row):
         return True
     radius_a, radius_b = radius_of(pair, A), radius_of(pair, B)
     error = ERROR * ordered.size + ordered.slop
-    core = segment_cores(pair, work, error)
+    core = closed_form_cores(pair, how, work, error)
     if -core.depth < _NEAR * ordered.size:
         return False
     radius = radius_a + radius_b

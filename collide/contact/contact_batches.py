@@ -13,23 +13,22 @@ from collide.contact.curved_contacts import curved_contacts
 from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.compound_layout import body_ball
-from collide.lowering.kinds import Kind, kind_of
+from collide.lowering.kinds import kind_of
 from collide.lowering.shape_set_tables import tables_of
 from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import CompoundParts, PartColumns, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import Question
-from collide.narrowphase.dispatch import Method, method_of
+from collide.narrowphase.dispatch import OF_SETS, OF_UNIONS, Method, cells_of, method_of
 from collide.pairs.batches import answer_batch, of_one_set
 from collide.pairs.pair_arguments import pose_at
-from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
 from collide.transforms import as_poses
 
-#: What makes the contacts of two bodies, by the method that answers the pair; other methods are of convex sets, which
-#: go together, or of compounds, which are taken apart.
+#: What makes the contacts of two bodies, by the method that answers the pair; convex sets go together, and unions are
+#: taken apart.
 _OF_MESHES = {Method.FACETS: facet_contacts, Method.CURVED: curved_contacts, Method.HULL: halfspace_contacts}
-_CONVEX = frozenset((Method.CLOSED, Method.PLANE, Method.PLANES, Method.CONVEX))
+_ARE_SETS = cells_of(OF_SETS)
 #: Contacts nearer to the margin than this part of the pair's size are judged by the bodies' distance.
 _ROUNDING = 2.0**-40
 
@@ -71,9 +70,10 @@ def contact_batch(
     A, B = closed_shapes(A, B, X_WA, X_WB, n, margin)
     if not (isinstance(A, Shape) and isinstance(B, Shape)):
         A, B = of_one_set(A, B, n)
-    if _all_convex(A, B):
+    how = None if isinstance(A, Picked) else method_of(kind_of(A), kind_of(B))
+    if how in OF_SETS or (how is None and _all_convex(A, B)):
         return convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, check=check, threads=threads)
-    if isinstance(A, Shape) and isinstance(B, Shape) and (isinstance(A, Compound) or isinstance(B, Compound)):
+    if how in OF_UNIONS:
         near = near_on_ways(body_ball(A), body_ball(B), X_WA, X_WB, n, margin=margin, check=check)
         if near is not None and not near.all():
             counts = np.zeros(n, dtype=np.int64)
@@ -84,7 +84,8 @@ def contact_batch(
             counts[near] = np.diff(ends, prepend=0)
             return rows, np.cumsum(counts)
     X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
-    if isinstance(A, Shape) and isinstance(B, Shape) and (make := _OF_MESHES.get(method_of(kind_of(A), kind_of(B)))):
+    if how in _OF_MESHES:
+        make = _OF_MESHES[how]
         rows, ends = make(A, B, X_WA, X_WB, margin, max_contacts, None, threads)
         of_pair = np.repeat(np.arange(n), np.diff(ends, prepend=0))
         return _only_within_margin(rows, of_pair, n, A, B, X_WA, X_WB, margin)
@@ -115,11 +116,9 @@ def _only_within_margin(
     return rows, np.cumsum(np.bincount(of_pair, minlength=n))
 
 
-def _all_convex(A, B) -> bool:
-    if isinstance(A, Picked):
-        single = tables_of(A.shape_set).single_convex
-        return bool(single[A.rows].all() and single[B.rows].all())
-    return method_of(kind_of(A), kind_of(B)) in _CONVEX
+def _all_convex(A: Picked, B: Picked) -> bool:
+    single = tables_of(A.shape_set).single_convex
+    return bool(single[A.rows].all() and single[B.rows].all())
 
 
 def _part_pairs(shapes, which, X_WA, X_WB, n: int, margin: float, singles: list[Shape]) -> PartPairs:
@@ -177,9 +176,9 @@ def _rows_of_parts(
     singles: list[Shape], pairs: PartPairs, margin: float, max_contacts: int, threads: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """(rows, ends) of pairs of parts: convex pairs in one batch, pairs with meshes batch by batch for two shapes."""
-    kinds = [kind_of(shape) for shape in singles]
-    is_convex = np.array([kind < Kind.MESH for kind in kinds])
-    convex = np.flatnonzero(is_convex[pairs.A] & is_convex[pairs.B])
+    kinds = np.array([kind_of(shape) for shape in singles])
+    is_convex = _ARE_SETS[kinds[pairs.A], kinds[pairs.B]]
+    convex = np.flatnonzero(is_convex)
     counts = np.zeros(len(pairs), dtype=np.int64)
     blocks: list[np.ndarray] = []
     if len(convex):
@@ -193,7 +192,7 @@ def _rows_of_parts(
         counts[convex] = np.diff(ends, prepend=0)
         blocks.append(rows)
     owners = [np.repeat(convex, counts[convex])]
-    meshed = np.flatnonzero(~(is_convex[pairs.A] & is_convex[pairs.B]))
+    meshed = np.flatnonzero(~is_convex)
     keys = pairs.A[meshed] * len(singles) + pairs.B[meshed]
     for key in np.unique(keys).tolist():
         which = meshed[keys == key]

@@ -147,9 +147,9 @@ def _put_overlap(pairs, k, A, B, round_a, round_b, view, over_a, over_b, points,
     round_a, round_b : radii across the edges shown by the bodies, 0 of sharp edges and of faces [m].
     """
     if over_a:
-        n = _corners_over(pairs, k, A, view, points, n, False)
+        n = _corners_over(pairs, k, view, points, n, False)
     if over_b:
-        n = _corners_over(pairs, k, B, view, points, n, True)
+        n = _corners_over(pairs, k, view, points, n, True)
     return _crossings(pairs, k, A, B, round_a, round_b, view, points, n)
 
 
@@ -268,8 +268,8 @@ def _within(view, gap, bound):
 
 
 @kernel
-def _corners_over(pairs, k, body, view, points, n, exchanged):
-    """Append corners of the other facet over the body's facet: A's, or B's where ``exchanged``."""
+def _corners_over(pairs, k, view, points, n, exchanged):
+    """Append corners of the other facet over a facet: A's, or B's where ``exchanged``."""
     seen, error = points.seen, view.error
     face, corners = (9, 0) if exchanged else (0, 9)
     u0, v0, h0 = seen[face], seen[face + 1], seen[face + 2]
@@ -462,8 +462,8 @@ def depth_along(pairs, k, A, B, view, points, enough):
     least, _ = see_pair(pairs, k, view.axes, points.seen)
     if -least <= enough:
         return max(-least, 0.0)
-    n = _corners_over(pairs, k, A, view, points, 0, False)
-    n = _corners_over(pairs, k, B, view, points, n, True)
+    n = _corners_over(pairs, k, view, points, 0, False)
+    n = _corners_over(pairs, k, view, points, n, True)
     n = _crossings(pairs, k, A, B, 0.0, 0.0, view, points, n)
     if n == 0:
         return max(-least, 0.0)

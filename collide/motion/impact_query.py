@@ -11,7 +11,7 @@ from collide.base import argument_checks as checks
 from collide.base.threads import check_threads, share_if_it_helps
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.lowering.closed_regions import reach_of
-from collide.lowering.kinds import Kind, kind_of
+from collide.lowering.kinds import kind_of
 from collide.motion.convex_impact import CONTACT, FREE, OPEN_START, TOO_SMALL
 from collide.motion.convex_motions import convex_impacts, single_impact
 from collide.motion.impact_jobs import WRONG_TURN
@@ -21,6 +21,7 @@ from collide.motion.placed_motion import poses_at
 from collide.motion.region_motions import with_regions_closed
 from collide.motion.surface_motions import surface_impacts
 from collide.narrowphase.convex_batches import Question
+from collide.narrowphase.dispatch import OF_FACETS, cells_of
 from collide.numerics.sine_cosine import LARGEST_ANGLE
 from collide.pairs.batches import answer_batch, distinct_shapes
 from collide.pairs.pair_arguments import matched_counts
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 #: Brackets [unit time] that may be asked for.
 _TOLERANCES = (1e-14, 1.0)
+_LOOKS_AT_FACETS = cells_of(OF_FACETS)
 
 
 def time_of_impact(
@@ -271,8 +273,8 @@ def _answer(question: _Question) -> np.ndarray:
     """Rows of `IMPACT_DTYPE`."""
     shapes, a, b, motions, tolerance, threads = question
     rows = free_rows(len(a))
-    meshed = np.array([kind_of(shape) in (Kind.MESH, Kind.MESH_COMPOUND) for shape in shapes], dtype=bool)
-    of_facets = meshed[a] | meshed[b]
+    kinds = np.array([kind_of(shape) for shape in shapes], dtype=np.int64)
+    of_facets = _LOOKS_AT_FACETS[kinds[a], kinds[b]]
     unbounded = np.array([reach_of(shape) == np.inf for shape in shapes], dtype=bool)
     to_ask_first = of_facets | (unbounded[a] & unbounded[b])
     _ask_start(question, rows, np.flatnonzero(to_ask_first))
@@ -318,8 +320,8 @@ def _describe_start(question: _Question, rows: np.ndarray) -> None:
     some = np.flatnonzero((rows["status"] == CONTACT) & (rows["upper"] == 0.0))
     if not len(some):
         return
-    meshed = np.array([shape.meshed for shape in question.shapes])
-    of_facets = meshed[question.a[some]] | meshed[question.b[some]]
+    kinds = np.array([kind_of(shape) for shape in question.shapes])
+    of_facets = _LOOKS_AT_FACETS[kinds[question.a[some]], kinds[question.b[some]]]
     for depths in (True, False):  # a depth of meshes takes milliseconds
         _describe_as_distance(question, rows, some[of_facets != depths], depths)
 

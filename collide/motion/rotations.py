@@ -7,12 +7,10 @@ A rotation vector ω [rad] points along the axis; its length is the angle. Rotat
 
 from __future__ import annotations
 
-import math
-
 from collide.kernels import kernel
 from collide.numerics.matrix3 import Matrix3
 from collide.numerics.sine_cosine import angle_of, sine_cosine
-from collide.numerics.vec3 import Vec3, dot, norm, scale
+from collide.numerics.vec3 import Vec3, norm, scale
 
 #: Below this length of a quaternion's vector part, half the angle is its own sine.
 _SMALL = 1e-9
@@ -68,9 +66,3 @@ def rotation_between(X0, X1):
 def _entry(X1, X0, i, j):
     """Entry (i, j) of R1 R0ᵀ."""
     return X1[4 * i] * X0[4 * j] + X1[4 * i + 1] * X0[4 * j + 1] + X1[4 * i + 2] * X0[4 * j + 2]
-
-
-@kernel
-def largest_turn(omega):
-    """|ω|, infinite where a square overflows."""
-    return math.sqrt(dot(omega, omega))

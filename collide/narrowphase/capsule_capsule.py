@@ -1,7 +1,4 @@
-"""Sphere and capsule pairs in closed form: the nearest points of two segments.
-
-A sphere is a capsule whose segment is a point, so one formula answers the three pairs.
-"""
+"""Two capsules in closed form: the nearest points of two segments."""
 
 from __future__ import annotations
 
@@ -31,11 +28,17 @@ _PARALLEL = 1e-24
 
 @kernel
 def segment_cores(pair, work, error):
-    """The `CoreDistance` of two cores that are points or segments."""
+    """The `CoreDistance` of two cores that are segments."""
     points, weights = work.points, work.weights
     for k in range(4):  # A0 − B0, A1 − B0, A0 − B1, A1 − B1
-        place_vertices(pair, points, work.ids, k, min(k & 1, pair.A.n - 1), min(k >> 1, pair.B.n - 1))
+        place_vertices(pair, points, work.ids, k, k & 1, k >> 1)
     distance, lower = nearest_of_segments(points, weights)
+    return core_of_ends(points, weights, distance, lower, error)
+
+
+@kernel(inline=True)
+def core_of_ends(points, weights, distance, lower, error):
+    """The `CoreDistance` of two segments, from the four differences of their ends: of cores that meet, across both."""
     if distance > error:
         nhat = neg(vec3_at(weights, AXIS))
         return CoreDistance(-distance, lower, distance, -math.inf, math.inf, nhat, 4, 4, 0)
@@ -68,7 +71,7 @@ def _keep_nearer(points, s, t, weights, best):
 
 
 @kernel
-def _clamp(value, square):
+def clamped_share(value, square):
     """value / square within [0, 1]; 0 where the segment is a point."""
     if not value > 0.0:
         return 0.0
@@ -94,10 +97,10 @@ def nearest_of_segments(points, weights):
     uu, vv, uv = dot(u, u), dot(v, v), dot(u, v)
     pu, pv = -dot(p, u), -dot(p, v)
     best = math.inf
-    best = _keep_nearer(points, _clamp(pu, uu), 0.0, weights, best)
-    best = _keep_nearer(points, _clamp(pu - uv, uu), 1.0, weights, best)
-    best = _keep_nearer(points, 0.0, _clamp(pv, vv), weights, best)
-    best = _keep_nearer(points, 1.0, _clamp(pv - uv, vv), weights, best)
+    best = _keep_nearer(points, clamped_share(pu, uu), 0.0, weights, best)
+    best = _keep_nearer(points, clamped_share(pu - uv, uu), 1.0, weights, best)
+    best = _keep_nearer(points, 0.0, clamped_share(pv, vv), weights, best)
+    best = _keep_nearer(points, 1.0, clamped_share(pv - uv, vv), weights, best)
     n = cross(u, v)
     square = dot(n, n)
     if square > 0.0:
@@ -113,23 +116,28 @@ def nearest_of_segments(points, weights):
 def _best_bound(points, weights, u, v, n):
     """The greatest lower bound of the distance from planes across the nearest point, n = u × v, and u and v."""
     nearest = vec3_at(weights, NEAREST_POINT)
-    lower = _raised_bound(points, weights, -math.inf, nearest)
+    lower = raised_bound(points, weights, -math.inf, nearest)
     # The same direction to full precision, where the gap is tiny beside the segments: from the
     # segments themselves (see `simplex.across_simplex`).
-    lower = _raised_bound(points, weights, lower, neg(n) if dot(n, nearest) < 0.0 else n)
+    lower = raised_bound(points, weights, lower, neg(n) if dot(n, nearest) < 0.0 else n)
     for k in range(2):
         e = u if k == 0 else v
         square = dot(e, e)
         if square > 0.0:
-            d = nearest
-            for _ in range(2):
-                d = sub(d, scale(dot(d, e) / square, e))
-            lower = _raised_bound(points, weights, lower, d)
+            lower = raised_bound(points, weights, lower, across(nearest, e))
     return lower
 
 
+@kernel(inline=True)
+def across(v, e):
+    """The part of v across e; the second round takes what the first left along e."""
+    for _ in range(2):
+        v = sub(v, scale(dot(v, e) / dot(e, e), e))
+    return v
+
+
 @kernel
-def _raised_bound(points, weights, lower, d):
+def raised_bound(points, weights, lower, d):
     """The lower bound, raised by the least value of the four differences along d, and its axis with it."""
     length = norm(d)
     if length == 0.0:

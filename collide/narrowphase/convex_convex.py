@@ -8,6 +8,7 @@ from collide.kernels import kernel
 from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.capsule_capsule import segment_cores
+from collide.narrowphase.convex_methods import CONVEX, SPHERE_CAPSULE, SPHERES
 from collide.narrowphase.core_distance import convex_cores, request_plane
 from collide.narrowphase.exact.depth_requests import add_request
 from collide.narrowphase.gap.gap_queue import enqueue, write_guess
@@ -26,15 +27,18 @@ from collide.narrowphase.rows import (
     write_verdict,
     write_vertices,
 )
+from collide.narrowphase.sphere_capsule import point_segment_cores
+from collide.narrowphase.sphere_sphere import point_cores
 from collide.numerics.vec3 import add, put_vec3, scale, sub, vec3_at
 from collide.results import FORMULA, PLANE, SIMPLEX, SWEPT, UNDECIDED
 
 
 @kernel(inline=True)
-def convex_convex(ordered, is_closed_form, query, row, row_number, n_start, work):
+def convex_convex(ordered, how, query, row, row_number, n_start, work):
     """Write the row of two swept convex cores.
 
-    is_closed_form : both cores are points or segments.   n_start : pairs of vertices for GJK to begin with (`gjk`).
+    how : the method, of cores: SPHERES, SPHERE_CAPSULE, CAPSULES or CONVEX.
+    n_start : pairs of vertices for GJK to begin with (`gjk`).
     Returns the kind of gap of a row that is queued for its last digits and finished then (`gap_queue.py`), or −1.
     """
     pair, size, flip = ordered.pair, ordered.size, ordered.flip
@@ -47,20 +51,21 @@ def convex_convex(ordered, is_closed_form, query, row, row_number, n_start, work
     sign = (-1.0 if flip else 1.0) if query.boolean or query.resumes else 0.0
     put_vec3(work.weights, AXIS, scale(sign, vec3_at(row.doubles, NORMAL)))
     work.request[1] = 0
+    is_closed_form = how != CONVEX
     if is_closed_form:
-        core = segment_cores(pair, work, error)
+        core = closed_form_cores(pair, how, work, error)
     else:
         core = convex_cores(ordered, query, work, radius, error, curved, n_start)
     lower = core.lower - error - radius
     upper = core.upper + error - radius
-    how = _how(core, is_closed_form, lower, radius)
+    argument = _argument(core, is_closed_form, lower, radius)
     row.words[ITERATIONS] = core.iterations
     distance = -core.depth - radius
     is_gap = exact_numbers and not query.boolean and core.depth < -error and lower <= query.limit
     if is_gap and is_refinable(size):
         write_guess(row, distance, lower, upper, core.nhat)
         write_vertices(row, work.ids, core.n_vertices, flip)
-        return enqueue(ordered, query, work, core.n_points, how, row_number, error)
+        return enqueue(ordered, query, work, core.n_points, argument, row_number, error)
     decided = lower > 0.0 or upper <= 0.0
     if core.deepest < math.inf:
         rounding = 4.0 * 2.0**-53 * radius
@@ -70,9 +75,9 @@ def convex_convex(ordered, is_closed_form, query, row, row_number, n_start, work
     if not query.boolean:
         width = PROMISE_CURVED * size if curved else (0.0 if exact_numbers else PROMISE_STORED * size)
     if query.boolean and decided:
-        write_decision(row, distance, lower, upper, how, query.limit)
+        write_decision(row, distance, lower, upper, argument, query.limit)
     else:
-        write_verdict(row, distance, lower, upper, how, width, query.limit)
+        write_verdict(row, distance, lower, upper, argument, width, query.limit)
     is_open = row.flags[CERTIFIED] == 0 and (core.depth < -error or radius > 0.0) and (query.depths or upper > 0.0)
     # Radii may prove an overlap of cores between which doubles see no clear direction: such a gap is open, too.
     if width == 0.0 and (not decided or is_open or (is_gap and radius > 0.0)):
@@ -95,7 +100,17 @@ def convex_convex(ordered, is_closed_form, query, row, row_number, n_start, work
 
 
 @kernel(inline=True)
-def _how(core, is_closed_form, lower, radius):
+def closed_form_cores(pair, how, work, error):
+    """The `CoreDistance` of two cores that are points or segments, by the method in its file."""
+    if how == SPHERES:
+        return point_cores(pair, work, error)
+    if how == SPHERE_CAPSULE:
+        return point_segment_cores(pair, work, error)
+    return segment_cores(pair, work, error)
+
+
+@kernel(inline=True)
+def _argument(core, is_closed_form, lower, radius):
     """What decides the pair, if its bracket leaves out 0: see `results.How`."""
     if is_closed_form:
         return FORMULA

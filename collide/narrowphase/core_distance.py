@@ -1,7 +1,7 @@
 """Two convex cores without the balls around them: a gap or a depth, its feature, and a bracket.
 
 GJK, and EPA where the cores overlap; `refine_depth.py` finds the last digits of a depth. Points and segments:
-`capsule_capsule.py`.
+`sphere_sphere.py`, `sphere_capsule.py`, `capsule_capsule.py`.
 """
 
 from __future__ import annotations

@@ -4,15 +4,19 @@ Lowering makes a `Kind` of a shape (`lowering/kinds.py`); `TABLE` holds a `Metho
 table is written, the other half is its mirror: the method is the same, A and B are exchanged. A method is carried out
 by the file of its name; `method_functions.py` names its function for each public question.
 
-Kernels cannot read this table. They choose among CLOSED, PLANE, PLANES and CONVEX, the methods of two convex sets, by
-`convex_methods.method`; `tests/narrowphase/test_dispatch.py` holds both to be equal. No other code chooses a method.
+Kernels choose among the methods of two convex sets by numbers made from this table (`convex_methods.py`); contacts,
+casts and motions name what carries out their question for its methods, or for a group of them. No other code chooses a
+method.
 
 To add a kind or a method: CONTRIBUTING.md lists the files, "Adding things".
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from enum import Enum
+
+import numpy as np
 
 from collide.lowering.kinds import CURVED_KINDS, Kind
 
@@ -20,17 +24,15 @@ from collide.lowering.kinds import CURVED_KINDS, Kind
 class Method(Enum):
     """How a pair is answered: (name of its file or files in this room, what happens there)."""
 
-    #: The first four are of two convex sets: `convex_methods.py` is the same choice for kernels.
-    CLOSED = (
-        "capsule_capsule",
-        "closed form: the nearest points of two segments, a sphere being a point, a capsule a segment",
-    )
+    SPHERES = "sphere_sphere", "closed form: the distance of two points"
+    SPHERE_CAPSULE = "sphere_capsule", "closed form: the point of a segment nearest to a point"
+    CAPSULES = "capsule_capsule", "closed form: the nearest points of two segments"
     PLANE = "halfspace_convex", "closed form: one support query against the plane"
     PLANES = "halfspace_halfspace", "two planes: they meet unless exactly opposite"
     CONVEX = (
         "convex_convex",
-        "GJK, EPA where cores overlap; MPR first for small hulls; last digits of gaps in double-doubles "
-        + "(gap/refine_gap); exact integers where doubles leave a sign open (exact/exact_stage)",
+        "GJK, EPA where cores overlap; MPR first for small hulls, box_sphere for its booleans; last digits of gaps in "
+        + "double-doubles (gap/refine_gap); exact integers where doubles leave a sign open (exact/exact_stage)",
     )
     FACETS = "facets/mesh_methods", "two BVHs of facets traversed together, exact triangle tests"
     CURVED = "facets/mesh_curved", "facets against a polytope inside and one around, then facet by facet with GJK"
@@ -55,7 +57,8 @@ class Method(Enum):
         return self.value[1]
 
 
-C, H, P, G = Method.CLOSED, Method.PLANE, Method.PLANES, Method.CONVEX
+D, I, C = Method.SPHERES, Method.SPHERE_CAPSULE, Method.CAPSULES
+H, P, G = Method.PLANE, Method.PLANES, Method.CONVEX
 F, E, L = Method.FACETS, Method.CURVED, Method.HULL
 U, M = Method.PARTS, Method.MESH_PARTS
 R, S = Method.REGION, Method.REGIONS
@@ -65,7 +68,7 @@ R, S = Method.REGION, Method.REGIONS
 #: ROUNDED is an `HPolytope` whose corners are not doubles: to kernels it is points, to meshes it has no exact facets.
 _UPPER_HALF = (
     # sphere capsule polytope rounded curved halfspace mesh compound both region
-    (C,      C,      G,       G,      G,     H,        F,   U,       M,   R),  # sphere
+    (D,      I,      G,       G,      G,     H,        F,   U,       M,   R),  # sphere
     (        C,      G,       G,      G,     H,        F,   U,       M,   R),  # capsule
     (                G,       G,      G,     H,        F,   U,       M,   R),  # polytope
     (                         G,      G,     H,        E,   U,       M,   R),  # rounded
@@ -82,6 +85,10 @@ _LINES = [_ORDER.index("curved" if kind in CURVED_KINDS else kind) for kind in K
 TABLE: tuple[tuple[Method, ...], ...] = tuple(
     tuple(_UPPER_HALF[min(_LINES[a], _LINES[b])][abs(_LINES[a] - _LINES[b])] for b in Kind) for a in Kind
 )
+#: Methods of two convex sets, in the order of the numbers that kernels know them by; of unions, which are taken apart;
+#: and of pairs with a mesh.
+OF_SETS, OF_UNIONS, OF_FACETS = (D, I, C, H, P, G), (U, M), (F, E, L, M)
+
 #: Questions that a method does not answer, and why, in the words of the error.
 REFUSED: dict[tuple[Method, str], str] = {
     (Method.PLANES, "distance"): (
@@ -99,3 +106,8 @@ REFUSED[Method.PARTS, "distance"] = REFUSED[Method.MESH_PARTS, "distance"] = (
 def method_of(kind_a: Kind, kind_b: Kind) -> Method:
     """The method for a pair of kinds, in either order."""
     return TABLE[kind_a][kind_b]
+
+
+def cells_of(methods: Collection[Method]) -> np.ndarray:
+    """[kind of A, kind of B] bool: whether the pair's method is one of these."""
+    return np.array([[method in methods for method in row] for row in TABLE])

@@ -10,7 +10,7 @@ import numpy as np
 from collide.base.lazy_modules import lazy_module
 from collide.lowering.kinds import kind_of
 from collide.narrowphase.convex_batches import Question, answer_parts, answer_sets, prepare_parts, prepare_sets
-from collide.narrowphase.dispatch import TABLE, Method
+from collide.narrowphase.dispatch import OF_SETS, TABLE, Method, cells_of
 from collide.narrowphase.region_pairs import Batch, answer_closed, answer_unbounded
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
@@ -77,22 +77,13 @@ def _unprepared(A: Shape, B: Shape) -> None:
     return None
 
 
-_SETS = Answer(answer_sets, prepare_sets, False)
-_PARTS = Answer(answer_parts, prepare_parts, False)
-_FACETS = Answer(_answer_meshes, _prepare_facets, True)
-_CURVED = Answer(_answer_meshes, _prepare_curved, True)
-_MESHES = Answer(_answer_meshes, _unprepared, True)
-
 ANSWERS: dict[Method, Answer] = {
-    Method.CLOSED: _SETS,
-    Method.PLANE: _SETS,
-    Method.PLANES: _SETS,
-    Method.CONVEX: _SETS,
-    Method.PARTS: _PARTS,
-    Method.FACETS: _FACETS,
-    Method.CURVED: _CURVED,
-    Method.HULL: _MESHES,
-    Method.MESH_PARTS: _MESHES,
+    **dict.fromkeys(OF_SETS, Answer(answer_sets, prepare_sets, False)),
+    Method.PARTS: Answer(answer_parts, prepare_parts, False),
+    Method.FACETS: Answer(_answer_meshes, _prepare_facets, True),
+    Method.CURVED: Answer(_answer_meshes, _prepare_curved, True),
+    Method.HULL: Answer(_answer_meshes, _unprepared, True),
+    Method.MESH_PARTS: Answer(_answer_meshes, _unprepared, True),
     Method.REGION: Answer(_answer_region, _unprepared, True),
     Method.REGIONS: Answer(_answer_regions, _unprepared, True),
 }
@@ -101,7 +92,7 @@ ANSWERS: dict[Method, Answer] = {
 #: [kind of A][kind of B]: the same by the table.
 _ANSWER_TABLE = tuple(tuple(ANSWERS[method] for method in row) for row in TABLE)
 #: [kind of A, kind of B]: whether a batch is of one pair of shapes.
-OF_ONE_PAIR = np.array([[ANSWERS[method].of_one_pair for method in row] for row in TABLE])
+OF_ONE_PAIR = cells_of([method for method, answer in ANSWERS.items() if answer.of_one_pair])
 
 
 def answer_of(A: Shape, B: Shape) -> Answer:

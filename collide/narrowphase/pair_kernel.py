@@ -4,15 +4,17 @@ A single entry for booleans, distances and batches, because every further entry 
 The half of the pair matrix below the diagonal is answered by exchanging the bodies and flipping the row.
 
 Each kind of pair is answered in the file of its name: `halfspace_halfspace.py`, `halfspace_convex.py`,
-`capsule_capsule.py`, `convex_convex.py`; pairs of small hulls go through `gjk/mpr_batch.py` first.
+`sphere_sphere.py`, `sphere_capsule.py`, `capsule_capsule.py`, `convex_convex.py`; pairs of small hulls go through
+`gjk/mpr_batch.py` first, booleans of a box and a sphere through `box_sphere.py`.
 """
 
 from __future__ import annotations
 
 from collide.kernels import entry, kernel, view_i64, view_u8
 from collide.kernels.lanes import LANES
+from collide.narrowphase.box_sphere import decide_box_sphere, is_box_and_sphere
 from collide.narrowphase.convex_convex import convex_convex
-from collide.narrowphase.convex_methods import CAPSULES, HALFSPACE_CONVEX, HALFSPACES, method
+from collide.narrowphase.convex_methods import HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.gap.gap_queue import KINDS, clear_queue, refine_queued
 from collide.narrowphase.gjk.mpr_batch import answer_small_hulls
 from collide.narrowphase.halfspace_convex import halfspace_convex
@@ -98,7 +100,9 @@ def _answer(ordered, query, row, row_number, has_portals, work):
     if how == HALFSPACE_CONVEX:
         halfspace_convex(ordered, query, row, work)
         return -1
-    return convex_convex(ordered, how == CAPSULES, query, row, row_number, n_start, work)
+    if query.boolean and is_box_and_sphere(ordered.pair) and decide_box_sphere(ordered, query.limit, row):
+        return -1
+    return convex_convex(ordered, how, query, row, row_number, n_start, work)
 
 
 @kernel(inline=True)

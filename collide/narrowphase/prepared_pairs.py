@@ -61,7 +61,8 @@ def prepared_pair(A: Shape, B: Shape, slot: str = "_prepared") -> Any:
 
     slot : attribute of A for the purpose of the pair.
     """
-    return getattr(A, slot, {}).get(getattr(B, "_serial", None))
+    pairs = getattr(A, slot, None)
+    return pairs.get(getattr(B, "_serial", None)) if pairs.__class__ is dict else None  # a class has a descriptor there
 
 
 def single_calls_are_safe() -> bool:

@@ -132,7 +132,7 @@ def shallow_cylinders(pair, points, ids, weights, size, tolerance):
         of_a = side == 0
         owner = A if of_a else B
         if not nearest.is_proven and owner.kind == CYLINDER:
-            nearest = _on_side(pair, points, ids, weights, of_a, best.n, tolerance)
+            nearest = _on_side(pair, points, ids, weights, of_a, tolerance)
     return nearest
 
 
@@ -212,7 +212,7 @@ def _on_line(pair, owner, Q, t, best, of_a):
 
 
 @kernel(inline=True)
-def _on_side(pair, points, ids, weights, of_a, nhat, tolerance):
+def _on_side(pair, points, ids, weights, of_a, tolerance):
     """The depth proven by the side of cylinder A (or B) with a corner of the other body, or a point of its rim or side.
 
     By Newton's method on the angle around the axis, within a bracket of the root: a nearly level rim has its lowest

@@ -68,7 +68,7 @@ def of_trajectory(stated: Stated, max_samples: int = MAX_SAMPLES) -> dict:
     row_of = {body.name: row for row, body in enumerate(stated.scene.bodies)}
     samples, left_out = samples_of_page(watch, max_samples)
     poses = watch.poses_at(samples)
-    standing = _standing_verdicts(stated, row_of)
+    standing = _standing_verdicts(stated)
     open_pairs = {entry[side]: NOT_ANSWERED for entry in watch.unanswered for side in ("a", "b")}
     rows, verdicts = [], []
     for k, at_sample in zip(samples.tolist(), poses):
@@ -148,7 +148,7 @@ def _bodies_of(look: Look, names: Mapping[int, str]) -> Iterable[tuple[str, str]
         yield from ((names[body], name) for body in {*rows["a"].tolist(), *rows["b"].tolist()})
 
 
-def _standing_verdicts(stated: Stated, row_of: Mapping[str, int]) -> dict[str, str]:
+def _standing_verdicts(stated: Stated) -> dict[str, str]:
     """Body → its worst class in pairs without moving bodies, constant along the trajectory."""
     report, moving = stated.report, set(stated.watch.moving)
     standing: dict[str, str] = {}

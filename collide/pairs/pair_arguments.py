@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.errors import InvalidArgument
+from collide.base import argument_checks as checks
 from collide.shapes.shape import Shape, checked_shape
 from collide.shapes.shape_set import Picked
 from collide.transforms import poses_as_given
@@ -31,17 +31,7 @@ def matched_counts(A, B, counts: dict[str, int]) -> tuple[int, bool]:
             single = False
         elif not isinstance(side, Shape) and not (A is None and B is None):
             checked_shape(name, side)
-    return matched_length(counts), single
-
-
-def matched_length(counts: dict[str, int]) -> int:
-    """The length of a batch, of arguments by name; all but A and B may be single. Raises as `matched_counts`."""
-    wanted = max(counts.values()) if min(counts.values()) else 0
-    for name, count in counts.items():
-        if count != wanted and (count != 1 or name in "AB"):
-            lengths = ", ".join(f"{argument} {n}" for argument, n in counts.items())
-            raise InvalidArgument(f"lengths do not match: {lengths}; batches must be equally long, or a single pose")
-    return wanted
+    return checks.matched_count("", **counts), single
 
 
 def _is_sequence(side) -> bool:

@@ -59,38 +59,23 @@ def _grown(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
     """Two shapes that meet exactly where A and B are within the margin; ``None`` where they are not to be had.
 
     Of two swept sets of points only the sum of the radii counts, nearly always the exact sum of two doubles. A
-    half-space stays.
+    half-space and a region stay.
     """
-    if A.is_region or B.is_region:
-        return _grown_beside_region(A, B, margin)
-    if not (is_single_convex(A) and is_single_convex(B)):
+    sets = [None if S.is_region or not is_single_convex(S) else convex_set_of(S) for S in (A, B)]
+    points = [packed for packed in sets if packed is not None and packed.kind == POINTS and packed.slop == 0.0]
+    stay = [S.is_region or (packed is not None and packed.kind == HALFSPACE) for S, packed in zip((A, B), sets)]
+    if not points or len(points) + sum(stay) < 2:
         return None
-    packed = [convex_set_of(shape) for shape in (A, B)]
-    is_swept_points = [p.kind == POINTS and p.slop == 0.0 for p in packed]
-    total = Fraction(margin) + sum(Fraction(p.radius) for p in packed)
+    total = Fraction(margin) + sum(Fraction(packed.radius) for packed in points)
     first = float(total)
     if first > total:
         first = math.nextafter(first, 0.0)
     rest = float(total - Fraction(first))
     if total != Fraction(first) + Fraction(rest) or 0.0 < rest < SMALLEST or first > LARGEST:
         return None
-    if all(is_swept_points):
-        return ConvexHull(packed[0].points, radius=first), ConvexHull(packed[1].points, radius=rest)
-    if rest == 0.0 and is_swept_points[0] and packed[1].kind == HALFSPACE:
-        return ConvexHull(packed[0].points, radius=first), B
-    if rest == 0.0 and is_swept_points[1] and packed[0].kind == HALFSPACE:
-        return A, ConvexHull(packed[1].points, radius=first)
-    return None
-
-
-def _grown_beside_region(A: Shape, B: Shape, margin: float) -> tuple[Shape, Shape] | None:
-    """The same of a region, which stays, and points swept by a ball."""
-    body = B if A.is_region else A
-    packed = convex_set_of(body) if is_single_convex(body) else None
-    if packed is None or packed.kind != POINTS or packed.slop:
+    if len(points) == 2:
+        return ConvexHull(points[0].points, radius=first), ConvexHull(points[1].points, radius=rest)
+    if rest != 0.0:
         return None
-    radius = packed.radius + margin
-    if Fraction(radius) != Fraction(packed.radius) + Fraction(margin) or radius > LARGEST:
-        return None
-    grown = ConvexHull(packed.points, radius=radius)
-    return (A, grown) if A.is_region else (grown, B)
+    grown = ConvexHull(points[0].points, radius=first)
+    return (A, grown) if stay[0] else (grown, B)

@@ -75,7 +75,7 @@ def nearest_pairs(header_at, q_at, dof, first, n, max_distance, limits_at, rows_
         while True:
             words[N_OPEN] = n_open
             row.words[BODY_A] = NONE
-            _find_nearest(scene, row, rows_at + ROW * k, k, limit)
+            _find_nearest(scene, rows_at + ROW * k, k, limit)
             is_settled = row.words[BODY_A] != NONE and row.doubles[DISTANCE] <= limit
             if is_settled or words[N_OPEN] > n_open or limit >= max_distance:
                 break
@@ -88,8 +88,8 @@ def nearest_pairs(header_at, q_at, dof, first, n, max_distance, limits_at, rows_
 
 
 @kernel(inline=True)
-def _find_nearest(scene, row, row_at, number, limit):
-    """Make ``row`` that of the nearest pair within the limit."""
+def _find_nearest(scene, row_at, number, limit):
+    """Make the row at an address that of the nearest pair within the limit."""
     words = scene.words
     for body in range(words[N_BODIES]):
         at = BODY_INTS * body

@@ -6,7 +6,6 @@ bodies is a choice among its cells. Facets without meeting facets are taken whol
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -23,9 +22,6 @@ from collide.solids.limits import BYTES_PER_PAIR, UNLIMITED, Limits
 from collide.solids.placed_facets import Operand, PlacedFacets
 from collide.solids.split_facets import split_facets
 from collide.solids.sweep_triangulation import triangulate
-
-#: Of the winding numbers (c, r) of cells: which cells belong, (c,) bool.
-Rule = Callable[[np.ndarray], np.ndarray]
 
 
 class Arrangement(NamedTuple):

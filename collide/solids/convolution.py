@@ -151,14 +151,14 @@ def _vertex_counts(
     opposite = (-start[0], -start[1], -start[2])
     # Twice the count is (count of n + count of −n) + their difference; their sum is 1 less half the changes of sign
     # around the vertex, for each ring of facets there.
-    to_further = _jumps(start, [further], Q, _plain(Q, along, [further]), along, shear)
-    to_opposite = _jumps(further, [opposite], Q, _plain(Q, along, [opposite]), along, shear)
+    to_further = _jumps(start, [further], Q, _plain(along, [further]), along, shear)
+    to_opposite = _jumps(further, [opposite], Q, _plain(along, [opposite]), along, shear)
     difference = -(to_further + to_opposite)[0]
-    at_start = (_rings(Q) - _changes(Q, along, start) + difference) // 2
+    at_start = (_rings(Q) - _changes(Q, start) + difference) // 2
     return at_start + _jumps(start, normals, Q, of_edges, along, shear)
 
 
-def _plain(Q: ExactSurface, along: list[Point], normals: list[Point]) -> np.ndarray:
+def _plain(along: list[Point], normals: list[Point]) -> np.ndarray:
     """(n, edges) signs of normals that are perpendicular to no edge."""
     return np.array([[1 if inner(n, g) > 0 else -1 for g in along] for n in normals], dtype=np.int8)
 
@@ -171,7 +171,7 @@ def _jumps(
     if any(axis == (0, 0, 0) or inner(shear.v, axis) == 0 for axis in axes):
         raise CollideError("a direction chosen at random is a normal of a solid; please report it")
     of_axes = _signs(Q.normals, axes, shear, at_normals=True)
-    at_start = _plain(Q, along, [start])
+    at_start = _plain(along, [start])
     counts = _crossings(at_start, of_edges, of_axes[Q.sides[:, 0]].T, of_axes[Q.sides[:, 1]].T, 1, Q.bend[None, :])
     out = np.zeros((len(Q.points), len(normals)), dtype=np.int64)
     np.add.at(out, Q.edges[:, 0], counts.T)
@@ -190,7 +190,7 @@ def _rings(Q: ExactSurface) -> np.ndarray:
     return np.bincount(Q.faces.ravel()[tops], minlength=len(Q.points))
 
 
-def _changes(Q: ExactSurface, along: list[Point], n: Point) -> np.ndarray:
+def _changes(Q: ExactSurface, n: Point) -> np.ndarray:
     """(vertices,) half the number of sign changes, along n, of the edges in their order around a vertex."""
     height = np.empty(len(Q.points), dtype=object)
     height[:] = [inner(n, p) for p in Q.points]

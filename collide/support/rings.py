@@ -207,7 +207,7 @@ def _put_polygon(points, n, facets, n_facets, rings, space):
         is_convex = is_convex and is_used == (bent[k] == 1)
     if is_convex:
         _keep_border(n, rings, space)
-    elif not _close_disc(points, n, facets, half, n_border, rings, space):
+    elif not _close_disc(points, n, half, n_border, rings, space):
         return False
     for k in range(n):
         rings.corner[k] = bent[k]
@@ -276,7 +276,7 @@ def _keep_border(n, rings, space):
 
 
 @kernel
-def _close_disc(points, n, facets, half, n_border, rings, space):
+def _close_disc(points, n, half, n_border, rings, space):
     """Rings of a side, closed by triangles to point n, then without point n; the two sides are facets 0 and 1.
 
     A neighbour just before point n loses the facet between the two: the lower side follows.

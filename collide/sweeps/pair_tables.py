@@ -80,7 +80,7 @@ def state_words(q: np.ndarray) -> str:
     return f"--state={','.join(f'{value:.5g}' for value in q.tolist())}"
 
 
-def comparison_tables(proposal: Proposal, comparison: PairComparison, place: str) -> list[Table]:
+def comparison_tables(comparison: PairComparison, place: str) -> list[Table]:
     """What only the SRDF at ``place`` disables, and what only the proposal does."""
     theirs = comparison.only_theirs
     tables = []

@@ -200,6 +200,8 @@ def test_what_is_refused():
         collide.shape_cast(box, EYE, (1, 0, 0), "box", EYE)
     with pytest.raises(InvalidArgument, match="lengths do not match"):
         collide.shape_cast(box, np.tile(EYE, (2, 1, 1)), np.ones((3, 3)), box, EYE)
+    with pytest.raises(InvalidArgument, match=r"lengths do not match: .*A 1"):
+        collide.shape_cast([box], EYE, np.ones((3, 3)), box, EYE)  # as of distance: a list has a shape for each
     with pytest.raises(InvalidPose):
         collide.shape_cast(box, -EYE, (1, 0, 0), box, EYE)
     for A in (floor, collide.Compound([(box, EYE), (floor, EYE)])):

@@ -1,4 +1,5 @@
-"""Nearest points of two segments, against the nearest point of the parallelogram of their differences in Fractions."""
+"""Closed forms of spheres and capsules: nearest points against the nearest point of the parallelogram of differences in
+Fractions, cores against exact distances."""
 
 from __future__ import annotations
 
@@ -15,7 +16,9 @@ from posed_bodies import PosedBodies
 from reproduction import reproducing
 
 import collide
-from collide.narrowphase.capsule_capsule import nearest_of_segments, segment_cores
+from collide.narrowphase.capsule_capsule import nearest_of_segments
+from collide.narrowphase.convex_convex import closed_form_cores
+from collide.narrowphase.convex_methods import CAPSULES, SPHERE_CAPSULE, SPHERES
 from collide.narrowphase.gjk.minkowski_difference import AXIS, NEAREST_POINT, POINT
 
 pytestmark = pytest.mark.plain_kernels
@@ -74,32 +77,45 @@ def test_nearest_of_segments(kind):
     assert all(seen[k] >= 8 for k in few), seen
 
 
+#: The method by the number of segments among the cores.
+HOW = SPHERES, SPHERE_CAPSULE, CAPSULES
+
+
+def cores_of(bodies):
+    pair = bodies.pair
+    return closed_form_cores(pair, HOW[pair.A.n + pair.B.n - 2], bodies.work, bodies.error)
+
+
 @pytest.mark.parametrize("apart", [True, False])
-def test_cores(apart):
-    """Depths where segments meet: no unit vector parts them by less, of many."""
-    rng = rng_of("segment cores", apart)
+@pytest.mark.parametrize("n_segments", [0, 1, 2])
+def test_cores(apart, n_segments):
+    """Depths where cores meet: no unit vector parts them by less, of many."""
+    rng = rng_of("segment cores", apart, n_segments)
     cases = 0
     directions = rng.normal(size=(4000, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     while cases < 40:
         length, other_length = rng.uniform(0.5, 2.0, 2)
         A, B = collide.Capsule(0.1, length), collide.Capsule(0.2, other_length)
-        if rng.random() < 0.3:
+        if n_segments < 2:
             A = collide.Sphere(0.3)
+        if n_segments < 1:
+            B = collide.Sphere(0.4)
+        if rng.random() < 0.5:  # ranks go by content: the point is worked on as A and as B
+            A, B = B, A
         X_WA = random_pose(rng)
         X_WB = random_pose(rng, 3.0)
         if not apart:  # a point of one upon a point of the other
-            middle = 0.0 if isinstance(A, collide.Sphere) else rng.uniform(-0.4, 0.4) * A.length
-            on_a = X_WA @ (0.0, 0.0, middle, 1.0)
-            on_b = X_WB @ (0.0, 0.0, rng.uniform(-0.4, 0.4) * B.length, 1.0)
+            middles = [rng.uniform(-0.4, 0.4) * getattr(S, "length", 0.0) for S in (A, B)]
+            on_a, on_b = (X @ (0.0, 0.0, middle, 1.0) for X, middle in zip((X_WA, X_WB), middles))
             X_WB[:3, 3] += (on_a - on_b)[:3]
         case = Case(A, B, X_WA, X_WB)
         bodies = PosedBodies(*case)
         with naive.reproducible(case):
-            core = segment_cores(bodies.pair, bodies.work, bodies.error)
+            core = cores_of(bodies)
             true = float(naive.exact_distance(case)) + bodies.radius
             assert core.lower - bodies.error <= true <= core.upper + bodies.error
-            assert core.n_points == core.n_vertices == 4
+            assert core.n_points == (4 if n_segments else 1) and core.n_vertices == 4
             n = np.array(core.nhat) * (-1.0 if bodies.ordered.flip else 1.0)
             assert abs(np.linalg.norm(n) - 1.0) <= 1e-15
             assert abs(naive.clearance_along(case, n) + bodies.radius + core.depth) <= 1e-12
@@ -115,7 +131,7 @@ def test_parallel_cores_that_meet():
         for turn in (pose(), random_pose(rng_of("parallel cores"))):
             case = Case(collide.Capsule(0.1, 1.0), collide.Capsule(0.1, 2.0), turn, turn @ pose(t=(0.0, 0.0, shift)))
             bodies = PosedBodies(*case)
-            core = segment_cores(bodies.pair, bodies.work, bodies.error)
+            core = cores_of(bodies)
             assert abs(core.depth) <= bodies.error and abs(np.dot(core.nhat, turn[:3, 2])) <= 1e-15
     bodies = PosedBodies(collide.Sphere(1.0), collide.Sphere(2.0), pose(), pose())
-    assert segment_cores(bodies.pair, bodies.work, bodies.error).nhat == (0.0, 0.0, 1.0)
+    assert cores_of(bodies).nhat == (0.0, 0.0, 1.0)

@@ -13,7 +13,7 @@ import collide
 from collide.lowering.kinds import WITH_FACETS, Kind, kind_of
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 from collide.narrowphase import convex_methods
-from collide.narrowphase.dispatch import TABLE, Method, method_of
+from collide.narrowphase.dispatch import OF_FACETS, OF_SETS, OF_UNIONS, TABLE, Method, cells_of, method_of
 from collide.narrowphase.method_functions import ANSWERS, OF_ONE_PAIR, answer_of
 
 PACKED = {
@@ -21,13 +21,10 @@ PACKED = {
     Kind.CONE: (CONE, 0), Kind.ELLIPSOID: (ELLIPSOID, 0), Kind.HALFSPACE: (HALFSPACE, 0),
 }
 OF_KERNELS = {
-    Method.CLOSED: convex_methods.CAPSULES, Method.PLANE: convex_methods.HALFSPACE_CONVEX,
+    Method.SPHERES: convex_methods.SPHERES, Method.SPHERE_CAPSULE: convex_methods.SPHERE_CAPSULE,
+    Method.CAPSULES: convex_methods.CAPSULES, Method.PLANE: convex_methods.HALFSPACE_CONVEX,
     Method.PLANES: convex_methods.HALFSPACES, Method.CONVEX: convex_methods.CONVEX,
 }
-
-
-#: The kernel as plain Python, however kernels run.
-_method = getattr(convex_methods.method, "py_func", convex_methods.method)
 
 
 def test_the_table_is_complete_and_its_own_mirror():
@@ -45,11 +42,22 @@ def test_every_method_is_carried_out_by_the_file_it_names():
         assert method.meaning
 
 
+@pytest.mark.plain_kernels
 def test_kernels_go_by_the_same_table():
     for a, b in product(PACKED, PACKED):
-        if b == Kind.HALFSPACE != a:
-            continue  # kernels have the half-space first
-        assert _method(*PACKED[a], *PACKED[b]) == OF_KERNELS[method_of(a, b)], (a, b)
+        assert convex_methods.method(*PACKED[a], *PACKED[b]) == OF_KERNELS[method_of(a, b)], (a, b)
+
+
+def test_groups_of_methods_are_the_kinds_they_are_named_for():
+    """Judged by kinds, cell by cell."""
+    meshes, unions = {Kind.MESH, Kind.MESH_COMPOUND}, {Kind.COMPOUND, Kind.MESH_COMPOUND}
+    of_facets, of_unions, of_sets = map(cells_of, (OF_FACETS, OF_UNIONS, OF_SETS))
+    for a, b in product(Kind, Kind):
+        if Kind.REGION not in (a, b):
+            assert of_facets[a, b] == bool({a, b} & meshes), (a, b)
+            assert of_unions[a, b] == bool({a, b} & unions), (a, b)
+            assert of_sets[a, b] == (max(a, b) < Kind.MESH), (a, b)
+    assert not (of_facets | of_unions | of_sets)[Kind.REGION].any()
 
 
 def test_each_shape_has_the_kind_of_its_points():

@@ -48,9 +48,9 @@ def pair_hits(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check: 
     return _states(A, B, X_WA, X_WB, check, parts_open=False) != APART
 
 
-def pair_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, *, check: bool = False) -> np.ndarray:
+def pair_states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
     """(n,) APART, HIT or OPEN: what `pair_hits` says, and whether that is proven."""
-    return _states(A, B, X_WA, X_WB, check, parts_open=True)
+    return _states(A, B, X_WA, X_WB, False, parts_open=True)
 
 
 def _states(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, check: bool, *, parts_open: bool) -> np.ndarray:

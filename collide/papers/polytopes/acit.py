@@ -13,7 +13,6 @@ again, twice as large.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from fractions import Fraction
 from typing import NamedTuple
@@ -261,12 +260,3 @@ def _origin(d: int) -> HomogeneousRows:
 def _inflated(halfspaces: HomogeneousRows, by: float) -> HomogeneousRows:
     values, last = halfspaces.values, np.broadcast_to(halfspaces.last + by, len(halfspaces))
     return HomogeneousRows(values, last, lambda row: as_integers([*values[row].tolist(), float(last[row])])[0])
-
-
-def expected_depth(n: int, d: int) -> int:
-    """How often n rows are pruned before they are at most α, at ε per round and 2d + 1 rounds."""
-    limits, depth = sizes(d), 0
-    while n > limits.alpha:
-        n = limits.sample + math.floor((2 * d + 1) * limits.epsilon * n)
-        depth += 1
-    return depth

@@ -10,7 +10,6 @@ from collide.base import argument_checks as checks
 from collide.base.threads import check_threads, share_if_it_helps
 from collide.errors import InvalidArgument
 from collide.kernels import address_of
-from collide.pairs.pair_arguments import matched_length
 from collide.papers.polytopes.convex_polygon import ConvexPolygon, planar_poses
 from collide.papers.polytopes.planar_certificates import PlanarCertificate, certificate_of_row, gap_across
 from collide.papers.polytopes.planar_distance import (
@@ -48,7 +47,7 @@ class PolygonQuestion:
         counts = {name: len(side) for name, side in (("A", self.A), ("B", self.B)) if isinstance(side, list)}
         self.single = single_a and single_b and not counts
         counts |= {"X_WA": len(self.X_WA), "X_WB": len(self.X_WB)}
-        self.n = matched_length(counts)
+        self.n = checks.matched_count("", **counts)
 
     def pair(self, k: int) -> tuple[ConvexPolygon, ConvexPolygon, np.ndarray, np.ndarray]:
         """Polygons and poses (3, 3) of pair k."""

@@ -15,7 +15,7 @@ from collide.kernels import address_of, view_i64
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.narrowphase.convex_convex import convex_convex
-from collide.narrowphase.convex_methods import CAPSULES, method
+from collide.narrowphase.convex_methods import method
 from collide.narrowphase.gap import gap_queue as Q
 from collide.narrowphase.pair_workspace import DOUBLES, INTEGERS, Query, workspace_at
 from collide.narrowphase.posed_pair import ordered_pair
@@ -71,7 +71,7 @@ class Pairs:
         A, B = ordered.pair.A, ordered.pair.B
         query = Query(False, True, np.inf, address_of(self.poses.terms), False)
         row = blank_row(address_of(rows) + ROW * k)
-        return convex_convex(ordered, method(A.kind, A.n, B.kind, B.n) == CAPSULES, query, row, k, 0, self.work)
+        return convex_convex(ordered, method(A.kind, A.n, B.kind, B.n), query, row, k, 0, self.work)
 
     def refine(self, rows: np.ndarray, kind: int) -> None:
         queue = self.work.queue_at, self.work.queue_integers_at
