@@ -221,9 +221,8 @@ def prepare_contacts(A, B) -> bool:
     if pair is None:
         pair = prepare_sets(A, B) if is_convex else Prepared()
         keep_prepared(A, B, pair)
-    if pair.contacts is None:  # shapes of the same few numbers share a pair (`convex_batches.prepare_sets`)
-        pair.contacts, held = _single_contacts(pair.table) if is_convex else _single_far_contacts(A, B)
-        pair.held = pair.held, held
+    pair.contacts, held = _single_contacts(shape_table(A, B)[0]) if is_convex else _single_far_contacts(A, B)
+    pair.held = pair.held, held
     return prepared_pair(A, B) is pair
 
 

@@ -6,18 +6,18 @@ never changes.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Hashable
-from operator import attrgetter
+from collections.abc import Callable
+from struct import Struct
 
 import numpy as np
 
-from collide.lowering.convex_sets import ConvexSet, convex_set, moved
+from collide.lowering.convex_sets import SET_NUMBERS, ConvexSet, convex_set, set_numbers_of, moved
+from collide.lowering.lower_numbers import N_NUMBERS
+from collide.lowering.lowered_sets import lower_numbers
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_curved, pack_halfspace, pack_points
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
-from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
 
 #: A convex set and its (4, 4) pose in the shape's frame.
@@ -26,13 +26,8 @@ Part = tuple[PackedConvex, np.ndarray]
 #: Shapes of few numbers share parts where these are equal, zeros of different signs apart: programs that make shapes as
 #: they go make the same again and again. So many kinds of numbers are remembered, then all are forgotten.
 MAX_SHARED = 1024
-_NUMBERS_OF: dict[type, Callable[..., Hashable]] = {
-    Sphere: attrgetter("radius"), Capsule: attrgetter("radius", "length"), Cylinder: attrgetter("radius", "length"),
-    Cone: attrgetter("radius", "length"), Box: lambda shape: shape.size.tobytes(),
-    Ellipsoid: lambda shape: shape.radii.tobytes(),
-    Halfspace: lambda shape: (shape.normal.tobytes(), shape.offset, math.copysign(1.0, shape.offset)),
-}
-_parts_of_numbers: dict[Hashable, tuple[Part, ...]] = {}
+_KEY = Struct(f"={N_NUMBERS}d")
+_parts_of_numbers: dict[bytes, tuple[Part, ...]] = {}
 
 #: One product of two poses rounds each coordinate of a point by at most this many units in the
 #: last place of its terms: three products and three sums for the rotation, one more for the shift.
@@ -47,21 +42,16 @@ def parts_of(shape: Shape) -> tuple[Part, ...]:
     """The convex sets whose union a shape is. Raises UnsupportedQuery for meshes and regions."""
     if isinstance(shape, Compound):
         return _compound(shape)
-    numbers_of = _NUMBERS_OF.get(shape.__class__)
-    if numbers_of is None:
+    numbers = set_numbers_of(shape)
+    if numbers is None:
         return _alone(_packed(convex_set(shape)))
-    key = shape.__class__, numbers_of(shape)
+    key = _KEY.pack(*numbers)
     parts = _parts_of_numbers.get(key)
     if parts is None:
         if len(_parts_of_numbers) >= MAX_SHARED:
             _parts_of_numbers.clear()
-        parts = _parts_of_numbers[key] = _alone(_packed(convex_set(shape)))
+        parts = _parts_of_numbers[key] = _alone(lower_numbers([numbers]).packed(0))
     return parts
-
-
-def shares_parts(shape: Shape) -> bool:
-    """Whether a shape has the parts of all others of its numbers: few points, which are cheap to remember."""
-    return shape.__class__ in _NUMBERS_OF
 
 
 def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:
@@ -83,6 +73,8 @@ def convex_set_of(shape: Shape) -> PackedConvex:
 
 def is_single_convex(shape: Shape) -> bool:
     """Whether a shape is one convex set in its own frame."""
+    if shape.__class__ in SET_NUMBERS:
+        return True
     if shape.is_asked_whole:
         return False
     parts = parts_of(shape)

@@ -25,18 +25,22 @@ Function = TypeVar("Function", bound=Callable)
 ALL_CONTACTS = 2**31 - 1
 
 
-def asks_prepared_pairs(result: type | None = None, certify: Callable | None = None) -> Callable[[Function], Function]:
+def asks_prepared_pairs(
+    prepare: Callable[[Any, Any], bool], result: type | None = None, certify: Callable | None = None
+) -> Callable[[Function], Function]:
     """Decorates `collide`, `distance` or `contacts`.
 
+    prepare : makes two shapes ready, and says whether the call has done so; False of anything else. Asked where a pair
+    of matrices meets a pair of shapes that is not ready, and then the pair is asked.
     result : the type of the returned object, whose row is opened when fields are asked for; ``None`` of booleans.
     certify : makes certificates of results.
     """
 
     def decorate(function: Function) -> Function:
         if query_of_c is None:
-            return _in_python(function, result, certify)
+            return _in_python(function, prepare, result, certify)
         name = function.__name__
-        return query_of_c(function, _described(function), _LENGTHS[name], _USUAL[name], result, certify)
+        return query_of_c(function, _described(function), _LENGTHS[name], _USUAL[name], prepare, result, certify)
 
     return decorate
 
@@ -58,7 +62,7 @@ def _described(function: Callable) -> str:
 # --- the same in Python -------------------------------------------------------------------------
 
 
-def _in_python(function: Any, result: Any, certify: Callable | None) -> Any:
+def _in_python(function: Any, prepare: Callable, result: Any, certify: Callable | None) -> Any:
     ask = {"collide": _collide, "distance": partial(_distance, certify), "contacts": partial(_contacts, result)}
 
     known = inspect.signature(function).parameters.keys()
@@ -67,6 +71,8 @@ def _in_python(function: Any, result: Any, certify: Callable | None) -> Any:
     def query(*arguments, **options):
         is_single = options.keys() <= known and _are_plain(arguments, **options)
         answer = ask[function.__name__](*arguments, **options) if is_single else None
+        if is_single and answer is None and _are_matrices(*arguments[2:]) and prepare(*arguments[:2]):
+            answer = ask[function.__name__](*arguments, **options)
         return function(*arguments, **options) if answer is None else answer
 
     return query
@@ -75,6 +81,10 @@ def _in_python(function: Any, result: Any, certify: Callable | None) -> Any:
 def _are_plain(arguments: tuple, *, check_poses=True, threads=1, axes=None, algorithm=None, **_) -> bool:
     plain = check_poses.__class__ is bool and threads.__class__ is int and threads == 1
     return len(arguments) == 4 and plain and axes is None and algorithm is None
+
+
+def _are_matrices(X_WA, X_WB) -> bool:
+    return is_matrix(X_WA) and is_matrix(X_WB)
 
 
 def _length(question: str, value: Any) -> float | None:
@@ -99,7 +109,7 @@ def _distance(certify, A, B, X_WA, X_WB, *, max_distance=math.inf, signed=True, 
     pair, limit = prepared_pair(A, B), _length("distance", max_distance)
     if pair is None or limit is None or pair.distance is None or signed.__class__ is not bool:
         return None
-    if not (is_matrix(X_WA) and is_matrix(X_WB)):
+    if not _are_matrices(X_WA, X_WB):
         return None
     memory = bytearray(PAIR_DTYPE.itemsize) + X_WA.tobytes() + X_WB.tobytes()
     if pair.distance(X_WA, X_WB, memory, signed, limit) is None:

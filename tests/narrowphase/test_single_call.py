@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import sys
 import threading
 from itertools import combinations_with_replacement
 
@@ -92,29 +93,37 @@ def test_first_calls_refuse_what_later_ones_do():
             ask(A, 1.0, X, X)
 
 
-def test_pairs_of_the_same_small_sets_are_one():
-    """Pairs of equal boxes share what single calls read, whichever shapes live; those of hulls do not, being large."""
+def test_new_pairs_walk_few_functions():
+    """From the call to the answer of two shapes never seen before: those of the standard library and of C apart."""
+    if not single_calls_are_safe() or query.collide.__class__.__name__ != "builtin_function_or_method":
+        pytest.skip("without the library more of the walk is Python's")
+    rng = rng_of("walk of new pairs")
+    X, Y = np.eye(4), collide.pose((0.9, 0.1, 0.2))
+    kinds = [kind for kind in naive.KINDS if kind in ("Box", "Sphere", "Capsule", "Cylinder", "Cone", "Ellipsoid")]
+    assert len(kinds) == 6
+    for kind_a, kind_b in combinations_with_replacement(kinds, 2):
+        A, B = naive.one_of_each(rng)[kind_a], naive.one_of_each(rng)[kind_b]
+        collide.collide(*(naive.one_of_each(rng)[kind] for kind in (kind_a, kind_b)), X, Y)  # loads what is lazy
+        walked = []
+        sys.setprofile(lambda frame, event, _: walked.append(frame.f_code.co_name) if event == "call" else None)
+        try:
+            collide.collide(A, B, X, Y)
+        finally:
+            sys.setprofile(None)
+        assert prepared_pair(A, B) is not None and len(walked) <= (14 if "Capsule" not in (kind_a, kind_b) else 22), walked
+
+
+def test_pairs_of_few_numbers_hold_one_block():
+    """Nothing else is kept of two boxes but what the pair needs: no table, no packed sets, until batches ask."""
     if not single_calls_are_safe():
         pytest.skip("plain kernels have no single calls")
-    X, Y = np.eye(4), collide.pose((0.9, 0.0, 0.0))
-
-    def asked(A, B):
-        assert collide.collide(A, B, X, Y) is True
-        return prepared_pair(A, B)
-
-    first = asked(collide.Box((1, 1, 1)), collide.Sphere(0.5))
-    assert asked(collide.Box((1, 1, 1)), collide.Sphere(0.5)) is first
-    assert asked(collide.Sphere(0.5), collide.Box((1, 1, 1))) is not first
-    kept = []
-    for _ in range(3):  # what contacts need is made once, and nothing is added to what the pair holds
-        A, B = collide.Box((1, 1, 1)), collide.Sphere(0.5)
-        assert len(collide.contacts(A, B, X, Y).rows) == 1 and prepared_pair(A, B) is first
-        kept.append((first.contacts, first.held))
-    assert kept[0] == kept[1] == kept[2] and kept[0][1] is kept[2][1]
-    points = rng_of("hulls of pairs").normal(size=(20, 3))
-    assert asked(collide.ConvexHull(points), collide.Sphere(0.5)) is not asked(
-        collide.ConvexHull(points), collide.Sphere(0.5)
-    )
+    A, B, X, Y = collide.Box((1, 2, 3)), collide.Sphere(0.5), np.eye(4), collide.pose((0.9, 0.0, 0.0))
+    assert collide.collide(A, B, X, Y) is True
+    pair = prepared_pair(A, B)
+    assert pair.table is None and not hasattr(A, "_parts") and not hasattr(B, "_parts")
+    assert collide.collide(A, B, X, np.stack([Y, Y])).all() and pair.table is not None
+    first = pair.table
+    assert collide.distance(A, B, X, np.stack([Y, Y])).hit.all() and pair.table is first
 
 
 def test_single_gaps_of_what_has_no_depth():
