@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import BLOCK, POINTS
-from collide.lowering.shape_table import (
+from collide.lowering.set_rows import (
     ADDRESS,
     COARSE_AT,
     COUNT,
@@ -26,7 +26,8 @@ from collide.lowering.shape_table import (
 )
 from collide.numerics.lowest_bits import NO_BITS
 from collide.numerics.number_digest import DIGEST_WORDS, put_digest
-from collide.support.point_columns import put_columns
+from collide.numerics.vec3 import dot, vec3_at
+from collide.support.point_columns import lowest_of, reach_of_square
 
 #: Numbers that tell a set, and their places.
 N_NUMBERS = 8
@@ -59,8 +60,8 @@ def lower_sets(sets_at, n, ints_at, numbers_at, columns_at, contents_at, memory_
 def _lower_set(set_at, ints_at, numbers_at, columns_at, content_at, memory_at):
     """The rows of a set, and columns of its core points."""
     values, ints, numbers = view_f64(set_at, N_NUMBERS), view_i64(ints_at, INTS), view_f64(numbers_at, NUMBERS)
-    points_at, head_at = memory_at, memory_at + 8 * 3 * _CORNERS
-    head = view_f64(head_at, _HEAD)
+    head = view_f64(memory_at, _HEAD)
+    points_at = memory_at + 8 * _HEAD  # digested with the head, of which they are no more than the rest: no zero is −0.0
     kind, n = int(values[_KIND]), int(values[_N])
     ints[KIND] = kind
     ints[COUNT] = n
@@ -78,19 +79,25 @@ def _lower_set(set_at, ints_at, numbers_at, columns_at, content_at, memory_at):
     head[0] = values[_KIND]
     head[1] = values[_RADIUS]
     if n > 0:
-        _put_corners(values, n, points_at)
-        ints[LOWEST] = put_columns(points_at, n, columns_at, BLOCK, numbers_at + 8 * REACH)
-    put_digest(head_at, _HEAD, points_at, 3 * n, 0, 0, memory_at + 8 * (3 * _CORNERS + _HEAD), content_at)
+        _put_corners(values, n, points_at, columns_at)
+        half_sizes = vec3_at(values, _FIRST)  # every corner is as far from the origin, and has the same bits
+        numbers[REACH] = reach_of_square(dot(half_sizes, half_sizes))
+        ints[LOWEST] = lowest_of(view_f64(set_at + 8 * _FIRST, 3), 3)
+    put_digest(memory_at, _HEAD + 3 * n, 0, 0, 0, 0, memory_at + 8 * (_HEAD + 3 * _CORNERS), content_at)
 
 
 @kernel(inline=True)
-def _put_corners(values, n, points_at):
-    """`convex_sets.corners_of`: (n, 3) corners, signs by the bits of their numbers."""
-    points = view_f64(points_at, 3 * _CORNERS)
-    for k in range(n):
+def _put_corners(values, n, points_at, columns_at):
+    """`convex_sets.corners_of`: (n, 3) corners, signs by the bits of their numbers, and columns (3, BLOCK) filled up with
+    the first."""
+    points, columns = view_f64(points_at, 3 * BLOCK), view_f64(columns_at, COLUMNS)
+    for k in range(BLOCK):
+        number = k if k < n else 0
         for axis in range(3):
             half = values[_FIRST + axis]
-            points[3 * k + axis] = half if (k >> (2 - axis)) & 1 else 0.0 - half
+            coordinate = half if (number >> (2 - axis)) & 1 else 0.0 - half
+            points[3 * k + axis] = coordinate
+            columns[BLOCK * axis + k] = coordinate
 
 
 @kernel(inline=True)

@@ -6,14 +6,14 @@ never changes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from struct import Struct
 
 import numpy as np
 
-from collide.lowering.convex_sets import SET_NUMBERS, ConvexSet, convex_set, set_numbers_of, moved
+from collide.lowering.convex_sets import SET_NUMBERS, ConvexSet, SetNumbers, convex_set, set_numbers_of, moved
 from collide.lowering.lower_numbers import N_NUMBERS
-from collide.lowering.lowered_sets import lower_numbers
+from collide.lowering.lowered_sets import LoweredSets, PlacedSets
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_curved, pack_halfspace, pack_points
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
@@ -22,6 +22,7 @@ from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
 
 #: A convex set and its (4, 4) pose in the shape's frame.
 Part = tuple[PackedConvex, np.ndarray]
+Parts = Sequence[Part]
 
 #: Shapes of few numbers share parts where these are equal, zeros of different signs apart: programs that make shapes as
 #: they go make the same again and again. So many kinds of numbers are remembered, then all are forgotten.
@@ -38,7 +39,7 @@ _MAX_OWN_BOUNDS, _CELLS = 512, 6
 
 
 @kept_with_shape("_parts")
-def parts_of(shape: Shape) -> tuple[Part, ...]:
+def parts_of(shape: Shape) -> Parts:
     """The convex sets whose union a shape is. Raises UnsupportedQuery for meshes and regions."""
     if isinstance(shape, Compound):
         return _compound(shape)
@@ -50,17 +51,17 @@ def parts_of(shape: Shape) -> tuple[Part, ...]:
     if parts is None:
         if len(_parts_of_numbers) >= MAX_SHARED:
             _parts_of_numbers.clear()
-        parts = _parts_of_numbers[key] = _alone(lower_numbers([numbers]).packed(0))
+        parts = _parts_of_numbers[key] = _alone(LoweredSets([numbers])[0])
     return parts
 
 
-def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:
+def bounding_parts_of(shape: Shape) -> Parts:
     """Convex sets that hold a shape: its parts, or larger, simpler sets for shapes without parts. For culling."""
     return _bounds_around(shape) if shape.is_asked_whole else parts_of(shape)
 
 
 @kept_with_shape("_bounds")
-def _bounds_around(shape: Compound | Mesh | HPolytope) -> tuple[Part, ...]:
+def _bounds_around(shape: Compound | Mesh | HPolytope) -> Parts:
     if isinstance(shape, HPolytope):
         return _alone(_half_space_around(shape))
     return _compound(shape, bounding_parts_of) if isinstance(shape, Compound) else _mesh_bounds(shape)
@@ -101,11 +102,25 @@ def _half_space_around(region: HPolytope) -> PackedConvex:
     return pack_halfspace(tuple(normals[least]), float(offsets[least]))
 
 
-def _compound(shape: Compound, of_item: Callable[[Shape], tuple[Part, ...]] = parts_of) -> tuple[Part, ...]:
-    return tuple([_placed(packed, X_CS, X_SP) for item, X_CS in shape.items for packed, X_SP in of_item(item)])
+def _compound(shape: Compound, of_item: Callable[[Shape], Parts] = parts_of) -> PlacedSets:
+    rules = [SET_NUMBERS.get(item.__class__) for item, _ in shape.items]
+    if None not in rules:
+        return PlacedSets(LoweredSets([rule(item) for rule, (item, _) in zip(rules, shape.items)]), shape.poses)  # type: ignore[misc]
+    sets: list[SetNumbers | PackedConvex] = []
+    poses: list[np.ndarray] = []
+    for rule, (item, X_CS) in zip(rules, shape.items):
+        if rule is not None:
+            sets.append(rule(item))
+            poses.append(X_CS)
+            continue
+        for packed, X_SP in of_item(item):
+            packed, X_CP = _placed(packed, X_CS, X_SP)
+            sets.append(packed)
+            poses.append(X_CP)
+    return PlacedSets(LoweredSets(sets), np.array(poses))
 
 
-def _alone(packed: PackedConvex) -> tuple[Part, ...]:
+def _alone(packed: PackedConvex) -> Parts:
     return ((packed, IDENTITY),)
 
 
@@ -118,7 +133,7 @@ def _placed(packed: PackedConvex, X_CS: np.ndarray, X_SP: np.ndarray) -> Part:
     return packed._replace(slop=packed.slop + 2 * _ULPS_PER_PRODUCT * _ULP * scale), X_CP
 
 
-def _mesh_bounds(mesh: Mesh) -> tuple[Part, ...]:
+def _mesh_bounds(mesh: Mesh) -> Parts:
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[mesh.faces] = True
     return _alone(pack_points(_points_around(mesh.vertices[used])))

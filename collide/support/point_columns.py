@@ -18,12 +18,6 @@ def lay_out_points(points_at, n, columns_at, padded, reach_at):
 
     reach : a double, out: how far a point is from the origin at most, rounded upwards.   O(padded).
     """
-    return put_columns(points_at, n, columns_at, padded, reach_at)
-
-
-@kernel
-def put_columns(points_at, n, columns_at, padded, reach_at):
-    """`lay_out_points` for kernels."""
     points, columns = view_f64(points_at, 3 * n), view_f64(columns_at, 3 * padded)
     largest = 0.0
     for k in range(n):
@@ -35,8 +29,14 @@ def put_columns(points_at, n, columns_at, padded, reach_at):
     for k in range(n, padded):
         for axis in range(3):
             columns[axis * padded + k] = points[axis]
-    view_f64(reach_at, 1)[0] = math.sqrt(largest) * _UPWARDS
+    view_f64(reach_at, 1)[0] = reach_of_square(largest)
     return lowest_of(points, 3 * n)
+
+
+@kernel(inline=True)
+def reach_of_square(largest):
+    """How far points are from the origin at most, rounded upwards, by the largest square."""
+    return math.sqrt(largest) * _UPWARDS
 
 
 @kernel
