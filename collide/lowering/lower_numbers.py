@@ -36,7 +36,7 @@ _KIND, _N, _RADIUS, _REACH, _FIRST = range(5)
 _CORNERS = 8
 #: Doubles of a set's columns: whole cache lines.
 COLUMNS = 3 * BLOCK
-#: Words of a digest, and of memory that one set is worked out in: its points, the head of what is digested, the digest's.
+#: Words of a digest; of the numbers digested before the points; of memory that a set is worked out in.
 CONTENT = 2
 _HEAD = 6
 LOWERING_WORDS = 3 * _CORNERS + _HEAD + DIGEST_WORDS
@@ -61,7 +61,7 @@ def _lower_set(set_at, ints_at, numbers_at, columns_at, content_at, memory_at):
     """The rows of a set, and columns of its core points."""
     values, ints, numbers = view_f64(set_at, N_NUMBERS), view_i64(ints_at, INTS), view_f64(numbers_at, NUMBERS)
     head = view_f64(memory_at, _HEAD)
-    points_at = memory_at + 8 * _HEAD  # digested with the head, of which they are no more than the rest: no zero is −0.0
+    points_at = memory_at + 8 * _HEAD  # digested with the head as they are: no zero is −0.0
     kind, n = int(values[_KIND]), int(values[_N])
     ints[KIND] = kind
     ints[COUNT] = n
@@ -88,7 +88,7 @@ def _lower_set(set_at, ints_at, numbers_at, columns_at, content_at, memory_at):
 
 @kernel(inline=True)
 def _put_corners(values, n, points_at, columns_at):
-    """`convex_sets.corners_of`: (n, 3) corners, signs by the bits of their numbers, and columns (3, BLOCK) filled up with
+    """`convex_sets.corners_of`: (n, 3) corners, signs by the bits of their numbers; columns (3, BLOCK), filled up with
     the first."""
     points, columns = view_f64(points_at, 3 * BLOCK), view_f64(columns_at, COLUMNS)
     for k in range(BLOCK):

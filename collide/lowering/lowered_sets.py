@@ -144,7 +144,7 @@ def in_rows(parts: Sequence[tuple[PackedConvex, np.ndarray]]) -> PlacedSets:
 
 
 def ranks_of(contents: bytes) -> np.ndarray:
-    """(n,) places of digests, one behind the next, in their order as bytes; equal digests have one place. O(n log n)."""
+    """(n,) places of digests, one behind the next, in their order as bytes, the same of equal digests. O(n log n)."""
     words = np.frombuffer(contents, dtype=">u8").astype(np.uint64).reshape(-1, CONTENT)
     order = np.lexsort((words[:, 1], words[:, 0]))
     ordered, ranks = words[order], np.empty(len(words), dtype=np.int64)

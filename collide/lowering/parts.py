@@ -11,7 +11,7 @@ from struct import Struct
 
 import numpy as np
 
-from collide.lowering.convex_sets import SET_NUMBERS, ConvexSet, SetNumbers, convex_set, set_numbers_of, moved
+from collide.lowering.convex_sets import SET_NUMBERS, ConvexSet, SetNumbers, convex_set, moved, set_numbers_of
 from collide.lowering.lower_numbers import N_NUMBERS
 from collide.lowering.lowered_sets import LoweredSets, PlacedSets
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_curved, pack_halfspace, pack_points
@@ -28,7 +28,7 @@ Parts = Sequence[Part]
 #: they go make the same again and again. So many kinds of numbers are remembered, then all are forgotten.
 MAX_SHARED = 1024
 _KEY = Struct(f"={N_NUMBERS}d")
-_parts_of_numbers: dict[bytes, tuple[Part, ...]] = {}
+_parts_of_numbers: dict[bytes, Parts] = {}
 
 #: One product of two poses rounds each coordinate of a point by at most this many units in the
 #: last place of its terms: three products and three sums for the rotation, one more for the shift.
@@ -120,7 +120,7 @@ def _compound(shape: Compound, of_item: Callable[[Shape], Parts] = parts_of) -> 
     return PlacedSets(LoweredSets(sets), np.array(poses))
 
 
-def _alone(packed: PackedConvex) -> Parts:
+def _alone(packed: PackedConvex) -> tuple[Part]:
     return ((packed, IDENTITY),)
 
 

@@ -267,7 +267,7 @@ def prepared_sets(table: ShapeTable) -> Prepared:
 def _prepared(header: np.ndarray, table: ShapeTable | None, space: BlockWorkspace) -> Prepared:
     return Prepared(
         prepared_boolean(collide_single, header), prepared_within(within_single, header),
-        prepared_row(distance_single, header), None, table, space,
+        prepared_row(distance_single, header), None, table, space, None if table else header,
     )
 
 

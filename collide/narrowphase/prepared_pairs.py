@@ -38,17 +38,18 @@ class Prepared:
         with the pair's row of `PAIR_DTYPE`; depths and limit [m] as of `convex_batches.Question`.
     contacts(X_WA, X_WB, max_contacts, margin) : bytes of the rows of `CONTACT_DTYPE`.
     table : read by batches of the pair: a `ShapeTable` or a `CompoundTable`, or ``None``.
+    header : of two shapes of a few numbers, the block of `lower_pair.py`.
     held : other objects in use by kernels.
     """
 
-    __slots__ = ("__weakref__", "collide", "contacts", "distance", "held", "table", "within")
+    __slots__ = ("__weakref__", "collide", "contacts", "distance", "header", "held", "table", "within")
 
     def __init__(
         self, collide: Single | None = None, within: Single | None = None, distance: Single | None = None,
-        contacts: Single | None = None, table: Any = None, held: Any = None,
+        contacts: Single | None = None, table: Any = None, held: Any = None, header: Any = None,
     ):
         self.collide, self.within, self.distance, self.contacts = collide, within, distance, contacts
-        self.table, self.held = table, held
+        self.table, self.held, self.header = table, held, header
 
 
 def prepared_pair(A: Shape, B: Shape, slot: str = "_prepared") -> Any:

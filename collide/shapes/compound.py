@@ -56,7 +56,7 @@ class Compound(Shape):
             poses = np.array([_checked_pose(k, shape, X) for k, (shape, X) in enumerate(pairs)])
         poses.flags.writeable = False
         shapes = [shape for shape, _ in pairs]
-        self._store(items=tuple(zip(shapes, poses)), meshed=any([shape.meshed for shape in shapes]), poses=poses)
+        self._store(items=tuple(zip(shapes, poses)), meshed=any(shape.meshed for shape in shapes), poses=poses)
 
     @property
     def convex(self) -> bool:  # type: ignore[override]

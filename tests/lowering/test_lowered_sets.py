@@ -122,7 +122,8 @@ def test_tables_of_bodies_are_those_of_their_sets():
 def test_parts_of_a_compound_are_lowered_without_python_of_their_own():
     """No packed set is made until asked for: a union of 300 boxes is lowered in some calls, not in thousands."""
     rng = rng_of("lowered compound")
-    shape = collide.Compound([(collide.Box(rng.uniform(0.1, 1.0, 3)), collide.pose(rng.normal(size=3))) for _ in range(300)])
+    boxes = [collide.Box(size) for size in rng.uniform(0.1, 1.0, (300, 3))]
+    shape = collide.Compound([(box, collide.pose(rng.normal(size=3))) for box in boxes])
     parts = parts_of(shape)
     assert isinstance(parts, L.PlacedSets) and not parts.sets._packed
     assert collide.collide(shape, collide.Sphere(0.1), np.eye(4), collide.pose((90.0, 0, 0))) is False

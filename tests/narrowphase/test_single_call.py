@@ -93,6 +93,17 @@ def test_first_calls_refuse_what_later_ones_do():
             ask(A, 1.0, X, X)
 
 
+def functions_walked(call):
+    """Names of the functions of Python that a call enters."""
+    walked = []
+    sys.setprofile(lambda frame, event, _: walked.append(frame.f_code.co_name) if event == "call" else None)
+    try:
+        call()
+    finally:
+        sys.setprofile(None)
+    return walked[1:]
+
+
 def test_new_pairs_walk_few_functions():
     """From the call to the answer of two shapes never seen before: those of the standard library and of C apart."""
     if not single_calls_are_safe() or query.collide.__class__.__name__ != "builtin_function_or_method":
@@ -104,12 +115,7 @@ def test_new_pairs_walk_few_functions():
     for kind_a, kind_b in combinations_with_replacement(kinds, 2):
         A, B = naive.one_of_each(rng)[kind_a], naive.one_of_each(rng)[kind_b]
         collide.collide(*(naive.one_of_each(rng)[kind] for kind in (kind_a, kind_b)), X, Y)  # loads what is lazy
-        walked = []
-        sys.setprofile(lambda frame, event, _: walked.append(frame.f_code.co_name) if event == "call" else None)
-        try:
-            collide.collide(A, B, X, Y)
-        finally:
-            sys.setprofile(None)
+        walked = functions_walked(lambda A=A, B=B: collide.collide(A, B, X, Y))
         assert prepared_pair(A, B) is not None and len(walked) <= 14 + 6 * (kind_a, kind_b).count("Capsule"), walked
 
 
@@ -124,6 +130,44 @@ def test_pairs_of_few_numbers_hold_one_block():
     assert collide.collide(A, B, X, np.stack([Y, Y])).all() and pair.table is not None
     first = pair.table
     assert collide.distance(A, B, X, np.stack([Y, Y])).hit.all() and pair.table is first
+
+
+def test_contacts_of_pairs_of_equal_numbers_are_made_once():
+    """Faces are shared by pairs of the same few numbers, hold what they read, and nothing is added with a pair."""
+    if not single_calls_are_safe():
+        pytest.skip("plain kernels have no single calls")
+    X, Y = np.eye(4), collide.pose((0.9, 0.0, 0.0))
+    kept, rows = [], []
+    for _ in range(3):
+        A, B = collide.Box((1, 1.25, 1)), collide.Capsule(0.5, 0.75)
+        rows.append(collide.contacts(A, B, X, Y).rows.tobytes())
+        kept.append((prepared_pair(A, B).contacts, prepared_pair(A, B).held[1]))
+        del A, B
+    assert kept[0] == kept[1] == kept[2] and rows[0] == rows[1] == rows[2] and len(rows[0]) > 0
+    A, B = collide.Box((1, 1.25, 1)), collide.Capsule(0.5, 0.75)
+    collide.collide(A, B, X, Y), collide.contacts(A, B, X, Y)
+    before = prepared_pair(A, B).held
+    collide.contacts(A, B, X, Y), collide.distance(A, B, X, Y)
+    assert prepared_pair(A, B).held is before
+
+
+def test_faces_of_few_numbers_have_the_bits_of_packed_sets():
+    """Contacts by the one block, and by a `HullFaceTable` of packed sets: of all aspects, slivers among them."""
+    if not single_calls_are_safe():
+        pytest.skip("plain kernels have no single calls")
+    rng, n_rows = rng_of("faces of few numbers"), 0
+    for k in range(150):
+        size = np.exp(rng.normal(size=3) * (0.2, 2.0, 12.0)[k % 3]) if k % 4 else rng.integers(1, 4, 3) * 0.5
+        A = collide.Box(np.clip(size, 1e-8, 1e8))
+        least, most = float(A.size.min()), float(A.size.max())
+        B = (collide.Box(A.size[::-1]), collide.Sphere(least), collide.Capsule(least, most))[k % 3]
+        X, Y = np.eye(4), collide.pose((0.5 * A.size[0], 0.0, 0.0)) @ random_pose(rng, 0.0)
+        with naive.reproducible(Case(A, B, X, Y)):
+            rows = collide.contacts(A, B, X, Y, margin=0.01).rows
+            assert prepared_pair(A, B).table is None, "the one block has no space for these faces"
+            assert rows.tobytes() == collide.contacts(A, B, X[None], Y[None], margin=0.01).rows.tobytes()
+        n_rows += len(rows)
+    assert n_rows > 300
 
 
 def test_single_gaps_of_what_has_no_depth():

@@ -279,7 +279,7 @@ def test_the_same_in_python_answers_alike(no_long_way):
         long_way.__name__, long_way.__signature__ = question, inspect.signature(ask)
         in_python = single_queries._in_python(long_way, prepare, collide.Contacts, collide.certify)
         new = collide.Box((1, 1, 1)), collide.Box((0.7, 1.3, 0.4))
-        told = [_said(f, *pair, EYE, collide.pose((0.9, 0.3, 0.1))) for f in (in_python, ask) for pair in (new,)]
+        told = [_said(f, *new, EYE, collide.pose((0.9, 0.3, 0.1))) for f in (in_python, ask)]
         assert told[0] == told[1] and not isinstance(told[0], str), "a new pair is made ready, and asked"
         pair, n_single = prepared_boxes(), 0
         for X in (collide.pose((0.9, 0.3, 0.1)), collide.pose((0.6, 0.2, 0.3)), EYE.astype(np.float32), 2 * EYE):
