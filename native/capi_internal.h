@@ -48,7 +48,7 @@ enum {
 };
 
 /* Integers that a digest is worked out in (collide/numerics/number_digest.py). */
-enum { DIGEST_WORDS = 40 };
+enum { DIGEST_WORDS = 24 };
 
 /* Sizes of things: nothing is larger, or a product of such would overflow. */
 #define LARGEST 1e50

@@ -73,7 +73,8 @@ def python_functions(entries) -> str:
         lines.append(f"    Py_BEGIN_ALLOW_THREADS {call} Py_END_ALLOW_THREADS" if nogil else f"    {call}")
         lines += ["    Py_RETURN_NONE;" if result == "void" else f"    return {_TO_PYTHON[result]};", "}"]
         text += lines
-    singles = [(name, _SINGLES[tuple(_parsed(signature)[1])]) for name, signature, nogil in entries if not nogil]
+    keep_lock = [(name, tuple(_parsed(signature)[1])) for name, signature, nogil in entries if not nogil]
+    singles = [(name, _SINGLES[arguments]) for name, arguments in keep_lock if arguments in _SINGLES]
     text.append("#define SINGLES " + " ".join(f"{macro}({name})" for name, macro in singles))
     text.append("#define SINGLE_METHODS " + " ".join(f"SINGLE_METHOD({name})" for name, _ in singles))
     text.append("#define ENTRIES \\")

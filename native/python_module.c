@@ -186,7 +186,7 @@ struct query {
     enum word length, option;   /* its own arguments: a length, and one that is none (WORDS where there is no such) */
     enum word none[2];          /* arguments that may be None */
     double least, most;         /* of the length, unless it is 0 [m] */
-    PyObject *function, *result, *certify;
+    PyObject *function, *prepare, *result, *certify;
     PyObject *usual_length, *usual_option;
 };
 
@@ -228,7 +228,7 @@ static int attribute_of(PyObject *owner, enum word name, PyObject **found)
 }
 
 /* How the pair made ready of A and B answers a question, as `attribute_of` says; the attribute itself has to be there. */
-static int single_of(PyObject *A, PyObject *B, enum word question, PyObject **single)
+static int kept_single_of(PyObject *A, PyObject *B, enum word question, PyObject **single)
 {
     PyObject *pairs, *serial, *pair;
     int found;
@@ -246,6 +246,18 @@ static int single_of(PyObject *A, PyObject *B, enum word question, PyObject **si
     }
     Py_DECREF(pairs);
     return found;
+}
+
+/* The same. Where the pair is not ready, or not for this question, and the poses are matrices, it is made ready now. */
+static int single_of(const struct query *query, PyObject *const *given, enum word question, PyObject **single)
+{
+    int found = kept_single_of(given[0], given[1], question, single);
+    PyObject *made;
+    if (found < 0 || (found && *single != Py_None) || matrix_of(given[2]) == NULL || matrix_of(given[3]) == NULL) return found;
+    if (found) Py_CLEAR(*single);
+    if ((made = PyObject_CallFunctionObjArgs(query->prepare, given[0], given[1], NULL)) == NULL) return -1;
+    Py_DECREF(made);
+    return made == Py_True ? kept_single_of(given[0], given[1], question, single) : 0;
 }
 
 static PyObject *tuple_of(PyObject *const *items, Py_ssize_t n)
@@ -337,7 +349,7 @@ static PyObject *ask_collide(PyObject *self, PyObject *const *given, Py_ssize_t 
         int is_touch = read.length == query->usual_length || PyFloat_AsDouble(read.length) == 0.0;
         enum word question = !is_touch ? WITHIN : are_batch(given[2], given[3]) ? COLLIDE_POSES : COLLIDE;
         PyObject *arguments[3] = {given[2], given[3], read.length};
-        if ((found = single_of(given[0], given[1], question, &single)) < 0) return NULL;
+        if ((found = single_of(query, given, question, &single)) < 0) return NULL;
         if (found) {
             if ((answer = answer_of_single(single, arguments, is_touch ? 2 : 3)) != Py_None) return answer;
             Py_DECREF(answer);
@@ -370,7 +382,7 @@ static PyObject *ask_distance(PyObject *self, PyObject *const *given, Py_ssize_t
     int found;
     if (n == 4 && (X_WA = matrix_of(given[2])) != NULL && (X_WB = matrix_of(given[3])) != NULL &&
         read_options(query, names, given + n, &read) && (read.option == Py_True || read.option == Py_False)) {
-        if ((found = single_of(given[0], given[1], DISTANCE, &single)) < 0) return NULL;
+        if ((found = single_of(query, given, DISTANCE, &single)) < 0) return NULL;
         if (found && single != Py_None) {
             memory = PyByteArray_FromStringAndSize(NULL, sizeof(struct single_pair));
             if (memory == NULL) answer = NULL;
@@ -396,7 +408,7 @@ static PyObject *ask_distance(PyObject *self, PyObject *const *given, Py_ssize_t
     } else if (n == 4 && are_batch(given[2], given[3]) && read_options(query, names, given + n, &read) &&
                (read.option == Py_True || read.option == Py_False)) {
         PyObject *arguments[4] = {given[2], given[3], read.option, read.length};
-        if ((found = single_of(given[0], given[1], DISTANCE_POSES, &single)) < 0) return NULL;
+        if ((found = single_of(query, given, DISTANCE_POSES, &single)) < 0) return NULL;
         if (found) {
             if ((answer = answer_of_single(single, arguments, 4)) == NULL) return NULL;
             if (answer != Py_None) return result_of_poses(query, given[0], given[1], answer);
@@ -420,7 +432,7 @@ static PyObject *ask_contacts(PyObject *self, PyObject *const *given, Py_ssize_t
         PyObject *arguments[4] = {given[2], given[3], read.option, read.length};
         if (most == -1 && PyErr_Occurred() != NULL) PyErr_Clear();
         if (most < 1 || most > ALL_CONTACTS) return long_way(query, given, n, names);
-        if ((found = single_of(given[0], given[1], CONTACTS, &single)) < 0) return NULL;
+        if ((found = single_of(query, given, CONTACTS, &single)) < 0) return NULL;
         if (found) {
             if ((answer = answer_of_single(single, arguments, 4)) == NULL) return NULL;
             if (answer != Py_None) return result_of(query, answer);
@@ -446,16 +458,17 @@ static int spell_words(void)
     return one != NULL || (one = PyLong_FromLong(1)) != NULL;
 }
 
-/* query(function, doc, (least, most), (usual length, usual option), result, certify): the function of the same name as one of C's. The
+/* query(function, doc, (least, most), (usual length, usual option), prepare, result, certify): the function of the same name as one of C's. The
    doc begins with a line that `inspect.signature` reads. */
 static PyObject *query_of(PyObject *module, PyObject *arguments)
 {
-    PyObject *function, *name, *module_name, *usual_length, *usual_option, *result, *certify, *made = NULL;
+    PyObject *function, *name, *module_name, *usual_length, *usual_option, *prepare, *result, *certify, *made = NULL;
     const char *doc;
     char *kept;
     double least, most;
     size_t k;
-    if (!PyArg_ParseTuple(arguments, "Os(dd)(OO)OO:query", &function, &doc, &least, &most, &usual_length, &usual_option, &result, &certify))
+    if (!PyArg_ParseTuple(arguments, "Os(dd)(OO)OOO:query", &function, &doc, &least, &most, &usual_length, &usual_option, &prepare,
+                          &result, &certify))
         return NULL;
     if (!spell_words()) return NULL;
     name = PyObject_GetAttrString(function, "__name__");
@@ -473,6 +486,7 @@ static PyObject *query_of(PyObject *module, PyObject *arguments)
         query->least = least;
         query->most = most;
         keep(&query->function, function);
+        keep(&query->prepare, prepare);
         keep(&query->result, result);
         keep(&query->certify, certify);
         keep(&query->usual_length, usual_length);

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from collide.lowering.shape_table import REACH, PoseTable, ShapeTable, has_own_p
 from collide.shapes.shape import Shape
 
 #: Convex sets of a shape and their poses in it.
-PartsOf = Callable[[Shape], tuple[Part, ...]]
+PartsOf = Callable[[Shape], Sequence[Part]]
 
 
 class PosedParts(NamedTuple):

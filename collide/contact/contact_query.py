@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Shapes = Shape | Sequence[Shape]
 
 
-@asks_prepared_pairs(Contacts)
+@asks_prepared_pairs(prepare_contacts, Contacts)
 def contacts(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, margin: float = 0.0, max_contacts: int = 8,
     check_poses: bool = True, threads: int = 1,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from struct import Struct
 from threading import local
 from typing import Any, NamedTuple
 
@@ -29,18 +30,24 @@ from collide.contact.convex_manifolds import (
     MARGIN,
     MAX_CONTACTS,
     PAIRS_DONE,
+    POSES_AT,
     ROWS_DONE,
     max_corners,
     workspace_doubles,
     workspace_integers,
 )
+from collide.contact.ready_contacts import CONTACT_WORDS, ready_contacts
 from collide.contact.single_contact_call import SINGLE_HEADER, contacts_single
 from collide.contact.support_face import ROUND
 from collide.errors import InvalidPose, UnsupportedQuery
 from collide.kernels import address_of
 from collide.kernels.prepared import prepared_contacts
 from collide.lowering.compound_layout import layout_of
+from collide.lowering.convex_sets import SET_NUMBERS
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
+from collide.lowering.hull_polygons import faces_memory
+from collide.lowering.lower_numbers import N_NUMBERS
+from collide.lowering.packed_convex import BLOCK as BLOCK_OF_POINTS
 from collide.lowering.parts import is_single_convex
 from collide.lowering.shape_table import POSE, ShapeTable
 from collide.narrowphase.composite.single_composite_call import BALLS_WORK, balls_beyond
@@ -221,10 +228,12 @@ def prepare_contacts(A, B) -> bool:
     if pair is None:
         pair = prepare_sets(A, B) if is_convex else Prepared()
         keep_prepared(A, B, pair)
-    if pair.contacts is None:  # shapes of the same few numbers share a pair (`convex_batches.prepare_sets`)
-        pair.contacts, held = _single_contacts(pair.table) if is_convex else _single_far_contacts(A, B)
-        pair.held = pair.held, held
-    return prepared_pair(A, B) is pair
+    made = None if pair.header is None else _contacts_of_numbers(A, B, pair.header)
+    if made is None:
+        made = _single_contacts(shape_table(A, B)[0]) if is_convex else _single_far_contacts(A, B)
+    pair.contacts, held = made
+    pair.held = pair.held, held
+    return True
 
 
 def _single_far_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
@@ -232,6 +241,36 @@ def _single_far_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
     held = layout_of(A).ball, layout_of(B).ball, np.zeros(BALLS_WORK)
     header = np.array([address_of(of) for of in held], dtype=np.int64)
     return prepared_contacts(balls_beyond, header, no_rows()), held
+
+
+#: Faces take longer than the rest of a pair of few numbers: pairs of equal numbers share these. So many pairs are
+#: remembered, then all are forgotten.
+_MAX_SHARED = 256
+_contacts_by_numbers: dict[bytes, tuple[Single, Any]] = {}
+_BOTH_NUMBERS = Struct(f"={2 * N_NUMBERS}d")
+
+
+def _contacts_of_numbers(A: Shape, B: Shape, header: np.ndarray) -> tuple[Single, Any] | None:
+    """`_single_contacts` of two shapes of a few numbers; ``None`` where the faces take more space than there is.
+
+    header : the block of `lower_pair`.
+    """
+    key = _BOTH_NUMBERS.pack(*SET_NUMBERS[A.__class__](A), *SET_NUMBERS[B.__class__](B))
+    made = _contacts_by_numbers.get(key)
+    if made is None:
+        made = _made_of_numbers(header)
+        if made is not None:
+            if len(_contacts_by_numbers) >= _MAX_SHARED:
+                _contacts_by_numbers.clear()
+            _contacts_by_numbers[key] = made
+    return made
+
+
+def _made_of_numbers(header: np.ndarray) -> tuple[Single, Any] | None:
+    space, block = _space_of_contacts().fit(ROUND), np.empty(CONTACT_WORDS, dtype=np.int64)
+    if not ready_contacts(address_of(block), address_of(header), address_of(space.header), address_of(space.memory)):
+        return None
+    return prepared_contacts(contacts_single, block, space.rows), (header, space.buffers)
 
 
 def _single_contacts(table: ShapeTable) -> tuple[Single, Any]:
@@ -243,10 +282,7 @@ def _single_contacts(table: ShapeTable) -> tuple[Single, Any]:
     header[HEADER_OF_POSES : HEADER_OF_POSES + PAIRS_DONE] = _addresses(
         table, faces, space, space.poses, space.shape_of
     )
-    rows = np.zeros(max_corners(faces.largest), dtype=CONTACT_DTYPE)
-    # Kernels use these buffers, whatever becomes of the workspace; a larger one is of other arrays.
-    held = block, faces, space.doubles, space.integers, space.poses, space.shape_of
-    return prepared_contacts(contacts_single, header, rows), held
+    return prepared_contacts(contacts_single, header, space.rows), (block, faces, space.buffers)
 
 
 class _Workspace:
@@ -256,6 +292,8 @@ class _Workspace:
         self.largest = 0
         self.doubles, self.integers = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.poses, self.shape_of = np.zeros((2, POSE)), np.zeros(2, dtype=np.int64)
+        self.header = np.zeros(SINGLE_HEADER, dtype=np.int64)
+        self.memory = np.empty(3 * BLOCK_OF_POINTS + faces_memory(BLOCK_OF_POINTS) // 8, dtype=np.int64)
 
     def fit(self, largest: int) -> _Workspace:
         """Itself, with space for faces of so many corners."""
@@ -264,6 +302,13 @@ class _Workspace:
             self.largest = largest
             self.doubles = np.zeros(workspace_doubles(largest))
             self.integers = np.zeros(workspace_integers(largest), dtype=np.int64)
+            self.rows = np.zeros(max_corners(largest), dtype=CONTACT_DTYPE)
+            self.header[HEADER_OF_POSES + POSES_AT : HEADER_OF_POSES + PAIRS_DONE] = (
+                address_of(self.poses), address_of(self.shape_of), address_of(self.doubles), address_of(self.integers),
+                largest,
+            )
+            #: Used by kernels of pairs, whatever becomes of the workspace: a larger one is of other arrays.
+            self.buffers = self.doubles, self.integers, self.poses, self.shape_of
         return self
 
 

@@ -49,8 +49,8 @@ if MODE == COMPILED:
         """
         return glue.prepared(entry.__name__, header, rows)
 
-    #: ``query_of_c(function, doc, (min_length, max_length), (usual length, usual option), result, certify)``: a public
-    #: function of single calls as one of C's; None where there is no library (`narrowphase/single_queries.py`).
+    #: ``query_of_c(function, doc, (min_length, max_length), (usual length, usual option), prepare, result, certify)``:
+    #: a public function of single calls as one of C's; None where there is no library (`narrowphase/single_queries.py`).
     query_of_c: Callable | None = glue.query
 else:
     query_of_c = None

@@ -12,7 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
+from collide.lowering.lowered_sets import LoweredSets, in_rows
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex
+from collide.lowering.set_rows import KIND, RADIUS, REACH, SLOP
 from collide.lowering.shape_table import ShapeTable
 
 # Doubles of a part: its pose in the body (R row by row, then t), 1 where that is more than the identity, the farthest
@@ -49,7 +51,7 @@ class LaidOut(NamedTuple):
     """A body: its convex parts, (parts, PART) doubles, (BODY,) doubles; its parts by their places (parts,) int64, each
     GROUP in turn of parts near each other, and (groups, GROUP_BALL) doubles."""
 
-    packed: tuple[PackedConvex, ...]
+    packed: LoweredSets
     parts: np.ndarray
     ball: np.ndarray
     by_place: np.ndarray
@@ -58,17 +60,16 @@ class LaidOut(NamedTuple):
 
 def lay_out(parts: Sequence[tuple[PackedConvex, np.ndarray]]) -> LaidOut:
     """A body, by its convex parts and their poses (4, 4) in it."""
-    X = np.array([pose for _, pose in parts])
+    sets, X = (parts := in_rows(parts)).sets, parts.X_BP
     rows = np.zeros((len(parts), PART))
     rows[:, :9], rows[:, 9:12] = X[:, :3, :3].reshape(-1, 9), X[:, :3, 3]
     rows[:, TURNED] = (X != np.eye(4)).any(axis=(1, 2))
-    rows[:, MEASURE] = [packed.reach for packed, _ in parts] + np.abs(X[:, :3, 3]).sum(axis=1)
-    rows[:, SWEPT_RADIUS] = [packed.radius for packed, _ in parts]
-    balls = _balls_of([packed for packed, _ in parts])
+    rows[:, MEASURE] = sets.numbers[:, REACH] + np.abs(X[:, :3, 3]).sum(axis=1)
+    rows[:, SWEPT_RADIUS] = sets.numbers[:, RADIUS]
+    balls = _balls_of(sets)
     rows[:, CENTRE : CENTRE + 3] = (X[:, :3, :3] @ balls[:, :3, None])[:, :, 0] + X[:, :3, 3]
     # A matrix that passes for a rotation may lengthen a little.
-    stretch = np.sqrt(np.abs(np.swapaxes(X[:, :3, :3], 1, 2) @ X[:, :3, :3]).sum(axis=2).max(axis=1))
-    rows[:, BALL] = balls[:, 3] * np.maximum(1.0, stretch) * _OUTWARD
+    rows[:, BALL] = balls[:, 3] * np.maximum(1.0, _stretches(X)) * _OUTWARD
     centres, radii = rows[:, CENTRE : CENTRE + 3], rows[:, BALL]
     body = np.zeros(BODY)
     body[BODY_CENTRE : BODY_CENTRE + 3] = middle = 0.5 * (centres.min(axis=0) + centres.max(axis=0))
@@ -78,7 +79,16 @@ def lay_out(parts: Sequence[tuple[PackedConvex, np.ndarray]]) -> LaidOut:
     body[BODY_REACH] = reaches[np.isfinite(reaches)].max(initial=0.0)
     by_place = _by_place(centres)
     groups = _groups_of(centres[by_place], radii[by_place], rows[by_place, SWEPT_RADIUS])
-    return LaidOut(tuple([packed for packed, _ in parts]), rows, body, by_place, groups)
+    return LaidOut(sets, rows, body, by_place, groups)
+
+
+def _stretches(X: np.ndarray) -> np.ndarray:
+    """(k,) by how much matrices (k, 4, 4) lengthen a vector at most: the root of the largest sum of a row of |RᵀR|."""
+    x, y, z = (np.ascontiguousarray(X[:, :3, axis].T) for axis in range(3))
+    xx, yy, zz, xy, yz, zx = (
+        np.abs(u[0] * v[0] + u[1] * v[1] + u[2] * v[2]) for u, v in ((x, x), (y, y), (z, z), (x, y), (y, z), (z, x))
+    )
+    return np.sqrt(np.maximum(np.maximum(xx + xy + zx, yy + yz + xy), zz + zx + yz))
 
 
 def _by_place(centres: np.ndarray) -> np.ndarray:
@@ -105,24 +115,19 @@ def _groups_of(centres: np.ndarray, balls: np.ndarray, radii: np.ndarray) -> np.
     return groups
 
 
-def _balls_of(sets: list[PackedConvex]) -> np.ndarray:
+def _balls_of(sets: LoweredSets) -> np.ndarray:
     """(k, 4) centres and radii of balls that hold the cores of convex sets, as they are stored and as they were
-    described; sets of equally many points are gone through together."""
+    described."""
+    kinds, slops = sets.ints[:, KIND], sets.numbers[:, SLOP]
     balls = np.zeros((len(sets), 4))
-    of_size: dict[int, list[int]] = {}
-    for k, packed in enumerate(sets):
-        of_size.setdefault(len(packed.points) if packed.kind == POINTS else -packed.kind, []).append(k)
-    for size, numbers in of_size.items():
-        some = [sets[k] for k in numbers]
-        slops = np.array([packed.slop for packed in some])
-        if size > 0:
-            points = np.array([packed.points for packed in some])
-            balls[numbers, :3] = centres = 0.5 * (points.min(axis=1) + points.max(axis=1))
-            balls[numbers, 3] = np.sqrt(np.square(points - centres[:, None]).sum(axis=2).max(axis=1)) + slops
-        elif size == -HALFSPACE:
-            balls[numbers, 3] = np.inf
-        else:
-            balls[numbers, 3] = np.array([packed.reach for packed in some]) + slops
+    balls[:, 3] = np.where(kinds == HALFSPACE, np.inf, sets.numbers[:, REACH] + slops)
+    has_points = kinds[sets.by_numbers] == POINTS
+    of_numbers = sets.by_numbers[has_points]  # corners of boxes around the origin, all equally far (`corners_of`)
+    balls[of_numbers, 3] = np.sqrt(np.square(sets.columns[has_points, :, 0]).sum(axis=1)) + slops[of_numbers]
+    for k in np.setdiff1d(np.flatnonzero(kinds == POINTS), of_numbers, assume_unique=True).tolist():
+        points = sets[k].points
+        balls[k, :3] = centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        balls[k, 3] = np.sqrt(np.square(points - centre).sum(axis=1).max()) + slops[k]
     return balls
 
 
@@ -132,7 +137,7 @@ class CompoundTable:
     def __init__(self, bodies: Sequence[LaidOut]):
         self.counts = np.array([len(body.packed) for body in bodies], dtype=np.int64)
         self.first = np.cumsum(self.counts) - self.counts
-        self.table = ShapeTable([packed for body in bodies for packed in body.packed])
+        self.table = ShapeTable.of_bodies([body.packed for body in bodies])
         self._parts = np.concatenate([body.parts for body in bodies])
         n_groups = np.array([len(body.groups) for body in bodies])
         self._bodies = np.ascontiguousarray(np.stack([self.first, self.counts, np.cumsum(n_groups) - n_groups], axis=1))

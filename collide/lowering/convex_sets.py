@@ -1,13 +1,13 @@
 """What a shape is, as convex sets of numbers: one function a class. `parts.py` packs the sets for kernels.
 
-No kernel is imported: certificates read these sets.
+No kernel is imported: certificates read these sets. Shapes of a few numbers are told by eight (`SET_NUMBERS`), whose
+core points are corners of a box: `corners_of` here, and `lower_numbers.py` for kernels, by the same signs.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from struct import Struct
 from typing import NamedTuple
 
 import numpy as np
@@ -65,6 +65,8 @@ def convex_set(shape: Shape) -> ConvexSet:
     """The convex set of a shape other than a Compound. Raises UnsupportedQuery for meshes and regions, TypeError for
     classes not derived from the library's."""
     for cls in type(shape).__mro__:
+        if cls in SET_NUMBERS:
+            return _of_numbers(*SET_NUMBERS[cls](shape))
         if cls in _RULES:
             return _RULES[cls](shape)
     raise TypeError(f"{type(shape).__name__} cannot be asked about: derive it from one of collide's shapes")
@@ -75,47 +77,80 @@ def moved(X_CS: np.ndarray, X_SP: np.ndarray) -> np.ndarray:
     return X_CS if X_SP is IDENTITY or np.array_equal(X_SP, IDENTITY) else X_CS @ X_SP
 
 
+#: A set by eight numbers: its kind; how many core points; the radius of the ball swept over the core; the reach of a
+#: curved core, 0 of others; then half sizes of the box whose corners the points are (`corners_of`), or the four numbers
+#: of a set of another kind (`packed_convex.PackedConvex`).
+SetNumbers = tuple[int, int, float, float, float, float, float, float]
+
+
+def corners_of(n: int, half_x: float, half_y: float, half_z: float) -> np.ndarray:
+    """(n, 3) read-only corners of a box, of its edge along z, or its centre, for n = 8, 2 or 1.
+
+    Bits of a corner's number are the signs along x, y, z, z being the lowest bit; 0 − 0 is 0 where −1·0 is not.
+    """
+    half_sizes = np.array((half_x, half_y, half_z))
+    corners = np.where(_IS_POSITIVE[:n], half_sizes, 0.0 - half_sizes)
+    corners.setflags(write=False)
+    return corners
+
+
+_IS_POSITIVE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
 _NO_POINTS = np.zeros((0, 3))
 _NO_POINTS.flags.writeable = False
-_ORIGIN = np.zeros((1, 3))  # read-only once packed
-#: Of a box: an array of these takes half the time that numpy's product takes.
-_CORNERS = Struct("=24d")
 
 
-def _sphere(shape: Sphere) -> ConvexSet:
-    return ConvexSet(POINTS, _ORIGIN, shape.radius)
+def _sphere(shape: Sphere) -> SetNumbers:
+    return POINTS, 1, shape.radius, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
-def _box(shape: Box) -> ConvexSet:
-    x, y, z = half_sizes = tuple([0.5 * length for length in shape.size.tolist()])
-    corners = _CORNERS.pack(
-        -x, -y, -z, -x, -y, z, -x, y, -z, -x, y, z, x, -y, -z, x, -y, z, x, y, -z, x, y, z,
-    )
-    return ConvexSet(POINTS, np.frombuffer(corners).reshape(8, 3), params=half_sizes)
+def _box(shape: Box) -> SetNumbers:
+    x, y, z = shape.size.tolist()
+    return POINTS, 8, 0.0, 0.0, 0.5 * x, 0.5 * y, 0.5 * z, 0.0
 
 
-def _capsule(shape: Capsule) -> ConvexSet:
+def _capsule(shape: Capsule) -> SetNumbers:
     half = 0.5 * shape.length
-    return ConvexSet(POINTS, np.array([(0.0, 0.0, -half), (0.0, 0.0, half)])[: 2 if half else 1], shape.radius)
+    return POINTS, 2 if half else 1, shape.radius, 0.0, 0.0, 0.0, half, 0.0
 
 
-def _cylinder(shape: Cylinder) -> ConvexSet:
-    half = 0.5 * shape.length
-    return ConvexSet(CYLINDER, _NO_POINTS, params=(shape.radius, half), curved_reach=math.hypot(shape.radius, half))
+def _cylinder(shape: Cylinder) -> SetNumbers:
+    radius, half = shape.radius, 0.5 * shape.length
+    return CYLINDER, 0, 0.0, math.hypot(radius, half) * _UPWARDS, radius, half, 0.0, 0.0
 
 
-def _cone(shape: Cone) -> ConvexSet:
-    half = 0.5 * shape.length
-    return ConvexSet(CONE, _NO_POINTS, params=(shape.radius, half), curved_reach=math.hypot(shape.radius, half))
+def _cone(shape: Cone) -> SetNumbers:
+    radius, half = shape.radius, 0.5 * shape.length
+    return CONE, 0, 0.0, math.hypot(radius, half) * _UPWARDS, radius, half, 0.0, 0.0
 
 
-def _ellipsoid(shape: Ellipsoid) -> ConvexSet:
-    radii = shape.radii.tolist()
-    return ConvexSet(ELLIPSOID, _NO_POINTS, params=tuple(radii), curved_reach=max(radii))
+def _ellipsoid(shape: Ellipsoid) -> SetNumbers:
+    x, y, z = shape.radii.tolist()
+    return ELLIPSOID, 0, 0.0, max(x, y, z) * _UPWARDS, x, y, z, 0.0
 
 
-def _halfspace(shape: Halfspace) -> ConvexSet:
-    return ConvexSet(HALFSPACE, _NO_POINTS, params=(*shape.normal.tolist(), shape.offset))
+def _halfspace(shape: Halfspace) -> SetNumbers:
+    x, y, z = shape.normal.tolist()
+    return HALFSPACE, 0, 0.0, 0.0, x, y, z, shape.offset
+
+
+#: Rounds a reach upwards.
+_UPWARDS = 1 + 1e-15
+SET_NUMBERS: dict[type, Callable[..., SetNumbers]] = {
+    Sphere: _sphere, Box: _box, Capsule: _capsule, Cylinder: _cylinder, Cone: _cone, Ellipsoid: _ellipsoid,
+    Halfspace: _halfspace,
+}
+
+
+def set_numbers_of(shape: Shape) -> SetNumbers | None:
+    """The eight numbers of a shape; ``None`` of shapes of others."""
+    numbers_of = SET_NUMBERS.get(shape.__class__)
+    return None if numbers_of is None else numbers_of(shape)
+
+
+def _of_numbers(kind: int, n: int, radius: float, reach: float, *numbers: float) -> ConvexSet:
+    if kind != POINTS:
+        return ConvexSet(kind, _NO_POINTS, params=numbers, curved_reach=reach)
+    return ConvexSet(POINTS, corners_of(n, *numbers[:3]), radius, numbers if n == 8 else ())
 
 
 def _convex_hull(shape: ConvexHull) -> ConvexSet:
@@ -141,13 +176,6 @@ def _mesh(shape: Mesh) -> ConvexSet:
 
 
 _RULES: dict[type, Callable[..., ConvexSet]] = {
-    Sphere: _sphere,
-    Box: _box,
-    Capsule: _capsule,
-    Cylinder: _cylinder,
-    Cone: _cone,
-    Ellipsoid: _ellipsoid,
-    Halfspace: _halfspace,
     ConvexHull: _convex_hull,
     HPolytope: _hpolytope,
     Mesh: _mesh,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
-from collide.lowering.hull_polygons import LARGEST, N_DOUBLES, faces_memory, keep_faces, make_faces
+from collide.lowering.hull_polygons import FACE_INTS, LARGEST, N_DOUBLES, faces_memory, keep_faces, make_faces
 from collide.lowering.packed_convex import POINTS, PackedConvex, on_cache_lines
 from collide.lowering.shape_table import ShapeTable
 
@@ -16,7 +16,6 @@ from collide.lowering.shape_table import ShapeTable
     N_VERTICES, PADDED, N_FACES, COLUMNS_AT, VERTEX_IDS_AT, NORMALS_AT, FLATNESS_AT, TRIANGLES_AT, STARTS_AT,
     CORNERS_AT, EDGES_AT, FACE_OF_AT, FAN_STARTS_AT, FANS_AT,
 ) = range(14)
-FACE_INTS = 14
 
 
 class HullFaces(NamedTuple):

@@ -41,6 +41,8 @@ _THIN = 2.0**-6
 #: Coordinates are filled up to a multiple of so many (`packed_convex.BLOCK`).
 _BLOCK = 8
 
+#: Integers of a row of a `HullFaceTable`: `hull_faces.py` names their places.
+FACE_INTS = 14
 #: Integers of the header: how many faces, corners of faces, and vertices that have some; doubles to be kept; most
 #: corners of a face.
 FACES, CORNERS, IDS, N_DOUBLES, LARGEST = range(5)
@@ -141,6 +143,12 @@ def make_faces(points_at, n, memory_at):
 
     memory : as many bytes as `faces_memory` says, out: what `keep_faces` copies; its header first.
     """
+    return find_faces(points_at, n, memory_at)
+
+
+@kernel
+def find_faces(points_at, n, memory_at):
+    """`make_faces` for kernels."""
     hull_at = memory_at + 8 * _HEADER
     dimension = grow_hull(points_at, n, hull_at)
     if dimension < 0:
@@ -541,10 +549,16 @@ def keep_faces(points_at, n, memory_at, block_at, row_at):
 
     row : FACE_INTS integers, out: counts, and where each array of `hull_faces.HullFaces` stands in the block.
     """
+    copy_faces(points_at, n, memory_at, block_at, row_at)
+
+
+@kernel
+def copy_faces(points_at, n, memory_at, block_at, row_at):
+    """`keep_faces` for kernels."""
     making = _made(points_at, n, memory_at)
     header = making.header
     n_faces, n_corners, n_ids, padded = header[FACES], header[CORNERS], header[IDS], _padded(header)
-    row = view_i64(row_at, 14)
+    row = view_i64(row_at, FACE_INTS)
     row[0] = n_ids
     row[1] = padded
     row[2] = n_faces

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 from collide.curved.shape_kinds import HALFSPACE, NUMBERS, POINTS
-from collide.lowering.convex_sets import ConvexSet, convex_set
+from collide.lowering.convex_sets import convex_set, set_numbers_of
 from collide.shapes.compound import Compound
 from collide.shapes.primitives import Box, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import Shape, kept_with_shape
@@ -36,7 +36,7 @@ _OF_NUMBER = {number: Kind[name] for name, number in NUMBERS.items() if number !
 CURVED_KINDS = frozenset(kind for number, kind in _OF_NUMBER.items() if number != HALFSPACE)
 _OF_POINTS = (Kind.SPHERE, Kind.CAPSULE, Kind.POLYTOPE)
 #: Classes all of whose shapes are of one kind: new shapes are told apart without making their sets.
-_OF_CLASS = {
+OF_CLASS = {
     Sphere: Kind.SPHERE, Box: Kind.POLYTOPE, Cylinder: Kind.CYLINDER, Cone: Kind.CONE, Ellipsoid: Kind.ELLIPSOID,
     Halfspace: Kind.HALFSPACE,
 }
@@ -44,7 +44,8 @@ _OF_CLASS = {
 
 def kind_of(shape: Shape) -> Kind:
     """The kind of a shape."""
-    return _OF_CLASS[shape.__class__] if shape.__class__ in _OF_CLASS else _kind_by_set(shape)
+    kind = OF_CLASS.get(shape.__class__)
+    return _kind_by_set(shape) if kind is None else kind
 
 
 @kept_with_shape("_kind")
@@ -53,12 +54,16 @@ def _kind_by_set(shape: Shape) -> Kind:
         return Kind.MESH_COMPOUND if shape.meshed else Kind.COMPOUND
     if shape.is_region:
         return Kind.REGION
-    return Kind.MESH if shape.meshed else _kind_of_convex(convex_set(shape))
+    if shape.meshed:
+        return Kind.MESH
+    numbers = set_numbers_of(shape)
+    if numbers is not None:
+        return _kind_of_convex(numbers[0], numbers[1], 0.0)
+    part = convex_set(shape)
+    return _kind_of_convex(part.kind, len(part.points), part.slop)
 
 
-def _kind_of_convex(part: ConvexSet) -> Kind:
-    if part.kind != POINTS:
-        return _OF_NUMBER[part.kind]
-    if part.slop != 0.0:
-        return Kind.ROUNDED
-    return _OF_POINTS[min(len(part.points), 3) - 1]
+def _kind_of_convex(kind: int, n_points: int, slop: float) -> Kind:
+    if kind != POINTS:
+        return _OF_NUMBER[kind]
+    return Kind.ROUNDED if slop != 0.0 else _OF_POINTS[min(n_points, 3) - 1]

@@ -19,8 +19,8 @@ from collide.numerics.lowest_bits import NO_BITS
 from collide.support.point_columns import lay_out_points
 
 __all__ = [
-    "BLOCK", "CONE", "CYLINDER", "ELLIPSOID", "HALFSPACE", "POINTS", "PackedConvex", "on_cache_lines", "pack_curved",
-    "pack_halfspace", "pack_points",
+    "BLOCK", "CONE", "CYLINDER", "ELLIPSOID", "HALFSPACE", "NO_POINTS", "POINTS", "PackedConvex", "PreparedStructures",
+    "on_cache_lines", "pack_curved", "pack_halfspace", "pack_points",
 ]
 
 #: Coordinates stand in blocks of this many doubles, so that a scan needs no remainder loop.
@@ -110,7 +110,7 @@ def pack_points(
 
 def pack_curved(kind: int, params, reach: float) -> PackedConvex:
     """A cylinder, cone or ellipsoid by its numbers."""
-    return _without_points(kind, float(reach) * (1 + 1e-15), params)
+    return _without_points(kind, float(reach), params)
 
 
 def pack_halfspace(normal, offset: float) -> PackedConvex:
@@ -121,8 +121,8 @@ def pack_halfspace(normal, offset: float) -> PackedConvex:
 def _without_points(kind: int, reach: float, params: tuple[float, ...]) -> PackedConvex:
     numbers = _four(params)
     return PackedConvex(
-        kind, 0.0, reach, 0.0, numbers, _NO_POINTS, _NO_POINTS, address_of(_NO_POINTS), 0, PreparedStructures(False),
-        NO_BITS, _digest(kind, 0.0, numbers, _NO_POINTS),
+        kind, 0.0, reach, 0.0, numbers, NO_POINTS, NO_POINTS, address_of(NO_POINTS), 0, PreparedStructures(False),
+        NO_BITS, _digest(kind, 0.0, numbers, NO_POINTS),
     )
 
 
@@ -143,7 +143,7 @@ _HEAD = Struct("=6d")
 _NO_NUMBERS = (0.0, 0.0, 0.0, 0.0)
 _MINUS_ZERO = Struct("=d").pack(-0.0)
 _DOUBLE = 8
-_NO_POINTS = np.frombuffer(b"").reshape(0, 3)  # read-only
+NO_POINTS = np.frombuffer(b"").reshape(0, 3)  # read-only
 
 
 def on_cache_lines(*shape: int) -> np.ndarray:

@@ -6,33 +6,29 @@ never changes.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Hashable
-from operator import attrgetter
+from collections.abc import Callable, Sequence
+from struct import Struct
 
 import numpy as np
 
-from collide.lowering.convex_sets import ConvexSet, convex_set, moved
+from collide.lowering.convex_sets import SET_NUMBERS, ConvexSet, SetNumbers, convex_set, moved, set_numbers_of
+from collide.lowering.lower_numbers import N_NUMBERS
+from collide.lowering.lowered_sets import LoweredSets, PlacedSets
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_curved, pack_halfspace, pack_points
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
-from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
 
 #: A convex set and its (4, 4) pose in the shape's frame.
 Part = tuple[PackedConvex, np.ndarray]
+Parts = Sequence[Part]
 
 #: Shapes of few numbers share parts where these are equal, zeros of different signs apart: programs that make shapes as
 #: they go make the same again and again. So many kinds of numbers are remembered, then all are forgotten.
 MAX_SHARED = 1024
-_NUMBERS_OF: dict[type, Callable[..., Hashable]] = {
-    Sphere: attrgetter("radius"), Capsule: attrgetter("radius", "length"), Cylinder: attrgetter("radius", "length"),
-    Cone: attrgetter("radius", "length"), Box: lambda shape: shape.size.tobytes(),
-    Ellipsoid: lambda shape: shape.radii.tobytes(),
-    Halfspace: lambda shape: (shape.normal.tobytes(), shape.offset, math.copysign(1.0, shape.offset)),
-}
-_parts_of_numbers: dict[Hashable, tuple[Part, ...]] = {}
+_KEY = Struct(f"={N_NUMBERS}d")
+_parts_of_numbers: dict[bytes, Parts] = {}
 
 #: One product of two poses rounds each coordinate of a point by at most this many units in the
 #: last place of its terms: three products and three sums for the rotation, one more for the shift.
@@ -43,34 +39,29 @@ _MAX_OWN_BOUNDS, _CELLS = 512, 6
 
 
 @kept_with_shape("_parts")
-def parts_of(shape: Shape) -> tuple[Part, ...]:
+def parts_of(shape: Shape) -> Parts:
     """The convex sets whose union a shape is. Raises UnsupportedQuery for meshes and regions."""
     if isinstance(shape, Compound):
         return _compound(shape)
-    numbers_of = _NUMBERS_OF.get(shape.__class__)
-    if numbers_of is None:
+    numbers = set_numbers_of(shape)
+    if numbers is None:
         return _alone(_packed(convex_set(shape)))
-    key = shape.__class__, numbers_of(shape)
+    key = _KEY.pack(*numbers)
     parts = _parts_of_numbers.get(key)
     if parts is None:
         if len(_parts_of_numbers) >= MAX_SHARED:
             _parts_of_numbers.clear()
-        parts = _parts_of_numbers[key] = _alone(_packed(convex_set(shape)))
+        parts = _parts_of_numbers[key] = _alone(LoweredSets([numbers])[0])
     return parts
 
 
-def shares_parts(shape: Shape) -> bool:
-    """Whether a shape has the parts of all others of its numbers: few points, which are cheap to remember."""
-    return shape.__class__ in _NUMBERS_OF
-
-
-def bounding_parts_of(shape: Shape) -> tuple[Part, ...]:
+def bounding_parts_of(shape: Shape) -> Parts:
     """Convex sets that hold a shape: its parts, or larger, simpler sets for shapes without parts. For culling."""
     return _bounds_around(shape) if shape.is_asked_whole else parts_of(shape)
 
 
 @kept_with_shape("_bounds")
-def _bounds_around(shape: Compound | Mesh | HPolytope) -> tuple[Part, ...]:
+def _bounds_around(shape: Compound | Mesh | HPolytope) -> Parts:
     if isinstance(shape, HPolytope):
         return _alone(_half_space_around(shape))
     return _compound(shape, bounding_parts_of) if isinstance(shape, Compound) else _mesh_bounds(shape)
@@ -83,6 +74,8 @@ def convex_set_of(shape: Shape) -> PackedConvex:
 
 def is_single_convex(shape: Shape) -> bool:
     """Whether a shape is one convex set in its own frame."""
+    if shape.__class__ in SET_NUMBERS:
+        return True
     if shape.is_asked_whole:
         return False
     parts = parts_of(shape)
@@ -109,11 +102,25 @@ def _half_space_around(region: HPolytope) -> PackedConvex:
     return pack_halfspace(tuple(normals[least]), float(offsets[least]))
 
 
-def _compound(shape: Compound, of_item: Callable[[Shape], tuple[Part, ...]] = parts_of) -> tuple[Part, ...]:
-    return tuple([_placed(packed, X_CS, X_SP) for item, X_CS in shape.items for packed, X_SP in of_item(item)])
+def _compound(shape: Compound, of_item: Callable[[Shape], Parts] = parts_of) -> PlacedSets:
+    rules = [SET_NUMBERS.get(item.__class__) for item, _ in shape.items]
+    if None not in rules:
+        return PlacedSets(LoweredSets([rule(item) for rule, (item, _) in zip(rules, shape.items)]), shape.poses)  # type: ignore[misc]
+    sets: list[SetNumbers | PackedConvex] = []
+    poses: list[np.ndarray] = []
+    for rule, (item, X_CS) in zip(rules, shape.items):
+        if rule is not None:
+            sets.append(rule(item))
+            poses.append(X_CS)
+            continue
+        for packed, X_SP in of_item(item):
+            packed, X_CP = _placed(packed, X_CS, X_SP)
+            sets.append(packed)
+            poses.append(X_CP)
+    return PlacedSets(LoweredSets(sets), np.array(poses))
 
 
-def _alone(packed: PackedConvex) -> tuple[Part, ...]:
+def _alone(packed: PackedConvex) -> tuple[Part]:
     return ((packed, IDENTITY),)
 
 
@@ -126,7 +133,7 @@ def _placed(packed: PackedConvex, X_CS: np.ndarray, X_SP: np.ndarray) -> Part:
     return packed._replace(slop=packed.slop + 2 * _ULPS_PER_PRODUCT * _ULP * scale), X_CP
 
 
-def _mesh_bounds(mesh: Mesh) -> tuple[Part, ...]:
+def _mesh_bounds(mesh: Mesh) -> Parts:
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[mesh.faces] = True
     return _alone(pack_points(_points_around(mesh.vertices[used])))

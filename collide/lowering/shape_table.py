@@ -6,22 +6,34 @@ Rows are flat because nine arrays cost 500 ns a call in Python and four addresse
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Sequence
 from fractions import Fraction
-from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from collide.kernels import address_of
+from collide.lowering.lowered_sets import ChainedSets, LoweredSets, ranks_of
 from collide.lowering.packed_convex import PackedConvex
-from collide.lowering.prepared_structures import coarse_address, may_have_tree, support_tree_of
+from collide.lowering.prepared_structures import may_have_tree, support_tree_of
+from collide.lowering.set_rows import (
+    ADDRESS,
+    COARSE_AT,
+    COUNT,
+    INTS,
+    KIND,
+    LOWEST,
+    NUMBERS,
+    PADDED,
+    PARAMS,
+    RADIUS,
+    RANK,
+    REACH,
+    SLOP,
+    TREE,
+    write_row,
+)
 
-# One row of integers a shape.
-KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE, COARSE_AT = range(8)
-INTS = 8
-# One row of doubles a shape; PARAMS is the first of four.
-RADIUS, REACH, SLOP, PARAMS = range(4)
-NUMBERS = 7
 # One row of doubles a posed part: R row by row (9), t (3), slop of the pose (1), the row of the exact terms where R and
 # t are a rounded product of two poses (1), else −1, and how much R lengthens a vector at most (1), −1 until a kernel
 # asks.
@@ -37,8 +49,11 @@ TERM_ROW = LOW_PARTS + 12
 #: 4√3u·reach for the rotation and as much for the shift; doubled.
 PRODUCT_SLOP = 16 * 2.0**-53
 
-#: The same two rows as Python writes them: a third of the time that numpy takes to read a tuple.
-_INT_ROW, _NUMBER_ROW = Struct(f"={INTS}q"), Struct(f"={NUMBERS}d")
+__all__ = [
+    "ADDRESS", "COARSE_AT", "COUNT", "INTS", "KIND", "LOWEST", "NUMBERS", "PADDED", "PARAMS", "POSE", "RADIUS", "RANK",
+    "REACH", "SLOP", "TREE", "PoseTable", "ShapeTable", "has_own_pose", "moved_pose", "pose_table",
+]
+
 #: Once rows are added, ranks are so far apart that others go between them.
 _RANK_STEP = 1 << 32
 
@@ -53,12 +68,28 @@ class ShapeTable:
     """
 
     def __init__(self, packed: list[PackedConvex]):
-        self.packed: list[PackedConvex] = []
+        self.packed: Any = []
         self.ints, self.numbers = np.empty((len(packed), INTS), dtype=np.int64), np.empty((len(packed), NUMBERS))
         self._without_tree: set[int] = set()
         self._contents: list[bytes] = sorted({p.content for p in packed})
         self._ranks: list[int] = [*range(len(self._contents))]
         self._write(packed)
+
+    @classmethod
+    def of_bodies(cls, bodies: Sequence[LoweredSets]) -> ShapeTable:
+        """The sets of bodies, one behind the next, from their rows; such a table is not appended to."""
+        table = cls([])
+        table.packed = ChainedSets(bodies)
+        table.ints, table.numbers = (
+            np.concatenate([getattr(body, name) for body in bodies]) for name in ("ints", "numbers")
+        )
+        table.ints[:, RANK] = ranks_of(b"".join([body.contents for body in bodies]))
+        first = 0
+        for body in bodies:
+            table._without_tree.update([first + k for k in body.with_tree])
+            first += len(body)
+        table.addresses = address_of(table.ints), address_of(table.numbers)
+        return table
 
     def append(self, packed: list[PackedConvex]) -> None:
         """Add rows: O(log n) each, and the copy of all rows where memory has run out."""
@@ -90,11 +121,7 @@ class ShapeTable:
         first = len(self.packed)
         self.packed.extend(packed)
         for k, p in enumerate(packed, first):
-            _INT_ROW.pack_into(
-                self.ints.data, _INT_ROW.size * k,
-                p.kind, len(p.points), p.padded, p.address, p.lowest, self._rank_of(p), 0, coarse_address(p),
-            )
-            _NUMBER_ROW.pack_into(self.numbers.data, _NUMBER_ROW.size * k, p.radius, p.reach, p.slop, *p.numbers)
+            write_row(self.ints, self.numbers, k, p, self._rank_of(p))
             if may_have_tree(p):
                 self._without_tree.add(k)
         self.addresses = address_of(self.ints), address_of(self.numbers)

@@ -13,7 +13,8 @@ import numpy as np
 
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.compound_table import CompoundTable
-from collide.lowering.parts import MAX_SHARED, convex_set_of, is_single_convex, shares_parts
+from collide.lowering.convex_sets import SET_NUMBERS
+from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_kernel_calls
@@ -81,7 +82,10 @@ def shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
     pair = prepared_pair(A, B)
     if pair is not None and pair.table is not None:
         return pair.table, None
-    return ShapeTable([convex_set_of(A), convex_set_of(B)]), None
+    table = ShapeTable([convex_set_of(A), convex_set_of(B)])
+    if pair is not None:  # of few numbers: its kernels have a block of their own
+        pair.table = table
+    return table, None
 
 
 def answer_parts(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
@@ -102,20 +106,11 @@ def _answer_compounds(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray,
 
 
 def prepare_sets(A: Shape, B: Shape) -> Prepared:
-    """Two convex sets in their own frames made ready for single calls; of shapes that share parts, once."""
-    packed = [convex_set_of(A), convex_set_of(B)]
-    if not (shares_parts(A) and shares_parts(B)):
-        return convex_kernel_calls.prepared_sets(ShapeTable(packed))
-    key = id(packed[0]), id(packed[1])  # the pair's table holds both for as long as the pair is remembered
-    pair = _pairs_of_sets.get(key)
-    if pair is None:
-        if len(_pairs_of_sets) >= MAX_SHARED:
-            _pairs_of_sets.clear()
-        pair = _pairs_of_sets[key] = convex_kernel_calls.prepared_sets(ShapeTable(packed))
-    return pair
-
-
-_pairs_of_sets: dict[tuple[int, int], Prepared] = {}
+    """Two convex sets in their own frames made ready for single calls."""
+    numbers_a, numbers_b = SET_NUMBERS.get(A.__class__), SET_NUMBERS.get(B.__class__)
+    if numbers_a is None or numbers_b is None:
+        return convex_kernel_calls.prepared_sets(ShapeTable([convex_set_of(A), convex_set_of(B)]))
+    return convex_kernel_calls.prepared_numbers(numbers_a(A), numbers_b(B))
 
 
 def prepare_parts(A: Shape, B: Shape) -> Prepared:

@@ -10,12 +10,14 @@ import numpy as np
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row, prepared_within
+from collide.lowering.convex_sets import SetNumbers
 from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
 from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
 from collide.narrowphase.exact.exact_stage import settle_exactly, settle_rows, step_codes
 from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finish_rows import finish_rows
+from collide.narrowphase.lower_pair import PAIR_WORDS, lower_pair
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.pose_batches import (
     ANSWERED,
@@ -221,6 +223,8 @@ class BlockWorkspace:
         self._header[POSES_AT:SETTLE] = *map(address_of, buffers), *self.addresses
         steps = code_of(settle_exactly), address_of(step_codes()), address_of(self.digits)
         self._header[SETTLE:ANSWERED] = steps
+        #: Where a header without tables is.
+        self.header_at = address_of(self._header)
 
     def header_of(self, table: ShapeTable) -> np.ndarray:
         """What `pose_batches.py` reads first: addresses of the kernel, the tables and this workspace."""
@@ -257,8 +261,19 @@ def prepared_sets(table: ShapeTable) -> Prepared:
     if not table.is_built:
         table.build_trees(np.arange(2))
     space = space_of_single_calls()
-    header = space.header_of(table)
+    return _prepared(space.header_of(table), table, space)
+
+
+def _prepared(header: np.ndarray, table: ShapeTable | None, space: BlockWorkspace) -> Prepared:
     return Prepared(
-        collide=prepared_boolean(collide_single, header), within=prepared_within(within_single, header),
-        distance=prepared_row(distance_single, header), table=table, held=space,
+        prepared_boolean(collide_single, header), prepared_within(within_single, header),
+        prepared_row(distance_single, header), None, table, space, None if table else header,
     )
+
+
+def prepared_numbers(A: SetNumbers, B: SetNumbers) -> Prepared:
+    """The same of two sets of few numbers, in one block of memory, without a table."""
+    space = space_of_single_calls()
+    block = np.empty(PAIR_WORDS, dtype=np.int64)
+    lower_pair(address_of(block), space.header_at, *A, *B)
+    return _prepared(block, None, space)

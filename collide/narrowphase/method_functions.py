@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.base.lazy_modules import lazy_module
-from collide.lowering.kinds import kind_of
+from collide.lowering.kinds import OF_CLASS, kind_of
 from collide.narrowphase.convex_batches import Question, answer_parts, answer_sets, prepare_parts, prepare_sets
 from collide.narrowphase.dispatch import OF_SETS, TABLE, Method, cells_of
 from collide.narrowphase.region_pairs import Batch, answer_closed, answer_unbounded
@@ -97,7 +97,8 @@ OF_ONE_PAIR = cells_of([method for method, answer in ANSWERS.items() if answer.o
 
 def answer_of(A: Shape, B: Shape) -> Answer:
     """What answers a pair of shapes."""
-    return _ANSWER_TABLE[kind_of(A)][kind_of(B)]
+    kind_a, kind_b = OF_CLASS.get(A.__class__), OF_CLASS.get(B.__class__)
+    return _ANSWER_TABLE[kind_of(A) if kind_a is None else kind_a][kind_of(B) if kind_b is None else kind_b]
 
 
 def rows_of_pair(

@@ -21,6 +21,7 @@ Single = Callable[..., Any]
 
 #: Numbers of shapes within this process, never used again.
 _serials = itertools.count()
+_set, _ref = object.__setattr__, weakref.ref
 #: A shape keeps this many partners.
 _MAX_PARTNERS = 512
 
@@ -39,21 +40,23 @@ class Prepared:
     collide_poses(X_WA, X_WB) : of a batch, (N, 4, 4) both or a single pose (4, 4) with it: (N,) bool.
     distance_poses(X_WA, X_WB, depths, limit) : of a batch: its finished rows, and copies (N or 1, 4, 4) of the poses.
     table : read by batches of the pair: a `ShapeTable`, a `CompoundTable` or a `FacetPair`, or ``None``.
+    header : of two shapes of a few numbers, the block of `lower_pair.py`.
     held : other objects in use by kernels.
     """
 
     __slots__ = (
-        "__weakref__", "collide", "collide_poses", "contacts", "distance", "distance_poses", "held", "table", "within",
+        "__weakref__", "collide", "collide_poses", "contacts", "distance", "distance_poses", "header", "held", "table",
+        "within",
     )
 
     def __init__(
         self, *, collide: Single | None = None, within: Single | None = None, distance: Single | None = None,
         contacts: Single | None = None, collide_poses: Single | None = None, distance_poses: Single | None = None,
-        table: Any = None, held: Any = None,
+        table: Any = None, held: Any = None, header: Any = None,
     ):
         self.collide, self.within, self.distance, self.contacts = collide, within, distance, contacts
         self.collide_poses, self.distance_poses = collide_poses, distance_poses
-        self.table, self.held = table, held
+        self.table, self.held, self.header = table, held, header
 
 
 def prepared_pair(A: Shape, B: Shape, slot: str = "_prepared") -> Any:
@@ -70,25 +73,23 @@ def single_calls_are_safe() -> bool:
 
 
 def keep_prepared(A: Shape, B: Shape, pair: Any, slot: str = "_prepared") -> None:
-    prepared, partners = _dictionary(A, slot), _dictionary(A, "_partners")
+    prepared, partners = getattr(A, slot, None), getattr(A, "_partners", None)
+    if prepared is None:
+        prepared = {}
+        _set(A, slot, prepared)
+    if partners is None:
+        partners = {}
+        _set(A, "_partners", partners)
     serial = getattr(B, "_serial", None)
     if serial is None:
         serial = next(_serials)
-        object.__setattr__(B, "_serial", serial)
+        _set(B, "_serial", serial)
     if len(prepared) >= _MAX_PARTNERS:
         # a list: other threads add, and partners that go take
         for oldest in list(prepared)[: len(prepared) + 1 - _MAX_PARTNERS]:
             _forget(lambda: A, slot, oldest)
     prepared[serial] = pair
-    partners[slot, serial] = weakref.ref(B, partial(_forget, weakref.ref(A), slot, serial))
-
-
-def _dictionary(A: Shape, slot: str) -> dict:
-    entries = getattr(A, slot, None)
-    if entries is None:
-        entries = {}
-        object.__setattr__(A, slot, entries)
-    return entries
+    partners[slot, serial] = _ref(B, partial(_forget, _ref(A), slot, serial))
 
 
 def _forget(A: Callable[[], Shape | None], slot: str, serial: int, _: Any = None) -> None:

@@ -27,18 +27,22 @@ Function = TypeVar("Function", bound=Callable)
 ALL_CONTACTS = 2**31 - 1
 
 
-def asks_prepared_pairs(result: type | None = None, certify: Callable | None = None) -> Callable[[Function], Function]:
+def asks_prepared_pairs(
+    prepare: Callable[[Any, Any], bool], result: type | None = None, certify: Callable | None = None
+) -> Callable[[Function], Function]:
     """Decorates `collide`, `distance` or `contacts`.
 
+    prepare : makes two shapes ready, and says whether the call has done so; False of anything else. Asked where a pair
+    of matrices meets a pair of shapes that is not ready, and then the pair is asked.
     result : the type of the returned object, whose row is opened when fields are asked for; ``None`` of booleans.
     certify : makes certificates of results.
     """
 
     def decorate(function: Function) -> Function:
         if query_of_c is None:
-            return _in_python(function, result, certify)
+            return _in_python(function, prepare, result, certify)
         name = function.__name__
-        return query_of_c(function, _described(function), _LENGTHS[name], _USUAL[name], result, certify)
+        return query_of_c(function, _described(function), _LENGTHS[name], _USUAL[name], prepare, result, certify)
 
     return decorate
 
@@ -60,7 +64,7 @@ def _described(function: Callable) -> str:
 # --- the same in Python -------------------------------------------------------------------------
 
 
-def _in_python(function: Any, result: Any, certify: Callable | None) -> Any:
+def _in_python(function: Any, prepare: Callable, result: Any, certify: Callable | None) -> Any:
     ask = {"collide": _collide, "distance": partial(_distance, certify), "contacts": partial(_contacts, result)}
 
     known = inspect.signature(function).parameters.keys()
@@ -69,6 +73,8 @@ def _in_python(function: Any, result: Any, certify: Callable | None) -> Any:
     def query(*arguments, **options):
         is_single = options.keys() <= known and _are_plain(arguments, **options)
         answer = ask[function.__name__](*arguments, **options) if is_single else None
+        if is_single and answer is None and _are_matrices(*arguments[2:]) and prepare(*arguments[:2]):
+            answer = ask[function.__name__](*arguments, **options)
         return function(*arguments, **options) if answer is None else answer
 
     return query
@@ -91,6 +97,10 @@ def _n_poses(X: Any) -> int:
     if type(X) is not np.ndarray or X.shape[-2:] != (4, 4) or X.ndim not in (2, 3) or not X.size:
         return 0
     return X.size // 16 if is_matrix(X.reshape(-1, 4, 4)[0]) and X.flags.c_contiguous else 0
+
+
+def _are_matrices(X_WA, X_WB) -> bool:
+    return is_matrix(X_WA) and is_matrix(X_WB)
 
 
 def _length(question: str, value: Any) -> float | None:
@@ -121,7 +131,7 @@ def _distance(certify, A, B, X_WA, X_WB, *, max_distance=math.inf, signed=True, 
         return answer and PairResult(answer[0], False, (A, B, *answer[1:]), certify)
     if pair.distance is None:
         return None
-    if not (is_matrix(X_WA) and is_matrix(X_WB)):
+    if not _are_matrices(X_WA, X_WB):
         return None
     memory = bytearray(PAIR_DTYPE.itemsize) + X_WA.tobytes() + X_WB.tobytes()
     if pair.distance(X_WA, X_WB, memory, signed, limit) is None:

@@ -25,7 +25,7 @@ _ORDER = np.array([int(word, 16) for word in (
 _BLOCK, _WORDS = 128, 16
 _NEGATIVE_ZERO = -(2**63)
 #: Integers of workspace.
-DIGEST_WORDS = 40
+DIGEST_WORDS = 24
 
 
 class _Message(NamedTuple):
@@ -42,8 +42,14 @@ def digest_numbers(head_at, n_head, doubles_at, n_doubles, integers_at, n_intege
 
     memory : DIGEST_WORDS integers. O(n), a nanosecond or two a byte.
     """
+    put_digest(head_at, n_head, doubles_at, n_doubles, integers_at, n_integers, memory_at, digest_at)
+
+
+@kernel
+def put_digest(head_at, n_head, doubles_at, n_doubles, integers_at, n_integers, memory_at, digest_at):
+    """`digest_numbers` for kernels."""
     message = _Message(view_i64(head_at, n_head), view_i64(doubles_at, n_doubles), view_i32(integers_at, n_integers))
-    state, v, words = view_i64(memory_at, 8), view_i64(memory_at + 64, 16), view_i64(memory_at + 192, 16)
+    state, words = view_i64(memory_at, 8), view_i64(memory_at + 64, _WORDS)
     digest = view_i64(digest_at, 2)
     n_bytes = 8 * (n_head + n_doubles) + 4 * n_integers
     for k in range(8):
@@ -53,7 +59,7 @@ def digest_numbers(head_at, n_head, doubles_at, n_doubles, integers_at, n_intege
     for block in range(n_blocks):
         for k in range(_WORDS):
             words[k] = _word(message, _WORDS * block + k)
-        _take_block(state, v, words, min(_BLOCK * (block + 1), n_bytes), block == n_blocks - 1)
+        _take_block(state, words, min(_BLOCK * (block + 1), n_bytes), block == n_blocks - 1)
     digest[0] = state[0]
     digest[1] = state[1]
 
@@ -73,32 +79,44 @@ def _word(message, k):
 
 
 @kernel
-def _take_block(state, v, words, n_bytes, is_last):
-    for k in range(8):
-        v[k] = state[k]
-        v[8 + k] = _START[k]
-    v[12] ^= n_bytes
+def _take_block(state, words, n_bytes, is_last):
+    v0, v1, v2, v3, v4, v5, v6, v7 = state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7]
+    v8, v9, va, vb, vc, vd, ve, vf = (
+        _START[0], _START[1], _START[2], _START[3], _START[4] ^ n_bytes, _START[5], _START[6], _START[7],
+    )
     if is_last:
-        v[14] = ~v[14]
-    for step in range(96):  # twelve rounds of eight
-        i, row = step % 4, step % 8 // 4
-        at = (16 * (step // 8) + 2 * (step % 8)) % 160
-        _mix(v, i, 4 + (i + row) % 4, 8 + (i + 2 * row) % 4, 12 + (i + 3 * row) % 4, words[_ORDER[at]],
-             words[_ORDER[at + 1]])
-    for k in range(8):
-        state[k] ^= v[k] ^ v[8 + k]
+        ve = ~ve
+    for k in range(12):  # rounds; the sixteen words stay in registers
+        at = 16 * (k % 10)
+        v0, v4, v8, vc = _mixed(v0, v4, v8, vc, words[_ORDER[at]], words[_ORDER[at + 1]])
+        v1, v5, v9, vd = _mixed(v1, v5, v9, vd, words[_ORDER[at + 2]], words[_ORDER[at + 3]])
+        v2, v6, va, ve = _mixed(v2, v6, va, ve, words[_ORDER[at + 4]], words[_ORDER[at + 5]])
+        v3, v7, vb, vf = _mixed(v3, v7, vb, vf, words[_ORDER[at + 6]], words[_ORDER[at + 7]])
+        v0, v5, va, vf = _mixed(v0, v5, va, vf, words[_ORDER[at + 8]], words[_ORDER[at + 9]])
+        v1, v6, vb, vc = _mixed(v1, v6, vb, vc, words[_ORDER[at + 10]], words[_ORDER[at + 11]])
+        v2, v7, v8, vd = _mixed(v2, v7, v8, vd, words[_ORDER[at + 12]], words[_ORDER[at + 13]])
+        v3, v4, v9, ve = _mixed(v3, v4, v9, ve, words[_ORDER[at + 14]], words[_ORDER[at + 15]])
+    state[0] ^= v0 ^ v8
+    state[1] ^= v1 ^ v9
+    state[2] ^= v2 ^ va
+    state[3] ^= v3 ^ vb
+    state[4] ^= v4 ^ vc
+    state[5] ^= v5 ^ vd
+    state[6] ^= v6 ^ ve
+    state[7] ^= v7 ^ vf
 
 
 @kernel(inline=True)
-def _mix(v, a, b, c, d, x, y):
-    v[a] += v[b] + x
-    v[d] = _turned(v[d] ^ v[a], 32)
-    v[c] += v[d]
-    v[b] = _turned(v[b] ^ v[c], 24)
-    v[a] += v[b] + y
-    v[d] = _turned(v[d] ^ v[a], 16)
-    v[c] += v[d]
-    v[b] = _turned(v[b] ^ v[c], 63)
+def _mixed(a, b, c, d, x, y):
+    a += b + x
+    d = _turned(d ^ a, 32)
+    c += d
+    b = _turned(b ^ c, 24)
+    a += b + y
+    d = _turned(d ^ a, 16)
+    c += d
+    b = _turned(b ^ c, 63)
+    return a, b, c, d
 
 
 @kernel(inline=True)

@@ -43,7 +43,7 @@ def collide(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, security_margin: float = ..., check_poses: bool = ...,
     threads: int = ..., axes: NDArray[np.float64] | None = ..., algorithm: str | None = ...,
 ) -> Any: ...
-@asks_prepared_pairs()
+@asks_prepared_pairs(prepare_pair)
 def collide(
     A,
     B,
@@ -168,7 +168,7 @@ def distance(
     A: Shapes, B: Shapes, X_WA: PoseLike, X_WB: PoseLike, *, max_distance: float = ..., signed: bool = ...,
     check_poses: bool = ..., threads: int = ..., algorithm: str | None = ...,
 ) -> PairResult: ...
-@asks_prepared_pairs(PairResult, certify)
+@asks_prepared_pairs(prepare_pair, PairResult, certify)
 def distance(
     A,
     B,

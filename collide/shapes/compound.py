@@ -34,11 +34,13 @@ class Compound(Shape):
     then around the parts, find the pairs to test.
     """
 
-    __slots__ = ("items", "meshed")
+    __slots__ = ("items", "meshed", "poses")
     _fields = ("items",)
     items: tuple[tuple[Shape, np.ndarray], ...]
     #: Whether a mesh is among the items, however deep.
     meshed: bool
+    #: (k, 4, 4) the poses X_CS of the items, read-only.
+    poses: np.ndarray
 
     def __init__(self, items):
         try:
@@ -49,8 +51,12 @@ class Compound(Shape):
             ) from None
         if not pairs:
             raise InvalidShape(f"Compound: items is empty, {brief(items)}; at least one (shape, pose) is needed")
-        items = _all_checked(pairs) or tuple(_check_item(k, shape, X) for k, (shape, X) in enumerate(pairs))
-        self._store(items=items, meshed=any(shape.meshed for shape, _ in items))
+        poses = _all_checked(pairs)
+        if poses is None:
+            poses = np.array([_checked_pose(k, shape, X) for k, (shape, X) in enumerate(pairs)])
+        poses.flags.writeable = False
+        shapes = [shape for shape, _ in pairs]
+        self._store(items=tuple(zip(shapes, poses)), meshed=any(shape.meshed for shape in shapes), poses=poses)
 
     @property
     def convex(self) -> bool:  # type: ignore[override]
@@ -64,8 +70,8 @@ class Compound(Shape):
         return tuple((shape, (X + 0.0).tobytes()) for shape, X in self.items)
 
 
-def _all_checked(pairs: list) -> tuple[tuple[Shape, np.ndarray], ...] | None:
-    """The items, their matrices checked together; ``None`` where an item has to be checked alone."""
+def _all_checked(pairs: list) -> np.ndarray | None:
+    """The poses of the items, checked together; ``None`` where an item has to be checked alone."""
     for shape, X in pairs:
         if not isinstance(shape, Shape) or shape.is_region:
             return None
@@ -76,11 +82,10 @@ def _all_checked(pairs: list) -> tuple[tuple[Shape, np.ndarray], ...] | None:
         as_poses(X_CS)
     except InvalidPose:
         return None
-    X_CS.flags.writeable = False
-    return tuple(zip([shape for shape, _ in pairs], X_CS))
+    return X_CS
 
 
-def _check_item(k: int, shape, X) -> tuple[Shape, np.ndarray]:
+def _checked_pose(k: int, shape, X) -> np.ndarray:
     if not isinstance(shape, Shape):
         raise InvalidShape(f"Compound: items[{k}] must start with a shape, got {type(shape).__name__}")
     if shape.is_region:
@@ -88,6 +93,4 @@ def _check_item(k: int, shape, X) -> tuple[Shape, np.ndarray]:
             f"Compound: items[{k}] is an HPolytope with bounded=False; make it a body of its own, or close it by "
             "half-spaces far away and leave bounded=False out"
         )
-    X = as_pose(X, f"Compound: items[{k}] pose").copy()
-    X.flags.writeable = False
-    return shape, X
+    return as_pose(X, f"Compound: items[{k}] pose")

@@ -29,8 +29,14 @@ def lay_out_points(points_at, n, columns_at, padded, reach_at):
     for k in range(n, padded):
         for axis in range(3):
             columns[axis * padded + k] = points[axis]
-    view_f64(reach_at, 1)[0] = math.sqrt(largest) * _UPWARDS
+    view_f64(reach_at, 1)[0] = reach_of_square(largest)
     return lowest_of(points, 3 * n)
+
+
+@kernel(inline=True)
+def reach_of_square(largest):
+    """How far points are from the origin at most, rounded upwards, by the largest square."""
+    return math.sqrt(largest) * _UPWARDS
 
 
 @kernel

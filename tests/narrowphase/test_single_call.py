@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import sys
 import threading
 from itertools import combinations_with_replacement
 
@@ -92,29 +93,81 @@ def test_first_calls_refuse_what_later_ones_do():
             ask(A, 1.0, X, X)
 
 
-def test_pairs_of_the_same_small_sets_are_one():
-    """Pairs of equal boxes share what single calls read, whichever shapes live; those of hulls do not, being large."""
+def functions_walked(call):
+    """Names of the functions of Python that a call enters."""
+    walked = []
+    sys.setprofile(lambda frame, event, _: walked.append(frame.f_code.co_name) if event == "call" else None)
+    try:
+        call()
+    finally:
+        sys.setprofile(None)
+    return walked[1:]
+
+
+def test_new_pairs_walk_few_functions():
+    """From the call to the answer of two shapes never seen before: those of the standard library and of C apart."""
+    if not single_calls_are_safe() or query.collide.__class__.__name__ != "builtin_function_or_method":
+        pytest.skip("without the library more of the walk is Python's")
+    rng = rng_of("walk of new pairs")
+    X, Y = np.eye(4), collide.pose((0.9, 0.1, 0.2))
+    kinds = [kind for kind in naive.KINDS if kind in ("Box", "Sphere", "Capsule", "Cylinder", "Cone", "Ellipsoid")]
+    assert len(kinds) == 6
+    for kind_a, kind_b in combinations_with_replacement(kinds, 2):
+        A, B = naive.one_of_each(rng)[kind_a], naive.one_of_each(rng)[kind_b]
+        collide.collide(*(naive.one_of_each(rng)[kind] for kind in (kind_a, kind_b)), X, Y)  # loads what is lazy
+        walked = functions_walked(lambda A=A, B=B: collide.collide(A, B, X, Y))
+        assert prepared_pair(A, B) is not None and len(walked) <= 14 + 6 * (kind_a, kind_b).count("Capsule"), walked
+
+
+def test_pairs_of_few_numbers_hold_one_block():
+    """Nothing else is kept of two boxes but what the pair needs: no table, no packed sets, until batches ask."""
+    if not single_calls_are_safe():
+        pytest.skip("plain kernels have no single calls")
+    A, B, X, Y = collide.Box((1, 2, 3)), collide.Sphere(0.5), np.eye(4), collide.pose((0.9, 0.0, 0.0))
+    assert collide.collide(A, B, X, Y) is True
+    pair = prepared_pair(A, B)
+    assert pair.table is None and not hasattr(A, "_parts") and not hasattr(B, "_parts")
+    assert collide.collide(A, B, X, np.stack([Y, Y])).all() and pair.table is not None
+    first = pair.table
+    assert collide.distance(A, B, X, np.stack([Y, Y])).hit.all() and pair.table is first
+
+
+def test_contacts_of_pairs_of_equal_numbers_are_made_once():
+    """Faces are shared by pairs of the same few numbers, hold what they read, and nothing is added with a pair."""
     if not single_calls_are_safe():
         pytest.skip("plain kernels have no single calls")
     X, Y = np.eye(4), collide.pose((0.9, 0.0, 0.0))
+    kept, rows = [], []
+    for _ in range(3):
+        A, B = collide.Box((1, 1.25, 1)), collide.Capsule(0.5, 0.75)
+        rows.append(collide.contacts(A, B, X, Y).rows.tobytes())
+        kept.append((prepared_pair(A, B).contacts, prepared_pair(A, B).held[1]))
+        del A, B
+    assert kept[0] == kept[1] == kept[2] and rows[0] == rows[1] == rows[2] and len(rows[0]) > 0
+    A, B = collide.Box((1, 1.25, 1)), collide.Capsule(0.5, 0.75)
+    collide.collide(A, B, X, Y), collide.contacts(A, B, X, Y)
+    before = prepared_pair(A, B).held
+    collide.contacts(A, B, X, Y), collide.distance(A, B, X, Y)
+    assert prepared_pair(A, B).held is before
 
-    def asked(A, B):
-        assert collide.collide(A, B, X, Y) is True
-        return prepared_pair(A, B)
 
-    first = asked(collide.Box((1, 1, 1)), collide.Sphere(0.5))
-    assert asked(collide.Box((1, 1, 1)), collide.Sphere(0.5)) is first
-    assert asked(collide.Sphere(0.5), collide.Box((1, 1, 1))) is not first
-    kept = []
-    for _ in range(3):  # what contacts need is made once, and nothing is added to what the pair holds
-        A, B = collide.Box((1, 1, 1)), collide.Sphere(0.5)
-        assert len(collide.contacts(A, B, X, Y).rows) == 1 and prepared_pair(A, B) is first
-        kept.append((first.contacts, first.held))
-    assert kept[0] == kept[1] == kept[2] and kept[0][1] is kept[2][1]
-    points = rng_of("hulls of pairs").normal(size=(20, 3))
-    assert asked(collide.ConvexHull(points), collide.Sphere(0.5)) is not asked(
-        collide.ConvexHull(points), collide.Sphere(0.5)
-    )
+def test_faces_of_few_numbers_have_the_bits_of_packed_sets():
+    """Contacts by the one block, and by a `HullFaceTable` of packed sets: of all aspects, slivers among them."""
+    if not single_calls_are_safe():
+        pytest.skip("plain kernels have no single calls")
+    rng, n_rows = rng_of("faces of few numbers"), 0
+    for k in range(150):
+        size = np.exp(rng.normal(size=3) * (0.2, 2.0, 12.0)[k % 3]) if k % 4 else rng.integers(1, 4, 3) * 0.5
+        A = collide.Box(np.clip(size, 1e-8, 1e8))
+        least, most = float(A.size.min()), float(A.size.max())
+        B = (collide.Box(A.size[::-1]), collide.Sphere(least), collide.Capsule(least, most))[k % 3]
+        X, Y = np.eye(4), collide.pose((0.5 * A.size[0], 0.0, 0.0)) @ random_pose(rng, 0.0)
+        with naive.reproducible(Case(A, B, X, Y)):
+            rows = collide.contacts(A, B, X, Y, margin=0.01).rows
+            assert prepared_pair(A, B).table is None, "the one block has no space for these faces"
+            assert rows.tobytes() == collide.contacts(A, B, X[None], Y[None], margin=0.01).rows.tobytes()
+        n_rows += len(rows)
+    assert n_rows > 300
 
 
 def test_single_gaps_of_what_has_no_depth():

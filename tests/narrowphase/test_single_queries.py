@@ -270,13 +270,17 @@ def no_long_way(monkeypatch):
 
 def test_the_same_in_python_answers_alike(no_long_way):
     """Where there is no library, `single_queries.py` does what the functions of C do."""
-    for question, ask in zip(("collide", "distance", "contacts"), QUERIES):
+    prepares = query.prepare_pair, query.prepare_pair, contact_query.prepare_contacts
+    for question, ask, prepare in zip(("collide", "distance", "contacts"), QUERIES, prepares):
 
         def long_way(*_, **__):
             raise LongWay
 
         long_way.__name__, long_way.__signature__ = question, inspect.signature(ask)
-        in_python = single_queries._in_python(long_way, collide.Contacts, collide.certify)
+        in_python = single_queries._in_python(long_way, prepare, collide.Contacts, collide.certify)
+        new = collide.Box((1, 1, 1)), collide.Box((0.7, 1.3, 0.4))
+        told = [_said(f, *new, EYE, collide.pose((0.9, 0.3, 0.1))) for f in (in_python, ask)]
+        assert told[0] == told[1] and not isinstance(told[0], str), "a new pair is made ready, and asked"
         pair, n_single = prepared_boxes(), 0
         for X in (collide.pose((0.9, 0.3, 0.1)), collide.pose((0.6, 0.2, 0.3)), EYE.astype(np.float32), 2 * EYE):
             for options in OPTIONS[ask] + OF_ALL:
