@@ -113,6 +113,14 @@ for name, A, B in (("boxes", box, box), ("hulls of 128", ball(128), ball(128)), 
         return run, len(pairs)
     cases[f"single, {name}: boolean"] = singles(collide.collide)
     cases[f"single, {name}: distance"] = singles(collide.distance)
+sizes = rng.uniform(0.5, 1.0, (2, 3000, 3)).tolist()
+for name, make in (("boxes", collide.Box), ("spheres", lambda size: collide.Sphere(size[0]))):
+    for question, ask in (("boolean", collide.collide), ("distance", collide.distance), ("contacts", collide.contacts)):
+        def first(make=make, ask=ask):
+            for a, b in zip(*sizes):
+                r = ask(make(a), make(b), X1[0][0], X1[1][0])
+            return np.array([r]) if r.__class__ is bool else r
+        cases[f"first call, {name} made with it: {question}"] = first, 3000
 told = {}
 for name, (ask, count) in cases.items():
     if only == "names":

@@ -233,7 +233,7 @@ def prepare_contacts(A, B) -> bool:
         made = _single_contacts(shape_table(A, B)[0]) if is_convex else _single_far_contacts(A, B)
     pair.contacts, held = made
     pair.held = pair.held, held
-    return True
+    return prepared_pair(A, B) is pair
 
 
 def _single_far_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:

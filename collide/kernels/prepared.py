@@ -50,7 +50,7 @@ if MODE == COMPILED:
         return glue.prepared(entry.__name__, header, rows)
 
     #: ``query_of_c(function, doc, (min_length, max_length), (usual length, usual option), prepare, result, certify)``:
-    #: a public function of single calls as one of C's; None where there is no library (`narrowphase/single_queries.py`).
+    #: a public function of single calls as one of C's; None without a library (`narrowphase/single_queries.py`).
     query_of_c: Callable | None = glue.query
 else:
     query_of_c = None

@@ -1,4 +1,4 @@
-"""Convex sets in the rows that kernels read: those of a few numbers all at once, by `lower_numbers.py`.
+"""Convex sets in the rows that kernels read: primitives by a single call of `lower_numbers.py`.
 
 A Compound of a thousand boxes takes a single call; what Python reads of a set (`PackedConvex`) is made when asked for.
 """
@@ -37,13 +37,13 @@ _DIGEST = 8 * CONTENT
 
 
 class LoweredSets(Sequence[PackedConvex]):
-    """Convex sets in rows, each packed alone when asked for.
+    """Convex sets in rows; a set is packed at the first access.
 
     ints, numbers : (n, INTS) and (n, NUMBERS), ranks left 0 (`set_rows.py`).
-    by_numbers : (m,) the sets told by eight numbers.   columns : (m, 3, BLOCK) their core points, read-only, filled up
-    with the first.
-    contents : digests, one behind the next.
-    with_tree : sets that may have a support tree.
+    by_numbers : (m,) places of the sets of eight numbers.   columns : (m, 3, BLOCK) core points of these sets,
+    read-only, filled up with copies of the first point.
+    contents : digests, 16 bytes a set.
+    with_tree : places of sets with a support tree, made or not.
     """
 
     def __init__(self, sets: Sequence[SetNumbers | PackedConvex]):

@@ -77,7 +77,7 @@ class ShapeTable:
 
     @classmethod
     def of_bodies(cls, bodies: Sequence[LoweredSets]) -> ShapeTable:
-        """The sets of bodies, one behind the next, from their rows; such a table is not appended to."""
+        """The sets of bodies in turn, copied from their rows. The table takes no further rows."""
         table = cls([])
         table.packed = ChainedSets(bodies)
         table.ints, table.numbers = (

@@ -105,7 +105,7 @@ def prepare_pair(A, B) -> bool:
     if known is not None:  # asked for contacts alone
         pair.contacts, pair.held = known.contacts, (pair.held, known.held)
     keep_prepared(A, B, pair)
-    return True
+    return prepared_pair(A, B) is pair
 
 
 def _of_one_pair(A: Picked, B: Picked) -> np.ndarray:
