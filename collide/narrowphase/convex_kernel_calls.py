@@ -266,8 +266,8 @@ def prepared_sets(table: ShapeTable) -> Prepared:
 
 def _prepared(header: np.ndarray, table: ShapeTable | None, space: BlockWorkspace) -> Prepared:
     return Prepared(
-        prepared_boolean(collide_single, header), prepared_within(within_single, header),
-        prepared_row(distance_single, header), None, table, space, None if table else header,
+        collide=prepared_boolean(collide_single, header), within=prepared_within(within_single, header),
+        distance=prepared_row(distance_single, header), table=table, held=space, header=None if table else header,
     )
 
 
