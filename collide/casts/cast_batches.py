@@ -27,7 +27,7 @@ from collide.casts.starts import Starts, item_of
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.compound_layout import body_ball, part_balls
 from collide.lowering.compound_table import Balls
-from collide.lowering.kinds import kind_of
+from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of, convex_set_of, parts_of
 from collide.narrowphase.composite.balls_on_ways import near_on_ways

@@ -23,7 +23,8 @@ from collide.kernels import address_of
 from collide.lowering.compound_layout import layout_of, part_balls
 from collide.lowering.compound_table import Balls
 from collide.lowering.facet_bodies import body_of
-from collide.lowering.kinds import Kind, kind_of
+from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import Kind
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import moved_pose
 from collide.narrowphase.composite.balls_on_ways import SingleWay, near_on_ways

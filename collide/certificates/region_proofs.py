@@ -25,7 +25,8 @@ from collide.least_distance.posed_sets import (
     points_at,
 )
 from collide.lowering.convex_sets import ConvexSet, convex_set
-from collide.lowering.kinds import Kind, kind_of
+from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import Kind
 from collide.numerics.exact_points import integers
 from collide.numerics.exact_vectors import dot, inner
 from collide.shapes.hpolytope import HPolytope

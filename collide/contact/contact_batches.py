@@ -13,7 +13,7 @@ from collide.contact.curved_contacts import curved_contacts
 from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.compound_layout import body_ball
-from collide.lowering.kinds import kind_of
+from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.shape_set_tables import tables_of
 from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import CompoundParts, PartColumns, boxes_near, compound_parts

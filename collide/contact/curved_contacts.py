@@ -30,7 +30,8 @@ from collide.kernels import address_of
 from collide.lowering.enclosures import Enclosure, enclosure_of
 from collide.lowering.facet_bodies import Body, PosesWithSlop, as_given, body_of
 from collide.lowering.hull_faces import face_table_of
-from collide.lowering.kinds import Kind, kind_of
+from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import Kind
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import ShapeTable
 from collide.mesh.bvh import REACH, MeshTree

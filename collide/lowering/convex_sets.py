@@ -14,6 +14,7 @@ import numpy as np
 
 from collide.curved.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 from collide.errors import UnsupportedQuery
+from collide.lowering.set_numbers import SetNumbers
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
@@ -75,12 +76,6 @@ def convex_set(shape: Shape) -> ConvexSet:
 def moved(X_CS: np.ndarray, X_SP: np.ndarray) -> np.ndarray:
     """The pose of a part in a compound's frame, from that in its item's."""
     return X_CS if X_SP is IDENTITY or np.array_equal(X_SP, IDENTITY) else X_CS @ X_SP
-
-
-#: A set by eight numbers: its kind; how many core points; the radius of the ball swept over the core; the reach of a
-#: curved core, 0 of others; then half sizes of the box whose corners the points are (`corners_of`), or the four numbers
-#: of a set of another kind (`packed_convex.PackedConvex`).
-SetNumbers = tuple[int, int, float, float, float, float, float, float]
 
 
 def corners_of(n: int, half_x: float, half_y: float, half_z: float) -> np.ndarray:

@@ -15,7 +15,8 @@ import numpy as np
 from collide.errors import UnsupportedQuery
 from collide.hull.exact_hull import convex_hull
 from collide.kernels import address_of
-from collide.lowering.kinds import WITH_FACETS, kind_of
+from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import WITH_FACETS
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.mesh.build_bvh import build_mesh_tree

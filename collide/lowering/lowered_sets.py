@@ -13,10 +13,10 @@ from struct import pack
 import numpy as np
 
 from collide.kernels import address_of
-from collide.lowering.convex_sets import SetNumbers
 from collide.lowering.lower_numbers import COLUMNS, CONTENT, LOWERING_WORDS, N_NUMBERS, lower_sets
 from collide.lowering.packed_convex import BLOCK, NO_POINTS, PackedConvex, PreparedStructures, on_cache_lines
 from collide.lowering.prepared_structures import may_have_tree
+from collide.lowering.set_numbers import SetNumbers
 from collide.lowering.set_rows import (
     ADDRESS,
     COUNT,

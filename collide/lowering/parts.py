@@ -11,10 +11,11 @@ from struct import Struct
 
 import numpy as np
 
-from collide.lowering.convex_sets import SET_NUMBERS, ConvexSet, SetNumbers, convex_set, moved, set_numbers_of
+from collide.lowering.convex_sets import SET_NUMBERS, ConvexSet, convex_set, moved, set_numbers_of
 from collide.lowering.lower_numbers import N_NUMBERS
 from collide.lowering.lowered_sets import LoweredSets, PlacedSets
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_curved, pack_halfspace, pack_points
+from collide.lowering.set_numbers import SetNumbers
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh

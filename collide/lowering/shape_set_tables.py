@@ -8,7 +8,7 @@ import numpy as np
 
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.compound_table import CompoundTable
-from collide.lowering.kinds import kind_of
+from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.parts import bounding_parts_of, is_single_convex
 from collide.lowering.shape_table import ShapeTable
 from collide.shapes.shape_set import ShapeSet

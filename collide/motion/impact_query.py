@@ -11,7 +11,7 @@ from collide.base import argument_checks as checks
 from collide.base.threads import check_threads, share_if_it_helps
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.lowering.closed_regions import reach_of
-from collide.lowering.kinds import kind_of
+from collide.lowering.kind_of_shape import kind_of
 from collide.motion.convex_impact import CONTACT, FREE, OPEN_START, TOO_SMALL
 from collide.motion.convex_motions import convex_impacts, single_impact
 from collide.motion.impact_jobs import WRONG_TURN

@@ -24,7 +24,8 @@ from collide.lowering.compound_table import PART, TURNED
 from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import as_given, body_of, is_halfspace
 from collide.lowering.facet_table import Facets, FacetTable
-from collide.lowering.kinds import WITH_FACETS, kind_of
+from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import WITH_FACETS
 from collide.lowering.packed_convex import PackedConvex, pack_points
 from collide.lowering.parts import bounding_parts_of, convex_set_of
 from collide.lowering.shape_table import RANK, SLOP, ShapeTable

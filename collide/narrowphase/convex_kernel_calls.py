@@ -10,7 +10,7 @@ import numpy as np
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row, prepared_within
-from collide.lowering.convex_sets import SetNumbers
+from collide.lowering.set_numbers import SetNumbers
 from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
 from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
 from collide.narrowphase.exact.exact_stage import settle_exactly, settle_rows, step_codes

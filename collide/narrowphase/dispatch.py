@@ -1,8 +1,8 @@
 """THE table: the method of every pair of shapes.
 
-Lowering makes a `Kind` of a shape (`lowering/kinds.py`); `TABLE` holds a `Method` for every two kinds. Half of the
-table is written, the other half is its mirror: the method is the same, A and B are exchanged. A method is carried out
-by the file of its name; `method_functions.py` names its function for each public question.
+Lowering makes a `Kind` of a shape (`lowering/kind_of_shape.py`); `TABLE` holds a `Method` for every two kinds. Half of
+the table is written, the other half is its mirror: the method is the same, A and B are exchanged. A method is carried
+out by the file of its name; `method_functions.py` names its function for each public question.
 
 Kernels choose among the methods of two convex sets by numbers made from this table (`convex_methods.py`); contacts,
 casts and motions name what carries out their question for its methods, or for a group of them. No other code chooses a

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.base.lazy_modules import lazy_module
-from collide.lowering.kinds import OF_CLASS, kind_of
+from collide.lowering.kind_of_shape import OF_CLASS, kind_of
 from collide.narrowphase.convex_batches import Question, answer_parts, answer_sets, prepare_parts, prepare_sets
 from collide.narrowphase.dispatch import OF_SETS, TABLE, Method, cells_of
 from collide.narrowphase.region_pairs import Batch, answer_closed, answer_unbounded

@@ -12,7 +12,7 @@ from collide.base import argument_checks as checks
 from collide.base.threads import check_threads
 from collide.certificates.make_certificate import certify
 from collide.errors import InvalidArgument, UnsupportedQuery
-from collide.lowering.kinds import kind_of
+from collide.lowering.kind_of_shape import kind_of
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.convex_kernel_calls import finish_distances
 from collide.narrowphase.dispatch import REFUSED, Method, method_of

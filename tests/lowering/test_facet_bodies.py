@@ -12,7 +12,8 @@ from naive import one_of_each, rng_of
 import collide
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.lowering import facet_bodies as F
-from collide.lowering.kinds import Kind, kind_of
+from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import Kind
 from collide.lowering.parts import convex_set_of
 
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]

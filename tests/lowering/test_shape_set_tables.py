@@ -6,7 +6,7 @@ import numpy as np
 from naive import one_of_each, rng_of
 
 import collide
-from collide.lowering.kinds import kind_of
+from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable

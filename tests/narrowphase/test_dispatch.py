@@ -10,7 +10,8 @@ import pytest
 from naive import one_of_each, rng_of
 
 import collide
-from collide.lowering.kinds import WITH_FACETS, Kind, kind_of
+from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import WITH_FACETS, Kind
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 from collide.narrowphase import convex_methods
 from collide.narrowphase.dispatch import OF_FACETS, OF_SETS, OF_UNIONS, TABLE, Method, cells_of, method_of

@@ -13,7 +13,8 @@ import numpy as np
 
 from collide.lowering.enclosures import Enclosure, enclosure_of
 from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of, is_halfspace
-from collide.lowering.kinds import WITH_FACETS, kind_of
+from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import WITH_FACETS
 from collide.lowering.parts import bounding_parts_of
 from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.dispatch import Method, method_of

@@ -15,7 +15,8 @@ import numpy as np
 from collide.errors import InvalidPose
 from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import body_of
-from collide.lowering.kinds import Kind, kind_of
+from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import Kind
 from collide.narrowphase.composite.composite_meshes import compound_rows, compound_states
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows

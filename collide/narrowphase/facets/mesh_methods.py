@@ -10,7 +10,8 @@ import numpy as np
 
 from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import as_given, body_of
-from collide.lowering.kinds import Kind, kind_of
+from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import Kind
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
 from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
