@@ -15,7 +15,7 @@ from collide.casts.convex_casts import CastRows
 from collide.casts.directions import Directions
 from collide.lowering.compound_layout import layout_of
 from collide.narrowphase.composite.balls_on_ways import SingleWay
-from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
+from collide.narrowphase.prepared_pairs import kept_pair, prepared_pair, single_calls_are_safe
 from collide.pairs.pair_arguments import asked_poses, matched_counts
 from collide.results import only_value
 from collide.shapes.compound import Compound
@@ -124,7 +124,8 @@ def shape_cast(
     """
     is_plain = check_poses is True and start_normals is False and threads.__class__ is int and threads == 1
     if is_plain and max_distance.__class__ is float and max_distance >= 0.0:
-        way = prepared_pair(A, B, "_way")
+        pair = prepared_pair(A, B)
+        way = None if pair is None else pair.cast
         if way is not None and way.body_misses(X_WA, X_WB, direction_W, max_distance):
             return _single_miss()
     limit = checks.limit("shape_cast: max_distance", max_distance, "")
@@ -150,8 +151,10 @@ def _single_miss() -> ShapeCasts:
 def _prepare_way(A: Shape, B: Shape) -> None:
     """Have single casts of a union and another body look at the balls around both bodies first."""
     is_union = isinstance(A, Compound) or isinstance(B, Compound)
-    if is_union and not B.is_region and single_calls_are_safe() and prepared_pair(A, B, "_way") is None:
-        keep_prepared(A, B, SingleWay(layout_of(A).ball, layout_of(B).ball), "_way")
+    if is_union and not B.is_region and single_calls_are_safe():
+        pair = kept_pair(A, B)
+        if pair.cast is None:
+            pair.cast = SingleWay(layout_of(A).ball, layout_of(B).ball)
 
 
 def _in_threads(

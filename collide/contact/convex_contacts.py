@@ -228,6 +228,8 @@ def prepare_contacts(A, B) -> bool:
     if pair is None:
         pair = prepare_sets(A, B) if is_convex else Prepared()
         keep_prepared(A, B, pair)
+    elif is_convex and pair.collide is None:  # asked for impacts alone
+        pair.take(prepare_sets(A, B))
     made = None if pair.header is None else _contacts_of_numbers(A, B, pair.header)
     if made is None:
         made = _single_contacts(shape_table(A, B)[0]) if is_convex else _single_far_contacts(A, B)

@@ -25,7 +25,7 @@ from collide.motion.span_bounds import HEADER, OUT, WORKSPACE, stays_free
 from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
 from collide.narrowphase.convex_kernel_calls import scratch
 from collide.narrowphase.pair_kernel import answer_pairs
-from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
+from collide.narrowphase.prepared_pairs import kept_pair, prepared_pair, single_calls_are_safe
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import IDENTITY, Shape
 
@@ -242,15 +242,16 @@ def _times_of_ball(
     return earliest_of(rows)
 
 
-def _bodies_of(shapes: list[Shape], slot: str = "_moving") -> _Bodies:
-    """Prepared bodies of a list of shapes; of a pair kept with A, in a slot: a simulator asks about the same two again
+def _bodies_of(shapes: list[Shape], part: str = "impact") -> _Bodies:
+    """Bodies of a list of shapes; of a pair kept as a part of its `Prepared`: a simulator asks about the same two again
     and again."""
     if len(shapes) > 2:
         return _Bodies(shapes)
-    bodies = prepared_pair(shapes[0], shapes[-1], slot)
+    pair = kept_pair(shapes[0], shapes[-1])
+    bodies = getattr(pair, part)
     if bodies is None:
         bodies = _Bodies(shapes)
-        keep_prepared(shapes[0], shapes[-1], bodies, slot)
+        setattr(pair, part, bodies)
     return bodies
 
 
@@ -293,7 +294,7 @@ def _search_bounds(A: Shape, B: Shape, motion: Motions, pairs, numbers: np.ndarr
 
 def bounds_of(A: Shape, B: Shape) -> _Bodies:
     """Convex sets around the parts of two shapes, kept with A."""
-    return _bodies_of([A, B], "_moving_bounds")  # "_moving" answers for the shapes themselves
+    return _bodies_of([A, B], "impact_bounds")
 
 
 def earliest_of(rows: np.ndarray) -> np.ndarray:
@@ -304,7 +305,8 @@ def earliest_of(rows: np.ndarray) -> np.ndarray:
 
 def single_impact(A: Any, B: Any, matrices: tuple, tolerance: float) -> TimeOfImpact | None:
     """The answer for two shapes asked about before; None where not prepared, or as in `SinglePair.ask`."""
-    bodies = prepared_pair(A, B, "_moving")
+    pair = prepared_pair(A, B)
+    bodies = None if pair is None else pair.impact
     return None if bodies is None or bodies.single is None else bodies.single.ask(matrices, tolerance)
 
 

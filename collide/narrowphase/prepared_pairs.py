@@ -41,30 +41,40 @@ class Prepared:
     distance_poses(X_WA, X_WB, depths, limit) : of a batch: its finished rows, and copies (N or 1, 4, 4) of the poses.
     table : read by batches of the pair: a `ShapeTable`, a `CompoundTable` or a `FacetPair`, or ``None``.
     header : of two shapes of a few numbers, the block of `lower_pair.py`.
+    cast : a `SingleWay`: casts that miss by the balls around the bodies.
+    impact, impact_bounds : tables for motions (`motion/convex_motions.py`), of the shapes and of convex sets around.
     held : other objects in use by kernels.
     """
 
     __slots__ = (
-        "__weakref__", "collide", "collide_poses", "contacts", "distance", "distance_poses", "header", "held", "table",
-        "within",
+        "__weakref__", "cast", "collide", "collide_poses", "contacts", "distance", "distance_poses", "header", "held",
+        "impact", "impact_bounds", "table", "within",
     )
 
     def __init__(
         self, *, collide: Single | None = None, within: Single | None = None, distance: Single | None = None,
         contacts: Single | None = None, collide_poses: Single | None = None, distance_poses: Single | None = None,
-        table: Any = None, held: Any = None, header: Any = None,
+        table: Any = None, held: Any = None, header: Any = None, cast: Any = None,
     ):
         self.collide, self.within, self.distance, self.contacts = collide, within, distance, contacts
         self.collide_poses, self.distance_poses = collide_poses, distance_poses
-        self.table, self.held, self.header = table, held, header
+        self.table, self.held, self.header, self.cast = table, held, header, cast
+        self.impact = self.impact_bounds = None
+
+    def take(self, other: Prepared) -> None:
+        """What another has made ready, where it is not ready here."""
+        for name in _PARTS:
+            if getattr(self, name) is None:
+                setattr(self, name, getattr(other, name))
+        self.held = self.held, other.held
 
 
-def prepared_pair(A: Shape, B: Shape, slot: str = "_prepared") -> Any:
-    """The pair, or ``None`` where not prepared. `native/python_module.c` reads the same two attributes.
+_PARTS = [name for name in Prepared.__slots__ if name not in ("__weakref__", "held")]
 
-    slot : attribute of A for the purpose of the pair.
-    """
-    pairs = getattr(A, slot, None)
+
+def prepared_pair(A: Shape, B: Shape) -> Prepared | None:
+    """The pair, or ``None`` where not prepared. `native/python_module.c` reads the same two attributes."""
+    pairs = getattr(A, "_prepared", None)
     return pairs.get(getattr(B, "_serial", None)) if pairs.__class__ is dict else None  # a class has a descriptor there
 
 
@@ -72,11 +82,20 @@ def single_calls_are_safe() -> bool:
     return not PLAIN_PYTHON  # plain Python lets go of its lock in mid-kernel
 
 
-def keep_prepared(A: Shape, B: Shape, pair: Any, slot: str = "_prepared") -> None:
-    prepared, partners = getattr(A, slot, None), getattr(A, "_partners", None)
+def kept_pair(A: Shape, B: Shape) -> Prepared:
+    """The pair kept with A, made with nothing ready where there is none."""
+    pair = prepared_pair(A, B)
+    if pair is None:
+        pair = Prepared()
+        keep_prepared(A, B, pair)
+    return pair
+
+
+def keep_prepared(A: Shape, B: Shape, pair: Prepared) -> None:
+    prepared, partners = getattr(A, "_prepared", None), getattr(A, "_partners", None)
     if prepared is None:
         prepared = {}
-        _set(A, slot, prepared)
+        _set(A, "_prepared", prepared)
     if partners is None:
         partners = {}
         _set(A, "_partners", partners)
@@ -87,14 +106,14 @@ def keep_prepared(A: Shape, B: Shape, pair: Any, slot: str = "_prepared") -> Non
     if len(prepared) >= _MAX_PARTNERS:
         # a list: other threads add, and partners that go take
         for oldest in list(prepared)[: len(prepared) + 1 - _MAX_PARTNERS]:
-            _forget(lambda: A, slot, oldest)
+            _forget(lambda: A, oldest)
     prepared[serial] = pair
-    partners[slot, serial] = _ref(B, partial(_forget, _ref(A), slot, serial))
+    partners[serial] = _ref(B, partial(_forget, _ref(A), serial))
 
 
-def _forget(A: Callable[[], Shape | None], slot: str, serial: int, _: Any = None) -> None:
+def _forget(A: Callable[[], Shape | None], serial: int, _: Any = None) -> None:
     """A partner is gone. Nothing of this module is called: at the end of the process its names are gone before."""
     shape = A()
     if shape is not None:
-        getattr(shape, slot).pop(serial, None)
-        shape._partners.pop((slot, serial), None)
+        shape._prepared.pop(serial, None)
+        shape._partners.pop(serial, None)

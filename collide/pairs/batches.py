@@ -102,8 +102,9 @@ def prepare_pair(A, B) -> bool:
     pair = answer_of(A, B).prepare(A, B)
     if pair is None:
         return False
-    if known is not None:  # asked for contacts alone
-        pair.contacts, pair.held = known.contacts, (pair.held, known.held)
+    if known is not None:  # asked for contacts, casts or impacts alone
+        known.take(pair)
+        return True
     keep_prepared(A, B, pair)
     return prepared_pair(A, B) is pair
 

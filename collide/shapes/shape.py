@@ -25,9 +25,9 @@ class Shape:
 
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges",
-        "_hulls_instead", "_kind", "_laid_out", "_leaves", "_meshed_leaves", "_moving", "_moving_bounds", "_partners",
+        "_hulls_instead", "_kind", "_laid_out", "_leaves", "_meshed_leaves", "_partners",
         "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_surface", "_topology", "_union",
-        "_vertex_set", "_walk", "_way",
+        "_vertex_set", "_walk",
     )
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -39,13 +39,9 @@ class Shape:
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
     _prepared: dict[int, Any]
     _serial: int
-    #: Weak references to those other shapes, by the slot and their number (`narrowphase/prepared_pairs.py`).
-    _partners: dict[tuple[str, int], Any]
-    #: The same for times of impact (`motion/convex_motions.py`).
-    _moving: dict[int, Any]
-    _moving_bounds: dict[int, Any]
-    #: The same for casts, and for rays, that miss by the balls around bodies (`composite/balls_on_ways.py`).
-    _way: dict[int, Any]
+    #: Weak references to those other shapes, by their number (`narrowphase/prepared_pairs.py`).
+    _partners: dict[int, Any]
+    #: For rays that miss by the ball around the body (`composite/balls_on_ways.py`).
     _ray_way: Any
     #: What a union comes down to, and which of that are meshes (`casts/leaves.py`).
     _leaves: list
