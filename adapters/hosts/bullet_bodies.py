@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -113,27 +113,24 @@ class ClientBodies:
             numbers += position
             numbers += orientation
         for body, links in self._links.items():
-            self._add_links(numbers, body, links)
+            for place in self._places_of_links(body, links):
+                numbers += place
         return np.array(numbers).reshape(-1, 7)
 
-    def coordinates_of_bodies(self, bodies: Iterable[int]) -> np.ndarray:
-        """The same of some bodies, one after another: the base, then links, where they collide."""
-        numbers: list[float] = []
-        for body in bodies:
-            geoms = self._geoms_of[body]
-            if geoms and geoms[0].link == BASE:
-                position, orientation = self._pybullet.getBasePositionAndOrientation(body, self._client)
-                numbers += position
-                numbers += orientation
-            if body in self._links:
-                self._add_links(numbers, body, self._links[body])
-        return np.array(numbers).reshape(-1, 7)
+    def places_of(self, body: int) -> list[tuple]:
+        """The same of one body, in tuples one after another: the base, then links, where they collide."""
+        places: list[tuple] = []
+        geoms = self._geoms_of[body]
+        if geoms and geoms[0].link == BASE:
+            places += self._pybullet.getBasePositionAndOrientation(body, self._client)
+        if body in self._links:
+            places += self._places_of_links(body, self._links[body])
+        return places
 
-    def _add_links(self, numbers: list[float], body: int, links: list[int]) -> None:
+    def _places_of_links(self, body: int, links: list[int]) -> list[tuple]:
         # Without the last 1 links stand where they were a step ago; their colliders do not.
-        for state in self._pybullet.getLinkStates(body, links, 0, 1, self._client):
-            numbers += state[0]
-            numbers += state[1]
+        states = self._pybullet.getLinkStates(body, links, 0, 1, self._client)
+        return [place for state in states for place in state[:2]]
 
     def coordinates_of(self, body: int, link: int) -> tuple:
         """Position and quaternion of one link's centre of mass, in W."""

@@ -92,6 +92,8 @@ class Mirror:
         self._bodies = ClientBodies(pybullet, client, margins, shapes)
         self._tables = Tables([], np.empty((0, 4, 4)))
         self._coordinates = np.empty((0, 7))
+        #: Where bodies stand that were looked at by themselves, as pybullet said it; none that moved since.
+        self._places: dict[int, list[tuple]] = {}
         self._contacts: list[tuple] | None = None
         self._stale_filters = False
         self.world = World()
@@ -124,8 +126,13 @@ class Mirror:
             self.update()
             return
         members = set(bodies)
+        places = {body: self._bodies.places_of(body) for body in members}
+        if all(self._places.get(body) == place for body, place in places.items()):
+            return
         rows = [row for body in members for row in self._tables.rows_of.get(body, [])]
-        self._move(np.array(rows, dtype=np.int64), self._bodies.coordinates_of_bodies(members))
+        coordinates = [number for place in places.values() for numbers in place for number in numbers]
+        self._move(np.array(rows, dtype=np.int64), np.array(coordinates).reshape(-1, 7))
+        self._places |= places
 
     def refresh(self, body: int | None = None) -> None:
         """Read shapes anew, of one body or all: after changeDynamics of a margin, or resetMeshData."""
@@ -283,7 +290,7 @@ class Mirror:
         geoms = self._bodies.geoms
         before = {geom.body for geom in self._tables.geoms}
         self.filters.forget(before - {geom.body for geom in geoms})
-        self._tables = Tables([], np.empty((0, 4, 4)))
+        self._tables, self._places = Tables([], np.empty((0, 4, 4))), {}
         self._bodies.check(coordinates, np.arange(len(coordinates)))
         self._coordinates = coordinates
         self._tables = Tables(geoms, poses_of(coordinates))
@@ -310,6 +317,7 @@ class Mirror:
             return
         rows, coordinates = rows[moved], coordinates[moved]
         self._bodies.check(coordinates, rows)
+        self._places = {}
         X_WSs = poses_of(coordinates) @ self._tables.X_BS[rows]
         self.world.set_poses(rows, X_WSs)
         self._coordinates[rows], self._tables.X_WS[rows] = coordinates, X_WSs
@@ -371,6 +379,9 @@ def _integers(**values: Any) -> list[int]:
     """Numbers of bodies, links and shapes, bits and flags. Raises TypeError as pybullet does, InvalidArgument."""
     numbers = []
     for name, value in values.items():
+        if value.__class__ is int and -_ALL_GROUPS <= value <= _ALL_GROUPS:
+            numbers.append(value)
+            continue
         try:
             number = operator.index(value)
         except TypeError:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from collide import InvalidPose
 from collide.adapters.hosts.pybullet_mirror import Mirror, attach
 
 p = pytest.importorskip("pybullet", reason="pybullet is not installed: pip install 'collide-robotics[pybullet]'")
@@ -203,3 +204,22 @@ def test_boxes_that_overlap_are_those_of_the_bodies(client):
         assert set(want) <= set(theirs)
         n, empty = n + len(want), empty + (ours is None)
     assert n > 25 and empty > 3
+
+
+def test_a_body_that_returns_is_followed(client):
+    """Bodies that are asked about alone are compared with where they were seen last, whoever saw them."""
+    stand_in = attach(p, client)
+    A, B = (body(client, 1.0, (2.0 * k, 0, 0), shapeType=p.GEOM_SPHERE, radius=0.5) for k in range(2))
+    mirror = stand_in.mirror_of(client)
+    for whole in (False, True, False, True, True, False):
+        for x in (2.0, 3.0, 2.0, 5.0, 2.0):
+            p.resetBasePositionAndOrientation(B, [x, 0, 0], [0, 0, 0, 1], client)
+            if whole and x != 2.0:
+                mirror.update()
+                continue
+            ((*_, gap, _, _, _, _, _),) = stand_in.getClosestPoints(A, B, 9.0, physicsClientId=client)
+            assert abs(gap - (x - 1.0)) < 1e-12, (whole, x)
+    p.resetBasePositionAndOrientation(B, [np.nan, 0, 0], [0, 0, 0, 1], client)
+    for _ in range(2):
+        with pytest.raises(InvalidPose, match="diverged"):
+            stand_in.getClosestPoints(A, B, 9.0, physicsClientId=client)
