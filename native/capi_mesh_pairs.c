@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-/* Header of the kernels (collide/narrowphase/facets/collide_kernel.py). */
+/* Header of the kernels (collide/narrowphase/facets/mesh_collide_kernel.py). */
 enum {
     TREE_A, TREE_B, SOLID_A, SOLID_B, POINTS_A, POINTS_B, N_POINTS_A, N_POINTS_B, RADIUS_A, RADIUS_B, SAME_TREE, SAME_BODY, EXCHANGED,
     SURFACES_CODE, POINTS_CODE, DISTANCES_CODE, EXACT_CODE, STACK_AT, N_STACK, MESH_DOUBLES_AT, MESH_INTEGERS_AT, HEAP_AT, N_HEAP,

@@ -10,8 +10,8 @@ from collide.kernels import kernel, view_i64
 from collide.lowering.shape_table import COUNT, INTS, KIND
 from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.convex_convex import closed_form_cores, write_witness_points
-from collide.narrowphase.convex_methods import CONVEX, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.halfspace_convex import plane_gap, write_plane_points
+from collide.narrowphase.kernel_dispatch import CONVEX, HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.posed_pair import radius_of
 from collide.narrowphase.rows import write_decision
 from collide.results import FORMULA

@@ -43,7 +43,7 @@ from collide.errors import InvalidPose, UnsupportedQuery
 from collide.kernels import address_of
 from collide.kernels.prepared import prepared_contacts
 from collide.lowering.compound_layout import layout_of
-from collide.lowering.convex_sets import SET_NUMBERS
+from collide.lowering.convex_sets import PRIMITIVE_NUMBERS
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.hull_polygons import faces_memory
 from collide.lowering.lower_numbers import N_NUMBERS
@@ -257,7 +257,7 @@ def _contacts_of_numbers(A: Shape, B: Shape, header: np.ndarray) -> tuple[Single
 
     header : the block of `lower_pair`.
     """
-    key = _BOTH_NUMBERS.pack(*SET_NUMBERS[A.__class__](A), *SET_NUMBERS[B.__class__](B))
+    key = _BOTH_NUMBERS.pack(*PRIMITIVE_NUMBERS[A.__class__](A), *PRIMITIVE_NUMBERS[B.__class__](B))
     made = _contacts_by_numbers.get(key)
     if made is None:
         made = _made_of_numbers(header)

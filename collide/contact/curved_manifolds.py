@@ -36,7 +36,7 @@ from collide.lowering.packed_convex import CYLINDER
 from collide.lowering.shape_table import INTS, NUMBERS, POSE, RADIUS, REACH, SLOP
 from collide.mesh.bvh import REACH as TREE_REACH
 from collide.mesh.bvh import open_tree
-from collide.narrowphase.facets.collide_kernel import FacetBody
+from collide.narrowphase.facets.mesh_collide_kernel import FacetBody
 from collide.narrowphase.pose_batches import set_pose
 from collide.narrowphase.posed_pair import posed_pair
 from collide.narrowphase.rows import DISTANCE, HIT, LOWER, POINT_A, ROW, UPPER, view_row

@@ -6,7 +6,7 @@ import numpy as np
 
 from collide.contact.contact_rows import CONTACT_DTYPE, GAP, TRANSLATION
 from collide.lowering.facet_bodies import has_facets
-from collide.narrowphase.facets.mesh_methods import mesh_rows
+from collide.narrowphase.facets.mesh_pairs import mesh_rows
 from collide.shapes.shape import Shape
 
 

@@ -49,7 +49,8 @@ from collide.contact.support_face import axes_across
 from collide.kernels import entry, kernel, native_call, view_f64, view_i64, view_u8
 from collide.mesh.bvh import INTS, N_FACETS, open_tree
 from collide.narrowphase.facets import facets_within
-from collide.narrowphase.facets.collide_kernel import (
+from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR, MEETS, NUMBERS_OF_PAIR, world_error
+from collide.narrowphase.facets.mesh_collide_kernel import (
     APART,
     EXCHANGED,
     HEADER,
@@ -62,17 +63,16 @@ from collide.narrowphase.facets.collide_kernel import (
     open_pair,
     open_space,
 )
-from collide.narrowphase.facets.collide_kernel import SINGULAR as PLACES_NOTHING
-from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR, MEETS, NUMBERS_OF_PAIR, world_error
+from collide.narrowphase.facets.mesh_collide_kernel import SINGULAR as PLACES_NOTHING
 from collide.narrowphase.facets.posed_surfaces import is_swapped_order, shift_between
 from collide.narrowphase.facets.surface_collision import FULL
 from collide.numerics.vec3 import Vec3, vec3_at
 
 _list_pairs = native_call(facets_within.SIGNATURE)
 
-# Header: that of `collide_kernel.py`, then addresses of both topologies, the longest separating translation (a double),
-# the address of `list_near_pairs`, the workspace and how many pairs it is for, whether that is the most there may be,
-# max_contacts; then what a call has done: poses, rows.
+# Header: that of `mesh_collide_kernel.py`, then addresses of both topologies, the longest separating translation (a
+# double), the address of `list_near_pairs`, the workspace and how many pairs it is for, whether that is the most there
+# may be, max_contacts; then what a call has done: poses, rows.
 (
     TOPOLOGY_A, TOPOLOGY_B, LIMIT, NEAR_CODE, WORDS_AT, CAPACITY, IS_LARGEST, MAX_CONTACTS, POSES_DONE, ROWS_DONE,
 ) = range(HEADER, HEADER + 10)

@@ -30,10 +30,10 @@ from collide.errors import UnsupportedQuery
 from collide.kernels import address_of, code_of
 from collide.lowering.facet_bodies import Body, body_of, hull_of, is_halfspace
 from collide.lowering.parts import convex_set_of
-from collide.narrowphase.facets.collide_kernel import HEADER
 from collide.narrowphase.facets.facet_kernel_calls import pair_header, step_of
 from collide.narrowphase.facets.facet_queries import not_invertible, stack_of, workspace
 from collide.narrowphase.facets.facets_within import list_near_pairs
+from collide.narrowphase.facets.mesh_collide_kernel import HEADER
 from collide.shapes.shape import Shape
 
 #: Pairs of facets there is space for to begin with, what of it is kept from call to call, and at most: a gigabyte.

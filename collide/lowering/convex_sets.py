@@ -1,7 +1,7 @@
 """What a shape is, as convex sets of numbers: one function a class. `parts.py` packs the sets for kernels.
 
-No kernel is imported: certificates read these sets. Shapes of a few numbers are told by eight (`SET_NUMBERS`), whose
-core points are corners of a box: `corners_of` here, and `lower_numbers.py` for kernels, by the same signs.
+No kernel is imported: certificates read these sets. Shapes of a few numbers are told by eight (`PRIMITIVE_NUMBERS`),
+whose core points are corners of a box: `corners_of` here, and `lower_numbers.py` for kernels, by the same signs.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from collide.curved.shape_kinds import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 from collide.errors import UnsupportedQuery
-from collide.lowering.set_numbers import SetNumbers
+from collide.lowering.primitive_numbers import PrimitiveNumbers
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
@@ -66,8 +66,8 @@ def convex_set(shape: Shape) -> ConvexSet:
     """The convex set of a shape other than a Compound. Raises UnsupportedQuery for meshes and regions, TypeError for
     classes not derived from the library's."""
     for cls in type(shape).__mro__:
-        if cls in SET_NUMBERS:
-            return _of_numbers(*SET_NUMBERS[cls](shape))
+        if cls in PRIMITIVE_NUMBERS:
+            return _of_numbers(*PRIMITIVE_NUMBERS[cls](shape))
         if cls in _RULES:
             return _RULES[cls](shape)
     raise TypeError(f"{type(shape).__name__} cannot be asked about: derive it from one of collide's shapes")
@@ -94,51 +94,51 @@ _NO_POINTS = np.zeros((0, 3))
 _NO_POINTS.flags.writeable = False
 
 
-def _sphere(shape: Sphere) -> SetNumbers:
+def _sphere(shape: Sphere) -> PrimitiveNumbers:
     return POINTS, 1, shape.radius, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
-def _box(shape: Box) -> SetNumbers:
+def _box(shape: Box) -> PrimitiveNumbers:
     x, y, z = shape.size.tolist()
     return POINTS, 8, 0.0, 0.0, 0.5 * x, 0.5 * y, 0.5 * z, 0.0
 
 
-def _capsule(shape: Capsule) -> SetNumbers:
+def _capsule(shape: Capsule) -> PrimitiveNumbers:
     half = 0.5 * shape.length
     return POINTS, 2 if half else 1, shape.radius, 0.0, 0.0, 0.0, half, 0.0
 
 
-def _cylinder(shape: Cylinder) -> SetNumbers:
+def _cylinder(shape: Cylinder) -> PrimitiveNumbers:
     radius, half = shape.radius, 0.5 * shape.length
     return CYLINDER, 0, 0.0, math.hypot(radius, half) * _UPWARDS, radius, half, 0.0, 0.0
 
 
-def _cone(shape: Cone) -> SetNumbers:
+def _cone(shape: Cone) -> PrimitiveNumbers:
     radius, half = shape.radius, 0.5 * shape.length
     return CONE, 0, 0.0, math.hypot(radius, half) * _UPWARDS, radius, half, 0.0, 0.0
 
 
-def _ellipsoid(shape: Ellipsoid) -> SetNumbers:
+def _ellipsoid(shape: Ellipsoid) -> PrimitiveNumbers:
     x, y, z = shape.radii.tolist()
     return ELLIPSOID, 0, 0.0, max(x, y, z) * _UPWARDS, x, y, z, 0.0
 
 
-def _halfspace(shape: Halfspace) -> SetNumbers:
+def _halfspace(shape: Halfspace) -> PrimitiveNumbers:
     x, y, z = shape.normal.tolist()
     return HALFSPACE, 0, 0.0, 0.0, x, y, z, shape.offset
 
 
 #: Rounds a reach upwards.
 _UPWARDS = 1 + 1e-15
-SET_NUMBERS: dict[type, Callable[..., SetNumbers]] = {
+PRIMITIVE_NUMBERS: dict[type, Callable[..., PrimitiveNumbers]] = {
     Sphere: _sphere, Box: _box, Capsule: _capsule, Cylinder: _cylinder, Cone: _cone, Ellipsoid: _ellipsoid,
     Halfspace: _halfspace,
 }
 
 
-def set_numbers_of(shape: Shape) -> SetNumbers | None:
+def primitive_numbers_of(shape: Shape) -> PrimitiveNumbers | None:
     """The eight numbers of a shape; ``None`` of shapes of others."""
-    numbers_of = SET_NUMBERS.get(shape.__class__)
+    numbers_of = PRIMITIVE_NUMBERS.get(shape.__class__)
     return None if numbers_of is None else numbers_of(shape)
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from collide.kernels import address_of
+from collide.lowering.lazy_structures import coarse_address, may_have_tree, support_tree_of
 from collide.lowering.packed_convex import BLOCK, POINTS, PackedConvex, pack_points
-from collide.lowering.prepared_structures import coarse_address, may_have_tree, support_tree_of
 from collide.lowering.shape_table import ADDRESS, INTS, LOWEST, NUMBERS, PARAMS, REACH, TREE
 from collide.numerics.lowest_bits import lowest_exponents
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collide.curved.shape_kinds import POINTS
-from collide.lowering.convex_sets import convex_set, set_numbers_of
+from collide.lowering.convex_sets import convex_set, primitive_numbers_of
 from collide.lowering.kinds import OF_NUMBER, Kind
 from collide.shapes.compound import Compound
 from collide.shapes.primitives import Box, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
@@ -31,7 +31,7 @@ def _kind_by_set(shape: Shape) -> Kind:
         return Kind.REGION
     if shape.meshed:
         return Kind.MESH
-    numbers = set_numbers_of(shape)
+    numbers = primitive_numbers_of(shape)
     if numbers is not None:
         return _kind_of_convex(numbers[0], numbers[1], 0.0)
     part = convex_set(shape)

@@ -1,4 +1,4 @@
-"""Shapes of a few numbers as kernels read them: from eight numbers (`set_numbers.SetNumbers`) to rows of the tables.
+"""Shapes of a few numbers as kernels read them: from eight (`primitive_numbers.py`) to rows of the tables.
 
 A pair of these shapes takes a single call and a single block of memory; the sets of a Compound take a single call. Bits
 are the bits of `packed_convex.py`.

@@ -13,10 +13,10 @@ from struct import pack
 import numpy as np
 
 from collide.kernels import address_of
+from collide.lowering.lazy_structures import may_have_tree
 from collide.lowering.lower_numbers import COLUMNS, CONTENT, LOWERING_WORDS, N_NUMBERS, lower_sets
 from collide.lowering.packed_convex import BLOCK, NO_POINTS, PackedConvex, PreparedStructures, on_cache_lines
-from collide.lowering.prepared_structures import may_have_tree
-from collide.lowering.set_numbers import SetNumbers
+from collide.lowering.primitive_numbers import PrimitiveNumbers
 from collide.lowering.set_rows import (
     ADDRESS,
     COUNT,
@@ -46,7 +46,7 @@ class LoweredSets(Sequence[PackedConvex]):
     with_tree : places of sets with a support tree, made or not.
     """
 
-    def __init__(self, sets: Sequence[SetNumbers | PackedConvex]):
+    def __init__(self, sets: Sequence[PrimitiveNumbers | PackedConvex]):
         n = len(sets)
         self.ints, self.numbers = np.empty((n, INTS), dtype=np.int64), np.empty((n, NUMBERS))
         self._packed = {k: packed for k, packed in enumerate(sets) if packed.__class__ is PackedConvex}

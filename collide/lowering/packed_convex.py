@@ -28,7 +28,7 @@ BLOCK = 8
 
 
 class PreparedStructures:
-    """What `prepared_structures.py` makes of the points when first needed; shared by all copies of a packed set.
+    """What `lazy_structures.py` makes of the points when first needed; shared by all copies of a packed set.
 
     with_tree : whether a support tree may be made, if the points are many.   made : by name, what has been made.
     """

@@ -11,11 +11,11 @@ from struct import Struct
 
 import numpy as np
 
-from collide.lowering.convex_sets import SET_NUMBERS, ConvexSet, convex_set, moved, set_numbers_of
+from collide.lowering.convex_sets import PRIMITIVE_NUMBERS, ConvexSet, convex_set, moved, primitive_numbers_of
 from collide.lowering.lower_numbers import N_NUMBERS
 from collide.lowering.lowered_sets import LoweredSets, PlacedSets
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_curved, pack_halfspace, pack_points
-from collide.lowering.set_numbers import SetNumbers
+from collide.lowering.primitive_numbers import PrimitiveNumbers
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
@@ -44,7 +44,7 @@ def parts_of(shape: Shape) -> Parts:
     """The convex sets whose union a shape is. Raises UnsupportedQuery for meshes and regions."""
     if isinstance(shape, Compound):
         return _compound(shape)
-    numbers = set_numbers_of(shape)
+    numbers = primitive_numbers_of(shape)
     if numbers is None:
         return _alone(_packed(convex_set(shape)))
     key = _KEY.pack(*numbers)
@@ -75,7 +75,7 @@ def convex_set_of(shape: Shape) -> PackedConvex:
 
 def is_single_convex(shape: Shape) -> bool:
     """Whether a shape is one convex set in its own frame."""
-    if shape.__class__ in SET_NUMBERS:
+    if shape.__class__ in PRIMITIVE_NUMBERS:
         return True
     if shape.is_asked_whole:
         return False
@@ -104,10 +104,10 @@ def _half_space_around(region: HPolytope) -> PackedConvex:
 
 
 def _compound(shape: Compound, of_item: Callable[[Shape], Parts] = parts_of) -> PlacedSets:
-    rules = [SET_NUMBERS.get(item.__class__) for item, _ in shape.items]
+    rules = [PRIMITIVE_NUMBERS.get(item.__class__) for item, _ in shape.items]
     if None not in rules:
         return PlacedSets(LoweredSets([rule(item) for rule, (item, _) in zip(rules, shape.items)]), shape.poses)  # type: ignore[misc]
-    sets: list[SetNumbers | PackedConvex] = []
+    sets: list[PrimitiveNumbers | PackedConvex] = []
     poses: list[np.ndarray] = []
     for rule, (item, X_CS) in zip(rules, shape.items):
         if rule is not None:

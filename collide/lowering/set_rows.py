@@ -6,8 +6,8 @@ from struct import Struct
 
 import numpy as np
 
+from collide.lowering.lazy_structures import coarse_address
 from collide.lowering.packed_convex import PackedConvex
-from collide.lowering.prepared_structures import coarse_address
 
 # One row of integers a shape.
 KIND, COUNT, PADDED, ADDRESS, LOWEST, RANK, TREE, COARSE_AT = range(8)

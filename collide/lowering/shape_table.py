@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
+from collide.lowering.lazy_structures import may_have_tree, support_tree_of
 from collide.lowering.lowered_sets import ChainedSets, LoweredSets, ranks_of
 from collide.lowering.packed_convex import PackedConvex
-from collide.lowering.prepared_structures import may_have_tree, support_tree_of
 from collide.lowering.set_rows import (
     ADDRESS,
     COARSE_AT,

@@ -13,7 +13,7 @@ import numpy as np
 
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.compound_table import CompoundTable
-from collide.lowering.convex_sets import SET_NUMBERS
+from collide.lowering.convex_sets import PRIMITIVE_NUMBERS
 from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
@@ -107,7 +107,7 @@ def _answer_compounds(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray,
 
 def prepare_sets(A: Shape, B: Shape) -> Prepared:
     """Two convex sets in their own frames made ready for single calls."""
-    numbers_a, numbers_b = SET_NUMBERS.get(A.__class__), SET_NUMBERS.get(B.__class__)
+    numbers_a, numbers_b = PRIMITIVE_NUMBERS.get(A.__class__), PRIMITIVE_NUMBERS.get(B.__class__)
     if numbers_a is None or numbers_b is None:
         return convex_kernel_calls.prepared_sets(ShapeTable([convex_set_of(A), convex_set_of(B)]))
     return convex_kernel_calls.prepared_numbers(numbers_a(A), numbers_b(B))

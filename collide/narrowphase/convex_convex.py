@@ -8,12 +8,12 @@ from collide.kernels import kernel
 from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.capsule_capsule import segment_cores
-from collide.narrowphase.convex_methods import CONVEX, SPHERE_CAPSULE, SPHERES
 from collide.narrowphase.core_distance import convex_cores, request_plane
 from collide.narrowphase.exact.depth_requests import add_request
 from collide.narrowphase.gap.gap_queue import enqueue, write_guess
 from collide.narrowphase.gap.precise_pair import is_refinable
 from collide.narrowphase.gjk.minkowski_difference import AXIS, POINT_OF_A, POINT_OF_B, weighted_sum
+from collide.narrowphase.kernel_dispatch import CONVEX, SPHERE_CAPSULE, SPHERES
 from collide.narrowphase.posed_pair import radius_of
 from collide.narrowphase.rows import (
     CERTIFIED,

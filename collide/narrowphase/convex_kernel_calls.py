@@ -10,7 +10,7 @@ import numpy as np
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row, prepared_within
-from collide.lowering.set_numbers import SetNumbers
+from collide.lowering.primitive_numbers import PrimitiveNumbers
 from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
 from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
 from collide.narrowphase.exact.exact_stage import settle_exactly, settle_rows, step_codes
@@ -271,7 +271,7 @@ def _prepared(header: np.ndarray, table: ShapeTable | None, space: BlockWorkspac
     )
 
 
-def prepared_numbers(A: SetNumbers, B: SetNumbers) -> Prepared:
+def prepared_numbers(A: PrimitiveNumbers, B: PrimitiveNumbers) -> Prepared:
     """The same of two sets of few numbers, in one block of memory, without a table."""
     space = space_of_single_calls()
     block = np.empty(PAIR_WORDS, dtype=np.int64)

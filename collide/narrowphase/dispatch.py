@@ -2,9 +2,9 @@
 
 Lowering makes a `Kind` of a shape (`lowering/kind_of_shape.py`); `TABLE` holds a `Method` for every two kinds. Half of
 the table is written, the other half is its mirror: the method is the same, A and B are exchanged. A method is carried
-out by the file of its name; `method_functions.py` names its function for each public question.
+out by the file of its name; `dispatch_functions.py` names its function for each public question.
 
-Kernels choose among the methods of two convex sets by numbers made from this table (`convex_methods.py`); contacts,
+Kernels choose among the methods of two convex sets by numbers made from this table (`kernel_dispatch.py`); contacts,
 casts and motions name what carries out their question for its methods, or for a group of them. No other code chooses a
 method.
 
@@ -34,9 +34,9 @@ class Method(Enum):
         "GJK, EPA where cores overlap; MPR first for small hulls, box_sphere for its booleans; last digits of gaps in "
         + "double-doubles (gap/refine_gap); exact integers where doubles leave a sign open (exact/exact_stage)",
     )
-    FACETS = "facets/mesh_methods", "two BVHs of facets traversed together, exact triangle tests"
+    FACETS = "facets/mesh_pairs", "two BVHs of facets traversed together, exact triangle tests"
     CURVED = "facets/mesh_curved", "facets against a polytope inside and one around, then facet by facet with GJK"
-    HULL = "facets/mesh_methods", "the hull of the mesh answers against the plane"
+    HULL = "facets/mesh_pairs", "the hull of the mesh answers against the plane"
     PARTS = "composite/composite", "pairs of convex parts, culled by balls, combined to one row"
     MESH_PARTS = (
         "composite/composite_meshes",

@@ -26,7 +26,7 @@ def lower_pair(
     block_at, header_at, kind_a, n_a, radius_a, reach_a, x_a, y_a, z_a, w_a, kind_b, n_b, radius_b, reach_b, x_b, y_b,
     z_b, w_b,
 ):
-    """Fill a block of PAIR_WORDS with two sets of eight numbers each (`set_numbers.SetNumbers`).
+    """Fill a block of PAIR_WORDS with two sets of eight numbers each (`primitive_numbers.PrimitiveNumbers`).
 
     header : of `pose_batches.py`, copied, but for the addresses of the tables. All threads share its workspace: the
     kernel keeps Python's lock.

@@ -14,11 +14,11 @@ from collide.kernels import entry, kernel, view_i64, view_u8
 from collide.kernels.lanes import LANES
 from collide.narrowphase.box_sphere import decide_box_sphere, is_box_and_sphere
 from collide.narrowphase.convex_convex import convex_convex
-from collide.narrowphase.convex_methods import HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.gap.gap_queue import KINDS, clear_queue, refine_queued
 from collide.narrowphase.gjk.mpr_batch import answer_small_hulls
 from collide.narrowphase.halfspace_convex import halfspace_convex
 from collide.narrowphase.halfspace_halfspace import halfspace_halfspace
+from collide.narrowphase.kernel_dispatch import HALFSPACE_CONVEX, HALFSPACES, method
 from collide.narrowphase.pair_workspace import DOUBLES, INTEGERS, REQUESTS_AT, Query, workspace_at
 from collide.narrowphase.posed_pair import Tables, ordered_pair
 from collide.narrowphase.rows import COUNT, HIT, HOW, ROW, VERTICES_A, VERTICES_B, clear_vertices, view_row

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i32, view_u8
 from collide.narrowphase.bounds import PROMISE_DEPTH, PROMISE_GAP, PROMISE_SUBNORMAL
-from collide.narrowphase.touching import touching_is_a_hit
 from collide.numerics.vec3 import put_vec3
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
 
@@ -56,6 +55,13 @@ def is_undecided_or_refused(row):
 
 
 @kernel(inline=True)
+def hit_unless_apart(lower):
+    """1 unless bodies are proven to be apart, by a lower bound of their distance: closed sets that touch share a point,
+    and an open sign counts as a hit. For facets `facets/mesh_collide_kernel.py` decides touching exactly."""
+    return 0 if lower > 0.0 else 1
+
+
+@kernel(inline=True)
 def clear_vertices(row):
     """The row names no vertices."""
     for k in range(4):
@@ -101,7 +107,7 @@ def write_decision(row, distance, lower, upper, how, limit):
     row.doubles[UPPER] = upper if lower <= limit else math.inf
     row.doubles[DISTANCE] = (min(max(distance, lower), upper) if lower <= limit else lower) + 0.0
     row.flags[HOW] = how
-    row.flags[HIT] = touching_is_a_hit(lower)
+    row.flags[HIT] = hit_unless_apart(lower)
     row.flags[CERTIFIED] = 1
     row.flags[BEYOND] = 1 if lower > limit else 0
 
@@ -121,7 +127,7 @@ def write_verdict(row, distance, lower, upper, how, width, limit):
         width = max(width, PROMISE_SUBNORMAL)
     decided = lower > 0.0 or upper <= 0.0
     row.flags[HOW] = how if decided else UNDECIDED
-    row.flags[HIT] = touching_is_a_hit(lower)
+    row.flags[HIT] = hit_unless_apart(lower)
     row.flags[CERTIFIED] = 1 if decided and upper - lower <= width else 0
     row.flags[BEYOND] = 1 if lower > limit else 0
     if lower > limit:

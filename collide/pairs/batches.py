@@ -10,7 +10,7 @@ from collide.base.threads import check_threads, pieces_of, share, share_if_it_he
 from collide.errors import InvalidPose
 from collide.lowering.shape_set_tables import tables_of
 from collide.narrowphase.convex_batches import Question, answer_parts
-from collide.narrowphase.method_functions import OF_ONE_PAIR, Answer, answer_of
+from collide.narrowphase.dispatch_functions import OF_ONE_PAIR, Answer, answer_of
 from collide.narrowphase.prepared_pairs import keep_prepared, prepared_pair, single_calls_are_safe
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape

@@ -17,8 +17,8 @@ from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.convex_kernel_calls import finish_distances
 from collide.narrowphase.dispatch import REFUSED, Method, method_of
 from collide.narrowphase.single_queries import asks_prepared_pairs
-from collide.pairs.algorithms import named_algorithm
 from collide.pairs.batches import answer_batch, length_of, prepare_pair
+from collide.pairs.optional_algorithms import named_algorithm
 from collide.pairs.pair_arguments import asked_poses, pose_at, shape_at
 from collide.pairs.security_margin import checked_margin, within
 from collide.results import PairResult

@@ -13,9 +13,9 @@ import numpy as np
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
 from collide.lowering.compound_table import lay_out
+from collide.lowering.lazy_structures import may_have_tree, support_tree_of
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_halfspace, pack_points
 from collide.lowering.parts import Part, bounding_parts_of, parts_of
-from collide.lowering.prepared_structures import may_have_tree, support_tree_of
 from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, ShapeTable, pose_table
 from collide.mesh.convex_surface import is_own_hull
 from collide.robots.check_scene import BODY_INTS, BOX

@@ -14,7 +14,7 @@ from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, pose_table
 from collide.narrowphase.composite.composite import combine
 from collide.narrowphase.convex_kernel_calls import run_pairs
-from collide.narrowphase.method_functions import rows_of_pair
+from collide.narrowphase.dispatch_functions import rows_of_pair
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
 from collide.worlds.packed_world import PackedWorld, batches_of_shapes

@@ -18,7 +18,7 @@ from collide.errors import UnsupportedQuery
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite import combine, of_thread
 from collide.narrowphase.convex_kernel_calls import run_pairs
-from collide.narrowphase.method_functions import rows_of_pair
+from collide.narrowphase.dispatch_functions import rows_of_pair
 from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet

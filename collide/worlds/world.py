@@ -19,7 +19,7 @@ from collide.worlds.bodies import Body
 from collide.worlds.hits import WorldHits
 from collide.worlds.outside import answer_outside, questions_of
 from collide.worlds.packed_world import PackedWorld
-from collide.worlds.pairs import WorldPairs
+from collide.worlds.pair_queries import WorldPairs
 
 __all__ = ["Body", "World"]
 

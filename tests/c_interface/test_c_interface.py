@@ -27,8 +27,8 @@ import collide
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.kernels import mode
 from collide.kernels.library import library_path
+from collide.lowering.lazy_structures import may_have_tree, support_tree_of
 from collide.lowering.parts import convex_set_of, parts_of
-from collide.lowering.prepared_structures import may_have_tree, support_tree_of
 from collide.results import PAIR_DTYPE, flipped
 
 if mode.MODE != mode.COMPILED:

@@ -11,7 +11,7 @@ from naive import rng_of
 
 import collide
 from collide.lowering import lowered_sets as L
-from collide.lowering.convex_sets import SET_NUMBERS, convex_set
+from collide.lowering.convex_sets import PRIMITIVE_NUMBERS, convex_set
 from collide.lowering.packed_convex import BLOCK, CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
 from collide.lowering.parts import parts_of
 from collide.lowering.set_rows import ADDRESS, COUNT, KIND, LOWEST, PADDED, PARAMS, RADIUS, REACH, SLOP
@@ -67,7 +67,7 @@ def test_rows_are_those_of_the_definitions(with_others):
     rng = rng_of("lowered sets", with_others)
     shapes = some_shapes(rng, 140)
     hulls = [parts_of(collide.ConvexHull(rng.normal(size=(n, 3))))[0][0] for n in (5, 300)] if with_others else []
-    sets = [SET_NUMBERS[type(shape)](shape) for shape in shapes]
+    sets = [PRIMITIVE_NUMBERS[type(shape)](shape) for shape in shapes]
     if with_others:
         sets[3:3], shapes[3:3] = hulls, hulls
     lowered = L.LoweredSets(sets)
@@ -104,7 +104,7 @@ def test_tables_of_bodies_are_those_of_their_sets():
     """Ranks, rows and packed sets of several bodies, equal sets among them, beside a table of the sets one by one."""
     rng = rng_of("tables of bodies")
     shapes = some_shapes(rng, 60)
-    numbers = [SET_NUMBERS[type(shape)](shape) for shape in shapes]
+    numbers = [PRIMITIVE_NUMBERS[type(shape)](shape) for shape in shapes]
     bodies = [L.LoweredSets(numbers[:25]), L.LoweredSets(numbers[20:]), L.LoweredSets(numbers[:1])]
     table, sets = ShapeTable.of_bodies(bodies), [packed for body in bodies for packed in body]
     whole = ShapeTable(sets)

@@ -13,8 +13,8 @@ import collide
 from collide.kernels import address_of
 from collide.lowering import packed_convex as P
 from collide.lowering.facet_table import FacetTable
+from collide.lowering.lazy_structures import coarse_address
 from collide.lowering.parts import parts_of
-from collide.lowering.prepared_structures import coarse_address
 from collide.lowering.shape_table import ADDRESS, COUNT, KIND, LOWEST, PADDED, RANK, REACH, ShapeTable
 
 

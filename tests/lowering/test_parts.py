@@ -13,8 +13,8 @@ import collide
 from collide.errors import UnsupportedQuery
 from collide.lowering import parts as P
 from collide.lowering.convex_sets import convex_set
+from collide.lowering.lazy_structures import MIN_FOR_TREE, coarse_address, may_have_tree, support_tree_of
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS, pack_points
-from collide.lowering.prepared_structures import MIN_FOR_TREE, coarse_address, may_have_tree, support_tree_of
 from collide.lowering.shape_table import COARSE_AT, INTS, NUMBERS, RANK, TREE, ShapeTable
 from collide.shapes.shape import IDENTITY
 

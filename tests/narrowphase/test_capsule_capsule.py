@@ -18,8 +18,8 @@ from reproduction import reproducing
 import collide
 from collide.narrowphase.capsule_capsule import nearest_of_segments
 from collide.narrowphase.convex_convex import closed_form_cores
-from collide.narrowphase.convex_methods import CAPSULES, SPHERE_CAPSULE, SPHERES
 from collide.narrowphase.gjk.minkowski_difference import AXIS, NEAREST_POINT, POINT
+from collide.narrowphase.kernel_dispatch import CAPSULES, SPHERE_CAPSULE, SPHERES
 
 pytestmark = pytest.mark.plain_kernels
 

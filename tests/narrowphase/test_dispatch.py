@@ -13,18 +13,18 @@ import collide
 from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.kinds import WITH_FACETS, Kind
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, HALFSPACE, POINTS
-from collide.narrowphase import convex_methods
+from collide.narrowphase import kernel_dispatch
 from collide.narrowphase.dispatch import OF_FACETS, OF_SETS, OF_UNIONS, TABLE, Method, cells_of, method_of
-from collide.narrowphase.method_functions import ANSWERS, OF_ONE_PAIR, answer_of
+from collide.narrowphase.dispatch_functions import ANSWERS, OF_ONE_PAIR, answer_of
 
 PACKED = {
     Kind.SPHERE: (POINTS, 1), Kind.CAPSULE: (POINTS, 2), Kind.POLYTOPE: (POINTS, 8), Kind.CYLINDER: (CYLINDER, 0),
     Kind.CONE: (CONE, 0), Kind.ELLIPSOID: (ELLIPSOID, 0), Kind.HALFSPACE: (HALFSPACE, 0),
 }
 OF_KERNELS = {
-    Method.SPHERES: convex_methods.SPHERES, Method.SPHERE_CAPSULE: convex_methods.SPHERE_CAPSULE,
-    Method.CAPSULES: convex_methods.CAPSULES, Method.PLANE: convex_methods.HALFSPACE_CONVEX,
-    Method.PLANES: convex_methods.HALFSPACES, Method.CONVEX: convex_methods.CONVEX,
+    Method.SPHERES: kernel_dispatch.SPHERES, Method.SPHERE_CAPSULE: kernel_dispatch.SPHERE_CAPSULE,
+    Method.CAPSULES: kernel_dispatch.CAPSULES, Method.PLANE: kernel_dispatch.HALFSPACE_CONVEX,
+    Method.PLANES: kernel_dispatch.HALFSPACES, Method.CONVEX: kernel_dispatch.CONVEX,
 }
 
 
@@ -46,7 +46,7 @@ def test_every_method_is_carried_out_by_the_file_it_names():
 @pytest.mark.plain_kernels
 def test_kernels_go_by_the_same_table():
     for a, b in product(PACKED, PACKED):
-        assert convex_methods.method(*PACKED[a], *PACKED[b]) == OF_KERNELS[method_of(a, b)], (a, b)
+        assert kernel_dispatch.method(*PACKED[a], *PACKED[b]) == OF_KERNELS[method_of(a, b)], (a, b)
 
 
 def test_groups_of_methods_are_the_kinds_they_are_named_for():

@@ -21,8 +21,8 @@ import surfaces
 
 import collide
 from collide import ConvexHull, InvalidShape, Mesh
+from collide.lowering.lazy_structures import support_tree_of
 from collide.lowering.parts import convex_set_of
-from collide.lowering.prepared_structures import support_tree_of
 from collide.shapes.shape_files import _digest
 
 EYE = np.eye(4)

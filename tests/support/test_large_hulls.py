@@ -9,9 +9,9 @@ import pytest
 
 import collide
 from collide.errors import InvalidShape
-from collide.lowering import prepared_structures
+from collide.lowering import lazy_structures
+from collide.lowering.lazy_structures import may_have_tree, support_tree_of
 from collide.lowering.parts import convex_set_of
-from collide.lowering.prepared_structures import may_have_tree, support_tree_of
 from collide.results import EXACT
 from collide.scenes.families import generate, names
 from collide.support import lazy_support_tree
@@ -28,7 +28,7 @@ def _ball(rng, n, axes=(1, 1, 1)):
 @pytest.fixture()
 def trees_everywhere(monkeypatch):
     """Every hull gets a support tree, however small, so that the hard families meet them."""
-    monkeypatch.setattr(prepared_structures, "MIN_FOR_TREE", 4)
+    monkeypatch.setattr(lazy_structures, "MIN_FOR_TREE", 4)
     monkeypatch.setattr(lazy_support_tree, "MIN_VERTICES", 4)
 
 

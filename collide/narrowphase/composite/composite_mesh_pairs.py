@@ -18,12 +18,12 @@ from collide.lowering.kinds import WITH_FACETS
 from collide.lowering.parts import bounding_parts_of
 from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.dispatch import Method, method_of
-from collide.narrowphase.facets.collide_kernel import APART, FARTHER, HIT, OPEN
-from collide.narrowphase.facets.distance_kernel import PROMISE
 from collide.narrowphase.facets.facet_kernel_calls import body_rows, core_hits
 from collide.narrowphase.facets.facet_queries import all_hits, first_hits, surface_distances
+from collide.narrowphase.facets.mesh_collide_kernel import APART, FARTHER, HIT, OPEN
 from collide.narrowphase.facets.mesh_curved import curved_rows, settle_curved
-from collide.narrowphase.facets.mesh_methods import hull_shape, mesh_rows, mesh_states
+from collide.narrowphase.facets.mesh_distance_kernel import PROMISE
+from collide.narrowphase.facets.mesh_pairs import hull_shape, mesh_rows, mesh_states
 from collide.results import EXACT, FORMULA, PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.shape import Shape
 

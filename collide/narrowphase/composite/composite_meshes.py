@@ -21,8 +21,8 @@ from collide.narrowphase.composite.composite_mesh_pairs import part_rows, part_s
 from collide.narrowphase.composite.composite_parts import Balls, CompoundParts, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
 from collide.narrowphase.convex_kernel_calls import run_poses
-from collide.narrowphase.facets.collide_kernel import APART, HIT, OPEN
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
+from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT, OPEN
 from collide.narrowphase.facets.separating_translation import SeparatingTranslation, shortened
 from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE
 from collide.numerics.frames import frame_along

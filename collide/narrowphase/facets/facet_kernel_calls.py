@@ -1,10 +1,10 @@
 """Two bodies of facets at many pairs of poses: whether they share a point, and rows of results.
 
-Kernels answer whole batches (`collide_kernel.py`, `distance_kernel.py`). Completed here, pose by pose, is what a row
-may still lack: depths, the direction of bodies that all but touch, and gaps too large for boxes of floats. Gaps are the
-surfaces' distance less the radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a translation
-that is proven to separate the bodies (`separating_translation.py`); how much shorter another may be is not known, so
-the bracket reaches up to 0.
+Kernels answer whole batches (`mesh_collide_kernel.py`, `mesh_distance_kernel.py`). Completed here, pose by pose, is
+what a row may still lack: depths, the direction of bodies that all but touch, and gaps too large for boxes of floats.
+Gaps are the surfaces' distance less the radii, in brackets below 2⁻⁴³ of the size. Overlaps are minus the length of a
+translation that is proven to separate the bodies (`separating_translation.py`); how much shorter another may be is not
+known, so the bracket reaches up to 0.
 """
 
 from __future__ import annotations
@@ -22,7 +22,16 @@ from collide.mesh.bvh_slabs import make_slabs
 from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.narrowphase.facets import surface_collision, surface_distance, winding_numbers
-from collide.narrowphase.facets.collide_kernel import (
+from collide.narrowphase.facets.exact_triangles import decide_exactly
+from collide.narrowphase.facets.facet_queries import (
+    HEAP,
+    Workspace,
+    not_invertible,
+    stack_of,
+    surface_distances,
+    workspace,
+)
+from collide.narrowphase.facets.mesh_collide_kernel import (
     APART,
     NO_POSE,
     RADIUS_A,
@@ -31,7 +40,7 @@ from collide.narrowphase.facets.collide_kernel import (
     meet_poses,
     meet_single,
 )
-from collide.narrowphase.facets.distance_kernel import (
+from collide.narrowphase.facets.mesh_distance_kernel import (
     FARTHEST,
     LEFT_OPEN,
     NEARLY_TOUCH,
@@ -41,15 +50,6 @@ from collide.narrowphase.facets.distance_kernel import (
     TOO_FAR,
     gap_poses,
     gap_single,
-)
-from collide.narrowphase.facets.exact_triangles import decide_exactly
-from collide.narrowphase.facets.facet_queries import (
-    HEAP,
-    Workspace,
-    not_invertible,
-    stack_of,
-    surface_distances,
-    workspace,
 )
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
 from collide.narrowphase.prepared_pairs import Prepared
@@ -220,7 +220,7 @@ def step_of(X: np.ndarray) -> int:
 
 
 def pair_header(A: Body, B: Body, exchanged: bool, space: Workspace) -> np.ndarray:
-    """What the kernels of `collide_kernel.py` read first; the caller keeps bodies and workspace alive."""
+    """What the kernels of `mesh_collide_kernel.py` read first; the caller keeps bodies and workspace alive."""
     same_tree = A.tree.content == B.tree.content
     header = np.array(
         [

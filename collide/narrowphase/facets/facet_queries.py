@@ -22,8 +22,8 @@ from collide.narrowphase.facets import self_collision as self_contact
 from collide.narrowphase.facets import surface_collision as surfaces
 from collide.narrowphase.facets import surface_distance as distances
 from collide.narrowphase.facets import winding_numbers as inside
-from collide.narrowphase.facets.collide_kernel import SCRATCH
 from collide.narrowphase.facets.exact_triangles import INTEGERS, decide_exactly
+from collide.narrowphase.facets.mesh_collide_kernel import SCRATCH
 from collide.narrowphase.facets.surface_collision import COUNTERS, FULL, SINGULAR, walk_surfaces
 
 #: Pairs of boxes that wait in order; beyond them the walk of distances goes depth first.

@@ -1,6 +1,6 @@
 """Two shapes with a mesh in one or both, at n pairs of poses: what pair queries and worlds ask.
 
-Unions are taken apart into single bodies (`composite/`), single bodies go by their kinds (`mesh_methods.py`). Hulls
+Unions are taken apart into single bodies (`composite/`), single bodies go by their kinds (`mesh_pairs.py`). Hulls
 settle what facets leave open: the convex engine gives them the last digit, and takes the poses of parts without
 rounding them.
 """
@@ -22,7 +22,6 @@ from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
 from collide.narrowphase.convex_kernel_calls import finish_distances, number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
-from collide.narrowphase.facets.collide_kernel import APART, OPEN
 from collide.narrowphase.facets.curved_gap_calls import prepared_curved, serves
 from collide.narrowphase.facets.facet_kernel_calls import (
     FacetPair,
@@ -32,7 +31,8 @@ from collide.narrowphase.facets.facet_kernel_calls import (
     serves_single_calls,
     write_rows,
 )
-from collide.narrowphase.facets.mesh_methods import checked_poses, hull_shape, mesh_rows, mesh_states
+from collide.narrowphase.facets.mesh_collide_kernel import APART, OPEN
+from collide.narrowphase.facets.mesh_pairs import checked_poses, hull_shape, mesh_rows, mesh_states
 from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.narrowphase.prepared_pairs import Prepared
 from collide.results import PAIR_DTYPE, UNDECIDED

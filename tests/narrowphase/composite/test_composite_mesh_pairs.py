@@ -14,7 +14,7 @@ from naive_triangles import as_integers, facet_pairs, surface_distance, winding,
 import collide
 from collide.lowering.facet_bodies import PosesWithSlop, body_of
 from collide.narrowphase.composite.composite_mesh_pairs import loose_states, part_rows, part_states
-from collide.narrowphase.facets.collide_kernel import APART, HIT, OPEN
+from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT, OPEN
 
 BOX = collide.Mesh(*box())
 

@@ -15,9 +15,9 @@ from surfaces import joined
 import collide
 from collide.errors import InvalidPose
 from collide.lowering.facet_bodies import body_of
-from collide.narrowphase.facets.collide_kernel import APART, HIT
 from collide.narrowphase.facets.facet_kernel_calls import balls_farther, core_hits, states
 from collide.narrowphase.facets.mesh_batches import pair_hits, pair_rows, pair_states, rows_within
+from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT
 from collide.transforms import LARGEST
 
 SPREADS = (0.3, 2.5)

@@ -15,8 +15,8 @@ from collide.kernels import address_of, view_i64
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.narrowphase.convex_convex import convex_convex
-from collide.narrowphase.convex_methods import method
 from collide.narrowphase.gap import gap_queue as Q
+from collide.narrowphase.kernel_dispatch import method
 from collide.narrowphase.pair_workspace import DOUBLES, INTEGERS, Query, workspace_at
 from collide.narrowphase.posed_pair import ordered_pair
 from collide.narrowphase.rows import ROW, blank_row

@@ -11,8 +11,8 @@ from mesh_shapes import bumpy_sphere
 from naive import random_pose, rng_of
 
 import collide
-from collide.narrowphase.facets.collide_kernel import APART, HIT
-from collide.narrowphase.facets.mesh_methods import checked_poses, hull_shape, mesh_rows, mesh_states
+from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT
+from collide.narrowphase.facets.mesh_pairs import checked_poses, hull_shape, mesh_rows, mesh_states
 from collide.results import flipped
 
 MESH = collide.Mesh(*bumpy_sphere(60))

@@ -15,8 +15,8 @@ from collide.lowering.kinds import Kind
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
 from collide.narrowphase.convex_kernel_calls import number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
-from collide.narrowphase.facets.collide_kernel import APART, HIT
 from collide.narrowphase.facets.facet_kernel_calls import body_rows, states
+from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT
 from collide.narrowphase.facets.mesh_curved import curved_rows, curved_states
 from collide.results import flipped
 from collide.shapes.mesh import Mesh

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from collide.errors import InvalidArgument
-from collide.pairs.algorithms import DEFAULT, named_algorithm
+from collide.pairs.optional_algorithms import DEFAULT, named_algorithm
 from collide.papers.hierarchies import hierarchy_queries
 
 

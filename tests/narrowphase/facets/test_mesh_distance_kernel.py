@@ -19,8 +19,8 @@ from collide.kernels import address_of
 from collide.lowering.facet_bodies import body_of
 from collide.narrowphase import rows
 from collide.narrowphase.facets import surface_distance as layout
-from collide.narrowphase.facets.distance_kernel import _set_bracket, _step, _unit_or_z
 from collide.narrowphase.facets.facet_kernel_calls import body_rows
+from collide.narrowphase.facets.mesh_distance_kernel import _set_bracket, _step, _unit_or_z
 from collide.numerics.vec3 import Vec3
 from collide.results import PAIR_DTYPE
 

@@ -12,7 +12,7 @@ from collide.kernels import entry, kernel, prepared, view_f64, view_i32, view_i6
 from collide.mesh.bvh import CENTRE, EXPONENT, INTS, REACH
 from collide.narrowphase import rows
 from collide.narrowphase.facets import surface_distance
-from collide.narrowphase.facets.collide_kernel import (
+from collide.narrowphase.facets.mesh_collide_kernel import (
     APART,
     EXCHANGED,
     FARTHER,

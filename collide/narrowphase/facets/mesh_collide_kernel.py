@@ -3,7 +3,7 @@
 Bodies whose balls are apart are apart. Else their surfaces are tested (`surface_collision.py`), then a point of every
 part of either body against the inside of the other (`winding_numbers.py`): without radii, both tests decide exactly.
 Bodies swept by balls take the distance of the surfaces (`surface_distance.py`). The traversals are called where they
-were compiled (`kernels.native_call`). Rows are written by `distance_kernel.py`.
+were compiled (`kernels.native_call`). Rows are written by `mesh_distance_kernel.py`.
 """
 
 from __future__ import annotations
