@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from threading import local
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,8 @@ from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.numerics.exact_points import integers, rounded
 from collide.numerics.exact_vectors import inner
 
+#: Columns of both ends of a chord: from below, the value, from above.
+_BRACKETS = [FIRST_LOWER, LAST_LOWER], [FIRST, LAST], [FIRST_UPPER, LAST_UPPER]
 #: Brackets wider than this, in units of t of the far side, are not certified.
 _MAX_WIDTH = 2.0**-36
 
@@ -69,15 +72,15 @@ def parts_met(
     limits = directions.limits(limit)[questions[:, 0]]
     met = np.flatnonzero(rows[:, STATE] != MISSED)
     rows, asked, limits = rows[met], questions[met], limits[met]
-    exact = np.zeros(len(rows), dtype=bool)
-    is_open = _are_open(rows, limits)
+    exact, ends = np.zeros(len(rows), dtype=bool), _ends_of(rows)
+    is_open = _are_open(rows, ends, limits)
     if every:  # flat parts, and rays that touch: is it one place, or two?
         is_open |= rows[:, FIRST_UPPER] >= rows[:, LAST_LOWER]
     for k in np.flatnonzero(is_open).tolist():
         if _has_exact_numbers(parts, asked[k, 1]):
             exact[k] = True
             _settle(parts, asked[k], origins, directions.vectors, limits[k], rows[k])
-    return _events(rows, met, asked, limits, exact, directions)
+    return _events(rows, met, asked, limits, exact, _ends_of(rows) if exact.any() else ends, directions)
 
 
 def candidate_parts(
@@ -117,53 +120,51 @@ def _as_rays(origins: np.ndarray, directions: Directions) -> np.ndarray:
     return rays
 
 
-def _are_open(rows: np.ndarray, limits: np.ndarray) -> np.ndarray:
+class _Ends(NamedTuple):
+    """Both ends of k chords, (k, 2): value, lower, upper of t.   wide : bracketed too widely to be certified."""
+
+    value: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    wide: np.ndarray
+
+
+def _ends_of(rows: np.ndarray) -> _Ends:
+    lower, value, upper = (rows[:, columns] for columns in _BRACKETS)
+    far = np.where(np.isfinite(value), np.abs(value), 0.0).max(axis=1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        wide = np.isfinite(upper) & np.isfinite(lower) & ~(upper - lower <= _MAX_WIDTH * far)
+    return _Ends(value, lower, upper, wide)
+
+
+def _are_open(rows: np.ndarray, ends: _Ends, limits: np.ndarray) -> np.ndarray:
     """(k,) bool: chords not decided by doubles, or with ends bracketed too widely: both sides of the origin or of the
     limit are possible.
     """
-    is_open = rows[:, STATE] == UNCLEAR
-    for lower, upper in ((FIRST_LOWER, FIRST_UPPER), (LAST_LOWER, LAST_UPPER)):
-        is_open |= (rows[:, lower] <= 0.0) & (rows[:, upper] >= 0.0)
-        is_open |= (rows[:, lower] <= limits) & (rows[:, upper] > limits)
-        is_open |= _are_wide(rows, lower, upper) & (rows[:, upper] >= 0.0) & (rows[:, lower] <= limits)
-    return is_open
+    _, lower, upper, wide = ends
+    is_ahead, is_before = upper >= 0.0, lower <= limits[:, None]
+    is_open = (lower <= 0.0) & is_ahead | is_before & (upper > limits[:, None]) | wide & is_ahead & is_before
+    return is_open.any(axis=1) | (rows[:, STATE] == UNCLEAR)
 
 
-def _are_wide(rows: np.ndarray, lower: int, upper: int) -> np.ndarray:
-    ends = np.abs(rows[:, [FIRST, LAST]])
-    far = np.where(np.isfinite(ends), ends, 0.0).max(axis=1)
-    finite = np.isfinite(rows[:, upper]) & np.isfinite(rows[:, lower])
-    with np.errstate(invalid="ignore"):
-        return finite & ~(rows[:, upper] - rows[:, lower] <= _MAX_WIDTH * far)
-
-
-def _events(rows, met, asked, limits, exact, directions: Directions) -> RayEvents:
-    """The ends of chords that count: from the origin to the limit."""
-    both = []
-    ends = (FIRST, FIRST_LOWER, FIRST_UPPER, FIRST_NORMAL, FIRST_SIDE), (LAST, LAST_LOWER, LAST_UPPER, LAST_NORMAL,
-                                                                         LAST_SIDE)
-    for value, lower, upper, normal, side in ends:
-        counts = np.isfinite(rows[:, value]) & (rows[:, upper] >= 0.0) & (rows[:, lower] <= limits)
-        proven = (rows[:, STATE] == MET) & (rows[:, lower] >= 0.0) & (rows[:, upper] <= limits)
-        # What was decided exactly is as it is said, within doubles that hold it.
-        counts &= ~exact | ((rows[:, value] >= 0.0) & (rows[:, value] <= limits))
-        proven |= exact
-        k = np.flatnonzero(counts)
-        t = np.clip(rows[k][:, [value, lower, upper]], 0.0, None)
-        t[:, :2] = np.minimum(t[:, :2], limits[k, None])
-        narrow = ~_are_wide(rows[k], lower, upper)
-        both.append(
-            RayEvents(
-                asked[k, 0], t, rows[k][:, normal : normal + 3], rows[k, side].astype(np.int64), met[k], proven[k],
-                proven[k] & narrow,
-            )
-        )
-    ray = np.concatenate([events.ray for events in both])
-    t = np.concatenate([events.t for events in both])
+def _events(rows, met, asked, limits, exact, ends: _Ends, directions: Directions) -> RayEvents:
+    """The ends of chords that count, from the origin to the limit: first ends, then last ends."""
+    value, lower, upper, wide = ends
+    limit = limits[:, None]
+    counts = np.isfinite(value) & (upper >= 0.0) & (lower <= limit)
+    proven = (rows[:, STATE] == MET)[:, None] & (lower >= 0.0) & (upper <= limit)
+    if exact.any():  # what was decided exactly is as it is said, within doubles that hold it
+        counts &= ~exact[:, None] | ((value >= 0.0) & (value <= limit))
+        proven |= exact[:, None]
+    last, k = np.nonzero(counts.T)
+    t = np.clip(np.stack([value[k, last], lower[k, last], upper[k, last]], axis=1), 0.0, None)
+    t[:, :2] = np.minimum(t[:, :2], limits[k, None])
+    ray, is_proven = asked[k, 0], proven[k, last]
     with np.errstate(over="ignore", under="ignore"):
         t = np.ldexp(t, -directions.exponents[ray, None])
-    columns = [np.concatenate(columns) for columns in zip(*both)]
-    return RayEvents(ray, t, *columns[2:])
+    normal = rows[:, FIRST_NORMAL : LAST_NORMAL + 3].reshape(-1, 2, 3)[k, last]
+    side = rows[k, FIRST_SIDE + last].astype(np.int64)
+    return RayEvents(ray, t, normal, side, met[k], is_proven, is_proven & ~wide[k, last])
 
 
 # --- exactly ------------------------------------------------------------------------------------

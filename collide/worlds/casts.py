@@ -44,6 +44,8 @@ class Filter(NamedTuple):
     def skipped(self, packed: PackedWorld) -> np.ndarray:
         """(n,) int64: 1 of bodies that are left out."""
         roster = packed.roster
+        if self.group is None and self.mask is None:
+            return np.zeros(len(roster.ids), dtype=np.int64)
         counts = np.ones(len(roster.ids), dtype=bool)
         if self.group is not None:
             counts &= (roster.mask & self.group) != 0
@@ -77,16 +79,18 @@ def cast_rays(
     if packed.tree is not None and n:
         asked = _candidates(packed, parts, first, skipped, origins, directions, limit, every)
     is_meshed = packed.meshed[body_of[asked[:, 1]]]
-    convex = np.ascontiguousarray(asked[~is_meshed])
+    any_meshed = bool(is_meshed.any())
+    convex = np.ascontiguousarray(asked[~is_meshed]) if any_meshed else asked
     events = parts_met(parts, convex, origins, directions, limit, every)
     part = convex[events.item, 1]
-    events = events._replace(item=part - first[body_of[part]])
-    all_events, all_bodies = [events], [body_of[part]]
-    pairs = np.unique(np.stack([body_of[asked[is_meshed, 1]], asked[is_meshed, 0]], axis=1), axis=0)
-    for body_events, bodies in _on_meshes(packed, pairs, origins, directions, limit, every):
-        all_events.append(body_events)
-        all_bodies.append(bodies)
-    return _as_rows(joined(all_events), np.concatenate(all_bodies), origins, directions, every)
+    bodies = body_of[part]
+    events = events._replace(item=part - first[bodies])
+    if any_meshed:
+        pairs = np.unique(np.stack([body_of[asked[is_meshed, 1]], asked[is_meshed, 0]], axis=1), axis=0)
+        on_meshes = list(_on_meshes(packed, pairs, origins, directions, limit, every))
+        events = joined([events, *(some for some, _ in on_meshes)])
+        bodies = np.concatenate([bodies, *(of_some for _, of_some in on_meshes)])
+    return _as_rows(events, bodies, origins, directions, every)
 
 
 def _candidates(
