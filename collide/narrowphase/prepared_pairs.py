@@ -61,12 +61,12 @@ class Prepared:
         self.table, self.held, self.header, self.cast = table, held, header, cast
         self.impact = self.impact_bounds = None
 
-    def take(self, other: Prepared) -> None:
-        """What another has made ready, where it is not ready here."""
+    def take(self, made: Prepared) -> None:
+        """Take what has been made ready, for questions not ready here."""
         for name in _PARTS:
             if getattr(self, name) is None:
-                setattr(self, name, getattr(other, name))
-        self.held = self.held, other.held
+                setattr(self, name, getattr(made, name))
+        self.held = self.held, made.held
 
 
 _PARTS = [name for name in Prepared.__slots__ if name not in ("__weakref__", "held")]
@@ -83,7 +83,7 @@ def single_calls_are_safe() -> bool:
 
 
 def kept_pair(A: Shape, B: Shape) -> Prepared:
-    """The pair kept with A, made with nothing ready where there is none."""
+    """The pair kept with A; a new pair with nothing ready where A keeps no pair."""
     pair = prepared_pair(A, B)
     if pair is None:
         pair = Prepared()

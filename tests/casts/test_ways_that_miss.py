@@ -160,4 +160,4 @@ def test_a_far_half_space_is_no_miss():
         assert collide.shape_cast(B, X, v, A, EYE).distance == pytest.approx(4.9)
         assert collide.raycast(A, EYE, X[:3, 3].copy(), v).distance == pytest.approx(5.0)
     if single_calls_are_safe():
-        assert isinstance(prepared_pair(B, A, "_way"), balls_on_ways.SingleWay)
+        assert isinstance(prepared_pair(B, A).cast, balls_on_ways.SingleWay)

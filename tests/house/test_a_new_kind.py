@@ -112,8 +112,8 @@ EDITS = {
         )
     ],
     "lowering/convex_sets.py": [
-        ("def _ellipsoid(", "def _bicone(shape) -> ConvexSet:\n    return _cylinder(shape)._replace(kind=5)\n\n\n"),
-        ("    Cylinder: _cylinder,", "    primitives.Bicone: _bicone,\n"),
+        ("def _ellipsoid(", "def _bicone(shape) -> PrimitiveNumbers:\n    return (5, *_cylinder(shape)[1:])\n\n\n"),
+        ("    Sphere: _sphere, Box: _box,", "    primitives.Bicone: _bicone,\n"),
         ("from collide.shapes.shape import", "from collide.shapes import primitives\n"),
     ],
     "lowering/kinds.py": [("\n\n#: Kinds whose surface", "    BICONE = 12\n")],
