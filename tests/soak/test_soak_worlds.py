@@ -72,7 +72,7 @@ def test_boxes_of_nan_are_noticed(monkeypatch):
     monkeypatch.setattr("collide.worlds.packed_world.widened", old)
     monkeypatch.setattr("collide.broadphase.tree_over_bodies._comparable", lambda boxes: boxes)
     assert bounding_boxes.widened is not old
-    lost = differing(sorts="collides collisions distances", worlds=8)
+    lost = differing(sorts="collides collisions distances", worlds=24)  # few have a margin and no end
     assert len(lost) >= 5, lost
 
 
