@@ -1,6 +1,6 @@
 """Faults planted in the code around kernels, one at a time, each of which the tests of its room must notice.
 
-    python tests/mutants/planted_faults.py --faults 200 --seed 1          two at a time, a quarter of an hour
+    python tests/mutants/planted_faults.py --faults 200 --seed 1          two at a time, seven minutes
     python tests/mutants/planted_faults.py --rooms sweeps --faults 20
     python tests/mutants/planted_faults.py --seed 1 --fault 17            one again, with what pytest says
 
