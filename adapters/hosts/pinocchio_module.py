@@ -12,7 +12,6 @@ geometries, a broadphase manager, pools. What each writes is said in `pinocchio.
 from __future__ import annotations
 
 import sys
-import warnings
 import weakref
 from types import ModuleType
 from typing import Any
@@ -21,6 +20,7 @@ import numpy as np
 
 from collide.adapters.hosts import pinocchio as answers
 from collide.adapters.hosts.host_numbers import of_kind, row
+from collide.adapters.hosts.stand_in import warn_of_holders
 from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 
@@ -50,20 +50,9 @@ def install() -> _Installed:
     global _before, _module
     if _module is None:
         genuine = answers.genuine()
-        holders = sorted(
-            name
-            for name, module in list(sys.modules.items())
-            if isinstance(module, ModuleType) and name.partition(".")[0] not in ("collide", "pinocchio")
-            and any(value is genuine for value in list(vars(module).values()))
-        )
         _before, _module = sys.modules.get("pinocchio"), _Pinocchio(genuine)
         sys.modules["pinocchio"] = _module
-        if holders:
-            warnings.warn(
-                f"these modules hold pinocchio already: {', '.join(holders)}; install() before they are imported",
-                RuntimeWarning,
-                stacklevel=2,
-            )
+        warn_of_holders(genuine, "pinocchio", stacklevel=2)
     return _Installed()
 
 

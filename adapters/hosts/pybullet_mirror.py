@@ -30,6 +30,7 @@ from collide.adapters.hosts.bullet_arguments import (
 )
 from collide.adapters.hosts.bullet_bodies import MARK
 from collide.adapters.hosts.bullet_mirror import MARGINS, Mirror, genuine_pybullet
+from collide.adapters.hosts.stand_in import warn_of_holders
 from collide.errors import CollideError, InvalidArgument
 from collide.kernels import library
 from collide.shapes import Shape
@@ -114,20 +115,9 @@ def install(**options) -> _Installed:
     global _before, _stand_in
     if _stand_in is None:
         genuine = genuine_pybullet()
-        holders = sorted(
-            name
-            for name, module in list(sys.modules.items())
-            if isinstance(module, ModuleType) and not name.startswith("collide.")
-            and any(value is genuine for value in list(vars(module).values()))
-        )
         _before, _stand_in = genuine, attach(genuine, **options)
         sys.modules["pybullet"] = _stand_in
-        if holders:
-            warnings.warn(
-                f"these modules hold pybullet already: {', '.join(holders)}; install() before they are imported",
-                RuntimeWarning,
-                stacklevel=2,
-            )
+        warn_of_holders(genuine, "pybullet", stacklevel=2)
         if library.glue is None:
             warnings.warn(
                 "collide runs without its compiled library: what it answers or watches of a BulletClient's calls is "

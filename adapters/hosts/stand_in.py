@@ -13,6 +13,22 @@ from types import ModuleType
 from typing import Any
 
 
+def warn_of_holders(host: ModuleType, name: str, *, stacklevel: int) -> None:
+    """A RuntimeWarning that names modules, collide's and the host's own excepted, that hold a host already."""
+    holders = sorted(
+        holder
+        for holder, module in list(sys.modules.items())
+        if isinstance(module, ModuleType) and holder.partition(".")[0] not in ("collide", name)
+        and any(value is host for value in list(vars(module).values()))
+    )
+    if holders:
+        warnings.warn(
+            f"these modules hold {name} already: {', '.join(holders)}; install() before they are imported",
+            RuntimeWarning,
+            stacklevel=stacklevel + 1,
+        )
+
+
 class StandIn:
     """Lets imports of a host find modules of ours.
 
