@@ -19,6 +19,7 @@ from collide.narrowphase.exact.exact_directions import (
 from collide.narrowphase.exact.exact_supports import support_pair
 from collide.narrowphase.exact.exact_workspace import exact_pair, fits, load_poses, point_at, scratch_at, set_point
 from collide.narrowphase.exact.johnson import (
+    has_pair,
     nearest_subset,
     reduce_simplex,
     set_delta,
@@ -91,7 +92,7 @@ def touch_exactly(ordered, terms, digits, boolean, ids, n, radius_a, radius_b):
         if zero:
             return sign_only(TOUCHING, n, rounds)
         i, j, v = support_pair(exact, length)
-        is_in_simplex = _has_pair(ids, n, i, j)
+        is_in_simplex = has_pair(ids, n, i, j)
         if not is_in_simplex:
             ids[2 * n] = i
             ids[2 * n + 1] = j
@@ -135,14 +136,6 @@ def gap_of_face(ordered, terms, digits, ids, rounds):
 
 
 @kernel
-def _has_pair(ids, n, i, j):
-    for k in range(n):
-        if ids[2 * k] == i and ids[2 * k + 1] == j:
-            return True
-    return False
-
-
-@kernel
 def _try_face(exact, ids):
     """(verdict, points) from the plane of points 0, 1, 2 alone: most flush faces need no more.
 
@@ -152,7 +145,7 @@ def _try_face(exact, ids):
     if side == 0:
         return UNDONE, 3
     i, j, _ = support_pair(exact, n)
-    if _has_pair(ids, 3, i, j):
+    if has_pair(ids, 3, i, j):
         return SEPARATE, 3  # nothing lies farther back than the plane itself
     set_point(exact, 3, i, j)
     if side_of(exact, n, 3) > 0:

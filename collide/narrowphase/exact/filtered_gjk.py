@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 from collide.kernels import kernel
 from collide.lowering.shape_table import INTS, LOWEST, POSE_SLOP, POSE_TERMS
 from collide.narrowphase.bounds import ERROR
-from collide.narrowphase.exact.johnson import count_of
+from collide.narrowphase.exact.johnson import count_of, has_pair
 from collide.numerics import bounded
 from collide.numerics.bounded import UNKNOWN, Bounded, BoundedVec3
 from collide.numerics.vec3 import Vec3, column_at, dot, norm, norm1, rotate_back, scale
@@ -126,7 +126,7 @@ def _search(ordered, ids, points):
         i, j = (-1, -1) if direction.sign == UNKNOWN else _support_pair(pair, ids, n, direction.d, error)
         if i < 0 or j < 0:
             return FilteredSearch(OPEN, n, rounds)
-        if _has_pair(ids, n, i, j):
+        if has_pair(ids, n, i, j):
             return FilteredSearch(APART, n, rounds)
         ids[2 * n] = i
         ids[2 * n + 1] = j
@@ -148,14 +148,6 @@ def _search(ordered, ids, points):
         mask = _nearest_subset(points, n + 1, n) if n < 3 else _nearest_of_four(points, beyond)
         n += 1
     return FilteredSearch(OPEN, n, _ROUNDS)
-
-
-@kernel(inline=True)
-def _has_pair(ids, n, i, j):
-    for k in range(n):
-        if ids[2 * k] == i and ids[2 * k + 1] == j:
-            return True
-    return False
 
 
 # --- points ---------------------------------------------------------------------------------------

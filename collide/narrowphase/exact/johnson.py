@@ -13,6 +13,15 @@ from collide.numerics.double_double import DD, ScaledDD
 from collide.numerics.error_free import two_sum
 
 
+@kernel(inline=True)
+def has_pair(ids, n, i, j):
+    """Whether vertices i of A and j of B make a point of a simplex of n points."""
+    for k in range(n):
+        if ids[2 * k] == i and ids[2 * k + 1] == j:
+            return True
+    return False
+
+
 @kernel
 def set_gram(exact, k):
     """Products of point k with points 0 … k."""
