@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import lru_cache
 from typing import Any
@@ -51,6 +51,19 @@ def share(pieces: Iterable, work: Callable[[Any], None], workers: int) -> None:
             pass
 
     _in_threads(go_on, go_on, leave, workers)
+
+
+def answers_in_order(pieces: Sequence, work: Callable[[Any], Any], workers: int) -> list:
+    """What ``work`` returns for every piece, in the pieces' order; in ``workers`` threads, as `share`."""
+    if workers < 2 or len(pieces) < 2:
+        return [work(piece) for piece in pieces]
+    answers: list[Any] = [None] * len(pieces)
+
+    def answer(number: int) -> None:
+        answers[number] = work(pieces[number])
+
+    share(range(len(pieces)), answer, workers)
+    return answers
 
 
 def share_if_it_helps(n: int, work: Callable[[slice], None], workers: int) -> None:

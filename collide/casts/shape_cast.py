@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.base import argument_checks as checks
-from collide.base.threads import check_threads, pieces_of, share
+from collide.base.threads import answers_in_order, check_threads, pieces_of
 from collide.casts.cast_arguments import checked_directions, refuse_unbounded
 from collide.casts.cast_batches import cast_batch
 from collide.casts.convex_casts import CastRows
@@ -172,14 +172,8 @@ def _in_threads(
     threads = min(threads, n // _MIN_PER_THREAD)
     if threads < 2:
         return answer(slice(0, n))
-    pieces = list(pieces_of(n, threads, _MIN_PER_THREAD))
-    answers: dict[int, CastRows] = {}
-
-    def work(piece: slice) -> None:
-        answers[piece.start] = answer(piece)
-
-    share(pieces, work, threads)
-    return CastRows._make(np.concatenate(columns) for columns in zip(*(answers[piece.start] for piece in pieces)))
+    answers = answers_in_order(pieces_of(n, threads, _MIN_PER_THREAD), answer, threads)
+    return CastRows._make(map(np.concatenate, zip(*answers)))
 
 
 def as_casts(rows: CastRows, directions: Directions) -> ShapeCasts:

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int32]
 
+#: Contacts of n pairs, pair after pair, and where those of each pair end (n,).
+Rows = tuple[np.ndarray, np.ndarray]
 #: What `kind` indexes: the patch is apart; it meets, or its radii overlap; or no patch describes the overlap, and the
 #: row is the answer of `distance`: a translation that separates the bodies, and no place.
 KINDS = ("gap", "overlap", "translation")
@@ -61,6 +63,14 @@ def field_at(field: str, unit: int) -> int:
 
 def no_rows() -> np.ndarray:
     return np.zeros(0, dtype=CONTACT_DTYPE)
+
+
+def joined_rows(pieces: Sequence[Rows]) -> Rows:
+    """The rows of pieces of a batch, piece after piece."""
+    if len(pieces) == 1:
+        return pieces[0]
+    counts = [np.diff(ends, prepend=0) for _, ends in pieces]
+    return np.concatenate([rows for rows, _ in pieces]), np.cumsum(np.concatenate(counts))
 
 
 def _middles(rows: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide.base.threads import pieces_of, share
+from collide.base.threads import answers_in_order, pieces_of
 from collide.contact.contact_blocks import (
     BAD_POSE,
     BLOCK_HEADER,
@@ -25,7 +25,7 @@ from collide.contact.contact_blocks import (
     WHICH_AT,
     contacts_of_pairs,
 )
-from collide.contact.contact_rows import CONTACT_DTYPE, no_rows
+from collide.contact.contact_rows import CONTACT_DTYPE, joined_rows, no_rows
 from collide.contact.convex_manifolds import (
     MARGIN,
     MAX_CONTACTS,
@@ -129,14 +129,7 @@ def contacts_of(
     if threads < 2:
         return _contacts_of(pairs, asked)
     pieces = pieces_of(n, threads, _PIECE)
-    answered: list = [None] * len(pieces)
-
-    def work(number: int) -> None:
-        answered[number] = _contacts_of(pairs.take(pieces[number]), asked)
-
-    share(range(len(pieces)), work, threads)
-    counts = [np.diff(ends, prepend=0) for _, ends in answered]
-    return np.concatenate([rows for rows, _ in answered]), np.cumsum(np.concatenate(counts))
+    return joined_rows(answers_in_order(pieces, lambda piece: _contacts_of(pairs.take(piece), asked), threads))
 
 
 class _Asked(NamedTuple):

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.base.threads import pieces_of, share
-from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP
+from collide.base.threads import answers_in_order, pieces_of
+from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP, Rows, joined_rows
 from collide.contact.curved_manifolds import (
     HEADER,
     POSE_A,
@@ -52,8 +52,6 @@ _FIRST_ASKED = 64
 #: A length that is longer than the depth by no more than this part is as good as one can be.
 _AS_GOOD = 1.0 + 2.0**-10
 
-Rows = tuple[np.ndarray, np.ndarray]
-
 
 class _Near(NamedTuple):
     """Facets near the set at n poses: meeting facets, the deepest first, then the others, the nearest first.
@@ -80,22 +78,14 @@ def curved_contacts(
     size = max(1, min(_POSES_OF_PIECE, -(-n // max(threads, 1))))
     pieces = pieces_of(n, -(-n // size), 1)
     topology_of(body_of(A)), enclosure_of(B)  # made once, before threads ask for them
-    of_piece: dict[int, Rows] = {}
 
-    def answer(piece: slice) -> None:
+    def answer(piece: slice) -> Rows:
         XA, XB = (X if len(X) == 1 else X[piece] for X in (X_WA, X_WB))
         some = None if slack is None else slack[piece]
-        of_piece[piece.start] = _of_poses(A, B, XA, XB, piece.stop - piece.start, margin, max_contacts, some)
+        return _of_poses(A, B, XA, XB, piece.stop - piece.start, margin, max_contacts, some)
 
-    if threads > 1 and len(pieces) > 1:
-        share(pieces, answer, threads)
-    else:
-        for piece in pieces:
-            answer(piece)
-    answers = [of_piece[start] for start in sorted(of_piece)]
-    rows = np.concatenate([rows for rows, _ in answers])
-    counts = np.concatenate([np.diff(ends, prepend=0) for _, ends in answers])
-    return exchanged_rows(rows) if exchanged else rows, np.cumsum(counts)
+    rows, ends = joined_rows(answers_in_order(pieces, answer, threads))
+    return exchanged_rows(rows) if exchanged else rows, ends
 
 
 def exchanged_rows(rows: np.ndarray) -> np.ndarray:

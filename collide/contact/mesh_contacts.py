@@ -6,8 +6,8 @@ from threading import local
 
 import numpy as np
 
-from collide.base.threads import pieces_of, share
-from collide.contact.contact_rows import CONTACT_DTYPE
+from collide.base.threads import answers_in_order, pieces_of
+from collide.contact.contact_rows import CONTACT_DTYPE, Rows, joined_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.distance_contacts import with_distances
 from collide.contact.facet_manifolds import (
@@ -44,8 +44,6 @@ _CALLS_KEPT = 256
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
 #: Poses that are worth a thread of their own.
 _FEWEST_POSES = 16
-
-Rows = tuple[np.ndarray, np.ndarray]
 
 
 def halfspace_contacts(
@@ -85,26 +83,15 @@ def facet_contacts(
     """
     n = max(len(X_WA), len(X_WB))
     pieces = pieces_of(n, threads, _FEWEST_POSES) if threads > 1 and n >= 2 * _FEWEST_POSES else [slice(0, n)]
-    of_piece: dict[int, Rows] = {}
     topology_of(body_of(A)), topology_of(body_of(B))  # made once, before threads ask for them
 
-    def answer(piece: slice) -> None:
+    def answer(piece: slice) -> Rows:
         try:
-            of_piece[piece.start] = _of_poses(A, B, X_WA, X_WB, piece, margin, max_contacts, slack)
+            return _of_poses(A, B, X_WA, X_WB, piece, margin, max_contacts, slack)
         finally:
             _of_thread.shrink()
 
-    if len(pieces) == 1:
-        answer(pieces[0])
-    else:
-        share(pieces, answer, threads)
-    answers = [of_piece[start] for start in sorted(of_piece)]
-    if len(answers) == 1:
-        return answers[0]
-    offsets = np.cumsum([0, *(len(rows) for rows, _ in answers)])
-    return np.concatenate([rows for rows, _ in answers]), np.concatenate(
-        [ends + offset for (_, ends), offset in zip(answers, offsets.tolist())]
-    )
+    return joined_rows(answers_in_order(pieces, answer, threads))
 
 
 def _of_poses(
