@@ -132,7 +132,7 @@ def _pairs(report: Report) -> Iterator[Finding]:
     yield from followed.values()
     for what, name in _CLASSES.items():
         for pair in getattr(report, name):
-            if not followed or frozenset((pair.a, pair.b)) not in followed:
+            if frozenset((pair.a, pair.b)) not in followed:
                 yield Finding(what, pair.a, pair.b, pair.distance)
 
 

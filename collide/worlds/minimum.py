@@ -69,7 +69,7 @@ def _least(packed: PackedWorld, pairs: np.ndarray, limit: float, best: float, wi
     pairs, bounds = pairs[order], bounds[order]
     at, size = 0, _FIRST
     while at < len(pairs):
-        top = best if best == np.inf else best + _ROUNDING * abs(best)
+        top = best + _ROUNDING * abs(best)
         some = pairs[at : at + size][bounds[at : at + size] <= min(top, limit)]
         if not len(some):
             break

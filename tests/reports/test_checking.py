@@ -69,6 +69,16 @@ def test_a_known_collision_that_got_deeper_is_new_and_said(command, tmp_path):
     assert command(stacked(0.10005, 0.2), "check", "--baseline", known, "--baseline-tolerance", "0.01mm")[0] == 1
 
 
+def test_a_collision_as_deep_as_the_tolerance_allows_is_known():
+    made = report.make(stacked(0.5))
+    (depth,) = (-pair.distance for pair in made.colliding)
+    for less, what in ((0.25, checking.KNOWN), (0.25 + 2.0**-40, checking.DEEPER)):
+        entry = checking.Finding(checking.COLLISION, "low 0", "high 0", less - depth)
+        known = checking.Baseline({"": {checking._key(entry): entry}})
+        found = checking.check(made, "", touching_counts=False, known=known, tolerance=0.25)
+        assert [finding.what for finding in found.findings] == [what]
+
+
 def test_gone_collisions_are_told(command, tmp_path):
     known = tmp_path / "known.json"
     command(stacked(0.1, 0.2), "check", "--write-baseline", known)

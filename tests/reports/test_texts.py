@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from collide.reports import json_text
+from collide.reports import json_text, terminal
 from collide.reports.checking import COLLISION, DEEPER, GONE, KNOWN, Check, Finding
 from collide.reports.comparing import _engine_tables, _wrong_of
 from collide.reports.comparing import verdict as comparison_verdict
 from collide.reports.doctor import _ask, _cache, _known_pairs
-from collide.reports.number_format import seconds
+from collide.reports.number_format import brief_length, seconds
 from collide.reports.pair_classes import Pairs
 from collide.reports.report import _skipped
 from collide.reports.tables import Column, Table, lay_out
@@ -141,3 +141,29 @@ def test_a_comparison_in_one_line():
         assert comparison_verdict({**data, "disagreements": disputes}).endswith(f"1 failure{end}")
     assert _wrong_of(summary("peer")) == ""
 
+
+def test_lines_are_as_wide_as_the_terminal_or_columns_says(monkeypatch):
+    """A terminal has its width, COLUMNS counts for any stream, and a pipe gets a page and whole names."""
+    pipe, window = SimpleNamespace(isatty=lambda: False), SimpleNamespace(isatty=lambda: True)
+    monkeypatch.setenv("COLUMNS", "97")
+    assert terminal.output_width(pipe) == (97, False) == terminal.output_width(window)
+    monkeypatch.setenv("COLUMNS", "7")
+    assert terminal.output_width(pipe) == (30, False)
+    monkeypatch.delenv("COLUMNS")
+    assert terminal.output_width(pipe) == (terminal.PIPE_WIDTH, True) and not terminal.output_width(window)[1]
+
+
+@pytest.mark.parametrize(("metres", "words"), [
+    (0.0, "0 mm"), (1.0, "1 m"), (np.nextafter(1.0, 0.0), "1000 mm"), (-1.5, "-1.5 m"), (1e-3, "1 mm"),
+    (0.999e-3, "999 µm"), (1e6, "1e+06 m"), (999999.0, "999999 m"), (1e-7, "0.1 µm"), (0.9e-7, "9e-08 m"),
+])
+def test_lengths_in_a_sentence_change_their_unit_at_round_numbers(metres, words):
+    assert brief_length(metres) == words
+
+
+def test_stages_of_a_report_come_in_the_order_they_run_and_others_after_them():
+    spent = {"pack": 0.5, "own stage": 0.25, "read": 0.125, "other": 1.0, "total": 1.875, "meshes": 0.0}
+    report = SimpleNamespace(seconds=spent, versions={"machine": "box", "collide": "1.0", "numba": None})
+    first, second = terminal._times(report)
+    assert first == "1.88 s in all: read 125 ms, pack 500 ms, own stage 250 ms, imports and the rest 1.00 s"
+    assert second == "collide 1.0, box"

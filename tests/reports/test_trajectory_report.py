@@ -14,7 +14,7 @@ from collide.cli import main as cli
 from collide.errors import InvalidArgument, SceneError
 from collide.reports import report
 from collide.reports import state_reports as states
-from collide.reports.trajectory_report import follow, sample, verdict
+from collide.reports.trajectory_report import Watch, follow, sample, verdict
 from collide.scenes.loaders.state_words import in_states
 from collide.scenes.loaders.trajectories import Trajectory, read_trajectory
 
@@ -114,6 +114,29 @@ def test_every_sample_says_what_a_report_of_its_state_says():
         least = min([least, *(pair.distance for pair in (*hits, *made.near) if "slider" in (pair.a, pair.b))])
     assert found["least"]["distance"] == least and any(colliding) and not all(colliding)
     assert found["first_collision"]["at"]["sample"] == colliding.index(True)
+
+
+@pytest.mark.parametrize("max_kept", [0, 100])
+def test_a_look_at_a_sample_has_the_least_distance_however_far(max_kept):
+    """Beyond what was asked for at the sample, and within: as `World.minimum` says."""
+    scene = slider_scene()
+    path = sample(scene, moving(0.0, MEETS + 0.1), 0.1)
+    watch = Watch(scene, path, 0.0, 0.0, max_kept)
+    samples = list(watch.poses())
+    for k, poses in samples:
+        watch.see(k, poses)
+    hits = 0
+    for k, poses in samples:
+        look = watch.look_at(k, poses)
+        assert look.least == watch.world.minimum().rows["distance"][0], k
+        hits += bool(len(look.by_class["colliding"]))
+    assert 0 < hits < len(samples) - 2
+
+
+def test_joint_values_of_an_event_have_no_negative_zero():
+    found = follow(slider_scene(), moving(-0.0, 0.25, lift=[-0.0, -0.0]))
+    values = found["least"]["state"]
+    assert list(values) == ["slide", "lift"] and math.copysign(1.0, values["lift"]) == 1.0
 
 
 def test_few_pairs_are_asked_once_something_near_is_known(monkeypatch):

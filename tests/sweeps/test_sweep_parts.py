@@ -13,7 +13,7 @@ from plain_robots import joint, robot_of
 from slow_checker import SlowChecker
 
 from collide import InvalidArgument, SceneError, Sphere
-from collide.sweeps import pair_tables
+from collide.sweeps import configurations, pair_tables, sweep, sweep_question
 from collide.sweeps.configurations import (
     DrawnConfigurations,
     GivenConfigurations,
@@ -271,3 +271,41 @@ def test_pairs_of_links_are_counted_by_reason(monkeypatch):
     monkeypatch.setattr(pair_tables, "never_words", lambda proposal: ())
     counts = {row[0]: row[1] for row in pair_tables._by_reason(proposal).rows}
     assert counts == {ADJACENT: "2", DEFAULT: "0", ALWAYS: "0", NEVER: "3", "tested": "2"}
+
+
+def test_a_joint_value_is_outside_where_it_passes_its_limit_by_more_than_the_slack():
+    robot, slack = SlowChecker().robot, sweep_question._SLACK
+    just = 1.0
+    for _ in range(5):  # where the slack of the value itself ends
+        just = 1.0 + slack * max(1.0, just)
+    values = np.array([[just], [-just], [np.nextafter(just, 2.0)], [np.nextafter(-just, -2.0)]])
+    assert [note is None for note in sweep_question._notes(robot, values)] == [True, True, False, False]
+
+
+def test_as_many_drawn_rows_as_memory_holds_may_be_had_at_once(monkeypatch):
+    monkeypatch.setattr(configurations, "_MAX_DRAWN", 12)
+    assert DrawnConfigurations(6).of(arm()).shape == (6, 2)
+    with pytest.raises(InvalidArgument, match="7 rows are too many for memory"):
+        DrawnConfigurations(7).of(arm())
+
+
+def test_as_many_workers_as_there_may_be(tmp_path, monkeypatch):
+    pytest.importorskip("pyarrow")
+    monkeypatch.setattr(sweep, "MAX_WORKERS", 0)
+    assert run_of(tmp_path, 1, 3, None).go(workers=0).done == 3
+    with pytest.raises(InvalidArgument, match="workers must be at most 0 processes, got 1"):
+        run_of(tmp_path, 1, 3, None).go(workers=1)
+
+
+def test_hidden_pairs_collide_in_part_of_the_sample_and_are_disabled():
+    link = lambda name, reason, hits: SimpleNamespace(
+        a="base", b=name, reason=reason, hits=hits, samples=9, fixed=False, share_bounds=(0.0, 1.0), searched=False,
+        nearest=None,
+    )
+    hits = [("p", DEFAULT, 4), ("q", DEFAULT, 9), ("r", ALWAYS, 8), ("s", NEVER, 0), ("t", None, 3)]
+    pairs = [link(*one) for one in hits]
+    proposal = SimpleNamespace(
+        pairs=pairs, disabled=[pair for pair in pairs if pair.reason is not None], samples=9, nearest=None,
+    )
+    tables = {table.title.split()[0]: table for table in pair_tables.proposal_tables(proposal)}
+    assert [row[1] for row in tables["HIDDEN"].rows] == ["p", "r"]

@@ -137,3 +137,14 @@ def test_pairs_are_handed_out_by_twos_until_none_may_be_nearer():
     assert every == [[0, 4], [1, 2, 5], [3]]
     assert [some.tolist() for some in nearest_first(owner, bounds, np.array([1.0, 5.0]))] == [[0, 4], [1]]
     assert list(nearest_first(owner[:0], bounds[:0], np.zeros(0))) == []
+
+
+def test_the_first_cast_that_hits_may_be_any():
+    """Of three casts the second alone meets the ball, or the last two, or all."""
+    world = collide.World()
+    world.add(BALL, pose(t=(2.0, 0, 0)))
+    for aims in ([0, 1, 0], [0, 1, 1], [0, 0, 1], [1, 1, 1]):
+        directions = np.array([(1.0, 0, 0) if aim else (-1.0, 0, 0) for aim in aims])
+        hits = world.shape_cast(BALL, np.eye(4), directions)
+        assert hits["hit"].astype(int).tolist() == aims, aims
+        assert np.allclose(hits["distance"][hits["hit"]], 1.5)
