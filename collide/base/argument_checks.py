@@ -174,7 +174,9 @@ def vectors(caller: str, name: str, values) -> tuple[np.ndarray, bool]:
     if read.ndim not in (1, 2) or read.shape[-1] != 3:
         raise InvalidArgument(f"{caller}: {name} must be (3,) or (N, 3), got {read.shape}")
     rows = np.ascontiguousarray(read.reshape(-1, 3))
-    refuse_rows(caller, name, rows, ~np.isfinite(rows).all(axis=1), "has entries that are not finite")
+    are_finite = np.isfinite(rows)
+    if not are_finite.all():
+        refuse_rows(caller, name, rows, ~are_finite.all(axis=1), "has entries that are not finite")
     return rows, read.ndim == 1
 
 

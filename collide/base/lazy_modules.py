@@ -7,6 +7,7 @@ same for modules and for the names of a package, but would be a second required 
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import Any
 
@@ -18,7 +19,8 @@ class LazyModule:
         self._name = name
 
     def __getattr__(self, attribute: str) -> Any:
-        return getattr(import_module(self._name), attribute)
+        module = sys.modules.get(self._name) or import_module(self._name)
+        return getattr(module, attribute)
 
 
 def lazy_module(name: str) -> Any:

@@ -7,15 +7,12 @@ import math
 import numpy as np
 
 from collide.base import argument_checks as checks
-from collide.casts.directions import Directions
+from collide.casts.directions import LONGEST, MIN_RATIO, SHORTEST, Directions, scale_directions
 from collide.errors import UnsupportedQuery
+from collide.kernels import address_of
 from collide.lowering.closed_regions import reach_of
 from collide.shapes.shape import Shape
 from collide.transforms import LARGEST
-
-#: The largest component of a direction stays within these; its others are 0 or at least this part of the largest.
-_DIRECTIONS = (1e-100, 1e100)
-_MIN_RATIO = 2.0**-500
 
 
 def checked_directions(caller: str, name: str, values, thing: str) -> tuple[Directions, bool]:
@@ -24,16 +21,16 @@ def checked_directions(caller: str, name: str, values, thing: str) -> tuple[Dire
     thing : "a ray", for messages.
     """
     values_read, single = checks.vectors(caller, name, values)
-    sizes = np.abs(values_read).max(axis=1)
-    checks.refuse_rows(caller, name, values_read, sizes == 0.0, f"has length 0: {thing} needs a direction")
-    low, high = _DIRECTIONS
-    complaint = f"has no component within [{low:g}, {high:g}]"
-    checks.refuse_rows(caller, name, values_read, (sizes < low) | (sizes > high), complaint)
-    exponents = np.frexp(sizes)[1].astype(np.int64)
-    scaled = np.ldexp(values_read, -exponents[:, None])
-    thin = (scaled != 0.0) & (np.abs(scaled) < _MIN_RATIO)
-    complaint = "has components that differ by more than 2^500; make them 0"
-    checks.refuse_rows(caller, name, scaled, thin.any(axis=1), complaint)
+    n = len(values_read)
+    scaled, exponents = np.empty((n, 3)), np.empty(n, dtype=np.int64)
+    if scale_directions(address_of(values_read), n, address_of(scaled), address_of(exponents)) < n:
+        sizes = np.abs(values_read).max(axis=1)
+        checks.refuse_rows(caller, name, values_read, sizes == 0.0, f"has length 0: {thing} needs a direction")
+        complaint = f"has no component within [{SHORTEST:g}, {LONGEST:g}]"
+        checks.refuse_rows(caller, name, values_read, (sizes < SHORTEST) | (sizes > LONGEST), complaint)
+        thin = (values_read != 0.0) & (np.abs(values_read) < MIN_RATIO * sizes[:, None])
+        complaint = "has components that differ by more than 2^500; make them 0"
+        checks.refuse_rows(caller, name, values_read, thin.any(axis=1), complaint)
     return Directions(scaled, exponents), single
 
 
@@ -44,17 +41,23 @@ def checked_rays(caller: str, origins_W, directions_W, **counts: int) -> tuple[n
     """
     origins, single_origin = checks.vectors(caller, "origins_W", origins_W)
     directions, single_direction = checked_directions(caller, "directions_W", directions_W, "a ray")
-    checks.refuse_rows(caller, "origins_W", origins, np.abs(origins).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
+    _refuse_far(caller, "origins_W", origins)
     n = checks.matched_count(caller, **counts, origins_W=len(origins), directions_W=len(directions.vectors))
-    origins = np.ascontiguousarray(np.broadcast_to(origins, (n, 3)))
+    origins = origins if len(origins) == n else np.ascontiguousarray(np.broadcast_to(origins, (n, 3)))
     return origins, directions.repeated(n), single_origin and single_direction
 
 
 def checked_points(caller: str, name: str, values) -> np.ndarray:
     """(n, 3) points. Raises InvalidArgument."""
     points, _ = checks.vectors(caller, name, values)
-    checks.refuse_rows(caller, name, points, np.abs(points).max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
+    _refuse_far(caller, name, points)
     return points
+
+
+def _refuse_far(caller: str, name: str, points: np.ndarray) -> None:
+    sizes = np.abs(points)
+    if sizes.max(initial=0.0) > LARGEST:
+        checks.refuse_rows(caller, name, points, sizes.max(axis=1) > LARGEST, f"exceeds {LARGEST:g}")
 
 
 def refuse_unbounded(what: str, shapes) -> None:

@@ -29,17 +29,16 @@ from collide.casts.directions import Directions
 from collide.casts.exact_cast import cast_exactly, corners_of
 from collide.casts.posed_parts import PosedParts
 from collide.casts.ray_hits import RayEvents
-from collide.casts.rays_in_tree import TREE_RAY_DOUBLES, TREE_RAY_INTEGERS, parts_on_rays
+from collide.casts.rays_in_tree import MAX_WIDTH, TREE_RAY_DOUBLES, TREE_RAY_INTEGERS, parts_on_rays
 from collide.curved.chords import MET, MISSED, UNCLEAR
 from collide.kernels import address_of
 from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.shape_table import PoseTable, ShapeTable
 from collide.numerics.exact_points import integers, rounded
 from collide.numerics.exact_vectors import inner
 
 #: Columns of both ends of a chord: from below, the value, from above.
 _BRACKETS = [FIRST_LOWER, LAST_LOWER], [FIRST, LAST], [FIRST_UPPER, LAST_UPPER]
-#: Brackets wider than this, in units of t of the far side, are not certified.
-_MAX_WIDTH = 2.0**-36
 
 
 class _Workspace(local):
@@ -83,31 +82,49 @@ def parts_met(
     return _events(rows, met, asked, limits, exact, _ends_of(rows) if exact.any() else ends, directions)
 
 
-def candidate_parts(
-    parts: PosedParts, tree: BoxTree, first: np.ndarray, skipped: np.ndarray, meshed: np.ndarray, origins, directions,
-    limit: float, every: bool,
-) -> np.ndarray:
-    """(k, 2) int64: rays and parts with a ray's possible first wall, or any wall, of the bounded bodies of a tree.
+class TreeOfParts(NamedTuple):
+    """Bodies of posed parts in a box-tree.
 
-    first : (bodies + 1,) the first part of each.   skipped, meshed : (bodies,) int64, 1 of bodies not asked, and of
-    bodies whose parts are only bounds.   The rest as of `parts_met`.
+    table : of the parts' shapes, its trees built.   poses : of the parts.   shape_of : (parts,) int64, the parts' rows
+    of the table.
+    first : (bodies + 1,) int64, the first part of each.   meshed : (bodies,) int64, 1 of bodies whose parts are only
+    bounds.
     """
-    n = len(origins)
+
+    table: ShapeTable
+    poses: PoseTable
+    shape_of: np.ndarray
+    tree: BoxTree
+    first: np.ndarray
+    meshed: np.ndarray
+
+
+def candidate_parts(
+    bodies: TreeOfParts, skipped: np.ndarray, origins, directions: Directions, limit: float, rows: np.ndarray | None
+) -> np.ndarray:
+    """(k, 2) int64: rays and the parts that hold a ray's first wall, perhaps, or any wall.
+
+    skipped : (bodies,) int64, 1 of bodies not asked.   rows : (n,) of `WORLD_HIT_DTYPE`, to become the answers of rays
+    whose first wall is proven, which are not among the pairs; None for all walls.   The rest as of `parts_met`.
+    """
+    n, tree, first = len(origins), bodies.tree, bodies.first
     rays = _as_rays(origins, directions)
     limits = directions.limits(limit)
     header = np.array(
         [
             address_of(tree.nodes), address_of(tree.links), tree.n_nodes, address_of(first), len(first) - 1,
-            address_of(skipped), address_of(meshed),
+            address_of(skipped), address_of(bodies.meshed), address_of(tree.unbounded), len(tree.unbounded),
         ],
         dtype=np.int64,
     )
+    rows_at = 0 if rows is None else address_of(rows)
     capacity = 64 + 4 * n
     while True:
         pairs = np.empty((capacity, 2), dtype=np.int64)
         count = parts_on_rays(
-            *parts.table.addresses, address_of(parts.poses.rows), address_of(parts.shape_of), address_of(header),
-            address_of(rays), address_of(limits), n, every, address_of(pairs), capacity, *_workspace.addresses,
+            *bodies.table.addresses, address_of(bodies.poses.rows), address_of(bodies.shape_of), address_of(header),
+            address_of(rays), address_of(limits), address_of(directions.exponents), n, rows_at, address_of(pairs),
+            capacity, *_workspace.addresses,
         )
         if count <= capacity:
             return pairs[:count]
@@ -133,7 +150,7 @@ def _ends_of(rows: np.ndarray) -> _Ends:
     lower, value, upper = (rows[:, columns] for columns in _BRACKETS)
     far = np.where(np.isfinite(value), np.abs(value), 0.0).max(axis=1, keepdims=True)
     with np.errstate(invalid="ignore"):
-        wide = np.isfinite(upper) & np.isfinite(lower) & ~(upper - lower <= _MAX_WIDTH * far)
+        wide = np.isfinite(upper) & np.isfinite(lower) & ~(upper - lower <= MAX_WIDTH * far)
     return _Ends(value, lower, upper, wide)
 
 

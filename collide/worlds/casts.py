@@ -14,9 +14,9 @@ from collide.casts.cast_batches import cast_batch
 from collide.casts.convex_casts import CastRows
 from collide.casts.directions import Directions
 from collide.casts.items_ahead import nearest_first
-from collide.casts.posed_parts import PosedParts, posed_parts
+from collide.casts.posed_parts import posed_parts
 from collide.casts.ray_hits import RayEvents, first_of_each, joined
-from collide.casts.ray_parts import candidate_parts, parts_met
+from collide.casts.ray_parts import TreeOfParts, candidate_parts, parts_met
 from collide.casts.raycast import surfaces_met
 from collide.errors import InvalidArgument
 from collide.lowering.parts import bounding_parts_of
@@ -73,11 +73,13 @@ def cast_rays(
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """(rows, starts) of n rays: the first wall of each, or every one.   limit : of t in lengths of the directions."""
     n = len(origins)
-    skipped = which.skipped(packed)
+    if packed.tree is None or not n:
+        return empty_hits(0 if every else n), np.zeros(n + 1, dtype=np.int64) if every else None
+    rows = None if every else np.empty(n, dtype=WORLD_HIT_DTYPE)
+    asked = candidate_parts(_tree_of(packed), which.skipped(packed), origins, directions, limit, rows)
+    if rows is not None and not len(asked):
+        return rows, None
     parts, body_of, first = packed.posed_parts()
-    asked = np.empty((0, 2), dtype=np.int64)
-    if packed.tree is not None and n:
-        asked = _candidates(packed, parts, first, skipped, origins, directions, limit, every)
     is_meshed = packed.meshed[body_of[asked[:, 1]]]
     any_meshed = bool(is_meshed.any())
     convex = np.ascontiguousarray(asked[~is_meshed]) if any_meshed else asked
@@ -90,23 +92,14 @@ def cast_rays(
         on_meshes = list(_on_meshes(packed, pairs, origins, directions, limit, every))
         events = joined([events, *(some for some, _ in on_meshes)])
         bodies = np.concatenate([bodies, *(of_some for _, of_some in on_meshes)])
-    return _as_rows(events, bodies, origins, directions, every)
+    return _as_rows(events, bodies, origins, directions, rows)
 
 
-def _candidates(
-    packed: PackedWorld, parts: PosedParts, first, skipped, origins, directions: Directions, limit, every
-) -> np.ndarray:
-    """(k, 2) rays and parts that may make a first wall, or any."""
-    tree, meshed = packed.tree, packed.meshed.astype(np.int64)
+def _tree_of(packed: PackedWorld) -> TreeOfParts:
+    parts, tree = packed.parts, packed.tree
     assert tree is not None
-    asked = candidate_parts(parts, tree, first, skipped, meshed, origins, directions, limit, every)
-    unbounded = tree.unbounded[skipped[tree.unbounded] == 0]
-    if len(unbounded):
-        n = len(origins)
-        of_unbounded = np.concatenate([np.arange(first[body], first[body + 1]) for body in unbounded.tolist()])
-        pairs = np.stack([np.repeat(np.arange(n), len(of_unbounded)), np.tile(of_unbounded, n)], axis=1)
-        asked = np.concatenate([asked, pairs])
-    return asked
+    parts.table.build_trees(parts.row_of)
+    return TreeOfParts(parts.table, parts.poses, parts.row_of, tree, parts.first, packed.meshed.astype(np.int64))
 
 
 def _on_meshes(packed: PackedWorld, pairs: np.ndarray, origins, directions: Directions, limit: float, every: bool):
@@ -121,21 +114,22 @@ def _on_meshes(packed: PackedWorld, pairs: np.ndarray, origins, directions: Dire
         yield events._replace(ray=ray[events.ray]), body[events.ray]
 
 
-def _as_rows(events: RayEvents, bodies: np.ndarray, origins, directions: Directions, every: bool):
-    """(rows, starts) of events and the positions of the bodies they are of."""
+def _as_rows(events: RayEvents, bodies: np.ndarray, origins, directions: Directions, rows: np.ndarray | None):
+    """(rows, starts) of events and the positions of the bodies they are of.   rows : of all rays, to be filled; None:
+    a row for every event."""
     n = len(origins)
     # Along a ray by t, then body, item and facet.
     order = np.lexsort((events.facet, events.item, bodies, events.t[:, 0], events.ray))
     events, bodies = events.of(order), bodies[order]
     starts = None
-    if every:
+    if rows is None:
         starts = np.concatenate([[0], np.cumsum(np.bincount(events.ray, minlength=n))])
         rows = np.zeros(len(events.ray), dtype=WORLD_HIT_DTYPE)
         at: np.ndarray | slice = slice(None)
     else:
         bodies = bodies[np.flatnonzero(np.diff(events.ray, prepend=-1))]
         events = first_of_each(events)
-        rows, at = empty_hits(n), events.ray
+        at = events.ray
     step = np.ldexp(directions.vectors[events.ray], directions.exponents[events.ray, None])
     columns = {
         "distance": events.t[:, 0], "lower": events.t[:, 1], "upper": events.t[:, 2], "normal": events.normal,

@@ -19,9 +19,11 @@ at_start        of casts: whether they touch before they move
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
+
+from collide.worlds.bodies import Roster
 
 WORLD_HIT_DTYPE = np.dtype(
     [
@@ -49,7 +51,7 @@ class WorldHits:
     Parameters
     ----------
     rows : (n,) `WORLD_HIT_DTYPE`, as the module `collide.worlds.hits` says.
-    names : {id: name} of the bodies met.
+    roster : the bodies, for their names.
     starts : (N + 1,) where the rows of each ray begin and end, with ``all_hits``; ``None`` otherwise.
 
     Notes
@@ -58,10 +60,10 @@ class WorldHits:
     names of the bodies row by row, ``None`` where nothing is met.
     """
 
-    __slots__ = ("_names", "rows", "starts")
+    __slots__ = ("_roster", "rows", "starts")
 
-    def __init__(self, rows: np.ndarray, names: Mapping[int, str], starts: np.ndarray | None = None):
-        self.rows, self._names, self.starts = rows, dict(names), starts
+    def __init__(self, rows: np.ndarray, roster: Roster, starts: np.ndarray | None = None):
+        self.rows, self._roster, self.starts = rows, roster, starts
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -78,4 +80,6 @@ class WorldHits:
     @property
     def names(self) -> list[str | None]:
         """Names of the bodies, row by row; None where nothing is met."""
-        return [self._names.get(body) for body in self.rows["body"].tolist()]
+        ids, names = self._roster.ids, self._roster.names
+        bodies = self.rows["body"]
+        return [None if b < 0 else names[k] for b, k in zip(bodies.tolist(), np.searchsorted(ids, bodies).tolist())]

@@ -245,9 +245,7 @@ class World(WorldPairs):
 
 
 def _hits(packed: PackedWorld, rows: np.ndarray, starts: np.ndarray | None = None) -> WorldHits:
-    """Rows whose bodies are positions, with their ids."""
-    roster = packed.roster
-    named = np.unique(rows["body"][rows["body"] >= 0])
-    met = rows["body"] >= 0
-    rows["body"][met] = roster.ids[rows["body"][met]]
-    return WorldHits(rows, {int(roster.ids[k]): roster.names[k] for k in named.tolist()}, starts)
+    """Rows whose bodies are positions, −1 of none, with their ids."""
+    ids = packed.roster.ids
+    rows["body"] = np.append(ids, ids.dtype.type(-1))[rows["body"]]
+    return WorldHits(rows, packed.roster, starts)

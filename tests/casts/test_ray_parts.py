@@ -16,10 +16,11 @@ import collide
 from collide.broadphase.box_tree import BoxTree
 from collide.casts.cast_arguments import checked_rays
 from collide.casts.posed_parts import PosedParts, posed_parts
-from collide.casts.ray_parts import candidate_parts, parts_met
+from collide.casts.ray_parts import TreeOfParts, candidate_parts, parts_met
 from collide.casts.rays_in_tree import TREE_RAY_DOUBLES, TREE_RAY_INTEGERS, parts_on_rays
 from collide.kernels import address_of
 from collide.lowering.parts import parts_of
+from collide.worlds.hits import WORLD_HIT_DTYPE
 
 EYE = np.eye(4)
 
@@ -136,6 +137,10 @@ class Scene:
         self.low, self.high = low, high
         self.skipped, self.meshed = (rng.random((2, n)) < 0.25).astype(np.int64)
 
+    def bodies(self) -> TreeOfParts:
+        parts = self.parts
+        return TreeOfParts(parts.table, parts.poses, parts.shape_of, self.tree, self.first, self.meshed)
+
 
 @pytest.mark.parametrize("every", [False, True])
 @pytest.mark.parametrize("limit", [math.inf, 1.0])
@@ -145,9 +150,8 @@ def test_candidates_hold_all_walls_and_none_of_what_is_skipped(every, limit):
     o = rng.uniform(-6, 6, (25, 3))
     at = np.array([scene.items[k][1][:3, 3] for k in rng.integers(0, len(scene.items), 25)])
     origins, directions, _ = checked_rays("f", o, at - o + 0.1 * rng.normal(size=(25, 3)))
-    found = candidate_parts(
-        scene.parts, scene.tree, scene.first, scene.skipped, scene.meshed, origins, directions, limit, every
-    )
+    rows = None if every else np.empty(25, dtype=WORLD_HIT_DTYPE)
+    found = candidate_parts(scene.bodies(), scene.skipped, origins, directions, limit, rows)
     pairs = set(map(tuple, found.tolist()))
     assert len(pairs) == len(found)
     body = np.searchsorted(scene.first, np.arange(len(scene.items)), "right") - 1
@@ -155,13 +159,24 @@ def test_candidates_hold_all_walls_and_none_of_what_is_skipped(every, limit):
     asked = np.array([(k, part) for k in range(25) for part in range(len(scene.items))
                       if not scene.skipped[body[part]] and not scene.meshed[body[part]]])
     events = parts_met(scene.parts, asked, origins, directions, limit, True)
-    n_needed = 0
+    n_needed = n_answered = 0
     for k in range(25):
         mine = np.flatnonzero(events.ray == k)
         needed = mine if every else mine[np.argsort(events.t[mine, 0])[:1]]
         n_needed += len(needed)
+        if not every and not any(ray == k for ray, _ in pairs):  # answered: the first wall, or none
+            row, n_answered = rows[k], n_answered + 1
+            assert row["ray"] == k and row["hit"] == bool(len(needed)) and row["certified"] and not row["at_start"]
+            for event in needed:
+                part = asked[events.item[event], 1]
+                assert (row["body"], row["item"]) == (body[part], part - scene.first[body[part]])
+                assert [row["distance"], row["lower"], row["upper"]] == events.t[event].tolist()
+                assert (row["normal"] == events.normal[event]).all() and row["facet"] == events.facet[event]
+                point = o[k] + row["distance"] * (directions.vectors[k] * 2.0 ** directions.exponents[k])
+                assert (row["point"] == point).all()
+            continue
         assert all((k, asked[events.item[row], 1]) in pairs for row in needed)
-    assert n_needed > 4
+    assert n_needed > 4 and (every or n_answered)
     # Of a mesh all parts, where the ray comes to its box: not beyond the limit, and in any case nowhere else.
     for k, part in pairs:
         if scene.meshed[body[part]]:
@@ -179,18 +194,18 @@ def test_more_candidates_than_room_are_counted():
     o = rng.uniform(-6, 6, (10, 3))
     at = np.array([X[:3, 3] for _, X in scene.items[:10]])
     origins, directions, _ = checked_rays("f", o, at - o)
-    arguments = scene.parts, scene.tree, scene.first, scene.skipped * 0, scene.meshed * 0, origins, directions
-    whole = candidate_parts(*arguments, math.inf, True)
+    scene.skipped, scene.meshed = scene.skipped * 0, scene.meshed * 0
+    whole = candidate_parts(scene.bodies(), scene.skipped, origins, directions, math.inf, None)
     header = np.array([
         address_of(scene.tree.nodes), address_of(scene.tree.links), scene.tree.n_nodes, address_of(scene.first), 12,
-        address_of(arguments[3]), address_of(arguments[4]),
+        address_of(scene.skipped), address_of(scene.meshed), address_of(scene.tree.unbounded), 0,
     ])
     rays, limits = np.hstack([origins, directions.vectors]), np.full(10, math.inf)
     doubles, integers = np.zeros(TREE_RAY_DOUBLES), np.zeros(TREE_RAY_INTEGERS, dtype=np.int64)
     pairs = np.full((5, 2), -7, dtype=np.int64)
     count = parts_on_rays(
         *scene.parts.table.addresses, address_of(scene.parts.poses.rows), address_of(scene.parts.shape_of),
-        address_of(header), address_of(rays), address_of(limits), 10, True, address_of(pairs), 3, address_of(doubles),
-        address_of(integers),
+        address_of(header), address_of(rays), address_of(limits), address_of(directions.exponents), 10, 0,
+        address_of(pairs), 3, address_of(doubles), address_of(integers),
     )
     assert count == len(whole) > 3 and np.array_equal(pairs[:3], whole[:3]) and (pairs[3:] == -7).all()
