@@ -137,7 +137,13 @@ def seed_of(near, k):
     if not abs(dot(u, u) - 1.0) < _SAME:
         return False, u, nothing
     p = sub(vec3_at(row.doubles, POINT_A), near.origin)
-    first, second = _feature_at(near.corners, 9 * k, p)
+    on = _ON
+    first, second = _feature_at(near.corners, 9 * k, p, on)
+    # Within a facet the nearest point has the facet's normal: another normal is of an edge or a corner, beside which
+    # rounding has put the point, of a facet tiny beside the set.
+    while first < 0 and on < 1.0 and norm(cross(n, u)) > _OF_DEPTHS * _SAME_PATCH * norm(n):
+        on *= 4.0
+        first, second = _feature_at(near.corners, 9 * k, p, on)
     facing = dot(n, u)
     if dot(n, n) > 0.0 and (first < 0 or norm(cross(n, u)) <= slack):
         return facing > 0.0 or not near.mesh.solid, n if facing > 0.0 else neg(n), 4 * facet + FACE
@@ -167,15 +173,18 @@ def _across_lines(near, p, q, u):
 
 
 @kernel
-def _feature_at(corners, at, p):
-    """Feature of a triangle under a point on its surface: (a corner, −1), both ends of an edge, or (−1, −1)."""
+def _feature_at(corners, at, p, on):
+    """Feature of a triangle under a point on its surface: (a corner, −1), both ends of an edge, or (−1, −1).
+
+    on : a point this near to a corner or an edge, in lengths of the longest edge, is on it.
+    """
     longest = 0.0
     for i in range(3):
         longest = max(longest, norm(sub(_corner(corners, at, i + 1), _corner(corners, at, i))))
     for i in range(3):
-        if norm(sub(p, _corner(corners, at, i))) <= _ON * longest:
+        if norm(sub(p, _corner(corners, at, i))) <= on * longest:
             return i, -1
-    best, edge = _ON * longest, -1
+    best, edge = on * longest, -1
     for i in range(3):
         q = _corner(corners, at, i)
         e, w = sub(_corner(corners, at, i + 1), q), sub(p, q)

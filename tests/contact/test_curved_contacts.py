@@ -264,3 +264,25 @@ def test_too_many_facets_are_refused(monkeypatch):
     monkeypatch.setattr(curved_contacts, "MAX_FACETS", 5)
     with pytest.raises(collide.UnsupportedQuery, match="smaller margin"):
         collide.contacts(collide.Mesh(*table(6)), CAN, EYE, collide.pose((0, 0, 0.25)))
+
+
+def test_contacts_of_facets_tiny_beside_the_set_lie_on_both():
+    """Rounding put the nearest point of a facet of 1e-7 m beside its corner, within the facet: the patch got the
+    facet's normal, 17 degrees off, and a point 1.5e-5 m off a cone 1e-4 m away."""
+    rng = np.random.default_rng(5)
+    n_rows = 0
+    for _ in range(60):
+        points = rng.normal(size=(12, 3)) * (2e-7, 1e-7, 5e-8)
+        M = collide.Mesh(points, rng.permutation(12).reshape(4, 3), solid=False)
+        S = [CAN, CONE, EGG][rng.integers(3)]
+        X_WA, X_WS = collide.pose(1e-6 * rng.normal(size=3)), np.eye(4)
+        direction = rng.normal(size=3)
+        X_WS[:3, 3] = direction / np.linalg.norm(direction)
+        r = collide.distance(M, S, X_WA, X_WS)
+        X_WS[:3, 3] -= (r.distance - 10.0 ** rng.uniform(-6, -3)) * r.normal
+        r = collide.distance(M, S, X_WA, X_WS)
+        for row in collide.contacts(M, S, X_WA, X_WS, margin=1.5 * r.distance).rows:
+            off = beyond(S, within(X_WS, row["point_b"][None]))[0]
+            assert abs(off) < 1e-10, (off, points.tolist(), M.faces.tolist(), S, X_WA.tolist(), X_WS.tolist())
+            n_rows += 1
+    assert n_rows > 100
