@@ -135,10 +135,13 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
     well_conditioned = enclosed and run.clearance > WELL_CONDITIONED * size
     iterations = run.iterations
     shallowest, deepest = -math.inf, math.inf
+    # A gap next to nothing has its nearest points where the whole surface is known, as a depth has; a gap of polytopes
+    # gets its points with its last digits.
+    has_points = query.depths or (curved and not query.boolean)
     start = 0
     while True:  # where rounding has spoilt a surface, one that begins elsewhere is often sound
         seed = Seed(points, ids, enclosed and start == 0, well_conditioned, use_capped_tetrahedron, start)
-        result = epa(pair, polytope, seed, Goal(not query.depths, size, error, tolerance))
+        result = epa(pair, polytope, seed, Goal(not has_points, size, error, tolerance))
         iterations += 65536 * max(result.n_vertices - 4, 0)
         if result.status == FLAT:
             if result.n_vertices == 3 and not curved:  # what spans it: for the exact stage, which may prove it flat
@@ -161,7 +164,7 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
         # few vertices: `exact_depth.py` tries all planes instead
         if refined.sound or not use_capped_tetrahedron or start == _MAX_STARTS:
             break
-    _weigh_foot(work, polytope, result, query.depths, not enclosed, curved, tolerance, size, error)
+    _weigh_foot(work, polytope, result, has_points, not enclosed, curved, tolerance, size, error)
     if result.clearance > error:
         upper = min(upper, -result.clearance)
     n_vertices = 4 if enclosed else 3
@@ -201,7 +204,7 @@ def _refined_result(result, refined, error):
 
 
 @kernel(inline=True)
-def _weigh_foot(work, polytope, result, depths, with_ids, curved, tolerance, size, error):
+def _weigh_foot(work, polytope, result, has_points, with_ids, curved, tolerance, size, error):
     """Points 0 … 2 become the facet holding the origin's foot on the plane of the depth, weighted for the foot.
 
     with_ids : name the facet's vertices, too; else the simplex enclosing the origin stays named.
@@ -220,7 +223,7 @@ def _weigh_foot(work, polytope, result, depths, with_ids, curved, tolerance, siz
     if curved:
         width = result.depth - result.clearance
         tolerated = max(slack, _MISS_OF_WIDTH * width) if result.clearance > error else slack
-    if depths and norm1(sub(weighted_sum(work.points, work.weights, 3, 0), foot)) > tolerated:
+    if has_points and norm1(sub(weighted_sum(work.points, work.weights, 3, 0), foot)) > tolerated:
         weigh_nearest(polytope, result.n_facets, facet, work.points, work.ids, work.weights, with_ids, foot, tolerated)
 
 

@@ -432,3 +432,43 @@ def test_a_depth_whose_first_surface_rounding_spoils():
     r = collide.distance(*generate("cyl1000", 10, 105)[1].shapes())
     assert r.certified and r.lower <= r.distance <= r.upper < 0
     assert abs(r.distance + 6.449941917895806e-17) < 1e-27
+
+
+@pytest.mark.parametrize("kind", [collide.Cone, collide.Cylinder, collide.Ellipsoid])
+def test_nearest_points_of_gaps_next_to_nothing_lie_on_the_body(kind):
+    """Where GJK could not tell a gap of 1e-11 m beside a cone from contact, EPA proved the gap, and its nearest points
+    were up to 8 cm away from the body: the facet under them did not hold the origin's foot."""
+    rng = rng_of("points of gaps next to nothing", kind.__name__)
+    n_near = 0
+    for number in range(120):
+        radius, length = 10.0 ** rng.uniform(-0.5, 0.5, 2)
+        sizes = {collide.Cone: (radius, length), collide.Cylinder: (radius, length)}
+        B = kind(*sizes.get(kind, ((radius, length, 0.7 * radius),)))
+        points = np.array([(0, 0, 0), (0.5, -0.75, 0.25), (0.1, 0.0, 0.3)])[: 2 + number % 2]
+        A, X_WA, X_WB = collide.ConvexHull(points), random_pose(rng, 1.0), np.eye(4)
+        r = collide.distance(A, B, X_WA, X_WB)
+        X_WB[:3, 3] -= (r.distance - rng.choice([1e-12, 1e-11, 1e-10, 1e-9])) * r.normal
+        for S in (A, collide.Mesh(points, [[0, 1, len(points) - 1]], solid=False)):
+            r = collide.distance(S, B, X_WA, X_WB, signed=False)
+            if r.hit or r.upper > 1e-8:
+                continue
+            n_near += 1
+            off = naive.distance_to_body(r.point_a, A, X_WA)
+            assert off <= 1e-8, (off, r.distance, S, points, B, X_WA.tolist(), X_WB.tolist())
+    assert n_near > 120
+
+
+def test_normals_of_unions_have_no_negative_zero():
+    """Swapped arguments then give mirrored bits: the way out of a box along −y was (0, −1, −0)."""
+    A, turned = collide.Sphere(0.5), np.diag([1.0, -1.0, -1.0, 1.0])
+    parts = [(collide.Box((0.1, 0.2, 0.1)), collide.pose((0.1, 0, 0))), (collide.Capsule(0.05, 0.1), np.eye(4))]
+    n_zeros = 0
+    for items in (parts, parts[::-1], [*parts, (collide.Box((0.1, 0.1, 0.3)), collide.pose((0, 0.2, 0)))]):
+        B = collide.Compound(items)
+        for X_WA, X_WB in ((np.eye(4), turned), (turned, np.eye(4)), (turned, turned)):
+            one, other = collide.distance(A, B, X_WA, X_WB), collide.distance(B, A, X_WB, X_WA)
+            assert (0.0 - one.normal).tobytes() == other.normal.tobytes()
+            zeros = one.normal[one.normal == 0.0]
+            n_zeros += len(zeros)
+            assert (np.copysign(1.0, zeros) == 1.0).all(), one.normal
+    assert n_zeros > 8

@@ -239,7 +239,7 @@ def separate_bodies(score, at, out_at, parts, first_a, n_a, first_b, n_b, work_a
         row.words[PART_B] = int(score[overlap + _OF_B])
         middle = scale(0.5, add(vec3_at(score, overlap + _VECTORS + 3), vec3_at(score, overlap + _VECTORS + 6)))
         half = scale(0.5 * doubles[DISTANCE], nhat)
-        put_vec3(doubles, NORMAL, nhat)
+        put_vec3(doubles, NORMAL, add(nhat, Vec3(0.0, 0.0, 0.0)))  # never −0.0
         put_vec3(doubles, POINT_A, sub(middle, half))
         put_vec3(doubles, POINT_B, add(middle, half))
     if not upper - doubles[LOWER] <= promised:
