@@ -54,9 +54,10 @@ def scale_directions(values_at, n, vectors_at, exponents_at):
             size = max(size, abs(values[i]))
         if not SHORTEST <= size <= LONGEST:
             return k
-        exponents[k] = math.frexp(size)[1]
+        exponent = int(math.frexp(size)[1])
+        exponents[k] = exponent
         for i in range(3 * k, 3 * k + 3):
-            vectors[i] = math.ldexp(values[i], -exponents[k])
+            vectors[i] = math.ldexp(values[i], -exponent)
             if vectors[i] != 0.0 and abs(values[i]) < MIN_RATIO * size:
                 return k
     return n

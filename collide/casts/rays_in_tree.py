@@ -292,6 +292,6 @@ def parts_on_rays(
     for k in range(n):
         walk = _open_walk(rays_at + 8 * RAY * k, doubles_at, integers_at)
         end = _walk_ray(tree, tables, walk, k, limits[k], listed, count)
-        if rows_at == 0 or not _put_row(tree, walk, k, exponents[k], rows_at + HIT_ROW * k):
+        if rows_at == 0 or not _put_row(tree, walk, k, int(exponents[k]), rows_at + HIT_ROW * k):
             count = end
     return count
