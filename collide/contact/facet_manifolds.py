@@ -43,7 +43,7 @@ from collide.contact.contact_patches import (
 from collide.contact.contact_points import PatchPoints
 from collide.contact.manifold_points import POINT, ManifoldPoints
 from collide.contact.patch_rows import CONTACT, PatchSpace, flip_row, put_patch
-from collide.contact.reduce_patch import HullSpace
+from collide.contact.reduce_patch import HullSpace, column_words
 from collide.contact.shallow_overlaps import STEP_ERRORS, separate_pairs
 from collide.contact.support_face import axes_across
 from collide.kernels import entry, kernel, native_call, view_f64, view_i64, view_u8
@@ -82,6 +82,7 @@ CONTACT_HEADER = HEADER + 10
 DONE, ROWS_FULL, PAIRS_FULL, TOO_MANY, SINGULAR = range(5)
 #: Words of one set of points, a pair; of all that does not grow with them.
 _WORDS_OF_POINTS = MAX_POINTS * (POINT + 4)
+_WORDS_OF_HULL = 4 * MAX_POINTS
 _FIXED_WORDS = TRANSLATION_WORDS + CLEARING_WORDS + 18 + 8 + CELLS
 #: Integers that are kept of a pair while more are listed: those of the list, and its group.
 _KNOWN = INTS_OF_PAIR + 1
@@ -91,7 +92,8 @@ _MAX_WAYS = 8
 
 def workspace_words(capacity: int) -> int:
     """64-bit words the kernel works in, for so many pairs of facets."""
-    return (WORDS_OF_PAIRS + 2 * _WORDS_OF_POINTS + 3 * MAX_POINTS + MAX_NORMALS) * capacity + _FIXED_WORDS
+    each = WORDS_OF_PAIRS + 2 * _WORDS_OF_POINTS + _WORDS_OF_HULL + MAX_NORMALS
+    return each * capacity + _FIXED_WORDS + column_words(MAX_POINTS * capacity)
 
 
 class _Task(NamedTuple):
@@ -132,7 +134,7 @@ def _after_pairs(task, words_a_pair):
 
 @kernel(inline=True)
 def _fixed_at(task):
-    return _after_pairs(task, 2 * _WORDS_OF_POINTS + 3 * MAX_POINTS + MAX_NORMALS)
+    return _after_pairs(task, 2 * _WORDS_OF_POINTS + _WORDS_OF_HULL + MAX_NORMALS)
 
 
 @kernel
@@ -166,7 +168,7 @@ def _open_rows(task, max_contacts, out_at, capacity):
     cells_at = _fixed_at(task) + 8 * (_FIXED_WORDS - CELLS)
     hull = HullSpace(
         view_i64(numbers_at, n), view_i64(numbers_at + 8 * n, n), view_i64(numbers_at + 16 * n, n),
-        view_i64(cells_at, CELLS),
+        view_i64(numbers_at + 24 * n, n), view_i64(cells_at, CELLS), cells_at + 8 * CELLS,
     )
     X = view_f64(task.pair.XA_at, 16)
     return PatchSpace(target, hull, Vec3(X[3], X[7], X[11]), out_at, capacity, max_contacts, task.margin)
@@ -282,7 +284,7 @@ def _put_contacts(task, rows, first):
         if state == HIT or n == 0 or reach == 0.0:  # without a pair that meets: apart, be it by less than rounding
             return DONE, first, state == HIT
     ways_at = _fixed_at(task)
-    depths_at = _after_pairs(task, 2 * _WORDS_OF_POINTS + 3 * MAX_POINTS)
+    depths_at = _after_pairs(task, 2 * _WORDS_OF_POINTS + _WORDS_OF_HULL)
     ways = open_translations(ways_at, depths_at, task.capacity)
     is_deep = False
     link_pairs(frame.pairs, frame.B.n_corners)

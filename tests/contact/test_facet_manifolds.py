@@ -270,7 +270,8 @@ def test_hulls_of_patches_hold_their_points():
         points = contact_points.PatchPoints(
             ManifoldPoints(numbers, np.zeros(2 * n, dtype=np.int64)), np.zeros(n), np.arange(n), np.zeros(18)
         )
-        space = reduce_patch.HullSpace(*(np.zeros(n + 80, dtype=np.int64) for _ in range(4)))
+        columns = np.zeros(reduce_patch.column_words(n))
+        space = reduce_patch.HullSpace(*(np.zeros(n + 80, dtype=np.int64) for _ in range(5)), address_of(columns))
         tolerance = 1e-9
         m = reduce_patch.hull_of_patch(points, n, tolerance, space)
         corners = flat[space.corners[:m]]
