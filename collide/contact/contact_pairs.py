@@ -93,11 +93,11 @@ def open_pairs(words_at, capacity, n):
 
 
 @kernel
-def pose_pairs(pairs, A, B):
-    """Fill in corners, normals and numbers of corners; there was no search yet."""
+def pose_pairs(pairs, first, A, B):
+    """Fill in corners, normals and numbers of corners of pairs from ``first`` on; there was no search yet."""
     pairs.search[SEARCH] = 0
     pairs.search[N_REACHED] = 0
-    for k in range(pairs.n):
+    for k in range(first, pairs.n):
         _pose_facet(pairs, k, 0, A)
         _pose_facet(pairs, k, 1, B)
         pairs.states[k] = 0
