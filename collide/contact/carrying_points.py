@@ -205,8 +205,10 @@ def _span_on_border(columns_at, at_i, n_before, tolerance, base_u, base_v, along
         du, dv = rows[3 * b] - at_i.x, rows[3 * b + 1] - at_i.y
         clearance = rows[3 * b + 2] - at_i.z - tolerance - (base_u * du + base_v * dv)
         speed = along_u * du + along_v * dv
-        bound = clearance / select(speed == 0.0, 1.0, speed)
-        narrows = ((speed > 0.0) & (bound < high)) | ((speed < 0.0) & (bound > low))
+        # Quotients below high, or above low, are of clearances below the products, but for rounding.
+        factor = select(speed == 0.0, 1.0, speed)
+        lowers, raises = (clearance <= _above(high, factor)), (clearance <= _above(low, factor))
+        narrows = ((speed > 0.0) & lowers) | ((speed < 0.0) & raises)
         if not any_of((narrows | ((speed == 0.0) & (clearance < -0.5 * tolerance))) & ~_in_place(du, dv, tolerance)):
             continue
         for k in range(LANES * b, min(n_before, LANES * b + LANES)):
@@ -223,6 +225,13 @@ def _span_on_border(columns_at, at_i, n_before, tolerance, base_u, base_v, along
             elif of_k < -0.5 * tolerance:
                 return 1.0, -1.0
     return low, high
+
+
+@kernel(inline=True)
+def _above(bound, factor):
+    """An upper bound of their product, whatever rounding did to it."""
+    product = bound * factor
+    return select(product > 0.0, (1.0 + 2.0**-50) * product, (1.0 - 2.0**-50) * product)
 
 
 @kernel
