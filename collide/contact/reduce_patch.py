@@ -372,6 +372,9 @@ def reduce_patch(points, n, tolerance, max_contacts, target, space):
     """
     n_corners = hull_of_patch(points, n, tolerance, space)
     n_ring = _put_ring(points, n, n_corners, tolerance, target, space)
+    if max_contacts == 1:
+        space.order[0] = 0
+        return 1
     mark_carrying(points.manifold.points, n, n_corners, tolerance, space)
     n_target = _put_inner(points, n, n_ring, tolerance, target, space)
     if n_target == n_ring or n_target <= max_contacts:
