@@ -8,8 +8,19 @@ from __future__ import annotations
 
 import math
 
+from collide.contact.eight_places import (
+    BLOCK,
+    TO_GAP,
+    TO_V,
+    blocks_of,
+    fill_last_block,
+    place_in_columns,
+    put_in_columns,
+)
 from collide.contact.manifold_points import GAP, POINT, V
-from collide.kernels import kernel
+from collide.kernels import kernel, view_f64
+from collide.kernels.lanes import LANES, any_of, select, view_lanes
+from collide.numerics.vec3 import Vec3
 
 #: Classes of points: on a wall; that carry nothing; that a tilt of up to 45° lets carry, and so on, each class for a
 #: quarter of the slope before, down to a millionth, below which all slopes are as good.
@@ -30,16 +41,36 @@ def mark_carrying(p, n, n_corners, tolerance, space):
     is compared with all n: the work grows with n, not with n².
     space.corners : of the hull, ``n_corners``; they are asked first, since most points are far above them.
     """
+    stride = 1 if n <= MAX_CLASSED else _stride_of(n)
+    _put_in_order(p, n, stride, n_corners, space)
     if n <= MAX_CLASSED:
         for i in range(n):
             if space.remaining[i] != ON_WALL:
-                _mark(p, i, n, 1, n_corners, tolerance, space)
+                _mark(p, i, n, stride, n_corners, tolerance, space)
         return
     _find_lowest(p, n, space)
-    stride = _stride_of(n)
     for c in range(CELLS):
         if space.cells[c] >= 0:
             _mark(p, space.cells[c], n, stride, n_corners, tolerance, space)
+
+
+@kernel
+def _put_in_order(p, n, stride, n_corners, space):
+    """Put the points into columns in the order of comparison, with NaN as the gap of points on a wall, which cut
+    nothing.
+    """
+    columns = view_f64(space.columns, BLOCK * blocks_of(n_corners + n))
+    for k in range(n_corners + n):
+        j = _compared(space, k, n, stride, n_corners)
+        gap = math.nan if space.remaining[j] == ON_WALL else p[POINT * j + GAP]
+        put_in_columns(columns, k, p[POINT * j], p[POINT * j + V], gap)
+    fill_last_block(space.columns, n_corners + n)
+
+
+@kernel(inline=True)
+def _compared(space, k, n, stride, n_corners):
+    """Number of the k-th of the points to compare with: corners, then all, ``stride`` from each to the next."""
+    return space.corners[k] if k < n_corners else (k - n_corners) * stride % n
 
 
 @kernel
@@ -104,64 +135,103 @@ def _slope_below(p, i, n, stride, n_corners, tolerance, space):
     half-plane, the new gentlest slope is on its border (R. Seidel, "Small-dimensional linear programming and convex
     hulls made easy", 1991, section 3; here with the distance from the origin to minimise).
     """
-    at_i = POINT * i
+    n_compared = n_corners + n
+    columns = view_f64(space.columns, BLOCK * blocks_of(n_compared))
+    at_i = Vec3(p[POINT * i], p[POINT * i + V], p[POINT * i + GAP])
     u = v = 0.0
-    walk = 0
-    for k in range(n_corners + n):
-        j, walk = _next_compared(space, k, n, stride, n_corners, walk)
-        at = POINT * j
-        du, dv, rise = p[at] - p[at_i], p[at + V] - p[at_i + V], p[at + GAP] - p[at_i + GAP]
+    k = 0
+    while True:
+        k = _next_cut(space.columns, n_compared, k, at_i, u, v, tolerance)
+        if k == n_compared:
+            return u * u + v * v
+        at = place_in_columns(k)
+        du, dv = columns[at] - at_i.x, columns[at + TO_V] - at_i.y
         if abs(du) <= tolerance and abs(dv) <= tolerance:
+            j = _compared(space, k, n, stride, n_corners)
+            rise = p[POINT * j + GAP] - at_i.z
             if rise < 0.0 or (rise == 0.0 and j < i):
                 return -1.0
-            continue
-        rise -= tolerance
-        if space.remaining[j] == ON_WALL or u * du + v * dv <= rise + 0.5 * tolerance:
-            continue  # half of it is left to rounding, of points that are on the plane and asked again
-        share = rise / (du * du + dv * dv)
-        low, high = _span_on_border(
-            p, at_i, k, n, stride, n_corners, tolerance, space, share * du, share * dv, -dv, du
-        )
-        if not low <= high:
-            return -1.0
-        step = min(max(0.0, low), high)
-        u, v = share * du - step * dv, share * dv + step * du
-        if not u * u + v * v <= _ROUNDING:
-            return -1.0
-    return u * u + v * v
-
-
-@kernel(inline=True)
-def _next_compared(space, k, n, stride, n_corners, walk):
-    """(The k-th of the points to compare with, the next ``walk``, 0 before the first.)"""
-    if k < n_corners:
-        return space.corners[k], walk
-    further = walk + stride
-    return walk, further - n if further >= n else further
+        else:
+            share = (columns[at + TO_GAP] - at_i.z - tolerance) / (du * du + dv * dv)
+            low, high = _span_on_border(
+                space.columns, at_i, k, tolerance, share * du, share * dv, -dv, du
+            )
+            if not low <= high:
+                return -1.0
+            step = min(max(0.0, low), high)
+            u, v = share * du - step * dv, share * dv + step * du
+            if not u * u + v * v <= _ROUNDING:
+                return -1.0
+        k += 1
 
 
 @kernel
-def _span_on_border(
-    p, at_i, n_before, n, stride, n_corners, tolerance, space, base_u, base_v, along_u, along_v
-):
-    """(low, high): bounds of t at which the earlier points leave the slope base + t · along; empty if low > high."""
-    low, high = -math.inf, math.inf
-    walk = 0
-    for k in range(n_before):
-        j, walk = _next_compared(space, k, n, stride, n_corners, walk)
-        at = POINT * j
-        du, dv = p[at] - p[at_i], p[at + V] - p[at_i + V]
-        if space.remaining[j] == ON_WALL or (abs(du) <= tolerance and abs(dv) <= tolerance):
+def _next_cut(columns_at, n, first, at_i, u, v, tolerance):
+    """The next of n points, from ``first`` on, in the place of point i or cutting off the slope (u, v); n without."""
+    rows = view_lanes(columns_at, 3 * blocks_of(n))
+    columns = view_f64(columns_at, BLOCK * blocks_of(n))
+    for b in range(first // LANES, blocks_of(n)):
+        du, dv = rows[3 * b] - at_i.x, rows[3 * b + 1] - at_i.y
+        if not any_of(_cuts(du, dv, rows[3 * b + 2] - at_i.z, u, v, tolerance)):
             continue
-        clearance = p[at + GAP] - p[at_i + GAP] - tolerance - (base_u * du + base_v * dv)
+        for k in range(max(first, LANES * b), min(n, LANES * b + LANES)):
+            at = place_in_columns(k)
+            du_k, dv_k = columns[at] - at_i.x, columns[at + TO_V] - at_i.y
+            if _cuts(du_k, dv_k, columns[at + TO_GAP] - at_i.z, u, v, tolerance):
+                return k
+    return n
+
+
+@kernel(inline=True)
+def _cuts(du, dv, rise, u, v, tolerance):
+    """Whether a point away by (du, dv) is in the same place, or cuts off the slope: of half the tolerance is left to
+    rounding, of points that are on the plane and asked again.
+    """
+    return _in_place(du, dv, tolerance) | (u * du + v * dv > rise - tolerance + 0.5 * tolerance)
+
+
+@kernel(inline=True)
+def _in_place(du, dv, tolerance):
+    return (du <= tolerance) & (du >= -tolerance) & (dv <= tolerance) & (dv >= -tolerance)
+
+
+@kernel
+def _span_on_border(columns_at, at_i, n_before, tolerance, base_u, base_v, along_u, along_v):
+    """(low, high): bounds of t at which the earlier points leave the slope base + t · along; empty if low > high."""
+    rows = view_lanes(columns_at, 3 * blocks_of(n_before))
+    columns = view_f64(columns_at, BLOCK * blocks_of(n_before))
+    low, high = -math.inf, math.inf
+    for b in range(blocks_of(n_before)):
+        du, dv = rows[3 * b] - at_i.x, rows[3 * b + 1] - at_i.y
+        clearance = rows[3 * b + 2] - at_i.z - tolerance - (base_u * du + base_v * dv)
         speed = along_u * du + along_v * dv
-        if speed > 0.0:
-            high = min(high, clearance / speed)
-        elif speed < 0.0:
-            low = max(low, clearance / speed)
-        elif clearance < -0.5 * tolerance:
-            return 1.0, -1.0
+        # Quotients below high, or above low, are of clearances below the products, but for rounding.
+        factor = select(speed == 0.0, 1.0, speed)
+        lowers, raises = (clearance <= _above(high, factor)), (clearance <= _above(low, factor))
+        narrows = ((speed > 0.0) & lowers) | ((speed < 0.0) & raises)
+        if not any_of((narrows | ((speed == 0.0) & (clearance < -0.5 * tolerance))) & ~_in_place(du, dv, tolerance)):
+            continue
+        for k in range(LANES * b, min(n_before, LANES * b + LANES)):
+            at = place_in_columns(k)
+            du_k, dv_k = columns[at] - at_i.x, columns[at + TO_V] - at_i.y
+            of_k = columns[at + TO_GAP] - at_i.z - tolerance - (base_u * du_k + base_v * dv_k)
+            speed_k = along_u * du_k + along_v * dv_k
+            if _in_place(du_k, dv_k, tolerance) or math.isnan(of_k):
+                continue
+            if speed_k > 0.0:
+                high = min(high, of_k / speed_k)
+            elif speed_k < 0.0:
+                low = max(low, of_k / speed_k)
+            elif of_k < -0.5 * tolerance:
+                return 1.0, -1.0
     return low, high
+
+
+@kernel(inline=True)
+def _above(bound, factor):
+    """An upper bound of their product, whatever rounding did to it."""
+    product = bound * factor
+    return select(product > 0.0, (1.0 + 2.0**-50) * product, (1.0 - 2.0**-50) * product)
 
 
 @kernel

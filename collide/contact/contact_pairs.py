@@ -93,13 +93,20 @@ def open_pairs(words_at, capacity, n):
 
 
 @kernel
-def pose_pairs(pairs, A, B):
-    """Fill in corners, normals and numbers of corners; there was no search yet."""
+def pose_pairs(pairs, first, A, B):
+    """Fill in corners, normals and numbers of corners of pairs from ``first`` on; there was no search yet."""
     pairs.search[SEARCH] = 0
     pairs.search[N_REACHED] = 0
-    for k in range(pairs.n):
-        _pose_facet(pairs, k, 0, A)
-        _pose_facet(pairs, k, 1, B)
+    for k in range(first, pairs.n):
+        for side in range(2):
+            # Pairs that follow each other mostly share a facet.
+            at = INTS_OF_PAIR * k + side
+            if k > first and pairs.facets[at] == pairs.facets[at - INTS_OF_PAIR]:
+                _copy_facet(pairs, k - 1, k, side)
+            elif side == 0:
+                _pose_facet(pairs, k, 0, A)
+            else:
+                _pose_facet(pairs, k, 1, B)
         pairs.states[k] = 0
         pairs.tried[k] = 0
         pairs.groups[k] = -1
@@ -123,6 +130,16 @@ def _pose_facet(pairs, k, side, body):
         put_vec3(pairs.normals, 6 * k + 3 * side, Vec3(0.0, 0.0, 0.0))
 
 
+@kernel(inline=True)
+def _copy_facet(pairs, source, to, side):
+    """Copy corners, normal and numbers of corners of a pair's facet from another pair."""
+    for i in range(9):
+        pairs.corners[18 * to + 9 * side + i] = pairs.corners[18 * source + 9 * side + i]
+    for i in range(3):
+        pairs.normals[6 * to + 3 * side + i] = pairs.normals[6 * source + 3 * side + i]
+        pairs.ids[6 * to + 3 * side + i] = pairs.ids[6 * source + 3 * side + i]
+
+
 @kernel
 def move_pair(pairs, k, to):
     """Move a posed pair to number ``to``, marked as not searched."""
@@ -130,11 +147,8 @@ def move_pair(pairs, k, to):
         pairs.near[NUMBERS_OF_PAIR * to + i] = pairs.near[NUMBERS_OF_PAIR * k + i]
     for i in range(INTS_OF_PAIR):
         pairs.facets[INTS_OF_PAIR * to + i] = pairs.facets[INTS_OF_PAIR * k + i]
-    for i in range(18):
-        pairs.corners[18 * to + i] = pairs.corners[18 * k + i]
-    for i in range(6):
-        pairs.normals[6 * to + i] = pairs.normals[6 * k + i]
-        pairs.ids[6 * to + i] = pairs.ids[6 * k + i]
+    _copy_facet(pairs, k, to, 0)
+    _copy_facet(pairs, k, to, 1)
 
 
 @kernel(inline=True)

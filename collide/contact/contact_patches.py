@@ -42,9 +42,12 @@ from collide.contact.shallow_overlaps import STEP_ERRORS
 from collide.contact.support_face import FACE, axes_across, seen_along
 from collide.kernels import kernel
 from collide.narrowphase.facets.facets_within import (
+    BESIDE,
     FACET_A,
     FACET_B,
     INTS_OF_PAIR,
+    LARGEST_GAP,
+    LEAST_GAP,
     LENGTH,
     LOWER,
     NUMBERS_OF_PAIR,
@@ -170,6 +173,21 @@ def may_be_reached(frame, k, axes, length):
         return False
     over_a, over_b = may_share_points(frame.pairs, k, frame.A, frame.B, view, frame.points.seen)
     return over_a or over_b
+
+
+@kernel
+def put_view(frame, axes, length, views, at):
+    """Write what `list_near_pairs` takes of a translation along ``axes`` by ``length`` [m]: of all pairs that
+    `may_be_reached`, or are within the reach, no pair is refused.
+
+    Both kernels round: heights and places are off by at most 8 errors each, and limits are wider by 128.
+    """
+    view, slack = _overlap_view(frame, axes, DEEPEST * length, True), 128.0 * frame.error
+    put_vec3(views, at, axes.e)
+    put_vec3(views, at + 3, axes.f)
+    put_vec3(views, at + 6, axes.nhat)
+    views[at + LEAST_GAP], views[at + LARGEST_GAP] = view.low - slack, view.high + slack
+    views[at + BESIDE] = frame.reach + slack if frame.A.radius + frame.B.radius == 0.0 else math.inf
 
 
 @kernel(inline=True)

@@ -25,7 +25,7 @@ from collide.contact.manifold_points import (
 )
 from collide.contact.support_face import ACROSS, EDGE, FACE, KNOWN, VERTEX, seen_along
 from collide.kernels import kernel
-from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR
+from collide.narrowphase.facets.facets_within import BETWEEN_SHADOWS, FACET_A, FACET_B, INTS_OF_PAIR
 from collide.numerics.vec3 import Vec3, add, neg, norm, put_vec3, scale, sub, vec3_at
 
 #: A facet is looked at along n where its normal's cosine with it is above this.
@@ -33,7 +33,6 @@ LEAST_COSINE = 2.0**-10
 #: Barycentric coordinates and edge parameters may be as far outside as rounding moves them, in so many errors of a
 #: coordinate: no corner may be lost. Never farther than this share.
 _ERRORS_OUTSIDE, _FARTHEST_OUTSIDE = 16.0, 2.0**-10
-_BETWEEN_SHADOWS = 2.0**-6
 #: Edges whose sine, seen along n, is below this are parallel: their ends show it. Edges and heights of facets that are
 #: shorter, seen so, than so many errors of a coordinate are none.
 _PARALLEL, _MIN_ERRORS = 2.0**-30, 256.0
@@ -137,7 +136,7 @@ def _shadows_apart(seen, axis):
     a, b, c = seen[axis], seen[axis + 3], seen[axis + 6]
     p, q, r = seen[axis + 9], seen[axis + 12], seen[axis + 15]
     low_a, high_a, low_b, high_b = min(a, b, c), max(a, b, c), min(p, q, r), max(p, q, r)
-    return max(low_b - high_a, low_a - high_b) > _BETWEEN_SHADOWS * (high_a - low_a + high_b - low_b)
+    return max(low_b - high_a, low_a - high_b) > BETWEEN_SHADOWS * (high_a - low_a + high_b - low_b)
 
 
 @kernel

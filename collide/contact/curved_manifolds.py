@@ -28,7 +28,7 @@ from collide.contact.curved_patches import (
 )
 from collide.contact.manifold_points import POINT, ManifoldPoints
 from collide.contact.patch_rows import CONTACT, PatchSpace, RowsOf, choose_points, facet_of_row, put_row, widen_row
-from collide.contact.reduce_patch import HullSpace
+from collide.contact.reduce_patch import HullSpace, column_words
 from collide.contact.shallow_overlaps import STEP_ERRORS
 from collide.contact.support_face import axes_across, seen_along, support_face, swept_face
 from collide.kernels import entry, kernel, view_f64, view_i64
@@ -80,7 +80,7 @@ def workspace_words(capacity: int, largest: int) -> int:
     corners = 3 + largest + 8
     points = corners * capacity + 1
     of_face = 5 * largest + 2 * 3 * corners + (POINT + 2) * corners
-    return POSE + 9 + 6 + of_face + 14 * capacity + 19 * points + CELLS + 64
+    return POSE + 9 + 6 + of_face + 14 * capacity + 20 * points + CELLS + column_words(points) + 64
 
 
 @kernel(inline=True)
@@ -161,7 +161,8 @@ def _open_task(header_at, first, n, margin, slack, out_at, capacity):
     order, at = _integers(at, n_points + 1)
     corners, at = _integers(at, n_points + 1)
     remaining, at = _integers(at, n_points + 1)
-    hull = HullSpace(order, corners, remaining, view_i64(at, CELLS))
+    by_place, at = _integers(at, n_points + 1)
+    hull = HullSpace(order, corners, remaining, by_place, view_i64(at, CELLS), at + 8 * CELLS)
     space = PatchSpace(target, hull, near.origin, out_at, capacity, words[MAX_CONTACTS], margin + slack)
     error = 8.0 * error + pair.numbers[SLOP] + slack
     return _Task(

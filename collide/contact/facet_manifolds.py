@@ -36,6 +36,7 @@ from collide.contact.contact_patches import (
     need_nearest,
     next_minimum,
     next_seed,
+    put_view,
     seed_group,
     set_directions,
     sort_by_gap,
@@ -43,13 +44,25 @@ from collide.contact.contact_patches import (
 from collide.contact.contact_points import PatchPoints
 from collide.contact.manifold_points import POINT, ManifoldPoints
 from collide.contact.patch_rows import CONTACT, PatchSpace, flip_row, put_patch
-from collide.contact.reduce_patch import HullSpace
+from collide.contact.reduce_patch import HullSpace, column_words
 from collide.contact.shallow_overlaps import STEP_ERRORS, separate_pairs
 from collide.contact.support_face import axes_across
 from collide.kernels import entry, kernel, native_call, view_f64, view_i64, view_u8
 from collide.mesh.bvh import INTS, N_FACETS, open_tree
 from collide.narrowphase.facets import facets_within
-from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR, MEETS, NUMBERS_OF_PAIR, world_error
+from collide.narrowphase.facets.facets_within import (
+    FACET_A,
+    FACET_B,
+    INTS_OF_PAIR,
+    MEETS,
+    N_LISTED,
+    N_VIEWS,
+    NUMBERS_OF_PAIR,
+    STACKED,
+    VIEW,
+    VIEWS_AT,
+    world_error,
+)
 from collide.narrowphase.facets.mesh_collide_kernel import (
     APART,
     EXCHANGED,
@@ -82,16 +95,19 @@ CONTACT_HEADER = HEADER + 10
 DONE, ROWS_FULL, PAIRS_FULL, TOO_MANY, SINGULAR = range(5)
 #: Words of one set of points, a pair; of all that does not grow with them.
 _WORDS_OF_POINTS = MAX_POINTS * (POINT + 4)
-_FIXED_WORDS = TRANSLATION_WORDS + CLEARING_WORDS + 18 + 8 + CELLS
-#: Integers that are kept of a pair while more are listed: those of the list, and its group.
-_KNOWN = INTS_OF_PAIR + 1
+_WORDS_OF_HULL = 4 * MAX_POINTS
 #: Pairs are compared one by one with translations where these are no more.
 _MAX_WAYS = 8
+_WORDS_OF_VIEWS = VIEWS_AT + VIEW * _MAX_WAYS
+_FIXED_WORDS = TRANSLATION_WORDS + CLEARING_WORDS + 18 + 8 + _WORDS_OF_VIEWS + CELLS
+#: Integers that are kept of a pair while more are listed: those of the list, and its group.
+_KNOWN = INTS_OF_PAIR + 1
 
 
 def workspace_words(capacity: int) -> int:
     """64-bit words the kernel works in, for so many pairs of facets."""
-    return (WORDS_OF_PAIRS + 2 * _WORDS_OF_POINTS + 3 * MAX_POINTS + MAX_NORMALS) * capacity + _FIXED_WORDS
+    each = WORDS_OF_PAIRS + 2 * _WORDS_OF_POINTS + _WORDS_OF_HULL + MAX_NORMALS
+    return each * capacity + _FIXED_WORDS + column_words(MAX_POINTS * capacity)
 
 
 class _Task(NamedTuple):
@@ -132,7 +148,7 @@ def _after_pairs(task, words_a_pair):
 
 @kernel(inline=True)
 def _fixed_at(task):
-    return _after_pairs(task, 2 * _WORDS_OF_POINTS + 3 * MAX_POINTS + MAX_NORMALS)
+    return _after_pairs(task, 2 * _WORDS_OF_POINTS + _WORDS_OF_HULL + MAX_NORMALS)
 
 
 @kernel
@@ -145,7 +161,7 @@ def _open_frame(task, n):
     seen_at = _fixed_at(task) + 8 * (TRANSLATION_WORDS + CLEARING_WORDS)
     points = _open_points(_after_pairs(task, 0), task.capacity, seen_at)
     pairs = open_pairs(task.words_at, task.capacity, n)
-    pose_pairs(pairs, A, B)
+    pose_pairs(pairs, 0, A, B)
     return ContactFrame(pairs, A, B, task.error, _reach_of(task), points)
 
 
@@ -166,7 +182,7 @@ def _open_rows(task, max_contacts, out_at, capacity):
     cells_at = _fixed_at(task) + 8 * (_FIXED_WORDS - CELLS)
     hull = HullSpace(
         view_i64(numbers_at, n), view_i64(numbers_at + 8 * n, n), view_i64(numbers_at + 16 * n, n),
-        view_i64(cells_at, CELLS),
+        view_i64(numbers_at + 24 * n, n), view_i64(cells_at, CELLS), cells_at + 8 * CELLS,
     )
     X = view_f64(task.pair.XA_at, 16)
     return PatchSpace(target, hull, Vec3(X[3], X[7], X[11]), out_at, capacity, max_contacts, task.margin)
@@ -243,10 +259,10 @@ def _contacts_at(header_at, XA_at, XB_at, margin, out_at, capacity, first):
 
 
 @kernel
-def _list(task, reach, measures):
+def _list(task, reach, measures, views_at):
     """(DONE, PAIRS_FULL, TOO_MANY or SINGULAR, how many pairs): facets within reach, into the workspace.
 
-    measures : as of `list_near_pairs`.
+    measures, views : as of `list_near_pairs`.
     """
     pair, space = task.pair, task.space
     n = _list_pairs(
@@ -254,7 +270,7 @@ def _list(task, reach, measures):
         (
             pair.A.tree_at, pair.B.tree_at, pair.XA_at, pair.XB_at, reach, task.words_at,
             task.words_at + 8 * NUMBERS_OF_PAIR * task.capacity, task.capacity, space.stack_at, space.n_stack,
-            space.doubles_at, space.integers_at, space.exact, measures,
+            space.doubles_at, space.integers_at, space.exact, measures, views_at,
         ),
     )
     if n >= 0:
@@ -268,7 +284,7 @@ def _list(task, reach, measures):
 def _put_contacts(task, rows, first):
     """(status, rows then, whether a row of `distance` is lacking) of bodies that may be within the margin."""
     reach = _reach_of(task)
-    status, n = _list(task, reach, True)
+    status, n = _list(task, reach, True, 0)
     if status == TOO_MANY and reach == 0.0:
         return DONE, first, True
     if status != DONE:
@@ -282,7 +298,7 @@ def _put_contacts(task, rows, first):
         if state == HIT or n == 0 or reach == 0.0:  # without a pair that meets: apart, be it by less than rounding
             return DONE, first, state == HIT
     ways_at = _fixed_at(task)
-    depths_at = _after_pairs(task, 2 * _WORDS_OF_POINTS + 3 * MAX_POINTS)
+    depths_at = _after_pairs(task, 2 * _WORDS_OF_POINTS + _WORDS_OF_HULL)
     ways = open_translations(ways_at, depths_at, task.capacity)
     is_deep = False
     link_pairs(frame.pairs, frame.B.n_corners)
@@ -317,7 +333,7 @@ def _list_wider(task, frame, ways, reach):
     """(status, frame) with all pairs within a larger reach, as far as a translation's patch may reach them.
 
     Pairs listed before keep their states; new pairs are not measured: all pairs in contact, or within the margin, are
-    among the old.
+    among the old. The list is thinned out whenever the workspace is full.
     """
     before, numbers, integers = frame.pairs, frame.points.manifold.points, frame.points.pairs
     n_before = before.n
@@ -327,34 +343,51 @@ def _list_wider(task, frame, ways, reach):
         for i in range(INTS_OF_PAIR):
             integers[_KNOWN * k + i] = before.facets[INTS_OF_PAIR * k + i]
         integers[_KNOWN * k + INTS_OF_PAIR] = before.groups[k]
-    status, n = _list(task, reach, False)
-    if status != DONE:
-        return status, frame
-    frame = _open_frame(task, n)
-    pairs = frame.pairs
     n_facets_b = view_i64(task.pair.B.tree_at, INTS)[N_FACETS]
-    mask = clear_table(pairs.table, n_before)
+    mask = clear_table(before.table, n_before)
     for i in range(n_before):
         key = integers[_KNOWN * i + FACET_A] * n_facets_b + integers[_KNOWN * i + FACET_B]
-        slot = slot_of(pairs.table, mask, key)
-        pairs.table[2 * slot] = key
-        pairs.table[2 * slot + 1] = i
-    n_kept = 0
-    for k in range(n):
-        key = pairs.facets[INTS_OF_PAIR * k + FACET_A] * n_facets_b + pairs.facets[INTS_OF_PAIR * k + FACET_B]
-        slot = slot_of(pairs.table, mask, key)
-        is_known = pairs.table[2 * slot] == key
-        if not (is_known or _may_be_in_a_patch(frame, ways, k)):
-            continue
-        if n_kept < k:
-            move_pair(pairs, k, n_kept)
-        if is_known:
-            i = pairs.table[2 * slot + 1]
-            for j in range(NUMBERS_OF_PAIR):
-                pairs.near[NUMBERS_OF_PAIR * n_kept + j] = numbers[NUMBERS_OF_PAIR * i + j]
-            pairs.facets[INTS_OF_PAIR * n_kept + MEETS] = integers[_KNOWN * i + MEETS]
-            pairs.groups[n_kept] = integers[_KNOWN * i + INTS_OF_PAIR]
-        n_kept += 1
+        slot = slot_of(before.table, mask, key)
+        before.table[2 * slot] = key
+        before.table[2 * slot + 1] = i
+    views_at = _fixed_at(task) + 8 * (_FIXED_WORDS - CELLS - _WORDS_OF_VIEWS)
+    n_views = ways.counts[N_WAYS] if ways.counts[N_WAYS] <= _MAX_WAYS else 0
+    words, views = view_i64(views_at, VIEWS_AT), view_f64(views_at + 8 * VIEWS_AT, VIEW * n_views)
+    words[N_VIEWS], words[STACKED], words[N_LISTED] = n_views, 0, 0
+    for i in range(n_views):
+        put_view(frame, axes_across(vec3_at(ways.ways, 3 * i)), ways.lengths[i], views, VIEW * i)
+    n_kept, n_known = 0, 0
+    while True:
+        status, _ = _list(task, reach, False, views_at)
+        if status == SINGULAR:
+            return status, frame
+        pairs = open_pairs(task.words_at, task.capacity, words[N_LISTED])
+        pose_pairs(pairs, n_kept, frame.A, frame.B)
+        wide = ContactFrame(pairs, frame.A, frame.B, frame.error, frame.reach, frame.points)
+        for k in range(n_kept, pairs.n):
+            key = pairs.facets[INTS_OF_PAIR * k + FACET_A] * n_facets_b + pairs.facets[INTS_OF_PAIR * k + FACET_B]
+            slot = slot_of(pairs.table, mask, key)
+            is_known = pairs.table[2 * slot] == key
+            if not (is_known or _may_be_in_a_patch(wide, ways, k)):
+                continue
+            if n_kept < k:
+                move_pair(pairs, k, n_kept)
+            if is_known:
+                i = pairs.table[2 * slot + 1]
+                for j in range(NUMBERS_OF_PAIR):
+                    pairs.near[NUMBERS_OF_PAIR * n_kept + j] = numbers[NUMBERS_OF_PAIR * i + j]
+                pairs.facets[INTS_OF_PAIR * n_kept + MEETS] = integers[_KNOWN * i + MEETS]
+                pairs.groups[n_kept] = integers[_KNOWN * i + INTS_OF_PAIR]
+                n_known += 1
+            n_kept += 1
+        words[N_LISTED] = n_kept
+        if status == DONE:
+            if n_known == n_before or words[N_VIEWS] == 0:
+                break
+            # Nearest points that came out badly: a pair farther apart is listed at first. It is kept as well.
+            words[N_VIEWS], words[N_LISTED], n_kept, n_known = 0, 0, 0, 0
+        elif 8 * (task.capacity - n_kept) < task.capacity:
+            return status, frame
     pairs = open_pairs(task.words_at, task.capacity, n_kept)
     link_pairs(pairs, frame.B.n_corners)
     return DONE, ContactFrame(pairs, frame.A, frame.B, frame.error, frame.reach, frame.points)

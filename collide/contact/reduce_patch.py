@@ -7,9 +7,11 @@ from typing import Any, NamedTuple
 
 from collide.contact.carrying_points import MAX_CLASSED, ON_WALL, PLAIN, STEEP, choose_carrying, mark_carrying
 from collide.contact.contact_points import copy_of_points
+from collide.contact.eight_places import BLOCK, blocks_of, fill_last_block, place_in_columns, put_in_columns
 from collide.contact.manifold_points import GAP, POINT, V
 from collide.contact.reduce_points import select_points
-from collide.kernels import kernel
+from collide.kernels import kernel, view_f64
+from collide.kernels.lanes import LANES, any_of, select, view_lanes
 
 #: Points are on a wall where they lie so many times as far above another as aside of it.
 _STEEP = 2.0
@@ -17,16 +19,30 @@ _STEEP = 2.0
 _NO_WALL = -1
 #: Directions in which extreme points are looked for before others are compared with them.
 _EXTREME = 8
+#: Points within the polygon of extreme points, beyond a side, and in the place of a corner.
+_INNER, _BEYOND, _THERE = 0.0, 1.0, 2.0
+#: Numbers that are sorted by insertion.
+_RUN = 8
 
 
 class HullSpace(NamedTuple):
     """Views of numbers of points: the points compared, a hull's corners, the class of each point (on a wall or not),
-    and the lowest of each of CELLS cells."""
+    all points by place, and the lowest of each of CELLS cells.
+
+    columns : address of `column_words` doubles: points in columns, then a mark of each, then cells of places.
+    """
 
     order: Any
     corners: Any
     remaining: Any
+    by_place: Any
     cells: Any
+    columns: int
+
+
+def column_words(n: int) -> int:
+    """Doubles of columns for patches of n points."""
+    return 6 * n + 5 * LANES
 
 
 @kernel
@@ -37,13 +53,22 @@ def hull_of_patch(points, n, tolerance, space):
     Points rising steeply from a lower point are on a wall.   tolerance : smaller lengths are rounding [m].
     """
     p = points.manifold.points
+    step = max(tolerance, 1e-300)
+    lowest = math.inf
+    columns = view_f64(space.columns, BLOCK * blocks_of(n))
     for i in range(n):
         space.remaining[i] = PLAIN
-    n_order = _outer_points(p, n, tolerance, space)
-    n_corners = _hull(p, n_order, tolerance, space)
-    while _drop_walls(p, n, n_corners, tolerance, space):
-        n_order = _standing_points(p, n, tolerance, space)
-        n_corners = _hull(p, n_order, tolerance, space)
+        lowest = min(lowest, p[POINT * i + GAP])
+        put_in_columns(columns, i, p[POINT * i], p[POINT * i + V], p[POINT * i + GAP])
+    fill_last_block(space.columns, n)
+    n_order = _outer_points(p, n, tolerance, False, space)
+    _sort(p, n, space.order, n_order, step, space)
+    n_corners = _hull(p, n_order, step, space)
+    if _drop_walls(p, n, n_corners, tolerance, lowest, False, space):
+        _sort_all(p, n, step, space)
+        n_corners = _hull(p, _standing_points(p, n, tolerance, space), step, space)
+        while _drop_walls(p, n, n_corners, tolerance, lowest, True, space):
+            n_corners = _hull(p, _standing_points(p, n, tolerance, space), step, space)
     for i in range(n):
         if space.remaining[i] == _NO_WALL:
             space.remaining[i] = PLAIN
@@ -51,12 +76,25 @@ def hull_of_patch(points, n, tolerance, space):
 
 
 @kernel
-def _standing_points(p, n, tolerance, space):
-    """Put what may be corners of the hull of the points on no wall into ``space.order``; how many."""
-    if n > MAX_CLASSED:
-        return _outer_points(p, n, tolerance, space)
-    n_order = 0
+def _sort_all(p, n, step, space):
+    """Sort all points by place, in columns as well: walls fall layer by layer, and each layer's points are sorted."""
+    columns = view_f64(space.columns, BLOCK * blocks_of(n))
     for i in range(n):
+        space.by_place[i] = i
+    _sort(p, n, space.by_place, n, step, space)
+    for k in range(n):
+        at = POINT * space.by_place[k]
+        put_in_columns(columns, k, p[at], p[at + V], p[at + GAP])
+
+
+@kernel
+def _standing_points(p, n, tolerance, space):
+    """Put what may be corners of the hull of the points on no wall into ``space.order``, by place; how many."""
+    if n > MAX_CLASSED:
+        return _outer_points(p, n, tolerance, True, space)
+    n_order = 0
+    for k in range(n):
+        i = space.by_place[k]
         if space.remaining[i] != ON_WALL:
             space.order[n_order] = i
             n_order += 1
@@ -64,52 +102,84 @@ def _standing_points(p, n, tolerance, space):
 
 
 @kernel
-def _drop_walls(p, n, n_corners, tolerance, space):
+def _drop_walls(p, n, n_corners, tolerance, lowest, is_sorted, space):
     """Mark corners rising steeply from other points as ON_WALL; whether any corner was.
 
     Each point is compared with the others once: corners on no wall are marked until the hull is known.
+    lowest : gap [m].   is_sorted : whether columns are, by place.
+
+    A point at most r lower is a wall's foot only where it is less than r / _STEEP aside: of columns that are sorted
+    the others are not looked at.
     """
-    lowest = math.inf
-    for i in range(n):
-        lowest = min(lowest, p[POINT * i + GAP])
     dropped = False
     for j in range(n_corners):
-        k = POINT * space.corners[j]
-        if p[k + GAP] - lowest <= tolerance or space.remaining[space.corners[j]] == _NO_WALL:
+        i = space.corners[j]
+        k = POINT * i
+        if p[k + GAP] - lowest <= tolerance or space.remaining[i] == _NO_WALL:
             continue
-        space.remaining[space.corners[j]] = _NO_WALL
-        for i in range(n):
-            rise = p[k + GAP] - p[POINT * i + GAP] - tolerance
-            if rise <= 0.0:
-                continue
-            du, dv = p[k] - p[POINT * i], p[k + V] - p[POINT * i + V]
-            if rise * rise > _STEEP * _STEEP * (du * du + dv * dv):
-                space.remaining[space.corners[j]] = ON_WALL
-                dropped = True
-                break
+        first, last = 0, n
+        if is_sorted:
+            aside = (1.0 / _STEEP + 2.0**-20) * (p[k + GAP] - lowest) + 4.0 * max(tolerance, 1e-300)
+            first, last = _first_from(p[k] - aside, n, space), _first_from(p[k] + aside, n, space)
+        if _is_steep(p[k], p[k + V], p[k + GAP], tolerance, first, last, n, space):
+            space.remaining[i] = ON_WALL
+            dropped = True
+        else:
+            space.remaining[i] = _NO_WALL
     return dropped
+
+
+@kernel
+def _first_from(u, n, space):
+    """A number k: sorted points before k have places of at most u plus twice the sorting step, points from k on of at
+    least u less twice the step."""
+    columns = view_f64(space.columns, BLOCK * blocks_of(n))
+    low, high = 0, n
+    while low < high:
+        middle = (low + high) // 2
+        if columns[place_in_columns(middle)] < u:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def _is_steep(u, v, gap, tolerance, first, last, n, space):
+    """Whether a point rises steeply from a point of columns in the blocks that hold numbers ``first`` to ``last``."""
+    rows = view_lanes(space.columns, 3 * blocks_of(n))
+    for b in range(first // LANES, blocks_of(last)):
+        du, dv = u - rows[3 * b], v - rows[3 * b + 1]
+        rise = gap - rows[3 * b + 2] - tolerance
+        if any_of((rise > 0.0) & (rise * rise > _STEEP * _STEEP * (du * du + dv * dv))):
+            return True
+    return False
 
 
 @kernel
 def _extreme_points(p, n, remaining, extreme):
     """Put the numbers of the points on no wall farthest in eight directions, counter-clockwise, without repeats in a
-    row; how many."""
+    row; how many. Of equally far points the deeper counts, then the first."""
     first = 0
     while first < n - 1 and remaining[first] == ON_WALL:
         first += 1
     for d in range(_EXTREME):
         extreme[d] = first
+    u, v = p[POINT * first], p[POINT * first + V]
+    low_u, high_u, low_v, high_v = u, u, v, v
+    low_sum, high_sum, low_rest, high_rest = u + v, u + v, v - u, v - u
     for i in range(first + 1, n):
         if remaining[i] == ON_WALL:
             continue
         u, v = p[POINT * i], p[POINT * i + V]
-        _farther(p, extreme, 0, 4, i, u, p[POINT * extreme[0]], p[POINT * extreme[4]])
-        a, b = POINT * extreme[2], POINT * extreme[6]
-        _farther(p, extreme, 2, 6, i, v, p[a + V], p[b + V])
-        a, b = POINT * extreme[1], POINT * extreme[5]
-        _farther(p, extreme, 1, 5, i, u + v, p[a] + p[a + V], p[b] + p[b + V])
-        a, b = POINT * extreme[3], POINT * extreme[7]
-        _farther(p, extreme, 3, 7, i, v - u, p[a + V] - p[a], p[b + V] - p[b])
+        high_u = _farther(p, extreme, 0, i, u, high_u)
+        low_u = -_farther(p, extreme, 4, i, -u, -low_u)
+        high_v = _farther(p, extreme, 2, i, v, high_v)
+        low_v = -_farther(p, extreme, 6, i, -v, -low_v)
+        high_sum = _farther(p, extreme, 1, i, u + v, high_sum)
+        low_sum = -_farther(p, extreme, 5, i, -(u + v), -low_sum)
+        high_rest = _farther(p, extreme, 3, i, v - u, high_rest)
+        low_rest = -_farther(p, extreme, 7, i, -(v - u), -low_rest)
     n_extreme = 1
     for d in range(1, _EXTREME):
         if extreme[d] != extreme[n_extreme - 1]:
@@ -119,59 +189,81 @@ def _extreme_points(p, n, remaining, extreme):
 
 
 @kernel(inline=True)
-def _farther(p, extreme, d, opposite, i, value, largest, least):
-    """Make point i extreme in a direction, or the opposite direction, where farthest; of equal points the deeper
-    counts."""
-    if value > largest or (value == largest and p[POINT * i + GAP] < p[POINT * extreme[d] + GAP]):
+def _farther(p, extreme, d, i, value, largest):
+    """Make point i extreme in a direction where farther than ``largest``, or as far and deeper; the new largest."""
+    if value < largest:
+        return largest
+    if value > largest or p[POINT * i + GAP] < p[POINT * extreme[d] + GAP]:
         extreme[d] = i
-    if value < least or (value == least and p[POINT * i + GAP] < p[POINT * extreme[opposite] + GAP]):
-        extreme[opposite] = i
+    return value
 
 
 @kernel
-def _outer_points(p, n, tolerance, space):
-    """Put possible corners of the hull of the points on no wall into ``space.order``; how many.
+def _outer_points(p, n, tolerance, is_sorted, space):
+    """Put possible corners of the hull of the points on no wall into ``space.order``, in the order of columns; how
+    many.
 
     Points within the polygon of eight extreme points, or on its sides, are no corners (S. G. Akl, G. T. Toussaint, "A
     fast convex hull algorithm", 1978); of points in the place of an extreme point the deepest counts.
+    is_sorted : whether columns are, by place.
     """
     extreme = space.corners
     n_extreme = _extreme_points(p, n, space.remaining, extreme)
+    marks = view_f64(space.columns, (BLOCK + LANES) * blocks_of(n))
+    _mark_outer(p, n, extreme, n_extreme, tolerance, space)
     n_order = 0
-    for i in range(n):
-        if space.remaining[i] != ON_WALL and _is_outer(p, i, extreme, n_extreme, tolerance):
+    for k in range(n):
+        mark = marks[BLOCK * blocks_of(n) + k]
+        if mark == _INNER:
+            continue
+        i = space.by_place[k] if is_sorted else k
+        if space.remaining[i] == ON_WALL:
+            continue
+        if mark == _BEYOND or _is_deepest_there(p, i, extreme, n_extreme, tolerance):
             space.order[n_order] = i
             n_order += 1
     return n_order
 
 
-@kernel(inline=True)
-def _is_outer(p, i, extreme, n_extreme, tolerance):
-    u, v = p[POINT * i], p[POINT * i + V]
-    beyond = False
+@kernel
+def _mark_outer(p, n, extreme, n_extreme, tolerance, space):
+    """Set the mark of each point in columns."""
+    blocks = blocks_of(n)
+    rows = view_lanes(space.columns, 4 * blocks)
     for d in range(n_extreme):
-        at = POINT * extreme[d]
-        du, dv = u - p[at], v - p[at + V]
-        if abs(du) <= tolerance and abs(dv) <= tolerance:
-            return extreme[d] == i or p[POINT * i + GAP] < p[at + GAP]
-        to = POINT * extreme[d + 1 if d + 1 < n_extreme else 0]
-        eu, ev = p[to] - p[at], p[to + V] - p[at + V]
-        wide = eu * dv - ev * du
-        if wide < 0.0 and wide * wide > tolerance * tolerance * (eu * eu + ev * ev):
-            beyond = True
-    return beyond
+        at, to = POINT * extreme[d], POINT * extreme[d + 1 if d + 1 < n_extreme else 0]
+        u, v = p[at], p[at + V]
+        eu, ev = p[to] - u, p[to + V] - v
+        limit = tolerance * tolerance * (eu * eu + ev * ev)
+        for b in range(blocks):
+            du, dv = rows[3 * b] - u, rows[3 * b + 1] - v
+            wide = eu * dv - ev * du
+            is_there = (du <= tolerance) & (du >= -tolerance) & (dv <= tolerance) & (dv >= -tolerance)
+            mark = select((wide < 0.0) & (wide * wide > limit), _BEYOND, _INNER)
+            if d > 0:
+                before = rows[3 * blocks + b]
+                mark = select(before == _INNER, mark, before)
+            rows[3 * blocks + b] = select(is_there, _THERE, mark)
 
 
 @kernel
-def _hull(p, n, tolerance, space):
-    """Corners of the hull of the n points of ``space.order``, each farther than the tolerance from the line through its
-    neighbours; how many.
+def _is_deepest_there(p, i, extreme, n_extreme, tolerance):
+    """Whether a point in the place of an extreme point is that point, or deeper."""
+    for d in range(n_extreme):
+        at = POINT * extreme[d]
+        if abs(p[POINT * i] - p[at]) <= tolerance and abs(p[POINT * i + V] - p[at + V]) <= tolerance:
+            return extreme[d] == i or p[POINT * i + GAP] < p[at + GAP]
+    return False
+
+
+@kernel
+def _hull(p, n, step, space):
+    """Corners of the hull of the n points of ``space.order``, by place, each farther than ``step`` from the line
+    through its neighbours; how many.
 
     A. M. Andrew, "Another efficient algorithm for convex hulls in two dimensions" (1979). Of points in the same place
     the deepest is taken.
     """
-    step = max(tolerance, 1e-300)
-    _sort(p, space.order, n, step)
     n_distinct = 0
     for i in range(n):
         k = space.order[i]
@@ -220,42 +312,53 @@ def _cell(x, step):
 
 
 @kernel(inline=True)
-def _precedes(p, i, j, step):
+def _precedes(p, cells, i, j):
     """Whether point i comes before j: by place, in steps, then by gap."""
-    a, b = POINT * i, POINT * j
-    cell_a, cell_b = _cell(p[a], step), _cell(p[b], step)
-    if cell_a != cell_b:
-        return cell_a < cell_b
-    cell_a, cell_b = _cell(p[a + V], step), _cell(p[b + V], step)
-    if cell_a != cell_b:
-        return cell_a < cell_b
-    if p[a + GAP] != p[b + GAP]:
-        return p[a + GAP] < p[b + GAP]
+    if cells[2 * i] != cells[2 * j]:
+        return cells[2 * i] < cells[2 * j]
+    if cells[2 * i + 1] != cells[2 * j + 1]:
+        return cells[2 * i + 1] < cells[2 * j + 1]
+    if p[POINT * i + GAP] != p[POINT * j + GAP]:
+        return p[POINT * i + GAP] < p[POINT * j + GAP]
     return i < j
 
 
 @kernel
-def _sort(p, order, n, step):
-    """Sort numbers of points by place (heapsort: J. W. J. Williams, 1964)."""
-    for root in range(n // 2 - 1, -1, -1):
-        _sift(p, order, root, n, step)
-    for end in range(n - 1, 0, -1):
-        order[0], order[end] = order[end], order[0]
-        _sift(p, order, 0, end, step)
+def _sort(p, n_points, order, n, step, space):
+    """Sort numbers of points, n of n_points, by place: runs by insertion, then merged, ``space.corners`` between."""
+    at = (BLOCK + LANES) * blocks_of(n_points)
+    cells = view_f64(space.columns + 8 * at, 2 * n_points)
+    for k in range(n):
+        i = order[k]
+        cells[2 * i], cells[2 * i + 1] = _cell(p[POINT * i], step), _cell(p[POINT * i + V], step)
+    for k in range(n):
+        i, place = order[k], k
+        while place % _RUN != 0 and _precedes(p, cells, i, order[place - 1]):
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = i
+    width = _RUN
+    while width < n:
+        for first in range(0, n - width, 2 * width):
+            _merge(p, cells, order, first, first + width, min(first + 2 * width, n), space.corners)
+        width *= 2
 
 
 @kernel
-def _sift(p, order, root, end, step):
-    k = order[root]
-    while 2 * root + 1 < end:
-        child = 2 * root + 1
-        if child + 1 < end and _precedes(p, order[child], order[child + 1], step):
-            child += 1
-        if not _precedes(p, k, order[child], step):
-            break
-        order[root] = order[child]
-        root = child
-    order[root] = k
+def _merge(p, cells, order, first, middle, end, between):
+    """Merge two runs that follow each other."""
+    for k in range(first, middle):
+        between[k] = order[k]
+    lower, upper = first, middle
+    for k in range(first, end):
+        if lower == middle:
+            return
+        if upper == end or _precedes(p, cells, between[lower], order[upper]):
+            order[k] = between[lower]
+            lower += 1
+        else:
+            order[k] = order[upper]
+            upper += 1
 
 
 @kernel
@@ -269,6 +372,9 @@ def reduce_patch(points, n, tolerance, max_contacts, target, space):
     """
     n_corners = hull_of_patch(points, n, tolerance, space)
     n_ring = _put_ring(points, n, n_corners, tolerance, target, space)
+    if max_contacts == 1:
+        space.order[0] = 0
+        return 1
     mark_carrying(points.manifold.points, n, n_corners, tolerance, space)
     n_target = _put_inner(points, n, n_ring, tolerance, target, space)
     if n_target == n_ring or n_target <= max_contacts:

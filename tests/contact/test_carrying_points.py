@@ -20,6 +20,7 @@ from collide.contact.carrying_points import (
     mark_carrying,
 )
 from collide.contact.manifold_points import POINT, ManifoldPoints
+from collide.kernels import address_of
 
 pytestmark = pytest.mark.plain_kernels
 TOLERANCE = 1e-9
@@ -34,7 +35,18 @@ def patch(places: np.ndarray, gaps: np.ndarray) -> contact_points.PatchPoints:
 
 
 def space(n: int) -> reduce_patch.HullSpace:
-    return reduce_patch.HullSpace(*(np.zeros(max(n + 16, CELLS), dtype=np.int64) for _ in range(4)))
+    return hull_space(max(n + 16, CELLS))
+
+
+def hull_space(n: int) -> reduce_patch.HullSpace:
+    columns = np.zeros(reduce_patch.column_words(n))
+    of_hull = reduce_patch.HullSpace(*(np.zeros(n, dtype=np.int64) for _ in range(5)), address_of(columns))
+    _columns[of_hull.columns] = columns
+    return of_hull
+
+
+#: Memory of which spaces hold the addresses.
+_columns: dict[int, np.ndarray] = {}
 
 
 def gentlest(places: np.ndarray, gaps: np.ndarray, i: int) -> float:
@@ -128,9 +140,9 @@ def test_of_many_points_few_are_asked_and_each_compared_with_all(shape, monkeypa
         asked.append(i)
         return slope_below(p, i, *others)
 
-    def counted_steps(p, at_i, n_before, *others):
+    def counted_steps(columns_at, at_i, n_before, *others):
         steps[0] += n_before
-        return span_on_border(p, at_i, n_before, *others)
+        return span_on_border(columns_at, at_i, n_before, *others)
 
     monkeypatch.setattr(carrying_points, "_slope_below", counted)
     monkeypatch.setattr(carrying_points, "_span_on_border", counted_steps)

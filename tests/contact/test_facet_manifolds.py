@@ -25,6 +25,8 @@ from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP, TRANSLATION
 from collide.contact.manifold_points import POINT, ManifoldPoints
 from collide.contact.support_face import EDGE, FACE, VERTEX, axes_across
 from collide.kernels import PLAIN_PYTHON, address_of
+from collide.lowering.facet_bodies import body_of
+from collide.narrowphase.facets.facet_queries import facets_within
 from collide.numerics.vec3 import Vec3
 
 EYE = np.eye(4)
@@ -115,6 +117,28 @@ def test_a_call_after_one_that_needed_much_space_begins_with_what_may_be_kept(mo
     assert space.described[1] == 128
     collide.contacts(ground, shape, EYE, collide.pose((0.0, 0.0, 5.0)))
     assert mesh_contacts._of_thread._words is kept
+
+
+def test_the_wider_list_goes_on_where_the_workspace_was_full(monkeypatch):
+    """Deep overlaps of fine meshes: far more pairs lie within 2.5 times the depth than there is space for at first.
+    Those that no patch reaches make way for the next, and rows are the same bits as with space for all at once."""
+    A, B = collide.Mesh(*bumpy_sphere(2000, 3)), collide.Mesh(*bumpy_sphere(2000, 4))
+    listed_in_parts = 0
+    for k, depth in enumerate((0.05, 0.2, 0.4)):
+        X = collide.pose((2.0 - depth, 0.1 * k, 0.0), rpy=(0.3, 0.2 * k, 1.0))
+        found = []
+        for fewest in (1 << 16, 1 << 12, 1 << 9):
+            monkeypatch.setattr(mesh_contacts, "_FEWEST_PAIRS", fewest)
+            space = mesh_contacts._OfThread()
+            monkeypatch.setattr(mesh_contacts, "_of_thread", space)
+            found.append((collide.contacts(A, B, EYE, X).rows, space.described[1]))
+        (rows, _), *others = found
+        reach = -2.5 * rows["distance"].min()
+        n_within = len(facets_within(body_of(A).tree, body_of(B).tree, EYE, X, reach, 1 << 22).length)
+        for again, capacity in others:
+            assert same_rows(again, rows), (depth, capacity)
+            listed_in_parts += capacity < n_within
+    assert listed_in_parts >= 3
 
 
 @pytest.mark.skipif(not PLAIN_PYTHON, reason="patches kernels: NUMBA_DISABLE_JIT=1 python -m pytest")
@@ -270,7 +294,8 @@ def test_hulls_of_patches_hold_their_points():
         points = contact_points.PatchPoints(
             ManifoldPoints(numbers, np.zeros(2 * n, dtype=np.int64)), np.zeros(n), np.arange(n), np.zeros(18)
         )
-        space = reduce_patch.HullSpace(*(np.zeros(n + 80, dtype=np.int64) for _ in range(4)))
+        columns = np.zeros(reduce_patch.column_words(n))
+        space = reduce_patch.HullSpace(*(np.zeros(n + 80, dtype=np.int64) for _ in range(5)), address_of(columns))
         tolerance = 1e-9
         m = reduce_patch.hull_of_patch(points, n, tolerance, space)
         corners = flat[space.corners[:m]]

@@ -192,7 +192,7 @@ def facets_within(
     marks = np.empty((capacity, near_pairs.INTS_OF_PAIR), dtype=np.int64)
     count = near_pairs.list_near_pairs(
         A.address, B.address, address_of(X_WA), address_of(X_WB), float(reach), address_of(out), address_of(marks),
-        capacity, *work.addresses, True,
+        capacity, *work.addresses, True, 0,
     )
     if count == -SINGULAR:
         raise not_invertible(0)

@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import entry, kernel, view_f64, view_i64
+from collide.kernels.lanes import LANES, any_of, view_lanes
 from collide.mesh.box_overlap import FRAME, PROBE
-from collide.mesh.bvh import EXPONENT, MAX_LEAF, REACH, open_tree
+from collide.mesh.bvh import CENTRE, EXPONENT, MAX_LEAF, REACH, box_at, open_tree
 from collide.mesh.triangle import put_triangle, triangle_at
 from collide.narrowphase.facets.exact_corners import CORNERS
 from collide.narrowphase.facets.posed_surfaces import (
@@ -23,6 +24,7 @@ from collide.narrowphase.facets.posed_surfaces import (
     PLACING,
     put_in_frame_of_a,
     put_in_world,
+    rotate_by_pose,
     shift_between,
 )
 from collide.narrowphase.facets.posed_trees import (
@@ -35,7 +37,7 @@ from collide.narrowphase.facets.posed_trees import (
 from collide.narrowphase.facets.surface_collision import FULL, SINGULAR
 from collide.narrowphase.facets.traversal import make_traversal, pair_of_trees
 from collide.narrowphase.facets.triangle_distance import common_point, nearest_points, separated_by
-from collide.numerics.vec3 import Vec3, add, put_vec3, scale, vec3_at
+from collide.numerics.vec3 import Vec3, absolute, add, dot, put_vec3, scale, vec3_at
 
 # A pair, doubles: distance of its nearest points, proven lower bound, point of A, point of B; both points are the
 # common one where they meet. And integers: facet of A, facet of B, whether they meet.
@@ -45,12 +47,24 @@ FACET_A, FACET_B, MEETS = range(3)
 INTS_OF_PAIR = 3
 
 # Doubles of workspace besides a placing and corners: reaches along both frames' axes (6), two triangles (18), points
-# (6), two integers, the facet pairs found and those decided exactly, and a leaf's triangles with their boxes.
-_REACHES, _TRIANGLES, _POINTS, _COUNTERS, _LEAF = 0, 6, 24, 30, 32
+# (6), two integers, the facet pairs found and those decided exactly; leaves of either tree that were placed last, each
+# in the slot of its number, and which they are.
+_REACHES, _TRIANGLES, _POINTS, _COUNTERS, _LEAVES = 0, 6, 24, 30, 32
 _N_PAIRS, _EXACT = range(2)
-#: Doubles of a triangle with the box around it: nine, then least and largest x, y, z.
-_BOXED = 15
-DOUBLES = PLACING + CORNERS + 32 + _BOXED * (MAX_LEAF + 1)
+# What `list_near_pairs` is asked about seen along directions: words of a header, then doubles of each view. How many
+# views; the height of the stack to go on with, 0 to begin; how many pairs are listed before. A view: two unit vectors
+# across the direction and the direction itself; limits of the gap along it; how far apart facets may lie seen along it;
+# and, worked out by the kernel, each of the three vectors as a row and an offset for boxes of A's tree, of B's.
+N_VIEWS, STACKED, N_LISTED, VIEWS_AT = 0, 1, 2, 4
+LEAST_GAP, LARGEST_GAP, BESIDE, _ROWS_OF_A, _ROWS_OF_B = 9, 10, 11, 12, 24
+VIEW = 36
+#: Facets seen along a direction share points where they are no farther apart than so much of both together.
+BETWEEN_SHADOWS = 2.0**-6
+
+#: Slots for leaves of a tree. Doubles of a leaf: corners of its triangles, then rows of eight, of each triangle the
+#: least x, y, z and the largest.
+_SLOTS, _BOXES, _OF_LEAF = 16, 9 * MAX_LEAF + 1, 9 * MAX_LEAF + 1 + 6 * LANES
+DOUBLES = PLACING + CORNERS + _LEAVES + 2 * _SLOTS * (_OF_LEAF + 1)
 FLOATS = 2 * FRAME + PROBE
 
 #: Reaches beyond this, in units of boxes, would leave the floats: nothing is culled there.
@@ -62,9 +76,9 @@ class _Query(NamedTuple):
     """reach : pairs at most so far apart are listed [m].   error : bound of the error of a coordinate in the world.
 
     shift : t_B − t_A.
-    leaf : triangles of a leaf of A, and a triangle of B, with boxes.
+    leaves, leaves_at, placed : the leaves placed last, the address, and which they are.
     out, facets : doubles and integers of the pairs listed, room for ``capacity`` pairs.
-    measures : whether the pairs are measured.
+    measures : whether the pairs are measured.   views, n_views : pairs that none of them lets through are not listed.
     """
 
     trees: PosedTrees
@@ -75,11 +89,15 @@ class _Query(NamedTuple):
     triangles: np.ndarray
     points: np.ndarray
     counters: np.ndarray
-    leaf: np.ndarray
+    leaves: np.ndarray
+    leaves_at: int
+    placed: np.ndarray
     out: np.ndarray
     facets: np.ndarray
     capacity: int
     measures: bool
+    views: np.ndarray
+    n_views: int
 
 
 @kernel
@@ -133,31 +151,112 @@ def _unless_full(query, _stack, top):
     return -top if query.counters[_N_PAIRS] + MAX_FACET_PAIRS > query.capacity else top
 
 
+@kernel
+def _set_rows(tree, X, shift, query, rows_at):
+    """Set each view's rows and offsets: row · c + offset is the place of a box's centre c, in tree units, as seen.
+
+    shift : of the body's origin, from that of A [m].
+    """
+    unit = math.ldexp(1.0, int(tree.header[EXPONENT]))
+    middle = add(rotate_by_pose(X, vec3_at(tree.numbers, CENTRE)), shift)
+    for i in range(3 * query.n_views):
+        at = VIEW * (i // 3)
+        axis = vec3_at(query.views, at + 3 * (i % 3))
+        to = at + rows_at + 4 * (i % 3)
+        for j in range(3):
+            query.views[to + j] = unit * (axis.x * X[j] + axis.y * X[4 + j] + axis.z * X[8 + j])
+        query.views[to + 3] = dot(axis, middle)
+
+
+@kernel(inline=True)
+def _are_seen(views, k, low_a, high_a, low_b, high_b):
+    """Whether a view lets two spans along its vector k (0, 1 across, 2 along) through.
+
+    Facets within boxes lie farther apart than the boxes do, and are no wider: what is refused of boxes is refused of
+    all facets within.
+    """
+    at = VIEW * (k // 3)
+    if k % 3 == 2:
+        return low_b - high_a <= views[at + LARGEST_GAP] and high_b - low_a >= views[at + LEAST_GAP]
+    apart = max(low_b - high_a, low_a - high_b)
+    return not apart > BETWEEN_SHADOWS * (high_a - low_a + high_b - low_b) + views[at + BESIDE]
+
+
+@kernel
+def _boxes_are_seen(query, pair):
+    """Whether some view lets pairs of facets in two boxes through."""
+    a, b = box_at(query.trees.A, pair.a), box_at(query.trees.B, pair.b)
+    views = query.views
+    for view in range(query.n_views):
+        is_seen = True
+        for k in range(3 * view + 2, 3 * view - 1, -1):
+            at = VIEW * view + 4 * (k % 3)
+            of_a, of_b = vec3_at(views, at + _ROWS_OF_A), vec3_at(views, at + _ROWS_OF_B)
+            middle_a, half_a = dot(of_a, a.centre) + views[at + _ROWS_OF_A + 3], dot(absolute(of_a), a.half)
+            middle_b, half_b = dot(of_b, b.centre) + views[at + _ROWS_OF_B + 3], dot(absolute(of_b), b.half)
+            if not _are_seen(views, k, middle_a - half_a, middle_a + half_a, middle_b - half_b, middle_b + half_b):
+                is_seen = False
+                break
+        if is_seen:
+            return True
+    return False
+
+
+@kernel(inline=True)
+def _span_along(axis, leaves, at):
+    """(least, largest) height of a triangle along a vector."""
+    p, q, r = dot(axis, vec3_at(leaves, at)), dot(axis, vec3_at(leaves, at + 3)), dot(axis, vec3_at(leaves, at + 6))
+    return min(p, q, r), max(p, q, r)
+
+
+@kernel
+def _facets_are_seen(query, leaves, i, j):
+    """Whether some view lets two triangles of ``leaves`` through."""
+    for view in range(query.n_views):
+        is_seen = True
+        for k in range(3 * view + 2, 3 * view - 1, -1):
+            axis = vec3_at(query.views, VIEW * view + 3 * (k % 3))
+            low_a, high_a = _span_along(axis, leaves, i)
+            low_b, high_b = _span_along(axis, leaves, j)
+            if not _are_seen(query.views, k, low_a, high_a, low_b, high_b):
+                is_seen = False
+                break
+        if is_seen:
+            return True
+    return False
+
+
 @kernel(inline=True)
 def _visit_leaves(query, pair):
     """List the facet pairs of two leaves that come within the reach."""
-    trees, T = query.trees, query.triangles
-    run_a = ~pair.link_a
-    run_b = ~pair.link_b
-    first_a, n_a = run_a >> 3, run_a & 7
-    of_b = _BOXED * MAX_LEAF
-    leaf = query.leaf
+    if query.n_views > 0 and not _boxes_are_seen(query, pair):
+        return False
+    trees, T, leaves = query.trees, query.triangles, query.leaves
+    first_a, n_a, first_b, n_b = ~pair.link_a >> 3, ~pair.link_a & 7, ~pair.link_b >> 3, ~pair.link_b & 7
     bound = query.reach + 8.0 * query.error
-    for i in range(n_a):
-        put_in_world(trees.XA, Vec3(0.0, 0.0, 0.0), trees.A.triangles, 9 * (first_a + i), leaf, _BOXED * i)
-        _put_box(leaf, _BOXED * i)
-    for b in range(run_b >> 3, (run_b >> 3) + (run_b & 7)):
-        put_in_world(trees.XB, query.shift, trees.B.triangles, 9 * b, leaf, of_b)
-        _put_box(leaf, of_b)
+    at_a = _placed_leaf(query, 0, trees.A, trees.XA, Vec3(0.0, 0.0, 0.0), first_a, n_a)
+    at_b = _placed_leaf(query, 1, trees.B, trees.XB, query.shift, first_b, n_b)
+    rows = view_lanes(query.leaves_at + 8 * (at_a + _BOXES), 6)
+    for j in range(n_b):
+        box_b = at_b + _BOXES + j
+        if not any_of(
+            (leaves[box_b] - rows[3] <= bound) & (rows[0] - leaves[box_b + 3 * LANES] <= bound)
+            & (leaves[box_b + LANES] - rows[4] <= bound) & (rows[1] - leaves[box_b + 4 * LANES] <= bound)
+            & (leaves[box_b + 2 * LANES] - rows[5] <= bound) & (rows[2] - leaves[box_b + 5 * LANES] <= bound)
+        ):
+            continue
+        b, of_b = first_b + j, at_b + 9 * j
         is_placed = False
         for i in range(n_a):
-            if _boxes_apart(leaf, _BOXED * i, of_b, bound):
+            if _boxes_apart(leaves, at_a + _BOXES + i, box_b, bound):
+                continue
+            if query.n_views > 0 and not _facets_are_seen(query, leaves, at_a + 9 * i, of_b):
                 continue
             if not is_placed:
                 put_in_frame_of_a(trees.placing, trees.B.triangles, 9 * b, trees.corners, 9)
-                put_triangle(T, 9, triangle_at(leaf, of_b))
+                put_triangle(T, 9, triangle_at(leaves, of_b))
                 is_placed = True
-            put_triangle(T, 0, triangle_at(leaf, _BOXED * i))
+            put_triangle(T, 0, triangle_at(leaves, at_a + 9 * i))
             if separated_by(T, bound):
                 continue
             if query.measures:
@@ -170,24 +269,44 @@ def _visit_leaves(query, pair):
 
 
 @kernel(inline=True)
-def _put_box(leaf, at):
-    """Behind a triangle: the least and largest of its coordinates."""
-    for j in range(3):
-        p, q, r = leaf[at + j], leaf[at + 3 + j], leaf[at + 6 + j]
-        leaf[at + 9 + j] = min(p, q, r)
-        leaf[at + 12 + j] = max(p, q, r)
+def _placed_leaf(query, side, tree, X, shift, first, n):
+    """Where a leaf's triangles stand in ``leaves``, rotated by a pose X and shifted, with their boxes.
+
+    A leaf meets several of the other tree, most of them one after the other: it is placed once while its slot is its.
+    """
+    slot = _SLOTS * side + (first // MAX_LEAF) % _SLOTS
+    at = _OF_LEAF * slot
+    if query.placed[slot] != first:
+        query.placed[slot] = first
+        _place_leaf(query.leaves, at, tree, X, shift, first, n)
+    return at
+
+
+@kernel
+def _place_leaf(leaves, at, tree, X, shift, first, n):
+    for i in range(LANES):
+        for j in range(3):
+            low, high = at + _BOXES + LANES * j + i, at + _BOXES + LANES * (3 + j) + i
+            leaves[low], leaves[high] = math.inf, -math.inf
+        if i >= n:
+            continue
+        put_in_world(X, shift, tree.triangles, 9 * (first + i), leaves, at + 9 * i)
+        for j in range(3):
+            p, q, r = leaves[at + 9 * i + j], leaves[at + 9 * i + 3 + j], leaves[at + 9 * i + 6 + j]
+            leaves[at + _BOXES + LANES * j + i] = min(p, q, r)
+            leaves[at + _BOXES + LANES * (3 + j) + i] = max(p, q, r)
 
 
 @kernel(inline=True)
-def _boxes_apart(leaf, i, j, bound):
+def _boxes_apart(leaves, i, j, bound):
     """Whether two triangles' boxes are farther apart along an axis than the bound."""
     return (
-        leaf[j + 9] - leaf[i + 12] > bound
-        or leaf[i + 9] - leaf[j + 12] > bound
-        or leaf[j + 10] - leaf[i + 13] > bound
-        or leaf[i + 10] - leaf[j + 13] > bound
-        or leaf[j + 11] - leaf[i + 14] > bound
-        or leaf[i + 11] - leaf[j + 14] > bound
+        leaves[j] - leaves[i + 3 * LANES] > bound
+        or leaves[i] - leaves[j + 3 * LANES] > bound
+        or leaves[j + LANES] - leaves[i + 4 * LANES] > bound
+        or leaves[i + LANES] - leaves[j + 4 * LANES] > bound
+        or leaves[j + 2 * LANES] - leaves[i + 5 * LANES] > bound
+        or leaves[i + 2 * LANES] - leaves[j + 5 * LANES] > bound
     )
 
 
@@ -226,27 +345,42 @@ def _list(query, a, b, length, lower, meets):
     counters[_N_PAIRS] += 1
 
 
-_traverse = make_traversal(_unless_full, pair_of_trees, _visit_leaves, make_open_larger(_widen_probe))
+_open_larger = make_open_larger(_widen_probe)
+
+
+@kernel(inline=True)
+def _open_if_seen(query, pair, stack, top):
+    if query.n_views > 0 and not _boxes_are_seen(query, pair):
+        return top
+    return _open_larger(query, pair, stack, top)
+
+
+_traverse = make_traversal(_unless_full, pair_of_trees, _visit_leaves, _open_if_seen)
 
 
 #: Of `list_near_pairs`.
 SIGNATURE = (
-    "int64(int64, int64, int64, int64, float64, int64, int64, int64, int64, int64, int64, int64, int64, boolean)"
+    "int64(int64, int64, int64, int64, float64, int64, int64, int64, int64, int64, int64, int64, int64, boolean, int64)"
 )
 
 
 @entry(SIGNATURE)
 def list_near_pairs(
     header_a_at, header_b_at, XA_at, XB_at, reach, out_at, facets_at, capacity, stack_at, n_stack, doubles_at,
-    integers_at, exact_at, measures,
+    integers_at, exact_at, measures, views_at,
 ):
     """How many pairs of facets come within ``reach`` at a pair of poses (16 doubles each); −FULL, −SINGULAR.
 
     Every pair at most ``reach`` apart is listed; a few pairs farther apart by rounding may be.
     measures : if False, distances are infinite, no pair meets, and more pairs farther apart may be listed.
     out, facets : NUMBERS_OF_PAIR doubles and INTS_OF_PAIR integers a pair, room for ``capacity`` pairs.
+    views : 0; or address of a header and of views, without which no pair is left out. Listed are then pairs that a view
+    lets through, behind the N_LISTED of the header. After −FULL the header has the number of pairs listed, and a call
+    with the same stack goes on from there.
     Arguments are flat, as of all entries.
     """
+    words = view_i64(views_at, VIEWS_AT)
+    n_views = words[N_VIEWS] if views_at != 0 else 0
     A = open_tree(header_a_at)
     B = open_tree(header_b_at)
     trees, invertible = pose_trees(
@@ -256,18 +390,27 @@ def list_near_pairs(
         return -SINGULAR
     numbers_at = doubles_at + 8 * (PLACING + CORNERS)
     error = world_error(A, trees.XA, B, trees.XB)
+    leaves_at = numbers_at + 8 * _LEAVES
+    placed = view_i64(leaves_at + 16 * _SLOTS * _OF_LEAF, 2 * _SLOTS)
+    for slot in range(2 * _SLOTS):
+        placed[slot] = -1
     query = _Query(
         trees, reach, error, shift_between(trees.XA, trees.XB), view_f64(numbers_at + 8 * _REACHES, 6),
         view_f64(numbers_at + 8 * _TRIANGLES, 18), view_f64(numbers_at + 8 * _POINTS, 6),
-        view_i64(numbers_at + 8 * _COUNTERS, 2), view_f64(numbers_at + 8 * _LEAF, _BOXED * (MAX_LEAF + 1)),
+        view_i64(numbers_at + 8 * _COUNTERS, 2), view_f64(leaves_at, 2 * _SLOTS * _OF_LEAF), leaves_at, placed,
         view_f64(out_at, NUMBERS_OF_PAIR * capacity), view_i64(facets_at, INTS_OF_PAIR * capacity), capacity,
-        measures,
+        measures, view_f64(views_at + 8 * VIEWS_AT, VIEW * n_views), n_views,
     )
     _set_reaches(A, B, trees.placing, reach + 8.0 * error, query.reaches)
-    query.counters[_N_PAIRS] = 0
+    _set_rows(A, trees.XA, Vec3(0.0, 0.0, 0.0), query, _ROWS_OF_A)
+    _set_rows(B, trees.XB, query.shift, query, _ROWS_OF_B)
+    query.counters[_N_PAIRS] = words[N_LISTED] if views_at != 0 else 0
     query.counters[_EXACT] = 0
     stack = view_i64(stack_at, n_stack)
-    stack[0] = 0
-    if _traverse(query, stack, 1) != 0:
-        return -FULL
-    return query.counters[_N_PAIRS]
+    top = words[STACKED] if views_at != 0 else 0
+    if top == 0:
+        stack[0], top = 0, 1
+    top = _traverse(query, stack, top)
+    if views_at != 0:
+        words[N_LISTED], words[STACKED] = query.counters[_N_PAIRS], -top
+    return -FULL if top != 0 else query.counters[_N_PAIRS]
