@@ -133,6 +133,20 @@ def dot(a, b):
 
 
 @kernel
+def sparse_dot(a, b):
+    """a·b of a vector with zeros, known exactly: terms of a component 0 are left out."""
+    total = Bounded(0.0, 0.0, 0.0)
+    if a.x.high != 0.0:
+        total = mul(a.x, b.x)
+    if a.y.high != 0.0:
+        total = mul(a.y, b.y) if a.x.high == 0.0 else add(total, mul(a.y, b.y))
+    if a.z.high != 0.0:
+        is_first = a.x.high == 0.0 and a.y.high == 0.0
+        total = mul(a.z, b.z) if is_first else add(total, mul(a.z, b.z))
+    return total
+
+
+@kernel
 def cross(a, b):
     return BoundedVec3(
         sub(mul(a.y, b.z), mul(a.z, b.y)), sub(mul(a.z, b.x), mul(a.x, b.z)), sub(mul(a.x, b.y), mul(a.y, b.x))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from collide.numerics import bounded
-from collide.numerics.bounded import UNKNOWN, Bounded
+from collide.numerics.bounded import UNKNOWN, Bounded, BoundedVec3
 
 pytestmark = pytest.mark.plain_kernels
 
@@ -81,3 +81,16 @@ def test_long_sums_of_products_keep_their_bound():
         assert total.error <= 2.0**-100 * 2.0**45
         inexact += total.error > 0.0
     assert inexact > 200
+
+
+def test_a_sparse_product_is_the_whole_one():
+    rng = np.random.default_rng(7)
+    for _ in range(200):
+        a, b = (
+            BoundedVec3(*(bounded.exact_difference(drawn(rng, "all bits"), drawn(rng, "all bits")) for _ in range(3)))
+            for _ in range(2)
+        )
+        a = BoundedVec3(*(x if rng.random() < 0.5 else Bounded(0.0, 0.0, 0.0) for x in a))
+        exact = sum(value(x) * value(y) for x, y in zip(a, b))
+        product = bounded.sparse_dot(a, b)
+        assert abs(value(product) - exact) <= Fraction(product.error) <= Fraction(bounded.dot(a, b).error), (a, b)

@@ -28,6 +28,7 @@ from collide.narrowphase.epa.polytope_surface import (
 from collide.narrowphase.exact.depth_requests import MAX_TIED_FACETS
 from collide.narrowphase.gap.precise_pair import (
     HEIGHT_ERROR,
+    LOW_PARTS_OF_PAIR,
     SLOP_ERROR,
     fine_height,
     fine_length,
@@ -38,10 +39,10 @@ from collide.narrowphase.gap.precise_pair import (
     unit_scale,
 )
 from collide.narrowphase.gap.tied_vertices import is_unique_minimiser, lowest_pair
-from collide.narrowphase.gjk.minkowski_difference import place_vertices
+from collide.narrowphase.gjk.minkowski_difference import place_vertices, point_at
 from collide.numerics import double_double as dd
 from collide.numerics.double_double import DD, STRIDE
-from collide.numerics.vec3 import Vec3, absolute, divide, neg, norm1, sub
+from collide.numerics.vec3 import Vec3, absolute, cross, divide, dot, neg, norm1, sub
 from collide.support.block_scan import least
 
 #: Vertices added, diagonals flipped and planes taken again before a run hands over the bracket it has.
@@ -74,7 +75,9 @@ class _Fine(NamedTuple):
     """The surface, the double-doubles beside it, and what is needed to find more of them.
 
     low : low parts of both poses.   points, distances, known : of `FineSurface`.   direction : a stored normal.
+    nearest : that of the facet at work, reversed.
     error : of a height over the length of its direction.   scale : what coordinates are multiplied with.
+    rounding : of a coordinate in doubles [m].
     """
 
     pair: Any
@@ -84,8 +87,10 @@ class _Fine(NamedTuple):
     distances: Any
     known: Any
     direction: Any
+    nearest: Any
     error: float
     scale: float
+    rounding: float
 
 
 @kernel
@@ -151,6 +156,31 @@ def _set_distance(fine, f):
 
 
 @kernel(inline=True)
+def _nearest_facet(fine, n_facets, f, tie):
+    """Take the planes of facet f and of all others again that may be as near; returns the nearest of these, with
+    `_set_distance`, its normal reversed in ``nearest``.
+
+    tie : error of doubles, by which clearances known in doubles alone are too small.
+
+    All before any is chosen: no plane waits for the outcome of another.
+    """
+    clearances = fine.surface.clearances
+    limit = clearances[f] + tie
+    nearest, length, spread = f, 0.0, 0.0
+    least_clearance = math.inf
+    for g in range(n_facets):
+        if g != f and (clearances[g] > limit or fine.distances[2 * g] > -math.inf):
+            continue
+        length_of_g, spread_of_g = _set_distance(fine, g)
+        if clearances[g] < least_clearance or g == nearest:
+            nearest, length, spread = g, length_of_g, spread_of_g
+            least_clearance = clearances[g]
+            for k in range(STRIDE):
+                fine.nearest[k] = -fine.direction[k]
+    return nearest, length, spread
+
+
+@kernel(inline=True)
 def _put_distance(fine, f, distance):
     fine.distances[2 * f] = distance.high
     fine.distances[2 * f + 1] = distance.low
@@ -181,9 +211,26 @@ def _flip_to(surface, f, v, error):
 
 @kernel
 def _is_behind(fine, h, apex, margin):
-    """Whether a vertex lies beyond the fine plane of facet h, which is not yet marked."""
-    if fine.surface.facets[FACET * h + MARKS] & SEEN:
+    """Whether a vertex lies beyond the fine plane of facet h, which is not yet marked.
+
+    Doubles first, unless the border is full: coordinates are off by ε = ``rounding`` at most, the edges e and f and the
+    way w to the vertex by 2ε, e × f by 4ε·(|e| + |f|) + 24ε² and its height over the plane by at most
+    |w|·(4ε·(|e| + |f|) + 24ε²) + 2ε·|e||f| and 8u·|e||f||w|, lengths as sums of coordinates. The margin is far below.
+    """
+    surface = fine.surface
+    if surface.facets[FACET * h + MARKS] & SEEN:
         return False
+    if margin == 0.0:
+        corner = point_at(surface.points, surface.facets[FACET * h])
+        e = sub(point_at(surface.points, surface.facets[FACET * h + 1]), corner)
+        f = sub(point_at(surface.points, surface.facets[FACET * h + 2]), corner)
+        w = sub(point_at(surface.points, apex), corner)
+        over = dot(cross(e, f), w)
+        e_length, f_length, w_length = norm1(e), norm1(f), norm1(w)
+        eps = fine.rounding
+        error = eps * (8.0 * w_length * (e_length + f_length + 8.0 * eps) + 8.0 * e_length * f_length)
+        if abs(over) > error:
+            return over > 0.0
     a, _, _ = _load_plane(fine, h)
     height = dd.sub(fine_height(fine.points, apex, fine.direction), fine_height(fine.points, a, fine.direction))
     return height.high > 4.0 * fine.error * fine_length(fine.direction).high + margin
@@ -226,7 +273,7 @@ def _request_nearest(surface, distance, f, n_facets, request):
 
 
 @kernel(inline=True)
-def _fine(pair, terms_at, work, surface, size, slop):
+def _fine(pair, terms_at, work, surface, size, slop, rounding):
     """The `_Fine` of a surface, none of whose fine points is known."""
     fine = fine_surface_at(work.epa_at, work.epa_integers_at)
     low_at = work.fine_at + 8 * STRIDE
@@ -234,7 +281,8 @@ def _fine(pair, terms_at, work, surface, size, slop):
     scale = unit_scale(size)
     error = HEIGHT_ERROR + SLOP_ERROR * slop * scale
     return _Fine(
-        pair, surface, low, fine.points, fine.distances, fine.known, view_f64(work.fine_at, STRIDE), error, scale
+        pair, surface, low, fine.points, fine.distances, fine.known, view_f64(work.fine_at, STRIDE),
+        view_f64(low_at + 8 * LOW_PARTS_OF_PAIR, STRIDE), error, scale, rounding,
     )
 
 
@@ -248,23 +296,19 @@ def refine(pair, terms_at, work, surface, n_facets, n_vertices, size, slop, erro
     """
     if not is_refinable(size):
         return RefinedDepth(False, 0.0, 0.0, 0.0, Vec3(0.0, 0.0, 1.0), -1, n_facets)
-    fine = _fine(pair, terms_at, work, surface, size, slop)
+    fine = _fine(pair, terms_at, work, surface, size, slop, error)
     corners = view_i64(work.nearest_at, 6)
-    ids, clearances, direction = surface.ids, surface.clearances, fine.direction
+    ids, clearances, direction = surface.ids, surface.clearances, fine.nearest
     over = 1.0 / fine.scale
     for v in range(n_vertices):
         fine.known[v] = 0
     for f in range(n_facets):
         _invalidate(fine, f, error)
     for _ in range(_STEPS):
-        f = least(clearances, max(n_facets, 8))
-        was_known = fine.distances[2 * f] > -math.inf
-        length, spread = _set_distance(fine, f)
-        if not was_known and least(clearances, max(n_facets, 8)) != f:
+        f, length, spread = _nearest_facet(fine, n_facets, least(clearances, max(n_facets, 8)), error * fine.scale)
+        if least(clearances, max(n_facets, 8)) != f:
             continue
         distance = fine.distances[2 * f]
-        for k in range(STRIDE):
-            direction[k] = -direction[k]
         for k in range(3):
             v = surface.facets[FACET * f + k]
             corners[2 * k] = ids[2 * v]

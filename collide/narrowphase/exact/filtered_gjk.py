@@ -28,7 +28,7 @@ from collide.narrowphase.bounds import ERROR
 from collide.narrowphase.exact.johnson import count_of, has_pair
 from collide.numerics import bounded
 from collide.numerics.bounded import UNKNOWN, Bounded, BoundedVec3
-from collide.numerics.vec3 import Vec3, column_at, dot, norm, norm1, rotate_back, scale
+from collide.numerics.vec3 import Vec3, column_at, cross, dot, neg, norm, norm1, rotate_back, scale, sub
 
 #: How a search ends: a sign is left to integers; the cores share a point; they do not.
 OPEN, MEET, APART = range(3)
@@ -46,6 +46,8 @@ _FIRST_AT = 8
 # 2^_LOWEST_BIT. So no bit of a point is below 2⁻²¹³, and of no product of four points, the highest degree here, below
 # 2⁻⁸⁵². Bounds of errors are sums of bits rounded off, and of parts 2⁻⁵¹ of those: none is below 2⁻⁹⁶⁰ but 0.
 _SMALLEST_ENTRY, _LOWEST_BIT, _LARGEST_SIZE = 2.0**-60, -100, 2.0**60
+#: What doubles leave in doubt, in units of the terms named at each sign: 2⁶u.
+_ROUNDED = 2.0**-47
 #: A direction is good enough to propose vertices by: as good as `direction_double`.
 _GOOD_DIRECTION = 2.0**-52
 
@@ -132,7 +134,7 @@ def _search(ordered, ids, points):
         ids[2 * n + 1] = j
         _put_point(pair, points, n, i, j)
         beyond = 0
-        nearer = bounded.sign(_dot_with_difference(direction.d, points, 0, n))
+        nearer = _side_of_difference(direction.d, points, 0, n)
         if nearer == UNKNOWN:
             return FilteredSearch(OPEN, n, rounds)
         if nearer <= 0:
@@ -162,13 +164,19 @@ def _put_point(pair, points, k, i, j):
         p, q = A.pose_at + 3 * axis, B.pose_at + 3 * axis
         total = Bounded(poses[A.pose_at + 9 + axis], 0.0, 0.0)
         total = bounded.add_product(total, -1.0, poses[B.pose_at + 9 + axis])
-        total = bounded.add_product(total, poses[p], a.x)
-        total = bounded.add_product(total, poses[p + 1], a.y)
-        total = bounded.add_product(total, poses[p + 2], a.z)
-        total = bounded.add_product(total, -poses[q], b.x)
-        total = bounded.add_product(total, -poses[q + 1], b.y)
-        total = bounded.add_product(total, -poses[q + 2], b.z)
+        total = _add_product(total, poses[p], a.x)
+        total = _add_product(total, poses[p + 1], a.y)
+        total = _add_product(total, poses[p + 2], a.z)
+        total = _add_product(total, -poses[q], b.x)
+        total = _add_product(total, -poses[q + 1], b.y)
+        total = _add_product(total, -poses[q + 2], b.z)
         bounded.put(points, _POINT * k + 3 * axis, bounded.settled(total))
+
+
+@kernel(inline=True)
+def _add_product(total, x, y):
+    """`bounded.add_product`, left out where an entry of a rotation is 0: two of three, of bodies along the axes."""
+    return total if x == 0.0 else bounded.add_product(total, x, y)
 
 
 @kernel(inline=True)
@@ -176,10 +184,32 @@ def _point(points, k):
     return bounded.vec3_at(points, _POINT * k)
 
 
+@kernel(inline=True)
+def _leading(points, k):
+    """Point k as doubles have it: the sum of its coordinates is off by 2u of its `_size`."""
+    return Vec3(points[_POINT * k], points[_POINT * k + 3], points[_POINT * k + 6])
+
+
+@kernel(inline=True)
+def _size(points, k):
+    """The sum of point k's coordinates, and 2⁵³ times that of their errors."""
+    at = _POINT * k
+    return norm1(_leading(points, k)) + 2.0**53 * (points[at + 2] + points[at + 5] + points[at + 8])
+
+
 @kernel
-def _dot_with_difference(d, points, i, j):
-    """d·(point i − point j)."""
-    return bounded.dot(d, bounded.sub_vec3(_point(points, i), _point(points, j)))
+def _side_of_difference(d, points, i, j):
+    """Sign of d·(point i − point j), or UNKNOWN.
+
+    Doubles first: with P the `_size` of the points, d off by u|d| and its error, and the difference, of at most 2P, by
+    4uP, they are off by 14u·P·|d| and 2P times the error.
+    """
+    leading = Vec3(d.x.high, d.y.high, d.z.high)
+    side = dot(leading, sub(_leading(points, i), _leading(points, j)))
+    error = d.x.error + d.y.error + d.z.error
+    if abs(side) > (_ROUNDED * norm1(leading) + 4.0 * error) * max(_size(points, i), _size(points, j)):
+        return 1 if side > 0.0 else -1
+    return bounded.sign(bounded.dot(d, bounded.sub_vec3(_point(points, i), _point(points, j))))
 
 
 @kernel
@@ -203,10 +233,8 @@ def _reduce(points, ids, mask, n):
 @kernel
 def _nearest_subset(points, n, newest):
     """`johnson.nearest_subset` of up to three points; 0 where a sign it goes by is not proven."""
-    if n == 3:
-        p, q, r = _point(points, 0), _point(points, 1), _point(points, 2)
-        if _has_foot(bounded.cross(bounded.sub_vec3(q, p), bounded.sub_vec3(r, q)), p, q, r):
-            return 7
+    if n == 3 and _has_foot(points, 0, 1, 2):
+        return 7
     for count in range(1, 3):
         for mask in range(1, 1 << n):
             if count_of(mask) != count or (newest >= 0 and not (mask >> newest) & 1):
@@ -227,18 +255,32 @@ def _nearest_of_four(points, beyond):
         foot on the plane is the nearest point if the foot lies within the face.
     """
     for k in range(3):
-        if (beyond >> k) & 1:
-            i, j = 0 if k != 0 else 1, 2 if k != 2 else 1
-            p, q, r = _point(points, i), _point(points, j), _point(points, 3)
-            d = bounded.cross(bounded.sub_vec3(q, p), bounded.sub_vec3(r, q))
-            if _has_foot(d, p, q, r):
-                return 15 & ~(1 << k)
+        if (beyond >> k) & 1 and _has_foot(points, 0 if k != 0 else 1, 2 if k != 2 else 1, 3):
+            return 15 & ~(1 << k)
     return 0
 
 
 @kernel
-def _has_foot(normal, p, q, r):
-    """Whether Δ_i > 0 is proven for three points: Δ_i is normal · (y_j × y_k)."""
+def _has_foot(points, i, j, k):
+    """Whether Δ > 0 is proven for three points: Δ of a point is normal · (the product of the next two).
+
+    Doubles first. With P the `_size` of the points, the edges e and f are off by 4uP each, and their product by
+    15uP·(|e| + |f|) of at most P·(|e| + |f|); a product of two points is off by 11uP² of at most P².
+    """
+    p, q, r = _leading(points, i), _leading(points, j), _leading(points, k)
+    e, f = sub(q, p), sub(r, q)
+    normal = cross(e, f)
+    least = min(min(dot(normal, cross(q, r)), dot(normal, cross(r, p))), dot(normal, cross(p, q)))
+    size = max(max(_size(points, i), _size(points, j)), _size(points, k))
+    rounded = _ROUNDED * (size * size * size) * (norm1(e) + norm1(f))
+    if abs(least) > rounded:
+        return least > 0.0
+    return _has_fine_foot(_point(points, i), _point(points, j), _point(points, k))
+
+
+@kernel
+def _has_fine_foot(p, q, r):
+    normal = bounded.cross(bounded.sub_vec3(q, p), bounded.sub_vec3(r, q))
     if bounded.sign(bounded.dot(normal, bounded.cross(q, r))) != 1:
         return False
     if bounded.sign(bounded.dot(normal, bounded.cross(r, p))) != 1:
@@ -259,10 +301,12 @@ def _is_nearest(points, n, mask):
         of_d, of_e = bounded.dot(e, along), bounded.neg(bounded.dot(d, along))
         answer = _both(answer, _is_positive(of_d))
         answer = _both(answer, _is_positive(of_e))
+        if answer == 0:
+            return 0
         d = bounded.add_vec3(bounded.scale_vec3(of_d, d), bounded.scale_vec3(of_e, e))
     for k in range(n):
         if answer != 0 and not (mask >> k) & 1:
-            nearer = bounded.sign(_dot_with_difference(d, points, i, k))
+            nearer = _side_of_difference(d, points, i, k)
             answer = _both(answer, UNKNOWN if nearer == UNKNOWN else 1 if nearer <= 0 else 0)
     return answer
 
@@ -306,22 +350,33 @@ def _direction(points, n):
 @kernel
 def _separating_faces(points):
     """`exact_gjk._separating_faces`; 8 or more where a sign is 0 or not proven."""
-    apex = _point(points, 3)
-    e, f, g = (
-        bounded.sub_vec3(_point(points, 0), apex), bounded.sub_vec3(_point(points, 1), apex),
-        bounded.sub_vec3(_point(points, 2), apex),
-    )
-    beyond = _is_beyond(apex, f, g, e)
-    beyond |= _is_beyond(apex, g, e, f) << 1
-    return beyond | _is_beyond(apex, e, f, g) << 2
+    beyond = _is_beyond(points, 1, 2, 0)
+    beyond |= _is_beyond(points, 2, 0, 1) << 1
+    return beyond | _is_beyond(points, 0, 1, 2) << 2
 
 
 @kernel
-def _is_beyond(apex, f, g, across):
-    """1 where the face through the apex along f and g parts the origin from the third edge, 0 where not, or 8."""
-    normal = bounded.cross(f, g)
+def _is_beyond(points, i, j, k):
+    """1 where the face through point 3, i and j parts the origin from point k, 0 where not, or 8.
+
+    Doubles first: with P the `_size` of the points, the edges f and g are off by 4uP each, and their product by
+    15uP·(|f| + |g|) of at most P·(|f| + |g|); along the third edge, of at most 2P, that makes 42u·P²·(|f| + |g|).
+    """
+    apex = _leading(points, 3)
+    f, g = sub(_leading(points, i), apex), sub(_leading(points, j), apex)
+    normal = cross(f, g)
+    origin, side = dot(normal, neg(apex)), dot(normal, sub(_leading(points, k), apex))
+    size = max(max(_size(points, 3), _size(points, i)), max(_size(points, j), _size(points, k)))
+    if min(abs(origin), abs(side)) > _ROUNDED * (size * size) * (norm1(f) + norm1(g)):
+        return 1 if (origin > 0.0) != (side > 0.0) else 0
+    return _is_beyond_finely(_point(points, 3), _point(points, i), _point(points, j), _point(points, k))
+
+
+@kernel
+def _is_beyond_finely(apex, p, q, r):
+    normal = bounded.cross(bounded.sub_vec3(p, apex), bounded.sub_vec3(q, apex))
     origin = bounded.sign(bounded.dot(normal, bounded.neg_vec3(apex)))
-    side = bounded.sign(bounded.dot(normal, across))
+    side = bounded.sign(bounded.dot(normal, bounded.sub_vec3(r, apex)))
     if origin == 0 or origin == UNKNOWN or side == 0 or side == UNKNOWN:
         return 8
     return 1 if origin != side else 0
@@ -380,7 +435,7 @@ def _rotate_back(poses, p, d):
 def _along(poses, at, d):
     """A column of R times d."""
     x, y, z = Bounded(poses[at], 0.0, 0.0), Bounded(poses[at + 3], 0.0, 0.0), Bounded(poses[at + 6], 0.0, 0.0)
-    return bounded.dot(BoundedVec3(x, y, z), d)
+    return bounded.sparse_dot(BoundedVec3(x, y, z), d)
 
 
 @kernel
@@ -388,7 +443,7 @@ def _compare(pair, body, simplex, turned, i, j):
     """Sign of (Rᵀd)·(a_i − a_j), or UNKNOWN.   turned : Rᵀd.   simplex : that d is across."""
     hull = pair.A if body == 0 else pair.B
     difference = _difference(hull, i, j)
-    side = bounded.sign(bounded.dot(turned, difference))
+    side = bounded.sign(bounded.sparse_dot(difference, turned))
     if side == UNKNOWN:
         is_level = _is_side(body, simplex, i, j) or _axes_of(difference) & ~_axes_across(pair, body, simplex) == 0
         return 0 if is_level else UNKNOWN
@@ -472,6 +527,7 @@ def side_of_facets(ordered, requests, request_at, points):
     among all pairs where i is among the vertices of A and j among those of B.
     """
     pair, n_facets = ordered.pair, requests[request_at + 1]
+    error = ERROR * ordered.size + ordered.slop
     for k in range(n_facets):
         facet = Simplex(requests, request_at + 2 + 6 * k, 3)
         for corner in range(3):
@@ -481,29 +537,35 @@ def side_of_facets(ordered, requests, request_at, points):
         outwards = bounded.cross(bounded.sub_vec3(q, p), bounded.sub_vec3(_point(points, 2), q))
         side = bounded.sign(bounded.dot(outwards, p))
         if side == 1 and n_facets == 1 and requests[request_at] == 1:
-            return OUTERMOST if _is_outermost(pair, facet, outwards) else NOTHING
+            return OUTERMOST if _is_outermost(pair, facet, outwards, error) else NOTHING
         x, y, z = bounded.sign(outwards.x), bounded.sign(outwards.y), bounded.sign(outwards.z)
         if side != 0 or not (abs(x) == 1 or abs(y) == 1 or abs(z) == 1):
             continue
-        if _is_outermost(pair, facet, outwards) or _is_outermost(pair, facet, bounded.neg_vec3(outwards)):
+        if _is_outermost(pair, facet, outwards, error) or _is_outermost(
+            pair, facet, bounded.neg_vec3(outwards), error
+        ):
             return THROUGH_ORIGIN
     return NOTHING
 
 
 @kernel
-def _is_outermost(pair, facet, normal):
+def _is_outermost(pair, facet, normal, error):
     """Whether no vertex of A ⊖ B is proven to lie beyond a facet along its normal."""
     i, j = facet.ids[facet.at], facet.ids[facet.at + 1]
-    return _is_extreme(pair, 0, facet, normal, i, 1) and _is_extreme(pair, 1, facet, normal, j, -1)
+    return _is_extreme(pair, 0, facet, normal, i, 1, error) and _is_extreme(pair, 1, facet, normal, j, -1, error)
 
 
 @kernel
-def _is_extreme(pair, body, facet, normal, i, sign):
+def _is_extreme(pair, body, facet, normal, i, sign, error):
     """Whether no vertex of a body lies farther along the facet's normal, or against it (sign −1), than vertex i."""
     hull = pair.A if body == 0 else pair.B
     turned = _rotate_back(pair.poses, hull.pose_at, normal)
+    # Doubles first, as for `_extreme_vertex`: what they put behind vertex i by more than they round is behind.
+    g = Vec3(turned.x.high, turned.y.high, turned.z.high)
+    is_good = turned.x.error + turned.y.error + turned.z.error <= _GOOD_DIRECTION * norm1(g)
+    limit = dot(column_at(hull.coords, hull.padded, i), g) * sign - (2.0 * error * norm1(g) if is_good else math.inf)
     for k in range(hull.n):
-        if k != i:
+        if k != i and dot(column_at(hull.coords, hull.padded, k), g) * sign >= limit:
             side = _compare(pair, body, facet, turned, k, i)
             if side == UNKNOWN or side * sign > 0:
                 return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from fractions import Fraction
 
@@ -15,9 +16,11 @@ from posed_bodies import PosedBodies
 
 import collide
 from collide.kernels import address_of
+from collide.narrowphase.epa import refine_depth as R
 from collide.narrowphase.epa.expand_polytope import EXPANDED, Goal, Seed, epa
 from collide.narrowphase.epa.polytope_surface import surface_at
 from collide.narrowphase.epa.refine_depth import refine
+from collide.scenes.families.ingredients import rotation_about
 
 pytestmark = pytest.mark.plain_kernels
 
@@ -53,6 +56,25 @@ def refined(bodies: PosedBodies):
     )
     facets = triangles(surface, fine.facet).values() if fine.sound else []
     return result, fine, [[tuple(surface.ids[2 * v : 2 * v + 2].tolist()) for v in facet] for facet in facets]
+
+
+def test_vertices_behind_planes_in_doubles_are_behind_in_double_doubles(monkeypatch):
+    """Boxes pressed onto tilted boxes: the same depth where doubles may decide nothing, of fewer planes where they
+    may."""
+    rng = rng_of("behind")
+    make, load = R._fine, R._load_plane
+    loaded: Counter = Counter()
+    for _ in range(20):
+        A, B = (collide.Box(tuple(rng.uniform(0.5, 1.5, 3))) for _ in range(2))
+        turned = pose(rotation_about(2, rng.uniform(0.0, 6.0)), (0.1, 0.2, (A.size[2] + B.size[2]) / 2 - 1e-7))
+        X = random_pose(rng)
+        bodies, answers = PosedBodies(A, B, X, X @ turned), []
+        for way, rounding in (("doubles", 1.0), ("none", math.inf)):
+            monkeypatch.setattr(R, "_fine", lambda *given, r=rounding: make(*given[:-1], given[-1] * r))
+            monkeypatch.setattr(R, "_load_plane", lambda *given, w=way: loaded.update([w]) or load(*given))
+            answers.append(refined(bodies)[1:])
+        assert repr(answers[0]) == repr(answers[1]), bodies.shapes
+    assert loaded["doubles"] < 0.8 * loaded["none"], loaded
 
 
 @pytest.mark.many(2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from collide.narrowphase.exact import filtered_gjk as F
 from collide.narrowphase.exact.exact_gjk import SEPARATE, TOUCHING, gap_of_face, touch_exactly
 from collide.narrowphase.exact.exact_workspace import INTEGERS
 from collide.narrowphase.exact.plane_depth import depth_of_facet, nearest_plane
+from collide.numerics.bounded import Bounded, BoundedVec3
 from collide.numerics.vec3 import Vec3, norm
 
 pytestmark = pytest.mark.plain_kernels
@@ -114,6 +116,63 @@ def test_the_same_search_as_in_integers(draw):
                 off = (gap.excess.high - exact.excess.high) + (gap.excess.low - exact.excess.low)
                 assert abs(off) <= 2.0**-74 * exact.excess.high, told
     assert seen["meet"] + seen["apart"] >= KINDS[draw] * 24, seen
+
+
+def near_planes(rng) -> np.ndarray:
+    """Four points, each a sum of two doubles, the origin near the plane or an edge of the first three; now and then all
+    are points near the origin, as good as their errors."""
+    points = rng.normal(size=(4, 3)) * 2.0 ** rng.integers(-3, 4, size=(4, 1))
+    shares = rng.dirichlet(np.ones(3)) * rng.choice((0.0, 1.0), 3, p=(0.2, 0.8))
+    shares /= max(shares.sum(), 1.0)
+    points -= shares @ points[:3] * (1.0 + rng.choice((0.0, 2.0**-52, 2.0**-30)))
+    points[3] = points[:3].mean(axis=0) + rng.normal(size=3) * 2.0 ** float(rng.integers(-70, 2))
+    return points * (2.0**-52 if rng.random() < 0.1 else 1.0)
+
+
+def test_signs_in_doubles_are_those_of_fractions():
+    """Each end of each sign, of points off by some error: where it says anything, all points within the error agree."""
+    rng = rng_of("signs in doubles")
+    seen = Counter()
+    for _ in range(600):
+        error = float(rng.choice((0.0, 2.0**-105, 2.0**-90)))
+        stored, exact = np.zeros(F.DOUBLES), []
+        for k, point in enumerate(near_planes(rng)):
+            low = point * 2.0**-54 * rng.uniform(-1.0, 1.0, 3)
+            stored[9 * k : 9 * k + 9] = np.column_stack([point, low, np.full(3, error)]).ravel()
+            off = rng.uniform(-1.0, 1.0, 3) * error
+            exact.append([sum(map(Fraction, map(float, parts))) for parts in zip(point, low, off)])
+        p, q, r, apex = exact
+        normal = crossed(minus(q, p), minus(r, q))
+        deltas = [inner(normal, crossed(q, r)), inner(normal, crossed(r, p)), inner(normal, crossed(p, q))]
+        has_foot = F._has_foot(stored, 0, 1, 2)
+        assert not has_foot or min(deltas) > 0, stored
+        seen["foot"] += has_foot
+        seen["no foot"] += not has_foot
+        edge = np.array([float(x) for x in minus(p, q)])
+        d = rng.normal(size=3)
+        d -= (d @ edge) / (edge @ edge) * edge * (1.0 + rng.choice((0.0, 2.0**-45)))
+        side = F._side_of_difference(BoundedVec3(*(Bounded(float(x), 0.0, 0.0) for x in d)), stored, 0, 1)
+        product = inner([Fraction(float(x)) for x in d], minus(p, q))
+        assert side == F.UNKNOWN or side == (product > 0) - (product < 0), stored
+        seen["side unknown" if side == F.UNKNOWN else "side"] += 1
+        beyond = F._is_beyond(stored, 0, 1, 2)
+        across = crossed(minus(p, apex), minus(q, apex))
+        origin, third = -inner(across, apex), inner(across, minus(r, apex))
+        assert beyond == 8 or beyond == ((origin > 0) != (third > 0)), stored
+        seen["in a plane" if beyond == 8 else "beyond" if beyond else "not beyond"] += 1
+    assert min(seen[k] for k in ("foot", "no foot", "side", "beyond", "not beyond", "in a plane")) > 8, seen
+
+
+def minus(a: list, b: list) -> list:
+    return [x - y for x, y in zip(a, b)]
+
+
+def inner(a: list, b: list) -> Fraction:
+    return sum(x * y for x, y in zip(a, b))
+
+
+def crossed(a: list, b: list) -> list:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 @pytest.mark.parametrize("draw", [dyadic_case, tilted_case], ids=lambda draw: draw.__name__)
