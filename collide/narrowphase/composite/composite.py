@@ -126,17 +126,22 @@ _single_space: _SingleSpace | None = None
 _MAX_AT_ONCE = 1024
 
 
+def single_header(table: CompoundTable) -> tuple[np.ndarray, _SingleSpace]:
+    """(header of single calls of bodies 0 and 1, their workspace)."""
+    global _single_space
+    space = _single_space  # read once: another thread may put a smaller one there
+    if space is None or space.capacity < table.max_parts:
+        space = _single_space = _SingleSpace(table.max_parts)
+    return space.header_of(table, space.scratch), space
+
+
 def prepared_compounds(A: LaidOut, B: LaidOut) -> Prepared:
     """Two bodies ready for one call at a time, and their table for batches."""
-    global _single_space
     table = CompoundTable([A, B])
     table.build_trees(None)
     if table.counts.prod() > _MAX_AT_ONCE:
         return Prepared(table=table)
-    space = _single_space  # read once: another thread may put a smaller one there
-    if space is None or space.capacity < table.max_parts:
-        space = _single_space = _SingleSpace(table.max_parts)
-    header = space.header_of(table, space.scratch)
+    header, space = single_header(table)
     places = address_of(space.byte), address_of(space.row)
     words = np.array([code_of(answer_compounds), *places, *header.tolist()])
     return Prepared(

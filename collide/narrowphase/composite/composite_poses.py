@@ -324,10 +324,10 @@ def _list_near_parts(block, groups, of_b, reach, first):
 
 
 @kernel(inline=True)
-def _list_pair(block, k, count_b, pair, boolean, n_listed):
+def _list_pair(block, k, count_b, pair, exactly, n_listed):
     """Put a pair of parts of slot k on the list."""
-    block.pairs[2 * n_listed] = row_of_part(block, k, 0, pair // count_b, not boolean)
-    block.pairs[2 * n_listed + 1] = row_of_part(block, k, 1, pair % count_b, not boolean)
+    block.pairs[2 * n_listed] = row_of_part(block, k, 0, pair // count_b, exactly)
+    block.pairs[2 * n_listed + 1] = row_of_part(block, k, 1, pair % count_b, exactly)
     block.owners[2 * n_listed] = k
     block.owners[2 * n_listed + 1] = pair
 
@@ -340,7 +340,7 @@ def _list_nearest(block, boolean, every):
         pair = 0 if every else _nearest_pair(block, k, boolean)
         block.slots[SLOT_SIZE * k + FIRST_PAIR] = pair
         if pair >= 0:
-            _list_pair(block, k, body_of(block, k, 1).n_parts, pair, boolean, n_listed)
+            _list_pair(block, k, body_of(block, k, 1).n_parts, pair, not boolean, n_listed)
             n_listed += 1
     block.header[SLOT] = block.header[N_POSES]
     return n_listed
@@ -370,8 +370,6 @@ def _list_others(block, boolean, depths, every):
 def _list_others_of(block, k, boolean, every, n_listed):
     """List the other pairs of a pose, from PAIR on; PAIR becomes the pair to go on with. Returns the list's length."""
     header = block.header
-    count_a = body_of(block, k, 0).n_parts
-    count_b = body_of(block, k, 1).n_parts
     size = _place_body_balls(block, k)
     margin = BALL_MARGIN * size
     # The groups of a single pose stand where `_nearest_pair` has placed them just now.
@@ -385,23 +383,48 @@ def _list_others_of(block, k, boolean, every, n_listed):
         # Others that are as near by their balls as the first: which of them came first has no say.
         reach += max(first_reach_of(block.scores, SCORE * k), _gap_of_pair(block, groups, first_pair), 0.0)
         reach += _BRACKET * size
+    return _list_pairs(block, k, groups, reach, first_pair, not boolean, n_listed)
+
+
+@kernel
+def _list_pairs(block, k, groups, reach, but, exactly, n_listed):
+    """List the pairs of parts of slot k whose balls come within ``reach`` [m], from PAIR on, ascending, without one;
+    PAIR becomes the pair to go on with. Returns the list's length."""
+    header = block.header
+    count_a, count_b, balls = groups.A.n_parts, groups.B.n_parts, header[CAPACITY]
     n_near_a = _list_near_parts(block, groups, False, reach, 0)
     n_near_b = _list_near_parts(block, groups, True, reach, count_a)
-    balls = header[CAPACITY]
     start = header[PAIR]
     for i in range(n_near_a):
         for j in range(count_a, count_a + n_near_b):
             pair = block.near[i] * count_b + block.near[j]
             gap = _gap(block, block.near[balls + i], block.near[balls + j])
-            if pair < start or pair == first_pair or gap > reach:
+            if pair < start or pair == but or gap > reach:
                 continue
             if n_listed == LIST:
                 header[PAIR] = pair
                 return n_listed
-            _list_pair(block, k, count_b, pair, boolean, n_listed)
+            _list_pair(block, k, count_b, pair, exactly, n_listed)
             n_listed += 1
     header[PAIR] = count_a * count_b
     return n_listed
+
+
+@kernel
+def list_pairs_within(block, limit):
+    """List the pairs of parts of slot 0 whose balls come within a limit [m], ascending, their rows of poses placed;
+    returns how many, −1 of more than LIST.
+
+    No part reaches out of its ball by more than the balls' margin of the size: parts of other pairs are farther apart
+    than the limit.
+    """
+    margin = BALL_MARGIN * _place_body_balls(block, 0)
+    reach = limit * (1.0 + 2.0**-50) + margin
+    if _gap(block, 0, 1) > reach:
+        return 0
+    block.header[PAIR] = 0
+    n = _list_pairs(block, 0, _place_groups(block, 0, math.inf, margin), reach, -1, False, 0)
+    return n if block.header[PAIR] == count_pairs(block, 0) else -1
 
 
 @kernel
