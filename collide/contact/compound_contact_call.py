@@ -31,7 +31,7 @@ from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.lowering.place_parts import is_exact_product
 from collide.lowering.shape_table import INTS, KIND, POSE, POSE_SLOP
 from collide.narrowphase.composite.composite_block import HEADER as COMPOSITE_HEADER
-from collide.narrowphase.composite.composite_block import INTS_AT, LIST, N_DONE, body_of, lay_out, open_block, part_view
+from collide.narrowphase.composite.composite_block import INTS_AT, N_DONE, body_of, lay_out, open_block, part_view
 from collide.narrowphase.composite.composite_poses import list_pairs_within
 from collide.narrowphase.pose_batches import HEADER as HEADER_OF_POSES
 

@@ -60,7 +60,8 @@ class Prepared:
         self.collide, self.within, self.distance, self.contacts = collide, within, distance, contacts
         self.collide_poses, self.distance_poses = collide_poses, distance_poses
         self.table, self.held, self.header, self.cast = table, held, header, cast
-        self.impact = self.impact_bounds = self.missing_faces = None
+        self.impact = self.impact_bounds = None
+        self.missing_faces: Any = None
 
     def take(self, made: Prepared) -> None:
         """Take what has been made ready, for questions not ready here."""

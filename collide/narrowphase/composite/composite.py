@@ -14,7 +14,16 @@ from collide.kernels.prepared import prepared_boolean, prepared_row, prepared_wi
 from collide.lowering.compound_table import BALL_IN_WORLD, CompoundTable, LaidOut
 from collide.lowering.shape_table import POSE, TERM_ROW, PoseTable, ShapeTable
 from collide.narrowphase import convex_kernel_calls as run
-from collide.narrowphase.composite.composite_block import BLOCK, HEADER, LIST, N_ANSWERED, N_DONE, N_LISTED, SLOTS
+from collide.narrowphase.composite.composite_block import (
+    BLOCK,
+    HEADER,
+    LIST,
+    N_ANSWERED,
+    N_DONE,
+    N_LISTED,
+    NEAR,
+    SLOTS,
+)
 from collide.narrowphase.composite.composite_poses import BAD_POSE, answer_compounds
 from collide.narrowphase.composite.composite_rows import SCORE, SEPARATING, combine_rows
 from collide.narrowphase.composite.single_composite_call import (
@@ -44,7 +53,7 @@ class _Workspace:
         self.pairs, self.owners = np.zeros((LIST, 2), dtype=np.int64), np.zeros((LIST, 2), dtype=np.int64)
         self.rows = np.zeros(LIST, dtype=PAIR_DTYPE)
         self.scores, self.slots = np.zeros(BLOCK * SCORE), np.zeros(SLOTS, dtype=np.int64)
-        self.balls, self.near = np.zeros((4 + 2 * capacity, BALL_IN_WORLD)), np.zeros(2 * capacity, dtype=np.int64)
+        self.balls, self.near = np.zeros((4 + 2 * capacity, BALL_IN_WORLD)), np.zeros(NEAR, dtype=np.int64)
         of_slots = self.scores, self.slots, self.balls, self.near
         buffers = *self.poses, self.shape_of, self.pairs, self.owners, self.rows, *of_slots
         self._addresses = tuple(map(address_of, buffers))
