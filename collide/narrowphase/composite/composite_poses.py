@@ -287,7 +287,7 @@ def _gap_of_pair(block, nodes, pair):
 
 
 @kernel
-def _sort_near(near, n):
+def sort_numbers(numbers, n):
     """Sort the first n numbers: Shell's sort with Knuth's gaps, O(n^1.5)."""
     gap = 1
     while gap < n:
@@ -295,12 +295,12 @@ def _sort_near(near, n):
     while gap > 1:
         gap //= 3
         for k in range(gap, n):
-            number = near[k]
+            number = numbers[k]
             j = k
-            while j >= gap and near[j - gap] > number:
-                near[j] = near[j - gap]
+            while j >= gap and numbers[j - gap] > number:
+                numbers[j] = numbers[j - gap]
                 j -= gap
-            near[j] = number
+            numbers[j] = number
 
 
 @kernel
@@ -329,14 +329,14 @@ def _find_near(block, nodes, reach, start, but):
                     near[n_near] = pair
                     n_near += 1
                     if n_near == MAX_NEAR:
-                        _sort_near(near, n_near)
+                        sort_numbers(near, n_near)
                         n_near = LIST + 1
                         end_of_near = near[LIST]
             elif gap - nodes.margin <= reach:
                 near[MAX_NEAR + 2 * top] = at_a
                 near[MAX_NEAR + 2 * top + 1] = at_b
                 top += 1
-    _sort_near(near, n_near)
+    sort_numbers(near, n_near)
     return n_near
 
 
