@@ -250,9 +250,10 @@ def prepare_contacts(A, B) -> bool:
     if not is_convex and _is_flat(A) and _is_flat(B) and method_of(kind_of(A), kind_of(B)) is Method.PARTS:
         if pair.table is None:
             pair.take(prepare_parts(A, B))
-        pair.missing_faces = CompoundContacts(pair.table, _reach_of(A) + _reach_of(B))
-        pair.missing_faces.get_ready(pair)
-        return prepared_pair(A, B) is pair
+        if pair.distance is not None:  # not of too many parts for single calls
+            pair.missing_faces = CompoundContacts(pair.table, _reach_of(A) + _reach_of(B))
+            pair.missing_faces.get_ready(pair)
+            return prepared_pair(A, B) is pair
     made = None if pair.header is None else _contacts_of_numbers(A, B, pair.header)
     if made is None:
         made = _single_contacts(shape_table(A, B)[0]) if is_convex else _single_far_contacts(A, B)

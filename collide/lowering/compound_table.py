@@ -29,18 +29,20 @@ PART = 19
 # Doubles of a body: such a ball for all of it, the largest radius swept, and how far its bounded parts reach.
 BODY_CENTRE, BODY_BALL, BODY_SWEPT, BODY_REACH = 0, 3, 4, 5
 BODY = 6
-# Doubles of a ball in the world: its centre, from where body A stands, and its radius.
-BALL_IN_WORLD = 4
+# Doubles of a ball in the world: its centre, from where body A stands, its radius, and how far what is in the ball
+# reaches along a direction.
+BALL_IN_WORLD = 5
 # Integers of a body: its first part, how many there are, its first group of parts, and how many groups there are.
 FIRST, COUNT, FIRST_GROUP, N_GROUPS = 0, 1, 2, 3
 BODY_INTS = 4
 #: Parts that are near each other stand in groups of so many, these in groups of as many, and so on up to a single one;
 #: the last group of each size has what is left.
 GROUP = 4
-# Doubles of a group: such a ball for all of its parts, the largest radius swept, and its members from … to, by the
-# numbers of a body's nodes: parts by place, then all groups, small ones first.
-MEMBERS, MEMBERS_END = 5, 6
-GROUP_BALL = 7
+# Doubles of a group: such a ball for all of its parts, the largest radius swept, its members from … to, by the numbers
+# of a body's nodes (parts by place, then all groups, small ones first), half sizes of the box around its parts'
+# centres, in the middle of which the ball stands, and the largest radius of their balls.
+MEMBERS, MEMBERS_END, HALF_SIZES, LARGEST_BALL = 5, 6, 7, 10
+GROUP_BALL = 11
 
 #: Radii of balls are rounded up by more than a dozen roundings.
 _OUTWARD = 1 + 2.0**-45
@@ -110,6 +112,7 @@ def lay_out_parts(ints_at, numbers_at, X_at, n, rows_at, ball_at, by_place_at, g
         for start in range(0, n, span):
             groups = view_f64(groups_at + 8 * GROUP_BALL * (number - n), GROUP_BALL)
             _put_ball(rows, by_place, start, min(start + span, n), groups, 0)
+            _put_box(rows, by_place, start, min(start + span, n), groups)
             groups[MEMBERS] = float(first)
             first = min(first + GROUP, end)
             groups[MEMBERS_END] = float(first)
@@ -186,6 +189,19 @@ def _put_ball(rows, by_place, first, end, ball, at):
     put_vec3(ball, at, middle)
     ball[at + 3] = radius * _OUTWARD
     ball[at + 4] = largest
+
+
+@kernel
+def _put_box(rows, by_place, first, end, group):
+    """Half sizes of the box around the centres of the parts at some places, and the largest radius of their balls."""
+    size, largest = Vec3(0.0, 0.0, 0.0), 0.0
+    for place in range(first, end):
+        part = PART * by_place[place]
+        out = sub(vec3_at(rows, part + CENTRE), vec3_at(group, 0))
+        size = Vec3(max(size.x, abs(out.x)), max(size.y, abs(out.y)), max(size.z, abs(out.z)))
+        largest = max(largest, rows[part + BALL])
+    put_vec3(group, HALF_SIZES, size)
+    group[LARGEST_BALL] = largest
 
 
 @kernel

@@ -11,7 +11,7 @@ from collide.lowering import hull_faces
 from collide.narrowphase.prepared_pairs import prepared_pair, single_calls_are_safe
 
 EYE = np.eye(4)
-pytestmark = pytest.mark.skipif(not single_calls_are_safe(), reason="single calls of unions keep Python's lock")
+pytestmark = pytest.mark.skipif(not single_calls_are_safe(), reason="single calls go the long way here")
 
 MAKERS = (
     lambda w: collide.Box(2 * w), lambda w: collide.Sphere(w[0]), lambda w: collide.Capsule(w[0], w[1]),

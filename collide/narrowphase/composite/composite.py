@@ -58,11 +58,11 @@ class _Workspace:
         buffers = *self.poses, self.shape_of, self.pairs, self.owners, self.rows, *of_slots
         self._addresses = tuple(map(address_of, buffers))
 
-    def header_of(self, table: CompoundTable, scratch: tuple[int, int]) -> np.ndarray:
-        """The header of a call; scratch : addresses of a workspace of `answer_pairs`."""
-        return np.array(
-            (code_of(answer_pairs), *table.addresses, *self._addresses, *scratch, self.capacity, *_AT_THE_START)
-        )
+    def header_of(self, table: CompoundTable, scratch: tuple[int, int], at_once: int = 0) -> np.ndarray:
+        """The header of a call; scratch : addresses of a workspace of `answer_pairs`.   at_once : of single calls, how
+        many pairs of parts are answered at once."""
+        addresses = *table.addresses, *self._addresses, *scratch
+        return np.array((code_of(answer_pairs), *addresses, self.capacity, at_once, *_AT_THE_START))
 
 
 class _SingleSpace(_Workspace):
@@ -131,8 +131,11 @@ def answer_compound_batch(
 
 #: Workspace of all single calls: their kernels keep Python's lock. A larger one takes its place; pairs hold their own.
 _single_space: _SingleSpace | None = None
-#: Pairs of parts of a single call, which keeps Python's lock; more are left to the long way, which lets go of it.
-_MAX_AT_ONCE = 1024
+#: Pairs of parts of a single call, which keeps Python's lock; more are left to the long way, which lets go of it. Of
+#: bodies with more pairs, so many at most are answered before they are left to it.
+_MAX_AT_ONCE, _MAX_OF_MANY = 1024, 256
+#: Parts of two bodies whose single calls go through one kernel: a row of poses each is kept.
+_MAX_PARTS = 1 << 13
 
 
 def single_header(table: CompoundTable) -> tuple[np.ndarray, _SingleSpace]:
@@ -141,14 +144,15 @@ def single_header(table: CompoundTable) -> tuple[np.ndarray, _SingleSpace]:
     space = _single_space  # read once: another thread may put a smaller one there
     if space is None or space.capacity < table.max_parts:
         space = _single_space = _SingleSpace(table.max_parts)
-    return space.header_of(table, space.scratch), space
+    at_once = _MAX_AT_ONCE if table.counts.prod() <= _MAX_AT_ONCE else _MAX_OF_MANY
+    return space.header_of(table, space.scratch, at_once), space
 
 
 def prepared_compounds(A: LaidOut, B: LaidOut) -> Prepared:
     """Two bodies ready for one call at a time, and their table for batches."""
     table = CompoundTable([A, B])
     table.build_trees(None)
-    if table.counts.prod() > _MAX_AT_ONCE:
+    if table.max_parts > _MAX_PARTS:
         return Prepared(table=table)
     header, space = single_header(table)
     places = address_of(space.byte), address_of(space.row)

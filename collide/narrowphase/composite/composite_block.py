@@ -30,16 +30,17 @@ MAX_NEAR, STACK = 2 * LIST, 128
 NEAR = MAX_NEAR + 2 * STACK
 
 # Header: the kernel, tables of shapes, parts, bodies and groups; workspace, and how many rows of parts it has room for;
-# then how far things have come, 0 to begin with: poses answered, poses of the block, stage, slot and pair of parts to
-# go on with, pairs on the list, and how many pairs of parts were answered in all.
+# how many pairs of parts a single call answers before all is for the long way, 0 of batches; then how far things have
+# come, 0 to begin with: poses answered, poses of the block, stage, slot and pair of parts to go on with, pairs on the
+# list, and how many pairs of parts were answered in all.
 (
     CORE, INTS_AT, NUMBERS_AT, PARTS_AT, BODIES_AT, BODY_BALLS_AT, BY_PLACE_AT, GROUPS_AT,
     POSES_AT, TERMS_AT, SHAPE_OF_AT, PAIRS_AT, OWNERS_AT, ROWS_AT, SCORES_AT, SLOTS_AT, BALLS_AT, NEAR_AT, DOUBLES_AT,
     INTEGERS_AT,
-    CAPACITY,
+    CAPACITY, AT_ONCE,
     N_DONE, N_POSES, STAGE, SLOT, PAIR, N_LISTED, N_ANSWERED,
-) = range(28)
-HEADER = 28
+) = range(29)
+HEADER = 29
 
 # Integers of a slot, which is a pose of the block: both bodies, rows of poses of theirs and where those of their parts
 # begin, whether a boolean is a hit, and the pair of parts answered first, −1 where balls say that none meets.

@@ -22,6 +22,8 @@ from collide.lowering.compound_table import (
     BODY_REACH,
     CENTRE,
     GROUP_BALL,
+    HALF_SIZES,
+    LARGEST_BALL,
     MEMBERS,
     MEMBERS_END,
     PART,
@@ -29,6 +31,7 @@ from collide.lowering.compound_table import (
 from collide.lowering.place_parts import BALL_MARGIN, gap_of_balls, place_ball, write_terms
 from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_STRETCH, POSE_TERMS
 from collide.narrowphase.composite.composite_block import (
+    AT_ONCE,
     BODY_BALLS_AT,
     BODY_NUMBERS,
     BODY_ROWS,
@@ -79,7 +82,7 @@ from collide.narrowphase.composite.composite_rows import (
 )
 from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.rows import HIT, HOW, PART_A, PART_B, ROW
-from collide.numerics.vec3 import Vec3, norm1, sub, vec3_at
+from collide.numerics.vec3 import Vec3, dot, norm, norm1, rotate_back, scale, sub, vec3_at
 from collide.results import REFUSED, UNDECIDED
 
 answer_at = native_call(SIGNATURE)
@@ -92,6 +95,10 @@ _LAY_OUT, _NEAREST, _OTHERS = range(3)
 #: Pairs of parts whose balls are farther apart than the best so far by this much of the bodies' size are left out: far
 #: more than brackets of curved parts are wide, so that they have no say in any number of the answer.
 _BRACKET = 2.0**-20
+#: Of a ball in the world: how far its contents reach along a direction.
+ALONG = 4
+#: Centres nearer than this give no direction [m].
+_LEAST_LENGTH = 1e-100
 
 
 # --- balls --------------------------------------------------------------------------------------
@@ -132,7 +139,10 @@ class Nodes(NamedTuple):
     """The nodes of both bodies of a slot, parts by place and groups; balls of A stand in the block from ``a`` on,
     balls of B from ``b`` on; members of a group are placed when the group is first opened.
 
-    margin : how much less the distance of two parts' balls may be than the distance of their groups' balls [m].
+    u : unit vector from the ball around all of A to the ball around all of B, or 0; with each ball stands how far its
+    contents reach along u, of B's how near: their difference is a lower bound of the distance, of flat groups a better
+    one than the balls'.   u_A, u_B : the same in the bodies' frames.   shift : from A's origin to B's.
+    margin : how much less the distance of two parts' balls may be than these bounds of their groups [m].
     """
 
     A: Body
@@ -140,33 +150,49 @@ class Nodes(NamedTuple):
     a: int
     b: int
     shift: Vec3
+    u: Vec3
+    u_A: Vec3
+    u_B: Vec3
     margin: float
 
 
 @kernel
 def _nodes_of(block, k, margin, is_placed):
-    """The nodes of both bodies of slot k, with the balls of the largest groups; as they are where placed."""
+    """The nodes of both bodies of slot k, whose balls stand first; with the balls of the largest groups, as they are
+    where placed."""
     A = body_of(block, k, 0)
     B = body_of(block, k, 1)
     shift = _shift(block, POSE * A.row, POSE * B.row)
-    nodes = Nodes(A, B, 2, 2 + A.n_parts + A.n_groups, shift, margin)
+    u = sub(vec3_at(block.balls, BALL_IN_WORLD), vec3_at(block.balls, 0))
+    length = norm(u)
+    u = scale(1.0 / length if length > _LEAST_LENGTH else 0.0, u)
+    u_A, u_B = rotate_back(block.poses, POSE * A.row, u), rotate_back(block.poses, POSE * B.row, u)
+    nodes = Nodes(A, B, 2, 2 + A.n_parts + A.n_groups, shift, u, u_A, u_B, margin)
     if not is_placed:
-        _place_node(block, A, 2, A.n_parts + A.n_groups - 1, Vec3(0.0, 0.0, 0.0))
-        _place_node(block, B, nodes.b, B.n_parts + B.n_groups - 1, shift)
+        _place_node(block, nodes, True, A.n_parts + A.n_groups - 1)
+        _place_node(block, nodes, False, B.n_parts + B.n_groups - 1)
     return nodes
 
 
 @kernel(inline=True)
-def _place_node(block, body, first, node, shift):
-    """Place the ball of a node; the members of a group are not placed yet."""
+def _place_node(block, nodes, of_a, node):
+    """Place the ball of a node of A or B; the members of a group are not placed yet."""
+    body, first = (nodes.A, nodes.a) if of_a else (nodes.B, nodes.b)
+    shift = Vec3(0.0, 0.0, 0.0) if of_a else nodes.shift
     pose, ball_at = POSE * body.row, (first + node) * BALL_IN_WORLD
     if node < body.n_parts:
         number = body.first + view_i64(block.header[BY_PLACE_AT] + 8 * (body.first + node), 1)[0]
         part = view_f64(block.header[PARTS_AT] + 8 * (PART * number + CENTRE), PART - CENTRE)
         place_ball(block.poses, pose, part, 0, shift.x, shift.y, shift.z, block.balls, ball_at)
+        reach = block.balls[ball_at + 3]
+        block.balls[ball_at + ALONG] = dot(nodes.u, vec3_at(block.balls, ball_at)) + (reach if of_a else -reach)
         return
     group = _group_of(block, body, node)
     place_ball(block.poses, pose, group, 0, shift.x, shift.y, shift.z, block.balls, ball_at)
+    u = nodes.u_A if of_a else nodes.u_B
+    reach = abs(u.x) * group[HALF_SIZES] + abs(u.y) * group[HALF_SIZES + 1] + abs(u.z) * group[HALF_SIZES + 2]
+    reach += group[LARGEST_BALL] * block.poses[pose + POSE_STRETCH] + group[4]
+    block.balls[ball_at + ALONG] = dot(nodes.u, vec3_at(block.balls, ball_at)) + (reach if of_a else -reach)
     block.balls[(first + int(group[MEMBERS])) * BALL_IN_WORLD + 3] = math.nan
 
 
@@ -177,13 +203,14 @@ def _group_of(block, body, node):
 
 
 @kernel(inline=True)
-def _members_of(block, body, first, node, shift):
+def _members_of(block, nodes, of_a, node):
     """(first member, end) of a group, the members placed."""
+    body, first = (nodes.A, nodes.a) if of_a else (nodes.B, nodes.b)
     group = _group_of(block, body, node)
     begin, end = int(group[MEMBERS]), int(group[MEMBERS_END])
     if math.isnan(block.balls[(first + begin) * BALL_IN_WORLD + 3]):
         for member in range(begin, end):
-            _place_node(block, body, first, member, shift)
+            _place_node(block, nodes, of_a, member)
     return begin, end
 
 
@@ -196,10 +223,10 @@ def _opened(block, nodes, a, b):
     if of_a and b >= B.n_parts:
         of_a = block.balls[(nodes.a + a) * BALL_IN_WORLD + 3] >= block.balls[(nodes.b + b) * BALL_IN_WORLD + 3]
     if of_a:
-        begin, end = _members_of(block, A, nodes.a, a, Vec3(0.0, 0.0, 0.0))
+        begin, end = _members_of(block, nodes, True, a)
         return True, begin, end
     if b >= B.n_parts:
-        begin, end = _members_of(block, B, nodes.b, b, nodes.shift)
+        begin, end = _members_of(block, nodes, False, b)
         return False, begin, end
     return False, 0, 0
 
@@ -208,6 +235,13 @@ def _opened(block, nodes, a, b):
 def _gap_of_nodes(block, nodes, a, b):
     """The distance of two nodes' balls [m]."""
     return _gap(block, nodes.a + a, nodes.b + b)
+
+
+@kernel(inline=True)
+def _are_beyond(block, nodes, a, b, reach):
+    """Whether contents of two nodes are farther apart along u than ``reach`` [m]: for less work than their balls."""
+    along_a = block.balls[(nodes.a + a) * BALL_IN_WORLD + ALONG]
+    return block.balls[(nodes.b + b) * BALL_IN_WORLD + ALONG] - along_a - nodes.margin > reach
 
 
 @kernel(inline=True)
@@ -258,6 +292,8 @@ def _nearest_pair(block, k, boolean):
         of_a, begin, end = _opened(block, nodes, a, b)
         for member in range(begin, end):
             at_a, at_b = (member, b) if of_a else (a, member)
+            if _are_beyond(block, nodes, at_a, at_b, least):
+                continue
             gap = _gap_of_nodes(block, nodes, at_a, at_b)
             if at_a < nodes.A.n_parts and at_b < nodes.B.n_parts:
                 if gap <= least:
@@ -320,6 +356,8 @@ def _find_near(block, nodes, reach, start, but):
         of_a, begin, end = _opened(block, nodes, a, b)
         for member in range(begin, end):
             at_a, at_b = (member, b) if of_a else (a, member)
+            if _are_beyond(block, nodes, at_a, at_b, reach):
+                continue
             gap = _gap_of_nodes(block, nodes, at_a, at_b)
             if at_a < nodes.A.n_parts and at_b < nodes.B.n_parts:
                 if gap > reach:
@@ -500,7 +538,7 @@ def _take_rows(block, boolean, out_at):
 
 @kernel
 def _close_block(block, boolean, depths, out_at):
-    """Finish the answers of the block."""
+    """Finish the answers of the block; False where a single call leaves the depth of many parts to the long way."""
     header = block.header
     for k in range(header[N_POSES]):
         if boolean:
@@ -508,7 +546,10 @@ def _close_block(block, boolean, depths, out_at):
         elif count_pairs(block, k) > 1:
             row_at = out_at + ROW * (header[N_DONE] + k)
             if close_score(block.scores, SCORE * k, row_at) and depths:
+                if 0 < header[AT_ONCE] < count_pairs(block, k):
+                    return False
                 _separate_bodies_of(block, k, row_at)
+    return True
 
 
 @kernel
@@ -572,7 +613,8 @@ def answer_compounds(
             header[SLOT] = 0
             header[STAGE] += 1
             if header[STAGE] > _OTHERS:
-                _close_block(block, boolean, depths, out_at)
+                if not _close_block(block, boolean, depths, out_at):
+                    return OPEN
                 header[N_DONE] += header[N_POSES]
                 header[STAGE] = _LAY_OUT
                 continue
@@ -581,6 +623,8 @@ def answer_compounds(
         else:
             header[N_LISTED] = _list_others(block, boolean, depths, every)
         header[N_ANSWERED] += header[N_LISTED]
+        if 0 < header[AT_ONCE] < header[N_ANSWERED]:
+            return OPEN
         if header[N_LISTED] > 0 and (_answer_list(header, boolean, depths, limit) or every):
             _write_terms_of_list(block)
             return OPEN
