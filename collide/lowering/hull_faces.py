@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -100,23 +101,30 @@ def faces_of(packed: PackedConvex) -> KeptFaces:
 
 
 class HullFaceTable:
-    """A row of FACE_INTS integers a convex set, as kernels read them; 0 of sets other than hulls of points.
+    """A row of FACE_INTS integers a convex set, as kernels read them; 0 of sets other than hulls of points, and of
+    those not made yet.
 
     largest : most corners of a face of these sets, at least as many as a curved set's end has (`support_face.py`).
     """
 
-    def __init__(self, packed: list[PackedConvex], least: int):
+    def __init__(self, packed: Sequence[PackedConvex], least: int):
         self.ints = np.zeros((len(packed), FACE_INTS), dtype=np.int64)
-        self.faces = [faces_of(p) if p.kind == POINTS else None for p in packed]
-        self.largest = least
-        for k, faces in enumerate(self.faces):
-            if faces is not None:
+        self.faces: list[KeptFaces | None] = [None] * len(packed)
+        self.largest, self._packed = least, packed
+
+    def make(self, rows: Iterable[int]) -> HullFaceTable:
+        """Itself, with the faces of these sets."""
+        for k in rows:
+            packed = self._packed[k]
+            if packed.kind == POINTS and self.faces[k] is None:
+                self.faces[k] = faces = faces_of(packed)
                 self.ints[k] = faces.row
                 self.largest = max(self.largest, faces.largest)
+        return self
 
 
 def face_table_of(table: ShapeTable, least: int) -> HullFaceTable:
     """The faces of a table's sets, made when first asked for and kept with it."""
     if table.faces is None:
-        table.faces = HullFaceTable(table.packed, least)
+        table.faces = HullFaceTable(table.packed, least).make(range(len(table.packed)))
     return table.faces

@@ -96,6 +96,25 @@ def _are_safe(poses, body, parts, part):
     return True
 
 
+@kernel
+def is_exact_product(poses, body, parts, part):
+    """Whether the product of a body's pose and a part's is rounded nowhere, as `shape_table.moved_pose` tells."""
+    for i in range(3):
+        for j in range(4):
+            total = 0.0
+            for k in range(3):
+                remaining = poses[body + 3 * i + k]
+                factor = parts[part + (3 * k + j if j < 3 else 9 + k)]
+                high, low = two_product(remaining, factor)
+                total, rest = two_sum(total, high)
+                is_safe = abs(high) > SAFE_PRODUCT or remaining == 0.0 or factor == 0.0
+                if low != 0.0 or rest != 0.0 or not is_safe:
+                    return False
+            if j == 3 and two_sum(total, poses[body + 9 + i])[1] != 0.0:
+                return False
+    return True
+
+
 @kernel(inline=True)
 def _is_identity(poses, p):
     """Whether a body stands at the origin: its parts keep their own poses, bit by bit."""

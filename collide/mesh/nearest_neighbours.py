@@ -72,7 +72,7 @@ def _swap(points, order, i, j):
 
 
 @kernel
-def _split_at(points, order, low, high, middle, axis):
+def split_at(points, order, low, high, middle, axis):
     """Order rows low … high − 1: rows before ``middle`` lie no farther along the axis than rows from ``middle`` on.
 
     Hoare's selection; equal coordinates go to both sides, so lattices do no harm.
@@ -103,7 +103,7 @@ def _split_at(points, order, low, high, middle, axis):
 
 
 @kernel
-def _fit_box(points, low, high, boxes, node):
+def fit_box(points, low, high, boxes, node):
     for k in range(3):
         smallest = points[3 * low + k]
         largest = smallest
@@ -125,14 +125,14 @@ def build_tree(points_at, order_at, n, levels, boxes_at):
             low = (n * i) >> level
             high = (n * (i + 1)) >> level
             node = (1 << level) + i
-            _fit_box(points, low, high, boxes, node)
+            fit_box(points, low, high, boxes, node)
             if level < levels:
-                axis = _longest_axis(boxes, 6 * node)
-                _split_at(points, order, low, high, (n * (2 * i + 1)) >> (level + 1), axis)
+                axis = longest_axis(boxes, 6 * node)
+                split_at(points, order, low, high, (n * (2 * i + 1)) >> (level + 1), axis)
 
 
 @kernel
-def _longest_axis(boxes, at):
+def longest_axis(boxes, at):
     size = sub(vec3_at(boxes, at + 3), vec3_at(boxes, at))
     axis = 1 if size.y > size.x else 0
     return 2 if size.z > (size.y if axis == 1 else size.x) else axis

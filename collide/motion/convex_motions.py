@@ -12,20 +12,32 @@ import numpy as np
 from collide.base.threads import pieces_of, share
 from collide.kernels import address_of, code_of
 from collide.lowering.compound_layout import layout_of
-from collide.lowering.compound_table import PART
+from collide.lowering.compound_table import PART, CompoundTable
 from collide.lowering.packed_convex import pack_points
 from collide.lowering.shape_table import POSE, RANK, ShapeTable
 from collide.motion.convex_impact import CONTACT, FREE, OPEN, OPEN_START
-from collide.motion.impact_jobs import begin_single, find_impacts
-from collide.motion.impact_rows import TimeOfImpact, free_rows, no_impact, single_result
+from collide.motion.impact_jobs import OMEGA_A_AT, XA0_STEP, begin_single, find_impacts
+from collide.motion.impact_rows import TimeOfImpact, free_rows, single_result
 from collide.motion.motions import Motions
 from collide.motion.moving_body import BODY
 from collide.motion.parts_ahead import MAX_ASKED, balls_meet, parts_ahead, spans_of
-from collide.motion.span_bounds import HEADER, OUT, WORKSPACE, stays_free
-from collide.narrowphase.composite.composite_parts import CompoundParts, compound_parts
+from collide.motion.union_impact import (
+    COMPOSITE,
+    IMPACT,
+    KERNEL,
+    SIZE,
+    SMALLER,
+    SPAN,
+    UNION_DOUBLES,
+    UNION_HEADER,
+    UNION_INTEGERS,
+    first_impact_of_unions,
+)
+from collide.narrowphase.composite.composite import of_thread
+from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_kernel_calls import scratch
 from collide.narrowphase.pair_kernel import answer_pairs
-from collide.narrowphase.prepared_pairs import kept_pair, prepared_pair, single_calls_are_safe
+from collide.narrowphase.prepared_pairs import kept_pair, prepared_pair
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import IDENTITY, Shape
 
@@ -59,8 +71,6 @@ class _Workspace:
 class _OfThread(local):
     def __init__(self) -> None:
         self.space = _Workspace()
-        self.span = np.zeros(WORKSPACE + OUT + HEADER)
-        self.span_at = address_of(self.span)
 
 
 class SinglePair:
@@ -93,34 +103,65 @@ class SinglePair:
 
 
 class SingleUnions:
-    """Two bodies of several convex parts, prepared for single motions in which balls about their origins never meet."""
+    """Two bodies of several convex parts, prepared for one motion at a time."""
 
-    def __init__(self, A: CompoundParts, B: CompoundParts):
-        here = IDENTITY[None]
-        self._spans = spans_of(A, B, Motions(here, here, here, here, None, None))
-        self._at = address_of(self._spans.parts), address_of(self._spans.reaches)
+    def __init__(self, bodies: _Bodies, A: Shape, B: Shape):
+        self._layouts, self._table = (layout_of(A), layout_of(B)), kept_pair(A, B).table
+        self._tables = Tables(bodies.table.addresses, len(bodies.table.packed), bodies.parts)
+        self._held, self._first = bodies.table, (int(bodies.first[0]), int(bodies.first[-1]))
+        self._larger = int(bodies.ranks[0] > bodies.ranks[-1]) - int(bodies.ranks[0] < bodies.ranks[-1])
+        here, unions = IDENTITY[None], (compound_parts(A), compound_parts(B))
+        self._spans = spans_of(*unions, Motions(here, here, here, here, None, None))
+        self._sizes = sum(union.radius for union in unions), min(union.radius for union in unions)
+        self._of_thread = local()
 
     def ask(self, matrices: tuple, tolerance: float) -> TimeOfImpact | None:
-        """As of `SinglePair`; None where the balls meet."""
+        """As of `SinglePair`."""
         for X in matrices:
             if X.__class__ is not np.ndarray or X.dtype is not _FLOAT64 or X.shape != (4, 4) or not X.flags.carray:
                 return None
-        if not stays_free(*map(address_of, matrices), *self._at, _of_thread.span_at):
+        space = getattr(self._of_thread, "space", None) or self._prepare()
+        at = map(address_of, matrices)
+        if first_impact_of_unions(space.header_at, *at, 0, 0, True, tolerance, space.row_at) != 0:
             return None
-        return no_impact()
+        return single_result(space.row, tolerance, self._first)
+
+    def search(self, motions: Motions, k: int, tolerance: float, rows: np.ndarray) -> bool:
+        """Write row k of motions, already checked; False where too many parts come near together."""
+        at = [0 if X is None else address_of(X[k % len(X)]) for X in motions]
+        space = getattr(self._of_thread, "space", None) or self._prepare()
+        return first_impact_of_unions(space.header_at, *at, False, tolerance, address_of(rows[k : k + 1])) == 0
+
+    def _prepare(self) -> _SingleSpace:
+        if not isinstance(self._table, CompoundTable):
+            self._table = CompoundTable(self._layouts)
+        composite, here = of_thread.space_for(self._table), IDENTITY[None]
+        doubles, integers = np.zeros(UNION_DOUBLES), np.zeros(UNION_INTEGERS, dtype=np.int64)
+        doubles[[SIZE, SMALLER]] = self._sizes
+        header, row = np.zeros(UNION_HEADER, dtype=np.int64), free_rows(1)
+        at = address_of(doubles), address_of(integers)
+        header[KERNEL:IMPACT] = code_of(find_impacts), *self._first, self._larger, *at
+        header[IMPACT:SPAN] = header_of(self._tables, Motions(here, here, here, here, None, None))
+        header[IMPACT + XA0_STEP : IMPACT + OMEGA_A_AT] = 0
+        header[SPAN:COMPOSITE] = self._spans.header
+        header[COMPOSITE:] = composite.header_of(self._table, scratch())
+        space = _SingleSpace(header, row, address_of(header), 0, address_of(row), (doubles, integers, composite))
+        self._of_thread.space = space
+        return space
 
 
 _FLOAT64 = np.dtype(np.float64)
 
 
 class _SingleSpace(NamedTuple):
-    """Header and row of one thread's single motions, and addresses, of the jobs, too."""
+    """Header and row of one thread's single motions, and addresses, of the jobs, too; arrays in use besides."""
 
     header: np.ndarray
     row: np.ndarray
     header_at: int
     jobs_at: int
     row_at: int
+    held: Any = None
 
 
 _of_thread = _OfThread()
@@ -158,10 +199,11 @@ class _Bodies:
         self.single: SinglePair | SingleUnions | None = None
         if len(shapes) <= 2 and self.is_simple:
             self.single = SinglePair(self, 0, len(shapes) - 1)
-        elif len(shapes) <= 2 and int(self.counts[0] * self.counts[-1]) > MAX_ASKED and single_calls_are_safe():
+        elif len(shapes) <= 2 and int(self.counts[0] * self.counts[-1]) > MAX_ASKED:
             unions = [compound_parts(shape) for shape in (shapes[0], shapes[-1])]
-            if not any(union.unbounded for union in unions):
-                self.single = SingleUnions(*unions)
+            least, largest = sorted(union.radius for union in unions)
+            if not any(union.unbounded for union in unions) and TIMES_SMALLER * least > largest:
+                self.single = SingleUnions(self, shapes[0], shapes[-1])
 
     def jobs(self, a: np.ndarray, b: np.ndarray, first: int, motions: Motions) -> np.ndarray:
         """(k, JOB) every part of A with every part of B, motion by motion, for shapes a and b of motions from ``first``
@@ -324,8 +366,10 @@ def convex_impacts(
     at_once = max(JOBS_AT_ONCE // per_motion, 1) if per_motion <= MAX_ASKED else 1
 
     of_one_pair = per_motion > MAX_ASKED and (a == a[0]).all() and (b == b[0]).all()
-    near = None
+    near = unions = None
     if of_one_pair:
+        is_pair = a[0] == 0 and b[0] == len(shapes) - 1
+        unions = bodies.single if is_pair and isinstance(bodies.single, SingleUnions) else None
         near = balls_meet(compound_parts(shapes[a[0]]), compound_parts(shapes[b[0]]), motions, n)
 
     def work(piece: slice) -> None:
@@ -333,6 +377,10 @@ def convex_impacts(
         for first in range(piece.start, piece.stop, at_once):
             if near is not None and not near[first]:
                 continue
+            if unions is not None:
+                if unions.search(motions, first, tolerance, rows):
+                    continue
+                rows[first] = free_rows(1)[0]
             some = slice(first, min(first + at_once, piece.stop))
             for jobs in (
                 [bodies.jobs(a[some], b[some], first, motions)] if per_motion <= MAX_ASKED

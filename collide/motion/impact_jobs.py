@@ -103,19 +103,20 @@ def begin_single(header_at, XA0_at, XA1_at, XB0_at, XB1_at, row_at):
     for k in range(4):
         if not set_pose(poses, 0, view_f64(header[XA0_AT + k], 16), True):
             return -1
-    _empty_rows(row_at, 1)
+    empty_rows(row_at, 1)
     return 0
 
 
 @entry("int64(int64, int64)")
 def clear_impacts(rows_at, n):
     """Rows of answers become those of motions without any contact; returns 0."""
-    _empty_rows(rows_at, n)
+    empty_rows(rows_at, n)
     return 0
 
 
 @kernel
-def _empty_rows(rows_at, n):
+def empty_rows(rows_at, n):
+    """`clear_impacts` for kernels."""
     for k in range(n):
         numbers = view_f64(rows_at + ANSWER * k, DOUBLES_OF_ROW)
         words = view_i32(rows_at + ANSWER * k + 8 * DOUBLES_OF_ROW, 4)
@@ -152,18 +153,19 @@ def _exchange(motions, job):
     if ints[INTS * sa + RANK] != ints[INTS * sb + RANK]:
         return ints[INTS * sa + RANK] > ints[INTS * sb + RANK]
     a, b = _body_motion(motions, job, False), _body_motion(motions, job, True)
-    order = _compare(a.X0, 0, b.X0, 0, 12)
+    order = compare_numbers(a.X0, 0, b.X0, 0, 12)
     if order == 0:
-        order = _compare(a.X1, 0, b.X1, 0, 12)
+        order = compare_numbers(a.X1, 0, b.X1, 0, 12)
     if order == 0:
-        order = _compare(a.parts, a.part_at, b.parts, b.part_at, 12)
+        order = compare_numbers(a.parts, a.part_at, b.parts, b.part_at, 12)
     if order == 0 and a.has_omega and b.has_omega:
-        order = _compare(a.omega, 0, b.omega, 0, 3)
+        order = compare_numbers(a.omega, 0, b.omega, 0, 3)
     return order > 0
 
 
 @kernel(inline=True)
-def _compare(a, at_a, b, at_b, n):
+def compare_numbers(a, at_a, b, at_b, n):
+    """−1, 0 or 1: the order of n numbers of a and of b."""
     for k in range(n):
         if a[at_a + k] != b[at_b + k]:
             return 1 if a[at_a + k] > b[at_b + k] else -1

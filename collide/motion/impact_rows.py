@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -81,23 +81,20 @@ def as_result(rows: np.ndarray, tolerance: float, single: bool) -> TimeOfImpact:
     return TimeOfImpact(*(only_value(column) if single else column for column in columns))
 
 
-def no_impact() -> TimeOfImpact:
-    """Of a single motion without any contact."""
-    values: tuple[Any, ...] = False, 1.0, 1.0, 1.0, True, *np.zeros((3, 3)), 0, 0, 0
-    return TimeOfImpact(*values)
-
-
-def single_result(row: np.ndarray, tolerance: float) -> TimeOfImpact | None:
-    """`TimeOfImpact` of a motion of two convex parts; None for motions with a proven or possible contact at the start,
-    or refused."""
-    status, values = int(row["status"][0]), row.view(np.float64)[:DOUBLES_OF_ROW].copy()
+def single_result(row: np.ndarray, tolerance: float, first: tuple[int, int] | None = None) -> TimeOfImpact | None:
+    """`TimeOfImpact` of a motion of two convex parts, or of unions whose first parts have these rows; None for motions
+    with a proven or possible contact at the start, or refused."""
+    status, numbers = int(row["status"][0]), row.view(np.float64)[:DOUBLES_OF_ROW].copy()
     if status == FREE:
         lower = upper = 1.0
     else:
-        lower, upper = values[:2].tolist()
+        lower, upper = numbers[:2].tolist()
         if status not in (CONTACT, OPEN) or upper == 0.0:
             return None
-    normal, point_a, point_b = values[2:5], values[5:8], values[8:11]
+    normal, point_a, point_b = numbers[2:5], numbers[5:8], numbers[8:11]
     certified = upper - lower <= tolerance
-    queries = int(row["queries"][0])
-    return TimeOfImpact(status != FREE, lower, lower, upper, certified, normal, point_a, point_b, 0, 0, queries)  # type: ignore[arg-type]
+    queries, part_a, part_b = int(row["queries"][0]), 0, 0
+    if first is not None and status != FREE:
+        part_a, part_b = int(row["part_a"][0]) - first[0], int(row["part_b"][0]) - first[1]
+    values = status != FREE, lower, lower, upper, certified, normal, point_a, point_b, part_a, part_b, queries
+    return TimeOfImpact(*values)  # type: ignore[arg-type]

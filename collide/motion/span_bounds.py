@@ -19,7 +19,6 @@ from collide.motion.moving_body import (
 from collide.motion.moving_pair import origin_error
 from collide.motion.speed_bound import speed_bound
 from collide.motion.swept_balls import time_of_balls
-from collide.narrowphase.pose_batches import set_pose
 from collide.numerics.vec3 import Vec3, add, norm, scale, sub
 
 # Addresses of a motion: poses of A and B at both ends, angular velocities or 0; two rows of parts, and three doubles:
@@ -40,7 +39,7 @@ def describe_span(motion_at, begin, end, work_at, out_at):
 
     motion : HEADER addresses.   work : WORKSPACE doubles.   out : OUT doubles.
     """
-    _describe(motion_at, begin, end, work_at, out_at)
+    describe(motion_at, begin, end, work_at, out_at)
     return 0
 
 
@@ -57,40 +56,14 @@ def balls_meet_in_motion(motion_at, steps_at, n, work_at, header_at, met_at):
     for k in range(n):
         for i in range(HEADER):
             header[i] = motion[i] + k * steps[i]
-        _describe(header_at, 0.0, 1.0, work_at, out_at)
+        describe(header_at, 0.0, 1.0, work_at, out_at)
         met[k] = 0 if out[BEGIN] > out[END] else 1
     return 0
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64)")
-def stays_free(XA0_at, XA1_at, XB0_at, XB1_at, parts_at, reaches_at, work_at):
-    """1 where balls about both bodies' origins never meet in a motion between four poses; else 0, and where a matrix is
-    no pose.
-
-    parts, reaches : as of a motion.   work : WORKSPACE + OUT doubles, and space for HEADER addresses.
-    """
-    header_at = work_at + 8 * (WORKSPACE + OUT)
-    header = view_i64(header_at, HEADER)
-    header[XA0_AT] = XA0_at
-    header[XA1_AT] = XA1_at
-    header[XB0_AT] = XB0_at
-    header[XB1_AT] = XB1_at
-    header[OMEGA_A_AT] = 0
-    header[OMEGA_B_AT] = 0
-    header[PARTS_AT] = parts_at
-    header[REACHES_AT] = reaches_at
-    poses = view_f64(work_at, POSE)
-    for k in range(4):
-        if not set_pose(poses, 0, view_f64(header[XA0_AT + k], 16), True):
-            return 0
-    out_at = work_at + 8 * WORKSPACE
-    _describe(header_at, 0.0, 1.0, work_at, out_at)
-    out = view_f64(out_at, OUT)
-    return 1 if out[BEGIN] > out[END] else 0
-
-
 @kernel
-def _describe(motion_at, begin, end, work_at, out_at):
+def describe(motion_at, begin, end, work_at, out_at):
+    """`describe_span` for kernels."""
     motion = view_i64(motion_at, HEADER)
     reaches = view_f64(motion[REACHES_AT], 3)
     a, b = view_f64(work_at, BODY), view_f64(work_at + 8 * BODY, BODY)

@@ -41,6 +41,7 @@ class Prepared:
     distance_poses(X_WA, X_WB, depths, limit) : of a batch: its finished rows, and copies (N or 1, 4, 4) of the poses.
     table : read by batches of the pair: a `ShapeTable`, a `CompoundTable` or a `FacetPair`, or ``None``.
     header : of two shapes of a few numbers, the block of `lower_pair.py`.
+    missing_faces : of two unions, `CompoundContacts`, which makes the faces that a call of ``contacts`` missed.
     cast : a `SingleWay`: casts that miss by the balls around the bodies.
     impact, impact_bounds : tables for motions (`motion/convex_motions.py`), of the shapes and of convex sets around.
     held : other objects in use by kernels.
@@ -48,7 +49,7 @@ class Prepared:
 
     __slots__ = (
         "__weakref__", "cast", "collide", "collide_poses", "contacts", "distance", "distance_poses", "header", "held",
-        "impact", "impact_bounds", "table", "within",
+        "impact", "impact_bounds", "missing_faces", "table", "within",
     )
 
     def __init__(
@@ -60,6 +61,7 @@ class Prepared:
         self.collide_poses, self.distance_poses = collide_poses, distance_poses
         self.table, self.held, self.header, self.cast = table, held, header, cast
         self.impact = self.impact_bounds = None
+        self.missing_faces: Any = None
 
     def take(self, made: Prepared) -> None:
         """Take what has been made ready, for questions not ready here."""

@@ -30,8 +30,8 @@ class Compound(Shape):
     Nested poses are multiplied out in float64, and every bracket accounts for the rounding. Against a convex shape or
     another compound only pairs of nearby parts are tested: a compound of two parts costs about as much as the parts one
     by one, a compound of more parts less. Making a compound of k parts, and its first query, are O(k log k). Balls
-    around whole bodies leave far poses out of contacts, casts and times of impact; balls around groups of 16 parts, and
-    then around the parts, find the pairs to test.
+    around whole bodies leave far poses out of contacts, casts and times of impact; balls around groups of parts, and of
+    groups, then around the parts, find the pairs to test.
     """
 
     __slots__ = ("items", "meshed", "poses")

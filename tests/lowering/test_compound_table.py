@@ -71,20 +71,26 @@ def test_balls_hold_their_parts_and_are_not_much_larger(seed):
         assert layout_of(shape) is layout_of(shape) and np.array_equal(layout_of(shape).parts, body.parts)
 
 
-@pytest.mark.parametrize("n", [1, T.GROUP, T.GROUP + 1, 700])
+@pytest.mark.parametrize("n", [1, T.GROUP, T.GROUP + 1, 16, 17, 700])
 def test_groups_hold_the_balls_of_their_parts_and_are_small(n):
-    """Every part stands in one group, sixteen a group; of many parts a group takes little of the union's size."""
+    """Every part, and every group but the last, is a member of one group; groups of sixteen of many parts take little
+    of the union's size."""
     rng = rng_of("groups of parts", n)
     items = [(collide.Capsule(r, 0.02), random_pose(rng, 1.0)) for r in rng.uniform(0.01, 0.03, n)]
     body = layout_of(collide.Compound(items))
     assert np.array_equal(np.sort(body.by_place), np.arange(n))
-    assert body.groups.shape == (-(-n // T.GROUP), T.GROUP_BALL)
-    rows = body.parts[body.by_place]
-    for group, first in zip(body.groups, range(0, n, T.GROUP)):
-        for row in rows[first : first + T.GROUP]:
+    parts_of, members = [[place] for place in range(n)], []
+    for group in body.groups:
+        first, end = group[[T.MEMBERS, T.MEMBERS_END]].astype(int)
+        members += range(first, end)
+        assert 0 < end - first <= T.GROUP
+        parts_of.append([place for member in range(first, end) for place in parts_of[member]])
+        for row in body.parts[body.by_place[parts_of[-1]]]:
             apart = math.dist(row[T.CENTRE : T.CENTRE + 3], group[:3])
             assert apart + row[T.BALL] <= group[3] and row[T.SWEPT_RADIUS] <= group[4]
-    assert n < 700 or np.median(body.groups[:, 3]) < 0.4 * body.ball[T.BODY_BALL]
+    assert members == list(range(n + len(body.groups) - 1)) and sorted(parts_of[-1]) == list(range(n))
+    of_sixteen = [group[3] for group, parts in zip(body.groups, parts_of[n:]) if len(parts) == 16]
+    assert n < 700 or np.median(of_sixteen) < 0.4 * body.ball[T.BODY_BALL]
 
 
 def test_parts_of_one_place_keep_their_order():
@@ -112,7 +118,7 @@ def test_tables_of_bodies_stand_one_behind_the_other():
     assert table.max_parts == 2 * max(counts) and len(table.addresses) == 7
     assert np.array_equal(table._parts, np.concatenate([body.parts for body in bodies]))
     n_groups = [len(body.groups) for body in bodies]
-    expected = [[sum(counts[:k]), counts[k], sum(n_groups[:k])] for k in range(len(counts))]
+    expected = [[sum(counts[:k]), counts[k], sum(n_groups[:k]), n_groups[k]] for k in range(len(counts))]
     assert table._bodies.tolist() == expected
     assert np.array_equal(table._by_place, np.concatenate([body.by_place for body in bodies]))
     assert np.array_equal(table._groups, np.concatenate([body.groups for body in bodies]))

@@ -55,14 +55,12 @@ def test_the_first_contact_is_that_of_all_pairs_of_parts(a, meshed, b):
 
 def test_impacts_of_unions_search_few_pairs_of_parts(monkeypatch):
     """Of 150 × 150 convex parts, and of 150 meshes and a box."""
-    jobs, searched = [], []
-    find, few = convex_motions.find_impacts, surface_motions._search_few
-    monkeypatch.setattr(convex_motions, "find_impacts", lambda *args: (jobs.append(args[2]), find(*args))[1])
+    searched, few = [], surface_motions._search_few
     monkeypatch.setattr(surface_motions, "_search_few", lambda *args: (searched.append(1), few(*args))[1])
     ends = collide.pose((0.1, 0.0, 20.0)), collide.pose((0.0, 0.1, -20.0))
     eye = np.eye(4)
-    assert collide.time_of_impact(clutter(150, False, "a"), clutter(150, False, "b"), eye, eye, *ends).hit
-    assert 0 < sum(jobs) < 0.2 * 150 * 150, jobs
+    r = collide.time_of_impact(clutter(150, False, "a"), clutter(150, False, "b"), eye, eye, *ends)
+    assert r.hit and 0 < r.queries < 400, r.queries
     assert collide.time_of_impact(clutter(150, True, "a"), collide.Box((0.3, 0.3, 0.3)), eye, eye, *ends).hit
     assert 0 < len(searched) < 40, len(searched)
 
@@ -187,6 +185,42 @@ def test_a_small_union_is_searched_beside_those_parts_of_a_large_one_that_a_ball
     assert sum(jobs) <= 100, jobs
 
 
+@pytest.mark.parametrize(("part", "n"), [("boxes", 30), ("balls", 90)])
+def test_motions_of_unions_inside_a_kernel_have_the_answers_of_the_long_way(part, n, monkeypatch):
+    """Single, in batches, with A and B exchanged, and turning: all bits but the number of questions."""
+    rng, hits = rng_of(f"unions in a kernel {part}"), 0
+
+    def union(m: int) -> collide.Compound:
+        makers = (lambda: collide.Box(rng.uniform(0.2, 0.6, 3))), (lambda: collide.Sphere(rng.uniform(0.1, 0.3)))
+        poses = [random_pose(rng, 0.5 * m ** (1 / 3)) for _ in range(m)]
+        return collide.Compound([(makers[part == "balls"](), X) for X in poses])
+
+    def bits(r) -> list:
+        return [np.array(of).ravel().tolist() for of in r[:10]]
+
+    for case in range(12):
+        A, B, size = union(n), union(int(rng.integers(9, n))), 2.6 * n ** (1 / 3)
+        start, end = (random_pose(rng, 1.0) for _ in "ab")
+        start[:3, 3] = size, 0.2 * size, -0.1 * size
+        end[:3, 3] = size * rng.uniform((-1.0, -0.8, -0.8), (0.0, 0.8, 0.8))
+        omega = None
+        if case % 3 == 2:
+            omega = rng.normal(size=3) * 5.0
+            end = collide.moved_poses(start, end[:3, 3] - start[:3, 3], omega)
+        eye = np.eye(4)
+        for _ in range(2):  # the second call is prepared
+            r = collide.time_of_impact(A, B, eye, eye, start, end, omega_WB=omega)
+        many = collide.time_of_impact(A, B, eye, eye, start[None], end[None], omega_WB=omega)
+        swapped = collide.time_of_impact(B, A, start, end, eye, eye, omega_WA=omega)
+        with monkeypatch.context() as m:
+            m.setattr(convex_motions.SingleUnions, "search", lambda *_: False)
+            long_way = collide.time_of_impact(A, B, eye, eye, start[None], end[None], omega_WB=omega)
+        assert bits(r) == bits(many) == bits(long_way) and r.queries == many.queries[0]
+        assert bits(swapped)[:5] == bits(r)[:5] and (swapped.part_b, swapped.part_a) == (r.part_a, r.part_b)
+        hits += bool(r.hit)
+    assert 3 <= hits < 12, hits
+
+
 def test_boxes_of_two_unions_are_not_listed_where_most_are_near(monkeypatch):
     """150 parts beside 150 that fly through them: lists of pairs stay short."""
     lengths, near = [], parts_ahead.boxes_near
@@ -197,6 +231,8 @@ def test_boxes_of_two_unions_are_not_listed_where_most_are_near(monkeypatch):
         return found
 
     monkeypatch.setattr(parts_ahead, "boxes_near", listed)
+    # the long way, of more pairs than kernels list
+    monkeypatch.setattr(convex_motions.SingleUnions, "search", lambda *_: False)
     ends = collide.pose((0.1, 0.0, 20.0)), collide.pose((0.0, 0.1, -20.0))
     assert collide.time_of_impact(clutter(150, False, "a"), clutter(150, False, "b"), np.eye(4), np.eye(4), *ends).hit
     assert lengths and max(lengths) < 0.3 * 150 * 150, lengths

@@ -14,7 +14,16 @@ from collide.kernels.prepared import prepared_boolean, prepared_row, prepared_wi
 from collide.lowering.compound_table import BALL_IN_WORLD, CompoundTable, LaidOut
 from collide.lowering.shape_table import POSE, TERM_ROW, PoseTable, ShapeTable
 from collide.narrowphase import convex_kernel_calls as run
-from collide.narrowphase.composite.composite_block import BLOCK, HEADER, LIST, N_ANSWERED, N_DONE, N_LISTED, SLOTS
+from collide.narrowphase.composite.composite_block import (
+    BLOCK,
+    HEADER,
+    LIST,
+    N_ANSWERED,
+    N_DONE,
+    N_LISTED,
+    NEAR,
+    SLOTS,
+)
 from collide.narrowphase.composite.composite_poses import BAD_POSE, answer_compounds
 from collide.narrowphase.composite.composite_rows import SCORE, SEPARATING, combine_rows
 from collide.narrowphase.composite.single_composite_call import (
@@ -44,16 +53,16 @@ class _Workspace:
         self.pairs, self.owners = np.zeros((LIST, 2), dtype=np.int64), np.zeros((LIST, 2), dtype=np.int64)
         self.rows = np.zeros(LIST, dtype=PAIR_DTYPE)
         self.scores, self.slots = np.zeros(BLOCK * SCORE), np.zeros(SLOTS, dtype=np.int64)
-        self.balls, self.near = np.zeros((4 + 2 * capacity, BALL_IN_WORLD)), np.zeros(2 * capacity, dtype=np.int64)
+        self.balls, self.near = np.zeros((4 + 2 * capacity, BALL_IN_WORLD)), np.zeros(NEAR, dtype=np.int64)
         of_slots = self.scores, self.slots, self.balls, self.near
         buffers = *self.poses, self.shape_of, self.pairs, self.owners, self.rows, *of_slots
         self._addresses = tuple(map(address_of, buffers))
 
-    def header_of(self, table: CompoundTable, scratch: tuple[int, int]) -> np.ndarray:
-        """The header of a call; scratch : addresses of a workspace of `answer_pairs`."""
-        return np.array(
-            (code_of(answer_pairs), *table.addresses, *self._addresses, *scratch, self.capacity, *_AT_THE_START)
-        )
+    def header_of(self, table: CompoundTable, scratch: tuple[int, int], at_once: int = 0) -> np.ndarray:
+        """The header of a call; scratch : addresses of a workspace of `answer_pairs`.   at_once : of single calls, how
+        many pairs of parts are answered at once."""
+        addresses = *table.addresses, *self._addresses, *scratch
+        return np.array((code_of(answer_pairs), *addresses, self.capacity, at_once, *_AT_THE_START))
 
 
 class _SingleSpace(_Workspace):
@@ -122,21 +131,30 @@ def answer_compound_batch(
 
 #: Workspace of all single calls: their kernels keep Python's lock. A larger one takes its place; pairs hold their own.
 _single_space: _SingleSpace | None = None
-#: Pairs of parts of a single call, which keeps Python's lock; more are left to the long way, which lets go of it.
-_MAX_AT_ONCE = 1024
+#: Pairs of parts of a single call, which keeps Python's lock; more are left to the long way, which lets go of it. Of
+#: bodies with more pairs, so many at most are answered before they are left to it.
+_MAX_AT_ONCE, _MAX_OF_MANY = 1024, 256
+#: Parts of two bodies whose single calls go through one kernel: a row of poses each is kept.
+_MAX_PARTS = 1 << 13
+
+
+def single_header(table: CompoundTable) -> tuple[np.ndarray, _SingleSpace]:
+    """(header of single calls of bodies 0 and 1, their workspace)."""
+    global _single_space
+    space = _single_space  # read once: another thread may put a smaller one there
+    if space is None or space.capacity < table.max_parts:
+        space = _single_space = _SingleSpace(table.max_parts)
+    at_once = _MAX_AT_ONCE if table.counts.prod() <= _MAX_AT_ONCE else _MAX_OF_MANY
+    return space.header_of(table, space.scratch, at_once), space
 
 
 def prepared_compounds(A: LaidOut, B: LaidOut) -> Prepared:
     """Two bodies ready for one call at a time, and their table for batches."""
-    global _single_space
     table = CompoundTable([A, B])
     table.build_trees(None)
-    if table.counts.prod() > _MAX_AT_ONCE:
+    if table.max_parts > _MAX_PARTS:
         return Prepared(table=table)
-    space = _single_space  # read once: another thread may put a smaller one there
-    if space is None or space.capacity < table.max_parts:
-        space = _single_space = _SingleSpace(table.max_parts)
-    header = space.header_of(table, space.scratch)
+    header, space = single_header(table)
     places = address_of(space.byte), address_of(space.row)
     words = np.array([code_of(answer_compounds), *places, *header.tolist()])
     return Prepared(

@@ -5,7 +5,16 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i64
-from collide.lowering.compound_table import BALL_IN_WORLD, BODY_INTS, COUNT, FIRST, FIRST_GROUP, PART, TURNED
+from collide.lowering.compound_table import (
+    BALL_IN_WORLD,
+    BODY_INTS,
+    COUNT,
+    FIRST,
+    FIRST_GROUP,
+    N_GROUPS,
+    PART,
+    TURNED,
+)
 from collide.lowering.place_parts import place_part
 from collide.lowering.shape_table import POSE, TERM_ROW
 from collide.narrowphase.composite.composite_rows import SCORE
@@ -15,18 +24,23 @@ from collide.narrowphase.pose_batches import set_pose
 #: Poses that go through together, and pairs of parts on a list.
 BLOCK = 64
 LIST = ROWS_PER_BATCH
+#: Numbers of pairs of parts that are near, before the least of them are listed; then pairs of nodes of both bodies,
+#: still to be looked at: each step down takes one and puts four, and there are no more than 32 steps.
+MAX_NEAR, STACK = 2 * LIST, 128
+NEAR = MAX_NEAR + 2 * STACK
 
 # Header: the kernel, tables of shapes, parts, bodies and groups; workspace, and how many rows of parts it has room for;
-# then how far things have come, 0 to begin with: poses answered, poses of the block, stage, slot and pair of parts to
-# go on with, pairs on the list, and how many pairs of parts were answered in all.
+# how many pairs of parts a single call answers before all is for the long way, 0 of batches; then how far things have
+# come, 0 to begin with: poses answered, poses of the block, stage, slot and pair of parts to go on with, pairs on the
+# list, and how many pairs of parts were answered in all.
 (
     CORE, INTS_AT, NUMBERS_AT, PARTS_AT, BODIES_AT, BODY_BALLS_AT, BY_PLACE_AT, GROUPS_AT,
     POSES_AT, TERMS_AT, SHAPE_OF_AT, PAIRS_AT, OWNERS_AT, ROWS_AT, SCORES_AT, SLOTS_AT, BALLS_AT, NEAR_AT, DOUBLES_AT,
     INTEGERS_AT,
-    CAPACITY,
+    CAPACITY, AT_ONCE,
     N_DONE, N_POSES, STAGE, SLOT, PAIR, N_LISTED, N_ANSWERED,
-) = range(28)
-HEADER = 28
+) = range(29)
+HEADER = 29
 
 # Integers of a slot, which is a pose of the block: both bodies, rows of poses of theirs and where those of their parts
 # begin, whether a boolean is a hit, and the pair of parts answered first, −1 where balls say that none meets.
@@ -50,14 +64,15 @@ class Block(NamedTuple):
 
 
 class Body(NamedTuple):
-    """One body of a slot: its parts in the table, and rows of poses: of its first part, and of its own; its first
-    group in the table."""
+    """One body of a slot: its parts in the table, and rows of poses: of its first part, and of its own; its groups in
+    the table."""
 
     first: int
     n_parts: int
     part_rows: int
     row: int
     first_group: int
+    n_groups: int
 
 
 @kernel(inline=True)
@@ -70,7 +85,7 @@ def open_block(header_at):
         view_i64(header[OWNERS_AT], 2 * LIST), view_f64(header[SCORES_AT], SCORE * BLOCK),
         view_i64(header[SLOTS_AT], SLOTS),
         view_f64(header[BALLS_AT], (4 + 2 * header[CAPACITY]) * BALL_IN_WORLD),
-        view_i64(header[NEAR_AT], 2 * header[CAPACITY]),
+        view_i64(header[NEAR_AT], NEAR),
     )
 
 
@@ -83,7 +98,7 @@ def body_of(block, k, which):
     at = BODY_INTS * number
     return Body(
         bodies[at + FIRST], bodies[at + COUNT], block.slots[slot + PART_ROWS], block.slots[slot + BODY_ROWS],
-        bodies[at + FIRST_GROUP],
+        bodies[at + FIRST_GROUP], bodies[at + N_GROUPS],
     )
 
 

@@ -16,10 +16,22 @@ import math
 from typing import NamedTuple
 
 from collide.kernels import entry, kernel, native_call, view_f64, view_i32, view_i64, view_u8
-from collide.lowering.compound_table import BALL_IN_WORLD, BODY, BODY_REACH, CENTRE, GROUP, GROUP_BALL, PART
+from collide.lowering.compound_table import (
+    BALL_IN_WORLD,
+    BODY,
+    BODY_REACH,
+    CENTRE,
+    GROUP_BALL,
+    HALF_SIZES,
+    LARGEST_BALL,
+    MEMBERS,
+    MEMBERS_END,
+    PART,
+)
 from collide.lowering.place_parts import BALL_MARGIN, gap_of_balls, place_ball, write_terms
 from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_STRETCH, POSE_TERMS
 from collide.narrowphase.composite.composite_block import (
+    AT_ONCE,
     BODY_BALLS_AT,
     BODY_NUMBERS,
     BODY_ROWS,
@@ -33,6 +45,7 @@ from collide.narrowphase.composite.composite_block import (
     INTS_AT,
     IS_HIT,
     LIST,
+    MAX_NEAR,
     N_ANSWERED,
     N_DONE,
     N_LISTED,
@@ -40,6 +53,7 @@ from collide.narrowphase.composite.composite_block import (
     NUMBERS_AT,
     PAIR,
     PAIRS_AT,
+    PARTS_AT,
     POSES_AT,
     ROWS_AT,
     SHAPE_OF_AT,
@@ -68,7 +82,7 @@ from collide.narrowphase.composite.composite_rows import (
 )
 from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.rows import HIT, HOW, PART_A, PART_B, ROW
-from collide.numerics.vec3 import Vec3, norm1, sub, vec3_at
+from collide.numerics.vec3 import Vec3, dot, norm, norm1, rotate_back, scale, sub, vec3_at
 from collide.results import REFUSED, UNDECIDED
 
 answer_at = native_call(SIGNATURE)
@@ -81,6 +95,10 @@ _LAY_OUT, _NEAREST, _OTHERS = range(3)
 #: Pairs of parts whose balls are farther apart than the best so far by this much of the bodies' size are left out: far
 #: more than brackets of curved parts are wide, so that they have no say in any number of the answer.
 _BRACKET = 2.0**-20
+#: Of a ball in the world: how far its contents reach along a direction.
+ALONG = 4
+#: Centres nearer than this give no direction [m].
+_LEAST_LENGTH = 1e-100
 
 
 # --- balls --------------------------------------------------------------------------------------
@@ -117,72 +135,120 @@ def place_two_balls(poses, p, q, of_a, a, of_b, b, balls):
     return reach_a + reach_b + norm1(shift)
 
 
-class Groups(NamedTuple):
-    """The groups of both bodies of a slot, and places of balls in the block: of A's groups from ``a`` on, of A's parts,
-    by place, from ``parts_a`` on; of B's likewise.
+class Nodes(NamedTuple):
+    """The nodes of both bodies of a slot, parts by place and groups; balls of A stand in the block from ``a`` on,
+    balls of B from ``b`` on; members of a group are placed when the group is first opened.
 
-    cut : groups farther apart hold no pair that counts [m].   margin : how much less the distance of two parts' balls
-        may be than the distance of their groups' balls [m].
+    u : unit vector from the ball around all of A to the ball around all of B, or 0; with each ball stands how far its
+    contents reach along u, of B's how near: their difference is a lower bound of the distance, of flat groups a better
+    one than the balls'.   u_A, u_B : the same in the bodies' frames.   shift : from A's origin to B's.
+    margin : how much less the distance of two parts' balls may be than these bounds of their groups [m].
     """
 
     A: Body
     B: Body
-    n_a: int
-    n_b: int
     a: int
     b: int
-    parts_a: int
-    parts_b: int
-    cut: float
+    shift: Vec3
+    u: Vec3
+    u_A: Vec3
+    u_B: Vec3
     margin: float
 
 
 @kernel
-def _groups_of(block, k, cut, margin):
-    """The groups of both bodies of slot k, whether placed or not."""
+def _nodes_of(block, k, margin, is_placed):
+    """The nodes of both bodies of slot k, whose balls stand first; with the balls of the largest groups, as they are
+    where placed."""
     A = body_of(block, k, 0)
     B = body_of(block, k, 1)
-    n_a = (A.n_parts + GROUP - 1) // GROUP
-    n_b = (B.n_parts + GROUP - 1) // GROUP
-    parts_b = 2 + A.n_parts
-    a = parts_b + B.n_parts
-    return Groups(A, B, n_a, n_b, a, a + n_a, 2, parts_b, cut, margin)
-
-
-@kernel
-def _place_groups(block, k, cut, margin):
-    """Place the balls of all groups; those of their parts are placed when they are first wanted."""
-    groups = _groups_of(block, k, cut, margin)
-    A, B = groups.A, groups.B
-    _place_groups_of(block, A, groups.n_a, groups.a, groups.parts_a, Vec3(0.0, 0.0, 0.0))
-    _place_groups_of(
-        block, B, groups.n_b, groups.b, groups.parts_b, _shift(block, POSE * A.row, POSE * B.row)
-    )
-    return groups
+    shift = _shift(block, POSE * A.row, POSE * B.row)
+    u = sub(vec3_at(block.balls, BALL_IN_WORLD), vec3_at(block.balls, 0))
+    length = norm(u)
+    u = scale(1.0 / length if length > _LEAST_LENGTH else 0.0, u)
+    u_A, u_B = rotate_back(block.poses, POSE * A.row, u), rotate_back(block.poses, POSE * B.row, u)
+    nodes = Nodes(A, B, 2, 2 + A.n_parts + A.n_groups, shift, u, u_A, u_B, margin)
+    if not is_placed:
+        _place_node(block, nodes, True, A.n_parts + A.n_groups - 1)
+        _place_node(block, nodes, False, B.n_parts + B.n_groups - 1)
+    return nodes
 
 
 @kernel(inline=True)
-def _place_groups_of(block, body, n, first, parts, shift):
-    groups = view_f64(block.header[GROUPS_AT], GROUP_BALL * (body.first_group + n))
-    for k in range(n):
-        numbers_at = GROUP_BALL * (body.first_group + k)
-        ball_at = (first + k) * BALL_IN_WORLD
-        place_ball(block.poses, POSE * body.row, groups, numbers_at, shift.x, shift.y, shift.z, block.balls, ball_at)
-        block.balls[(parts + GROUP * k) * BALL_IN_WORLD + 3] = math.nan  # its parts are not placed yet
-
-
-@kernel
-def _open_group(block, body, group, first, shift):
-    """Have the balls of a group's parts; ``first`` is that of the body's first by place."""
-    start = GROUP * group
-    if not math.isnan(block.balls[(first + start) * BALL_IN_WORLD + 3]):
+def _place_node(block, nodes, of_a, node):
+    """Place the ball of a node of A or B; the members of a group are not placed yet."""
+    body, first = (nodes.A, nodes.a) if of_a else (nodes.B, nodes.b)
+    shift = Vec3(0.0, 0.0, 0.0) if of_a else nodes.shift
+    pose, ball_at = POSE * body.row, (first + node) * BALL_IN_WORLD
+    if node < body.n_parts:
+        number = body.first + view_i64(block.header[BY_PLACE_AT] + 8 * (body.first + node), 1)[0]
+        part = view_f64(block.header[PARTS_AT] + 8 * (PART * number + CENTRE), PART - CENTRE)
+        place_ball(block.poses, pose, part, 0, shift.x, shift.y, shift.z, block.balls, ball_at)
+        reach = block.balls[ball_at + 3]
+        block.balls[ball_at + ALONG] = dot(nodes.u, vec3_at(block.balls, ball_at)) + (reach if of_a else -reach)
         return
-    parts = part_view(block, body.first + body.n_parts)
-    by_place = view_i64(block.header[BY_PLACE_AT], body.first + body.n_parts)
-    for place in range(start, min(start + GROUP, body.n_parts)):
-        numbers_at = PART * (body.first + by_place[body.first + place]) + CENTRE
-        ball_at = (first + place) * BALL_IN_WORLD
-        place_ball(block.poses, POSE * body.row, parts, numbers_at, shift.x, shift.y, shift.z, block.balls, ball_at)
+    group = _group_of(block, body, node)
+    place_ball(block.poses, pose, group, 0, shift.x, shift.y, shift.z, block.balls, ball_at)
+    u = nodes.u_A if of_a else nodes.u_B
+    reach = abs(u.x) * group[HALF_SIZES] + abs(u.y) * group[HALF_SIZES + 1] + abs(u.z) * group[HALF_SIZES + 2]
+    reach += group[LARGEST_BALL] * block.poses[pose + POSE_STRETCH] + group[4]
+    block.balls[ball_at + ALONG] = dot(nodes.u, vec3_at(block.balls, ball_at)) + (reach if of_a else -reach)
+    block.balls[(first + int(group[MEMBERS])) * BALL_IN_WORLD + 3] = math.nan
+
+
+@kernel(inline=True)
+def _group_of(block, body, node):
+    """View of a group, by its number among the body's nodes."""
+    return view_f64(block.header[GROUPS_AT] + 8 * GROUP_BALL * (body.first_group + node - body.n_parts), GROUP_BALL)
+
+
+@kernel(inline=True)
+def _members_of(block, nodes, of_a, node):
+    """(first member, end) of a group, the members placed."""
+    body, first = (nodes.A, nodes.a) if of_a else (nodes.B, nodes.b)
+    group = _group_of(block, body, node)
+    begin, end = int(group[MEMBERS]), int(group[MEMBERS_END])
+    if math.isnan(block.balls[(first + begin) * BALL_IN_WORLD + 3]):
+        for member in range(begin, end):
+            _place_node(block, nodes, of_a, member)
+    return begin, end
+
+
+@kernel(inline=True)
+def _opened(block, nodes, a, b):
+    """(whether A's node is opened rather than B's, its first member, end): the larger ball, if a group's; no members
+    where both are parts."""
+    A, B = nodes.A, nodes.B
+    of_a = a >= A.n_parts
+    if of_a and b >= B.n_parts:
+        of_a = block.balls[(nodes.a + a) * BALL_IN_WORLD + 3] >= block.balls[(nodes.b + b) * BALL_IN_WORLD + 3]
+    if of_a:
+        begin, end = _members_of(block, nodes, True, a)
+        return True, begin, end
+    if b >= B.n_parts:
+        begin, end = _members_of(block, nodes, False, b)
+        return False, begin, end
+    return False, 0, 0
+
+
+@kernel(inline=True)
+def _gap_of_nodes(block, nodes, a, b):
+    """The distance of two nodes' balls [m]."""
+    return _gap(block, nodes.a + a, nodes.b + b)
+
+
+@kernel(inline=True)
+def _are_beyond(block, nodes, a, b, reach):
+    """Whether contents of two nodes are farther apart along u than ``reach`` [m]: for less work than their balls."""
+    along_a = block.balls[(nodes.a + a) * BALL_IN_WORLD + ALONG]
+    return block.balls[(nodes.b + b) * BALL_IN_WORLD + ALONG] - along_a - nodes.margin > reach
+
+
+@kernel(inline=True)
+def _number_of(block, nodes, a, b):
+    """The number of a pair of parts, by their places."""
+    of_a = view_i64(block.header[BY_PLACE_AT] + 8 * (nodes.A.first + a), 1)[0]
+    return of_a * nodes.B.n_parts + view_i64(block.header[BY_PLACE_AT] + 8 * (nodes.B.first + b), 1)[0]
 
 
 @kernel(inline=True)
@@ -192,29 +258,8 @@ def _gap(block, i, j):
 
 
 @kernel
-def _nearest_of_groups(block, groups, a, b, least, nearest):
-    """(least distance of balls, pair of parts) after the parts of groups a and b; of equals the first pair counts."""
-    A, B = groups.A, groups.B
-    _open_group(block, A, a, groups.parts_a, Vec3(0.0, 0.0, 0.0))
-    _open_group(block, B, b, groups.parts_b, _shift(block, POSE * A.row, POSE * B.row))
-    of_a = view_i64(block.header[BY_PLACE_AT], A.first + A.n_parts)
-    of_b = view_i64(block.header[BY_PLACE_AT], B.first + B.n_parts)
-    for i in range(GROUP * a, min(GROUP * (a + 1), A.n_parts)):
-        if _gap(block, groups.parts_a + i, groups.b + b) - groups.margin > min(least, groups.cut):
-            continue
-        for j in range(GROUP * b, min(GROUP * (b + 1), B.n_parts)):
-            gap = _gap(block, groups.parts_a + i, groups.parts_b + j)
-            if gap <= least or nearest < 0:
-                pair = of_a[A.first + i] * B.n_parts + of_b[B.first + j]
-                if gap < least or nearest < 0 or pair < nearest:
-                    least = gap
-                    nearest = pair
-    return least, nearest
-
-
-@kernel
 def _nearest_pair(block, k, boolean):
-    """The pair of parts of slot k with the nearest balls; −1 of booleans where no balls meet.
+    """The pair of parts of slot k with the nearest balls, of equals the first; −1 of booleans where no balls meet.
 
     Groups of parts whose balls are farther apart than the nearest pair so far hold no nearer pair.
     """
@@ -226,33 +271,47 @@ def _nearest_pair(block, k, boolean):
         return -1
     if n_pairs == 1:
         return 0
-    groups = _place_groups(block, k, margin if boolean else math.inf, margin)
-    least_of_groups = math.inf
-    first_a = first_b = 0
-    for a in range(groups.n_a):
-        if _gap(block, groups.a + a, 1) > least_of_groups:
-            continue
-        for b in range(groups.n_b):
-            gap = _gap(block, groups.a + a, groups.b + b)
-            if gap < least_of_groups:
-                least_of_groups = gap
-                first_a = a
-                first_b = b
-    least, nearest = _nearest_of_groups(block, groups, first_a, first_b, math.inf, -1)
-    for a in range(groups.n_a):
-        if groups.n_b > 1 and _gap(block, groups.a + a, 1) - margin > min(least, groups.cut):
-            continue
-        for b in range(groups.n_b):
-            is_first = a == first_a and b == first_b
-            if not is_first and _gap(block, groups.a + a, groups.b + b) - margin <= min(least, groups.cut):
-                least, nearest = _nearest_of_groups(block, groups, a, b, least, nearest)
+    nodes = _nodes_of(block, k, margin, False)
+    a, b = nodes.A.n_parts + nodes.A.n_groups - 1, nodes.B.n_parts + nodes.B.n_groups - 1
+    stack, top = MAX_NEAR, 1
+    block.near[stack] = a
+    block.near[stack + 1] = b
+    while a >= nodes.A.n_parts or b >= nodes.B.n_parts:  # down to a near pair, which leaves out most of the others
+        of_a, begin, end = _opened(block, nodes, a, b)
+        least, best = math.inf, begin
+        for member in range(begin, end):
+            gap = _gap_of_nodes(block, nodes, member if of_a else a, b if of_a else member)
+            if gap < least:
+                least = gap
+                best = member
+        a, b = (best, b) if of_a else (a, best)
+    least, nearest = _gap_of_nodes(block, nodes, a, b), _number_of(block, nodes, a, b)
+    while top > 0:
+        top -= 1
+        a, b = block.near[stack + 2 * top], block.near[stack + 2 * top + 1]
+        of_a, begin, end = _opened(block, nodes, a, b)
+        for member in range(begin, end):
+            at_a, at_b = (member, b) if of_a else (a, member)
+            if _are_beyond(block, nodes, at_a, at_b, least):
+                continue
+            gap = _gap_of_nodes(block, nodes, at_a, at_b)
+            if at_a < nodes.A.n_parts and at_b < nodes.B.n_parts:
+                if gap <= least:
+                    pair = _number_of(block, nodes, at_a, at_b)
+                    if gap < least or pair < nearest:
+                        least = gap
+                        nearest = pair
+            elif gap - margin <= (min(least, margin) if boolean else least):
+                block.near[stack + 2 * top] = at_a
+                block.near[stack + 2 * top + 1] = at_b
+                top += 1
     return -1 if boolean and least > margin else nearest
 
 
 @kernel
-def _gap_of_pair(block, groups, pair):
+def _gap_of_pair(block, nodes, pair):
     """The distance of the balls of a pair of parts [m]."""
-    A, B = groups.A, groups.B
+    A, B = nodes.A, nodes.B
     at = 2 + 2 * block.header[CAPACITY]
     of_a, of_b = A.first + pair // B.n_parts, B.first + pair % B.n_parts
     parts = part_view(block, max(of_a, of_b) + 1)
@@ -264,59 +323,58 @@ def _gap_of_pair(block, groups, pair):
 
 
 @kernel
-def _sort_near(near, first, n, half):
-    """Sort n numbers of the list of near parts from ``first`` on, and with them their balls' places, ``half`` behind:
-    Shell's sort with Knuth's gaps, O(n^1.5)."""
+def sort_numbers(numbers, n):
+    """Sort the first n numbers: Shell's sort with Knuth's gaps, O(n^1.5)."""
     gap = 1
     while gap < n:
         gap = 3 * gap + 1
     while gap > 1:
         gap //= 3
         for k in range(gap, n):
-            number = near[first + k]
-            place = near[half + first + k]
+            number = numbers[k]
             j = k
-            while j >= gap and near[first + j - gap] > number:
-                near[first + j] = near[first + j - gap]
-                near[half + first + j] = near[half + first + j - gap]
+            while j >= gap and numbers[j - gap] > number:
+                numbers[j] = numbers[j - gap]
                 j -= gap
-            near[first + j] = number
-            near[half + first + j] = place
+            numbers[j] = number
 
 
 @kernel
-def _list_near_parts(block, groups, of_b, reach, first):
-    """List the near parts of A, or of B: their numbers, ascending, from ``first`` on, and the places of their balls in
-    the list's second half; returns how many they are.
+def _find_near(block, nodes, reach, start, but):
+    """Find pairs of parts whose balls come within ``reach`` [m], by numbers from ``start`` on, without ``but``: all, or
+    the least LIST + 1; ascending in the list of numbers. Returns how many.
 
-    A part is left out where its group is farther than ``reach`` [m] from all groups of the other body, and where its
-    ball is farther from the ball around the other body: all balls in the body's ball are as far away.
+    Groups of parts whose balls are farther apart hold no such pair.
     """
-    body = groups.B if of_b else groups.A
-    n, at, n_others, others_at, parts = (
-        (groups.n_b, groups.b, groups.n_a, groups.a, groups.parts_b) if of_b
-        else (groups.n_a, groups.a, groups.n_b, groups.b, groups.parts_a)
-    )
-    shift = _shift(block, POSE * groups.A.row, POSE * groups.B.row) if of_b else Vec3(0.0, 0.0, 0.0)
-    by_place = view_i64(block.header[BY_PLACE_AT], body.first + body.n_parts)
-    half = block.header[CAPACITY]
-    n_near = 0
-    for group in range(n):
-        is_near = False
-        if _gap(block, at + group, 0 if of_b else 1) - groups.margin <= reach:
-            for j in range(n_others):
-                if _gap(block, at + group, others_at + j) - groups.margin <= reach:
-                    is_near = True
-                    break
-        if not is_near:
-            continue
-        _open_group(block, body, group, parts, shift)
-        for place in range(GROUP * group, min(GROUP * (group + 1), body.n_parts)):
-            if _gap(block, parts + place, 0 if of_b else 1) - groups.margin <= reach:
-                block.near[first + n_near] = by_place[body.first + place]
-                block.near[half + first + n_near] = parts + place
-                n_near += 1
-    _sort_near(block.near, first, n_near, half)
+    near, n_near, end_of_near = block.near, 0, nodes.A.n_parts * nodes.B.n_parts
+    near[MAX_NEAR] = nodes.A.n_parts + nodes.A.n_groups - 1
+    near[MAX_NEAR + 1] = nodes.B.n_parts + nodes.B.n_groups - 1
+    top = 1
+    while top > 0:
+        top -= 1
+        a, b = near[MAX_NEAR + 2 * top], near[MAX_NEAR + 2 * top + 1]
+        of_a, begin, end = _opened(block, nodes, a, b)
+        for member in range(begin, end):
+            at_a, at_b = (member, b) if of_a else (a, member)
+            if _are_beyond(block, nodes, at_a, at_b, reach):
+                continue
+            gap = _gap_of_nodes(block, nodes, at_a, at_b)
+            if at_a < nodes.A.n_parts and at_b < nodes.B.n_parts:
+                if gap > reach:
+                    continue
+                pair = _number_of(block, nodes, at_a, at_b)
+                if start <= pair < end_of_near and pair != but:
+                    near[n_near] = pair
+                    n_near += 1
+                    if n_near == MAX_NEAR:
+                        sort_numbers(near, n_near)
+                        n_near = LIST + 1
+                        end_of_near = near[LIST]
+            elif gap - nodes.margin <= reach:
+                near[MAX_NEAR + 2 * top] = at_a
+                near[MAX_NEAR + 2 * top + 1] = at_b
+                top += 1
+    sort_numbers(near, n_near)
     return n_near
 
 
@@ -324,10 +382,10 @@ def _list_near_parts(block, groups, of_b, reach, first):
 
 
 @kernel(inline=True)
-def _list_pair(block, k, count_b, pair, boolean, n_listed):
+def _list_pair(block, k, count_b, pair, exactly, n_listed):
     """Put a pair of parts of slot k on the list."""
-    block.pairs[2 * n_listed] = row_of_part(block, k, 0, pair // count_b, not boolean)
-    block.pairs[2 * n_listed + 1] = row_of_part(block, k, 1, pair % count_b, not boolean)
+    block.pairs[2 * n_listed] = row_of_part(block, k, 0, pair // count_b, exactly)
+    block.pairs[2 * n_listed + 1] = row_of_part(block, k, 1, pair % count_b, exactly)
     block.owners[2 * n_listed] = k
     block.owners[2 * n_listed + 1] = pair
 
@@ -340,7 +398,7 @@ def _list_nearest(block, boolean, every):
         pair = 0 if every else _nearest_pair(block, k, boolean)
         block.slots[SLOT_SIZE * k + FIRST_PAIR] = pair
         if pair >= 0:
-            _list_pair(block, k, body_of(block, k, 1).n_parts, pair, boolean, n_listed)
+            _list_pair(block, k, body_of(block, k, 1).n_parts, pair, not boolean, n_listed)
             n_listed += 1
     block.header[SLOT] = block.header[N_POSES]
     return n_listed
@@ -370,38 +428,52 @@ def _list_others(block, boolean, depths, every):
 def _list_others_of(block, k, boolean, every, n_listed):
     """List the other pairs of a pose, from PAIR on; PAIR becomes the pair to go on with. Returns the list's length."""
     header = block.header
-    count_a = body_of(block, k, 0).n_parts
-    count_b = body_of(block, k, 1).n_parts
     size = _place_body_balls(block, k)
     margin = BALL_MARGIN * size
-    # The groups of a single pose stand where `_nearest_pair` has placed them just now.
-    is_placed = header[N_POSES] == 1 and header[PAIR] == 0 and not every
-    groups = _groups_of(block, k, math.inf, margin) if is_placed else _place_groups(block, k, math.inf, margin)
+    # The nodes of a single pose stand where `_nearest_pair` has placed them just now.
+    nodes = _nodes_of(block, k, margin, header[N_POSES] == 1 and header[PAIR] == 0 and not every)
     first_pair = block.slots[SLOT_SIZE * k + FIRST_PAIR]
     reach = margin
     if every:
         reach = math.inf
     elif not boolean:
         # Others that are as near by their balls as the first: which of them came first has no say.
-        reach += max(first_reach_of(block.scores, SCORE * k), _gap_of_pair(block, groups, first_pair), 0.0)
+        reach += max(first_reach_of(block.scores, SCORE * k), _gap_of_pair(block, nodes, first_pair), 0.0)
         reach += _BRACKET * size
-    n_near_a = _list_near_parts(block, groups, False, reach, 0)
-    n_near_b = _list_near_parts(block, groups, True, reach, count_a)
-    balls = header[CAPACITY]
-    start = header[PAIR]
-    for i in range(n_near_a):
-        for j in range(count_a, count_a + n_near_b):
-            pair = block.near[i] * count_b + block.near[j]
-            gap = _gap(block, block.near[balls + i], block.near[balls + j])
-            if pair < start or pair == first_pair or gap > reach:
-                continue
-            if n_listed == LIST:
-                header[PAIR] = pair
-                return n_listed
-            _list_pair(block, k, count_b, pair, boolean, n_listed)
-            n_listed += 1
-    header[PAIR] = count_a * count_b
+    return _list_pairs(block, k, nodes, reach, first_pair, not boolean, n_listed)
+
+
+@kernel
+def _list_pairs(block, k, nodes, reach, but, exactly, n_listed):
+    """List the pairs of parts of slot k whose balls come within ``reach`` [m], from PAIR on, ascending, without one;
+    PAIR becomes the pair to go on with. Returns the list's length."""
+    header = block.header
+    n_near = _find_near(block, nodes, reach, header[PAIR], but)
+    for k_near in range(n_near):
+        if n_listed == LIST:
+            header[PAIR] = block.near[k_near]
+            return n_listed
+        _list_pair(block, k, nodes.B.n_parts, block.near[k_near], exactly, n_listed)
+        n_listed += 1
+    header[PAIR] = nodes.A.n_parts * nodes.B.n_parts
     return n_listed
+
+
+@kernel
+def list_pairs_within(block, limit):
+    """List the pairs of parts of slot 0 whose balls come within a limit [m], ascending, their rows of poses placed;
+    returns how many, −1 of more than LIST.
+
+    No part reaches out of its ball by more than the balls' margin of the size: parts of other pairs are farther apart
+    than the limit.
+    """
+    margin = BALL_MARGIN * _place_body_balls(block, 0)
+    reach = limit * (1.0 + 2.0**-50) + margin
+    if _gap(block, 0, 1) > reach:
+        return 0
+    block.header[PAIR] = 0
+    n = _list_pairs(block, 0, _nodes_of(block, 0, margin, False), reach, -1, False, 0)
+    return n if block.header[PAIR] == count_pairs(block, 0) else -1
 
 
 @kernel
@@ -466,7 +538,7 @@ def _take_rows(block, boolean, out_at):
 
 @kernel
 def _close_block(block, boolean, depths, out_at):
-    """Finish the answers of the block."""
+    """Finish the answers of the block; False where a single call leaves the depth of many parts to the long way."""
     header = block.header
     for k in range(header[N_POSES]):
         if boolean:
@@ -474,7 +546,10 @@ def _close_block(block, boolean, depths, out_at):
         elif count_pairs(block, k) > 1:
             row_at = out_at + ROW * (header[N_DONE] + k)
             if close_score(block.scores, SCORE * k, row_at) and depths:
+                if 0 < header[AT_ONCE] < count_pairs(block, k):
+                    return False
                 _separate_bodies_of(block, k, row_at)
+    return True
 
 
 @kernel
@@ -538,7 +613,8 @@ def answer_compounds(
             header[SLOT] = 0
             header[STAGE] += 1
             if header[STAGE] > _OTHERS:
-                _close_block(block, boolean, depths, out_at)
+                if not _close_block(block, boolean, depths, out_at):
+                    return OPEN
                 header[N_DONE] += header[N_POSES]
                 header[STAGE] = _LAY_OUT
                 continue
@@ -547,6 +623,8 @@ def answer_compounds(
         else:
             header[N_LISTED] = _list_others(block, boolean, depths, every)
         header[N_ANSWERED] += header[N_LISTED]
+        if 0 < header[AT_ONCE] < header[N_ANSWERED]:
+            return OPEN
         if header[N_LISTED] > 0 and (_answer_list(header, boolean, depths, limit) or every):
             _write_terms_of_list(block)
             return OPEN

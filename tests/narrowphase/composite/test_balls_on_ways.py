@@ -145,9 +145,9 @@ def test_contacts_of_many_poses_far_away_ask_no_boxes_of_parts(monkeypatch):
 def test_motions_past_a_union_list_none_of_its_parts(monkeypatch):
     from collide.motion import convex_motions
 
-    asked, turns = [], convex_motions.parts_in_turn
+    asked, search = [], convex_motions.SingleUnions.search
     monkeypatch.setattr(
-        convex_motions, "parts_in_turn", lambda *args: (asked.append(1), turns(*args))[1]
+        convex_motions.SingleUnions, "search", lambda *args: (asked.append(1), search(*args))[1]
     )
     A, B, eye = union(200, "motions"), collide.Box((0.3, 0.3, 0.3)), np.eye(4)
     starts = np.array([collide.pose((40.0 if k % 4 else 5.0, 0.1, 0.0)) for k in range(20)])

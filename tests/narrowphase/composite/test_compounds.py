@@ -22,9 +22,9 @@ from collide.lowering.place_parts import place_part, write_terms
 from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW, ShapeTable, pose_table
 from collide.narrowphase import convex_kernel_calls as run
 from collide.narrowphase.composite import composite as unions
-from collide.narrowphase.prepared_pairs import single_calls_are_safe
+from collide.narrowphase.prepared_pairs import prepared_pair, single_calls_are_safe
 from collide.pairs import batches, query
-from collide.results import EXACT, SWEPT, UNDECIDED, flipped
+from collide.results import EXACT, PAIR_DTYPE, SWEPT, UNDECIDED, flipped
 
 CASES = 60
 
@@ -392,3 +392,28 @@ def test_near_parts_are_listed_in_the_order_of_their_numbers():
         assert gaps.lower[k] - 1e-12 <= parts <= gaps.upper[k] + 1e-12, k
         n_far += parts > 0.5
     assert 3 <= n_far <= 11, n_far
+
+
+@pytest.mark.skipif(not single_calls_are_safe(), reason="single calls go the long way here")
+def test_single_calls_of_many_parts_have_the_bytes_of_batches():
+    """More pairs of parts than a single call answers: far apart, near, meeting, and with more overlaps than it lists."""
+    rng, answered = rng_of("single calls of many parts"), {"collide": 0, "distance": 0}
+    A, B = (collide.Compound([(collide.Box(rng.uniform(0.1, 0.3, 3)), random_pose(rng, 1.0)) for _ in range(90)])
+            for _ in "ab")
+    X_WA = random_pose(rng, 1.0)
+    for away in (0.0, 0.6, 1.4, 1.7, 2.0, 2.5, 9.0, 100.0):
+        X_WB = random_pose(rng, 1.0)
+        X_WB[:3, 3] = X_WA[:3, 3] + away * np.array([0.6, 0.48, 0.64])
+        single, batch = collide.collide(A, B, X_WA, X_WB), collide.collide(A, B, X_WA[None], X_WB[None])
+        assert single == batch[0]
+        for options in ({"signed": False}, {}, {"max_distance": 0.3}):
+            row = collide.distance(A, B, X_WA, X_WB, **options)
+            many = collide.distance(A, B, X_WA[None], X_WB[None], **options)
+            assert [row.lower, row.upper, row.distance, *row.normal, row.part_a, row.part_b, row.how] == [
+                many.lower[0], many.upper[0], many.distance[0], *many.normal[0], many.part_a[0], many.part_b[0],
+                many.how[0],
+            ]
+        pair = prepared_pair(A, B)
+        answered["collide"] += pair.collide(X_WA, X_WB) is not None
+        answered["distance"] += pair.distance(X_WA, X_WB, bytearray(PAIR_DTYPE.itemsize), True, np.inf) is not None
+    assert answered["collide"] == 8 and 3 <= answered["distance"] < 8, answered
