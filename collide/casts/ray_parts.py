@@ -102,10 +102,10 @@ class TreeOfParts(NamedTuple):
 def candidate_parts(
     bodies: TreeOfParts, skipped: np.ndarray, origins, directions: Directions, limit: float, rows: np.ndarray | None
 ) -> np.ndarray:
-    """(k, 2) int64: rays and the parts that hold a ray's first wall, perhaps, or any wall.
+    """(k, 2) int64: a ray and a part with the ray's possible first wall, or any wall.
 
     skipped : (bodies,) int64, 1 of bodies not asked.   rows : (n,) of `WORLD_HIT_DTYPE`, to become the answers of rays
-    whose first wall is proven, which are not among the pairs; None for all walls.   The rest as of `parts_met`.
+    whose first wall is proven: rays without pairs; None for all walls.   The rest as of `parts_met`.
     """
     n, tree, first = len(origins), bodies.tree, bodies.first
     rays = _as_rays(origins, directions)

@@ -72,10 +72,10 @@ class RefinedDepth(NamedTuple):
 
 
 class _Fine(NamedTuple):
-    """The surface, the double-doubles beside it, and what is needed to find more of them.
+    """The surface, the double-doubles beside the surface, and what is needed to find more of them.
 
     low : low parts of both poses.   points, distances, known : of `FineSurface`.   direction : a stored normal.
-    nearest : that of the facet at work, reversed.
+    nearest : the normal of the facet at work, reversed.
     error : of a height over the length of its direction.   scale : what coordinates are multiplied with.
     rounding : of a coordinate in doubles [m].
     """
@@ -157,7 +157,7 @@ def _set_distance(fine, f):
 
 @kernel(inline=True)
 def _nearest_facet(fine, n_facets, f, tie):
-    """Take the planes of facet f and of all others again that may be as near; returns the nearest of these, with
+    """Take the planes of facet f, and of all facets perhaps as near, again; returns the nearest of these, with
     `_set_distance`, its normal reversed in ``nearest``.
 
     tie : error of doubles, by which clearances known in doubles alone are too small.

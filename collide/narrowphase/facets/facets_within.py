@@ -76,9 +76,9 @@ class _Query(NamedTuple):
     """reach : pairs at most so far apart are listed [m].   error : bound of the error of a coordinate in the world.
 
     shift : t_B − t_A.
-    leaves, leaves_at, placed : the leaves placed last, the address, and which they are.
+    leaves, leaves_at, placed : the leaves placed last, their address, and their numbers.
     out, facets : doubles and integers of the pairs listed, room for ``capacity`` pairs.
-    measures : whether the pairs are measured.   views, n_views : pairs that none of them lets through are not listed.
+    measures : whether the pairs are measured.   views, n_views : a pair is listed where a view lets the pair through.
     """
 
     trees: PosedTrees
@@ -272,7 +272,7 @@ def _visit_leaves(query, pair):
 def _placed_leaf(query, side, tree, X, shift, first, n):
     """Where a leaf's triangles stand in ``leaves``, rotated by a pose X and shifted, with their boxes.
 
-    A leaf meets several of the other tree, most of them one after the other: it is placed once while its slot is its.
+    A leaf meets leaves of the other tree one after another, and is placed again only once another leaf took its slot.
     """
     slot = _SLOTS * side + (first // MAX_LEAF) % _SLOTS
     at = _OF_LEAF * slot
