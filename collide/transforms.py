@@ -282,6 +282,8 @@ def _is_surely_pose(row_x: list, row_y: list, row_z: list, last: list) -> bool:
 
 def _are_surely_poses(batch: np.ndarray) -> bool:
     """Whether all matrices (N, 4, 4) are; about 50 ns each."""
+    if len(batch) == 1:
+        return _is_surely_pose(*batch[0].tolist())
     with np.errstate(invalid="ignore", over="ignore"):
         return all(_is_surely_rigid(batch[k : k + _TOGETHER]) for k in range(0, len(batch), _TOGETHER))
 

@@ -41,7 +41,7 @@ def mark_carrying(p, n, n_corners, tolerance, space):
     is compared with all n: the work grows with n, not with n².
     space.corners : of the hull, ``n_corners``; they are asked first, since most points are far above them.
     """
-    stride = 1 if n <= MAX_CLASSED else _stride_of(n)
+    stride = _stride_of(n)
     _put_in_order(p, n, stride, n_corners, space)
     if n <= MAX_CLASSED:
         for i in range(n):
@@ -128,8 +128,8 @@ def _mark(p, i, n, stride, n_corners, tolerance, space):
 def _slope_below(p, i, n, stride, n_corners, tolerance, space):
     """The square of the slope of the gentlest plane through point i below all others; −1 for slopes beyond 45°.
 
-    tolerance : height above all points elsewhere [m].   stride : 1, or the order of looking at the others: the work
-    grows with their number where neighbours come far from each other.
+    tolerance : height above all points elsewhere [m].   stride : from point to point in the order of comparison: the
+    work grows with their number where neighbours come far from each other.
 
     Each point cuts a half-plane from the slopes (u, v). Where the gentlest slope remaining violates the next
     half-plane, the new gentlest slope is on its border (R. Seidel, "Small-dimensional linear programming and convex

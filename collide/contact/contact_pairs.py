@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 from collide.contact.contact_facets import posed_corner
 from collide.kernels import kernel, view_f64, view_i64
-from collide.narrowphase.facets.facets_within import INTS_OF_PAIR, MEETS, NUMBERS_OF_PAIR
-from collide.numerics.vec3 import Vec3, cross, dot, norm, put_vec3, scale, sub, vec3_at
+from collide.mesh.triangle import triangle_at
+from collide.narrowphase.facets.facets_within import INTS_OF_PAIR, MEETS, NUMBERS_OF_PAIR, unit_normal
+from collide.numerics.vec3 import dot, put_vec3, vec3_at
 
 # What a pair is, bits: its facets meet or nearly; it was told apart by a translation, or is in a patch; its nearest
 # points are local minima; then what searches mark: where they start, what they may pass, what they reached; pairs of
@@ -21,8 +22,6 @@ SEARCH, N_REACHED = range(2)
 
 #: Most corners of an overlap of two facets, with what rounding may add: 3 and 3 corners, 9 crossings.
 MAX_POINTS = 15
-#: A normal whose length is below this part of the edges' product may be rounding: the facet has none.
-_FLAT_FACET = 2.0**-44
 
 # Workspace, words a pair: of `ContactPairs`, in the order of its fields from `near` on.
 _WORDS = (NUMBERS_OF_PAIR, INTS_OF_PAIR, 18, 6, 6, 9, 9, 10, 9, 1, 1, 1, 1, 2, 3, 1, 1, 1, 80)
@@ -120,14 +119,7 @@ def _pose_facet(pairs, k, side, body):
     for j in range(3):
         put_vec3(pairs.corners, at + 3 * j, posed_corner(body, place, j))
         pairs.ids[6 * k + 3 * side + j] = int(body.corners[3 * facet + j])
-    p = vec3_at(pairs.corners, at)
-    u, v = sub(vec3_at(pairs.corners, at + 3), p), sub(vec3_at(pairs.corners, at + 6), p)
-    n = cross(u, v)
-    length = norm(n)
-    if length > _FLAT_FACET * (norm(u) * norm(v)):
-        put_vec3(pairs.normals, 6 * k + 3 * side, scale(1.0 / length, n))
-    else:
-        put_vec3(pairs.normals, 6 * k + 3 * side, Vec3(0.0, 0.0, 0.0))
+    put_vec3(pairs.normals, 6 * k + 3 * side, unit_normal(triangle_at(pairs.corners, at)))
 
 
 @kernel(inline=True)

@@ -28,6 +28,7 @@ from collide.contact.contact_pairs import (
     pair_meets,
 )
 from collide.contact.contact_points import (
+    LEAST_COSINE,
     PatchPoints,
     View,
     copy_of_points,
@@ -42,7 +43,10 @@ from collide.contact.shallow_overlaps import STEP_ERRORS
 from collide.contact.support_face import FACE, axes_across, seen_along
 from collide.kernels import kernel
 from collide.narrowphase.facets.facets_within import (
+    ANYWAY,
     BESIDE,
+    FACES,
+    FACES_ALONG,
     FACET_A,
     FACET_B,
     INTS_OF_PAIR,
@@ -62,6 +66,8 @@ _ALONG = 0.8
 _CLOSE = 2.0**12
 #: Points deeper than so many times the separating translation belong to other parts of the bodies.
 DEEPEST = 2.5
+#: What rounding of a cosine may be between two kernels.
+_COSINES = 2.0**-40
 #: Directions that differ by less than this and their rounding are the same.
 _SAME = 2.0**-20
 
@@ -187,7 +193,11 @@ def put_view(frame, axes, length, views, at):
     put_vec3(views, at + 3, axes.f)
     put_vec3(views, at + 6, axes.nhat)
     views[at + LEAST_GAP], views[at + LARGEST_GAP] = view.low - slack, view.high + slack
-    views[at + BESIDE] = frame.reach + slack if frame.A.radius + frame.B.radius == 0.0 else math.inf
+    is_sharp = frame.A.radius + frame.B.radius == 0.0
+    views[at + BESIDE] = frame.reach + slack if is_sharp else math.inf
+    views[at + FACES_ALONG] = _ALONG - _COSINES if is_sharp else -math.inf
+    views[at + FACES] = -LEAST_COSINE - _COSINES if is_sharp else -math.inf
+    views[at + ANYWAY] = frame.reach
 
 
 @kernel(inline=True)

@@ -77,8 +77,8 @@ def contacts(
     Compound are asked pair by pair: O(k) calls for k pairs whose boxes come within the margin. Two bodies of facets
     cost some tens of microseconds in a batch, a curved shape on a mesh a tenth of a millisecond; single calls as much
     again, and a millisecond. The time for meshes grows as k log k with the k pairs of facets within the margin or, for
-    overlapping bodies, within 2.5 times the depth, some microseconds a pair: n·m at worst, refused beyond 2¹⁸ pairs. A
-    patch whose rim rises steeply is reduced once for each ring of points on its walls.
+    overlapping bodies, that a patch may reach, about a microsecond a pair: n·m at worst; beyond 2¹⁸ pairs apart within
+    the margin the question is refused, of overlaps `distance` answers.
     """
     margin = check_margin("contacts", margin)
     max_contacts = check_max_contacts("contacts", max_contacts)

@@ -59,6 +59,7 @@ from collide.narrowphase.facets.facets_within import (
     N_VIEWS,
     NUMBERS_OF_PAIR,
     STACKED,
+    TWO_SIDES,
     VIEW,
     VIEWS_AT,
     world_error,
@@ -354,6 +355,7 @@ def _list_wider(task, frame, ways, reach):
     n_views = ways.counts[N_WAYS] if ways.counts[N_WAYS] <= _MAX_WAYS else 0
     words, views = view_i64(views_at, VIEWS_AT), view_f64(views_at + 8 * VIEWS_AT, VIEW * n_views)
     words[N_VIEWS], words[STACKED], words[N_LISTED] = n_views, 0, 0
+    words[TWO_SIDES] = (0 if frame.A.solid else 1) | (0 if frame.B.solid else 2)
     for i in range(n_views):
         put_view(frame, axes_across(vec3_at(ways.ways, 3 * i)), ways.lengths[i], views, VIEW * i)
     n_kept, n_known = 0, 0

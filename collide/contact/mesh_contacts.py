@@ -38,7 +38,7 @@ from collide.shapes.shape import Shape
 
 #: Pairs of facets there is space for to begin with, what of it is kept from call to call, and at most: a gigabyte.
 _FEWEST_PAIRS, _KEPT_PAIRS, MAX_PAIRS = 1 << 10, 1 << 14, 1 << 18
-#: Space that has grown is kept for so many calls, 15 or 59 MB; to grow it again lists the pairs of one call twice.
+#: Space that has grown is kept for so many calls, 19 or 75 MB; to grow it again lists the pairs of one call twice.
 _CALLS_KEPT = 256
 #: Rows there is space for to begin with, and so many more a pose.
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8

@@ -37,7 +37,7 @@ from collide.narrowphase.facets.posed_trees import (
 from collide.narrowphase.facets.surface_collision import FULL, SINGULAR
 from collide.narrowphase.facets.traversal import make_traversal, pair_of_trees
 from collide.narrowphase.facets.triangle_distance import common_point, nearest_points, separated_by
-from collide.numerics.vec3 import Vec3, absolute, add, dot, put_vec3, scale, vec3_at
+from collide.numerics.vec3 import Vec3, absolute, add, cross, dot, norm, put_vec3, scale, sub, vec3_at
 
 # A pair, doubles: distance of its nearest points, proven lower bound, point of A, point of B; both points are the
 # common one where they meet. And integers: facet of A, facet of B, whether they meet.
@@ -52,18 +52,24 @@ INTS_OF_PAIR = 3
 _REACHES, _TRIANGLES, _POINTS, _COUNTERS, _LEAVES = 0, 6, 24, 30, 32
 _N_PAIRS, _EXACT = range(2)
 # What `list_near_pairs` is asked about seen along directions: words of a header, then doubles of each view. How many
-# views; the height of the stack to go on with, 0 to begin; how many pairs are listed before. A view: two unit vectors
-# across the direction and the direction itself; limits of the gap along it; how far apart facets may lie seen along it;
-# and, worked out by the kernel, each of the three vectors as a row and an offset for boxes of A's tree, of B's.
-N_VIEWS, STACKED, N_LISTED, VIEWS_AT = 0, 1, 2, 4
-LEAST_GAP, LARGEST_GAP, BESIDE, _ROWS_OF_A, _ROWS_OF_B = 9, 10, 11, 12, 24
-VIEW = 36
+# views; the height of the stack to go on with, 0 to begin; how many pairs are listed before; which bodies' facets have
+# two sides, bits. A view: two unit vectors across the direction and the direction itself; limits of the gap along it;
+# how far apart facets may lie seen along it; each of the three vectors, worked out by the kernel, as a row and an
+# offset for boxes of A's tree, of B's; cosines of the facet that faces along the direction more, and of the other, at
+# least, but for facets whose boxes are no farther apart than a reach.
+N_VIEWS, STACKED, N_LISTED, TWO_SIDES, VIEWS_AT = range(5)
+LEAST_GAP, LARGEST_GAP, BESIDE, _ROWS_OF_A, _ROWS_OF_B, FACES_ALONG, FACES, ANYWAY = 9, 10, 11, 12, 24, 36, 37, 38
+VIEW = 39
 #: Facets seen along a direction share points where they are no farther apart than so much of both together.
 BETWEEN_SHADOWS = 2.0**-6
 
+#: A normal whose length is below this part of the edges' product may be rounding: the facet has none.
+_FLAT_FACET = 2.0**-44
+
 #: Slots for leaves of a tree. Doubles of a leaf: corners of its triangles, then rows of eight, of each triangle the
-#: least x, y, z and the largest.
-_SLOTS, _BOXES, _OF_LEAF = 16, 9 * MAX_LEAF + 1, 9 * MAX_LEAF + 1 + 6 * LANES
+#: least x, y, z and the largest, then normals.
+_SLOTS, _BOXES, _NORMALS = 16, 9 * MAX_LEAF + 1, 9 * MAX_LEAF + 1 + 6 * LANES
+_OF_LEAF = _NORMALS + 3 * LANES
 DOUBLES = PLACING + CORNERS + _LEAVES + 2 * _SLOTS * (_OF_LEAF + 1)
 FLOATS = 2 * FRAME + PROBE
 
@@ -73,12 +79,13 @@ _U = 2.0**-53
 
 
 class _Query(NamedTuple):
-    """reach : pairs at most so far apart are listed [m].   error : bound of the error of a coordinate in the world.
+    """reach : largest distance of a pair [m].   error : bound of the error of a coordinate in the world.
 
     shift : t_B − t_A.
-    leaves, leaves_at, placed : the leaves placed last, their address, and their numbers.
+    leaves, leaves_at, placed : the leaves placed last, their address, their first triangles.
     out, facets : doubles and integers of the pairs listed, room for ``capacity`` pairs.
-    measures : whether the pairs are measured.   views, n_views : a pair is listed where a view lets the pair through.
+    measures : whether the pairs are measured.   views, n_views, two_sides : of pairs, those let through by a view are
+    listed; of `N_VIEWS` and its neighbours.
     """
 
     trees: PosedTrees
@@ -98,6 +105,7 @@ class _Query(NamedTuple):
     measures: bool
     views: np.ndarray
     n_views: int
+    two_sides: int
 
 
 @kernel
@@ -209,11 +217,31 @@ def _span_along(axis, leaves, at):
     return min(p, q, r), max(p, q, r)
 
 
+@kernel(inline=True)
+def _face_along(query, view, at_a, i, at_b, j):
+    """Whether triangles i and j of two leaves face along a view's direction, or are as near as counts anyway."""
+    leaves, at = query.leaves, VIEW * view
+    nhat = vec3_at(query.views, at + 6)
+    cosine_a = dot(vec3_at(leaves, at_a + _NORMALS + 3 * i), nhat)
+    cosine_b = -dot(vec3_at(leaves, at_b + _NORMALS + 3 * j), nhat)
+    if query.two_sides & 1:
+        cosine_a = abs(cosine_a)
+    if query.two_sides & 2:
+        cosine_b = abs(cosine_b)
+    if max(cosine_a, cosine_b) >= query.views[at + FACES_ALONG] and min(cosine_a, cosine_b) >= query.views[at + FACES]:
+        return True
+    anyway = query.views[at + ANYWAY] + 8.0 * query.error
+    return not _boxes_apart(leaves, at_a + _BOXES + i, at_b + _BOXES + j, anyway)
+
+
 @kernel
-def _facets_are_seen(query, leaves, i, j):
-    """Whether some view lets two triangles of ``leaves`` through."""
+def _facets_are_seen(query, at_a, a, at_b, b):
+    """Whether some view lets triangles a and b of two leaves through."""
+    leaves, i, j = query.leaves, at_a + 9 * a, at_b + 9 * b
     for view in range(query.n_views):
-        is_seen = True
+        is_seen = _face_along(query, view, at_a, a, at_b, b)
+        if not is_seen:
+            continue
         for k in range(3 * view + 2, 3 * view - 1, -1):
             axis = vec3_at(query.views, VIEW * view + 3 * (k % 3))
             low_a, high_a = _span_along(axis, leaves, i)
@@ -250,7 +278,7 @@ def _visit_leaves(query, pair):
         for i in range(n_a):
             if _boxes_apart(leaves, at_a + _BOXES + i, box_b, bound):
                 continue
-            if query.n_views > 0 and not _facets_are_seen(query, leaves, at_a + 9 * i, of_b):
+            if query.n_views > 0 and not _facets_are_seen(query, at_a, i, at_b, j):
                 continue
             if not is_placed:
                 put_in_frame_of_a(trees.placing, trees.B.triangles, 9 * b, trees.corners, 9)
@@ -270,15 +298,18 @@ def _visit_leaves(query, pair):
 
 @kernel(inline=True)
 def _placed_leaf(query, side, tree, X, shift, first, n):
-    """Where a leaf's triangles stand in ``leaves``, rotated by a pose X and shifted, with their boxes.
+    """Place of a leaf's triangles in ``leaves``, rotated by a pose X and shifted, with their boxes.
 
-    A leaf meets leaves of the other tree one after another, and is placed again only once another leaf took its slot.
+    A leaf meets several leaves of the second tree, mostly one after the next: a slot holds the leaf between them.
     """
     slot = _SLOTS * side + (first // MAX_LEAF) % _SLOTS
     at = _OF_LEAF * slot
     if query.placed[slot] != first:
         query.placed[slot] = first
         _place_leaf(query.leaves, at, tree, X, shift, first, n)
+        if query.n_views > 0:
+            for i in range(n):
+                put_vec3(query.leaves, at + _NORMALS + 3 * i, unit_normal(triangle_at(query.leaves, at + 9 * i)))
     return at
 
 
@@ -295,6 +326,15 @@ def _place_leaf(leaves, at, tree, X, shift, first, n):
             p, q, r = leaves[at + 9 * i + j], leaves[at + 9 * i + 3 + j], leaves[at + 9 * i + 6 + j]
             leaves[at + _BOXES + LANES * j + i] = min(p, q, r)
             leaves[at + _BOXES + LANES * (3 + j) + i] = max(p, q, r)
+
+
+@kernel
+def unit_normal(triangle):
+    """The unit vector across a triangle; 0 where the direction may be rounding."""
+    u, v = sub(triangle.q, triangle.p), sub(triangle.r, triangle.p)
+    n = cross(u, v)
+    length = norm(n)
+    return scale(1.0 / length, n) if length > _FLAT_FACET * (norm(u) * norm(v)) else Vec3(0.0, 0.0, 0.0)
 
 
 @kernel(inline=True)
@@ -399,7 +439,7 @@ def list_near_pairs(
         view_f64(numbers_at + 8 * _TRIANGLES, 18), view_f64(numbers_at + 8 * _POINTS, 6),
         view_i64(numbers_at + 8 * _COUNTERS, 2), view_f64(leaves_at, 2 * _SLOTS * _OF_LEAF), leaves_at, placed,
         view_f64(out_at, NUMBERS_OF_PAIR * capacity), view_i64(facets_at, INTS_OF_PAIR * capacity), capacity,
-        measures, view_f64(views_at + 8 * VIEWS_AT, VIEW * n_views), n_views,
+        measures, view_f64(views_at + 8 * VIEWS_AT, VIEW * n_views), n_views, words[TWO_SIDES] if views_at != 0 else 0,
     )
     _set_reaches(A, B, trees.placing, reach + 8.0 * error, query.reaches)
     _set_rows(A, trees.XA, Vec3(0.0, 0.0, 0.0), query, _ROWS_OF_A)
