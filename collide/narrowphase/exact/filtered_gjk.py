@@ -136,6 +136,8 @@ def _search(ordered, ids, points):
         beyond = 0
         nearer = _side_of_difference(direction.d, points, 0, n)
         if nearer == UNKNOWN:
+            nearer = _side_of_vertices(pair, Simplex(ids, 0, n), direction.d, i, j)
+        if nearer == UNKNOWN:
             return FilteredSearch(OPEN, n, rounds)
         if nearer <= 0:
             return FilteredSearch(APART, n, rounds)
@@ -423,6 +425,18 @@ def _extreme_vertex(pair, body, simplex, d, direction, slack, sign):
         if side * sign < 0:
             best = i
     return best
+
+
+@kernel(cold=True)
+def _side_of_vertices(pair, simplex, d, i, j):
+    """`_side_of_difference` of the simplex's first point and the support point (i, j), body by body, or UNKNOWN.
+
+    No vertex of the first point lies before the support's vertex of the same body, so a body's sign is 1 or 0.
+    """
+    at = simplex.at
+    side_of_a = _compare(pair, 0, simplex, _rotate_back(pair.poses, pair.A.pose_at, d), simplex.ids[at], i)
+    side_of_b = _compare(pair, 1, simplex, _rotate_back(pair.poses, pair.B.pose_at, d), j, simplex.ids[at + 1])
+    return 1 if side_of_a == 1 or side_of_b == 1 else max(side_of_a, side_of_b)
 
 
 @kernel
