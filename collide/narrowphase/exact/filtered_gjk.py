@@ -186,6 +186,13 @@ def _point(points, k):
     return bounded.vec3_at(points, _POINT * k)
 
 
+@kernel
+def face_at(points):
+    """Point 0, and a normal of points 0, 1, 2: (y₁ − y₀) × (y₂ − y₁)."""
+    p, q = _point(points, 0), _point(points, 1)
+    return p, bounded.cross(bounded.sub_vec3(q, p), bounded.sub_vec3(_point(points, 2), q))
+
+
 @kernel(inline=True)
 def _leading(points, k):
     """Point k as doubles have it: the sum of its coordinates is off by 2u of its `_size`."""
@@ -337,8 +344,7 @@ def _direction(points, n):
             bounded.scale_vec3(bounded.dot(q, along), p), bounded.scale_vec3(bounded.neg(bounded.dot(p, along)), q)
         )
     if n == 3:
-        q, r = _point(points, 1), _point(points, 2)
-        d = bounded.cross(bounded.sub_vec3(q, p), bounded.sub_vec3(r, q))
+        p, d = face_at(points)
         side = bounded.sign(bounded.dot(d, p))
         if side == -1:
             return Direction(1, bounded.neg_vec3(d))
@@ -547,8 +553,7 @@ def side_of_facets(ordered, requests, request_at, points):
         for corner in range(3):
             at = facet.at + 2 * corner
             _put_point(pair, points, corner, requests[at], requests[at + 1])
-        p, q = _point(points, 0), _point(points, 1)
-        outwards = bounded.cross(bounded.sub_vec3(q, p), bounded.sub_vec3(_point(points, 2), q))
+        p, outwards = face_at(points)
         side = bounded.sign(bounded.dot(outwards, p))
         if side == 1 and n_facets == 1 and requests[request_at] == 1:
             return OUTERMOST if _is_outermost(pair, facet, outwards, error) else NOTHING
