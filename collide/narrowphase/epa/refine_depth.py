@@ -72,10 +72,10 @@ class RefinedDepth(NamedTuple):
 
 
 class _Fine(NamedTuple):
-    """The surface, the double-doubles beside the surface, and what is needed to find more of them.
+    """The surface, its double-doubles, and what more double-doubles are computed from.
 
     low : low parts of both poses.   points, distances, known : of `FineSurface`.   direction : a stored normal.
-    nearest : the normal of the facet at work, reversed.
+    nearest : that of the facet at work, reversed.
     error : of a height over the length of its direction.   scale : what coordinates are multiplied with.
     rounding : of a coordinate in doubles [m].
     """
@@ -157,12 +157,12 @@ def _set_distance(fine, f):
 
 @kernel(inline=True)
 def _nearest_facet(fine, n_facets, f, tie):
-    """Take the planes of facet f, and of all facets perhaps as near, again; returns the nearest of these, with
-    `_set_distance`, its normal reversed in ``nearest``.
+    """Take the planes of facet f and of all facets maybe as near again; returns the nearest facet, with the numbers of
+    `_set_distance`, and writes its normal, reversed, into ``nearest``.
 
-    tie : error of doubles, by which clearances known in doubles alone are too small.
+    tie : error of doubles [scaled], by which clearances known in doubles alone are too small.
 
-    All before any is chosen: no plane waits for the outcome of another.
+    No plane waits for the outcome of another plane: their arithmetic overlaps in the processor.
     """
     clearances = fine.surface.clearances
     limit = clearances[f] + tie

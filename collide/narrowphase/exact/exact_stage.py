@@ -49,8 +49,8 @@ def settle_exactly(
 
     1. `settle_hulls`: two swept hulls. GJK in double-doubles with proven bounds (`filtered_gjk.py`), and in integers
        where a sign stays unproven, decides whether they share a point; integers then know the distance of disjoint
-       cores to all digits. Depths below rounding come from the facets nearest the origin, as
-       named by doubles (`depth_requests.py`, `plane_depth.py`).
+       cores to all digits, or double-doubles where rounding cannot tell (`face_height.py`). Depths below
+       rounding come from the facets nearest the origin, as named by doubles (`depth_requests.py`, `plane_depth.py`).
     2. `settle_halfspaces`: a half-space against a swept hull, the sign of a polynomial a vertex; two half-spaces with
        opposite normals (`opposite_halfspaces.py`). Only if step 1 met a half-space.
     3. `exact_depth`: overlaps settled by step 1 without a depth, where depths are wanted and hulls are small: the

@@ -136,6 +136,8 @@ def _search(ordered, ids, points):
         beyond = 0
         nearer = _side_of_difference(direction.d, points, 0, n)
         if nearer == UNKNOWN:
+            nearer = _side_of_vertices(pair, Simplex(ids, 0, n), direction.d, i, j)
+        if nearer == UNKNOWN:
             return FilteredSearch(OPEN, n, rounds)
         if nearer <= 0:
             return FilteredSearch(APART, n, rounds)
@@ -182,6 +184,13 @@ def _add_product(total, x, y):
 @kernel(inline=True)
 def _point(points, k):
     return bounded.vec3_at(points, _POINT * k)
+
+
+@kernel
+def face_at(points):
+    """Point 0, and a normal of points 0, 1, 2: (y₁ − y₀) × (y₂ − y₁)."""
+    p, q = _point(points, 0), _point(points, 1)
+    return p, bounded.cross(bounded.sub_vec3(q, p), bounded.sub_vec3(_point(points, 2), q))
 
 
 @kernel(inline=True)
@@ -335,8 +344,7 @@ def _direction(points, n):
             bounded.scale_vec3(bounded.dot(q, along), p), bounded.scale_vec3(bounded.neg(bounded.dot(p, along)), q)
         )
     if n == 3:
-        q, r = _point(points, 1), _point(points, 2)
-        d = bounded.cross(bounded.sub_vec3(q, p), bounded.sub_vec3(r, q))
+        p, d = face_at(points)
         side = bounded.sign(bounded.dot(d, p))
         if side == -1:
             return Direction(1, bounded.neg_vec3(d))
@@ -423,6 +431,18 @@ def _extreme_vertex(pair, body, simplex, d, direction, slack, sign):
         if side * sign < 0:
             best = i
     return best
+
+
+@kernel(cold=True)
+def _side_of_vertices(pair, simplex, d, i, j):
+    """`_side_of_difference` of the simplex's first point and the support point (i, j), body by body, or UNKNOWN.
+
+    No vertex of the first point lies before the support's vertex of the same body, so a body's sign is 1 or 0.
+    """
+    at = simplex.at
+    side_of_a = _compare(pair, 0, simplex, _rotate_back(pair.poses, pair.A.pose_at, d), simplex.ids[at], i)
+    side_of_b = _compare(pair, 1, simplex, _rotate_back(pair.poses, pair.B.pose_at, d), j, simplex.ids[at + 1])
+    return 1 if side_of_a == 1 or side_of_b == 1 else max(side_of_a, side_of_b)
 
 
 @kernel
@@ -533,8 +553,7 @@ def side_of_facets(ordered, requests, request_at, points):
         for corner in range(3):
             at = facet.at + 2 * corner
             _put_point(pair, points, corner, requests[at], requests[at + 1])
-        p, q = _point(points, 0), _point(points, 1)
-        outwards = bounded.cross(bounded.sub_vec3(q, p), bounded.sub_vec3(_point(points, 2), q))
+        p, outwards = face_at(points)
         side = bounded.sign(bounded.dot(outwards, p))
         if side == 1 and n_facets == 1 and requests[request_at] == 1:
             return OUTERMOST if _is_outermost(pair, facet, outwards, error) else NOTHING

@@ -7,7 +7,16 @@ import math
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import HALFSPACE, POINTS
 from collide.narrowphase.exact.depth_requests import REQUESTS, find_request
-from collide.narrowphase.exact.exact_gjk import SEPARATE, TOUCHING, UNDONE, gap_of_face, sign_only, touch_exactly
+from collide.narrowphase.exact.exact_gjk import (
+    SEPARATE,
+    TOUCHING,
+    UNDONE,
+    ExactAnswer,
+    gap_of_face,
+    sign_only,
+    touch_exactly,
+)
+from collide.narrowphase.exact.face_height import face_height
 from collide.narrowphase.exact.filtered_gjk import (
     APART,
     MEET,
@@ -39,6 +48,7 @@ from collide.narrowphase.rows import (
     write_vertices,
 )
 from collide.numerics.double_double import DD
+from collide.numerics.vec3 import divide, norm
 from collide.results import EXACT, PLANE, SWEPT, UNDECIDED
 
 #: How `settle_hulls` is called.
@@ -86,6 +96,7 @@ def _settle(ordered, space, requests, k, row_at, boolean, depths, limit):
     radius_a, radius_b = radius_of(ordered.pair, ordered.pair.A), radius_of(ordered.pair, ordered.pair.B)
     n = _take_simplex(ids, row, ordered.flip)
     is_in_reach = n == 3 and is_filtered(ordered)
+    is_swept = radius_a != 0.0 or radius_b != 0.0
     answer = _search(ordered, space, boolean, n, radius_a, radius_b, is_in_reach)
     if answer.verdict == UNDONE:
         keep_proven_sign(row)
@@ -106,7 +117,7 @@ def _settle(ordered, space, requests, k, row_at, boolean, depths, limit):
     if touching and not answer.cores_apart:
         distance = min(distance, 0.0)
         if not boolean:
-            has_depth, depth = _depth(ordered, space, requests, find_request(requests, k), is_in_reach)
+            has_depth, depth = _depth(ordered, space, requests, find_request(requests, k), is_in_reach, is_swept)
             if has_depth:
                 bracket = bracket_of_depth(depth, radius_a, radius_b)
                 distance = bracket.nearest
@@ -137,22 +148,31 @@ def _search(ordered, space, boolean, n, radius_a, radius_b, is_in_reach):
     ids = space.simplex
     is_swept = radius_a != 0.0 or radius_b != 0.0
     if is_in_reach and (is_swept or not boolean):
-        search = search_filtered(ordered, ids, view_f64(space.doubles_at, FILTER_DOUBLES))
+        points = view_f64(space.doubles_at, FILTER_DOUBLES)
+        search = search_filtered(ordered, ids, points)
         if search.end == MEET:
             return sign_only(TOUCHING, search.n, search.rounds)
         if search.end == APART and search.n == 3 and not is_swept:
+            face = face_height(points)
+            if face.proven:
+                v = divide(face.direction, norm(face.direction))
+                return ExactAnswer(SEPARATE, 3, True, face.distance, v, search.rounds)
             return gap_of_face(ordered, space.terms, space.digits, ids, search.rounds)
     return touch_exactly(ordered, space.terms, space.digits, boolean, ids, n, radius_a, radius_b)
 
 
 @kernel
-def _depth(ordered, space, requests, request_at, is_in_reach):
+def _depth(ordered, space, requests, request_at, is_in_reach, is_swept):
     """The `ExactDepth` of `nearest_plane`, by double-doubles as far as these prove sides."""
     if is_in_reach and request_at > 0:
-        side = side_of_facets(ordered, requests, request_at, view_f64(space.doubles_at, FILTER_DOUBLES))
+        points = view_f64(space.doubles_at, FILTER_DOUBLES)
+        side = side_of_facets(ordered, requests, request_at, points)
         if side == THROUGH_ORIGIN:
             return ExactDepth(True, DD(0.0, 0.0))
         if side == OUTERMOST:
+            face = face_height(points)
+            if face.proven and not is_swept:  # a sum with the radii is rounded at another place
+                return ExactDepth(True, face.distance)
             return depth_of_facet(ordered, space.terms, space.digits, requests, request_at)
     return nearest_plane(ordered, space.terms, space.digits, requests, request_at)
 

@@ -71,7 +71,7 @@ def near_case(rng) -> Case:
 
 #: Kinds of pairs, and what part of the searches at least need no integers for their end.
 KINDS = {
-    dyadic_case: 0.4, decimal_case: 0.4, tilted_case: 0.3, turned_case: 0.4, lattice_case: 0.4, near_case: 0.6,
+    dyadic_case: 0.4, decimal_case: 0.7, tilted_case: 0.7, turned_case: 0.9, lattice_case: 0.9, near_case: 0.6,
 }
 
 
