@@ -28,8 +28,20 @@ from collide.lowering.compound_table import (
     MEMBERS_END,
     PART,
 )
+from collide.lowering.packed_convex import POINTS
 from collide.lowering.place_parts import BALL_MARGIN, gap_of_balls, place_ball, write_terms
-from collide.lowering.shape_table import INTS, NUMBERS, POSE, POSE_STRETCH, POSE_TERMS
+from collide.lowering.shape_table import (
+    ADDRESS,
+    INTS,
+    KIND,
+    NUMBERS,
+    PADDED,
+    POSE,
+    POSE_STRETCH,
+    POSE_TERMS,
+    RADIUS,
+    SLOP,
+)
 from collide.narrowphase.composite.composite_block import (
     AT_ONCE,
     BODY_BALLS_AT,
@@ -77,12 +89,26 @@ from collide.narrowphase.composite.composite_rows import (
     begin_score,
     close_score,
     copy_row,
+    first_normal_of,
     first_reach_of,
     separate_bodies,
 )
 from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.rows import HIT, HOW, PART_A, PART_B, ROW
-from collide.numerics.vec3 import Vec3, dot, norm, norm1, rotate_back, scale, sub, vec3_at
+from collide.numerics.vec3 import (
+    Vec3,
+    add,
+    column_at,
+    dot,
+    neg,
+    norm,
+    norm1,
+    rotate,
+    rotate_back,
+    scale,
+    sub,
+    vec3_at,
+)
 from collide.results import REFUSED, UNDECIDED
 
 answer_at = native_call(SIGNATURE)
@@ -97,6 +123,8 @@ _LAY_OUT, _NEAREST, _OTHERS = range(3)
 _BRACKET = 2.0**-20
 #: Of a ball in the world: how far its contents reach along a direction.
 ALONG = 4
+#: Parts of more points are left to the narrowphase.
+_MAX_LISTED = 16
 #: Centres nearer than this give no direction [m].
 _LEAST_LENGTH = 1e-100
 
@@ -440,23 +468,68 @@ def _list_others_of(block, k, boolean, every, n_listed):
         # Others that are as near by their balls as the first: which of them came first has no say.
         reach += max(first_reach_of(block.scores, SCORE * k), _gap_of_pair(block, nodes, first_pair), 0.0)
         reach += _BRACKET * size
-    return _list_pairs(block, k, nodes, reach, first_pair, not boolean, n_listed)
+    nhat = Vec3(0.0, 0.0, 0.0) if boolean else first_normal_of(block.scores, SCORE * k)
+    return _list_pairs(block, k, nodes, reach, first_pair, nhat, not boolean, n_listed)
 
 
 @kernel
-def _list_pairs(block, k, nodes, reach, but, exactly, n_listed):
+def _list_pairs(block, k, nodes, reach, but, nhat, exactly, n_listed):
     """List the pairs of parts of slot k whose balls come within ``reach`` [m], from PAIR on, ascending, without one;
-    PAIR becomes the pair to go on with. Returns the list's length."""
+    PAIR becomes the pair to go on with. Returns the list's length.
+
+    exactly : leave out what is farther apart along ``nhat``, or along the way between the balls' centres, and have the
+    exact terms of poses.
+    """
     header = block.header
     n_near = _find_near(block, nodes, reach, header[PAIR], but)
     for k_near in range(n_near):
+        pair = block.near[k_near]
+        if exactly and _are_apart(block, nodes, pair, nhat, reach):
+            continue
         if n_listed == LIST:
-            header[PAIR] = block.near[k_near]
+            header[PAIR] = pair
             return n_listed
-        _list_pair(block, k, nodes.B.n_parts, block.near[k_near], exactly, n_listed)
+        _list_pair(block, k, nodes.B.n_parts, pair, exactly, n_listed)
         n_listed += 1
     header[PAIR] = nodes.A.n_parts * nodes.B.n_parts
     return n_listed
+
+
+@kernel
+def _are_apart(block, nodes, pair, nhat, reach):
+    """Whether a pair of parts is proven farther apart than ``reach`` [m]: with heights h over planes across a unit
+    vector n, no point of B is nearer than n·t − h_B(−n) − h_A(n), t from A's origin to B's. Rounding takes less than
+    the balls' margin of the size."""
+    of_a, of_b = nodes.A.first + pair // nodes.B.n_parts, nodes.B.first + pair % nodes.B.n_parts
+    p, q = POSE * nodes.A.row, POSE * nodes.B.row
+    for of_centres in range(2):
+        n = nhat
+        if of_centres == 1:
+            parts = part_view(block, max(of_a, of_b) + 1)
+            from_a = rotate(block.poses, p, vec3_at(parts, PART * of_a + CENTRE))
+            n = sub(add(rotate(block.poses, q, vec3_at(parts, PART * of_b + CENTRE)), nodes.shift), from_a)
+            length = norm(n)
+            n = scale(1.0 / length if length > _LEAST_LENGTH else 0.0, n)
+        height_a = _height(block, of_a, rotate_back(block.poses, p, n))
+        height_b = _height(block, of_b, neg(rotate_back(block.poses, q, n)))
+        if dot(n, nodes.shift) - height_a - height_b - nodes.margin > reach:
+            return True
+    return False
+
+
+@kernel(inline=True)
+def _height(block, number, v):
+    """How far a part reaches along a vector of its body's frame of length 1 at most [m]; infinity of all but few
+    points."""
+    ints = view_i64(block.header[INTS_AT] + 8 * INTS * number, INTS)
+    if ints[KIND] != POINTS or ints[PADDED] > _MAX_LISTED:
+        return math.inf
+    numbers = view_f64(block.header[NUMBERS_AT] + 8 * NUMBERS * number, NUMBERS)
+    part = view_f64(block.header[PARTS_AT] + 8 * PART * number, PART)
+    columns, g, height = view_f64(ints[ADDRESS], 3 * ints[PADDED]), rotate_back(part, 0, v), -math.inf
+    for k in range(ints[PADDED]):
+        height = max(height, dot(column_at(columns, ints[PADDED], k), g))
+    return height + dot(vec3_at(part, 9), v) + numbers[RADIUS] + numbers[SLOP]
 
 
 @kernel
@@ -472,7 +545,7 @@ def list_pairs_within(block, limit):
     if _gap(block, 0, 1) > reach:
         return 0
     block.header[PAIR] = 0
-    n = _list_pairs(block, 0, _nodes_of(block, 0, margin, False), reach, -1, False, 0)
+    n = _list_pairs(block, 0, _nodes_of(block, 0, margin, False), reach, -1, Vec3(0.0, 0.0, 0.0), False, 0)
     return n if block.header[PAIR] == count_pairs(block, 0) else -1
 
 

@@ -45,10 +45,11 @@ _N_AXES = 12
 
 # Doubles of a score, what is known of a pair of bodies from the rows so far: the least distance, the number of its row,
 # ends of the bracket, the least lower end of a row that is not certified, rounds, whether a row is a hit, how far other
-# parts have a say by the first row, the number of overlaps kept, and the deepest of them.
+# parts have a say by the first row, the number of overlaps kept, the first row's normal, and the deepest overlaps.
 (
-    _LEAST, _NEAREST, _LOWER, _UPPER, _UNCERTIFIED, _GJK, _EPA, _HIT, _SAY, _N_OVERLAPS, _DEEPEST,
+    _LEAST, _NEAREST, _LOWER, _UPPER, _UNCERTIFIED, _GJK, _EPA, _HIT, _SAY, _N_OVERLAPS, _NORMAL,
 ) = range(11)
+_DEEPEST = _NORMAL + 3
 # Of an overlap: its distance, the number of its row, its parts, its normal and both points.
 _DISTANCE, _NUMBER, _OF_A, _OF_B, _VECTORS = range(5)
 _OVERLAP = _VECTORS + 9
@@ -98,6 +99,12 @@ def first_reach_of(score, at):
 
 
 @kernel(inline=True)
+def first_normal_of(score, at):
+    """The normal of the first row: whatever goes by it depends on the pair of bodies alone."""
+    return vec3_at(score, at + _NORMAL)
+
+
+@kernel(inline=True)
 def copy_row(row_at, out_at):
     row = view_i64(row_at, ROW // 8)
     out = view_i64(out_at, ROW // 8)
@@ -120,6 +127,7 @@ def add_row(score, at, row_at, number, out_at):
         copy_row(row_at, out_at)
     if nearest < 0.0:
         score[at + _SAY] = lower if row.flags[BEYOND] != 0 else upper
+        put_vec3(score, at + _NORMAL, vec3_at(row.doubles, NORMAL))
     score[at + _LOWER] = min(score[at + _LOWER], lower)
     score[at + _UPPER] = min(score[at + _UPPER], upper)
     if row.flags[CERTIFIED] == 0:

@@ -68,7 +68,7 @@ def test_one_row_of_many(overlaps):
         rounds = rows["iterations"].astype(int)
         assert row["iterations"] == (rounds & 0xFFFF).sum() | (rounds >> 16).sum() << 16, told
         deep = sorted((rows["distance"][k], k) for k in np.flatnonzero(rows["upper"] < 0).tolist())[:MAX_NORMALS]
-        kept = score[10:].reshape(MAX_NORMALS, -1)[: len(deep)]
+        kept = score[13:].reshape(MAX_NORMALS, -1)[: len(deep)]
         assert [(d, int(k)) for d, k in kept[:, :2].tolist()] == deep, told
         for overlap_kept, (_, k) in zip(kept, deep):
             assert np.array_equal(overlap_kept[4:7], rows["normal"][k]), told

@@ -16,7 +16,8 @@ from naive import Case, random_pose, rng_of
 
 import collide
 from collide.kernels import address_of, entry, view_f64
-from collide.lowering.compound_table import PART, lay_out
+from collide.lowering.compound_layout import layout_of
+from collide.lowering.compound_table import BALL, CENTRE, PART, SWEPT_RADIUS, lay_out
 from collide.lowering.parts import convex_set_of, parts_of
 from collide.lowering.place_parts import place_part, write_terms
 from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, TERM_ROW, ShapeTable, pose_table
@@ -396,7 +397,7 @@ def test_near_parts_are_listed_in_the_order_of_their_numbers():
 
 @pytest.mark.skipif(not single_calls_are_safe(), reason="single calls go the long way here")
 def test_single_calls_of_many_parts_have_the_bytes_of_batches():
-    """More pairs of parts than a single call answers: far apart, near, meeting, and with more overlaps than it lists."""
+    """More pairs of parts than a single call answers: far, near, meeting, and with more overlaps than listed."""
     rng, answered = rng_of("single calls of many parts"), {"collide": 0, "distance": 0}
     A, B = (collide.Compound([(collide.Box(rng.uniform(0.1, 0.3, 3)), random_pose(rng, 1.0)) for _ in range(90)])
             for _ in "ab")
@@ -417,3 +418,26 @@ def test_single_calls_of_many_parts_have_the_bytes_of_batches():
         answered["collide"] += pair.collide(X_WA, X_WB) is not None
         answered["distance"] += pair.distance(X_WA, X_WB, bytearray(PAIR_DTYPE.itemsize), True, np.inf) is not None
     assert answered["collide"] == 8 and 3 <= answered["distance"] < 8, answered
+
+
+@pytest.mark.parametrize("away", [3.0, 20.0, 200.0])
+def test_planes_leave_out_most_parts_that_are_near_by_their_balls(away):
+    """Slabs, balls, capsules and small hulls: the distance is that of the parts one by one, and few are asked."""
+    rng, asked, n_near, half = rng_of("planes", away), 0, 0, np.array((0.2, 0.15, 0.1))
+    makers = (lambda w: collide.Box(w), lambda w: collide.Sphere(w[0]), lambda w: collide.Capsule(w[0], w[1]),
+              lambda w: collide.ConvexHull(np.vstack([np.diag(w), -np.diag(w[::-1])])))
+    B = collide.Box(2 * half)
+    for _ in range(12):
+        items = [(makers[int(rng.integers(4))](rng.uniform(0.05, 0.5, 3) * (1, 1, 0.3)), random_pose(rng, 1.0))
+                 for _ in range(150)]
+        A, X_WA, X_WB = collide.Compound(items), random_pose(rng, 1.0), random_pose(rng, 1.0)
+        X_WB[:3, 3] = X_WA[:3, 3] + away * naive.unit(rng.normal(size=3))
+        rows = [collide.distance(shape, B, X_WA @ X, X_WB, signed=False) for shape, X in items]
+        of_all = collide.distance(A, B, X_WA, X_WB, signed=False)
+        asked += _asked(lambda A=A, X=X_WA, Y=X_WB: collide.distance(A, B, X[None], Y[None], signed=False))
+        assert abs(of_all.distance - min(row.distance for row in rows)) < 1e-13 * away
+        balls = layout_of(A).parts
+        centres = balls[:, CENTRE : CENTRE + 3] @ X_WA[:3, :3].T + X_WA[:3, 3] - X_WB[:3, 3]
+        gaps = np.linalg.norm(centres, axis=1) - balls[:, BALL] - balls[:, SWEPT_RADIUS] - np.linalg.norm(half)
+        n_near += int((gaps <= rows[int(gaps.argmin())].distance).sum())
+    assert 12 <= asked < 0.7 * n_near, (asked, n_near)
