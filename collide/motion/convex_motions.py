@@ -120,7 +120,7 @@ class SingleUnions:
         for X in matrices:
             if X.__class__ is not np.ndarray or X.dtype is not _FLOAT64 or X.shape != (4, 4) or not X.flags.carray:
                 return None
-        space = getattr(self._of_thread, "space", None) or self._prepare()
+        space = self.ready()
         at = map(address_of, matrices)
         if first_impact_of_unions(space.header_at, *at, 0, 0, True, tolerance, space.row_at) != 0:
             return None
@@ -129,8 +129,12 @@ class SingleUnions:
     def search(self, motions: Motions, k: int, tolerance: float, rows: np.ndarray) -> bool:
         """Write row k of motions, already checked; False where too many parts come near together."""
         at = [0 if X is None else address_of(X[k % len(X)]) for X in motions]
-        space = getattr(self._of_thread, "space", None) or self._prepare()
+        space = self.ready()
         return first_impact_of_unions(space.header_at, *at, False, tolerance, address_of(rows[k : k + 1])) == 0
+
+    def ready(self) -> _SingleSpace:
+        """This thread's workspace, made when first asked for."""
+        return getattr(self._of_thread, "space", None) or self._prepare()
 
     def _prepare(self) -> _SingleSpace:
         if not isinstance(self._table, CompoundTable):
@@ -138,9 +142,10 @@ class SingleUnions:
         composite, here = of_thread.space_for(self._table), IDENTITY[None]
         doubles, integers = np.zeros(UNION_DOUBLES), np.zeros(UNION_INTEGERS, dtype=np.int64)
         doubles[[SIZE, SMALLER]] = self._sizes
+        is_searched = self._sizes[0] < (1.0 + TIMES_SMALLER) * self._sizes[1]  # else as `parts_in_turn` does
         header, row = np.zeros(UNION_HEADER, dtype=np.int64), free_rows(1)
         at = address_of(doubles), address_of(integers)
-        header[KERNEL:IMPACT] = code_of(find_impacts), *self._first, self._larger, *at
+        header[KERNEL:IMPACT] = code_of(find_impacts), *self._first, self._larger, is_searched, *at
         header[IMPACT:SPAN] = header_of(self._tables, Motions(here, here, here, here, None, None))
         header[IMPACT + XA0_STEP : IMPACT + OMEGA_A_AT] = 0
         header[SPAN:COMPOSITE] = self._spans.header
@@ -201,8 +206,7 @@ class _Bodies:
             self.single = SinglePair(self, 0, len(shapes) - 1)
         elif len(shapes) <= 2 and int(self.counts[0] * self.counts[-1]) > MAX_ASKED:
             unions = [compound_parts(shape) for shape in (shapes[0], shapes[-1])]
-            least, largest = sorted(union.radius for union in unions)
-            if not any(union.unbounded for union in unions) and TIMES_SMALLER * least > largest:
+            if not any(union.unbounded for union in unions):
                 self.single = SingleUnions(self, shapes[0], shapes[-1])
 
     def jobs(self, a: np.ndarray, b: np.ndarray, first: int, motions: Motions) -> np.ndarray:
@@ -370,6 +374,8 @@ def convex_impacts(
     if of_one_pair:
         is_pair = a[0] == 0 and b[0] == len(shapes) - 1
         unions = bodies.single if is_pair and isinstance(bodies.single, SingleUnions) else None
+        if unions is not None:
+            unions.ready()
         near = balls_meet(compound_parts(shapes[a[0]]), compound_parts(shapes[b[0]]), motions, n)
 
     def work(piece: slice) -> None:

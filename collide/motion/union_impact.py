@@ -36,9 +36,10 @@ from collide.narrowphase.pose_batches import set_pose
 _find_impacts_at = native_call("int64(int64, int64, int64, float64, float64, float64, int64)")
 
 # Header: the kernel of jobs; rows of both bodies' first parts in its tables; which body's content is the larger, A's
-# (1), B's (−1) or none (0); where the doubles and integers are that it works in. Then the headers of `impact_jobs.py`,
+# (1), B's (−1) or none (0); whether unions whose balls meet are searched; where the doubles and integers are that it
+# works in. Then the headers of `impact_jobs.py`,
 # `span_bounds.py` and `composite_block.py`, whose motion is the one asked about.
-KERNEL, FIRST_A, FIRST_B, LARGER, DOUBLES_AT, INTEGERS_AT, IMPACT = range(7)
+KERNEL, FIRST_A, FIRST_B, LARGER, IS_SEARCHED, DOUBLES_AT, INTEGERS_AT, IMPACT = range(8)
 SPAN = IMPACT + IMPACT_HEADER
 COMPOSITE = SPAN + SPAN_HEADER
 UNION_HEADER = COMPOSITE + COMPOSITE_HEADER
@@ -70,6 +71,8 @@ def first_impact_of_unions(header_at, XA0_at, XA1_at, XB0_at, XB1_at, omega_a_at
             return -1
     empty_rows(row_at, 1)
     out = _described(header_at, 0.0, 1.0)
+    if out[BEGIN] <= out[END] and header[IS_SEARCHED] == 0:
+        return -1
     doubles[_SPANS], doubles[_SPANS + 1] = out[BEGIN], out[END]
     numbers = view_f64(row_at, DOUBLES_OF_ROW)
     least, top, n_searched = LEAST_MOVED * doubles[SMALLER], 1, 0

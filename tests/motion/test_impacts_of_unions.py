@@ -173,8 +173,10 @@ def test_a_small_union_is_searched_beside_those_parts_of_a_large_one_that_a_ball
     """Through 100 boxes of a metre: one ball a part, then all parts of the small union beside the first that it meets;
     beside a miss there is nothing more."""
     jobs, find = [], convex_motions.find_impacts
-    monkeypatch.setattr(convex_motions, "find_impacts", lambda *args: (jobs.append(args[2]), find(*args))[1])
     large, tiny, eye = clutter(100, False, "a"), small(clutter(120, False, "b"), 1e-6), np.eye(4)
+    away = collide.pose((9.0, 0.0, 0.0))
+    assert not collide.time_of_impact(large, tiny, eye, eye, away, away).hit  # ready: the kernel itself is asked for
+    monkeypatch.setattr(convex_motions, "find_impacts", lambda *args: (jobs.append(args[2]), find(*args))[1])
     x, y, _ = large.items[0][1][:3, 3]
     ends = collide.pose((x, y, 20.0)), collide.pose((x, y, -20.0))
     assert collide.time_of_impact(large, tiny, eye, eye, *ends).hit
