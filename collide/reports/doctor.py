@@ -220,12 +220,12 @@ def _answers() -> list[Check]:
 def _known_pairs():
     """(name, A, B, where B stands along x [m], true signed distance [m])."""
     box, sphere = collide.Box((1.0, 1.0, 1.0)), collide.Sphere(0.5)
-    hull = collide.ConvexHull([(-0.5, 0, 0), (0.5, 0.5, 0), (0.5, -0.5, 0.5), (0.5, -0.5, -0.5)])
+    hull = collide.ConvexHull([(0, 0, 0), (1, 0.5, 0), (1, 0, 0.5), (1, 0.5, 0.5)])
     yield "two spheres apart", sphere, sphere, 3.0, 2.0
     yield "two boxes apart", box, box, 1.5, 0.5
     yield "two boxes overlapping", box, box, 0.75, -0.25
     yield "box and sphere touching", box, sphere, 1.0, 0.0
-    yield "capsule and hull apart", collide.Capsule(0.25, 1.0), hull, 1.0, 0.25
+    yield "capsule and hull apart", collide.Capsule(0.25, 1.0), hull, 0.5, 0.25
     yield "cylinder and box overlapping", collide.Cylinder(0.5, 2.0), box, 0.75, -0.25
     yield "half-space and sphere apart", collide.Halfspace((1.0, 0.0, 0.0), 0.0), sphere, 1.5, 1.0
 

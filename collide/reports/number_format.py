@@ -39,16 +39,16 @@ def brief_length(metres: float) -> str:
     size = abs(metres)
     if size == 0 or 1e-3 <= size < 1:
         return f"{metres * 1e3:.6g} mm"
-    if 1 <= size < 1e6:
+    if size >= 1:
         return f"{metres:.6g} m"
-    if 1e-7 <= size < 1e-3:
+    if size >= 1e-7:
         return f"{metres * 1e6:.6g} µm"
     return f"{metres:.3g} m"
 
 
 def volume(cubic_metres: float) -> str:
     """A volume inside a sentence: ``1.5 m³``, ``12.3 cm³``, ``0.4 mm³``."""
-    for unit, size in (("m³", 1.0), ("cm³", 1e-6), ("mm³", 1e-9)):
+    for unit, size in (("m³", 1.0), ("cm³", 1e-6)):
         if cubic_metres >= 0.1 * size:
             return f"{cubic_metres / size:.4g} {unit}"
     return f"{cubic_metres / 1e-9:.4g} mm³"
@@ -66,13 +66,13 @@ def _split(metres: float) -> tuple[str, str]:
     size = abs(metres)
     if not math.isfinite(size):
         return "unbounded", ""
-    if size == 0 or 1e-4 <= size < 10:
-        return f"{metres * 1e3:.3f}", "mm"
-    if 10 <= size < 1e6:
+    if size >= 1e6 or 0 < size < 1e-7:
+        return f"{metres:.2e}", "m"
+    if size >= 10:
         return f"{metres:.3f}", "m"
-    if 1e-7 <= size < 1e-4:
+    if 0 < size < 1e-4:
         return f"{metres * 1e6:.3f}", "µm"
-    return f"{metres:.2e}", "m"
+    return f"{metres * 1e3:.3f}", "mm"
 
 
 def widths(values) -> list[str]:

@@ -335,7 +335,7 @@ class Watch:
     def _state(self, k: int) -> dict[str, float]:
         """Joint values of all robots at sample k."""
         return {
-            joint: float(value) + 0.0
+            joint: float(value)
             for robot, placement in self.scene.placements.items()
             for joint, value in zip(placement.robot.joint_names, self.path.configurations[robot][k])
         }

@@ -94,10 +94,9 @@ def moving_columns(robot: Robot, bodies: list[LinkBody]) -> dict[tuple[int, int]
     dict of (int, int) to (k,) int
         Numbers of two bodies, the smaller first → columns; without columns the links are rigidly joined.
     """
-    share = np.random.default_rng(20).uniform(0.3, 0.7, robot.dof)
-    lower, upper = np.maximum(robot.lower, -1.0), np.minimum(robot.upper, 1.0)
-    base = lower + share * (upper - lower)
-    Q = np.vstack([base, base + np.diag(0.17 * (0.01 + upper - lower))]) if robot.dof else base[None]
+    random = np.random.default_rng(20)
+    base, moved = random.uniform(0.3, 0.7, robot.dof), random.uniform(0.8, 1.2, robot.dof)
+    Q = np.vstack([base, np.where(np.eye(robot.dof, dtype=bool), moved, base)])
     X_WLs = robot.link_poses(Q)
     index = {link: k for k, link in enumerate(robot.links)}
     X_WBs = [X_WLs[:, index[body.link]] for body in bodies]
@@ -105,6 +104,6 @@ def moving_columns(robot: Robot, bodies: list[LinkBody]) -> dict[tuple[int, int]
     moving = {}
     for i, j in combinations(range(len(bodies)), 2):
         X_AB = inverses[i] @ X_WBs[j]
-        shifts = np.abs(X_AB[1:] - X_AB[0]).max(axis=(1, 2)) if robot.dof else np.zeros(0)
+        shifts = np.abs(X_AB[1:] - X_AB[0]).max(axis=(1, 2))
         moving[i, j] = np.flatnonzero(shifts > 1e-9)
     return moving

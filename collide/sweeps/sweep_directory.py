@@ -143,7 +143,7 @@ class SweepDirectory:
         of_sweep = _digest_of(manifest)
         for file in sorted(self.path.glob("chunk-*.parquet")):
             number = _number_of(file)
-            if number is None or file != self.chunk_file(number) or not 0 <= number < manifest["chunks"]:
+            if number is None or file != self.chunk_file(number) or number >= manifest["chunks"]:
                 continue
             try:
                 table = None if file.is_symlink() or not file.is_file() else parquet.read_table(file)

@@ -181,7 +181,7 @@ def _askable(checker: Any, rows: np.ndarray, Q: np.ndarray, notes: list[str | No
     if not len(rows):
         return []
     try:
-        checker.robot.link_poses(Q[rows[np.abs(Q[rows]).max(axis=1) > 1e6]] if len(rows) else Q[:0])
+        checker.robot.link_poses(Q[rows[(np.abs(Q[rows]) > 1e6).any(axis=1)]])
         return [rows]
     except CollideError:
         fine = []

@@ -137,8 +137,9 @@ class _Counts:
         self.n_no_answer += int((~is_answer).sum())
         self.n_outside += int((is_answer & has_note).sum())
         for named, rows in ((self.no_answer, ~is_answer), (self.outside, is_answer & has_note)):
-            for k in np.flatnonzero(rows)[: _MAX_NAMED - len(named)].tolist():
-                named.append((table["row"][k].as_py(), table["note"][k].as_py()))
+            first = np.flatnonzero(rows)[:_MAX_NAMED].tolist()
+            named += [(table["row"][k].as_py(), table["note"][k].as_py()) for k in first]
+            del named[_MAX_NAMED:]
         if self._with_distances:
             self._look_for_least(table)
 

@@ -66,6 +66,8 @@ def test_a_plot_has_a_panel_a_mesh_and_one_label_below(files, n):
     assert cli.main(["locality", *map(str, named), "--plot", str(image), "--quiet"]) == 0
     text = image.read_text()
     assert text.count("<!-- local stretch -->") == 1
+    assert text.count("<!-- σ, at most ") == text.count("<!-- σ10, at most ") == n
+    assert f'height="{72 * (2.6 * n + 0.6):g}pt"' in text
     titles = [text.index(f"<!-- torus{k}: ") for k in range(n)]
     label, panels = text.index("<!-- local stretch -->"), [text.index(f'id="axes_{k + 1}"') for k in range(n)]
     assert titles == sorted(titles) and label > panels[-1]

@@ -13,7 +13,6 @@ from collide.reports.checking import COLLISION, DEEPER, GONE, KNOWN, Check, Find
 from collide.reports.comparing import _engine_tables, _wrong_of
 from collide.reports.comparing import verdict as comparison_verdict
 from collide.reports.doctor import _ask, _cache, _known_pairs
-from collide.reports.number_format import brief_length, seconds
 from collide.reports.pair_classes import Pairs
 from collide.reports.report import _skipped
 from collide.reports.tables import Column, Table, lay_out
@@ -43,10 +42,6 @@ def test_json_of_pairs_is_whole_whatever_the_chunks(monkeypatch, n):
 def test_the_line_about_the_scene(robots, end, bodies, words):
     scene = {"name": "cell", "bodies": bodies, "static": 1, "robots": robots}
     assert _scene_line(SimpleNamespace(scene=scene)) == f"cell: {words} (1 fixed){end}"
-
-
-def test_seconds_have_two_digits_or_three():
-    assert [seconds(value) for value in (0.00994, 0.00995, 0.0123)] == ["9.9 ms", "10 ms", "12 ms"]
 
 
 def test_prose_has_a_title_where_there_is_any():
@@ -151,14 +146,6 @@ def test_lines_are_as_wide_as_the_terminal_or_columns_says(monkeypatch):
     assert terminal.output_width(pipe) == (30, False)
     monkeypatch.delenv("COLUMNS")
     assert terminal.output_width(pipe) == (terminal.PIPE_WIDTH, True) and not terminal.output_width(window)[1]
-
-
-@pytest.mark.parametrize(("metres", "words"), [
-    (0.0, "0 mm"), (1.0, "1 m"), (np.nextafter(1.0, 0.0), "1000 mm"), (-1.5, "-1.5 m"), (1e-3, "1 mm"),
-    (0.999e-3, "999 µm"), (1e6, "1e+06 m"), (999999.0, "999999 m"), (1e-7, "0.1 µm"), (0.9e-7, "9e-08 m"),
-])
-def test_lengths_in_a_sentence_change_their_unit_at_round_numbers(metres, words):
-    assert brief_length(metres) == words
 
 
 def test_stages_of_a_report_come_in_the_order_they_run_and_others_after_them():
