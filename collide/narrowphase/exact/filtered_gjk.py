@@ -135,7 +135,7 @@ def _search(ordered, ids, points):
         _put_point(pair, points, n, i, j)
         beyond = 0
         nearer = _side_of_difference(direction.d, points, 0, n)
-        if nearer == UNKNOWN:
+        if nearer == UNKNOWN and n == 3:  # integers go on from an edge's search: there the first simplex is to stay
             nearer = _side_of_vertices(pair, Simplex(ids, 0, n), direction.d, i, j)
         if nearer == UNKNOWN:
             return FilteredSearch(OPEN, n, rounds)

@@ -19,6 +19,7 @@ from collide.narrowphase.exact.exact_workspace import INTEGERS
 from collide.narrowphase.exact.plane_depth import depth_of_facet, nearest_plane
 from collide.numerics.bounded import Bounded, BoundedVec3
 from collide.numerics.vec3 import Vec3, norm
+from collide.scenes.families import generate
 
 pytestmark = pytest.mark.plain_kernels
 
@@ -200,6 +201,15 @@ def test_the_same_depths_as_in_integers(draw):
     proven = seen["through the origin"] + seen["outermost"]
     assert proven > 5 and seen["nothing"] > 5, seen
     assert seen["lost"] <= proven, seen
+
+
+def test_an_edge_whose_last_sign_is_open_leaves_the_first_simplex_to_integers():
+    """Two boxes edge to edge: begun from another simplex, integers ended at another of the level edges."""
+    case = generate("box_lattice", 78, 77)[77]
+    bodies = PosedBodies(*case.shapes())
+    ids = [6, 1, 2, 0, 7, 0, *[0] * 10]
+    assert F.search_filtered(bodies.ordered, ids, np.zeros(F.DOUBLES)).end == F.OPEN
+    assert ids[:6] == [6, 1, 2, 0, 7, 0]
 
 
 @pytest.mark.parametrize(
