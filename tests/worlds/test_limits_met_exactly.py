@@ -10,9 +10,12 @@ import collide
 from collide import Box, Compound, Halfspace, InvalidArgument, Sphere, World, pose
 from collide.worlds import outside, packed_world
 from collide.worlds.bodies import WorldBodies
+from collide.worlds.world_parts import MIN_BY_TREE
 
-#: Sixteen boxes of 0.5 m, one a metre along x: two of these have pairs of parts enough for a tree over them.
-COMB = Compound([(Box((0.5, 0.5, 0.5)), pose((k, 0, 0))) for k in range(16)])
+#: Boxes of 0.5 m, one a metre along x: two such combs have just the pairs of parts that a tree over them is made for.
+TEETH = 32
+COMB = Compound([(Box((0.5, 0.5, 0.5)), pose((k, 0, 0))) for k in range(TEETH)])
+assert TEETH**2 == MIN_BY_TREE
 
 
 def world_of(*bodies, **options) -> World:
@@ -32,15 +35,15 @@ def mesh_of(shape) -> collide.Mesh:
 @pytest.mark.parametrize(("limit", "rows"), [(0.5, 1), (0.5 + 2.0**-40, 1), (0.5 - 2.0**-40, 0)])
 def test_parts_exactly_as_far_apart_as_asked_have_a_row(limit, rows):
     """The last part of a comb and the first of another, 0.5 m apart: all other pairs are farther."""
-    for first, second in ((COMB, COMB), (COMB, Box((0.5, 0.5, 0.5))), (Box((30.5, 0.5, 0.5)), COMB)):
-        world = world_of((first, (0, 0, 0)), (second, (16, 0, 0)))
+    for first, second in ((COMB, COMB), (COMB, Box((0.5, 0.5, 0.5))), (Box((2 * TEETH - 1.5, 0.5, 0.5)), COMB)):
+        world = world_of((first, (0, 0, 0)), (second, (TEETH, 0, 0)))
         found = world.distances(max_distance=limit)
         assert len(found) == rows
         for row in found:
-            assert row["distance"] == 0.5 and (row["part_a"], row["part_b"]) == (15 if first is COMB else 0, 0)
-    world = world_of((COMB, (16, 0, 0)), (COMB, (16, 40, 0)))
+            assert row["distance"] == 0.5 and (row["part_a"], row["part_b"]) == (TEETH - 1 if first is COMB else 0, 0)
+    world = world_of((COMB, (TEETH, 0, 0)), (COMB, (TEETH, 40, 0)))
     asked = world.query(COMB, pose(), max_distance=limit)
-    assert asked["distance"].tolist() == [0.5] * rows and asked["part_a"].tolist() == [15] * rows
+    assert asked["distance"].tolist() == [0.5] * rows and asked["part_a"].tolist() == [TEETH - 1] * rows
 
 
 @pytest.mark.parametrize(("limit", "body"), [(0.5, 7), (0.5 - 2.0**-50, -1), (0.5 + 2.0**-50, 7)])
@@ -49,6 +52,9 @@ def test_the_nearest_body_exactly_as_far_as_asked_counts(limit, body):
     for k in range(9):
         world.add(Box((1, 1, 1)), pose((0, 0, 0) if k == 7 else (50 + 3 * k, 0, 0)))
     assert world.nearest((1, 0, 0), max_distance=limit)["body"].tolist() == [body]
+    lower = world.nearest((1, 0, 0))["lower"][0]
+    assert world.nearest((1, 0, 0), max_distance=lower)["body"].tolist() == [7]
+    assert world.nearest((1, 0, 0), max_distance=np.nextafter(lower, 0.0))["body"].tolist() == [-1]
     found = world.raycast((1, 0, 0), (-1, 0, 0), max_distance=limit)
     assert found["body"].tolist() == [body]
 
@@ -237,7 +243,7 @@ def test_margins_of_new_bodies_are_read_where_they_are_numbers_of_any_kind():
         assert world.collides()
     for none in (0, 0.0, np.float64(0.0), -0.0):
         assert world.body(world.add(Sphere(0.1), margin=none)).margin == 0.0
-    for wrong in (-0.25, float("nan"), float("inf"), "far", 1e60):
+    for wrong in (-0.25, float("nan"), float("inf"), "far", 1e60, np.zeros(1)):
         with pytest.raises(InvalidArgument, match=r"World\.add: margin"):
             world.add(Sphere(0.1), margin=wrong)
 
@@ -260,12 +266,15 @@ def test_rows_of_removed_bodies_stay_until_they_are_more_than_so_many(remaining)
 
 def test_arrays_of_ids_of_another_form_are_refused():
     world = world_of(*[(Sphere(0.1), (k, 0, 0)) for k in range(4)])
-    for wrong in (np.array([[0, 1], [2, 3]]), np.array(2), np.array([0.0, 1.0]), np.array([True, False])):
-        for remove in (False, True):
-            if remove and len(world) == 4:
-                world.remove(3)
+    for _ in range(2):
+        for wrong in (np.array([[0, 1], [2, 3]]), np.array(2), np.array([0.0, 1.0]), np.array([True, False])):
             with pytest.raises((InvalidArgument, collide.UnknownBody)):
                 world.sleep(wrong)
+        if len(world) == 4:
+            world.remove(3)
+    for removed in ([0, 3], np.array([3, 0])):
+        with pytest.raises(collide.UnknownBody, match="no body has id 3"):
+            world.sleep(removed)
     assert not any(world.body(k).sleeping for k in world.ids)
     world.sleep(np.array([0, 2], dtype=np.uint8))
     assert [world.body(k).sleeping for k in world.ids] == [True, False, True]
@@ -309,17 +318,17 @@ def test_a_comb_that_moves_is_asked_where_it_stands():
     world = world_of((COMB, (0, 0, 0)), (COMB, (0, 2, 0)))
     assert world.distances(max_distance=1.75)["distance"].tolist() == [1.5]
     for z in (3.0, 1.0, 2.0):
-        world.set_pose(1, pose((16, 0, z)))
+        world.set_pose(1, pose((TEETH, 0, z)))
         (row,) = world.distances(max_distance=9.0)
         gap = np.hypot(0.5, z - 0.5)
-        assert row["distance"] == pytest.approx(gap, abs=1e-12) and (row["part_a"], row["part_b"]) == (15, 0)
+        assert row["distance"] == pytest.approx(gap, abs=1e-12) and (row["part_a"], row["part_b"]) == (TEETH - 1, 0)
     world.set_pose(1, pose((0.5, 0, 0)))
     assert world.minimum()["distance"][0] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_unions_of_different_many_parts_have_the_parts_that_are_nearest():
     short = Compound([(Box((0.5, 0.5, 0.5)), pose((k, 0, 0))) for k in range(70)])
-    for first, second, parts in ((COMB, short, (15, 0)), (short, COMB, (69, 0))):
+    for first, second, parts in ((COMB, short, (TEETH - 1, 0)), (short, COMB, (69, 0))):
         far = len(first.items)
         world = world_of((first, (0, 0, 0)), (second, (far, 0, 0)), (Sphere(0.5), (0, 50, 0)))
         for limit in (0.5, 0.75):
@@ -388,3 +397,43 @@ def test_rows_of_many_pieces_are_those_of_one(monkeypatch, threads):
                 assert world.distances(threads=threads).rows.tobytes() == whole.tobytes()
                 assert world.stats["narrowphase"] == 36
                 assert world.collides(threads=threads) == bool(whole["hit"].any())
+
+
+def test_a_body_that_is_new_and_moved_is_added_only():
+    world = world_of((Sphere(0.5), (0, 0, 0)), (Sphere(0.5), (9, 0, 0)))
+    assert not world.collides()
+    world.set_pose(world.add(Sphere(0.5), pose((5, 0, 0))), pose((0.5, 0, 0)))
+    world.set_pose(1, pose((8, 0, 0)))
+    assert world.collides() and (world.stats["updates"]["added"], world.stats["updates"]["moved"]) == (1, 1)
+
+
+def test_bodies_whose_boxes_meet_and_that_do_not_have_no_overlap():
+    c = np.sqrt(0.5)
+    turned = np.array([[c, -c, 0, 1.0], [c, c, 0, 1.0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    world = World()
+    for X_WB in (pose(), turned):
+        world.add(Box((1, 1, 1)), X_WB)
+    assert world.boxes_near((0.4, 0.4, 0), (0.5, 0.5, 0)) == [0, 1] and not world.collides()
+    assert len(world.overlaps()) == 0
+    world.set_pose(1, pose((1, 0, 0)))
+    assert world.overlaps()["volume"].tolist() == [0.0] and world.overlaps()["patch_area"].tolist() == [1.0]
+
+
+def test_the_nearest_pair_within_a_limit_is_found_behind_many_that_are_beyond():
+    """Balls beside each other at a diagonal: boxes overlap, and the balls are 0.77 m apart."""
+    world = World()
+    for k in range(24):
+        for shift in (0.0, 1.6):
+            world.add(Sphere(1.0), pose((20 * k + shift, shift, shift)))
+    assert len(world.minimum(max_distance=0.5)) == 0
+    pair = [world.add(Box((1, 1, 1)), pose((x, 50, 0))) for x in (0.0, 1.375)]
+    (row,) = world.minimum(max_distance=0.5)
+    assert [row["a"], row["b"]] == pair and row["distance"] == 0.375
+
+
+def test_of_bodies_that_are_touched_at_once_the_first_counts_whichever_is_asked_first():
+    """A ball meets an edge beside its way and a face before it at the same time: 1.25² = 0.75² + 1²."""
+    face, edge = (Box((2, 0.25, 9)), (-1.25, 0, 0)), (Box((2, 2, 9)), (-1.0, 1.75, 0))
+    for bodies in ((face, edge), (edge, face)):
+        found = world_of(*bodies).shape_cast(Sphere(1.25), pose((5, 0, 0)), (-1, 0, 0))
+        assert found["body"].tolist() == [0] and found["distance"].tolist() == [4.0]
