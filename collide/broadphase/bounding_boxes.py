@@ -18,8 +18,6 @@ from collide.lowering.shape_table import (
     PARAMS,
     POSE,
     POSE_SLOP,
-    POSE_STRETCH,
-    POSE_TERMS,
     RADIUS,
     REACH,
     SLOP,
@@ -78,7 +76,7 @@ def _bound(ints, numbers, poses, coordinates, s, p, axis):
 
 
 @kernel
-def _put_box(ints_at, numbers_at, s, poses, k, boxes):
+def put_box(ints_at, numbers_at, s, poses, k, boxes):
     """Write the box of shape s at pose row k into row k of boxes; a half-space gets an infinite box."""
     ints = view_i64(ints_at, INTS * (s + 1))
     numbers = view_f64(numbers_at, NUMBERS * (s + 1))
@@ -104,36 +102,7 @@ def bounding_boxes(ints_at, numbers_at, poses_at, shape_of_at, n, boxes_at):
     poses = view_f64(poses_at, POSE * n)
     boxes = view_f64(boxes_at, 6 * n)
     for k in range(n):
-        _put_box(ints_at, numbers_at, shape_of[k], poses, k, boxes)
-
-
-@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def move_single_parts(
-    ints_at, numbers_at, shape_of_at, n_bodies, moved_at, n_moved, X_new_at, X_WBs_at, poses_at, boxes_at
-):
-    """Move bodies of a single part without a pose of its own: body ``k`` is shape ``shape_of[k]``.
-
-    moved : the bodies.   X_new : 16 doubles a body, copied to X_WBs and to pose rows as of `pose_table`.
-    boxes : as of `bounding_boxes`.
-    """
-    shape_of = view_i64(shape_of_at, n_bodies)
-    moved = view_i64(moved_at, n_moved)
-    X_new = view_f64(X_new_at, 16 * n_bodies)
-    X_WBs = view_f64(X_WBs_at, 16 * n_bodies)
-    poses = view_f64(poses_at, POSE * n_bodies)
-    boxes = view_f64(boxes_at, 6 * n_bodies)
-    for k in range(n_moved):
-        body = moved[k]
-        for j in range(16):
-            X_WBs[16 * body + j] = X_new[16 * body + j]
-        for axis in range(3):
-            for j in range(3):
-                poses[POSE * body + 3 * axis + j] = X_new[16 * body + 4 * axis + j]
-            poses[POSE * body + 9 + axis] = X_new[16 * body + 4 * axis + 3]
-        poses[POSE * body + POSE_SLOP] = 0.0
-        poses[POSE * body + POSE_TERMS] = -1.0
-        poses[POSE * body + POSE_STRETCH] = -1.0
-        _put_box(ints_at, numbers_at, shape_of[body], poses, body, boxes)
+        put_box(ints_at, numbers_at, shape_of[k], poses, k, boxes)
 
 
 def boxes_of(table: ShapeTable, poses: np.ndarray, shape_of: np.ndarray) -> np.ndarray:
@@ -158,18 +127,3 @@ def widened(boxes: np.ndarray, margins: np.ndarray) -> np.ndarray:
     r = margins[:, None] + (np.abs(boxes) + margins[:, None]) * 2.0**-50
     r[margins == 0.0] = 0.0
     return np.hstack([boxes[:, :3] - r[:, :3], boxes[:, 3:] + r[:, 3:]])
-
-
-def move_parts(
-    table: ShapeTable, row_of: np.ndarray, moved: np.ndarray, X_new: np.ndarray, X_WBs: np.ndarray, poses: np.ndarray,
-    boxes: np.ndarray,
-) -> None:
-    """`move_single_parts` of arrays.
-
-    row_of : (n,) int64, the row of the table of each body.   moved : (k,) int64.   X_new, X_WBs : (n, 4, 4).
-    poses : (n, POSE).   boxes : (n, 6).
-    """
-    move_single_parts(
-        address_of(table.ints), address_of(table.numbers), address_of(row_of), len(row_of), address_of(moved),
-        len(moved), address_of(X_new), address_of(X_WBs), address_of(poses), address_of(boxes),
-    )

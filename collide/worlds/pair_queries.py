@@ -216,7 +216,8 @@ class WorldPairs(WorldScene):
             box-tree with new boxes, trees made anew.
         bytes_per_body : memory of tables and tree.   seconds : {pack, broadphase, narrowphase} [s].
 
-        sum(skipped) + narrowphase = pairs, unless `collides` stopped at a hit.
+        sum(skipped) + narrowphase = pairs, unless `collides` stopped at a hit; ``skipped["broadphase"]`` is missing
+        where the hit came before all near pairs were looked for, of 256 bodies or more.
         """
         if self._last_query is not None:
             self._stats, self._last_query = self._last_query.stats(), None
@@ -234,6 +235,12 @@ class WorldPairs(WorldScene):
         started = time.perf_counter()
         packed = self._pack()
         ready = time.perf_counter()
+        if boolean and not limit and len(first := packed.first_candidates()):
+            looked = time.perf_counter()
+            answer = packed.answer(first, 0.0, boolean=True, stop_at_hit=True)
+            if answer.rows["hit"].any():
+                self._record(packed, answer, None, (started, ready, looked))
+                return packed, answer.rows["hit"]
         candidates = packed.candidates(limit)
         culled = time.perf_counter()
         wanted: list[np.ndarray] = []
@@ -247,18 +254,24 @@ class WorldPairs(WorldScene):
             wanted.append(_wanted(packed, answer.rows, reach, boolean, margins))
             if boolean and wanted[-1].any():
                 break
-        ended = time.perf_counter()
         answer = answers[0] if len(answers) == 1 else joined(answers, boolean=True)
-        rows = answer.rows
-        self._last_query = QueryRecord(
-            packed, packed.roster, packed.filters, len(candidates), rows["hit"].copy(), rows["how"].copy(),
-            rows["iterations"].copy(), answer.convex_pairs, answer.body_pairs, answer.mesh_pairs, packed.take_work(),
-            {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
-        )
+        self._record(packed, answer, len(candidates), (started, ready, culled))
         if len(wanted) == 1:
             return packed, wanted[0]
         all_wanted = np.concatenate(wanted)
         return packed, all_wanted if boolean else _sorted_by_pair(all_wanted, PAIR_DTYPE)
+
+    def _record(
+        self, packed: PackedWorld, answer: Answer, n_candidates: int | None, times: tuple[float, float, float]
+    ) -> None:
+        """What `stats` tells of a question that has just been answered.   times : started, packed, pairs known."""
+        started, ready, culled = times
+        rows, ended = answer.rows, time.perf_counter()
+        self._last_query = QueryRecord(
+            packed, packed.roster, packed.filters, n_candidates, rows["hit"].copy(), rows["how"].copy(),
+            rows["iterations"].copy(), answer.convex_pairs, answer.body_pairs, answer.mesh_pairs, packed.take_work(),
+            {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
+        )
 
 
 def _result(packed: PackedWorld, rows: np.ndarray) -> WorldResult:

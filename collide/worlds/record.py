@@ -16,13 +16,14 @@ from collide.worlds.packed_world import PackedWorld, PairFilters
 class QueryRecord(NamedTuple):
     """A query of a whole World.
 
-    packed : asked for its memory.   work : {what: number} of what was brought up to date for the query.
+    packed : asked for its memory.   n_candidates : ``None`` where a hit came before all were known.
+    work : {what: number} of what was brought up to date for the query.
     """
 
     packed: PackedWorld
     roster: Roster
     filters: PairFilters
-    n_candidates: int
+    n_candidates: int | None
     hit: np.ndarray
     how: np.ndarray
     iterations: np.ndarray
@@ -46,7 +47,8 @@ class QueryRecord(NamedTuple):
             place[allowed[is_there]], reasons,
         )
         pairs = n * (n - 1) // 2
-        skipped[CULLED] = pairs - sum(skipped.values()) - self.n_candidates
+        if self.n_candidates is not None:
+            skipped[CULLED] = pairs - sum(skipped.values()) - self.n_candidates
         return {
             "bodies": n, "static": int(roster.static[alive].sum()), "sleeping": int(roster.sleeping[alive].sum()),
             "pairs": pairs, "skipped": skipped,
