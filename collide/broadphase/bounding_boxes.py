@@ -127,3 +127,35 @@ def widened(boxes: np.ndarray, margins: np.ndarray) -> np.ndarray:
     r = margins[:, None] + (np.abs(boxes) + margins[:, None]) * 2.0**-50
     r[margins == 0.0] = 0.0
     return np.hstack([boxes[:, :3] - r[:, :3], boxes[:, 3:] + r[:, 3:]])
+
+
+@entry("void(int64, int64, int64, int64, float64, int64)")
+def gap_bounds(boxes_at, n_boxes, pairs_at, n, rounding, bounds_at):
+    """Lower bounds of signed distances [m] of n pairs of bodies from their boxes, two integers a pair.
+
+    Boxes apart by gaps g_x, g_y, g_z ≥ 0 along the axes hold points at least |g| apart. Where boxes overlap along all
+    axes, a shift by the least overlap parts both bodies, so the depth of convex bodies is at most this overlap. Bounds
+    are lowered by ``rounding``, relative to the bound and to the coordinates of the first box; infinite bounds stay.
+    """
+    boxes, pairs, bounds = view_f64(boxes_at, 6 * n_boxes), view_i64(pairs_at, 2 * n), view_f64(bounds_at, n)
+    for k in range(n):
+        a, b = 6 * pairs[2 * k], 6 * pairs[2 * k + 1]
+        square = 0.0
+        deep = -math.inf
+        largest = 0.0
+        for axis in range(3):
+            above, below = boxes[a + axis] - boxes[b + 3 + axis], boxes[b + axis] - boxes[a + 3 + axis]
+            gap = max(above, below) if above + below == above + below else -math.inf  # NaN bounds nothing
+            square += max(gap, 0.0) * max(gap, 0.0)
+            deep = max(deep, gap)
+            for end in (boxes[a + axis], boxes[a + 3 + axis]):
+                largest = max(largest, abs(end)) if abs(end) < math.inf else largest
+        bound = math.sqrt(square) if deep > 0.0 else deep
+        bounds[k] = bound - rounding * max(abs(bound), largest) if abs(bound) < math.inf else bound
+
+
+def least_distances(boxes: np.ndarray, pairs: np.ndarray, rounding: float) -> np.ndarray:
+    """(k,) `gap_bounds` of pairs (k, 2) of rows of boxes (n, 6)."""
+    boxes, pairs, bounds = np.ascontiguousarray(boxes), np.ascontiguousarray(pairs), np.empty(len(pairs))
+    gap_bounds(address_of(boxes), len(boxes), address_of(pairs), len(pairs), rounding, address_of(bounds))
+    return bounds

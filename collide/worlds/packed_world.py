@@ -40,6 +40,8 @@ _MIN_SCANNED, _SCANNED, _FIRST_PAIRS = 256, 64, 32
 #: Of more candidates than this, booleans that stop at a hit ask first the so many whose boxes overlap most, of at most
 #: so many, evenly taken: to look at all would take half as long as to ask them.
 _MIN_SORTED, _LIKELIEST, _MAX_COMPARED = 512, 32, 2048
+#: Poses of so many bodies are copied in the time that it takes to find out which are named.
+_MAX_COPIED = 128
 
 
 class Answer(NamedTuple):
@@ -219,8 +221,10 @@ class PackedWorld:
             return np.empty((0, 2), dtype=np.int64) if self.tree is None else self.tree.pairs(margin)
 
     def first_candidates(self) -> np.ndarray:
-        """(k, 2) the first few candidates of margin 0, sorted; none where to look for all takes no longer."""
-        if self.tree is None or self.has_margins or len(self.roster.ids) < _MIN_SCANNED:
+        """(k, 2) the first candidates of margin 0, sorted; no pairs of Worlds with few bodies, whose candidates are known
+        as soon, with margins or with meshes, which are asked last.
+        """
+        if self.tree is None or self.has_margins or self._any_meshed or len(self.roster.ids) < _MIN_SCANNED:
             return np.empty((0, 2), dtype=np.int64)
         with updating():
             return self.tree.first_pairs(_SCANNED, _FIRST_PAIRS)
@@ -248,7 +252,9 @@ class PackedWorld:
         return self.parts.table, self.parts.row_of[self.parts.first[pairs]]
 
     def bodies_named(self, *positions: np.ndarray) -> BodiesAsTheyStood:
-        """The bodies at positions that results name, with their poses now."""
+        """The bodies at positions that results name, with their poses now; all bodies of a few."""
+        if len(self.X_WBs) <= _MAX_COPIED:
+            return BodiesAsTheyStood(self.roster, np.arange(len(self.X_WBs)), self.X_WBs.copy())
         is_named = np.zeros(len(self.roster.ids), dtype=bool)
         for some in positions:
             is_named[some] = True

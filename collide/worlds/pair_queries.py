@@ -31,6 +31,9 @@ world_contacts = lazy_module("collide.worlds.contacts")
 world_overlaps = lazy_module("collide.worlds.overlaps")
 #: Rows of `PAIR_DTYPE` without their fields.
 _BYTES = np.dtype((np.void, PAIR_DTYPE.itemsize))
+#: What statistics count of rows; rows up to this number are kept as they are.
+_COUNTED = np.dtype([("hit", "?"), ("how", "<i4"), ("iterations", "i4")])
+_MAX_ROWS = 256
 
 
 class WorldPairs(WorldScene):
@@ -235,21 +238,20 @@ class WorldPairs(WorldScene):
         started = time.perf_counter()
         packed = self._pack()
         ready = time.perf_counter()
+        answers: list[Answer] = []
         if boolean and not limit and len(first := packed.first_candidates()):
-            looked = time.perf_counter()
-            answer = packed.answer(first, 0.0, boolean=True, stop_at_hit=True)
-            if answer.rows["hit"].any():
-                self._record(packed, answer, None, (started, ready, looked))
-                return packed, answer.rows["hit"]
+            culled = time.perf_counter()
+            answers.append(packed.answer(first, 0.0, boolean=True, stop_at_hit=True))
+            if answers[0].rows["hit"].any():
+                self._record(packed, answers[0], None, (started, ready, culled))
+                return packed, answers[0].rows["hit"]
         candidates = packed.candidates(limit)
         culled = time.perf_counter()
+        rest = _without(candidates, first) if answers else candidates
         wanted: list[np.ndarray] = []
-        answers: list[Answer] = []
-        for some, reach in _by_margin(packed, candidates, limit) if margins else [(slice(None), limit)]:
+        for some, reach in _by_margin(packed, rest, limit) if margins else [(slice(None), limit)]:
             is_boolean = boolean and not reach
-            answer = packed.answer(
-                candidates[some], reach, boolean=is_boolean, stop_at_hit=is_boolean, threads=threads
-            )
+            answer = packed.answer(rest[some], reach, boolean=is_boolean, stop_at_hit=is_boolean, threads=threads)
             answers.append(answer)
             wanted.append(_wanted(packed, answer.rows, reach, boolean, margins))
             if boolean and wanted[-1].any():
@@ -267,9 +269,11 @@ class WorldPairs(WorldScene):
         """What `stats` tells of a question that has just been answered.   times : started, packed, pairs known."""
         started, ready, culled = times
         rows, ended = answer.rows, time.perf_counter()
+        if len(rows) > _MAX_ROWS:
+            rows = rows[list(_COUNTED.names or ())].astype(_COUNTED)
         self._last_query = QueryRecord(
-            packed, packed.roster, packed.filters, n_candidates, rows["hit"].copy(), rows["how"].copy(),
-            rows["iterations"].copy(), answer.convex_pairs, answer.body_pairs, answer.mesh_pairs, packed.take_work(),
+            packed, packed.roster, packed.filters, n_candidates, rows, answer.convex_pairs, answer.body_pairs,
+            answer.mesh_pairs, packed.take_work(),
             {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
         )
 
@@ -277,6 +281,12 @@ class WorldPairs(WorldScene):
 def _result(packed: PackedWorld, rows: np.ndarray) -> WorldResult:
     """Of rows whose a and b are positions, in place."""
     return WorldResult(rows, packed.to_ids(rows), certify)
+
+
+def _without(pairs: np.ndarray, some: np.ndarray) -> np.ndarray:
+    """Pairs (k, 2), sorted, less some of them."""
+    keys, keys_of_some = ((of[:, 0] << 32) + of[:, 1] for of in (pairs, some))
+    return np.delete(pairs, np.searchsorted(keys, keys_of_some), axis=0)
 
 
 def _by_margin(packed: PackedWorld, pairs: np.ndarray, margin: float) -> Iterator[tuple[np.ndarray | slice, float]]:
