@@ -334,11 +334,12 @@ class WorldBodies:
                 rows = _NO_ROWS
             if int(rows.view(np.uint64).max()) < n:  # one below 0 is above 2⁶³ there
                 return rows
-        known: list[Any] = bodies.tolist() if isinstance(bodies, np.ndarray) else list(bodies)
-        try:
-            return np.array([self._row_of[body] for body in known], dtype=np.int64)
-        except KeyError:
-            return np.array([self._row_of[self.id_of(body, "bodies")] for body in bodies], dtype=np.int64)
+        if isinstance(bodies, np.ndarray) and bodies.dtype.kind == "i" and self._row_of:
+            ids = self.roster().ids
+            rows = np.searchsorted(ids, bodies).clip(max=len(ids) - 1)
+            if (ids[rows] == bodies).all() and self._alive[rows].all():
+                return rows
+        return np.array([self._row_of[self.id_of(body, "bodies")] for body in bodies], dtype=np.int64)
 
     def roster(self) -> Roster:
         """The bodies as they are now, poses apart. Rows are positions of it, until its generation is another."""

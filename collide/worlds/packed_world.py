@@ -221,8 +221,8 @@ class PackedWorld:
             return np.empty((0, 2), dtype=np.int64) if self.tree is None else self.tree.pairs(margin)
 
     def first_candidates(self) -> np.ndarray:
-        """(k, 2) the first candidates of margin 0, sorted; no pairs of Worlds with few bodies, whose candidates are known
-        as soon, with margins or with meshes, which are asked last.
+        """(k, 2) the first candidates of margin 0, sorted; no pairs of Worlds of few bodies, whose candidates are known
+        as soon, with margins, or with meshes, which are asked last.
         """
         if self.tree is None or self.has_margins or self._any_meshed or len(self.roster.ids) < _MIN_SCANNED:
             return np.empty((0, 2), dtype=np.int64)
