@@ -80,7 +80,7 @@ class WorldScene:
 
         Returns
         -------
-        (N,) int64 ids, ascending. About 0.7 µs a body, with names, bits and margins of their own 1 µs; the next query
+        (N,) int64 ids, ascending. About 0.5 µs a body, with names, bits and margins of their own 1 µs; the next query
         takes 2 µs a body for tables and tree, as after `add`.
 
         Raises
@@ -144,7 +144,7 @@ class WorldScene:
         self._bodies.move(self._bodies.id_of(body), X_WB)
 
     def set_poses(self, bodies: Iterable[int | str], X_WBs) -> None:
-        """Move k bodies. About 0.1 µs a body, by ids.
+        """Move k bodies. About 0.02 µs a body, by ids.
 
         Parameters
         ----------
