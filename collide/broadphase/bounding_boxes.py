@@ -18,8 +18,6 @@ from collide.lowering.shape_table import (
     PARAMS,
     POSE,
     POSE_SLOP,
-    POSE_STRETCH,
-    POSE_TERMS,
     RADIUS,
     REACH,
     SLOP,
@@ -78,7 +76,7 @@ def _bound(ints, numbers, poses, coordinates, s, p, axis):
 
 
 @kernel
-def _put_box(ints_at, numbers_at, s, poses, k, boxes):
+def put_box(ints_at, numbers_at, s, poses, k, boxes):
     """Write the box of shape s at pose row k into row k of boxes; a half-space gets an infinite box."""
     ints = view_i64(ints_at, INTS * (s + 1))
     numbers = view_f64(numbers_at, NUMBERS * (s + 1))
@@ -104,36 +102,7 @@ def bounding_boxes(ints_at, numbers_at, poses_at, shape_of_at, n, boxes_at):
     poses = view_f64(poses_at, POSE * n)
     boxes = view_f64(boxes_at, 6 * n)
     for k in range(n):
-        _put_box(ints_at, numbers_at, shape_of[k], poses, k, boxes)
-
-
-@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
-def move_single_parts(
-    ints_at, numbers_at, shape_of_at, n_bodies, moved_at, n_moved, X_new_at, X_WBs_at, poses_at, boxes_at
-):
-    """Move bodies of a single part without a pose of its own: body ``k`` is shape ``shape_of[k]``.
-
-    moved : the bodies.   X_new : 16 doubles a body, copied to X_WBs and to pose rows as of `pose_table`.
-    boxes : as of `bounding_boxes`.
-    """
-    shape_of = view_i64(shape_of_at, n_bodies)
-    moved = view_i64(moved_at, n_moved)
-    X_new = view_f64(X_new_at, 16 * n_bodies)
-    X_WBs = view_f64(X_WBs_at, 16 * n_bodies)
-    poses = view_f64(poses_at, POSE * n_bodies)
-    boxes = view_f64(boxes_at, 6 * n_bodies)
-    for k in range(n_moved):
-        body = moved[k]
-        for j in range(16):
-            X_WBs[16 * body + j] = X_new[16 * body + j]
-        for axis in range(3):
-            for j in range(3):
-                poses[POSE * body + 3 * axis + j] = X_new[16 * body + 4 * axis + j]
-            poses[POSE * body + 9 + axis] = X_new[16 * body + 4 * axis + 3]
-        poses[POSE * body + POSE_SLOP] = 0.0
-        poses[POSE * body + POSE_TERMS] = -1.0
-        poses[POSE * body + POSE_STRETCH] = -1.0
-        _put_box(ints_at, numbers_at, shape_of[body], poses, body, boxes)
+        put_box(ints_at, numbers_at, shape_of[k], poses, k, boxes)
 
 
 def boxes_of(table: ShapeTable, poses: np.ndarray, shape_of: np.ndarray) -> np.ndarray:
@@ -160,16 +129,33 @@ def widened(boxes: np.ndarray, margins: np.ndarray) -> np.ndarray:
     return np.hstack([boxes[:, :3] - r[:, :3], boxes[:, 3:] + r[:, 3:]])
 
 
-def move_parts(
-    table: ShapeTable, row_of: np.ndarray, moved: np.ndarray, X_new: np.ndarray, X_WBs: np.ndarray, poses: np.ndarray,
-    boxes: np.ndarray,
-) -> None:
-    """`move_single_parts` of arrays.
+@entry("void(int64, int64, int64, int64, float64, int64)")
+def gap_bounds(boxes_at, n_boxes, pairs_at, n, rounding, bounds_at):
+    """Lower bounds of signed distances [m] of n pairs of bodies from their boxes, two integers a pair.
 
-    row_of : (n,) int64, the row of the table of each body.   moved : (k,) int64.   X_new, X_WBs : (n, 4, 4).
-    poses : (n, POSE).   boxes : (n, 6).
+    Boxes apart by gaps g_x, g_y, g_z ≥ 0 along the axes hold points at least |g| apart. Where boxes overlap along all
+    axes, a shift by the least overlap parts both bodies, so the depth of convex bodies is at most this overlap. Bounds
+    are lowered by ``rounding``, relative to the bound and to the coordinates of the first box; infinite bounds stay.
     """
-    move_single_parts(
-        address_of(table.ints), address_of(table.numbers), address_of(row_of), len(row_of), address_of(moved),
-        len(moved), address_of(X_new), address_of(X_WBs), address_of(poses), address_of(boxes),
-    )
+    boxes, pairs, bounds = view_f64(boxes_at, 6 * n_boxes), view_i64(pairs_at, 2 * n), view_f64(bounds_at, n)
+    for k in range(n):
+        a, b = 6 * pairs[2 * k], 6 * pairs[2 * k + 1]
+        square = 0.0
+        deep = -math.inf
+        largest = 0.0
+        for axis in range(3):
+            above, below = boxes[a + axis] - boxes[b + 3 + axis], boxes[b + axis] - boxes[a + 3 + axis]
+            gap = max(above, below) if above + below == above + below else -math.inf  # NaN bounds nothing
+            square += max(gap, 0.0) * max(gap, 0.0)
+            deep = max(deep, gap)
+            for end in (boxes[a + axis], boxes[a + 3 + axis]):
+                largest = max(largest, abs(end)) if abs(end) < math.inf else largest
+        bound = math.sqrt(square) if deep > 0.0 else deep
+        bounds[k] = bound - rounding * max(abs(bound), largest) if abs(bound) < math.inf else bound
+
+
+def least_distances(boxes: np.ndarray, pairs: np.ndarray, rounding: float) -> np.ndarray:
+    """(k,) `gap_bounds` of pairs (k, 2) of rows of boxes (n, 6)."""
+    boxes, pairs, bounds = np.ascontiguousarray(boxes), np.ascontiguousarray(pairs), np.empty(len(pairs))
+    gap_bounds(address_of(boxes), len(boxes), address_of(pairs), len(pairs), rounding, address_of(bounds))
+    return bounds

@@ -133,46 +133,71 @@ def _place_leaf(tree, body, leaf, step, side, spacing):
         tree.header[N_CHANGED] += 1
 
 
+@kernel(inline=True)
+def take_box(tree, body, moved, at, spacing):
+    """Store a moved body's box, six of the doubles ``moved``: 1 where the body's leaf has another box, 0 where not, −1
+    for an unbounded box of a body with a leaf, or a bounded box of a body without.
+
+    A box with a NaN becomes the unbounded box: walks skip boxes whose comparisons fail, and comparisons with NaN fail.
+    A leaf's box holds its body's. A body whose step is small against its size or its distance from others gets room for
+    several steps of this length, so that most of its steps change no node.
+    """
+    boxes, nodes = tree.boxes, tree.nodes
+    to, leaf = 6 * body, tree.leaf_of[body]
+    step = 0.0
+    side = 0.0
+    is_within = True
+    is_bounded = True
+    for axis in range(3):
+        low, high = moved[at + axis], moved[at + 3 + axis]
+        step = max(step, abs(low - boxes[to + axis]), abs(high - boxes[to + 3 + axis]))
+        side = max(side, high - low)
+        is_bounded = is_bounded & (low > -math.inf) & (high < math.inf)  # NaN is neither
+        boxes[to + axis] = low
+        boxes[to + 3 + axis] = high
+        if leaf >= 0:
+            is_within = is_within & (low >= nodes[6 * leaf + axis]) & (high <= nodes[6 * leaf + 3 + axis])
+    if not is_bounded:
+        _open_where_unknown(boxes, to)
+    if is_bounded != (leaf >= 0):
+        return -1
+    if leaf < 0 or is_within:
+        return 0
+    _place_leaf(tree, body, leaf, step, side, spacing)
+    return 1
+
+
+@kernel(inline=True)
+def _open_where_unknown(boxes, at):
+    """Make a box that holds a NaN the unbounded box."""
+    is_unknown = False
+    for k in range(6):
+        is_unknown = is_unknown | (boxes[at + k] != boxes[at + k])
+    if is_unknown:
+        for axis in range(3):
+            boxes[at + axis], boxes[at + 3 + axis] = -math.inf, math.inf
+
+
 @entry("int64(int64, int64, int64, int64, float64, int64)")
 def take_boxes(tree_at, bodies_at, n, moved_at, spacing, escaped_at):
-    """Store the boxes of n moved bodies; returns the number of leaves whose boxes had to grow or shrink, or −1 for an
-    unbounded box of a body with a leaf, or a bounded box of a body without.
+    """Store the boxes of n moved bodies; returns the number of leaves whose boxes had to grow or shrink, or −1, as of
+    `take_box`.
 
     moved : 6 doubles each, their new boxes.   spacing : typical distance of bodies from each other [m].
     escaped : out, the bodies whose leaves changed; they are noted as changed.
-
-    A leaf's box holds its body's. A body whose step is small against its size or its distance from others gets room for
-    several steps of this length, so that most of its steps change no node.
     """
     tree = tree_in_memory(tree_at)
     bodies = view_i64(bodies_at, n)
     moved = view_f64(moved_at, 6 * n)
     escaped = view_i64(escaped_at, n)
-    boxes, nodes = tree.boxes, tree.nodes
     count = 0
     for k in range(n):
-        body = bodies[k]
-        at, leaf = 6 * body, tree.leaf_of[body]
-        step = 0.0
-        side = 0.0
-        is_within = True
-        is_bounded = True
-        for axis in range(3):
-            low, high = moved[6 * k + axis], moved[6 * k + 3 + axis]
-            step = max(step, abs(low - boxes[at + axis]), abs(high - boxes[at + 3 + axis]))
-            side = max(side, high - low)
-            is_bounded = is_bounded & (low > -math.inf) & (high < math.inf)
-            boxes[at + axis] = low
-            boxes[at + 3 + axis] = high
-            if leaf >= 0:
-                is_within = is_within & (low >= nodes[6 * leaf + axis]) & (high <= nodes[6 * leaf + 3 + axis])
-        if is_bounded != (leaf >= 0):
+        state = take_box(tree, bodies[k], moved, 6 * k, spacing)
+        if state < 0:
             return -1
-        if leaf < 0 or is_within:
-            continue
-        _place_leaf(tree, body, leaf, step, side, spacing)
-        escaped[count] = body
-        count += 1
+        if state > 0:
+            escaped[count] = bodies[k]
+            count += 1
     return count
 
 

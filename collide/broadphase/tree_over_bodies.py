@@ -148,7 +148,7 @@ class TreeOverBodies:
         bodies are: the mean side of an inner node.
         """
         sides = sum(self._sides)
-        self._spacing = sides / max(3 * sum(self._n_inner), 1)
+        self.spacing = sides / max(3 * sum(self._n_inner), 1)
         if not self._sides:
             return 0.0, 0.0
         x0, y0, z0, x1, y1, z1 = self.around.tolist()
@@ -185,12 +185,15 @@ class TreeOverBodies:
         """Store boxes (k, 6) of moved bodies (k,). The tree is built anew once its quality is much worse than after the
         last build: bodies near in the tree are to be near in space.
         """
-        bodies, boxes = np.ascontiguousarray(bodies), np.ascontiguousarray(_comparable(boxes))
-        escaped = np.empty(len(bodies), dtype=np.int64)
-        header = self.header()
+        bodies, boxes = np.ascontiguousarray(bodies), np.ascontiguousarray(boxes)
+        header, escaped = self.header(), np.empty(len(bodies), dtype=np.int64)
         n = take_boxes(
-            address_of(header), address_of(bodies), len(bodies), address_of(boxes), self._spacing, address_of(escaped)
+            address_of(header), address_of(bodies), len(bodies), address_of(boxes), self.spacing, address_of(escaped)
         )
+        self.fit_above(escaped, n)
+
+    def fit_above(self, escaped: np.ndarray, n: int) -> None:
+        """Fit the nodes above the first n of these bodies, whose leaves have changed: n as `take_boxes` tells it."""
         if n < 0:
             raise ValueError("bodies keep their ends, or have none; build a new tree")
         if n:

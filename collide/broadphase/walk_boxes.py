@@ -252,6 +252,47 @@ def pairs_among(tree_at, begin, end, margin, keys_at, capacity):
     return count
 
 
+@entry("int64(int64, int64, int64, int64)")
+def first_pairs(tree_at, n_bodies, keys_at, capacity):
+    """Keys, ascending, of pairs of the first n_bodies bodies with bodies of larger numbers whose boxes meet, filters
+    applied; returns the number of keys.
+
+    Body after body, until ``capacity`` keys are stored: of the last body the keys with the least partners. Boxes and
+    filters alone decide which pairs are stored, not the shape of the tree.
+    """
+    tree = tree_in_memory(tree_at)
+    keys = view_i64(keys_at, capacity)
+    count = i = 0
+    while i < n_bodies and count < capacity:
+        begin = count
+        node = tree.n_nodes
+        box = _box_at(tree.boxes, 6 * i, 0.0)
+        if tree.leaf_of[i] >= 0:
+            node = _next_leaf(tree, 0, tree.n_nodes, box)
+        while node < tree.n_nodes:
+            j = tree.links[LINK * node + BODY]
+            if j > i and _meet(tree.boxes, 6 * j, box) and _are_tested(tree, i, j, STILL_BIT):
+                count = _insert_key(keys, begin, count, (i << 32) + j)
+            node = _next_leaf(tree, node + 1, tree.n_nodes, box)
+        i += 1
+    return count
+
+
+@kernel(inline=True)
+def _insert_key(keys, begin, count, key):
+    """Put a key among the ascending keys begin … count − 1; without space the largest goes. The new count."""
+    if count == len(keys):
+        if keys[count - 1] <= key:
+            return count
+        count -= 1
+    at = count
+    while at > begin and keys[at - 1] > key:
+        keys[at] = keys[at - 1]
+        at -= 1
+    keys[at] = key
+    return count + 1
+
+
 @entry("int64(int64, int64, int64, float64, int64, int64)")
 def mended_pairs(tree_at, cached_at, n_cached, margin, keys_at, capacity):
     """Keys of pairs whose leaves' boxes come within a margin: cached keys less pairs of changed bodies, and the pairs

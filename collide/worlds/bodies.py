@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.broadphase.moved_bodies import store_poses
 from collide.errors import InvalidArgument, InvalidPose, UnknownBody
 from collide.numerics.growing_rows import GrowingRows
 from collide.numerics.rigid_poses import are_rigid_matrices
@@ -25,8 +26,6 @@ from collide.transforms import LARGEST, SAFE_TOLERANCE, as_pose, as_poses
 #: Groups and masks are bit sets of this many bits.
 _BITS = 32
 _IDENTITY = np.eye(4)
-#: A pose as bytes: numpy puts arrays of them twice as fast as of 16 doubles.
-_POSE = np.dtype((np.void, _IDENTITY.nbytes))
 #: So many rows of removed bodies stay whatever the number of others.
 _MIN_ROWS = 64
 #: What is no row of any body.
@@ -249,7 +248,7 @@ class WorldBodies:
     def remove(self, identity: int) -> None:
         row = self._row_of.pop(identity)
         del self._id_of[self._names[row]]
-        self._alive[row] = False
+        self._alive[row] = self._moved[row] = False
         self._made.pop(identity, None)
         self._roster = None
 
@@ -314,15 +313,13 @@ class WorldBodies:
         if len(X_WBs) != len(rows):
             named = f"{len(rows)} bodies {checks.brief(bodies)}"
             raise InvalidPose(f"World.set_poses: {named}, but X_WBs {X_WBs.shape} are {len(X_WBs)} poses")
-        self._X_WBs.reshape(-1).view(_POSE)[rows] = np.ascontiguousarray(X_WBs).reshape(-1).view(_POSE)
-        self._moved[rows] = True
+        store_poses(rows, X_WBs, self._X_WBs, self._moved)
         self._made.clear()
 
-    def take_moved(self) -> np.ndarray:
-        """Rows of the bodies that moved since this was last called, ascending."""
-        (rows,) = self._moved.nonzero()
-        self._moved[rows] = False
-        return rows
+    @property
+    def is_moved(self) -> np.ndarray:
+        """(n,) bool by row: bodies that moved since their flags were last cleared; a view."""
+        return self._moved[: len(self._ids)]
 
     def _rows_of(self, bodies: Iterable[int | str]) -> np.ndarray:
         if not (isinstance(bodies, np.ndarray) and bodies.ndim == 1 and bodies.dtype.kind in "iu"):
@@ -332,10 +329,15 @@ class WorldBodies:
         n = self._next
         if len(self._row_of) == n == len(self._ids) and len(bodies):  # none was ever removed: ids are rows
             try:
-                rows = np.asarray(bodies, dtype=np.int64)
+                rows = np.ascontiguousarray(bodies, dtype=np.int64)
             except OverflowError:
                 rows = _NO_ROWS
             if int(rows.view(np.uint64).max()) < n:  # one below 0 is above 2⁶³ there
+                return rows
+        if isinstance(bodies, np.ndarray) and bodies.dtype.kind == "i" and self._row_of:
+            ids = self.roster().ids
+            rows = np.searchsorted(ids, bodies).clip(max=len(ids) - 1)
+            if (ids[rows] == bodies).all() and self._alive[rows].all():
                 return rows
         return np.array([self._row_of[self.id_of(body, "bodies")] for body in bodies], dtype=np.int64)
 

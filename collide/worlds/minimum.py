@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.broadphase.bounding_boxes import least_distances
 from collide.worlds.packed_world import PackedWorld
 
 #: Relative: what a bound from boxes, or a distance within its bracket, may be off. Far more than either is.
@@ -33,7 +34,7 @@ def nearest_pair(packed: PackedWorld, limit: float, threads: int) -> np.ndarray:
     for margin in _margins(packed, limit):
         candidates = packed.candidates(margin)
         keys = candidates[:, 0] * n + candidates[:, 1]
-        is_new = ~np.isin(keys, asked)
+        is_new = ~np.isin(keys, asked) if len(asked) else slice(None)
         asked = keys
         best, winner = _least(packed, candidates[is_new], min(limit, best), best, winner, threads)
         if best < np.inf:
@@ -64,43 +65,33 @@ def _margins(packed: PackedWorld, limit: float):
 
 def _least(packed: PackedWorld, pairs: np.ndarray, limit: float, best: float, winner: _Nearest, threads: int):
     """(least distance, its pair) among pairs (k, 2) and the best so far."""
-    bounds = _lower_bounds(packed, pairs)
-    order = np.lexsort((pairs[:, 1], pairs[:, 0], bounds))
-    pairs, bounds = pairs[order], bounds[order]
-    at, size = 0, _FIRST
-    while at < len(pairs):
+    bounds, size = _lower_bounds(packed, pairs), _FIRST
+    while True:
         top = best + _ROUNDING * abs(best)
-        some = pairs[at : at + size][bounds[at : at + size] <= min(top, limit)]
-        if not len(some):
-            break
+        remain = bounds <= min(top, limit)
+        pairs, bounds = pairs[remain], bounds[remain]
+        if not len(pairs) or best == -np.inf:  # −inf: two half-spaces
+            return best, winner
+        nearest = np.argpartition(bounds, size - 1)[:size] if size < len(bounds) else np.arange(len(bounds))
         reach = max(min(limit, top), 0.0)
-        rows = packed.answer(some, reach, boolean=False, stop_at_hit=False, threads=threads).rows
+        rows = packed.answer(pairs[nearest], reach, boolean=False, stop_at_hit=False, threads=threads).rows
         rows = rows[~rows["beyond"] & (rows["distance"] <= limit)]
         for row in rows[np.lexsort((rows["b"], rows["a"], rows["distance"]))][:1, None]:
             pair, distance = np.array([[row["a"][0], row["b"][0]]], dtype=np.int64), float(row["distance"][0])
             if distance < best or (distance == best and tuple(pair[0]) < tuple(winner.pair[0])):
                 # Depths have no limit: a row that hits is that of any, a gap's may be of a search that the limit cut.
                 best, winner = distance, _Nearest(pair, row if reach == np.inf or row["hit"][0] else None)
-        if best == -np.inf:  # two half-spaces
-            break
-        at, size = at + size, 2 * size
-    return best, winner
+        bounds[nearest] = np.inf
+        pairs, bounds, size = pairs[bounds < np.inf], bounds[bounds < np.inf], 2 * size
 
 
 def _lower_bounds(packed: PackedWorld, pairs: np.ndarray) -> np.ndarray:
-    """(k,) lower bounds of signed distances [m]: the gap of boxes, or minus the shortest shift along an axis to part
-    them. With a body not convex, whose depth is known from above alone, −inf where the boxes meet.
+    """(k,) lower bounds of signed distances [m], as of `gap_bounds`: less than the gap of boxes, or minus the shortest
+    shift along an axis to part them. With a body not convex, whose depth is known from above alone, −inf where they
+    may meet.
     """
     parts = packed.parts
-    boxes = parts.body_boxes(np.arange(len(parts.shape_of)))
-    a, b = boxes[pairs[:, 0]], boxes[pairs[:, 1]]
-    with np.errstate(invalid="ignore"):
-        gaps = np.maximum(a[:, :3] - b[:, 3:], b[:, :3] - a[:, 3:])
-    gaps = np.nan_to_num(gaps, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
-    apart = np.sqrt(np.square(np.maximum(gaps, 0.0)).sum(axis=1))
-    deep = gaps.max(axis=1)
-    deep[~parts.single_convex[pairs].all(axis=1)] = -np.inf
-    bounds = np.where((gaps > 0.0).any(axis=1), apart, deep)
-    with np.errstate(invalid="ignore"):
-        slack = _ROUNDING * np.maximum(np.abs(bounds), np.abs(np.where(np.isfinite(a), a, 0.0)).max(axis=1))
-    return np.where(np.isfinite(bounds), bounds - slack, bounds)
+    boxes = parts.boxes if parts.all_of_one_part else parts.body_boxes(np.arange(len(parts.shape_of)))
+    bounds = least_distances(boxes, pairs, _ROUNDING)
+    bounds[(bounds <= 0.0) & ~parts.single_convex[pairs].all(axis=1)] = -np.inf
+    return bounds

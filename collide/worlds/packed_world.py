@@ -34,9 +34,14 @@ mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
 _FIRST_CHUNK = 8
 #: Pairs of bodies that a thread takes at once; booleans that stop at a hit look whether there was one after so many.
 _PAIRS_AT_ONCE = 2048
+#: Booleans about so many bodies or more ask pairs of so many bodies first, so many at most, before all others are
+#: looked for: where bodies are crowded, one of them hits.
+_MIN_SCANNED, _SCANNED, _FIRST_PAIRS = 256, 64, 32
 #: Of more candidates than this, booleans that stop at a hit ask first the so many whose boxes overlap most, of at most
 #: so many, evenly taken: to look at all would take half as long as to ask them.
 _MIN_SORTED, _LIKELIEST, _MAX_COMPARED = 512, 32, 2048
+#: Poses of so many bodies are copied in the time that it takes to find out which are named.
+_MAX_COPIED = 128
 
 
 class Answer(NamedTuple):
@@ -67,7 +72,8 @@ class PairFilters(NamedTuple):
 class PackedWorld:
     """Bodies by position (0 … n − 1), each a run of convex parts.
 
-    roster : the bodies.   filters : of pairs.   parts : the parts.   tree : the box-tree over bodies; ``None`` before
+    roster : the bodies.   X_WBs : (n, 4, 4) their poses.
+    filters : of pairs.   parts : the parts.   tree : the box-tree over bodies; ``None`` before
     the first body.   has_margins : whether any body or pair has.
     """
 
@@ -79,7 +85,7 @@ class PackedWorld:
         self._part_trees = PartTrees(self.parts)
         self._inflation = np.zeros(0)
         self._work = {"added": 0, "removed": 0, "moved": 0}
-        self._any_dead = self.has_margins = self._any_meshed = False
+        self.has_margins = self._any_meshed = False
         self._append(roster, X_WBs)
         self._remove(np.flatnonzero(~roster.alive))
         self._take_sleep(roster._replace(sleeping=np.zeros(len(roster.ids), dtype=bool)), roster)
@@ -87,35 +93,44 @@ class PackedWorld:
 
     # --- changes --------------------------------------------------------------------------------
 
-    def update(self, roster: Roster, X_WBs: np.ndarray, moved: np.ndarray) -> None:
-        """Take what has changed since: bodies behind the others, removed ones, margins, sleep; poses of ``moved`` (k,)
-        positions.   X_WBs : (n, 4, 4), of all bodies.
+    def update(self, roster: Roster, X_WBs: np.ndarray, is_moved: np.ndarray) -> None:
+        """Take what has changed since: bodies behind the others, removed ones, margins, sleep; poses of bodies with a
+        flag in ``is_moved`` (n,), which is cleared.   X_WBs : (n, 4, 4), of all bodies, as of `_append`.
         """
         before, n = self.roster, len(self.roster.ids)
         if roster is not before:
-            self._append(roster, X_WBs[n:])
+            self._append(roster, X_WBs)
             dead = np.flatnonzero(before.alive & ~roster.alive[:n])
             dead = np.append(dead, n + np.flatnonzero(~roster.alive[n:]))
             self._remove(dead)
             self._take_sleep(before, roster)
             if (before.margin != roster.margin[:n]).any() or roster.margin[n:].any():
                 self._inflate()
-            moved = moved[moved < n]
-        if self._any_dead:
-            moved = moved[roster.alive[moved]]
-        if len(moved):
-            self.parts.move(moved, X_WBs)
-            assert self.tree is not None
-            self.tree.move(moved, self._tree_boxes(moved))
-            self._work["moved"] += len(moved)
+            is_moved[n:] = False
+        if self.tree is not None:
+            self._work["moved"] += self._move(X_WBs, is_moved, self.tree)
+
+    def _move(self, X_WBs: np.ndarray, is_moved: np.ndarray, tree: BoxTree) -> int:
+        """Take poses of bodies that moved, clear their flags, return their number."""
+        if self.parts.single is not None:
+            n, moved = self.parts.single.move(is_moved, X_WBs, None if self.has_margins else tree)
+        else:
+            (moved,) = is_moved.nonzero()
+            is_moved[moved], n = False, len(moved)
+            if n:
+                self.parts.move(moved, X_WBs)
+        if n and moved is not None:
+            tree.move(moved, self._tree_boxes(moved))
+        return n
 
     def _append(self, roster: Roster, X_WBs: np.ndarray) -> None:
+        """X_WBs : (n, 4, 4) poses of all bodies; not copied, they are to hold the poses of the last update."""
         n = len(self.parts.shape_of)
-        self.roster = roster
+        self.roster, self.X_WBs = roster, X_WBs
         new = np.arange(n, len(roster.ids))
         if not len(new):
             return
-        self.parts.append(roster.shapes[n : len(roster.ids)], X_WBs)
+        self.parts.append(roster.shapes[n : len(roster.ids)], X_WBs[n:])
         self._inflation = np.append(self._inflation, np.zeros(len(new)))
         self._shape_set, self._any_meshed = None, bool(self.parts.meshed.any())
         boxes = self.parts.body_boxes(new)
@@ -131,7 +146,6 @@ class PackedWorld:
         if len(dead):
             assert self.tree is not None
             self.tree.remove(dead)
-            self._any_dead = True
             self._work["removed"] += len(dead)
 
     def _take_sleep(self, before: Roster, roster: Roster) -> None:
@@ -169,12 +183,8 @@ class PackedWorld:
     # --- what there is --------------------------------------------------------------------------
 
     @property
-    def X_WBs(self) -> np.ndarray:
-        """(n, 4, 4) poses.   shapes : the distinct ones.   shape_of : (n,) which of them each body has."""
-        return self.parts.X_WBs
-
-    @property
     def shapes(self) -> list[Shape]:
+        """The distinct ones.   shape_of : (n,) which of them each body has."""
         return self.parts.shapes
 
     @property
@@ -200,7 +210,7 @@ class PackedWorld:
         """(all parts, (parts,) the body of each, (n + 1,) the first part of each body and the number of all)."""
         parts = self.parts
         parts.table.build_trees(parts.row_of)
-        all_parts = PosedParts(parts.table, parts.poses, parts.row_of, parts.X_WBs[parts.body_of], parts.X_BP)
+        all_parts = PosedParts(parts.table, parts.poses, parts.row_of, self.X_WBs[parts.body_of], parts.X_BP)
         return all_parts, parts.body_of, parts.first
 
     def candidates(self, margin: float) -> np.ndarray:
@@ -209,6 +219,15 @@ class PackedWorld:
         """
         with updating():  # what the tree keeps of pairs
             return np.empty((0, 2), dtype=np.int64) if self.tree is None else self.tree.pairs(margin)
+
+    def first_candidates(self) -> np.ndarray:
+        """(k, 2) the first candidates of margin 0, sorted; no pairs of Worlds of few bodies, whose candidates are known
+        as soon, with margins, or with meshes, which are asked last.
+        """
+        if self.tree is None or self.has_margins or self._any_meshed or len(self.roster.ids) < _MIN_SCANNED:
+            return np.empty((0, 2), dtype=np.int64)
+        with updating():
+            return self.tree.first_pairs(_SCANNED, _FIRST_PAIRS)
 
     def margins_of(self, pairs: np.ndarray) -> np.ndarray:
         """(k,) the margins [m] of pairs (k, 2), i < j: their own, or the sum of both bodies'."""
@@ -233,7 +252,9 @@ class PackedWorld:
         return self.parts.table, self.parts.row_of[self.parts.first[pairs]]
 
     def bodies_named(self, *positions: np.ndarray) -> BodiesAsTheyStood:
-        """The bodies at positions that results name, with their poses now."""
+        """The bodies at positions that results name, with their poses now; all bodies of a few."""
+        if len(self.X_WBs) <= _MAX_COPIED:
+            return BodiesAsTheyStood(self.roster, np.arange(len(self.X_WBs)), self.X_WBs.copy())
         is_named = np.zeros(len(self.roster.ids), dtype=bool)
         for some in positions:
             is_named[some] = True

@@ -31,6 +31,9 @@ world_contacts = lazy_module("collide.worlds.contacts")
 world_overlaps = lazy_module("collide.worlds.overlaps")
 #: Rows of `PAIR_DTYPE` without their fields.
 _BYTES = np.dtype((np.void, PAIR_DTYPE.itemsize))
+#: What statistics count of rows; rows up to this number are kept as they are.
+_COUNTED = np.dtype([("hit", "?"), ("how", "<i4"), ("iterations", "i4")])
+_MAX_ROWS = 256
 
 
 class WorldPairs(WorldScene):
@@ -216,7 +219,8 @@ class WorldPairs(WorldScene):
             box-tree with new boxes, trees made anew.
         bytes_per_body : memory of tables and tree.   seconds : {pack, broadphase, narrowphase} [s].
 
-        sum(skipped) + narrowphase = pairs, unless `collides` stopped at a hit.
+        sum(skipped) + narrowphase = pairs, unless `collides` stopped at a hit; ``skipped["broadphase"]`` is missing
+        where the hit came before all near pairs were looked for, of 256 bodies or more.
         """
         if self._last_query is not None:
             self._stats, self._last_query = self._last_query.stats(), None
@@ -234,36 +238,55 @@ class WorldPairs(WorldScene):
         started = time.perf_counter()
         packed = self._pack()
         ready = time.perf_counter()
+        answers: list[Answer] = []
+        if boolean and not limit and len(first := packed.first_candidates()):
+            culled = time.perf_counter()
+            answers.append(packed.answer(first, 0.0, boolean=True, stop_at_hit=True))
+            if answers[0].rows["hit"].any():
+                self._record(packed, answers[0], None, (started, ready, culled))
+                return packed, answers[0].rows["hit"]
         candidates = packed.candidates(limit)
         culled = time.perf_counter()
+        rest = _without(candidates, first) if answers else candidates
         wanted: list[np.ndarray] = []
-        answers: list[Answer] = []
-        for some, reach in _by_margin(packed, candidates, limit) if margins else [(slice(None), limit)]:
+        for some, reach in _by_margin(packed, rest, limit) if margins else [(slice(None), limit)]:
             is_boolean = boolean and not reach
-            answer = packed.answer(
-                candidates[some], reach, boolean=is_boolean, stop_at_hit=is_boolean, threads=threads
-            )
+            answer = packed.answer(rest[some], reach, boolean=is_boolean, stop_at_hit=is_boolean, threads=threads)
             answers.append(answer)
             wanted.append(_wanted(packed, answer.rows, reach, boolean, margins))
             if boolean and wanted[-1].any():
                 break
-        ended = time.perf_counter()
         answer = answers[0] if len(answers) == 1 else joined(answers, boolean=True)
-        rows = answer.rows
-        self._last_query = QueryRecord(
-            packed, packed.roster, packed.filters, len(candidates), rows["hit"].copy(), rows["how"].copy(),
-            rows["iterations"].copy(), answer.convex_pairs, answer.body_pairs, answer.mesh_pairs, packed.take_work(),
-            {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
-        )
+        self._record(packed, answer, len(candidates), (started, ready, culled))
         if len(wanted) == 1:
             return packed, wanted[0]
         all_wanted = np.concatenate(wanted)
         return packed, all_wanted if boolean else _sorted_by_pair(all_wanted, PAIR_DTYPE)
 
+    def _record(
+        self, packed: PackedWorld, answer: Answer, n_candidates: int | None, times: tuple[float, float, float]
+    ) -> None:
+        """What `stats` tells of a question that has just been answered.   times : started, packed, pairs known."""
+        started, ready, culled = times
+        rows, ended = answer.rows, time.perf_counter()
+        if len(rows) > _MAX_ROWS:
+            rows = rows[list(_COUNTED.names or ())].astype(_COUNTED)
+        self._last_query = QueryRecord(
+            packed, packed.roster, packed.filters, n_candidates, rows, answer.convex_pairs, answer.body_pairs,
+            answer.mesh_pairs, packed.take_work(),
+            {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
+        )
+
 
 def _result(packed: PackedWorld, rows: np.ndarray) -> WorldResult:
     """Of rows whose a and b are positions, in place."""
     return WorldResult(rows, packed.to_ids(rows), certify)
+
+
+def _without(pairs: np.ndarray, some: np.ndarray) -> np.ndarray:
+    """Pairs (k, 2), sorted, less some of them."""
+    keys, keys_of_some = ((of[:, 0] << 32) + of[:, 1] for of in (pairs, some))
+    return np.delete(pairs, np.searchsorted(keys, keys_of_some), axis=0)
 
 
 def _by_margin(packed: PackedWorld, pairs: np.ndarray, margin: float) -> Iterator[tuple[np.ndarray | slice, float]]:

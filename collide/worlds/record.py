@@ -16,16 +16,16 @@ from collide.worlds.packed_world import PackedWorld, PairFilters
 class QueryRecord(NamedTuple):
     """A query of a whole World.
 
-    packed : asked for its memory.   work : {what: number} of what was brought up to date for the query.
+    packed : asked for its memory.   n_candidates : ``None`` where a hit came before all were known.
+    rows : what was answered, fields hit, how and iterations at least.
+    work : {what: number} of what was brought up to date for the query.
     """
 
     packed: PackedWorld
     roster: Roster
     filters: PairFilters
-    n_candidates: int
-    hit: np.ndarray
-    how: np.ndarray
-    iterations: np.ndarray
+    n_candidates: int | None
+    rows: np.ndarray
     convex_pairs: int
     body_pairs: int
     mesh_pairs: int
@@ -46,14 +46,15 @@ class QueryRecord(NamedTuple):
             place[allowed[is_there]], reasons,
         )
         pairs = n * (n - 1) // 2
-        skipped[CULLED] = pairs - sum(skipped.values()) - self.n_candidates
+        if self.n_candidates is not None:
+            skipped[CULLED] = pairs - sum(skipped.values()) - self.n_candidates
         return {
             "bodies": n, "static": int(roster.static[alive].sum()), "sleeping": int(roster.sleeping[alive].sum()),
             "pairs": pairs, "skipped": skipped,
             "narrowphase": self.body_pairs, "convex_pairs": self.convex_pairs, "mesh_pairs": self.mesh_pairs,
-            "hits": int(self.hit.sum()), "undecided": int((self.how == UNDECIDED).sum()),
-            "how": dict(Counter(HOW[how] for how in self.how)),
-            "gjk_iterations": int((self.iterations & 0xFFFF).sum()),
-            "epa_iterations": int((self.iterations >> 16).sum()), "updates": self.work,
+            "hits": int(self.rows["hit"].sum()), "undecided": int((self.rows["how"] == UNDECIDED).sum()),
+            "how": dict(Counter(HOW[how] for how in self.rows["how"])),
+            "gjk_iterations": int((self.rows["iterations"] & 0xFFFF).sum()),
+            "epa_iterations": int((self.rows["iterations"] >> 16).sum()), "updates": self.work,
             "bytes_per_body": round(self.packed.nbytes / n) if n else 0, "seconds": self.seconds,
         }

@@ -80,7 +80,7 @@ class WorldScene:
 
         Returns
         -------
-        (N,) int64 ids, ascending. About 0.7 µs a body, with names, bits and margins of their own 1 µs; the next query
+        (N,) int64 ids, ascending. About 0.5 µs a body, with names, bits and margins of their own 1 µs; the next query
         takes 2 µs a body for tables and tree, as after `add`.
 
         Raises
@@ -144,7 +144,7 @@ class WorldScene:
         self._bodies.move(self._bodies.id_of(body), X_WB)
 
     def set_poses(self, bodies: Iterable[int | str], X_WBs) -> None:
-        """Move k bodies. About 0.1 µs a body, by ids.
+        """Move k bodies. About 0.02 µs a body, by ids.
 
         Parameters
         ----------
@@ -307,15 +307,14 @@ class WorldScene:
             return self._brought_up_to_date()
 
     def _brought_up_to_date(self) -> PackedWorld:
-        moved = self._bodies.take_moved()
-        roster, X_WBs = self._bodies.roster(), self._bodies.poses()
+        roster, X_WBs, is_moved = self._bodies.roster(), self._bodies.poses(), self._bodies.is_moved
         packed = self._packed
         if packed is None or packed.roster.generation != roster.generation:
             with log_duration("tables and box-tree of a World of %d bodies made", len(self)):
                 packed = self._packed = PackedWorld(roster, X_WBs, self._filters(roster))
+                is_moved[:] = False
         else:
-            if roster is not packed.roster or len(moved):
-                packed.update(roster, X_WBs, moved)
+            packed.update(roster, X_WBs, is_moved)
             if self._pairs_changed:
                 packed.set_filters(self._filters(roster))
         self._pairs_changed = False

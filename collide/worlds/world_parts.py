@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from collide.broadphase.bounding_boxes import boxes_of, move_parts
+from collide.broadphase.bounding_boxes import boxes_of
+from collide.broadphase.moved_bodies import SingleParts
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.parts import bounding_parts_of, is_single_convex
 from collide.lowering.shape_table import (
@@ -35,12 +36,13 @@ class WorldParts:
 
     Attributes
     ----------
-    shapes : the distinct shapes.   shape_of : (n,) which of them each body has.   X_WBs : (n, 4, 4) poses, copied.
+    shapes : the distinct shapes.   shape_of : (n,) which of them each body has.
     meshed, single_convex : (n,) bool: bodies asked as a whole, meshes above all; bodies with a single convex set in
         their own frame.
     counts, first : (n,), (n + 1,) how many parts each body has, and where they begin.   body_of : (parts,).
     table, row_of, poses : as `run_pairs` takes them.   X_BP : (parts, 4, 4).   boxes : (parts, 6).
-    all_of_one_part : whether parts are bodies.
+    all_of_one_part, are_single : whether parts are bodies; and whether no part has a pose of its own besides.
+    single : if so, the parts for moves; else ``None``.
     """
 
     def __init__(self) -> None:
@@ -52,24 +54,23 @@ class WorldParts:
         # whether they have a pose of their own.
         self._of_shapes = _columns((np.int64,), (np.int64,), (bool,), (bool,))
         self._shape_parts = _columns((np.int64,), (float, 4, 4), (float,), (bool,))
-        # shape_of, X_WBs, meshed, single_convex, counts.
-        self._of_bodies = _columns((np.int64,), (float, 4, 4), (bool,), (bool,), (np.int64,))
+        # shape_of, meshed, single_convex, counts.
+        self._of_bodies = _columns((np.int64,), (bool,), (bool,), (np.int64,))
         # body_of, row_of, X_BP, reach, has_pose, rows of poses, boxes.
         self._of_parts = _columns((np.int64,), (np.int64,), (float, 4, 4), (float,), (bool,), (float, POSE), (float, 6))
         self._first = GrowingRows(np.zeros(1, dtype=np.int64))
         self._terms = GrowingRows.empty(float, TERM_ROW)
-        self.all_of_one_part, self._any_own_pose = True, False
+        self.all_of_one_part = self.are_single = True
         self._take_columns()
 
     def _take_columns(self) -> None:
-        self.shape_of, self.X_WBs, self.meshed, self.single_convex, self.counts = (
-            column.rows for column in self._of_bodies
-        )
+        self.shape_of, self.meshed, self.single_convex, self.counts = (column.rows for column in self._of_bodies)
         self.first = self._first.rows
         self.body_of, self.row_of, self.X_BP, self._reach, self._has_pose, rows, self.boxes = (
             column.rows for column in self._of_parts
         )
         self.poses = PoseTable(rows, self._terms.rows if len(self._terms.rows) else NO_TERMS)
+        self.single = SingleParts(self.table, self.row_of, rows, self.boxes) if self.are_single else None
 
     # --- adding and moving ----------------------------------------------------------------------
 
@@ -87,12 +88,12 @@ class WorldParts:
         moved[moved >= 0.0] += len(self._terms.rows)
         self._terms.extend(poses.terms)
         self._first.extend(n_parts + np.cumsum(counts))
-        for column, rows in zip(self._of_bodies, (shape_of, X_WBs, meshed, single, counts)):
+        for column, rows in zip(self._of_bodies, (shape_of, meshed, single, counts)):
             column.extend(rows)
         for column, rows in zip(self._of_parts, (body_of, row_of, X_BP, reach, has_pose, poses.rows, boxes)):
             column.extend(rows)
         self.all_of_one_part = self.all_of_one_part and bool((counts == 1).all())
-        self._any_own_pose = self._any_own_pose or bool(has_pose.any())
+        self.are_single = self.are_single and self.all_of_one_part and not has_pose.any()
         self._take_columns()
 
     def _numbers_of(self, shapes: Sequence[Shape]) -> np.ndarray:
@@ -131,15 +132,10 @@ class WorldParts:
 
     def move(self, bodies: np.ndarray, X_WBs: np.ndarray) -> None:
         """Take new poses of bodies (k,), ascending, from those of all (n, 4, 4). Others' boxes are not made again."""
-        if self.all_of_one_part and not self._any_own_pose:
-            move_parts(self.table, self.row_of, bodies, X_WBs, self.X_WBs, self.poses.rows, self.boxes)
-            return
-        X_WBs = X_WBs[bodies]
-        self.X_WBs[bodies] = X_WBs
         parts: np.ndarray | slice = bodies if self.all_of_one_part else self.parts_of(bodies)
         if len(bodies) == len(self.shape_of):
             parts = slice(None)  # all of them: nothing is gathered
-        X_WB = X_WBs if self.all_of_one_part else self.X_WBs[self.body_of[parts]]
+        X_WB = X_WBs[self.body_of[parts]]
         moved = pose_table(X_WB, self.X_BP[parts], self._reach[parts], self._has_pose[parts])
         before = self.poses.rows[parts, POSE_TERMS].copy()
         has_terms = before >= 0.0
@@ -149,11 +145,11 @@ class WorldParts:
                 moved.rows[has_terms, POSE_TERMS] = before[has_terms]
             self.poses.rows[parts] = moved.rows
         else:
-            self._pose_anew()
+            self._pose_anew(X_WBs)
         self.boxes[parts] = boxes_of(self.table, moved.rows, self.row_of[parts])
 
-    def _pose_anew(self) -> None:
-        poses = pose_table(self.X_WBs[self.body_of], self.X_BP, self._reach, self._has_pose)
+    def _pose_anew(self, X_WBs: np.ndarray) -> None:
+        poses = pose_table(X_WBs[self.body_of], self.X_BP, self._reach, self._has_pose)
         self.poses.rows[:] = poses.rows
         self._terms = GrowingRows(poses.terms)
         self._take_columns()

@@ -11,7 +11,7 @@ from naive import pose, random_pose, rng_of
 from naive_triangles import world_points
 
 import collide
-from collide.broadphase.bounding_boxes import boxes_of, widened
+from collide.broadphase.bounding_boxes import boxes_of, least_distances, widened
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import ShapeTable, pose_table
 from collide.worlds.world_parts import WorldParts
@@ -114,15 +114,16 @@ def test_bodies_that_are_moved_at_once_have_the_boxes_and_poses_of_new_ones():
     X_WBs = np.array([random_pose(rng, 2.0) for _ in kinds])
     parts.append(kinds, X_WBs)
     for _ in range(5):
-        moved = np.flatnonzero(rng.random(len(kinds)) < 0.4)
+        is_moved = rng.random(len(kinds)) < 0.4
+        (moved,) = is_moved.nonzero()
         X_WBs[moved] = [random_pose(rng, 2.0) for _ in moved]
         given = X_WBs.copy()
         given[np.setdiff1d(np.arange(len(kinds)), moved)] = np.nan
-        parts.move(moved, given)
+        n, bodies = parts.single.move(is_moved, given, None)
+        assert n == len(moved) and bodies.tolist() == moved.tolist() and not is_moved.any()
         new = WorldParts()
         new.append(kinds, X_WBs)
         assert parts.boxes.tobytes() == new.boxes.tobytes() and parts.poses.rows.tobytes() == new.poses.rows.tobytes()
-        assert np.array_equal(parts.X_WBs, X_WBs)
         n_moved += len(moved)
     assert n_moved > 10
 
@@ -142,3 +143,24 @@ def test_widened_boxes_hold_their_room_exactly_and_no_bound_is_ever_nan():
             sign, b, r = (-1 if axis < 3 else 1), Fraction(boxes[k, axis]), Fraction(room[k])
             out = sign * (Fraction(wide[k, axis]) - b) - r
             assert 0 <= out <= (abs(b) + 2 * r) / 2**49, (boxes[k].tolist(), room[k])
+
+
+def test_bounds_of_gaps_are_those_of_the_boxes():
+    """Beside numpy: apart, overlapping, without end, with a NaN, which bounds nothing along its axis."""
+    rng, rounding = rng_of("gaps of boxes"), 2.0**-24
+    low = rng.normal(size=(300, 3)) * 2.0
+    boxes = np.hstack([low, low + rng.uniform(0.0, 2.0, (300, 3))])
+    boxes[:9], boxes[9, 0], boxes[10, 5] = [-np.inf] * 3 + [np.inf] * 3, -np.inf, np.inf
+    boxes[11, 1], boxes[12] = np.nan, np.nan
+    pairs = rng.permutation(np.stack(np.triu_indices(300, 1), axis=1))
+    a, b = boxes[pairs[:, 0]], boxes[pairs[:, 1]]
+    gaps = np.maximum(a[:, :3] - b[:, 3:], b[:, :3] - a[:, 3:])
+    gaps = np.where(np.isnan(gaps), -np.inf, gaps)
+    true = np.where((gaps > 0).any(axis=1), np.linalg.norm(np.maximum(gaps, 0.0), axis=1), gaps.max(axis=1))
+    bounds = least_distances(boxes, pairs, rounding)
+    assert not np.isnan(bounds).any() and (np.isinf(bounds) == np.isinf(true)).all()
+    finite = np.isfinite(true)
+    sizes = np.maximum(np.abs(true), np.abs(np.where(np.isfinite(a), a, 0.0)).max(axis=1))[finite]
+    below = true[finite] - bounds[finite]
+    assert (below > 0.5 * rounding * sizes).all() and (below < 2 * rounding * sizes).all()
+    assert (true > 0).sum() > 1000 and (true[finite] < 0).sum() > 500 and (~finite).sum() > 500

@@ -296,7 +296,7 @@ def test_a_boolean_looks_first_where_boxes_overlap_most():
     assert not world.collides() and world.stats["narrowphase"] >= 1000
     world.add(collide.Sphere(0.5), pose(t=(3000.0, 9, 0)))
     world.add(collide.Sphere(0.5), pose(t=(3000.0, 9.1, 0)))
-    assert world.collides() and world.stats["narrowphase"] <= 32
+    assert world.collides() and world.stats["narrowphase"] <= 64, "the first pairs of all, and the likeliest"
 
 
 # --- parts of unions ----------------------------------------------------------------------------

@@ -33,6 +33,34 @@ def test_one_hit_is_found_among_thousands_of_pairs_whatever_its_place(threads, f
     assert len(world.collisions(threads=threads)) == 1
 
 
+@pytest.mark.parametrize("is_moved", [False, True])
+def test_booleans_of_crowds_ask_a_few_pairs(is_moved):
+    """The same few whatever was asked and moved before, and none that filters leave out: then the pairs behind them."""
+    rng = np.random.default_rng(3)
+    X = np.array([pose(t=t) for t in rng.uniform(0, 6, (400, 3))])
+    world = collide.World()
+    ids = world.add_many(BALL, rng.permutation(X) if is_moved else X)
+    if is_moved:
+        assert world.collides() and len(world.distances(0.2)) > 400
+        world.set_poses(ids, X)
+    assert world.collides() and world.stats["narrowphase"] <= 4 and world.stats["hits"] == 1
+    assert "broadphase" not in world.stats["skipped"]
+    n_asked = world.stats["narrowphase"]
+    assert world.collides() and world.stats["narrowphase"] == n_asked
+    world.sleep(ids[:300])
+    of_sleepers = world.stats["narrowphase"]
+    assert world.collides() and world.stats["narrowphase"] <= of_sleepers + 4
+    world.sleep(ids)
+    assert not world.collides() and world.stats["skipped"] == {"sleeping": 400 * 399 // 2, "broadphase": 0}
+    world.wake(ids[[7]])
+    rows = world.collisions().rows
+    assert world.collides() and len(rows) and (rows["a"] == 7).any() | (rows["b"] == 7).any()
+    for k in rows["a"].tolist() + rows["b"].tolist():
+        if k != 7:
+            world.allow(7, k)
+    assert not world.collides() and not len(world.collisions())
+
+
 def spaced(*margins: float, gap: float = 0.25) -> collide.World:
     world = collide.World()
     for k, margin in enumerate(margins):
