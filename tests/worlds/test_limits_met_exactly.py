@@ -426,9 +426,12 @@ def test_the_nearest_pair_within_a_limit_is_found_behind_many_that_are_beyond():
         for shift in (0.0, 1.6):
             world.add(Sphere(1.0), pose((20 * k + shift, shift, shift)))
     assert len(world.minimum(max_distance=0.5)) == 0
-    pair = [world.add(Box((1, 1, 1)), pose((x, 50, 0))) for x in (0.0, 1.375)]
+    pair = [world.add(Sphere(1.0), pose(place)) for place in ((0, 50, 0), (1.9, 51.3, 0))]
     (row,) = world.minimum(max_distance=0.5)
-    assert [row["a"], row["b"]] == pair and row["distance"] == 0.375
+    assert [row["a"], row["b"]] == pair and row["distance"] == pytest.approx(np.hypot(1.9, 1.3) - 2.0)
+    pair = [world.add(Box((1, 1, 1)), pose((x, 90, 0))) for x in (0.0, 1.125)]
+    (row,) = world.minimum(max_distance=0.5)
+    assert [row["a"], row["b"]] == pair and row["distance"] == 0.125
 
 
 def test_of_bodies_that_are_touched_at_once_the_first_counts_whichever_is_asked_first():
