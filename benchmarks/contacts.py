@@ -11,8 +11,6 @@ single   µs a call from Python of one pair: `contacts`, `coal.collide`, `getClo
 batches  µs a pair of ours in batches of 1 to 10,000 boxes on boxes, beside coal's loop
 meshes   µs a pair: a box on a rough ground of 100,352 facets, and two bunnies (from ../shared/data) that overlap by a
          thousandth of their size. coal's contacts there are pairs of facets; MuJoCo has no meshes that are not convex
-deep     µs a call of one pair of meshes that overlap by 1 mm to 25 cm: a ball of a metre across, of 2,000 to 92,000
-         facets, in a box or in a ball like it. coal is asked for one contact, and for all: pairs of facets that meet
 world    ms a step of 5,000 bodies at rest in ten pits (`contact_worlds.py`): move, then find all contacts
 
 CPU time. Checked first, and told: how many contacts a pair everyone finds; whoever finds none at all of bodies that
@@ -163,36 +161,6 @@ def meshes(options: Options, case: str) -> Race:
     return Race(tasks, n, beside=beside, bars=bars("meshes", case, "touching"))
 
 
-#: Tolerances of balls of 2,000, 23,120 and 92,480 facets [m].
-BALLS = {"ball 2k": 2.2e-3, "ball 23k": 1.4e-4, "ball 92k": 3.3e-5}
-
-
-@cache
-def ball_mesh(name: str) -> collide.Mesh:
-    return collide.Mesh(*collide.tessellate(collide.Sphere(0.5), tolerance=BALLS[name]))
-
-
-def deep(options: Options, case: str, depth: float) -> Race:
-    name, solid = case.split(" in ")
-    A, X = ball_mesh(name), collide.pose(rpy=(0.3, -0.2, 0.5))
-    if solid == "box":
-        B, Y = collide.Box((1.0, 0.8, 0.6)), collide.pose((0.02, 0.03, depth - 0.8))
-    else:
-        B, Y = A, collide.pose((0.6 * (1.0 - depth), 0.0, 0.8 * (1.0 - depth)), rpy=(0.7, 0.2, 0.1))
-    tasks: dict[str, Callable] = {"collide": partial(collide.contacts, A, B, X, Y)}
-    beside = {"collide": {"contacts": len(tasks["collide"]())}}
-    if installed(coal="coal"):
-        for peer, max_contacts in (("coal", 1), ("coal, all", 1 << 20)):
-            made = CoalContacts([A], [B], [X], [Y], 0.0, max_contacts=max_contacts)
-            beside[peer], tasks[peer] = {"contacts": per_pair(made.manifolds())}, made.detect
-    return Race(tasks, beside=beside, columns={"facets": len(A.faces)})
-
-
-def deep_cases(options: Options):
-    names = list(BALLS)[: 2 if options.quick else None]
-    return grid(case=[f"{name} in {solid}" for name in names for solid in ("box", "ball")], depth=DEPTHS)
-
-
 @cache
 def worlds(bodies: int) -> dict:
     pits = Pits(bodies)
@@ -226,7 +194,6 @@ def world_cases(options: Options):
 
 
 SIZES = (1, 10, 100, 1000, 10_000)
-DEPTHS = (1e-3, 1e-2, 5e-2, 0.25)
 claim = partial(Claim, bar="median")
 CLAIMS = [
     claim("pairs", "µs a pair", pair_cases, pairs, file="contacts-pairs"),
@@ -234,7 +201,6 @@ CLAIMS = [
     claim("batches", "µs a pair in batches", lambda o: grid(poses=SIZES), batches, file="contacts-batches"),
     claim("meshes", "µs a pair", lambda o: grid(case=["box on ground", *(f"{m} on {m}" for m in meshes_here("bunny"))]),
           meshes, turns=5, file="contacts-meshes"),
-    claim("deep", "µs a call", deep_cases, deep, turns=5, file="contacts-deep"),
     claim("world", "ms a step", world_cases, world, unit="ms", file="contacts-world"),
 ]
 

@@ -7,7 +7,6 @@ same for modules and for the names of a package, but would be a second required 
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
 from typing import Any
 
@@ -16,11 +15,12 @@ class LazyModule:
     """Stands for the module of this name: the first access of an attribute imports the module."""
 
     def __init__(self, name: str):
-        self._name = name
+        self._name, self._module = name, None
 
     def __getattr__(self, attribute: str) -> Any:
-        module = sys.modules.get(self._name) or import_module(self._name)
-        return getattr(module, attribute)
+        if self._module is None:  # another thread may be importing it: the import waits until the module is whole
+            self._module = import_module(self._name)
+        return getattr(self._module, attribute)
 
 
 def lazy_module(name: str) -> Any:
