@@ -15,7 +15,8 @@ class LazyModule:
     """Stands for the module of this name: the first access of an attribute imports the module."""
 
     def __init__(self, name: str):
-        self._name, self._module = name, None
+        self._name = name
+        self._module: Any = None
 
     def __getattr__(self, attribute: str) -> Any:
         if self._module is None:  # another thread may be importing it: the import waits until the module is whole

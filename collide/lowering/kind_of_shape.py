@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collide.curved.shape_kinds import POINTS
-from collide.lowering.convex_sets import primitive_numbers_of
+from collide.lowering.convex_sets import convex_set, primitive_numbers_of
 from collide.lowering.kinds import OF_NUMBER, Kind
-from collide.lowering.parts import convex_set_of
 from collide.shapes.compound import Compound
 from collide.shapes.primitives import Box, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import Shape, kept_with_shape
@@ -35,7 +34,7 @@ def _kind_by_set(shape: Shape) -> Kind:
     numbers = primitive_numbers_of(shape)
     if numbers is not None:
         return _kind_of_convex(numbers[0], numbers[1], 0.0)
-    part = convex_set_of(shape)  # kept with the shape: a query that asks the kind reads the set next
+    part = convex_set(shape)
     return _kind_of_convex(part.kind, len(part.points), part.slop)
 
 
