@@ -10,6 +10,16 @@ import numpy as np
 from collide.casts.directions import Directions
 from collide.results import only_value
 
+#: Rows of a World's hits, of kernels too; `collide.worlds.hits` says what the fields are.
+WORLD_HIT_DTYPE = np.dtype(
+    [
+        ("distance", "f8"), ("lower", "f8"), ("upper", "f8"), ("normal", "f8", 3), ("point", "f8", 3),
+        ("ray", "i4"), ("body", "i4"), ("item", "i4"), ("facet", "i4"),
+        ("hit", "?"), ("certified", "?"), ("at_start", "?"),
+    ],
+    align=True,
+)
+
 
 class RayHits(NamedTuple):
     """Where rays first meet a body, or, with ``all_hits``, every place where they meet its surface.

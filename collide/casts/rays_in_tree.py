@@ -25,6 +25,7 @@ from collide.casts.cut_parts import (
     STATE,
     cut_part,
 )
+from collide.casts.ray_hits import WORLD_HIT_DTYPE
 from collide.casts.silhouette import CAST_INTEGERS
 from collide.curved.chords import MET, MISSED
 from collide.kernels import entry, kernel, view_f64, view_i32, view_i64, view_u8
@@ -48,10 +49,13 @@ NODES_AT, LINKS_AT, N_NODES, FIRST_AT, N_BODIES, SKIPPED_AT, MESHED_AT, UNBOUNDE
 TREE_OF_PARTS = 9
 
 # A row of `WORLD_HIT_DTYPE`: doubles, 32-bit integers, bytes.
-_DISTANCE, _NORMAL, _POINT = 0, 3, 6
-_RAY, _BODY, _ITEM, _FACET = 18, 19, 20, 21
-_HIT, _CERTIFIED = 88, 89
-HIT_ROW = 96
+_OFFSETS = {name: place[1] for name, place in (WORLD_HIT_DTYPE.fields or {}).items()}
+_DISTANCE, _LOWER, _UPPER, _NORMAL, _POINT = (
+    _OFFSETS[name] // 8 for name in ("distance", "lower", "upper", "normal", "point")
+)
+_RAY, _BODY, _ITEM, _FACET = (_OFFSETS[name] // 4 for name in ("ray", "body", "item", "facet"))
+_HIT, _CERTIFIED = _OFFSETS["hit"], _OFFSETS["certified"]
+HIT_ROW = WORLD_HIT_DTYPE.itemsize
 
 
 class _Tree(NamedTuple):
@@ -254,14 +258,14 @@ def _put_row(tree, walk, k, exponent, row_at):
         doubles[i] = 0.0
     integers[_RAY] = k
     integers[_BODY] = integers[_ITEM] = integers[_FACET] = -1
-    doubles[0] = doubles[1] = doubles[2] = math.inf
+    doubles[_DISTANCE] = doubles[_LOWER] = doubles[_UPPER] = math.inf
     flags[_CERTIFIED] = 1
     if wall[_WALL_UPPER] == math.inf:
         return wall[_NEXT_LOWER] == math.inf
     if not wall[_WALL_UPPER] < wall[_NEXT_LOWER]:
         return False
     body, part = int(wall[_WALL_BODY]), int(wall[_WALL_PART])
-    for i, t in ((0, wall[_WALL]), (1, wall[_WALL_LOWER]), (2, wall[_WALL_UPPER])):
+    for i, t in ((_DISTANCE, wall[_WALL]), (_LOWER, wall[_WALL_LOWER]), (_UPPER, wall[_WALL_UPPER])):
         doubles[i] = math.ldexp(t, -exponent)
     put_vec3(doubles, _NORMAL, vec3_at(wall, _WALL_NORMAL))
     for axis in range(3):

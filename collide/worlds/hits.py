@@ -23,16 +23,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from collide.casts.ray_hits import WORLD_HIT_DTYPE
 from collide.worlds.bodies import Roster
-
-WORLD_HIT_DTYPE = np.dtype(
-    [
-        ("distance", "f8"), ("lower", "f8"), ("upper", "f8"), ("normal", "f8", 3), ("point", "f8", 3),
-        ("ray", "i4"), ("body", "i4"), ("item", "i4"), ("facet", "i4"),
-        ("hit", "?"), ("certified", "?"), ("at_start", "?"),
-    ],
-    align=True,
-)
 
 
 def empty_hits(n: int) -> np.ndarray:
