@@ -136,8 +136,8 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
     iterations = run.iterations
     shallowest, deepest = -math.inf, math.inf
     # A gap next to nothing has its nearest points where the whole surface is known, as a depth has; a gap of polytopes
-    # gets its points with its last digits.
-    has_points = query.depths or (curved and not query.boolean)
+    # of exact numbers gets its points with its last digits.
+    has_points = query.depths or not (query.boolean or exact_numbers)
     start = 0
     while True:  # where rounding has spoilt a surface, one that begins elsewhere is often sound
         seed = Seed(points, ids, enclosed and start == 0, well_conditioned, use_capped_tetrahedron, start)
