@@ -45,6 +45,7 @@ own() {
 plain() { NUMBA_DISABLE_JIT=1 run plain python -m pytest -q tests/contact/test_facet_manifolds.py -k no_patch_may_reach; }
 matrix() { run matrix bash tests/matrix.sh; }
 soaks() {
+    rm -rf "$log/fuzz" # of the last night: a search goes on from its folder only where it is told to
     run fuzz collide fuzz --minutes 20 --seed "$seed" --save "$log/fuzz" --quiet & # one core
     run soak-worlds python tests/soak/soak_worlds.py --questions 30000 --seed "$seed"
     run soak-memory python tests/soak/soak_memory.py --shapes 30000 --seed "$seed"
