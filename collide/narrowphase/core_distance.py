@@ -91,9 +91,7 @@ def convex_cores(ordered, query, work, radius, error, curved, n_start):
     # What the exact stage can settle needs no EPA to find out whether it is open.
     if not query.depths and (upper + error < radius or exact_numbers):
         if enclosed and not query.boolean:
-            miss, extent = weigh_enclosed(points, weights)
-            if not miss <= _NEAR_MISS * extent:
-                nearest_of_all(points, 4, weights, 15)
+            _weigh_enclosed(work)
         return _common_point(upper, n, run.iterations)
     return _by_epa(ordered, query, work, run, upper, radius, error, curved)
 
@@ -164,11 +162,34 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
         # few vertices: `exact_depth.py` tries all planes instead
         if refined.sound or not use_capped_tetrahedron or start == _MAX_STARTS:
             break
-    _weigh_foot(work, polytope, result, has_points, not enclosed, curved, tolerance, size, error)
+    miss = _weigh_foot(work, polytope, result, has_points, not enclosed, curved, tolerance, size, error)
+    of_gjk = abs(result.depth) + (0.0 if enclosed else upper)  # what GJK's last simplex may miss the foot by
     if result.clearance > error:
         upper = min(upper, -result.clearance)
     n_vertices = 4 if enclosed else 3
+    if miss > of_gjk:  # the surface is unfinished
+        n = _weigh_nearest_of_gjk(pair, work, radius, error)
+        return CoreDistance(result.depth, lower, upper, shallowest, deepest, result.nhat, n, n, iterations)
     return CoreDistance(result.depth, lower, upper, shallowest, deepest, result.nhat, 3, n_vertices, iterations)
+
+
+@kernel
+def _weigh_nearest_of_gjk(pair, work, radius, error):
+    """GJK's last simplex again, weighted for its point nearest the origin, or for the origin within; its points."""
+    run = gjk(
+        pair, work.points, work.ids, work.weights, 0, False, math.inf, radius, math.inf, error, GJK_ROUNDS
+    )
+    if run.status == ENCLOSED:
+        _weigh_enclosed(work)
+    return run.n_points
+
+
+@kernel(inline=True)
+def _weigh_enclosed(work):
+    """Weigh a tetrahedron for the origin within, or for its point nearest the origin where rounding spoils that."""
+    miss, extent = weigh_enclosed(work.points, work.weights)
+    if not miss <= _NEAR_MISS * extent:
+        nearest_of_all(work.points, 4, work.weights, 15)
 
 
 @kernel(inline=True)
@@ -205,7 +226,8 @@ def _refined_result(result, refined, error):
 
 @kernel(inline=True)
 def _weigh_foot(work, polytope, result, has_points, with_ids, curved, tolerance, size, error):
-    """Points 0 … 2 become the facet holding the origin's foot on the plane of the depth, weighted for the foot.
+    """Points 0 … 2 become the facet holding the origin's foot on the plane of the depth, weighted for the foot; by how
+    much they miss the foot where that is more than may be, else 0 [m].
 
     with_ids : name the facet's vertices, too; else the simplex enclosing the origin stays named.
     """
@@ -223,8 +245,12 @@ def _weigh_foot(work, polytope, result, has_points, with_ids, curved, tolerance,
     if curved:
         width = result.depth - result.clearance
         tolerated = max(slack, _MISS_OF_WIDTH * width) if result.clearance > error else slack
-    if has_points and norm1(sub(weighted_sum(work.points, work.weights, 3, 0), foot)) > tolerated:
-        weigh_nearest(polytope, result.n_facets, facet, work.points, work.ids, work.weights, with_ids, foot, tolerated)
+    if not has_points or norm1(sub(weighted_sum(work.points, work.weights, 3, 0), foot)) <= tolerated:
+        return 0.0
+    miss = weigh_nearest(
+        polytope, result.n_facets, facet, work.points, work.ids, work.weights, with_ids, foot, tolerated
+    )
+    return miss if miss > tolerated else 0.0
 
 
 @kernel

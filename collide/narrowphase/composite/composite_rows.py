@@ -36,7 +36,7 @@ from collide.narrowphase.rows import (
     UPPER,
     view_row,
 )
-from collide.numerics.vec3 import Vec3, add, neg, norm, norm1, put_vec3, scale, sub, vec3_at
+from collide.numerics.vec3 import Vec3, add, neg, norm, put_vec3, scale, sub, vec3_at
 
 #: Normals of overlapping parts that are tried for a separating translation, deepest first; then axes, three of either
 #: frame, both ways.
@@ -306,8 +306,8 @@ def _size_of_body(parts, first, n, origin):
     for part in range(first, first + n):
         shape = parts.shape_of[part]
         at = NUMBERS * shape
-        away = norm1(sub(vec3_at(parts.poses, POSE * part + 9), origin))
-        size = max(size, 2 * parts.numbers[at + REACH] + parts.numbers[at + RADIUS] + away)
+        away = norm(sub(vec3_at(parts.poses, POSE * part + 9), origin))
+        size = max(size, parts.numbers[at + REACH] + parts.numbers[at + RADIUS] + away)
         kind = parts.ints[INTS * shape + KIND]
         curved = curved or kind != POINTS
         has_halfspace = has_halfspace or kind == HALFSPACE
