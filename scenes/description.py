@@ -328,7 +328,7 @@ class Scene:
         links: dict[str, SceneBody] = {}
         for link in robot.links:
             if link in robot.geometry:
-                body, X_LB = _link_body(link, robot.geometry[link])
+                body, X_LB = link_body(link, robot.geometry[link])
                 body.owner, body.static = label, link in robot.base_links and not mobile
                 self.add(body)
                 links[body.name] = body
@@ -379,7 +379,7 @@ class Scene:
         self.add(replace(body, X_WB=placement.body_poses()[body.name], owner=owner, static=False))
 
 
-def _link_body(link: str, elements: tuple[LinkShape, ...]) -> tuple[SceneBody, np.ndarray]:
+def link_body(link: str, elements: tuple[LinkShape, ...]) -> tuple[SceneBody, np.ndarray]:
     """One body for a link, and its pose X_LB in the link: several elements become a compound."""
     about = [element.approximation for element in elements if element.approximation]
     if len(elements) == 1:

@@ -85,8 +85,8 @@ _REPORT = """examples:
   collide report scene.yaml --json - | jq '.colliding[] | [.a, .b, .depth]'
   collide report panda_workbench --html page.html       to look at, in a browser
 
-A scene is a file (URDF, MJCF, planning scene, mesh, scene YAML) or the name of
-a shipped one; several files make one scene.
+A scene is a file (URDF, MJCF, SDFormat, planning scene, mesh, scene YAML) or
+the name of a shipped one; several files make one scene.
 
 The first page holds what needs a person: collisions, then what is nearer than
 the clearance. A body that is in many pairs takes one row, contacts within
@@ -266,7 +266,7 @@ def _scene_arguments(parser: argparse.ArgumentParser, at_least: int = 1) -> None
         help="joint values: a state's name, a YAML or JSON file, 0,0.5,... in the order of the joints, "
         "or joint=0.5,...; several names or files, separated by commas or given again, are several states",
     )
-    group.add_argument("--robot", metavar="FILE", help="the robot of a planning scene, URDF or MJCF")
+    group.add_argument("--robot", metavar="FILE", help="the robot of a planning scene: URDF, MJCF or SDFormat")
     group.add_argument("--srdf", metavar="FILE", help="disabled pairs and named states (default: beside the robot)")
     group.add_argument("--meshes", choices=("mesh", "hull", "pieces"),
                        help="how meshes enter: as they are (default), as convex hulls, or as unions of convex pieces")

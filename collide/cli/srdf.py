@@ -35,14 +35,14 @@ states, end effectors, virtual joints. --pairs-only leaves them out.
 --compare judges the disabled pairs of an SRDF: one that it says never collide,
 and that do, is wrong, and a configuration is shown.
 
-ROBOT is a URDF or MJCF file, or a scene (a file or a shipped one) with a robot
+ROBOT is a URDF, MJCF or SDFormat file, or a scene (a file or a shipped one) with a robot
 in it.
 
 exit status: 0 done, 1 the SRDF compared with is wrong about a pair, 2 error"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("robot", metavar="ROBOT", help="a URDF or MJCF file, or a scene with a robot in it")
+    parser.add_argument("robot", metavar="ROBOT", help="a URDF, MJCF or SDFormat file, or a scene with a robot in it")
     parser.add_argument("--name", metavar="NAME", help="which robot, of a scene with several")
     parser.add_argument("--samples", type=count, default=10_000, metavar="N", help="configurations drawn (10000)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="other seeds draw others (0)")

@@ -153,13 +153,14 @@ class Robot:
 
     @classmethod
     def load(cls, path, srdf=None, **options) -> Robot:
-        """A robot from a URDF or an MJCF file, with the SRDF beside the file or a given SRDF.
+        """A robot from a URDF, MJCF or SDFormat file, with the SRDF beside the file or a given SRDF.
 
         Parameters
         ----------
         path : str or Path
             The URDF file; or an MJCF file, read by the package mujoco (extra ``[mujoco]``): bodies are links, the
-            root is the world, pairs left out by MuJoCo's filters are never tested, keyframes are states.
+            root is the world, pairs left out by MuJoCo's filters are never tested, keyframes are states; or an SDFormat
+            file with a single robot.
         srdf : str, Path or bool, optional
             The SRDF file. ``None`` looks beside the robot's file, ``False`` does without. An SRDF adds to MuJoCo's
             filters.

@@ -17,13 +17,15 @@ from collide.errors import LONGEST_PLACE, InvalidArgument, SceneError, brief, cu
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody, free_name
 from collide.scenes.loaders import mesh_file as mesh_loader
-from collide.scenes.loaders import mjcf, moveit, scene_yaml, states, urdf
+from collide.scenes.loaders import mjcf, moveit, moveit_text, scene_yaml, sdformat, states, urdf
 from collide.scenes.loaders.documents import read_document
 from collide.scenes.loaders.mesh_shapes import part_shape
+from collide.scenes.loaders.robot_file import load_robot
 from collide.scenes.loaders.xml_text import parse_xml
 
 FORMATS = (
-    "URDF and MJCF (.urdf, .xml), scene files and MoveIt planning scenes (.yaml, .yml, .json), "
+    "URDF, MJCF and SDFormat (.urdf, .xml, .sdf, .world), scene files and MoveIt planning scenes "
+    "(.yaml, .yml, .json, .scene), "
     f"meshes ({', '.join(mesh_loader.SUFFIXES)})"
 )
 
@@ -59,14 +61,14 @@ def load(
     Parameters
     ----------
     path : str or Path
-        A URDF or an MJCF file (an SRDF beside it is read too), a MoveIt planning scene, a mesh, a scene file
-        (docs/scene-format.md), or the name of a shipped scene.
+        A URDF, an MJCF or an SDFormat file (an SRDF beside it is read too), a MoveIt planning scene, a mesh, a scene
+        file (docs/scene-format.md), or the name of a shipped scene.
     *more_paths
         Further files of the same scene.
     state : str, Path or mapping of str to float, optional
         The name of a state that the files define, a file of joint values, or joint → value [rad or m].
     robot : Robot, str or Path, optional
-        For MoveIt planning scenes: the robot, or its URDF.
+        For MoveIt planning scenes: the robot, or its file.
     srdf : str, Path or bool, optional
         The SRDF of a URDF; None looks beside it, False does without.
     meshes : {"mesh", "hull", "pieces"}
@@ -157,6 +159,8 @@ def _load_one(path: Path, options: Options) -> Scene:
         raise SceneError(f"is a folder; name a file in it. Known formats: {FORMATS}", path=path)
     if suffix in (".yaml", ".yml", ".json"):
         return _load_document(path, options)
+    if suffix == ".scene":
+        return _load_text_scene(path, options)
     if suffix in (".urdf", ".xml", ".xacro", ".srdf", ".sdf", ".mjcf", ".world") or starts_like_xml(path):
         return _load_xml(path, options)
     raise SceneError(f"unknown format {path.suffix!r}; known are {FORMATS}", path=path)
@@ -166,8 +170,13 @@ def _load_xml(path: Path, options: Options) -> Scene:
     root = parse_xml(path, [])
     if root.tag == "mujoco":
         return _load_mjcf(path, options)
-    if root.tag in ("sdf", "world"):
-        raise SceneError(f"is SDF (<{root.tag}>), which is not read; convert it to URDF", path=path)
+    if sdformat.is_sdf(root):
+        seconds: dict[str, float] = {}
+        scene = sdformat.load_scene(path, options.srdf, seconds=seconds, **options.for_robots())
+        scene.seconds = seconds
+        return scene
+    if root.tag == "mujocoinclude":
+        raise SceneError("is a part of an MJCF model (<mujocoinclude>): give the file that includes it", path=path)
     if root.tag != "robot":
         raise SceneError(f"<{root.tag}> is no format known here; known are {FORMATS}", path=path)
     if root.find("link") is None and root.find("disable_collisions") is not None:
@@ -176,6 +185,17 @@ def _load_xml(path: Path, options: Options) -> Scene:
     robot = urdf.load_robot(path, options.srdf, seconds=scene.seconds, **options.for_robots())
     scene.name = robot.name
     scene.place_robot(robot, np.eye(4))
+    return scene
+
+
+def _load_text_scene(path: Path, options: Options) -> Scene:
+    """The obstacles of a MoveIt scene as text, and the robot where one is given, its root at the world's origin."""
+    scene = moveit_text.load_text_scene(path, options.meshes)
+    if options.robot is not None:
+        robot = options.robot
+        if not isinstance(robot, Robot):
+            robot = load_robot(robot, options.srdf, seconds=scene.seconds, **options.for_robots())
+        scene.place_robot(robot, np.eye(4))
     return scene
 
 

@@ -17,12 +17,12 @@ import numpy as np
 from collide.errors import cut, listing
 from collide.robots.kinematic_tree import Joint, Mimic
 from collide.scenes.description import free_name
+from collide.scenes.loaders.robot_reading import BALL as BALL_JOINT
+from collide.scenes.loaders.robot_reading import chain
 from collide.transforms import pose
 
 #: Kinds of joints (mjtJoint), as a compiled model numbers them.
 FREE, BALL, SLIDE, HINGE = range(4)
-#: Axes about which a ball joint is turned, from the parent on, and what the columns are called.
-_BALL_AXES = (("/yaw", 2), ("/pitch", 1), ("/roll", 0))
 
 
 @dataclass
@@ -112,7 +112,8 @@ class _Growing:
         """A hinge, slide or ball joint."""
         model = self.model
         if model.jnt_type[number] == BALL:
-            self._add_ball(name, parent, child, X_PJ)
+            for ball in chain(name, BALL_JOINT, parent, child, X_PJ, lambda link: free_name(link, self.taken)):
+                self._link(ball.child, ball)
             return
         is_hinge, axis = model.jnt_type[number] == HINGE, np.array(model.jnt_axis[number])
         value = self.held.get(number, 0.0) - float(model.qpos0[model.jnt_qposadr[number]])
@@ -123,12 +124,6 @@ class _Growing:
         kind = "prismatic" if not is_hinge else "revolute" if limited else "continuous"
         joint = Joint(name, kind, parent, child, X_PJ, axis, lower, upper, self._mimic(number))
         self._link(child, replace(joint, type="fixed", mimic=None) if number in self.held else joint)
-
-    def _add_ball(self, name: str, parent: str, child: str, X_PJ: np.ndarray) -> None:
-        for suffix, coordinate in _BALL_AXES:
-            link = child if coordinate == 0 else free_name(f"{child}{suffix}", self.taken)
-            self._link(link, Joint(name + suffix, "continuous", parent, link, X_PJ, np.eye(3)[coordinate]))
-            parent, X_PJ = link, np.eye(4)
 
     def _link(self, name: str, joint: Joint) -> None:
         self.tree.links.append(name)

@@ -1,8 +1,8 @@
-"""Where a file name in a description points: relative paths, ``file://`` and ``package://``.
+"""Where a file name in a description points: relative paths, ``file://``, ``package://`` and ``model://``.
 
-A package is looked for, in this order: the folders given by ``package_path``, the folders above
-the description, ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, and the data that Python packages install
-(``cmeel.prefix/share`` of example-robot-data, ``pybullet_data``).
+A package or model is looked for, in this order: the folders given by ``package_path``, the folders above
+the description, ROS_PACKAGE_PATH and Gazebo's lists of folders, AMENT_PREFIX_PATH, and the data that Python packages
+install (``cmeel.prefix/share`` of example-robot-data, ``pybullet_data``).
 """
 
 from __future__ import annotations
@@ -15,6 +15,11 @@ from urllib.parse import unquote, urlsplit
 
 from collide.base.given_files import is_file
 from collide.errors import SceneError, brief, cut
+
+#: Environment variables that list folders of packages and models.
+_FOLDER_LISTS = (
+    "ROS_PACKAGE_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH",
+)
 
 
 class NotFound(SceneError):
@@ -45,6 +50,8 @@ def find(filename: str, beside: Path, package_path: Iterable = (), *, element: s
             return candidate
         searched[str(candidate)] = None
     advice = ""
+    if scheme == "model":
+        advice = "; say where models lie with package_path (--package-path) or GZ_SIM_RESOURCE_PATH"
     if scheme == "package":
         advice = "; say where packages lie with package_path (--package-path) or ROS_PACKAGE_PATH"
         if rest.startswith("example-robot-data/"):
@@ -71,7 +78,9 @@ def _split(filename: str, beside: Path, element: str | None) -> tuple[str, str]:
 def _plain_candidates(name: str, beside: Path, package_path: Iterable) -> Iterator[Path]:
     folder = beside.parent
     yield folder / name
-    if not PurePosixPath(name).is_absolute():
+    if PurePosixPath(name).is_absolute():  # which Bullet takes for a path from the file's folder
+        yield folder / name.lstrip("/")
+    else:
         for base in package_path:
             yield Path(base) / name
 
@@ -98,8 +107,8 @@ def _package_candidates(name: str, beside: Path, package_path: Iterable) -> Iter
 
 
 def _environment_folders() -> Iterator[Path]:
-    for base in filter(None, os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)):
-        yield Path(base)
+    for variable in _FOLDER_LISTS:
+        yield from map(Path, filter(None, os.environ.get(variable, "").split(os.pathsep)))
     for base in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
         yield Path(base) / "share"
 

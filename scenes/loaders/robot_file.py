@@ -7,7 +7,7 @@ from pathlib import Path
 from collide.base import argument_checks as checks
 from collide.errors import SceneError
 from collide.robots.robot import Robot
-from collide.scenes.loaders import mjcf, urdf
+from collide.scenes.loaders import mjcf, sdformat, urdf
 from collide.scenes.loaders.xml_text import parse_xml
 
 
@@ -15,19 +15,14 @@ def load_robot(
     path, srdf=None, *, meshes: str = "mesh", package_path=(), missing_meshes: str = "error",
     seconds: dict[str, float] | None = None,
 ) -> Robot:
-    """A `Robot` from a URDF or an MJCF file, whatever it is called; options as of `urdf.load_robot`.
+    """A `Robot` from a URDF, an MJCF or an SDFormat file, whatever it is called; options as of `urdf.load_robot`.
 
     MuJoCo looks for meshes itself, beside the file, and needs all of them: ``package_path`` and ``missing_meshes``
     are for URDFs.
     """
     path = checks.file_path("Robot.load: path", path, SceneError)
-    if is_mjcf(path):
+    root = None if Path(path).suffix.lower() == ".urdf" else parse_xml(Path(path), [])
+    if root is not None and root.tag == "mujoco":
         return mjcf.load_robot(path, srdf, meshes=meshes, seconds=seconds)
-    return urdf.load_robot(
-        path, srdf, meshes=meshes, package_path=package_path, missing_meshes=missing_meshes, seconds=seconds
-    )
-
-
-def is_mjcf(path) -> bool:
-    """Whether the outermost element of an XML file is <mujoco>; files called .urdf are not opened."""
-    return Path(path).suffix.lower() != ".urdf" and parse_xml(Path(path), []).tag == "mujoco"
+    read = sdformat.load_robot if root is not None and sdformat.is_sdf(root) else urdf.load_robot
+    return read(path, srdf, meshes=meshes, package_path=package_path, missing_meshes=missing_meshes, seconds=seconds)

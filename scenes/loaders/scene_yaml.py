@@ -15,7 +15,7 @@ from collide.base.given_files import LARGEST_TEXT, read_text
 from collide.errors import InvalidArgument, SceneError, brief, listing
 from collide.robots.robot import Robot
 from collide.scenes.description import Scene, SceneBody
-from collide.scenes.loaders import mjcf, resources, shape_yaml, urdf
+from collide.scenes.loaders import mjcf, resources, sdformat, shape_yaml, urdf
 from collide.scenes.loaders.documents import parse_document
 from collide.scenes.loaders.fields import Fields, did_you_mean, read_pose
 from collide.scenes.loaders.files import MAX_INCLUDED
@@ -28,7 +28,7 @@ VERSION = 1
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 _SCENE = ("collide", "name", "about", "units", "include", "robots", "bodies", "allow", "states")
-_ROBOT = ("urdf", "mjcf", "srdf", "robot", "name", "prefix", "pose", "state", "base", "meshes")
+_ROBOT = ("urdf", "mjcf", "sdf", "srdf", "robot", "name", "prefix", "pose", "state", "base", "meshes")
 _BODY = ("name", "about", "shape", "pose", "static", "group", "mask")
 
 
@@ -158,8 +158,8 @@ def _prefix(entry: Fields) -> str:
 
 
 def _read_robot(building: _Building, entry: Fields) -> Robot | mjcf.MjcfFile:
-    if sum(key in entry for key in ("urdf", "mjcf", "robot")) != 1:
-        entry.fail("give either urdf or mjcf, a file, or robot, a description with links and joints")
+    if sum(key in entry for key in ("urdf", "mjcf", "sdf", "robot")) != 1:
+        entry.fail("give one of urdf, mjcf and sdf, a file, or robot, a description with links and joints")
     meshes = entry.choice("meshes", OPTIONS, building.meshes)
     if "robot" in entry:
         return inline_robot(
@@ -170,11 +170,11 @@ def _read_robot(building: _Building, entry: Fields) -> Robot | mjcf.MjcfFile:
         srdf = resources.find(srdf, building.path, building.package_path, element=entry.place("srdf"))
     elif srdf is not None and srdf is not False:
         entry.fail(f"must be the name of a file, or false to do without, got {brief(srdf)}", "srdf")
-    key = "mjcf" if "mjcf" in entry else "urdf"
+    key = next(key for key in ("mjcf", "sdf", "urdf") if key in entry)
     file = resources.find(entry.text(key), building.path, building.package_path, element=entry.place(key))
     if key == "mjcf":
         return mjcf.load_mjcf(file, srdf, meshes=meshes, seconds=building.seconds)
-    return urdf.load_robot(
+    return (sdformat if key == "sdf" else urdf).load_robot(
         file, srdf, meshes=meshes, package_path=building.package_path,
         missing_meshes=building.missing_meshes, seconds=building.seconds,
     )

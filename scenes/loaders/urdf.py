@@ -11,44 +11,22 @@ import math
 import time
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
-from collide.base import argument_checks as checks
 from collide.errors import InvalidPose, InvalidShape, SceneError, cut, listing
 from collide.robots.kinematic_tree import Joint, Mimic
 from collide.robots.robot import LinkShape, Robot
-from collide.scenes.loaders import mesh_file as mesh_loader
-from collide.scenes.loaders import resources
+from collide.scenes.description import free_name
 from collide.scenes.loaders.fields import placed
-from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
+from collide.scenes.loaders.mesh_shapes import Taken
+from collide.scenes.loaders.robot_reading import BALL, Reading, chain, opened
 from collide.scenes.loaders.srdf import find_srdf, read_srdf
 from collide.scenes.loaders.xml_text import parse_xml
-from collide.shapes.primitives import Box, Capsule, Cylinder, Sphere
+from collide.shapes.primitives import Box, Capsule, Cylinder, Halfspace, Sphere
 from collide.shapes.shape import Shape
 from collide.transforms import pose
-
-MISSING_MESHES = ("error", "skip")
-
-
-@dataclass
-class Reading:
-    """One URDF being read: where it lies, how meshes are taken, and what there is to say."""
-
-    path: Path
-    meshes: str = "mesh"
-    package_path: tuple = ()
-    missing_meshes: str = "error"
-    notes: list[str] = field(default_factory=list)
-    missing: list[str] = field(default_factory=list)
-    mesh_files: dict[Path, mesh_loader.MeshFile] = field(default_factory=dict)
-    seconds: float = 0.0
-
-    def fail(self, element: str, what: str) -> NoReturn:
-        raise SceneError(what, path=self.path, element=element)
 
 
 def load_robot(
@@ -65,30 +43,28 @@ def load_robot(
     Raises SceneError, InvalidShape or InvalidPose naming file, link or joint, and value.
     """
     started = time.perf_counter()
-    path = Path(path)
-    mesh_loader.check_meshes_option(meshes)
-    if not isinstance(missing_meshes, str) or missing_meshes not in MISSING_MESHES:
-        raise SceneError(f'missing_meshes must be "error" or "skip", got {checks.brief(missing_meshes)}')
-    reading = Reading(path, meshes, tuple(_as_paths(package_path)), missing_meshes)
+    reading = opened(path, meshes, package_path, missing_meshes)
+    path = reading.path
     root = parse_xml(path, reading.notes)
     if root.tag != "robot":
         advice = "; a scene file names an MJCF model under mjcf" if root.tag == "mujoco" else ""
         reading.fail(f"<{root.tag}>", f"the outermost element of a URDF is <robot>{advice}")
     robot = _build(root, reading, find_srdf(path, root.get("name"), srdf))
-    if seconds is not None:
-        seconds["meshes"] = seconds.get("meshes", 0.0) + reading.seconds
-        seconds["read"] = seconds.get("read", 0.0) + time.perf_counter() - started - reading.seconds
+    reading.add_time(seconds, started)
     return robot
 
 
 def _build(root: ET.Element, reading: Reading, srdf: Path | None) -> Robot:
     links = [_name(element, "link", k, reading) for k, element in enumerate(root.findall("link"))]
     if not links:
-        reading.fail("<robot>", "has no <link>" + _expand_advice(root))
-    joints = [
-        _joint(element, _name(element, "joint", k, reading), reading) for k, element in enumerate(root.findall("joint"))
-    ]
+        reading.fail("<robot>", "has no <link>" + _advice(root))
     geometry = {name: link_shapes(element, name, reading) for name, element in zip(links, root.findall("link"))}
+    taken = dict.fromkeys(links, 1)
+    joints: list[Joint] = []
+    for k, element in enumerate(root.findall("joint")):
+        joint = _joint(element, _name(element, "joint", k, reading), reading)
+        joints += _of_single_coordinates(joint, taken, reading)
+    links += [link for link in taken if link not in geometry]
     _note_unchecked(root, geometry, reading)
     semantics = read_srdf(srdf, links, [joint.name for joint in joints]) if srdf is not None else None
     sources = [str(reading.path)] + ([str(srdf)] if srdf is not None else [])
@@ -118,7 +94,20 @@ def _note_unchecked(root: ET.Element, geometry: dict, reading: Reading) -> None:
 # --- XML ----------------------------------------------------------------------------------------
 
 
-def _expand_advice(root: ET.Element) -> str:
+def _of_single_coordinates(joint: Joint, taken: dict[str, int], reading: Reading) -> list[Joint]:
+    """A joint, or in place of Bullet's "spherical" ones three that turn about an axis each."""
+    if joint.type != "spherical":
+        return [joint]
+    reading.notes.append(
+        f"{_place('joint', joint.name)} is spherical, as Bullet has it: its columns are NAME/yaw, NAME/pitch, "
+        "NAME/roll, without limits"
+    )
+    return chain(joint.name, BALL, joint.parent, joint.child, joint.X_PJ, lambda name: free_name(name, taken))
+
+
+def _advice(root: ET.Element) -> str:
+    if root.find("deformable") is not None:
+        return ": it describes a soft body (<deformable>), and bodies here are rigid"
     if any("}" in str(element.tag) for element in root.iter()):
         return "; it looks like xacro: expand it first (xacro in.xacro > out.urdf)"
     return ""
@@ -142,15 +131,7 @@ def floats(
     text = element.get(attribute, default)
     if text is None:
         reading.fail(place, f'<{element.tag}> needs {attribute}="..."')
-    wanted = "one finite number" if count == 1 else f"{count} finite numbers"
-    try:
-        values = [float(word) for word in text.replace(",", " ").split()]
-    except ValueError:
-        advice = "; expand the xacro first" if "${" in text or "$(" in text else ""
-        reading.fail(place, f'<{element.tag}> {attribute} must be {wanted}, got "{cut(text)}"{advice}')
-    if len(values) != count or not all(map(math.isfinite, values)):
-        reading.fail(place, f'<{element.tag}> {attribute} must be {wanted}, got "{cut(text)}"')
-    return np.array(values)
+    return reading.numbers(text, count, f"<{element.tag}> {attribute}", place)
 
 
 def _origin(element: ET.Element, place: str, reading: Reading) -> np.ndarray:
@@ -228,25 +209,31 @@ def link_shapes(link: ET.Element, name: str, reading: Reading, tag: str = "colli
         place = _place("link", name) + (f" {tag} {k}" if len(elements) > 1 else "")
         X_LG = _origin(element, place, reading)
         source = f"{reading.path}: {place}"
-        for shape, approximation in _element_shapes(element, name, place, reading):
+        for shape, approximation in _element_shapes(element, place, reading):
             shapes.append(LinkShape(shape, X_LG, approximation, source))
     return shapes
 
 
-def _element_shapes(described: ET.Element, link: str, place: str, reading: Reading) -> list[tuple[Shape, str | None]]:
+def _element_shapes(described: ET.Element, place: str, reading: Reading) -> list[tuple[Shape, str | None]]:
     geometry = described.find("geometry")
     children = [] if geometry is None else [child for child in geometry if isinstance(child.tag, str)]
     if len(children) != 1:
         reading.fail(place, f"<{described.tag}> needs <geometry> with one shape in it, found {len(children)}")
     element = children[0]
     if element.tag == "mesh":
-        return _mesh_shapes(element, link, place, reading)
+        return [*_mesh_shapes(element, place, reading)]
+    if element.tag == "cdf":
+        name = cut(element.get("filename", ""))
+        reading.notes.append(
+            f"{place}: {name}, a grid of distances of Bullet's, is not read: that link is NOT checked by it"
+        )
+        return []
     try:
         shape = _primitive(element, place, reading)
     except InvalidShape as error:
         raise InvalidShape(placed(error, reading.path, place)) from None
     sizes = [value for attribute in ("size", "radius", "length") for value in np.ravel(getattr(shape, attribute, ()))]
-    _note_size(float(max(sizes)), place, reading)
+    reading.note_size(float(max(sizes, default=1.0)), place)
     return [(shape, None)]
 
 
@@ -262,57 +249,19 @@ def _primitive(element: ET.Element, place: str, reading: Reading):
         return Cylinder(number("radius"), number("length"))
     if element.tag == "capsule":
         return Capsule(number("radius"), number("length"))
-    reading.fail(place, f"unknown shape <{cut(element.tag)}>; known are box, sphere, cylinder, capsule and mesh")
+    if element.tag == "plane":  # of Bullet
+        return Halfspace(floats(element, "normal", 3, place, reading, "0 0 1"), 0.0)
+    reading.fail(place, f"unknown shape <{cut(element.tag)}>; known are box, sphere, cylinder, capsule, mesh and plane")
 
 
-def _mesh_shapes(element: ET.Element, link: str, place: str, reading: Reading) -> list[tuple[Shape, str | None]]:
+def _mesh_shapes(element: ET.Element, place: str, reading: Reading) -> list[Taken]:
     filename = element.get("filename")
     if not filename:
         reading.fail(place, '<mesh> needs a filename="..."')
-    scale = _mesh_scale(element, place, reading)
-    try:
-        file = resources.find(filename, reading.path, reading.package_path, element=place)
-    except resources.NotFound as error:
-        if reading.missing_meshes == "skip":
-            missing = f"{place} has no collision mesh {cut(filename, 240)}: that link is NOT checked by it"
-            reading.notes.append(missing)
-            reading.missing.append(missing)
-            return []
-        raise SceneError(
-            f"{error.what}\n    (missing_meshes=\"skip\", --missing-meshes skip, loads the robot without it)",
-            path=reading.path, element=place,
-        ) from None
-    started = time.perf_counter()
-    if file not in reading.mesh_files:
-        reading.mesh_files[file] = mesh_loader.read_mesh(file, reading.meshes)
-        reading.notes += reading.mesh_files[file].notes
-    shapes = [
-        (shape, about) for shape, about in element_shapes(reading.mesh_files[file], scale, f"{reading.path}: {place}")
-    ]
-    _note_size(extent(reading.mesh_files[file], scale), place, reading)
-    reading.seconds += time.perf_counter() - started
-    return shapes
+    return reading.mesh_shapes(filename, _mesh_scale(element, place, reading), place)
 
 
 def _mesh_scale(element: ET.Element, place: str, reading: Reading) -> np.ndarray:
     text = element.get("scale", "1 1 1")
     single = len(text.replace(",", " ").split()) == 1
-    scale = np.broadcast_to(floats(element, "scale", 1 if single else 3, place, reading, "1 1 1"), (3,)).copy()
-    if not scale.all():
-        reading.fail(place, f'<mesh> scale must not be 0, got "{cut(text)}"')
-    if mirrors(scale):
-        reading.notes.append(f'{place}: the mesh scale "{cut(text)}" mirrors; the mesh was mirrored')
-    return scale
-
-
-def _note_size(extent: float, place: str, reading: Reading) -> None:
-    note = mesh_loader.size_note(extent, place)
-    if note:
-        reading.notes.append(note)
-
-
-def _as_paths(package_path) -> list[Path]:
-    folders = [package_path] if isinstance(package_path, (str, Path)) else list(package_path)
-    return [Path(entry) for entry in folders]
-
-
+    return np.broadcast_to(floats(element, "scale", 1 if single else 3, place, reading, "1 1 1"), (3,)).copy()

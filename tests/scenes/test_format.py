@@ -287,7 +287,7 @@ BAD = {
     "allow itself": ({"bodies": [body()], "allow": [["mug", "mug"]]}, "never tested against itself"),
     "mesh": ({"bodies": [body({"mesh": {"file": "gone.stl"}})]}, r'"mug".shape.mesh.file: cannot find "gone.stl"'),
     "mesh scale": ({"bodies": [body({"mesh": {"file": "x.stl", "scale": 0}})]}, "mesh.scale: must not be 0"),
-    "no robot": ({"robots": [{}]}, r"robots\[0\]: give either urdf or mjcf, a file, or robot"),
+    "no robot": ({"robots": [{}]}, r"robots\[0\]: give one of urdf, mjcf and sdf, a file, or robot"),
     "urdf": ({"robots": [{"urdf": "gone.urdf"}]}, r'robots\[0\].urdf: cannot find "gone.urdf"'),
     "joint": (
         {"robots": [{"robot": ARM, "state": {"slid": 1}}]},

@@ -11,7 +11,8 @@ from collide.errors import CollideError, SceneError
 from collide.robots.robot import Robot
 from collide.scenes import load
 from collide.scenes.loaders import resources
-from collide.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Sphere
+from collide.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Halfspace, Sphere
+from collide.transforms import pose
 
 TETRAHEDRON = """o tetra
 v 0 0 0
@@ -330,3 +331,52 @@ def test_demo_robots_load():
         pytest.importorskip("trimesh")
         robot = Robot.load(file)
         assert robot.geometry and robot.semantic_pairs is not None
+
+
+# --- what Bullet reads besides ----------------------------------------------------------------------
+
+
+def test_what_only_bullet_reads_is_read_with_a_note(robot_of):
+    robot = robot_of(
+        link("a", collision('<plane normal="0 1 0"/>')), link("b", collision('<cdf filename="b.cdf"/>') + BALL),
+        link("c", BALL),
+        joint("j", "a", "b", "revolute", '<origin xyz="0 0 1" rpy="0.1 0.2 0.3 0"/><limit lower="-1.5." upper="2."/>'),
+        joint("k", "b", "c", "spherical", '<origin xyz="0 0 1"/>'),
+    )
+    assert robot.geometry["a"][0].shape == Halfspace((0, 1, 0), 0) and len(robot.geometry["b"]) == 1
+    assert robot.joint_names == ("j", "k/yaw", "k/pitch", "k/roll") and robot.lower[0] == -1.5
+    X_AB, X_BC = pose((0, 0, 1), rpy=(0.1, 0.2, 0.3)), pose((0, 0, 1), rpy=(0.3, 0.2, 0.1))
+    at = dict(zip(robot.links, robot.link_poses([0, 0.1, 0.2, 0.3], np.eye(4))[0]))
+    np.testing.assert_allclose(at["b"], X_AB, atol=1e-15)
+    np.testing.assert_allclose(np.linalg.inv(at["b"]) @ at["c"], X_BC, atol=1e-15)
+    notes = " ".join(robot.notes)
+    for words in ("four numbers", "without the dot", "grid of distances", "spherical, as Bullet has it"):
+        assert words in notes
+
+
+def test_a_soft_body_is_refused_by_name(robot_of):
+    with pytest.raises(SceneError, match="soft body"):
+        robot_of('<deformable name="torus"/>')
+
+
+def test_bullets_own_files_stand_where_bullet_has_them():
+    bullet = pytest.importorskip("pybullet", reason="the package pybullet is not installed")
+    data = pytest.importorskip("pybullet_data", reason="the package pybullet is not installed").getDataPath()
+    client = bullet.connect(bullet.DIRECT)
+    try:
+        for name in ("quadruped/microtaur/microtaur", "biped/biped2d_pybullet", "racecar/racecar_differential"):
+            name += ".urdf"
+            body, robot = bullet.loadURDF(f"{data}/{name}", physicsClientId=client), Robot.load(f"{data}/{name}")
+            at = dict(zip(robot.links, robot.link_poses(np.zeros(robot.dof), np.eye(4))[0]))
+            theirs = {}
+            for k in range(bullet.getNumJoints(body, physicsClientId=client)):
+                state = bullet.getLinkState(body, k, computeForwardKinematics=1, physicsClientId=client)
+                link_name = bullet.getJointInfo(body, k, physicsClientId=client)[12].decode()
+                theirs[link_name] = pose(state[4], quat_xyzw=state[5])
+            first = next(iter(theirs))
+            X_WR = theirs[first] @ np.linalg.inv(at[first])
+            assert len(theirs) > 5
+            for link_name, X_WL in theirs.items():  # in single precision
+                np.testing.assert_allclose(X_WR @ at[link_name], X_WL, atol=1e-6, err_msg=f"{name} {link_name}")
+    finally:
+        bullet.disconnect(client)

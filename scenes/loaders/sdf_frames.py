@@ -1,0 +1,166 @@
+"""Frames of an SDFormat file: which element stands where, in the frame of the model or world around it.
+
+A scope is a model or a world. Links, joints, frames and models in it are frames, told by name; ``a::b`` is b within the
+model a. Poses are relative to the frame that they name (``relative_to``), else: links, frames and models to the scope's
+own frame, joints to their child, frames attached to another to that one. (SDFormat's specification, "Pose frame
+semantics"; files up to version 1.6 know no ``relative_to``.)
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from collide.errors import InvalidPose, cut, listing
+from collide.scenes.loaders.fields import placed, rotation_from_degrees
+from collide.scenes.loaders.robot_reading import Reading
+from collide.transforms import pose
+
+#: The frame of the model, and that of the world, as they are called within.
+MODEL, WORLD = "__model__", "world"
+
+
+@dataclass
+class Scope:
+    """A model or a world.
+
+    name : within the scope around it.   element : <model> or <world>.   reading : the file that it is in.
+    frames : name → the element with its pose.   models : name → the scope of a model within.
+    frame_of_pose : of a model whose pose is that of another of its frames (``placement_frame``).
+    """
+
+    name: str
+    element: ET.Element
+    reading: Reading
+    placed_by: ET.Element | None = None
+    frame_of_pose: str | None = None
+    static: bool = False
+    frames: dict[str, ET.Element] = field(default_factory=dict)
+    models: dict[str, Scope] = field(default_factory=dict)
+    _X_SF: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def X_SF(self, name: str, place: str, asked: tuple[str, ...] = ()) -> np.ndarray:
+        """(4, 4) pose of a frame F in this scope's own frame S. Raises SceneError for unknown frames and circles."""
+        if self._is_own(name):
+            return np.eye(4)
+        if name in asked:
+            self.reading.fail(place, f"poses are relative to each other in a circle: {listing([*asked, name])}")
+        if name not in self._X_SF:
+            self._X_SF[name] = self._pose_of_frame(name, place, (*asked, name))
+        return self._X_SF[name]
+
+    def _is_own(self, name: str) -> bool:
+        """Whether a frame is the scope's own."""
+        return name in ("", MODEL) or self._is_world(name)
+
+    def _is_world(self, name: str) -> bool:
+        """Whether the world is meant: files older than version 1.7 have links that are called so."""
+        return name == WORLD and not (WORLD in self.frames and self.frames[WORLD].tag == "link")
+
+    def _pose_of_frame(self, name: str, place: str, asked: tuple[str, ...]) -> np.ndarray:
+        first, _, rest = name.partition("::")
+        if rest and first in self.models:
+            return self.X_SF(first, place, asked) @ self.models[first].X_SF(rest, place)
+        if first in self.models:
+            model = self.models[first]
+            X_SP = self._pose_of_element(model.placed_by, "", place, asked)
+            if model.frame_of_pose:
+                X_SP = X_SP @ inverse(model.X_SF(model.frame_of_pose, place))
+            return X_SP
+        if name not in self.frames:
+            known = listing([*self.frames, *self.models])
+            self.reading.fail(place, f'unknown frame "{cut(name)}"; {cut(self.name)} has {known or "none"}')
+        element = self.frames[name]
+        default = ""
+        if element.tag == "joint":
+            default = text_of(element, "child")
+        elif element.tag == "frame":
+            default = element.get("attached_to", "")
+        return self._pose_of_element(element, default, place, asked)
+
+    def _pose_of_element(
+        self, element: ET.Element | None, default: str, place: str, asked: tuple[str, ...]
+    ) -> np.ndarray:
+        """The pose of an element of this scope, by its <pose>."""
+        described = None if element is None else element.find("pose")
+        relative_to = default if described is None else described.get("relative_to") or default
+        X_FE = pose_of(element, place, self.reading)
+        if self._is_own(relative_to):
+            return X_FE
+        X_SF = self.X_SF(relative_to, place, asked)
+        return X_SF if described is None or is_identity(X_FE) else X_SF @ X_FE
+
+    def link_of(self, name: str, place: str, asked: tuple[str, ...] = ()) -> str:
+        """The link, by its name in this scope, that a frame is attached to; "world" of what is attached to the world.
+
+        Raises SceneError for frames that are unknown or attached to no link.
+        """
+        if self._is_world(name):
+            return WORLD
+        if name in asked:
+            self.reading.fail(place, f"frames are attached to each other in a circle: {listing([*asked, name])}")
+        asked = (*asked, name)
+        first, _, rest = name.partition("::")
+        if first in self.models:
+            return f"{first}::{self.models[first].link_of(rest or MODEL, place)}"
+        if name in ("", MODEL):
+            canonical = self.element.get("canonical_link")
+            return self.link_of(canonical, place, asked) if canonical else self._first_link(place)
+        element = self.frames.get(name)
+        if element is None:
+            known = listing([*self.frames, *self.models])
+            self.reading.fail(place, f'unknown link or frame "{cut(name)}"; {cut(self.name)} has {known or "none"}')
+        if element.tag == "link":
+            return name
+        attached = text_of(element, "child") if element.tag == "joint" else element.get("attached_to", "")
+        return self.link_of(attached, place, asked)
+
+    def _first_link(self, place: str) -> str:
+        for name, element in self.frames.items():
+            if element.tag == "link":
+                return name
+        for name in self.models:
+            return self.link_of(name, place)
+        self.reading.fail(place, f"model {cut(self.name)} has no link")
+
+
+def inverse(X: np.ndarray) -> np.ndarray:
+    """(4, 4) inverse of a pose, by its transpose."""
+    inverted = np.eye(4)
+    inverted[:3, :3] = X[:3, :3].T
+    inverted[:3, 3] = -(X[:3, :3].T @ X[:3, 3])
+    return inverted + 0.0
+
+
+def is_identity(X: np.ndarray) -> bool:
+    return np.array_equal(X, np.eye(4))
+
+
+def text_of(element: ET.Element | None, tag: str, default: str = "") -> str:
+    """The text of a child element, blanks around it left out."""
+    child = None if element is None else element.find(tag)
+    return default if child is None else (child.text or "").strip() or default
+
+
+def pose_of(element: ET.Element | None, place: str, reading: Reading) -> np.ndarray:
+    """(4, 4) what stands in the <pose> of an element; the identity without one."""
+    described = None if element is None else element.find("pose")
+    text = "" if described is None else (described.text or "").strip()
+    if described is None or not text:
+        return np.eye(4)
+    try:
+        if described.get("rotation_format", "euler_rpy") == "quat_xyzw":
+            numbers = reading.numbers(text, 7, "<pose>", place)
+            return pose(numbers[:3], quat_xyzw=numbers[3:])
+        numbers = reading.numbers(text, 6, "<pose>", place)
+        if is_true(described.get("degrees", "false")):
+            return pose(numbers[:3], R=rotation_from_degrees(numbers[3:]))
+        return pose(numbers[:3], rpy=numbers[3:])
+    except InvalidPose as error:
+        raise InvalidPose(placed(error, reading.path, f"{place} <pose>")) from None
+
+
+def is_true(word: str) -> bool:
+    return word.strip().lower() in ("true", "1")
