@@ -1,8 +1,8 @@
 """The models of an SDFormat file, one by one: its links and joints, and the robots and bodies that they make.
 
 A link that no joint holds is a body; links that joints hold together are a robot, a tree that starts at the world
-where one of them is joined to it, else at the first link that is nobody's child. A joint that closes a loop is left
-out, with a note; so is what moves within a static model, whose links stand where they are.
+where one of them is joined to it, else at the first link that is nobody's child. A joint that closes a loop of joints
+before it is left out, with a note; so is what moves within a static model, whose links stand where they are.
 """
 
 from __future__ import annotations
@@ -61,6 +61,25 @@ class ModelJoint:
     motions: list[Motion]
 
 
+class Joined:
+    """Which names are joined with which, directly or by others."""
+
+    def __init__(self) -> None:
+        self._above: dict[str, str] = {}
+
+    def leader(self, name: str) -> str:
+        """A name that stands for all that are joined with this one."""
+        while (above := self._above.get(name, name)) != name:
+            self._above[name] = name = self._above.get(above, above)
+        return name
+
+    def join(self, a: str, b: str) -> bool:
+        """Join two names; whether they were apart."""
+        a, b = self.leader(a), self.leader(b)
+        self._above[b] = a
+        return a != b
+
+
 @dataclass
 class Model:
     """A model with its links and joints, those of the models within it, too."""
@@ -87,22 +106,15 @@ class Model:
 
     def groups(self) -> Iterator[tuple[list[ModelLink], list[ModelJoint]]]:
         """Links held together by joints, each group and all of them in the file's order, with their joints."""
-        leader = {name: name for name in self.links}
-
-        def find(name: str) -> str:
-            while leader[name] != name:
-                leader[name] = name = leader[leader[name]]
-            return name
-
-        joints = [] if self.static else self.joints
+        joined, joints = Joined(), [] if self.static else self.joints
         for joint in joints:
             if joint.parent != WORLD:
-                leader[find(joint.child)] = find(joint.parent)
+                joined.join(joint.parent, joint.child)
         groups: dict[str, tuple[list[ModelLink], list[ModelJoint]]] = {}
         for name, link in self.links.items():
-            groups.setdefault(find(name), ([], []))[0].append(link)
+            groups.setdefault(joined.leader(name), ([], []))[0].append(link)
         for joint in joints:
-            groups[find(joint.child)][1].append(joint)
+            groups[joined.leader(joint.child)][1].append(joint)
         yield from groups.values()
 
 
@@ -306,28 +318,32 @@ def _robot(model: Model, links: list[ModelLink], joints: list[ModelJoint], only:
 def _tree(
     model: Model, root: str, root_name: str, joints: list[ModelJoint], taken: dict[str, int]
 ) -> tuple[list[Joint], list[str]]:
-    """(joints from the root on, in the file's order; names of those that close a loop)."""
-    reached, waiting, direction = {root}, [root], {}
+    """(joints from the root on, in the file's order; names of those that close a loop of joints before them)."""
+    joined = Joined()
+    kept = [joint for joint in joints if joined.join(joint.parent, joint.child)]
+    at: dict[str, list[ModelJoint]] = {}
+    for joint in kept:
+        at.setdefault(joint.parent, []).append(joint)
+        at.setdefault(joint.child, []).append(joint)
+    waiting, reached_from = [root], {root: ""}
     while waiting:
-        link = waiting.pop(0)
-        for joint in joints:
-            if joint.name in direction or link not in (joint.parent, joint.child):
-                continue
+        link = waiting.pop()
+        for joint in at.get(link, ()):
             far = joint.child if link == joint.parent else joint.parent
-            if far not in reached:
-                reached.add(far)
+            if far not in reached_from:
+                reached_from[far] = link
                 waiting.append(far)
-                direction[joint.name] = link == joint.parent
     made: list[Joint] = []
-    for joint in joints:
-        if joint.name in direction:
-            near, far = (joint.parent, joint.child) if direction[joint.name] else (joint.child, joint.parent)
-            X_MN = np.eye(4) if near == WORLD else model.links[near].X_ML
-            parent = root_name if near == root else near
-            made += _links_of_joint(
-                joint, direction[joint.name], parent, far, inverse(X_MN) @ joint.X_MJ, model.links[far].X_ML, taken
-            )
-    return made, [joint.name for joint in joints if joint.name not in direction]
+    for joint in kept:
+        forward = reached_from[joint.child] == joint.parent
+        near, far = (joint.parent, joint.child) if forward else (joint.child, joint.parent)
+        X_MN = np.eye(4) if near == WORLD else model.links[near].X_ML
+        parent = root_name if near == root else near
+        made += _links_of_joint(
+            joint, forward, parent, far, inverse(X_MN) @ joint.X_MJ, model.links[far].X_ML, taken
+        )
+    names = {joint.name for joint in kept}
+    return made, [joint.name for joint in joints if joint.name not in names]
 
 
 def _links_of_joint(
