@@ -16,7 +16,7 @@ from collide.narrowphase.epa.origin_foot import load_facet, weigh_nearest, weigh
 from collide.narrowphase.epa.polytope_surface import number, surface_at
 from collide.narrowphase.epa.refine_depth import refine
 from collide.narrowphase.gjk.gjk import APART, ENCLOSED, NEAREST, gjk
-from collide.narrowphase.gjk.minkowski_difference import AXIS, NEAREST_POINT, weighted_sum
+from collide.narrowphase.gjk.minkowski_difference import AXIS, NEAREST_POINT, POINT, weighted_sum
 from collide.narrowphase.gjk.simplex import nearest_of_all, weigh_enclosed
 from collide.narrowphase.shallow_cylinders import is_cylinder_pair, shallow_cylinders
 from collide.narrowphase.shallow_ellipsoids import NOTHING, is_ellipsoid_pair, shallow_ellipsoids
@@ -136,6 +136,8 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
     # A gap next to nothing has its nearest points where the whole surface is known, as a depth has; a gap of polytopes
     # of exact numbers gets its points with its last digits.
     has_points = query.depths or not (query.boolean or exact_numbers)
+    if has_points:
+        _keep_simplex(work)
     start = 0
     while True:  # where rounding has spoilt a surface, one that begins elsewhere is often sound
         seed = Seed(points, ids, enclosed and start == 0, well_conditioned, use_capped_tetrahedron, start)
@@ -168,20 +170,33 @@ def _by_epa(ordered, query, work, run, upper, radius, error, curved):
         upper = min(upper, -result.clearance)
     n_vertices = 4 if enclosed else 3
     if miss > of_gjk:  # the surface is unfinished
-        n = _weigh_nearest_of_gjk(pair, work, radius, error)
+        _take_simplex(work)
+        if enclosed:
+            _weigh_enclosed(work)
         return CoreDistance(result.depth, lower, upper, shallowest, deepest, result.nhat, n, n, iterations)
     return CoreDistance(result.depth, lower, upper, shallowest, deepest, result.nhat, 3, n_vertices, iterations)
 
 
+@kernel(inline=True)
+def _keep_simplex(work):
+    """Copy points 0 … 3, their weights and their vertices to where `_take_simplex` finds them."""
+    for k in range(4 * POINT):
+        work.simplex[k] = work.points[k]
+    for k in range(4):
+        work.simplex[4 * POINT + k] = work.weights[k]
+    for k in range(8):
+        work.simplex[4 * POINT + 4 + k] = work.ids[k]
+
+
 @kernel
-def _weigh_nearest_of_gjk(pair, work, radius, error):
-    """GJK's last simplex again, weighted for its point nearest the origin, or for the origin within; its points."""
-    run = gjk(
-        pair, work.points, work.ids, work.weights, 0, False, math.inf, radius, math.inf, error, GJK_ROUNDS
-    )
-    if run.status == ENCLOSED:
-        _weigh_enclosed(work)
-    return run.n_points
+def _take_simplex(work):
+    """Take points, weights and vertices back."""
+    for k in range(4 * POINT):
+        work.points[k] = work.simplex[k]
+    for k in range(4):
+        work.weights[k] = work.simplex[4 * POINT + k]
+    for k in range(8):
+        work.ids[k] = int(work.simplex[4 * POINT + 4 + k])
 
 
 @kernel(inline=True)

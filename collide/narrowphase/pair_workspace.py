@@ -15,10 +15,13 @@ from collide.narrowphase.gjk.minkowski_difference import POINT
 from collide.numerics.double_double import STRIDE
 from collide.numerics.exact_dot_sign import PRODUCT_TERMS
 
-# Workspace of one thread, in doubles: difference points and their weights; last digits of depths and heights (four
-# points, a direction, low parts of two poses); EPA's; the queue of gaps.
+# Workspace of one thread, in doubles: difference points and their weights; GJK's simplex, while EPA goes on from it;
+# last digits of depths and heights (four points, a direction, low parts of two poses); EPA's; the queue of gaps.
 _WEIGHTS_AT = 5 * POINT
-_FINE_AT = 64
+_SIMPLEX_AT = 64
+#: Of a simplex: four points, their weights, a vertex of A and of B of each.
+SIMPLEX = 4 * POINT + 4 + 8
+_FINE_AT = _SIMPLEX_AT + SIMPLEX
 _EPA_DOUBLES_AT = _FINE_AT + 5 * STRIDE + LOW_PARTS_OF_PAIR
 _QUEUE_DOUBLES_AT = _EPA_DOUBLES_AT + EPA_DOUBLES
 DOUBLES = _QUEUE_DOUBLES_AT + QUEUE_DOUBLES
@@ -52,7 +55,7 @@ class Workspace(NamedTuple):
 
     points : five points of A ⊖ B, POINT doubles each.   weights : of four of them; from NEAREST_POINT on their
     weighted point, nearest the origin; from AXIS on a unit axis.   ids : a vertex of A and of B a point.
-    request : an entry of `depth_requests.py`, and requests : all entries of a call.
+    simplex : SIMPLEX doubles.   request : an entry of `depth_requests.py`, and requests : all entries of a call.
     fine_at, nearest_at, ties_at : for last digits (`refine_depth.py`, `refine_height`).
     epa_at, epa_integers_at, queue_at, queue_integers_at : of EPA and of the queue of gaps.
     """
@@ -60,6 +63,7 @@ class Workspace(NamedTuple):
     points: Any
     weights: Any
     ids: Any
+    simplex: Any
     request: Any
     requests: Any
     fine_at: int
@@ -76,7 +80,8 @@ def workspace_at(doubles_at, integers_at):
     """The `Workspace` in DOUBLES doubles and INTEGERS int64."""
     return Workspace(
         view_f64(doubles_at, 5 * POINT), view_f64(doubles_at + 8 * _WEIGHTS_AT, 10), view_i64(integers_at, 10),
-        view_i64(integers_at + 8 * _REQUEST_AT, ENTRY), view_i64(integers_at + 8 * REQUESTS_AT, REQUESTS),
+        view_f64(doubles_at + 8 * _SIMPLEX_AT, SIMPLEX), view_i64(integers_at + 8 * _REQUEST_AT, ENTRY),
+        view_i64(integers_at + 8 * REQUESTS_AT, REQUESTS),
         doubles_at + 8 * _FINE_AT, integers_at + 8 * _NEAREST_AT, integers_at + 8 * _TIES_AT,
         doubles_at + 8 * _EPA_DOUBLES_AT, integers_at + 8 * _EPA_INTEGERS_AT,
         doubles_at + 8 * _QUEUE_DOUBLES_AT, integers_at + 8 * _QUEUE_INTEGERS_AT,

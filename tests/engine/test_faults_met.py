@@ -499,6 +499,24 @@ def test_a_corner_on_a_rim_is_the_nearest_point_of_its_triangle():
             assert np.abs(p - (corner + X_WB[:3, 3])).max() <= 2e-12, (signed, p)
 
 
+def test_points_of_bodies_that_touch_are_those_that_touch():
+    """A cone and a cylinder that touch in a point that GJK meets at once: EPA's nearest facet is 0.86 nm off."""
+    R = np.array([[-0.4814756476086668, 0.7379352246330552, -0.4728983030267472],
+                  [0.6050643363231102, 0.6702080213460333, 0.42978873534948425],
+                  [0.6340964829343315, -0.079201088181901, -0.7691871280521494]])
+    A, X_WA = collide.Cone(0.0007756546298296063, 0.014892097152404847), pose(
+        R, [0.01902097459710758, 0.010363577373323638, 0.019421259722113376])
+    B, X_WB = collide.Cylinder(0.3998679329891994, 2.927038455903536), pose(
+        R, [0.8968728198736718, -0.8736766963714684, 0.8981152116718323])
+    for signed in (True, False):
+        r = collide.distance(A, B, X_WA, X_WB, signed=signed)
+        for p, shape, X in ((r.point_a, A, X_WA), (r.point_b, B, X_WB)):
+            x, y, z = X[:3, :3].T @ (p - X[:3, 3])
+            at_height = 0.5 - z / shape.length if isinstance(shape, collide.Cone) else 1.0  # of the radius
+            outside = max(math.hypot(x, y) - shape.radius * at_height, abs(z) - 0.5 * shape.length)
+            assert outside <= 2e-11, (signed, p, outside)
+
+
 def test_a_union_is_certified_for_brackets_no_wider_than_its_size_allows():
     """Specks of a nanometre in the middle of an ellipsoid: a bracket of 24 pm was called certified, at most 13 pm are
     promised of bodies of 0.9 mm. The size that the kernel judged by was twice that of docs/conventions.md."""
