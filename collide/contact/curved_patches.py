@@ -31,7 +31,7 @@ from collide.contact.manifold_points import (
 )
 from collide.contact.support_face import EDGE, FACE, VERTEX, SupportFace, seen_along
 from collide.kernels import kernel
-from collide.narrowphase.rows import HIT, NORMAL, POINT_A, ROW, view_row
+from collide.narrowphase.rows import DISTANCE, HIT, NORMAL, POINT_A, ROW, view_row
 from collide.numerics.vec3 import Vec3, add, cross, dot, neg, norm, put_vec3, scale, sub, vec3_at
 
 # What a facet is, bits: it is in a patch, or in the one in hand; a search looked at it.
@@ -42,6 +42,8 @@ COVERED, REACHED, TRIED = 1, 2, 4
 _SAME, _SAME_PATCH, _OF_DEPTHS = 2.0**-20, 2.0**-12, 16.0
 #: Nearest points this near to a corner or an edge, in lengths of the longest edge, are on it.
 _ON = 2.0**-16
+#: So far beside its place, in units of the pair's size, a facet's normal may lay the point of the set.
+_BESIDE = 2.0**-33
 #: A facet is across the normal down to this cosine; of a steeper one an edge, up to this sine, is.
 _ACROSS = 0.7
 #: A facet that looks away from the normal by this cosine shows nothing.
@@ -144,8 +146,11 @@ def seed_of(near, k):
     while first < 0 and on < 1.0 and norm(cross(n, u)) > _OF_DEPTHS * _SAME_PATCH * norm(n):
         on *= 4.0
         first, second = _feature_at(near.corners, 9 * k, p, on)
-    facing = dot(n, u)
-    if dot(n, n) > 0.0 and (first < 0 or norm(cross(n, u)) <= slack):
+    facing, turned = dot(n, u), norm(cross(n, u))
+    # At a corner or an edge, the facet's normal lays the point of the set beside it by the gap times the angle.
+    beside = turned * max(row.doubles[DISTANCE], 0.0)
+    is_facets = turned <= slack and beside <= _BESIDE * (norm(p) + abs(row.doubles[DISTANCE]))
+    if dot(n, n) > 0.0 and (first < 0 or is_facets):
         return facing > 0.0 or not near.mesh.solid, n if facing > 0.0 else neg(n), 4 * facet + FACE
     if first < 0:
         return False, u, nothing

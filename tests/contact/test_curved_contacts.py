@@ -286,3 +286,23 @@ def test_contacts_of_facets_tiny_beside_the_set_lie_on_both():
             assert abs(off) < 1e-10, (off, points.tolist(), M.faces.tolist(), S, X_WA.tolist(), X_WS.tolist())
             n_rows += 1
     assert n_rows > 100
+
+
+def test_the_point_of_a_speck_beside_a_far_corner_lies_on_the_speck():
+    """A cone of half a micrometre 0.4 m from the corner of a sheet, and 5 nm beside it: the facet's normal, 1.4e-8 rad
+    off, laid its point 2.5 nm off the cone."""
+    x, y = 0.07094780567312997, 0.5
+    sheet = collide.Mesh([[a, b, 0.0] for a in (-x, x) for b in (-y, y)], [[0, 2, 3], [0, 3, 1]], solid=False)
+    cone = collide.Cone(5.298901415169268e-07, 9.809577671573438e-07)
+    X_WA = np.array([[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    X_WB = np.array([
+        [0.24221303903608715, 0.9702098033590105, -0.005077517796411357, 0.3958937904112512],
+        [-0.7165225721818909, 0.17534655111886344, -0.6751658985498059, -0.07094813501117088],
+        [-0.6541622484328715, 0.16717214025306293, 0.7376484448898812, -0.49999964018370263], [0.0, 0.0, 0.0, 1.0]])
+    rows = collide.contacts(sheet, cone, X_WA, X_WB, margin=0.3958936589116268).rows
+    assert len(rows) >= 1
+    for row in rows:
+        p = X_WB[:3, :3].T @ (row["point_b"] - X_WB[:3, 3])
+        radius = cone.radius * (0.5 - p[2] / cone.length)
+        assert np.hypot(p[0], p[1]) - radius <= 1e-12 and abs(p[2]) <= 0.5 * cone.length + 1e-12, row
+        assert np.abs(row["point_b"] - row["point_a"] - row["distance"] * row["normal"]).max() <= 1e-15
