@@ -44,6 +44,8 @@ def contacts_of(o1: CollisionObject, o2: CollisionObject, limit: int, with_geome
         return [new_contact(g1, g2, -1, -1, np.zeros(3), np.zeros(3), math.inf)]
     if _is_one_facet(o1, o2, limit):
         return [facet_contact(o1, o2, True)]
+    if _coincide(o1, o2) and (contact := _contact_along_x(o1, o2)) is not None:
+        return [contact]
     if limit == 1 and len(g1._shapes) == len(g2._shapes) == 1:
         X_WA, X_WB = o1._X.copy(), o2._X.copy()
         return [contact_when_read(g1, g2, _only_contact, g1, g2, g1._shapes[0], g2._shapes[0], X_WA, X_WB)]
@@ -57,6 +59,28 @@ def contacts_of(o1: CollisionObject, o2: CollisionObject, limit: int, with_geome
     return _of_rows(rows, [(o1, o2)] * len(rows))
 
 
+def _coincide(o1: CollisionObject, o2: CollisionObject) -> bool:
+    """Whether two hulls are one hull at one pose."""
+    g1, g2 = o1._geometry, o2._geometry
+    if not g1._node_type == g2._node_type == NODE_TYPE.GEOM_CONVEX or not np.array_equal(o1._X, o2._X):
+        return False
+    return g1 is g2 or np.array_equal(g1._shapes[0].points, g2._shapes[0].points)
+
+
+def _contact_along_x(o1: CollisionObject, o2: CollisionObject) -> Contact | None:
+    """python-fcl's contact of two hulls in one place, where it is right: many ways out are as short as each other, and
+    libccd goes along −x of the world, between the first vertices that reach as far. ``None`` where another is shorter.
+    """
+    hull, X = o1._geometry._shapes[0], o1._X
+    corners = hull.points @ X[:3, :3].T + X[:3, 3]
+    width = float(np.ptp(corners[:, 0]))
+    depth = -float(engine.distance(hull, hull, X, X).distance)
+    if width > depth * (1.0 + 1e-12):
+        return None
+    pos = 0.5 * (corners[corners[:, 0].argmin()] + corners[corners[:, 0].argmax()])
+    return new_contact(o1._geometry, o2._geometry, -1, -1, np.array([-1.0, 0.0, 0.0]), pos, width)
+
+
 def contacts_of_pairs(pairs: list, limit: int, with_geometry: bool) -> list[list[Contact]]:
     """The same of many pairs of objects that meet, pair by pair, those of two single shapes in one batch."""
     pairs = [ordered(o1, o2) for o1, o2 in pairs]
@@ -64,7 +88,8 @@ def contacts_of_pairs(pairs: list, limit: int, with_geometry: bool) -> list[list
         return [contacts_of(o1, o2, limit, False) for o1, o2 in pairs]
     answers: list[list[Contact] | None] = [None] * len(pairs)
     plain = [
-        k for k, (o1, o2) in enumerate(pairs) if _is_plain_question(o1, o2) and not _is_one_facet(o1, o2, limit)
+        k for k, (o1, o2) in enumerate(pairs)
+        if _is_plain_question(o1, o2) and not _is_one_facet(o1, o2, limit) and not _coincide(o1, o2)
     ]
     if len(plain) > 1:
         for k, contacts in zip(plain, _batch([pairs[k] for k in plain], limit)):

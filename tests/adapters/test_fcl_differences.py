@@ -355,3 +355,22 @@ def test_quaternions_of_another_length():
     matrix, status = theirs(code)
     assert status == 0 and not np.allclose(np.array(matrix) @ np.array(matrix).T, np.eye(3))
     assert np.allclose(ours(code), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+
+
+def test_a_hull_in_the_place_of_its_like_has_python_fcls_contact_where_that_is_right():
+    """One contact along −x for a cube, whose ways out along x, y and z are as short; where that is not the shortest, as
+    of a slab or a cube that is turned, the shortest."""
+    code = """
+def contacts(size, turned=(1.0, 0.0, 0.0, 0.0)):
+    result = fcl.CollisionResult()
+    fcl.collide(at(hull(size), 5, 0, 0, q=turned), at(hull(size), 5, 0, 0, q=turned), wanted, result)
+    return [[*map(float, c.pos), *map(float, c.normal), float(c.penetration_depth)] for c in result.contacts]
+turned = (math.cos(0.15), 0.0, 0.0, math.sin(0.15))
+print(json.dumps([contacts((1, 1, 1)), contacts((1, 2, 2)), contacts((1, 0.5, 2)), contacts((1, 1, 1), turned)]))
+"""
+    (cube, plate, slab, tilted), _ = theirs(code)
+    of_cube, of_plate, of_slab, of_tilted = ours(code)
+    np.testing.assert_allclose([of_cube, of_plate], [cube, plate], atol=1e-12)
+    assert len(cube) == 1 and cube[0][3:] == [-1, 0, 0, 1]
+    assert slab[0][6] == 1.0 and all(abs(row[6] - 0.5) < 1e-12 for row in of_slab)
+    assert tilted[0][6] > 1.4 and all(abs(row[6] - 1.0) < 1e-12 for row in of_tilted)
