@@ -255,7 +255,8 @@ def _put_patch(task, k, nhat, feature, number, n_rows):
     look = Look(axes, -deepest - STEP_ERRORS * near.error, task.space.margin)
     n = grow_over(near, 1, of_set, look)
     bracket = max(row.doubles[UPPER] - distance, distance - row.doubles[LOWER])
-    if least_gap_of(points, n) - 4.0 * near.error > distance + bracket + STEP_ERRORS * near.error:
+    slack = STEP_ERRORS * near.error + 2.0 * of_set.flatness
+    if least_gap_of(points, n) - 4.0 * near.error > distance + bracket + slack:
         # Put in front: the nearest points, where corners are farther apart.
         a = seen_along(axes, sub(vec3_at(row.doubles, POINT_A), near.origin))
         nearest = NearestPoint(
