@@ -35,8 +35,8 @@ states, end effectors, virtual joints. --pairs-only leaves them out.
 --compare judges the disabled pairs of an SRDF: one that it says never collide,
 and that do, is wrong, and a configuration is shown.
 
-ROBOT is a URDF, MJCF or SDFormat file, or a scene (a file or a shipped one) with a robot
-in it.
+ROBOT is a URDF, MJCF or SDFormat file, or a scene (a file or a shipped one)
+with a robot in it.
 
 exit status: 0 done, 1 the SRDF compared with is wrong about a pair, 2 error"""
 

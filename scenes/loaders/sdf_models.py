@@ -320,9 +320,9 @@ def _tree(
 ) -> tuple[list[Joint], list[str]]:
     """(joints from the root on, in the file's order; names of those that close a loop of joints before them)."""
     joined = Joined()
-    kept = [joint for joint in joints if joined.join(joint.parent, joint.child)]
+    tree = [joint for joint in joints if joined.join(joint.parent, joint.child)]
     at: dict[str, list[ModelJoint]] = {}
-    for joint in kept:
+    for joint in tree:
         at.setdefault(joint.parent, []).append(joint)
         at.setdefault(joint.child, []).append(joint)
     waiting, reached_from = [root], {root: ""}
@@ -334,7 +334,7 @@ def _tree(
                 reached_from[far] = link
                 waiting.append(far)
     made: list[Joint] = []
-    for joint in kept:
+    for joint in tree:
         forward = reached_from[joint.child] == joint.parent
         near, far = (joint.parent, joint.child) if forward else (joint.child, joint.parent)
         X_MN = np.eye(4) if near == WORLD else model.links[near].X_ML
@@ -342,7 +342,7 @@ def _tree(
         made += _links_of_joint(
             joint, forward, parent, far, inverse(X_MN) @ joint.X_MJ, model.links[far].X_ML, taken
         )
-    names = {joint.name for joint in kept}
+    names = {joint.name for joint in tree}
     return made, [joint.name for joint in joints if joint.name not in names]
 
 

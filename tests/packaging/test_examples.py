@@ -208,8 +208,16 @@ ELSEWHERE = {
 _ARM = """<robot name="panda"><link name="base"/><link name="panda_hand"><collision><geometry><box size="0.1 0.1 0.1"/>
 </geometry></collision></link><joint name="turn" type="revolute"><parent link="base"/><child link="panda_hand"/>
 <origin xyz="0.5 0 0"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+_BALL = '<collision name="c"><geometry><sphere><radius>0.1</radius></sphere></geometry></collision>'
+_ARM_SDF = (
+    f'<sdf version="1.7"><model name="arm"><link name="a">{_BALL}</link><link name="b">{_BALL}</link>'
+    '<joint name="j" type="revolute"><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz></axis></joint>'
+    "</model></sdf>"
+)
 _FILES = {
     "panda.urdf": _ARM,
+    "arm.sdf": _ARM_SDF,
+    "warehouse.sdf": _ARM_SDF.replace("<model", '<world name="w"><model').replace("</model>", "</model></world>"),
     "two_links.urdf": _ARM.replace(
         '<link name="base"/>',
         '<link name="base"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>',
