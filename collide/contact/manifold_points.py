@@ -20,6 +20,8 @@ _BESIDE = 2.0**-20
 #: Sines up to this are those of lines along each other where a surface is round across one: it falls off from its line
 #: with the square of how far the other is beside it, and that is worked out.
 ALONG = 2.0**-10
+#: A round line no farther beside a side of a face than this part of its radius is along that side.
+_OFF_SIDE = 2.0**-14
 #: Round surfaces are looked at down to 45°, as faces are: so far beside its line, in radii.
 _ASIDE = math.sqrt(0.5)
 #: Ends of what round bodies share are found in so many steps, each some thousand times shorter than the one before.
@@ -224,7 +226,10 @@ def _ends_beside(edge, face, is_edge_of_b, tolerance, max_gap, n, manifold):
         shared = shared_span(a, b, tolerance)
         du, dv = a.q.x - a.p.x, a.q.y - a.p.y
         length = (shared.high - shared.low) * math.sqrt(du * du + dv * dv)
-        if not length > longest:
+        # Along the side itself the line is over the face, or beside it, by as much as its normal is off: a cylinder's is
+        # good to some 1e-5. Its ends are the side's each time.
+        is_on_side = best < 0 and _beside(rim, line) <= _OFF_SIDE * max(edge.round_p, edge.round_q)
+        if not length > (longest - 2.0 * tolerance - _BESIDE * longest if is_on_side else longest):
             continue
         farthest = max(place_between(a, b, shared, shared.low).gap, place_between(a, b, shared, shared.high).gap)
         if farthest <= max_gap:
@@ -235,6 +240,18 @@ def _ends_beside(edge, face, is_edge_of_b, tolerance, max_gap, n, manifold):
     a, b = (rim, line) if is_edge_of_b else (line, rim)
     n, _ = _put_shared(a, b, shared_span(a, b, tolerance), manifold)
     return n
+
+
+@kernel(inline=True)
+def _beside(a, b):
+    """How far the ends of line b are beside line a, seen along the normal, at most; infinite where a has no length."""
+    du, dv = a.q.x - a.p.x, a.q.y - a.p.y
+    length = math.sqrt(du * du + dv * dv)
+    if length == 0.0:
+        return math.inf
+    at_p = du * (b.p.y - a.p.y) - dv * (b.p.x - a.p.x)
+    at_q = du * (b.q.y - a.p.y) - dv * (b.q.x - a.p.x)
+    return max(abs(at_p), abs(at_q)) / length
 
 
 @kernel(inline=True)
