@@ -226,8 +226,8 @@ def _ends_beside(edge, face, is_edge_of_b, tolerance, max_gap, n, manifold):
         shared = shared_span(a, b, tolerance)
         du, dv = a.q.x - a.p.x, a.q.y - a.p.y
         length = (shared.high - shared.low) * math.sqrt(du * du + dv * dv)
-        # Along the side itself the line is over the face, or beside it, by as much as its normal is off: a cylinder's is
-        # good to some 1e-5. Its ends are the side's each time.
+        # Along the side itself the line is over the face, or beside it, by as much as its normal is off: a cylinder's
+        # is good to some 1e-5. Its ends are the side's each time.
         is_on_side = best < 0 and _beside(rim, line) <= _OFF_SIDE * max(edge.round_p, edge.round_q)
         if not length > (longest - 2.0 * tolerance - _BESIDE * longest if is_on_side else longest):
             continue

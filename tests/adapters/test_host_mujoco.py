@@ -478,8 +478,9 @@ def test_world_tests_the_pairs_that_mujoco_tests():
 
 
 def test_a_can_on_the_edges_of_two_boxes_rests():
-    """It lies across a gap, on an edge on either side, whose faces are at 30° to the ways out: contacts that were a face's
-    in some steps and the edge's in others kept it turning at 2e-3 rad/s. MuJoCo alone has it roll at 0.2 to 6 rad/s."""
+    """It lies across a gap, on an edge on either side, whose faces are at 30° to the ways out: contacts that were a
+    face's in some steps and the edge's in others kept it turning at 2e-3 rad/s. MuJoCo alone has it roll at 0.2 to 6
+    rad/s."""
     for roll, yaw in ((90, 0), (90.5, 0), (90, 1)):
         model = mujoco.MjModel.from_xml_string(
             '<mujoco><worldbody><geom type="box" size="0.1 0.3 0.1" pos="-0.14 0 0.1"/>'
