@@ -41,15 +41,20 @@ class Scope:
     models: dict[str, Scope] = field(default_factory=dict)
     _X_SF: dict[str, np.ndarray] = field(default_factory=dict)
 
-    def X_SF(self, name: str, place: str, asked: tuple[str, ...] = ()) -> np.ndarray:
+    def X_SF(self, name: str, place: str) -> np.ndarray:
         """(4, 4) pose of a frame F in this scope's own frame S. Raises SceneError for unknown frames and circles."""
-        if self._is_own(name):
-            return np.eye(4)
-        if name in asked:
-            self.reading.fail(place, f"poses are relative to each other in a circle: {listing([*asked, name])}")
-        if name not in self._X_SF:
-            self._X_SF[name] = self._pose_of_frame(name, place, (*asked, name))
-        return self._X_SF[name]
+        chain: dict[str, None] = {}  # in order, and found at once
+        while not (self._is_own(name) or name in self._X_SF):
+            if name in chain:
+                self.reading.fail(place, f"poses are relative to each other in a circle: {listing([*chain, name])}")
+            chain[name] = None
+            name = self._relative_to(name, place)
+        X_SR = np.eye(4) if self._is_own(name) else self._X_SF[name]
+        for frame in reversed(chain):
+            X_RF = self._X_RF(frame, place)
+            X_SR = X_RF if self._is_own(name) else X_SR if is_identity(X_RF) else X_SR @ X_RF
+            self._X_SF[frame], name = X_SR, frame
+        return X_SR
 
     def _is_own(self, name: str) -> bool:
         """Whether a frame is the scope's own."""
@@ -59,16 +64,11 @@ class Scope:
         """Whether the world is meant: files older than version 1.7 have links that are called so."""
         return name == WORLD and not (WORLD in self.frames and self.frames[WORLD].tag == "link")
 
-    def _pose_of_frame(self, name: str, place: str, asked: tuple[str, ...]) -> np.ndarray:
+    def _relative_to(self, name: str, place: str) -> str:
+        """The frame of this scope that the pose of another is relative to."""
         first, _, rest = name.partition("::")
-        if rest and first in self.models:
-            return self.X_SF(first, place, asked) @ self.models[first].X_SF(rest, place)
         if first in self.models:
-            model = self.models[first]
-            X_SP = self._pose_of_element(model.placed_by, "", place, asked)
-            if model.frame_of_pose:
-                X_SP = X_SP @ inverse(model.X_SF(model.frame_of_pose, place))
-            return X_SP
+            return first if rest else _stated(self.models[first].placed_by, "")
         if name not in self.frames:
             known = listing([*self.frames, *self.models])
             self.reading.fail(place, f'unknown frame "{cut(name)}"; {cut(self.name)} has {known or "none"}')
@@ -78,52 +78,60 @@ class Scope:
             default = text_of(element, "child")
         elif element.tag == "frame":
             default = element.get("attached_to", "")
-        return self._pose_of_element(element, default, place, asked)
+        return _stated(element, default)
 
-    def _pose_of_element(
-        self, element: ET.Element | None, default: str, place: str, asked: tuple[str, ...]
-    ) -> np.ndarray:
-        """The pose of an element of this scope, by its <pose>."""
-        described = None if element is None else element.find("pose")
-        relative_to = default if described is None else described.get("relative_to") or default
-        X_FE = pose_of(element, place, self.reading)
-        if self._is_own(relative_to):
-            return X_FE
-        X_SF = self.X_SF(relative_to, place, asked)
-        return X_SF if described is None or is_identity(X_FE) else X_SF @ X_FE
+    def _X_RF(self, name: str, place: str) -> np.ndarray:
+        """(4, 4) pose of a frame in the one that its pose is relative to."""
+        first, _, rest = name.partition("::")
+        if first not in self.models:
+            return pose_of(self.frames[name], place, self.reading)
+        model = self.models[first]
+        if rest:
+            return model.X_SF(rest, place)
+        X_RP = pose_of(model.placed_by, place, self.reading)
+        return X_RP @ inverse(model.X_SF(model.frame_of_pose, place)) if model.frame_of_pose else X_RP
 
-    def link_of(self, name: str, place: str, asked: tuple[str, ...] = ()) -> str:
+    def link_of(self, name: str, place: str) -> str:
         """The link, by its name in this scope, that a frame is attached to; "world" of what is attached to the world.
 
         Raises SceneError for frames that are unknown or attached to no link.
         """
-        if self._is_world(name):
-            return WORLD
-        if name in asked:
-            self.reading.fail(place, f"frames are attached to each other in a circle: {listing([*asked, name])}")
-        asked = (*asked, name)
-        first, _, rest = name.partition("::")
-        if first in self.models:
-            return f"{first}::{self.models[first].link_of(rest or MODEL, place)}"
-        if name in ("", MODEL):
-            canonical = self.element.get("canonical_link")
-            return self.link_of(canonical, place, asked) if canonical else self._first_link(place)
-        element = self.frames.get(name)
-        if element is None:
-            known = listing([*self.frames, *self.models])
-            self.reading.fail(place, f'unknown link or frame "{cut(name)}"; {cut(self.name)} has {known or "none"}')
-        if element.tag == "link":
-            return name
-        attached = text_of(element, "child") if element.tag == "joint" else element.get("attached_to", "")
-        return self.link_of(attached, place, asked)
+        chain: dict[str, None] = {}
+        while True:
+            if self._is_world(name):
+                return WORLD
+            if name in chain:
+                what = f"frames are attached to each other in a circle: {listing([*chain, name])}"
+                self.reading.fail(place, what)
+            chain[name] = None
+            first, _, rest = name.partition("::")
+            if first in self.models:
+                return f"{first}::{self.models[first].link_of(rest or MODEL, place)}"
+            if name in ("", MODEL):
+                name = self.element.get("canonical_link") or self._first_link(place)
+                continue
+            element = self.frames.get(name)
+            if element is None:
+                known = listing([*self.frames, *self.models])
+                self.reading.fail(place, f'unknown link or frame "{cut(name)}"; {cut(self.name)} has {known or "none"}')
+            if element.tag == "link":
+                return name
+            name = text_of(element, "child") if element.tag == "joint" else element.get("attached_to", "")
 
     def _first_link(self, place: str) -> str:
+        """The first link, else the first model within."""
         for name, element in self.frames.items():
             if element.tag == "link":
                 return name
         for name in self.models:
-            return self.link_of(name, place)
+            return name
         self.reading.fail(place, f"model {cut(self.name)} has no link")
+
+
+def _stated(element: ET.Element | None, default: str) -> str:
+    """The frame that an element's <pose> names, else a default."""
+    described = None if element is None else element.find("pose")
+    return default if described is None else described.get("relative_to") or default
 
 
 def inverse(X: np.ndarray) -> np.ndarray:
