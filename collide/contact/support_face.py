@@ -47,9 +47,9 @@ ROUND = 8
 _BLUR = 2.0**-46
 #: Faces and edges whose direction is known worse than to this angle show no more than their nearest point when swept.
 KNOWN = 2.0**-20
-#: Sines below this count as 0: a cylinder stands upright. At rest it tilts this way and that by less (a can of 1 cm
-#: whose rim moves by a micrometre by 1e-4), and corners that went around with its lowest point would never let it rest.
-_UPRIGHT = 2.0**-13
+#: Sines below this count as 0: a cylinder stands upright. At rest it tilts this way and that by less (a can of 5 cm
+#: whose rim moves by a micrometre by 2e-5), and corners that went around with its lowest point would never let it rest.
+_UPRIGHT = 2.0**-15
 #: Of the radius and the sine: by so much the lowest point may be lower than the lowest corner of an upright octagon.
 _SAGITTA = 1.0 - math.cos(math.pi / ROUND) + 2.0**-50
 
