@@ -207,19 +207,32 @@ def resolve_mimics(joints: Sequence[Joint]) -> dict[str, tuple[str, float, float
     return drivers
 
 
+class Joined:
+    """Groups of names joined in pairs, directly or by way of further names (union-find)."""
+
+    def __init__(self) -> None:
+        self._above: dict[str, str] = {}
+
+    def leader(self, name: str) -> str:
+        """The name that stands for the group of a name."""
+        while (above := self._above.get(name, name)) != name:
+            self._above[name] = name = self._above.get(above, above)
+        return name
+
+    def join(self, a: str, b: str) -> bool:
+        """Join the groups of two names; whether the groups were apart."""
+        a, b = self.leader(a), self.leader(b)
+        self._above[b] = a
+        return a != b
+
+
 def rigid_clusters(links: Sequence[str], joints: Sequence[Joint]) -> tuple[tuple[str, ...], ...]:
     """Links welded together by fixed joints, each cluster and all clusters in the order of the links."""
-    leader = {link: link for link in links}
-
-    def find(link: str) -> str:
-        while leader[link] != link:
-            leader[link] = link = leader[leader[link]]
-        return link
-
+    joined = Joined()
     for joint in joints:
         if joint.type == "fixed":
-            leader[find(joint.child)] = find(joint.parent)
+            joined.join(joint.parent, joint.child)
     members: dict[str, list[str]] = {}
     for link in links:
-        members.setdefault(find(link), []).append(link)
+        members.setdefault(joined.leader(link), []).append(link)
     return tuple(tuple(cluster) for cluster in members.values())

@@ -29,6 +29,7 @@ class Scope:
     name : within the scope around it.   element : <model> or <world>.   reading : the file that it is in.
     frames : name → the element with its pose.   models : name → the scope of a model within.
     frame_of_pose : of a model whose pose is that of another of its frames (``placement_frame``).
+    version : of the format of its file.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Scope:
     placed_by: ET.Element | None = None
     frame_of_pose: str | None = None
     static: bool = False
+    version: tuple[int, ...] = ()
     frames: dict[str, ET.Element] = field(default_factory=dict)
     models: dict[str, Scope] = field(default_factory=dict)
     _X_SF: dict[str, np.ndarray] = field(default_factory=dict)
@@ -68,7 +70,7 @@ class Scope:
         """The frame of this scope that the pose of another is relative to."""
         first, _, rest = name.partition("::")
         if first in self.models:
-            return first if rest else _stated(self.models[first].placed_by, "")
+            return first if rest else frame_in_pose(self.models[first].placed_by, "")
         if name not in self.frames:
             known = listing([*self.frames, *self.models])
             self.reading.fail(place, f'unknown frame "{cut(name)}"; {cut(self.name)} has {known or "none"}')
@@ -78,7 +80,7 @@ class Scope:
             default = text_of(element, "child")
         elif element.tag == "frame":
             default = element.get("attached_to", "")
-        return _stated(element, default)
+        return frame_in_pose(element, default)
 
     def _X_RF(self, name: str, place: str) -> np.ndarray:
         """(4, 4) pose of a frame in the one that its pose is relative to."""
@@ -128,7 +130,7 @@ class Scope:
         self.reading.fail(place, f"model {cut(self.name)} has no link")
 
 
-def _stated(element: ET.Element | None, default: str) -> str:
+def frame_in_pose(element: ET.Element | None, default: str) -> str:
     """The frame that an element's <pose> names, else a default."""
     described = None if element is None else element.find("pose")
     return default if described is None else described.get("relative_to") or default

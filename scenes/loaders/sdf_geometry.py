@@ -13,7 +13,7 @@ from collide.scenes.loaders.fields import placed
 from collide.scenes.loaders.mesh_parts import MeshFile, MeshPart, described
 from collide.scenes.loaders.mesh_shapes import Taken
 from collide.scenes.loaders.robot_reading import Reading
-from collide.scenes.loaders.sdf_frames import Scope, inverse, is_true, pose_of, text_of
+from collide.scenes.loaders.sdf_frames import Scope, frame_in_pose, inverse, is_true, pose_of, text_of
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import Shape
 
@@ -49,9 +49,8 @@ def shapes_of_link(scope: Scope, link: ET.Element, name: str) -> tuple[list[Link
 
 def _pose_in_link(scope: Scope, element: ET.Element, link: str, place: str) -> np.ndarray:
     X_FG = pose_of(element, place, scope.reading)
-    stated = element.find("pose")
-    relative_to = None if stated is None else stated.get("relative_to")
-    if not relative_to or relative_to == link:
+    relative_to = frame_in_pose(element, link)
+    if relative_to == link:
         return X_FG
     return inverse(scope.X_SF(link, place)) @ scope.X_SF(relative_to, place) @ X_FG
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from collide.errors import SceneError, cut, listing
-from collide.robots.kinematic_tree import Joint, Mimic
+from collide.robots.kinematic_tree import Joined, Joint, Mimic
 from collide.robots.robot import LinkShape, Robot
 from collide.scenes.description import SceneBody, free_name, link_body
 from collide.scenes.loaders.robot_reading import BALL, Motion, Reading, chain
@@ -59,25 +59,6 @@ class ModelJoint:
     child: str
     X_MJ: np.ndarray
     motions: list[Motion]
-
-
-class Joined:
-    """Which names are joined with which, directly or by others."""
-
-    def __init__(self) -> None:
-        self._above: dict[str, str] = {}
-
-    def leader(self, name: str) -> str:
-        """A name that stands for all that are joined with this one."""
-        while (above := self._above.get(name, name)) != name:
-            self._above[name] = name = self._above.get(above, above)
-        return name
-
-    def join(self, a: str, b: str) -> bool:
-        """Join two names; whether they were apart."""
-        a, b = self.leader(a), self.leader(b)
-        self._above[b] = a
-        return a != b
 
 
 @dataclass
@@ -221,13 +202,7 @@ def _motion(
 
 def _of_parent_model(scope: Scope) -> str:
     """Whether axes are those of the model's frame where they do not say: so they were up to version 1.4."""
-    return "true" if version_of(scope) < (1, 5) else "false"
-
-
-def version_of(scope: Scope) -> tuple[int, ...]:
-    """The version of the file's format; the newest where there is none."""
-    words = scope.element.get("sdf_version", "").split(".")
-    return tuple(map(int, words)) if all(word.isdigit() for word in words) else (2,)
+    return "true" if scope.version < (1, 5) else "false"
 
 
 def _mimic(axis: ET.Element, prefix: str, place: str, reading: Reading) -> Mimic | None:

@@ -27,8 +27,12 @@ from collide.scenes.loaders.srdf import find_srdf, read_srdf
 from collide.scenes.loaders.xml_text import parse_xml
 
 _FRAMES = ("link", "joint", "frame")
-_UNREAD = {"actor": "actors", "population": "populations", "state": "the state that a world was saved in",
-           "road": "roads", "joint": "joints between models"}
+_UNREAD = {
+    "actor": "actors are", "population": "populations are", "state": "the state that a world was saved in is",
+    "road": "roads are", "joint": "joints between models are",
+}
+#: What files without a version are taken for.
+NEWEST = (2,)
 
 
 def is_sdf(root: ET.Element) -> bool:
@@ -154,10 +158,9 @@ class _File:
         return scope, models
 
     def _scope(self, name: str, element: ET.Element, reading: Reading, version: str, depth: int) -> Scope:
-        element.set("sdf_version", version)
         scope = Scope(
             name, element, reading, element, element.get("placement_frame") or None,
-            is_true(text_of(element, "static", "false")),
+            is_true(text_of(element, "static", "false")), _numbers(version) or NEWEST,
         )
         place = f'{element.tag} "{cut(name)}"'
         if depth > DEEPEST:
@@ -170,8 +173,7 @@ class _File:
             elif child.tag == "include":
                 self._include(scope, child, depth, place)
             elif child.tag in _UNREAD and element.tag == "world":
-                reading.notes.append(f"{place}: {_UNREAD[child.tag]} are NOT read" if child.tag != "state" else
-                                     f"{place}: {_UNREAD[child.tag]} is NOT read")
+                reading.notes.append(f"{place}: {_UNREAD[child.tag]} NOT read")
         return scope
 
     def _add(self, scope: Scope, child: ET.Element, place: str) -> None:
@@ -238,12 +240,14 @@ class _File:
             config = resources.find(f"{folder}/model.config", reading.path, where, element=place)
         except resources.NotFound:
             return resources.find(f"{folder}/model.sdf", reading.path, where, element=place)
-        named = sorted(parse_xml(config, []).findall("sdf"), key=_version)
+        named = sorted(parse_xml(config, []).findall("sdf"), key=lambda entry: _numbers(entry.get("version", "")))
         files = [config.parent / name for entry in named if (name := (entry.text or "").strip())]
         if not files or not is_file(files[-1]):
             reading.fail(place, f"{config} names no SDFormat file that is there")
         return files[-1]
 
 
-def _version(entry: ET.Element) -> list[int]:
-    return [int(word) for word in entry.get("version", "").split(".") if word.isdigit()]
+def _numbers(version: str) -> tuple[int, ...]:
+    """The numbers of a version, to be compared; none of what is no version."""
+    words = version.split(".")
+    return tuple(map(int, words)) if all(word.isdigit() for word in words) else ()
