@@ -278,6 +278,7 @@ def _put_face(F, G, face, t, error, exchanged, row):
     n = scale((1.0 if dot(a, t) >= 0.0 else -1.0) / math.sqrt(dot(a, a)), a)
     x, y, z = _end_of(G.x, G.half.x, n, error), _end_of(G.y, G.half.y, n, error), _end_of(G.z, G.half.z, n, error)
     p = _in_plane(add(t, add(add(x.corner, y.corner), z.corner)), e, f)
+    end = p
     # Corners of other bodies' faces show where these overlap; a segment has no face, and its point is the corner's.
     is_corner_over = (h_e > 0.0 and h_f > 0.0) or (abs(p.x) <= h_e + 4.0 * error and abs(p.y) <= h_f + 4.0 * error)
     # Middle of the edge or face, and half of its sides; of a corner these are 0.
@@ -292,6 +293,10 @@ def _put_face(F, G, face, t, error, exchanged, row):
     if face.gap > 0.0:
         row.doubles[UPPER] = face.gap + error * (1.0 + 2.0 * (x.is_flat + y.is_flat + z.is_flat))
     on_g = add(add(t, F.p), add(add(x.corner, y.corner), z.corner))
+    if G.half.x == 0.0 and z.is_flat != 0.0:
+        # A ball swept along this segment is nearest beneath it: the place over the face that is nearest to the end.
+        first = max(_first_over(end.x, 2.0 * gz.x, h_e), _first_over(end.y, 2.0 * gz.y, h_f))
+        on_g = add(on_g, scale(2.0 * min(first, 1.0), z.side))
     on_f = sub(on_g, scale(face.gap, n))
     put_vec3(row.doubles, NORMAL, add(scale(-1.0 if exchanged else 1.0, n), Vec3(0.0, 0.0, 0.0)))
     put_vec3(row.doubles, POINT_B if exchanged else POINT_A, on_f)
@@ -307,6 +312,16 @@ def _end_of(axis, half, n, error):
     if abs(half * along) <= error:
         return BoxEnd(corner, neg(corner), 1.0)
     return BoxEnd(corner, Vec3(0.0, 0.0, 0.0), 0.0)
+
+
+@kernel(inline=True)
+def _first_over(start, along, half):
+    """Least part of a segment's length from which a coordinate is within ±half, or 0."""
+    if start > half and along < 0.0:
+        return (half - start) / along
+    if start < -half and along > 0.0:
+        return (-half - start) / along
+    return 0.0
 
 
 @kernel(inline=True)

@@ -131,6 +131,35 @@ def test_brackets_hold_the_widest_gap():
     assert decided["flush"] > 95 and decided["capsule level"] > 75, decided
 
 
+def test_points_of_round_bodies_lie_over_the_face():
+    """The end of a capsule longer than the face was taken, 6 cm off a box of 10 µm: soak of pairs, case 4308."""
+    decided = beyond = 0
+    for seed in range(600):
+        rng = np.random.default_rng(seed)
+        box = collide.Box(rng.uniform(0.2, 1.0, 3) * 10.0 ** rng.uniform(-6, 0))
+        other = collide.Capsule(rng.uniform(0.02, 0.2), rng.uniform(0.1, 1.5)) if seed % 3 else collide.Sphere(0.1)
+        k = int(rng.integers(3))
+        lying = collide.pose((0, 0, 0), rpy=(0, np.pi / 2, 0) if k == 2 else (0, 0, 0))
+        X_AB = collide.pose((0, 0, 0), rpy=np.eye(3)[k] * rng.choice([0.0, np.pi / 2, 0.7])) @ lying
+        X_AB[:3, 3] = rng.uniform(-0.5, 0.5, 3) * box.size + rng.uniform(-0.5, 0.5) * half_of(other)[2] * X_AB[:3, 2]
+        X_AB[k, 3] = box.size[k] / 2 + other.radius + rng.choice([1e-3, 0.05, 0.8])
+        X = collide.pose(rng.normal(size=3), rpy=rng.uniform(-3, 3, 3)) if seed % 2 else np.eye(4)
+        A, B, X_WA, X_WB, point = box, other, X, X @ X_AB, "point_a"
+        if rng.integers(2):
+            A, B, X_WA, X_WB, point = B, A, X_WB, X_WA, "point_b"
+        row, known = row_of(A, B, X_WA, X_WB)
+        if not known or row["hit"]:
+            continue
+        decided += 1
+        beyond += half_of(other)[2] > max(box.size)
+        outside = np.abs(X[:3, :3].T @ (row[point] - X[:3, 3])) - half_of(box)
+        assert outside.max() <= 1e-14, (seed, outside)
+        rows = collide.contacts(A, B, X_WA, X_WB, margin=1.0).rows
+        outside = np.abs((rows[point] - X[:3, 3]) @ X[:3, :3]) - half_of(box)
+        assert len(rows) and outside.max() <= 1e-13, (seed, outside)
+    assert decided > 150 and beyond > 30, (decided, beyond)
+
+
 def test_exchanged_rows_are_the_mirror():
     for seed in range(100):
         A, B, X_WA, X_WB = boxes(np.random.default_rng(seed), MODES[seed % len(MODES)])

@@ -540,6 +540,16 @@ def test_a_union_is_certified_for_brackets_no_wider_than_its_size_allows():
     assert promised < width < 2 * promised and not r.certified, r  # where the two sizes differ
 
 
+def test_contacts_of_a_capsule_over_a_tiny_face_lie_on_it():
+    """One point was the capsule's end, 5.9 cm beside a box of 10 µm."""
+    A, X_WA = collide.Capsule(0.2741310784647174, 0.05928700689200324), pose(
+        t=[-0.4328603814663495, -0.6893606223932622, 0.3551272011410056])
+    B = collide.Box([1.0188392111109613e-05, 7.813830854851132e-07, 1.8619509419889566e-06])
+    X_WB = pose(t=[-0.43286289735479017, -1.8002305574451374, 0.3254891055958631])
+    rows = collide.contacts(A, B, X_WA, X_WB, margin=0.84).rows
+    assert len(rows) and (np.abs(rows["point_b"] - X_WB[:3, 3]) <= np.array(B.size) / 2 + 1e-15).all(), rows["point_b"]
+
+
 def test_normals_of_unions_have_no_negative_zero():
     """Swapped arguments then give mirrored bits: the way out of a box along −y was (0, −1, −0)."""
     A, turned = collide.Sphere(0.5), np.diag([1.0, -1.0, -1.0, 1.0])
