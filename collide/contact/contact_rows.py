@@ -6,7 +6,8 @@ part_a, part_b  number of each body's part in a Compound, 0 otherwise
 patch           number of the patch among its pair's patches, from 0
 kind            index into `KINDS`
 facet_a,facet_b facet each point lies on: of a Mesh rows of ``faces``, of a convex shape triangles of its
-                hull, −1 where a curved or a plane surface has none
+                hull (of a Box ``facet // 2`` is the face: −x, +x, −y, +y, −z, +z), −1 where a curved or a
+                plane surface has none
 normal          (3,) unit vector nhat_AB_W, one for all contacts of a patch
 point_a,point_b (3,) points of A's and B's surfaces [m]: point_b − point_a = distance · normal
 distance        signed, along the normal [m]: the gap there, or minus the overlap
@@ -53,12 +54,6 @@ CONTACT_DTYPE = np.dtype(
 )
 #: Names of the fields of a row.
 FIELDS: tuple[str, ...] = CONTACT_DTYPE.names or ()
-
-
-def field_at(field: str, unit: int) -> int:
-    """Where a field of a row begins, in units of so many bytes."""
-    assert CONTACT_DTYPE.fields is not None
-    return CONTACT_DTYPE.fields[field][1] // unit
 
 
 def no_rows() -> np.ndarray:

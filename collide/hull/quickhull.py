@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide.hull.box_corners import BOX_FACETS, are_box_corners, put_box_hull
 from collide.hull.first_simplex import APICES, first_simplex
 from collide.hull.growing_hull import (
     ACROSS,
@@ -330,6 +331,16 @@ def grow_hull(points_at, count, memory_at):
     facets_at = state_at + 8 * STATE
     at = facets_at + 8 * FACET * capacity
     row = 4 * capacity
+    vertices, surface = view_i32(at + 8 * row, capacity), view_i32(at + 10 * row, 6 * capacity)
+    header[FACETS_AT] = at + 10 * row
+    header[VERTICES_AT] = at + 8 * row
+    if are_box_corners(points_at, count):
+        put_box_hull(vertices, surface)
+        header[N_FACETS] = BOX_FACETS
+        header[N_VERTICES] = count
+        return 3
+    header[N_FACETS] = 0
+    header[N_VERTICES] = 0
     cloud_points = view_f64(points_at, 3 * count)
     originals, scaled = view_f64(originals_at, 3 * capacity), view_f64(scaled_at, 3 * capacity)
     work = view_f64(work_at, WORK)
@@ -345,11 +356,6 @@ def grow_hull(points_at, count, memory_at):
         view_i32(at + 8 * row, capacity), view_i32(at + 9 * row, capacity),
     )
     corners = view_i64(state_at + 8 * CORNERS, 4)
-    vertices, surface = hull.starting, view_i32(at + 10 * row, 6 * capacity)
-    header[N_FACETS] = 0
-    header[N_VERTICES] = 0
-    header[FACETS_AT] = at + 10 * row
-    header[VERTICES_AT] = at + 8 * row
     dimension = first_simplex(cloud, count, corners)
     if dimension >= 2 and not grow(hull, count, begin(hull, count, corners)):
         return -1

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from collide.hull.box_corners import BOX_FACES, are_box_corners, box_corner
 from collide.hull.quickhull import (
     FACETS_AT,
     HULL_EACH,
@@ -150,6 +151,9 @@ def make_faces(points_at, n, memory_at):
 def find_faces(points_at, n, memory_at):
     """`make_faces` for kernels."""
     hull_at = memory_at + 8 * _HEADER
+    if are_box_corners(points_at, n):
+        _put_box(points_at, n, memory_at)
+        return 0
     dimension = grow_hull(points_at, n, hull_at)
     if dimension < 0:
         return -1
@@ -172,6 +176,24 @@ def find_faces(points_at, n, memory_at):
         _straighten(making, n, tolerance)
     _count(making, n)
     return 0
+
+
+@kernel
+def _put_box(points_at, n, memory_at):
+    """The faces of a box, as merging its triangles makes them."""
+    hull = view_i64(memory_at + 8 * _HEADER, 4)
+    hull[FACETS_AT] = hull[VERTICES_AT] = memory_at  # nobody reads them
+    making = _made(points_at, n, memory_at)
+    for k in range(_HEADER):
+        making.header[k] = 0
+    making.starts[0] = 0
+    for face in range(BOX_FACES):
+        side = 1.0 if face % 2 == 1 else -1.0
+        for k in range(4):
+            making.corners[4 * face + k] = box_corner(face, k)
+        normal = Vec3(side if face < 2 else 0.0, side if face // 2 == 1 else 0.0, side if face > 3 else 0.0)
+        _put_face(making, 4, normal, 0.0, 2 * face)
+    _count(making, n)
 
 
 @kernel
