@@ -254,6 +254,12 @@ class PairResult(Generic[Form]):
         return f"PairResult(<{len(self.rows)} rows>, hits={int(self.rows['hit'].sum())})"
 
 
+def field_at(dtype: np.dtype, field: str, unit: int) -> int:
+    """Where a field of a record begins, in units of so many bytes."""
+    assert dtype.fields is not None
+    return dtype.fields[field][1] // unit
+
+
 def zeroed_rows(n: int, dtype: np.dtype) -> np.ndarray:
     """n records of zeros: for single calls, where `np.zeros` takes half a microsecond to set up a dtype of fields."""
     return np.frombuffer(bytearray(n * dtype.itemsize), dtype)

@@ -150,6 +150,14 @@ def rotation_from_unit(w, x, y, z) -> np.ndarray:
     )
 
 
+def inverse_pose(X: np.ndarray) -> np.ndarray:
+    """(4, 4) inverse of a pose, by its transpose."""
+    inverted = np.eye(4)
+    inverted[:3, :3] = X[:3, :3].T
+    inverted[:3, 3] = -(X[:3, :3].T @ X[:3, 3])
+    return inverted + 0.0
+
+
 def as_poses(X: PoseLike, name: str = "X", *, check: bool = True) -> np.ndarray:
     """Poses as a C-contiguous float64 batch (N, 4, 4); a single pose gives N = 1.
 

@@ -12,6 +12,7 @@ from collide.adapters.hosts.host_numbers import shaped
 from collide.adapters.hosts.quaternion_poses import pose_of
 from collide.scenes.loaders.mesh_file import read_mesh
 from collide.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Halfspace, Mesh, Shape, Sphere
+from collide.transforms import inverse_pose
 
 SHAPE_ARGUMENTS = (
     "shapeType", "radius", "halfExtents", "height", "fileName", "meshScale", "planeNormal", "flags",
@@ -76,7 +77,7 @@ def inertial_frames(arguments: dict[str, Any]) -> dict[int, tuple[int, np.ndarra
         arguments.get("baseInertialFrameOrientation", _UPRIGHT), *(arguments.get("linkInertialFrameOrientations") or ())
     ]
     return {
-        k - 1: (shape, _inverse(pose_of(position, orientation)))
+        k - 1: (shape, inverse_pose(pose_of(position, orientation)))
         for k, (shape, position, orientation) in enumerate(zip(shapes, positions, orientations))
         if shape >= 0
     }
@@ -113,10 +114,3 @@ def _terrain(arguments: dict[str, Any]) -> Mesh:
     corner = (np.arange(nx - 1)[None, :] + nx * np.arange(ny - 1)[:, None]).ravel()
     facets = [(corner, corner + 1, corner + nx), (corner + 1, corner + nx + 1, corner + nx)]
     return Mesh(points, np.concatenate([np.stack(facet, axis=1) for facet in facets]), solid=False)
-
-
-def _inverse(X: np.ndarray) -> np.ndarray:
-    out = np.eye(4)
-    out[:3, :3] = X[:3, :3].T
-    out[:3, 3] = -X[:3, :3].T @ X[:3, 3]
-    return out

@@ -6,8 +6,6 @@ answered as a batch of convex pairs (`contact_blocks.py`).
 
 from __future__ import annotations
 
-import math
-
 from collide.contact.contact_blocks import (
     BEGIN,
     BLOCK_HEADER,
@@ -21,8 +19,9 @@ from collide.contact.contact_blocks import (
     XA_AT,
     XB_AT,
 )
-from collide.contact.contact_rows import CONTACT_DTYPE, field_at
+from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import FACES_AT, MARGIN, MAX_CONTACTS, PAIRS_DONE, ROWS_DONE
+from collide.contact.near_the_margin import is_near_the_margin
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i32, view_i64
 from collide.lowering.compound_table import PART, TURNED
 from collide.lowering.hull_faces import N_VERTICES
@@ -34,6 +33,7 @@ from collide.narrowphase.composite.composite_block import HEADER as COMPOSITE_HE
 from collide.narrowphase.composite.composite_block import INTS_AT, N_DONE, body_of, lay_out, open_block, part_view
 from collide.narrowphase.composite.composite_poses import list_pairs_within
 from collide.narrowphase.pose_batches import HEADER as HEADER_OF_POSES
+from collide.results import field_at
 
 _contacts_of_pairs_at = native_call("int64(int64, int64)")
 
@@ -44,12 +44,8 @@ KERNEL, N_WANTED, WANTED_AT, REACH_OF_BOTH, COMPOSITE = range(5)
 BATCH = COMPOSITE + COMPOSITE_HEADER
 COMPOUND_HEADER = BATCH + BLOCK_HEADER
 
-#: Contacts nearer to the margin than this part of the pair's size are judged by the bodies' distance.
-ROUNDING = 2.0**-40
-
 _CONTACT = CONTACT_DTYPE.itemsize
-_PART_A, _PART_B, _PATCH = (field_at(name, 4) for name in ("part_a", "part_b", "patch"))
-_UPPER = field_at("upper", 8)
+_PART_A, _PART_B, _PATCH = (field_at(CONTACT_DTYPE, name, 4) for name in ("part_a", "part_b", "patch"))
 
 
 @entry(prepared.CONTACTS, nogil=False)
@@ -83,12 +79,9 @@ def contacts_single_compound(header_at, XA_at, XB_at, out_at, max_contacts, marg
     view_f64(batch_at + 8 * LIMIT, 1)[0] = margin + slack
     if _contacts_of_pairs_at(header[KERNEL], (batch_at, n)) != DONE:
         return -1
-    least = _name_parts(header, block, n, out_at)
-    size = 4.0 * view_f64(header_at + 8 * REACH_OF_BOTH, 1)[0]
-    for i in range(3):
-        size += abs(view_f64(XB_at, 16)[4 * i + 3] - view_f64(XA_at, 16)[4 * i + 3])
-    is_on_the_brink = least < math.inf and least > margin - ROUNDING * size
-    return -1 if is_on_the_brink else header[manifold + ROWS_DONE]
+    _name_parts(header, block, n, out_at)
+    n_rows, reach = header[manifold + ROWS_DONE], view_f64(header_at + 8 * REACH_OF_BOTH, 1)[0]
+    return -1 if is_near_the_margin(out_at, n_rows, margin, reach, XA_at, XB_at) else n_rows
 
 
 @kernel
@@ -138,20 +131,16 @@ def _put_matrix(header, block, side, row, X_at):
 
 @kernel
 def _name_parts(header, block, n, out_at):
-    """Write the parts of each contact, and patches counted on from pair to pair; the least upper bound of a distance
-    [m]."""
+    """Write the parts of each contact, and patches counted on from pair to pair."""
     ends = view_i64(header[BATCH + ENDS_AT], n)
     count_b = body_of(block, 0, 1).n_parts
-    least, first, patch = math.inf, 0, 0
+    first, patch = 0, 0
     for k in range(n):
         pair = block.owners[2 * k + 1]
         for number in range(first, ends[k]):
-            at = out_at + _CONTACT * number
-            words = view_i32(at, _CONTACT // 4)
+            words = view_i32(out_at + _CONTACT * number, _CONTACT // 4)
             words[_PART_A] = pair // count_b
             words[_PART_B] = pair % count_b
             words[_PATCH] = patch
-            least = min(least, view_f64(at, _CONTACT // 8)[_UPPER])
         patch += 1 if ends[k] > first else 0
         first = ends[k]
-    return least

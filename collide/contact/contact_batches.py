@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
-from collide.contact.contact_rows import no_rows
+from collide.contact.contact_rows import CONTACT_DTYPE, no_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.curved_contacts import curved_contacts
 from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
+from collide.contact.near_the_margin import ROUNDING
+from collide.contact.single_contacts import single_contacts_of
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.compound_layout import body_ball
 from collide.lowering.kind_of_shape import kind_of
@@ -19,6 +22,7 @@ from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import CompoundParts, PartColumns, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import OF_SETS, OF_UNIONS, Method, cells_of, method_of
+from collide.narrowphase.prepared_pairs import Single
 from collide.pairs.batches import answer_batch, of_one_set
 from collide.pairs.pair_arguments import pose_at
 from collide.shapes.shape import Shape
@@ -29,8 +33,10 @@ from collide.transforms import as_poses
 #: taken apart.
 _OF_MESHES = {Method.FACETS: facet_contacts, Method.CURVED: curved_contacts, Method.HULL: halfspace_contacts}
 _ARE_SETS = cells_of(OF_SETS)
-#: Contacts nearer to the margin than this part of the pair's size are judged by the bodies' distance.
-_ROUNDING = 2.0**-40
+#: Pairs that are quicker by themselves than pairs of parts in a batch of few poses.
+_BY_SINGLE_CALLS = cells_of((Method.FACETS, Method.PARTS))
+#: Unions of more parts, whose tables are kept with every partner, are not made ready for the pairs of a list.
+_MAX_KEPT_PARTS = 64
 
 
 class PartPairs(NamedTuple):
@@ -89,6 +95,28 @@ def contact_batch(
         rows, ends = make(A, B, X_WA, X_WB, margin, max_contacts, None, threads)
         of_pair = np.repeat(np.arange(n), np.diff(ends, prepend=0))
         return _only_within_margin(rows, of_pair, n, A, B, X_WA, X_WB, margin)
+    if n > 1 and (asks := _single_calls(A, B, n, how)):
+        return _by_single_calls(asks, A, B, X_WA, X_WB, n, margin, max_contacts, threads)
+    return _by_parts(A, B, X_WA, X_WB, n, margin, max_contacts, threads)
+
+
+def _single_calls(A, B, n: int, how: Method | None) -> dict[int, Single]:
+    """{number of a pair: its kernel of single calls}, of unions of convex parts, and of facets among other pairs."""
+    if not isinstance(A, Picked):
+        ask = single_contacts_of(A, B) if how is Method.PARTS else None
+        return {} if ask is None else dict.fromkeys(range(n), ask)
+    kinds, shapes = tables_of(A.shape_set).kinds, A.shape_set.shapes
+    is_small = cache(lambda a: len(compound_parts(shapes[a]).parts) <= _MAX_KEPT_PARTS)
+    known = cache(lambda a, b: single_contacts_of(shapes[a], shapes[b]) if is_small(a) and is_small(b) else None)
+    some = np.flatnonzero(_BY_SINGLE_CALLS[kinds[A.rows], kinds[B.rows]]).tolist()
+    asks = {k: known(int(A.rows[k]), int(B.rows[k])) for k in some}
+    return {k: ask for k, ask in asks.items() if ask is not None}
+
+
+def _by_parts(
+    A, B, X_WA, X_WB, n: int, margin: float, max_contacts: int, threads: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """`contact_batch` of checked poses, with all pairs of parts in few batches."""
     shapes: tuple[Shape, ...] = (A, B)
     which = None
     if isinstance(A, Picked):
@@ -104,6 +132,22 @@ def contact_batch(
     rows["part_b"] = np.repeat(part_pairs.part_b, ends - starts)
     _number_patches(rows, of_pair)
     return _only_within_margin(rows, of_pair, n, A, B, X_WA, X_WB, margin)
+
+
+def _by_single_calls(
+    asks: dict[int, Single], A, B, X_WA, X_WB, n: int, margin: float, max_contacts: int, threads: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """`contact_batch` of checked poses by kernels of single calls; all else, and what they leave open, in one batch."""
+    X_WA, X_WB = (np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4))) for X in (X_WA, X_WB))
+    answers = ((k, ask(X_WA[k], X_WB[k], max_contacts, margin)) for k, ask in asks.items())
+    pieces: dict[int, bytes] = {k: rows for k, rows in answers if rows is not None}
+    is_open = [k for k in range(n) if k not in pieces]
+    if is_open:
+        A, B = (S if isinstance(S, Shape) else S[np.array(is_open)] for S in (A, B))
+        rows, ends = _by_parts(A, B, X_WA[is_open], X_WB[is_open], len(is_open), margin, max_contacts, threads)
+        pieces |= {k: some.tobytes() for k, some in zip(is_open, np.split(rows, ends))}
+    rows = np.frombuffer(bytearray().join(pieces[k] for k in range(n)), dtype=CONTACT_DTYPE)
+    return rows, np.cumsum([len(pieces[k]) // CONTACT_DTYPE.itemsize for k in range(n)])
 
 
 def _only_within_margin(
@@ -236,7 +280,7 @@ def _within_margin(rows, of_pair, A, B, X_WA, X_WB, margin: float) -> np.ndarray
     pairs, ends = of_pair[starts], np.append(starts[1:], len(rows))
     across = np.abs(_some(X_WB, pairs)[:, :3, 3] - _some(X_WA, pairs)[:, :3, 3]).sum(axis=1)
     size = 4.0 * (_reaches(A, pairs) + _reaches(B, pairs)) + across
-    near = np.minimum.reduceat(rows["upper"], starts) > margin - _ROUNDING * size
+    near = np.minimum.reduceat(rows["upper"], starts) > margin - ROUNDING * size
     for i in np.flatnonzero(near).tolist():
         k = int(pairs[i])
         shape_a, shape_b = (A, B) if isinstance(A, Shape) else (A[k], B[k])

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from collide.contact.box_box import put_box_row
 from collide.contact.closed_form_rows import has_closed_form, put_closed_form
-from collide.contact.contact_rows import CONTACT_DTYPE, field_at
+from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import (
     LARGEST,
     MARGIN,
@@ -43,6 +43,7 @@ from collide.narrowphase.pose_batches import (
 )
 from collide.narrowphase.posed_pair import ordered_pair
 from collide.narrowphase.rows import BEYOND, LOWER, ROW, is_undecided_or_refused, view_row
+from collide.results import field_at
 
 # Header: that of single calls, then what is asked: addresses of two rows of the `ShapeTable` a pair, or 0 for rows 0
 # and 1 throughout; of both bodies' matrices, and how many doubles from one to the next (16, or 0 for one that goes with
@@ -60,7 +61,7 @@ BLOCK_HEADER = SINGLE_HEADER + 17
 DONE, OPEN, BAD_POSE, ROWS_FULL, UNBOUNDED = range(5)
 
 _CONTACT = CONTACT_DTYPE.itemsize
-_A, _B = field_at("a", 4), field_at("b", 4)
+_A, _B = field_at(CONTACT_DTYPE, "a", 4), field_at(CONTACT_DTYPE, "b", 4)
 
 
 class _Task(NamedTuple):

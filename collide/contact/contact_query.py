@@ -11,7 +11,7 @@ from collide.base import argument_checks as checks
 from collide.base.threads import check_threads
 from collide.contact.contact_batches import contact_batch
 from collide.contact.contact_rows import Contacts
-from collide.contact.convex_contacts import prepare_contacts
+from collide.contact.single_contacts import prepare_contacts
 from collide.errors import InvalidArgument
 from collide.narrowphase.single_queries import ALL_CONTACTS, asks_prepared_pairs
 from collide.pairs.batches import length_of
@@ -86,7 +86,7 @@ def contacts(
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     n = length_of(A, B, X_WA, X_WB)
     check = checks.true_or_false("check_poses", check_poses)
-    if prepare_contacts(A, B) and single:
+    if single and prepare_contacts(A, B):
         return contacts(
             A, B, X_WA[0], X_WB[0], margin=margin, max_contacts=max_contacts, check_poses=check, threads=threads
         )

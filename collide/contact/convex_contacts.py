@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
-from struct import Struct
 from threading import local
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from collide.base.threads import answers_in_order, pieces_of
-from collide.contact.compound_contact_call import (
-    BATCH,
-    COMPOSITE,
-    COMPOUND_HEADER,
-    KERNEL,
-    N_WANTED,
-    REACH_OF_BOTH,
-    WANTED_AT,
-    contacts_single_compound,
-)
 from collide.contact.contact_blocks import (
     BAD_POSE,
     BLOCK_HEADER,
@@ -35,7 +23,7 @@ from collide.contact.contact_blocks import (
     WHICH_AT,
     contacts_of_pairs,
 )
-from collide.contact.contact_rows import CONTACT_DTYPE, joined_rows, no_rows
+from collide.contact.contact_rows import CONTACT_DTYPE, joined_rows
 from collide.contact.convex_manifolds import (
     MARGIN,
     MAX_CONTACTS,
@@ -46,41 +34,24 @@ from collide.contact.convex_manifolds import (
     workspace_doubles,
     workspace_integers,
 )
-from collide.contact.ready_contacts import CONTACT_WORDS, ready_contacts
-from collide.contact.single_contact_call import SINGLE_HEADER, contacts_single
+from collide.contact.single_contact_call import SINGLE_HEADER
 from collide.contact.support_face import ROUND
 from collide.errors import InvalidPose, UnsupportedQuery
-from collide.kernels import address_of, code_of
-from collide.kernels.prepared import prepared_contacts
-from collide.lowering.compound_layout import layout_of
-from collide.lowering.compound_table import MEASURE, SWEPT_RADIUS, CompoundTable
-from collide.lowering.convex_sets import PRIMITIVE_NUMBERS
+from collide.kernels import address_of
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.hull_polygons import faces_memory
-from collide.lowering.kind_of_shape import kind_of
-from collide.lowering.lower_numbers import N_NUMBERS
 from collide.lowering.packed_convex import BLOCK as BLOCK_OF_POINTS
-from collide.lowering.parts import is_single_convex
 from collide.lowering.shape_table import POSE, ShapeTable
-from collide.narrowphase.composite.composite import single_header
-from collide.narrowphase.composite.composite_block import LIST
-from collide.narrowphase.composite.single_composite_call import BALLS_WORK, balls_beyond
-from collide.narrowphase.convex_batches import prepare_parts, prepare_sets, shape_table
-from collide.narrowphase.convex_kernel_calls import BlockWorkspace, block_workspace, space_of_single_calls
-from collide.narrowphase.dispatch import Method, method_of
+from collide.narrowphase.convex_batches import shape_table
+from collide.narrowphase.convex_kernel_calls import block_workspace
 from collide.narrowphase.pose_batches import BLOCK
 from collide.narrowphase.pose_batches import HEADER as HEADER_OF_POSES
-from collide.narrowphase.prepared_pairs import Prepared, Single, keep_prepared, prepared_pair, single_calls_are_safe
-from collide.shapes.compound import Compound
-from collide.shapes.shape import Shape
 from collide.transforms import as_poses
 
 #: The least that a thread is handed.
 _PIECE = 512
 #: Contacts a pair that there is room for at first, and of so many pairs: how many they have tells about the others.
 _USUAL, _FIRST = 8, 256
-#: Contacts of a single call of two unions; more are left to the long way.
-_MAX_ROWS = 1024
 
 
 class ConvexPairs(NamedTuple):
@@ -171,7 +142,7 @@ def _contacts_of(pairs: ConvexPairs, asked: _Asked) -> tuple[np.ndarray, np.ndar
     places = np.empty(BLOCK, dtype=np.int64)
     header = np.zeros(BLOCK_HEADER, dtype=np.int64)
     header[:HEADER_OF_POSES] = block.header_of(table)
-    header[HEADER_OF_POSES : HEADER_OF_POSES + PAIRS_DONE] = _addresses(
+    header[HEADER_OF_POSES : HEADER_OF_POSES + PAIRS_DONE] = manifold_addresses(
         table, faces, space, block.poses.rows, block.shape_of
     )
     header[HEADER_OF_POSES + MAX_CONTACTS] = asked.max_contacts
@@ -214,8 +185,8 @@ def _with_space(rows: np.ndarray, n_rows: int, n_done: int, n: int, max_rows: in
     return larger
 
 
-def _addresses(
-    table: ShapeTable, faces: HullFaceTable, space: _Workspace, poses: np.ndarray, shape_of: np.ndarray
+def manifold_addresses(
+    table: ShapeTable, faces: HullFaceTable, space: ManifoldSpace, poses: np.ndarray, shape_of: np.ndarray
 ) -> tuple[int, ...]:
     """The header of `convex_manifolds` up to what a call has done."""
     return (
@@ -224,137 +195,7 @@ def _addresses(
     )
 
 
-def prepare_contacts(A, B) -> bool:
-    """Make two convex sets ready for single calls of `contacts` and `distance`, or two bodies, a union among them, for
-    single calls of `contacts` at poses far apart. Returns whether this call has made the pair ready."""
-    if not (isinstance(A, Shape) and isinstance(B, Shape) and single_calls_are_safe()):
-        return False
-    pair = prepared_pair(A, B)
-    if pair is not None and pair.contacts is not None:
-        return pair.missing_faces is not None and pair.missing_faces.make(pair)
-    is_convex = is_single_convex(A) and is_single_convex(B)
-    if not is_convex and not (isinstance(A, Compound) or isinstance(B, Compound)):
-        return False
-    if pair is None:
-        pair = prepare_sets(A, B) if is_convex else Prepared()
-        keep_prepared(A, B, pair)
-    elif is_convex and pair.collide is None:  # asked for impacts alone
-        pair.take(prepare_sets(A, B))
-    if not is_convex and _is_flat(A) and _is_flat(B) and method_of(kind_of(A), kind_of(B)) is Method.PARTS:
-        if pair.table is None:
-            pair.take(prepare_parts(A, B))
-        if pair.distance is not None:  # not of too many parts for single calls
-            pair.missing_faces = CompoundContacts(pair.table, _reach_of(A) + _reach_of(B))
-            pair.missing_faces.get_ready(pair)
-            return prepared_pair(A, B) is pair
-    made = None if pair.header is None else _contacts_of_numbers(A, B, pair.header)
-    if made is None:
-        made = _single_contacts(shape_table(A, B)[0]) if is_convex else _single_far_contacts(A, B)
-    pair.contacts, held = made
-    pair.held = pair.held, held
-    return prepared_pair(A, B) is pair
-
-
-def _is_flat(shape: Shape) -> bool:
-    """Whether no item of a union is a union: parts of unions in unions stand at poses rounded otherwise."""
-    return not isinstance(shape, Compound) or not any(isinstance(item, Compound) for item, _ in shape.items)
-
-
-def _reach_of(shape: Shape) -> float:
-    """How far any part reaches from the origin, at most, half-spaces apart [m]."""
-    parts = layout_of(shape).parts
-    return float((parts[:, MEASURE] + parts[:, SWEPT_RADIUS]).max())
-
-
-class CompoundContacts:
-    """What single calls of `contacts` of two unions of convex parts work on. Faces of a part are made when the part
-    first comes near the other union: of a thousand parts few do."""
-
-    def __init__(self, table: CompoundTable, reach: float):
-        self._table, self._reach = table, reach
-        self._faces = HullFaceTable(table.table.packed, ROUND)
-        self._pairs = np.zeros((LIST, 2), dtype=np.int64), np.zeros((LIST, 16)), np.zeros((LIST, 16)), np.zeros(LIST)
-        self._ends, self._places = np.zeros(LIST, dtype=np.int64), np.zeros(BLOCK, dtype=np.int64)
-        self._wanted = np.zeros(2 * LIST, dtype=np.int64)
-
-    def get_ready(self, pair: Prepared) -> None:
-        """Make the pair's ``contacts``."""
-        table, block, space = self._table.table, _block_of_unions(), _space_of_contacts().fit(self._faces.largest)
-        self._largest, at = self._faces.largest, [address_of(of) for of in self._pairs]
-        self._header = header = np.zeros(COMPOUND_HEADER, dtype=np.int64)
-        header[[KERNEL, WANTED_AT]] = code_of(contacts_of_pairs), address_of(self._wanted)
-        header.view(np.float64)[REACH_OF_BOTH] = self._reach
-        header[COMPOSITE:BATCH], composite = single_header(self._table)
-        rows, batch = np.zeros(_MAX_ROWS + max_corners(self._largest), dtype=CONTACT_DTYPE), header[BATCH:]
-        batch[:HEADER_OF_POSES] = block.header_of(table)
-        batch[HEADER_OF_POSES : HEADER_OF_POSES + PAIRS_DONE] = _addresses(
-            table, self._faces, space, block.poses.rows, block.shape_of
-        )
-        batch[WHICH_AT:LIMIT] = at[0], at[1], 16, at[2], 16, 0, 0, at[3], 0, len(rows), address_of(self._ends)
-        batch[PLACES_AT] = address_of(self._places)
-        pair.contacts, pair.held = prepared_contacts(contacts_single_compound, header, rows), (
-            pair.held, self, block, composite, space.buffers,
-        )
-
-    def make(self, pair: Prepared) -> bool:
-        """Make the faces missed by the last call; returns False where the call missed no faces."""
-        rows = self._wanted[: self._header[N_WANTED]].tolist()
-        self._header[N_WANTED] = 0
-        if self._faces.make(rows).largest > self._largest:
-            self.get_ready(pair)
-        return bool(rows)
-
-
-def _single_far_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
-    """(`Prepared.contacts` of two bodies, answering 0 contacts where their balls are far apart; the arrays in use)."""
-    held = layout_of(A).ball, layout_of(B).ball, np.zeros(BALLS_WORK)
-    header = np.array([address_of(of) for of in held], dtype=np.int64)
-    return prepared_contacts(balls_beyond, header, no_rows()), held
-
-
-#: Faces take longer than the rest of a pair of few numbers: pairs of equal numbers share these. So many pairs are
-#: remembered, then all are forgotten.
-_MAX_SHARED = 256
-_contacts_by_numbers: dict[bytes, tuple[Single, Any]] = {}
-_BOTH_NUMBERS = Struct(f"={2 * N_NUMBERS}d")
-
-
-def _contacts_of_numbers(A: Shape, B: Shape, header: np.ndarray) -> tuple[Single, Any] | None:
-    """`_single_contacts` of two shapes of a few numbers; ``None`` where the faces take more space than there is.
-
-    header : the block of `lower_pair`.
-    """
-    key = _BOTH_NUMBERS.pack(*PRIMITIVE_NUMBERS[A.__class__](A), *PRIMITIVE_NUMBERS[B.__class__](B))
-    made = _contacts_by_numbers.get(key)
-    if made is None:
-        made = _made_of_numbers(header)
-        if made is not None:
-            if len(_contacts_by_numbers) >= _MAX_SHARED:
-                _contacts_by_numbers.clear()
-            _contacts_by_numbers[key] = made
-    return made
-
-
-def _made_of_numbers(header: np.ndarray) -> tuple[Single, Any] | None:
-    space, block = _space_of_contacts().fit(ROUND), np.empty(CONTACT_WORDS, dtype=np.int64)
-    if not ready_contacts(address_of(block), address_of(header), address_of(space.header), address_of(space.memory)):
-        return None
-    return prepared_contacts(contacts_single, block, space.rows), (header, space.buffers)
-
-
-def _single_contacts(table: ShapeTable) -> tuple[Single, Any]:
-    """(`Prepared.contacts` of rows 0 and 1 of a table, what it uses besides)."""
-    block, faces = space_of_single_calls(), face_table_of(table, ROUND)
-    space = _space_of_contacts().fit(faces.largest)
-    header = np.zeros(SINGLE_HEADER, dtype=np.int64)
-    header[:HEADER_OF_POSES] = block.header_of(table)
-    header[HEADER_OF_POSES : HEADER_OF_POSES + PAIRS_DONE] = _addresses(
-        table, faces, space, space.poses, space.shape_of
-    )
-    return prepared_contacts(contacts_single, header, space.rows), (block, faces, space.buffers)
-
-
-class _Workspace:
+class ManifoldSpace:
     """Scratch memory of the kernel."""
 
     def __init__(self) -> None:
@@ -364,7 +205,7 @@ class _Workspace:
         self.header = np.zeros(SINGLE_HEADER, dtype=np.int64)
         self.memory = np.empty(3 * BLOCK_OF_POINTS + faces_memory(BLOCK_OF_POINTS) // 8, dtype=np.int64)
 
-    def fit(self, largest: int) -> _Workspace:
+    def fit(self, largest: int) -> ManifoldSpace:
         """Itself, with space for faces of so many corners."""
         self.shape_of[:] = 0, 1
         if largest > self.largest:
@@ -385,19 +226,7 @@ class _OfThread(local):
     """The workspace of one thread, made when the thread first asks."""
 
     def __init__(self) -> None:
-        self.space = _Workspace()
+        self.space = ManifoldSpace()
 
 
 _of_thread = _OfThread()
-
-
-@cache
-def _space_of_contacts() -> _Workspace:
-    """One for all single calls, as `convex_kernel_calls.space_of_single_calls`."""
-    return _Workspace()
-
-
-@cache
-def _block_of_unions() -> BlockWorkspace:
-    """A workspace for all single calls of unions, which write rows of the table into the block."""
-    return BlockWorkspace()

@@ -11,9 +11,10 @@ every gap measured is within a few of them (`_bound`).
 from __future__ import annotations
 
 import math
+from functools import partial
 
 from collide.contact.clip_polygons import Clipped
-from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, field_at
+from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP
 from collide.contact.manifold_points import (
     GAP as POINT_GAP,
 )
@@ -41,6 +42,7 @@ from collide.narrowphase.pose_batches import set_pose
 from collide.narrowphase.posed_pair import ordered_pair, radius_of, reach_of
 from collide.narrowphase.rows import BEYOND, DISTANCE, HIT, LOWER, NORMAL, POINT_A, POINT_B, UPPER, view_row
 from collide.numerics.vec3 import Vec3, add, norm1, put_vec3, scale, sub, vec3_at
+from collide.results import field_at
 
 #: Lengths up to so many errors of a coordinate, or up to this part of the manifold's size, are rounding.
 _ERRORS, _SHARE = 64.0, 2.0**-30
@@ -57,10 +59,11 @@ HEADER = 12
 
 
 _CONTACT = CONTACT_DTYPE.itemsize
-_DISTANCE, _LOWER, _UPPER, _APART = (field_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
-_NORMAL, _POINT_A, _POINT_B = (field_at(name, 8) for name in ("normal", "point_a", "point_b"))
-_A, _B, _FACET_A, _FACET_B = (field_at(name, 4) for name in ("a", "b", "facet_a", "facet_b"))
-_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (field_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
+_at = partial(field_at, CONTACT_DTYPE)
+_DISTANCE, _LOWER, _UPPER, _APART = (_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
+_NORMAL, _POINT_A, _POINT_B = (_at(name, 8) for name in ("normal", "point_a", "point_b"))
+_A, _B, _FACET_A, _FACET_B = (_at(name, 4) for name in ("a", "b", "facet_a", "facet_b"))
+_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
 
 
 def workspace_doubles(largest: int) -> int:

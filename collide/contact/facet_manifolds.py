@@ -198,7 +198,10 @@ def _open_clearing(task):
     )
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64, int64)")
+SIGNATURE = "int64(int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64, int64)"
+
+
+@entry(SIGNATURE)
 def facet_manifolds(
     header_at, XA_at, step_a, XB_at, step_b, n, margin, slack_at, out_at, capacity, ends_at, lacks_at
 ):
@@ -209,7 +212,7 @@ def facet_manifolds(
     filled from header[ROWS_DONE] on.   ends : where the contacts of each pose end.
     lacks : a byte a pose: the row of `distance` is to be added, perhaps as the only row.
 
-    Twelve arguments: called by Python, with integers and doubles alone.
+    Twelve arguments: called by Python and `facet_contact_call.py`, with integers and doubles alone.
     """
     header = view_i64(header_at, CONTACT_HEADER)
     ends, lacks = view_i64(ends_at, n), view_u8(lacks_at, n)

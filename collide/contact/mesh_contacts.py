@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cache
 from threading import local
+from typing import Any
 
 import numpy as np
 
@@ -10,11 +12,20 @@ from collide.base.threads import answers_in_order, pieces_of
 from collide.contact.contact_rows import CONTACT_DTYPE, Rows, joined_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.distance_contacts import with_distances
+from collide.contact.facet_contact_call import (
+    FACETS_HEADER,
+    KERNEL,
+    MANIFOLDS,
+    N_ROWS,
+    REACH_OF_BOTH,
+    contacts_single_facets,
+)
 from collide.contact.facet_manifolds import (
     CONTACT_HEADER,
     DONE,
     IS_LARGEST,
     LIMIT,
+    MAX_CONTACTS,
     PAIRS_FULL,
     POSES_DONE,
     ROWS_DONE,
@@ -28,18 +39,28 @@ from collide.contact.facet_topology import topology_of
 from collide.contact.support_face import VERTEX
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of, code_of
+from collide.kernels.prepared import prepared_contacts
 from collide.lowering.facet_bodies import Body, body_of, hull_of, is_halfspace
 from collide.lowering.parts import convex_set_of
-from collide.narrowphase.facets.facet_kernel_calls import pair_header, step_of
-from collide.narrowphase.facets.facet_queries import not_invertible, stack_of, workspace
+from collide.narrowphase.composite.composite_parts import compound_parts
+from collide.narrowphase.facets.facet_kernel_calls import (
+    pair_header,
+    serves_single_calls,
+    step_of,
+    workspace_of_single_calls,
+)
+from collide.narrowphase.facets.facet_queries import Workspace, not_invertible, stack_of, workspace
 from collide.narrowphase.facets.facets_within import list_near_pairs
 from collide.narrowphase.facets.mesh_collide_kernel import HEADER
+from collide.narrowphase.prepared_pairs import Single
 from collide.shapes.shape import Shape
 
 #: Pairs of facets there is space for to begin with, what of it is kept from call to call, and at most: a gigabyte.
 _FEWEST_PAIRS, _KEPT_PAIRS, MAX_PAIRS = 1 << 10, 1 << 14, 1 << 18
 #: Space that has grown is kept for so many calls, 19 or 75 MB; to grow it again lists the pairs of one call twice.
 _CALLS_KEPT = 256
+#: Pairs of facets, and rows, that a single call has space for; calls of more are left to the long way.
+_PAIRS_OF_SINGLE_CALLS, _ROWS_OF_SINGLE_CALLS = 1 << 12, 1 << 10
 #: Rows there is space for to begin with, and so many more a pose.
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
 #: Poses that are worth a thread of their own.
@@ -101,18 +122,9 @@ def _of_poses(
     n = piece.stop - piece.start
     X_WA, X_WB = (X if len(X) == 1 else X[piece] for X in (X_WA, X_WB))
     slack = None if slack is None else slack[piece]
-    body_a, body_b = body_of(A), body_of(B)
-    exchanged = body_b.key < body_a.key
-    ordered = (body_b, body_a) if exchanged else (body_a, body_b)
-    space, work = _of_thread, workspace(stack_of(body_a.tree, body_b.tree))
-    topologies = [topology_of(body) for body in ordered]
-    header = np.zeros(CONTACT_HEADER, dtype=np.int64)
-    header[:HEADER] = pair_header(*ordered, exchanged, work)
-    header[HEADER:POSES_DONE] = (
-        *(address_of(topology.header) for topology in topologies), 0, code_of(list_near_pairs), *space.described,
-        min(max_contacts, 1 << 40),
-    )
-    header.view(np.float64)[LIMIT] = _longest_translation(*ordered)
+    space, body_a, body_b = _of_thread, body_of(A), body_of(B)
+    header = _header_of(body_a, body_b, workspace(stack_of(body_a.tree, body_b.tree)), space.described)
+    header[MAX_CONTACTS] = min(max_contacts, 1 << 40)
     ends, lacks = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.uint8)
     out = np.zeros(_FIRST_ROWS + _ROWS_PER_POSE * n, dtype=CONTACT_DTYPE)
     while True:
@@ -139,6 +151,22 @@ def _of_poses(
     return rows, ends
 
 
+def _header_of(A: Body, B: Body, work: Workspace, described: tuple[int, int, bool]) -> np.ndarray:
+    """What `facet_manifolds` reads, but for how many contacts a patch may have.
+
+    work : of the traversals.   described : as `_OfThread.described`. The caller keeps bodies and workspaces alive.
+    """
+    exchanged = B.key < A.key
+    ordered = (B, A) if exchanged else (A, B)
+    header = np.zeros(CONTACT_HEADER, dtype=np.int64)
+    header[:HEADER] = pair_header(*ordered, exchanged, work)
+    header[HEADER:MAX_CONTACTS] = (
+        *(address_of(topology_of(body).header) for body in ordered), 0, code_of(list_near_pairs), *described
+    )
+    header.view(np.float64)[LIMIT] = _longest_translation(*ordered)
+    return header
+
+
 def _longest_translation(A: Body, B: Body) -> float:
     """How far bodies may overlap for patches to describe it [m]: the smaller body's diameter."""
     smaller = min(A.reach, B.reach)
@@ -151,6 +179,28 @@ def _too_many(margin: float, A: Body, B: Body) -> UnsupportedQuery:
         f"contacts: more than {MAX_PAIRS} pairs of facets lie within {reach:g} m (margin and radii) of each "
         "other: ask with a smaller margin, or take coarser meshes"
     )
+
+
+# --- single calls -------------------------------------------------------------------------------
+
+
+def single_facet_contacts(A: Shape, B: Shape) -> tuple[Single, Any] | None:
+    """(`Prepared.contacts` of two bodies of facets, what it uses besides), or ``None`` of too many parts."""
+    body_a, body_b = body_of(A), body_of(B)
+    if not serves_single_calls(body_a, body_b):
+        return None
+    work, (words, rows) = workspace_of_single_calls(body_a, body_b), _space_of_single_calls()
+    header = np.zeros(FACETS_HEADER, dtype=np.int64)
+    header[[KERNEL, N_ROWS]] = code_of(facet_manifolds), len(rows)
+    header.view(np.float64)[REACH_OF_BOTH] = compound_parts(A).reach + compound_parts(B).reach
+    header[MANIFOLDS:] = _header_of(body_a, body_b, work, (address_of(words), _PAIRS_OF_SINGLE_CALLS, False))
+    return prepared_contacts(contacts_single_facets, header, rows), (body_a, body_b, work, words)
+
+
+@cache
+def _space_of_single_calls() -> tuple[np.ndarray, np.ndarray]:
+    """(workspace, rows), one for all: the kernels keep Python's lock."""
+    return np.empty(workspace_words(_PAIRS_OF_SINGLE_CALLS)), np.zeros(_ROWS_OF_SINGLE_CALLS, dtype=CONTACT_DTYPE)
 
 
 class _OfThread(local):

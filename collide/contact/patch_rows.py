@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any, NamedTuple
 
 from collide.contact.contact_pairs import facing_a, facing_b
 from collide.contact.contact_points import LEAST_COSINE, PatchPoints, copy_of_points
-from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP, field_at
+from collide.contact.contact_rows import CONTACT_DTYPE, GAP, OVERLAP
 from collide.contact.manifold_points import GAP as POINT_GAP
 from collide.contact.manifold_points import HEIGHT, POINT, V
 from collide.contact.reduce_patch import HullSpace, reduce_patch
 from collide.kernels import kernel, view_f64, view_i32
 from collide.narrowphase.facets.facets_within import FACET_A, FACET_B, INTS_OF_PAIR
 from collide.numerics.vec3 import Vec3, add, put_vec3, scale, sub, vec3_at
+from collide.results import field_at
 
 #: Points nearer than so many errors of a coordinate, or this part of the patch's size, are one point.
 _ERRORS, _SHARE = 64.0, 2.0**-30
 
 CONTACT = CONTACT_DTYPE.itemsize
-_DISTANCE, _LOWER, _UPPER, _APART = (field_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
-_NORMAL, _POINT_A, _POINT_B = (field_at(name, 8) for name in ("normal", "point_a", "point_b"))
-_B, _FACET_A, _FACET_B = (field_at(name, 4) for name in ("b", "facet_a", "facet_b"))
-_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (field_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
+_at = partial(field_at, CONTACT_DTYPE)
+_DISTANCE, _LOWER, _UPPER, _APART = (_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
+_NORMAL, _POINT_A, _POINT_B = (_at(name, 8) for name in ("normal", "point_a", "point_b"))
+_B, _FACET_A, _FACET_B = (_at(name, 4) for name in ("b", "facet_a", "facet_b"))
+_FEATURE_A, _FEATURE_B, _PATCH, _KIND = (_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
 
 
 class PatchSpace(NamedTuple):

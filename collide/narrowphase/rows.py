@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any, NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i32, view_u8
 from collide.narrowphase.bounds import PROMISE_DEPTH, PROMISE_GAP, PROMISE_SUBNORMAL
 from collide.numerics.vec3 import put_vec3
-from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED
+from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED, field_at
 
-
-def _at(field: str, unit: int) -> int:
-    assert PAIR_DTYPE.fields is not None
-    return PAIR_DTYPE.fields[field][1] // unit
-
-
+_at = partial(field_at, PAIR_DTYPE)
 ROW = PAIR_DTYPE.itemsize
 DISTANCE, LOWER, UPPER = _at("distance", 8), _at("lower", 8), _at("upper", 8)
 NORMAL, POINT_A, POINT_B = _at("normal", 8), _at("point_a", 8), _at("point_b", 8)

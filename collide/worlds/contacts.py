@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collide.base.threads import share
+from collide.base.threads import answers_in_order
 from collide.contact.contact_batches import contact_batch
 from collide.contact.convex_contacts import ConvexPairs, contacts_of
 from collide.errors import UnsupportedQuery
@@ -20,16 +20,11 @@ def contacts_in_pieces(
     packed: PackedWorld, pairs: np.ndarray, margin: float, max_contacts: int, threads: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """As `contacts_of_bodies`, by at most so many threads; the same bits."""
-    starts = range(0, len(pairs), _PAIRS_AT_ONCE)
-    if threads < 2 or len(starts) < 2:
+    if threads < 2 or len(pairs) <= _PAIRS_AT_ONCE:
         return contacts_of_bodies(packed, pairs, margin, max_contacts)
-    answers: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-
-    def work(start: int) -> None:
-        answers[start] = contacts_of_bodies(packed, pairs[start : start + _PAIRS_AT_ONCE], margin, max_contacts)
-
-    share(starts, work, threads)
-    rows, counts = zip(*(answers[start] for start in starts))
+    pieces = np.split(pairs, range(_PAIRS_AT_ONCE, len(pairs), _PAIRS_AT_ONCE))
+    answers = answers_in_order(pieces, lambda piece: contacts_of_bodies(packed, piece, margin, max_contacts), threads)
+    rows, counts = zip(*answers)
     return np.concatenate(rows), np.concatenate(counts)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.base.lazy_modules import lazy_module
-from collide.base.threads import share
+from collide.base.threads import answers_in_order
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.lowering.parts import bounding_parts_of
 from collide.lowering.shape_table import POSE_TERMS, PoseTable, ShapeTable, pose_table
@@ -122,15 +122,10 @@ def _of_convex(
             (n_own + np.cumsum(counts_b) - counts_b)[of_body.reshape(-1)], counts_b[of_body.reshape(-1)],
         ], axis=1,
     )
-    answers: dict[int, np.ndarray] = {}
-
-    def work(start: int) -> None:
-        some = slice(start, start + _PAIRS_AT_ONCE)
-        answers[start] = _rows_of(table, poses, row_of, pairs[some], spans[some], limit)
-
-    starts = range(0, len(pairs), _PAIRS_AT_ONCE)
-    share(starts, work, threads if len(starts) > 1 else 1)
-    return np.concatenate([answers[start] for start in starts])
+    pieces = [slice(start, start + _PAIRS_AT_ONCE) for start in range(0, len(pairs), _PAIRS_AT_ONCE)]
+    return np.concatenate(answers_in_order(
+        pieces, lambda some: _rows_of(table, poses, row_of, pairs[some], spans[some], limit), threads
+    ))
 
 
 def _rows_of(table: ShapeTable, poses: PoseTable, row_of, pairs, spans, limit: float) -> np.ndarray:

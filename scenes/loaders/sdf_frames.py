@@ -16,7 +16,7 @@ import numpy as np
 from collide.errors import InvalidPose, cut, listing
 from collide.scenes.loaders.fields import placed, rotation_from_degrees
 from collide.scenes.loaders.robot_reading import Reading
-from collide.transforms import pose
+from collide.transforms import inverse_pose, pose
 
 #: The frame of the model, and that of the world, as they are called within.
 MODEL, WORLD = "__model__", "world"
@@ -91,7 +91,7 @@ class Scope:
         if rest:
             return model.X_SF(rest, place)
         X_RP = pose_of(model.placed_by, place, self.reading)
-        return X_RP @ inverse(model.X_SF(model.frame_of_pose, place)) if model.frame_of_pose else X_RP
+        return X_RP @ inverse_pose(model.X_SF(model.frame_of_pose, place)) if model.frame_of_pose else X_RP
 
     def link_of(self, name: str, place: str) -> str:
         """The link, by its name in this scope, that a frame is attached to; "world" of what is attached to the world.
@@ -134,14 +134,6 @@ def frame_in_pose(element: ET.Element | None, default: str) -> str:
     """The frame that an element's <pose> names, else a default."""
     described = None if element is None else element.find("pose")
     return default if described is None else described.get("relative_to") or default
-
-
-def inverse(X: np.ndarray) -> np.ndarray:
-    """(4, 4) inverse of a pose, by its transpose."""
-    inverted = np.eye(4)
-    inverted[:3, :3] = X[:3, :3].T
-    inverted[:3, 3] = -(X[:3, :3].T @ X[:3, 3])
-    return inverted + 0.0
 
 
 def is_identity(X: np.ndarray) -> bool:

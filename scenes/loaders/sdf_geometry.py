@@ -13,9 +13,10 @@ from collide.scenes.loaders.fields import placed
 from collide.scenes.loaders.mesh_parts import MeshFile, MeshPart, described
 from collide.scenes.loaders.mesh_shapes import Taken
 from collide.scenes.loaders.robot_reading import Reading
-from collide.scenes.loaders.sdf_frames import Scope, frame_in_pose, inverse, is_true, pose_of, text_of
+from collide.scenes.loaders.sdf_frames import Scope, frame_in_pose, is_true, pose_of, text_of
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import Shape
+from collide.transforms import inverse_pose
 
 #: The bits of a collision that names none: <collide_bitmask>.
 ALL_BITS = 0xFFFF
@@ -52,7 +53,7 @@ def _pose_in_link(scope: Scope, element: ET.Element, link: str, place: str) -> n
     relative_to = frame_in_pose(element, link)
     if relative_to == link:
         return X_FG
-    return inverse(scope.X_SF(link, place)) @ scope.X_SF(relative_to, place) @ X_FG
+    return inverse_pose(scope.X_SF(link, place)) @ scope.X_SF(relative_to, place) @ X_FG
 
 
 def _bits(element: ET.Element, place: str, reading: Reading) -> int:

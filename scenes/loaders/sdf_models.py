@@ -19,8 +19,9 @@ from collide.robots.kinematic_tree import Joined, Joint, Mimic
 from collide.robots.robot import LinkShape, Robot
 from collide.scenes.description import SceneBody, free_name, link_body
 from collide.scenes.loaders.robot_reading import BALL, Motion, Reading, chain
-from collide.scenes.loaders.sdf_frames import MODEL, WORLD, Scope, inverse, is_identity, is_true, text_of
+from collide.scenes.loaders.sdf_frames import MODEL, WORLD, Scope, is_identity, is_true, text_of
 from collide.scenes.loaders.sdf_geometry import shapes_of_link
+from collide.transforms import inverse_pose
 
 #: Limits from here on are none: what libsdformat writes for a joint without limits.
 NO_LIMIT = 1e16
@@ -315,7 +316,7 @@ def _tree(
         X_MN = np.eye(4) if near == WORLD else model.links[near].X_ML
         parent = root_name if near == root else near
         made += _links_of_joint(
-            joint, forward, parent, far, inverse(X_MN) @ joint.X_MJ, model.links[far].X_ML, taken
+            joint, forward, parent, far, inverse_pose(X_MN) @ joint.X_MJ, model.links[far].X_ML, taken
         )
     names = {joint.name for joint in tree}
     return made, [joint.name for joint in joints if joint.name not in names]
@@ -325,7 +326,7 @@ def _links_of_joint(
     joint: ModelJoint, forward: bool, parent: str, child: str, X_PJ: np.ndarray, X_ML: np.ndarray, taken: dict[str, int]
 ) -> list[Joint]:
     """A joint as joints of one coordinate each, and a fixed one where the child's frame is not the joint's."""
-    X_JC = np.eye(4) if np.array_equal(joint.X_MJ, X_ML) else inverse(joint.X_MJ) @ X_ML
+    X_JC = np.eye(4) if np.array_equal(joint.X_MJ, X_ML) else inverse_pose(joint.X_MJ) @ X_ML
     if not joint.motions:
         return [Joint(joint.name, "fixed", parent, child, X_PJ if is_identity(X_JC) else X_PJ @ X_JC)]
     motions = joint.motions if forward else [motion._replace(axis=-motion.axis) for motion in joint.motions[::-1]]

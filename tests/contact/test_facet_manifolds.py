@@ -115,7 +115,7 @@ def test_a_call_after_one_that_needed_much_space_begins_with_what_may_be_kept(mo
     space = mesh_contacts._of_thread
     kept = space._words
     assert space.described[1] == 128
-    collide.contacts(ground, shape, EYE, collide.pose((0.0, 0.0, 5.0)))
+    collide.contacts(ground, shape, EYE, collide.pose((0.0, 0.0, 5.0))[None])
     assert mesh_contacts._of_thread._words is kept
 
 
@@ -352,5 +352,5 @@ def test_a_workspace_that_grew_is_given_back_after_some_calls(monkeypatch):
     grown, small, X = space._words.nbytes, collide.Mesh(*CUBE), collide.pose((0, 0, 0.45))
     for k in range(mesh_contacts._CALLS_KEPT):
         assert space._words.nbytes == grown, f"given back after {k} calls"
-        assert len(collide.contacts(small, small, EYE, X))
+        assert len(collide.contacts(small, small, EYE, X[None]))
     assert space._words.nbytes < 0.3 * grown and space._capacity == mesh_contacts._FEWEST_PAIRS

@@ -28,7 +28,7 @@ ROUNDED = 1.6e-3
 SEED = 22
 
 
-def body(pybullet, kind: str, s: np.ndarray, R: np.ndarray, t: np.ndarray) -> int:
+def body(pybullet, client: int, kind: str, s: np.ndarray, R: np.ndarray, t: np.ndarray) -> int:
     """A body of a kind and three lengths."""
     arguments = {
         "Box": {"shapeType": p.GEOM_BOX, "halfExtents": (s / 2).tolist()},
@@ -41,9 +41,11 @@ def body(pybullet, kind: str, s: np.ndarray, R: np.ndarray, t: np.ndarray) -> in
             "flags": p.GEOM_FORCE_CONCAVE_TRIMESH,
         },
     }[kind]
-    number = pybullet.createCollisionShape(**arguments)
+    number = pybullet.createCollisionShape(**arguments, physicsClientId=client)
     mass = float(kind != "BVHModel")
-    return pybullet.createMultiBody(mass, number, basePosition=t.tolist(), baseOrientation=quaternion_xyzw(R))
+    return pybullet.createMultiBody(
+        mass, number, basePosition=t.tolist(), baseOrientation=quaternion_xyzw(R), physicsClientId=client
+    )
 
 
 def judged(mirror: Mirror, kinds: set[str], theirs: float, ours: float, grown: float) -> str:
@@ -73,13 +75,13 @@ def test_signs_of_closest_points_are_judged_in_our_favour(n):
     for k, pair in enumerate(calls(n, SEED, KINDS)):
         kinds = {kind for kind, *_ in pair}
         p.resetSimulation(physicsClientId=client)
-        A, B = (body(p, *arguments) for arguments in pair)
+        A, B = (body(p, client, *arguments) for arguments in pair)
         shapes = {
             (number, -1): collide.Mesh(CORNERS * s, np.array(FACETS), solid=False)
             for number, (kind, s, _, _) in zip((A, B), pair) if kind == "BVHModel"
         }
         plain, grown = Mirror(client, shapes=shapes), Mirror(client, shapes=shapes, margins="bullet")
-        rows = [ask.getClosestPoints(A, B, 10.0) for ask in (p, plain, grown)]
+        rows = [ask.getClosestPoints(A, B, 10.0, physicsClientId=client) for ask in (p, plain, grown)]
         if not rows[0]:
             n_unanswered += 1  # two meshes of triangles: Bullet has no answer
             continue

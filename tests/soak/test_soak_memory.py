@@ -14,7 +14,6 @@ from soak_memory import USES, drops, main
 from soak_pairs import WORLD_KINDS
 
 import collide
-from collide.contact import convex_contacts
 from collide.lowering import facet_bodies, parts
 from collide.narrowphase import prepared_pairs
 
@@ -33,7 +32,6 @@ def _blocks() -> int:
 @pytest.mark.slow
 def test_no_shape_outlives_its_last_user_and_memory_stays(monkeypatch):
     monkeypatch.setattr(parts, "MAX_SHARED", 32)  # full long before half of the shapes: what is kept by numbers stays
-    monkeypatch.setattr(convex_contacts, "_MAX_SHARED", 32)
     blocks: list[int] = []
     drops(SHAPES // 2, seed=6)  # what is made once
     survivors, answered, refused = drops(SHAPES, seed=5, sample=lambda _: blocks.append(_blocks()))

@@ -350,14 +350,20 @@ def serves_single_calls(A: Body, B: Body) -> bool:
     return max(len(A.points) if B.solid else 0, len(B.points) if A.solid else 0) <= _MAX_POINTS
 
 
-def prepared_facets(A: Body, B: Body) -> Prepared:
-    """Two bodies ready for one call at a time: booleans, and distances without a limit."""
+def workspace_of_single_calls(A: Body, B: Body) -> Workspace:
+    """The workspace of all single calls, deep enough for these bodies."""
     global _single_space
-    pair = pair_of(A, B)
-    A, B = pair.A, pair.B
     space, n_stack = _single_space, stack_of(A.tree, B.tree)
     if space is None or space.n_stack < n_stack:
         space = _single_space = Workspace(max(512, n_stack))
+    return space
+
+
+def prepared_facets(A: Body, B: Body) -> Prepared:
+    """Two bodies ready for one call at a time: booleans, and distances without a limit."""
+    pair = pair_of(A, B)
+    A, B = pair.A, pair.B
+    space = workspace_of_single_calls(A, B)
     if A.radius + B.radius > 0.0:
         pair.need_slabs()
     header = pair_header(A, B, pair.exchanged, space)
