@@ -24,6 +24,7 @@ from collide.casts.mesh_casts import Casts, cast_leaves
 from collide.casts.posed_parts import PosedSides, posed_sides
 from collide.casts.region_casts import Way, are_proven, are_to_be_asked_again, limits_of
 from collide.casts.starts import Starts, item_of
+from collide.casts.union_casts import UnionWay, cast_by_kernel, prepare_way
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.compound_layout import body_ball, part_balls
 from collide.lowering.compound_table import Balls
@@ -89,15 +90,16 @@ def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Direct
             for column, values in zip(out, _first_contacts(A, B, X_WA, X_WB, of_near, limits[near])):
                 column[near] = values
             return out
+        way = prepare_way(A, B)
+        if isinstance(way, UnionWay):
+            return _by_kernel(way, A, B, X_WA, X_WB, directions, limits)
     sides = [[side] * n if isinstance(side, Shape) else side for side in (A, B)]
     onto_region = np.flatnonzero([b.is_region for b in sides[1]])
     if len(onto_region):
         return _with_regions(sides, X_WA, X_WB, directions, limits, onto_region)
     meshed = np.broadcast_to(_LOOKS_AT_FACETS[kind_a, kind_b], n)
     if not meshed.any():
-        if are_two and len(parts_of(A)) * len(parts_of(B)) > MAX_ASKED:
-            return _cast_unions(A, B, X_WA, X_WB, directions.vectors, limits)
-        return _cast_parts(posed_sides(A, B, X_WA, X_WB, n), directions.vectors, limits)
+        return _cast_parts_of(A, B, X_WA, X_WB, directions.vectors, limits)
     X_WA, X_WB = (np.broadcast_to(X, (n, 4, 4)) for X in (X_WA, X_WB))
     numbers: dict[tuple[int, int], list[int]] = {}
     for k, (a, b) in enumerate(zip(*sides)):
@@ -113,6 +115,26 @@ def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Direct
             answers.append(_cast_meshed(sides[0][some[0]], sides[1][some[0]], *poses, vectors, limit))
     order = np.argsort(np.concatenate(list(numbers.values())), kind="stable")
     return CastRows._make(np.concatenate(columns)[order] for columns in zip(*answers))
+
+
+def _by_kernel(
+    way: UnionWay, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, directions: Directions, limits: np.ndarray
+) -> CastRows:
+    """The same of unions of convex parts, cast by cast in a kernel; what it leaves open is asked together."""
+    rows, is_open = cast_by_kernel(way, X_WA, X_WB, directions, limits)
+    if len(is_open):
+        X_WA, X_WB = (X if len(X) == 1 else X[is_open] for X in (X_WA, X_WB))
+        answer = _cast_parts_of(A, B, X_WA, X_WB, directions.vectors[is_open], limits[is_open])
+        for column, values in zip(rows, answer):
+            column[is_open] = values
+    return rows
+
+
+def _cast_parts_of(A, B, X_WA: np.ndarray, X_WB: np.ndarray, vectors: np.ndarray, limits: np.ndarray) -> CastRows:
+    """The same of convex shapes and unions of such."""
+    if isinstance(A, Shape) and isinstance(B, Shape) and len(parts_of(A)) * len(parts_of(B)) > MAX_ASKED:
+        return _cast_unions(A, B, X_WA, X_WB, vectors, limits)
+    return _cast_parts(posed_sides(A, B, X_WA, X_WB, len(limits)), vectors, limits)
 
 
 def _with_regions(sides, X_WA, X_WB, directions: Directions, limits: np.ndarray, some: np.ndarray) -> CastRows:

@@ -46,7 +46,10 @@ def cast_pair(pair, size, slop, question, row, doubles_at, integers_at):
     put_vec3(row, TOUCHING, add(met.point, vec3_at(pair.poses, pair.B.pose_at + 9)))
 
 
-@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
+SIGNATURE = "void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)"
+
+
+@entry(SIGNATURE)
 def cast_pairs(
     ints_at, numbers_at, poses_at, shape_of_at, pairs_at, questions_at, n, rows_at, doubles_at, integers_at
 ):

@@ -13,12 +13,10 @@ from collide.casts.cast_arguments import checked_directions, refuse_unbounded
 from collide.casts.cast_batches import cast_batch
 from collide.casts.convex_casts import CastRows
 from collide.casts.directions import Directions
-from collide.lowering.compound_layout import layout_of
-from collide.narrowphase.composite.balls_on_ways import SingleWay
-from collide.narrowphase.prepared_pairs import kept_pair, prepared_pair, single_calls_are_safe
+from collide.casts.union_casts import NO_ROW, prepare_way, single_cast
+from collide.narrowphase.prepared_pairs import prepared_pair
 from collide.pairs.pair_arguments import asked_poses, matched_counts
 from collide.results import only_value
-from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_poses
 
@@ -127,7 +125,10 @@ def shape_cast(
         pair = prepared_pair(A, B)
         way = None if pair is None else pair.cast
         if way is not None and way.body_misses(X_WA, X_WB, direction_W, max_distance):
-            return _single_miss()
+            return ShapeCasts(*single_cast(NO_ROW))
+        row = None if way is None else way.single_contact(X_WA, X_WB, direction_W, max_distance)
+        if row is not None:
+            return ShapeCasts(*single_cast(row))
     limit = checks.limit("shape_cast: max_distance", max_distance, "")
     start_normals = checks.true_or_false("shape_cast: start_normals", start_normals)
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
@@ -137,24 +138,10 @@ def shape_cast(
     n, _ = matched_counts(A, B, counts)
     refuse_unbounded("shape_cast: A", A)
     if single and single_direction:
-        _prepare_way(A, B)
+        prepare_way(A, B)
     rows = _in_threads(A, B, X_WA, X_WB, directions.repeated(n), limit, start_normals, check_threads(threads))
     casts = as_casts(rows, directions.repeated(n))
     return ShapeCasts._make(only_value(values) for values in casts) if single and single_direction else casts
-
-
-def _single_miss() -> ShapeCasts:
-    inf, nothing = math.inf, np.zeros((2, 3))
-    return ShapeCasts(False, inf, inf, inf, nothing[0], nothing[1], True, False, -1, -1)  # type: ignore[arg-type]
-
-
-def _prepare_way(A: Shape, B: Shape) -> None:
-    """Have single casts of a union and another body look at the balls around both bodies first."""
-    is_union = isinstance(A, Compound) or isinstance(B, Compound)
-    if is_union and not B.is_region and single_calls_are_safe():
-        pair = kept_pair(A, B)
-        if pair.cast is None:
-            pair.cast = SingleWay(layout_of(A).ball, layout_of(B).ball)
 
 
 def _in_threads(

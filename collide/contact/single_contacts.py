@@ -31,11 +31,12 @@ from collide.lowering.compound_layout import layout_of
 from collide.lowering.compound_table import MEASURE, SWEPT_RADIUS, CompoundTable
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.parts import is_single_convex
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite import single_header
 from collide.narrowphase.composite.composite_block import LIST
 from collide.narrowphase.composite.single_composite_call import BALLS_WORK, balls_beyond
-from collide.narrowphase.convex_batches import prepare_parts, prepare_sets, shape_table
+from collide.narrowphase.convex_batches import lowered_numbers, prepare_parts, prepare_sets, shape_table
 from collide.narrowphase.convex_kernel_calls import BlockWorkspace, space_of_single_calls
 from collide.narrowphase.dispatch import OF_SETS, OF_UNIONS, Method, method_of
 from collide.narrowphase.pose_batches import BLOCK
@@ -51,8 +52,8 @@ _MAX_ROWS = 1024
 
 
 def prepare_contacts(A, B) -> bool:
-    """Make two shapes ready for single calls of `contacts`, convex sets also for `distance`. Returns whether this call
-    has made the pair ready. Single calls of other pairs are batches, unless bodies are far apart."""
+    """Make two shapes ready for single calls of `contacts`. Returns whether this call has made the pair ready. Single
+    calls of other pairs are batches, unless bodies are far apart."""
     if not (isinstance(A, Shape) and isinstance(B, Shape) and single_calls_are_safe()):
         return False
     pair = prepared_pair(A, B)
@@ -61,28 +62,30 @@ def prepare_contacts(A, B) -> bool:
     how = method_of(kind_of(A), kind_of(B))
     if how not in _WITH_KERNELS:
         return False
-    are_sets = how in OF_SETS
     if pair is None:
-        pair = prepare_sets(A, B) if are_sets else Prepared()
+        pair = Prepared()
         keep_prepared(A, B, pair)
-    elif are_sets and pair.collide is None:  # asked for impacts alone
-        pair.take(prepare_sets(A, B))
-    if how is Method.PARTS and _is_flat(A) and _is_flat(B):
+    are_sets = how in OF_SETS or (how is Method.PARTS and is_single_convex(A) and is_single_convex(B))
+    if are_sets and pair.header is None and pair.table is None:
+        pair.header = lowered_numbers(A, B)
+        if pair.header is None:
+            pair.take(prepare_sets(A, B))
+    if how is Method.PARTS and not are_sets and _is_flat(A) and _is_flat(B):
         if pair.table is None:
             pair.take(prepare_parts(A, B))
         if pair.distance is not None:  # not of too many parts for single calls
             pair.missing_faces = CompoundContacts(pair.table, _reach_of(A) + _reach_of(B))
             pair.missing_faces.get_ready(pair)
-            return prepared_pair(A, B) is pair
+            return True
     made = None if pair.header is None else _made_of_numbers(pair.header)
-    pair.contacts, held = _made_of(A, B, how) if made is None else made
+    pair.contacts, held = _made_of(A, B, how, are_sets) if made is None else made
     pair.held = pair.held, held
-    return prepared_pair(A, B) is pair
+    return True
 
 
-def _made_of(A: Shape, B: Shape, how: Method) -> tuple[Single, Any]:
+def _made_of(A: Shape, B: Shape, how: Method, are_sets: bool) -> tuple[Single, Any]:
     """(`Prepared.contacts`, what it uses besides)."""
-    if how in OF_SETS:
+    if are_sets:
         return _single_contacts(shape_table(A, B)[0])
     made = single_facet_contacts(A, B) if how is Method.FACETS else None
     return _single_far_contacts(A, B) if made is None else made

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.kernels import address_of
 from collide.lowering.compound_layout import layout_of
 from collide.lowering.compound_table import CompoundTable
 from collide.lowering.convex_sets import PRIMITIVE_NUMBERS
@@ -19,6 +20,7 @@ from collide.lowering.shape_set_tables import tables_of
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase import convex_kernel_calls
 from collide.narrowphase.composite.composite import answer_compound_batch, prepared_compounds
+from collide.narrowphase.lower_pair import PAIR_WORDS, lower_pair
 from collide.narrowphase.prepared_pairs import Prepared, prepared_pair
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
@@ -107,10 +109,20 @@ def _answer_compounds(out: np.ndarray, A, B, X_WA: np.ndarray, X_WB: np.ndarray,
 
 def prepare_sets(A: Shape, B: Shape) -> Prepared:
     """Two convex sets in their own frames made ready for single calls."""
+    block = lowered_numbers(A, B)
+    if block is None:
+        return convex_kernel_calls.prepared_sets(ShapeTable([convex_set_of(A), convex_set_of(B)]))
+    return convex_kernel_calls.prepared_by(block)
+
+
+def lowered_numbers(A: Shape, B: Shape) -> np.ndarray | None:
+    """The block of `lower_pair` of two shapes of a few numbers; ``None`` of others."""
     numbers_a, numbers_b = PRIMITIVE_NUMBERS.get(A.__class__), PRIMITIVE_NUMBERS.get(B.__class__)
     if numbers_a is None or numbers_b is None:
-        return convex_kernel_calls.prepared_sets(ShapeTable([convex_set_of(A), convex_set_of(B)]))
-    return convex_kernel_calls.prepared_numbers(numbers_a(A), numbers_b(B))
+        return None
+    block = np.empty(PAIR_WORDS, dtype=np.int64)
+    lower_pair(address_of(block), convex_kernel_calls.space_of_single_calls().header_at, *numbers_a(A), *numbers_b(B))
+    return block
 
 
 def prepare_parts(A: Shape, B: Shape) -> Prepared:

@@ -10,14 +10,12 @@ import numpy as np
 from collide.errors import UnsupportedQuery
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_boolean, prepared_row, prepared_within
-from collide.lowering.primitive_numbers import PrimitiveNumbers
 from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
 from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
 from collide.narrowphase.exact.exact_stage import settle_exactly, settle_rows, step_codes
 from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finish_rows import finish_rows
-from collide.narrowphase.lower_pair import PAIR_WORDS, lower_pair
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
 from collide.narrowphase.pose_batches import (
     ANSWERED,
@@ -260,20 +258,13 @@ def prepared_sets(table: ShapeTable) -> Prepared:
     """Two convex sets ready for one call at a time: rows 0 and 1 of a table."""
     if not table.is_built:
         table.build_trees(np.arange(2))
-    space = space_of_single_calls()
-    return _prepared(space.header_of(table), table, space)
+    return prepared_by(space_of_single_calls().header_of(table), table)
 
 
-def _prepared(header: np.ndarray, table: ShapeTable | None, space: BlockWorkspace) -> Prepared:
+def prepared_by(header: np.ndarray, table: ShapeTable | None = None) -> Prepared:
+    """The same by what kernels read first; of two sets of few numbers a block of `lower_pair`, without a table."""
     return Prepared(
         collide=prepared_boolean(collide_single, header), within=prepared_within(within_single, header),
-        distance=prepared_row(distance_single, header), table=table, held=space, header=None if table else header,
+        distance=prepared_row(distance_single, header), table=table, held=space_of_single_calls(),
+        header=None if table else header,
     )
-
-
-def prepared_numbers(A: PrimitiveNumbers, B: PrimitiveNumbers) -> Prepared:
-    """The same of two sets of few numbers, in one block of memory, without a table."""
-    space = space_of_single_calls()
-    block = np.empty(PAIR_WORDS, dtype=np.int64)
-    lower_pair(address_of(block), space.header_at, *A, *B)
-    return _prepared(block, None, space)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
+
 import numpy as np
 import pytest
 from naive import random_pose, rng_of
@@ -9,6 +12,9 @@ from reproduction import reproducing
 
 import collide
 from collide.casts import cast_batches, convex_casts
+from collide.casts.union_cast import COMPOSITE
+from collide.narrowphase.composite.composite_block import N_ANSWERED
+from collide.narrowphase.prepared_pairs import prepared_pair
 
 AGAIN = (
     "import collide, numpy as np\n"
@@ -104,15 +110,48 @@ def test_a_batch_of_casts_of_unions_is_the_casts_one_by_one():
 
 
 def test_casts_of_unions_ask_few_pairs_of_parts(monkeypatch):
-    """Of 200 × 200 convex parts."""
+    """Of 200 × 200 convex parts, in a kernel, and where it leaves the cast to the long way."""
     asked = []
     answer = convex_casts.answer_part_pairs
     monkeypatch.setattr(
         convex_casts, "answer_part_pairs", lambda *args: (asked.append(len(args[1])), answer(*args))[1]
     )
     A, B = clutter(("can",), 200, "moves"), clutter(("box",), 200, "stands")
-    r = collide.shape_cast(A, collide.pose((-5.0, 0.1, 0.0)), (1, 0, 0), B, np.eye(4))
-    assert r.hit and 0 < sum(asked) < 200, asked
+    question = A, collide.pose((-5.0, 0.1, 0.0)), (1, 0, 0), B, np.eye(4)
+    r = collide.shape_cast(*question)
+    way = prepared_pair(A, B).cast
+    assert r.hit and not asked and 0 < way._header[COMPOSITE + N_ANSWERED] < 50
+    monkeypatch.setattr(type(way), "first_contact", lambda *_: None)
+    again = collide.shape_cast(*question)
+    assert 0 < sum(asked) < 200, asked
+    assert all(np.array_equal(x, y) for x, y in zip(r, again))
+
+
+@pytest.mark.parametrize("kinds", [("box",), ("can",), ("box", "can", "sphere", "capsule")])
+def test_casts_by_the_kernel_have_the_bits_of_the_long_way(kinds, monkeypatch):
+    """Single and in batches, of every length of direction; touching at the start, and missing, too."""
+    rng = np.random.default_rng(len(kinds[0]) + len(kinds))
+    seen, by_kernel = Counter(), 0
+    for case in range(6):
+        A, B = clutter(kinds, int(rng.integers(2, 40)), f"moves {case}"), clutter(kinds, 30, f"stands {case}")
+        places = rng.uniform(-1, 1, (12, 3)) * np.resize([0.3, 1.0, 2.0], (12, 1))
+        X_WAs = np.array([collide.pose(p, rpy=rng.uniform(-3, 3, 3)) for p in places])
+        d = (0.3 * rng.normal(size=(12, 3)) - X_WAs[:, :3, 3]) * 10.0 ** rng.integers(-3, 4, (12, 1))
+        limit = math.inf if case % 2 else 0.02
+        batch = collide.shape_cast(A, X_WAs, d, B, np.eye(4), max_distance=limit)
+        singles = [collide.shape_cast(A, X, v, B, np.eye(4), max_distance=limit) for X, v in zip(X_WAs, d)]
+        way = prepared_pair(A, B).cast
+        by_kernel += sum(way.single_contact(X, np.eye(4), v, limit) is not None for X, v in zip(X_WAs, d))
+        with monkeypatch.context() as without:
+            without.setattr(type(way), "first_contact", lambda *_: None)
+            long_way = collide.shape_cast(A, X_WAs, d, B, np.eye(4), max_distance=limit)
+        for name in batch._fields:
+            column = getattr(long_way, name)
+            assert getattr(batch, name).tobytes() == column.tobytes(), (case, name)
+            assert np.array([getattr(one, name) for one in singles], dtype=column.dtype).tobytes() == column.tobytes()
+        seen.update(zip(batch.hit.tolist(), batch.at_start.tolist()))
+    assert by_kernel > 0.85 * 72, by_kernel
+    assert min(seen[True, False], seen[False, False]) > 8 and seen[True, True], seen
 
 
 def test_casts_onto_many_meshes_walk_few_of_them(monkeypatch):

@@ -132,18 +132,17 @@ def test_pairs_of_few_numbers_hold_one_block():
     assert collide.distance(A, B, X, np.stack([Y, Y])).hit.all() and pair.table is first
 
 
-def test_contacts_of_pairs_of_equal_numbers_are_made_once():
-    """Faces are shared by pairs of the same few numbers, hold what they read, and nothing is added with a pair."""
+def test_contacts_of_pairs_of_equal_numbers_are_equal_and_made_once():
+    """Pairs hold what they read, and nothing is added with a call."""
     if not single_calls_are_safe():
         pytest.skip("plain kernels have no single calls")
     X, Y = np.eye(4), collide.pose((0.9, 0.0, 0.0))
-    kept, rows = [], []
+    rows = []
     for _ in range(3):
         A, B = collide.Box((1, 1.25, 1)), collide.Capsule(0.5, 0.75)
         rows.append(collide.contacts(A, B, X, Y).rows.tobytes())
-        kept.append((prepared_pair(A, B).contacts, prepared_pair(A, B).held[1]))
         del A, B
-    assert kept[0] == kept[1] == kept[2] and rows[0] == rows[1] == rows[2] and len(rows[0]) > 0
+    assert rows[0] == rows[1] == rows[2] and len(rows[0]) > 0
     A, B = collide.Box((1, 1.25, 1)), collide.Capsule(0.5, 0.75)
     collide.collide(A, B, X, Y), collide.contacts(A, B, X, Y)
     before = prepared_pair(A, B).held

@@ -41,7 +41,7 @@ def _beyond(d, reach, size):
 
 
 @kernel(inline=True)
-def _is_direction(v):
+def is_direction(v):
     """Whether a single cast takes the vector as it is: others are for Python to look at."""
     size = max(abs(v.x), abs(v.y), abs(v.z))
     if not (size >= _MIN_SIZE and size <= _MAX_SIZE):
@@ -65,7 +65,7 @@ def body_misses(of_a_at, XA_at, of_b_at, XB_at, vector_at, limit, work_at):
     """
     poses, balls = view_f64(work_at, 2 * POSE), view_f64(work_at + 16 * POSE, 2 * BALL_IN_WORLD)
     v = vec3_at(view_f64(vector_at, 3), 0)
-    if not _is_direction(v):
+    if not is_direction(v):
         return 0
     if not (set_pose(poses, 0, view_f64(XA_at, 16), True) and set_pose(poses, POSE, view_f64(XB_at, 16), True)):
         return 0
@@ -81,7 +81,7 @@ def ray_misses(of_b_at, XB_at, origin_at, vector_at, limit, work_at):
     origin, v = vec3_at(view_f64(origin_at, 3), 0), vec3_at(view_f64(vector_at, 3), 0)
     if not (abs(origin.x) <= LARGEST and abs(origin.y) <= LARGEST and abs(origin.z) <= LARGEST):
         return 0
-    if not (_is_direction(v) and set_pose(poses, 0, view_f64(XB_at, 16), True)):
+    if not (is_direction(v) and set_pose(poses, 0, view_f64(XB_at, 16), True)):
         return 0
     of_b = view_f64(of_b_at, _BALL)
     shift = sub(vec3_at(poses, 9), origin)
@@ -167,7 +167,7 @@ class SingleWay:
 
     def body_misses(self, X_WA, X_WB, direction_W, limit: float) -> bool:
         """Whether A, moved along the direction, stays clear of B; False of arrays that kernels do not read."""
-        if not (_is_array(X_WA, (4, 4)) and _is_array(X_WB, (4, 4)) and _is_array(direction_W, (3,))):
+        if not (is_array(X_WA, (4, 4)) and is_array(X_WB, (4, 4)) and is_array(direction_W, (3,))):
             return False
         return body_misses(
             self._ball_a_at, address_of(X_WA), self._ball_b_at, address_of(X_WB), address_of(direction_W), limit,
@@ -176,10 +176,14 @@ class SingleWay:
 
     def ray_misses(self, X_WB, origin_W, direction_W, limit: float) -> bool:
         """The same of a ray."""
-        if not (_is_array(X_WB, (4, 4)) and _is_array(origin_W, (3,)) and _is_array(direction_W, (3,))):
+        if not (is_array(X_WB, (4, 4)) and is_array(origin_W, (3,)) and is_array(direction_W, (3,))):
             return False
         at = address_of(X_WB), address_of(origin_W), address_of(direction_W)
         return ray_misses(self._ball_b_at, *at, limit, _work.at) == 1
+
+    def single_contact(self, X_WA, X_WB, direction_W, limit: float) -> np.ndarray | None:
+        """What A meets first where the parts' balls tell: not here."""
+        return None
 
 
 class _Work(local):
@@ -194,6 +198,6 @@ _work = _Work()
 _FLOAT64 = np.dtype(np.float64)
 
 
-def _is_array(X, shape: tuple[int, ...]) -> bool:
+def is_array(X, shape: tuple[int, ...]) -> bool:
     """Whether X is laid out as kernels read a pose or a vector."""
     return X.__class__ is np.ndarray and X.dtype is _FLOAT64 and X.shape == shape and X.flags.carray

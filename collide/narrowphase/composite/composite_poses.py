@@ -139,7 +139,7 @@ def _shift(block, p, q):
 
 
 @kernel
-def _place_body_balls(block, k):
+def place_body_balls(block, k):
     """Balls 0 and 1 become those of all of A and of all of B, as seen from A; returns how large the pair is [m]."""
     p = POSE * block.slots[SLOT_SIZE * k + BODY_ROWS]
     q = POSE * block.slots[SLOT_SIZE * k + BODY_ROWS + 1]
@@ -185,7 +185,7 @@ class Nodes(NamedTuple):
 
 
 @kernel
-def _nodes_of(block, k, margin, is_placed):
+def nodes_of(block, k, margin, is_placed):
     """The nodes of both bodies of slot k, whose balls stand first; with the balls of the largest groups, as they are
     where placed."""
     A = body_of(block, k, 0)
@@ -243,7 +243,7 @@ def _members_of(block, nodes, of_a, node):
 
 
 @kernel(inline=True)
-def _opened(block, nodes, a, b):
+def opened_node(block, nodes, a, b):
     """(whether A's node is opened rather than B's, its first member, end): the larger ball, if a group's; no members
     where both are parts."""
     A, B = nodes.A, nodes.B
@@ -273,7 +273,7 @@ def _are_beyond(block, nodes, a, b, reach):
 
 
 @kernel(inline=True)
-def _number_of(block, nodes, a, b):
+def number_of_pair(block, nodes, a, b):
     """The number of a pair of parts, by their places."""
     of_a = view_i64(block.header[BY_PLACE_AT] + 8 * (nodes.A.first + a), 1)[0]
     return of_a * nodes.B.n_parts + view_i64(block.header[BY_PLACE_AT] + 8 * (nodes.B.first + b), 1)[0]
@@ -294,18 +294,18 @@ def _nearest_pair(block, k, boolean):
     n_pairs = count_pairs(block, k)
     if n_pairs == 1 and not boolean:
         return 0
-    margin = BALL_MARGIN * _place_body_balls(block, k)
+    margin = BALL_MARGIN * place_body_balls(block, k)
     if boolean and _gap(block, 0, 1) > margin:
         return -1
     if n_pairs == 1:
         return 0
-    nodes = _nodes_of(block, k, margin, False)
+    nodes = nodes_of(block, k, margin, False)
     a, b = nodes.A.n_parts + nodes.A.n_groups - 1, nodes.B.n_parts + nodes.B.n_groups - 1
     stack, top = MAX_NEAR, 1
     block.near[stack] = a
     block.near[stack + 1] = b
     while a >= nodes.A.n_parts or b >= nodes.B.n_parts:  # down to a near pair, which leaves out most of the others
-        of_a, begin, end = _opened(block, nodes, a, b)
+        of_a, begin, end = opened_node(block, nodes, a, b)
         least, best = math.inf, begin
         for member in range(begin, end):
             gap = _gap_of_nodes(block, nodes, member if of_a else a, b if of_a else member)
@@ -313,11 +313,11 @@ def _nearest_pair(block, k, boolean):
                 least = gap
                 best = member
         a, b = (best, b) if of_a else (a, best)
-    least, nearest = _gap_of_nodes(block, nodes, a, b), _number_of(block, nodes, a, b)
+    least, nearest = _gap_of_nodes(block, nodes, a, b), number_of_pair(block, nodes, a, b)
     while top > 0:
         top -= 1
         a, b = block.near[stack + 2 * top], block.near[stack + 2 * top + 1]
-        of_a, begin, end = _opened(block, nodes, a, b)
+        of_a, begin, end = opened_node(block, nodes, a, b)
         for member in range(begin, end):
             at_a, at_b = (member, b) if of_a else (a, member)
             if _are_beyond(block, nodes, at_a, at_b, least):
@@ -325,7 +325,7 @@ def _nearest_pair(block, k, boolean):
             gap = _gap_of_nodes(block, nodes, at_a, at_b)
             if at_a < nodes.A.n_parts and at_b < nodes.B.n_parts:
                 if gap <= least:
-                    pair = _number_of(block, nodes, at_a, at_b)
+                    pair = number_of_pair(block, nodes, at_a, at_b)
                     if gap < least or pair < nearest:
                         least = gap
                         nearest = pair
@@ -381,7 +381,7 @@ def _find_near(block, nodes, reach, start, but):
     while top > 0:
         top -= 1
         a, b = near[MAX_NEAR + 2 * top], near[MAX_NEAR + 2 * top + 1]
-        of_a, begin, end = _opened(block, nodes, a, b)
+        of_a, begin, end = opened_node(block, nodes, a, b)
         for member in range(begin, end):
             at_a, at_b = (member, b) if of_a else (a, member)
             if _are_beyond(block, nodes, at_a, at_b, reach):
@@ -390,7 +390,7 @@ def _find_near(block, nodes, reach, start, but):
             if at_a < nodes.A.n_parts and at_b < nodes.B.n_parts:
                 if gap > reach:
                     continue
-                pair = _number_of(block, nodes, at_a, at_b)
+                pair = number_of_pair(block, nodes, at_a, at_b)
                 if start <= pair < end_of_near and pair != but:
                     near[n_near] = pair
                     n_near += 1
@@ -456,10 +456,10 @@ def _list_others(block, boolean, depths, every):
 def _list_others_of(block, k, boolean, every, n_listed):
     """List the other pairs of a pose, from PAIR on; PAIR becomes the pair to go on with. Returns the list's length."""
     header = block.header
-    size = _place_body_balls(block, k)
+    size = place_body_balls(block, k)
     margin = BALL_MARGIN * size
     # The nodes of a single pose stand where `_nearest_pair` has placed them just now.
-    nodes = _nodes_of(block, k, margin, header[N_POSES] == 1 and header[PAIR] == 0 and not every)
+    nodes = nodes_of(block, k, margin, header[N_POSES] == 1 and header[PAIR] == 0 and not every)
     first_pair = block.slots[SLOT_SIZE * k + FIRST_PAIR]
     reach = margin
     if every:
@@ -540,12 +540,12 @@ def list_pairs_within(block, limit):
     No part reaches out of its ball by more than the balls' margin of the size: parts of other pairs are farther apart
     than the limit.
     """
-    margin = BALL_MARGIN * _place_body_balls(block, 0)
+    margin = BALL_MARGIN * place_body_balls(block, 0)
     reach = limit * (1.0 + 2.0**-50) + margin
     if _gap(block, 0, 1) > reach:
         return 0
     block.header[PAIR] = 0
-    n = _list_pairs(block, 0, _nodes_of(block, 0, margin, False), reach, -1, Vec3(0.0, 0.0, 0.0), False, 0)
+    n = _list_pairs(block, 0, nodes_of(block, 0, margin, False), reach, -1, Vec3(0.0, 0.0, 0.0), False, 0)
     return n if block.header[PAIR] == count_pairs(block, 0) else -1
 
 

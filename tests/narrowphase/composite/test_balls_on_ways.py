@@ -103,7 +103,7 @@ def union(n: int, seed: str) -> collide.Compound:
 
 def test_casts_past_a_union_pose_no_part_of_it_and_others_few(monkeypatch):
     """A box of 1,000 on either side: misses ask balls alone, hits pose what is near the way."""
-    from collide.casts import cast_batches
+    from collide.casts import cast_batches, union_casts
 
     posed, make = [], cast_batches.posed_sides
 
@@ -120,6 +120,8 @@ def test_casts_past_a_union_pose_no_part_of_it_and_others_few(monkeypatch):
         collide.shape_cast(A, eye, (1, 0, 0), B, away, max_distance=30.0),
     ):
         assert not casts.hit.any() and casts.certified.all() and not posed
+    assert collide.shape_cast(A, eye, (1, 0, 0), B, away).hit.any() and not posed
+    monkeypatch.setattr(union_casts.UnionWay, "first_contact", lambda *_: None)  # the kernel leaves all open
     assert collide.shape_cast(A, eye, (1, 0, 0), B, away).hit.any()
     assert 0 < sum(posed) < 150, posed
 
@@ -131,6 +133,7 @@ def test_contacts_of_many_poses_far_away_ask_no_boxes_of_parts(monkeypatch):
     monkeypatch.setattr(
         contact_batches, "boxes_near", lambda *args: (asked.append(len(args[2])), near(*args))[1]
     )
+    monkeypatch.setattr(contact_batches, "single_contacts_of", lambda A, B: None)  # no kernel
     A, B = union(300, "contacts"), collide.Box((0.4, 0.4, 0.4))
     X = np.array([collide.pose((40.0 if k % 4 else 0.1 * k, 0.0, 0.0)) for k in range(20)])
     rows, ends = collide.contacts(A, B, X, np.eye(4)), []
