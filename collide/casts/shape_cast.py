@@ -13,7 +13,8 @@ from collide.casts.cast_arguments import checked_directions, refuse_unbounded
 from collide.casts.cast_batches import cast_batch
 from collide.casts.convex_casts import CastRows
 from collide.casts.directions import Directions
-from collide.casts.union_casts import NO_ROW, prepare_way, single_cast
+from collide.casts.union_cast import AT_START, ITEM_A, ITEM_B, OUT_NORMAL, OUT_POINT, T_UPPER, T
+from collide.casts.union_casts import prepare_way
 from collide.narrowphase.prepared_pairs import prepared_pair
 from collide.pairs.pair_arguments import asked_poses, matched_counts
 from collide.results import only_value
@@ -22,6 +23,7 @@ from collide.transforms import as_poses
 
 #: A thread is handed at least so many casts.
 _MIN_PER_THREAD = 500
+_INF = math.inf
 
 
 class ShapeCasts(NamedTuple):
@@ -124,11 +126,9 @@ def shape_cast(
     if is_plain and max_distance.__class__ is float and max_distance >= 0.0:
         pair = prepared_pair(A, B)
         way = None if pair is None else pair.cast
-        if way is not None and way.body_misses(X_WA, X_WB, direction_W, max_distance):
-            return ShapeCasts(*single_cast(NO_ROW))
         row = None if way is None else way.single_contact(X_WA, X_WB, direction_W, max_distance)
         if row is not None:
-            return ShapeCasts(*single_cast(row))
+            return _single_cast(row)
     limit = checks.limit("shape_cast: max_distance", max_distance, "")
     start_normals = checks.true_or_false("shape_cast: start_normals", start_normals)
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
@@ -142,6 +142,16 @@ def shape_cast(
     rows = _in_threads(A, B, X_WA, X_WB, directions.repeated(n), limit, start_normals, check_threads(threads))
     casts = as_casts(rows, directions.repeated(n))
     return ShapeCasts._make(only_value(values) for values in casts) if single and single_direction else casts
+
+
+def _single_cast(row: np.ndarray) -> ShapeCasts:
+    """The result of an answer of `union_cast.py`, empty where nothing is met."""
+    if not len(row):
+        return ShapeCasts(False, _INF, _INF, _INF, np.zeros(3), np.zeros(3), True, False, -1, -1)  # type: ignore[arg-type]
+    t, lower, upper = row[T : T_UPPER + 1].tolist()
+    point, normal = row[OUT_POINT : OUT_POINT + 3], row[OUT_NORMAL : OUT_NORMAL + 3]
+    items = int(row[ITEM_A]), int(row[ITEM_B])
+    return ShapeCasts(True, t, lower, upper, point, normal, True, bool(row[AT_START]), *items)  # type: ignore[arg-type]
 
 
 def _in_threads(

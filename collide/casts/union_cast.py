@@ -135,7 +135,7 @@ def _walk(block, cast, nodes, out):
     top = 1
     while top > 0:
         top -= 1
-        if times[_TIMES + top] > min(cast.limit, out[T_UPPER]):
+        if _is_too_late(times[_TIMES + top], cast, out):
             continue
         a, b = stack[MAX_NEAR + 2 * top], stack[MAX_NEAR + 2 * top + 1]
         if a < nodes.A.n_parts and b < nodes.B.n_parts:
@@ -147,7 +147,7 @@ def _walk(block, cast, nodes, out):
         for member in range(begin, end):
             at_a, at_b = (member, b) if of_a else (a, member)
             t = _earliest(block, cast, nodes, at_a, at_b)
-            if t > min(cast.limit, out[T_UPPER]):
+            if _is_too_late(t, cast, out):
                 continue
             k = top
             while k > bottom and times[_TIMES + k - 1] < t:
@@ -160,6 +160,12 @@ def _walk(block, cast, nodes, out):
             stack[MAX_NEAR + 2 * k + 1] = at_b
             top += 1
     return True
+
+
+@kernel(inline=True)
+def _is_too_late(t, cast, out):
+    """Whether what touches at t at the earliest has no say: infinity stands for never."""
+    return t > min(cast.limit, out[T_UPPER]) or t == math.inf
 
 
 @kernel

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from collide.casts.cast_pairs import cast_pairs
@@ -60,10 +58,9 @@ class UnionWay(SingleWay):
         return None if status < 0 else row[: UNION_ROW * status]
 
     def single_contact(self, X_WA, X_WB, direction_W, limit: float) -> np.ndarray | None:
-        """The same of a single call's arguments, whatever these are."""
-        if not (is_array(X_WA, (4, 4)) and is_array(X_WB, (4, 4)) and is_array(direction_W, (3,))):
-            return None
-        return self.first_contact(X_WA, X_WB, direction_W, limit)
+        row = super().single_contact(X_WA, X_WB, direction_W, limit)  # soonest where bodies are far from each other
+        is_read = row is None and is_array(X_WA, (4, 4)) and is_array(X_WB, (4, 4)) and is_array(direction_W, (3,))
+        return self.first_contact(X_WA, X_WB, direction_W, limit) if is_read else row
 
 
 def prepare_way(A: Shape, B: Shape) -> SingleWay | None:
@@ -103,16 +100,3 @@ def cast_by_kernel(
             rows.normal[k], rows.point[k] = row[OUT_NORMAL : OUT_NORMAL + 3], row[OUT_POINT : OUT_POINT + 3]
             rows.item_a[k], rows.item_b[k], rows.at_start[k] = row[ITEM_A], row[ITEM_B], row[AT_START]
     return rows, np.array(is_open, dtype=np.int64)
-
-
-NO_ROW = np.empty(0)
-
-
-def single_cast(row: np.ndarray) -> tuple:
-    """What `shape_cast` returns of an answer, field by field."""
-    if not len(row):
-        nothing = np.zeros((2, 3))
-        return False, math.inf, math.inf, math.inf, nothing[0], nothing[1], True, False, -1, -1
-    t, lower, upper = row[T : T_UPPER + 1].tolist()
-    point, normal = row[OUT_POINT : OUT_POINT + 3], row[OUT_NORMAL : OUT_NORMAL + 3]
-    return True, t, lower, upper, point, normal, True, bool(row[AT_START]), int(row[ITEM_A]), int(row[ITEM_B])

@@ -182,8 +182,9 @@ class SingleWay:
         return ray_misses(self._ball_b_at, *at, limit, _work.at) == 1
 
     def single_contact(self, X_WA, X_WB, direction_W, limit: float) -> np.ndarray | None:
-        """What A meets first where the parts' balls tell: not here."""
-        return None
+        """What A meets first: an empty row where the balls around the bodies tell that A meets nothing, else ``None``,
+        for the caller to ask as of a batch."""
+        return _NOTHING if self.body_misses(X_WA, X_WB, direction_W, limit) else None
 
 
 class _Work(local):
@@ -195,6 +196,7 @@ class _Work(local):
 
 
 _work = _Work()
+_NOTHING = np.empty(0)
 _FLOAT64 = np.dtype(np.float64)
 
 
