@@ -115,12 +115,11 @@ def shape_cast(
     portal (Snethen's XenoCollide), with proven bounds; an exact linear program where doubles leave a cast of polytopes
     open. About 1 to 3 µs a convex pair in batches; O(log n) a support point from 224 vertices on.
 
-    Unions of m and k parts: a tree of the k boxes and, of the pairs of parts whose boxes meet on the way, the nearest
-    first, until a contact is proven nearer than all others can be: O((m + k) log k), some tens of 10⁶ pairs; m k where
-    every part is in every other's way, and up to 64 pairs without a tree. Meshes of n facets: a walk down both trees by
-    the same bounds, O(log n) and the facets as near as the first contact; of unions with meshes the convex sets around
-    the parts are cast first, and the parts in that order. Bodies that touch at the start cost what `collide.collide`
-    does.
+    Unions of m and k convex parts: a walk down the trees over both, the parts whose balls may meet soonest first, until
+    a contact is proven sooner than all others can be: some tens of microseconds; m k where every part is in every
+    other's way. Meshes of n facets: a walk down both trees by the same bounds, O(log n) and the facets as near as the
+    first contact; of unions with meshes the convex sets around the parts are cast first, and the parts in that order.
+    Bodies that touch at the start cost what `collide.collide` does.
     """
     is_plain = check_poses is True and start_normals is False and threads.__class__ is int and threads == 1
     if is_plain and max_distance.__class__ is float and max_distance >= 0.0:

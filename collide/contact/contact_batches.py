@@ -95,7 +95,8 @@ def contact_batch(
         rows, ends = make(A, B, X_WA, X_WB, margin, max_contacts, None, threads)
         of_pair = np.repeat(np.arange(n), np.diff(ends, prepend=0))
         return _only_within_margin(rows, of_pair, n, A, B, X_WA, X_WB, margin)
-    if n > 1 and (asks := _single_calls(A, B, n, how)):
+    # A single call of two shapes comes here where its kernel has left it open.
+    if (n > 1 or how is None) and (asks := _single_calls(A, B, n, how)):
         return _by_single_calls(asks, A, B, X_WA, X_WB, n, margin, max_contacts, threads)
     return _by_parts(A, B, X_WA, X_WB, n, margin, max_contacts, threads)
 

@@ -73,12 +73,12 @@ def contacts(
     than the smaller body's diameter), a row of kind "translation" is the answer of `distance`. A part of a mesh within
     the other body, without meeting facets, adds nothing while other facets meet.
 
-    Two convex shapes have one patch, with the normal of `distance`: in a batch, some microseconds a pair. Parts of a
-    Compound are asked pair by pair: O(k) calls for k pairs whose boxes come within the margin. Two bodies of facets
-    cost some tens of microseconds in a batch, a curved shape on a mesh a tenth of a millisecond; single calls as much
-    again, and a millisecond. The time for meshes grows as k log k with the k pairs of facets within the margin or, for
-    overlapping bodies, that a patch may reach, about a microsecond a pair: n·m at worst; beyond 2¹⁸ pairs apart within
-    the margin the question is refused, of overlaps `distance` answers.
+    Two convex shapes have one patch, with the normal of `distance`: about a microsecond a pair. Of unions of convex
+    parts those are asked whose balls come within the margin, found by a tree over both: some microseconds for few near
+    parts. Two bodies of facets cost tens of microseconds, a curved shape on a mesh a tenth of a millisecond in a batch
+    and a millisecond by itself. The time for meshes grows as k log k with the k pairs of facets within the margin or,
+    for overlapping bodies, that a patch may reach, about a microsecond a pair: n·m at worst; beyond 2¹⁸ pairs apart
+    within the margin the question is refused, of overlaps `distance` answers.
     """
     margin = check_margin("contacts", margin)
     max_contacts = check_max_contacts("contacts", max_contacts)

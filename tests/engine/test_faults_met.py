@@ -550,6 +550,24 @@ def test_contacts_of_a_capsule_over_a_tiny_face_lie_on_it():
     assert len(rows) and (np.abs(rows["point_b"] - X_WB[:3, 3]) <= np.array(B.size) / 2 + 1e-15).all(), rows["point_b"]
 
 
+def test_depths_of_meshes_in_unions_below_half_spaces_are_certified_where_narrow():
+    """400 m from the world's origin a part's rounded pose is off by 0.7 pm: a bracket of 1.5 pm was called certified,
+    where 2^-43 of 2.3 m is promised."""
+    mesh = collide.Mesh([[-1.5e-4, -2.6e-3, 6.3e-5], [-1.5e-4, 2.6e-3, -1.2e-4], [1.5e-4, -2.6e-3, -4.3e-5],
+                         [1.5e-4, 2.6e-3, 8.7e-5]], [[0, 2, 3], [0, 3, 1]], solid=False)
+    X_WA = collide.pose((0.0, 0.0, 0.0), rpy=(0.4, 0.5, 0.6))
+    A, B = collide.Halfspace([-0.16, 0.53, 0.76], -0.09), collide.Compound([
+        (mesh, collide.pose((-0.004, 0.006, 0.006), rpy=(0.7, -0.3, 1.1)))])
+    far = X_WA.copy()
+    X_WB = X_WA @ collide.pose((0.5, -1.5, 0.8))
+    near_row = collide.distance(A, B, X_WA, X_WB)
+    assert near_row.hit and near_row.certified, near_row
+    far[:3, 3], X_WB[:3, 3] = (52.4, -419.8, -360.8), X_WB[:3, 3] + (52.4, -419.8, -360.8)
+    row = collide.distance(A, B, far, X_WB)
+    width = row.upper - row.lower
+    assert row.hit and width > 2.0**-43 * 2.5 and not row.certified, (row, width)
+
+
 def test_normals_of_unions_have_no_negative_zero():
     """Swapped arguments then give mirrored bits: the way out of a box along −y was (0, −1, −0)."""
     A, turned = collide.Sphere(0.5), np.diag([1.0, -1.0, -1.0, 1.0])

@@ -109,7 +109,9 @@ def _curved_rows(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop, limit
 def _plane_rows(A: Shape, B: Shape, PA: PosesWithSlop, PB: PosesWithSlop, limit: float) -> np.ndarray:
     rows = convex_rows(hull_shape(A), hull_shape(B), PA.X, PB.X)
     rows["count"], rows["vertices_a"], rows["vertices_b"] = 0, -1, -1
-    _widen(rows, _size(A, B, PA, PB), PA.slop + PB.slop, limit)
+    size = _size(A, B, PA, PB)
+    _widen(rows, size, PA.slop + PB.slop, limit)
+    rows["certified"] &= rows["beyond"] | (rows["upper"] - rows["lower"] <= PROMISE * size)  # of depths, too
     crossing = (rows["lower"] <= 0.0) & (rows["upper"] > 0.0)
     rows["how"][crossing] = UNDECIDED
     rows["hit"] = ~(rows["lower"] > 0.0)
