@@ -213,7 +213,8 @@ def _cast_parts(block, cast, pair, n_parts_b, out):
         ),
     )
     row, is_at_start = view_f64(work_at + 8 * _ROW_AT, CAST_ROW), False
-    if row[STATUS] == MISS:
+    is_met = row[STATUS] == HIT or row[STATUS] == OPEN
+    if row[STATUS] == MISS or (is_met and row[LOWER] > out[T_UPPER]):  # of a later one nothing is told, however wide
         return True
     if row[STATUS] == BEHIND or (row[STATUS] == OPEN and row[LOWER] <= 0.0):
         if not _ask_start(block, work_at, True):

@@ -21,7 +21,7 @@ from collide.contact.contact_blocks import (
 )
 from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.convex_manifolds import FACES_AT, MARGIN, MAX_CONTACTS, PAIRS_DONE, ROWS_DONE
-from collide.contact.near_the_margin import is_near_the_margin
+from collide.contact.near_the_margin import is_near_the_margin, leeway_of
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i32, view_i64
 from collide.lowering.compound_table import PART, TURNED
 from collide.lowering.hull_faces import N_VERTICES
@@ -76,11 +76,12 @@ def contacts_single_compound(header_at, XA_at, XB_at, out_at, max_contacts, marg
     header[BATCH + IS_ANSWERED] = 0
     header[manifold + MAX_CONTACTS] = max_contacts
     view_f64(batch_at + 8 * (HEADER_OF_POSES + MARGIN), 1)[0] = margin
-    view_f64(batch_at + 8 * LIMIT, 1)[0] = margin + slack
+    reach = view_f64(header_at + 8 * REACH_OF_BOTH, 1)[0]
+    view_f64(batch_at + 8 * LIMIT, 1)[0] = margin + max(leeway_of(reach, XA_at, XB_at), slack)
     if _contacts_of_pairs_at(header[KERNEL], (batch_at, n)) != DONE:
         return -1
     _name_parts(header, block, n, out_at)
-    n_rows, reach = header[manifold + ROWS_DONE], view_f64(header_at + 8 * REACH_OF_BOTH, 1)[0]
+    n_rows = header[manifold + ROWS_DONE]
     return -1 if is_near_the_margin(out_at, n_rows, margin, reach, XA_at, XB_at) else n_rows
 
 

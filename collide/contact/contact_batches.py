@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.contact.contact_rows import CONTACT_DTYPE, no_rows
+from collide.contact.contact_rows import CONTACT_DTYPE, Slack, no_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.curved_contacts import curved_contacts
 from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
-from collide.contact.near_the_margin import ROUNDING
+from collide.contact.near_the_margin import ROUNDING, leeways
 from collide.contact.single_contacts import single_contacts_of
 from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.compound_layout import body_ball
@@ -126,7 +126,10 @@ def _by_parts(
     part_pairs = _part_pairs(shapes, which, X_WA, X_WB, n, margin, singles)
     if not len(part_pairs):
         return no_rows(), np.zeros(n, dtype=np.int64)
-    rows, ends = _rows_of_parts(singles, part_pairs, margin, max_contacts, threads)
+    every = np.arange(n)
+    leeway = np.broadcast_to(leeways(_reaches(A, every) + _reaches(B, every), X_WA, X_WB), n).copy()
+    np.maximum.at(leeway, part_pairs.pair, part_pairs.slack)
+    rows, ends = _rows_of_parts(singles, part_pairs, leeway[part_pairs.pair], margin, max_contacts, threads)
     starts = np.concatenate([[0], ends[:-1]])
     of_pair = np.repeat(part_pairs.pair, ends - starts)
     rows["part_a"] = np.repeat(part_pairs.part_a, ends - starts)
@@ -212,49 +215,42 @@ def _near_parts(A: CompoundParts, B: CompoundParts, X_WA: np.ndarray, X_WB: np.n
 def _may_come_within(a: PartColumns, b: PartColumns, i, j, X_WA, X_WB, limit: np.ndarray) -> np.ndarray:
     """(m,) bool: whether balls around two parts come within a limit (m,)."""
     apart = np.sqrt(np.square(X_WB[:, :3, 3] - X_WA[:, :3, 3]).sum(axis=1))
-    stretched = (1.0 + 1e-3) * (a.reach[i] + b.reach[j])  # poses stretch by 1e-4 at most
+    stretched = (1.0 + 1e-3) * (a.reach[i] + b.reach[j])  # poses stretch by 1e-4 at largest
     reach = stretched + a.radius[i] + b.radius[j] + a.slop[i] + b.slop[j]
     return (apart * (1.0 - 2.0**-40) <= reach + limit) | ~np.isnan(a.plane[i]) | ~np.isnan(b.plane[j])
 
 
 def _rows_of_parts(
-    singles: list[Shape], pairs: PartPairs, margin: float, max_contacts: int, threads: int
+    singles: list[Shape], pairs: PartPairs, leeway: np.ndarray, margin: float, max_contacts: int, threads: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, ends) of pairs of parts: convex pairs in one batch, pairs with meshes batch by batch for two shapes."""
+    """(rows, ends) of pairs of parts: convex pairs together, pairs with meshes batch by batch for two shapes. Pairs of
+    equal leeways, no less than their slacks, go into a batch."""
     kinds = np.array([kind_of(shape) for shape in singles])
-    is_convex = _ARE_SETS[kinds[pairs.A], kinds[pairs.B]]
-    convex = np.flatnonzero(is_convex)
     counts = np.zeros(len(pairs), dtype=np.int64)
-    blocks: list[np.ndarray] = []
-    if len(convex):
-        some = pairs.take(convex)
-        shape_set = ShapeSet(singles)
-        rows, ends = convex_contacts(
-            Picked(shape_set, some.A), Picked(shape_set, some.B), np.ascontiguousarray(some.X_WA),
-            np.ascontiguousarray(some.X_WB), margin, max_contacts, slack=np.ascontiguousarray(some.slack),
-            threads=threads,
-        )
-        counts[convex] = np.diff(ends, prepend=0)
-        blocks.append(rows)
-    owners = [np.repeat(convex, counts[convex])]
-    meshed = np.flatnonzero(~is_convex)
-    keys = pairs.A[meshed] * len(singles) + pairs.B[meshed]
-    for key in np.unique(keys).tolist():
-        which = meshed[keys == key]
-        a, b = divmod(key, len(singles))
+    blocks, owners = [no_rows()], [np.zeros(0, dtype=np.int64)]
+    keys = np.where(_ARE_SETS[kinds[pairs.A], kinds[pairs.B]], -1, pairs.A * len(singles) + pairs.B)
+    shape_set = ShapeSet(singles)
+    for key, largest in np.unique(np.stack([keys, leeway], axis=1), axis=0).tolist():
+        which = np.flatnonzero((keys == key) & (leeway == largest))
         some = pairs.take(which)
-        make = _OF_MESHES[method_of(kinds[a], kinds[b])]
         X_WA, X_WB = np.ascontiguousarray(some.X_WA), np.ascontiguousarray(some.X_WB)
-        slack = some.slack if some.slack.any() else None
-        rows, ends = make(singles[a], singles[b], X_WA, X_WB, margin, max_contacts, slack, threads)
+        slack = Slack(np.ascontiguousarray(some.slack), largest)
+        if key < 0:
+            A, B = Picked(shape_set, some.A), Picked(shape_set, some.B)
+            rows, ends = convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, slack=slack, threads=threads)
+        else:
+            a, b = divmod(int(key), len(singles))
+            make, is_moved = _OF_MESHES[method_of(kinds[a], kinds[b])], bool(some.slack.any())
+            asked = slack if is_moved else None
+            rows, ends = make(singles[a], singles[b], X_WA, X_WB, margin, max_contacts, asked, threads)
         counts[which] = np.diff(ends, prepend=0)
-        if slack is not None:
-            rows["lower"] -= np.repeat(slack, counts[which])
-            rows["upper"] += np.repeat(slack, counts[which])
+        if key >= 0 and is_moved:
+            rows["lower"] -= np.repeat(some.slack, counts[which])
+            rows["upper"] += np.repeat(some.slack, counts[which])
         blocks.append(rows)
         owners.append(np.repeat(which, counts[which]))
     order = np.argsort(np.concatenate(owners), kind="stable")
-    return np.concatenate([*blocks, no_rows()])[order], np.cumsum(counts)
+    return np.concatenate(blocks)[order], np.cumsum(counts)
 
 
 def _number_patches(rows: np.ndarray, of_pair: np.ndarray) -> None:

@@ -24,7 +24,7 @@ Rows of a patch stand together, the deepest first.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, Literal, NamedTuple, overload
 
 import numpy as np
 
@@ -38,6 +38,21 @@ if TYPE_CHECKING:
 
 #: Contacts of n pairs, pair after pair, and where those of each pair end (n,).
 Rows = tuple[np.ndarray, np.ndarray]
+
+
+class Slack(NamedTuple):
+    """By how much rounding may have moved the bodies of n pairs towards each other [m].
+
+    each : (n,).   largest : no less than any slack, and the same whatever else is in the batch.
+    """
+
+    each: np.ndarray
+    largest: float
+
+    def take(self, some) -> Slack:
+        return Slack(self.each[some], self.largest)
+
+
 #: What `kind` indexes: the patch is apart; it meets, or its radii overlap; or no patch describes the overlap, and the
 #: row is the answer of `distance`: a translation that separates the bodies, and no place.
 KINDS = ("gap", "overlap", "translation")

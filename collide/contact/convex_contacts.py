@@ -23,7 +23,7 @@ from collide.contact.contact_blocks import (
     WHICH_AT,
     contacts_of_pairs,
 )
-from collide.contact.contact_rows import CONTACT_DTYPE, joined_rows
+from collide.contact.contact_rows import CONTACT_DTYPE, Slack, joined_rows
 from collide.contact.convex_manifolds import (
     MARGIN,
     MAX_CONTACTS,
@@ -61,7 +61,7 @@ class ConvexPairs(NamedTuple):
     X_WA, X_WB : C-contiguous matrices (n, 4, 4), or (1, 4, 4) for a single pose.
     of_pair : (n, 2) numbers of matrices, where ``X_WA`` and ``X_WB`` are the same array.
     ids : an id for each matrix, for columns a and b; None for 0 and 1.
-    slack : (n,) by how much rounding may have moved the bodies of a pair towards each other [m].
+    slack : by how much rounding may have moved the bodies of a pair towards each other.
     """
 
     table: ShapeTable
@@ -70,7 +70,7 @@ class ConvexPairs(NamedTuple):
     X_WB: np.ndarray
     of_pair: np.ndarray | None = None
     ids: np.ndarray | None = None
-    slack: np.ndarray | None = None
+    slack: Slack | None = None
 
     def __len__(self) -> int:  # type: ignore[override]
         if self.of_pair is not None:
@@ -79,22 +79,23 @@ class ConvexPairs(NamedTuple):
         return max(lengths) if min(lengths) else 0
 
     def take(self, piece: slice) -> ConvexPairs:
-        which, of_pair, slack = (
-            None if column is None else column[piece] for column in (self.which, self.of_pair, self.slack)
+        slack = None if self.slack is None else self.slack.take(piece)
+        which, of_pair = (
+            None if column is None else column[piece] for column in (self.which, self.of_pair)
         )
         X_WA, X_WB = (X if len(X) == 1 or of_pair is not None else X[piece] for X in (self.X_WA, self.X_WB))
         return ConvexPairs(self.table, which, X_WA, X_WB, of_pair, self.ids, slack)
 
 
 def convex_contacts(
-    A, B, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, max_contacts: int, *, slack: np.ndarray | None = None,
+    A, B, X_WA: np.ndarray, X_WB: np.ndarray, margin: float, max_contacts: int, *, slack: Slack | None = None,
     check: bool = False, threads: int = 1,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(rows, ends): contacts of pairs of single convex sets, pair after pair, and where the contacts of each pair end.
 
     A, B : shapes, or shapes `Picked` from a set pose by pose.   X_WA, X_WB : C-contiguous (n, 4, 4), or (1, 4, 4) for a
-    single pose.   slack : (n,) by how much rounding may have moved the bodies of a pair towards each other [m]: the
-    margin is larger by the slack.   check : refuse matrices other than rotations. Raises InvalidPose, UnsupportedQuery.
+    single pose.   slack : the margin of a pair is larger by its slack.   check : refuse matrices other than rotations.
+    Raises InvalidPose, UnsupportedQuery.
     """
     table, which = shape_table(A, B)
     pairs = ConvexPairs(table, which, X_WA, X_WB, slack=slack)
@@ -110,7 +111,7 @@ def contacts_of(
     pairs: ConvexPairs, margin: float, max_contacts: int, *, check: bool = False, threads: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
     """(rows, ends) as `convex_contacts`. Raises InvalidPose without a name, UnsupportedQuery."""
-    limit = margin if pairs.slack is None else margin + float(pairs.slack.max(initial=0.0))
+    limit = margin if pairs.slack is None else margin + pairs.slack.largest
     asked = _Asked(margin, max_contacts, limit, check)
     n = len(pairs)
     threads = min(threads, n // _PIECE)
@@ -147,9 +148,10 @@ def _contacts_of(pairs: ConvexPairs, asked: _Asked) -> tuple[np.ndarray, np.ndar
     )
     header[HEADER_OF_POSES + MAX_CONTACTS] = asked.max_contacts
     header.view(np.float64)[[HEADER_OF_POSES + MARGIN, LIMIT]] = asked.margin, asked.limit
+    slacks = None if pairs.slack is None else pairs.slack.each
     header[WHICH_AT : LIMIT] = (
         _address_or_0(pairs.which), address_of(pairs.X_WA), 16 * (len(pairs.X_WA) > 1), address_of(pairs.X_WB),
-        16 * (len(pairs.X_WB) > 1), _address_or_0(pairs.of_pair), _address_or_0(pairs.ids), _address_or_0(pairs.slack),
+        16 * (len(pairs.X_WB) > 1), _address_or_0(pairs.of_pair), _address_or_0(pairs.ids), _address_or_0(slacks),
         address_of(out), len(out), address_of(ends),
     )
     header[CHECK], header[PLACES_AT] = asked.check, address_of(places)

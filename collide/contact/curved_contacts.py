@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.base.threads import answers_in_order, pieces_of
-from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP, Rows, joined_rows
+from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP, Rows, Slack, joined_rows
 from collide.contact.curved_manifolds import (
     HEADER,
     POSE_A,
@@ -68,7 +68,7 @@ class _Near(NamedTuple):
 
 
 def curved_contacts(
-    A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int, slack: np.ndarray | None, threads: int
+    A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int, slack: Slack | None, threads: int
 ) -> Rows:
     """(rows, ends) of a mesh and a curved convex set; as `mesh_contacts.facet_contacts`."""
     exchanged = kind_of(A) is not Kind.MESH
@@ -81,7 +81,7 @@ def curved_contacts(
 
     def answer(piece: slice) -> Rows:
         XA, XB = (X if len(X) == 1 else X[piece] for X in (X_WA, X_WB))
-        some = None if slack is None else slack[piece]
+        some = None if slack is None else slack.take(piece)
         return _of_poses(A, B, XA, XB, piece.stop - piece.start, margin, max_contacts, some)
 
     rows, ends = joined_rows(answers_in_order(pieces, answer, threads))
@@ -98,18 +98,18 @@ def exchanged_rows(rows: np.ndarray) -> np.ndarray:
 
 
 def _of_poses(
-    A: Shape, B: Shape, X_WA, X_WB, n: int, margin: float, max_contacts: int, slack: np.ndarray | None
+    A: Shape, B: Shape, X_WA, X_WB, n: int, margin: float, max_contacts: int, slack: Slack | None
 ) -> Rows:
     """The same of a piece of the poses, the mesh being A."""
     body, enclosure = body_of(A), enclosure_of(B)
     packed = enclosure.packed
     PA, PB = (as_given(np.ascontiguousarray(np.broadcast_to(X, (n, 4, 4)))) for X in (X_WA, X_WB))
-    limit = np.full(n, margin) if slack is None else margin + slack
-    near = _near(body, enclosure, PA, PB, limit)
+    limit = np.full(n, margin) if slack is None else margin + slack.each
+    near, reach = _near(body, enclosure, PA, PB, limit), margin if slack is None else margin + slack.largest
     rows, ends, lacks = _patches(body, packed, PA.X, PB.X, near, margin, max_contacts, slack)
     rows = _shortened(body, enclosure, PA, PB, near, rows, ends)
     if lacks.any():
-        return with_distances(A, B, PA.X, PB.X, limit, rows, ends, lacks, reach=float(limit.max()))
+        return with_distances(A, B, PA.X, PB.X, limit, rows, ends, lacks, reach=reach)
     return rows, ends
 
 
@@ -146,7 +146,7 @@ def _near(body: Body, enclosure: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop
 
 
 def _patches(
-    body: Body, packed: PackedConvex, X_WA, X_WB, near: _Near, margin: float, max_contacts: int, slack
+    body: Body, packed: PackedConvex, X_WA, X_WB, near: _Near, margin: float, max_contacts: int, slack: Slack | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(rows, ends, (n,) whether no patch tells) of poses (n, 4, 4)."""
     n = len(X_WA)
@@ -166,7 +166,7 @@ def _patches(
     out = np.zeros(_FIRST_ROWS + _ROWS_PER_POSE * n, dtype=CONTACT_DTYPE)
     while curved_manifolds(
         address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), n, margin,
-        0 if slack is None else address_of(slack), address_of(out), len(out), address_of(ends), address_of(lacks),
+        0 if slack is None else address_of(slack.each), address_of(out), len(out), address_of(ends), address_of(lacks),
     ):
         out[header[ROWS_DONE] :] = np.zeros((), dtype=CONTACT_DTYPE)
         out = np.concatenate([out, np.zeros(2 * len(out), dtype=CONTACT_DTYPE)])

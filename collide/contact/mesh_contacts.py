@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from collide.base.threads import answers_in_order, pieces_of
-from collide.contact.contact_rows import CONTACT_DTYPE, Rows, joined_rows
+from collide.contact.contact_rows import CONTACT_DTYPE, Rows, Slack, joined_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.distance_contacts import with_distances
 from collide.contact.facet_contact_call import (
@@ -68,7 +68,7 @@ _FEWEST_POSES = 16
 
 
 def halfspace_contacts(
-    A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int, slack: np.ndarray | None, threads: int
+    A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int, slack: Slack | None, threads: int
 ) -> Rows:
     """Rows of a mesh and a half-space: those of the mesh's hull, with facets of the mesh. As `facet_contacts`."""
     hull_a, hull_b = (S if is_halfspace(S) else hull_of(body_of(S)) for S in (A, B))
@@ -94,13 +94,13 @@ def _rows_of_hull_points(mesh: Shape, hull: Shape) -> tuple[np.ndarray, np.ndarr
 
 
 def facet_contacts(
-    A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int, slack: np.ndarray | None, threads: int
+    A: Shape, B: Shape, X_WA, X_WB, margin: float, max_contacts: int, slack: Slack | None, threads: int
 ) -> Rows:
     """(rows, ends) of two bodies of facets: contacts pose after pose, and where the contacts of each pose end.
 
     X_WA, X_WB : (n, 4, 4), or (1, 4, 4) for a single pose, checked.
-    slack : (n,) by how much rounding may have moved the bodies towards each other [m]: the margin is larger by the
-    slack. Exchanged A and B give the same numbers. Raises UnsupportedQuery, InvalidPose.
+    slack : the margin of a pose is larger by its slack. Exchanged A and B give the same numbers. Raises
+    UnsupportedQuery, InvalidPose.
     """
     n = max(len(X_WA), len(X_WB))
     pieces = pieces_of(n, threads, _FEWEST_POSES) if threads > 1 and n >= 2 * _FEWEST_POSES else [slice(0, n)]
@@ -116,21 +116,22 @@ def facet_contacts(
 
 
 def _of_poses(
-    A: Shape, B: Shape, X_WA, X_WB, piece: slice, margin: float, max_contacts: int, slack: np.ndarray | None
+    A: Shape, B: Shape, X_WA, X_WB, piece: slice, margin: float, max_contacts: int, slack: Slack | None
 ) -> Rows:
     """The same of a piece of the poses, in one thread."""
     n = piece.stop - piece.start
     X_WA, X_WB = (X if len(X) == 1 else X[piece] for X in (X_WA, X_WB))
-    slack = None if slack is None else slack[piece]
+    slack = None if slack is None else slack.take(piece)
     space, body_a, body_b = _of_thread, body_of(A), body_of(B)
     header = _header_of(body_a, body_b, workspace(stack_of(body_a.tree, body_b.tree)), space.described)
     header[MAX_CONTACTS] = min(max_contacts, 1 << 40)
+    slack_at = 0 if slack is None else address_of(slack.each)
     ends, lacks = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.uint8)
     out = np.zeros(_FIRST_ROWS + _ROWS_PER_POSE * n, dtype=CONTACT_DTYPE)
     while True:
         status = facet_manifolds(
             address_of(header), address_of(X_WA), step_of(X_WA), address_of(X_WB), step_of(X_WB), n, margin,
-            0 if slack is None else address_of(slack), address_of(out), len(out), address_of(ends), address_of(lacks),
+            slack_at, address_of(out), len(out), address_of(ends), address_of(lacks),
         )
         if status == DONE:
             break
@@ -146,7 +147,7 @@ def _of_poses(
             raise not_invertible(piece.start + int(header[POSES_DONE]))
     rows = out[: header[ROWS_DONE]]
     if lacks.any():
-        limit = np.full(n, margin) if slack is None else margin + slack
+        limit = np.full(n, margin) if slack is None else margin + slack.each
         return with_distances(A, B, X_WA, X_WB, limit, rows, ends, lacks)
     return rows, ends
 

@@ -28,13 +28,14 @@ from collide.contact.support_face import ROUND
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_contacts
 from collide.lowering.compound_layout import layout_of
-from collide.lowering.compound_table import MEASURE, SWEPT_RADIUS, CompoundTable
+from collide.lowering.compound_table import CompoundTable
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.parts import is_single_convex
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite import single_header
 from collide.narrowphase.composite.composite_block import LIST
+from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.composite.single_composite_call import BALLS_WORK, balls_beyond
 from collide.narrowphase.convex_batches import lowered_numbers, prepare_parts, prepare_sets, shape_table
 from collide.narrowphase.convex_kernel_calls import BlockWorkspace, space_of_single_calls
@@ -74,7 +75,7 @@ def prepare_contacts(A, B) -> bool:
         if pair.table is None:
             pair.take(prepare_parts(A, B))
         if pair.distance is not None:  # not of too many parts for single calls
-            pair.missing_faces = CompoundContacts(pair.table, _reach_of(A) + _reach_of(B))
+            pair.missing_faces = CompoundContacts(pair.table, compound_parts(A).reach + compound_parts(B).reach)
             pair.missing_faces.get_ready(pair)
             return True
     made = None if pair.header is None else _made_of_numbers(pair.header)
@@ -112,12 +113,6 @@ def _with_faces(pair: Prepared, X_WA: np.ndarray, X_WB: np.ndarray, max_contacts
 def _is_flat(shape: Shape) -> bool:
     """Whether no item of a union is a union: parts of unions in unions stand at poses rounded otherwise."""
     return not isinstance(shape, Compound) or not any(isinstance(item, Compound) for item, _ in shape.items)
-
-
-def _reach_of(shape: Shape) -> float:
-    """How far any part reaches from the origin, at most, half-spaces apart [m]."""
-    parts = layout_of(shape).parts
-    return float((parts[:, MEASURE] + parts[:, SWEPT_RADIUS]).max())
 
 
 class CompoundContacts:

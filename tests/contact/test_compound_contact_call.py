@@ -80,6 +80,34 @@ def test_batches_have_the_bytes_of_single_calls(monkeypatch):
     assert prepared_pair(A, turned).contacts(X_WAs[0], X_WBs[0], 8, 0.02) is None
 
 
+@pytest.mark.parametrize("kind", ["flat", "nested", "with a mesh"])
+def test_rows_on_the_brink_have_the_same_bits_whatever_else_is_in_the_batch(kind):
+    """Parts far from the world's origin are asked farther beyond the margin; once with them, so were all others."""
+    rng = np.random.default_rng(len(kind))
+    hits = 0
+    for case in range(60):
+        unions = []
+        for _ in range(2):
+            shapes = [MAKERS[int(rng.integers(len(MAKERS)))](rng.uniform(0.1, 0.4, 3)) for _ in range(2)]
+            if kind == "with a mesh":
+                shapes[0] = collide.Mesh(*collide.tessellate(collide.Box(rng.uniform(0.1, 0.4, 3)))[:2])
+            parts = [(shape, random_pose(rng, 0.5, False)) for shape in shapes]
+            item = collide.Compound(parts)
+            unions.append(collide.Compound([(item, random_pose(rng, 0.5, False))]) if kind == "nested" else item)
+        X, Y = random_pose(rng, 2.5, False), random_pose(rng, 2.5, False)
+        gap = float(collide.distance(*unions, X, Y).distance)
+        if gap <= 0.0:
+            continue
+        away = [pose.copy() for pose in (X, Y)]
+        for pose in away:
+            pose[:3, 3] += (900.0, 500.0, 300.0)
+        one = collide.contacts(*unions, X, Y, margin=gap).rows
+        some = collide.contacts(*unions, np.stack([X, away[0]]), np.stack([Y, away[1]]), margin=gap)
+        assert some[0].rows.tobytes() == one.tobytes(), case
+        hits += len(one) > 0
+    assert hits > 15, hits
+
+
 def test_pairs_on_the_brink_of_the_margin_and_moved_half_spaces_are_left_to_the_long_way():
     """A gap of 1 m and a margin of as much, of bodies far from the origin; a half-space at a pose of its own."""
     box = collide.Box((1.0, 1.0, 1.0))
