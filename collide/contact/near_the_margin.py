@@ -1,4 +1,4 @@
-"""Contacts so near to the margin that rounding may have let them in: `distance` then decides whether they count.
+"""Contacts near the margin, perhaps let in by rounding: `distance` then decides whether bodies are within it.
 
 Parts of unions stand at rounded poses, and are asked a little beyond the margin. The pose and the bodies tell how far,
 so that a pair's rows are the same bits whatever else is in a batch.
