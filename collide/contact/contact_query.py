@@ -86,7 +86,7 @@ def contacts(
     X_WA, X_WB, single = asked_poses(A, B, X_WA, X_WB)
     n = length_of(A, B, X_WA, X_WB)
     check = checks.true_or_false("check_poses", check_poses)
-    if single and prepare_contacts(A, B):
+    if prepare_contacts(A, B) and single:  # batches, too, read a table that is kept with the pair
         return contacts(
             A, B, X_WA[0], X_WB[0], margin=margin, max_contacts=max_contacts, check_poses=check, threads=threads
         )

@@ -1,7 +1,7 @@
-"""Contacts near the margin, perhaps let in by rounding: `distance` then decides whether bodies are within it.
+"""Contacts near the margin, perhaps let in by rounding: `distance` then decides whether bodies are within the margin.
 
-Parts of unions stand at rounded poses, and are asked a little beyond the margin. The pose and the bodies tell how far,
-so that a pair's rows are the same bits whatever else is in a batch.
+Parts of unions stand at rounded poses, and are asked a little beyond the margin. The pose and the bodies tell how far:
+a pair's rows are the same bits whatever else is in a batch.
 """
 
 from __future__ import annotations

@@ -85,7 +85,7 @@ def shape_table(A, B) -> tuple[ShapeTable, np.ndarray | None]:
     if pair is not None and pair.table is not None:
         return pair.table, None
     table = ShapeTable([convex_set_of(A), convex_set_of(B)])
-    if pair is not None and pair.collide is not None:  # of few numbers: its kernels have a block of their own
+    if pair is not None and pair.header is not None:  # of few numbers: its kernels have a block of their own
         pair.table = table
     return table, None
 

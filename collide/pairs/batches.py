@@ -97,7 +97,7 @@ def prepare_pair(A, B) -> bool:
     if not (isinstance(A, Shape) and isinstance(B, Shape) and single_calls_are_safe()):
         return False
     known = prepared_pair(A, B)
-    if known is not None and (known.collide or known.table):
+    if known is not None and (known.collide or (known.table and known.header is None)):
         return False
     pair = answer_of(A, B).prepare(A, B)
     if pair is None:

@@ -106,6 +106,7 @@ def test_a_call_after_one_that_needed_much_space_begins_with_what_may_be_kept(mo
     for name, value in (("_FEWEST_PAIRS", 8), ("_KEPT_PAIRS", 128)):
         monkeypatch.setattr(mesh_contacts, name, value)
     monkeypatch.setattr(mesh_contacts, "_of_thread", mesh_contacts._OfThread())
+    collide.contacts(ground, shape, EYE, X[0])  # single calls have a workspace of their own
     begun, kernel = [], mesh_contacts.facet_manifolds
     monkeypatch.setattr(mesh_contacts, "facet_manifolds", lambda *args: begun.append(1) or kernel(*args))
     first = collide.contacts(ground, shape, EYE, X, margin=0.01)

@@ -132,6 +132,21 @@ def test_pairs_of_few_numbers_hold_one_block():
     assert collide.distance(A, B, X, np.stack([Y, Y])).hit.all() and pair.table is first
 
 
+def test_contacts_first_leaves_the_other_questions_to_be_made_ready():
+    """Single contacts, then batches that keep a table, then a boolean: each by its kernel."""
+    if not single_calls_are_safe():
+        pytest.skip("plain kernels have no single calls")
+    A, B, X, Y = collide.Box((1, 2, 3)), collide.Box((3, 2, 1)), np.eye(4), collide.pose((0.9, 0.0, 0.0))
+    one = collide.contacts(A, B, X, Y)
+    pair = prepared_pair(A, B)
+    assert pair.contacts is not None and pair.collide is None and pair.table is None
+    assert collide.contacts(A, B, X, np.stack([Y, Y])).rows[: len(one)].tobytes() == one.rows.tobytes()
+    first = pair.table
+    assert first is not None and len(collide.contacts(A, B, X, Y[None])) == len(one) and pair.table is first
+    assert collide.collide(A, B, X, Y) is True and pair.collide is not None and pair.distance is not None
+    assert prepared_pair(A, B) is pair and pair.table is first
+
+
 def test_contacts_of_pairs_of_equal_numbers_are_equal_and_made_once():
     """Pairs hold what they read, and nothing is added with a call."""
     if not single_calls_are_safe():
