@@ -457,6 +457,7 @@ EXCUSED = {
     "transforms.refuse_no_pose": "only ever raises, of what a check found",
     "transforms.rotation_from_rpy": "its numbers are checked by `pose` and `poses`",
     "transforms.rotation_from_unit": "as rotation_from_rpy",
+    "transforms.inverse_pose": "of poses that loaders and hosts have made",
     "How": "an enumeration of Python's own",
     "WorldResult": "made by World's queries",
     "WorldHits": "made by World's queries",
