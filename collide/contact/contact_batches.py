@@ -224,14 +224,14 @@ def _rows_of_parts(
     singles: list[Shape], pairs: PartPairs, leeway: np.ndarray, margin: float, max_contacts: int, threads: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """(rows, ends) of pairs of parts: convex pairs together, pairs with meshes batch by batch for two shapes. Pairs of
-    equal leeways, no less than their slacks, go into a batch."""
+    equal leeways, no less than their slacks, go into a batch; of meshes those at exact poses by themselves."""
     kinds = np.array([kind_of(shape) for shape in singles])
     counts = np.zeros(len(pairs), dtype=np.int64)
     blocks, owners = [no_rows()], [np.zeros(0, dtype=np.int64)]
     keys = np.where(_ARE_SETS[kinds[pairs.A], kinds[pairs.B]], -1, pairs.A * len(singles) + pairs.B)
-    shape_set = ShapeSet(singles)
-    for key, largest in np.unique(np.stack([keys, leeway], axis=1), axis=0).tolist():
-        which = np.flatnonzero((keys == key) & (leeway == largest))
+    shape_set, are_moved = ShapeSet(singles), (keys >= 0) & (pairs.slack > 0.0)
+    for key, largest, is_moved in np.unique(np.stack([keys, leeway, are_moved], axis=1), axis=0).tolist():
+        which = np.flatnonzero((keys == key) & (leeway == largest) & (are_moved == is_moved))
         some = pairs.take(which)
         X_WA, X_WB = np.ascontiguousarray(some.X_WA), np.ascontiguousarray(some.X_WB)
         slack = Slack(np.ascontiguousarray(some.slack), largest)
@@ -240,11 +240,10 @@ def _rows_of_parts(
             rows, ends = convex_contacts(A, B, X_WA, X_WB, margin, max_contacts, slack=slack, threads=threads)
         else:
             a, b = divmod(int(key), len(singles))
-            make, is_moved = _OF_MESHES[method_of(kinds[a], kinds[b])], bool(some.slack.any())
-            asked = slack if is_moved else None
+            make, asked = _OF_MESHES[method_of(kinds[a], kinds[b])], slack if is_moved else None
             rows, ends = make(singles[a], singles[b], X_WA, X_WB, margin, max_contacts, asked, threads)
         counts[which] = np.diff(ends, prepend=0)
-        if key >= 0 and is_moved:
+        if is_moved:
             rows["lower"] -= np.repeat(some.slack, counts[which])
             rows["upper"] += np.repeat(some.slack, counts[which])
         blocks.append(rows)
