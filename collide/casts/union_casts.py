@@ -21,7 +21,7 @@ from collide.casts.union_cast import (
     cast_single_union,
 )
 from collide.kernels import address_of, code_of
-from collide.lowering.compound_layout import layout_of
+from collide.lowering.compound_layout import is_flat, layout_of
 from collide.lowering.compound_table import CompoundTable
 from collide.lowering.kind_of_shape import kind_of
 from collide.narrowphase.composite.balls_on_ways import SingleWay, is_array
@@ -71,8 +71,7 @@ def prepare_way(A: Shape, B: Shape) -> SingleWay | None:
         return None
     pair = kept_pair(A, B)
     if pair.cast is None:
-        is_flat = not any(isinstance(item, Compound) for S in (A, B) if isinstance(S, Compound) for item, _ in S.items)
-        if is_flat and method_of(kind_of(A), kind_of(B)) is Method.PARTS:
+        if method_of(kind_of(A), kind_of(B)) is Method.PARTS and is_flat(A) and is_flat(B):
             if pair.table is None:
                 pair.take(prepare_parts(A, B))
             # Not of too many parts for single calls, nor of a part each.

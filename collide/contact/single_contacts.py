@@ -27,7 +27,7 @@ from collide.contact.single_contact_call import SINGLE_HEADER, contacts_single
 from collide.contact.support_face import ROUND
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_contacts
-from collide.lowering.compound_layout import layout_of
+from collide.lowering.compound_layout import is_flat, layout_of
 from collide.lowering.compound_table import CompoundTable
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.kind_of_shape import kind_of
@@ -43,7 +43,6 @@ from collide.narrowphase.dispatch import OF_SETS, OF_UNIONS, Method, method_of
 from collide.narrowphase.pose_batches import BLOCK
 from collide.narrowphase.pose_batches import HEADER as HEADER_OF_POSES
 from collide.narrowphase.prepared_pairs import Prepared, Single, keep_prepared, prepared_pair, single_calls_are_safe
-from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 
 #: Pairs that have kernels of single calls, if of far poses alone.
@@ -71,7 +70,7 @@ def prepare_contacts(A, B) -> bool:
         pair.header = lowered_numbers(A, B)
         if pair.header is None:
             pair.take(prepare_sets(A, B))
-    if how is Method.PARTS and not are_sets and _is_flat(A) and _is_flat(B):
+    if how is Method.PARTS and not are_sets and is_flat(A) and is_flat(B):
         if pair.table is None:
             pair.take(prepare_parts(A, B))
         if pair.distance is not None:  # not of too many parts for single calls
@@ -108,11 +107,6 @@ def _with_faces(pair: Prepared, X_WA: np.ndarray, X_WB: np.ndarray, max_contacts
     if rows is None and pair.missing_faces.make(pair):
         rows = pair.contacts(X_WA, X_WB, max_contacts, margin)  # type: ignore[misc]
     return rows
-
-
-def _is_flat(shape: Shape) -> bool:
-    """Whether no item of a union is a union: parts of unions in unions stand at poses rounded otherwise."""
-    return not isinstance(shape, Compound) or not any(isinstance(item, Compound) for item, _ in shape.items)
 
 
 class CompoundContacts:

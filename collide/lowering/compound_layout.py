@@ -5,6 +5,7 @@ from __future__ import annotations
 from collide.kernels import address_of
 from collide.lowering.compound_table import CENTRE, PART, Balls, LaidOut, lay_out
 from collide.lowering.parts import bounding_parts_of
+from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape, kept_with_shape
 
 
@@ -22,3 +23,8 @@ def part_balls(shape: Shape) -> Balls:
     """Balls around the convex parts of a shape, or around their bounds, by number."""
     parts = layout_of(shape).parts
     return Balls(address_of(parts) + 8 * CENTRE, PART, len(parts))
+
+
+def is_flat(shape: Shape) -> bool:
+    """Whether no item of a union is a union: parts of unions in unions stand at poses rounded otherwise."""
+    return not isinstance(shape, Compound) or not any(isinstance(item, Compound) for item, _ in shape.items)
