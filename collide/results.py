@@ -193,6 +193,7 @@ class PairResult(Generic[Form]):
 
     def __init__(self, rows: np.ndarray, is_single: bool, question: Question, certify: Callable):
         self.rows, self.is_single, self.question, self._certify = rows, is_single, question, certify
+        self._single = None
 
     def __reduce__(self):
         return type(self), (self.rows, self.is_single, self.question, self._certify)
@@ -220,26 +221,14 @@ class PairResult(Generic[Form]):
     if not TYPE_CHECKING:  # checkers are to know the fields above, and no others
 
         def __getattr__(self, name: str):
-            if name == "_single":
-                return None
-            single = self._single
-            if name in FIELDS:
-                values = self.rows[name] if single is None else None
-                if single is None and not self.is_single:
-                    return values
-                value = only_value(values) if single is None else _read(single[2], name)
-                return How(value) if name == "how" else value
-            if single is not None and name in PairResult.__slots__:
-                self._open(*single)
+            if name in PairResult.__slots__ and self._single is not None:
+                self._open(*self._single)
                 return getattr(self, name)
             raise AttributeError(f"no field {name!r}; there are {', '.join(FIELDS)}")
 
         def _open(self, A, B, memory: bytearray, certify: Callable) -> None:
             poses = np.frombuffer(memory, np.float64, 32, PAIR_DTYPE.itemsize).reshape(2, 1, 4, 4)
             self.__init__(np.frombuffer(memory, PAIR_DTYPE, 1), True, (A, B, *poses), certify)
-
-    def __dir__(self):
-        return [*super().__dir__(), *FIELDS]
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -265,17 +254,31 @@ def zeroed_rows(n: int, dtype: np.dtype) -> np.ndarray:
     return np.frombuffer(bytearray(n * dtype.itemsize), dtype)
 
 
-def _read(memory: bytearray, field: str):
-    """A field of the row that memory begins with: a number of Python's, or a vector of its own."""
-    if field in _NUMBERS:
-        unpack, at = _NUMBERS[field]
-        return unpack(memory, at)[0]
-    return np.frombuffer(memory, *_VECTORS[field]).copy()
-
-
 def only_value(column: np.ndarray):
     """What a column of one row holds: a number of Python's, or a vector of its own."""
     return column[0].copy() if column.ndim > 1 else column[0].item()
+
+
+def _field(name: str) -> property:
+    """A field of a `PairResult`: a number of Python's, or a vector of its own; of batches a column."""
+    unpack, at = _NUMBERS.get(name, (None, 0))
+    dtype, length, begin = _VECTORS.get(name, (np.dtype("f8"), 0, 0))
+
+    def field(self: PairResult) -> Any:
+        if self._single is None:
+            value = only_value(self.rows[name]) if self.is_single else self.rows[name]
+        elif unpack is None:
+            return np.frombuffer(self._single[2], dtype, length, begin).copy()
+        else:
+            (value,) = unpack(self._single[2], at)
+        return How(value) if name == "how" and value.__class__ is int else value  # type: ignore[call-arg]
+
+    return property(field, doc=f"``{name}``, as in the table of `collide.results`.")
+
+
+if not TYPE_CHECKING:
+    for _name in FIELDS:
+        setattr(PairResult, _name, _field(_name))
 
 
 def question_of_row(question: Question, k: int) -> Question:

@@ -166,6 +166,41 @@ static PyObject *prepared(PyObject *module, PyObject *arguments)
     return made;
 }
 
+/* --- numbers of rows ----------------------------------------------------------------------------------------------- */
+
+static PyObject *vector_of(const double *values)
+{
+    npy_intp length = 3;
+    PyObject *vector = PyArray_SimpleNew(1, &length, NPY_DOUBLE);
+    if (vector != NULL) memcpy(PyArray_DATA((PyArrayObject *)vector), values, 3 * sizeof *values);
+    return vector;
+}
+
+static PyObject *middle_of(const double *a, const double *b)
+{
+    double middle[3];
+    int k;
+    for (k = 0; k < 3; k++) middle[k] = 0.5 * a[k] + 0.5 * b[k];
+    return vector_of(middle);
+}
+
+/* row_fields(row): (distance, normal, point_a, point_b, their middle, part_a, part_b, hit) of bytes that begin with a row of PAIR_DTYPE.
+   Vectors are arrays (3,) of their own. */
+static PyObject *row_fields(PyObject *module, PyObject *given)
+{
+    const collide_pair *row = NULL;
+    if (PyByteArray_Check(given) && PyByteArray_Size(given) >= (Py_ssize_t)sizeof *row)
+        row = (const collide_pair *)(const void *)PyByteArray_AsString(given);
+    else if (PyBytes_Check(given) && PyBytes_Size(given) >= (Py_ssize_t)sizeof *row)
+        row = (const collide_pair *)(const void *)PyBytes_AsString(given);
+    if (row == NULL) {
+        PyErr_SetString(PyExc_TypeError, "row_fields: bytes or a bytearray that begins with a row");
+        return NULL;
+    }
+    return Py_BuildValue("dNNNNiiO", row->distance, vector_of(row->normal), vector_of(row->point_a), vector_of(row->point_b),
+                         middle_of(row->point_a, row->point_b), row->part_a, row->part_b, row->hit ? Py_True : Py_False);
+}
+
 /* --- queries of two shapes at one pair of poses, and at many -------------------------------------------------------- */
 
 enum word {
@@ -442,6 +477,32 @@ static PyObject *ask_contacts(PyObject *self, PyObject *const *given, Py_ssize_t
     return long_way(query, given, n, names);
 }
 
+/* nearest_of_pair(A, B, X_WA, X_WB, signed): the fields of the row of `distance`; None where that has to be asked. */
+static PyObject *nearest_of_pair(PyObject *module, PyObject *const *given, Py_ssize_t n)
+{
+    const struct query *query = &queries[1];
+    PyObject *single, *memory, *answer, *arguments[5];
+    int found;
+    if (n != 5) return wrong_count("nearest_of_pair", 5, n);
+    if (query->prepare == NULL || matrix_of(given[2]) == NULL || matrix_of(given[3]) == NULL) Py_RETURN_NONE;
+    if ((found = single_of(query, given, DISTANCE, &single)) < 0) return NULL;
+    if (!found) Py_RETURN_NONE;
+    if ((memory = PyByteArray_FromStringAndSize(NULL, sizeof(collide_pair))) == NULL) {
+        Py_DECREF(single);
+        return NULL;
+    }
+    memset(PyByteArray_AsString(memory), 0, sizeof(collide_pair));
+    arguments[0] = given[2], arguments[1] = given[3], arguments[2] = memory, arguments[3] = given[4];
+    arguments[4] = query->usual_length;
+    answer = answer_of_single(single, arguments, 5);
+    if (answer != NULL && answer != Py_None) {
+        Py_DECREF(answer);
+        answer = row_fields(module, memory);
+    }
+    Py_DECREF(memory);
+    return answer;
+}
+
 static int keep(PyObject **place, PyObject *object)
 {
     Py_XINCREF(object);
@@ -615,6 +676,8 @@ static PyMethodDef methods[] = {
     {"address_of", address_of, METH_O, NULL},
     {"code_of", code_of, METH_O, NULL},
     {"builtin_of", builtin_of, METH_VARARGS, NULL},
+    {"nearest_of_pair", (PyCFunction)(void (*)(void))nearest_of_pair, METH_FASTCALL, NULL},
+    {"row_fields", row_fields, METH_O, NULL},
     {NULL, NULL, 0, NULL},
 };
 

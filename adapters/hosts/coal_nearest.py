@@ -45,15 +45,22 @@ class Nearest(NamedTuple):
     facets_2: np.ndarray | None = None
 
 
-class GeometryPair:
-    """Two geometries at poses (4, 4), with the shapes and swept radii [m] that they have now."""
+class GeometryPair(NamedTuple):
+    """Two geometries at poses (4, 4), with the shapes and swept radii [m] that they had when they were asked."""
 
-    __slots__ = ("X1", "X2", "g1", "g2", "radius_1", "radius_2", "shapes_1", "shapes_2")
+    g1: CollisionGeometry
+    X1: np.ndarray
+    g2: CollisionGeometry
+    X2: np.ndarray
+    shapes_1: tuple[Shape, ...]
+    shapes_2: tuple[Shape, ...]
+    radius_1: float
+    radius_2: float
 
-    def __init__(self, g1: CollisionGeometry, X1: np.ndarray, g2: CollisionGeometry, X2: np.ndarray):
-        self.g1, self.X1, self.g2, self.X2 = g1, X1, g2, X2
-        self.shapes_1, self.shapes_2 = g1._shapes, g2._shapes
-        self.radius_1, self.radius_2 = g1._radius_swept, g2._radius_swept
+    @classmethod
+    def now(cls, g1: CollisionGeometry, X1: np.ndarray, g2: CollisionGeometry, X2: np.ndarray) -> GeometryPair:
+        """With what the geometries have now."""
+        return cls(g1, X1, g2, X2, g1._shapes, g2._shapes, g1._radius_swept, g2._radius_swept)
 
     def is_of_two_shapes(self) -> bool:
         """Whether each geometry is one shape, and one of the two has an end."""

@@ -58,7 +58,7 @@ def _patch_rows(g1, X1, g2, X2, collision_result, tolerance: float) -> np.ndarra
     """Contacts that may belong to a patch: those no more than twice the tolerance less deep than the deepest."""
     if isinstance(g1, (Plane, Halfspace)) and isinstance(g2, (Plane, Halfspace)):
         return np.zeros(0)
-    answer = nearest(GeometryPair(g1, X1, g2, X2), 0.0, np.inf, False)
+    answer = nearest(GeometryPair.now(g1, X1, g2, X2), 0.0, np.inf, False)
     radii = g1._radius_swept + g2._radius_swept
     reach = max(0.0, float(answer.distance) + radii) + 2.0 * tolerance
     return engine.contacts(*answer.shapes, X1, X2, margin=reach, max_contacts=_CORNERS).rows

@@ -8,7 +8,6 @@ have; `computeContactPatch` has the rest.
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
 
@@ -17,15 +16,19 @@ from collide.adapters.hosts.coal_enums import OBJECT_TYPE
 from collide.adapters.hosts.coal_geometry import CollisionGeometry, CollisionObject, checked_geometry, pose_of
 from collide.adapters.hosts.coal_nearest import GeometryPair, Nearest, nearest
 from collide.adapters.hosts.coal_requests import Contact
-from collide.adapters.hosts.fcl_facets import contacts_of_facets
+from collide.adapters.hosts.coal_transform import Transform3s
+from collide.adapters.hosts.facet_contacts import FacetContact, contacts_of_facets, deciding_contact
 from collide.adapters.hosts.host_numbers import real, whole
+from collide.adapters.hosts.nearest_points import nearest_points
 from collide.errors import InvalidArgument
 from collide.pairs.query import collide as hits
 
 #: How many contacts of two meshes are looked at where those are wanted that are deeper than something.
 _ALL = 1 << 30
+#: Where `nearest_points` says whether bodies meet.
+_HIT = 7
 #: How many pairs' bounds of the distance wait in a result at most, until they are worked out.
-_MAX_BOUNDS = 16
+_MAX_BOUNDS = 1024
 
 
 def collide(*args):
@@ -49,8 +52,7 @@ def collide(*args):
     TypeError
         For arguments of other types.
     """
-    g1, X1, g2, X2, request, result = asked("collide", args, 2)
-    return collide_posed(g1, X1, g2, X2, request, result)
+    return collide_posed(*asked("collide", args, 2))
 
 
 def collide_posed(g1, X1, g2, X2, request, result) -> int:
@@ -58,29 +60,37 @@ def collide_posed(g1, X1, g2, X2, request, result) -> int:
 
     Of two sets that are a shape each, the boolean is decided, and the rest is worked out when it is read.
     """
-    limit, margin = _checked(request)
+    limit, margin = request.num_max_contacts, request.security_margin
+    if limit.__class__ is not int or limit < 1 or margin.__class__ is not float or not -math.inf < margin < math.inf:
+        limit, margin = _checked(request)
     contacts = result._contacts
     n_wanted = limit - len(contacts)
     if n_wanted < 1:
         return len(contacts)
-    pair = _Asked(g1, X1, g2, X2)
-    if margin < 0.0 or not pair.is_of_two_shapes() or (n_wanted > 1 and (g1._has_parts or g2._has_parts)):
+    shapes_1, shapes_2 = g1._shapes, g2._shapes
+    if (
+        margin < 0.0 or len(shapes_1) != 1 or len(shapes_2) != 1 or (g1._box is None and g2._box is None)
+        or (n_wanted > 1 and (g1._has_parts or g2._has_parts))
+    ):
+        pair = GeometryPair.now(g1, X1, g2, X2)
         rows, bound = _worked_out(pair, request.enable_contact, margin, request.distance_upper_bound, n_wanted)
         for row in rows:
             contacts.append(contact_of(g1, g2, *row))
         result.distance_lower_bound = min(result.distance_lower_bound, bound)
         return len(contacts)
-    reach = margin + pair.radius_1 + pair.radius_2
-    A, B = pair.shapes_1[0], pair.shapes_2[0]
+    radius_1, radius_2 = g1._radius_swept, g2._radius_swept
+    reach = margin + radius_1 + radius_2
+    A, B = shapes_1[0], shapes_2[0]
     is_within = hits(A, B, X1, X2, security_margin=reach) if reach else hits(A, B, X1, X2)
-    pair.keep(request.enable_contact, margin, request.distance_upper_bound)
+    # Programs change poses in place, and shapes are never changed. Bytes are made in half the time of an array.
+    asked_pair = g1, X1.tobytes(), g2, X2.tobytes(), shapes_1, shapes_2, radius_1, radius_2
+    question = asked_pair, request.enable_contact, margin, request.distance_upper_bound
     if is_within:
         contact = object.__new__(Contact)  # the constructor's defaults would be thrown away
-        contact.o1, contact.o2 = g1, g2
-        contact._postpone(pair.contact)
+        contact.__dict__ = {"o1": g1, "o2": g2, "_work": (_only_contact, question)}
         contacts.append(contact)
     bounds = result._bounds_to_come
-    bounds.append(pair.bound)
+    bounds.append((_bound, question))
     if len(bounds) > _MAX_BOUNDS:
         result.distance_lower_bound  # noqa: B018 - works them out
     return len(contacts)
@@ -88,9 +98,8 @@ def collide_posed(g1, X1, g2, X2, request, result) -> int:
 
 def _checked(request) -> tuple[int, float]:
     """The number of contacts and the margin [m]. Raises InvalidArgument, TypeError."""
-    limit, margin = request.num_max_contacts, request.security_margin
-    if limit.__class__ is not int or margin.__class__ is not float:
-        limit, margin = whole("num_max_contacts", limit), real("security_margin", margin)
+    limit = whole("num_max_contacts", request.num_max_contacts)
+    margin = real("security_margin", request.security_margin)
     if limit < 1:
         raise InvalidArgument(f"num_max_contacts must be at least 1, got {request.num_max_contacts}")
     if not -math.inf < margin < math.inf:
@@ -98,32 +107,42 @@ def _checked(request) -> tuple[int, float]:
     return limit, margin
 
 
-class _Asked(GeometryPair):
-    """A pair of which a contact's fields and a bound of the distance are worked out once, when one of them is read."""
+def _pair_as_asked(g1, X1: bytes, g2, X2: bytes, *rest) -> GeometryPair:
+    return GeometryPair(g1, np.ndarray((4, 4), buffer=X1), g2, np.ndarray((4, 4), buffer=X2), *rest)
 
-    __slots__ = ("_answer", "_question")
 
-    _answer: tuple[list[tuple], float] | None
-    #: Whether contacts are wanted, the margin [m], the distance beyond which a bound is enough [m].
-    _question: tuple[bool, float, float]
+def _only_contact(asked_pair: tuple, enable_contact, margin: float, upper_bound: float) -> tuple:
+    """The fields `Contact._later` of two shapes within the margin."""
+    pair = _pair_as_asked(*asked_pair)
+    g1, X1, g2, X2, (A, *_), (B, *_), radius_1, radius_2 = pair
+    if enable_contact and not (g1._has_parts or g2._has_parts or radius_1 or radius_2):
+        distance, normal, point_1, point_2, middle, _, _, _ = nearest_points(A, B, X1, X2)
+        return -1, -1, normal, distance, [point_1, point_2], middle
+    by_facets = _is_facet_by_facet(pair)
+    if enable_contact and (by_facets or not (g1._has_parts or g2._has_parts)):
+        answer = nearest_points(A, B, X1, X2, not by_facets)
+        if by_facets and answer[_HIT]:
+            b1, b2, normal, point_1, point_2, middle, depth = _deciding_contact(pair, answer)
+            return b1, b2, normal, depth, [point_1, point_2], middle
+        return _of_answer(pair, answer)
+    ((b1, b2, normal, point_1, point_2, depth),) = _worked_out(pair, enable_contact, margin, upper_bound, 1)[0]
+    return _fields(b1, b2, normal, point_1, point_2, depth)
 
-    def keep(self, *question) -> None:
-        """Takes copies of the poses, which programs change in place; shapes are never changed."""
-        self.X1, self.X2, self._question, self._answer = self.X1.copy(), self.X2.copy(), question, None
 
-    def _worked_out(self) -> tuple[list[tuple], float]:
-        answer = self._answer
-        if answer is None:
-            answer = self._answer = _worked_out(self, *self._question, 1)
-        return answer
+def _of_answer(pair: GeometryPair, answer: tuple) -> tuple:
+    """The same from `nearest_points` of the shapes, with depths: the balls swept over them taken off."""
+    distance, normal, point_1, point_2, middle, part_1, part_2, _ = answer
+    r1, r2 = pair.radius_1, pair.radius_2
+    if r1 or r2:
+        distance, point_1, point_2 = distance - (r1 + r2), point_1 + r1 * normal, point_2 - r2 * normal
+        middle = 0.5 * point_1 + 0.5 * point_2
+    b1, b2 = part_1 if pair.g1._has_parts else -1, part_2 if pair.g2._has_parts else -1
+    return b1, b2, normal, distance, [point_1, point_2], middle
 
-    def bound(self) -> float:
-        """What the distance less the margin is at least [m]."""
-        return self._worked_out()[1]
 
-    def contact(self) -> tuple:
-        """The fields of the contact, in the order of `Contact._later`."""
-        return _fields(*self._worked_out()[0][0])
+def _bound(asked_pair: tuple, enable_contact, margin: float, upper_bound: float) -> float:
+    """What the distance less the margin is at least [m]."""
+    return _worked_out(_pair_as_asked(*asked_pair), enable_contact, margin, upper_bound, 1)[1]
 
 
 def _worked_out(
@@ -140,7 +159,11 @@ def _worked_out(
     lower = float(answer.lower)
     rows: list[tuple] = []
     is_within = answer.is_within
-    if is_within and are_meshes and answer.distance <= 0.0:
+    if is_within and n_wanted == 1 and answer.distance <= 0.0 <= margin and enable_contact and _is_facet_by_facet(pair):
+        answer_of_facets = nearest_points(pair.shapes_1[0], pair.shapes_2[0], pair.X1, pair.X2, False)
+        b1, b2, normal, point_1, point_2, _, lower = _deciding_contact(pair, answer_of_facets)
+        rows = [(b1, b2, normal, point_1, point_2, lower)]
+    elif is_within and are_meshes and answer.distance <= 0.0:
         rows, lower = _facet_rows(pair, margin, n_wanted, bool(enable_contact) or margin < 0.0)
         is_within = bool(rows) or margin >= 0.0
     elif is_within and has_parts and enable_contact and (n_wanted > 1 or answer.distance <= 0.0):
@@ -186,6 +209,25 @@ def _facet_rows(pair: GeometryPair, margin: float, n_wanted: int, with_geometry:
     return rows, -deepest
 
 
+def _is_facet_by_facet(pair: GeometryPair) -> bool:
+    """Whether a mesh is asked with a mesh or a solid that has an end: one contact is then of the facets that decide."""
+    g1, g2 = pair.g1, pair.g2
+    kinds = {g1._object_type, g2._object_type}
+    is_asked = OBJECT_TYPE.OT_BVH in kinds and kinds <= {OBJECT_TYPE.OT_BVH, OBJECT_TYPE.OT_GEOM}
+    return is_asked and g1._box is not None and g2._box is not None and pair.is_of_two_shapes()
+
+
+def _deciding_contact(pair: GeometryPair, answer: tuple) -> FacetContact:
+    """Of bodies whose facets meet; the balls swept over solids added to the depth.   answer : of `nearest_points`."""
+    contact = deciding_contact(pair.shapes_1[0], pair.shapes_2[0], pair.X1, pair.X2, answer)
+    r1, r2, normal = pair.radius_1, pair.radius_2, contact.normal
+    if not (r1 or r2):
+        return contact
+    point_a, point_b = contact.point_a + r1 * normal, contact.point_b - r2 * normal
+    middle = 0.5 * point_a + 0.5 * point_b
+    return contact._replace(point_a=point_a, point_b=point_b, middle=middle, distance=contact.distance - (r1 + r2))
+
+
 def _rows(pair: GeometryPair, answer: Nearest, margin: float, limit: int) -> list[tuple]:
     """The contact manifold of the shapes that decided, the deepest first."""
     swept_1, swept_2 = pair.radius_1, pair.radius_2
@@ -220,8 +262,9 @@ def distance(*args):
     Returns
     -------
     float
-        [m]. Of bodies that overlap minus their depth, 0 without ``enable_signed_distance``; 0 of two meshes, which have
-        no inside; −1.8e308 of planes and half-spaces that no translation takes apart.
+        [m]. Of bodies that overlap minus their depth, of a mesh and a solid that of one facet that meets it, 0 without
+        ``enable_signed_distance``; 0 of two meshes, which have no inside; −1.8e308 of planes and half-spaces that no
+        translation takes apart.
 
     Raises
     ------
@@ -230,38 +273,37 @@ def distance(*args):
     TypeError
         For arguments of other types.
     """
-    g1, X1, g2, X2, request, result = asked("distance", args, 2)
-    return distance_posed(g1, X1, g2, X2, request, result)
+    return distance_posed(*asked("distance", args, 2))
 
 
 def distance_posed(g1, X1, g2, X2, request, result) -> float:
     """The same of geometries at poses (4, 4)."""
-    are_meshes = g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
-    is_signed = bool(request.enable_signed_distance) and not are_meshes
-    pair = GeometryPair(g1, X1, g2, X2)
     result.o1, result.o2 = g1, g2
-    if pair.is_of_two_shapes():
-        gap = engine.distance(pair.shapes_1[0], pair.shapes_2[0], X1, X2, signed=is_signed)
-        least, radii = gap.distance, pair.radius_1 + pair.radius_2
-        if radii and (is_signed or not gap.hit):
-            least -= radii
-        result.min_distance = least
-        result._postpone(partial(_of_gap, gap, pair.radius_1, pair.radius_2, g1._has_parts, g2._has_parts))
+    shapes_1, shapes_2, radius_1, radius_2 = g1._shapes, g2._shapes, g1._radius_swept, g2._radius_swept
+    is_signed = bool(request.enable_signed_distance)
+    if len(shapes_1) == len(shapes_2) == 1 and not (
+        g1._has_parts or g2._has_parts or radius_1 or radius_2 or (g1._box is None and g2._box is None)
+    ):
+        least, normal, point_1, point_2, _, _, _, _ = nearest_points(shapes_1[0], shapes_2[0], X1, X2, is_signed)
+        result._fill(least, normal, [point_1, point_2], -1, -1)
         return least
+    is_signed = is_signed and not g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
+    pair = GeometryPair(g1, X1, g2, X2, shapes_1, shapes_2, radius_1, radius_2)
+    if pair.is_of_two_shapes():
+        by_facets = is_signed and _is_facet_by_facet(pair)
+        answer = nearest_points(pair.shapes_1[0], pair.shapes_2[0], X1, X2, is_signed and not by_facets)
+        if by_facets and answer[_HIT]:
+            b1, b2, normal, point_1, point_2, _, least = _deciding_contact(pair, answer)
+            result._fill(least, normal, [point_1, point_2], b1, b2)
+        else:
+            b1, b2, normal, least, points, _ = _of_answer(pair, answer)
+            result._fill(answer[0] if answer[_HIT] and not is_signed else least, normal, points, b1, b2)
+        return result.min_distance
     answer = nearest(pair, 0.0, math.inf, is_signed)
-    result.min_distance = answer.distance
-    result.normal, result.nearest_points = np.array(answer.normal), [np.array(answer.point_1), np.array(answer.point_2)]
-    result.b1, result.b2 = _of_whole(answer.facets_1, answer.part_1), _of_whole(answer.facets_2, answer.part_2)
+    b1, b2 = _of_whole(answer.facets_1, answer.part_1), _of_whole(answer.facets_2, answer.part_2)
+    points = [np.array(answer.point_1), np.array(answer.point_2)]
+    result._fill(answer.distance, np.array(answer.normal), points, b1, b2)
     return result.min_distance
-
-
-def _of_gap(gap, radius_1: float, radius_2: float, has_parts_1: bool, has_parts_2: bool) -> tuple:
-    """The fields `DistanceResult._later` of a result of `collide.distance`."""
-    row = gap.rows[0]
-    normal, points = np.array(row["normal"]), [np.array(row["point_a"]), np.array(row["point_b"])]
-    if radius_1 or radius_2:
-        points = [points[0] + radius_1 * normal, points[1] - radius_2 * normal]
-    return normal, points, int(row["part_a"]) if has_parts_1 else -1, int(row["part_b"]) if has_parts_2 else -1
 
 
 class _OfTwo:
@@ -287,6 +329,10 @@ class ComputeDistance(_OfTwo):
 
 def asked(name: str, args: tuple, n_more: int) -> tuple:
     """(g1, X1, g2, X2, …) of both forms of a query's arguments. Raises TypeError."""
+    if len(args) == 4 + n_more and args[1].__class__ is args[3].__class__ is Transform3s:
+        g1, tf1, g2, tf2 = args[:4]
+        if isinstance(g1, CollisionGeometry) and isinstance(g2, CollisionGeometry):
+            return g1, tf1._X, g2, tf2._X, *args[4:]
     if len(args) == 2 + n_more and isinstance(args[0], CollisionObject) and isinstance(args[1], CollisionObject):
         o1, o2, *more = args
         return o1._geometry, o1._X, o2._geometry, o2._X, *more

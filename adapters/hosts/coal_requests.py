@@ -153,7 +153,8 @@ class CollisionResult(QueryResult):
     def distance_lower_bound(self):
         """[m]; of pairs that were asked since it was last read, it is worked out now."""
         while self._bounds_to_come:
-            self._bound = min(self._bound, self._bounds_to_come.pop()())
+            work, question = self._bounds_to_come.pop()
+            self._bound = min(self._bound, work(*question))
         return self._bound
 
     @distance_lower_bound.setter
@@ -205,6 +206,9 @@ class DistanceResult(FieldsWhenRead, QueryResult):
         self.min_distance = _MAX
         self.o1 = self.o2 = None
         self._postpone(_nothing)
+
+    def _fill(self, least: float, normal: np.ndarray, points: list, b1: int, b2: int) -> None:
+        self.min_distance, self.normal, self.nearest_points, self.b1, self.b2 = least, normal, points, b1, b2
 
     def getNearestPoint1(self):
         """A copy (3,): of the first body."""

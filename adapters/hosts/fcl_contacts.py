@@ -7,12 +7,14 @@ import math
 import numpy as np
 
 import collide as engine
-from collide.adapters.hosts.fcl_facets import contact_when_read, facet_contact, facet_contacts, new_contact
+from collide.adapters.hosts.fcl_facets import facet_contact, facet_contacts, new_contact
 from collide.adapters.hosts.fcl_geometry import CollisionObject
 from collide.adapters.hosts.fcl_requests import NODE_TYPE, OBJECT_TYPE, Contact
+from collide.adapters.hosts.nearest_points import nearest_points
 from collide.errors import CollideError
 
 _PLAIN, _MESH = OBJECT_TYPE.OT_GEOM, OBJECT_TYPE.OT_BVH
+_CONVEX = NODE_TYPE.GEOM_CONVEX
 FLAT = (NODE_TYPE.GEOM_PLANE, NODE_TYPE.GEOM_HALFSPACE)
 
 
@@ -24,9 +26,10 @@ def ordered(o1: CollisionObject, o2: CollisionObject) -> tuple[CollisionObject, 
 
 def nearest_sides(o1: CollisionObject, o2: CollisionObject):
     """The shapes, of a plane that half-space out of which the way is shorter."""
-    pairs = [(A, B) for A in o1._geometry._shapes for B in o2._geometry._shapes]
-    if len(pairs) == 1:
-        return pairs[0]
+    shapes_1, shapes_2 = o1._geometry._shapes, o2._geometry._shapes
+    if len(shapes_1) == len(shapes_2) == 1:
+        return shapes_1[0], shapes_2[0]
+    pairs = [(A, B) for A in shapes_1 for B in shapes_2]
     return max(pairs, key=lambda pair: engine.distance(pair[0], pair[1], o1._X, o2._X).distance)
 
 
@@ -36,6 +39,8 @@ def contacts_of(o1: CollisionObject, o2: CollisionObject, limit: int, with_geome
     with_geometry : whether normals, places and depths are wanted; else they are 0.
     """
     g1, g2 = o1._geometry, o2._geometry
+    if limit == 1 and g1._object_type == g2._object_type == _PLAIN and g1._box is not None and g2._box is not None:
+        return [_contact_of_solids(o1, o2, with_geometry)]
     if g1._object_type == g2._object_type == _MESH:
         return [facet_contact(o1, o2, with_geometry)] if limit == 1 else facet_contacts(o1, o2, limit, with_geometry)
     if not with_geometry:
@@ -46,12 +51,7 @@ def contacts_of(o1: CollisionObject, o2: CollisionObject, limit: int, with_geome
         return [facet_contact(o1, o2, True)]
     if _coincide(o1, o2) and (contact := _contact_along_x(o1, o2)) is not None:
         return [contact]
-    if limit == 1 and len(g1._shapes) == len(g2._shapes) == 1:
-        X_WA, X_WB = o1._X.copy(), o2._X.copy()
-        return [contact_when_read(g1, g2, _only_contact, g1, g2, g1._shapes[0], g2._shapes[0], X_WA, X_WB)]
     A, B = nearest_sides(o1, o2)
-    if limit == 1:
-        return [new_contact(g1, g2, *_only_contact(g1, g2, A, B, o1._X, o2._X))]
     rows = engine.contacts(A, B, o1._X, o2._X, max_contacts=limit).rows
     if not len(rows):
         return [new_contact(g1, g2, *_touching(g1, g2, A, B, o1._X, o2._X))]
@@ -59,10 +59,25 @@ def contacts_of(o1: CollisionObject, o2: CollisionObject, limit: int, with_geome
     return _of_rows(rows, [(o1, o2)] * len(rows))
 
 
+def _contact_of_solids(o1: CollisionObject, o2: CollisionObject, with_geometry: bool) -> Contact:
+    """The one contact of two convex sets that have an end."""
+    g1, g2, X_WA, X_WB = o1._geometry, o2._geometry, o1._X, o2._X
+    if not with_geometry:
+        return new_contact(g1, g2, -1, -1, np.zeros(3), np.zeros(3), 0.0)
+    if g1._node_type == g2._node_type == _CONVEX and _coincide(o1, o2):
+        contact = _contact_along_x(o1, o2)
+        if contact is not None:
+            return contact
+    distance, normal, _, _, pos, _, _, _ = nearest_points(g1._shapes[0], g2._shapes[0], X_WA, X_WB)
+    return new_contact(g1, g2, -1, -1, normal, pos, -distance if distance < 0.0 else 0.0)
+
+
 def _coincide(o1: CollisionObject, o2: CollisionObject) -> bool:
     """Whether two hulls are one hull at one pose."""
     g1, g2 = o1._geometry, o2._geometry
-    if not g1._node_type == g2._node_type == NODE_TYPE.GEOM_CONVEX or not np.array_equal(o1._X, o2._X):
+    if not g1._node_type == g2._node_type == _CONVEX or o1._X.item(3) != o2._X.item(3):
+        return False
+    if not np.array_equal(o1._X, o2._X):
         return False
     return g1 is g2 or np.array_equal(g1._shapes[0].points, g2._shapes[0].points)
 
@@ -133,24 +148,6 @@ def _is_one_facet(o1: CollisionObject, o2: CollisionObject, limit: int) -> bool:
     return limit == 1 and g1._object_type == _MESH and g2._object_type == _PLAIN and g2._node_type not in FLAT
 
 
-def _only_contact(g1, g2, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple:
-    """The fields `Contact._later` of shapes that meet, where one contact is wanted."""
-    rows = engine.contacts(A, B, X_WA, X_WB, max_contacts=1).rows
-    if not len(rows):
-        return _touching(g1, g2, A, B, X_WA, X_WB)
-    return _of_row(g1, g2, rows, ("facet_a", "facet_b"))
-
-
-def _of_row(g1, g2, rows: np.ndarray, facets: tuple[str, str]) -> tuple:
-    """The fields `Contact._later` of one row; facets : the names of the columns that have facets' numbers."""
-    pos = 0.5 * rows["point_a"][0] + 0.5 * rows["point_b"][0]
-    b1 = b2 = -1
-    if g1._object_type != _PLAIN:  # which stands first
-        b1 = _number(g1, rows[facets[0]].item(), rows["part_a"].item())
-        b2 = _number(g2, rows[facets[1]].item(), rows["part_b"].item())
-    return b1, b2, rows["normal"][0].copy(), pos, max(0.0, -rows["distance"].item())
-
-
 def _of_rows(rows: np.ndarray, pairs: list) -> list[Contact]:
     """A contact a row, of the pair of objects beside it."""
     normals, positions = list(rows["normal"].copy()), list(0.5 * rows["point_a"] + 0.5 * rows["point_b"])
@@ -168,7 +165,8 @@ def _of_rows(rows: np.ndarray, pairs: list) -> list[Contact]:
 
 def _touching(g1, g2, A, B, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple:
     """The fields `Contact._later` of bodies that touch within rounding, where no facets say where."""
-    return _of_row(g1, g2, engine.distance(A, B, X_WA, X_WB).rows, ("part_a", "part_b"))
+    distance, normal, _, _, pos, part_a, part_b, _ = nearest_points(A, B, X_WA, X_WB)
+    return _number(g1, part_a, part_a), _number(g2, part_b, part_b), normal, pos, max(0.0, -distance)
 
 
 def _number(geometry, facet: int, part: int) -> int:

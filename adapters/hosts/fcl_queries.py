@@ -6,8 +6,6 @@ came first; results collect over calls.
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 import collide as engine
@@ -23,6 +21,7 @@ from collide.adapters.hosts.fcl_requests import (
 )
 from collide.adapters.hosts.fcl_transform import Transform
 from collide.adapters.hosts.host_numbers import whole
+from collide.adapters.hosts.nearest_points import nearest_points
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.pairs.query import collide as hits
 
@@ -51,19 +50,20 @@ def collide(o1, o2, request=None, result=None):
     TypeError
         Where arguments are no collision objects.
     """
-    if not (isinstance(o1, CollisionObject) and isinstance(o2, CollisionObject)):
-        raise TypeError(f"o1 and o2 must be CollisionObjects, got {type(o1).__name__} and {type(o2).__name__}")
+    if o1.__class__ is not CollisionObject or o2.__class__ is not CollisionObject:
+        _check_objects(o1, o2)
     limit, with_geometry = 1, False
     if request is not None:
-        limit, with_geometry = checked_limit(request), request.enable_contact
-        if limit == 0:
+        limit, with_geometry = request.num_max_contacts, request.enable_contact
+        if limit.__class__ is not int or limit < 1 or request.enable_cost:
+            limit = checked_limit(request)
+            if limit == 0:
+                return 0
+    shapes_1, shapes_2 = o1._geometry._shapes, o2._geometry._shapes
+    if len(shapes_1) == len(shapes_2) == 1:
+        if not hits(shapes_1[0], shapes_2[0], o1._X, o2._X):
             return 0
-    g1, g2 = o1._geometry, o2._geometry
-    if len(g1._shapes) == len(g2._shapes) == 1:
-        hit = hits(g1._shapes[0], g2._shapes[0], o1._X, o2._X)
-    else:
-        hit = meet(o1, o2)
-    if not hit:
+    elif not meet(o1, o2):
         return 0
     if result is None:
         return 1 if limit == 1 else len(contacts_of(*ordered(o1, o2), limit, with_geometry))
@@ -71,6 +71,11 @@ def collide(o1, o2, request=None, result=None):
     contacts = contacts_of(*ordered(o1, o2), limit, with_geometry)
     result.contacts.extend(contacts)
     return len(contacts)
+
+
+def _check_objects(o1, o2) -> None:
+    if not (isinstance(o1, CollisionObject) and isinstance(o2, CollisionObject)):
+        raise TypeError(f"o1 and o2 must be CollisionObjects, got {type(o1).__name__} and {type(o2).__name__}")
 
 
 def checked_limit(request: CollisionRequest) -> int:
@@ -114,39 +119,29 @@ def distance(o1, o2, request=None, result=None):
         [m]. Of objects that meet: minus their depth with ``enable_signed_distance``, −1 without it. Meshes have no
         inside: −1 in any case, but with planes and half-spaces, and 0 of two of them.
     """
-    if not (isinstance(o1, CollisionObject) and isinstance(o2, CollisionObject)):
-        raise TypeError(f"o1 and o2 must be CollisionObjects, got {type(o1).__name__} and {type(o2).__name__}")
+    if o1.__class__ is not CollisionObject or o2.__class__ is not CollisionObject:
+        _check_objects(o1, o2)
     o1, o2 = ordered(o1, o2)
     g1, g2 = o1._geometry, o2._geometry
     is_mesh = g1._object_type == OBJECT_TYPE.OT_BVH  # which stands first
-    both_meshes = is_mesh and g2._object_type == OBJECT_TYPE.OT_BVH
     signed = request is not None and bool(request.enable_signed_distance) and (not is_mesh or g2._node_type in FLAT)
-    if not (g1._shapes and g2._shapes):
+    shapes_1, shapes_2 = g1._shapes, g2._shapes
+    if not (shapes_1 and shapes_2):
         _refuse_unfinished(g1, g2)
-    if len(g1._shapes) == len(g2._shapes) == 1:
-        A, B = g1._shapes[0], g2._shapes[0]
+    if len(shapes_1) == len(shapes_2) == 1:
+        A, B = shapes_1[0], shapes_2[0]
     elif is_plane_with_pieces(o1, o2):
         return _plane_distance(o1, o2, signed, result)
     else:
         A, B = nearest_sides(o1, o2)
-    answer = engine.distance(A, B, o1._X, o2._X, signed=signed)
-    value = answer.distance
-    if not signed and answer.hit:
-        value = 0.0 if both_meshes else -1.0
+    value, _, point_1, point_2, _, part_1, part_2, is_hit = nearest_points(A, B, o1._X, o2._X, signed=signed)
+    if is_hit and not signed:
+        value = 0.0 if is_mesh and g2._object_type == OBJECT_TYPE.OT_BVH else -1.0
     if result is not None and result.min_distance > value:
-        result.min_distance, result.o1, result.o2 = value, g1, g2
-        result._postpone(partial(_of_result, answer, g1._object_type, g2._object_type))
+        result.min_distance, result.o1, result.o2, result.nearest_points = value, g1, g2, [point_1, point_2]
+        result.b1 = -1 if g1._object_type == OBJECT_TYPE.OT_GEOM else part_1  # which stands first
+        result.b2 = -1 if g2._object_type == OBJECT_TYPE.OT_GEOM else part_2
     return value
-
-
-def _of_result(answer, kind_1: int, kind_2: int) -> tuple:
-    """The fields `DistanceResult._later` of a result of `collide.distance`."""
-    rows = answer.rows
-    b1 = b2 = -1
-    if kind_1 != OBJECT_TYPE.OT_GEOM:  # which stands first
-        b1 = rows["part_a"].item()
-        b2 = rows["part_b"].item() if kind_2 != OBJECT_TYPE.OT_GEOM else -1
-    return [rows["point_a"][0].copy(), rows["point_b"][0].copy()], b1, b2
 
 
 def _plane_distance(o1: CollisionObject, o2: CollisionObject, signed: bool, result) -> float:

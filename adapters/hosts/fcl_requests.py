@@ -122,10 +122,8 @@ class DistanceRequest:
         self.gjk_solver_type = gjk_solver_type
 
 
-class DistanceResult(FieldsWhenRead):
+class DistanceResult:
     """The least distance of the calls that it was handed to."""
-
-    _later = ("nearest_points", "b1", "b2")
 
     def __init__(self, min_distance_=sys.float_info.max):
         self.min_distance = min_distance_

@@ -7,6 +7,7 @@ to 1,000 times as long as the boolean.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 
 class FieldsWhenRead:
@@ -15,21 +16,23 @@ class FieldsWhenRead:
     #: Names of the fields that may be worked out later.
     _later: tuple[str, ...] = ()
 
-    def _postpone(self, work: Callable[[], tuple]) -> None:
-        """Empties the fields; ``work`` returns their values, in the order of `_later`, when one is read."""
+    def _postpone(self, work: Callable[..., tuple], *question: Any) -> None:
+        """Empties the fields; ``work(*question)`` returns their values, in the order of `_later`, when one is read."""
         held = self.__dict__
-        for name in self._later:
-            held.pop(name, None)
-        held["_work"] = work
+        if "_work" not in held:
+            for name in self._later:
+                held.pop(name, None)
+        held["_work"] = work, question
 
     def __getattr__(self, name: str):  # of what is not there yet
         if name not in self._later or "_work" not in self.__dict__:
             raise AttributeError(f"{type(self).__name__} has no {name}")
-        work = self.__dict__["_work"]
-        for field, value in zip(self._later, work()):
-            self.__dict__.setdefault(field, value)  # a field that was set meanwhile stays
-        self.__dict__.pop("_work", None)
-        return self.__dict__[name]
+        held = self.__dict__
+        work, question = held["_work"]
+        for field, value in zip(self._later, work(*question)):
+            held.setdefault(field, value)  # a field that was set meanwhile stays
+        held.pop("_work", None)
+        return held[name]
 
     def __dir__(self):
         return [*super().__dir__(), *self._later]

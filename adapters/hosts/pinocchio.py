@@ -237,7 +237,7 @@ def distances(model, data, geom_model, geom_data, q, *, only: int | None = None)
     for row in np.flatnonzero(~in_batch).tolist():
         g1, X1, g2, X2 = _bodies(known, X, which[row])
         are_meshes = g1._has_parts and g2._has_parts
-        answer_of_pair = nearest(GeometryPair(g1, X1, g2, X2), 0.0, np.inf, bool(is_signed[row]) and not are_meshes)
+        answer_of_pair = nearest(GeometryPair.now(g1, X1, g2, X2), 0.0, np.inf, bool(is_signed[row]) and not are_meshes)
         for name in PairDistances._fields[1:]:
             getattr(answer, name)[row] = getattr(answer_of_pair, name)
     return answer

@@ -136,5 +136,5 @@ def meet(known: KnownPairs, X_1: np.ndarray, X_2: np.ndarray, which: np.ndarray,
             is_hit[row] = hits(g1._shapes[0], g2._shapes[0], X_1[row], X_2[row])
         else:
             margin = float(margins[row])
-            is_hit[row] = nearest(GeometryPair(g1, X_1[row], g2, X_2[row]), margin, 0.0, margin < 0.0).is_within
+            is_hit[row] = nearest(GeometryPair.now(g1, X_1[row], g2, X_2[row]), margin, 0.0, margin < 0.0).is_within
     return is_hit

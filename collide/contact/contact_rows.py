@@ -169,7 +169,7 @@ class Contacts:
         kind: Ints
 
     def __init__(self, rows: np.ndarray, starts: np.ndarray | None = None):
-        self.rows, self._starts = rows, starts
+        self.rows, self._starts, self._single = rows, starts, None
         rows.setflags(write=False)
         if starts is not None:
             starts.setflags(write=False)
@@ -188,8 +188,6 @@ class Contacts:
     if not TYPE_CHECKING:  # checkers are to know the fields above, and no others
 
         def __getattr__(self, name: str):
-            if name == "_single":
-                return None
             if name in FIELDS:
                 return self.rows[name]
             if name in Contacts.__slots__ and self._single is not None:

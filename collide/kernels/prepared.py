@@ -49,11 +49,23 @@ if MODE == COMPILED:
         """
         return glue.prepared(entry.__name__, header, rows)
 
+    #: ``row_fields(row)``: (distance, normal, point_a, point_b, their middle, part_a, part_b, hit) of bytes that begin
+    #: with a row of `PAIR_DTYPE`.
+    row_fields: Callable = glue.row_fields
+    #: ``nearest_of_pair(A, B, X_WA, X_WB, signed)``: `adapters.hosts.nearest_points`; None where
+    #: the question is left to the long way. None itself without a library.
+    nearest_of_pair: Callable | None = glue.nearest_of_pair
     #: ``query_of_c(function, doc, (min_length, max_length), (usual length, usual option), prepare, result, certify)``:
     #: a public function of single calls as one of C's; None without a library (`narrowphase/single_queries.py`).
     query_of_c: Callable | None = glue.query
 else:
-    query_of_c = None
+    query_of_c = nearest_of_pair = None
+
+    def row_fields(row) -> tuple:
+        numbers = np.frombuffer(row, np.float64, _DOUBLES).copy()
+        normal, point_a, point_b = numbers[3:].reshape(3, 3)
+        parts = np.frombuffer(row, np.int32, 2, 8 * _DOUBLES + 8).tolist()
+        return numbers.item(0), normal, point_a, point_b, 0.5 * point_a + 0.5 * point_b, *parts, bool(row[_HIT])
 
     def prepared_boolean(entry, header: np.ndarray) -> Callable:
         def asked(X_WA, X_WB):
@@ -90,6 +102,12 @@ else:
             return None if n < 0 else out[:n].tobytes()
 
         return asked
+
+
+#: Doubles that a pair's row begins with: the distance and its bounds, the normal, two points.
+_DOUBLES = 12
+#: The byte of a pair's row that says whether it meets.
+_HIT = 157
 
 
 def _truth_of(status: int) -> bool | None:

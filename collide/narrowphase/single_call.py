@@ -148,6 +148,12 @@ def distance_single(header_at, XA_at, XB_at, row_at, depths, limit):
 
     limit : the query's max_distance [m].
     """
+    return write_distance(header_at, XA_at, XB_at, row_at, depths, limit)
+
+
+@kernel
+def write_distance(header_at, XA_at, XB_at, row_at, depths, limit):
+    """`distance_single` for other kernels."""
     hit = _answer(header_at, XA_at, XB_at, False, depths, limit, row_at)
     row = view_row(row_at)
     row.words[BODY_B] = 1

@@ -26,8 +26,8 @@ class Shape:
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges",
         "_hulls_instead", "_kind", "_laid_out", "_leaves", "_meshed_leaves", "_partners",
-        "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_surface", "_topology", "_union",
-        "_vertex_set", "_walk",
+        "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_single_facets", "_surface", "_topology",
+        "_union", "_vertex_set", "_walk",
     )
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -50,6 +50,8 @@ class Shape:
     _walk: Any
     #: The shape as meshes meet it: facets under a tree, and a radius (`lowering/facet_bodies.py`), or two polytopes.
     _surface: Any
+    #: Facets with the shape, one by one (`narrowphase/facets/single_facets.py`).
+    _single_facets: Any
     #: Which facets of that share corners, for contacts (`contact/contact_facets.py`).
     _topology: Any
     #: Its parts, as unions with meshes ask about them (`narrowphase/composite/composite_parts.py`).

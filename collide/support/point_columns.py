@@ -18,6 +18,12 @@ def lay_out_points(points_at, n, columns_at, padded, reach_at):
 
     reach : a double, out: how far a point is from the origin at most, rounded upwards.   O(padded).
     """
+    return put_points(points_at, n, columns_at, padded, reach_at)
+
+
+@kernel
+def put_points(points_at, n, columns_at, padded, reach_at):
+    """`lay_out_points` for other kernels."""
     points, columns = view_f64(points_at, 3 * n), view_f64(columns_at, 3 * padded)
     largest = 0.0
     for k in range(n):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from collide.adapters.hosts import coal_api as coal
-from collide.adapters.hosts import coal_queries, fcl_contacts
+from collide.adapters.hosts import coal_queries, fcl_facets
 from collide.adapters.hosts import fcl_api as fcl
 from collide.adapters.hosts.fields_when_read import FieldsWhenRead
 
@@ -34,8 +34,8 @@ FCL = {
 }
 
 
-def values(contact):
-    return [np.array(getattr(contact, name)).tolist() for name in contact._later]
+def values(contact, names=()):
+    return [np.array(getattr(contact, name)).tolist() for name in names or contact._later]
 
 
 def coal_pairs():
@@ -94,10 +94,11 @@ def test_fcls_contacts_are_of_the_poses_that_were_asked():
         for result, gap in zip(results, gaps):
             fcl.collide(*objects, fcl.CollisionRequest(enable_contact=True), result)
             fcl.distance(*objects, fcl.DistanceRequest(), gap)
-        at_once = [values(c) for c in results[0].contacts], values(gaps[0])
+        nearest = "min_distance", "nearest_points", "b1", "b2"
+        at_once = [values(c) for c in results[0].contacts], values(gaps[0], nearest)
         objects[0].setTranslation(np.full(3, 50.0))
         n_contacts += len(results[1].contacts)
-        assert ([values(c) for c in results[1].contacts], values(gaps[1])) == at_once, (first, second)
+        assert ([values(c) for c in results[1].contacts], values(gaps[1], nearest)) == at_once, (first, second)
     assert 0.2 * N_PAIRS < n_contacts < 0.9 * N_PAIRS
 
 
@@ -105,9 +106,10 @@ def test_what_nobody_reads_is_not_worked_out(monkeypatch):
     def refuse(*_, **__):
         raise AssertionError("worked out without being asked for")
 
-    for module in (coal_queries, fcl_contacts):
-        for name in ("distance", "contacts"):
-            monkeypatch.setattr(module.engine, name, refuse)
+    for name in ("distance", "contacts"):
+        monkeypatch.setattr(coal_queries.engine, name, refuse)
+    for module in (coal_queries, fcl_facets):
+        monkeypatch.setattr(module, "nearest_points", refuse)
     n_hits = 0
     for g1, tf1, g2, tf2 in coal_pairs():
         if isinstance(g1, coal.Halfspace) and isinstance(g2, coal.Halfspace):
@@ -118,14 +120,14 @@ def test_what_nobody_reads_is_not_worked_out(monkeypatch):
             with pytest.raises(AssertionError, match="without being asked"):
                 result.getContact(0).normal  # noqa: B018 - reads it
     assert n_hits > 10
-    box, ball = fcl.CollisionObject(fcl.Box(1, 1, 1)), fcl.CollisionObject(fcl.Sphere(1))
+    mesh, ball = fcl.CollisionObject(surface(fcl.BVHModel())), fcl.CollisionObject(fcl.Sphere(1))
     result = fcl.CollisionResult()
-    assert fcl.collide(box, ball, fcl.CollisionRequest(enable_contact=True), result) == 1
+    assert fcl.collide(mesh, ball, fcl.CollisionRequest(enable_contact=True), result) == 1
 
 
 def test_bounds_that_nobody_reads_do_not_pile_up():
     box, far, result = coal.Box(1, 1, 1), coal.Transform3s(np.array([5.0, 0, 0])), coal.CollisionResult()
-    for k in range(1000):
+    for k in range(2 * coal_queries._MAX_BOUNDS):
         far.setTranslation(np.array([5.0 + k, 0, 0]))
         coal.collide(box, coal.Transform3s(), box, far, coal.CollisionRequest(), result)
         assert len(result._bounds_to_come) <= coal_queries._MAX_BOUNDS

@@ -93,12 +93,12 @@ class Fcl:
 
 
 class Coal:
-    """coal, or its stand-in: (hit, hit of Pinocchio's request without contacts, signed distance [m])."""
+    """coal, or its stand-in: (hit, hit of Pinocchio's request without contacts, signed distance [m], facets)."""
 
     def __init__(self, module: str):
         self.coal = import_module(module)
 
-    def answers(self, n: int, seed: int) -> list[tuple[bool, bool, float]]:
+    def answers(self, n: int, seed: int) -> list[tuple[bool, bool, float, tuple[int, int]]]:
         coal, replies = self.coal, []
         for pair in calls(n, seed, flat=True):
             a, b = (coal_geometry(coal, kind, s) for kind, s, _, _ in pair)
@@ -107,5 +107,6 @@ class Coal:
             no_contact.enable_contact = False
             asked, measured, result = coal.ComputeCollision(a, b), coal.ComputeDistance(a, b), coal.DistanceResult()
             hits = [asked(X_a, X_b, r, coal.CollisionResult()) > 0 for r in (request, no_contact)]
-            replies.append((*hits, float(measured(X_a, X_b, coal.DistanceRequest(), result))))
+            gap = float(measured(X_a, X_b, coal.DistanceRequest(), result))
+            replies.append((*hits, gap, (result.b1, result.b2)))
         return replies

@@ -24,7 +24,7 @@ from collide.narrowphase.facets import surface_distance as distances
 from collide.narrowphase.facets import winding_numbers as inside
 from collide.narrowphase.facets.exact_triangles import INTEGERS, decide_exactly
 from collide.narrowphase.facets.mesh_collide_kernel import SCRATCH
-from collide.narrowphase.facets.surface_collision import COUNTERS, FULL, SINGULAR, walk_surfaces
+from collide.narrowphase.facets.surface_collision import COUNTERS, FULL, PROGRESS, SINGULAR, walk_surfaces
 
 #: Pairs of boxes that wait in order; beyond them the walk of distances goes depth first.
 HEAP = 1 << 14
@@ -123,7 +123,7 @@ def _hit_keys(A: MeshTree, B: MeshTree, X_WA, X_WB, first_only: bool) -> tuple[n
     X_WA, X_WB, n = matched(X_WA, X_WB)
     work = workspace(stack_of(A, B))
     keys = np.empty(64 + n if first_only else 4096, dtype=np.int64)
-    progress = np.zeros(3, dtype=np.int64)
+    progress = np.zeros(PROGRESS, dtype=np.int64)
     starts, counters = np.zeros(n + 1, dtype=np.int64), np.zeros((n, COUNTERS), dtype=np.int64)
     while True:
         status = walk_surfaces(

@@ -33,8 +33,10 @@ APART, HIT, OPEN, NO_POSE, SINGULAR = range(5)
     STACK_AT, N_STACK, DOUBLES_AT, INTEGERS_AT, HEAP_AT, N_HEAP, SCRATCH_AT,
 ) = range(24)
 HEADER = 24
-#: Words of scratch: facet pairs (as many as a walk that stops at the first asks for), counters and marks, a result.
-KEYS, COUNTERS = 128, 8
+#: Words of scratch: facet pairs (as many as a walk that stops at the first asks for), counters and marks (of a walk two
+#: starts, its counters, its progress), a result.
+KEYS, COUNTERS = 128, 2 + surface_collision.COUNTERS + surface_collision.PROGRESS
+_PROGRESS = 2 + surface_collision.COUNTERS
 SCRATCH = KEYS + COUNTERS + RESULT + MARKS
 
 #: Cores of bodies with radii are looked for as far as the radii, and this much farther, so that a bracket decides.
@@ -211,7 +213,7 @@ def cores_state(space, pair, inside_at):
         space.surfaces,
         (
             pair.A.tree_at, pair.B.tree_at, pair.XA_at, 0, pair.XB_at, 0, 1, pair.same_tree, True, space.scratch_at,
-            KEYS, starts_at, starts_at + 16, starts_at + 40, space.stack_at, space.n_stack, space.doubles_at,
+            KEYS, starts_at, starts_at + 16, starts_at + 8 * _PROGRESS, space.stack_at, space.n_stack, space.doubles_at,
             space.integers_at, space.exact,
         ),
     )
@@ -223,6 +225,13 @@ def cores_state(space, pair, inside_at):
     if state == APART:
         state = inside_state(space, pair.B, pair.XB_at, pair.A, pair.XA_at, inside_at)
     return state
+
+
+@kernel(inline=True)
+def crossing_of(space):
+    """Where the triangles of surfaces that meet, as `cores_state` saw just now, stand in the trees: of A, and of B."""
+    word = view_i64(space.scratch_at + 8 * KEYS, COUNTERS)[_PROGRESS + surface_collision.LAST]
+    return word >> 32, word & 0xFFFFFFFF
 
 
 @kernel(inline=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from collide.kernels import entry, kernel, prepared, view_f64, view_i32, view_i64, view_u8
-from collide.mesh.bvh import CENTRE, EXPONENT, INTS, REACH
+from collide.mesh.bvh import CENTRE, EXPONENT, INTS, REACH, open_tree
 from collide.narrowphase import rows
 from collide.narrowphase.facets import surface_distance
 from collide.narrowphase.facets.mesh_collide_kernel import (
@@ -25,6 +25,7 @@ from collide.narrowphase.facets.mesh_collide_kernel import (
     are_poses,
     balls_farther_than,
     cores_state,
+    crossing_of,
     gap_state,
     is_rigid,
     measure,
@@ -34,8 +35,9 @@ from collide.narrowphase.facets.mesh_collide_kernel import (
     placed,
     result_of,
 )
-from collide.narrowphase.facets.posed_surfaces import is_swapped_order
+from collide.narrowphase.facets.posed_surfaces import is_swapped_order, put_in_world, shift_between
 from collide.narrowphase.facets.surface_distance import FACET_A, FACET_B, IN_FULL, MARKS, RESULT
+from collide.narrowphase.facets.triangle_distance import common_point, nearest_points
 from collide.narrowphase.rows import ROW, blank_row, view_row
 from collide.numerics.vec3 import Vec3, add, dot, put_vec3, scale, sub, vec3_at
 from collide.results import EXACT, FORMULA, UNDECIDED
@@ -241,14 +243,29 @@ def _write_core_hit(space, pair, depths, row_at):
     flags[rows.HIT] = 1
     flags[rows.HOW] = EXACT
     if math.isnan(row[rows.POINT_A]):
-        measure(space, pair, math.inf, IN_FULL)
-        result, marks = result_of(space)
-        put_vec3(row, rows.POINT_A, vec3_at(result, surface_distance.POINT_A))
-        words[rows.PART_A] = max(marks[FACET_A], 0)
-        words[rows.PART_B] = max(marks[FACET_B], 0)
+        words[rows.PART_A], words[rows.PART_B] = _put_crossing(space, pair, row)
     put_vec3(row, rows.POINT_B, vec3_at(row, rows.POINT_A))
     flags[rows.CERTIFIED] = 1
     return CORES_MEET if depths else 0
+
+
+@kernel
+def _put_crossing(space, pair, row):
+    """Write a common point of the two crossing facets found by `cores_state`; returns the numbers of the facets.
+
+    Triangles are placed as by `surface_distance.py`: in the world's axes, with A's origin as theirs.
+    """
+    a, b = crossing_of(space)
+    A, B = open_tree(pair.A.tree_at), open_tree(pair.B.tree_at)
+    XA, XB = view_f64(pair.XA_at, 16), view_f64(pair.XB_at, 16)
+    T, points = view_f64(space.doubles_at, 18), view_f64(space.doubles_at + 8 * 18, 6)
+    put_in_world(XA, Vec3(0.0, 0.0, 0.0), A.triangles, 9 * a, T, 0)
+    put_in_world(XB, shift_between(XA, XB), B.triangles, 9 * b, T, 9)
+    length, _ = nearest_points(T, points)
+    common_point(T, length, points)
+    middle = add(scale(0.5, vec3_at(points, 0)), scale(0.5, vec3_at(points, 3)))
+    put_vec3(row, rows.POINT_A, add(middle, Vec3(XA[3], XA[7], XA[11])))
+    return int(A.ids[a]), int(B.ids[b])
 
 
 @kernel

@@ -37,8 +37,10 @@ COUNTERS = 3
 DOUBLES = PLACING + CORNERS
 FLOATS = 2 * FRAME + PRISM
 
-# Progress, integers: the pose, the stack's height, the facet pairs found.
-POSE, TOP, N_PAIRS = range(3)
+# Progress, integers: the pose, the stack's height, the facet pairs found, and where the last one's triangles stand in
+# the trees (`traversal.word_of`).
+POSE, TOP, N_PAIRS, LAST = range(4)
+PROGRESS = 4
 #: Status: all poses done, no room for more pairs, or a matrix that cannot be inverted.
 DONE, FULL, SINGULAR = range(3)
 #: A reference with this bit is to a triangle: leaves that are compared with small boxes become their triangles.
@@ -101,6 +103,7 @@ def _visit_leaves(query, pair):
                     facet_b * len(B.ids) + facet_a if query.swapped else facet_a * len(B.ids) + facet_b
                 )
                 progress[N_PAIRS] = n_pairs + 1
+                progress[LAST] = word_of(b, a) if query.swapped else word_of(a, b)
                 if query.first_only:
                     return True
     return False
@@ -164,13 +167,13 @@ def walk_surfaces(
     same_tree : the trees are equal; they are then taken in the order of their poses, and answers exchanged.
     pairs : out, facet of A times the number of B's facets plus facet of B; of pose k those from starts[k] to
         starts[k + 1]. With ``first_only`` at most one a pose.
-    counters : COUNTERS integers a pose.   progress : POSE, TOP, N_PAIRS; zeros at first.
+    counters : COUNTERS integers a pose.   progress : PROGRESS integers; zeros at first.
     """
     A = open_tree(header_a_at)
     B = open_tree(header_b_at)
     pairs = view_i64(pairs_at, capacity)
     starts = view_i64(starts_at, n + 1)
-    progress = view_i64(progress_at, 3)
+    progress = view_i64(progress_at, PROGRESS)
     stack = view_i64(stack_at, n_stack)
     while progress[POSE] < n:
         k = progress[POSE]
