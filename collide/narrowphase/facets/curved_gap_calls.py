@@ -1,8 +1,9 @@
-"""Gaps of meshes and cylinders, cones and ellipsoids from Python: batches of poses, and pairs for single calls."""
+"""Meshes and cylinders, cones and ellipsoids from Python: states and gaps of batches, and pairs for single calls."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,10 +19,15 @@ from collide.narrowphase.convex_kernel_calls import scratch, space_of_single_cal
 from collide.narrowphase.facets.curved_gap_kernel import (
     EXCHANGED,
     HEADER,
+    MAYBE_INSIDE,
+    MEETS,
     REACH_OF_MESH,
     STACK_AT,
+    SURFACES_APART,
     curved_gap_single,
     curved_gaps,
+    curved_state_single,
+    curved_states_of,
 )
 from collide.narrowphase.facets.facet_queries import points_in_solid
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
@@ -56,6 +62,35 @@ class GapQuestion:
         self.header.view(np.float64)[REACH_OF_MESH] = reach_of(A)
 
 
+class SurfaceStates(NamedTuple):
+    """n poses of a mesh and a shape.
+
+    meets, apart : (n,) whether the mesh's surface is known to meet the shape, or to be apart; poses without either are
+    left to another method.   maybe_inside : (n,) of surfaces apart, whether the shape may lie inside the mesh.
+    place : (n,) the triangle meeting the shape, in the order of the tree.   how : (n,) index into `results.HOW`.
+    """
+
+    meets: np.ndarray
+    apart: np.ndarray
+    maybe_inside: np.ndarray
+    place: np.ndarray
+    how: np.ndarray
+
+
+def surface_states(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray) -> SurfaceStates:
+    """Whether a mesh and a shape meet at n poses (n, 4, 4)."""
+    n = len(X_WA)
+    state, place, how = np.empty((3, n), dtype=np.int64)
+    X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
+    question = GapQuestion(A, E, scratch())
+    curved_states_of(
+        address_of(question.header), address_of(X_WA), address_of(X_WB), n, address_of(state), address_of(place),
+        address_of(how),
+    )
+    meets, maybe_inside = state == MEETS, state == MAYBE_INSIDE
+    return SurfaceStates(meets, maybe_inside | (state == SURFACES_APART), maybe_inside, place, how)
+
+
 def gap_rows(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(rows, (n,) bool whether they are written) of a mesh and a shape, apart at n poses (n, 4, 4).
 
@@ -80,18 +115,25 @@ def prepared_curved(A: Body, E: Enclosure, exchanged: bool) -> Prepared:
     question = GapQuestion(A, E, space.addresses)
     question.header[EXCHANGED] = exchanged
     gap = prepared_row(curved_gap_single, question.header)
+    state_of = prepared_row(curved_state_single, question.header)
+
+    def is_outside(X_WA, X_WB) -> bool:
+        """Whether the shape, whose surface the mesh's does not meet, is outside of the mesh."""
+        X_WM, X_WS = (X_WB, X_WA) if exchanged else (X_WA, X_WB)
+        return bool(points_in_solid(A.tree, X_WM, E.outer.points[0], X_WS)[0] == OUTSIDE)
 
     def distance(X_WA, X_WB, memory: bytearray, depths: bool, limit: float) -> bool | None:
-        """True; None where the bodies may meet, and of limits."""
+        """True; None where a depth is wanted, where the bodies may meet, and of limits."""
         apart = gap(X_WA, X_WB, memory, depths, limit) if limit == math.inf else None
         if apart is False and A.solid:
-            X_WM, X_WS = (X_WB, X_WA) if exchanged else (X_WA, X_WB)
-            return True if points_in_solid(A.tree, X_WM, E.outer.points[0], X_WS)[0] == OUTSIDE else None
+            return True if is_outside(X_WA, X_WB) else None
         return None if apart is None else True
 
     def collide(X_WA, X_WB) -> bool | None:
-        """False where the bodies are apart; None where they may meet: the long way says."""
-        return None if distance(X_WA, X_WB, bytearray(PAIR_DTYPE.itemsize), False, math.inf) is None else False
+        memory = bytearray(PAIR_DTYPE.itemsize)
+        if state_of(X_WA, X_WB, memory, False, 0.0) is None:
+            return None
+        return memory[0] == MEETS or (memory[0] == MAYBE_INSIDE and A.solid and not is_outside(X_WA, X_WB))
 
     def within(X_WA, X_WB, margin: float) -> bool | None:
         memory = bytearray(PAIR_DTYPE.itemsize)

@@ -1,7 +1,8 @@
-"""The gap of a mesh and a cylinder, cone or ellipsoid: a walk down the box-tree, the convex engine at the facets.
+"""A mesh and a cylinder, cone or ellipsoid: a walk down the box-tree, the convex engine at the facets.
 
 Facets are taken nearest first, by the gaps between boxes along the mesh's axes and along the normal of the nearest
-facet so far; what is farther than the least upper bound is left out. The mesh's bracket is the least of the facets'.
+facet so far; what is farther than the least upper bound is left out, and a facet that meets the shape ends the walk.
+The mesh's bracket is the least of the facets'. A boolean is a walk with the upper bound 0 from the beginning.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from collide.lowering.shape_table import INTS, KIND, NUMBERS, PARAMS, POSE, RADI
 from collide.mesh.bvh import (
     CENTRE,
     EXPONENT,
+    N_FACETS,
     NODE,
     NOTHING,
     WIDTH,
@@ -37,6 +39,7 @@ from collide.narrowphase.rows import (
     COUNT,
     DISTANCE,
     HIT,
+    HOW,
     ITERATIONS,
     LOWER,
     NORMAL,
@@ -51,7 +54,7 @@ from collide.narrowphase.rows import (
     is_undecided_or_refused,
     view_row,
 )
-from collide.numerics.vec3 import Vec3, absolute, dot, neg, norm, norm1, put_vec3, rotate_back, scale, sub, vec3_at
+from collide.numerics.vec3 import Vec3, absolute, add, dot, neg, norm, norm1, put_vec3, rotate_back, scale, sub, vec3_at
 
 _answer_pairs_at = native_call(SIGNATURE)
 
@@ -63,8 +66,11 @@ _answer_pairs_at = native_call(SIGNATURE)
     INTEGERS_AT, STACK_AT, BOUNDS_AT, EXCHANGED, REACH_OF_MESH,
 ) = range(15)
 HEADER = 15
-#: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh.
-LONG_WAY, SURFACES_APART, MAYBE_INSIDE = -1, 1, 0
+#: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh; a facet meets the shape.
+LONG_WAY, SURFACES_APART, MAYBE_INSIDE, MEETS = -1, 1, 0, 2
+#: Where so many facets of a mesh leave it open whether it meets the shape, polytopes around and inside the shape may
+#: decide sooner: a tube around a cylinder, whose facets are all near.
+_MAX_ASKED = 64
 
 #: A matrix farther off a rotation is left to the long way.
 _FAR_OFF = 2.0**-40
@@ -98,7 +104,7 @@ class _Nearest(NamedTuple):
     key, place : of the best row, the first of the rows.   lower, upper : least bounds of all facets [m].
     open_lower : least lower bound of the facets without a certificate [m].   along, above : direction in the mesh's
     frame in which the shape is looked for, and height of the shape's lowest point [m].
-    failed : a facet has no proven gap.
+    failed : a facet has no proven gap: the facet asked last.   n_asked : how many facets were asked about.
     """
 
     key: float
@@ -109,6 +115,7 @@ class _Nearest(NamedTuple):
     along: Vec3
     above: float
     failed: bool
+    n_asked: int
 
 
 @kernel(inline=True)
@@ -148,8 +155,8 @@ def _box_of_facet(tree, place):
 
 
 @kernel
-def _ask_facet(walk, place):
-    """The row of a facet and the shape, written behind the best row."""
+def _ask_facet(walk, place, depths):
+    """The row of a facet and the shape, written behind the best row.   depths : whether a depth is wanted."""
     words, tree = walk.words, walk.tree
     coordinates = view_f64(words[COORDINATES_AT], 3 * BLOCK)
     reach = 0.0
@@ -171,8 +178,8 @@ def _ask_facet(walk, place):
     _answer_pairs_at(
         words[CORE],
         (
-            words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], 0, words[SHAPE_OF_AT], words[PAIRS_AT], 1, False, False,
-            False, math.inf, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
+            words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], 0, words[SHAPE_OF_AT], words[PAIRS_AT], 1, False,
+            depths, False, math.inf, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
         ),
     )
     return view_row(row_at)
@@ -181,7 +188,7 @@ def _ask_facet(walk, place):
 @kernel
 def _with_facet(walk, nearest, place):
     """The `_Nearest` with one facet more."""
-    row = _ask_facet(walk, place)
+    row = _ask_facet(walk, place, False)
     lower, upper = row.doubles[LOWER], row.doubles[UPPER]
     failed = nearest.failed or is_undecided_or_refused(row) or not lower > 0.0
     key, best, along, above = nearest.key, nearest.place, nearest.along, nearest.above
@@ -196,7 +203,8 @@ def _with_facet(walk, nearest, place):
         above = dot(n, walk.t) - _height(walk, neg(n))
     open_lower = nearest.open_lower if row.flags[CERTIFIED] != 0 else min(nearest.open_lower, lower)
     return _Nearest(
-        key, best, min(nearest.lower, lower), min(nearest.upper, upper), open_lower, along, above, failed
+        key, place if failed else best, min(nearest.lower, lower), min(nearest.upper, upper), open_lower, along, above,
+        failed, nearest.n_asked + 1,
     )
 
 
@@ -230,13 +238,16 @@ def _push_children(walk, nearest, node, top):
 
 
 @kernel
-def _walk_down(walk):
-    """The `_Nearest` of all facets that may be nearest."""
+def _walk_down(walk, limit, max_asked):
+    """The `_Nearest` of all facets that may be nearest, and no farther than a limit [m].
+
+    max_asked : the walk is given up after so many facets; `n_asked` is then larger.
+    """
     tree, words = walk.tree, walk.words
     zero = Vec3(0.0, 0.0, 0.0)
-    nearest = _Nearest(math.inf, -1, math.inf, math.inf, math.inf, zero, -math.inf, False)
+    nearest = _Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
     top = _push_children(walk, nearest, 0, 0)
-    while top > 0 and not nearest.failed:
+    while top > 0 and not nearest.failed and nearest.n_asked <= max_asked:
         top -= 1
         if view_f64(words[BOUNDS_AT], top + 1)[top] > nearest.upper:
             continue
@@ -261,16 +272,13 @@ def _off_rotation(R):
 
 
 @kernel
-def _gap(header_at, XA_at, XB_at, check, row_at):
-    """The row of one pair of poses, the mesh's first; LONG_WAY, SURFACES_APART or MAYBE_INSIDE."""
+def _place(header_at, XA_at, XB_at, check):
+    """(whether both matrices are poses, and near rotations, the `_Walk`) of one pair of poses."""
     words = view_i64(header_at, HEADER)
     ints, numbers = view_i64(words[INTS_AT], 2 * INTS), view_f64(words[NUMBERS_AT], 2 * NUMBERS)
     poses = view_f64(words[POSES_AT], 2 * POSE)
-    if not (set_pose(poses, 0, view_f64(XA_at, 16), check) and set_pose(poses, POSE, view_f64(XB_at, 16), check)):
-        return LONG_WAY
-    off = _off_rotation(poses)
-    if not off < _FAR_OFF:
-        return LONG_WAY
+    placed = set_pose(poses, 0, view_f64(XA_at, 16), check) and set_pose(poses, POSE, view_f64(XB_at, 16), check)
+    off = _off_rotation(poses) if placed else math.inf
     tree = open_tree(words[TREE_AT])
     t = sub(vec3_at(poses, POSE + 9), vec3_at(poses, 9))
     reach = norm1(vec3_at(tree.numbers, TREE_REACH)) + numbers[NUMBERS + REACH] + numbers[NUMBERS + RADIUS] + norm1(t)
@@ -281,15 +289,76 @@ def _gap(header_at, XA_at, XB_at, check, row_at):
         dot(x, t) - _height(walk, neg(x)), dot(y, t) - _height(walk, neg(y)), dot(z, t) - _height(walk, neg(z))
     )
     high = Vec3(dot(x, t) + _height(walk, x), dot(y, t) + _height(walk, y), dot(z, t) + _height(walk, z))
-    walk = _Walk(header_at, tree, words, ints, numbers, poses, t, low, high, slack)
-    nearest = _walk_down(walk)
+    return off < _FAR_OFF, _Walk(header_at, tree, words, ints, numbers, poses, t, low, high, slack)
+
+
+@kernel
+def _inside_or_apart(walk):
+    """SURFACES_APART or MAYBE_INSIDE, of surfaces that are apart: by the middle of the shape's box."""
+    centre = scale(0.5, Vec3(walk.low.x + walk.high.x, walk.low.y + walk.high.y, walk.low.z + walk.high.z))
+    reach = vec3_at(walk.tree.numbers, TREE_REACH)
+    inside = abs(centre.x) <= reach.x + walk.slack and abs(centre.y) <= reach.y + walk.slack
+    return MAYBE_INSIDE if inside and abs(centre.z) <= reach.z + walk.slack else SURFACES_APART
+
+
+@kernel
+def _is_proven_hit(row):
+    return row.flags[HIT] != 0 and not is_undecided_or_refused(row)
+
+
+@kernel
+def _write_meeting(walk, place, row_at):
+    """The mesh's row, without a depth, where a facet meets the shape: at the middle of the facet's way out. False where
+    that is left open."""
+    how = view_row(walk.words[ROW_AT] + ROW).flags[HOW]
+    facet, row = _ask_facet(walk, place, True), view_row(row_at)
+    if not _is_proven_hit(facet):
+        return False
+    middle = scale(0.5, add(vec3_at(facet.doubles, POINT_A), vec3_at(facet.doubles, POINT_B)))
+    put_vec3(row.doubles, POINT_A, middle)
+    put_vec3(row.doubles, POINT_B, middle)
+    row.words[PART_A] = walk.tree.ids[place]
+    row.flags[HIT], row.flags[HOW], row.flags[CERTIFIED] = 1, how, 1
+    for k in range(4):
+        row.words[VERTICES_A + k] = row.words[VERTICES_B + k] = -1
+    return True
+
+
+@kernel
+def _gap(header_at, XA_at, XB_at, check, depths, row_at):
+    """The row of one pair of poses, the mesh's first; LONG_WAY, SURFACES_APART or MAYBE_INSIDE, and without depths
+    MEETS."""
+    is_placed, walk = _place(header_at, XA_at, XB_at, check)
+    if not is_placed:
+        return LONG_WAY
+    nearest = _walk_down(walk, math.inf, walk.tree.header[N_FACETS])
+    if nearest.failed and not depths:
+        meeting = _walk_down(walk, 0.0, _MAX_ASKED)  # the facet that batches name
+        is_hit = meeting.failed and _is_proven_hit(view_row(walk.words[ROW_AT] + ROW))
+        return MEETS if is_hit and _write_meeting(walk, meeting.place, row_at) else LONG_WAY
     if nearest.failed or nearest.place < 0:
         return LONG_WAY
     _write_gap(walk, nearest, row_at)
-    centre = scale(0.5, Vec3(low.x + high.x, low.y + high.y, low.z + high.z))
-    reach_a = vec3_at(tree.numbers, TREE_REACH)
-    inside = abs(centre.x) <= reach_a.x + slack and abs(centre.y) <= reach_a.y + slack
-    return MAYBE_INSIDE if inside and abs(centre.z) <= reach_a.z + slack else SURFACES_APART
+    return _inside_or_apart(walk)
+
+
+@kernel
+def _state(header_at, XA_at, XB_at, check):
+    """(state, place, how) of one pair of poses, the mesh's first.
+
+    state : LONG_WAY, SURFACES_APART, MAYBE_INSIDE or MEETS.   place : of MEETS the triangle meeting the shape, in the
+    order of the tree.   how : index into `results.HOW`.
+    """
+    is_placed, walk = _place(header_at, XA_at, XB_at, check)
+    if not is_placed:
+        return LONG_WAY, -1, 0
+    nearest = _walk_down(walk, 0.0, _MAX_ASKED)
+    if nearest.failed:
+        row = view_row(walk.words[ROW_AT] + ROW)
+        return (MEETS if _is_proven_hit(row) else LONG_WAY), nearest.place, int(row.flags[HOW])
+    if nearest.n_asked > _MAX_ASKED:
+        return LONG_WAY, -1, 0
+    return _inside_or_apart(walk), -1, 0
 
 
 @kernel
@@ -324,20 +393,48 @@ def curved_gaps(header_at, XA_at, XB_at, n, rows_at, states_at):
     """
     states, n_written = view_u8(states_at, n), 0
     for k in range(n):
-        status = _gap(header_at, XA_at + 128 * k, XB_at + 128 * k, False, rows_at + ROW * k)
+        status = _gap(header_at, XA_at + 128 * k, XB_at + 128 * k, False, True, rows_at + ROW * k)
         states[k] = 0 if status == LONG_WAY else 1
         n_written += int(states[k])
     return n_written
 
 
+@entry("int64(int64, int64, int64, int64, int64, int64, int64)")
+def curved_states_of(header_at, XA_at, XB_at, n, states_at, places_at, how_at):
+    """States of a mesh and a shape at n pairs of checked poses; returns how many are not left to the long way.
+
+    header, XA, XB : as of `curved_gaps`.   states, places, how : n integers each, as of `_state`.
+    """
+    states, places, how = view_i64(states_at, n), view_i64(places_at, n), view_i64(how_at, n)
+    n_decided = 0
+    for k in range(n):
+        states[k], places[k], how[k] = _state(header_at, XA_at + 128 * k, XB_at + 128 * k, False)
+        n_decided += int(states[k] != LONG_WAY)
+    return n_decided
+
+
 @entry(prepared.ROW, nogil=False)
-def curved_gap_single(header_at, XA_at, XB_at, row_at, _unused, _unlimited):
-    """ROW zero bytes become the row of bodies whose surfaces are apart; LONG_WAY, SURFACES_APART, or MAYBE_INSIDE.
+def curved_state_single(header_at, XA_at, XB_at, row_at, _unused, _unlimited):
+    """1 with the bodies' state, SURFACES_APART, MAYBE_INSIDE or MEETS, in the first word of a row; LONG_WAY.
+
+    header : as of `curved_gap_single`.
+    """
+    exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
+    state, _, _ = _state(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True)
+    if state == LONG_WAY:
+        return LONG_WAY
+    view_i64(row_at, 1)[0] = state
+    return 1
+
+
+@entry(prepared.ROW, nogil=False)
+def curved_gap_single(header_at, XA_at, XB_at, row_at, depths, _unlimited):
+    """ROW zero bytes become the row of bodies whose surfaces are apart, or, without depths, meet; returns as `_gap`.
 
     header : its [EXCHANGED] says that the shape stands first.
     """
     exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
-    status = _gap(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True, row_at)
+    status = _gap(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True, depths, row_at)
     if status == LONG_WAY:
         return LONG_WAY
     row = view_row(row_at)

@@ -1,13 +1,15 @@
 """Meshes against convex shapes without exact facets: cylinders, cones, ellipsoids, polytopes with rounded corners.
 
-A polytope around the shape and a polytope inside decide without rounding wherever the surface of the mesh does not
-pass between them. Elsewhere facets that may be near enough are asked about, nearest first: the convex engine proves a
-bracket for each, and the mesh's bracket is the least. Signs left open by the brackets stay open.
+A kernel that asks the facets near the shape decides most poses. A polytope around the shape and a polytope inside
+decide without rounding wherever the surface of the mesh does not pass between them. Elsewhere facets that may be near
+enough are asked about, nearest first: the convex engine proves a bracket for each, and the mesh's bracket is the least.
+Signs left open by the brackets stay open.
 """
 
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +20,7 @@ from collide.lowering.packed_convex import POINTS
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.convex_kernel_calls import number_of_poses
-from collide.narrowphase.facets.curved_gap_calls import gap_rows, serves
+from collide.narrowphase.facets.curved_gap_calls import gap_rows, serves, surface_states
 from collide.narrowphase.facets.facet_kernel_calls import balls_farther, core_hits, farthest_gap, hull_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.facets_against_curved import facet_rows
@@ -65,13 +67,18 @@ def settle_curved(
 ) -> CurvedStates:
     """Whether a mesh and a shape share a point, proven for the poses and everything within their slops.
 
-    outer_meets : the polytope around the shape is known to meet the mesh at all poses, which have no slop.
+    outer_meets : the polytope around the shape is known to meet the mesh at all poses, without slop. The polytope
+    inside is then asked before the facets: searches of depths ask near the surface, among many facets.
     """
     n = len(PA.X)
     states = CurvedStates(np.full(n, OPEN), np.full(n, EXACT), np.full((n, 3), np.nan), np.full(n, -1))
     exact = np.flatnonzero((PA.slop == 0.0) & (PB.slop == 0.0))
-    if len(exact):
-        _settle_by_polytopes(A, E, PA.X, PB.X, exact, states, outer_meets)
+    by_polytopes = partial(_settle_by_polytopes, outer_meets=outer_meets)
+    ways = (by_polytopes, _settle_by_walk) if outer_meets else (_settle_by_walk, by_polytopes)
+    for settle in ways:
+        exact = exact[states.state[exact] == OPEN]
+        if len(exact):
+            settle(A, E, PA.X, PB.X, exact, states)
     remaining = np.flatnonzero(states.state == OPEN)
     if len(remaining):
         # Refuses poses that are none.
@@ -82,6 +89,21 @@ def settle_curved(
             states.state[inside], states.how[inside] = HIT, EXACT
             states.point[inside] = _moved(PB.X[inside], E.outer.points[0])
     return states
+
+
+def _settle_by_walk(A: Body, E: Enclosure, X_WA, X_WB, poses: np.ndarray, states: CurvedStates) -> None:
+    """HIT where a facet meets the shape, or the shape lies inside the mesh, APART where neither does."""
+    if not serves(E.packed):
+        return
+    surface = surface_states(A, E, X_WA[poses], X_WB[poses])
+    states.state[poses[surface.apart]] = APART
+    meeting = poses[surface.meets]
+    states.state[meeting], states.how[meeting] = HIT, surface.how[surface.meets]
+    states.place[meeting] = surface.place[surface.meets]
+    inside = poses[surface.maybe_inside]
+    if A.solid and len(inside):
+        inside = inside[points_in_solid(A.tree, X_WA[inside], E.outer.points[0], X_WB[inside]) != OUTSIDE]
+        states.state[inside], states.point[inside] = HIT, _moved(X_WB[inside], E.outer.points[0])
 
 
 def _settle_by_polytopes(
