@@ -62,7 +62,7 @@ def collide_posed(g1, X1, g2, X2, request, result) -> int:
     """
     limit, margin = request.num_max_contacts, request.security_margin
     if limit.__class__ is not int or limit < 1 or margin.__class__ is not float or not -math.inf < margin < math.inf:
-        limit, margin = _checked(request)
+        limit, margin = checked_request(request)
     contacts = result._contacts
     n_wanted = limit - len(contacts)
     if n_wanted < 1:
@@ -73,7 +73,7 @@ def collide_posed(g1, X1, g2, X2, request, result) -> int:
         or (n_wanted > 1 and (g1._has_parts or g2._has_parts))
     ):
         pair = GeometryPair.now(g1, X1, g2, X2)
-        rows, bound = _worked_out(pair, request.enable_contact, margin, request.distance_upper_bound, n_wanted)
+        rows, bound = contact_rows(pair, request.enable_contact, margin, request.distance_upper_bound, n_wanted)
         for row in rows:
             contacts.append(contact_of(g1, g2, *row))
         result.distance_lower_bound = min(result.distance_lower_bound, bound)
@@ -96,7 +96,7 @@ def collide_posed(g1, X1, g2, X2, request, result) -> int:
     return len(contacts)
 
 
-def _checked(request) -> tuple[int, float]:
+def checked_request(request) -> tuple[int, float]:
     """The number of contacts and the margin [m]. Raises InvalidArgument, TypeError."""
     limit = whole("num_max_contacts", request.num_max_contacts)
     margin = real("security_margin", request.security_margin)
@@ -125,8 +125,8 @@ def _only_contact(asked_pair: tuple, enable_contact, margin: float, upper_bound:
             b1, b2, normal, point_1, point_2, middle, depth = _deciding_contact(pair, answer)
             return b1, b2, normal, depth, [point_1, point_2], middle
         return _of_answer(pair, answer)
-    ((b1, b2, normal, point_1, point_2, depth),) = _worked_out(pair, enable_contact, margin, upper_bound, 1)[0]
-    return _fields(b1, b2, normal, point_1, point_2, depth)
+    ((b1, b2, normal, point_1, point_2, depth),) = contact_rows(pair, enable_contact, margin, upper_bound, 1)[0]
+    return contact_fields(b1, b2, normal, point_1, point_2, depth)
 
 
 def _of_answer(pair: GeometryPair, answer: tuple) -> tuple:
@@ -142,10 +142,10 @@ def _of_answer(pair: GeometryPair, answer: tuple) -> tuple:
 
 def _bound(asked_pair: tuple, enable_contact, margin: float, upper_bound: float) -> float:
     """What the distance less the margin is at least [m]."""
-    return _worked_out(_pair_as_asked(*asked_pair), enable_contact, margin, upper_bound, 1)[1]
+    return contact_rows(_pair_as_asked(*asked_pair), enable_contact, margin, upper_bound, 1)[1]
 
 
-def _worked_out(
+def contact_rows(
     pair: GeometryPair, enable_contact, margin: float, upper_bound: float, n_wanted: int
 ) -> tuple[list[tuple], float]:
     """Contacts, as arguments of `contact_of`, and what the distance less the margin is at least [m]."""
@@ -159,10 +159,11 @@ def _worked_out(
     lower = float(answer.lower)
     rows: list[tuple] = []
     is_within = answer.is_within
-    if is_within and n_wanted == 1 and answer.distance <= 0.0 <= margin and enable_contact and _is_facet_by_facet(pair):
-        answer_of_facets = nearest_points(pair.shapes_1[0], pair.shapes_2[0], pair.X1, pair.X2, False)
-        b1, b2, normal, point_1, point_2, _, lower = _deciding_contact(pair, answer_of_facets)
-        rows = [(b1, b2, normal, point_1, point_2, lower)]
+    if is_within and n_wanted == 1 and answer.distance <= 0.0 <= margin and _is_facet_by_facet(pair):
+        if enable_contact:
+            answer_of_facets = nearest_points(pair.shapes_1[0], pair.shapes_2[0], pair.X1, pair.X2, False)
+            b1, b2, normal, point_1, point_2, _, lower = _deciding_contact(pair, answer_of_facets)
+            rows = [(b1, b2, normal, point_1, point_2, lower)]
     elif is_within and are_meshes and answer.distance <= 0.0:
         rows, lower = _facet_rows(pair, margin, n_wanted, bool(enable_contact) or margin < 0.0)
         is_within = bool(rows) or margin >= 0.0
@@ -185,11 +186,11 @@ def contact_of(g1, g2, b1, b2, normal, point_1, point_2, depth) -> Contact:
     """A contact of surfaces' points (3,), signed ``depth`` [m] apart along the normal (3,)."""
     contact = object.__new__(Contact)
     contact.o1, contact.o2 = g1, g2
-    contact.__dict__.update(zip(Contact._later, _fields(b1, b2, normal, point_1, point_2, depth)))
+    contact.__dict__.update(zip(Contact._later, contact_fields(b1, b2, normal, point_1, point_2, depth)))
     return contact
 
 
-def _fields(b1, b2, normal, point_1, point_2, depth) -> tuple:
+def contact_fields(b1, b2, normal, point_1, point_2, depth) -> tuple:
     """The same in the order of `Contact._later`."""
     points = [np.array(point_1), np.array(point_2)]
     return int(b1), int(b2), np.array(normal), float(depth), points, 0.5 * points[0] + 0.5 * points[1]

@@ -14,8 +14,7 @@ import numpy as np
 
 import collide as engine
 from collide.adapters.hosts.coal_nearest import GeometryPair, nearest
-from collide.adapters.hosts.coal_queries import collide_posed
-from collide.adapters.hosts.coal_requests import CollisionResult
+from collide.adapters.hosts.coal_queries import checked_request, contact_fields, contact_rows
 from collide.adapters.hosts.host_numbers import of_kind
 from collide.adapters.hosts.pinocchio_pairs import (
     KnownPairs,
@@ -302,15 +301,14 @@ def _placed(known: KnownPairs, X: np.ndarray, which: np.ndarray) -> tuple[np.nda
 
 def _add_contacts(coal, known: KnownPairs, geom_model, X, k: int, request, result) -> None:
     """The contacts of a pair that collides, into Pinocchio's own result."""
-    ours = CollisionResult()
-    g1, X1, g2, X2 = _bodies(known, X, k)
-    collide_posed(g1, X1, g2, X2, request, ours)
+    limit, margin = checked_request(request)
+    pair = GeometryPair.now(*_bodies(known, X, k))
+    rows, bound = contact_rows(pair, request.enable_contact, margin, request.distance_upper_bound, limit)
     first, second = (geom_model.geometryObjects[g].geometry for g in known.pairs[k].tolist())
-    for contact in ours.getContacts():
-        result.addContact(coal.Contact(
-            first, second, contact.b1, contact.b2, contact.pos, contact.normal, contact.penetration_depth
-        ))
-    result.distance_lower_bound = ours.distance_lower_bound
+    for row in rows:
+        b1, b2, normal, depth, _, pos = contact_fields(*row)
+        result.addContact(coal.Contact(first, second, b1, b2, pos, normal, depth))
+    result.distance_lower_bound = bound
 
 
 class _PointWriter:
