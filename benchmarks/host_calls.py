@@ -1,10 +1,9 @@
-"""Single calls of pybullet, coal and Pinocchio beside the same calls of collide.
+"""Single calls of pybullet and Pinocchio beside the same calls of collide.
 
     python benchmarks/host_calls.py
 
-pybullet through `attach`, in a client of a floor, 100 balls that rest on it, and a hull. coal: shapes that are apart
-and that meet, with the default request for contacts. Pinocchio: robots at random configurations. µs by the clock;
-engines that are not installed are left out.
+pybullet through `attach`, in a client of a floor, 100 balls that rest on it, and a hull. Pinocchio:
+robots at random configurations. µs by the clock; engines that are not installed are left out.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ use_tests("differential")
 import pinocchio_robots
 
 from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
-from collide.adapters.peers.hull_facets import triangulate
 
 
 @cache
@@ -63,53 +61,6 @@ def client() -> dict:
     return calls
 
 
-def sphere_points() -> np.ndarray:
-    turns = np.arange(500) + 0.5
-    height, angle = 1.0 - turns / 250.0, np.pi * (1.0 + 5.0**0.5) * turns
-    across = np.sqrt(1.0 - height**2)
-    return 0.5 * np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
-
-
-def ball_mesh(module):
-    points, facets = triangulate(sphere_points())
-    model = module.BVHModelOBBRSS()
-    model.beginModel(len(facets), len(points))
-    model.addVertices(points)
-    model.addTriangles(facets)
-    model.endModel()
-    return model
-
-
-SHAPES = {
-    "two boxes": lambda m: (m.Box(1, 1, 1), m.Box(1, 1, 1)), "ball and box": lambda m: (m.Sphere(0.5), m.Box(1, 1, 1)),
-    "two balls of 996 triangles": lambda m: (ball_mesh(m), ball_mesh(m)),
-}
-
-
-def of_coal(options: Options, shapes: str, where: str, question: str) -> Race:
-    from collide.adapters.hosts import coal_api
-
-    tasks = {}
-    for name, module in (("collide", coal_api), ("coal", import_module("coal"))):
-        kind = "Collision" if question == "collide" else "Distance"
-        request, result = getattr(module, f"{kind}Request")(), getattr(module, f"{kind}Result")()
-        a, b = SHAPES[shapes](module)
-        away = 1.5 if where == "apart" else 0.9
-        asked = a, module.Transform3s(), b, module.Transform3s(np.eye(3), np.array([away, 0.05, 0.02])), request, result
-
-        def call(ask=getattr(module, question), asked=asked) -> None:  # noqa: B008
-            asked[-1].clear()
-            ask(*asked)
-
-        tasks[name] = call
-    return Race(tasks)
-
-
-def coal_cases(options: Options):
-    shapes, questions = SHAPES if installed(coal="coal") else (), ("collide", "distance")
-    return grid(shapes=shapes, where=("apart", "meeting"), question=questions)
-
-
 def of_pinocchio(options: Options, robot: str, question: str) -> Race:
     """µs a configuration: all pairs with results, or whether any collides, ours of all configurations in one call."""
     import pinocchio as pin
@@ -138,7 +89,6 @@ claim = partial(Claim, turns=40, seconds=3.0, clock=time.perf_counter)
 CLAIMS = [
     claim("pybullet", "µs a call", lambda o: grid(call=client() if installed(pybullet="pybullet") else ()),
           lambda o, call: Race(client()[call]), file="host-calls-pybullet"),
-    claim("coal", "µs a call", coal_cases, of_coal, file="host-calls-coal"),
     claim("pinocchio", "µs a configuration", pinocchio_cases, of_pinocchio, file="host-calls-pinocchio"),
 ]
 

@@ -1,9 +1,8 @@
-"""What python-fcl's managers, single calls and trimesh's CollisionManager cost on collide, beside python-fcl.
+"""What python-fcl's managers and trimesh's CollisionManager cost on collide, beside python-fcl.
 
-    python benchmarks/host_managers.py --table managers calls trimesh
+    python benchmarks/host_managers.py --table managers trimesh
 
 managers   all that a manager of 10 to 5,000 objects is asked, crowded and apart; both engines answer in one process
-calls      single calls of pairs of shapes
 trimesh    its CollisionManager, which keeps the fcl that it finds: each engine in a child process
 
 µs of the thread's own time; a ratio above 1 says that collide is faster. "differ" counts answers unlike ours.
@@ -15,21 +14,13 @@ import time
 from functools import cache, partial
 
 import numpy as np
-from inputs import ball, rotations, use_tests
-
-use_tests("differential")
-import host_pairs
+from inputs import ball, rotations
 
 from collide.adapters.bench.child_contestant import InChild
 from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
 from collide.adapters.bench.turns import Seconds
 from collide.adapters.hosts import fcl_api
 from collide.adapters.peers.fcl_peer import triangulate
-
-#: Single calls: what bodies, and how far apart the overlapping and the separated ones stand [m].
-PAIRS = ("Box Box", "Sphere Sphere", "Box Sphere", "Capsule Capsule", "Capsule Box", "Cylinder Box", "Cone Cone",
-         "Ellipsoid Box", "Convex Convex", "BVHModel Box", "BVHModel BVHModel", "BVHModel Sphere")
-PLACES = {"apart": 1.6, "meeting": 0.5}
 
 
 def modules() -> dict:
@@ -106,21 +97,6 @@ def manager_cases(options: Options):
         yield from grid(objects=sizes, where=("crowded", "apart"), question=questions)
 
 
-def calls(options: Options, pair: str, where: str, question: str) -> Race:
-    tasks, R = {}, rotations(np.random.default_rng(0).normal(size=(1, 4)))[0]
-    for name, module in modules().items():
-        shapes = [host_pairs.fcl_geometry(module, kind, np.array([0.8, 0.9, 1.0])) for kind in pair.split()]
-        a = module.CollisionObject(shapes[0])
-        b = module.CollisionObject(shapes[1], module.Transform(R, PLACES[where] * np.array([0.6, 0.3, 0.74])))
-        near, request = module.DistanceRequest(True), module.CollisionRequest(1, True)
-        tasks[name] = {
-            "collide": partial(module.collide, a, b),
-            "one contact": lambda m=module, a=a, b=b, r=request: m.collide(a, b, r, m.CollisionResult()),
-            "distance": lambda m=module, a=a, b=b, r=near: m.distance(a, b, r, m.DistanceResult()),
-        }[question]
-    return Race(tasks)
-
-
 class Trimesh:
     """trimesh's manager with the fcl that it finds."""
 
@@ -166,15 +142,9 @@ def trimesh_cases(options: Options):
     return grid(objects=sizes if installed(trimesh="trimesh", fcl="fcl") else (), question=questions)
 
 
-def call_cases(options: Options):
-    pairs = PAIRS[: 2 if options.quick else None] if installed(fcl="fcl") else ()
-    return grid(pair=pairs, where=PLACES, question=("collide", "one contact", "distance"))
-
-
 claim = partial(Claim, clock=time.thread_time, turns=15)
 CLAIMS = [
     claim("managers", "µs a question to a manager", manager_cases, managers, file="host-managers"),
-    claim("calls", "µs a single call", call_cases, calls, file="host-managers-calls"),
     claim("trimesh", "µs a question to trimesh's manager", trimesh_cases, of_trimesh, file="host-managers-trimesh"),
 ]
 

@@ -25,6 +25,7 @@ from collide.pairs.query import collide as hits
 
 #: How many contacts of two meshes are looked at where those are wanted that are deeper than something.
 _ALL = 1 << 30
+_POSE = 4, 4
 #: Where `nearest_points` says whether bodies meet.
 _HIT = 7
 #: How many pairs' bounds of the distance wait in a result at most, until they are worked out.
@@ -107,17 +108,14 @@ def checked_request(request) -> tuple[int, float]:
     return limit, margin
 
 
-def _pair_as_asked(g1, X1: bytes, g2, X2: bytes, *rest) -> GeometryPair:
-    return GeometryPair(g1, np.ndarray((4, 4), buffer=X1), g2, np.ndarray((4, 4), buffer=X2), *rest)
-
-
 def _only_contact(asked_pair: tuple, enable_contact, margin: float, upper_bound: float) -> tuple:
     """The fields `Contact._later` of two shapes within the margin."""
-    pair = _pair_as_asked(*asked_pair)
-    g1, X1, g2, X2, (A, *_), (B, *_), radius_1, radius_2 = pair
+    g1, X1, g2, X2, (A, *_), (B, *_), radius_1, radius_2 = asked_pair
+    X1, X2 = np.ndarray(_POSE, buffer=X1), np.ndarray(_POSE, buffer=X2)
     if enable_contact and not (g1._has_parts or g2._has_parts or radius_1 or radius_2):
         distance, normal, point_1, point_2, middle, _, _, _ = nearest_points(A, B, X1, X2)
         return -1, -1, normal, distance, [point_1, point_2], middle
+    pair = GeometryPair(g1, X1, g2, X2, *asked_pair[4:])
     by_facets = _is_facet_by_facet(pair)
     if enable_contact and (by_facets or not (g1._has_parts or g2._has_parts)):
         answer = nearest_points(A, B, X1, X2, not by_facets)
@@ -142,7 +140,9 @@ def _of_answer(pair: GeometryPair, answer: tuple) -> tuple:
 
 def _bound(asked_pair: tuple, enable_contact, margin: float, upper_bound: float) -> float:
     """What the distance less the margin is at least [m]."""
-    return contact_rows(_pair_as_asked(*asked_pair), enable_contact, margin, upper_bound, 1)[1]
+    g1, X1, g2, X2, *rest = asked_pair
+    pair = GeometryPair(g1, np.ndarray(_POSE, buffer=X1), g2, np.ndarray(_POSE, buffer=X2), *rest)
+    return contact_rows(pair, enable_contact, margin, upper_bound, 1)[1]
 
 
 def contact_rows(

@@ -24,8 +24,10 @@ def facet_contact(o1: CollisionObject, o2: CollisionObject, with_geometry: bool)
     themselves; one of those that `facet_contacts` has.
     """
     g1, g2 = o1._geometry, o2._geometry
+    if with_geometry:
+        return new_contact(g1, g2, *_of_deciding_facets(g1._shape, g2._shape, o1._X, o2._X, True))
     contact = Contact.__new__(Contact)
-    question = g1._shape, g2._shape, o1._X.copy(), o2._X.copy(), with_geometry
+    question = g1._shape, g2._shape, o1._X.copy(), o2._X.copy(), False
     contact.__dict__ = {"o1": g1, "o2": g2, "_work": (_of_deciding_facets, question)}
     return contact
 

@@ -29,8 +29,9 @@ class FieldsWhenRead:
             raise AttributeError(f"{type(self).__name__} has no {name}")
         held = self.__dict__
         work, question = held["_work"]
-        for field, value in zip(self._later, work(*question)):
-            held.setdefault(field, value)  # a field that was set meanwhile stays
+        fields = dict(zip(self._later, work(*question)))
+        fields.update(held)  # a field that was set meanwhile stays
+        held.update(fields)
         held.pop("_work", None)
         return held[name]
 

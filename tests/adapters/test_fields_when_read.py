@@ -120,9 +120,11 @@ def test_what_nobody_reads_is_not_worked_out(monkeypatch):
             with pytest.raises(AssertionError, match="without being asked"):
                 result.getContact(0).normal  # noqa: B018 - reads it
     assert n_hits > 10
-    mesh, ball = fcl.CollisionObject(surface(fcl.BVHModel())), fcl.CollisionObject(fcl.Sphere(1))
+    first, second = (fcl.CollisionObject(surface(fcl.BVHModel())) for _ in "12")
     result = fcl.CollisionResult()
-    assert fcl.collide(mesh, ball, fcl.CollisionRequest(enable_contact=True), result) == 1
+    assert fcl.collide(first, second, fcl.CollisionRequest(), result) == 1
+    with pytest.raises(AssertionError, match="without being asked"):
+        result.contacts[0].b1  # noqa: B018 - reads it
 
 
 def test_bounds_that_nobody_reads_do_not_pile_up():
