@@ -20,8 +20,8 @@ from collide.kernels import address_of
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
 
-#: The pairs of so many leaves are looked for first, before those of all.
-_FIRST_LEAVES = 32
+#: The pairs of so many leaves are looked for first, then those of so many times more, before those of all.
+_FIRST_LEAVES, _MORE_LEAVES = 32, 8
 #: Up to so many pairs are sorted by their gaps all at once.
 _MAX_SORTED = 2048
 #: Gaps of boxes are less than this part below what they are in doubles.
@@ -227,19 +227,17 @@ class _Tree(BoxTree):
 
     def blocks(self, margin: float) -> Iterator[np.ndarray]:
         """Blocks (k, 2) of rows i < j whose boxes come within margin along every axis."""
-        n = len(self.boxes)
-        is_first = np.zeros(n, dtype=bool)
-        is_first[self.order[:_FIRST_LEAVES]] = True
-        first = _sorted_pairs(self._among_first(_FIRST_LEAVES, margin), n)
-        if len(first):
-            yield first
-        if len(self.unbounded):
-            yield _all_with(self.unbounded, n)
-        if len(self.order) > _FIRST_LEAVES:
-            hits = self._among_first(n, margin)
-            hits = hits[~is_first[hits].any(axis=1)]
+        n, done, more = len(self.boxes), 0, _FIRST_LEAVES
+        is_done = np.zeros(n, dtype=bool)
+        while done < len(self.order) or done == 0:
+            hits = self._among_first(more, margin)
+            hits = hits[~is_done[hits].any(axis=1)] if done else hits
             if len(hits):
                 yield _sorted_pairs(hits, n)
+            if not done and len(self.unbounded):
+                yield _all_with(self.unbounded, n)
+            is_done[self.order[done:more]] = True
+            done, more = more, _MORE_LEAVES * more if len(hits) else n
 
     def blocks_with(self, guests: _Guests, margin: float) -> Iterator[np.ndarray]:
         """Blocks (k, 2) of rows, of this tree and of guests."""
