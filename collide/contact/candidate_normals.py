@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from collide.contact.contact_pairs import TOUCHING
 from collide.contact.internal_edges import cross_of_edges
 from collide.kernels import kernel, view_f64, view_i64
+from collide.kernels.lanes import LANES, select, view_lanes
 from collide.narrowphase.facets.facets_within import NUMBERS_OF_PAIR, POINT_A, POINT_B
 from collide.numerics.vec3 import Vec3, add, dot, neg, norm, put_vec3, scale, sub, vec3_at
 
@@ -23,7 +24,7 @@ AS_GOOD = 2.0**-20
 # MAX_NORMALS a pair.
 N_CANDIDATES, N_WAYS = range(2)
 MAX_TRANSLATIONS = 64
-_NUMBERS = 4 * MAX_NORMALS + 4 * MAX_TRANSLATIONS + 18 * _LOOKED_AT + 4 * _MAX_DISTINCT
+_NUMBERS = 4 * MAX_NORMALS + 4 * MAX_TRANSLATIONS + 18 * _LOOKED_AT + 4 * _MAX_DISTINCT + LANES
 TRANSLATION_WORDS = _NUMBERS + 8
 
 
@@ -31,7 +32,9 @@ class Translations(NamedTuple):
     """What is known of ways to part pairs that meet, or nearly.
 
     normals, worths : candidates.   lengths : of the translations [m], along ``ways``.   depths : MAX_NORMALS a pair.
-    looked_at : corners of some pairs seen from where they touch, in units of the farthest.   counted : normals.
+    looked_at : corners of some pairs seen from where they touch, in units of the farthest: of eight pairs a block of
+    18 coordinates, in each the eight beside each other; `lanes` is the same memory.   behind : eight numbers, out of
+    lanes.   counted : normals.
     counts : N_CANDIDATES, N_WAYS.
     """
 
@@ -40,7 +43,10 @@ class Translations(NamedTuple):
     ways: Any
     lengths: Any
     looked_at: Any
+    lanes: Any
     counted: Any
+    behind: Any
+    behind_lanes: Any
     depths: Any
     counts: Any
 
@@ -52,10 +58,15 @@ def open_translations(words_at, depths_at, capacity):
     at += 32 * MAX_NORMALS
     ways, lengths = view_f64(at, 3 * MAX_TRANSLATIONS), view_f64(at + 24 * MAX_TRANSLATIONS, MAX_TRANSLATIONS)
     at += 32 * MAX_TRANSLATIONS
-    looked_at, counted = view_f64(at, 18 * _LOOKED_AT), view_f64(at + 144 * _LOOKED_AT, 4 * _MAX_DISTINCT)
+    looked_at, lanes = view_f64(at, 18 * _LOOKED_AT), view_lanes(at, 18 * _LOOKED_AT // LANES)
+    at += 144 * _LOOKED_AT
+    counted, behind_at = view_f64(at, 4 * _MAX_DISTINCT), at + 32 * _MAX_DISTINCT
     counts = view_i64(words_at + 8 * _NUMBERS, 8)
     depths = view_f64(depths_at, MAX_NORMALS * capacity)
-    return Translations(normals, worths, ways, lengths, looked_at, counted, depths, counts)
+    return Translations(
+        normals, worths, ways, lengths, looked_at, lanes, counted, view_f64(behind_at, LANES), view_lanes(behind_at, 1),
+        depths, counts,
+    )
 
 
 @kernel
@@ -88,17 +99,25 @@ def _look_at_some(pairs, translations):
         near = NUMBERS_OF_PAIR * k
         middle = scale(0.5, add(vec3_at(pairs.near, near + POINT_A), vec3_at(pairs.near, near + POINT_B)))
         for side in range(2):
-            at, to = 18 * k + 9 * side, 18 * n + 9 * side
+            at, to = 18 * k + 9 * side, LANES * (18 * (n // LANES) + 9 * side) + n % LANES
             size = 0.0
             for j in range(0, 9, 3):
                 away = sub(vec3_at(pairs.corners, at + j), middle)
                 size = max(size, dot(away, away))
-                put_vec3(translations.looked_at, to + j, away)
+                _put_across(translations.looked_at, to + LANES * j, away)
             unit = (1.0 if side == 0 else -1.0) / math.sqrt(size) if size > 0.0 else 0.0
             for j in range(9):
-                translations.looked_at[to + j] *= unit
+                translations.looked_at[to + LANES * j] *= unit
         n += 1
     return n
+
+
+@kernel(inline=True)
+def _put_across(values, at, v):
+    """A vector among the coordinates of eight."""
+    values[at] = v.x
+    values[at + LANES] = v.y
+    values[at + 2 * LANES] = v.z
 
 
 @kernel
@@ -117,12 +136,16 @@ def _worth(n, n_looked_at, translations, floor):
 
     floor : what is surely worth less is not worked out: something below it is returned.
     """
-    total, least = 0.0, (floor - 2.0**-40) * n_looked_at
-    for i in range(n_looked_at):
-        lowest = 0.0
-        for j in range(18 * i, 18 * i + 18, 3):
-            lowest = min(lowest, -dot(n, vec3_at(translations.looked_at, j)))
-        total += lowest
+    total, least, corners = 0.0, (floor - 2.0**-40) * n_looked_at, translations.lanes
+    for first in range(0, n_looked_at, LANES):
+        at = 18 * (first // LANES)
+        highest = n.x * corners[at] + n.y * corners[at + 1] + n.z * corners[at + 2]
+        for j in range(at + 3, at + 18, 3):
+            height = n.x * corners[j] + n.y * corners[j + 1] + n.z * corners[j + 2]
+            highest = select(height > highest, height, highest)
+        translations.behind_lanes[0] = highest
+        for i in range(min(LANES, n_looked_at - first)):
+            total += min(0.0, -translations.behind[i])
         if total < least:
             break
     return total / n_looked_at

@@ -17,6 +17,9 @@ from collide.kernels.lanes import LANES, any_of, select, view_lanes
 _STEEP = 2.0
 #: What a corner is while others are compared that has been compared with all: on no wall.
 _NO_WALL = -1
+#: Walls fall layer by layer, each layer a look at all points: so many points are looked at, at most, and a wall higher
+#: than these layers stays: rough surfaces of 10⁵ facets deep in each other.
+_MAX_DROPPED = 1 << 18
 #: Directions in which extreme points are looked for before others are compared with them.
 _EXTREME = 8
 #: Points within the polygon of extreme points, beyond a side, and in the place of a corner.
@@ -67,8 +70,10 @@ def hull_of_patch(points, n, tolerance, space):
     if _drop_walls(p, n, n_corners, tolerance, lowest, False, space):
         _sort_all(p, n, step, space)
         n_corners = _hull(p, _standing_points(p, n, tolerance, space), step, space)
-        while _drop_walls(p, n, n_corners, tolerance, lowest, True, space):
+        n_left = _MAX_DROPPED
+        while n_left > 0 and _drop_walls(p, n, n_corners, tolerance, lowest, True, space):
             n_corners = _hull(p, _standing_points(p, n, tolerance, space), step, space)
+            n_left -= n
     for i in range(n):
         if space.remaining[i] == _NO_WALL:
             space.remaining[i] = PLAIN
