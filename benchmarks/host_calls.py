@@ -23,12 +23,12 @@ from collide.adapters.bench.claims import Claim, Options, Race, grid, installed,
 
 @cache
 def client() -> dict:
-    """What is asked of a module by name, of pybullet and of its mirror, which is attached to the client."""
+    """What is asked of a module by name, of pybullet and of the module that is used in place of it."""
     p = import_module("pybullet")
     from collide.adapters.hosts.pybullet_mirror import attach
 
-    number = p.connect(p.DIRECT)
-    q, random = attach(p, number), np.random.default_rng(0)
+    q, random = attach(p, exclusive=True), np.random.default_rng(0)
+    number = q.connect(p.DIRECT)
     q.createMultiBody(0.0, q.createCollisionShape(p.GEOM_PLANE))
     ball = q.createCollisionShape(p.GEOM_SPHERE, radius=0.2)
     balls = [q.createMultiBody(1.0, ball, basePosition=[*random.uniform(-4, 4, 2), 0.2]) for _ in range(100)]
@@ -40,7 +40,7 @@ def client() -> dict:
 
     def moved() -> None:
         for body, (place, rotation) in zip(balls, places):
-            p.resetBasePositionAndOrientation(body, place, rotation, number)
+            q.resetBasePositionAndOrientation(body, place, rotation, number)
         mirror.update()
 
     ends = [[x, y, 5.0] for x, y in random.uniform(-4, 4, (100, 2))], [[0.0, 0.0, -1.0]] * 100

@@ -96,6 +96,8 @@ class Mirror:
         self._places: dict[int, list[tuple]] = {}
         self._contacts: list[tuple] | None = None
         self._stale_filters = False
+        #: Groups of the geoms, which rays have masks for.
+        self._groups = np.empty(0, dtype=np.int64)
         self.world = World()
         if self._follows_at_once:
             self.update()
@@ -278,8 +280,7 @@ class Mirror:
         if parent >= 0:
             X = self._pose(parent, link)
             origins, ends = (points @ X[:3, :3].T + X[:3, 3] for points in (origins, ends))
-        groups = np.array([self.filters.bits(geom)[0] for geom in self._tables.geoms], dtype=np.int64)
-        passed = (groups & mask) == 0
+        passed = (self._groups & mask) == 0
         epsilon = _number("fractionEpsilon", fractionEpsilon)
         return ray_hits(self.world, self._tables, origins, ends, passed, hit_number, epsilon)
 
@@ -309,6 +310,7 @@ class Mirror:
         if not untouched:
             for a, b in filters.incompatible(tables.geoms).tolist():
                 self.world.allow(a, b, reason="groups and masks")
+        self._groups = np.array([filters.bits(geom)[0] for geom in tables.geoms], dtype=np.int64)
         self._contacts, self._stale_filters = None, False
 
     def _move(self, rows: np.ndarray, coordinates: np.ndarray) -> None:

@@ -31,6 +31,7 @@ from collide.adapters.hosts.bullet_arguments import (
 from collide.adapters.hosts.bullet_bodies import MARK
 from collide.adapters.hosts.bullet_mirror import MARGINS, Mirror, genuine_pybullet
 from collide.adapters.hosts.stand_in import warn_of_holders
+from collide.base import argument_checks as checks
 from collide.errors import CollideError, InvalidArgument
 from collide.kernels import library
 from collide.shapes import Shape
@@ -47,6 +48,8 @@ _CLIENT_AT = {
 }
 _CLIENT_AT_OF_QUESTIONS = dict(zip(QUESTIONS, (11, 4, 2, 4, 8)))
 _BODIES_OF_QUESTIONS = {"getClosestPoints": (("bodyA", "bodyB"), 1), "getContactPoints": (("bodyA", "bodyB"), 2)}
+#: How names begin of functions that move no body and make none.
+_LOOKING = ("get", "calculate", "compute", "is", "rayTest", "addUserDebug", "removeUserDebug", "error")
 #: Where flags stand among those of what loads bodies.
 _FLAGS_AT = {"createMultiBody": BODY_ARGUMENTS.index("flags"), "loadURDF": 5, "loadMJCF": 1}
 
@@ -54,7 +57,9 @@ _before: ModuleType | None = None
 _stand_in: ModuleType | None = None
 
 
-def attach(pybullet: Any = None, client: int | None = None, *, questions=QUESTIONS, **options) -> ModuleType:
+def attach(
+    pybullet: Any = None, client: int | None = None, *, questions=QUESTIONS, exclusive: bool = False, **options
+) -> ModuleType:
     """pybullet with collide's answers: a module to use in place of it. Every other name is pybullet's own.
 
     Parameters
@@ -63,6 +68,8 @@ def attach(pybullet: Any = None, client: int | None = None, *, questions=QUESTIO
     client : the client that calls without physicsClientId are about, and then the only one that is followed. None: 0,
         as in pybullet, and all are followed; of a ``BulletClient`` its own.
     questions : names of `QUESTIONS` that collide answers; the others stay pybullet's.
+    exclusive : whether all that the program does with pybullet goes through the returned module. Then bodies of clients
+        that it connects with DIRECT are looked at only after a call that may have moved some.
     options : of `Mirror`: ``margins``, ``shapes``, ``contact_margin``.
 
     Returns
@@ -82,7 +89,7 @@ def attach(pybullet: Any = None, client: int | None = None, *, questions=QUESTIO
         pybullet = genuine_pybullet()
     elif client is None and not isinstance(pybullet, ModuleType):
         client = _number_of(pybullet)
-    return _StandIn(pybullet, client, tuple(questions), options)
+    return _StandIn(pybullet, client, tuple(questions), checks.true_or_false("attach: exclusive", exclusive), options)
 
 
 def _number_of(bullet_client: Any) -> int:
@@ -109,15 +116,16 @@ def install(**options) -> _Installed:
 
     Notes
     -----
-    Modules that imported pybullet before keep it: a RuntimeWarning names them. Programs that make a ``BulletClient``
+    Modules that imported pybullet before keep it: a RuntimeWarning names them. Without any, ``exclusive`` is as if it
+    was said. Programs that make a ``BulletClient``
     need collide's compiled library, for it gives its number to builtins alone: a RuntimeWarning says so without.
     """
     global _before, _stand_in
     if _stand_in is None:
         genuine = genuine_pybullet()
-        _before, _stand_in = genuine, attach(genuine, **options)
+        held = warn_of_holders(genuine, "pybullet", stacklevel=2)
+        _before, _stand_in = genuine, attach(genuine, **{"exclusive": not held} | options)
         sys.modules["pybullet"] = _stand_in
-        warn_of_holders(genuine, "pybullet", stacklevel=2)
         if library.glue is None:
             warnings.warn(
                 "collide runs without its compiled library: what it answers or watches of a BulletClient's calls is "
@@ -165,11 +173,17 @@ class _WatchedMirror(Mirror):
 class _StandIn(ModuleType):
     """pybullet, but for the questions; and what passes is looked at."""
 
-    def __init__(self, pybullet: Any, client: int | None, questions: tuple[str, ...], options: dict) -> None:
+    def __init__(
+        self, pybullet: Any, client: int | None, questions: tuple[str, ...], exclusive: bool, options: dict
+    ) -> None:
         super().__init__("pybullet", "pybullet; nearest points, contacts, boxes and rays are collide's.")
         self.__wrapped__ = pybullet
         self.__all__ = [name for name in dir(pybullet) if not name.startswith("_")]
         self._client, self._options = client, options
+        self._exclusive = exclusive and isinstance(pybullet, ModuleType)
+        #: Clients that no one else can reach; those of them, and (client, body), that stand as their mirrors know them.
+        self._alone: set[int] = set()
+        self._seen: set = set()
         self._mirrors: dict[int, Mirror] = {}
         self._shapes: dict[tuple[int, int], Shape] = {}
         made = {name: self._answering(name) for name in questions}
@@ -182,9 +196,18 @@ class _StandIn(ModuleType):
         """pybullet's own, about this module's client: BulletClients give theirs by themselves, and 0 is the default."""
         attribute = getattr(self.__wrapped__, name)
         is_of_clients = name != "connect" and inspect.isbuiltin(attribute)
+        if self._exclusive and is_of_clients and not name.startswith(_LOOKING):
+            attribute = _as_builtin(name, functools.partial(self._change, attribute))
         if self._client and is_of_clients and isinstance(self.__wrapped__, ModuleType):
             return functools.partial(attribute, physicsClientId=self._client)
         return attribute
+
+    def _change(self, function: Callable, *values, **keywords):
+        """Bodies may have moved."""
+        try:
+            return function(*values, **keywords)
+        finally:
+            self._seen.clear()
 
     def __dir__(self):
         return sorted({*dir(self.__wrapped__), "mirror_of"})
@@ -217,13 +240,20 @@ class _StandIn(ModuleType):
             client = keywords.get("physicsClientId", values[place] if len(values) > place else None)
             if self._client is not None and client not in (None, self._client):
                 return getattr(self.__wrapped__, name)(*values, **keywords)
-            mirror = self._mirror(client)
+            mirror, number = self._mirror(client), self._number(client)
+            if number in self._seen:
+                return method(mirror, *values, **keywords)
             bodies = [keywords.get(side, values[k] if len(values) > k else -1) for k, side in enumerate(sides)]
             known = [body for body in bodies if body >= 0]
             if known and len(known) >= n_needed:
-                mirror.update_bodies(*known)
+                looked_at = {(number, body) for body in known}
+                if not looked_at <= self._seen:
+                    mirror.update_bodies(*known)
             else:
+                looked_at = {number}
                 mirror.update()
+            if number in self._alone:
+                self._seen |= looked_at
             return method(mirror, *values, **keywords)
 
         return answer
@@ -232,6 +262,7 @@ class _StandIn(ModuleType):
         note = getattr(self, f"_note_{name}", None) or functools.partial(self._note_bodies, name)
 
         def watched(*values, **keywords):
+            self._seen.clear()
             place = _CLIENT_AT[name]
             client = keywords.get("physicsClientId", values[place] if len(values) > place else None)
             # Looked up at the call: to look up a BulletClient's disconnect disconnects it.
@@ -265,15 +296,18 @@ class _StandIn(ModuleType):
 
     # --- what passes ----------------------------------------------------------------------------
 
-    def _note_connect(self, _client: int | None, _values: tuple, _keywords: dict, number: int) -> None:
+    def _note_connect(self, _client: int | None, values: tuple, keywords: dict, number: int) -> None:
         """A number is given anew, or none is (-1): what was known of it is about a client that is gone."""
         if number >= 0:
             self._note_disconnect(number)
+            if self._exclusive and keywords.get("method", *values[:1]) == self.__wrapped__.DIRECT:
+                self._alone.add(number)
 
     def _note_disconnect(self, client: int | None, *_) -> None:
         number = self._number(client)
         self._note_resetSimulation(number)
         self._mirrors.pop(number, None)
+        self._alone.discard(number)
 
     def _note_resetSimulation(self, client: int | None, *_) -> None:
         number = self._number(client)

@@ -13,8 +13,8 @@ from types import ModuleType
 from typing import Any
 
 
-def warn_of_holders(host: ModuleType, name: str, *, stacklevel: int) -> None:
-    """A RuntimeWarning that names modules, collide's and the host's own excepted, that hold a host already."""
+def warn_of_holders(host: ModuleType, name: str, *, stacklevel: int) -> list[str]:
+    """Names of modules, collide's and the host's own excepted, that hold a host already; a RuntimeWarning says them."""
     holders = sorted(
         holder
         for holder, module in list(sys.modules.items())
@@ -27,6 +27,7 @@ def warn_of_holders(host: ModuleType, name: str, *, stacklevel: int) -> None:
             RuntimeWarning,
             stacklevel=stacklevel + 1,
         )
+    return holders
 
 
 class StandIn:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import runpy
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -275,3 +276,59 @@ def test_the_extra_is_named_where_pybullet_is_missing():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "pip install 'collide-robotics[pybullet]'" in done.stdout
+
+
+def test_an_exclusive_module_looks_at_bodies_after_what_may_have_moved_some(monkeypatch):
+    """Beside a module that looks before each question, in a program of steps, resets, bodies that come and go."""
+    looks, look = [], Mirror.update
+    alone, client = attach(p, exclusive=True), None
+    try:
+        client = alone.connect(p.DIRECT)
+        careful = attach(p, client)
+        alone.createMultiBody(0.0, alone.createCollisionShape(p.GEOM_PLANE))
+        box = alone.createCollisionShape(p.GEOM_BOX, halfExtents=[0.2, 0.3, 0.1])
+        arm = alone.loadURDF(f"{DATA}/kuka_iiwa/model.urdf", [1, 0, 0.5])
+        random = np.random.default_rng(4)
+        bodies = [alone.createMultiBody(1.0, box, basePosition=[*random.uniform(-1, 1, 2), 0.3]) for _ in range(6)]
+        changes = {
+            "step": alone.stepSimulation,
+            "base": lambda: alone.resetBasePositionAndOrientation(bodies[0], random.normal(size=3), [0, 0, 0, 1]),
+            "come": lambda: bodies.append(alone.createMultiBody(1.0, box, basePosition=random.normal(size=3).tolist())),
+            "gone": lambda: alone.removeBody(bodies.pop()) if len(bodies) > 3 else None,
+            "look": lambda: (alone.getBasePositionAndOrientation(bodies[0]), alone.getNumBodies()),
+            "joint": lambda: alone.resetJointState(arm, 2, float(random.uniform(-1, 1))),
+        }
+        questions = {
+            "rayTest": lambda m: m.rayTest([0.1, 0.2, 3], [0.1, 0.2, -1]),
+            "getContactPoints": lambda m: m.getContactPoints(),
+            "contacts of two": lambda m: m.getContactPoints(bodies[0], bodies[1]),
+            "getClosestPoints": lambda m: m.getClosestPoints(bodies[0], bodies[1], 5.0),
+            "getOverlappingObjects": lambda m: m.getOverlappingObjects([-1, -1, -1], [1, 1, 1]),
+        }
+        n_looks = Counter()
+        for k in range(120):
+            change = str(random.choice(list(changes)))
+            changes[change]()
+            for name in random.permutation(list(questions))[:2].tolist():
+                monkeypatch.setattr(Mirror, "update", lambda self: (looks.append(1), look(self))[1])
+                ours = questions[name](alone)
+                monkeypatch.setattr(Mirror, "update", look)
+                n_looks[change] += len(looks)
+                looks.clear()
+                assert ours == questions[name](careful), f"{k}: {name} after {change}"
+        assert n_looks["step"] > 5 and n_looks["look"] < 0.7 * n_looks["step"], n_looks
+    finally:
+        if client is not None:
+            alone.disconnect(client)
+
+
+def test_clients_that_others_may_reach_are_looked_at_each_time(client):
+    """Made by pybullet itself, or module and pybullet both in use: a reset that does not pass is seen."""
+    stand_in = attach(p, client, exclusive=True)
+    ball = stand_in.createMultiBody(1.0, stand_in.createCollisionShape(p.GEOM_SPHERE, radius=0.5))
+    for z in (0.0, 2.0, 4.0):
+        p.resetBasePositionAndOrientation(ball, [0, 0, z], [0, 0, 0, 1], client)
+        ((body, _, _, position, _),) = stand_in.rayTest([0, 0, 9], [0, 0, -9])
+        assert body == ball and position[2] == pytest.approx(z + 0.5)
+    with pytest.raises(InvalidArgument, match="exclusive"):
+        attach(p, client, exclusive="yes")
