@@ -30,7 +30,7 @@ PAIRS = (
 )
 SIZES = {"1k": 1_000, "2k": 2_000, "50k": 50_000, "100k": 100_000}
 PEERS = {"python-fcl": "fcl", "coal": "coal"}
-ALONG, TURN = np.array([0.6, 0.3, 0.74]), rotations(np.array([[0.9, 0.2, -0.1, 0.3]]))[0]
+ALONG, ROTATION = np.array([0.6, 0.3, 0.74]), rotations(np.array([[0.9, 0.2, -0.1, 0.3]]))[0]
 
 
 def rings(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -46,14 +46,14 @@ def rings(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def knot(n: int) -> tuple[np.ndarray, np.ndarray]:
     """A tube along a trefoil knot, of about n facets."""
     sides = 12
-    t, turn = np.linspace(0, 2 * np.pi, n // (2 * sides), endpoint=False), np.linspace(0, 2 * np.pi, sides, False)
+    t, angles = np.linspace(0, 2 * np.pi, n // (2 * sides), endpoint=False), np.linspace(0, 2 * np.pi, sides, False)
     middle = np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], axis=1) / 6
     along = np.roll(middle, -1, axis=0) - np.roll(middle, 1, axis=0)
     along /= np.linalg.norm(along, axis=1)[:, None]
     across = np.cross(along, [0, 0, 1.0])
     across /= np.linalg.norm(across, axis=1)[:, None]
     up = np.cross(along, across)
-    spokes = np.cos(turn)[None, :, None] * across[:, None] + np.sin(turn)[None, :, None] * up[:, None]
+    spokes = np.cos(angles)[None, :, None] * across[:, None] + np.sin(angles)[None, :, None] * up[:, None]
     return rings(middle[:, None] + 0.08 * spokes)
 
 
@@ -132,7 +132,7 @@ def places(pair: str) -> dict[str, np.ndarray]:
     for _ in range(40):
         middle = 0.5 * (apart + meeting)
         meets = collide.collide(a, b, np.eye(4), collide.pose(middle * ALONG) @ np.block([
-            [TURN, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]
+            [ROTATION, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]
         ]))
         apart, meeting = (apart, middle) if meets else (middle, meeting)
     return {"apart": 1.6 * ALONG, "1 cm deep": (meeting - 0.01) * ALONG, "deep": 0.35 * ALONG}
@@ -142,12 +142,12 @@ def call_of(module, pair: str, t: np.ndarray, question: str):
     """CALLS calls of a question in a row, as a program of that host asks."""
     a, b = (geometry(module, name) for name in pair.split(", "))
     if hasattr(module, "Transform3s"):
-        who = a, module.Transform3s(), b, module.Transform3s(TURN, t)
+        who = a, module.Transform3s(), b, module.Transform3s(ROTATION, t)
         result = module.DistanceResult() if question == "distance" else module.CollisionResult()
         request = module.DistanceRequest() if question == "distance" else module.CollisionRequest()
         new, contact = (lambda: result.clear() or result), lambda r: r.getContact(0).pos
     else:
-        who = module.CollisionObject(a), module.CollisionObject(b, module.Transform(TURN, t))
+        who = module.CollisionObject(a), module.CollisionObject(b, module.Transform(ROTATION, t))
         new = module.DistanceResult if question == "distance" else module.CollisionResult
         request = module.DistanceRequest(True) if question == "distance" else module.CollisionRequest(
             1, question == "contact")
