@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from collide.lowering.parts import bounding_parts_of
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.shape import Shape, kept_with_shape
+from collide.shapes.shape_set import Picked
 from collide.transforms import LARGEST, ROTATION_TOLERANCE
 
 #: More than what a sum of lengths rounds, and what poses that are nearly rotations stretch.
@@ -49,13 +51,13 @@ def closed_shapes(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, leeway: np.n
     leeway : a number or (n,): A may be moved this far, or bodies up to this far from A matter, too [m].
     Raises as `closings`.
     """
+    if not (_has_region(A) or _has_region(B)):
+        return A, B
     sides = [[S] * n if isinstance(S, Shape) else S for S in (A, B)]
     pairs: dict[tuple[int, int], list[int]] = {}
     for k, (a, b) in enumerate(zip(*sides)):
         if a.is_region or b.is_region:
             pairs.setdefault((id(a), id(b)), []).append(k)
-    if not pairs:
-        return A, B
     X_WA, X_WB, leeway = (np.broadcast_to(v, (n, *np.shape(v)[1:])) for v in (X_WA, X_WB, np.atleast_1d(leeway)))
     out_a, out_b = list(sides[0]), list(sides[1])
     for some in pairs.values():
@@ -66,6 +68,13 @@ def closed_shapes(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, leeway: np.n
             else:
                 out_b[k] = closed(b, size)
     return out_a, out_b
+
+
+def _has_region(shapes: Any) -> bool:
+    """Whether a shape, or one of a sequence, is a region."""
+    if isinstance(shapes, Picked):
+        return shapes.shape_set.has_region
+    return shapes.is_region if isinstance(shapes, Shape) else any(shape.is_region for shape in shapes)
 
 
 def sizes_at(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, leeway: np.ndarray | float = 0.0) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -42,6 +43,11 @@ class ShapeSet:
                 raise InvalidShape(f"ShapeSet: shapes[{k}] must be a shape, got {brief(shape)}")
         if not self.shapes:
             raise InvalidShape(f"ShapeSet: shapes is empty, {brief(shapes)}; at least one is needed")
+
+    @cached_property
+    def has_region(self) -> bool:
+        """Whether one of the shapes is an `HPolytope` kept as planes."""
+        return any(shape.is_region for shape in self.shapes)
 
     def __len__(self) -> int:
         return len(self.shapes)
