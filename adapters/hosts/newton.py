@@ -236,8 +236,10 @@ class Pipeline:
         if not int(model.shape_flags.numpy()[k]) & int(self._newton.ShapeFlags.COLLIDE_SHAPES):
             return None
         kind, scale = kinds(int(model.shape_type.numpy()[k])), model.shape_scale.numpy()[k].astype(np.float64)
-        if kind == kinds.PLANE and not scale[:2].any():
-            return Halfspace((0, 0, 1), 0.0)
+        if kind == kinds.PLANE:
+            x, y, _ = scale
+            corners = [(x, y, 0.0), (-x, y, 0.0), (-x, -y, 0.0), (x, -y, 0.0)]
+            return ConvexHull(corners) if x or y else Halfspace((0, 0, 1), 0.0)
         if kind == kinds.SPHERE:
             return Sphere(scale[0])
         if kind == kinds.BOX:
@@ -253,7 +255,7 @@ class Pipeline:
             return ConvexHull(points) if kind == kinds.CONVEX_MESH else Mesh(points, _facets(source, scale))
         if kind == kinds.HFIELD and source is not None and (scale > 0.0).all():
             return _height_field(source, scale)
-        self.remaining[k] = "planes with ends" if kind == kinds.PLANE else f"shapes of kind {kind.name}"
+        self.remaining[k] = f"shapes of kind {kind.name}"
         warnings.warn(
             f"shape {k} is left out: {self.remaining[k]} are not taken over", RuntimeWarning, stacklevel=4
         )

@@ -243,13 +243,50 @@ def test_particles_have_newtons_own_contacts():
     assert counts[0] == counts[1] and counts[0][0] >= 2 and counts[0][1]
 
 
+@pytest.mark.parametrize("kind", ["box", "sphere", "capsule", "convex"])
+def test_planes_with_ends_are_rectangles(kind):
+    """Bodies over a rectangle of half lengths 0.5 and 1 m are as far from it as from a plane; beside it is nothing."""
+    random, n_met = np.random.default_rng(8), 0
+    turn = quaternion(random)
+    R, t = rotation(turn), np.array([0.1, 0.2, 0.3])
+    for k in range(72):
+        is_beside = k % 3 == 2
+        place, q = np.array([0.0, random.uniform(-0.5, 0.5), random.uniform(0.12, 0.4)]), quaternion(random)
+        place[0] = 1.4 if is_beside else random.uniform(-0.05, 0.05)
+        height = lowest(kind, place, q)  # over the plane, in its frame
+        builder = newton.ModelBuilder()
+        builder.add_shape_plane(
+            plane=None, xform=wp.transform(wp.vec3(*t), wp.quat(*turn)), width=0.5, length=1.0,
+            cfg=newton.ModelBuilder.ShapeConfig(gap=0.0),
+        )
+        add(builder, kind, R @ place + t, product(turn, q), gap=0.05)
+        model = builder.finalize(device="cpu")
+        state, pipeline = model.state(), Pipeline(model)
+        contacts = pipeline.contacts()
+        pipeline.collide(state, contacts)
+        gaps = separations(model, contacts, state)
+        if is_beside or height > 0.05:
+            assert len(gaps) == 0, (k, place, q, gaps)
+        elif height > -0.02:
+            assert len(gaps) and gaps.min() == pytest.approx(height, abs=2e-6), (k, place, q, gaps, height)
+            n_met += 1
+    assert n_met > 3, n_met
+
+
+def product(p, q) -> np.ndarray:
+    """Of quaternions x, y, z, w."""
+    (a, s), (b, t) = (p[:3], p[3]), (q[:3], q[3])
+    return np.append(s * b + t * a + np.cross(a, b), s * t - a @ b)
+
+
 def test_what_goes_wrong_is_named():
     builder = newton.ModelBuilder()
-    builder.add_shape_plane(width=2.0, length=2.0)
+    field = newton.Heightfield(data=np.zeros((3, 3), dtype=np.float32), nrow=3, ncol=3, hx=1.0, hy=1.0)
+    builder.add_shape_heightfield(heightfield=field, scale=wp.vec3(1.0, 0.0, 1.0))
     add(builder, "box", (0, 0, 0), (0, 0, 0, 1))
     add(builder, "box", (0, 0, 0.1), (0, 0, 0, 1))
     model = builder.finalize(device="cpu")
-    with pytest.warns(RuntimeWarning, match="shape 0 is left out: planes with ends"):
+    with pytest.warns(RuntimeWarning, match="shape 0 is left out: shapes of kind HFIELD"):
         pipeline = Pipeline(model, rigid_contact_max=2)
     assert list(pipeline.remaining) == [0]
     state, contacts = model.state(), pipeline.contacts()
