@@ -29,8 +29,11 @@ from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_contacts
 from collide.lowering.compound_layout import is_flat, layout_of
 from collide.lowering.compound_table import CompoundTable
+from collide.lowering.enclosures import enclosure_of
+from collide.lowering.facet_bodies import body_of
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import Kind
 from collide.lowering.parts import is_single_convex
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite import single_header
@@ -40,6 +43,7 @@ from collide.narrowphase.composite.single_composite_call import BALLS_WORK, ball
 from collide.narrowphase.convex_batches import lowered_numbers, prepare_parts, prepare_sets, shape_table
 from collide.narrowphase.convex_kernel_calls import BlockWorkspace, space_of_single_calls
 from collide.narrowphase.dispatch import OF_SETS, OF_UNIONS, Method, method_of
+from collide.narrowphase.facets.curved_gap_calls import beyond_margin, serves
 from collide.narrowphase.pose_batches import BLOCK
 from collide.narrowphase.pose_batches import HEADER as HEADER_OF_POSES
 from collide.narrowphase.prepared_pairs import Prepared, Single, keep_prepared, prepared_pair, single_calls_are_safe
@@ -87,6 +91,8 @@ def _made_of(A: Shape, B: Shape, how: Method, are_sets: bool) -> tuple[Single, A
     """(`Prepared.contacts`, what it uses besides)."""
     if are_sets:
         return _single_contacts(shape_table(A, B)[0])
+    if how is Method.CURVED:
+        return _single_curved_contacts(A, B)
     made = single_facet_contacts(A, B) if how is Method.FACETS else None
     return _single_far_contacts(A, B) if made is None else made
 
@@ -153,6 +159,23 @@ def _single_far_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
     held = layout_of(A).ball, layout_of(B).ball, np.zeros(BALLS_WORK)
     header = np.array([address_of(of) for of in held], dtype=np.int64)
     return prepared_contacts(balls_beyond, header, no_rows()), held
+
+
+def _single_curved_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
+    """The same of a mesh and a curved shape, of which the kernel of gaps may say that they are beyond the margin."""
+    far, held = _single_far_contacts(A, B)
+    exchanged = kind_of(A) is not Kind.MESH
+    mesh, shape = (B, A) if exchanged else (A, B)
+    enclosure = enclosure_of(shape)
+    if not serves(enclosure.packed):
+        return far, held
+    is_beyond = beyond_margin(body_of(mesh), enclosure, exchanged)
+
+    def contacts(X_WA: np.ndarray, X_WB: np.ndarray, max_contacts: int, margin: float) -> bytes | None:
+        rows = far(X_WA, X_WB, max_contacts, margin)
+        return b"" if rows is None and is_beyond(X_WA, X_WB, margin) else rows
+
+    return contacts, held
 
 
 def _made_of_numbers(header: np.ndarray) -> tuple[Single, Any] | None:

@@ -306,3 +306,29 @@ def test_the_point_of_a_speck_beside_a_far_corner_lies_on_the_speck():
         radius = cone.radius * (0.5 - p[2] / cone.length)
         assert np.hypot(p[0], p[1]) - radius <= 1e-12 and abs(p[2]) <= 0.5 * cone.length + 1e-12, row
         assert np.abs(row["point_b"] - row["point_a"] - row["distance"] * row["normal"]).max() <= 1e-15
+
+
+@pytest.mark.parametrize("solid", [False, True])
+@pytest.mark.parametrize("margin", [0.0, 1e-3, 0.05, 0.4])
+def test_what_is_beyond_the_margin_is_left_out_and_nothing_else(margin, solid, monkeypatch):
+    """With the walk that finds what is beyond the margin, alone, in batches, swapped, and without it: the same bytes."""
+    rng, n_without = np.random.default_rng(17), 0
+    vertices, faces = collide.tessellate(collide.Sphere(0.5), tolerance=2e-2)
+    mesh = collide.Mesh(vertices * rng.uniform(0.9, 1.0, (len(vertices), 1)), faces, solid=solid)
+    for shape in (collide.Cylinder(0.2, 0.5), collide.Cone(0.2, 0.5), collide.Ellipsoid((0.3, 0.2, 0.1))):
+        n = 60
+        X = np.stack([collide.pose(rpy=rng.uniform(-3, 3, 3)) for _ in range(n)])
+        Y = np.stack([collide.pose(0.45 * rng.normal(size=3), rpy=rng.uniform(-3, 3, 3)) for _ in range(n)])
+        batch = collide.contacts(mesh, shape, X, Y, margin=margin)
+        with monkeypatch.context() as without:
+            without.setattr(curved_contacts, "serves", lambda packed: False)
+            long_way = collide.contacts(mesh, shape, X, Y, margin=margin)
+        assert batch.rows.tobytes() == long_way.rows.tobytes() and np.array_equal(batch.starts, long_way.starts)
+        for k in range(n):
+            one = collide.contacts(mesh, shape, X[k].copy(), Y[k].copy(), margin=margin)
+            swapped = collide.contacts(shape, mesh, Y[k].copy(), X[k].copy(), margin=margin)
+            case = f"{shape!r}, X_WA={X[k].tolist()}, X_WB={Y[k].tolist()}"
+            assert one.rows.tobytes() == batch[k].rows.tobytes() and len(swapped) == len(one), case
+            assert (len(one) > 0) == collide.collide(mesh, shape, X[k], Y[k], security_margin=margin), case
+            n_without += len(one) == 0
+    assert 5 < n_without < 150

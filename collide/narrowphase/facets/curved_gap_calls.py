@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -65,8 +66,8 @@ class GapQuestion:
 class SurfaceStates(NamedTuple):
     """n poses of a mesh and a shape.
 
-    meets, apart : (n,) whether the mesh's surface is known to meet the shape, or to be apart; poses without either are
-    left to another method.   maybe_inside : (n,) of surfaces apart, whether the shape may lie inside the mesh.
+    meets, apart : (n,) whether the mesh's surface is known to meet the shape, or to be farther apart than the margin;
+    poses without either are left to another method.   maybe_inside : (n,) of surfaces apart, whether the shape may lie inside the mesh.
     place : (n,) the triangle meeting the shape, in the order of the tree.   how : (n,) index into `results.HOW`.
     """
 
@@ -77,18 +78,39 @@ class SurfaceStates(NamedTuple):
     how: np.ndarray
 
 
-def surface_states(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray) -> SurfaceStates:
-    """Whether a mesh and a shape meet at n poses (n, 4, 4)."""
+def surface_states(
+    A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray, margin: float = 0.0
+) -> SurfaceStates:
+    """Whether a mesh and a shape meet at n poses (n, 4, 4).   margin : how far they may be apart [m]."""
     n = len(X_WA)
     state, place, how = np.empty((3, n), dtype=np.int64)
     X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
     question = GapQuestion(A, E, scratch())
     curved_states_of(
-        address_of(question.header), address_of(X_WA), address_of(X_WB), n, address_of(state), address_of(place),
-        address_of(how),
+        address_of(question.header), address_of(X_WA), address_of(X_WB), n, margin, address_of(state),
+        address_of(place), address_of(how),
     )
     meets, maybe_inside = state == MEETS, state == MAYBE_INSIDE
     return SurfaceStates(meets, maybe_inside | (state == SURFACES_APART), maybe_inside, place, how)
+
+
+def beyond_margin(A: Body, E: Enclosure, exchanged: bool) -> Callable[[np.ndarray, np.ndarray, float], bool]:
+    """A function of two poses and a margin [m]: whether a mesh and a shape are known to be farther apart than it.
+
+    exchanged : the shape stands first.   All threads share the workspace: the kernel keeps Python's lock.
+    """
+    question = GapQuestion(A, E, space_of_single_calls().addresses)
+    question.header[EXCHANGED] = exchanged
+    state_of = prepared_row(curved_state_single, question.header)
+
+    def is_beyond(X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> bool:
+        _ = question, A, E  # their arrays are in use
+        memory = bytearray(PAIR_DTYPE.itemsize)
+        if state_of(X_WA, X_WB, memory, False, margin) is None:
+            return False
+        return memory[0] == SURFACES_APART or (memory[0] == MAYBE_INSIDE and not A.solid)
+
+    return is_beyond
 
 
 def gap_rows(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

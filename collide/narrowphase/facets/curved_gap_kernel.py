@@ -2,7 +2,8 @@
 
 Facets are taken nearest first, by the gaps between boxes along the mesh's axes and along the normal of the nearest
 facet so far; what is farther than the least upper bound is left out, and a facet that meets the shape ends the walk.
-The mesh's bracket is the least of the facets'. A boolean is a walk with the upper bound 0 from the beginning.
+The mesh's bracket is the least of the facets'. A boolean is a walk with the upper bound 0 from the beginning, and
+whether the bodies come within a margin a walk with the margin.
 """
 
 from __future__ import annotations
@@ -66,8 +67,9 @@ _answer_pairs_at = native_call(SIGNATURE)
     INTEGERS_AT, STACK_AT, BOUNDS_AT, EXCHANGED, REACH_OF_MESH,
 ) = range(15)
 HEADER = 15
-#: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh; a facet meets the shape.
-LONG_WAY, SURFACES_APART, MAYBE_INSIDE, MEETS = -1, 1, 0, 2
+#: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh; a facet meets the shape; a
+#: facet is within the margin, or may be.
+LONG_WAY, SURFACES_APART, MAYBE_INSIDE, MEETS, NEAR = -1, 1, 0, 2, 3
 #: Where so many facets of a mesh leave it open whether it meets the shape, polytopes around and inside the shape may
 #: decide sooner: a tube around a cylinder, whose facets are all near.
 _MAX_ASKED = 64
@@ -238,16 +240,17 @@ def _push_children(walk, nearest, node, top):
 
 
 @kernel
-def _walk_down(walk, limit, max_asked):
+def _walk_down(walk, limit, enough, max_asked):
     """The `_Nearest` of all facets that may be nearest, and no farther than a limit [m].
 
-    max_asked : the walk is given up after so many facets; `n_asked` is then larger.
+    enough : a lower bound of no more than this ends the walk [m].   max_asked : the walk is given up after so many
+    facets; `n_asked` is then larger.
     """
     tree, words = walk.tree, walk.words
     zero = Vec3(0.0, 0.0, 0.0)
     nearest = _Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
     top = _push_children(walk, nearest, 0, 0)
-    while top > 0 and not nearest.failed and nearest.n_asked <= max_asked:
+    while top > 0 and not nearest.failed and nearest.lower > enough and nearest.n_asked <= max_asked:
         top -= 1
         if view_f64(words[BOUNDS_AT], top + 1)[top] > nearest.upper:
             continue
@@ -331,9 +334,9 @@ def _gap(header_at, XA_at, XB_at, check, depths, row_at):
     is_placed, walk = _place(header_at, XA_at, XB_at, check)
     if not is_placed:
         return LONG_WAY
-    nearest = _walk_down(walk, math.inf, walk.tree.header[N_FACETS])
+    nearest = _walk_down(walk, math.inf, 0.0, walk.tree.header[N_FACETS])
     if nearest.failed and not depths:
-        meeting = _walk_down(walk, 0.0, _MAX_ASKED)  # the facet that batches name
+        meeting = _walk_down(walk, 0.0, 0.0, _MAX_ASKED)  # the facet that batches name
         is_hit = meeting.failed and _is_proven_hit(view_row(walk.words[ROW_AT] + ROW))
         return MEETS if is_hit and _write_meeting(walk, meeting.place, row_at) else LONG_WAY
     if nearest.failed or nearest.place < 0:
@@ -343,22 +346,23 @@ def _gap(header_at, XA_at, XB_at, check, depths, row_at):
 
 
 @kernel
-def _state(header_at, XA_at, XB_at, check):
+def _state(header_at, XA_at, XB_at, check, margin):
     """(state, place, how) of one pair of poses, the mesh's first.
 
-    state : LONG_WAY, SURFACES_APART, MAYBE_INSIDE or MEETS.   place : of MEETS the triangle meeting the shape, in the
+    state : LONG_WAY, SURFACES_APART, MAYBE_INSIDE, MEETS or, with a margin above 0 [m], NEAR: apart is then farther
+    apart than the margin.   place : of MEETS the triangle meeting the shape, in the
     order of the tree.   how : index into `results.HOW`.
     """
     is_placed, walk = _place(header_at, XA_at, XB_at, check)
     if not is_placed:
         return LONG_WAY, -1, 0
-    nearest = _walk_down(walk, 0.0, _MAX_ASKED)
+    nearest = _walk_down(walk, margin, margin, _MAX_ASKED)
     if nearest.failed:
         row = view_row(walk.words[ROW_AT] + ROW)
         return (MEETS if _is_proven_hit(row) else LONG_WAY), nearest.place, int(row.flags[HOW])
     if nearest.n_asked > _MAX_ASKED:
         return LONG_WAY, -1, 0
-    return _inside_or_apart(walk), -1, 0
+    return (NEAR if nearest.lower <= margin else _inside_or_apart(walk)), -1, 0
 
 
 @kernel
@@ -399,28 +403,28 @@ def curved_gaps(header_at, XA_at, XB_at, n, rows_at, states_at):
     return n_written
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, int64)")
-def curved_states_of(header_at, XA_at, XB_at, n, states_at, places_at, how_at):
+@entry("int64(int64, int64, int64, int64, float64, int64, int64, int64)")
+def curved_states_of(header_at, XA_at, XB_at, n, margin, states_at, places_at, how_at):
     """States of a mesh and a shape at n pairs of checked poses; returns how many are not left to the long way.
 
-    header, XA, XB : as of `curved_gaps`.   states, places, how : n integers each, as of `_state`.
+    header, XA, XB : as of `curved_gaps`.   margin, states, places, how : of `_state`, n integers each.
     """
     states, places, how = view_i64(states_at, n), view_i64(places_at, n), view_i64(how_at, n)
     n_decided = 0
     for k in range(n):
-        states[k], places[k], how[k] = _state(header_at, XA_at + 128 * k, XB_at + 128 * k, False)
+        states[k], places[k], how[k] = _state(header_at, XA_at + 128 * k, XB_at + 128 * k, False, margin)
         n_decided += int(states[k] != LONG_WAY)
     return n_decided
 
 
 @entry(prepared.ROW, nogil=False)
-def curved_state_single(header_at, XA_at, XB_at, row_at, _unused, _unlimited):
-    """1 with the bodies' state, SURFACES_APART, MAYBE_INSIDE or MEETS, in the first word of a row; LONG_WAY.
+def curved_state_single(header_at, XA_at, XB_at, row_at, _unused, margin):
+    """1 with the bodies' state, as of `_state`, in the first word of a row; LONG_WAY.
 
     header : as of `curved_gap_single`.
     """
     exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
-    state, _, _ = _state(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True)
+    state, _, _ = _state(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True, margin)
     if state == LONG_WAY:
         return LONG_WAY
     view_i64(row_at, 1)[0] = state
