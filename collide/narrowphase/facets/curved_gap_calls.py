@@ -159,6 +159,11 @@ def prepared_curved(A: Body, E: Enclosure, exchanged: bool) -> Prepared:
 
     def within(X_WA, X_WB, margin: float) -> bool | None:
         memory = bytearray(PAIR_DTYPE.itemsize)
+        if state_of(X_WA, X_WB, memory, False, margin) is not None:
+            state = memory[0]
+            if state == MEETS or state == SURFACES_APART or (state == MAYBE_INSIDE and not A.solid):
+                return state == MEETS
+            memory = bytearray(PAIR_DTYPE.itemsize)
         if distance(X_WA, X_WB, memory, False, math.inf) is None:
             return None
         row = np.frombuffer(memory, PAIR_DTYPE, 1)[0]

@@ -73,3 +73,19 @@ def test_a_can_in_a_tube(gap):
     mesh, can = tube(1.0), collide.Cylinder(np.cos(np.pi / 48) - gap, 1.9)
     X = collide.pose((1, 2, 3), rpy=(0.1, 0.2, 0.3))
     assert collide.collide(mesh, can, X, X) == (gap < 0) == collide.collide(can, mesh, X[None], X[None])[0]
+
+
+@pytest.mark.parametrize("solid", [False, True])
+@pytest.mark.parametrize("name", SHAPES)
+def test_margins_are_those_of_distances(name, solid):
+    rng, shape, n_within = np.random.default_rng(32), SHAPES[name], 0
+    mesh = collide.Mesh(bumpy(rng), BALL[1], solid=solid)
+    for k in range(60):
+        X, Y = (collide.pose(0.4 * rng.normal(size=3), rpy=rng.uniform(-3, 3, 3)) for _ in "12")
+        margin, r = float(rng.choice([1e-3, 0.05, 0.2])), collide.distance(mesh, shape, X, Y, signed=False)
+        case = f"pose {k}: X_WA={X.tolist()}, X_WB={Y.tolist()}, {shape!r}, {margin=}, {solid=}"
+        is_within = collide.collide(mesh, shape, X, Y, security_margin=margin)
+        assert is_within == (r.hit or r.distance <= margin), case
+        assert is_within == collide.collide(shape, mesh, Y[None], X[None], security_margin=margin)[0], case
+        n_within += is_within and not r.hit
+    assert 2 < n_within < 40
