@@ -17,6 +17,7 @@ import inspect
 import sys
 import warnings
 from collections.abc import Callable
+from threading import RLock
 from types import ModuleType
 from typing import Any
 
@@ -181,9 +182,12 @@ class _StandIn(ModuleType):
         self.__all__ = [name for name in dir(pybullet) if not name.startswith("_")]
         self._client, self._options = client, options
         self._exclusive = exclusive and isinstance(pybullet, ModuleType)
-        #: Clients that no one else can reach; those of them, and (client, body), that stand as their mirrors know them.
+        #: Clients that no one else can reach. How many calls may have moved bodies; and how many there were when a
+        #: client, or (client, body), was looked at last.
         self._alone: set[int] = set()
-        self._seen: set = set()
+        self._n_changes = 0
+        self._looked_at: dict[Any, int] = {}
+        self._asking = RLock()
         self._mirrors: dict[int, Mirror] = {}
         self._shapes: dict[tuple[int, int], Shape] = {}
         made = {name: self._answering(name) for name in questions}
@@ -199,7 +203,7 @@ class _StandIn(ModuleType):
         if self._exclusive and is_of_clients and not name.startswith(_LOOKING):
             attribute = _as_builtin(name, functools.partial(self._change, attribute))
         if self._client and is_of_clients and isinstance(self.__wrapped__, ModuleType):
-            return functools.partial(attribute, physicsClientId=self._client)
+            return functools.partial(self._of_client, attribute)
         return attribute
 
     def _change(self, function: Callable, *values, **keywords):
@@ -207,7 +211,16 @@ class _StandIn(ModuleType):
         try:
             return function(*values, **keywords)
         finally:
-            self._seen.clear()
+            self._n_changes += 1
+
+    def _of_client(self, function: Callable, *values, **keywords):
+        """A function about this module's client, which programs may name, too, by its place."""
+        try:
+            return function(*values, **{"physicsClientId": self._client, **keywords})
+        except TypeError:
+            if not values:
+                raise
+            return function(*values, **keywords)
 
     def __dir__(self):
         return sorted({*dir(self.__wrapped__), "mirror_of"})
@@ -240,20 +253,24 @@ class _StandIn(ModuleType):
             client = keywords.get("physicsClientId", values[place] if len(values) > place else None)
             if self._client is not None and client not in (None, self._client):
                 return getattr(self.__wrapped__, name)(*values, **keywords)
-            mirror, number = self._mirror(client), self._number(client)
-            if number in self._seen:
+            with self._asking:
+                return ask(client, values, keywords)
+
+        def ask(client: int | None, values: tuple, keywords: dict):
+            mirror, number, n_changes = self._mirror(client), self._number(client), self._n_changes
+            if self._looked_at.get(number) == n_changes:
                 return method(mirror, *values, **keywords)
             bodies = [keywords.get(side, values[k] if len(values) > k else -1) for k, side in enumerate(sides)]
             known = [body for body in bodies if body >= 0]
             if known and len(known) >= n_needed:
-                looked_at = {(number, body) for body in known}
-                if not looked_at <= self._seen:
+                places: list[Any] = [(number, body) for body in known]
+                if any(self._looked_at.get(place) != n_changes for place in places):
                     mirror.update_bodies(*known)
             else:
-                looked_at = {number}
+                places = [number]
                 mirror.update()
             if number in self._alone:
-                self._seen |= looked_at
+                self._looked_at.update(dict.fromkeys(places, n_changes))
             return method(mirror, *values, **keywords)
 
         return answer
@@ -262,12 +279,14 @@ class _StandIn(ModuleType):
         note = getattr(self, f"_note_{name}", None) or functools.partial(self._note_bodies, name)
 
         def watched(*values, **keywords):
-            self._seen.clear()
             place = _CLIENT_AT[name]
             client = keywords.get("physicsClientId", values[place] if len(values) > place else None)
             # Looked up at the call: to look up a BulletClient's disconnect disconnects it.
             function = getattr(self.__wrapped__, name) if len(values) > place else self.__getattr__(name)
-            result = function(*values, **keywords)
+            try:
+                result = function(*values, **keywords)
+            finally:
+                self._n_changes += 1
             if self._client is None or client in (None, self._client):
                 note(self._client if client is None else client, values, keywords, result)
             return result
@@ -308,6 +327,7 @@ class _StandIn(ModuleType):
         self._note_resetSimulation(number)
         self._mirrors.pop(number, None)
         self._alone.discard(number)
+        self._looked_at.clear()
 
     def _note_resetSimulation(self, client: int | None, *_) -> None:
         number = self._number(client)

@@ -124,8 +124,8 @@ def _of_poses(
 
 
 def _within(body: Body, enclosure: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray, reach: float) -> np.ndarray:
-    """Numbers of the poses (n, 4, 4) at which a mesh and a set may be no farther apart than a reach [m]: at the others
-    there are no contacts, and asking the kernel of gaps takes a hundredth of the time to find none.
+    """Numbers of the poses (n, 4, 4) at which a mesh and a set may be no farther apart than a reach [m].
+    Other poses have no contacts: the kernel of gaps sees this in a hundredth of the time of a search for facets.
     """
     if not serves(enclosure.packed):
         return np.arange(len(X_WA))

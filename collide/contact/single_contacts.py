@@ -162,7 +162,7 @@ def _single_far_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
 
 
 def _single_curved_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
-    """The same of a mesh and a curved shape, of which the kernel of gaps may say that they are beyond the margin."""
+    """The same of a mesh and a curved shape, with the kernel of gaps for pairs beyond the margin."""
     far, held = _single_far_contacts(A, B)
     exchanged = kind_of(A) is not Kind.MESH
     mesh, shape = (B, A) if exchanged else (A, B)

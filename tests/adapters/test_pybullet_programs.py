@@ -5,7 +5,9 @@ from __future__ import annotations
 import runpy
 import subprocess
 import sys
+import threading
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -332,3 +334,42 @@ def test_clients_that_others_may_reach_are_looked_at_each_time(client):
         assert body == ball and position[2] == pytest.approx(z + 0.5)
     with pytest.raises(InvalidArgument, match="exclusive"):
         attach(p, client, exclusive="yes")
+
+
+def test_threads_that_ask_never_see_bodies_where_they_were():
+    alone, stop = attach(p, exclusive=True), threading.Event()
+
+    def ask() -> None:
+        while not stop.is_set():
+            alone.getOverlappingObjects([-1, -1, -1], [1, 1, 1])
+
+    interval, client = sys.getswitchinterval(), alone.connect(p.DIRECT)
+    threads = ThreadPoolExecutor(1)
+    try:
+        ball = alone.createCollisionShape(p.GEOM_SPHERE, radius=0.1)
+        first, second = (alone.createMultiBody(1.0, ball, basePosition=[x, 0, 0]) for x in (0.0, 1.0))
+        for k in range(20):
+            alone.createMultiBody(1.0, ball, basePosition=[0, k + 5, 0])
+        sys.setswitchinterval(1e-5)
+        asking = threads.submit(ask)
+        for k in range(600):
+            x = 1.0 + 0.5 * (k % 7)
+            alone.resetBasePositionAndOrientation(second, [x, 0, 0], [0, 0, 0, 1])
+            ((*_, gap, _, _, _, _, _),) = alone.getClosestPoints(first, second, 100.0)
+            assert gap == pytest.approx(x - 0.2, abs=1e-9), k
+        stop.set()
+        asking.result()
+    finally:
+        stop.set()
+        sys.setswitchinterval(interval)
+        threads.shutdown()
+        alone.disconnect(client)
+
+
+def test_a_client_is_named_by_its_place_or_its_name(client):
+    own = attach(p, client, exclusive=True)
+    own.stepSimulation(client)
+    own.stepSimulation(physicsClientId=client)
+    assert own.getNumBodies(client) == own.getNumBodies() == 0
+    with pytest.raises(TypeError):
+        own.stepSimulation(client, "more")

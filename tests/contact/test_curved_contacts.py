@@ -311,7 +311,7 @@ def test_the_point_of_a_speck_beside_a_far_corner_lies_on_the_speck():
 @pytest.mark.parametrize("solid", [False, True])
 @pytest.mark.parametrize("margin", [0.0, 1e-3, 0.05, 0.4])
 def test_what_is_beyond_the_margin_is_left_out_and_nothing_else(margin, solid, monkeypatch):
-    """With the walk that finds what is beyond the margin, alone, in batches, swapped, and without it: the same bytes."""
+    """With the walk that finds what is beyond the margin, alone, in batches, and without it: the same bytes."""
     rng, n_without = np.random.default_rng(17), 0
     vertices, faces = collide.tessellate(collide.Sphere(0.5), tolerance=2e-2)
     mesh = collide.Mesh(vertices * rng.uniform(0.9, 1.0, (len(vertices), 1)), faces, solid=solid)

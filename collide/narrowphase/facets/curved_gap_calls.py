@@ -67,8 +67,9 @@ class SurfaceStates(NamedTuple):
     """n poses of a mesh and a shape.
 
     meets, apart : (n,) whether the mesh's surface is known to meet the shape, or to be farther apart than the margin;
-    poses without either are left to another method.   maybe_inside : (n,) of surfaces apart, whether the shape may lie inside the mesh.
-    place : (n,) the triangle meeting the shape, in the order of the tree.   how : (n,) index into `results.HOW`.
+    poses without either are left to another method.   maybe_inside : (n,) of surfaces apart, whether the shape may lie
+    inside the mesh.   place : (n,) the triangle meeting the shape, in the order of the tree.   how : (n,) index into
+    `results.HOW`.
     """
 
     meets: np.ndarray

@@ -31,6 +31,7 @@ from collide.mesh.bvh import (
 from collide.mesh.bvh import REACH as TREE_REACH
 from collide.narrowphase.bounds import PROMISE_CURVED
 from collide.narrowphase.fallback_searches import lay_row_apart
+from collide.narrowphase.finish_rows import forget_depth
 from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.pose_batches import clear_rows, set_pose
 from collide.narrowphase.rows import (
@@ -55,7 +56,7 @@ from collide.narrowphase.rows import (
     is_undecided_or_refused,
     view_row,
 )
-from collide.numerics.vec3 import Vec3, absolute, add, dot, neg, norm, norm1, put_vec3, rotate_back, scale, sub, vec3_at
+from collide.numerics.vec3 import Vec3, absolute, dot, neg, norm, norm1, put_vec3, rotate_back, scale, sub, vec3_at
 
 _answer_pairs_at = native_call(SIGNATURE)
 
@@ -157,8 +158,8 @@ def _box_of_facet(tree, place):
 
 
 @kernel
-def _ask_facet(walk, place, depths):
-    """The row of a facet and the shape, written behind the best row.   depths : whether a depth is wanted."""
+def _ask_facet(walk, place):
+    """The row of a facet and the shape, without a depth, written behind the best row."""
     words, tree = walk.words, walk.tree
     coordinates = view_f64(words[COORDINATES_AT], 3 * BLOCK)
     reach = 0.0
@@ -181,7 +182,7 @@ def _ask_facet(walk, place, depths):
         words[CORE],
         (
             words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], 0, words[SHAPE_OF_AT], words[PAIRS_AT], 1, False,
-            depths, False, math.inf, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
+            False, False, math.inf, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
         ),
     )
     return view_row(row_at)
@@ -190,7 +191,7 @@ def _ask_facet(walk, place, depths):
 @kernel
 def _with_facet(walk, nearest, place):
     """The `_Nearest` with one facet more."""
-    row = _ask_facet(walk, place, False)
+    row = _ask_facet(walk, place)
     lower, upper = row.doubles[LOWER], row.doubles[UPPER]
     failed = nearest.failed or is_undecided_or_refused(row) or not lower > 0.0
     key, best, along, above = nearest.key, nearest.place, nearest.along, nearest.above
@@ -311,20 +312,16 @@ def _is_proven_hit(row):
 
 @kernel
 def _write_meeting(walk, place, row_at):
-    """The mesh's row, without a depth, where a facet meets the shape: at the middle of the facet's way out. False where
-    that is left open."""
-    how = view_row(walk.words[ROW_AT] + ROW).flags[HOW]
-    facet, row = _ask_facet(walk, place, True), view_row(row_at)
-    if not _is_proven_hit(facet):
-        return False
-    middle = scale(0.5, add(vec3_at(facet.doubles, POINT_A), vec3_at(facet.doubles, POINT_B)))
-    put_vec3(row.doubles, POINT_A, middle)
-    put_vec3(row.doubles, POINT_B, middle)
+    """The mesh's row, without a depth, where a facet meets the shape: at a point of both, by the row of the facet asked
+    last."""
+    facet, row = view_row(walk.words[ROW_AT] + ROW), view_row(row_at)
+    forget_depth(facet)
+    put_vec3(row.doubles, POINT_A, vec3_at(facet.doubles, POINT_A))
+    put_vec3(row.doubles, POINT_B, vec3_at(facet.doubles, POINT_B))
     row.words[PART_A] = walk.tree.ids[place]
-    row.flags[HIT], row.flags[HOW], row.flags[CERTIFIED] = 1, how, 1
+    row.flags[HIT], row.flags[HOW], row.flags[CERTIFIED] = 1, facet.flags[HOW], 1
     for k in range(4):
         row.words[VERTICES_A + k] = row.words[VERTICES_B + k] = -1
-    return True
 
 
 @kernel
@@ -337,8 +334,10 @@ def _gap(header_at, XA_at, XB_at, check, depths, row_at):
     nearest = _walk_down(walk, math.inf, 0.0, walk.tree.header[N_FACETS])
     if nearest.failed and not depths:
         meeting = _walk_down(walk, 0.0, 0.0, _MAX_ASKED)  # the facet that batches name
-        is_hit = meeting.failed and _is_proven_hit(view_row(walk.words[ROW_AT] + ROW))
-        return MEETS if is_hit and _write_meeting(walk, meeting.place, row_at) else LONG_WAY
+        if not (meeting.failed and _is_proven_hit(view_row(walk.words[ROW_AT] + ROW))):
+            return LONG_WAY
+        _write_meeting(walk, meeting.place, row_at)
+        return MEETS
     if nearest.failed or nearest.place < 0:
         return LONG_WAY
     _write_gap(walk, nearest, row_at)

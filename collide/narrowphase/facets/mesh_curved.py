@@ -17,9 +17,10 @@ import numpy as np
 from collide.lowering.enclosures import Enclosure
 from collide.lowering.facet_bodies import Body, PosesWithSlop, as_given, hull_of, reach_of
 from collide.lowering.packed_convex import POINTS
+from collide.mesh.bvh import MeshTree
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_batches import convex_rows
-from collide.narrowphase.convex_kernel_calls import number_of_poses
+from collide.narrowphase.convex_kernel_calls import finish_distances, number_of_poses
 from collide.narrowphase.facets.curved_gap_calls import gap_rows, serves, surface_states
 from collide.narrowphase.facets.facet_kernel_calls import balls_farther, core_hits, farthest_gap, hull_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
@@ -372,7 +373,10 @@ def _write_overlap(
     point, place = states.point[k], states.place[k : k + 1]
     if np.isnan(point[0]) and place[0] >= 0:
         pose = np.zeros(1, dtype=np.int64)
-        facet = facet_rows(A.tree, E.packed, PA, PB, pose, place, boolean=False, limit=math.inf)[0]
+        facets = facet_rows(A.tree, E.packed, PA, PB, pose, place, boolean=False, limit=math.inf, depths=not proven)
+        if proven:
+            finish_distances(facets, depths=False)  # at a point of both
+        facet = facets[0]
         point = 0.5 * (facet["point_a"] + facet["point_b"])
         row["part_a"] = A.tree.ids[place[0]]
         row["upper"] = 0.0 if proven else max(float(facet["upper"]), 0.0)
@@ -380,6 +384,8 @@ def _write_overlap(
         meeting = surface_distances(A.tree, E.inner.tree, PA.X, PB.X)  # type: ignore[union-attr]
         point = meeting.point_a[0]
         row["part_a"] = max(int(meeting.facets[0, 0]), 0)
+    elif serves(E.packed):
+        row["part_a"] = _facet_at(A.tree, PA.X[0], point)
     row["point_a"] = row["point_b"] = point
     row["certified"] = proven
     if depths:
@@ -389,3 +395,10 @@ def _write_overlap(
             return curved_states(A, E, X_WA, X_WB) != APART
 
         write_depth(row, point, separating_translation(A, E.outer, PA.X[0], PB.X[0], hulls, [], hits))
+
+
+def _facet_at(tree: MeshTree, X_WM: np.ndarray, point: np.ndarray) -> int:
+    """The facet with the corner nearest to a point of the world: where a vertex of the mesh lies inside a shape."""
+    corners = tree.triangles.reshape(-1, 3)
+    nearest = np.square(corners - (point - X_WM[:3, 3]) @ X_WM[:3, :3]).sum(axis=1).argmin()
+    return int(tree.ids[nearest // 3])

@@ -15,6 +15,9 @@ SHAPES = {
 }
 
 
+POINT = collide.ConvexHull([[0.0, 0.0, 0.0]])
+
+
 def bumpy(rng) -> np.ndarray:
     return BALL[0] * rng.uniform(0.85, 1.0, size=(len(BALL[0]), 1))
 
@@ -51,8 +54,19 @@ def test_verdicts_are_those_of_the_facets(name, solid, n):
             corners = collide.ConvexHull(mesh.vertices[mesh.faces[alone.part_a]])
             assert collide.collide(corners, shape, X, Y), case
             assert alone.lower == alone.upper == 0.0 and alone.certified, case
+            for body, pose in ((corners, X), (shape, Y)):
+                assert collide.distance(POINT, body, collide.pose(alone.point_a), pose).distance <= 1e-12, case
         n_hits += alone.hit
     assert 0.15 * n < n_hits < n
+
+
+def test_a_vertex_inside_names_a_facet_beside_it():
+    """The nearest facet touches within rounding, so that polytopes decide, by a corner of two facets that meet."""
+    vertices = [[-1, -1, -1], [-1, -1, 1], [-1, 1, 1], [1, -1, -1], [1, -1, 1], [1, 1, 1], [3, 0, 0]]
+    mesh = collide.Mesh(vertices, [[0, 3, 4], [3, 5, 4], [1, 5, 2], [6, 6, 6]], solid=False)
+    X_WA = np.array([[1.0, 0, 0, -2], [0, 0, -1, 1.5], [0, 1, 0, -1], [0, 0, 0, 1]])
+    r = collide.distance(mesh, collide.Cone(2, 0.25), X_WA, collide.pose((1, 1.5, -1)), signed=False)
+    assert r.hit and r.part_a in (1, 3)
 
 
 def tube(radius: float) -> collide.Mesh:
