@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import pickle
+import gc
 import sys
 import threading
 from collections import Counter
@@ -142,13 +143,16 @@ def test_batches_of_a_prepared_pair_do_not_go_the_long_way(no_long_way):
 
 
 def _python_calls(ask, *arguments, **options):
-    """(functions of Python called by a call, its answer)."""
+    """(functions of Python called by a call, its answer), without those at the end of other tests' shapes."""
     calls = []
+    gc.collect()
+    gc.disable()
     sys.setprofile(lambda frame, event, _: calls.append(frame.f_code.co_name) if event == "call" else None)
     try:
         answer = ask(*arguments, **options)
     finally:
         sys.setprofile(None)
+        gc.enable()
     return len(calls), answer
 
 
