@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import inspect
 import math
 import pickle
-import gc
 import sys
 import threading
 from collections import Counter
