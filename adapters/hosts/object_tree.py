@@ -220,23 +220,21 @@ class _Tree(BoxTree):
         hits.sort()
         return hits
 
-    def _among_first(self, n_leaves: int, margin: float) -> np.ndarray:
-        """(k, 2) pairs of rows, one of which is at the first leaves."""
-        leaves = np.flatnonzero(self.links[: self.n_nodes, BODY] >= 0)[:n_leaves]
-        return self.pairs_among(0, int(leaves.max(initial=-1)) + 1, margin)
-
     def blocks(self, margin: float) -> Iterator[np.ndarray]:
         """Blocks (k, 2) of rows i < j whose boxes come within margin along every axis."""
         n, done, more = len(self.boxes), 0, _FIRST_LEAVES
+        bodies = self.links[: self.n_nodes, BODY]
+        leaves = np.flatnonzero(bodies >= 0)  # ascending
         is_done = np.zeros(n, dtype=bool)
-        while done < len(self.order) or done == 0:
-            hits = self._among_first(more, margin)
+        while done < len(leaves) or done == 0:
+            end = int(leaves[min(more, len(leaves)) - 1]) + 1 if len(leaves) else 0
+            hits = self.pairs_among(0, end, margin)  # one of each at the first leaves
             hits = hits[~is_done[hits].any(axis=1)] if done else hits
             if len(hits):
                 yield _sorted_pairs(hits, n)
             if not done and len(self.unbounded):
                 yield _all_with(self.unbounded, n)
-            is_done[self.order[done:more]] = True
+            is_done[bodies[leaves[done:more]]] = True
             done, more = more, _MORE_LEAVES * more if len(hits) else n
 
     def blocks_with(self, guests: _Guests, margin: float) -> Iterator[np.ndarray]:
