@@ -145,7 +145,6 @@ def test_batches_of_a_prepared_pair_do_not_go_the_long_way(no_long_way):
 def _python_calls(ask, *arguments, **options):
     """(functions of Python called by a call, its answer), without those at the end of other tests' shapes."""
     calls = []
-    gc.collect()
     gc.disable()
     sys.setprofile(lambda frame, event, _: calls.append(frame.f_code.co_name) if event == "call" else None)
     try:
