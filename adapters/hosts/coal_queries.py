@@ -118,22 +118,28 @@ def _only_contact(asked_pair: tuple, enable_contact, margin: float, upper_bound:
     pair = GeometryPair(g1, X1, g2, X2, *asked_pair[4:])
     by_facets = _is_facet_by_facet(pair)
     if enable_contact and (by_facets or not (g1._has_parts or g2._has_parts)):
-        answer = nearest_points(A, B, X1, X2, not by_facets)
-        if by_facets and answer[_HIT]:
-            b1, b2, normal, point_1, point_2, middle, depth = _deciding_contact(pair, answer)
-            return b1, b2, normal, depth, [point_1, point_2], middle
-        return _of_answer(pair, answer)
+        return _nearest_fields(pair, True, by_facets)
     ((b1, b2, normal, point_1, point_2, depth),) = contact_rows(pair, enable_contact, margin, upper_bound, 1)[0]
     return contact_fields(b1, b2, normal, point_1, point_2, depth)
 
 
-def _of_answer(pair: GeometryPair, answer: tuple) -> tuple:
-    """The same from `nearest_points` of the shapes, with depths: the balls swept over them taken off."""
-    distance, normal, point_1, point_2, middle, part_1, part_2, _ = answer
+def _nearest_fields(pair: GeometryPair, is_signed: bool, by_facets: bool) -> tuple:
+    """The same of two single shapes, however far apart.
+
+    is_signed : whether the depth of bodies that overlap is wanted; else the distance is 0.   by_facets : as of
+    `_is_facet_by_facet`; the depth is then that of the facets that decide.
+    """
+    answer = nearest_points(pair.shapes_1[0], pair.shapes_2[0], pair.X1, pair.X2, is_signed and not by_facets)
+    if is_signed and by_facets and answer[_HIT]:
+        b1, b2, normal, point_1, point_2, middle, distance = _deciding_contact(pair, answer)
+        return b1, b2, normal, distance, [point_1, point_2], middle
+    distance, normal, point_1, point_2, middle, part_1, part_2, is_hit = answer
     r1, r2 = pair.radius_1, pair.radius_2
     if r1 or r2:
-        distance, point_1, point_2 = distance - (r1 + r2), point_1 + r1 * normal, point_2 - r2 * normal
+        point_1, point_2 = point_1 + r1 * normal, point_2 - r2 * normal
         middle = 0.5 * point_1 + 0.5 * point_2
+        if is_signed or not is_hit:
+            distance -= r1 + r2
     b1, b2 = part_1 if pair.g1._has_parts else -1, part_2 if pair.g2._has_parts else -1
     return b1, b2, normal, distance, [point_1, point_2], middle
 
@@ -291,14 +297,8 @@ def distance_posed(g1, X1, g2, X2, request, result) -> float:
     is_signed = is_signed and not g1._object_type == g2._object_type == OBJECT_TYPE.OT_BVH
     pair = GeometryPair(g1, X1, g2, X2, shapes_1, shapes_2, radius_1, radius_2)
     if pair.is_of_two_shapes():
-        by_facets = is_signed and _is_facet_by_facet(pair)
-        answer = nearest_points(pair.shapes_1[0], pair.shapes_2[0], X1, X2, is_signed and not by_facets)
-        if by_facets and answer[_HIT]:
-            b1, b2, normal, point_1, point_2, _, least = _deciding_contact(pair, answer)
-            result._fill(least, normal, [point_1, point_2], b1, b2)
-        else:
-            b1, b2, normal, least, points, _ = _of_answer(pair, answer)
-            result._fill(answer[0] if answer[_HIT] and not is_signed else least, normal, points, b1, b2)
+        b1, b2, normal, least, points, _ = _nearest_fields(pair, is_signed, is_signed and _is_facet_by_facet(pair))
+        result._fill(least, normal, points, b1, b2)
         return result.min_distance
     answer = nearest(pair, 0.0, math.inf, is_signed)
     b1, b2 = _of_whole(answer.facets_1, answer.part_1), _of_whole(answer.facets_2, answer.part_2)

@@ -19,6 +19,7 @@ from collide.shapes.shape import Shape
 #: The corner after each of three, and the one after that.
 _FOLLOWING, _LAST = [1, 2, 0], [2, 0, 1]
 
+
 class FacetContact(NamedTuple):
     """How two facets, or a facet and a solid, that meet come apart after the shortest way, each by itself.
 
@@ -59,12 +60,18 @@ def _of_facet_and_solid(A, i: int, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray,
     """(distance, normal, point_a, point_b, their middle, facet) of facet i of a mesh; where it does not meet the solid,
     of a facet at the point that both share: a part that lies inside the solid is not named.
     """
-    while True:
-        row = facets_with(B).distance(X_WA, X_WB, A, i)
-        fields = nearest_points(_facet(A, i), B, X_WA, X_WB) if row is None else row_fields(row)
-        distance, normal, point_a, point_b, middle, _, _, _ = fields
-        if distance <= 0.0 or i == (i := _facet_at(A, X_WA, point)):
-            return min(distance, 0.0), normal, point_a, point_b, middle, i
+    fields = _nearest_of_facet(A, i, B, X_WA, X_WB)
+    if fields[0] > 0.0:
+        i = _facet_at(A, X_WA, point)
+        fields = _nearest_of_facet(A, i, B, X_WA, X_WB)
+    distance, normal, point_a, point_b, middle, _, _, _ = fields
+    return min(distance, 0.0), normal, point_a, point_b, middle, i
+
+
+def _nearest_of_facet(A, i: int, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple:
+    """`nearest_points` of facet i of a mesh and a solid."""
+    row = facets_with(B).distance(X_WA, X_WB, A, i)
+    return nearest_points(_facet(A, i), B, X_WA, X_WB) if row is None else row_fields(row)
 
 
 def _facet(mesh, i: int) -> Shape:

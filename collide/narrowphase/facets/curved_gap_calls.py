@@ -95,23 +95,39 @@ def surface_states(
     return SurfaceStates(meets, maybe_inside | (state == SURFACES_APART), maybe_inside, place, how)
 
 
+class _SingleQuestion:
+    """A mesh and a shape, asked pose by pose.
+
+    exchanged : the shape stands first.   held : the kernel's arrays. All threads share the workspace: the kernel keeps
+    Python's lock.
+    """
+
+    def __init__(self, A: Body, E: Enclosure, exchanged: bool):
+        space = space_of_single_calls()
+        question = GapQuestion(A, E, space.addresses)
+        question.header[EXCHANGED] = exchanged
+        self.header, self.held = question.header, (space, question, A, E)
+        self._solid, self._state = A.solid, prepared_row(curved_state_single, question.header)
+
+    def state(self, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> int | None:
+        """MEETS, NEAR, SURFACES_APART or, of solids alone, MAYBE_INSIDE; None of pairs left to another method.
+
+        margin : how far the bodies may be apart [m].
+        """
+        memory = bytearray(PAIR_DTYPE.itemsize)
+        if self._state(X_WA, X_WB, memory, False, margin) is None:
+            return None
+        state = memory[0]
+        return SURFACES_APART if state == MAYBE_INSIDE and not self._solid else state
+
+
 def beyond_margin(A: Body, E: Enclosure, exchanged: bool) -> Callable[[np.ndarray, np.ndarray, float], bool]:
     """A function of two poses and a margin [m]: whether a mesh and a shape are known to be farther apart than it.
 
-    exchanged : the shape stands first.   All threads share the workspace: the kernel keeps Python's lock.
+    exchanged : the shape stands first.
     """
-    question = GapQuestion(A, E, space_of_single_calls().addresses)
-    question.header[EXCHANGED] = exchanged
-    state_of = prepared_row(curved_state_single, question.header)
-
-    def is_beyond(X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> bool:
-        _ = question, A, E  # their arrays are in use
-        memory = bytearray(PAIR_DTYPE.itemsize)
-        if state_of(X_WA, X_WB, memory, False, margin) is None:
-            return False
-        return memory[0] == SURFACES_APART or (memory[0] == MAYBE_INSIDE and not A.solid)
-
-    return is_beyond
+    single = _SingleQuestion(A, E, exchanged)
+    return lambda X_WA, X_WB, margin: single.state(X_WA, X_WB, margin) == SURFACES_APART
 
 
 def gap_rows(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -134,11 +150,8 @@ def prepared_curved(A: Body, E: Enclosure, exchanged: bool) -> Prepared:
 
     exchanged : the shape stands first.
     """
-    space = space_of_single_calls()  # all threads use it, one after the other, with Python's lock
-    question = GapQuestion(A, E, space.addresses)
-    question.header[EXCHANGED] = exchanged
-    gap = prepared_row(curved_gap_single, question.header)
-    state_of = prepared_row(curved_state_single, question.header)
+    single = _SingleQuestion(A, E, exchanged)
+    gap = prepared_row(curved_gap_single, single.header)
 
     def is_outside(X_WA, X_WB) -> bool:
         """Whether the shape, whose surface the mesh's does not meet, is outside of the mesh."""
@@ -153,21 +166,19 @@ def prepared_curved(A: Body, E: Enclosure, exchanged: bool) -> Prepared:
         return None if apart is None else True
 
     def collide(X_WA, X_WB) -> bool | None:
-        memory = bytearray(PAIR_DTYPE.itemsize)
-        if state_of(X_WA, X_WB, memory, False, 0.0) is None:
-            return None
-        return memory[0] == MEETS or (memory[0] == MAYBE_INSIDE and A.solid and not is_outside(X_WA, X_WB))
+        state = single.state(X_WA, X_WB, 0.0)
+        if state == MAYBE_INSIDE:
+            return not is_outside(X_WA, X_WB)
+        return None if state is None else state == MEETS
 
     def within(X_WA, X_WB, margin: float) -> bool | None:
+        state = single.state(X_WA, X_WB, margin)
+        if state == MEETS or state == SURFACES_APART:
+            return state == MEETS
         memory = bytearray(PAIR_DTYPE.itemsize)
-        if state_of(X_WA, X_WB, memory, False, margin) is not None:
-            state = memory[0]
-            if state == MEETS or state == SURFACES_APART or (state == MAYBE_INSIDE and not A.solid):
-                return state == MEETS
-            memory = bytearray(PAIR_DTYPE.itemsize)
         if distance(X_WA, X_WB, memory, False, math.inf) is None:
             return None
         row = np.frombuffer(memory, PAIR_DTYPE, 1)[0]
         return True if row["upper"] <= margin else False if row["lower"] > margin else None
 
-    return Prepared(collide=collide, within=within, distance=distance, held=(space, question, A, E))
+    return Prepared(collide=collide, within=within, distance=distance, held=single.held)

@@ -349,8 +349,8 @@ def _state(header_at, XA_at, XB_at, check, margin):
     """(state, place, how) of one pair of poses, the mesh's first.
 
     state : LONG_WAY, SURFACES_APART, MAYBE_INSIDE, MEETS or, with a margin above 0 [m], NEAR: apart is then farther
-    apart than the margin.   place : of MEETS the triangle meeting the shape, in the
-    order of the tree.   how : index into `results.HOW`.
+    apart than the margin.   place : of MEETS the triangle meeting the shape, in the order of the tree.   how : index
+    into `results.HOW`.
     """
     is_placed, walk = _place(header_at, XA_at, XB_at, check)
     if not is_placed:
