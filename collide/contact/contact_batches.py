@@ -33,8 +33,9 @@ from collide.transforms import as_poses
 #: taken apart.
 _OF_MESHES = {Method.FACETS: facet_contacts, Method.CURVED: curved_contacts, Method.HULL: halfspace_contacts}
 _ARE_SETS = cells_of(OF_SETS)
-#: Pairs that are quicker by themselves than pairs of parts in a batch of few poses.
-_BY_SINGLE_CALLS = cells_of((Method.FACETS, Method.PARTS))
+#: Pairs that are quicker by themselves than in a batch; those of lists than in batches of few poses.
+_ALWAYS_BY_SINGLE_CALLS = Method.PARTS, Method.CURVED
+_BY_SINGLE_CALLS = cells_of((Method.FACETS, *_ALWAYS_BY_SINGLE_CALLS))
 #: Unions of more parts, whose tables are kept with every partner, are not made ready for the pairs of a list.
 _MAX_KEPT_PARTS = 64
 
@@ -90,21 +91,16 @@ def contact_batch(
             counts[near] = np.diff(ends, prepend=0)
             return rows, np.cumsum(counts)
     X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
-    if how in _OF_MESHES:
-        make = _OF_MESHES[how]
-        rows, ends = make(A, B, X_WA, X_WB, margin, max_contacts, None, threads)
-        of_pair = np.repeat(np.arange(n), np.diff(ends, prepend=0))
-        return _only_within_margin(rows, of_pair, n, A, B, X_WA, X_WB, margin)
     # A single call of two shapes comes here where its kernel has left it open.
     if (n > 1 or how is None) and (asks := _single_calls(A, B, n, how)):
         return _by_single_calls(asks, A, B, X_WA, X_WB, n, margin, max_contacts, threads)
-    return _by_parts(A, B, X_WA, X_WB, n, margin, max_contacts, threads)
+    return _by_methods(A, B, X_WA, X_WB, n, margin, max_contacts, threads)
 
 
 def _single_calls(A, B, n: int, how: Method | None) -> dict[int, Single]:
-    """{number of a pair: its kernel of single calls}, of unions of convex parts, and of facets among other pairs."""
+    """{number of a pair: its kernel of single calls}, of pairs that have no kernel of batches as quick."""
     if not isinstance(A, Picked):
-        ask = single_contacts_of(A, B) if how is Method.PARTS else None
+        ask = single_contacts_of(A, B) if how in _ALWAYS_BY_SINGLE_CALLS else None
         return {} if ask is None else dict.fromkeys(range(n), ask)
     kinds, shapes = tables_of(A.shape_set).kinds, A.shape_set.shapes
     is_small = cache(lambda a: len(compound_parts(shapes[a]).parts) <= _MAX_KEPT_PARTS)
@@ -112,6 +108,18 @@ def _single_calls(A, B, n: int, how: Method | None) -> dict[int, Single]:
     some = np.flatnonzero(_BY_SINGLE_CALLS[kinds[A.rows], kinds[B.rows]]).tolist()
     asks = {k: known(int(A.rows[k]), int(B.rows[k])) for k in some}
     return {k: ask for k, ask in asks.items() if ask is not None}
+
+
+def _by_methods(
+    A, B, X_WA, X_WB, n: int, margin: float, max_contacts: int, threads: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """`contact_batch` of checked poses: of two shapes, one of them a mesh, in a batch; of others part by part."""
+    how = None if isinstance(A, Picked) else method_of(kind_of(A), kind_of(B))
+    if how not in _OF_MESHES:
+        return _by_parts(A, B, X_WA, X_WB, n, margin, max_contacts, threads)
+    rows, ends = _OF_MESHES[how](A, B, X_WA, X_WB, margin, max_contacts, None, threads)
+    of_pair = np.repeat(np.arange(n), np.diff(ends, prepend=0))
+    return _only_within_margin(rows, of_pair, n, A, B, X_WA, X_WB, margin)
 
 
 def _by_parts(
@@ -148,7 +156,7 @@ def _by_single_calls(
     is_open = [k for k in range(n) if k not in pieces]
     if is_open:
         A, B = (S if isinstance(S, Shape) else S[np.array(is_open)] for S in (A, B))
-        rows, ends = _by_parts(A, B, X_WA[is_open], X_WB[is_open], len(is_open), margin, max_contacts, threads)
+        rows, ends = _by_methods(A, B, X_WA[is_open], X_WB[is_open], len(is_open), margin, max_contacts, threads)
         pieces |= {k: some.tobytes() for k, some in zip(is_open, np.split(rows, ends))}
     rows = np.frombuffer(bytearray().join(pieces[k] for k in range(n)), dtype=CONTACT_DTYPE)
     return rows, np.cumsum([len(pieces[k]) // CONTACT_DTYPE.itemsize for k in range(n)])

@@ -7,12 +7,21 @@ to be moved along a patch's normal is proven by slabs in the kernel, and tried h
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from collide.base.threads import answers_in_order, pieces_of
 from collide.contact.contact_rows import CONTACT_DTYPE, OVERLAP, Rows, Slack, joined_rows, no_rows
+from collide.contact.curved_contact_call import (
+    AS_GOOD,
+    CURVED_HEADER,
+    MANIFOLDS,
+    REACH_OF_BOTH,
+    STARTS,
+    contacts_single_curved,
+)
 from collide.contact.curved_manifolds import (
     HEADER,
     POSE_A,
@@ -26,19 +35,24 @@ from collide.contact.facet_topology import topology_of
 from collide.contact.support_face import ROUND
 from collide.contact.swallowed_facets import facets_asked, meshes_within
 from collide.errors import UnsupportedQuery
-from collide.kernels import address_of
+from collide.kernels import address_of, code_of
+from collide.kernels.prepared import prepared_contacts
 from collide.lowering.enclosures import Enclosure, enclosure_of
-from collide.lowering.facet_bodies import Body, PosesWithSlop, as_given, body_of
+from collide.lowering.facet_bodies import Body, PosesWithSlop, as_given, body_of, reach_of
 from collide.lowering.hull_faces import face_table_of
 from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.kinds import Kind
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import ShapeTable
 from collide.mesh.bvh import REACH, MeshTree
-from collide.narrowphase.facets.curved_gap_calls import serves, surface_states
+from collide.narrowphase.composite.composite_parts import compound_parts
+from collide.narrowphase.convex_kernel_calls import space_of_single_calls
+from collide.narrowphase.facets.curved_gap_calls import GapQuestion, serves, surface_states
+from collide.narrowphase.facets.curved_gap_kernel import EXCHANGED
 from collide.narrowphase.facets.facet_kernel_calls import step_of
 from collide.narrowphase.facets.facets_against_curved import facet_rows
 from collide.narrowphase.facets.near_facets import near_facets
+from collide.narrowphase.prepared_pairs import Single
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
 
@@ -46,12 +60,14 @@ from collide.shapes.shape import Shape
 _FACETS_OF_PIECE, MAX_FACETS, _POSES_OF_PIECE = 1 << 16, 1 << 18, 256
 #: Rows there is space for to begin with, and so many more a pose.
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
+#: Facets are looked at that are farther than a limit by this part of the size: their rows tell what is near.
+_LEEWAY = 2.0**-36
+#: Facets near the shape, and rows, that a single call has space for; calls of more are left to the long way.
+_FACETS_OF_SINGLE_CALLS, _ROWS_OF_SINGLE_CALLS = 256, 1024
 #: Lengths tried where slabs prove one longer than the depth, in depths.
 _LENGTHS = (1.0 + 2.0**-20, 1.0 + 2.0**-7, 1.25, 2.0, 4.0)
 #: Facets asked first whether a set moved clears them.
 _FIRST_ASKED = 64
-#: A length that is longer than the depth by no more than this part is as good as one can be.
-_AS_GOOD = 1.0 + 2.0**-10
 
 
 class _Near(NamedTuple):
@@ -140,6 +156,7 @@ def _near(body: Body, enclosure: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop
     packed = enclosure.packed
     within = meshes_within(body, packed, PA, PB)
     upper = limit if within is None else np.where(within, -np.inf, limit)
+    upper = upper + _LEEWAY * (reach_of(body) + packed.reach)
     across = PB.X[:, :3, 3] - PA.X[:, :3, 3]
     candidates = near_facets(body.tree, packed, PA, PB, across, upper)
     pose, place = candidates.pose, candidates.place
@@ -170,18 +187,11 @@ def _patches(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(rows, ends, (n,) whether no patch tells) of poses (n, 4, 4)."""
     n = len(X_WA)
-    table = ShapeTable([packed])
-    faces = face_table_of(table, ROUND)
-    topology = topology_of(body)
-    capacity = int(np.diff(near.starts).max(initial=0))
-    work = np.empty(workspace_words(capacity, faces.largest))
-    slots, seen = np.zeros(len(body.tree.ids), dtype=np.int64), np.zeros(len(topology.fan_starts), dtype=np.int64)
-    header = np.zeros(HEADER, dtype=np.int64)
-    buffers = (near.facets, near.rows, near.starts, near.patches, slots, seen, work)
-    header[:POSE_A] = (
-        body.tree.address, address_of(topology.header), body.solid, len(slots), *table.addresses,
-        address_of(faces.ints), faces.largest, *map(address_of, buffers), capacity, min(max_contacts, 1 << 40),
-    )
+    capacity, (n_facets, n_corners) = int(np.diff(near.starts).max(initial=0)), _sizes_of(body)
+    table, marks = ShapeTable([packed]), (np.zeros(n_facets, dtype=np.int64), np.zeros(n_corners, dtype=np.int64))
+    work = np.empty(workspace_words(capacity, face_table_of(table, ROUND).largest))
+    facets = (address_of(of) for of in (near.facets, near.rows, near.starts, near.patches))
+    header = _header_of(body, table, (*facets, *map(address_of, marks), address_of(work)), capacity, max_contacts)
     ends, lacks = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     out = np.zeros(_FIRST_ROWS + _ROWS_PER_POSE * n, dtype=CONTACT_DTYPE)
     while curved_manifolds(
@@ -193,6 +203,26 @@ def _patches(
     return out[: header[ROWS_DONE]], ends, lacks
 
 
+def _sizes_of(body: Body) -> tuple[int, int]:
+    """Facets and corners of a mesh."""
+    return len(body.tree.ids), len(topology_of(body).fan_starts)
+
+
+def _header_of(
+    body: Body, table: ShapeTable, buffers: tuple[int, ...], capacity: int, max_contacts: int
+) -> np.ndarray:
+    """What `curved_manifolds` reads of a mesh and row 0 of a table.
+
+    buffers : addresses, as the header has them from the facets on to the workspace.   capacity : in facets.
+    """
+    header, faces = np.zeros(HEADER, dtype=np.int64), face_table_of(table, ROUND)
+    header[:POSE_A] = (
+        body.tree.address, address_of(topology_of(body).header), body.solid, len(body.tree.ids), *table.addresses,
+        address_of(faces.ints), faces.largest, *buffers, capacity, min(max_contacts, 1 << 40),
+    )
+    return header
+
+
 def _shortened(
     body: Body, enclosure: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, near: _Near, rows: np.ndarray,
     ends: np.ndarray,
@@ -202,7 +232,7 @@ def _shortened(
     begins = np.flatnonzero((np.diff(pose, prepend=-1) != 0) | (np.diff(rows["patch"], prepend=-1) != 0))
     sizes = np.diff(np.append(begins, len(rows)))
     depth = np.maximum(-rows["lower"][begins], 0.0)
-    is_long = (rows["kind"][begins] == OVERLAP) & (rows["apart"][begins] > _AS_GOOD * depth)
+    is_long = (rows["kind"][begins] == OVERLAP) & (rows["apart"][begins] > AS_GOOD * depth)
     begins, sizes, depth = begins[is_long], sizes[is_long], depth[is_long]
     if not len(begins):
         return rows
@@ -278,3 +308,50 @@ def _moved(X: np.ndarray, steps: np.ndarray) -> np.ndarray:
     moved = X.copy()
     moved[:, :3, 3] += steps
     return moved
+
+
+# --- single calls -------------------------------------------------------------------------------
+
+
+def single_curved_contacts(A: Shape, B: Shape) -> tuple[Single, Any] | None:
+    """(`Prepared.contacts` of a mesh and a curved shape, what it uses besides); ``None`` of rounded polytopes."""
+    exchanged = kind_of(A) is not Kind.MESH
+    body, enclosure = (body_of(B), enclosure_of(A)) if exchanged else (body_of(A), enclosure_of(B))
+    if not serves(enclosure.packed):
+        return None
+    block, table = space_of_single_calls(), ShapeTable([enclosure.packed])
+    question = GapQuestion(body, enclosure, block.addresses)
+    question.header[EXCHANGED] = exchanged
+    space = _space_of_single_calls(face_table_of(table, ROUND).largest)
+    marks = _marks(1 << max(_sizes_of(body)).bit_length())
+    header = np.zeros(CURVED_HEADER, dtype=np.int64)
+    header[:STARTS] = (
+        code_of(curved_manifolds), len(space.out), 0, address_of(question.header), body.solid, _FACETS_OF_SINGLE_CALLS,
+        *(address_of(of) for of in (space.listed, space.places, space.order, space.facets, space.rows)),
+    )
+    header.view(np.float64)[REACH_OF_BOTH] = compound_parts(A).reach + compound_parts(B).reach
+    buffers = (address_of(of) for of in (space.facets, space.rows, header[STARTS:], space.patches, *marks, space.work))
+    header[MANIFOLDS:] = _header_of(body, table, tuple(buffers), _FACETS_OF_SINGLE_CALLS, 1)
+    asked = prepared_contacts(contacts_single_curved, header, space.out)
+    return asked, (body, enclosure, block, table, question, space, marks)
+
+
+class _SpaceOfSingleCalls:
+    """What single calls work in: rows and numbers of facets as the walk lists them, and in order; contacts."""
+
+    def __init__(self, largest: int):
+        n = _FACETS_OF_SINGLE_CALLS
+        self.listed, self.rows = np.zeros((2, n), dtype=PAIR_DTYPE)
+        self.places, self.order, self.facets, self.patches = np.zeros((4, n), dtype=np.int64)
+        self.work = np.empty(workspace_words(n, largest))
+        self.out = np.zeros(_ROWS_OF_SINGLE_CALLS, dtype=CONTACT_DTYPE)
+
+
+#: One for all pairs whose shape has faces of so many corners: the kernels keep Python's lock.
+_space_of_single_calls = cache(_SpaceOfSingleCalls)
+
+
+@cache
+def _marks(n: int) -> np.ndarray:
+    """(2, n) words for marks of a mesh's facets and corners, zeros between calls: for all meshes of no more than n."""
+    return np.zeros((2, n), dtype=np.int64)

@@ -178,7 +178,10 @@ def _error(reaches, pair, shift):
     return 2.0**-49 * reach
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64, int64)")
+SIGNATURE = "int64(int64, int64, int64, int64, int64, int64, float64, int64, int64, int64, int64, int64)"
+
+
+@entry(SIGNATURE)
 def curved_manifolds(
     header_at, XA_at, step_a, XB_at, step_b, n, margin, slack_at, out_at, capacity, ends_at, lacks_at
 ):
@@ -189,7 +192,7 @@ def curved_manifolds(
     filled from header[ROWS_DONE] on.   ends : where the contacts of each pose end.
     lacks : a word a pose: no patch decides, and the row of `distance` is the only contact.
 
-    Twelve arguments: called by Python, with integers and doubles alone.
+    Twelve arguments: called by Python and `curved_contact_call.py`, with integers and doubles alone.
     """
     header = view_i64(header_at, HEADER)
     starts = view_i64(header[STARTS_AT], n + 1)

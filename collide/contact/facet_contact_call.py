@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collide.contact.contact_rows import CONTACT_DTYPE
 from collide.contact.facet_manifolds import CONTACT_HEADER, DONE, MAX_CONTACTS, POSES_DONE, ROWS_DONE, SIGNATURE
 from collide.contact.near_the_margin import is_near_the_margin
-from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i32, view_i64
+from collide.contact.patch_rows import clear_words
+from collide.kernels import entry, native_call, prepared, view_f64, view_i64
 from collide.narrowphase.facets.mesh_collide_kernel import is_rigid
-from collide.results import field_at
 
 _facet_manifolds_at = native_call(SIGNATURE)
 
@@ -15,9 +14,6 @@ _facet_manifolds_at = native_call(SIGNATURE)
 # (a double) [m]; of the call where its rows end, and what they lack. Then the header of `facet_manifolds.py`.
 KERNEL, N_ROWS, REACH_OF_BOTH, _END, _LACKS, MANIFOLDS = range(6)
 FACETS_HEADER = MANIFOLDS + CONTACT_HEADER
-
-_CONTACT = CONTACT_DTYPE.itemsize
-_A, _PART_A, _PART_B = (field_at(CONTACT_DTYPE, name, 4) for name in ("a", "part_a", "part_b"))
 
 
 @entry(prepared.CONTACTS, nogil=False)
@@ -46,13 +42,6 @@ def contacts_single_facets(header_at, XA_at, XB_at, out_at, max_contacts, margin
     n_rows, reach = header[_END], view_f64(header_at + 8 * REACH_OF_BOTH, 1)[0]
     if is_near_the_margin(out_at, n_rows, margin, reach, XA_at, XB_at):
         return -1
-    _clear_words(out_at, n_rows)
+    clear_words(out_at, n_rows)
     return n_rows
 
-
-@kernel
-def _clear_words(out_at, n_rows):
-    """Zero what a pair's rows leave to callers: the first body's id, and parts of unions."""
-    for k in range(n_rows):
-        words = view_i32(out_at + _CONTACT * k, _CONTACT // 4)
-        words[_A] = words[_PART_A] = words[_PART_B] = 0

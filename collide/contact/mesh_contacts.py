@@ -56,8 +56,8 @@ from collide.narrowphase.prepared_pairs import Single
 from collide.shapes.shape import Shape
 
 #: Pairs of facets there is space for to begin with, what of it is kept from call to call, and at most: a gigabyte.
-_FEWEST_PAIRS, _KEPT_PAIRS, MAX_PAIRS = 1 << 10, 1 << 14, 1 << 18
-#: Space that has grown is kept for so many calls, 19 or 75 MB; to grow it again lists the pairs of one call twice.
+_FEWEST_PAIRS, _KEPT_PAIRS, MAX_PAIRS = 1 << 12, 1 << 14, 1 << 18
+#: Space that has grown is kept for so many calls, at most 75 MB; to grow it again lists the pairs of one call twice.
 _CALLS_KEPT = 256
 #: Pairs of facets, and rows, that a single call has space for; calls of more are left to the long way.
 _PAIRS_OF_SINGLE_CALLS, _ROWS_OF_SINGLE_CALLS = 1 << 12, 1 << 10

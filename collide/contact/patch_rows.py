@@ -24,7 +24,8 @@ CONTACT = CONTACT_DTYPE.itemsize
 _at = partial(field_at, CONTACT_DTYPE)
 _DISTANCE, _LOWER, _UPPER, _APART = (_at(name, 8) for name in ("distance", "lower", "upper", "apart"))
 _NORMAL, _POINT_A, _POINT_B = (_at(name, 8) for name in ("normal", "point_a", "point_b"))
-_B, _FACET_A, _FACET_B = (_at(name, 4) for name in ("b", "facet_a", "facet_b"))
+_A, _B, _FACET_A, _FACET_B = (_at(name, 4) for name in ("a", "b", "facet_a", "facet_b"))
+_PART_A, _PART_B = (_at(name, 4) for name in ("part_a", "part_b"))
 _FEATURE_A, _FEATURE_B, _PATCH, _KIND = (_at(name, 4) for name in ("feature_a", "feature_b", "patch", "kind"))
 
 
@@ -186,6 +187,28 @@ def put_row(contact_at, points, k, facet_a, facet_b, rows):
 def facet_of_row(contact_at):
     """The facet of A that a row names."""
     return view_i32(contact_at, CONTACT // 4)[_FACET_A]
+
+
+@kernel(inline=True)
+def patch_of_row(contact_at):
+    """The patch that a row is of."""
+    return view_i32(contact_at, CONTACT // 4)[_PATCH]
+
+
+@kernel(inline=True)
+def is_cleared_by(contact_at, factor):
+    """Whether a row's ``apart``, where its facets meet, is at most so many times its depth."""
+    doubles = view_f64(contact_at, CONTACT // 8)
+    meets = view_i32(contact_at, CONTACT // 4)[_KIND] == OVERLAP
+    return not meets or doubles[_APART] <= factor * max(-doubles[_LOWER], 0.0)
+
+
+@kernel
+def clear_words(out_at, n_rows):
+    """Zero what a pair's rows leave to callers: the first body's id, and parts of unions."""
+    for k in range(n_rows):
+        words = view_i32(out_at + CONTACT * k, CONTACT // 4)
+        words[_A] = words[_PART_A] = words[_PART_B] = 0
 
 
 @kernel

@@ -21,6 +21,7 @@ from collide.contact.contact_blocks import LIMIT, PLACES_AT, WHICH_AT, contacts_
 from collide.contact.contact_rows import CONTACT_DTYPE, no_rows
 from collide.contact.convex_contacts import ManifoldSpace, manifold_addresses
 from collide.contact.convex_manifolds import PAIRS_DONE, max_corners
+from collide.contact.curved_contacts import single_curved_contacts
 from collide.contact.mesh_contacts import single_facet_contacts
 from collide.contact.ready_contacts import CONTACT_WORDS, ready_contacts
 from collide.contact.single_contact_call import SINGLE_HEADER, contacts_single
@@ -29,11 +30,8 @@ from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_contacts
 from collide.lowering.compound_layout import is_flat, layout_of
 from collide.lowering.compound_table import CompoundTable
-from collide.lowering.enclosures import enclosure_of
-from collide.lowering.facet_bodies import body_of
 from collide.lowering.hull_faces import HullFaceTable, face_table_of
 from collide.lowering.kind_of_shape import kind_of
-from collide.lowering.kinds import Kind
 from collide.lowering.parts import is_single_convex
 from collide.lowering.shape_table import ShapeTable
 from collide.narrowphase.composite.composite import single_header
@@ -43,14 +41,15 @@ from collide.narrowphase.composite.single_composite_call import BALLS_WORK, ball
 from collide.narrowphase.convex_batches import lowered_numbers, prepare_parts, prepare_sets, shape_table
 from collide.narrowphase.convex_kernel_calls import BlockWorkspace, space_of_single_calls
 from collide.narrowphase.dispatch import OF_SETS, OF_UNIONS, Method, method_of
-from collide.narrowphase.facets.curved_gap_calls import beyond_margin, serves
 from collide.narrowphase.pose_batches import BLOCK
 from collide.narrowphase.pose_batches import HEADER as HEADER_OF_POSES
 from collide.narrowphase.prepared_pairs import Prepared, Single, keep_prepared, prepared_pair, single_calls_are_safe
 from collide.shapes.shape import Shape
 
+#: What makes pairs with a mesh ready.
+_OF_MESHES = {Method.FACETS: single_facet_contacts, Method.CURVED: single_curved_contacts}
 #: Pairs that have kernels of single calls, if of far poses alone.
-_WITH_KERNELS = (*OF_SETS, *OF_UNIONS, Method.FACETS, Method.CURVED)
+_WITH_KERNELS = (*OF_SETS, *OF_UNIONS, *_OF_MESHES)
 #: Contacts of a single call of two unions; more are left to the long way.
 _MAX_ROWS = 1024
 
@@ -91,9 +90,8 @@ def _made_of(A: Shape, B: Shape, how: Method, are_sets: bool) -> tuple[Single, A
     """(`Prepared.contacts`, what it uses besides)."""
     if are_sets:
         return _single_contacts(shape_table(A, B)[0])
-    if how is Method.CURVED:
-        return _single_curved_contacts(A, B)
-    made = single_facet_contacts(A, B) if how is Method.FACETS else None
+    make = _OF_MESHES.get(how)
+    made = None if make is None else make(A, B)
     return _single_far_contacts(A, B) if made is None else made
 
 
@@ -159,23 +157,6 @@ def _single_far_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
     held = layout_of(A).ball, layout_of(B).ball, np.zeros(BALLS_WORK)
     header = np.array([address_of(of) for of in held], dtype=np.int64)
     return prepared_contacts(balls_beyond, header, no_rows()), held
-
-
-def _single_curved_contacts(A: Shape, B: Shape) -> tuple[Single, Any]:
-    """The same of a mesh and a curved shape, with the kernel of gaps for pairs beyond the margin."""
-    far, held = _single_far_contacts(A, B)
-    exchanged = kind_of(A) is not Kind.MESH
-    mesh, shape = (B, A) if exchanged else (A, B)
-    enclosure = enclosure_of(shape)
-    if not serves(enclosure.packed):
-        return far, held
-    is_beyond = beyond_margin(body_of(mesh), enclosure, exchanged)
-
-    def contacts(X_WA: np.ndarray, X_WB: np.ndarray, max_contacts: int, margin: float) -> bytes | None:
-        rows = far(X_WA, X_WB, max_contacts, margin)
-        return b"" if rows is None and is_beyond(X_WA, X_WB, margin) else rows
-
-    return contacts, held
 
 
 def _made_of_numbers(header: np.ndarray) -> tuple[Single, Any] | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -119,15 +118,6 @@ class _SingleQuestion:
             return None
         state = memory[0]
         return SURFACES_APART if state == MAYBE_INSIDE and not self._solid else state
-
-
-def beyond_margin(A: Body, E: Enclosure, exchanged: bool) -> Callable[[np.ndarray, np.ndarray, float], bool]:
-    """A function of two poses and a margin [m]: whether a mesh and a shape are known to be farther apart than it.
-
-    exchanged : the shape stands first.
-    """
-    single = _SingleQuestion(A, E, exchanged)
-    return lambda X_WA, X_WB, margin: single.state(X_WA, X_WB, margin) == SURFACES_APART
 
 
 def gap_rows(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

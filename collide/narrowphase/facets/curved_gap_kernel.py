@@ -80,6 +80,8 @@ _FAR_OFF = 2.0**-40
 #: Of the pair's size, what rounding takes off a gap between boxes.
 _ROUNDING = 2.0**-44
 _U = 2.0**-53
+#: Facets are looked at that are farther than a limit by so many times what rounding takes off a gap.
+NEAR_SLACK = 64.0
 
 
 class _Walk(NamedTuple):
@@ -158,8 +160,8 @@ def _box_of_facet(tree, place):
 
 
 @kernel
-def _ask_facet(walk, place):
-    """The row of a facet and the shape, without a depth, written behind the best row."""
+def _ask_facet(walk, place, depths):
+    """The row of a facet and the shape, written behind the best row.   depths : whether a depth is wanted."""
     words, tree = walk.words, walk.tree
     coordinates = view_f64(words[COORDINATES_AT], 3 * BLOCK)
     reach = 0.0
@@ -182,7 +184,7 @@ def _ask_facet(walk, place):
         words[CORE],
         (
             words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], 0, words[SHAPE_OF_AT], words[PAIRS_AT], 1, False,
-            False, False, math.inf, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
+            depths, False, math.inf, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
         ),
     )
     return view_row(row_at)
@@ -191,7 +193,7 @@ def _ask_facet(walk, place):
 @kernel
 def _with_facet(walk, nearest, place):
     """The `_Nearest` with one facet more."""
-    row = _ask_facet(walk, place)
+    row = _ask_facet(walk, place, False)
     lower, upper = row.doubles[LOWER], row.doubles[UPPER]
     failed = nearest.failed or is_undecided_or_refused(row) or not lower > 0.0
     key, best, along, above = nearest.key, nearest.place, nearest.along, nearest.above
@@ -267,6 +269,42 @@ def _walk_down(walk, limit, enough, max_asked):
     return nearest
 
 
+@kernel
+def rows_within(walk, limit, capacity, rows_at, places_at):
+    """(state, n) of the facets no farther than a limit [m]: writes their rows, with depths, and their places.
+
+    state : SURFACES_APART or MAYBE_INSIDE where n is 0; LONG_WAY where more than ``capacity`` facets are near, or one
+    is undecided; else NEAR.   rows, places : room for ``capacity``.
+    """
+    tree, words, places = walk.tree, walk.words, view_i64(places_at, capacity)
+    zero = Vec3(0.0, 0.0, 0.0)
+    # Looked at are facets a little farther away: what is near is told by their rows, as in batches.
+    nearest = _Nearest(math.inf, -1, math.inf, limit + NEAR_SLACK * walk.slack, math.inf, zero, -math.inf, False, 0)
+    n, top = 0, _push_children(walk, nearest, 0, 0)
+    while top > 0:
+        top -= 1
+        link = link_of(tree.links, view_i64(words[STACK_AT], top + 1)[top])
+        if link >= 0:
+            top = _push_children(walk, nearest, link, top)
+            continue
+        run = ~link
+        for place in range(run >> 3, (run >> 3) + (run & 7)):
+            centre, half = _box_of_facet(tree, place)
+            if _gap_of_box(walk, nearest, centre, half) > nearest.upper:
+                continue
+            row = _ask_facet(walk, place, True)
+            if row.doubles[LOWER] > limit:
+                continue
+            if n == capacity or is_undecided_or_refused(row):
+                return LONG_WAY, n
+            source, target = view_i64(words[ROW_AT] + ROW, ROW // 8), view_i64(rows_at + ROW * n, ROW // 8)
+            for k in range(ROW // 8):
+                target[k] = source[k]
+            places[n] = place
+            n += 1
+    return (NEAR if n > 0 else _inside_or_apart(walk)), n
+
+
 @kernel(inline=True)
 def _off_rotation(R):
     """How far a matrix is off a rotation: the largest entry of RᵀR − I, and rounding."""
@@ -276,7 +314,7 @@ def _off_rotation(R):
 
 
 @kernel
-def _place(header_at, XA_at, XB_at, check):
+def place_pair(header_at, XA_at, XB_at, check):
     """(whether both matrices are poses, and near rotations, the `_Walk`) of one pair of poses."""
     words = view_i64(header_at, HEADER)
     ints, numbers = view_i64(words[INTS_AT], 2 * INTS), view_f64(words[NUMBERS_AT], 2 * NUMBERS)
@@ -328,7 +366,7 @@ def _write_meeting(walk, place, row_at):
 def _gap(header_at, XA_at, XB_at, check, depths, row_at):
     """The row of one pair of poses, the mesh's first; LONG_WAY, SURFACES_APART or MAYBE_INSIDE, and without depths
     MEETS."""
-    is_placed, walk = _place(header_at, XA_at, XB_at, check)
+    is_placed, walk = place_pair(header_at, XA_at, XB_at, check)
     if not is_placed:
         return LONG_WAY
     nearest = _walk_down(walk, math.inf, 0.0, walk.tree.header[N_FACETS])
@@ -352,7 +390,7 @@ def _state(header_at, XA_at, XB_at, check, margin):
     apart than the margin.   place : of MEETS the triangle meeting the shape, in the order of the tree.   how : index
     into `results.HOW`.
     """
-    is_placed, walk = _place(header_at, XA_at, XB_at, check)
+    is_placed, walk = place_pair(header_at, XA_at, XB_at, check)
     if not is_placed:
         return LONG_WAY, -1, 0
     nearest = _walk_down(walk, margin, margin, _MAX_ASKED)

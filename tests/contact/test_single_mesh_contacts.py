@@ -1,9 +1,10 @@
-"""Single contacts of meshes inside a kernel: the bytes of batches, and what is left to these."""
+"""Single contacts of meshes inside kernels: the bytes of the long way, and what is left to it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from contact_scenes import table
 from mesh_families import random_pose, soup
 from mesh_shapes import block_ring, box
 
@@ -41,6 +42,41 @@ def test_single_calls_have_the_bytes_of_batches():
             by_kernel += prepared_pair(A, B).contacts(X_WA, X_WB, most, margin) is not None
             hits, far, asked = hits + (len(rows) > 0), far + (len(rows) == 0), asked + 1
     assert by_kernel > 0.6 * asked and hits > 100 and far > 100, (by_kernel, hits, far, asked)
+
+
+def test_single_calls_of_curved_shapes_have_the_bytes_of_the_long_way():
+    """On meshes of several sizes, whose marks share memory; solid ones and surfaces; in batches and lists, too."""
+    rng = np.random.default_rng(31)
+    meshes = [
+        collide.Mesh(*box()), collide.Mesh(*block_ring()), collide.Mesh(*table(12, seed=1)),
+        collide.Mesh(*table(40, seed=2)), collide.Mesh(*soup(rng, 40, 1.0, 0.3), solid=False),
+    ]
+    shapes = [collide.Cylinder(0.3, 0.5), collide.Cone(0.05, 0.1), collide.Ellipsoid((0.3, 0.2, 0.1))]
+    by_kernel = hits = far = asked = swallowed = 0
+    for case in range(150):
+        mesh, shape = meshes[case % 5], shapes[case % 3]
+        A, B = (shape, mesh) if case % 4 == 0 else (mesh, shape)
+        margin, most, X_WM = (0.0, 0.01, 0.1)[case % 7 % 3], int(rng.integers(1, 9)), random_pose(rng)
+        X_WS = np.array([random_pose(rng) for _ in range(6)])
+        X_WS[:, :3, 3] = mesh.vertices[rng.integers(len(mesh.vertices), size=6)] @ X_WM[:3, :3].T + X_WM[:3, 3]
+        X_WS[:, :3, 3] += rng.normal(size=(6, 3)) * np.array([0.0, 0.05, 0.1, 0.2, 0.4, 1.0])[:, None]
+        pieces = []
+        for X in X_WS:
+            X_WA, X_WB = (X, X_WM) if A is shape else (X_WM, X)
+            rows, _ = contact_batch(A, B, X_WA[None], X_WB[None], 1, margin, most, check=True)
+            single = collide.contacts(A, B, X_WA, X_WB, margin=margin, max_contacts=most).rows
+            assert single.tobytes() == rows.tobytes(), (case, len(pieces))
+            by_kernel += prepared_pair(A, B).contacts(X_WA, X_WB, most, margin) is not None
+            hits, far, asked = hits + (len(rows) > 0), far + (len(rows) == 0), asked + 1
+            swallowed += int((rows["kind"] == 2).any())
+            pieces.append(rows)
+        X_WA, X_WB = (X_WS, X_WM) if A is shape else (X_WM, X_WS)
+        for asked_a, asked_b in ((A, B), ([A] * 6, [B] * 6)):
+            batch = collide.contacts(asked_a, asked_b, X_WA, X_WB, margin=margin, max_contacts=most).rows
+            assert batch.tobytes() == np.concatenate(pieces).tobytes(), case
+    assert by_kernel > 0.5 * asked and hits > 300 and far > 100 and swallowed > 5, (
+        by_kernel, hits, far, asked, swallowed
+    )
 
 
 def test_rows_of_many_patches_are_whole():
