@@ -76,8 +76,9 @@ def contacts(
     Two convex shapes have one patch, with the normal of `distance`: about a microsecond a pair. Of unions of convex
     parts those are asked whose balls come within the margin, found by a tree over both: some microseconds for few near
     parts. Two bodies of facets, and a curved shape on a mesh, cost tens of microseconds; a millisecond where a curved
-    shape is so deep in a mesh that slabs do not prove the shortest way out. The time for meshes grows as k log k with the k pairs of facets within the margin or,
-    for overlapping bodies, that a patch may reach, about a microsecond a pair: n·m at worst; beyond 2¹⁸ pairs apart
+    shape is so deep in a mesh that slabs do not prove the shortest way out. The time for meshes grows as k log k with
+    the k pairs of facets within the margin or, for overlapping bodies, that a patch may reach, about a microsecond a
+    pair: n·m at worst; beyond 2¹⁸ pairs apart
     within the margin the question is refused, of overlaps `distance` answers.
     """
     margin = check_margin("contacts", margin)

@@ -62,8 +62,9 @@ _FACETS_OF_PIECE, MAX_FACETS, _POSES_OF_PIECE = 1 << 16, 1 << 18, 256
 _FIRST_ROWS, _ROWS_PER_POSE = 64, 8
 #: Facets are looked at that are farther than a limit by this part of the size: their rows tell what is near.
 _LEEWAY = 2.0**-36
-#: Facets near the shape, and rows, that a single call has space for; calls of more are left to the long way.
-_FACETS_OF_SINGLE_CALLS, _ROWS_OF_SINGLE_CALLS = 256, 1024
+#: Facets whose boxes are near the shape, fewer than MAX_ASKED, and rows, that a single call has space for: more are
+#: left to the long way.
+_FACETS_OF_SINGLE_CALLS, _ROWS_OF_SINGLE_CALLS = 448, 1024
 #: Lengths tried where slabs prove one longer than the depth, in depths.
 _LENGTHS = (1.0 + 2.0**-20, 1.0 + 2.0**-7, 1.25, 2.0, 4.0)
 #: Facets asked first whether a set moved clears them.

@@ -270,18 +270,13 @@ def _walk_down(walk, limit, enough, max_asked):
 
 
 @kernel
-def rows_within(walk, limit, capacity, rows_at, places_at):
-    """(state, n) of the facets no farther than a limit [m]: writes their rows, with depths, and their places.
-
-    state : SURFACES_APART or MAYBE_INSIDE where n is 0; LONG_WAY where more than ``capacity`` facets are near, or one
-    is undecided; else NEAR.   rows, places : room for ``capacity``.
-    """
-    tree, words, places = walk.tree, walk.words, view_i64(places_at, capacity)
+def _places_within(walk, limit, capacity, places):
+    """The number of the facets whose boxes may come within a limit [m]; their places, of no more than ``capacity``."""
+    tree, words = walk.tree, walk.words
     zero = Vec3(0.0, 0.0, 0.0)
-    # Looked at are facets a little farther away: what is near is told by their rows, as in batches.
-    nearest = _Nearest(math.inf, -1, math.inf, limit + NEAR_SLACK * walk.slack, math.inf, zero, -math.inf, False, 0)
+    nearest = _Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
     n, top = 0, _push_children(walk, nearest, 0, 0)
-    while top > 0:
+    while top > 0 and n <= capacity:
         top -= 1
         link = link_of(tree.links, view_i64(words[STACK_AT], top + 1)[top])
         if link >= 0:
@@ -290,18 +285,37 @@ def rows_within(walk, limit, capacity, rows_at, places_at):
         run = ~link
         for place in range(run >> 3, (run >> 3) + (run & 7)):
             centre, half = _box_of_facet(tree, place)
-            if _gap_of_box(walk, nearest, centre, half) > nearest.upper:
-                continue
-            row = _ask_facet(walk, place, True)
-            if row.doubles[LOWER] > limit:
-                continue
-            if n == capacity or is_undecided_or_refused(row):
-                return LONG_WAY, n
-            source, target = view_i64(words[ROW_AT] + ROW, ROW // 8), view_i64(rows_at + ROW * n, ROW // 8)
-            for k in range(ROW // 8):
-                target[k] = source[k]
-            places[n] = place
-            n += 1
+            if not _gap_of_box(walk, nearest, centre, half) > limit:
+                if n < capacity:
+                    places[n] = place
+                n += 1
+    return n
+
+
+@kernel
+def rows_within(walk, limit, capacity, rows_at, places_at):
+    """(state, n) of the facets no farther than a limit [m]: writes their rows, with depths, and their places.
+
+    state : SURFACES_APART or MAYBE_INSIDE where n is 0; LONG_WAY where boxes of more than ``capacity`` facets are near,
+    or a facet is undecided; else NEAR.   rows, places : room for ``capacity``.
+    """
+    places = view_i64(places_at, capacity)
+    # Looked at are facets a little farther away: what is near is told by their rows, as in batches.
+    n_looked_at = _places_within(walk, limit + NEAR_SLACK * walk.slack, capacity, places)
+    if n_looked_at > capacity:
+        return LONG_WAY, 0
+    n = 0
+    for i in range(n_looked_at):
+        row = _ask_facet(walk, places[i], True)
+        if row.doubles[LOWER] > limit:
+            continue
+        if is_undecided_or_refused(row):
+            return LONG_WAY, n
+        source, target = view_i64(walk.words[ROW_AT] + ROW, ROW // 8), view_i64(rows_at + ROW * n, ROW // 8)
+        for k in range(ROW // 8):
+            target[k] = source[k]
+        places[n] = places[i]
+        n += 1
     return (NEAR if n > 0 else _inside_or_apart(walk)), n
 
 
