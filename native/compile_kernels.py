@@ -67,7 +67,7 @@ UNITS = {
     "facets": ("narrowphase.facets.",),
     "motion": ("casts.", "motion."),
     "exact": ("narrowphase.exact.",),
-    "meshes": ("mesh.", "solids.", "hull.", "lowering."),
+    "meshes": ("mesh.", "solids.", "hull.", "lowering.", "fields."),
     "worlds": ("broadphase.", "robots.", "support.", "numerics."),
 }
 

@@ -47,11 +47,11 @@ from collide.lowering.shape_table import ShapeTable
 from collide.mesh.bvh import REACH, MeshTree
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_kernel_calls import space_of_single_calls
-from collide.narrowphase.facets.curved_gap_calls import GapQuestion, serves, surface_states
-from collide.narrowphase.facets.curved_gap_kernel import EXCHANGED
 from collide.narrowphase.facets.facet_kernel_calls import step_of
 from collide.narrowphase.facets.facets_against_curved import facet_rows
 from collide.narrowphase.facets.near_facets import near_facets
+from collide.narrowphase.facets.nearest_item_calls import GapQuestion, facets_of, serves, surface_states
+from collide.narrowphase.facets.nearest_item_kernel import EXCHANGED
 from collide.narrowphase.prepared_pairs import Single
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape
@@ -321,7 +321,7 @@ def single_curved_contacts(A: Shape, B: Shape) -> tuple[Single, Any] | None:
     if not serves(enclosure.packed):
         return None
     block, table = space_of_single_calls(), ShapeTable([enclosure.packed])
-    question = GapQuestion(body, enclosure, block.addresses)
+    question = GapQuestion(facets_of(body), enclosure.packed, block.addresses)
     question.header[EXCHANGED] = exchanged
     space = _space_of_single_calls(face_table_of(table, ROUND).largest)
     marks = _marks(1 << max(_sizes_of(body)).bit_length())

@@ -22,7 +22,6 @@ from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import convex_hits, convex_rows
 from collide.narrowphase.convex_kernel_calls import finish_distances, number_of_poses
 from collide.narrowphase.dispatch import Method, method_of
-from collide.narrowphase.facets.curved_gap_calls import prepared_curved, serves
 from collide.narrowphase.facets.facet_kernel_calls import (
     FacetPair,
     balls_farther,
@@ -33,6 +32,7 @@ from collide.narrowphase.facets.facet_kernel_calls import (
 )
 from collide.narrowphase.facets.mesh_collide_kernel import APART, OPEN
 from collide.narrowphase.facets.mesh_pairs import checked_poses, hull_shape, mesh_rows, mesh_states
+from collide.narrowphase.facets.nearest_item_calls import prepared_curved, serves
 from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.narrowphase.prepared_pairs import Prepared
 from collide.results import PAIR_DTYPE, UNDECIDED

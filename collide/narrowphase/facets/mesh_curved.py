@@ -21,12 +21,12 @@ from collide.mesh.bvh import MeshTree
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_batches import convex_rows
 from collide.narrowphase.convex_kernel_calls import finish_distances, number_of_poses
-from collide.narrowphase.facets.curved_gap_calls import gap_rows, serves, surface_states
 from collide.narrowphase.facets.facet_kernel_calls import balls_farther, core_hits, farthest_gap, hull_rows
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
 from collide.narrowphase.facets.facets_against_curved import facet_rows
 from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT, OPEN
 from collide.narrowphase.facets.near_facets import Facets, likely_facets, near_facets, near_facets_if_few
+from collide.narrowphase.facets.nearest_item_calls import gap_rows, serves, surface_states
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
 from collide.narrowphase.fallback_searches import lay_points_apart

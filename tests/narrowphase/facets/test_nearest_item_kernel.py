@@ -14,8 +14,8 @@ from naive import Case, random_pose, rng_of
 import collide
 from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import as_given, body_of
-from collide.narrowphase.facets.curved_gap_calls import gap_rows
 from collide.narrowphase.facets.mesh_curved import _nearest_by_rounds
+from collide.narrowphase.facets.nearest_item_calls import gap_rows
 from collide.narrowphase.prepared_pairs import prepared_pair, single_calls_are_safe
 
 KINDS = ("cylinder", "cone", "ellipsoid")

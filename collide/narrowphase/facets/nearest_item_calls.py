@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,15 +13,19 @@ from collide.lowering.enclosures import Enclosure
 from collide.lowering.facet_bodies import Body, reach_of
 from collide.lowering.facet_table import FacetTable
 from collide.lowering.packed_convex import POINTS, PackedConvex
-from collide.lowering.shape_table import POSE
+from collide.lowering.shape_table import COUNT, POSE, RADIUS
 from collide.mesh.bvh import WIDTH
+from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_kernel_calls import scratch, space_of_single_calls
-from collide.narrowphase.facets.curved_gap_kernel import (
+from collide.narrowphase.facets.facet_queries import points_in_solid
+from collide.narrowphase.facets.nearest_item_kernel import (
+    ARE_BALLS,
     EXCHANGED,
     HEADER,
     MAYBE_INSIDE,
     MEETS,
-    REACH_OF_MESH,
+    RADII_AT,
+    REACH_OF_ITEMS,
     STACK_AT,
     SURFACES_APART,
     curved_gap_single,
@@ -29,7 +33,6 @@ from collide.narrowphase.facets.curved_gap_kernel import (
     curved_state_single,
     curved_states_of,
 )
-from collide.narrowphase.facets.facet_queries import points_in_solid
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
 from collide.narrowphase.pair_kernel import answer_pairs
 from collide.narrowphase.prepared_pairs import Prepared
@@ -41,25 +44,50 @@ def serves(packed: PackedConvex) -> bool:
     return packed.kind != POINTS
 
 
+class Items(NamedTuple):
+    """The facets of a mesh, or the balls of a cloud.
+
+    tree : over facets, or points.   reach : how far they reach from their origin [m].   radius : the largest of balls,
+    0 of facets [m].   radii : (n,) of balls, where they differ.   are_balls : whether they are balls.
+    """
+
+    tree: Any
+    reach: float
+    radius: float = 0.0
+    radii: np.ndarray | None = None
+    are_balls: bool = False
+
+
 class GapQuestion:
-    """A mesh and a shape as the kernel reads them, and the kernel's output.
+    """Items and a shape as the kernel reads them, and the kernel's output.
 
     workspace : addresses of the doubles and integers that `answer_pairs` works in.
     """
 
-    def __init__(self, A: Body, E: Enclosure, workspace: tuple[int, int]):
-        self.table = FacetTable(np.zeros((1, 3, 3)), E.packed)
-        n_stack = WIDTH * (A.tree.depth + 2)
+    def __init__(self, items: Items, packed: PackedConvex, workspace: tuple[int, int]):
+        self.items, self.table = items, FacetTable(np.zeros((1, 3, 3)), packed)
+        if items.are_balls:
+            self.table.ints[0, COUNT], self.table.numbers[0, RADIUS] = 1, items.radius
+        self.table.build_trees(np.arange(2))
+        n_stack = WIDTH * (items.tree.depth + 2)
         self.poses, self.rows = np.zeros((2, POSE)), np.zeros(2, dtype=PAIR_DTYPE)
         self.numbers = np.array([0, 1])
         self.stack, self.bounds = np.zeros(n_stack, dtype=np.int64), np.zeros(n_stack)
         self.header = np.zeros(HEADER, dtype=np.int64)
         buffers = self.table.coordinates, self.poses, self.numbers, self.numbers, self.rows
         self.header[:STACK_AT] = (
-            code_of(answer_pairs), A.tree.address, *self.table.addresses, *map(address_of, buffers), *workspace,
+            code_of(answer_pairs), items.tree.address, *self.table.addresses, *map(address_of, buffers), *workspace,
         )
         self.header[STACK_AT:EXCHANGED] = address_of(self.stack), address_of(self.bounds)
-        self.header.view(np.float64)[REACH_OF_MESH] = reach_of(A)
+        self.header[ARE_BALLS] = items.are_balls
+        self.header[RADII_AT] = 0 if items.radii is None else address_of(items.radii)
+        promise = PROMISE_STORED if packed.kind == POINTS else PROMISE_CURVED
+        self.header.view(np.float64)[REACH_OF_ITEMS:] = items.reach, items.radius, promise
+
+
+def facets_of(A: Body) -> Items:
+    """Those of a mesh."""
+    return Items(A.tree, reach_of(A))
 
 
 class SurfaceStates(NamedTuple):
@@ -85,7 +113,7 @@ def surface_states(
     n = len(X_WA)
     state, place, how = np.empty((3, n), dtype=np.int64)
     X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
-    question = GapQuestion(A, E, scratch())
+    question = GapQuestion(facets_of(A), E.packed, scratch())
     curved_states_of(
         address_of(question.header), address_of(X_WA), address_of(X_WB), n, margin, address_of(state),
         address_of(place), address_of(how),
@@ -103,7 +131,7 @@ class _SingleQuestion:
 
     def __init__(self, A: Body, E: Enclosure, exchanged: bool):
         space = space_of_single_calls()
-        question = GapQuestion(A, E, space.addresses)
+        question = GapQuestion(facets_of(A), E.packed, space.addresses)
         question.header[EXCHANGED] = exchanged
         self.header, self.held = question.header, (space, question, A, E)
         self._solid, self._state = A.solid, prepared_row(curved_state_single, question.header)
@@ -128,7 +156,7 @@ def gap_rows(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple
     n = len(X_WA)
     rows, is_written = np.zeros(n, dtype=PAIR_DTYPE), np.zeros(n, dtype=bool)
     X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
-    question = GapQuestion(A, E, scratch())
+    question = GapQuestion(facets_of(A), E.packed, scratch())
     curved_gaps(
         address_of(question.header), address_of(X_WA), address_of(X_WB), n, address_of(rows), address_of(is_written)
     )

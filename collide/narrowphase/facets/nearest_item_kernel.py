@@ -1,9 +1,9 @@
-"""A mesh and a cylinder, cone or ellipsoid: a walk down the box-tree, the convex engine at the facets.
+"""A mesh and a curved shape, or a point cloud and a convex set: a walk down the box-tree, the convex engine at items.
 
-Facets are taken nearest first, by the gaps between boxes along the mesh's axes and along the normal of the nearest
-facet so far; what is farther than the least upper bound is left out, and a facet that meets the shape ends the walk.
-The mesh's bracket is the least of the facets'. A boolean is a walk with the upper bound 0 from the beginning, and
-whether the bodies come within a margin a walk with the margin.
+Items are facets of the mesh, or balls of the cloud. They are taken nearest first, by the gaps between boxes along the
+axes of the mesh or cloud and along the normal of the nearest item so far; what is farther than the least upper bound is
+left out, and an item that meets the shape ends the walk. The bracket of the whole is the least of the items'. A boolean
+is a walk with the upper bound 0 from the beginning, and whether the bodies come within a margin a walk with the margin.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ import math
 from typing import Any, NamedTuple
 
 from collide.curved.curved_kinds import curved_support
+from collide.fields.point_tree_kernel import points_of
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64, view_u8
-from collide.lowering.packed_convex import BLOCK
-from collide.lowering.shape_table import INTS, KIND, NUMBERS, PARAMS, POSE, RADIUS, REACH, SLOP
+from collide.lowering.packed_convex import BLOCK, POINTS
+from collide.lowering.shape_table import ADDRESS, INTS, KIND, NUMBERS, PADDED, PARAMS, POSE, RADIUS, REACH, SLOP
 from collide.mesh.bvh import (
     CENTRE,
     EXPONENT,
@@ -29,7 +30,6 @@ from collide.mesh.bvh import (
     open_tree,
 )
 from collide.mesh.bvh import REACH as TREE_REACH
-from collide.narrowphase.bounds import PROMISE_CURVED
 from collide.narrowphase.fallback_searches import lay_row_apart
 from collide.narrowphase.finish_rows import forget_depth
 from collide.narrowphase.pair_kernel import SIGNATURE
@@ -56,18 +56,34 @@ from collide.narrowphase.rows import (
     is_undecided_or_refused,
     view_row,
 )
-from collide.numerics.vec3 import Vec3, absolute, dot, neg, norm, norm1, put_vec3, rotate_back, scale, sub, vec3_at
+from collide.numerics.vec3 import (
+    Vec3,
+    absolute,
+    column_at,
+    dot,
+    neg,
+    norm,
+    norm1,
+    put_vec3,
+    rotate_back,
+    scale,
+    sub,
+    vec3_at,
+)
+from collide.support.support_mapping import support_vertex
 
 _answer_pairs_at = native_call(SIGNATURE)
 
-# Header: addresses of `answer_pairs`, of the tree, of two rows of the `ShapeTable` (a facet, the shape), of the facet's
+# Header: addresses of `answer_pairs`, of the tree, of two rows of the `ShapeTable` (an item, the shape), of the item's
 # coordinates, of two poses, their shape rows, one pair, a row, the workspace, and two stacks of so many places; whether
-# the shape stands first in single calls; the reach of the mesh's facets from its origin (a double).
+# the shape stands first in single calls; whether items are balls, and the address of their radii, point by point, or 0;
+# doubles: the reach of the items from their origin, the largest radius of theirs, and the width that is promised, as a
+# part of the size.
 (
     CORE, TREE_AT, INTS_AT, NUMBERS_AT, COORDINATES_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROW_AT, DOUBLES_AT,
-    INTEGERS_AT, STACK_AT, BOUNDS_AT, EXCHANGED, REACH_OF_MESH,
-) = range(15)
-HEADER = 15
+    INTEGERS_AT, STACK_AT, BOUNDS_AT, EXCHANGED, ARE_BALLS, RADII_AT, REACH_OF_ITEMS, LARGEST_RADIUS, PROMISE,
+) = range(19)
+HEADER = 19
 #: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh; a facet meets the shape; a
 #: facet is within the margin, or may be.
 LONG_WAY, SURFACES_APART, MAYBE_INSIDE, MEETS, NEAR = -1, 1, 0, 2, 3
@@ -87,8 +103,8 @@ NEAR_SLACK = 64.0
 class _Walk(NamedTuple):
     """What a walk works on: the tree, the header's words, rows of the tables, the poses.
 
-    t : p_WB − p_WA.   low, high : the shape's box along the mesh's axes, from the mesh's origin [m].
-    slack : what rounding takes off every gap [m].
+    t : p_WB − p_WA.   low, high : the shape's box along the items' axes, from their origin [m].
+    slack : what rounding and radii take off every gap [m].
     """
 
     header_at: int
@@ -104,12 +120,12 @@ class _Walk(NamedTuple):
 
 
 class _Nearest(NamedTuple):
-    """The nearest of the facets asked about so far.
+    """The nearest of the items asked about so far.
 
-    key, place : of the best row, the first of the rows.   lower, upper : least bounds of all facets [m].
-    open_lower : least lower bound of the facets without a certificate [m].   along, above : direction in the mesh's
+    key, place : of the best row, the first of the rows.   lower, upper : least bounds of all items [m].
+    open_lower : least lower bound of the items without a certificate [m].   along, above : direction in the items'
     frame in which the shape is looked for, and height of the shape's lowest point [m].
-    failed : a facet has no proven gap: the facet asked last.   n_asked : how many facets were asked about.
+    failed : an item has no proven gap: the item asked last.   n_asked : how many items were asked about.
     """
 
     key: float
@@ -126,9 +142,13 @@ class _Nearest(NamedTuple):
 @kernel(inline=True)
 def _height(walk, d):
     """How far the shape reaches along a direction of the world, from its own origin."""
-    g = rotate_back(walk.poses, POSE, d)
-    kind = walk.ints[INTS + KIND]
-    return dot(g, curved_support(kind, walk.numbers, NUMBERS + PARAMS, g)) + walk.numbers[NUMBERS + RADIUS]
+    g, ints = rotate_back(walk.poses, POSE, d), walk.ints
+    radius = walk.numbers[NUMBERS + RADIUS]
+    if ints[INTS + KIND] != POINTS:
+        return dot(g, curved_support(ints[INTS + KIND], walk.numbers, NUMBERS + PARAMS, g)) + radius
+    m = ints[INTS + PADDED]
+    coordinates = view_f64(ints[INTS + ADDRESS], 3 * m)
+    return dot(g, column_at(coordinates, m, support_vertex(coordinates, m, g))) + radius
 
 
 @kernel(inline=True)
@@ -149,8 +169,11 @@ def _gap_of_box(walk, nearest, centre, half):
 
 
 @kernel(inline=True)
-def _box_of_facet(tree, place):
-    """(centre, half lengths) of a facet's box."""
+def _box_of_item(walk, place):
+    """(centre, half lengths) of the box of a facet, or of a ball's centre."""
+    tree = walk.tree
+    if walk.words[ARE_BALLS] != 0:
+        return vec3_at(points_of(tree), 3 * int(tree.ids[place])), Vec3(0.0, 0.0, 0.0)
     p, q, r = vec3_at(tree.triangles, 9 * place), vec3_at(tree.triangles, 9 * place + 3), vec3_at(
         tree.triangles, 9 * place + 6
     )
@@ -160,24 +183,35 @@ def _box_of_facet(tree, place):
 
 
 @kernel
-def _ask_facet(walk, place, depths):
-    """The row of a facet and the shape, written behind the best row.   depths : whether a depth is wanted."""
+def _put_item(walk, place):
+    """A facet, or a ball, as row 0 of the tables."""
     words, tree = walk.words, walk.tree
     coordinates = view_f64(words[COORDINATES_AT], 3 * BLOCK)
+    corners, at, n = tree.triangles, 9 * place, 3
+    if words[ARE_BALLS] != 0:
+        number = int(tree.ids[place])
+        corners, at, n = points_of(tree), 3 * number, 1
+        if words[RADII_AT] != 0:
+            walk.numbers[RADIUS] = view_f64(words[RADII_AT], number + 1)[number]
     reach = 0.0
-    for corner in range(3):
-        x, y, z = tree.triangles[9 * place + 3 * corner], tree.triangles[9 * place + 3 * corner + 1], tree.triangles[
-            9 * place + 3 * corner + 2
-        ]
-        coordinates[corner] = x
-        coordinates[BLOCK + corner] = y
-        coordinates[2 * BLOCK + corner] = z
-        reach = max(reach, x * x + y * y + z * z)
-    for k in range(3, BLOCK):
+    for corner in range(n):
+        p = vec3_at(corners, at + 3 * corner)
+        coordinates[corner] = p.x
+        coordinates[BLOCK + corner] = p.y
+        coordinates[2 * BLOCK + corner] = p.z
+        reach = max(reach, p.x * p.x + p.y * p.y + p.z * p.z)
+    for k in range(n, BLOCK):
         coordinates[k] = coordinates[0]
         coordinates[BLOCK + k] = coordinates[BLOCK]
         coordinates[2 * BLOCK + k] = coordinates[2 * BLOCK]
     walk.numbers[REACH] = math.sqrt(reach) * (1 + 1e-15)
+
+
+@kernel
+def _ask_item(walk, place, depths):
+    """The row of an item and the shape, written behind the best row.   depths : whether a depth is wanted."""
+    words = walk.words
+    _put_item(walk, place)
     row_at = words[ROW_AT] + ROW
     clear_rows(row_at, 1)
     _answer_pairs_at(
@@ -191,9 +225,9 @@ def _ask_facet(walk, place, depths):
 
 
 @kernel
-def _with_facet(walk, nearest, place):
-    """The `_Nearest` with one facet more."""
-    row = _ask_facet(walk, place, False)
+def _with_item(walk, nearest, place):
+    """The `_Nearest` with one item more."""
+    row = _ask_item(walk, place, False)
     lower, upper = row.doubles[LOWER], row.doubles[UPPER]
     failed = nearest.failed or is_undecided_or_refused(row) or not lower > 0.0
     key, best, along, above = nearest.key, nearest.place, nearest.along, nearest.above
@@ -244,10 +278,10 @@ def _push_children(walk, nearest, node, top):
 
 @kernel
 def _walk_down(walk, limit, enough, max_asked):
-    """The `_Nearest` of all facets that may be nearest, and no farther than a limit [m].
+    """The `_Nearest` of all items that may be nearest, and no farther than a limit [m].
 
     enough : a lower bound of no more than this ends the walk [m].   max_asked : the walk is given up after so many
-    facets; `n_asked` is then larger.
+    items; `n_asked` is then larger.
     """
     tree, words = walk.tree, walk.words
     zero = Vec3(0.0, 0.0, 0.0)
@@ -263,9 +297,9 @@ def _walk_down(walk, limit, enough, max_asked):
             continue
         run = ~link
         for place in range(run >> 3, (run >> 3) + (run & 7)):
-            centre, half = _box_of_facet(tree, place)
+            centre, half = _box_of_item(walk, place)
             if not _gap_of_box(walk, nearest, centre, half) > nearest.upper:
-                nearest = _with_facet(walk, nearest, place)
+                nearest = _with_item(walk, nearest, place)
     return nearest
 
 
@@ -284,7 +318,7 @@ def _places_within(walk, limit, capacity, places):
             continue
         run = ~link
         for place in range(run >> 3, (run >> 3) + (run & 7)):
-            centre, half = _box_of_facet(tree, place)
+            centre, half = _box_of_item(walk, place)
             if not _gap_of_box(walk, nearest, centre, half) > limit:
                 if n < capacity:
                     places[n] = place
@@ -306,7 +340,7 @@ def rows_within(walk, limit, capacity, rows_at, places_at):
         return LONG_WAY, 0
     n = 0
     for i in range(n_looked_at):
-        row = _ask_facet(walk, places[i], True)
+        row = _ask_item(walk, places[i], True)
         if row.doubles[LOWER] > limit:
             continue
         if is_undecided_or_refused(row):
@@ -338,7 +372,8 @@ def place_pair(header_at, XA_at, XB_at, check):
     tree = open_tree(words[TREE_AT])
     t = sub(vec3_at(poses, POSE + 9), vec3_at(poses, 9))
     reach = norm1(vec3_at(tree.numbers, TREE_REACH)) + numbers[NUMBERS + REACH] + numbers[NUMBERS + RADIUS] + norm1(t)
-    slack = (_ROUNDING + 8.0 * off) * reach + numbers[NUMBERS + SLOP]
+    radius = view_f64(header_at + 8 * LARGEST_RADIUS, 1)[0]
+    slack = (_ROUNDING + 8.0 * off) * (reach + radius) + numbers[NUMBERS + SLOP] + radius
     walk = _Walk(header_at, tree, words, ints, numbers, poses, t, t, t, slack)
     x, y, z = _column(poses, 0), _column(poses, 1), _column(poses, 2)
     low = Vec3(
@@ -429,9 +464,9 @@ def _write_gap(walk, nearest, row_at):
     if distance != of_best:
         lay_row_apart(row)
     numbers = walk.numbers
-    reach = view_f64(walk.header_at + 8 * REACH_OF_MESH, 1)[0]
+    reach, promise = view_f64(walk.header_at + 8 * REACH_OF_ITEMS, 1)[0], view_f64(walk.header_at + 8 * PROMISE, 1)[0]
     size = reach + numbers[NUMBERS + REACH] + norm(walk.t)
-    certified = nearest.open_lower > nearest.upper or nearest.upper - nearest.lower <= PROMISE_CURVED * size
+    certified = nearest.open_lower > nearest.upper or nearest.upper - nearest.lower <= promise * size
     row.flags[CERTIFIED] = 1 if certified else 0
     row.flags[HIT] = row.flags[BEYOND] = row.flags[COUNT] = 0
     row.words[PART_A], row.words[PART_B], row.words[ITERATIONS] = walk.tree.ids[nearest.place], 0, 0

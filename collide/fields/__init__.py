@@ -1,0 +1,1 @@
+"""Worlds as sensors give them: points in trees."""
