@@ -146,7 +146,7 @@ def _within(body: Body, enclosure: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray
     """
     if not serves(enclosure.packed):
         return np.arange(len(X_WA))
-    states = surface_states(body, enclosure, X_WA, X_WB, reach)
+    states = surface_states(facets_of(body), enclosure.packed, X_WA, X_WB, reach)
     return np.flatnonzero(~states.apart | (states.maybe_inside & body.solid))
 
 

@@ -1,4 +1,4 @@
-"""The tree of a set of points: 21 bytes a point besides the points, built in linear time.
+"""The tree of a set of points: 23 bytes a point besides the points, built in linear time.
 
 Nodes are laid out as those of meshes' trees, with points in the place of facets: what walks down a mesh's tree walks
 down this one.
@@ -50,7 +50,7 @@ class PointTree:
         corner = np.maximum(np.abs(self.low), np.abs(self.high))
         radius = math.sqrt(3.0) * math.ldexp(1.0, exponent)
         self._numbers = np.concatenate([centre, corner, [radius]])
-        self._floats = np.empty((n, 3), dtype=np.float32)
+        self._floats = np.empty((-(-n // MAX_LEAF), 3, WIDTH), dtype=np.float32)
         buffers, sizes = (self._nodes, points, self.ids, self._numbers), (len(self._nodes), n, self.depth, exponent)
         self._header = np.array([*map(address_of, buffers), *sizes, address_of(self._floats), 0], dtype=np.int64)
         self.address = address_of(self._header)

@@ -47,6 +47,8 @@ WORK_BESIDES = _VALUES
 MAX_LEVELS = 12
 #: How far a point may be from its coordinates in floats, in units: √3 · 2⁻²⁴, and what taking off the centre rounds.
 FLOAT_ERROR = 2.0**-23
+#: Floats of a leaf.
+LEAF_FLOATS = 3 * WIDTH
 
 
 @kernel(inline=True)
@@ -136,7 +138,7 @@ def build_point_tree(header_at, work_at, first_nodes_at, n_levels):
     """Fill in the ids, the nodes and the floats of a tree of points; returns how many nodes.
 
     header : as of `mesh/bvh.py`, with the points (n, 3) in the place of the triangles, in their own order, and floats
-    (n, 3) in the place of the slabs: the points in units from the centre, in the order of the leaves.
+    in the place of the slabs: three rows of eight coordinates a leaf, in units from the centre, the last point repeated.
     work : WORK · n + WORK_BESIDES words.   first_nodes : of each level, the root's first; the last level has leaves.
     """
     header = view_i64(header_at, INTS)
@@ -152,18 +154,27 @@ def build_point_tree(header_at, work_at, first_nodes_at, n_levels):
     for level in range(n_levels - 1, -1, -1):
         for node in range(first_nodes[level], first_nodes[level + 1]):
             _fill_node(header, points, ids, centre, unit, node, node - first_nodes[level], level, first_nodes, n_levels)
-    floats = view_f32(header[SLABS_AT], 3 * n)
-    for place in range(n):
-        p = scale(1.0 / unit, sub(vec3_at(points, 3 * int(ids[place])), centre))
-        floats[3 * place], floats[3 * place + 1], floats[3 * place + 2] = p.x, p.y, p.z
+    n_leaves = leaves_of(n)
+    floats = view_f32(header[SLABS_AT], LEAF_FLOATS * n_leaves)
+    for leaf in range(n_leaves):
+        for i in range(WIDTH):
+            place, at = min(MAX_LEAF * leaf + min(i, MAX_LEAF - 1), n - 1), LEAF_FLOATS * leaf + i
+            p = scale(1.0 / unit, sub(vec3_at(points, 3 * int(ids[place])), centre))
+            floats[at], floats[at + WIDTH], floats[at + 2 * WIDTH] = p.x, p.y, p.z
     return first_nodes[n_levels]
+
+
+@kernel(inline=True)
+def leaves_of(n):
+    """How many leaves n points have."""
+    return (n + MAX_LEAF - 1) // MAX_LEAF
 
 
 @kernel
 def _fill_node(header, points, ids, centre, unit, node, number, level, first_nodes, n_levels):
     """Boxes and links of a node, the ``number``th of its level."""
     n = header[N_FACETS]
-    n_leaves = (n + MAX_LEAF - 1) // MAX_LEAF
+    n_leaves = leaves_of(n)
     n_words = NODE * first_nodes[n_levels]
     boxes, links = view_f32(header[NODES_AT], n_words), view_i32(header[NODES_AT], n_words)
     at = NODE * node
@@ -273,8 +284,8 @@ def _in_units(tree, p):
 
 @kernel(inline=True)
 def floats_of(tree):
-    """The points of a tree as floats, in units from the centre, in the order of the leaves."""
-    return view_f32(tree.header[SLABS_AT], 3 * tree.header[N_FACETS])
+    """The points of a tree as floats, in units from the centre, leaf by leaf."""
+    return view_f32(tree.header[SLABS_AT], LEAF_FLOATS * leaves_of(tree.header[N_FACETS]))
 
 
 @entry("void(int64, int64, int64, int64, float64, int64, int64, int64)")
@@ -307,13 +318,15 @@ def nearest_in_tree(header_at, queries_at, n, k, largest, squares_at, ids_at, st
                 top = _push_near(tree, link, x, limit, stack, bounds, top)
                 continue
             run = ~link
-            for place in range(run >> 3, (run >> 3) + (run & 7)):
-                dx = x.x - float(floats[3 * place])
-                dy = x.y - float(floats[3 * place + 1])
-                dz = x.z - float(floats[3 * place + 2])
+            first = run >> 3
+            leaf = LEAF_FLOATS * (first // MAX_LEAF)
+            for i in range(run & 7):
+                dx = x.x - float(floats[leaf + i])
+                dy = x.y - float(floats[leaf + WIDTH + i])
+                dz = x.z - float(floats[leaf + 2 * WIDTH + i])
                 if dx * dx + dy * dy + dz * dz > limit:
                     continue
-                number = int(tree.ids[place])
+                number = int(tree.ids[first + i])
                 d = sub(vec3_at(points, 3 * number), p)
                 if _insert(squares, ids, at, k, dot(d, d), number, largest):
                     limit = _limit_of(min(largest, squares[at + k - 1]), unit, slack)

@@ -31,6 +31,40 @@ def boxes_meeting_prism(_context, boxes, at, frame, probe):
     return _meeting(boxes, frame, probe, parted)
 
 
+@intrinsic
+def boxes_near_place(_context, boxes, at, x, y, z, limit):
+    """Bits of the boxes whose squared distance from a place is at most a limit; described in `mesh/box_overlap.py`."""
+    return _near_place(boxes, True)
+
+
+@intrinsic
+def points_near_place(_context, points, at, x, y, z, limit):
+    """The same of eight points."""
+    return _near_place(points, False)
+
+
+def _near_place(rows, have_sides):
+    """Signature and code of a mask: rows of eight points, or boxes, near a place."""
+    _check_floats(rows)
+    real = types.float32
+    signature = types.int64(rows, types.int64, real, real, real, real)
+
+    def codegen(context, builder, signature, args):
+        data = builder.gep(data_of(context, builder, signature.args[0], args[0]), [args[1]])
+        nothing, square = ir.Constant(_FLOATS, [0.0] * LANES), None
+        for axis in range(3):
+            gap = _abs(builder, builder.fsub(_eight(builder, data, axis), splat(builder, args[2 + axis], _FLOATS)))
+            if have_sides:
+                gap = builder.fsub(gap, _eight(builder, data, 3 + axis))
+                gap = builder.select(builder.fcmp_ordered(">", gap, nothing), gap, nothing)
+            gap = builder.fmul(gap, gap)
+            square = gap if square is None else builder.fadd(square, gap)
+        near = builder.fcmp_ordered("<=", square, splat(builder, args[5], _FLOATS))
+        return builder.zext(builder.bitcast(near, I8), I64)
+
+    return signature, codegen
+
+
 def _meeting(boxes, frame, probe, parted):
     """Signature and code of a mask: the boxes whose bit is 0 in every vector yielded by ``parted``."""
     _check_floats(boxes, frame, probe)

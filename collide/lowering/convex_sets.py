@@ -19,6 +19,7 @@ from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
+from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import IDENTITY, Shape
 
@@ -170,8 +171,16 @@ def _mesh(shape: Mesh) -> ConvexSet:
     )
 
 
+def _cloud(shape: PointCloud) -> ConvexSet:
+    raise UnsupportedQuery(
+        "PointCloud: a cloud is asked as a whole, and this query needs convex parts. collide(), distance(), contacts() "
+        "and World take it; elsewhere a Compound of Spheres at its points may do instead"
+    )
+
+
 _RULES: dict[type, Callable[..., ConvexSet]] = {
     ConvexHull: _convex_hull,
     HPolytope: _hpolytope,
     Mesh: _mesh,
+    PointCloud: _cloud,
 }

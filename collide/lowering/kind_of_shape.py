@@ -29,6 +29,8 @@ def _kind_by_set(shape: Shape) -> Kind:
         return Kind.MESH_COMPOUND if shape.meshed else Kind.COMPOUND
     if shape.is_region:
         return Kind.REGION
+    if shape.is_field:
+        return Kind.CLOUD
     if shape.meshed:
         return Kind.MESH
     numbers = primitive_numbers_of(shape)

@@ -19,6 +19,7 @@ from collide.lowering.primitive_numbers import PrimitiveNumbers
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
+from collide.shapes.point_cloud import PointCloud
 from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
 
 #: A convex set and its (4, 4) pose in the shape's frame.
@@ -62,10 +63,12 @@ def bounding_parts_of(shape: Shape) -> Parts:
 
 
 @kept_with_shape("_bounds")
-def _bounds_around(shape: Compound | Mesh | HPolytope) -> Parts:
+def _bounds_around(shape: Compound | Mesh | HPolytope | PointCloud) -> Parts:
     if isinstance(shape, HPolytope):
         return _alone(_half_space_around(shape))
-    return _compound(shape, bounding_parts_of) if isinstance(shape, Compound) else _mesh_bounds(shape)
+    if isinstance(shape, Compound):
+        return _compound(shape, bounding_parts_of)
+    return _cloud_bounds(shape) if isinstance(shape, PointCloud) else _mesh_bounds(shape)
 
 
 def convex_set_of(shape: Shape) -> PackedConvex:
@@ -138,6 +141,10 @@ def _mesh_bounds(mesh: Mesh) -> Parts:
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[mesh.faces] = True
     return _alone(pack_points(_points_around(mesh.vertices[used])))
+
+
+def _cloud_bounds(cloud: PointCloud) -> Parts:
+    return _alone(pack_points(_points_around(cloud.points), float(np.max(cloud.radius))))
 
 
 def _points_around(points: np.ndarray) -> np.ndarray:

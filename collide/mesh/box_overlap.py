@@ -61,6 +61,23 @@ def boxes_meeting_prism_one_by_one(boxes, at, frame, probe):
     return mask
 
 
+def boxes_near_place_one_by_one(boxes, at, x, y, z, limit):
+    """`boxes_near_place` in numpy's floats."""
+    with np.errstate(all="ignore"):
+        rows = boxes[at : at + 6 * WIDTH].reshape(6, WIDTH)
+        gaps = [np.abs(rows[axis] - place) - rows[3 + axis] for axis, place in enumerate(np.float32((x, y, z)))]
+        x, y, z = (np.where(gap > 0.0, gap, np.float32(0.0)) for gap in gaps)
+        return int(np.packbits(x * x + y * y + z * z <= np.float32(limit), bitorder="little")[0])
+
+
+def points_near_place_one_by_one(points, at, x, y, z, limit):
+    """`points_near_place` in numpy's floats."""
+    with np.errstate(all="ignore"):
+        rows = points[at : at + 3 * WIDTH].reshape(3, WIDTH)
+        x, y, z = (np.abs(rows[axis] - place) for axis, place in enumerate(np.float32((x, y, z))))
+        return int(np.packbits(x * x + y * y + z * z <= np.float32(limit), bitorder="little")[0])
+
+
 def boxes_nearest_one_by_one(boxes, at, slabs, slab_at, frame, probe, out):
     """`boxes_nearest` in numpy's floats."""
     with np.errstate(all="ignore"):
@@ -111,14 +128,25 @@ def _along(rows, frame, probe, axis):
 if not WITH_NUMBA:
     boxes_meeting, boxes_nearest = boxes_meeting_one_by_one, boxes_nearest_one_by_one
     boxes_meeting_prism = boxes_meeting_prism_one_by_one
+    boxes_near_place, points_near_place = boxes_near_place_one_by_one, points_near_place_one_by_one
 else:
-    from collide.kernels.box_vectors import boxes_meeting, boxes_meeting_prism, boxes_nearest
+    from collide.kernels.box_vectors import (
+        boxes_meeting,
+        boxes_meeting_prism,
+        boxes_near_place,
+        boxes_nearest,
+        points_near_place,
+    )
 
 #: ``boxes_meeting(boxes, at, frame, probe) -> int``: bit k is set unless an axis separates the probe's box from box k
 #: of the node whose first float is ``boxes[at]``. Views of float32. `boxes_meeting_prism` reads PRISM floats.
 #: ``boxes_nearest(boxes, at, slabs, slab_at, frame, probe, out)``: out becomes eight lower bounds of distances (≤ 0
 #: where no axis separates), then eight squared lengths of lines between centres, in units of the probe's tree.
+#: ``boxes_near_place(boxes, at, x, y, z, limit) -> int``: bit k is set where the squared distance of box k of the node
+#: from a place is at most a limit, floats all, and not of slots that are not used; `points_near_place` reads three rows
+#: of eight coordinates.
 __all__ = [
     "FRAME", "NEAR_PROBE", "PRISM", "PROBE", "boxes_meeting", "boxes_meeting_one_by_one", "boxes_meeting_prism",
-    "boxes_meeting_prism_one_by_one", "boxes_nearest", "boxes_nearest_one_by_one",
+    "boxes_meeting_prism_one_by_one", "boxes_near_place", "boxes_near_place_one_by_one", "boxes_nearest",
+    "boxes_nearest_one_by_one", "points_near_place", "points_near_place_one_by_one",
 ]

@@ -46,6 +46,10 @@ class Method(Enum):
         "region_pairs",
         "the region is closed by a box that changes nothing, then as the table says; touching by its planes",
     )
+    CLOUD = (
+        "clouds/cloud_pairs",
+        "a walk down the tree over the points, single balls by the table; else the balls nearby as a union",
+    )
     REGIONS = "region_pairs", "both without end: booleans by a program over all planes; boxes that grow until they tell"
 
     @property
@@ -61,23 +65,24 @@ D, I, C = Method.SPHERES, Method.SPHERE_CAPSULE, Method.CAPSULES
 H, P, G = Method.PLANE, Method.PLANES, Method.CONVEX
 F, E, L = Method.FACETS, Method.CURVED, Method.HULL
 U, M = Method.PARTS, Method.MESH_PARTS
-R, S = Method.REGION, Method.REGIONS
+R, S, W = Method.REGION, Method.REGIONS, Method.CLOUD
 
 #: Rows and columns in the order of `Kind`, its curved kinds taken together; what stands below the diagonal is mirrored.
 #: The column "both" is of compounds with meshes among their parts, the last of an `HPolytope` kept as planes.
 #: ROUNDED is an `HPolytope` whose corners are not doubles: to kernels it is points, to meshes it has no exact facets.
 _UPPER_HALF = (
-    # sphere capsule polytope rounded curved halfspace mesh compound both region
-    (D,      I,      G,       G,      G,     H,        F,   U,       M,   R),  # sphere
-    (        C,      G,       G,      G,     H,        F,   U,       M,   R),  # capsule
-    (                G,       G,      G,     H,        F,   U,       M,   R),  # polytope
-    (                         G,      G,     H,        E,   U,       M,   R),  # rounded
-    (                                 G,     H,        E,   U,       M,   R),  # curved
-    (                                        P,        L,   U,       M,   S),  # half-space
-    (                                                  F,   M,       M,   R),  # mesh
-    (                                                       U,       M,   R),  # compound
-    (                                                                M,   R),  # both
-    (                                                                     S,),  # region
+    # sphere capsule polytope rounded curved halfspace mesh compound both region cloud
+    (D,      I,      G,       G,      G,     H,        F,   U,       M,   R,     W),  # sphere
+    (        C,      G,       G,      G,     H,        F,   U,       M,   R,     W),  # capsule
+    (                G,       G,      G,     H,        F,   U,       M,   R,     W),  # polytope
+    (                         G,      G,     H,        E,   U,       M,   R,     W),  # rounded
+    (                                 G,     H,        E,   U,       M,   R,     W),  # curved
+    (                                        P,        L,   U,       M,   S,     W),  # half-space
+    (                                                  F,   M,       M,   R,     W),  # mesh
+    (                                                       U,       M,   R,     W),  # compound
+    (                                                                M,   R,     W),  # both
+    (                                                                     S,     R),  # region
+    (                                                                            W,),  # cloud
 )
 _ORDER = list(dict.fromkeys("curved" if kind in CURVED_KINDS else kind for kind in Kind))
 _LINES = [_ORDER.index("curved" if kind in CURVED_KINDS else kind) for kind in Kind]

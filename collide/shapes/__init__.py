@@ -10,11 +10,12 @@ from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.height_field import HeightField
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
+from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import ShapeSet
 
 __all__ = [
     "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid",
-    "HPolytope", "Halfspace", "HeightField", "Mesh", "Shape", "ShapeSet", "Sphere",
+    "HPolytope", "Halfspace", "HeightField", "Mesh", "PointCloud", "Shape", "ShapeSet", "Sphere",
 ]

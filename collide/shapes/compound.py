@@ -73,7 +73,7 @@ class Compound(Shape):
 def _all_checked(pairs: list) -> np.ndarray | None:
     """The poses of the items, checked together; ``None`` where an item has to be checked alone."""
     for shape, X in pairs:
-        if not isinstance(shape, Shape) or shape.is_region:
+        if not isinstance(shape, Shape) or shape.is_region or shape.is_field:
             return None
         if X.__class__ is not np.ndarray or X.shape != (4, 4) or X.dtype != np.float64:
             return None
@@ -93,4 +93,6 @@ def _checked_pose(k: int, shape, X) -> np.ndarray:
             f"Compound: items[{k}] is an HPolytope with bounded=False; make it a body of its own, or close it by "
             "half-spaces far away and leave bounded=False out"
         )
+    if shape.is_field:
+        raise InvalidShape(f"Compound: items[{k}] is a {type(shape).__name__}; make it a body of its own")
     return as_pose(X, f"Compound: items[{k}] pose")

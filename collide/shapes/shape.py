@@ -27,7 +27,7 @@ class Shape:
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges",
         "_hulls_instead", "_kind", "_laid_out", "_leaves", "_meshed_leaves", "_partners",
         "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_single_facets", "_surface", "_topology",
-        "_union", "_vertex_set", "_walk",
+        "_tree", "_union", "_vertex_set", "_walk",
     )
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -70,6 +70,8 @@ class Shape:
     _facet_edges: Any
     #: Facets of a mesh that cross each other (`solids/arrangement.py`).
     _crossings: Any
+    #: Over points of a cloud (`shapes/point_cloud.py`); meshes have slots of their own.
+    _tree: Any
     #: Row and column of the pair table (`lowering/kinds.py`).
     _kind: Any
 
@@ -79,11 +81,13 @@ class Shape:
     meshed = False
     #: True of an `HPolytope` that is kept as planes: it has no convex parts either, until a box closes it.
     is_region = False
+    #: True of clouds: their balls are parts that nobody lists.
+    is_field = False
 
     @property
     def is_asked_whole(self) -> bool:
         """Whether `parts_of` has no convex parts for it."""
-        return self.meshed or self.is_region
+        return self.meshed or self.is_region or self.is_field
 
     def _store(self, **values: Any) -> None:
         for name, value in values.items():

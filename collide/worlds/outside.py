@@ -94,7 +94,7 @@ def _of_shapes(packed: PackedWorld, questions: Questions, pairs: np.ndarray, lim
     """Rows of pairs (k, 2) of the same two shapes."""
     q, b = pairs.T
     A, B = questions.shapes[questions.shape_of[q[0]]], packed.shapes[packed.shape_of[b[0]]]
-    is_of_meshes = (A.meshed or B.meshed) and not (A.is_region or B.is_region)
+    is_of_meshes = (A.meshed or B.meshed) and not any(S.is_region or S.is_field for S in (A, B))
     rows_of = mesh_batches.rows_within if is_of_meshes else rows_of_pair
     rows = rows_of(A, B, questions.X_WS[q], packed.X_WBs[b], limit)
     rows["a"], rows["b"] = q, b

@@ -343,7 +343,7 @@ class PackedWorld:
         """Rows of pairs (k, 2) of bodies of the same two shapes. Raises UnsupportedQuery."""
         a, b = pairs.T
         A, B = self.shapes[self.shape_of[a[0]]], self.shapes[self.shape_of[b[0]]]
-        if A.is_region or B.is_region:
+        if any(shape.is_region or shape.is_field for shape in (A, B)):
             rows = rows_of_pair(A, B, self.X_WBs[a], self.X_WBs[b], limit, depths=not boolean)
         elif boolean:
             rows = np.zeros(len(pairs), dtype=PAIR_DTYPE)

@@ -32,7 +32,7 @@ from collide.narrowphase.facets.facet_kernel_calls import (
 )
 from collide.narrowphase.facets.mesh_collide_kernel import APART, OPEN
 from collide.narrowphase.facets.mesh_pairs import checked_poses, hull_shape, mesh_rows, mesh_states
-from collide.narrowphase.facets.nearest_item_calls import prepared_curved, serves
+from collide.narrowphase.facets.nearest_item_calls import facets_of, prepared_items, serves
 from collide.narrowphase.fallback_searches import lay_points_apart
 from collide.narrowphase.prepared_pairs import Prepared
 from collide.results import PAIR_DTYPE, UNDECIDED
@@ -193,7 +193,9 @@ def curved_pair(A: Shape, B: Shape) -> Prepared | None:
     if exchanged:
         A, B = B, A
     E = enclosure_of(B)
-    return prepared_curved(body_of(A), E, exchanged) if serves(E.packed) else None
+    if not serves(E.packed):
+        return None
+    return prepared_items(facets_of(body_of(A)), E.packed, exchanged, E.outer.points[0])
 
 
 def _has_compound(A: Shape, B: Shape) -> bool:

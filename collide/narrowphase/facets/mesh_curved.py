@@ -26,7 +26,7 @@ from collide.narrowphase.facets.facet_queries import points_in_solid, surface_di
 from collide.narrowphase.facets.facets_against_curved import facet_rows
 from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT, OPEN
 from collide.narrowphase.facets.near_facets import Facets, likely_facets, near_facets, near_facets_if_few
-from collide.narrowphase.facets.nearest_item_calls import gap_rows, serves, surface_states
+from collide.narrowphase.facets.nearest_item_calls import facets_of, gap_rows, serves, surface_states
 from collide.narrowphase.facets.separating_translation import separating_translation, write_depth
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
 from collide.narrowphase.fallback_searches import lay_points_apart
@@ -96,7 +96,7 @@ def _settle_by_walk(A: Body, E: Enclosure, X_WA, X_WB, poses: np.ndarray, states
     """HIT where a facet meets the shape, or the shape lies inside the mesh, APART where neither does."""
     if not serves(E.packed):
         return
-    surface = surface_states(A, E, X_WA[poses], X_WB[poses])
+    surface = surface_states(facets_of(A), E.packed, X_WA[poses], X_WB[poses])
     states.state[poses[surface.apart]] = APART
     meeting = poses[surface.meets]
     states.state[meeting], states.how[meeting] = HIT, surface.how[surface.meets]
@@ -270,7 +270,7 @@ def _nearest(A: Body, E: Enclosure, PA: PosesWithSlop, PB: PosesWithSlop, facets
     exact = np.flatnonzero((PA.slop == 0.0) & (PB.slop == 0.0)) if serves(E.packed) else np.zeros(0, dtype=np.int64)
     rows, remaining = np.zeros(len(facets), dtype=PAIR_DTYPE), np.ones(len(facets), dtype=bool)
     if len(exact):
-        rows[exact], is_written = gap_rows(A, E, PA.X[exact], PB.X[exact])
+        rows[exact], is_written = gap_rows(facets_of(A), E.packed, PA.X[exact], PB.X[exact])
         remaining[exact] = ~is_written
     some = np.flatnonzero(remaining)
     if len(some):

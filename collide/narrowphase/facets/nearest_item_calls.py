@@ -1,4 +1,4 @@
-"""Meshes and cylinders, cones and ellipsoids from Python: states and gaps of batches, and pairs for single calls."""
+"""Meshes and curved shapes, clouds and convex sets from Python: states and gaps of batches, pairs for single calls."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_row
-from collide.lowering.enclosures import Enclosure
 from collide.lowering.facet_bodies import Body, reach_of
 from collide.lowering.facet_table import FacetTable
 from collide.lowering.packed_convex import POINTS, PackedConvex
@@ -47,12 +46,14 @@ def serves(packed: PackedConvex) -> bool:
 class Items(NamedTuple):
     """The facets of a mesh, or the balls of a cloud.
 
-    tree : over facets, or points.   reach : how far they reach from their origin [m].   radius : the largest of balls,
-    0 of facets [m].   radii : (n,) of balls, where they differ.   are_balls : whether they are balls.
+    tree : over facets, or points.   reach : how far they reach from their origin [m].   solid : whether they enclose an
+    inside.   radius : the largest of balls, 0 of facets [m].   radii : (n,) of balls, where they differ.
+    are_balls : whether they are balls.
     """
 
     tree: Any
     reach: float
+    solid: bool
     radius: float = 0.0
     radii: np.ndarray | None = None
     are_balls: bool = False
@@ -87,15 +88,15 @@ class GapQuestion:
 
 def facets_of(A: Body) -> Items:
     """Those of a mesh."""
-    return Items(A.tree, reach_of(A))
+    return Items(A.tree, reach_of(A), A.solid)
 
 
 class SurfaceStates(NamedTuple):
-    """n poses of a mesh and a shape.
+    """n poses of items and a shape.
 
-    meets, apart : (n,) whether the mesh's surface is known to meet the shape, or to be farther apart than the margin;
-    poses without either are left to another method.   maybe_inside : (n,) of surfaces apart, whether the shape may lie
-    inside the mesh.   place : (n,) the triangle meeting the shape, in the order of the tree.   how : (n,) index into
+    meets, apart : (n,) whether an item is known to meet the shape, or all to be farther apart than the margin; poses
+    without either are left to another method.   maybe_inside : (n,) of items apart, whether the shape may lie inside
+    the mesh.   place : (n,) the item meeting the shape, in the order of the tree.   how : (n,) index into
     `results.HOW`.
     """
 
@@ -107,13 +108,13 @@ class SurfaceStates(NamedTuple):
 
 
 def surface_states(
-    A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray, margin: float = 0.0
+    items: Items, packed: PackedConvex, X_WA: np.ndarray, X_WB: np.ndarray, margin: float = 0.0
 ) -> SurfaceStates:
-    """Whether a mesh and a shape meet at n poses (n, 4, 4).   margin : how far they may be apart [m]."""
+    """Whether items and a shape meet at n poses (n, 4, 4).   margin : how far they may be apart [m]."""
     n = len(X_WA)
     state, place, how = np.empty((3, n), dtype=np.int64)
     X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
-    question = GapQuestion(facets_of(A), E.packed, scratch())
+    question = GapQuestion(items, packed, scratch())
     curved_states_of(
         address_of(question.header), address_of(X_WA), address_of(X_WB), n, margin, address_of(state),
         address_of(place), address_of(how),
@@ -123,18 +124,18 @@ def surface_states(
 
 
 class _SingleQuestion:
-    """A mesh and a shape, asked pose by pose.
+    """Items and a shape, asked pose by pose.
 
     exchanged : the shape stands first.   held : the kernel's arrays. All threads share the workspace: the kernel keeps
     Python's lock.
     """
 
-    def __init__(self, A: Body, E: Enclosure, exchanged: bool):
+    def __init__(self, items: Items, packed: PackedConvex, exchanged: bool):
         space = space_of_single_calls()
-        question = GapQuestion(facets_of(A), E.packed, space.addresses)
+        question = GapQuestion(items, packed, space.addresses)
         question.header[EXCHANGED] = exchanged
-        self.header, self.held = question.header, (space, question, A, E)
-        self._solid, self._state = A.solid, prepared_row(curved_state_single, question.header)
+        self.header, self.held = question.header, (space, question, packed)
+        self._solid, self._state = items.solid, prepared_row(curved_state_single, question.header)
 
     def state(self, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> int | None:
         """MEETS, NEAR, SURFACES_APART or, of solids alone, MAYBE_INSIDE; None of pairs left to another method.
@@ -148,38 +149,44 @@ class _SingleQuestion:
         return SURFACES_APART if state == MAYBE_INSIDE and not self._solid else state
 
 
-def gap_rows(A: Body, E: Enclosure, X_WA: np.ndarray, X_WB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, (n,) bool whether they are written) of a mesh and a shape, apart at n poses (n, 4, 4).
+def gap_rows(
+    items: Items, packed: PackedConvex, X_WA: np.ndarray, X_WB: np.ndarray, depths: bool = True
+) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, (n,) bool whether they are written) of items and a shape, apart at n poses (n, 4, 4), or, without depths,
+    meeting.
 
     Unwritten rows need another method.
     """
     n = len(X_WA)
     rows, is_written = np.zeros(n, dtype=PAIR_DTYPE), np.zeros(n, dtype=bool)
     X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
-    question = GapQuestion(facets_of(A), E.packed, scratch())
+    question = GapQuestion(items, packed, scratch())
     curved_gaps(
-        address_of(question.header), address_of(X_WA), address_of(X_WB), n, address_of(rows), address_of(is_written)
+        address_of(question.header), address_of(X_WA), address_of(X_WB), n, depths, address_of(rows),
+        address_of(is_written),
     )
     return rows, is_written
 
 
-def prepared_curved(A: Body, E: Enclosure, exchanged: bool) -> Prepared:
-    """A mesh and a shape ready for single gaps without a limit; everything else is left to the long way.
+def prepared_items(
+    items: Items, packed: PackedConvex, exchanged: bool, point: np.ndarray | None = None
+) -> Prepared:
+    """Items and a shape ready for single gaps without a limit; everything else is left to the long way.
 
-    exchanged : the shape stands first.
+    exchanged : the shape stands first.   point : (3,) of the shape, in its frame, where items enclose an inside.
     """
-    single = _SingleQuestion(A, E, exchanged)
+    single = _SingleQuestion(items, packed, exchanged)
     gap = prepared_row(curved_gap_single, single.header)
 
     def is_outside(X_WA, X_WB) -> bool:
         """Whether the shape, whose surface the mesh's does not meet, is outside of the mesh."""
         X_WM, X_WS = (X_WB, X_WA) if exchanged else (X_WA, X_WB)
-        return bool(points_in_solid(A.tree, X_WM, E.outer.points[0], X_WS)[0] == OUTSIDE)
+        return bool(points_in_solid(items.tree, X_WM, point, X_WS)[0] == OUTSIDE)
 
     def distance(X_WA, X_WB, memory: bytearray, depths: bool, limit: float) -> bool | None:
         """True; None where a depth is wanted, where the bodies may meet, and of limits."""
         apart = gap(X_WA, X_WB, memory, depths, limit) if limit == math.inf else None
-        if apart is False and A.solid:
+        if apart is False and items.solid:
             return True if is_outside(X_WA, X_WB) else None
         return None if apart is None else True
 

@@ -298,7 +298,7 @@ def _walk_down(walk, limit, enough, max_asked):
         run = ~link
         for place in range(run >> 3, (run >> 3) + (run & 7)):
             centre, half = _box_of_item(walk, place)
-            if not _gap_of_box(walk, nearest, centre, half) > nearest.upper:
+            if not (nearest.failed or _gap_of_box(walk, nearest, centre, half) > nearest.upper):
                 nearest = _with_item(walk, nearest, place)
     return nearest
 
@@ -474,16 +474,17 @@ def _write_gap(walk, nearest, row_at):
         row.words[VERTICES_A + k] = row.words[VERTICES_B + k] = -1
 
 
-@entry("int64(int64, int64, int64, int64, int64, int64)")
-def curved_gaps(header_at, XA_at, XB_at, n, rows_at, states_at):
-    """Rows of a mesh and a shape at n pairs of checked poses that are apart; returns how many are written.
+@entry("int64(int64, int64, int64, int64, boolean, int64, int64)")
+def curved_gaps(header_at, XA_at, XB_at, n, depths, rows_at, states_at):
+    """Rows of items and a shape at n pairs of checked poses that are apart, or, without depths, meet; returns how many
+    are written.
 
     header : of HEADER integers.   XA, XB : 16 doubles a pose.   rows : of PAIR_DTYPE.   states : a byte a pose, 1 where
     its row is written.
     """
     states, n_written = view_u8(states_at, n), 0
     for k in range(n):
-        status = _gap(header_at, XA_at + 128 * k, XB_at + 128 * k, False, True, rows_at + ROW * k)
+        status = _gap(header_at, XA_at + 128 * k, XB_at + 128 * k, False, depths, rows_at + ROW * k)
         states[k] = 0 if status == LONG_WAY else 1
         n_written += int(states[k])
     return n_written

@@ -15,7 +15,7 @@ import collide
 from collide.lowering.enclosures import enclosure_of
 from collide.lowering.facet_bodies import as_given, body_of
 from collide.narrowphase.facets.mesh_curved import _nearest_by_rounds
-from collide.narrowphase.facets.nearest_item_calls import gap_rows
+from collide.narrowphase.facets.nearest_item_calls import facets_of, gap_rows
 from collide.narrowphase.prepared_pairs import prepared_pair, single_calls_are_safe
 
 KINDS = ("cylinder", "cone", "ellipsoid")
@@ -50,7 +50,7 @@ def test_as_the_search_in_rounds(kind):
         A, E = body_of(case.A), enclosure_of(case.B)
         X_WA, X_WB = case.X_WA[None], case.X_WB[None]
         with naive.reproducible(case):
-            rows, is_written = gap_rows(A, E, X_WA, X_WB)
+            rows, is_written = gap_rows(facets_of(A), E.packed, X_WA, X_WB)
             seen["asked"] += 1
             if not is_written[0]:
                 assert collide.collide(*case), "apart, and left to the long way"
@@ -105,9 +105,10 @@ def test_matrices_off_a_rotation_are_left_to_the_search_in_rounds():
     ball, X, Y = collide.Mesh(*surfaces.box()), np.eye(4), collide.pose((3.0, 0.1, 0.2))
     E = enclosure_of(collide.Cylinder(0.3, 1.0))
     Y[:3, :3] *= 1.0 + 1e-6
-    _, is_written = gap_rows(body_of(ball), E, np.repeat(X[None], 2, axis=0), np.array([Y, collide.pose((3, 0, 0))]))
+    items = facets_of(body_of(ball))
+    _, is_written = gap_rows(items, E.packed, np.repeat(X[None], 2, axis=0), np.array([Y, collide.pose((3, 0, 0))]))
     assert is_written.tolist() == [True, True], "the shape's own matrix is taken as it is"
-    _, is_written = gap_rows(body_of(ball), E, Y[None], X[None] @ collide.pose((9, 0, 0))[None])
+    _, is_written = gap_rows(items, E.packed, Y[None], X[None] @ collide.pose((9, 0, 0))[None])
     assert is_written.tolist() == [False]
     r = collide.distance(ball, collide.Cylinder(0.3, 1.0), Y, collide.pose((9, 0, 0)), check_poses=False)
     assert r.lower <= r.distance <= r.upper and r.distance > 4.0

@@ -1,0 +1,70 @@
+"""The balls of a cloud that may come within some distance of another shape, and these as a union.
+
+A ball is left out where its centre is farther from the box around the other shape, along an axis of the cloud's frame,
+than the distance and the ball's radius: rounding of that box is added to it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.lowering.extents import extent_of
+from collide.lowering.packed_convex import HALFSPACE
+from collide.lowering.parts import bounding_parts_of
+from collide.shapes.compound import Compound
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.point_cloud import PointCloud
+from collide.shapes.shape import IDENTITY, Shape
+from collide.transforms import inverse_pose
+
+#: What rounding of a box's sides is, as a part of the numbers met.
+_ROUNDING = 2.0**-40
+_AXES = np.concatenate([np.eye(3), -np.eye(3)])
+
+
+class BoxAround(NamedTuple):
+    """A box along the axes of a cloud's frame around another shape [m]; infinite around half-spaces."""
+
+    low: np.ndarray
+    high: np.ndarray
+
+
+def box_in_frame(shape: Shape, X_WC: np.ndarray, X_WS: np.ndarray) -> BoxAround:
+    """The box around a shape at X_WS in the frame at X_WC, (4, 4) each, rounding added."""
+    X_CS = inverse_pose(X_WC) @ X_WS
+    low, high = np.full(3, math.inf), np.full(3, -math.inf)
+    for packed, X_SP in bounding_parts_of(shape):
+        if packed.kind == HALFSPACE:
+            return BoxAround(np.full(3, -math.inf), np.full(3, math.inf))
+        X_CP = X_CS @ X_SP
+        ends = np.array([extent_of(packed, X_CP, axis) for axis in _AXES])
+        low, high = np.minimum(low, -ends[3:]), np.maximum(high, ends[:3])
+    size = np.abs(low).max() + np.abs(high).max() + np.abs(X_WC[:3, 3]).sum() + np.abs(X_WS[:3, 3]).sum()
+    off = sum(np.abs(X[:3, :3].T @ X[:3, :3] - np.eye(3)).max() for X in (X_WC, X_WS))
+    slack = (_ROUNDING + 8.0 * off) * size
+    return BoxAround(low - slack, high + slack)
+
+
+def balls_within(cloud: PointCloud, box: BoxAround, distance: float) -> np.ndarray:
+    """Rows of the balls that may come within a distance of what is in a box [m], ascending."""
+    reach = distance * (1.0 + 2.0**-40) + float(np.max(cloud.radius))
+    some = cloud.tree.in_box(box.low - reach, box.high + reach)
+    if np.ndim(cloud.radius) == 0:
+        return some
+    own, points = cloud.radius[some] + distance * (1.0 + 2.0**-40), cloud.points[some]
+    return some[((points >= box.low - own[:, None]) & (points <= box.high + own[:, None])).all(axis=1)]
+
+
+def ball(cloud: PointCloud, k: int) -> ConvexHull:
+    """A ball of a cloud, as a shape in the cloud's frame."""
+    return ConvexHull(cloud.points[k : k + 1], radius=float(cloud.radii[k]))
+
+
+def union_of(cloud: PointCloud, some: np.ndarray) -> Shape:
+    """Some balls as one shape, whose parts are numbered as these."""
+    if len(some) == 1:
+        return ball(cloud, int(some[0]))
+    return Compound([(ball(cloud, k), IDENTITY) for k in some.tolist()])

@@ -1,0 +1,327 @@
+"""PointCloud: balls around points, as sensors give them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from collide.base import argument_checks as checks
+from collide.base.lazy_modules import lazy_module
+from collide.errors import InvalidArgument, InvalidShape
+from collide.shapes.shape import Shape, kept_with_shape, positive, rows
+from collide.transforms import LARGEST
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from collide.fields.point_tree import PointTree
+
+point_tree: Any = lazy_module("collide.fields.point_tree")
+
+#: Points that are nearest to places, and their distances, are asked for so many at once at most.
+_MAX_NEAREST = 1 << 20
+
+
+class NearestPoints(NamedTuple):
+    """The points of a cloud that are nearest to places.
+
+    distance : (m,) or (m, k) from the place to the point, balls left out [m], nearest first; ∞ for none.
+    index : int64 alike, rows of ``cloud.points``; −1 for none.
+    """
+
+    distance: np.ndarray
+    index: np.ndarray
+
+
+class PointCloud(Shape):
+    """The union of balls around points: what a depth camera or a lidar sees, as an obstacle.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like, float64
+        Centres in the frame of the shape [m], n ≥ 1. Any array will do that numpy takes: float32, torch tensors in the
+        computer's memory, structured arrays made plain.
+    radius : float or (n,) array_like, float64
+        Of the balls, ≥ 0 [m]: one for all, or one each; 0 makes points.
+    drop_invalid : bool
+        Leave out points with a coordinate that is not finite, as cameras give them where they see nothing; ``dropped``
+        says how many. By default such points are refused.
+
+    Raises
+    ------
+    InvalidShape
+        For points of another shape, none at all, not finite or out of range; radii below 0, or of another number.
+
+    Notes
+    -----
+    Every query answers for the union of the balls as given, exactly where it answers for single balls exactly; ``part``
+    numbers of results are rows of ``points``. A tree over the points is made when a query first needs it: 0.1 µs a
+    point up to 10⁵, 0.2 µs at 10⁷, and 23 bytes a point besides the points. Convex shapes walk down the tree, single
+    balls being asked about where boxes do not tell: O(log n + k) for the k balls nearby. Depths, contacts and pairs
+    with a mesh, a `Compound` or another cloud take the balls nearby as a `Compound`.
+    """
+
+    __slots__ = ("dropped", "points", "radius")
+    _fields = ("points", "radius")
+    convex = False
+    is_field = True
+    points: np.ndarray
+    radius: Any
+    #: How many points were left out, being not finite.
+    dropped: int
+
+    def __init__(self, points: ArrayLike, radius: float | ArrayLike = 0.0, *, drop_invalid: bool = False):
+        radius = _checked_radius(radius)
+        dropped = 0
+        if checks.true_or_false("PointCloud: drop_invalid", drop_invalid):
+            points, radius, dropped = _only_finite(points, radius)
+        points = rows("PointCloud", "points", points, (None, 3))
+        if np.ndim(radius) and len(radius) != len(points):
+            raise InvalidShape(
+                f"PointCloud: radius must be a number or one for each of {len(points)} points, got {len(radius)}"
+            )
+        self._store(points=points, radius=radius, dropped=dropped)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __repr__(self) -> str:
+        radius = f"{self.radius:g}" if np.ndim(self.radius) == 0 else f"{self.radii.min():g} … {self.radii.max():g}"
+        return f"PointCloud(<{len(self.points)} points>, radius={radius})"
+
+    @property
+    def radii(self) -> np.ndarray:
+        """(n,) radii of the balls [m], read-only."""
+        return np.broadcast_to(self.radius, len(self.points))
+
+    @property
+    def tree(self) -> PointTree:
+        """The tree over the points, made when first asked for."""
+        return _tree_of(self)
+
+    def nearest(self, p: ArrayLike, k: int = 1, *, max_distance: float = math.inf) -> NearestPoints:
+        """The nearest points to places.
+
+        Parameters
+        ----------
+        p : (3,) or (m, 3) array_like
+            Places in the frame of the cloud [m].
+        k : int
+            How many points for each place.
+        max_distance : float
+            Points farther away do not count [m].
+
+        Returns
+        -------
+        NearestPoints
+            Arrays (m,), (m, k) for k > 1; for a single place scalars, or (k,). Of points as far away as each other
+            those of least number come first.
+
+        Raises
+        ------
+        InvalidArgument
+            For places that are no finite coordinates, k below 1, a distance below 0.
+
+        Notes
+        -----
+        O(log n) a place where points are spread evenly: 1.5 µs among 10⁵ points, 4.3 µs among 10⁶.
+        """
+        places, single = _checked_places("PointCloud.nearest", p)
+        k = checks.integer("PointCloud.nearest: k", k, 1)
+        if k * len(places) > _MAX_NEAREST * 64:
+            raise InvalidArgument(f"PointCloud.nearest: {k} points for each of {len(places)} places; ask for fewer")
+        limit = checks.limit("PointCloud.nearest: max_distance", max_distance)
+        squares, index = self.tree.nearest(places, k, limit * limit)
+        distance = np.sqrt(squares)
+        if k == 1:
+            distance, index = distance[:, 0], index[:, 0]
+        return NearestPoints(distance[0], index[0]) if single else NearestPoints(distance, index)
+
+    def within(self, p: ArrayLike, r: float) -> np.ndarray:
+        """Rows of the points no farther from a place than a distance, ascending.
+
+        Parameters
+        ----------
+        p : (3,) array_like
+            A place in the frame of the cloud [m].
+        r : float
+            The distance, ≥ 0; balls are left out [m].
+
+        Returns
+        -------
+        np.ndarray
+            (k,) int64.
+
+        Raises
+        ------
+        InvalidArgument
+            For a place that is no finite coordinates, a distance below 0 or not finite.
+        """
+        places, single = _checked_places("PointCloud.within", p)
+        r = checks.limit("PointCloud.within: r", r)
+        if not single or not r < math.inf:
+            raise InvalidArgument("PointCloud.within: p must be a single place (3,), and r finite")
+        some = self.tree.in_box(places[0] - r * (1.0 + 1e-15), places[0] + r * (1.0 + 1e-15))
+        away = self.points[some] - places[0]
+        return some[np.square(away).sum(axis=1) <= r * r]
+
+    def cropped(self, box: ArrayLike) -> PointCloud:
+        """The cloud of the points within a box, its faces included.
+
+        Parameters
+        ----------
+        box : (2, 3) array_like
+            The least and the largest corner, in the frame of the cloud [m]; infinite numbers leave a side open.
+
+        Returns
+        -------
+        PointCloud
+            Its ``dropped`` says how many points lie outside.
+
+        Raises
+        ------
+        InvalidArgument
+            For corners of another shape or order.
+        InvalidShape
+            Where no point lies within.
+        """
+        corners = checks.array("PointCloud.cropped: box", box, "(2, 3)", InvalidArgument)
+        if corners.shape != (2, 3) or not (corners[0] <= corners[1]).all():
+            raise InvalidArgument(
+                f"PointCloud.cropped: box must be a least and a largest corner (2, 3), got {checks.brief(box)}"
+            )
+        return self._only(((self.points >= corners[0]) & (self.points <= corners[1])).all(axis=1), "cropped")
+
+    def filtered(self, spacing: float) -> PointCloud:
+        """A thinner cloud: of the points in a cell of a grid the first alone.
+
+        Parameters
+        ----------
+        spacing : float
+            Side of a cell, > 0 [m]: a point left out has a point within √3 · spacing.
+
+        Returns
+        -------
+        PointCloud
+            Its ``dropped`` says how many points were left out. Balls keep their radii: balls larger by √3 · spacing
+            hold the whole cloud.
+
+        Raises
+        ------
+        InvalidArgument
+            For a spacing not above 0, or so small that cells cannot be numbered.
+        """
+        spacing = positive("PointCloud.filtered", "spacing", spacing)
+        low = self.points.min(axis=0)
+        cells = np.floor((self.points - low) / spacing)
+        if not cells.max() < 1 << 20:
+            raise InvalidArgument(
+                f"PointCloud.filtered: a spacing of {spacing:g} m makes more than 2²⁰ cells along an axis; "
+                "take a larger one"
+            )
+        x, y, z = cells.astype(np.int64).T
+        _, first = np.unique((x << 40) | (y << 20) | z, return_index=True)
+        keep = np.zeros(len(self.points), dtype=bool)
+        keep[first] = True
+        return self._only(keep, "filtered")
+
+    def updated(self, *, added: ArrayLike | None = None, removed: ArrayLike | None = None) -> PointCloud:
+        """The cloud with points more and points less; points that stay keep their order, new ones follow.
+
+        Parameters
+        ----------
+        added : (k, 3) array_like, optional
+            Points of the cloud's radius; of a cloud with a radius each a `PointCloud`.
+        removed : (k,) array_like of int or bool, optional
+            Rows of ``points``, or a mask (n,).
+
+        Returns
+        -------
+        PointCloud
+            This cloud stays as it is: whoever reads it meanwhile sees the old points.
+
+        Raises
+        ------
+        InvalidShape
+            For points as in the constructor, and where no point is left.
+        InvalidArgument
+            For rows out of range.
+        """
+        keep = np.ones(len(self.points), dtype=bool)
+        if removed is not None:
+            keep[_checked_rows(removed, len(self.points))] = False
+        more = _more_points(self, added)
+        points = np.concatenate([self.points[keep], *(cloud.points for cloud in more)])
+        if np.ndim(self.radius) == 0 and all(np.ndim(cloud.radius) == 0 for cloud in more):
+            return PointCloud(points, self.radius)
+        return PointCloud(points, np.concatenate([self.radii[keep], *(cloud.radii for cloud in more)]))
+
+    def _only(self, keep: np.ndarray, what: str) -> PointCloud:
+        if not keep.any():
+            raise InvalidShape(f"PointCloud.{what}: no point of {len(keep)} is left")
+        made = PointCloud(self.points[keep], self.radius if np.ndim(self.radius) == 0 else self.radius[keep])
+        made._store(dropped=int(np.count_nonzero(~keep)))
+        return made
+
+
+@kept_with_shape("_tree")
+def _tree_of(cloud: PointCloud) -> PointTree:
+    return point_tree.PointTree(cloud.points)
+
+
+def _checked_radius(radius) -> Any:
+    """A radius [m], or an array of them, read-only."""
+    if np.ndim(radius) == 0 and not isinstance(radius, (list, tuple)):
+        return positive("PointCloud", "radius", radius, zero=True)
+    values = rows("PointCloud", "radius", radius, (None,))
+    if (values < 0.0).any():
+        k = int(np.flatnonzero(values < 0.0)[0])
+        raise InvalidShape(f"PointCloud: radius[{k}] must be ≥ 0, got {values[k]:g}")
+    return values
+
+
+def _only_finite(points, radius) -> tuple[Any, Any, int]:
+    """(finite points, their radii, how many were left out)."""
+    array = checks.array("PointCloud: points", points, "(N, 3)", InvalidShape)
+    if array.ndim != 2 or array.shape[1] != 3:
+        return points, radius, 0  # refused by its shape
+    finite = np.isfinite(array).all(axis=1)
+    if finite.all():
+        return array, radius, 0
+    if not finite.any():
+        raise InvalidShape(f"PointCloud: none of {len(array)} points is finite")
+    if np.ndim(radius) and len(radius) == len(array):
+        radius = rows("PointCloud", "radius", radius[finite], (None,))
+    return array[finite], radius, int(np.count_nonzero(~finite))
+
+
+def _checked_places(name: str, p) -> tuple[np.ndarray, bool]:
+    """((m, 3) places, whether a single one was given)."""
+    array = checks.array(f"{name}: p", p, "(3,) or (m, 3)", InvalidArgument)
+    if array.ndim not in (1, 2) or array.shape[-1] != 3 or not np.abs(array).max(initial=0.0) <= LARGEST:
+        raise InvalidArgument(f"{name}: p must be (3,) or (m, 3), finite and within ±{LARGEST:g} m")
+    return np.ascontiguousarray(array.reshape(-1, 3), dtype=np.float64), array.ndim == 1
+
+
+def _checked_rows(removed, n: int) -> np.ndarray:
+    array = np.asarray(removed)
+    if array.dtype == bool and array.shape == (n,):
+        return array
+    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
+        raise InvalidArgument(f"PointCloud.updated: removed must be rows (k,) of int, or a mask ({n},) of bool")
+    array = array.astype(np.int64)
+    if ((array < 0) | (array >= n)).any():
+        raise InvalidArgument(f"PointCloud.updated: removed: rows must lie within 0 … {n - 1}")
+    return array
+
+
+def _more_points(cloud: PointCloud, added) -> list[PointCloud]:
+    if added is None:
+        return []
+    if isinstance(added, PointCloud):
+        return [added]
+    if np.ndim(cloud.radius):
+        raise InvalidArgument("PointCloud.updated: points have a radius each: added must be a PointCloud")
+    return [PointCloud(added, cloud.radius)]
