@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.contact.cloud_contacts import cloud_contacts, has_cloud
 from collide.contact.contact_rows import CONTACT_DTYPE, Slack, no_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.curved_contacts import curved_contacts
@@ -74,6 +75,13 @@ def contact_batch(
     """
     if n == 0:
         return no_rows(), np.zeros(0, dtype=np.int64)
+    if has_cloud(A) or has_cloud(B):
+        X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
+
+        def rows_of(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+            return contact_batch(A, B, X_WA, X_WB, 1, margin, max_contacts)[0]
+
+        return cloud_contacts(rows_of, A, B, X_WA, X_WB, n, margin)
     A, B = closed_shapes(A, B, X_WA, X_WB, n, margin)
     if not (isinstance(A, Shape) and isinstance(B, Shape)):
         A, B = of_one_set(A, B, n)

@@ -14,6 +14,7 @@ from collide.fields.point_tree_kernel import (
     MAX_LEVELS,
     WORK,
     WORK_BESIDES,
+    balls_on_way,
     build_point_tree,
     nearest_in_tree,
     points_in_box,
@@ -84,6 +85,27 @@ class PointTree:
             n = points_in_box(self.address, *corners, address_of(ids), size, address_of(stack))
             if n <= size:
                 return np.sort(ids[:n])
+            size = n
+
+    def on_way(
+        self, radius, way: np.ndarray, limit: float, extra: float, slack: float, first: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(numbers, t) of the balls that a way may meet, by t from which on.
+
+        radius : of all balls, or (n,) [m].   way : (6,) origin and vector.   limit, extra, slack, first : as of
+        `balls_on_way`.
+        """
+        size, stack = _FIRST_LISTED, np.empty(_STACK, dtype=np.int64)
+        radii = 0 if np.ndim(radius) == 0 else address_of(radius)
+        while True:
+            ids, times = np.empty(size, dtype=np.int64), np.empty(size)
+            n = balls_on_way(
+                self.address, radii, float(np.max(radius)), address_of(way), limit, extra, slack, first,
+                address_of(ids), address_of(times), size, address_of(stack),
+            )
+            if n <= size:
+                order = np.lexsort((ids[:n], times[:n]))
+                return ids[:n][order], times[:n][order]
             size = n
 
 

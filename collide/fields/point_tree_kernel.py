@@ -8,6 +8,7 @@ small, takes twice as long to build. Nodes are those of meshes' trees (`mesh/bvh
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from collide.mesh.bvh import (
     link_of,
     open_tree,
 )
-from collide.numerics.vec3 import Vec3, dot, norm1, scale, sub, vec3_at
+from collide.numerics.vec3 import Vec3, add, dot, norm1, scale, sub, vec3_at
 
 #: Bits of a cell's number along each axis, the upper of which are put along the curve; digits sorted at once, and their
 #: values. Passes are even: keys go to and fro.
@@ -138,7 +139,7 @@ def build_point_tree(header_at, work_at, first_nodes_at, n_levels):
     """Fill in the ids, the nodes and the floats of a tree of points; returns how many nodes.
 
     header : as of `mesh/bvh.py`, with the points (n, 3) in the place of the triangles, in their own order, and floats
-    in the place of the slabs: three rows of eight coordinates a leaf, in units from the centre, the last point repeated.
+    in the place of the slabs: three rows of eight coordinates a leaf, in units from the centre, the last repeated.
     work : WORK · n + WORK_BESIDES words.   first_nodes : of each level, the root's first; the last level has leaves.
     """
     header = view_i64(header_at, INTS)
@@ -394,3 +395,106 @@ def points_in_box(header_at, low_at, high_at, ids_at, capacity, stack_at):
                     ids[n] = number
                 n += 1
     return n
+
+
+class _Way(NamedTuple):
+    """From a place along a vector, t from 0 to a limit.
+
+    extra : added to the radii of balls [m].   slack : by which places are off [m].   first : whether what lies behind a
+    ball that is met for sure may be left out.
+    """
+
+    o: Vec3
+    v: Vec3
+    square: float
+    limit: float
+    extra: float
+    slack: float
+    first: bool
+
+
+@kernel
+def _enters_box(way, centre, half, until):
+    """Whether a way may meet a box [m] before t = ``until``."""
+    begin, end = 0.0, until
+    for axis in range(3):
+        o, v = (way.o.x, way.v.x) if axis == 0 else (way.o.y, way.v.y) if axis == 1 else (way.o.z, way.v.z)
+        c, h = (centre.x, half.x) if axis == 0 else (centre.y, half.y) if axis == 1 else (centre.z, half.z)
+        low, high = c - h - o, c + h - o
+        if v == 0.0:
+            if low > 0.0 or high < 0.0:
+                return False
+            continue
+        a, b = low / v, high / v
+        begin, end = max(begin, min(a, b)), min(end, max(a, b))
+    return begin <= end * (1.0 + 2.0**-40)
+
+
+@kernel
+def _times_of_ball(way, p, radius):
+    """(least t at which a way may meet a ball's surface, t at which it has for sure); ∞ where it does not."""
+    w = sub(p, way.o)
+    s = dot(w, way.v) / way.square
+    across = sub(w, scale(s, way.v))
+    square, outer, inner = dot(across, across), radius + way.extra + way.slack, radius - way.slack
+    if not square <= outer * outer:
+        return math.inf, math.inf
+    half = math.sqrt((outer * outer - square) / way.square)
+    if s + half < 0.0 or s - half > way.limit:
+        return math.inf, math.inf
+    known = math.inf
+    if way.first and inner > 0.0 and square < inner * inner:
+        half_inner = math.sqrt((inner * inner - square) / way.square)
+        known = s - half_inner if s - half >= 0.0 else s + half
+        known = known if s + half_inner >= 0.0 else math.inf
+    return max(s - half, 0.0), known
+
+
+@entry("int64(int64, int64, float64, int64, float64, float64, float64, boolean, int64, int64, int64, int64)")
+def balls_on_way(tree_at, radii_at, radius, way_at, limit, extra, slack, first, ids_at, times_at, capacity, stack_at):
+    """Numbers of the balls that a way may meet, and t from which on; how many, of which ``capacity`` are written.
+
+    radii, radius : of each ball, or 0 and that of all [m].   way : origin and vector, in the cloud's frame.
+    limit, extra, slack, first : as of `_Way`.   stack : words as of `nearest_in_tree`.
+    """
+    tree, numbers = open_tree(tree_at), view_f64(way_at, 6)
+    points, ids, times = points_of(tree), view_i64(ids_at, capacity), view_f64(times_at, capacity)
+    v, stack = vec3_at(numbers, 3), view_i64(stack_at, WIDTH * (MAX_LEVELS + 1))
+    way = _Way(vec3_at(numbers, 0), v, dot(v, v), limit, extra, slack, first)
+    radii = view_f64(radii_at, tree.header[N_FACETS] if radii_at != 0 else 0)
+    unit, middle = math.ldexp(1.0, int(tree.header[EXPONENT])), vec3_at(tree.numbers, CENTRE)
+    reach = radius + extra + slack
+    until, n, top = limit, 0, 1
+    stack[0] = 0
+    while top > 0:
+        top -= 1
+        box = box_at(tree, stack[top])
+        half = Vec3(unit * box.half.x + reach, unit * box.half.y + reach, unit * box.half.z + reach)
+        if not _enters_box(way, add(middle, scale(unit, box.centre)), half, until):
+            continue
+        link = link_of(tree.links, stack[top])
+        if link >= 0:
+            for slot in range(WIDTH):
+                if tree.boxes[NODE * link + slot + 3 * WIDTH] > NOTHING / 2:
+                    stack[top] = WIDTH * link + slot
+                    top += 1
+            continue
+        run = ~link
+        for place in range(run >> 3, (run >> 3) + (run & 7)):
+            number = int(tree.ids[place])
+            own = radii[number] if radii_at != 0 else radius
+            begin, known = _times_of_ball(way, vec3_at(points, 3 * number), own)
+            if begin == math.inf or begin > until:
+                continue
+            until = min(until, known)
+            if n < capacity:
+                ids[n], times[n] = number, begin
+            n += 1
+    if n > capacity:
+        return n
+    n_kept = 0
+    for i in range(n):
+        if times[i] <= until:
+            ids[n_kept], times[n_kept] = ids[i], times[i]
+            n_kept += 1
+    return n_kept

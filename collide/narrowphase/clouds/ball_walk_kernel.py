@@ -27,7 +27,7 @@ _ROUNDING, _U = 2.0**-44, 2.0**-53
 #: The same where squares are worked out in floats, and what these hold.
 _FLOAT_ROUNDING, _LARGEST_FLOAT = 2.0**-20, 2.0**120
 #: Words of workspace: two poses, the walk's stack.
-WORK = 2 * POSE + WIDTH * (MAX_LEVELS + 1) + 1
+WORK = 2 * POSE + WIDTH * (MAX_LEVELS + 1)
 
 
 @kernel(inline=True)
@@ -65,9 +65,10 @@ def _state(tree, look, stack):
         link = link_of(tree.links, stack[top])
         if link >= 0:
             near = boxes_near_place(tree.boxes, NODE * link, fx, fy, fz, far)
-            for slot in range(WIDTH):  # without branches, which nobody predicts
-                stack[top] = WIDTH * link + slot
-                top += near >> slot & 1
+            for slot in range(WIDTH):
+                if near >> slot & 1:
+                    stack[top] = WIDTH * link + slot
+                    top += 1
             continue
         run = ~link
         first = run >> 3
@@ -104,7 +105,7 @@ def clouds_meet_balls(
     """
     tree, poses = open_tree(tree_at), view_f64(work_at, 2 * POSE)
     states, centre = view_u8(states_at, n), vec3_at(view_f64(centre_at, 3), 0)
-    stack = view_i64(work_at + 16 * POSE, WIDTH * (MAX_LEVELS + 1) + 1)
+    stack = view_i64(work_at + 16 * POSE, WIDTH * (MAX_LEVELS + 1))
     unit = math.ldexp(1.0, int(tree.header[EXPONENT]))
     middle, reach = vec3_at(tree.numbers, CENTRE), norm1(vec3_at(tree.numbers, REACH))
     radii, off = radius + other_radius, 0.0

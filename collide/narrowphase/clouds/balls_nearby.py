@@ -58,6 +58,23 @@ def balls_within(cloud: PointCloud, box: BoxAround, distance: float) -> np.ndarr
     return some[((points >= box.low - own[:, None]) & (points <= box.high + own[:, None])).all(axis=1)]
 
 
+def balls_on_way(
+    cloud: PointCloud, X_WC: np.ndarray, origin: np.ndarray, vector: np.ndarray, limit: float, extra: float,
+    *, first: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, t) of the balls that something may meet on its way from an origin along a vector of the world, by t from
+    which on.
+
+    limit : of t.   extra : radius of what is on its way [m].   first : whether what lies behind a ball that is met for
+    sure may be left out.
+    """
+    R, t = X_WC[:3, :3], X_WC[:3, 3]
+    way = np.concatenate([(origin - t) @ R, vector @ R])
+    size = np.abs(cloud.points).max() + np.max(cloud.radius) + np.abs(t).sum() + np.abs(origin).sum() + extra
+    slack = (_ROUNDING + 8.0 * np.abs(R.T @ R - np.eye(3)).max()) * size
+    return cloud.tree.on_way(cloud.radius, way, limit, extra, slack, first)
+
+
 def ball(cloud: PointCloud, k: int) -> ConvexHull:
     """A ball of a cloud, as a shape in the cloud's frame."""
     return ConvexHull(cloud.points[k : k + 1], radius=float(cloud.radii[k]))
