@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
+from collide.casts.cloud_casts import cloud_casts
 from collide.casts.convex_casts import (
     CastRows,
     PairRows,
@@ -31,6 +32,7 @@ from collide.lowering.compound_table import Balls
 from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of, convex_set_of, parts_of
+from collide.narrowphase.clouds.balls_nearby import has_cloud
 from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import Question
@@ -78,6 +80,8 @@ def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Direct
     n = len(limits)
     if not n:  # what no cast asks about may be a mesh, which has no parts
         return nothing_met(0)
+    if has_cloud(A) or has_cloud(B):
+        return cloud_casts(_first_contacts, A, B, X_WA, X_WB, directions, limits)
     kind_a, kind_b = (kind_of(S) if isinstance(S, Shape) else np.array([kind_of(s) for s in S]) for S in (A, B))
     are_two = isinstance(A, Shape) and isinstance(B, Shape)
     if are_two and _ARE_TAKEN_APART[kind_a, kind_b]:

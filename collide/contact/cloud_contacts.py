@@ -16,13 +16,6 @@ from collide.shapes.shape import Shape
 RowsOf = Callable[[Shape, Shape, np.ndarray, np.ndarray], np.ndarray]
 
 
-def has_cloud(shapes) -> bool:
-    """Whether a shape, or one of a sequence, is a cloud."""
-    if isinstance(shapes, Shape):
-        return shapes.is_field
-    return any(shape.is_field for shape in getattr(getattr(shapes, "shape_set", None), "shapes", shapes))
-
-
 def cloud_contacts(
     rows_of: RowsOf, A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, margin: float
 ) -> tuple[np.ndarray, np.ndarray]:

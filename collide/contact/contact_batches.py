@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.contact.cloud_contacts import cloud_contacts, has_cloud
+from collide.contact.cloud_contacts import cloud_contacts
 from collide.contact.contact_rows import CONTACT_DTYPE, Slack, no_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.curved_contacts import curved_contacts
@@ -19,6 +19,7 @@ from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.compound_layout import body_ball
 from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.shape_set_tables import tables_of
+from collide.narrowphase.clouds.balls_nearby import has_cloud
 from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import CompoundParts, PartColumns, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import Question

@@ -17,12 +17,22 @@ from collide.lowering.parts import bounding_parts_of
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.point_cloud import PointCloud
+from collide.shapes.primitives import Halfspace
 from collide.shapes.shape import IDENTITY, Shape
 from collide.transforms import inverse_pose
 
 #: What rounding of a box's sides is, as a part of the numbers met.
 _ROUNDING = 2.0**-40
+#: Heights over a plane that differ by less than this part of the size are looked at again, ball by ball.
+_LEVEL = 2.0**-36
 _AXES = np.concatenate([np.eye(3), -np.eye(3)])
+
+
+def has_cloud(shapes) -> bool:
+    """Whether a shape, or one of a sequence, is a cloud."""
+    if isinstance(shapes, Shape):
+        return shapes.is_field
+    return any(shape.is_field for shape in getattr(getattr(shapes, "shape_set", None), "shapes", shapes))
 
 
 class BoxAround(NamedTuple):
@@ -73,6 +83,14 @@ def balls_on_way(
     size = np.abs(cloud.points).max() + np.max(cloud.radius) + np.abs(t).sum() + np.abs(origin).sum() + extra
     slack = (_ROUNDING + 8.0 * np.abs(R.T @ R - np.eye(3)).max()) * size
     return cloud.tree.on_way(cloud.radius, way, limit, extra, slack, first)
+
+
+def lowest_balls(A: PointCloud, B: Halfspace, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """Rows of the balls that are lowest over a plane, rounding counted in."""
+    n = X_WB[:3, :3] @ B.normal
+    heights = A.points @ (X_WA[:3, :3].T @ n) - A.radii
+    size = np.abs(A.points).max() + float(np.max(A.radius)) + np.abs(X_WA[:3, 3]).sum() + np.abs(X_WB[:3, 3]).sum()
+    return np.flatnonzero(heights <= heights.min() + _LEVEL * size)
 
 
 def ball(cloud: PointCloud, k: int) -> ConvexHull:

@@ -17,7 +17,7 @@ from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.kinds import Kind
 from collide.lowering.parts import convex_set_of, is_single_convex
 from collide.narrowphase.clouds.ball_walk_kernel import MEETS, OPEN, WORK, clouds_meet_balls
-from collide.narrowphase.clouds.balls_nearby import BoxAround, balls_within, box_in_frame, union_of
+from collide.narrowphase.clouds.balls_nearby import BoxAround, balls_within, box_in_frame, lowest_balls, union_of
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.facets.nearest_item_calls import Items, gap_rows, prepared_items, surface_states
 from collide.narrowphase.prepared_pairs import Prepared
@@ -28,8 +28,6 @@ from collide.shapes.shape import Shape
 
 #: Rows of two shapes: ``rows_of_pair(A, B, X_WA, X_WB, limit, depths=)``.
 RowsOfPair = Callable[..., np.ndarray]
-#: Heights over a plane that differ by less than this part of the size are looked at again, ball by ball.
-_LEVEL = 2.0**-36
 
 
 def answer_cloud(
@@ -130,8 +128,8 @@ def _union_row(
 ) -> np.ndarray:
     """The row of a cloud and another shape at a pair of poses (1, 4, 4)."""
     if isinstance(B, Halfspace):
-        return _named(rows_of(union_of(A, some := _lowest(A, B, X_WA[0], X_WB[0])), B, X_WA, X_WB, math.inf,
-                              depths=question.depths), some)
+        some = lowest_balls(A, B, X_WA[0], X_WB[0])
+        return _named(rows_of(union_of(A, some), B, X_WA, X_WB, math.inf, depths=question.depths), some)
     box = box_in_frame(B, X_WA[0], X_WB[0])
     some = balls_within(A, box, 0.0)
     row = None
@@ -181,12 +179,3 @@ def _depth(
         if len(more) <= len(some):
             return row
         some = more
-
-
-def _lowest(A: PointCloud, B: Halfspace, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """Rows of the balls that are lowest over a plane, rounding counted in."""
-    n = X_WB[:3, :3] @ B.normal
-    heights = A.points @ (X_WA[:3, :3].T @ n) - A.radii
-    size = np.abs(A.points).max() + float(np.max(A.radius)) + np.abs(X_WA[:3, 3]).sum() + np.abs(X_WB[:3, 3]).sum()
-    return np.flatnonzero(heights <= heights.min() + _LEVEL * size)
-

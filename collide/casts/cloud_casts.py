@@ -1,0 +1,78 @@
+"""Casts of and onto point clouds: the balls that a body may meet on its way, the first of them first, as unions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from collide.casts.convex_casts import CastRows, nothing_met
+from collide.casts.directions import Directions
+from collide.lowering.closed_regions import reach_of
+from collide.narrowphase.clouds.balls_nearby import balls_on_way, lowest_balls, union_of
+from collide.pairs.pair_arguments import pose_at
+from collide.shapes.point_cloud import PointCloud
+from collide.shapes.primitives import Halfspace
+from collide.shapes.shape import Shape
+
+#: What casts two other shapes: ``cast(A, B, X_WA, X_WB, directions, limits)``.
+Cast = Callable[..., CastRows]
+#: Balls asked about to begin with, and so many times more each time.
+_FIRST_ASKED, _GROWTH = 16, 4
+
+
+def cloud_casts(
+    cast: Cast, A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Directions, limits: np.ndarray
+) -> CastRows:
+    """First contacts of n casts, in some of which a cloud moves or stands; items of clouds are rows of ``points``.
+
+    cast : what answers other shapes; further arguments as of `cast_batch`.
+    """
+    out = nothing_met(len(limits))
+    for k in range(len(limits)):
+        shapes = [S if isinstance(S, Shape) else S[k] for S in (A, B)]
+        poses = [np.ascontiguousarray(pose_at(X, k)) for X in (X_WA, X_WB)]
+        of_k = Directions(directions.vectors[k : k + 1], directions.exponents[k : k + 1])
+        for column, values in zip(out, _first_contact(cast, shapes, poses, of_k, limits[k : k + 1])):
+            column[k] = values[0]
+    return out
+
+
+def _first_contact(cast: Cast, shapes: list, poses: list, direction: Directions, limit: np.ndarray) -> CastRows:
+    side = next((side for side in (1, 0) if isinstance(shapes[side], PointCloud)), None)
+    X = [pose[None] for pose in poses]
+    if side is None:
+        return cast(*shapes, *X, direction, limit)
+    cloud, other = shapes[side], shapes[1 - side]
+    numbers, times = _balls_met(cloud, other, poses[side], poses[1 - side], direction.vectors[0], limit[0], side)
+    n, rows = _FIRST_ASKED, nothing_met(1)
+    while len(numbers):
+        some = numbers[:n]
+        pair = [union_of(cloud, some), other] if side == 0 else [other, union_of(cloud, some)]
+        rows = _first_contact(cast, pair, poses, direction, limit)
+        items = rows.item_a if side == 0 else rows.item_b
+        items[rows.hit] = some[items[rows.hit]]
+        if n >= len(numbers) or (rows.hit[0] and rows.proven[0] and rows.t[0, 2] < times[n]):
+            break
+        n *= _GROWTH
+    return rows
+
+
+def _balls_met(
+    cloud: PointCloud, other: Shape, X_WC: np.ndarray, X_WO: np.ndarray, vector: np.ndarray, limit: float, side: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, t from which on) of the balls that may be met first.   side : 0 where the cloud moves, 1 where it stands.
+    """
+    if isinstance(other, Halfspace):
+        some = lowest_balls(cloud, other, X_WC, X_WO)
+        return some, np.zeros(len(some))
+    way = -vector if side == 0 else vector
+    reach = reach_of(other) if not isinstance(other, PointCloud) else _reach_of_cloud(other)
+    if not reach < math.inf:
+        return np.arange(len(cloud)), np.zeros(len(cloud))
+    return balls_on_way(cloud, X_WC, X_WO[:3, 3], way, float(limit), reach)
+
+
+def _reach_of_cloud(cloud: PointCloud) -> float:
+    return float(np.sqrt(np.square(cloud.points).sum(axis=1).max()) + np.max(cloud.radius)) * (1.0 + 2.0**-40)
