@@ -10,7 +10,7 @@ import numpy as np
 from collide.casts.convex_casts import CastRows, nothing_met
 from collide.casts.directions import Directions
 from collide.lowering.closed_regions import reach_of
-from collide.narrowphase.clouds.balls_nearby import balls_on_way, lowest_balls, union_of
+from collide.narrowphase.clouds.balls_nearby import balls_on_way, first_balls, lowest_balls, union_of
 from collide.pairs.pair_arguments import pose_at
 from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Halfspace
@@ -18,8 +18,6 @@ from collide.shapes.shape import Shape
 
 #: What casts two other shapes: ``cast(A, B, X_WA, X_WB, directions, limits)``.
 Cast = Callable[..., CastRows]
-#: Balls asked about to begin with, and so many times more each time.
-_FIRST_ASKED, _GROWTH = 16, 4
 
 
 def cloud_casts(
@@ -46,16 +44,14 @@ def _first_contact(cast: Cast, shapes: list, poses: list, direction: Directions,
         return cast(*shapes, *X, direction, limit)
     cloud, other = shapes[side], shapes[1 - side]
     numbers, times = _balls_met(cloud, other, poses[side], poses[1 - side], direction.vectors[0], limit[0], side)
-    n, rows = _FIRST_ASKED, nothing_met(1)
-    while len(numbers):
-        some = numbers[:n]
+    rows = nothing_met(1)
+    for some, next_time in first_balls(numbers, times):
         pair = [union_of(cloud, some), other] if side == 0 else [other, union_of(cloud, some)]
         rows = _first_contact(cast, pair, poses, direction, limit)
         items = rows.item_a if side == 0 else rows.item_b
         items[rows.hit] = some[items[rows.hit]]
-        if n >= len(numbers) or (rows.hit[0] and rows.proven[0] and rows.t[0, 2] < times[n]):
+        if rows.hit[0] and rows.proven[0] and rows.t[0, 2] < next_time:
             break
-        n *= _GROWTH
     return rows
 
 

@@ -67,7 +67,7 @@ def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates
 
 def certificate_of_row(A, B, X_WA, X_WB, row) -> Certificates:
     """The certificate of a row of `distance` at poses (1, 4, 4); ``None`` for a pair without a certificate."""
-    if row["how"] == UNDECIDED or row["beyond"]:
+    if row["how"] == UNDECIDED or row["beyond"] or A.is_field or B.is_field:
         return None
     if A.is_region or B.is_region:
         return make_region_certificate(A, B, X_WA[0], X_WB[0])

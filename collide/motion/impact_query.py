@@ -12,6 +12,7 @@ from collide.base.threads import check_threads, share_if_it_helps
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.lowering.closed_regions import reach_of
 from collide.lowering.kind_of_shape import kind_of
+from collide.motion.cloud_motions import cloud_impacts
 from collide.motion.convex_impact import CONTACT, FREE, OPEN_START, TOO_SMALL
 from collide.motion.convex_motions import convex_impacts, single_impact
 from collide.motion.impact_jobs import WRONG_TURN
@@ -20,6 +21,7 @@ from collide.motion.motions import Motions
 from collide.motion.placed_motion import poses_at
 from collide.motion.region_motions import with_regions_closed
 from collide.motion.surface_motions import surface_impacts
+from collide.narrowphase.clouds.balls_nearby import has_cloud
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import OF_FACETS, cells_of
 from collide.numerics.sine_cosine import LARGEST_ANGLE
@@ -110,8 +112,15 @@ def time_of_impact(
     counts = {name: len(X) for name, X in zip((*matrices, *turns), (*poses, *omegas)) if X is not None}
     n, are_shapes = matched_counts(A, B, counts)
     motions = Motions(*poses, *omegas)
+    single = are_shapes and all(singles) and all(single_omegas)
+    if has_cloud(A) or has_cloud(B):
+
+        def answer(A: Shape, B: Shape, motions: Motions) -> np.ndarray:
+            return _answer(_Question(*with_regions_closed(*distinct_shapes(A, B, 1), motions), motions, width, 1))
+
+        return as_result(cloud_impacts(answer, *distinct_shapes(A, B, n), motions.spread(n)), width, single)
     question = _Question(*with_regions_closed(*distinct_shapes(A, B, n), motions), motions, width, n_threads)
-    return as_result(_answer(question), width, are_shapes and all(singles) and all(single_omegas))
+    return as_result(_answer(question), width, single)
 
 
 def poses_in_motion(

@@ -7,6 +7,7 @@ than the distance and the ball's radius: rounding of that box is added to it.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,8 @@ from collide.transforms import inverse_pose
 
 #: What rounding of a box's sides is, as a part of the numbers met.
 _ROUNDING = 2.0**-40
+#: Balls asked about to begin with, and so many times more each time.
+_FIRST_ASKED, _GROWTH = 16, 4
 #: Heights over a plane that differ by less than this part of the size are looked at again, ball by ball.
 _LEVEL = 2.0**-36
 _AXES = np.concatenate([np.eye(3), -np.eye(3)])
@@ -91,6 +94,19 @@ def lowest_balls(A: PointCloud, B: Halfspace, X_WA: np.ndarray, X_WB: np.ndarray
     heights = A.points @ (X_WA[:3, :3].T @ n) - A.radii
     size = np.abs(A.points).max() + float(np.max(A.radius)) + np.abs(X_WA[:3, 3]).sum() + np.abs(X_WB[:3, 3]).sum()
     return np.flatnonzero(heights <= heights.min() + _LEVEL * size)
+
+
+def first_balls(numbers: np.ndarray, times: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
+    """(balls, when the next is met at the earliest), more and more of them, of balls by the time from which they may be
+    met: who knows an impact before the next ball goes no further.
+    """
+    n = _FIRST_ASKED
+    while len(numbers):
+        if n >= len(numbers):
+            yield numbers, math.inf
+            return
+        yield numbers[:n], float(times[n])
+        n *= _GROWTH
 
 
 def ball(cloud: PointCloud, k: int) -> ConvexHull:

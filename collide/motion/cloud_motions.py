@@ -1,0 +1,68 @@
+"""Times of impact of point clouds: the balls that a body may meet on its way, the first of them first, as unions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from collide.lowering.closed_regions import reach_of
+from collide.motion.convex_impact import CONTACT, FREE
+from collide.motion.impact_rows import free_rows
+from collide.motion.motions import Motions
+from collide.narrowphase.clouds.balls_nearby import balls_on_way, first_balls, union_of
+from collide.shapes.point_cloud import PointCloud
+from collide.shapes.shape import Shape
+
+#: What answers other shapes: ``answer(A, B, motions)``, a row of `IMPACT_DTYPE` for one motion.
+Answer = Callable[[Shape, Shape, Motions], np.ndarray]
+
+
+def cloud_impacts(answer: Answer, shapes: list[Shape], a: np.ndarray, b: np.ndarray, motions: Motions) -> np.ndarray:
+    """Rows of `IMPACT_DTYPE` of motions in some of which clouds take part; parts of clouds are rows of ``points``.
+
+    shapes : distinct.   a, b : (n,) numbers of the shapes A and B, motion by motion.
+    """
+    rows = free_rows(len(a))
+    for k, (i, j) in enumerate(zip(a.tolist(), b.tolist())):
+        some = np.array([k])
+        rows[k : k + 1] = _first_impact(answer, shapes[i], shapes[j], motions.picked(some).spread(1))
+    return rows
+
+
+def _first_impact(answer: Answer, A: Shape, B: Shape, motions: Motions) -> np.ndarray:
+    side = next((side for side, shape in ((1, B), (0, A)) if isinstance(shape, PointCloud)), None)
+    if side is None:
+        return answer(A, B, motions)
+    cloud, other, name = (A, B, "part_a") if side == 0 else (B, A, "part_b")
+    assert isinstance(cloud, PointCloud)
+    row = free_rows(1)
+    for some, next_time in first_balls(*_balls_met(cloud, other, motions if side == 0 else motions.swapped())):
+        union = union_of(cloud, some)
+        row = _first_impact(answer, *((union, B) if side == 0 else (A, union)), motions)
+        if row["status"][0] != FREE:
+            row[name] = some[row[name]]
+            if row["status"][0] == CONTACT and row["upper"][0] < next_time:
+                break
+    return row
+
+
+def _balls_met(cloud: PointCloud, other: Shape, motions: Motions) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, time from which on) of the balls that another shape may meet, the cloud being A: all if the cloud turns.
+
+    Of one that does not, the other's origin moves on a line of the cloud's frame.
+    """
+    every = np.arange(len(cloud)), np.zeros(len(cloud))
+    X0, X1, Y0, Y1 = (X[0] for X in motions[:4])
+    omega, reach = motions.omega_WA, math.inf if isinstance(other, PointCloud) else reach_of(other)
+    turns = not np.array_equal(X0[:3, :3], X1[:3, :3]) or (omega is not None and bool(np.any(omega)))
+    if turns or not reach < math.inf:
+        return every
+    vector = (Y1[:3, 3] - X1[:3, 3]) - (Y0[:3, 3] - X0[:3, 3])
+    size = sum(float(np.abs(X[:3, 3]).sum()) for X in (X0, X1, Y0, Y1))
+    if not np.abs(vector).max() > 2.0**-40 * size:  # no way worth the name
+        vector, reach = np.array([1.0, 0.0, 0.0]), reach + float(np.abs(vector).sum()) + 1.0
+        numbers, _ = balls_on_way(cloud, X0, Y0[:3, 3], vector, 0.0, reach)
+        return np.sort(numbers), np.zeros(len(numbers))
+    return balls_on_way(cloud, X0, Y0[:3, 3], vector, 1.0, reach + 2.0**-40 * size)
