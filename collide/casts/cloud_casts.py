@@ -42,11 +42,11 @@ def _first_contact(cast: Cast, shapes: list, poses: list, direction: Directions,
     X = [pose[None] for pose in poses]
     if side is None:
         return cast(*shapes, *X, direction, limit)
-    cloud, other = shapes[side], shapes[1 - side]
-    numbers, times = _balls_met(cloud, other, poses[side], poses[1 - side], direction.vectors[0], limit[0], side)
+    cloud, B = shapes[side], shapes[1 - side]
+    numbers, times = _balls_met(cloud, B, poses[side], poses[1 - side], direction.vectors[0], limit[0], side)
     rows = nothing_met(1)
     for some, next_time in first_balls(numbers, times):
-        pair = [union_of(cloud, some), other] if side == 0 else [other, union_of(cloud, some)]
+        pair = [union_of(cloud, some), B] if side == 0 else [B, union_of(cloud, some)]
         rows = _first_contact(cast, pair, poses, direction, limit)
         items = rows.item_a if side == 0 else rows.item_b
         items[rows.hit] = some[items[rows.hit]]
@@ -56,19 +56,14 @@ def _first_contact(cast: Cast, shapes: list, poses: list, direction: Directions,
 
 
 def _balls_met(
-    cloud: PointCloud, other: Shape, X_WC: np.ndarray, X_WO: np.ndarray, vector: np.ndarray, limit: float, side: int
+    cloud: PointCloud, B: Shape, X_WC: np.ndarray, X_WB: np.ndarray, vector: np.ndarray, limit: float, side: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, t from which on) of the balls that may be met first.   side : 0 where the cloud moves, 1 where it stands.
-    """
-    if isinstance(other, Halfspace):
-        some = lowest_balls(cloud, other, X_WC, X_WO)
+    """(rows, earliest t) of the balls that B may meet.   side : 0 where the cloud moves, 1 where the cloud stands."""
+    if isinstance(B, Halfspace):
+        some = lowest_balls(cloud, B, X_WC, X_WB)
         return some, np.zeros(len(some))
     way = -vector if side == 0 else vector
-    reach = reach_of(other) if not isinstance(other, PointCloud) else _reach_of_cloud(other)
+    reach = reach_of(B)
     if not reach < math.inf:
         return np.arange(len(cloud)), np.zeros(len(cloud))
-    return balls_on_way(cloud, X_WC, X_WO[:3, 3], way, float(limit), reach)
-
-
-def _reach_of_cloud(cloud: PointCloud) -> float:
-    return float(np.sqrt(np.square(cloud.points).sum(axis=1).max()) + np.max(cloud.radius)) * (1.0 + 2.0**-40)
+    return balls_on_way(cloud, X_WC, X_WB[:3, 3], way, float(limit), reach)

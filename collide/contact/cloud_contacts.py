@@ -35,9 +35,9 @@ def cloud_contacts(
 def _contacts_of(rows_of: RowsOf, shapes: list, poses: list, margin: float) -> np.ndarray:
     balls: list[np.ndarray | None] = [None, None]
     for side in range(2):
-        cloud, other = shapes[side], shapes[1 - side]
+        cloud, B = shapes[side], shapes[1 - side]
         if isinstance(cloud, PointCloud):
-            some = balls_within(cloud, box_in_frame(other, poses[side], poses[1 - side]), margin)
+            some = balls_within(cloud, box_in_frame(B, poses[side], poses[1 - side]), margin)
             if not len(some):
                 return no_rows()
             balls[side], shapes[side] = some, union_of(cloud, some)

@@ -1,7 +1,6 @@
 """The tree of a set of points: 23 bytes a point besides the points, built in linear time.
 
-Nodes are laid out as those of meshes' trees, with points in the place of facets: what walks down a mesh's tree walks
-down this one.
+Nodes are laid out as in trees of meshes, with points in the place of facets: walks down both are the same kernels.
 """
 
 from __future__ import annotations
@@ -90,7 +89,7 @@ class PointTree:
     def on_way(
         self, radius, way: np.ndarray, limit: float, extra: float, slack: float, first: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        """(numbers, t) of the balls that a way may meet, by t from which on.
+        """(numbers, earliest t) of the balls on a way, by t.
 
         radius : of all balls, or (n,) [m].   way : (6,) origin and vector.   limit, extra, slack, first : as of
         `balls_on_way`.

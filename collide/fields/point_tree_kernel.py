@@ -400,8 +400,8 @@ def points_in_box(header_at, low_at, high_at, ids_at, capacity, stack_at):
 class _Way(NamedTuple):
     """From a place along a vector, t from 0 to a limit.
 
-    extra : added to the radii of balls [m].   slack : by which places are off [m].   first : whether what lies behind a
-    ball that is met for sure may be left out.
+    extra : added to the radii of balls [m].   slack : rounding of places [m].   first : whether balls behind a ball met
+    for sure may be left out.
     """
 
     o: Vec3
@@ -432,7 +432,7 @@ def _enters_box(way, centre, half, until):
 
 @kernel
 def _times_of_ball(way, p, radius):
-    """(least t at which a way may meet a ball's surface, t at which it has for sure); ∞ where it does not."""
+    """(least t of a way's first place on a ball's surface, largest t); infinite without such a place."""
     w = sub(p, way.o)
     s = dot(w, way.v) / way.square
     across = sub(w, scale(s, way.v))
@@ -452,7 +452,7 @@ def _times_of_ball(way, p, radius):
 
 @entry("int64(int64, int64, float64, int64, float64, float64, float64, boolean, int64, int64, int64, int64)")
 def balls_on_way(tree_at, radii_at, radius, way_at, limit, extra, slack, first, ids_at, times_at, capacity, stack_at):
-    """Numbers of the balls that a way may meet, and t from which on; how many, of which ``capacity`` are written.
+    """Write numbers and earliest t of the first ``capacity`` balls on a way; returns the number of all balls on the way.
 
     radii, radius : of each ball, or 0 and that of all [m].   way : origin and vector, in the cloud's frame.
     limit, extra, slack, first : as of `_Way`.   stack : words as of `nearest_in_tree`.
@@ -482,8 +482,8 @@ def balls_on_way(tree_at, radii_at, radius, way_at, limit, extra, slack, first, 
         run = ~link
         for place in range(run >> 3, (run >> 3) + (run & 7)):
             number = int(tree.ids[place])
-            own = radii[number] if radii_at != 0 else radius
-            begin, known = _times_of_ball(way, vec3_at(points, 3 * number), own)
+            of_ball = radii[number] if radii_at != 0 else radius
+            begin, known = _times_of_ball(way, vec3_at(points, 3 * number), of_ball)
             if begin == math.inf or begin > until:
                 continue
             until = min(until, known)

@@ -35,10 +35,10 @@ def _first_impact(answer: Answer, A: Shape, B: Shape, motions: Motions) -> np.nd
     side = next((side for side, shape in ((1, B), (0, A)) if isinstance(shape, PointCloud)), None)
     if side is None:
         return answer(A, B, motions)
-    cloud, other, name = (A, B, "part_a") if side == 0 else (B, A, "part_b")
+    cloud, body, name = (A, B, "part_a") if side == 0 else (B, A, "part_b")
     assert isinstance(cloud, PointCloud)
     row = free_rows(1)
-    for some, next_time in first_balls(*_balls_met(cloud, other, motions if side == 0 else motions.swapped())):
+    for some, next_time in first_balls(*_balls_met(cloud, body, motions if side == 0 else motions.swapped())):
         union = union_of(cloud, some)
         row = _first_impact(answer, *((union, B) if side == 0 else (A, union)), motions)
         if row["status"][0] != FREE:
@@ -48,14 +48,14 @@ def _first_impact(answer: Answer, A: Shape, B: Shape, motions: Motions) -> np.nd
     return row
 
 
-def _balls_met(cloud: PointCloud, other: Shape, motions: Motions) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, time from which on) of the balls that another shape may meet, the cloud being A: all if the cloud turns.
+def _balls_met(cloud: PointCloud, B: Shape, motions: Motions) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, earliest time) of the balls on B's way, the cloud being A: all balls where the cloud turns.
 
-    Of one that does not, the other's origin moves on a line of the cloud's frame.
+    Without a turn B's origin moves on a line of the cloud's frame.
     """
     every = np.arange(len(cloud)), np.zeros(len(cloud))
     X0, X1, Y0, Y1 = (X[0] for X in motions[:4])
-    omega, reach = motions.omega_WA, math.inf if isinstance(other, PointCloud) else reach_of(other)
+    omega, reach = motions.omega_WA, reach_of(B)
     turns = not np.array_equal(X0[:3, :3], X1[:3, :3]) or (omega is not None and bool(np.any(omega)))
     if turns or not reach < math.inf:
         return every

@@ -10,7 +10,7 @@ import numpy as np
 from collide.base import argument_checks as checks
 from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidArgument, InvalidShape
-from collide.shapes.shape import Shape, kept_with_shape, positive, rows
+from collide.shapes.shape import Shape, kept_with_shape, positive, rows, scalar
 from collide.transforms import LARGEST
 
 if TYPE_CHECKING:
@@ -25,10 +25,10 @@ _MAX_NEAREST = 1 << 20
 
 
 class NearestPoints(NamedTuple):
-    """The points of a cloud that are nearest to places.
+    """The points of a cloud nearest to places.
 
-    distance : (m,) or (m, k) from the place to the point, balls left out [m], nearest first; ∞ for none.
-    index : int64 alike, rows of ``cloud.points``; −1 for none.
+    distance : (m,) or (m, k) from the place to the point, balls left out [m], nearest first; infinite without a point.
+    index : int64 alike, rows of ``cloud.points``; −1 without a point.
     """
 
     distance: np.ndarray
@@ -36,31 +36,30 @@ class NearestPoints(NamedTuple):
 
 
 class PointCloud(Shape):
-    """The union of balls around points: what a depth camera or a lidar sees, as an obstacle.
+    """The union of balls around points: the view of a depth camera or a lidar, as an obstacle.
 
     Parameters
     ----------
     points : (n, 3) array_like, float64
-        Centres in the frame of the shape [m], n ≥ 1. Any array will do that numpy takes: float32, torch tensors in the
-        computer's memory, structured arrays made plain.
+        Centres in the frame of the shape [m], n ≥ 1: arrays of any real dtype, tensors in the computer's memory.
     radius : float or (n,) array_like, float64
-        Of the balls, ≥ 0 [m]: one for all, or one each; 0 makes points.
+        Of the balls, ≥ 0 [m]: a number for all, or a number each; 0 makes points.
     drop_invalid : bool
-        Leave out points with a coordinate that is not finite, as cameras give them where they see nothing; ``dropped``
-        says how many. By default such points are refused.
+        Leave out points with coordinates not finite, from pixels without an echo; ``dropped`` is their number. By
+        default they are refused.
 
     Raises
     ------
     InvalidShape
-        For points of another shape, none at all, not finite or out of range; radii below 0, or of another number.
+        For points of another shape, empty, not finite or out of range; radii below 0, or of another number.
 
     Notes
     -----
-    Every query answers for the union of the balls as given, exactly where it answers for single balls exactly; ``part``
-    numbers of results are rows of ``points``. A tree over the points is made when a query first needs it: 0.1 µs a
-    point up to 10⁵, 0.2 µs at 10⁷, and 23 bytes a point besides the points. Convex shapes walk down the tree, single
-    balls being asked about where boxes do not tell: O(log n + k) for the k balls nearby. Depths, contacts and pairs
-    with a mesh, a `Compound` or another cloud take the balls nearby as a `Compound`.
+    Queries answer for the union of the balls as given, exactly where they answer for single balls exactly; ``part``
+    numbers of results are rows of ``points``. The first query makes a tree over the points: 0.1 µs a point up to 10⁵,
+    0.2 µs at 10⁷, and 23 bytes a point besides the points. Convex shapes walk down the tree, with questions about
+    single balls where boxes do not tell: O(log n + k) for the k balls nearby. Depths, contacts and pairs with a mesh, a
+    `Compound` or another cloud take the balls nearby as a `Compound`.
     """
 
     __slots__ = ("dropped", "points", "radius")
@@ -83,6 +82,57 @@ class PointCloud(Shape):
                 f"PointCloud: radius must be a number or one for each of {len(points)} points, got {len(radius)}"
             )
         self._store(points=points, radius=radius, dropped=dropped)
+
+    @classmethod
+    def from_depth(
+        cls, depth: ArrayLike, *, fx: float, fy: float, cx: float | None = None, cy: float | None = None,
+        radius: float = 0.0, scale: float = 1.0, max_depth: float = math.inf,
+    ) -> PointCloud:
+        """The points of a depth image, in the frame of the camera: x to the right, y down, z ahead.
+
+        Parameters
+        ----------
+        depth : (h, w) array_like
+            Depths along the camera's axis, in rows from above; 0 and numbers not finite are pixels without an echo.
+        fx, fy : float
+            Focal lengths, > 0 [pixels].
+        cx, cy : float, optional
+            The pixel on the axis, columns from 0; by default the middle of the image.
+        radius : float
+            Of the balls [m].
+        scale : float
+            Metres in a unit of the depths, > 0: 0.001 for images in millimetres.
+        max_depth : float
+            Pixels farther away are left out [m].
+
+        Returns
+        -------
+        PointCloud
+            Its ``dropped`` says how many pixels gave no point.
+
+        Raises
+        ------
+        InvalidShape
+            For an image of another shape, without an echo, lengths not above 0, depths below 0.
+        """
+        image = checks.array("PointCloud.from_depth: depth", depth, "(h, w)", InvalidShape)
+        if image.ndim != 2 or not image.size:
+            raise InvalidShape(f"PointCloud.from_depth: depth must have shape (h, w), got {image.shape}")
+        fx, fy = (positive("PointCloud.from_depth", name, value) for name, value in (("fx", fx), ("fy", fy)))
+        z = image * positive("PointCloud.from_depth", "scale", scale)
+        if (z < 0.0).any():
+            raise InvalidShape("PointCloud.from_depth: depth has numbers below 0")
+        height, width = image.shape
+        cx = 0.5 * (width - 1) if cx is None else scalar("PointCloud.from_depth", "cx", cx)
+        cy = 0.5 * (height - 1) if cy is None else scalar("PointCloud.from_depth", "cy", cy)
+        keep = (z > 0.0) & (z <= min(checks.limit("PointCloud.from_depth: max_depth", max_depth), LARGEST))
+        if not keep.any():
+            raise InvalidShape("PointCloud.from_depth: no pixel of the image has a depth")
+        row, column = np.nonzero(keep)
+        z = z[keep]
+        made = cls(np.stack([(column - cx) / fx * z, (row - cy) / fy * z, z], axis=1), radius)
+        made._store(dropped=int(image.size - len(z)))
+        return made
 
     def __len__(self) -> int:
         return len(self.points)
@@ -228,7 +278,7 @@ class PointCloud(Shape):
         return self._only(keep, "filtered")
 
     def updated(self, *, added: ArrayLike | None = None, removed: ArrayLike | None = None) -> PointCloud:
-        """The cloud with points more and points less; points that stay keep their order, new ones follow.
+        """The cloud with points more and points less: remaining points in their order, then new points.
 
         Parameters
         ----------
@@ -240,7 +290,7 @@ class PointCloud(Shape):
         Returns
         -------
         PointCloud
-            This cloud stays as it is: whoever reads it meanwhile sees the old points.
+            This cloud stays as it is, for readers in other threads, too.
 
         Raises
         ------

@@ -161,6 +161,7 @@ def test_every_example_is_known():
 #: What a page's Python takes as given: run before it, in a folder with the files of `_FILES`.
 GIVEN = {
     "README": "",
+    "clouds": "",
     "barba-langerman": "A = B = collide.ConvexHull(np.random.default_rng(0).normal(size=(60, 3)))\n"
     "X_WA, X_WB = np.eye(4), collide.pose((1, 0, 0))",
     "casts": "shape = A = B = collide.Box((1, 1, 1)); X_WA = X_WS = np.eye(4); X_WB = collide.pose((3, 0, 0))\n"

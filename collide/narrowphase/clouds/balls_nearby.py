@@ -1,7 +1,7 @@
-"""The balls of a cloud that may come within some distance of another shape, and these as a union.
+"""Balls of a cloud near another shape, or on its way, and some balls as a union.
 
 A ball is left out where its centre is farther from the box around the other shape, along an axis of the cloud's frame,
-than the distance and the ball's radius: rounding of that box is added to it.
+than the distance and the ball's radius: rounding is added to the box.
 """
 
 from __future__ import annotations
@@ -67,19 +67,18 @@ def balls_within(cloud: PointCloud, box: BoxAround, distance: float) -> np.ndarr
     some = cloud.tree.in_box(box.low - reach, box.high + reach)
     if np.ndim(cloud.radius) == 0:
         return some
-    own, points = cloud.radius[some] + distance * (1.0 + 2.0**-40), cloud.points[some]
-    return some[((points >= box.low - own[:, None]) & (points <= box.high + own[:, None])).all(axis=1)]
+    reaches, points = (cloud.radius[some] + distance * (1.0 + 2.0**-40))[:, None], cloud.points[some]
+    return some[((points >= box.low - reaches) & (points <= box.high + reaches)).all(axis=1)]
 
 
 def balls_on_way(
     cloud: PointCloud, X_WC: np.ndarray, origin: np.ndarray, vector: np.ndarray, limit: float, extra: float,
     *, first: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, t) of the balls that something may meet on its way from an origin along a vector of the world, by t from
-    which on.
+    """(rows, earliest t) of the balls on the way of a ball from an origin along a vector of the world, by t.
 
-    limit : of t.   extra : radius of what is on its way [m].   first : whether what lies behind a ball that is met for
-    sure may be left out.
+    limit : of t.   extra : radius of the moving ball [m].   first : whether balls behind a ball met for sure may be
+    left out.
     """
     R, t = X_WC[:3, :3], X_WC[:3, 3]
     way = np.concatenate([(origin - t) @ R, vector @ R])

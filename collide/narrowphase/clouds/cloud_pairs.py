@@ -1,8 +1,8 @@
 """A point cloud and another shape, at n pairs of poses.
 
-Convex sets walk down the tree over the points (`nearest_item_kernel.py`). What the walk leaves open, and every other
-question (depths, half-spaces, meshes, unions, other clouds), goes to the union of the balls that decide: those within
-the upper bound of the gap, or within the depth, of a box around the other shape.
+Convex sets walk down the tree over the points (`nearest_item_kernel.py`). Open rests of the walk, and all other
+questions (depths, half-spaces, meshes, unions, other clouds), go to the union of the balls within the upper bound of
+the gap, or within the depth, of a box around the other shape.
 """
 
 from __future__ import annotations

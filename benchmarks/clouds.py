@@ -1,0 +1,126 @@
+"""What a point cloud costs, to make and to ask, beside scipy's k-d tree and coal's octree, from 10³ to 10⁷ points.
+
+    python benchmarks/clouds.py --table made asked
+
+made    a cloud and its tree, beside cKDTree and coal's OcTree of the same points, cells as large as a ball
+asked   spheres, convex shapes, gaps, nearest points; ours in batches, coal in a loop of Python, scipy in one call:
+        for spheres the points within both radii are counted
+
+µs a call. Points lie evenly in a cube of 2 m, or on the walls of a room, as a lidar sees them; balls have a radius of
+5 mm.
+"""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+import numpy as np
+from inputs import rotations
+
+import collide
+from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
+
+_RADIUS, _EYE = 0.005, np.eye(4)
+
+
+@cache
+def points_of(points: int, where: str) -> np.ndarray:
+    rng = np.random.default_rng(points)
+    places = rng.uniform(-1.0, 1.0, (points, 3))
+    if where == "room":
+        wall = rng.integers(0, 5, points)
+        places[np.arange(points), wall % 3] = np.where(wall < 3, -1.0, 1.0) + 0.002 * rng.normal(size=points)
+    return places
+
+
+def made(options: Options, points: int, where: str) -> Race:
+    places = points_of(points, where)
+    tasks = {"collide": lambda: collide.PointCloud(places, _RADIUS).tree}
+    if installed(scipy="scipy"):
+        from scipy.spatial import cKDTree
+
+        tasks["scipy"] = lambda: cKDTree(places)
+    if installed(coal="coal") and points <= 10**5:
+        import coal
+
+        tasks["coal"] = lambda: coal.makeOctree(places, 2.0 * _RADIUS)
+    columns = {"bytes_a_point": collide.PointCloud(places, _RADIUS).tree.nbytes / points}
+    return Race(tasks, columns=columns)
+
+
+def poses(n: int) -> np.ndarray:
+    rng = np.random.default_rng(2)
+    X = np.repeat(_EYE[None], n, axis=0)
+    X[:, :3, :3], X[:, :3, 3] = rotations(rng.normal(size=(n, 4))), rng.uniform(-1.0, 1.0, (n, 3))
+    return X
+
+
+def shapes() -> dict:
+    rng = np.random.default_rng(3)
+    unit = rng.normal(size=(64, 3))
+    unit /= np.sqrt(np.square(unit).sum(axis=1))[:, None]
+    return {
+        "sphere": collide.Sphere(0.02), "box": collide.Box((0.05, 0.04, 0.06)), "capsule": collide.Capsule(0.02, 0.05),
+        "hull of 64": collide.ConvexHull(0.03 * unit), "cylinder": collide.Cylinder(0.02, 0.05),
+    }
+
+
+@cache
+def asked_of(points: int, where: str, n: int) -> dict:
+    """{question: {engine: call}}"""
+    places, X = points_of(points, where), poses(n)
+    cloud, centres = collide.PointCloud(places, _RADIUS), np.ascontiguousarray(X[:, :3, 3])
+    calls: dict = {name: {"collide": partial(collide.collide, cloud, S, _EYE, X)} for name, S in shapes().items()}
+    calls["gap of a box"] = {"collide": partial(collide.distance, cloud, shapes()["box"], _EYE, X, signed=False)}
+    calls["nearest"] = {"collide": partial(cloud.nearest, centres)}
+    if installed(scipy="scipy"):
+        from scipy.spatial import cKDTree
+
+        tree = cKDTree(places)
+        calls["nearest"]["scipy"] = partial(tree.query, centres)
+        calls["sphere"]["scipy"] = partial(tree.query_ball_point, centres, 0.02 + _RADIUS, return_length=True)
+    if installed(coal="coal") and points <= 10**5:
+        import coal
+
+        octree, request = coal.makeOctree(places, 2.0 * _RADIUS), coal.CollisionRequest()
+        sides = {"sphere": coal.Sphere(0.02), "box": coal.Box(0.05, 0.04, 0.06), "capsule": coal.Capsule(0.02, 0.05)}
+        eye, T = coal.Transform3s(), [coal.Transform3s(M[:3, :3], M[:3, 3]) for M in X]
+
+        def loop(shape):
+            for transform in T:
+                coal.collide(octree, eye, shape, transform, request, coal.CollisionResult())
+
+        for name, shape in sides.items():
+            calls[name]["coal"] = partial(loop, shape)
+    for tasks in calls.values():
+        for call in tasks.values():
+            call()
+    return calls
+
+
+def asked(options: Options, points: int, where: str, question: str) -> Race:
+    n = 500 if options.quick else 5000
+    return Race(asked_of(points, where, n)[question], per=n)
+
+
+def sizes(options: Options) -> tuple[int, ...]:
+    return (10**3, 10**4) if options.quick else (10**3, 10**4, 10**5, 10**6, 10**7)
+
+
+def made_cases(options: Options):
+    return grid(points=sizes(options), where=("cube", "room"))
+
+
+def asked_cases(options: Options):
+    questions = (*shapes(), "gap of a box", "nearest")
+    return grid(points=sizes(options)[:4], where=("cube", "room"), question=questions)
+
+
+CLAIMS = [
+    Claim("made", "µs to make a cloud with its tree", made_cases, made, file="clouds-made", turns=5),
+    Claim("asked", "µs a question to a cloud", asked_cases, asked, file="clouds-asked", turns=5),
+]
+
+
+if __name__ == "__main__":
+    main(__doc__, CLAIMS)

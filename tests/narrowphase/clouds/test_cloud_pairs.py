@@ -1,0 +1,195 @@
+"""Clouds beside brute force in fractions, and beside a Compound of the same balls, whatever the other shape."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from mesh_shapes import block_ring, box
+from naive import spell
+from reproduction import reproducing
+
+import collide
+from collide.narrowphase.clouds import ball_walk_kernel, cloud_pairs
+
+EYE = np.eye(4)
+_SNIPPET = """
+import collide
+import numpy as np
+cloud = collide.PointCloud({points}, np.array({radius}))
+print(collide.distance(cloud, {shape}, np.array({X_WC}), np.array({X_WB}), signed=False))
+"""
+#: Quarter turns: matrices of zeros and ones, so that fractions follow them.
+TURNS = [np.eye(3), np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])]
+
+
+def as_union(cloud: collide.PointCloud) -> collide.Compound:
+    balls = zip(cloud.points, cloud.radii.tolist())
+    return collide.Compound([(collide.ConvexHull(p[None], radius=r), EYE) for p, r in balls])
+
+
+def turned(rng) -> np.ndarray:
+    X = np.eye(4)
+    X[:3, :3] = TURNS[rng.integers(3)]
+    X[:3, 3] = rng.integers(-4, 5, 3) / 8.0
+    return X
+
+
+def placed(X: np.ndarray, p) -> list[Fraction]:
+    return [sum(Fraction(X[i, j]) * Fraction(p[j]) for j in range(3)) + Fraction(X[i, 3]) for i in range(3)]
+
+
+def seen(X: np.ndarray, p: list[Fraction]) -> list[Fraction]:
+    """A place of the world in the frame of a quarter turn."""
+    d = [p[i] - Fraction(X[i, 3]) for i in range(3)]
+    return [sum(Fraction(X[i, j]) * d[i] for i in range(3)) for j in range(3)]
+
+
+def square_from_box(p: list[Fraction], half) -> Fraction:
+    return sum(max(abs(c) - Fraction(h), Fraction(0)) ** 2 for c, h in zip(p, half))
+
+
+def families(rng):
+    """(name, points, radius): grids on eighths, duplicates, no radius, tiny ones, far from the origin, any doubles."""
+    grid = rng.integers(-6, 7, (40, 3)) / 8.0
+    yield "grid", grid, 0.125
+    yield "duplicates", np.repeat(grid[:8], 5, axis=0), 0.25
+    yield "points", grid, 0.0
+    yield "tiny", grid, 1e-9
+    yield "far", grid + 2.0**20, 0.125
+    yield "any", rng.normal(size=(40, 3)), 0.1
+    yield "each", grid, rng.integers(0, 4, 40) / 8.0
+
+
+def test_balls_and_boxes_are_decided_as_fractions_decide():
+    """On exact multiples: flush faces, corners at the very distance of the radius, balls that touch."""
+    rng, asked, hits, flush = np.random.default_rng(11), 0, 0, 0
+    for _ in range(25):
+        for name, points, radius in families(rng):
+            cloud, X_WC, X_WB = collide.PointCloud(points, radius), turned(rng), turned(rng)
+            if name == "far":
+                X_WC[:3, 3] -= X_WC[:3, :3] @ np.full(3, 2.0**20)
+            size = rng.integers(1, 9, 3) / 8.0
+            for shape, half, r in ((collide.Box(size), size / 2.0, 0.0), (collide.Sphere(0.25), np.zeros(3), 0.25)):
+                squares = [square_from_box(seen(X_WB, placed(X_WC, p)), half) for p in points]
+                sums = [(Fraction(q) + Fraction(r)) ** 2 for q in cloud.radii.tolist()]
+                wanted = any(square <= limit for square, limit in zip(squares, sums))
+                flush += any(square == limit for square, limit in zip(squares, sums))
+                with reproducing(_SNIPPET, points=points, radius=radius, shape=spell(shape), X_WC=X_WC, X_WB=X_WB):
+                    assert collide.collide(cloud, shape, X_WC, X_WB) == wanted
+                    assert collide.collide(shape, cloud, X_WB[None], X_WC[None]).tolist() == [wanted]
+                    gap = collide.distance(cloud, shape, X_WC, X_WB, signed=False)
+                    exact = max(min(float(s) ** 0.5 - q - r for s, q in zip(squares, cloud.radii.tolist())), 0.0)
+                    assert gap.lower - 1e-12 <= exact <= gap.upper + 1e-12 and gap.hit == wanted
+                asked, hits = asked + 1, hits + wanted
+    assert hits > 0.2 * asked and flush > 0.05 * asked and asked - hits > 0.1 * asked, (asked, hits, flush)
+
+
+def others(rng) -> list:
+    pts = rng.normal(size=(20, 3))
+    return [
+        collide.Sphere(0.1), collide.Box((0.3, 0.2, 0.1)), collide.Capsule(0.05, 0.2), collide.ConvexHull(0.15 * pts),
+        collide.Cylinder(0.1, 0.2), collide.Cone(0.1, 0.2), collide.Ellipsoid((0.2, 0.1, 0.1)),
+        collide.Halfspace((0.0, 0.6, 0.8), 0.0), collide.Mesh(*box()).scaled(0.3),
+        collide.Mesh(*block_ring()).scaled(0.2),
+        collide.Compound([(collide.Box((0.1, 0.1, 0.1)), collide.pose((0.1, 0, 0))), (collide.Sphere(0.1), EYE)]),
+        collide.PointCloud(rng.normal(size=(30, 3)) * 0.2, 0.02),
+        collide.HPolytope(np.vstack([np.eye(3), -np.eye(3)])[:5], np.full(5, 0.1), bounded=False),
+    ]
+
+
+def test_all_questions_are_those_of_the_union_of_the_balls():
+    rng, asked, hits = np.random.default_rng(12), 0, 0
+    for case in range(130):
+        B = others(rng)[case % 13]
+        points = rng.uniform(-1, 1, (int(rng.integers(1, 50)), 3))
+        radius = rng.uniform(0, 0.1, len(points)) if case % 2 else float(rng.choice([0.0, 0.01, 0.1]))
+        cloud = collide.PointCloud(points, radius)
+        pair = cloud, B, as_union(cloud), as_union(B) if isinstance(B, collide.PointCloud) else B
+        X = collide.pose(rng.normal(size=3), rpy=rng.uniform(-3, 3, 3))
+        Y = X @ collide.pose(rng.uniform(-0.8, 0.8, 3), rpy=rng.uniform(-3, 3, 3))
+        for C, D, U, V, X_C, X_D in ((*pair, X, Y), (pair[1], pair[0], pair[3], pair[2], Y, X)):
+            with reproducing(_SNIPPET, points=points, radius=radius, shape=spell(B), X_WC=X, X_WB=Y):
+                mine, theirs = (collide.distance(*S, X_C, X_D, signed=False) for S in ((C, D), (U, V)))
+                assert mine.hit == theirs.hit and mine.distance == pytest.approx(theirs.distance, abs=1e-12)
+                assert mine.lower <= theirs.upper and theirs.lower <= mine.upper
+                assert collide.collide(C, D, X_C, X_D) == mine.hit
+                within = collide.collide(C, D, X_C, X_D, security_margin=0.05)
+                assert within == collide.collide(U, V, X_C, X_D, security_margin=0.05)
+                batch = collide.distance(C, D, X_C[None], X_D[None], signed=False)
+                assert batch.distance[0] == mine.distance and batch.lower[0] == mine.lower
+                deep, other = (collide.distance(*S, X_C, X_D) for S in ((C, D), (U, V)))
+                assert deep.hit == other.hit and (deep.hit or deep.distance == mine.distance)
+                assert not deep.hit or deep.lower <= deep.distance <= deep.upper
+            asked, hits = asked + 1, hits + bool(mine.hit)
+    assert hits > 0.1 * asked and hits < 0.9 * asked, (asked, hits)
+
+
+def test_a_depth_takes_the_bodies_apart():
+    rng, hits = np.random.default_rng(13), 0
+    for case in range(60):
+        cloud = collide.PointCloud(rng.uniform(-0.5, 0.5, (60, 3)), 0.05)
+        B = others(rng)[case % 7]
+        X_WB = collide.pose(rng.uniform(-0.4, 0.4, 3), rpy=rng.uniform(-3, 3, 3))
+        r = collide.distance(cloud, B, EYE, X_WB)
+        if r.hit:
+            hits += 1
+            moved = X_WB.copy()
+            moved[:3, 3] += r.normal * (-float(r.distance) * (1 + 1e-9) + 1e-9)
+            assert not collide.collide(cloud, B, EYE, moved), case
+    assert hits > 20
+
+
+def test_limits_lists_sets_and_worlds_ask_the_same():
+    rng = np.random.default_rng(14)
+    cloud, shapes = collide.PointCloud(rng.uniform(-1, 1, (500, 3)), 0.02), others(rng)[:7]
+    Y = np.array([collide.pose(rng.uniform(-2, 2, 3), rpy=rng.uniform(-3, 3, 3)) for _ in range(35)])
+    asked = [shapes[k % 7] for k in range(35)]
+    single = [collide.distance(cloud, B, EYE, X, signed=False) for B, X in zip(asked, Y)]
+    rows = collide.distance([cloud] * 35, asked, EYE, Y, signed=False)
+    assert rows.distance.tolist() == [float(r.distance) for r in single]
+    near = collide.distance(cloud, shapes[1], EYE, Y, max_distance=0.1, signed=False)
+    assert near.beyond.any() and not near.beyond.all() and (near.lower[near.beyond] > 0.1).all()
+    picked = collide.ShapeSet([cloud, *shapes])
+    by_set = collide.collide(picked[np.zeros(35, dtype=int)], picked[1 + np.arange(35) % 7], EYE, Y)
+    assert by_set.tolist() == [bool(r.hit) for r in single]
+    world = collide.World()
+    world.add(cloud, EYE)
+    for B, X in zip(asked, Y):
+        world.add(B, X)
+    hit = {(int(r["a"]), int(r["b"])) for r in world.collisions().rows}
+    assert {b for a, b in hit if a == 0} == {k + 1 for k, r in enumerate(single) if r.hit}
+    assert world.collides() == bool(hit)
+
+
+def test_what_the_walk_leaves_open_is_decided_by_the_union(monkeypatch):
+    """Kernels that decide nothing: the same booleans."""
+    rng = np.random.default_rng(15)
+    cloud = collide.PointCloud(rng.uniform(-1, 1, (200, 3)), 0.05)
+    Y = np.array([collide.pose(rng.uniform(-1, 1, 3), rpy=rng.uniform(-3, 3, 3)) for _ in range(40)])
+    for B in (collide.Sphere(0.1), collide.Box((0.2, 0.3, 0.1))):
+        wanted = collide.collide(cloud, B, EYE, Y)
+        assert wanted.any() and not wanted.all()
+        with monkeypatch.context() as patch:
+            patch.setattr(cloud_pairs, "walks", lambda shape: False)
+            patch.setattr(cloud_pairs, "are_balls", lambda A, B: False)
+            assert np.array_equal(collide.collide(cloud, B, EYE, Y), wanted)
+    states = np.full(40, ball_walk_kernel.OPEN, dtype=np.uint8)
+    monkeypatch.setattr(cloud_pairs, "clouds_meet_balls", lambda *args: _write(args[-2], states) or 40)
+    ball = collide.Sphere(0.1)
+    assert np.array_equal(collide.collide(cloud, ball, EYE, Y), collide.collide(as_union(cloud), ball, EYE, Y))
+
+
+def _write(address: int, states: np.ndarray) -> None:
+    import ctypes
+
+    ctypes.memmove(address, states.ctypes.data, len(states))
+
+
+def test_matrices_that_are_no_poses_are_refused_by_number():
+    cloud, Y = collide.PointCloud([(0, 0, 0)], 0.1), np.repeat(EYE[None], 5, axis=0)
+    Y[3, 0, 0] = 2.0
+    for B in (collide.Sphere(0.1), collide.Box((1, 1, 1))):
+        with pytest.raises(collide.InvalidPose, match=r"X_WB\[3\]"):
+            collide.collide(cloud, B, EYE, Y)
