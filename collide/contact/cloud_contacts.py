@@ -42,7 +42,7 @@ def _contacts_of(rows_of: RowsOf, shapes: list, poses: list, margin: float) -> n
                 return no_rows()
             balls[side], shapes[side] = some, union_of(cloud, some)
     rows = rows_of(*shapes, *(X[None] for X in poses)).copy()
-    for field, some in zip(("part_a", "part_b"), balls):
-        if some is not None:
-            rows[field] = some[rows[field]]
+    for field, numbers in zip(("part_a", "part_b"), balls):
+        if numbers is not None:
+            rows[field] = numbers[rows[field]]
     return rows.astype(CONTACT_DTYPE, copy=False)

@@ -452,9 +452,9 @@ def _times_of_ball(way, p, radius):
 
 @entry("int64(int64, int64, float64, int64, float64, float64, float64, boolean, int64, int64, int64, int64)")
 def balls_on_way(tree_at, radii_at, radius, way_at, limit, extra, slack, first, ids_at, times_at, capacity, stack_at):
-    """Write numbers and earliest t of the first ``capacity`` balls on a way; returns the number of all balls on the way.
+    """Write numbers and earliest t of the first ``capacity`` balls on a way; returns the number of all balls.
 
-    radii, radius : of each ball, or 0 and that of all [m].   way : origin and vector, in the cloud's frame.
+    radii, radius : of each ball, or 0 and the radius of all [m].   way : origin and vector, in the cloud's frame.
     limit, extra, slack, first : as of `_Way`.   stack : words as of `nearest_in_tree`.
     """
     tree, numbers = open_tree(tree_at), view_f64(way_at, 6)

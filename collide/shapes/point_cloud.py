@@ -28,11 +28,11 @@ class NearestPoints(NamedTuple):
     """The points of a cloud nearest to places.
 
     distance : (m,) or (m, k) from the place to the point, balls left out [m], nearest first; infinite without a point.
-    index : int64 alike, rows of ``cloud.points``; −1 without a point.
+    row : int64 alike, rows of ``cloud.points``; −1 without a point.
     """
 
     distance: np.ndarray
-    index: np.ndarray
+    row: np.ndarray
 
 
 class PointCloud(Shape):
@@ -72,16 +72,15 @@ class PointCloud(Shape):
     dropped: int
 
     def __init__(self, points: ArrayLike, radius: float | ArrayLike = 0.0, *, drop_invalid: bool = False):
-        radius = _checked_radius(radius)
-        dropped = 0
+        radii, dropped = _checked_radius(radius), 0
         if checks.true_or_false("PointCloud: drop_invalid", drop_invalid):
-            points, radius, dropped = _only_finite(points, radius)
+            points, radii, dropped = _only_finite(points, radii)
         points = rows("PointCloud", "points", points, (None, 3))
-        if np.ndim(radius) and len(radius) != len(points):
+        if np.ndim(radii) and len(radii) != len(points):
             raise InvalidShape(
-                f"PointCloud: radius must be a number or one for each of {len(points)} points, got {len(radius)}"
+                f"PointCloud: radius must be a number or one for each of {len(points)} points, got {len(radii)}"
             )
-        self._store(points=points, radius=radius, dropped=dropped)
+        self._store(points=points, radius=radii, dropped=dropped)
 
     @classmethod
     def from_depth(
@@ -183,11 +182,11 @@ class PointCloud(Shape):
         if k * len(places) > _MAX_NEAREST * 64:
             raise InvalidArgument(f"PointCloud.nearest: {k} points for each of {len(places)} places; ask for fewer")
         limit = checks.limit("PointCloud.nearest: max_distance", max_distance)
-        squares, index = self.tree.nearest(places, k, limit * limit)
+        squares, row = self.tree.nearest(places, k, limit * limit)
         distance = np.sqrt(squares)
         if k == 1:
-            distance, index = distance[:, 0], index[:, 0]
-        return NearestPoints(distance[0], index[0]) if single else NearestPoints(distance, index)
+            distance, row = distance[:, 0], row[:, 0]
+        return NearestPoints(distance[0], row[0]) if single else NearestPoints(distance, row)
 
     def within(self, p: ArrayLike, r: float) -> np.ndarray:
         """Rows of the points no farther from a place than a distance, ascending.

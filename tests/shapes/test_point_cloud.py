@@ -64,14 +64,14 @@ def test_neighbours_are_those_of_brute_force(size):
         near = cloud.nearest(places, k)
         wanted = np.full((len(places), k), -1)
         wanted[:, : min(k, size)] = order[:, :k]
-        assert np.array_equal(near.index.reshape(len(places), k), wanted)
+        assert np.array_equal(near.row.reshape(len(places), k), wanted)
         assert near.distance.reshape(len(places), k)[:, 0] == pytest.approx(np.sqrt(squares.min(axis=1)), rel=1e-15)
         assert np.isinf(near.distance.reshape(len(places), k)[wanted < 0]).all()
     single = cloud.nearest(places[0])
-    assert np.ndim(single.index) == 0 and single.index == order[0, 0]
+    assert np.ndim(single.row) == 0 and single.row == order[0, 0]
     limit = float(np.sqrt(np.median(squares.min(axis=1))))
     near = cloud.nearest(places, max_distance=limit)
-    assert np.array_equal(near.index >= 0, squares.min(axis=1) <= limit * limit) and (near.index >= 0).any()
+    assert np.array_equal(near.row >= 0, squares.min(axis=1) <= limit * limit) and (near.row >= 0).any()
     for place in places[:10]:
         for r in (0.0, 0.25, 1.0):
             inside = np.square(points - place).sum(axis=1) <= r * r

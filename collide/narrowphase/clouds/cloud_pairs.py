@@ -75,6 +75,7 @@ def answer_balls(
     """
     if not isinstance(A, PointCloud):
         A, B, X_WA, X_WB = B, A, X_WB, X_WA
+    assert isinstance(A, PointCloud)
     packed, n, work = convex_set_of(B), len(out), np.empty(WORK)
     states, centre = np.empty(n, dtype=np.uint8), np.ascontiguousarray(packed.points[0])
     (XA, step_a), (XB, step_b) = ((np.ascontiguousarray(X), 16 * (len(X) > 1)) for X in (X_WA, X_WB))

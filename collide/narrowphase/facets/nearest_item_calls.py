@@ -169,7 +169,7 @@ def gap_rows(
 
 
 def prepared_items(
-    items: Items, packed: PackedConvex, exchanged: bool, point: np.ndarray | None = None
+    items: Items, packed: PackedConvex, exchanged: bool, point: Any = None
 ) -> Prepared:
     """Items and a shape ready for single gaps without a limit; everything else is left to the long way.
 
