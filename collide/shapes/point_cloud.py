@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 point_tree: Any = lazy_module("collide.fields.point_tree")
 
-#: Points that are nearest to places, and their distances, are asked for so many at once at most.
-_MAX_NEAREST = 1 << 20
+#: Numbers of nearest points in an answer at most.
+_MAX_NEAREST = 1 << 26
 
 
 class NearestPoints(NamedTuple):
@@ -62,7 +62,7 @@ class PointCloud(Shape):
     `Compound` or another cloud take the balls nearby as a `Compound`.
     """
 
-    __slots__ = ("dropped", "points", "radius")
+    __slots__ = ("_tree", "dropped", "points", "radius")
     _fields = ("points", "radius")
     convex = False
     is_field = True
@@ -78,7 +78,8 @@ class PointCloud(Shape):
         points = rows("PointCloud", "points", points, (None, 3))
         if np.ndim(radii) and len(radii) != len(points):
             raise InvalidShape(
-                f"PointCloud: radius must be a number or one for each of {len(points)} points, got {len(radii)}"
+                f"PointCloud: radius must be a number or one for each of {len(points)} points, got {len(radii)}: "
+                f"{checks.brief(radius)}"
             )
         self._store(points=points, radius=radii, dropped=dropped)
 
@@ -126,7 +127,10 @@ class PointCloud(Shape):
         cy = 0.5 * (height - 1) if cy is None else scalar("PointCloud.from_depth", "cy", cy)
         keep = (z > 0.0) & (z <= min(checks.limit("PointCloud.from_depth: max_depth", max_depth), LARGEST))
         if not keep.any():
-            raise InvalidShape("PointCloud.from_depth: no pixel of the image has a depth")
+            raise InvalidShape(
+                f"PointCloud.from_depth: no pixel of depth {checks.brief(depth)} has a depth up to max_depth "
+                f"{checks.brief(max_depth)}"
+            )
         row, column = np.nonzero(keep)
         z = z[keep]
         made = cls(np.stack([(column - cx) / fx * z, (row - cy) / fy * z, z], axis=1), radius)
@@ -179,8 +183,11 @@ class PointCloud(Shape):
         """
         places, single = _checked_places("PointCloud.nearest", p)
         k = checks.integer("PointCloud.nearest: k", k, 1)
-        if k * len(places) > _MAX_NEAREST * 64:
-            raise InvalidArgument(f"PointCloud.nearest: {k} points for each of {len(places)} places; ask for fewer")
+        if k * len(places) > _MAX_NEAREST:
+            raise InvalidArgument(
+                f"PointCloud.nearest: k must be at most {_MAX_NEAREST // len(places)} for {len(places)} places, "
+                f"got {checks.brief(k)}"
+            )
         limit = checks.limit("PointCloud.nearest: max_distance", max_distance)
         squares, row = self.tree.nearest(places, k, limit * limit)
         distance = np.sqrt(squares)
@@ -211,7 +218,9 @@ class PointCloud(Shape):
         places, single = _checked_places("PointCloud.within", p)
         r = checks.limit("PointCloud.within: r", r)
         if not single or not r < math.inf:
-            raise InvalidArgument("PointCloud.within: p must be a single place (3,), and r finite")
+            raise InvalidArgument(
+                f"PointCloud.within: p must be a single place (3,), and r finite, got {checks.brief(p)} and {r:g}"
+            )
         some = self.tree.in_box(places[0] - r * (1.0 + 1e-15), places[0] + r * (1.0 + 1e-15))
         away = self.points[some] - places[0]
         return some[np.square(away).sum(axis=1) <= r * r]
@@ -241,7 +250,8 @@ class PointCloud(Shape):
             raise InvalidArgument(
                 f"PointCloud.cropped: box must be a least and a largest corner (2, 3), got {checks.brief(box)}"
             )
-        return self._only(((self.points >= corners[0]) & (self.points <= corners[1])).all(axis=1), "cropped")
+        keep = ((self.points >= corners[0]) & (self.points <= corners[1])).all(axis=1)
+        return self._only(keep, f"cropped: box {checks.brief(box)}")
 
     def filtered(self, spacing: float) -> PointCloud:
         """A thinner cloud: of the points in a cell of a grid the first alone.
@@ -322,7 +332,7 @@ def _tree_of(cloud: PointCloud) -> PointTree:
 
 def _checked_radius(radius) -> Any:
     """A radius [m], or an array of them, read-only."""
-    if np.ndim(radius) == 0 and not isinstance(radius, (list, tuple)):
+    if checks.number(radius) is not None:
         return positive("PointCloud", "radius", radius, zero=True)
     values = rows("PointCloud", "radius", radius, (None,))
     if (values < 0.0).any():
@@ -350,19 +360,25 @@ def _checked_places(name: str, p) -> tuple[np.ndarray, bool]:
     """((m, 3) places, whether a single one was given)."""
     array = checks.array(f"{name}: p", p, "(3,) or (m, 3)", InvalidArgument)
     if array.ndim not in (1, 2) or array.shape[-1] != 3 or not np.abs(array).max(initial=0.0) <= LARGEST:
-        raise InvalidArgument(f"{name}: p must be (3,) or (m, 3), finite and within ±{LARGEST:g} m")
+        raise InvalidArgument(
+            f"{name}: p must be (3,) or (m, 3), finite and within ±{LARGEST:g} m, got {checks.brief(p)}"
+        )
     return np.ascontiguousarray(array.reshape(-1, 3), dtype=np.float64), array.ndim == 1
 
 
 def _checked_rows(removed, n: int) -> np.ndarray:
-    array = np.asarray(removed)
+    array = checks.plain_array("PointCloud.updated: removed", removed, "(k,) of int, or a mask", InvalidArgument)
     if array.dtype == bool and array.shape == (n,):
         return array
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
-        raise InvalidArgument(f"PointCloud.updated: removed must be rows (k,) of int, or a mask ({n},) of bool")
+        raise InvalidArgument(
+            f"PointCloud.updated: removed must be rows (k,) of int, or a mask ({n},), got {checks.brief(removed)}"
+        )
     array = array.astype(np.int64)
     if ((array < 0) | (array >= n)).any():
-        raise InvalidArgument(f"PointCloud.updated: removed: rows must lie within 0 … {n - 1}")
+        raise InvalidArgument(
+            f"PointCloud.updated: removed: rows must lie within 0 … {n - 1}, got {checks.brief(removed)}"
+        )
     return array
 
 
@@ -372,5 +388,7 @@ def _more_points(cloud: PointCloud, added) -> list[PointCloud]:
     if isinstance(added, PointCloud):
         return [added]
     if np.ndim(cloud.radius):
-        raise InvalidArgument("PointCloud.updated: points have a radius each: added must be a PointCloud")
-    return [PointCloud(added, cloud.radius)]
+        raise InvalidArgument(
+            f"PointCloud.updated: points have a radius each: added must be a PointCloud, got {checks.brief(added)}"
+        )
+    return [PointCloud(rows("PointCloud.updated", "added", added, (None, 3)), cloud.radius)]

@@ -27,7 +27,7 @@ class Shape:
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges",
         "_hulls_instead", "_kind", "_laid_out", "_leaves", "_meshed_leaves", "_partners",
         "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_single_facets", "_surface", "_topology",
-        "_tree", "_union", "_vertex_set", "_walk",
+        "_union", "_vertex_set", "_walk",
     )
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -70,8 +70,6 @@ class Shape:
     _facet_edges: Any
     #: Facets of a mesh that cross each other (`solids/arrangement.py`).
     _crossings: Any
-    #: Over points of a cloud (`shapes/point_cloud.py`); meshes have slots of their own.
-    _tree: Any
     #: Row and column of the pair table (`lowering/kinds.py`).
     _kind: Any
 

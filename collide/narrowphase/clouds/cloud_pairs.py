@@ -15,7 +15,9 @@ import numpy as np
 from collide.kernels import address_of
 from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.kinds import Kind
-from collide.lowering.parts import convex_set_of, is_single_convex
+from collide.lowering.packed_convex import HALFSPACE
+from collide.lowering.parts import convex_set_of, is_single_convex, parts_of
+from collide.lowering.shape_table import moved_pose
 from collide.narrowphase.clouds.ball_walk_kernel import MEETS, OPEN, WORK, clouds_meet_balls
 from collide.narrowphase.clouds.balls_nearby import BoxAround, balls_within, box_in_frame, lowest_balls, union_of
 from collide.narrowphase.convex_batches import Question
@@ -54,9 +56,28 @@ def answer_cloud(
             rows, is_written = gap_rows(items, packed, X_WA, X_WB, question.depths)
             out[is_written] = _beyond_limit(rows[is_written], question.limit)
             is_open = ~is_written
+    elif question.boolean and kind_of(B) is Kind.COMPOUND:
+        is_open = _may_meet_parts(balls_of(A), B, X_WA, X_WB)
     for k in np.flatnonzero(is_open).tolist():
         row = _union_row(rows_of, A, B, X_WA[k : k + 1], X_WB[k : k + 1], question)
         out[k] = bool(row["hit"][0]) if question.boolean else _beyond_limit(row, question.limit)[0]
+
+
+def _may_meet_parts(items: Items, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) bool: whether balls may meet a part of a union; False where all parts, whose poses are rounded, are farther
+    from all balls than rounding may have moved a part.
+    """
+    may_meet = np.zeros(len(X_WA), dtype=bool)
+    for packed, X_BP in parts_of(B):
+        if packed.kind == HALFSPACE:
+            return np.ones(len(X_WA), dtype=bool)
+        some = np.flatnonzero(~may_meet)
+        if not len(some):
+            break
+        X_WP, slop = moved_pose(X_WB[some], X_BP, np.full(len(some), packed.reach))
+        states = surface_states(items, packed, X_WA[some], X_WP, 2.0 * float(slop.max()))
+        may_meet[some[~states.apart]] = True
+    return may_meet
 
 
 def are_balls(A: Shape, B: Shape) -> bool:
