@@ -32,7 +32,6 @@ from collide.lowering.compound_table import Balls
 from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.packed_convex import HALFSPACE
 from collide.lowering.parts import bounding_parts_of, convex_set_of, parts_of
-from collide.narrowphase.clouds.balls_nearby import has_cloud
 from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_batches import Question
@@ -40,6 +39,7 @@ from collide.narrowphase.dispatch import OF_FACETS, OF_UNIONS, cells_of
 from collide.pairs.batches import answer_batch
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
+from collide.shapes.shape_set import have_any
 
 _LOOKS_AT_FACETS, _ARE_TAKEN_APART = cells_of(OF_FACETS), cells_of(OF_UNIONS)
 
@@ -80,7 +80,7 @@ def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Direct
     n = len(limits)
     if not n:  # what no cast asks about may be a mesh, which has no parts
         return nothing_met(0)
-    if has_cloud(A) or has_cloud(B):
+    if have_any(A, "is_field") or have_any(B, "is_field"):
         return cloud_casts(_first_contacts, A, B, X_WA, X_WB, directions, limits)
     kind_a, kind_b = (kind_of(S) if isinstance(S, Shape) else np.array([kind_of(s) for s in S]) for S in (A, B))
     are_two = isinstance(A, Shape) and isinstance(B, Shape)

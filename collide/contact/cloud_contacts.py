@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from collide.contact.contact_rows import CONTACT_DTYPE, no_rows
+from collide.contact.contact_rows import no_rows
 from collide.narrowphase.clouds.balls_nearby import balls_within, box_in_frame, union_of
 from collide.pairs.pair_arguments import pose_at
 from collide.shapes.point_cloud import PointCloud
@@ -41,8 +41,8 @@ def _contacts_of(rows_of: RowsOf, shapes: list, poses: list, margin: float) -> n
             if not len(some):
                 return no_rows()
             balls[side], shapes[side] = some, union_of(cloud, some)
-    rows = rows_of(*shapes, *(X[None] for X in poses)).copy()
+    rows = rows_of(*shapes, *(X[None] for X in poses)).copy()  # a single call's rows may be read-only
     for field, numbers in zip(("part_a", "part_b"), balls):
         if numbers is not None:
             rows[field] = numbers[rows[field]]
-    return rows.astype(CONTACT_DTYPE, copy=False)
+    return rows

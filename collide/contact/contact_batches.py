@@ -19,7 +19,6 @@ from collide.lowering.closed_regions import closed_shapes
 from collide.lowering.compound_layout import body_ball
 from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.shape_set_tables import tables_of
-from collide.narrowphase.clouds.balls_nearby import has_cloud
 from collide.narrowphase.composite.balls_on_ways import near_on_ways
 from collide.narrowphase.composite.composite_parts import CompoundParts, PartColumns, boxes_near, compound_parts
 from collide.narrowphase.convex_batches import Question
@@ -28,7 +27,7 @@ from collide.narrowphase.prepared_pairs import Single
 from collide.pairs.batches import answer_batch, of_one_set
 from collide.pairs.pair_arguments import pose_at
 from collide.shapes.shape import Shape
-from collide.shapes.shape_set import Picked, ShapeSet
+from collide.shapes.shape_set import Picked, ShapeSet, have_any
 from collide.transforms import as_poses
 
 #: What makes the contacts of two bodies, by the method that answers the pair; convex sets go together, and unions are
@@ -76,7 +75,7 @@ def contact_batch(
     """
     if n == 0:
         return no_rows(), np.zeros(0, dtype=np.int64)
-    if has_cloud(A) or has_cloud(B):
+    if have_any(A, "is_field") or have_any(B, "is_field"):
         X_WA, X_WB = (as_poses(X, name, check=check) for X, name in ((X_WA, "X_WA"), (X_WB, "X_WB")))
 
         def rows_of(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:

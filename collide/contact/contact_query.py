@@ -78,8 +78,8 @@ def contacts(
     parts. Two bodies of facets, and a curved shape on a mesh, cost tens of microseconds; a millisecond where a curved
     shape is so deep in a mesh that slabs do not prove the shortest way out. The time for meshes grows as k log k with
     the k pairs of facets within the margin or, for overlapping bodies, that a patch may reach, about a microsecond a
-    pair: n·m at worst; beyond 2¹⁸ pairs apart
-    within the margin the question is refused, of overlaps `distance` answers.
+    pair: n·m at worst; beyond 2¹⁸ pairs apart within the margin the question is refused, of overlaps `distance`
+    answers.
     """
     margin = check_margin("contacts", margin)
     max_contacts = check_max_contacts("contacts", max_contacts)

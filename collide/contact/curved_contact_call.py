@@ -20,7 +20,7 @@ from collide.narrowphase.facets.nearest_item_kernel import (
     rows_within,
 )
 from collide.narrowphase.facets.nearest_item_kernel import HEADER as GAP_HEADER
-from collide.narrowphase.rows import DISTANCE, HIT, ROW, view_row
+from collide.narrowphase.rows import DISTANCE, HIT, ROW, copy_row, view_row
 
 _curved_manifolds_at = native_call(SIGNATURE)
 
@@ -95,10 +95,7 @@ def _put_in_order(header, n):
         order[k] = i
     for i in range(n):
         facets[i] = ids[places[order[i]]]
-        source = view_i64(header[ROWS_AT] + ROW * order[i], ROW // 8)
-        target = view_i64(header[ORDERED_AT] + ROW * i, ROW // 8)
-        for k in range(ROW // 8):
-            target[k] = source[k]
+        copy_row(header[ROWS_AT] + ROW * order[i], header[ORDERED_AT] + ROW * i)
 
 
 @kernel(inline=True)

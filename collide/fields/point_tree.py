@@ -19,10 +19,8 @@ from collide.fields.point_tree_kernel import (
     points_in_box,
 )
 from collide.kernels import address_of
-from collide.mesh.bvh import MAX_FACETS, MAX_LEAF, NODE, WIDTH
+from collide.mesh.bvh import MAX_LEAF, NODE, WIDTH
 
-#: Points of a tree at most.
-MAX_POINTS = MAX_FACETS
 #: Words of a walk's stack.
 _STACK = 2 * WIDTH * (MAX_LEVELS + 1)
 #: Points listed at once to begin with.

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from collide.lowering.parts import bounding_parts_of
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.shape import Shape, kept_with_shape
-from collide.shapes.shape_set import Picked
+from collide.shapes.shape_set import have_any
 from collide.transforms import LARGEST, ROTATION_TOLERANCE
 
 #: More than what a sum of lengths rounds, and what poses that are nearly rotations stretch.
@@ -51,7 +50,7 @@ def closed_shapes(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, leeway: np.n
     leeway : a number or (n,): A may be moved this far, or bodies up to this far from A matter, too [m].
     Raises as `closings`.
     """
-    if not (_has_region(A) or _has_region(B)):
+    if not (have_any(A, "is_region") or have_any(B, "is_region")):
         return A, B
     sides = [[S] * n if isinstance(S, Shape) else S for S in (A, B)]
     pairs: dict[tuple[int, int], list[int]] = {}
@@ -68,13 +67,6 @@ def closed_shapes(A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, leeway: np.n
             else:
                 out_b[k] = closed(b, size)
     return out_a, out_b
-
-
-def _has_region(shapes: Any) -> bool:
-    """Whether a shape, or one of a sequence, is a region."""
-    if isinstance(shapes, Picked):
-        return shapes.shape_set.has_region
-    return shapes.is_region if isinstance(shapes, Shape) else any(shape.is_region for shape in shapes)
 
 
 def sizes_at(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, leeway: np.ndarray | float = 0.0) -> np.ndarray:

@@ -21,7 +21,6 @@ from collide.motion.motions import Motions
 from collide.motion.placed_motion import poses_at
 from collide.motion.region_motions import with_regions_closed
 from collide.motion.surface_motions import surface_impacts
-from collide.narrowphase.clouds.balls_nearby import has_cloud
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.dispatch import OF_FACETS, cells_of
 from collide.numerics.sine_cosine import LARGEST_ANGLE
@@ -29,6 +28,7 @@ from collide.pairs.batches import answer_batch, distinct_shapes
 from collide.pairs.pair_arguments import matched_counts
 from collide.results import UNDECIDED
 from collide.shapes.shape import Shape
+from collide.shapes.shape_set import have_any
 from collide.transforms import LARGEST, SMALLEST, as_pose, poses_as_given
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def time_of_impact(
     n, are_shapes = matched_counts(A, B, counts)
     motions = Motions(*poses, *omegas)
     single = are_shapes and all(singles) and all(single_omegas)
-    if has_cloud(A) or has_cloud(B):
+    if have_any(A, "is_field") or have_any(B, "is_field"):
 
         def answer(A: Shape, B: Shape, motions: Motions) -> np.ndarray:
             return _answer(_Question(*with_regions_closed(*distinct_shapes(A, B, 1), motions), motions, width, 1))

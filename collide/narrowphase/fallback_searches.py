@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.kernels import entry, kernel, native_call, view_i64
+from collide.kernels import entry, kernel, native_call
 from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.pose_batches import clear_rows
 from collide.narrowphase.rows import (
@@ -28,6 +28,7 @@ from collide.narrowphase.rows import (
     POINT_B,
     ROW,
     UPPER,
+    copy_row,
     is_undecided,
     view_row,
 )
@@ -97,9 +98,7 @@ def take_proven(row_at, result_at, sign, limit):
     if sign or result.flags[HIT] != 0:
         _take_sign(view_row(row_at), result, limit)
     else:  # a gap, with all that is known of one
-        source, target = view_i64(result_at, ROW // 8), view_i64(row_at, ROW // 8)
-        for i in range(ROW // 8):
-            target[i] = source[i]
+        copy_row(result_at, row_at)
 
 
 @kernel

@@ -6,7 +6,7 @@ import math
 from functools import partial
 from typing import Any, NamedTuple
 
-from collide.kernels import kernel, view_f64, view_i32, view_u8
+from collide.kernels import kernel, view_f64, view_i32, view_i64, view_u8
 from collide.narrowphase.bounds import PROMISE_DEPTH, PROMISE_GAP, PROMISE_SUBNORMAL
 from collide.numerics.vec3 import put_vec3
 from collide.results import PAIR_DTYPE, REFUSED, UNDECIDED, field_at
@@ -55,6 +55,14 @@ def hit_unless_apart(lower):
     """1 unless bodies are proven to be apart, by a lower bound of their distance: closed sets that touch share a point,
     and an open sign counts as a hit. For facets `facets/mesh_collide_kernel.py` decides touching exactly."""
     return 0 if lower > 0.0 else 1
+
+
+@kernel(inline=True)
+def copy_row(row_at, out_at):
+    """Write the bytes of a row to another place."""
+    row, out = view_i64(row_at, ROW // 8), view_i64(out_at, ROW // 8)
+    for k in range(ROW // 8):
+        out[k] = row[k]
 
 
 @kernel(inline=True)

@@ -1,10 +1,22 @@
-"""Whether matrices are rigid poses, many at once."""
+"""Whether matrices are rigid poses, many at once, and how far a matrix is off a rotation."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from collide.kernels import address_of, entry, view_f64
+from collide.kernels import address_of, entry, kernel, view_f64
+from collide.numerics.vec3 import Vec3, dot
+
+#: What rounding adds to a product of two columns: four units in the last place.
+_ROUNDED = 2.0**-51
+
+
+@kernel(inline=True)
+def off_rotation(R):
+    """How far a matrix, row by row, is off a rotation: the largest entry of RᵀR − I, and rounding."""
+    x, y, z = Vec3(R[0], R[3], R[6]), Vec3(R[1], R[4], R[7]), Vec3(R[2], R[5], R[8])
+    off = max(max(abs(dot(x, x) - 1.0), abs(dot(y, y) - 1.0)), abs(dot(z, z) - 1.0))
+    return max(max(off, abs(dot(x, y))), max(abs(dot(y, z)), abs(dot(z, x)))) + _ROUNDED
 
 
 @entry("boolean(int64, int64, float64, float64)")

@@ -18,6 +18,7 @@ from collide.narrowphase.rows import (
     LOWER,
     ROW,
     UPPER,
+    copy_row,
     is_undecided_or_refused,
     view_row,
 )
@@ -149,7 +150,7 @@ def _take_nearer(scene, p, q, a, b, number, row_at, limit):
         if not is_first and out.doubles[LOWER] <= row.doubles[UPPER]:
             lower = min(lower, out.doubles[LOWER])
             is_certified &= out.flags[CERTIFIED]
-        _copy_row(scene, row_at)
+        copy_row(scene.words[ROW_AT], row_at)
         out.words[BODY_A] = a
         out.words[BODY_B] = b
     elif lower <= out.doubles[UPPER]:
@@ -160,11 +161,3 @@ def _take_nearer(scene, p, q, a, b, number, row_at, limit):
     out.doubles[LOWER] = lower
     out.flags[CERTIFIED] = is_certified
     return min(limit, out.doubles[UPPER]) if out.doubles[UPPER] > -math.inf else limit
-
-
-@kernel(inline=True)
-def _copy_row(scene, row_at):
-    source = view_i64(scene.words[ROW_AT], ROW // 8)
-    target = view_i64(row_at, ROW // 8)
-    for k in range(ROW // 8):
-        target[k] = source[k]

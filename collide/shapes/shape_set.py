@@ -45,9 +45,9 @@ class ShapeSet:
             raise InvalidShape(f"ShapeSet: shapes is empty, {brief(shapes)}; at least one is needed")
 
     @cached_property
-    def has_region(self) -> bool:
-        """Whether one of the shapes is an `HPolytope` kept as planes."""
-        return any(shape.is_region for shape in self.shapes)
+    def flags(self) -> frozenset[str]:
+        """"is_region" and "is_field", where such a shape is among the set's."""
+        return frozenset(flag for flag in ("is_region", "is_field") if any(getattr(S, flag) for S in self.shapes))
 
     def __len__(self) -> int:
         return len(self.shapes)
@@ -83,3 +83,10 @@ class Picked(Sequence):
         if isinstance(k, (slice, np.ndarray)):
             return Picked(self.shape_set, self.rows[k])
         return self.shape_set.shapes[self.rows[k]]
+
+
+def have_any(shapes, flag: str) -> bool:
+    """Whether a shape, or a shape of a sequence, has a flag of `ShapeSet.flags`."""
+    if isinstance(shapes, Picked):
+        return flag in shapes.shape_set.flags
+    return getattr(shapes, flag) if isinstance(shapes, Shape) else any(getattr(shape, flag) for shape in shapes)

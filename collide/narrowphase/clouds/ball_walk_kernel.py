@@ -18,24 +18,17 @@ from collide.lowering.shape_table import POSE
 from collide.mesh.box_overlap import boxes_near_place, points_near_place
 from collide.mesh.bvh import CENTRE, EXPONENT, MAX_LEAF, NODE, REACH, WIDTH, link_of, open_tree
 from collide.narrowphase.pose_batches import set_pose
+from collide.numerics.rigid_poses import off_rotation
 from collide.numerics.vec3 import Vec3, add, dot, norm1, rotate, rotate_back, scale, sub, vec3_at
 
 #: What becomes of a pair of poses.
 APART, MEETS, OPEN = range(3)
 #: Of the numbers met, what rounding moves a place by.
-_ROUNDING, _U = 2.0**-44, 2.0**-53
+_ROUNDING = 2.0**-44
 #: The same where squares are worked out in floats, and what these hold.
 _FLOAT_ROUNDING, _LARGEST_FLOAT = 2.0**-20, 2.0**120
 #: Words of workspace: two poses, the walk's stack.
 WORK = 2 * POSE + WIDTH * (MAX_LEVELS + 1)
-
-
-@kernel(inline=True)
-def _off_rotation(R):
-    """How far a matrix is off a rotation: the largest entry of RᵀR − I, and rounding."""
-    x, y, z = Vec3(R[0], R[3], R[6]), Vec3(R[1], R[4], R[7]), Vec3(R[2], R[5], R[8])
-    off = max(max(abs(dot(x, x) - 1.0), abs(dot(y, y) - 1.0)), abs(dot(z, z) - 1.0))
-    return max(max(off, abs(dot(x, y))), max(abs(dot(y, z)), abs(dot(z, x)))) + 4.0 * _U
 
 
 class _Look(NamedTuple):
@@ -113,7 +106,7 @@ def clouds_meet_balls(
         if step_a != 0 or k == 0:
             if not set_pose(poses, 0, view_f64(XA_at + 8 * step_a * k, 16), check):
                 return k
-            off = _off_rotation(poses)
+            off = off_rotation(poses)
         if (step_b != 0 or k == 0) and not set_pose(poses, POSE, view_f64(XB_at + 8 * step_b * k, 16), check):
             return k
         c = add(rotate(poses, POSE, centre), vec3_at(poses, POSE + 9))

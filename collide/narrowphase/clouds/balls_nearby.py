@@ -31,13 +31,6 @@ _LEVEL = 2.0**-36
 _AXES = np.concatenate([np.eye(3), -np.eye(3)])
 
 
-def has_cloud(shapes) -> bool:
-    """Whether a shape, or one of a sequence, is a cloud."""
-    if isinstance(shapes, Shape):
-        return shapes.is_field
-    return any(shape.is_field for shape in getattr(getattr(shapes, "shape_set", None), "shapes", shapes))
-
-
 class BoxAround(NamedTuple):
     """A box along the axes of a cloud's frame around another shape [m]; infinite around half-spaces."""
 

@@ -34,6 +34,7 @@ from collide.narrowphase.rows import (
     POINT_B,
     ROW,
     UPPER,
+    copy_row,
     view_row,
 )
 from collide.numerics.vec3 import Vec3, add, neg, norm, put_vec3, scale, sub, vec3_at
@@ -102,14 +103,6 @@ def first_reach_of(score, at):
 def first_normal_of(score, at):
     """The normal of the first row: whatever goes by it depends on the pair of bodies alone."""
     return vec3_at(score, at + _NORMAL)
-
-
-@kernel(inline=True)
-def copy_row(row_at, out_at):
-    row = view_i64(row_at, ROW // 8)
-    out = view_i64(out_at, ROW // 8)
-    for k in range(ROW // 8):
-        out[k] = row[k]
 
 
 @kernel

@@ -53,9 +53,11 @@ from collide.narrowphase.rows import (
     UPPER,
     VERTICES_A,
     VERTICES_B,
+    copy_row,
     is_undecided_or_refused,
     view_row,
 )
+from collide.numerics.rigid_poses import off_rotation
 from collide.numerics.vec3 import (
     Vec3,
     absolute,
@@ -95,7 +97,6 @@ _MAX_ASKED = 64
 _FAR_OFF = 2.0**-40
 #: Of the pair's size, what rounding takes off a gap between boxes.
 _ROUNDING = 2.0**-44
-_U = 2.0**-53
 #: Facets are looked at that are farther than a limit by so many times what rounding takes off a gap.
 NEAR_SLACK = 64.0
 
@@ -234,9 +235,7 @@ def _with_item(walk, nearest, place):
     own_key = 2.0 * upper - lower
     if own_key < key or (own_key == key and place < best):
         key, best = own_key, place
-        source, target = view_i64(walk.words[ROW_AT] + ROW, ROW // 8), view_i64(walk.words[ROW_AT], ROW // 8)
-        for k in range(ROW // 8):
-            target[k] = source[k]
+        copy_row(walk.words[ROW_AT] + ROW, walk.words[ROW_AT])
         n = scale(1.0 - 2.0**-40, vec3_at(row.doubles, NORMAL))
         along = rotate_back(walk.poses, 0, n)
         above = dot(n, walk.t) - _height(walk, neg(n))
@@ -345,20 +344,10 @@ def rows_within(walk, limit, capacity, rows_at, places_at):
             continue
         if is_undecided_or_refused(row):
             return LONG_WAY, n
-        source, target = view_i64(walk.words[ROW_AT] + ROW, ROW // 8), view_i64(rows_at + ROW * n, ROW // 8)
-        for k in range(ROW // 8):
-            target[k] = source[k]
+        copy_row(walk.words[ROW_AT] + ROW, rows_at + ROW * n)
         places[n] = places[i]
         n += 1
     return (NEAR if n > 0 else _inside_or_apart(walk)), n
-
-
-@kernel(inline=True)
-def _off_rotation(R):
-    """How far a matrix is off a rotation: the largest entry of RᵀR − I, and rounding."""
-    x, y, z = _column(R, 0), _column(R, 1), _column(R, 2)
-    off = max(max(abs(dot(x, x) - 1.0), abs(dot(y, y) - 1.0)), abs(dot(z, z) - 1.0))
-    return max(max(off, abs(dot(x, y))), max(abs(dot(y, z)), abs(dot(z, x)))) + 4.0 * _U
 
 
 @kernel
@@ -368,7 +357,7 @@ def place_pair(header_at, XA_at, XB_at, check):
     ints, numbers = view_i64(words[INTS_AT], 2 * INTS), view_f64(words[NUMBERS_AT], 2 * NUMBERS)
     poses = view_f64(words[POSES_AT], 2 * POSE)
     placed = set_pose(poses, 0, view_f64(XA_at, 16), check) and set_pose(poses, POSE, view_f64(XB_at, 16), check)
-    off = _off_rotation(poses) if placed else math.inf
+    off = off_rotation(poses) if placed else math.inf
     tree = open_tree(words[TREE_AT])
     t = sub(vec3_at(poses, POSE + 9), vec3_at(poses, 9))
     reach = norm1(vec3_at(tree.numbers, TREE_REACH)) + numbers[NUMBERS + REACH] + numbers[NUMBERS + RADIUS] + norm1(t)
@@ -454,9 +443,7 @@ def _state(header_at, XA_at, XB_at, check, margin):
 @kernel
 def _write_gap(walk, nearest, row_at):
     """The mesh's row from the best facet's and the least of all brackets."""
-    source, target = view_i64(walk.words[ROW_AT], ROW // 8), view_i64(row_at, ROW // 8)
-    for k in range(ROW // 8):
-        target[k] = source[k]
+    copy_row(walk.words[ROW_AT], row_at)
     row = view_row(row_at)
     of_best = row.doubles[DISTANCE]
     distance = min(max(of_best, nearest.lower), nearest.upper)
