@@ -66,10 +66,13 @@ if TYPE_CHECKING:
         HeightField,
         HPolytope,
         Mesh,
+        OcTree,
+        OcTreeLeaves,
         PointCloud,
         Shape,
         ShapeSet,
         Sphere,
+        VoxelGrid,
     )
     from collide.shapes.tessellation import tessellate
     from collide.solids.boolean import BooleanResult, boolean
@@ -122,7 +125,8 @@ _HOMES = {
     "collide.robots.robot_distances": ("RobotDistances",),
     "collide.shapes": (
         "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
-        "Halfspace", "HeightField", "Mesh", "PointCloud", "Shape", "ShapeSet", "Sphere",
+        "Halfspace", "HeightField", "Mesh", "OcTree", "OcTreeLeaves", "PointCloud", "Shape", "ShapeSet", "Sphere",
+        "VoxelGrid",
     ),
     "collide.shapes.tessellation": ("tessellate",),
     "collide.solids.boolean": ("BooleanResult", "boolean"),
@@ -153,10 +157,12 @@ __all__ = [
     "CertifiedEdges", "CollideError", "Compound", "Cone", "ConfigurationObstacle", "Contacts", "ConvexCells",
     "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs", "HPolytope",
     "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located",
-    "Mesh", "MissingExtra", "OverlapVolume", "Overlay", "PairResult", "PartitionSize", "PlanarObstacle",
+    "Mesh", "MissingExtra", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult", "PartitionSize",
+    "PlanarObstacle",
     "PointCloud", "Portals", "Proposal", "RayHits", "Robot", "RobotChecker", "RobotDistances", "SceneError",
     "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "SpacePartition", "Sphere", "SweepResults", "TetMesh",
-    "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "World", "WorldHits", "WorldResult", "boolean", "certify",
+    "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldHits", "WorldResult",
+    "boolean", "certify",
     "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "facet_pairs",
     "get_include", "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses",
     "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions",

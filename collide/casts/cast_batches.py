@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
-from collide.casts.cloud_casts import cloud_casts
 from collide.casts.convex_casts import (
     CastRows,
     PairRows,
@@ -19,6 +18,7 @@ from collide.casts.convex_casts import (
     nothing_met,
 )
 from collide.casts.directions import Directions
+from collide.casts.field_casts import field_casts
 from collide.casts.items_ahead import MAX_ASKED, rows_ahead, rows_within_sets
 from collide.casts.leaves import Leaf, leaves_of
 from collide.casts.mesh_casts import Casts, cast_leaves
@@ -81,7 +81,7 @@ def _first_contacts(A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Direct
     if not n:  # what no cast asks about may be a mesh, which has no parts
         return nothing_met(0)
     if have_any(A, "is_field") or have_any(B, "is_field"):
-        return cloud_casts(_first_contacts, A, B, X_WA, X_WB, directions, limits)
+        return field_casts(_first_contacts, A, B, X_WA, X_WB, directions, limits)
     kind_a, kind_b = (kind_of(S) if isinstance(S, Shape) else np.array([kind_of(s) for s in S]) for S in (A, B))
     are_two = isinstance(A, Shape) and isinstance(B, Shape)
     if are_two and _ARE_TAKEN_APART[kind_a, kind_b]:

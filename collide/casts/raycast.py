@@ -27,13 +27,13 @@ from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.kinds import Kind
 from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import moved_pose
-from collide.narrowphase.clouds.balls_nearby import ball, balls_on_way
 from collide.narrowphase.composite.balls_on_ways import SingleWay, near_on_ways
 from collide.narrowphase.composite.composite_parts import compound_parts
+from collide.narrowphase.fields.field_items import items_on_way
+from collide.narrowphase.fields.items_of import items_of
 from collide.narrowphase.prepared_pairs import single_calls_are_safe
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
-from collide.shapes.point_cloud import PointCloud
 from collide.shapes.shape import IDENTITY, Shape, checked_shape, kept_with_shape
 from collide.transforms import poses_as_given
 
@@ -108,8 +108,8 @@ def surfaces_met(
         return planes_met(shape, X_WA, origins, directions, limit, every=every)
     if _is_facets(shape):
         return facets_met(body_of(shape), X_WA, origins, directions, limit, every)
-    if isinstance(shape, PointCloud):
-        return _on_cloud(shape, X_WA, origins, directions, limit, every)
+    if shape.is_field:
+        return _on_field(shape, X_WA, origins, directions, limit, every)
     if not isinstance(shape, Compound):
         number, near = np.zeros(1, dtype=np.int64), np.ones((len(origins), 1), dtype=bool)
         return in_order(_on_parts([(shape, IDENTITY)], number, X_WA, origins, directions, limit, every, near))
@@ -133,31 +133,31 @@ def surfaces_met(
     return in_order(joined(events))
 
 
-def _on_cloud(
-    cloud: PointCloud, X_WA: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, every: bool
+def _on_field(
+    field: Shape, X_WA: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, every: bool
 ) -> RayEvents:
-    """Events of n rays and a cloud: the balls that a ray may meet first, as convex parts."""
-    limits, events = directions.limits(limit), []
+    """Events of n rays and a field: the items that a ray may meet first, as convex parts."""
+    items, limits, events = items_of(field), directions.limits(limit), []
     for begin in range(0, len(origins), _RAYS_TOGETHER):
         some = np.arange(begin, min(begin + _RAYS_TOGETHER, len(origins)))
         X = X_WA if len(X_WA) == 1 else X_WA[some]
         met = [
-            balls_on_way(
-                cloud, X[min(i, len(X) - 1)], origins[k], directions.vectors[k], float(limits[k]), 0.0, first=not every
+            items_on_way(
+                items, X[min(i, len(X) - 1)], origins[k], directions.vectors[k], float(limits[k]), 0.0, first=not every
             )[0] for i, k in enumerate(some.tolist())
         ]
-        numbers = np.unique(np.concatenate([*met, [0]]))  # of no balls there are no parts
+        numbers = np.unique(np.concatenate([*met, items.some()]))  # of no items there are no parts
         near = np.zeros((len(some), len(numbers)), dtype=bool)
-        for i, balls in enumerate(met):
-            near[i, np.searchsorted(numbers, balls)] = True
-        items = [(ball(cloud, k), IDENTITY) for k in numbers.tolist()]
+        for i, of_ray in enumerate(met):
+            near[i, np.searchsorted(numbers, of_ray)] = True
+        parts = [(item, items.X_FG) for item in items.hulls(numbers)]
         of_some = Directions(directions.vectors[some], directions.exponents[some])
-        on_balls = _on_parts(items, numbers, X, origins[some], of_some, limit, every, near)
-        events.append(on_balls._replace(ray=some[on_balls.ray]))
+        on_items = _on_parts(parts, numbers, X, origins[some], of_some, limit, every, near)
+        events.append(on_items._replace(ray=some[on_items.ray]))
     return in_order(joined(events))
 
 
-#: Rays asked together about the balls that they meet.
+#: Rays asked together about the items that they meet.
 _RAYS_TOGETHER = 32
 #: Rays that parts of a union are told apart for, by balls, before these are posed: of more the parts are posed once.
 _MAX_CULLED = 32

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.contact.cloud_contacts import cloud_contacts
 from collide.contact.contact_rows import CONTACT_DTYPE, Slack, no_rows
 from collide.contact.convex_contacts import convex_contacts
 from collide.contact.curved_contacts import curved_contacts
+from collide.contact.field_contacts import field_contacts
 from collide.contact.mesh_contacts import facet_contacts, halfspace_contacts
 from collide.contact.near_the_margin import ROUNDING, leeways
 from collide.contact.single_contacts import single_contacts_of
@@ -81,7 +81,7 @@ def contact_batch(
         def rows_of(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
             return contact_batch(A, B, X_WA, X_WB, 1, margin, max_contacts)[0]
 
-        return cloud_contacts(rows_of, A, B, X_WA, X_WB, n, margin)
+        return field_contacts(rows_of, A, B, X_WA, X_WB, n, margin)
     A, B = closed_shapes(A, B, X_WA, X_WB, n, margin)
     if not (isinstance(A, Shape) and isinstance(B, Shape)):
         A, B = of_one_set(A, B, n)

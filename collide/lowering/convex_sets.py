@@ -22,6 +22,7 @@ from collide.shapes.mesh import Mesh
 from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import IDENTITY, Shape
+from collide.shapes.voxel_grid import VoxelGrid
 
 __all__ = [
     "CONE", "CYLINDER", "ELLIPSOID", "HALFSPACE", "POINTS", "ConvexSet", "PlacedSet", "convex_set", "moved", "sets_of",
@@ -171,10 +172,11 @@ def _mesh(shape: Mesh) -> ConvexSet:
     )
 
 
-def _cloud(shape: PointCloud) -> ConvexSet:
+def _field(shape: PointCloud | VoxelGrid) -> ConvexSet:
+    name, remedy = type(shape).__name__, "Spheres at its points" if isinstance(shape, PointCloud) else "Boxes"
     raise UnsupportedQuery(
-        "PointCloud: a cloud is asked as a whole, and this query needs convex parts. collide(), distance(), contacts() "
-        "and World take it; elsewhere a Compound of Spheres at its points may do instead"
+        f"{name}: a field is asked as a whole, and this query needs convex parts. collide(), distance(), contacts() "
+        f"and World take it; elsewhere a Compound of {remedy} may do instead"
     )
 
 
@@ -182,5 +184,6 @@ _RULES: dict[type, Callable[..., ConvexSet]] = {
     ConvexHull: _convex_hull,
     HPolytope: _hpolytope,
     Mesh: _mesh,
-    PointCloud: _cloud,
+    PointCloud: _field,
+    VoxelGrid: _field,
 }

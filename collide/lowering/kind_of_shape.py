@@ -30,7 +30,7 @@ def _kind_by_set(shape: Shape) -> Kind:
     if shape.is_region:
         return Kind.REGION
     if shape.is_field:
-        return Kind.CLOUD
+        return Kind.FIELD
     if shape.meshed:
         return Kind.MESH
     numbers = primitive_numbers_of(shape)

@@ -25,7 +25,7 @@ class Kind(IntEnum):
     COMPOUND = 9
     MESH_COMPOUND = 10
     REGION = 11
-    CLOUD = 12
+    FIELD = 12
 
 
 #: Kinds whose surface is that of a hull of doubles swept by a ball, or a mesh: `facet_bodies.body_of` serves them.

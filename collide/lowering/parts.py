@@ -21,6 +21,7 @@ from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
 from collide.shapes.point_cloud import PointCloud
 from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
+from collide.shapes.voxel_grid import VoxelGrid
 
 #: A convex set and its (4, 4) pose in the shape's frame.
 Part = tuple[PackedConvex, np.ndarray]
@@ -38,6 +39,7 @@ _ULPS_PER_PRODUCT = 8
 _ULP = 2.0**-53
 #: Points of a mesh that are their own bounds; of more, boxes of so many cells along each axis hold them.
 _MAX_OWN_BOUNDS, _CELLS = 512, 6
+_CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=bool)
 
 
 @kept_with_shape("_parts")
@@ -63,11 +65,13 @@ def bounding_parts_of(shape: Shape) -> Parts:
 
 
 @kept_with_shape("_bounds")
-def _bounds_around(shape: Compound | Mesh | HPolytope | PointCloud) -> Parts:
+def _bounds_around(shape: Compound | Mesh | HPolytope | PointCloud | VoxelGrid) -> Parts:
     if isinstance(shape, HPolytope):
         return _alone(_half_space_around(shape))
     if isinstance(shape, Compound):
         return _compound(shape, bounding_parts_of)
+    if isinstance(shape, VoxelGrid):
+        return _grid_bounds(shape)
     return _cloud_bounds(shape) if isinstance(shape, PointCloud) else _mesh_bounds(shape)
 
 
@@ -147,6 +151,16 @@ def _cloud_bounds(cloud: PointCloud) -> Parts:
     return _alone(pack_points(_points_around(cloud.points), float(np.max(cloud.radius))))
 
 
+def _grid_bounds(grid: VoxelGrid) -> Parts:
+    low, high = grid.tree.coarse_boxes(_MAX_OWN_BOUNDS)
+    points = np.unique(np.where(_CORNERS, high[:, None], low[:, None]).reshape(-1, 3), axis=0)
+    if grid.X_FG is IDENTITY:
+        return _alone(pack_points(points))
+    R, t = grid.X_FG[:3, :3], grid.X_FG[:3, 3]
+    slack = 2 * _ULPS_PER_PRODUCT * _ULP * (np.abs(points).sum(axis=1).max() + np.abs(t).sum())
+    return _alone(pack_points(points @ R.T + t, float(slack)))
+
+
 def _points_around(points: np.ndarray) -> np.ndarray:
     """Points (k, 3) whose hull holds the ones given, and is not much larger: few, or corners of boxes around groups."""
     if len(points) <= _MAX_OWN_BOUNDS:
@@ -160,5 +174,4 @@ def _points_around(points: np.ndarray) -> np.ndarray:
     starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
     lows = np.minimum.reduceat(points[order], starts)[:, None]
     highs = np.maximum.reduceat(points[order], starts)[:, None]
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=bool)
-    return np.unique(np.where(corners, highs, lows).reshape(-1, 3), axis=0)
+    return np.unique(np.where(_CORNERS, highs, lows).reshape(-1, 3), axis=0)

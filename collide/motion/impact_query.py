@@ -12,9 +12,9 @@ from collide.base.threads import check_threads, share_if_it_helps
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.lowering.closed_regions import reach_of
 from collide.lowering.kind_of_shape import kind_of
-from collide.motion.cloud_motions import cloud_impacts
 from collide.motion.convex_impact import CONTACT, FREE, OPEN_START, TOO_SMALL
 from collide.motion.convex_motions import convex_impacts, single_impact
+from collide.motion.field_motions import field_impacts
 from collide.motion.impact_jobs import WRONG_TURN
 from collide.motion.impact_rows import TimeOfImpact, as_result, free_rows
 from collide.motion.motions import Motions
@@ -118,7 +118,7 @@ def time_of_impact(
         def answer(A: Shape, B: Shape, motions: Motions) -> np.ndarray:
             return _answer(_Question(*with_regions_closed(*distinct_shapes(A, B, 1), motions), motions, width, 1))
 
-        return as_result(cloud_impacts(answer, *distinct_shapes(A, B, n), motions.spread(n)), width, single)
+        return as_result(field_impacts(answer, *distinct_shapes(A, B, n), motions.spread(n)), width, single)
     question = _Question(*with_regions_closed(*distinct_shapes(A, B, n), motions), motions, width, n_threads)
     return as_result(_answer(question), width, single)
 

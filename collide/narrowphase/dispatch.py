@@ -46,9 +46,9 @@ class Method(Enum):
         "region_pairs",
         "the region is closed by a box that changes nothing, then as the table says; touching by its planes",
     )
-    CLOUD = (
-        "clouds/cloud_pairs",
-        "a walk down the tree over the points, single balls by the table; else the balls nearby as a union",
+    FIELD = (
+        "fields/field_pairs",
+        "a walk down the tree over points or cells, single ones by the table; else those nearby as a union",
     )
     REGIONS = "region_pairs", "both without end: booleans by a program over all planes; boxes that grow until they tell"
 
@@ -65,13 +65,13 @@ D, I, C = Method.SPHERES, Method.SPHERE_CAPSULE, Method.CAPSULES
 H, P, G = Method.PLANE, Method.PLANES, Method.CONVEX
 F, E, L = Method.FACETS, Method.CURVED, Method.HULL
 U, M = Method.PARTS, Method.MESH_PARTS
-R, S, W = Method.REGION, Method.REGIONS, Method.CLOUD
+R, S, W = Method.REGION, Method.REGIONS, Method.FIELD
 
 #: Rows and columns in the order of `Kind`, its curved kinds taken together; what stands below the diagonal is mirrored.
 #: The column "both" is of compounds with meshes among their parts, the last of an `HPolytope` kept as planes.
 #: ROUNDED is an `HPolytope` whose corners are not doubles: to kernels it is points, to meshes it has no exact facets.
 _UPPER_HALF = (
-    # sphere capsule polytope rounded curved halfspace mesh compound both region cloud
+    # sphere capsule polytope rounded curved halfspace mesh compound both region field
     (D,      I,      G,       G,      G,     H,        F,   U,       M,   R,     W),  # sphere
     (        C,      G,       G,      G,     H,        F,   U,       M,   R,     W),  # capsule
     (                G,       G,      G,     H,        F,   U,       M,   R,     W),  # polytope
@@ -82,7 +82,7 @@ _UPPER_HALF = (
     (                                                       U,       M,   R,     W),  # compound
     (                                                                M,   R,     W),  # both
     (                                                                     S,     R),  # region
-    (                                                                            W,),  # cloud
+    (                                                                            W,),  # field
 )
 _ORDER = list(dict.fromkeys("curved" if kind in CURVED_KINDS else kind for kind in Kind))
 _LINES = [_ORDER.index("curved" if kind in CURVED_KINDS else kind) for kind in Kind]

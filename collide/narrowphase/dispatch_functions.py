@@ -18,7 +18,7 @@ from collide.transforms import as_poses
 
 #: Half of the engine, which scenes without meshes never load.
 mesh_batches = lazy_module("collide.narrowphase.facets.mesh_batches")
-cloud_pairs = lazy_module("collide.narrowphase.clouds.cloud_pairs")
+field_pairs = lazy_module("collide.narrowphase.fields.field_pairs")
 
 
 class Answer(NamedTuple):
@@ -52,15 +52,15 @@ def _prepare_curved(A: Shape, B: Shape) -> Any:
     return mesh_batches.curved_pair(A, B)
 
 
-def _answer_cloud(out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
-    if cloud_pairs.are_balls(A, B) and question.boolean:
-        return cloud_pairs.answer_balls(rows_of_pair, out, A, B, X_WA, X_WB, question)
-    cloud_pairs.answer_cloud(rows_of_pair, out, A, B, _poses_of(out, X_WA, X_WB, question), question)
+def _answer_field(out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
+    if field_pairs.are_balls(A, B) and question.boolean:
+        return field_pairs.answer_balls(rows_of_pair, out, A, B, X_WA, X_WB, question)
+    field_pairs.answer_field(rows_of_pair, out, A, B, _poses_of(out, X_WA, X_WB, question), question)
     return True
 
 
-def _prepare_cloud(A: Shape, B: Shape) -> Any:
-    return cloud_pairs.prepare_cloud(A, B)
+def _prepare_field(A: Shape, B: Shape) -> Any:
+    return field_pairs.prepare_field(A, B)
 
 
 def _answer_region(out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question) -> bool:
@@ -96,7 +96,7 @@ ANSWERS: dict[Method, Answer] = {
     Method.CURVED: Answer(_answer_meshes, _prepare_curved, True),
     Method.HULL: Answer(_answer_meshes, _unprepared, True),
     Method.MESH_PARTS: Answer(_answer_meshes, _unprepared, True),
-    Method.CLOUD: Answer(_answer_cloud, _prepare_cloud, True),
+    Method.FIELD: Answer(_answer_field, _prepare_field, True),
     Method.REGION: Answer(_answer_region, _unprepared, True),
     Method.REGIONS: Answer(_answer_regions, _unprepared, True),
 }

@@ -25,7 +25,7 @@ class Shape:
 
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges",
-        "_hulls_instead", "_kind", "_laid_out", "_leaves", "_meshed_leaves", "_partners",
+        "_hulls_instead", "_items", "_kind", "_laid_out", "_leaves", "_meshed_leaves", "_partners",
         "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_single_facets", "_surface", "_topology",
         "_union", "_vertex_set", "_walk",
     )
@@ -70,6 +70,8 @@ class Shape:
     _facet_edges: Any
     #: Facets of a mesh that cross each other (`solids/arrangement.py`).
     _crossings: Any
+    #: What a field is made of (`narrowphase/fields/field_items.py`).
+    _items: Any
     #: Row and column of the pair table (`lowering/kinds.py`).
     _kind: Any
 
@@ -79,7 +81,7 @@ class Shape:
     meshed = False
     #: True of an `HPolytope` that is kept as planes: it has no convex parts either, until a box closes it.
     is_region = False
-    #: True of clouds: their balls are parts that nobody lists.
+    #: True of point clouds and voxel grids: their balls and cells are parts that nobody lists.
     is_field = False
 
     @property

@@ -54,11 +54,11 @@ def test_groups_of_methods_are_the_kinds_they_are_named_for():
     meshes, unions = {Kind.MESH, Kind.MESH_COMPOUND}, {Kind.COMPOUND, Kind.MESH_COMPOUND}
     of_facets, of_unions, of_sets = map(cells_of, (OF_FACETS, OF_UNIONS, OF_SETS))
     for a, b in product(Kind, Kind):
-        if not {a, b} & {Kind.REGION, Kind.CLOUD}:
+        if not {a, b} & {Kind.REGION, Kind.FIELD}:
             assert of_facets[a, b] == bool({a, b} & meshes), (a, b)
             assert of_unions[a, b] == bool({a, b} & unions), (a, b)
             assert of_sets[a, b] == (max(a, b) < Kind.MESH), (a, b)
-    assert not (of_facets | of_unions | of_sets)[[Kind.REGION, Kind.CLOUD]].any()
+    assert not (of_facets | of_unions | of_sets)[[Kind.REGION, Kind.FIELD]].any()
 
 
 def test_each_shape_has_the_kind_of_its_points():

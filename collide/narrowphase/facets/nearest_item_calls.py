@@ -1,4 +1,4 @@
-"""Meshes and curved shapes, clouds and convex sets from Python: states and gaps of batches, pairs for single calls."""
+"""Meshes and curved shapes, fields and convex sets from Python: states and gaps of batches, pairs for single calls."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from collide.fields.cell_tree_kernel import STACK
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_row
 from collide.lowering.facet_bodies import Body, reach_of
@@ -18,9 +19,12 @@ from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_kernel_calls import scratch, space_of_single_calls
 from collide.narrowphase.facets.facet_queries import points_in_solid
 from collide.narrowphase.facets.nearest_item_kernel import (
-    ARE_BALLS,
+    BALLS,
+    CELLS,
     EXCHANGED,
+    FACETS,
     HEADER,
+    ITEMS_ARE,
     MAYBE_INSIDE,
     MEETS,
     RADII_AT,
@@ -43,12 +47,16 @@ def serves(packed: PackedConvex) -> bool:
     return packed.kind != POINTS
 
 
-class Items(NamedTuple):
-    """The facets of a mesh, or the balls of a cloud.
+#: Corners of items, by what they are.
+_CORNERS = {FACETS: 3, BALLS: 1, CELLS: 8}
 
-    tree : over facets, or points.   reach : how far they reach from their origin [m].   solid : whether they enclose an
-    inside.   radius : the largest of balls, 0 of facets [m].   radii : (n,) of balls, where they differ.
-    are_balls : whether they are balls.
+
+class Items(NamedTuple):
+    """The facets of a mesh, the balls of a cloud, or the cells of a grid.
+
+    tree : over facets, points or cells.   reach : how far they reach from their origin [m].   solid : whether they
+    enclose an inside.   radius : the largest of balls, 0 of facets [m].   radii : (n,) of balls, where they differ.
+    are : FACETS, BALLS or CELLS.
     """
 
     tree: Any
@@ -56,7 +64,7 @@ class Items(NamedTuple):
     solid: bool
     radius: float = 0.0
     radii: np.ndarray | None = None
-    are_balls: bool = False
+    are: int = FACETS
 
 
 class GapQuestion:
@@ -67,10 +75,9 @@ class GapQuestion:
 
     def __init__(self, items: Items, packed: PackedConvex, workspace: tuple[int, int]):
         self.items, self.table = items, FacetTable(np.zeros((1, 3, 3)), packed)
-        if items.are_balls:
-            self.table.ints[0, COUNT], self.table.numbers[0, RADIUS] = 1, items.radius
+        self.table.ints[0, COUNT], self.table.numbers[0, RADIUS] = _CORNERS[items.are], items.radius
         self.table.build_trees(np.arange(2))
-        n_stack = WIDTH * (items.tree.depth + 2)
+        n_stack = STACK if items.are == CELLS else WIDTH * (items.tree.depth + 2)
         self.poses, self.rows = np.zeros((2, POSE)), np.zeros(2, dtype=PAIR_DTYPE)
         self.numbers = np.array([0, 1])
         self.stack, self.bounds = np.zeros(n_stack, dtype=np.int64), np.zeros(n_stack)
@@ -80,7 +87,7 @@ class GapQuestion:
             code_of(answer_pairs), items.tree.address, *self.table.addresses, *map(address_of, buffers), *workspace,
         )
         self.header[STACK_AT:EXCHANGED] = address_of(self.stack), address_of(self.bounds)
-        self.header[ARE_BALLS] = items.are_balls
+        self.header[ITEMS_ARE] = items.are
         self.header[RADII_AT] = 0 if items.radii is None else address_of(items.radii)
         promise = PROMISE_STORED if packed.kind == POINTS else PROMISE_CURVED
         self.header.view(np.float64)[REACH_OF_ITEMS:] = items.reach, items.radius, promise

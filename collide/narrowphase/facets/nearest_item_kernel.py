@@ -1,9 +1,10 @@
-"""A mesh and a curved shape, or a point cloud and a convex set: a walk down the box-tree, the convex engine at items.
+"""A mesh and a curved shape, or a field and a convex set: a walk down the box-tree, the convex engine at items.
 
-Items are facets of the mesh, or balls of the cloud. They are taken nearest first, by the gaps between boxes along the
-axes of the mesh or cloud and along the normal of the nearest item so far; what is farther than the least upper bound is
-left out, and an item that meets the shape ends the walk. The bracket of the whole is the least of the items'. A boolean
-is a walk with the upper bound 0 from the beginning, and whether the bodies come within a margin a walk with the margin.
+Items are facets of a mesh, balls of a point cloud, or boxes of cells of a grid. They are taken nearest first, by the
+gaps between boxes along their axes and along the normal of the nearest item so far; what is farther than the least
+upper bound is left out, and an item that meets the shape ends the walk. The bracket of the whole is the least of the
+items'. A boolean is a walk with the upper bound 0 from the beginning, and whether the bodies come within a margin a
+walk with the margin.
 """
 
 from __future__ import annotations
@@ -12,6 +13,22 @@ import math
 from typing import Any, NamedTuple
 
 from collide.curved.curved_kinds import curved_support
+from collide.fields.cell_tree_kernel import (
+    box_word,
+    cells_along,
+    child_of,
+    high_corner,
+    is_solid,
+    level_of,
+    low_corner,
+    number_of,
+    open_cells,
+    plane_at,
+    root_word,
+    x_of,
+    y_of,
+    z_of,
+)
 from collide.fields.point_tree_kernel import points_of
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import BLOCK, POINTS
@@ -78,14 +95,16 @@ _answer_pairs_at = native_call(SIGNATURE)
 
 # Header: addresses of `answer_pairs`, of the tree, of two rows of the `ShapeTable` (an item, the shape), of the item's
 # coordinates, of two poses, their shape rows, one pair, a row, the workspace, and two stacks of so many places; whether
-# the shape stands first in single calls; whether items are balls, and the address of their radii, point by point, or 0;
+# the shape stands first in single calls; what items are, and the address of balls' radii, point by point, or 0;
 # doubles: the reach of the items from their origin, the largest radius of theirs, and the width that is promised, as a
 # part of the size.
 (
     CORE, TREE_AT, INTS_AT, NUMBERS_AT, COORDINATES_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROW_AT, DOUBLES_AT,
-    INTEGERS_AT, STACK_AT, BOUNDS_AT, EXCHANGED, ARE_BALLS, RADII_AT, REACH_OF_ITEMS, LARGEST_RADIUS, PROMISE,
+    INTEGERS_AT, STACK_AT, BOUNDS_AT, EXCHANGED, ITEMS_ARE, RADII_AT, REACH_OF_ITEMS, LARGEST_RADIUS, PROMISE,
 ) = range(19)
 HEADER = 19
+#: What items are.
+FACETS, BALLS, CELLS = range(3)
 #: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh; a facet meets the shape; a
 #: facet is within the margin, or may be.
 LONG_WAY, SURFACES_APART, MAYBE_INSIDE, MEETS, NEAR = -1, 1, 0, 2, 3
@@ -173,7 +192,7 @@ def _gap_of_box(walk, nearest, centre, half):
 def _box_of_item(walk, place):
     """(centre, half lengths) of the box of a facet, or of a ball's centre."""
     tree = walk.tree
-    if walk.words[ARE_BALLS] != 0:
+    if walk.words[ITEMS_ARE] == BALLS:
         return vec3_at(points_of(tree), 3 * int(tree.ids[place])), Vec3(0.0, 0.0, 0.0)
     p, q, r = vec3_at(tree.triangles, 9 * place), vec3_at(tree.triangles, 9 * place + 3), vec3_at(
         tree.triangles, 9 * place + 6
@@ -184,12 +203,28 @@ def _box_of_item(walk, place):
 
 
 @kernel
+def _put_cell(walk, word):
+    """A box of cells as row 0 of the tables."""
+    cells, coordinates = open_cells(walk.words[TREE_AT]), view_f64(walk.words[COORDINATES_AT], 3 * BLOCK)
+    low, high = low_corner(cells, word), high_corner(cells, word)
+    for k in range(BLOCK):
+        coordinates[k] = high.x if k & 4 else low.x
+        coordinates[BLOCK + k] = high.y if k & 2 else low.y
+        coordinates[2 * BLOCK + k] = high.z if k & 1 else low.z
+    x, y, z = max(-low.x, high.x), max(-low.y, high.y), max(-low.z, high.z)
+    walk.numbers[REACH] = math.sqrt(x * x + y * y + z * z) * (1 + 1e-15)
+
+
+@kernel
 def _put_item(walk, place):
-    """A facet, or a ball, as row 0 of the tables."""
+    """A facet, a ball, or a box of cells as row 0 of the tables."""
     words, tree = walk.words, walk.tree
+    if words[ITEMS_ARE] == CELLS:
+        _put_cell(walk, place)
+        return
     coordinates = view_f64(words[COORDINATES_AT], 3 * BLOCK)
     corners, at, n = tree.triangles, 9 * place, 3
-    if words[ARE_BALLS] != 0:
+    if words[ITEMS_ARE] == BALLS:
         number = int(tree.ids[place])
         corners, at, n = points_of(tree), 3 * number, 1
         if words[RADII_AT] != 0:
@@ -275,6 +310,77 @@ def _push_children(walk, nearest, node, top):
     return top
 
 
+@kernel(inline=True)
+def _gap_along(walk_low, walk_high, low, high):
+    return max(low - walk_high, walk_low - high, 0.0)
+
+
+@kernel
+def _push_cells(walk, nearest, word, node, top):
+    """`_push_children` of a node of a tree of cells, the box of which is ``word``; two words a place on the stack."""
+    cells = open_cells(walk.words[TREE_AT])
+    stack, bounds = view_i64(walk.words[STACK_AT], 2 * (top + 64)), view_f64(walk.words[BOUNDS_AT], top + 64)
+    level, bits, first = level_of(word) - 1, cells.bits[node], top
+    n, reach = cells_along(level), nearest.upper + walk.slack
+    least, o, s, low, high = cells.least, cells.origin, cells.sides, walk.low, walk.high
+    for i in range(4):
+        x = x_of(word) + n * i
+        lx, hx = plane_at(o.x, s.x, least.x + x), plane_at(o.x, s.x, least.x + x + n)
+        if bits >> (16 * i) & 0xFFFF == 0 or _gap_along(low.x, high.x, lx, hx) > reach:
+            continue
+        for j in range(4):
+            y, row = y_of(word) + n * j, bits >> (16 * i + 4 * j) & 15
+            ly, hy = plane_at(o.y, s.y, least.y + y), plane_at(o.y, s.y, least.y + y + n)
+            if row == 0 or _gap_along(low.y, high.y, ly, hy) > reach:
+                continue
+            for k in range(4):
+                if row >> k & 1 == 0:
+                    continue
+                z, bit = z_of(word) + n * k, 16 * i + 4 * j + k
+                lz, hz = plane_at(o.z, s.z, least.z + z), plane_at(o.z, s.z, least.z + z + n)
+                centre = scale(0.5, Vec3(lx + hx, ly + hy, lz + hz))
+                bound = _gap_of_box(walk, nearest, centre, scale(0.5, Vec3(hx - lx, hy - ly, hz - lz)))
+                if bound > nearest.upper:
+                    continue
+                at = top
+                while at > first and bounds[at - 1] < bound:
+                    bounds[at], stack[2 * at], stack[2 * at + 1] = (
+                        bounds[at - 1], stack[2 * at - 2], stack[2 * at - 1]
+                    )
+                    at -= 1
+                bounds[at], stack[2 * at] = bound, box_word(level, x, y, z)
+                stack[2 * at + 1] = -1 if is_solid(cells, node, bit) else child_of(cells, node, bit)
+                top += 1
+    return top
+
+
+@kernel
+def _walk_cells(walk, limit, enough, max_asked):
+    """`_walk_down` of a tree of cells: the place of an item is the word of its box."""
+    zero, words = Vec3(0.0, 0.0, 0.0), walk.words
+    nearest = _Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
+    top = _push_cells(walk, nearest, root_word(open_cells(words[TREE_AT])), 0, 0)
+    while top > 0 and not nearest.failed and nearest.lower > enough and nearest.n_asked <= max_asked:
+        top -= 1
+        if view_f64(words[BOUNDS_AT], top + 1)[top] > nearest.upper:
+            continue
+        stack = view_i64(words[STACK_AT], 2 * top + 2)
+        word, node = stack[2 * top], stack[2 * top + 1]
+        if node < 0:
+            nearest = _with_item(walk, nearest, word)
+        else:
+            top = _push_cells(walk, nearest, word, node, top)
+    return nearest
+
+
+@kernel(inline=True)
+def _number_of_item(walk, place):
+    """The number that results name."""
+    if walk.words[ITEMS_ARE] == CELLS:
+        return number_of(open_cells(walk.words[TREE_AT]), place)
+    return int(walk.tree.ids[place])
+
+
 @kernel
 def _walk_down(walk, limit, enough, max_asked):
     """The `_Nearest` of all items that may be nearest, and no farther than a limit [m].
@@ -283,6 +389,8 @@ def _walk_down(walk, limit, enough, max_asked):
     items; `n_asked` is then larger.
     """
     tree, words = walk.tree, walk.words
+    if words[ITEMS_ARE] == CELLS:
+        return _walk_cells(walk, limit, enough, max_asked)
     zero = Vec3(0.0, 0.0, 0.0)
     nearest = _Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
     top = _push_children(walk, nearest, 0, 0)
@@ -394,7 +502,7 @@ def _write_meeting(walk, place, row_at):
     forget_depth(facet)
     put_vec3(row.doubles, POINT_A, vec3_at(facet.doubles, POINT_A))
     put_vec3(row.doubles, POINT_B, vec3_at(facet.doubles, POINT_B))
-    row.words[PART_A] = walk.tree.ids[place]
+    row.words[PART_A] = _number_of_item(walk, place)
     row.flags[HIT], row.flags[HOW], row.flags[CERTIFIED] = 1, facet.flags[HOW], 1
     for k in range(4):
         row.words[VERTICES_A + k] = row.words[VERTICES_B + k] = -1
@@ -456,7 +564,8 @@ def _write_gap(walk, nearest, row_at):
     certified = nearest.open_lower > nearest.upper or nearest.upper - nearest.lower <= promise * size
     row.flags[CERTIFIED] = 1 if certified else 0
     row.flags[HIT] = row.flags[BEYOND] = row.flags[COUNT] = 0
-    row.words[PART_A], row.words[PART_B], row.words[ITERATIONS] = walk.tree.ids[nearest.place], 0, 0
+    row.words[PART_A], row.words[PART_B] = _number_of_item(walk, nearest.place), 0
+    row.words[ITERATIONS] = 0
     for k in range(4):
         row.words[VERTICES_A + k] = row.words[VERTICES_B + k] = -1
 

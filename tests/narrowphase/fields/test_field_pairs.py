@@ -1,4 +1,4 @@
-"""Clouds beside brute force in fractions, and beside a Compound of the same balls, whatever the other shape."""
+"""Fields beside brute force in fractions, and beside a Compound of the same items, whatever the other shape."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from field_unions import as_union, random_grid
 from mesh_shapes import block_ring, box
 from naive import spell
 from reproduction import reproducing
 
 import collide
-from collide.narrowphase.clouds import ball_walk_kernel, cloud_pairs
+from collide.narrowphase.fields import ball_walk_kernel, field_pairs
 
 EYE = np.eye(4)
 _SNIPPET = """
@@ -20,13 +21,13 @@ import numpy as np
 cloud = collide.PointCloud({points}, np.array({radius}))
 print(collide.distance(cloud, {shape}, np.array({X_WC}), np.array({X_WB}), signed=False))
 """
+_GRID_SNIPPET = """
+import collide
+grid = collide.VoxelGrid({cells}, (0.125, 0.25, 0.5), {X})
+print(collide.distance(grid, {shape}, {X_WC}, {X_WB}, signed=False))
+"""
 #: Quarter turns: matrices of zeros and ones, so that fractions follow them.
 TURNS = [np.eye(3), np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])]
-
-
-def as_union(cloud: collide.PointCloud) -> collide.Compound:
-    balls = zip(cloud.points, cloud.radii.tolist())
-    return collide.Compound([(collide.ConvexHull(p[None], radius=r), EYE) for p, r in balls])
 
 
 def turned(rng) -> np.ndarray:
@@ -62,10 +63,12 @@ def families(rng):
     yield "each", grid, rng.integers(0, 4, 40) / 8.0
 
 
-def test_balls_and_boxes_are_decided_as_fractions_decide():
+@pytest.mark.many(2)
+@pytest.mark.parametrize("seed", range(4))
+def test_balls_and_boxes_are_decided_as_fractions_decide(seed):
     """On exact multiples: flush faces, corners at the very distance of the radius, balls that touch."""
-    rng, asked, hits, flush = np.random.default_rng(11), 0, 0, 0
-    for _ in range(25):
+    rng, asked, hits, flush = np.random.default_rng([11, seed]), 0, 0, 0
+    for _ in range(7):
         for name, points, radius in families(rng):
             cloud, X_WC, X_WB = collide.PointCloud(points, radius), turned(rng), turned(rng)
             if name == "far":
@@ -86,6 +89,34 @@ def test_balls_and_boxes_are_decided_as_fractions_decide():
     assert hits > 0.2 * asked and flush > 0.05 * asked and asked - hits > 0.1 * asked, (asked, hits, flush)
 
 
+@pytest.mark.many(2)
+@pytest.mark.parametrize("seed", range(4))
+def test_cells_and_boxes_are_decided_as_fractions_decide(seed):
+    """On exact multiples: flush faces, edges and corners, gaps of an eighth, balls that touch."""
+    rng, asked, hits, flush = np.random.default_rng([16, seed]), 0, 0, 0
+    for _ in range(40):
+        cells = rng.integers(-5, 6, (int(rng.integers(1, 60)), 3))
+        X_WC, X_WB, X = turned(rng), turned(rng), np.eye(4)
+        X[:3, 3] = rng.integers(-4, 5, 3) / 8.0
+        grid, size = collide.VoxelGrid(cells, (0.125, 0.25, 0.5), X), rng.integers(1, 9, 3) / 8.0
+        for shape, half, r in ((collide.Box(size), size / 2.0, 0.0), (collide.Sphere(0.25), np.zeros(3), 0.25)):
+            squares = []
+            for cell in cells:
+                corners = [seen(X_WB, placed(X_WC, (cell + k) * grid.cell + X[:3, 3])) for k in (0, 1)]
+                gaps = (max(min(a, b) - Fraction(h), -max(a, b) - Fraction(h)) for a, b, h in zip(*corners, half))
+                squares.append(sum(max(gap, Fraction(0)) ** 2 for gap in gaps))
+            limit = Fraction(r) ** 2
+            wanted, is_flush = min(squares) <= limit, min(squares) == limit > 0 or (r == 0.0 and min(squares) == 0)
+            with reproducing(_GRID_SNIPPET, cells=cells, X=X, shape=spell(shape), X_WC=X_WC, X_WB=X_WB):
+                assert collide.collide(grid, shape, X_WC, X_WB) == wanted
+                assert collide.collide(shape, grid, X_WB[None], X_WC[None]).tolist() == [wanted]
+                gap = collide.distance(grid, shape, X_WC, X_WB, signed=False)
+                exact = max(float(min(squares)) ** 0.5 - r, 0.0)
+                assert gap.lower - 1e-12 <= exact <= gap.upper + 1e-12 and gap.hit == wanted
+            asked, hits, flush = asked + 1, hits + wanted, flush + is_flush
+    assert hits > 0.2 * asked and flush > 0.05 * asked and asked - hits > 0.1 * asked, (asked, hits, flush)
+
+
 def others(rng) -> list:
     pts = rng.normal(size=(20, 3))
     return [
@@ -96,21 +127,31 @@ def others(rng) -> list:
         collide.Compound([(collide.Box((0.1, 0.1, 0.1)), collide.pose((0.1, 0, 0))), (collide.Sphere(0.1), EYE)]),
         collide.PointCloud(rng.normal(size=(30, 3)) * 0.2, 0.02),
         collide.HPolytope(np.vstack([np.eye(3), -np.eye(3)])[:5], np.full(5, 0.1), bounded=False),
+        random_grid(rng, 3),
     ]
 
 
-def test_all_questions_are_those_of_the_union_of_the_balls():
-    rng, asked, hits = np.random.default_rng(12), 0, 0
-    for case in range(130):
-        B = others(rng)[case % 13]
-        points = rng.uniform(-1, 1, (int(rng.integers(1, 50)), 3))
-        radius = rng.uniform(0, 0.1, len(points)) if case % 2 else float(rng.choice([0.0, 0.01, 0.1]))
-        cloud = collide.PointCloud(points, radius)
-        pair = cloud, B, as_union(cloud), as_union(B) if isinstance(B, collide.PointCloud) else B
+_QUESTION = "import collide\nprint(collide.distance({field}, {shape}, {X_WC}, {X_WB}, signed=False))"
+
+
+def random_field(rng, case: int) -> collide.Shape:
+    if case % 2:
+        return random_grid(rng)
+    points = rng.uniform(-1, 1, (int(rng.integers(1, 50)), 3))
+    return collide.PointCloud(points, rng.uniform(0, 0.1, len(points)) if case % 4 else float(rng.choice([0.0, 0.1])))
+
+
+@pytest.mark.many(2)
+@pytest.mark.parametrize("seed", range(8))
+def test_all_questions_are_those_of_the_union_of_the_items(seed):
+    rng, asked, hits = np.random.default_rng([12, seed]), 0, 0
+    for case in range(28):
+        B, field = others(rng)[case // 2 % 14], random_field(rng, case)
+        pair = field, B, as_union(field), as_union(B) if B.is_field else B
         X = collide.pose(rng.normal(size=3), rpy=rng.uniform(-3, 3, 3))
         Y = X @ collide.pose(rng.uniform(-0.8, 0.8, 3), rpy=rng.uniform(-3, 3, 3))
         for C, D, U, V, X_C, X_D in ((*pair, X, Y), (pair[1], pair[0], pair[3], pair[2], Y, X)):
-            with reproducing(_SNIPPET, points=points, radius=radius, shape=spell(B), X_WC=X, X_WB=Y):
+            with reproducing(_QUESTION, field=spell(pair[2]), shape=spell(pair[3]), X_WC=X, X_WB=Y):
                 mine, theirs = (collide.distance(*S, X_C, X_D, signed=False) for S in ((C, D), (U, V)))
                 assert mine.hit == theirs.hit and mine.distance == pytest.approx(theirs.distance, abs=1e-12)
                 assert mine.lower <= theirs.upper and theirs.lower <= mine.upper
@@ -128,9 +169,9 @@ def test_all_questions_are_those_of_the_union_of_the_balls():
 
 def test_a_depth_takes_the_bodies_apart():
     rng, hits = np.random.default_rng(13), 0
-    for case in range(60):
-        cloud = collide.PointCloud(rng.uniform(-0.5, 0.5, (60, 3)), 0.05)
-        B = others(rng)[case % 7]
+    for case in range(100):
+        cloud = collide.PointCloud(rng.uniform(-0.5, 0.5, (60, 3)), 0.05) if case % 2 else random_grid(rng)
+        B = others(rng)[case // 2 % 7]
         X_WB = collide.pose(rng.uniform(-0.4, 0.4, 3), rpy=rng.uniform(-3, 3, 3))
         r = collide.distance(cloud, B, EYE, X_WB)
         if r.hit:
@@ -138,7 +179,7 @@ def test_a_depth_takes_the_bodies_apart():
             moved = X_WB.copy()
             moved[:3, 3] += r.normal * (-float(r.distance) * (1 + 1e-9) + 1e-9)
             assert not collide.collide(cloud, B, EYE, moved), case
-    assert hits > 20
+    assert hits > 30
 
 
 def test_limits_lists_sets_and_worlds_ask_the_same():
@@ -172,11 +213,11 @@ def test_what_the_walk_leaves_open_is_decided_by_the_union(monkeypatch):
         wanted = collide.collide(cloud, B, EYE, Y)
         assert wanted.any() and not wanted.all()
         with monkeypatch.context() as patch:
-            patch.setattr(cloud_pairs, "walks", lambda shape: False)
-            patch.setattr(cloud_pairs, "are_balls", lambda A, B: False)
+            patch.setattr(field_pairs, "walks", lambda shape: False)
+            patch.setattr(field_pairs, "are_balls", lambda A, B: False)
             assert np.array_equal(collide.collide(cloud, B, EYE, Y), wanted)
     states = np.full(40, ball_walk_kernel.OPEN, dtype=np.uint8)
-    monkeypatch.setattr(cloud_pairs, "clouds_meet_balls", lambda *args: _write(args[-2], states) or 40)
+    monkeypatch.setattr(field_pairs, "clouds_meet_balls", lambda *args: _write(args[-2], states) or 40)
     ball = collide.Sphere(0.1)
     assert np.array_equal(collide.collide(cloud, ball, EYE, Y), collide.collide(as_union(cloud), ball, EYE, Y))
 

@@ -1,4 +1,4 @@
-"""Contacts of point clouds: those of the balls within the margin, as a union."""
+"""Contacts of fields: those of the items within the margin, as a union; none through a face between two cells."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from collections.abc import Callable
 import numpy as np
 
 from collide.contact.contact_rows import no_rows
-from collide.narrowphase.clouds.balls_nearby import balls_within, box_in_frame, union_of
+from collide.narrowphase.fields.field_items import box_in_frame
+from collide.narrowphase.fields.items_of import items_of
 from collide.pairs.pair_arguments import pose_at
-from collide.shapes.point_cloud import PointCloud
 from collide.shapes.shape import Shape
 
 #: Rows of a pair: ``rows_of(A, B, X_WA, X_WB)``, poses (1, 4, 4).
 RowsOf = Callable[[Shape, Shape, np.ndarray, np.ndarray], np.ndarray]
 
 
-def cloud_contacts(
+def field_contacts(
     rows_of: RowsOf, A, B, X_WA: np.ndarray, X_WB: np.ndarray, n: int, margin: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, ends) of n pairs, in some of which a cloud stands; parts of clouds are rows of ``points``.
+    """(rows, ends) of n pairs, in some of which a field stands; parts of fields are numbers of items.
 
     rows_of : what answers two other shapes.   A, B : shapes, or sequences of n.   X_WA, X_WB : checked.
     """
@@ -33,16 +33,23 @@ def cloud_contacts(
 
 
 def _contacts_of(rows_of: RowsOf, shapes: list, poses: list, margin: float) -> np.ndarray:
-    balls: list[np.ndarray | None] = [None, None]
+    fields = []
     for side in range(2):
-        cloud, B = shapes[side], shapes[1 - side]
-        if isinstance(cloud, PointCloud):
-            some = balls_within(cloud, box_in_frame(B, poses[side], poses[1 - side]), margin)
+        field, B = shapes[side], shapes[1 - side]
+        if field.is_field:
+            items = items_of(field)
+            some = items.within(box_in_frame(B, items.pose(poses[side]), poses[1 - side]), margin)
             if not len(some):
                 return no_rows()
-            balls[side], shapes[side] = some, union_of(cloud, some)
+            union = items.merged(some)
+            fields.append((side, items, union))
+            shapes[side] = union.shape
     rows = rows_of(*shapes, *(X[None] for X in poses)).copy()  # a single call's rows may be read-only
-    for field, numbers in zip(("part_a", "part_b"), balls):
-        if numbers is not None:
-            rows[field] = numbers[rows[field]]
-    return rows
+    keep = np.ones(len(rows), dtype=bool)
+    for side, items, union in fields:
+        part, point = ("part_a", "point_a") if side == 0 else ("part_b", "point_b")
+        X_WF, outwards = poses[side], rows["normal"] if side == 0 else -rows["normal"]
+        p_F, n_F = (rows[point] - X_WF[:3, 3]) @ X_WF[:3, :3], outwards @ X_WF[:3, :3]
+        keep &= ~items.is_within(p_F, n_F)
+        rows[part] = items.name(union, rows[part], p_F)
+    return rows[keep] if keep.any() else rows

@@ -1,4 +1,4 @@
-"""Casts of and onto point clouds: the balls that a body may meet on its way, the first of them first, as unions."""
+"""Casts of and onto fields: the items that a body may meet on its way, the first of them first, as unions."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from collide.casts.convex_casts import CastRows, nothing_met
 from collide.casts.directions import Directions
 from collide.lowering.closed_regions import reach_of
-from collide.narrowphase.clouds.balls_nearby import balls_on_way, first_balls, lowest_balls, union_of
+from collide.narrowphase.fields.field_items import FieldItems, first_items, items_on_way, lowest_items
+from collide.narrowphase.fields.items_of import items_of
 from collide.pairs.pair_arguments import pose_at
-from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Halfspace
 from collide.shapes.shape import Shape
 
@@ -20,10 +20,10 @@ from collide.shapes.shape import Shape
 Cast = Callable[..., CastRows]
 
 
-def cloud_casts(
+def field_casts(
     cast: Cast, A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Directions, limits: np.ndarray
 ) -> CastRows:
-    """First contacts of n casts, in some of which a cloud moves or stands; items of clouds are rows of ``points``.
+    """First contacts of n casts, in some of which a field moves or stands; items are those of fields.
 
     cast : what answers other shapes; further arguments as of `cast_batch`.
     """
@@ -38,32 +38,35 @@ def cloud_casts(
 
 
 def _first_contact(cast: Cast, shapes: list, poses: list, direction: Directions, limit: np.ndarray) -> CastRows:
-    side = next((side for side in (1, 0) if isinstance(shapes[side], PointCloud)), None)
+    side = next((side for side in (1, 0) if shapes[side].is_field), None)
     X = [pose[None] for pose in poses]
     if side is None:
         return cast(*shapes, *X, direction, limit)
-    cloud, B = shapes[side], shapes[1 - side]
-    numbers, times = _balls_met(cloud, B, poses[side], poses[1 - side], direction.vectors[0], limit[0], side)
+    items, B = items_of(shapes[side]), shapes[1 - side]
+    numbers, times = _items_met(items, B, poses[side], poses[1 - side], direction.vectors[0], limit[0], side)
     rows = nothing_met(1)
-    for some, next_time in first_balls(numbers, times):
-        pair = [union_of(cloud, some), B] if side == 0 else [B, union_of(cloud, some)]
+    for some, next_time in first_items(numbers, times):
+        union = items.union_of(some)
+        pair = [union, B] if side == 0 else [B, union]
         rows = _first_contact(cast, pair, poses, direction, limit)
-        items = rows.item_a if side == 0 else rows.item_b
-        items[rows.hit] = some[items[rows.hit]]
+        met = rows.item_a if side == 0 else rows.item_b
+        met[rows.hit] = some[met[rows.hit]]
         if rows.hit[0] and rows.proven[0] and rows.t[0, 2] < next_time:
             break
     return rows
 
 
-def _balls_met(
-    cloud: PointCloud, B: Shape, X_WC: np.ndarray, X_WB: np.ndarray, vector: np.ndarray, limit: float, side: int
+def _items_met(
+    items: FieldItems, B: Shape, X_WF: np.ndarray, X_WB: np.ndarray, vector: np.ndarray, limit: float, side: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, earliest t) of the balls that B may meet.   side : 0 where the cloud moves, 1 where the cloud stands."""
+    """(numbers, earliest t) of the items that B may meet.   side : 0 where the field moves, 1 where the field
+    stands.
+    """
     if isinstance(B, Halfspace):
-        some = lowest_balls(cloud, B, X_WC, X_WB)
+        some = lowest_items(items, X_WB[:3, :3] @ B.normal, X_WF, X_WB)
         return some, np.zeros(len(some))
     way = -vector if side == 0 else vector
     reach = reach_of(B)
     if not reach < math.inf:
-        return np.arange(len(cloud)), np.zeros(len(cloud))
-    return balls_on_way(cloud, X_WC, X_WB[:3, 3], way, float(limit), reach)
+        return items.every(), np.zeros(len(items.every()))
+    return items_on_way(items, X_WF, X_WB[:3, 3], way, float(limit), reach)

@@ -1,0 +1,194 @@
+"""What fields are made of, by number: balls of a cloud, boxes of cells of a grid, and those near another shape.
+
+An item is left out where it is farther from the box around the other shape, along an axis of the items' frame, than the
+distance: rounding is added to the box.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.lowering.extents import extent_of
+from collide.lowering.packed_convex import HALFSPACE
+from collide.lowering.parts import bounding_parts_of
+from collide.lowering.shape_table import moved_pose
+from collide.narrowphase.facets.nearest_item_calls import Items
+from collide.shapes.compound import Compound
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.shape import IDENTITY, Shape
+from collide.transforms import inverse_pose
+
+#: What rounding of a box's sides is, as a part of the numbers met.
+ROUNDING = 2.0**-40
+#: Items asked about to begin with, and so many times more each time.
+_FIRST_ASKED, _GROWTH = 16, 4
+#: Heights over a plane that differ by less than this part of the size are looked at again, item by item.
+_LEVEL = 2.0**-36
+_AXES = np.concatenate([np.eye(3), -np.eye(3)])
+
+
+class BoxAround(NamedTuple):
+    """A box along the axes of the items' frame around another shape [m]; infinite around half-spaces."""
+
+    low: np.ndarray
+    high: np.ndarray
+
+
+class NamedUnion(NamedTuple):
+    """Some items as one shape, in the field's frame.
+
+    numbers : (n,) of the item that each part is, or of the least cell of parts of so many cells as ``sizes`` (n, 3)
+    says.
+    """
+
+    shape: Shape
+    numbers: np.ndarray
+    sizes: np.ndarray | None = None
+
+
+class FieldItems(ABC):
+    """The items of a field.
+
+    n : how many numbers there are.   X_FG : (4, 4) pose of the items' frame in the field's.   walked : what walks
+    down their tree.   low, high : (3,) box around all items, in their frame [m].
+    """
+
+    n: int
+    X_FG: np.ndarray = IDENTITY
+    walked: Items
+    low: np.ndarray
+    high: np.ndarray
+
+    def pose(self, X_WF: np.ndarray) -> np.ndarray:
+        """The pose of the items' frame, rounded."""
+        return X_WF if self.X_FG is IDENTITY else X_WF @ self.X_FG
+
+    def posed(self, X_WF: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Poses (n, 4, 4) of the items' frame, and how far rounding may move items [m] (n,)."""
+        if self.X_FG is IDENTITY:
+            return X_WF, np.zeros(1)
+        return moved_pose(X_WF, self.X_FG, np.full(len(X_WF), self.walked.reach))
+
+    @abstractmethod
+    def every(self) -> np.ndarray:
+        """All numbers, ascending."""
+
+    @abstractmethod
+    def within(self, box: BoxAround, distance: float) -> np.ndarray:
+        """Numbers of the items that may come within a distance of what is in a box [m], ascending."""
+
+    @abstractmethod
+    def on_way(self, way: np.ndarray, limit: float, extra: float, slack: float, first: bool):
+        """(numbers, earliest t) of the items on the way of a ball from a place along a vector (6,), by t.
+
+        limit : of t.   extra : radius of the moving ball [m].   slack : of places [m].   first : whether items behind
+        an item met for sure may be left out.
+        """
+
+    @abstractmethod
+    def lowest(self, n: np.ndarray, slack: float) -> np.ndarray:
+        """Numbers of the items that are higher along a normal than the lowest by no more than a slack [m],
+        ascending.
+        """
+
+    @abstractmethod
+    def hulls(self, some: np.ndarray) -> list[ConvexHull]:
+        """Items, in the items' frame."""
+
+    def some(self) -> np.ndarray:
+        """The number of an item."""
+        return np.zeros(1, dtype=np.int64)
+
+    def is_within(self, p_F: np.ndarray, n_F: np.ndarray) -> np.ndarray:
+        """(n,) bool: whether what is next to points (n, 3) of the surface of an item, along directions (n, 3), is
+        another item, which closes the first one's face there.
+        """
+        return np.zeros(len(p_F), dtype=bool)
+
+    def merged(self, some: np.ndarray) -> NamedUnion:
+        """Some items as one shape of as few parts as may be."""
+        return NamedUnion(self.union_of(some), some)
+
+    def union_of(self, some: np.ndarray) -> Shape:
+        """Some items as one shape, in the field's frame, whose parts are numbered as these."""
+        return as_union(self.hulls(some), self.X_FG)
+
+    def name(self, union: NamedUnion, part: np.ndarray, p_F: np.ndarray) -> np.ndarray:
+        """Numbers of the items that parts (n,) of a union stand for, at points (n, 3) of the field's frame."""
+        return union.numbers[part]
+
+    def nearest(self, box: BoxAround) -> np.ndarray:
+        """Numbers of some items near the middle of a box, among them maybe the nearest; at least one."""
+        centre = BoxAround(*np.repeat([0.5 * (box.low + box.high)], 2, axis=0))
+        away = np.maximum(np.maximum(self.low - centre.high, centre.low - self.high), 0.0).max()
+        distance, step = float(away), 0.01 * float((self.high - self.low).max()) + 2.0**-40 * float(away) + 1e-300
+        while True:
+            distance, step = distance + step, 2.0 * step
+            some = self.within(centre, distance)
+            if len(some):
+                return some[:1]
+
+
+def as_union(hulls: list[ConvexHull], X: np.ndarray) -> Shape:
+    """Convex shapes at a pose as one shape, whose parts are numbered as these."""
+    if len(hulls) == 1 and len(hulls[0].points) == 1:  # a ball, whose only facet has the number 0
+        return hulls[0]
+    return Compound([(hull, X) for hull in hulls])
+
+
+def box_in_frame(shape: Shape, X_WC: np.ndarray, X_WS: np.ndarray) -> BoxAround:
+    """The box around a shape at X_WS in the frame at X_WC, (4, 4) each, rounding added."""
+    X_CS = inverse_pose(X_WC) @ X_WS
+    low, high = np.full(3, math.inf), np.full(3, -math.inf)
+    for packed, X_SP in bounding_parts_of(shape):
+        if packed.kind == HALFSPACE:
+            return BoxAround(np.full(3, -math.inf), np.full(3, math.inf))
+        X_CP = X_CS @ X_SP
+        ends = np.array([extent_of(packed, X_CP, axis) for axis in _AXES])
+        low, high = np.minimum(low, -ends[3:]), np.maximum(high, ends[:3])
+    size = np.abs(low).max() + np.abs(high).max() + np.abs(X_WC[:3, 3]).sum() + np.abs(X_WS[:3, 3]).sum()
+    off = sum(np.abs(X[:3, :3].T @ X[:3, :3] - np.eye(3)).max() for X in (X_WC, X_WS))
+    slack = (ROUNDING + 8.0 * off) * size
+    return BoxAround(low - slack, high + slack)
+
+
+def items_on_way(
+    items: FieldItems, X_WF: np.ndarray, origin: np.ndarray, vector: np.ndarray, limit: float, extra: float,
+    *, first: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """`FieldItems.on_way` from an origin along a vector of the world."""
+    X_WG = items.pose(X_WF)
+    R, t = X_WG[:3, :3], X_WG[:3, 3]
+    way = np.concatenate([(origin - t) @ R, vector @ R])
+    size = _reach(items) + np.abs(t).sum() + np.abs(origin).sum() + extra
+    slack = (ROUNDING + 8.0 * np.abs(R.T @ R - np.eye(3)).max()) * size
+    return items.on_way(way, limit, extra, slack, first)
+
+
+def lowest_items(items: FieldItems, n_W: np.ndarray, X_WF: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """Numbers of the items that are lowest along a normal, rounding counted in."""
+    X_WG = items.pose(X_WF)
+    size = _reach(items) + np.abs(X_WF[:3, 3]).sum() + np.abs(X_WB[:3, 3]).sum()
+    return items.lowest(X_WG[:3, :3].T @ n_W, _LEVEL * size)
+
+
+def _reach(items: FieldItems) -> float:
+    return float(np.maximum(np.abs(items.low), np.abs(items.high)).sum())
+
+
+def first_items(numbers: np.ndarray, times: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
+    """(items, when the next is met at the earliest), more and more of them, of items by the time from which they may be
+    met: who knows an impact before the next item goes no further.
+    """
+    n = _FIRST_ASKED
+    while len(numbers):
+        if n >= len(numbers):
+            yield numbers, math.inf
+            return
+        yield numbers[:n], float(times[n])
+        n *= _GROWTH

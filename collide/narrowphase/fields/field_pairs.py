@@ -1,0 +1,202 @@
+"""A field (point cloud, voxel grid, octree) and another shape, at n pairs of poses.
+
+Convex sets walk down the tree over the items (`nearest_item_kernel.py`). Open rests of the walk, and all other
+questions (depths, half-spaces, meshes, unions, other fields), go to the union of the items within the upper bound of
+the gap, or within the depth, of a box around the other shape.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.kernels import address_of
+from collide.lowering.kind_of_shape import kind_of
+from collide.lowering.kinds import Kind
+from collide.lowering.packed_convex import HALFSPACE, PackedConvex
+from collide.lowering.parts import convex_set_of, is_single_convex, parts_of
+from collide.lowering.shape_table import moved_pose
+from collide.narrowphase.convex_batches import Question
+from collide.narrowphase.facets.nearest_item_calls import gap_rows, prepared_items, surface_states
+from collide.narrowphase.fields.ball_walk_kernel import MEETS, OPEN, WORK, clouds_meet_balls
+from collide.narrowphase.fields.field_items import BoxAround, FieldItems, box_in_frame, lowest_items
+from collide.narrowphase.fields.items_of import items_of
+from collide.narrowphase.prepared_pairs import Prepared
+from collide.results import PAIR_DTYPE, flipped
+from collide.shapes.point_cloud import PointCloud
+from collide.shapes.primitives import Halfspace
+from collide.shapes.shape import IDENTITY, Shape
+
+#: Rows of two shapes: ``rows_of_pair(A, B, X_WA, X_WB, limit, depths=)``.
+RowsOfPair = Callable[..., np.ndarray]
+
+
+def answer_field(
+    rows_of: RowsOfPair, out: np.ndarray, A: Shape, B: Shape, poses: tuple[np.ndarray, np.ndarray], question: Question
+) -> None:
+    """Answers of a field and another shape, in either order, at checked poses (n, 4, 4).
+
+    rows_of : what answers two other shapes.   out, question : as of `convex_batches.answer_sets`.
+    """
+    if not A.is_field:
+        rows = np.zeros_like(out)
+        answer_field(rows_of, rows, B, A, poses[::-1], question)
+        out[:] = rows if question.boolean else flipped(rows)
+        return
+    X_WA, X_WB = (np.ascontiguousarray(X) for X in poses)
+    items, is_open = items_of(A), np.ones(len(out), dtype=bool)
+    if walks(B) and len(out):
+        X_WG, slop = items.posed(X_WA)
+        packed = _widened(convex_set_of(B), slop)
+        if question.boolean:
+            states = surface_states(items.walked, packed, X_WG, X_WB)
+            out[states.meets] = True
+            is_open = ~(states.meets | states.apart)
+        else:
+            rows, is_written = gap_rows(items.walked, packed, X_WG, X_WB, question.depths)
+            out[is_written] = _beyond_limit(rows[is_written], question.limit)
+            is_open = ~is_written
+    elif question.boolean and kind_of(B) is Kind.COMPOUND:
+        is_open = _may_meet_parts(items, B, X_WA, X_WB)
+    for k in np.flatnonzero(is_open).tolist():
+        row = _union_row(rows_of, A, B, X_WA[k : k + 1], X_WB[k : k + 1], question)
+        out[k] = bool(row["hit"][0]) if question.boolean else _beyond_limit(row, question.limit)[0]
+
+
+def _widened(packed: PackedConvex, slop: np.ndarray) -> PackedConvex:
+    """A convex set whose answers hold although poses are off [m]."""
+    largest = float(slop.max())
+    return packed if largest == 0.0 else packed._replace(slop=packed.slop + 2.0 * largest)
+
+
+def _may_meet_parts(items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
+    """(n,) bool: whether items may meet a part of a union; False where all parts, whose poses are rounded, are farther
+    from all items than rounding may have moved a part.
+    """
+    may_meet, (X_WG, slop_of_grid) = np.zeros(len(X_WA), dtype=bool), items.posed(X_WA)
+    for packed, X_BP in parts_of(B):
+        if packed.kind == HALFSPACE:
+            return np.ones(len(X_WA), dtype=bool)
+        some = np.flatnonzero(~may_meet)
+        if not len(some):
+            break
+        X_WP, slop = moved_pose(X_WB[some], X_BP, np.full(len(some), packed.reach))
+        margin = 2.0 * float(slop.max() + slop_of_grid.max())
+        states = surface_states(items.walked, packed, X_WG[some], X_WP, margin)
+        may_meet[some[~states.apart]] = True
+    return may_meet
+
+
+def are_balls(A: Shape, B: Shape) -> bool:
+    """Whether a pair is a cloud of equal balls and a ball."""
+    cloud, ball_shape = (A, B) if isinstance(A, PointCloud) else (B, A)
+    is_uniform = isinstance(cloud, PointCloud) and np.ndim(cloud.radius) == 0
+    return is_uniform and kind_of(ball_shape) is Kind.SPHERE
+
+
+def answer_balls(
+    rows_of: RowsOfPair, out: np.ndarray, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question
+) -> bool:
+    """Booleans of a cloud of equal balls and a ball; False where a matrix is no pose.
+
+    out, poses : as of `convex_batches.answer_sets`.
+    """
+    if not isinstance(A, PointCloud):
+        A, B, X_WA, X_WB = B, A, X_WB, X_WA
+    assert isinstance(A, PointCloud)
+    packed, n, work = convex_set_of(B), len(out), np.empty(WORK)
+    states, centre = np.empty(n, dtype=np.uint8), np.ascontiguousarray(packed.points[0])
+    (XA, step_a), (XB, step_b) = ((np.ascontiguousarray(X), 16 * (len(X) > 1)) for X in (X_WA, X_WB))
+    done = clouds_meet_balls(
+        A.tree.address, A.radius, address_of(centre), packed.radius, address_of(XA), step_a, address_of(XB), step_b, n,
+        question.check, address_of(states), address_of(work),
+    )
+    if done < n:
+        return False
+    out[:] = states == MEETS
+    for k in np.flatnonzero(states == OPEN).tolist():
+        X_A, X_B = (X[k : k + 1] if len(X) > 1 else X for X in (XA, XB))
+        out[k] = bool(_union_row(rows_of, A, B, X_A, X_B, question)["hit"][0])
+    return True
+
+
+def walks(shape: Shape) -> bool:
+    """Whether a shape is a convex set with an end."""
+    return is_single_convex(shape) and not isinstance(shape, Halfspace)
+
+
+def prepare_field(A: Shape, B: Shape) -> Prepared | None:
+    """A field and a convex set with an end made ready for single calls; ``None`` of other pairs."""
+    exchanged = not A.is_field
+    field, shape = (B, A) if exchanged else (A, B)
+    if not walks(shape) or items_of(field).X_FG is not IDENTITY:
+        return None
+    return prepared_items(items_of(field).walked, convex_set_of(shape), exchanged)
+
+
+def _beyond_limit(rows: np.ndarray, limit: float) -> np.ndarray:
+    """Rows farther apart than a limit [m] say no more than that they are."""
+    beyond = rows["lower"] > limit
+    rows["beyond"], rows["certified"] = beyond, rows["certified"] | beyond
+    rows["distance"][beyond], rows["upper"][beyond] = rows["lower"][beyond], math.inf
+    return rows
+
+
+# --- unions of the items nearby ------------------------------------------------------------------
+
+
+def _union_row(
+    rows_of: RowsOfPair, A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question
+) -> np.ndarray:
+    """The row of a field and another shape at a pair of poses (1, 4, 4)."""
+    nearby = _Nearby(rows_of, items_of(A), B, X_WA, X_WB)
+    if isinstance(B, Halfspace):
+        some = lowest_items(nearby.items, X_WB[0, :3, :3] @ B.normal, X_WA[0], X_WB[0])
+        return nearby.row(some, question.depths)
+    box = box_in_frame(B, nearby.items.pose(X_WA[0]), X_WB[0])
+    some = nearby.items.within(box, 0.0)
+    row = nearby.row(some, False) if len(some) else None
+    if row is not None and row["hit"][0]:
+        return row if question.boolean or not question.depths else _depth(nearby, some, box)
+    if question.boolean:
+        return np.zeros(1, dtype=PAIR_DTYPE) if row is None else row
+    first = nearby.row(nearby.items.nearest(box), False) if row is None else row
+    return nearby.row(nearby.items.within(box, float(first["upper"][0])), False)
+
+
+class _Nearby(NamedTuple):
+    """A field's items and another shape at a pair of poses (1, 4, 4)."""
+
+    rows_of: RowsOfPair
+    items: FieldItems
+    B: Shape
+    X_WA: np.ndarray
+    X_WB: np.ndarray
+
+    def row(self, some: np.ndarray, depths: bool) -> np.ndarray:
+        """The row of some items and the other shape; of another field with its items that may be nearest."""
+        _, items, B, X_WA, X_WB = self
+        union = items.merged(some)
+        if B.is_field:  # the other field stands first, and sees a union
+            row = np.zeros(1, dtype=PAIR_DTYPE)
+            answer_field(self.rows_of, row, B, union.shape, (X_WB, X_WA), Question(False, math.inf, depths))
+            row = flipped(row)
+        else:
+            row = self.rows_of(union.shape, B, X_WA, X_WB, math.inf, depths=depths)
+        row["part_a"] = items.name(union, row["part_a"], (row["point_a"] - X_WA[:, :3, 3]) @ X_WA[0, :3, :3])
+        row["vertices_a"], row["count"] = -1, 0
+        return row
+
+
+def _depth(nearby: _Nearby, some: np.ndarray, box: BoxAround) -> np.ndarray:
+    """The row of an overlap: all items within its depth have a say."""
+    while True:
+        row = nearby.row(some, True)
+        depth = max(-float(row["lower"][0]), -float(row["distance"][0]), 0.0)
+        more = nearby.items.within(box, depth)
+        if len(more) <= len(some):
+            return row
+        some = more
