@@ -47,10 +47,11 @@ def _first_contact(cast: Cast, shapes: list, poses: list, direction: Directions,
     rows = nothing_met(1)
     for some, next_time in first_items(numbers, times):
         union = items.union_of(some)
-        pair = [union, B] if side == 0 else [B, union]
+        pair = [union.shape, B] if side == 0 else [B, union.shape]
         rows = _first_contact(cast, pair, poses, direction, limit)
         met = rows.item_a if side == 0 else rows.item_b
-        met[rows.hit] = some[met[rows.hit]]
+        if not union.names_facets:  # of a mesh casts name the mesh
+            met[rows.hit] = union.numbers[met[rows.hit]]
         if rows.hit[0] and rows.proven[0] and rows.t[0, 2] < next_time:
             break
     return rows

@@ -29,7 +29,8 @@ from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import moved_pose
 from collide.narrowphase.composite.balls_on_ways import SingleWay, near_on_ways
 from collide.narrowphase.composite.composite_parts import compound_parts
-from collide.narrowphase.fields.field_items import items_on_way
+from collide.narrowphase.fields.columns import Columns
+from collide.narrowphase.fields.field_items import NamedUnion, items_on_way, rounding_of_places
 from collide.narrowphase.fields.items_of import items_of
 from collide.narrowphase.prepared_pairs import single_calls_are_safe
 from collide.shapes.compound import Compound
@@ -138,6 +139,8 @@ def _on_field(
 ) -> RayEvents:
     """Events of n rays and a field: the items that a ray may meet first, as convex parts."""
     items, limits, events = items_of(field), directions.limits(limit), []
+    if isinstance(items, Columns):
+        return _on_terrain(items, X_WA, origins, directions, limit, every)
     for begin in range(0, len(origins), _RAYS_TOGETHER):
         some = np.arange(begin, min(begin + _RAYS_TOGETHER, len(origins)))
         X = X_WA if len(X_WA) == 1 else X_WA[some]
@@ -155,6 +158,30 @@ def _on_field(
         on_items = _on_parts(parts, numbers, X, origins[some], of_some, limit, every, near)
         events.append(on_items._replace(ray=some[on_items.ray]))
     return in_order(joined(events))
+
+
+def _on_terrain(
+    items: Columns, X_WA: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, every: bool
+) -> RayEvents:
+    """Events of n rays and large terrain: those of the tiles that each ray may enter."""
+    X = np.broadcast_to(X_WA, (len(origins), 4, 4))
+    places = ((origins - X[:, :3, 3])[:, None] @ X[:, :3, :3])[:, 0]
+    vectors = (directions.vectors[:, None] @ X[:, :3, :3])[:, 0]
+    limits, slack = directions.limits(limit), rounding_of_places(items, X, origins)
+    events = [_on_tile(items.union_of(items.some()), np.arange(0), X_WA, origins, directions, limit, every)]
+    for some, tile in items.tiles_on_rays(places, vectors, limits, slack):
+        events.append(_on_tile(tile, some, X_WA, origins, directions, limit, every))
+    return in_order(joined(events))
+
+
+def _on_tile(
+    tile: NamedUnion, some: np.ndarray, X_WA, origins, directions: Directions, limit: float, every: bool
+) -> RayEvents:
+    """Events of some rays, by number, and a part of terrain."""
+    X = X_WA if len(X_WA) == 1 else X_WA[some]
+    of_some = Directions(directions.vectors[some], directions.exponents[some])
+    met = facets_met(body_of(tile.shape), X, origins[some], of_some, limit, every)
+    return met._replace(ray=some[met.ray], facet=tile.numbers[met.facet])
 
 
 #: Rays asked together about the items that they meet.

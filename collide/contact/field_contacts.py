@@ -50,6 +50,9 @@ def _contacts_of(rows_of: RowsOf, shapes: list, poses: list, margin: float) -> n
         part, point = ("part_a", "point_a") if side == 0 else ("part_b", "point_b")
         X_WF, outwards = poses[side], rows["normal"] if side == 0 else -rows["normal"]
         p_F, n_F = (rows[point] - X_WF[:3, 3]) @ X_WF[:3, :3], outwards @ X_WF[:3, :3]
-        keep &= ~items.is_within(p_F, n_F)
-        rows[part] = items.name(union, rows[part], p_F)
+        name = f"facet{part[-2:]}" if union.names_facets else part
+        if union.names_facets:  # corners and edges have numbers in the mesh made for this question
+            rows[f"feature{part[-2:]}"] = -1
+        rows[name] = items.name(union, rows[name], p_F)
+        keep &= ~items.hidden(rows[name], p_F, n_F)
     return rows[keep] if keep.any() else rows

@@ -39,9 +39,9 @@ def _first_impact(answer: Answer, A: Shape, B: Shape, motions: Motions) -> np.nd
     items, row = items_of(field), free_rows(1)
     for some, next_time in first_items(*_items_met(items, body, motions if side == 0 else motions.swapped())):
         union = items.union_of(some)
-        row = _first_impact(answer, *((union, B) if side == 0 else (A, union)), motions)
+        row = _first_impact(answer, *((union.shape, B) if side == 0 else (A, union.shape)), motions)
         if row["status"][0] != FREE:
-            row[name] = some[row[name]]
+            row[name] = union.numbers[row[name]]
             if row["status"][0] == CONTACT and row["upper"][0] < next_time:
                 break
     return row

@@ -1,14 +1,17 @@
-"""HeightField: heights over a grid and all that is below them, as a closed mesh of triangles."""
+"""HeightField: heights over a grid and all that is below them, as a closed mesh of triangles that are made when asked
+for.
+"""
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from collide.base import argument_checks as checks
 from collide.base.lazy_modules import lazy_module
-from collide.errors import InvalidArgument, InvalidShape
+from collide.errors import InvalidArgument, InvalidShape, MissingExtra
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape, positive, rows, scalar
 from collide.shapes.shape_files import Field, read_arrays, write_arrays
@@ -17,12 +20,17 @@ from collide.transforms import LARGEST
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from collide.mesh import bvh, mesh_survey
+    from collide.fields import height_pyramid, terrain_surface
+    from collide.mesh import mesh_survey
     from collide.mesh.mesh_survey import Survey
 
 if not TYPE_CHECKING:
-    bvh = lazy_module("collide.mesh.bvh")
     mesh_survey = lazy_module("collide.mesh.mesh_survey")
+    height_pyramid = lazy_module("collide.fields.height_pyramid")
+    terrain_surface = lazy_module("collide.fields.terrain_surface")
+
+#: Cells of a field at most; of more than so many, triangles are made where they are needed.
+_MAX_CELLS, _MAX_MESHED = 1 << 30, 1 << 20
 
 
 class GridCells(NamedTuple):
@@ -47,7 +55,8 @@ class HeightField(Mesh):
     heights : (r, c) array_like, float64
         [m], z of the grid points in the frame of the shape, r and c at least 2. Columns run along +x and rows along +y,
         as ``numpy.meshgrid(x, y)`` lays them out: ``heights[i, j]`` is at x = (j − (c − 1)/2)·dx,
-        y = (i − (r − 1)/2)·dy, and the field's middle at x = y = 0.
+        y = (i − (r − 1)/2)·dy, and the field's middle at x = y = 0. NaN makes a hole: cells with a corner there are
+        left out, down to the bottom.
     cell : float or (2,) array_like, float64
         Sides of a cell [m], > 0: of a square cell, or (dx, dy).
     bottom : float, optional
@@ -58,7 +67,7 @@ class HeightField(Mesh):
     Raises
     ------
     InvalidShape
-        For heights not finite, out of range, fewer than 2 × 2 or more than a box-tree holds (2²⁸ facets);
+        For heights that are infinite, out of range, fewer than 2 × 2 or of 2³⁰ cells or more; holes that leave no cell;
         cells not above 0; a bottom not below all heights.
 
     Notes
@@ -69,13 +78,14 @@ class HeightField(Mesh):
     triangle t of cell (i, j); walls and bottom follow (`cells_of` tells them apart). Vertex i·c + j is the grid point
     (i, j).
 
-    The surface closes by construction, so nothing is welded and no edge is looked for: O(r c), 0.15 µs a facet. Its
-    box-tree is built when a query first needs it and costs ten times as much: seconds for a million cells. Files and
-    pickles hold heights, cell and bottom alone. `scaled` copies are meshes; their facets are numbered as in their
-    ``base``.
+    No triangle is made before a query needs it, and the surface closes by construction, so nothing is welded and no
+    edge is looked for: O(r c), 0.15 µs a facet; the box-tree costs ten times as much. Of more than a million cells
+    only those near the other shape, or below a ray, are made into triangles, again and again but for the last few
+    places; facets of walls and bottom then have the number −1. Files and pickles hold heights, cell and bottom alone.
+    `scaled` copies are meshes; their facets are numbered as in their ``base``.
     """
 
-    __slots__ = ("bottom", "cell", "heights")
+    __slots__ = ("bottom", "cell", "heights", "pyramid")
     _fields = ("heights", "cell", "bottom")
     heights: np.ndarray
     cell: np.ndarray
@@ -85,12 +95,76 @@ class HeightField(Mesh):
         heights = _check_heights(heights)
         cell = _check_cell(cell)
         x, y = _grid_line(heights.shape[1], cell[0], "dx"), _grid_line(heights.shape[0], cell[1], "dy")
+        pyramid = height_pyramid.HeightPyramid(heights)
+        if not pyramid.n_cells:
+            raise InvalidShape("HeightField: no cell has four heights: all have a corner in a hole (NaN)")
         bottom = _check_bottom(bottom, heights, x, y)
-        vertices, faces = _closed_surface(x, y, heights, bottom)
         self._store(
-            heights=heights, cell=cell, bottom=bottom, vertices=vertices, faces=faces, solid=True, scale=1.0,
-            _copied=None, _survey=_known_survey(vertices, faces, _volume(heights, cell, bottom)),
+            heights=heights, cell=cell, bottom=bottom, solid=True, scale=1.0, _copied=None, pyramid=pyramid,
         )
+
+    def __getattr__(self, name: str) -> Any:
+        """Triangles, made when first asked for."""
+        if name in ("vertices", "faces"):
+            surface = terrain_surface.surface_of(self.heights, *self.grid_lines, self.bottom)
+            self._store(vertices=surface.vertices, faces=surface.faces)
+        elif name == "_survey" and not self.has_holes:
+            volume = _volume(self.heights, self.cell, self.bottom)
+            self._store(_survey=_known_survey(self.vertices, self.faces, volume))
+        else:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return getattr(self, name)
+
+    @property
+    def has_holes(self) -> bool:
+        """Whether cells are left out."""
+        return self.pyramid.n_cells < (self.heights.shape[0] - 1) * (self.heights.shape[1] - 1)
+
+    @property
+    def is_field(self) -> bool:  # type: ignore[override]
+        """Whether there are too many cells to make triangles of all."""
+        return self.pyramid.n_cells > _MAX_MESHED
+
+    @property
+    def grid_lines(self) -> tuple[np.ndarray, np.ndarray]:
+        """x (c,) and y (r,) of the grid points [m]."""
+        r, c = self.heights.shape
+        return _grid_line(c, self.cell[0], "dx"), _grid_line(r, self.cell[1], "dy")
+
+    @classmethod
+    def from_image(
+        cls, image: ArrayLike | str, cell: ArrayLike, *, low: float = 0.0, high: float = 1.0,
+        bottom: float | None = None,
+    ) -> HeightField:
+        """Terrain from grey values, the image's upper edge towards +y.
+
+        Parameters
+        ----------
+        image : (r, c) array_like of int or float, or a path
+            Grey values: of unsigned integers from 0 to the largest of their type, of floats from 0 to 1; NaN makes
+            holes. Files need the extra ``clouds`` (Pillow); pictures in colour are refused.
+        cell : float or (2,) array_like, float64
+            Sides of a cell, as of the constructor [m].
+        low, high : float
+            Heights of black and white [m].
+        bottom : float, optional
+            As of the constructor.
+
+        Returns
+        -------
+        HeightField
+
+        Raises
+        ------
+        InvalidShape
+            For images of another shape or type, files that cannot be read; as the constructor.
+        MissingExtra
+            For a file where Pillow is not installed.
+        """
+        low, high = scalar("HeightField.from_image", "low", low), scalar("HeightField.from_image", "high", high)
+        grey = _grey_of(image)
+        white = float(np.iinfo(grey.dtype).max) if grey.dtype.kind == "u" else 1.0
+        return cls(low + (high - low) / white * grey[::-1].astype(np.float64), cell, bottom=bottom)
 
     @classmethod
     def _from_fields(cls, heights, cell, bottom) -> HeightField:  # type: ignore[override]
@@ -122,15 +196,17 @@ class HeightField(Mesh):
         if numbers.dtype.kind not in "iu" and numbers.size:
             raise InvalidArgument(f"HeightField.cells_of: facets must be integers, got {checks.brief(facets)}")
         numbers = numbers.astype(np.int64)
-        outside = (numbers < -1) | (numbers >= len(self.faces))
+        n_facets = 2 * self.pyramid.n_cells if self.is_field else len(self.faces)
+        outside = (numbers < -1) | (numbers >= n_facets)
         if outside.any():
             raise InvalidArgument(
-                f"HeightField.cells_of: facets: {int(numbers[outside][0])} is none of 0 … {len(self.faces) - 1}, "
+                f"HeightField.cells_of: facets: {int(numbers[outside][0])} is none of 0 … {n_facets - 1}, "
                 "nor −1 for none"
             )
-        row_count, columns = self.heights.shape[0] - 1, self.heights.shape[1] - 1
-        on_top = (numbers >= 0) & (numbers < 2 * row_count * columns)
-        parts = (numbers // (2 * columns), numbers // 2 % columns, numbers % 2)
+        columns = self.heights.shape[1] - 1
+        on_top = (numbers >= 0) & (numbers < 2 * self.pyramid.n_cells)
+        cell = self.pyramid.cells_of(np.where(on_top, numbers // 2, 0))
+        parts = (cell // columns, cell % columns, numbers % 2)
         cells = [np.where(on_top, part, -1) for part in parts]
         return GridCells(*(cells if numbers.ndim else [int(part) for part in cells]))
 
@@ -191,14 +267,44 @@ def _check_heights(heights) -> np.ndarray:
         raise InvalidShape(
             f"HeightField: heights must have at least 2 rows and 2 columns of grid points, got shape {array.shape}"
         )
-    row_count, columns = array.shape
-    facets = 2 * (row_count - 1) * (columns - 1) + 6 * (row_count + columns - 2)
-    if facets > bvh.MAX_FACETS:
+    if array.size >= _MAX_CELLS:
         raise InvalidShape(
-            f"HeightField: heights of shape {array.shape} make {facets} facets, and a mesh has at most "
-            f"{bvh.MAX_FACETS}; cut the field into several"
+            f"HeightField: heights of shape {array.shape} are more than the 2³⁰ that a field holds; cut it into several"
         )
-    return rows("HeightField", "heights", array, (None, None))
+    holes = np.isnan(array)
+    if not holes.any():
+        return rows("HeightField", "heights", array, (None, None))
+    heights = rows("HeightField", "heights", np.where(holes, 0.0, array), (None, None)).copy()
+    heights[holes] = np.nan
+    heights.flags.writeable = False
+    return heights
+
+
+def _grey_of(image) -> np.ndarray:
+    """Grey values of an array or a file, bool and integers as unsigned."""
+    name = "HeightField.from_image: image"
+    if isinstance(image, (str, os.PathLike)):
+        image = _read_image(image)
+    grey = checks.plain_array(name, image, "(r, c)", InvalidShape)
+    if grey.ndim != 2 or grey.dtype.kind not in "uf":
+        raise InvalidShape(
+            f"{name} must be (r, c) of unsigned integers or floats, got {grey.dtype} {grey.shape}; turn colours to "
+            "grey first"
+        )
+    return grey
+
+
+def _read_image(path) -> np.ndarray:
+    """A picture's grey values. Raises MissingExtra, InvalidShape."""
+    try:
+        from PIL import Image
+    except ImportError:
+        raise MissingExtra("pillow", extra="clouds", purpose="read images") from None
+    try:
+        with Image.open(path) as picture:
+            return np.asarray(picture)
+    except (OSError, ValueError, Image.DecompressionBombError) as error:
+        raise InvalidShape(f"HeightField.from_image: {checks.brief(path)}: {error}") from None
 
 
 def _check_cell(cell) -> np.ndarray:
@@ -224,7 +330,7 @@ def _grid_line(n: int, side: float, name: str) -> np.ndarray:
 
 
 def _check_bottom(bottom, heights: np.ndarray, x: np.ndarray, y: np.ndarray) -> float:
-    i, j = np.unravel_index(np.argmin(heights), heights.shape)
+    i, j = np.unravel_index(np.nanargmin(heights), heights.shape)
     lowest = float(heights[i, j])
     if bottom is not None:
         number = scalar("HeightField", "bottom", bottom)
@@ -234,7 +340,7 @@ def _check_bottom(bottom, heights: np.ndarray, x: np.ndarray, y: np.ndarray) -> 
             )
         return number
     width = 2.0 * float(max(x[-1], y[-1]))
-    number = lowest - (float(heights.max()) - lowest + width)
+    number = lowest - (float(np.nanmax(heights)) - lowest + width)
     if not number < lowest:
         raise InvalidShape(
             f"HeightField: heights are near {lowest:g} m, where a field {width:g} m wide is lost in rounding; take "
@@ -249,35 +355,6 @@ def _check_bottom(bottom, heights: np.ndarray, x: np.ndarray, y: np.ndarray) -> 
 
 
 # --- the surface --------------------------------------------------------------------------------
-
-
-def _closed_surface(x: np.ndarray, y: np.ndarray, heights: np.ndarray, bottom: float) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and faces (m, 3), read-only: grid points and cells, then walls, then the fan of the bottom.
-
-    Every point of the rim has a point below, so walls are two triangles an edge and vertical in doubles; the bottom
-    is a fan around the point below the middle, on no edge of the rim.
-    """
-    row_count, columns = heights.shape
-    n = row_count * columns
-    at = np.arange(n, dtype=np.int32).reshape(row_count, columns)
-    # Counter-clockwise seen from above: along −y, +x, +y and −x.
-    rim = np.concatenate([at[0, :-1], at[:-1, -1], at[-1, :0:-1], at[:0:-1, 0]])
-    below = np.arange(n, n + len(rim), dtype=np.int32)
-    middle = np.full(len(rim), n + len(rim), dtype=np.int32)
-    following, below_following = np.roll(rim, -1), np.roll(below, -1)
-
-    vertices = np.empty((n + len(rim) + 1, 3))
-    vertices[:n, 0], vertices[:n, 1], vertices[:n, 2] = np.tile(x, row_count), np.repeat(y, columns), heights.ravel()
-    vertices[n:-1, :2] = vertices[rim, :2]
-    vertices[-1, :2] = 0.0
-    vertices[n:, 2] = bottom
-
-    here, right, across, up = at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]
-    cells = np.stack([here, right, across, here, across, up], axis=-1).reshape(-1, 3)
-    walls = np.stack([below, below_following, following, below, following, rim], axis=-1).reshape(-1, 3)
-    faces = np.concatenate([cells, walls, np.stack([middle, below_following, below], axis=-1)])
-    vertices.flags.writeable = faces.flags.writeable = False
-    return vertices, faces
 
 
 def _volume(heights: np.ndarray, cell: np.ndarray, bottom: float) -> float:

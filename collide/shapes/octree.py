@@ -91,7 +91,8 @@ class OcTree(VoxelGrid):
             more, of_more = _unknown_cubes(leaves, sides)
             cells, exponents = np.concatenate([cells, more]), np.concatenate([exponents, of_more])
         if not len(cells):
-            raise InvalidShape(f"OcTree: none of {len(leaves.cell)} leaves is occupied, the threshold being {threshold:g}")
+            n = len(leaves.cell)
+            raise InvalidShape(f"OcTree: none of {n} leaves is occupied, the threshold being {threshold:g}")
         self._keep(tree_of_cells("OcTree", cells, exponents, sides, pose), pose)
         for part in leaves:
             part.flags.writeable = False

@@ -50,7 +50,7 @@ def test_one_leaf_of_any_size_is_a_cube():
 def test_the_threshold_decides():
     leaves = ([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [0, 0, 0], np.log([0.3 / 0.7, 1.0, 0.9 / 0.1]))
     assert [collide.OcTree(leaves, 0.1, threshold=p).count for p in (0.2, 0.5, 0.8)] == [3, 2, 1]
-    with pytest.raises(collide.InvalidShape, match="none of 3 leaves is occupied, the threshold being 0.95"):
+    with pytest.raises(collide.InvalidShape, match=r"none of 3 leaves is occupied, the threshold being 0\.95"):
         collide.OcTree(leaves, 0.1, threshold=0.95)
 
 

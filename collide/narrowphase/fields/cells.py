@@ -49,7 +49,7 @@ class Cells(FieldItems):
     def some(self) -> np.ndarray:
         return np.array([self._tree.first_number()])
 
-    def is_within(self, p_F: np.ndarray, n_F: np.ndarray) -> np.ndarray:
+    def hidden(self, numbers: np.ndarray, p_F: np.ndarray, n_F: np.ndarray) -> np.ndarray:
         tree, X = self._tree, self.X_FG
         p = (p_F - X[:3, 3]) @ X[:3, :3] + _NEXT * tree.sides.min() * (n_F @ X[:3, :3])
         return tree.is_occupied(np.floor((p - tree.origin) / tree.sides) - tree.least)

@@ -42,25 +42,26 @@ class BoxAround(NamedTuple):
 class NamedUnion(NamedTuple):
     """Some items as one shape, in the field's frame.
 
-    numbers : (n,) of the item that each part is, or of the least cell of parts of so many cells as ``sizes`` (n, 3)
-    says.
+    numbers : (n,) what results name where they name a part: the item, or the least cell of so many as ``sizes`` (n, 3)
+    says, or the facet of terrain.   names_facets : whether parts are facets of one mesh.
     """
 
     shape: Shape
     numbers: np.ndarray
     sizes: np.ndarray | None = None
+    names_facets: bool = False
 
 
 class FieldItems(ABC):
     """The items of a field.
 
     n : how many numbers there are.   X_FG : (4, 4) pose of the items' frame in the field's.   walked : what walks
-    down their tree.   low, high : (3,) box around all items, in their frame [m].
+    down their tree; None of terrain.   low, high : (3,) box around all items, in their frame [m].
     """
 
     n: int
     X_FG: np.ndarray = IDENTITY
-    walked: Items
+    walked: Items | None = None
     low: np.ndarray
     high: np.ndarray
 
@@ -72,7 +73,8 @@ class FieldItems(ABC):
         """Poses (n, 4, 4) of the items' frame, and how far rounding may move items [m] (n,)."""
         if self.X_FG is IDENTITY:
             return X_WF, np.zeros(1)
-        return moved_pose(X_WF, self.X_FG, np.full(len(X_WF), self.walked.reach))
+        reach = float(np.linalg.norm(np.maximum(np.abs(self.low), np.abs(self.high)))) * (1.0 + 2.0**-50)
+        return moved_pose(X_WF, self.X_FG, np.full(len(X_WF), reach))
 
     @abstractmethod
     def every(self) -> np.ndarray:
@@ -104,23 +106,23 @@ class FieldItems(ABC):
         """The number of an item."""
         return np.zeros(1, dtype=np.int64)
 
-    def is_within(self, p_F: np.ndarray, n_F: np.ndarray) -> np.ndarray:
-        """(n,) bool: whether what is next to points (n, 3) of the surface of an item, along directions (n, 3), is
-        another item, which closes the first one's face there.
+    def hidden(self, numbers: np.ndarray, p_F: np.ndarray, n_F: np.ndarray) -> np.ndarray:
+        """(n,) bool: whether a point (n, 3) of a surface that results name by number is no point of the field's
+        surface, since what is next to it along a direction (n, 3) is the field again.
         """
         return np.zeros(len(p_F), dtype=bool)
 
+    def union_of(self, some: np.ndarray) -> NamedUnion:
+        """Some items as one shape, in the field's frame, item by item."""
+        return NamedUnion(as_union(self.hulls(some), self.X_FG), some)
+
     def merged(self, some: np.ndarray) -> NamedUnion:
         """Some items as one shape of as few parts as may be."""
-        return NamedUnion(self.union_of(some), some)
-
-    def union_of(self, some: np.ndarray) -> Shape:
-        """Some items as one shape, in the field's frame, whose parts are numbered as these."""
-        return as_union(self.hulls(some), self.X_FG)
+        return self.union_of(some)
 
     def name(self, union: NamedUnion, part: np.ndarray, p_F: np.ndarray) -> np.ndarray:
-        """Numbers of the items that parts (n,) of a union stand for, at points (n, 3) of the field's frame."""
-        return union.numbers[part]
+        """What results name for parts (n,) of a union, at points (n, 3) of the field's frame; −1 for −1."""
+        return np.where(part < 0, -1, union.numbers[part])
 
     def nearest(self, box: BoxAround) -> np.ndarray:
         """Numbers of some items near the middle of a box, among them maybe the nearest; at least one."""
@@ -165,9 +167,15 @@ def items_on_way(
     X_WG = items.pose(X_WF)
     R, t = X_WG[:3, :3], X_WG[:3, 3]
     way = np.concatenate([(origin - t) @ R, vector @ R])
-    size = _reach(items) + np.abs(t).sum() + np.abs(origin).sum() + extra
-    slack = (ROUNDING + 8.0 * np.abs(R.T @ R - np.eye(3)).max()) * size
-    return items.on_way(way, limit, extra, slack, first)
+    return items.on_way(way, limit, extra, rounding_of_places(items, X_WG[None], origin[None], extra), first)
+
+
+def rounding_of_places(items: FieldItems, X_WG: np.ndarray, p_W: np.ndarray, extra: float = 0.0) -> float:
+    """How far places of the world (n, 3) may be off in the items' frame at poses (n, 4, 4) [m].   extra : of what is
+    around them."""
+    R, t = X_WG[:, :3, :3], X_WG[:, :3, 3]
+    size = _reach(items) + np.abs(t).sum(axis=1).max() + np.abs(p_W).sum(axis=1).max() + extra
+    return float((ROUNDING + 8.0 * np.abs(R.transpose(0, 2, 1) @ R - np.eye(3)).max()) * size)
 
 
 def lowest_items(items: FieldItems, n_W: np.ndarray, X_WF: np.ndarray, X_WB: np.ndarray) -> np.ndarray:

@@ -48,7 +48,7 @@ def answer_field(
         return
     X_WA, X_WB = (np.ascontiguousarray(X) for X in poses)
     items, is_open = items_of(A), np.ones(len(out), dtype=bool)
-    if walks(B) and len(out):
+    if walks(B) and items.walked is not None and len(out):
         X_WG, slop = items.posed(X_WA)
         packed = _widened(convex_set_of(B), slop)
         if question.boolean:
@@ -59,7 +59,7 @@ def answer_field(
             rows, is_written = gap_rows(items.walked, packed, X_WG, X_WB, question.depths)
             out[is_written] = _beyond_limit(rows[is_written], question.limit)
             is_open = ~is_written
-    elif question.boolean and kind_of(B) is Kind.COMPOUND:
+    elif question.boolean and kind_of(B) is Kind.COMPOUND and items.walked is not None:
         is_open = _may_meet_parts(items, B, X_WA, X_WB)
     for k in np.flatnonzero(is_open).tolist():
         row = _union_row(rows_of, A, B, X_WA[k : k + 1], X_WB[k : k + 1], question)
@@ -132,9 +132,10 @@ def prepare_field(A: Shape, B: Shape) -> Prepared | None:
     """A field and a convex set with an end made ready for single calls; ``None`` of other pairs."""
     exchanged = not A.is_field
     field, shape = (B, A) if exchanged else (A, B)
-    if not walks(shape) or items_of(field).X_FG is not IDENTITY:
+    walked = items_of(field).walked
+    if not walks(shape) or walked is None or items_of(field).X_FG is not IDENTITY:
         return None
-    return prepared_items(items_of(field).walked, convex_set_of(shape), exchanged)
+    return prepared_items(walked, convex_set_of(shape), exchanged)
 
 
 def _beyond_limit(rows: np.ndarray, limit: float) -> np.ndarray:
@@ -186,7 +187,8 @@ class _Nearby(NamedTuple):
             row = flipped(row)
         else:
             row = self.rows_of(union.shape, B, X_WA, X_WB, math.inf, depths=depths)
-        row["part_a"] = items.name(union, row["part_a"], (row["point_a"] - X_WA[:, :3, 3]) @ X_WA[0, :3, :3])
+        if not (union.names_facets and depths and row["hit"][0]):  # depths name no facet of a mesh
+            row["part_a"] = items.name(union, row["part_a"], (row["point_a"] - X_WA[:, :3, 3]) @ X_WA[0, :3, :3])
         row["vertices_a"], row["count"] = -1, 0
         return row
 

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collide.narrowphase.fields.balls import Balls
 from collide.narrowphase.fields.cells import Cells
+from collide.narrowphase.fields.columns import Columns
 from collide.narrowphase.fields.field_items import FieldItems
+from collide.shapes.height_field import HeightField
 from collide.shapes.point_cloud import PointCloud
 from collide.shapes.shape import Shape, kept_with_shape
+from collide.shapes.voxel_grid import VoxelGrid
+
+_ITEMS_OF = {PointCloud: Balls, VoxelGrid: Cells, HeightField: Columns}
 
 
 @kept_with_shape("_items")
 def items_of(field: Shape) -> FieldItems:
     """What a field is made of."""
-    return Balls(field) if isinstance(field, PointCloud) else Cells(field)  # type: ignore[arg-type]
+    return next(items for cls, items in _ITEMS_OF.items() if isinstance(field, cls))(field)  # type: ignore[arg-type]

@@ -1,0 +1,255 @@
+"""The cells of large terrain as items, each a column from the bottom to its surface; triangles of some at a time.
+
+Items nearby become a closed mesh of the rectangle around them, whose walls stand within the terrain or are its own. So
+whatever stays within the rectangle meets the mesh as it meets the terrain.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.fields.height_pyramid import BLOCK
+from collide.fields.terrain_surface import surface_of
+from collide.narrowphase.fields.field_items import BoxAround, FieldItems, NamedUnion
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.height_field import HeightField
+from collide.shapes.mesh import Mesh
+
+#: Rectangles of no more cells than so many times those asked about are taken whole, and of so few in any case.
+_SPARE, _FEW = 4, 4096
+#: Meshes kept: bodies move little between queries. Corners of rectangles are multiples of so many cells.
+_KEPT, _STEP = 32, 8
+#: Cells of a tile along each axis, for rays.
+_TILE = 64
+#: How far next to a facet is, in sides of a cell: far above rounding.
+_NEXT = 2.0**-10
+
+
+class _Rectangle(NamedTuple):
+    """Rows and columns of cells from the first to before the last."""
+
+    row: int
+    column: int
+    last_row: int
+    last_column: int
+
+
+class Columns(FieldItems):
+    """The cells of a height field that are no holes, numbered row by row, holes counted in."""
+
+    def __init__(self, field: HeightField):
+        self._pyramid, self._heights, self._bottom = field.pyramid, field.heights, field.bottom
+        self._x, self._y = field.grid_lines
+        self._rows, self._columns = field.heights.shape[0] - 1, field.heights.shape[1] - 1
+        self.n = self._rows * self._columns
+        self.low = np.array([self._x[0], self._y[0], self._bottom])
+        self.high = np.array([self._x[-1], self._y[-1], self._pyramid.top])
+        self._kept: dict[_Rectangle, NamedUnion] = {}
+        self._kept_tiles: dict[_Rectangle, NamedUnion] = {}
+        tops, n = field.pyramid.highest, _TILE // BLOCK
+        padded = np.full((-(-tops.shape[0] // n) * n, -(-tops.shape[1] // n) * n), -math.inf)
+        padded[: tops.shape[0], : tops.shape[1]] = tops
+        self._tile_tops = padded.reshape(padded.shape[0] // n, n, -1, n).max(axis=(1, 3))
+
+    def every(self) -> np.ndarray:
+        return self._in_rectangle(_Rectangle(0, 0, self._rows, self._columns), -math.inf)
+
+    def within(self, box: BoxAround, distance: float) -> np.ndarray:
+        low, high = box.low - distance, box.high + distance
+        if high[2] < self._bottom:
+            return np.empty(0, dtype=np.int64)
+        # a cell more on each side: no wall of the rectangle is within the distance
+        column, last_column = (int(k) for k in np.searchsorted(self._x, (low[0], high[0])))
+        row, last_row = (int(k) for k in np.searchsorted(self._y, (low[1], high[1])))
+        if low[0] > self._x[-1] or high[0] < self._x[0] or low[1] > self._y[-1] or high[1] < self._y[0]:
+            return np.empty(0, dtype=np.int64)
+        around = _Rectangle(
+            max(row - 2, 0), max(column - 2, 0), min(last_row + 1, self._rows), min(last_column + 1, self._columns)
+        )
+        return self._in_rectangle(around, float(low[2]))
+
+    def _in_rectangle(self, around: _Rectangle, low: float) -> np.ndarray:
+        """Cells of a rectangle whose highest corner is no lower than ``low`` [m], ascending."""
+        if around.row >= around.last_row or around.column >= around.last_column:
+            return np.empty(0, dtype=np.int64)
+        cells = []
+        for begin in range(around.row, around.last_row, BLOCK):
+            end = min(begin + BLOCK, around.last_row)
+            blocks = self._pyramid.highest[begin // BLOCK : (end - 1) // BLOCK + 1]
+            if not (blocks[:, around.column // BLOCK : (around.last_column - 1) // BLOCK + 1] >= low).any():
+                continue
+            heights = self._pyramid.cell_heights(slice(begin, end), slice(around.column, around.last_column))
+            row, column = np.nonzero((heights >= low) & (heights > -math.inf))
+            cells.append((row + begin) * self._columns + column + around.column)
+        return np.concatenate(cells) if cells else np.empty(0, dtype=np.int64)
+
+    def on_way(self, way: np.ndarray, limit: float, extra: float, slack: float, first: bool):
+        reach, size = extra + slack, BLOCK
+        blocks = np.argwhere(self._pyramid.highest > -math.inf)
+        low, high = self._corners(blocks * size, size, self._pyramid.highest[tuple(blocks.T)])
+        blocks = blocks[_times(way, low - reach, high + reach, limit) < math.inf]
+        inside = (blocks[:, None] * size + np.array(list(np.ndindex(size, size)))).reshape(-1, 2)
+        inside = inside[(inside < (self._rows, self._columns)).all(axis=1)]
+        row, column, heights = *inside.T, self._heights
+        highest = np.maximum(
+            np.maximum(heights[row, column], heights[row, column + 1]),
+            np.maximum(heights[row + 1, column], heights[row + 1, column + 1]),
+        )
+        low, high = self._corners(inside, 1, highest)
+        times = np.where(np.isnan(highest), math.inf, _times(way, low - reach, high + reach, limit))
+        met = times < math.inf
+        cells, times = (row * self._columns + column)[met], times[met]
+        order = np.lexsort((cells, times))
+        return cells[order], times[order]
+
+    def _corners(self, least: np.ndarray, size: int, highest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (n, 3) of boxes around the columns of blocks of cells, from the least row and column (n, 2)."""
+        last = np.minimum(least + size, (self._rows, self._columns))
+        low = np.column_stack([self._x[least[:, 1]], self._y[least[:, 0]], np.full(len(least), self._bottom)])
+        return low, np.column_stack([self._x[last[:, 1]], self._y[last[:, 0]], highest])
+
+    def lowest(self, n: np.ndarray, slack: float) -> np.ndarray:
+        blocks = np.argwhere(self._pyramid.highest > -math.inf)
+        low, high = self._corners(blocks * BLOCK, BLOCK, self._pyramid.highest[tuple(blocks.T)])
+        bounds, least, lowest = np.minimum(n * low, n * high).sum(axis=1), math.inf, []
+        for k in np.argsort(bounds, kind="stable").tolist():
+            if bounds[k] > least + slack:
+                break
+            row, column = (blocks[k] * BLOCK).tolist()
+            around = _Rectangle(row, column, min(row + BLOCK, self._rows), min(column + BLOCK, self._columns))
+            cells = self._in_rectangle(around, -math.inf)
+            heights = self._least_heights(cells, n)
+            least = min(least, float(heights.min()))
+            lowest.append((cells, heights))
+        cells, heights = (np.concatenate(part) for part in zip(*lowest))
+        return np.sort(cells[heights <= least + slack])
+
+    def _least_heights(self, cells: np.ndarray, n: np.ndarray) -> np.ndarray:
+        """(k,) of the corners of columns along a normal [m]."""
+        row, column = cells // self._columns, cells % self._columns
+        least = np.full(len(cells), math.inf)
+        for i in (0, 1):
+            for j in (0, 1):
+                across = n[0] * self._x[column + j] + n[1] * self._y[row + i]
+                z = n[2] * self._heights[row + i, column + j]
+                least = np.minimum(least, across + np.minimum(z, n[2] * self._bottom))
+        return least
+
+    def hulls(self, some: np.ndarray) -> list[ConvexHull]:
+        raise NotImplementedError("columns are no convex sets")
+
+    def hidden(self, numbers: np.ndarray, p_F: np.ndarray, n_F: np.ndarray) -> np.ndarray:
+        p = p_F + _NEXT * min(self._x[1] - self._x[0], self._y[1] - self._y[0]) * n_F
+        column, row = np.searchsorted(self._x, p[:, 0]) - 1, np.searchsorted(self._y, p[:, 1]) - 1
+        inside = (column >= 0) & (column < self._columns) & (row >= 0) & (row < self._rows) & (p[:, 2] > self._bottom)
+        row, column, z = np.where(inside, row, 0), np.where(inside, column, 0), self._heights
+        u = (p[:, 0] - self._x[column]) / (self._x[column + 1] - self._x[column])
+        v = (p[:, 1] - self._y[row]) / (self._y[row + 1] - self._y[row])
+        first, last = z[row, column], z[row + 1, column + 1]
+        corner = np.where(u >= v, z[row, column + 1], z[row + 1, column])
+        height = first + np.maximum(u, v) * (corner - first) + np.minimum(u, v) * (last - corner)
+        return (numbers < 0) & inside & (p[:, 2] < height)  # NaN is no height
+
+    def some(self) -> np.ndarray:
+        row, column = np.argwhere(self._pyramid.highest > -math.inf)[0] * BLOCK
+        return self._in_rectangle(_Rectangle(row, column, self._rows, self._columns), -math.inf)[:1]
+
+    def union_of(self, some: np.ndarray) -> NamedUnion:
+        """A mesh of the rectangle around some cells, or, where these are few among many, of the cells themselves."""
+        around = self._around(some)
+        n = (around.last_row - around.row) * (around.last_column - around.column)
+        if n > max(_SPARE * len(some), _FEW):
+            return self._mesh(around, some)
+        union = self._kept.get(around)
+        if union is None:
+            union = self._mesh(around, None)
+            _keep(self._kept, around, union)
+        return union
+
+    def tiles_on_rays(
+        self, origins: np.ndarray, vectors: np.ndarray, limits: np.ndarray, slack: float
+    ) -> Iterator[tuple[np.ndarray, NamedUnion]]:
+        """(rays, the surface of a tile, walls and bottom of the terrain included) of tiles that rays may enter:
+        origins, vectors (n, 3) in the terrain's frame, limits of t (n,), slack [m].
+        """
+        tiles = np.argwhere(self._tile_tops > -math.inf)
+        low, high = self._corners(tiles * _TILE, _TILE, self._tile_tops[tuple(tiles.T)])
+        met = np.array([
+            _times(np.concatenate([o, v]), low - slack, high + slack, limit) < math.inf
+            for o, v, limit in zip(origins, vectors, limits.tolist())
+        ])
+        for k in np.flatnonzero(met.any(axis=0)).tolist():
+            yield np.flatnonzero(met[:, k]), self._tile(*(tiles[k] * _TILE).tolist())
+
+    def _tile(self, row: int, column: int) -> NamedUnion:
+        around = _Rectangle(row, column, min(row + _TILE, self._rows), min(column + _TILE, self._columns))
+        tile = self._kept_tiles.get(around)
+        if tile is None:
+            tile = self._mesh(around, None, solid=False)
+            _keep(self._kept_tiles, around, tile)
+        return tile
+
+    def _around(self, some: np.ndarray) -> _Rectangle:
+        row, column = some // self._columns, some % self._columns
+        return _Rectangle(
+            int(row.min()) // _STEP * _STEP, int(column.min()) // _STEP * _STEP,
+            min(-(-(int(row.max()) + 1) // _STEP) * _STEP, self._rows),
+            min(-(-(int(column.max()) + 1) // _STEP) * _STEP, self._columns),
+        )
+
+    def _mesh(self, around: _Rectangle, some: np.ndarray | None, *, solid: bool = True) -> NamedUnion:
+        row, column, last_row, last_column = around
+        rows, columns = slice(row, last_row + 1), slice(column, last_column + 1)
+        left_out = None
+        if some is not None:
+            left_out = np.ones((last_row - row, last_column - column), dtype=bool)
+            left_out[some // self._columns - row, some % self._columns - column] = False
+        surface = surface_of(
+            self._heights[rows, columns], self._x[columns], self._y[rows], self._bottom, left_out,
+            None if solid else self._cells_around(around),
+        )
+        local = surface.cells
+        cells = (local // (last_column - column) + row) * self._columns + local % (last_column - column) + column
+        numbers = np.full(len(surface.faces), -1, dtype=np.int64)
+        tops = 2 * len(cells)
+        numbers[:tops] = np.repeat(2 * self._pyramid.numbers_of(cells), 2) + np.tile([0, 1], len(cells))
+        if solid:
+            return NamedUnion(Mesh._known(surface.vertices, surface.faces, True), numbers, names_facets=True)
+        return NamedUnion(Mesh(surface.vertices, surface.faces, solid=False), numbers, names_facets=True)
+
+    def _cells_around(self, rectangle: _Rectangle) -> np.ndarray:
+        """Which cells of a rectangle and of one more row and column on each side are the terrain's."""
+        row, column, last_row, last_column = rectangle
+        first = max(row - 1, 0), max(column - 1, 0)
+        last = min(last_row + 1, self._rows), min(last_column + 1, self._columns)
+        around = np.zeros((last_row - row + 2, last_column - column + 2), dtype=bool)
+        at = first[0] - row + 1, first[1] - column + 1
+        heights = self._pyramid.cell_heights(slice(first[0], last[0]), slice(first[1], last[1]))
+        around[at[0] : at[0] + heights.shape[0], at[1] : at[1] + heights.shape[1]] = heights > -math.inf
+        return around
+
+
+def _keep(kept: dict, key, value) -> None:
+    """The last few are kept; threads may keep the same twice."""
+    while len(kept) >= _KEPT:
+        with suppress(StopIteration, RuntimeError):
+            kept.pop(next(iter(kept)), None)
+    kept[key] = value
+
+
+def _times(way: np.ndarray, low: np.ndarray, high: np.ndarray, limit: float) -> np.ndarray:
+    """(n,) when a way from a place along a vector (6,) enters boxes (n, 3) at the earliest; ∞ where it does not."""
+    begin, end = np.zeros(len(low)), np.full(len(low), limit)
+    for axis in range(3):
+        l, h, v = low[:, axis] - way[axis], high[:, axis] - way[axis], way[3 + axis]
+        if v == 0.0:
+            end[(l > 0.0) | (h < 0.0)] = -1.0
+            continue
+        a, b = l / v, h / v
+        begin, end = np.maximum(begin, np.minimum(a, b)), np.minimum(end, np.maximum(a, b))
+    return np.where(begin <= end * (1.0 + 2.0**-40), begin * (1.0 - 2.0**-40), math.inf)
