@@ -168,9 +168,23 @@ def _on_terrain(
     places = ((origins - X[:, :3, 3])[:, None] @ X[:, :3, :3])[:, 0]
     vectors = (directions.vectors[:, None] @ X[:, :3, :3])[:, 0]
     limits, slack = directions.limits(limit), rounding_of_places(items, X, origins)
+    tiles = items.tiles_on_rays(places, vectors, limits, slack)
     events = [_on_tile(items.union_of(items.some()), np.arange(0), X_WA, origins, directions, limit, every)]
-    for some, tile in items.tiles_on_rays(places, vectors, limits, slack):
-        events.append(_on_tile(tile, some, X_WA, origins, directions, limit, every))
+    is_open, step = np.array([len(numbers) > 0 for numbers, _ in tiles]), 0
+    while is_open.any():  # the next tile of each ray
+        rays = np.flatnonzero(is_open)
+        numbers = np.array([tiles[k][0][step] for k in rays.tolist()])
+        for number in np.unique(numbers).tolist():
+            some = rays[numbers == number]
+            met = _on_tile(items.tile(number), some, X_WA, origins, directions, limit, every)
+            events.append(met)
+        step += 1
+        is_open &= np.array([len(numbers) > step for numbers, _ in tiles])
+        if not every:
+            met = joined(events)
+            until = np.full(len(is_open), math.inf)
+            np.minimum.at(until, met.ray[met.proven], met.t[met.proven, 2])
+            is_open &= np.array([not is_open[k] or tiles[k][1][step] <= until[k] for k in range(len(is_open))])
     return in_order(joined(events))
 
 

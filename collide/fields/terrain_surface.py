@@ -82,7 +82,8 @@ def _walls(rim: np.ndarray, following: np.ndarray, below: np.ndarray, below_foll
 def _with_holes(
     x: np.ndarray, y: np.ndarray, heights: np.ndarray, bottom: float, cells: np.ndarray, around: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of some cells (r − 1, c − 1): every grid point of theirs has a point below, and every cell its own bottom."""
+    """Of some cells (r − 1, c − 1): every grid point of theirs has a point below, and every cell its own bottom, unless
+    they are a whole rectangle, whose surface is open (see ``around`` of `surface_of`)."""
     used = np.zeros(heights.shape, dtype=bool)
     for rows in (slice(None, -1), slice(1, None)):
         for columns in (slice(None, -1), slice(1, None)):
@@ -100,4 +101,9 @@ def _with_holes(
     ]
     begin = np.concatenate([a[cells & ~beside] for a, _, beside in edges])
     end = np.concatenate([b[cells & ~beside] for _, b, beside in edges])
-    return vertices, np.concatenate([tops, _walls(begin, end, begin + n, end + n), tops[:, ::-1] + n])
+    if cells.all():
+        a, b, c, d = (at[corner] + n for corner in ((0, 0), (0, -1), (-1, -1), (-1, 0)))
+        bottoms = np.array([[a, c, b], [a, d, c]], dtype=np.int32)
+    else:
+        bottoms = tops[:, ::-1] + n
+    return vertices, np.concatenate([tops, _walls(begin, end, begin + n, end + n), bottoms])

@@ -17,6 +17,7 @@ from collide.lowering.lowered_sets import LoweredSets, PlacedSets
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_curved, pack_halfspace, pack_points
 from collide.lowering.primitive_numbers import PrimitiveNumbers
 from collide.shapes.compound import Compound
+from collide.shapes.height_field import HeightField
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
 from collide.shapes.point_cloud import PointCloud
@@ -72,6 +73,8 @@ def _bounds_around(shape: Compound | Mesh | HPolytope | PointCloud | VoxelGrid) 
         return _compound(shape, bounding_parts_of)
     if isinstance(shape, VoxelGrid):
         return _grid_bounds(shape)
+    if isinstance(shape, HeightField) and shape.is_field:
+        return _terrain_bounds(shape)
     return _cloud_bounds(shape) if isinstance(shape, PointCloud) else _mesh_bounds(shape)
 
 
@@ -159,6 +162,11 @@ def _grid_bounds(grid: VoxelGrid) -> Parts:
     R, t = grid.X_FG[:3, :3], grid.X_FG[:3, 3]
     slack = 2 * _ULPS_PER_PRODUCT * _ULP * (np.abs(points).sum(axis=1).max() + np.abs(t).sum())
     return _alone(pack_points(points @ R.T + t, float(slack)))
+
+
+def _terrain_bounds(field: HeightField) -> Parts:
+    (x, y), top = field.grid_lines, field.pyramid.top
+    return _alone(pack_points(np.where(_CORNERS, (x[-1], y[-1], top), (x[0], y[0], field.bottom))))
 
 
 def _points_around(points: np.ndarray) -> np.ndarray:

@@ -126,6 +126,10 @@ class HeightField(Mesh):
         return self.pyramid.n_cells > _MAX_MESHED
 
     @property
+    def meshed(self) -> bool:  # type: ignore[override]
+        return not self.is_field
+
+    @property
     def grid_lines(self) -> tuple[np.ndarray, np.ndarray]:
         """x (c,) and y (r,) of the grid points [m]."""
         r, c = self.heights.shape

@@ -24,8 +24,8 @@ from collide.shapes.mesh import Mesh
 _SPARE, _FEW = 4, 4096
 #: Meshes kept: bodies move little between queries. Corners of rectangles are multiples of so many cells.
 _KEPT, _STEP = 32, 8
-#: Cells of a tile along each axis, for rays.
-_TILE = 64
+#: Cells of a tile along each axis, for rays, and tiles kept.
+_TILE, _KEPT_TILES = 32, 1024
 #: How far next to a facet is, in sides of a cell: far above rounding.
 _NEXT = 2.0**-10
 
@@ -54,7 +54,9 @@ class Columns(FieldItems):
         tops, n = field.pyramid.highest, _TILE // BLOCK
         padded = np.full((-(-tops.shape[0] // n) * n, -(-tops.shape[1] // n) * n), -math.inf)
         padded[: tops.shape[0], : tops.shape[1]] = tops
-        self._tile_tops = padded.reshape(padded.shape[0] // n, n, -1, n).max(axis=(1, 3))
+        highest = padded.reshape(padded.shape[0] // n, n, -1, n).max(axis=(1, 3))
+        self._tiles = np.argwhere(highest > -math.inf)
+        self._tile_tops = highest[tuple(self._tiles.T)]
 
     def every(self) -> np.ndarray:
         return self._in_rectangle(_Rectangle(0, 0, self._rows, self._columns), -math.inf)
@@ -156,8 +158,9 @@ class Columns(FieldItems):
         return (numbers < 0) & inside & (p[:, 2] < height)  # NaN is no height
 
     def some(self) -> np.ndarray:
-        row, column = np.argwhere(self._pyramid.highest > -math.inf)[0] * BLOCK
-        return self._in_rectangle(_Rectangle(row, column, self._rows, self._columns), -math.inf)[:1]
+        row, column = (np.argwhere(self._pyramid.highest > -math.inf)[0] * BLOCK).tolist()
+        block = _Rectangle(row, column, min(row + BLOCK, self._rows), min(column + BLOCK, self._columns))
+        return self._in_rectangle(block, -math.inf)[:1]
 
     def union_of(self, some: np.ndarray) -> NamedUnion:
         """A mesh of the rectangle around some cells, or, where these are few among many, of the cells themselves."""
@@ -168,30 +171,32 @@ class Columns(FieldItems):
         union = self._kept.get(around)
         if union is None:
             union = self._mesh(around, None)
-            _keep(self._kept, around, union)
+            _keep(self._kept, around, union, _KEPT)
         return union
 
     def tiles_on_rays(
         self, origins: np.ndarray, vectors: np.ndarray, limits: np.ndarray, slack: float
-    ) -> Iterator[tuple[np.ndarray, NamedUnion]]:
-        """(rays, the surface of a tile, walls and bottom of the terrain included) of tiles that rays may enter:
-        origins, vectors (n, 3) in the terrain's frame, limits of t (n,), slack [m].
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each ray the tiles (k,) that it may enter, and when at the earliest (k,), by t: origins, vectors (n, 3) in the
+        terrain's frame, limits of t (n,), slack [m].
         """
-        tiles = np.argwhere(self._tile_tops > -math.inf)
-        low, high = self._corners(tiles * _TILE, _TILE, self._tile_tops[tuple(tiles.T)])
-        met = np.array([
-            _times(np.concatenate([o, v]), low - slack, high + slack, limit) < math.inf
-            for o, v, limit in zip(origins, vectors, limits.tolist())
-        ])
-        for k in np.flatnonzero(met.any(axis=0)).tolist():
-            yield np.flatnonzero(met[:, k]), self._tile(*(tiles[k] * _TILE).tolist())
+        low, high = self._corners(self._tiles * _TILE, _TILE, self._tile_tops)
+        tiles = []
+        for origin, vector, limit in zip(origins, vectors, limits.tolist()):
+            times = _times(np.concatenate([origin, vector]), low - slack, high + slack, limit)
+            met = np.flatnonzero(times < math.inf)
+            order = met[np.argsort(times[met], kind="stable")]
+            tiles.append((order, times[order]))
+        return tiles
 
-    def _tile(self, row: int, column: int) -> NamedUnion:
+    def tile(self, number: int) -> NamedUnion:
+        """The surface of a tile, walls and bottom of the terrain included."""
+        row, column = (self._tiles[number] * _TILE).tolist()
         around = _Rectangle(row, column, min(row + _TILE, self._rows), min(column + _TILE, self._columns))
         tile = self._kept_tiles.get(around)
         if tile is None:
             tile = self._mesh(around, None, solid=False)
-            _keep(self._kept_tiles, around, tile)
+            _keep(self._kept_tiles, around, tile, _KEPT_TILES)
         return tile
 
     def _around(self, some: np.ndarray) -> _Rectangle:
@@ -234,9 +239,9 @@ class Columns(FieldItems):
         return around
 
 
-def _keep(kept: dict, key, value) -> None:
+def _keep(kept: dict, key, value, most: int) -> None:
     """The last few are kept; threads may keep the same twice."""
-    while len(kept) >= _KEPT:
+    while len(kept) >= most:
         with suppress(StopIteration, RuntimeError):
             kept.pop(next(iter(kept)), None)
     kept[key] = value
