@@ -16,11 +16,15 @@ Unions of convex parts: together, a single certificate names the two meeting par
 parts has its own. Pairs with a mesh have a single certificate: together, two facets within r_A + r_B of each other,
 with the named vertices as corners (a convex shape is taken whole, its facet is 0); apart, an axis between the hulls.
 
+Point clouds and grids (`field_proofs.py`) have items in the place of parts: a row of ``points``, or the number of a
+cell. together, one item and one part meet; apart, for every part of the other body "plane" certificates with the item
+−1: every item lies beyond one of these planes, by more than both radii.
+
 A region of half-spaces (`HPolytope` with ``bounded=False``) and points swept by a ball have a certificate of their own
 (`region_proofs.py`), naming half-spaces.
 
 Without a certificate are: cylinders, cones and ellipsoids; two half-spaces; regions beside
-other bodies; results with an open sign or
+other bodies; fields beside meshes and fields, and large terrain; results with an open sign or
 beyond the query's max_distance; meshes apart whose hull meets the other body (a proof would need an axis for every pair
 of facets).
 

@@ -10,6 +10,7 @@ import numpy as np
 from collide.certificates.certificate import APART, INSIDE, NO_VERTEX, PLANE, TOGETHER, Certificate, VertexPair
 from collide.certificates.convex_proofs import flaw_of_normal, flaw_of_proof
 from collide.certificates.exact_parts import ExactPart, common_vertices, exact_parts, has_exact_numbers
+from collide.certificates.field_proofs import field_certificate
 from collide.certificates.mesh_proofs import ProofBody, flaw_of_inside_proof
 from collide.certificates.nearest_to_origin import nearest_vertex_pairs
 from collide.certificates.region_proofs import RegionCertificate, make_region_certificate
@@ -67,8 +68,10 @@ def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates
 
 def certificate_of_row(A, B, X_WA, X_WB, row) -> Certificates:
     """The certificate of a row of `distance` at poses (1, 4, 4); ``None`` for a pair without a certificate."""
-    if row["how"] == UNDECIDED or row["beyond"] or A.is_field or B.is_field:
+    if row["how"] == UNDECIDED or row["beyond"]:
         return None
+    if A.is_field or B.is_field:
+        return field_certificate(A, B, X_WA[0], X_WB[0], row)
     if A.is_region or B.is_region:
         return make_region_certificate(A, B, X_WA[0], X_WB[0])
     if A.meshed or B.meshed:

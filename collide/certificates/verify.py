@@ -10,6 +10,7 @@ from collide.base import argument_checks as checks
 from collide.certificates.certificate import APART, PLANE, TOGETHER, Certificate, CertificateRefused, read_certificates
 from collide.certificates.convex_proofs import flaw_of_normal, flaw_of_proof
 from collide.certificates.exact_parts import exact_parts
+from collide.certificates.field_proofs import flaw_of_field_certificates
 from collide.certificates.mesh_proofs import flaw_of_mesh_certificates
 from collide.certificates.region_proofs import flaw_of_region_certificate
 from collide.errors import InvalidArgument
@@ -65,6 +66,8 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
         return
     certificates = read_certificates(certificate)
     flaw_of = flaw_of_mesh_certificates if A.meshed or B.meshed else _flaw_of_parts
+    if A.is_field or B.is_field:
+        flaw_of = flaw_of_field_certificates
     flaw = flaw_of(A, B, X_WA[0], X_WB[0], certificates, claim)
     if flaw:
         raise CertificateRefused(flaw)

@@ -7,7 +7,6 @@ whatever stays within the rectangle meets the mesh as it meets the terrain.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -177,8 +176,9 @@ class Columns(FieldItems):
     def tiles_on_rays(
         self, origins: np.ndarray, vectors: np.ndarray, limits: np.ndarray, slack: float
     ) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of each ray the tiles (k,) that it may enter, and when at the earliest (k,), by t: origins, vectors (n, 3) in the
-        terrain's frame, limits of t (n,), slack [m].
+        """Of each ray the tiles (k,) that it may enter, and when at the earliest (k,), by t.
+
+        origins, vectors : (n, 3) in the terrain's frame.   limits : of t (n,).   slack : of places [m].
         """
         low, high = self._corners(self._tiles * _TILE, _TILE, self._tile_tops)
         tiles = []
