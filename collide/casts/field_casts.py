@@ -23,7 +23,7 @@ Cast = Callable[..., CastRows]
 def field_casts(
     cast: Cast, A, B, X_WA: np.ndarray, X_WB: np.ndarray, directions: Directions, limits: np.ndarray
 ) -> CastRows:
-    """First contacts of n casts, in some of which a field moves or stands; items are those of fields.
+    """First contacts of n casts, where fields move or stand; items are items of fields.
 
     cast : what answers other shapes; further arguments as of `cast_batch`.
     """

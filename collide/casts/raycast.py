@@ -29,9 +29,9 @@ from collide.lowering.parts import parts_of
 from collide.lowering.shape_table import moved_pose
 from collide.narrowphase.composite.balls_on_ways import SingleWay, near_on_ways
 from collide.narrowphase.composite.composite_parts import compound_parts
-from collide.narrowphase.fields.columns import Columns
 from collide.narrowphase.fields.field_items import NamedUnion, items_on_way, rounding_of_places
 from collide.narrowphase.fields.items_of import items_of
+from collide.narrowphase.fields.terrain_columns import Columns
 from collide.narrowphase.prepared_pairs import single_calls_are_safe
 from collide.shapes.compound import Compound
 from collide.shapes.hpolytope import HPolytope
@@ -163,7 +163,7 @@ def _on_field(
 def _on_terrain(
     items: Columns, X_WA: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, every: bool
 ) -> RayEvents:
-    """Events of n rays and large terrain: those of the tiles that each ray may enter."""
+    """Events of n rays and large terrain, by the tiles on the way of each ray."""
     X = np.broadcast_to(X_WA, (len(origins), 4, 4))
     places = ((origins - X[:, :3, 3])[:, None] @ X[:, :3, :3])[:, 0]
     vectors = (directions.vectors[:, None] @ X[:, :3, :3])[:, 0]

@@ -1,10 +1,9 @@
-"""Proofs about point clouds and grids: a hit by one item, a gap by planes, one of which parts each item from the other
-body.
+"""Proofs about point clouds and grids: a hit by one item, a gap by planes, each item beyond at least a plane.
 
 With a normal n and the vertex b of the other body farthest along n, an item is beyond the plane where
-n·(p − b) > (r_p + r_b)|n|, p being its point, or its corner least far along n. The right side is replaced by a whole
-number that is no less. The left side is taken in doubles, whose rounding is bounded, and as fractions for items that
-doubles leave open.
+n·(p − b) > (r_p + r_b)|n|, p being its point, or its corner least far along n. The right side is replaced by a
+slightly larger fraction. The left side is taken in doubles with a bound of rounding, and as fractions for items left
+open by doubles.
 """
 
 from __future__ import annotations
@@ -74,10 +73,10 @@ def _field_of(field: Shape, X_WF: np.ndarray) -> _Field:
 
 
 def _numbered(field: Shape, X_WF: np.ndarray, number: int) -> ExactPart | None:
-    """The item of a number; None where there is none."""
+    """The item of a number; None for a number without an item."""
     if isinstance(field, PointCloud):
-        one = _field_of(field, X_WF) if 0 <= number < len(field) else None
-        return None if one is None else one.part(number)
+        single = _field_of(field, X_WF) if 0 <= number < len(field) else None
+        return None if single is None else single.part(number)
     assert isinstance(field, VoxelGrid)
     tree = field.tree
     cell = np.array([np.unravel_index(number, tree.shape)]) if 0 <= number < math.prod(tree.shape) else None
@@ -108,9 +107,10 @@ def flaw_of_field_certificates(
             return f"no planes between a field and part {j}, but {kind!r} of item {i}"
         normals[j].append(pairs[0] if A.is_field else opposite(pairs[0]))
     for j, part in enumerate(parts):
-        left = _left_by(items, part, normals[j])
-        if len(left.numbers):
-            return f"part {j}: no plane parts it from {len(left.numbers)} items, as from number {int(left.numbers[0])}"
+        remaining = _remaining(items, part, normals[j])
+        if len(remaining.numbers):
+            n, first = len(remaining.numbers), int(remaining.numbers[0])
+            return f"part {j}: no plane parts it from {n} items, as from number {first}"
     return None
 
 
@@ -131,7 +131,7 @@ def _flaw_of_hit(A: Shape, B: Shape, X_WA, X_WB, certificates: Sequence[Certific
     return flaw_of_proof(*bodies, pairs, hit=True)
 
 
-def _left_by(items: _Field, part: ExactPart, normals: Sequence[Point]) -> _Field:
+def _remaining(items: _Field, part: ExactPart, normals: Sequence[Point]) -> _Field:
     """The items that no plane parts from a part of the other body; of a half-space its own plane alone counts."""
     for normal in [in_integers(part.plane[0])] if part.kind == HALFSPACE and normals else normals:
         items = items.picked(~_beyond(items, part, normal))
@@ -188,7 +188,7 @@ def _no_less_than_length(normal: Point) -> Fraction:
 
 
 def field_certificate(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, row) -> tuple[Certificate, ...] | None:
-    """The certificate of a row of `distance`; None where none is known."""
+    """The certificate of a row of `distance`, or None."""
     if not has_field_certificates(A, B):
         return None
     field, body = (A, B) if A.is_field else (B, A)
@@ -227,10 +227,10 @@ def _of_hit(
         if step == 0:
             items = _field_of(field, X_WF)
             tried = [
-                (int(left.numbers[row]), left.part(row), k)
+                (int(remaining.numbers[row]), remaining.part(row), k)
                 for k, part in enumerate(parts)
-                for left in [_near(items, part)]
-                for row in range(min(len(left.numbers), _MAX_PLANES))
+                for remaining in [_near(items, part)]
+                for row in range(min(len(remaining.numbers), _MAX_PLANES))
             ]
     return None
 
@@ -245,16 +245,16 @@ def _pairs_of(item: ExactPart, part: ExactPart) -> list[tuple[int, int]]:
 def _near(items: _Field, part: ExactPart) -> _Field:
     """Items that no plane along an axis parts from a part."""
     if part.kind == HALFSPACE:
-        return _left_by(items, part, [(0, 0, 0)])
+        return _remaining(items, part, [(0, 0, 0)])
     axes = [tuple(sign * (axis == k) for k in range(3)) for axis in range(3) for sign in (1, -1)]
-    return _left_by(items, part, axes)  # type: ignore[arg-type]
+    return _remaining(items, part, axes)  # type: ignore[arg-type]
 
 
 def _normals(items: _Field, part: ExactPart) -> list[Point] | None:
-    """Normals of planes that part all items from a part; None where an item is not parted, or too many are needed."""
+    """Normals of planes between all items and a part; None for an item at the part, or for too many planes."""
     if part.kind == HALFSPACE:
         normals = [in_integers(part.plane[0])]
-        return None if len(_left_by(items, part, normals).numbers) else normals
+        return None if len(_remaining(items, part, normals).numbers) else normals
     normals, middle = [], _middle(items, part)
     while len(items.numbers):
         if len(normals) >= _MAX_PLANES:
@@ -278,7 +278,7 @@ def _middle(items: _Field, part: ExactPart) -> np.ndarray:
 
 
 def _parting(item: _Field, part: ExactPart) -> Point | None:
-    """A normal along which one item lies beyond a part, of few digits where these do."""
+    """A normal along which a single item lies beyond a part, of few digits where these do."""
     single = item.part(0)
     grid = min(single.vertices.grid, part.vertices.grid)
     points, vertices = single.vertices.on_grid(grid), part.vertices.on_grid(grid)

@@ -1,4 +1,4 @@
-"""Contacts of fields: those of the items within the margin, as a union; none through a face between two cells."""
+"""Contacts of fields: of the items within the margin, as a union; a face between two cells has no contact."""
 
 from __future__ import annotations
 

@@ -159,14 +159,16 @@ class CellTree:
                 return self._sorted(words[:n][heights[:n] <= heights[:n].min() + slack])
             size = n
 
-    def coarse_boxes(self, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (n, 3) of boxes that hold all cells: of the deepest level of nodes with no more than ``most``."""
+    def coarse_boxes(self, max_boxes: int) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (n, 3) of boxes that hold all cells: of the deepest level of nodes with no more than
+        ``max_boxes``.
+        """
         bits, solid, first = self.nodes
         least, node = np.zeros((1, 3), dtype=np.int64), np.zeros(1, dtype=np.int64)
         size = 1 << 2 * self.levels
         for level in range(self.levels - 1, -1, -1):
             row, bit = np.nonzero(bits[node][:, None] >> np.arange(64) & 1)
-            if len(row) > most or level == 0 or solid[node].any():
+            if len(row) > max_boxes or level == 0 or solid[node].any():
                 break
             size >>= 2
             least, node = least[row] + _OFFSETS[bit] * size, first[node[0]] + np.arange(len(row))
@@ -240,8 +242,8 @@ def numbers_of(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 def tree_of_array(occupied: np.ndarray, grid: Grid) -> CellTree:
     """The tree of an array (nx, ny, nz), a byte a cell, C-contiguous."""
     shape = grid.shape
-    levels, room = levels_of(shape), int(np.prod([-(-n // SIDE) for n in shape]))
-    keys, bits = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
+    levels, n_nodes = levels_of(shape), int(np.prod([-(-n // SIDE) for n in shape]))
+    keys, bits = np.empty(n_nodes, dtype=np.int64), np.empty(n_nodes, dtype=np.int64)
     n = pack_cells(address_of(occupied), *shape, levels, address_of(keys), address_of(bits))
     return _tree_of([_Run(keys[:n], bits[:n])], grid)
 

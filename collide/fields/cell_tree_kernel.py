@@ -209,8 +209,8 @@ def pack_cells(occupied_at, nx, ny, nz, levels, keys_at, words_at):
     """
     occupied, rows = view_u8(occupied_at, nx * ny * nz), view_i32(occupied_at, nx * ny * nz // SIDE)
     has_whole_rows = nz % SIDE == 0
-    room = -(-nx // SIDE) * -(-ny // SIDE) * -(-nz // SIDE)
-    keys, words = view_i64(keys_at, room), view_i64(words_at, room)
+    n_nodes = -(-nx // SIDE) * -(-ny // SIDE) * -(-nz // SIDE)
+    keys, words = view_i64(keys_at, n_nodes), view_i64(words_at, n_nodes)
     n, key, end = 0, 0, 1 << (3 * SIDE_BITS * (levels - 1))
     while key < end:
         x, y, z = SIDE * _axis_of(key, 4), SIDE * _axis_of(key, 2), SIDE * _axis_of(key, 0)
@@ -233,29 +233,29 @@ def pack_cells(occupied_at, nx, ny, nz, levels, keys_at, words_at):
 
 @entry("int64(int64, int64, int64, int64, int64)")
 def merge_cells(occupied_at, nx, ny, nz, boxes_at):
-    """Boxes whose union is that of the occupied cells of a block, six numbers each (least cell, cells along each axis);
+    """Boxes with the union of the occupied cells of a block, six numbers each (least cell, cells along each axis);
     returns how many. Cells are marked free on the way.
 
-    Greedy: from the first cell left along z, then y, then x as far as all cells are left.   boxes : room for all cells.
+    Greedy: from the first cell along z, then y, then x as far as all cells remain.   boxes : room for all cells.
     """
-    left, boxes = view_u8(occupied_at, nx * ny * nz), view_i64(boxes_at, 6 * nx * ny * nz)
+    remaining, boxes = view_u8(occupied_at, nx * ny * nz), view_i64(boxes_at, 6 * nx * ny * nz)
     n = 0
     for x in range(nx):
         for y in range(ny):
             for z in range(nz):
-                if left[(x * ny + y) * nz + z] == 0:
+                if remaining[(x * ny + y) * nz + z] == 0:
                     continue
                 x1, y1, z1 = x + 1, y + 1, z + 1
-                while z1 < nz and _all_left(left, ny, nz, x, x1, y, y1, z1, z1 + 1):
+                while z1 < nz and _all_remain(remaining, ny, nz, x, x1, y, y1, z1, z1 + 1):
                     z1 += 1
-                while y1 < ny and _all_left(left, ny, nz, x, x1, y1, y1 + 1, z, z1):
+                while y1 < ny and _all_remain(remaining, ny, nz, x, x1, y1, y1 + 1, z, z1):
                     y1 += 1
-                while x1 < nx and _all_left(left, ny, nz, x1, x1 + 1, y, y1, z, z1):
+                while x1 < nx and _all_remain(remaining, ny, nz, x1, x1 + 1, y, y1, z, z1):
                     x1 += 1
                 for i in range(x, x1):
                     for j in range(y, y1):
                         for k in range(z, z1):
-                            left[(i * ny + j) * nz + k] = 0
+                            remaining[(i * ny + j) * nz + k] = 0
                 at = 6 * n
                 boxes[at], boxes[at + 1], boxes[at + 2] = x, y, z
                 boxes[at + 3], boxes[at + 4], boxes[at + 5] = x1 - x, y1 - y, z1 - z
@@ -264,11 +264,11 @@ def merge_cells(occupied_at, nx, ny, nz, boxes_at):
 
 
 @kernel
-def _all_left(left, ny, nz, x0, x1, y0, y1, z0, z1):
+def _all_remain(remaining, ny, nz, x0, x1, y0, y1, z0, z1):
     for x in range(x0, x1):
         for y in range(y0, y1):
             for z in range(z0, z1):
-                if left[(x * ny + y) * nz + z] == 0:
+                if remaining[(x * ny + y) * nz + z] == 0:
                     return False
     return True
 
@@ -302,7 +302,7 @@ def _meets_range(word, low, high, at):
 
 @entry("int64(int64, int64, int64, int64, int64, int64)")
 def cells_in_range(header_at, low_at, high_at, words_at, capacity, stack_at):
-    """Occupied boxes with cells within a range, as words; how many, of which no more than ``capacity`` are written.
+    """Write the first ``capacity`` occupied boxes with cells within a range, as words; returns the number of all.
 
     low, high : least and largest cell, three integers each, both included.   stack : STACK words.
     """
@@ -332,7 +332,7 @@ def cells_in_range(header_at, low_at, high_at, words_at, capacity, stack_at):
 
 @kernel
 def _enters(cells, word, way, slack, limit):
-    """When a way from a place along a vector enters a box of cells that is larger by a slack; ∞ where it does not."""
+    """When a way from a place along a vector enters a box of cells, larger by a slack; ∞ for a way beside the box."""
     low, high, begin, end = low_corner(cells, word), high_corner(cells, word), 0.0, limit
     for axis in range(3):
         l, h = (low.x, high.x) if axis == 0 else (low.y, high.y) if axis == 1 else (low.z, high.z)
@@ -348,11 +348,11 @@ def _enters(cells, word, way, slack, limit):
 
 @entry("int64(int64, int64, float64, float64, boolean, int64, int64, int64, int64)")
 def cells_on_way(header_at, way_at, slack, limit, first, words_at, times_at, capacity, stack_at):
-    """Occupied boxes that a way may enter, as words, and when at the earliest; how many, of which no more than
-    ``capacity`` are written.
+    """Write the first ``capacity`` occupied boxes on a way, as words, and when the way enters each at the earliest;
+    returns the number of all boxes on the way.
 
-    way : place and vector, t from 0 to a limit.   slack : how much larger boxes are [m].   first : whether boxes may be
-    left out that are entered after a box is left for sure, the slack taken off.   stack : STACK words.
+    way : place and vector, t from 0 to a limit.   slack : how much larger boxes are [m].   first : whether boxes
+    entered after the certain entry into a box may be left out.   stack : STACK words.
     """
     cells, words, times = open_cells(header_at), view_i64(words_at, capacity), view_f64(times_at, capacity)
     way, stack = view_f64(way_at, 6), view_i64(stack_at, STACK)
@@ -392,8 +392,8 @@ def _least_height(cells, word, n):
 
 @entry("int64(int64, int64, float64, int64, int64, int64, int64)")
 def lowest_cells(header_at, normal_at, slack, words_at, heights_at, capacity, stack_at):
-    """Occupied boxes, as words, and their least heights along a normal, among them all that are higher than the lowest
-    by no more than a slack [m]; how many, of which no more than ``capacity`` are written.   stack : STACK words.
+    """Write the first ``capacity`` of some occupied boxes, as words, and their least heights along a normal; returns
+    their number. All boxes higher than the lowest by no more than a slack [m] are among them.   stack : STACK words.
     """
     cells, words, heights = open_cells(header_at), view_i64(words_at, capacity), view_f64(heights_at, capacity)
     normal, stack = vec3_at(view_f64(normal_at, 3), 0), view_i64(stack_at, STACK)

@@ -1,4 +1,4 @@
-"""Highest heights over blocks of cells: what tells cells that a body may reach from those far below."""
+"""Highest heights over blocks of cells: a body above the highest height of a block meets no cell of the block."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ BLOCK = 16
 
 
 class HeightPyramid:
-    """The cells of heights (r, c) of which no corner is NaN.
+    """The cells of heights (r, c) without a corner of NaN.
 
     n_cells : how many cells there are.   highest : (⌈(r − 1)/16⌉, ⌈(c − 1)/16⌉) float64, the highest height of each
     block of 16 × 16 cells, −∞ of blocks of holes [m].   lowest, top : of all [m].

@@ -20,8 +20,10 @@ def _planes(begin, end, first):
 
 @entry("void(int64, int64, int64, int64)")
 def walk_rays(begins_at, ends_at, n, cells_at):
-    """Cells from each place of ``begins`` up to before that of ``ends``, in sides of a cell: as many as the cells'
-    indices differ by along all axes, so that a ray ends where it is to end whatever rounds.
+    """Cells from each place of ``begins`` up to before the cell of ``ends``, in sides of a cell.
+
+    Their number is the difference of the cells' indices, added up over the axes: every ray ends in the right cell,
+    whatever rounds.
     """
     begins, ends = view_f64(begins_at, 3 * n), view_f64(ends_at, 3 * n)
     total = 0

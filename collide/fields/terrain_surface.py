@@ -21,11 +21,11 @@ def surface_of(
     heights: np.ndarray, x: np.ndarray, y: np.ndarray, bottom: float, holes: np.ndarray | None = None,
     around: np.ndarray | None = None,
 ) -> Surface:
-    """The surface over heights (r, c) at y (r,) and x (c,), down to a bottom; cells with a corner that is NaN are
-    holes.
+    """The surface over heights (r, c) at y (r,) and x (c,), down to a bottom; cells with a corner of NaN are holes.
 
-    holes : (r − 1, c − 1) bool, further cells to leave out.   around : (r + 1, c + 1) bool, which of the cells, and of
-    those beside them, are there: walls stand only before cells that are not, and the surface need not close.
+    holes : (r − 1, c − 1) bool, further cells to leave out.   around : (r + 1, c + 1) bool, the cells of the terrain,
+    with a row and a column more on each side. Walls stand only beside cells missing from ``around``, and the surface
+    need not close.
     """
     is_hole = np.isnan(heights)
     is_hole = is_hole[:-1, :-1] | is_hole[:-1, 1:] | is_hole[1:, :-1] | is_hole[1:, 1:]

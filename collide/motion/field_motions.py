@@ -20,7 +20,7 @@ Answer = Callable[[Shape, Shape, Motions], np.ndarray]
 
 
 def field_impacts(answer: Answer, shapes: list[Shape], a: np.ndarray, b: np.ndarray, motions: Motions) -> np.ndarray:
-    """Rows of `IMPACT_DTYPE` of motions in some of which fields take part; parts of fields are numbers of items.
+    """Rows of `IMPACT_DTYPE` of motions with fields; parts of fields are numbers of items.
 
     shapes : distinct.   a, b : (n,) numbers of the shapes A and B, motion by motion.
     """

@@ -1,4 +1,4 @@
-"""HeightField: heights over a grid and all that is below them, as a closed mesh of triangles that are made when asked
+"""HeightField: heights over a grid and all that is below them, as a closed mesh of triangles, made when asked
 for.
 """
 
@@ -127,6 +127,7 @@ class HeightField(Mesh):
 
     @property
     def meshed(self) -> bool:  # type: ignore[override]
+        """Whether triangles of all cells are made when a query needs triangles."""
         return not self.is_field
 
     @property

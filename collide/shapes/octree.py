@@ -137,7 +137,7 @@ class OcTree(VoxelGrid):
         cls, origins: ArrayLike, points: ArrayLike, resolution: float, *, max_range: float = math.inf,
         threshold: float = 0.5, unknown: str = "free",
     ) -> OcTree:
-        """A map of what a sensor saw: cells in which rays end are occupied, cells that they go through are free.
+        """A map of a sensor's rays: cells at their ends are occupied, cells on their way are free.
 
         Parameters
         ----------
@@ -148,15 +148,15 @@ class OcTree(VoxelGrid):
         resolution : float
             Side of a cell, > 0 [m].
         max_range : float
-            Longer rays end there, without a hit [m].
+            Longer rays end at this distance, without a hit [m].
         threshold, unknown
             As of the constructor.
 
         Returns
         -------
         OcTree
-            Its cells have OctoMap's log-odds of one scan: log(0.7 / 0.3) where a ray ends, log(0.4 / 0.6) where rays go
-            through and none ends.
+            Its cells have OctoMap's log-odds of a single scan: log(0.7 / 0.3) where a ray ends, log(0.4 / 0.6) where
+            rays only go through.
 
         Raises
         ------

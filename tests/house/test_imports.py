@@ -106,6 +106,7 @@ LATE = {
     "cli": {"scenes", "adapters", "papers.hierarchies"},
     "sweeps": {"pyarrow", "distributed"},
     "papers.tetrahedra": {"meshio"},
+    "shapes": {"PIL"},
 }
 #: Names that say nothing about what a module is for, and names that shadow a package when run as a script.
 BAD_NAMES = {"utils", "util", "helpers", "core", "common", "misc", "fcl", "coal", "pybullet", "numba", "numpy"}

@@ -1,4 +1,4 @@
-"""What fields are made of, by number: balls of a cloud, boxes of cells of a grid, and those near another shape.
+"""What fields are made of, by number: balls of a cloud, boxes of cells of a grid; and the items near another shape.
 
 An item is left out where it is farther from the box around the other shape, along an axis of the items' frame, than the
 distance: rounding is added to the box.
@@ -42,8 +42,8 @@ class BoxAround(NamedTuple):
 class NamedUnion(NamedTuple):
     """Some items as one shape, in the field's frame.
 
-    numbers : (n,) what results name where they name a part: the item, or the least cell of so many as ``sizes`` (n, 3)
-    says, or the facet of terrain.   names_facets : whether parts are facets of one mesh.
+    numbers : (n,) the number in results for each part: of the item, of the least of ``sizes`` (n, 3) cells, or of the
+    facet of terrain.   names_facets : whether parts are facets of a mesh.
     """
 
     shape: Shape
@@ -55,11 +55,10 @@ class NamedUnion(NamedTuple):
 class FieldItems(ABC):
     """The items of a field.
 
-    n : how many numbers there are.   X_FG : (4, 4) pose of the items' frame in the field's.   walked : what walks
-    down their tree; None of terrain.   low, high : (3,) box around all items, in their frame [m].
+    X_FG : (4, 4) pose of the items' frame in the field's.   walked : items with a tree to walk down; None of terrain.
+    low, high : (3,) box around all items, in their frame [m].
     """
 
-    n: int
     X_FG: np.ndarray = IDENTITY
     walked: Items | None = None
     low: np.ndarray
@@ -69,7 +68,7 @@ class FieldItems(ABC):
         """The pose of the items' frame, rounded."""
         return X_WF if self.X_FG is IDENTITY else X_WF @ self.X_FG
 
-    def posed(self, X_WF: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def poses_of_items(self, X_WF: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Poses (n, 4, 4) of the items' frame, and how far rounding may move items [m] (n,)."""
         if self.X_FG is IDENTITY:
             return X_WF, np.zeros(1)
@@ -107,8 +106,8 @@ class FieldItems(ABC):
         return np.zeros(1, dtype=np.int64)
 
     def hidden(self, numbers: np.ndarray, p_F: np.ndarray, n_F: np.ndarray) -> np.ndarray:
-        """(n,) bool: whether a point (n, 3) of a surface that results name by number is no point of the field's
-        surface, since what is next to it along a direction (n, 3) is the field again.
+        """(n,) bool: whether points (n, 3), of surfaces by their numbers in results, lie within the field: what is
+        next to each point along a direction (n, 3) is the field again.
         """
         return np.zeros(len(p_F), dtype=bool)
 

@@ -49,7 +49,7 @@ def answer_field(
     X_WA, X_WB = (np.ascontiguousarray(X) for X in poses)
     items, is_open = items_of(A), np.ones(len(out), dtype=bool)
     if walks(B) and items.walked is not None and len(out):
-        X_WG, slop = items.posed(X_WA)
+        X_WG, slop = items.poses_of_items(X_WA)
         packed = _widened(convex_set_of(B), slop)
         if question.boolean:
             states = surface_states(items.walked, packed, X_WG, X_WB)
@@ -76,7 +76,7 @@ def _may_meet_parts(items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndar
     """(n,) bool: whether items may meet a part of a union; False where all parts, whose poses are rounded, are farther
     from all items than rounding may have moved a part.
     """
-    may_meet, (X_WG, slop_of_grid) = np.zeros(len(X_WA), dtype=bool), items.posed(X_WA)
+    may_meet, (X_WG, slop_of_grid) = np.zeros(len(X_WA), dtype=bool), items.poses_of_items(X_WA)
     for packed, X_BP in parts_of(B):
         if packed.kind == HALFSPACE:
             return np.ones(len(X_WA), dtype=bool)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collide.narrowphase.fields.balls import Balls
-from collide.narrowphase.fields.cells import Cells
-from collide.narrowphase.fields.columns import Columns
+from collide.narrowphase.fields.cloud_balls import Balls
 from collide.narrowphase.fields.field_items import FieldItems
+from collide.narrowphase.fields.occupied_cells import Cells
+from collide.narrowphase.fields.terrain_columns import Columns
 from collide.shapes.height_field import HeightField
 from collide.shapes.point_cloud import PointCloud
 from collide.shapes.shape import Shape, kept_with_shape

@@ -18,14 +18,13 @@ class Balls(FieldItems):
     def __init__(self, cloud: PointCloud):
         tree, radius = cloud.tree, float(np.max(cloud.radius))
         self._tree, self._points, self._radius, self._radii = tree, cloud.points, cloud.radius, cloud.radii
-        self.n = len(cloud)
         self.low, self.high = tree.low - radius, tree.high + radius
         reach = math.sqrt(float(np.square(np.maximum(np.abs(tree.low), np.abs(tree.high))).sum())) * (1.0 + 2.0**-50)
         radii = cloud.radius if np.ndim(cloud.radius) else None
         self.walked = Items(tree, reach + radius, False, radius, radii, BALLS)
 
     def every(self) -> np.ndarray:
-        return np.arange(self.n)
+        return np.arange(len(self._points))
 
     def within(self, box: BoxAround, distance: float) -> np.ndarray:
         distance = distance * (1.0 + 2.0**-40)

@@ -20,11 +20,11 @@ from collide.shapes.height_field import HeightField
 from collide.shapes.mesh import Mesh
 
 #: Rectangles of no more cells than so many times those asked about are taken whole, and of so few in any case.
-_SPARE, _FEW = 4, 4096
+_SPARE, _MAX_WHOLE = 4, 4096
 #: Meshes kept: bodies move little between queries. Corners of rectangles are multiples of so many cells.
-_KEPT, _STEP = 32, 8
+_MAX_MESHES, _STEP = 32, 8
 #: Cells of a tile along each axis, for rays, and tiles kept.
-_TILE, _KEPT_TILES = 32, 1024
+_TILE, _MAX_TILES = 32, 1024
 #: How far next to a facet is, in sides of a cell: far above rounding.
 _NEXT = 2.0**-10
 
@@ -45,11 +45,10 @@ class Columns(FieldItems):
         self._pyramid, self._heights, self._bottom = field.pyramid, field.heights, field.bottom
         self._x, self._y = field.grid_lines
         self._rows, self._columns = field.heights.shape[0] - 1, field.heights.shape[1] - 1
-        self.n = self._rows * self._columns
         self.low = np.array([self._x[0], self._y[0], self._bottom])
         self.high = np.array([self._x[-1], self._y[-1], self._pyramid.top])
-        self._kept: dict[_Rectangle, NamedUnion] = {}
-        self._kept_tiles: dict[_Rectangle, NamedUnion] = {}
+        self._mesh_cache: dict[_Rectangle, NamedUnion] = {}
+        self._tile_cache: dict[_Rectangle, NamedUnion] = {}
         tops, n = field.pyramid.highest, _TILE // BLOCK
         padded = np.full((-(-tops.shape[0] // n) * n, -(-tops.shape[1] // n) * n), -math.inf)
         padded[: tops.shape[0], : tops.shape[1]] = tops
@@ -165,18 +164,18 @@ class Columns(FieldItems):
         """A mesh of the rectangle around some cells, or, where these are few among many, of the cells themselves."""
         around = self._around(some)
         n = (around.last_row - around.row) * (around.last_column - around.column)
-        if n > max(_SPARE * len(some), _FEW):
+        if n > max(_SPARE * len(some), _MAX_WHOLE):
             return self._mesh(around, some)
-        union = self._kept.get(around)
+        union = self._mesh_cache.get(around)
         if union is None:
             union = self._mesh(around, None)
-            _keep(self._kept, around, union, _KEPT)
+            _keep(self._mesh_cache, around, union, _MAX_MESHES)
         return union
 
     def tiles_on_rays(
         self, origins: np.ndarray, vectors: np.ndarray, limits: np.ndarray, slack: float
     ) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of each ray the tiles (k,) that it may enter, and when at the earliest (k,), by t.
+        """The tiles (k,) on the way of each ray, and when the ray enters each at the earliest (k,), by t.
 
         origins, vectors : (n, 3) in the terrain's frame.   limits : of t (n,).   slack : of places [m].
         """
@@ -193,10 +192,10 @@ class Columns(FieldItems):
         """The surface of a tile, walls and bottom of the terrain included."""
         row, column = (self._tiles[number] * _TILE).tolist()
         around = _Rectangle(row, column, min(row + _TILE, self._rows), min(column + _TILE, self._columns))
-        tile = self._kept_tiles.get(around)
+        tile = self._tile_cache.get(around)
         if tile is None:
             tile = self._mesh(around, None, solid=False)
-            _keep(self._kept_tiles, around, tile, _KEPT_TILES)
+            _keep(self._tile_cache, around, tile, _MAX_TILES)
         return tile
 
     def _around(self, some: np.ndarray) -> _Rectangle:
@@ -228,7 +227,7 @@ class Columns(FieldItems):
         return NamedUnion(Mesh(surface.vertices, surface.faces, solid=False), numbers, names_facets=True)
 
     def _cells_around(self, rectangle: _Rectangle) -> np.ndarray:
-        """Which cells of a rectangle and of one more row and column on each side are the terrain's."""
+        """Whether cells of a rectangle, and of a row and a column more on each side, are the terrain's."""
         row, column, last_row, last_column = rectangle
         first = max(row - 1, 0), max(column - 1, 0)
         last = min(last_row + 1, self._rows), min(last_column + 1, self._columns)
@@ -239,12 +238,12 @@ class Columns(FieldItems):
         return around
 
 
-def _keep(kept: dict, key, value, most: int) -> None:
+def _keep(cache: dict, key, value, max_items: int) -> None:
     """The last few are kept; threads may keep the same twice."""
-    while len(kept) >= most:
+    while len(cache) >= max_items:
         with suppress(StopIteration, RuntimeError):
-            kept.pop(next(iter(kept)), None)
-    kept[key] = value
+            cache.pop(next(iter(cache)), None)
+    cache[key] = value
 
 
 def _times(way: np.ndarray, low: np.ndarray, high: np.ndarray, limit: float) -> np.ndarray:

@@ -22,7 +22,7 @@ class Cells(FieldItems):
 
     def __init__(self, grid: VoxelGrid):
         tree = grid.tree
-        self._tree, self.n, self.X_FG = tree, int(np.prod(tree.shape)), grid.X_FG
+        self._tree, self.X_FG = tree, grid.X_FG
         self.low, self.high = tree.low, tree.high
         reach = math.sqrt(float(np.square(np.maximum(np.abs(tree.low), np.abs(tree.high))).sum())) * (1.0 + 2.0**-50)
         self.walked = Items(tree, reach, False, are=CELLS)
