@@ -82,7 +82,7 @@ class OcTree(VoxelGrid):
     ):
         leaves, resolution = _checked_leaves(leaves), positive("OcTree", "resolution", resolution)
         threshold = _checked_threshold(threshold)
-        if unknown not in ("free", "occupied"):
+        if not isinstance(unknown, str) or unknown not in ("free", "occupied"):
             raise InvalidShape(f'OcTree: unknown must be "free" or "occupied", got {checks.brief(unknown)}')
         pose, sides = IDENTITY if X is None else as_pose(X, "OcTree: X"), np.full(3, resolution)
         occupied = leaves.log_odds >= math.log(threshold / (1.0 - threshold))
