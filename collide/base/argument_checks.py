@@ -204,7 +204,9 @@ def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -
         raise error(f"{what} has masked entries; fill them or leave them out ({wanted} is wanted)")
     try:
         return np.asarray(value)
-    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError):
+    except (TypeError, ValueError, OverflowError, RecursionError, MemoryError, RuntimeError) as reason:
+        if hasattr(value, "__array__"):  # a tensor on another device, or with a gradient: its own words tell more
+            raise error(f"{what} must be an array of numbers {wanted}: {reason}; got {brief(value)}") from None
         # numpy's own words for rows of different lengths are long, and tell no more
         raise error(
             f"{what} must be numbers of shape {wanted}, and no rows of different lengths, got {brief(value)}"

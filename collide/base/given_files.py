@@ -14,6 +14,8 @@ from collide.errors import SceneError
 LARGEST_TEXT = 256 * 2**20
 #: Bytes of a mesh file, unpacked.
 LARGEST_MESH = 512 * 2**20
+#: Bytes of a file of points, or of an octree, unpacked.
+LARGEST_CLOUD = 2048 * 2**20
 
 _KINDS = (
     (stat.S_ISFIFO, "a named pipe"), (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"),
@@ -30,7 +32,9 @@ def read_bytes(path: Path, largest: int = LARGEST_TEXT, what: str = "description
         with os.fdopen(handle, "rb") as file:
             about = os.fstat(handle)
             _refuse_other_than_files(path, about)
-            content = b"" if about.st_size > largest else file.read(largest + 1)
+            content = b"" if about.st_size > largest else file.read(about.st_size + 1)
+            if len(content) > about.st_size:  # it grows, or is one of the kernel's, whose size is 0
+                content += file.read(largest + 1 - len(content))
             if about.st_size > largest or len(content) > largest:
                 raise SceneError(f"is larger than {largest >> 20} MiB, the most that is read of a {what}", path=path)
             return content

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from collide.base import argument_checks as checks
 from collide.base.lazy_modules import lazy_module
-from collide.errors import InvalidArgument, InvalidShape
+from collide.errors import InvalidArgument, InvalidShape, SceneError
+from collide.shapes import cloud_formats
 from collide.shapes.shape import Shape, kept_with_shape, positive, rows, scalar
+from collide.shapes.shape_files import ANY, Field, read_arrays, refused_as_shape, shape_suffix, write_arrays
 from collide.transforms import LARGEST
 
 if TYPE_CHECKING:
@@ -19,6 +25,13 @@ if TYPE_CHECKING:
     from collide.fields.point_tree import PointTree
 
 point_tree: Any = lazy_module("collide.fields.point_tree")
+sensor_messages: Any = lazy_module("collide.fields.sensor_messages")
+#: Who reads files of points: scenes stand above the engine.
+_LOADER = "collide.scenes.loaders.cloud_file", "read_points"
+
+#: Changes whenever files written before would be read wrongly. A radius each, or a single one for all.
+_FILE_FORMAT = 1
+_FILE_FIELDS = {"points": Field("f8", (None, 3)), "radius": ANY}
 
 #: Numbers of nearest points in an answer at most.
 _MAX_NEAREST = 1 << 26
@@ -41,7 +54,8 @@ class PointCloud(Shape):
     Parameters
     ----------
     points : (n, 3) array_like, float64
-        Centres in the frame of the shape [m], n ≥ 1: arrays of any real dtype, tensors in the computer's memory.
+        Centres in the frame of the shape [m], n ≥ 1: arrays of any real dtype, tensors in the computer's memory, arrays
+        of records with fields x, y and z, of any shape.
     radius : float or (n,) array_like, float64
         Of the balls, ≥ 0 [m]: a number for all, or a number each; 0 makes points.
     drop_invalid : bool
@@ -72,7 +86,7 @@ class PointCloud(Shape):
     dropped: int
 
     def __init__(self, points: ArrayLike, radius: float | ArrayLike = 0.0, *, drop_invalid: bool = False):
-        radii, dropped = _checked_radius(radius), 0
+        points, radii, dropped = _of_records(points), _checked_radius(radius), 0
         if checks.true_or_false("PointCloud: drop_invalid", drop_invalid):
             points, radii, dropped = _only_finite(points, radii)
         points = rows("PointCloud", "points", points, (None, 3))
@@ -136,6 +150,133 @@ class PointCloud(Shape):
         made = cls(np.stack([(column - cx) / fx * z, (row - cy) / fy * z, z], axis=1), radius)
         made._store(dropped=int(image.size - len(z)))
         return made
+
+    @classmethod
+    def from_file(
+        cls, path: str | Path, radius: float | ArrayLike | None = None, *, drop_invalid: bool = False
+    ) -> PointCloud:
+        """The points of a file, as they stand there.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, by its suffix, behind which ``.gz`` may stand: ``.pcd`` (ascii, binary, binary_compressed),
+            ``.ply``, ``.las`` and ``.laz``, text with a point a line (``.xyz``, ``.txt``, ``.asc``, ``.csv``), or
+            ``.npz`` from `save`. Of several fields or columns x, y and z are read; a first line of text may name
+            them.
+        radius : float or (n,) array_like, optional
+            Of the balls, ≥ 0 [m]. By default 0, of ``.npz`` files the saved radii.
+        drop_invalid : bool
+            As of the class.
+
+        Returns
+        -------
+        PointCloud
+            Coordinates are taken as metres, in the frame of the file: the sensor's pose in a PCD is not applied.
+
+        Raises
+        ------
+        SceneError
+            For a missing file, a damaged or unreadable file, naming the line of a text.
+        MissingExtra
+            For LAS and LAZ without laspy and lazrs: ``pip install 'collide-robotics[clouds]'``.
+        InvalidShape
+            As of the class, and for a damaged ``.npz`` file.
+
+        Notes
+        -----
+        O(n) time and memory; files of at most 2 GiB, unpacked. docs/clouds.md has figures.
+        """
+        path = checks.file_path("PointCloud.from_file: path", path, SceneError)
+        checks.true_or_false("PointCloud.from_file: drop_invalid", drop_invalid)
+        radius = None if radius is None else _checked_radius(radius)
+        if path.suffix.lower() == ".npz":
+            cloud = cls.load(path)
+            return cloud if radius is None else cls(cloud.points, radius)
+        points = getattr(import_module(_LOADER[0]), _LOADER[1])(path)
+        with _refused_from(f"PointCloud.from_file: {path}"):
+            return cls(points, 0.0 if radius is None else radius, drop_invalid=drop_invalid)
+
+    @classmethod
+    def from_message(
+        cls, message: Any, radius: float | ArrayLike = 0.0, *, drop_invalid: bool = False
+    ) -> PointCloud:
+        """The points of a ``sensor_msgs/PointCloud2`` of ROS or ROS 2, without ROS.
+
+        Parameters
+        ----------
+        message : object or Mapping
+            With ``height``, ``width``, ``fields`` (of ``name``, ``offset``, ``datatype``, ``count``),
+            ``is_bigendian``, ``point_step``, ``row_step`` and ``data``: bytes, an array or list of bytes, or base64
+            text, as rosbridge sends.
+        radius : float or (height · width,) array_like
+            Of the balls, ≥ 0 [m].
+        drop_invalid : bool
+            As of the class: pixels of organised clouds without an echo are NaN.
+
+        Returns
+        -------
+        PointCloud
+            In the frame of the message, row by row; fields besides x, y and z are left out.
+
+        Raises
+        ------
+        InvalidShape
+            For a message without these fields, whose sizes do not match, and as of the class.
+
+        Notes
+        -----
+        O(n), a few nanoseconds a point: coordinates are copied once.
+        """
+        points = sensor_messages.points_of_message("PointCloud.from_message: message", message)
+        with _refused_from("PointCloud.from_message"):
+            return cls(points, radius, drop_invalid=drop_invalid)
+
+    def save(self, path: str | Path) -> None:
+        """Write the cloud to a file: whole as ``.npz``, or its points in a form for other programs.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file. ``.npz``, or no suffix: points and radii, which `load` and `from_file` read. ``.pcd`` and
+            ``.ply`` (binary) and ``.xyz`` (text): the points without radii, which `from_file` reads as the same
+            doubles. An existing file is replaced, by all of the new file or not at all.
+
+        Raises
+        ------
+        InvalidShape
+            Where the suffix is another, and where the file cannot be written. LAS holds multiples of a scale, and
+            would round points.
+        """
+        suffix = shape_suffix("PointCloud", path, *cloud_formats.SUFFIXES)
+        if suffix in cloud_formats.SUFFIXES:
+            with refused_as_shape("PointCloud.save", path):
+                cloud_formats.write_points(path, self.points, suffix)
+            return
+        write_arrays("PointCloud", path, _FILE_FORMAT, {"points": self.points, "radius": np.asarray(self.radius)})
+
+    @classmethod
+    def load(cls, path: str | Path) -> PointCloud:
+        """A cloud from an ``.npz`` file written by `save`.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        PointCloud
+            Equal to the saved cloud.
+
+        Raises
+        ------
+        InvalidShape
+            Where the file is of another kind, or damaged, or describes no cloud.
+        """
+        arrays = read_arrays("PointCloud", path, _FILE_FORMAT, _FILE_FIELDS, "tree_")
+        with _refused_from(f"PointCloud.load: {path}"):
+            return cls(**arrays)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -328,6 +469,23 @@ class PointCloud(Shape):
 @kept_with_shape("_tree")
 def _tree_of(cloud: PointCloud) -> PointTree:
     return point_tree.PointTree(cloud.points)
+
+
+@contextmanager
+def _refused_from(source: str) -> Iterator[None]:
+    """An error of the class says where its numbers come from."""
+    try:
+        yield
+    except InvalidShape as error:
+        raise InvalidShape(f"{source}: {error}") from None
+
+
+def _of_records(points: Any) -> Any:
+    """Points (n, 3) of an array of records with fields x, y and z; anything else as it is."""
+    if not {"x", "y", "z"} <= {*(getattr(getattr(points, "dtype", None), "names", None) or ())}:
+        return points
+    columns = [checks.array(f"PointCloud: points[{axis!r}]", points[axis], "(…,)", InvalidShape) for axis in "xyz"]
+    return np.stack([column.ravel() for column in columns], axis=1)
 
 
 def _checked_radius(radius) -> Any:

@@ -27,24 +27,24 @@ MAX_PLACED = 50_000_000
 _PIECE = 2**20
 
 
-def read_mesh_bytes(path: Path) -> tuple[str, bytes]:
+def read_mesh_bytes(path: Path, largest: int = LARGEST_MESH, what: str = "mesh") -> tuple[str, bytes]:
     """The suffix of a mesh file in small letters, and its bytes; of ``part.stl.gz`` those of ``part.stl``."""
-    content = read_bytes(path, LARGEST_MESH, "mesh")
+    content = read_bytes(path, largest, what)
     if path.suffix.lower() != ".gz":
         return path.suffix.lower(), content
-    return Path(path.stem).suffix.lower(), _unpacked(content, path)
+    return Path(path.stem).suffix.lower(), _unpacked(content, path, largest, what)
 
 
-def _unpacked(content: bytes, path: Path) -> bytes:
+def _unpacked(content: bytes, path: Path, largest: int, what: str) -> bytes:
     """The content of a gzip file, looked at piece by piece: a megabyte may hold a gigabyte."""
     unpacked = bytearray()
     try:
         with gzip.GzipFile(fileobj=BytesIO(content)) as packed:
             while piece := packed.read(_PIECE):
                 unpacked += piece
-                if len(unpacked) > LARGEST_MESH:
+                if len(unpacked) > largest:
                     raise SceneError(
-                        f"unpacks to more than {LARGEST_MESH >> 20} MiB, the most that is read of a mesh: "
+                        f"unpacks to more than {largest >> 20} MiB, the most that is read of a {what}: "
                         "make it coarser, or cut it into parts",
                         path=path,
                     )

@@ -53,13 +53,11 @@ _Columns = dict[str, "np.ndarray | tuple[np.ndarray, np.ndarray]"]
 
 def read(content: bytes, path: Path) -> Read:
     """The polygons of a PLY as triangles; SceneError where what its header declares is not what follows."""
-    endian, elements, at = _header(content, path)
-    body = _Text(content, at, path) if not endian else _Binary(content, at, endian, path)
-    columns: dict[str, _Columns] = {}
-    for element in elements:
-        columns[element.name] = body.element(element)
-    body.end()
-    vertices = _vertices(columns, path)
+    elements, columns, body = _columns(content, path)
+    vertices = _coordinates(columns, path)
+    if not np.isfinite(vertices).all():
+        row = int(np.argmax(~np.isfinite(vertices).all(axis=1)))
+        refuse(path, f"vertex {row} is {vertices[row].tolist()}: coordinates must be finite")
     faces = next((columns["face"][key] for key in _CORNERS if key in columns.get("face", {})), None)
     if faces is None:
         if any(element.rows for element in elements if element.name in ("face", "tristrips")):
@@ -78,15 +76,24 @@ def read(content: bytes, path: Path) -> Read:
     )
 
 
-def _vertices(columns: dict[str, _Columns], path: Path) -> np.ndarray:
+def read_points(content: bytes, path: Path) -> np.ndarray:
+    """(n, 3) float64 vertices of a PLY, finite or not, whatever else it holds; SceneError as of `read`."""
+    return _coordinates(_columns(content, path)[1], path)
+
+
+def _columns(content: bytes, path: Path) -> tuple[list[_Element], dict[str, _Columns], _Text | _Binary]:
+    endian, elements, at = _header(content, path)
+    body = _Text(content, at, path) if not endian else _Binary(content, at, endian, path)
+    columns = {element.name: body.element(element) for element in elements}
+    body.end()
+    return elements, columns, body
+
+
+def _coordinates(columns: dict[str, _Columns], path: Path) -> np.ndarray:
     vertex = columns.get("vertex", {})
     if not all(isinstance(vertex.get(axis), np.ndarray) for axis in "xyz"):
         refuse(path, "its header declares no element vertex with the properties x, y and z")
-    points = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
-    if not np.isfinite(points).all():
-        row = int(np.argmax(~np.isfinite(points).all(axis=1)))
-        refuse(path, f"vertex {row} is {points[row].tolist()}: coordinates must be finite")
-    return points
+    return np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
 
 
 # --- header -----------------------------------------------------------------------------------------
@@ -349,5 +356,6 @@ class _Binary:
             )
 
 
+@np.errstate(invalid="ignore")  # signalling NaNs
 def _native(values: np.ndarray) -> np.ndarray:
     return values.astype(np.float64 if values.dtype.kind == "f" else np.int64)

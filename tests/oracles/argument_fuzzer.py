@@ -152,7 +152,7 @@ def robot() -> collide.Robot:
 
 @cache
 def files() -> Path:
-    """A folder with a robot in URDF and its SRDF."""
+    """A folder with a robot in URDF and its SRDF, and points."""
     folder = Path(tempfile.mkdtemp(prefix="collide-arguments-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     link = '<link name="{0}"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
@@ -163,6 +163,7 @@ def files() -> Path:
     (folder / "rail.srdf").write_text(
         '<robot name="rail"><disable_collisions link1="a" link2="b" reason="Never"/></robot>'
     )
+    (folder / "cloud.xyz").write_text("1 2 3\n4 5 6\n")
     return folder
 
 
@@ -211,6 +212,15 @@ def partition() -> collide.SpacePartition:
 
 
 @cache
+def point_message() -> dict:
+    """A PointCloud2 of two points."""
+    fields = [{"name": axis, "offset": 4 * k, "datatype": 7, "count": 1} for k, axis in enumerate("xyz")]
+    return {
+        "height": 1, "width": 2, "fields": fields, "is_bigendian": False, "point_step": 12, "row_step": 24,
+        "data": bytes(24),
+    }
+
+
 def polygon() -> collide.ConvexPolygon:
     return collide.ConvexPolygon([(0, 0), (1, 0), (0, 1)])
 
@@ -410,6 +420,8 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "PointCloud.cropped": lambda: {"box": [(0, 0, 0), (1, 1, 1)]},
     "PointCloud.filtered": lambda: {"spacing": 0.1},
     "PointCloud.from_depth": lambda: {"depth": np.ones((2, 2)), "fx": 1.0, "fy": 1.0},
+    "PointCloud.from_file": lambda: {"path": files() / "cloud.xyz"},
+    "PointCloud.from_message": lambda: {"message": point_message()},
     "PointCloud.nearest": lambda: {"p": (0, 0, 0)},
     "PointCloud.updated": lambda: {"added": [(0, 0, 1)]},
     "PointCloud.within": lambda: {"p": (0, 0, 0), "r": 1.0},
@@ -510,6 +522,7 @@ FILES = {"path", "folder", "srdf", "package_path", "state"}
 #: Where the argument is fine and what is wrong stands within: what the message names instead.
 SAID_OTHERWISE = {
     ("scenes.Scene.place_robot", "robot"): "the link that is in the scene already",
+    ("World.add_many", "shapes"): "of none at all, how many there are",
     ("scenes.allow_pairs", "world"): "the file, which names none of its bodies",
     ("polytopes.HierarchicalTree", "points"): "that the body is flat, or has another dimension than there are trees of",
 }
