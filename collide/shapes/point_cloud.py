@@ -276,7 +276,7 @@ class PointCloud(Shape):
         """
         arrays = read_arrays("PointCloud", path, _FILE_FORMAT, _FILE_FIELDS, "tree_")
         with _refused_from(f"PointCloud.load: {path}"):
-            return cls(**arrays)
+            return cls(arrays["points"], arrays["radius"])
 
     def __len__(self) -> int:
         return len(self.points)
