@@ -1,10 +1,12 @@
 """What a point cloud costs, to make and to ask, beside scipy's k-d tree and coal's octree, from 10³ to 10⁷ points.
 
-    python benchmarks/clouds.py --table made asked
+    python benchmarks/clouds.py --table made asked read
 
 made    a cloud and its tree, beside cKDTree and coal's OcTree of the same points, cells as large as a ball
 asked   spheres, convex shapes, gaps, nearest points; ours in batches, coal in a loop of Python, scipy in one call:
         for spheres the points within both radii are counted
+read    a file of each format, in µs a point, and the peak of memory while reading, in bytes a point; beside laspy's
+        whole records, numpy.loadtxt, trimesh
 
 µs a call. Points lie evenly in a cube of 2 m, or on the walls of a room, as a lidar sees them; balls have a radius of
 5 mm.
@@ -12,7 +14,12 @@ asked   spheres, convex shapes, gaps, nearest points; ours in batches, coal in a
 
 from __future__ import annotations
 
+import atexit
+import shutil
+import tempfile
+import tracemalloc
 from functools import cache, partial
+from pathlib import Path
 
 import numpy as np
 from inputs import rotations
@@ -103,6 +110,48 @@ def asked(options: Options, points: int, where: str, question: str) -> Race:
     return Race(asked_of(points, where, n)[question], per=n)
 
 
+@cache
+def folder() -> Path:
+    path = Path(tempfile.mkdtemp(prefix="collide-clouds-"))
+    atexit.register(shutil.rmtree, path, ignore_errors=True)
+    return path
+
+
+@cache
+def file_of(points: int, kind: str) -> Path:
+    path, places = folder() / f"{points}.{kind}", points_of(points, "room")
+    if kind in ("las", "laz"):
+        import laspy
+
+        data = laspy.LasData(laspy.LasHeader(point_format=3, version="1.2"))
+        data.header.scales = np.full(3, 1e-6)
+        data.x, data.y, data.z = places.T
+        data.write(path)
+    else:
+        collide.PointCloud(places, _RADIUS).save(path)
+    return path
+
+
+def read(options: Options, points: int, kind: str) -> Race:
+    path = file_of(points, kind)
+    tasks = {"collide": lambda: collide.PointCloud.from_file(path)}
+    if kind in ("las", "laz"):
+        import laspy
+
+        tasks["laspy"] = lambda: laspy.read(path).xyz
+    elif kind == "xyz":
+        tasks["numpy"] = lambda: np.loadtxt(path)
+    elif kind == "ply" and installed(trimesh="trimesh"):
+        import trimesh
+
+        tasks["trimesh"] = lambda: trimesh.load(path, process=False)
+    tracemalloc.start()
+    tasks["collide"]()
+    columns = {"peak_bytes_a_point": tracemalloc.get_traced_memory()[1] / points}
+    tracemalloc.stop()
+    return Race(tasks, per=points, columns=columns)
+
+
 def sizes(options: Options) -> tuple[int, ...]:
     return (10**3, 10**4) if options.quick else (10**3, 10**4, 10**5, 10**6, 10**7)
 
@@ -116,8 +165,14 @@ def asked_cases(options: Options):
     return grid(points=sizes(options)[:4], where=("cube", "room"), question=questions)
 
 
+def read_cases(options: Options):
+    kinds = ("pcd", "ply", "npz", "xyz", *(("las", "laz") if installed(laspy="laspy") else ()))
+    return grid(points=(10**4,) if options.quick else (10**6,), kind=kinds)
+
+
 CLAIMS = [
     Claim("made", "µs to make a cloud with its tree", made_cases, made, file="clouds-made", turns=5),
+    Claim("read", "µs a point read", read_cases, read, file="clouds-read", turns=5),
     Claim("asked", "µs a question to a cloud", asked_cases, asked, file="clouds-asked", turns=5),
 ]
 
