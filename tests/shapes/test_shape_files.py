@@ -33,7 +33,7 @@ def ball(seed: int, n: int) -> np.ndarray:
     return points / np.linalg.norm(points, axis=1)[:, None]
 
 
-SHAPES = ("mesh", "scaled mesh", "open mesh", "hull", "rounded hull", "hull with faces")
+SHAPES = ("mesh", "scaled mesh", "open mesh", "hull", "rounded hull", "hull with faces", "cloud", "cloud of radii")
 
 
 @cache
@@ -46,6 +46,8 @@ def shapes() -> dict:
         "hull": hull,
         "rounded hull": ConvexHull(ball(2, 300), radius=0.1),
         "hull with faces": ConvexHull(ball(3, 40), faces=ConvexHull(ball(3, 40)).hull.facets),
+        "cloud": collide.PointCloud(ball(6, 60), 0.125),
+        "cloud of radii": collide.PointCloud(ball(6, 60), np.linspace(0.0, 0.25, 60)),
     }
 
 
@@ -132,6 +134,8 @@ def test_forged_arrays_are_refused_or_are_another_shape(kind, tmp_path):
             taken.append((name, how))
             if isinstance(found, Mesh):
                 fresh = Mesh(found.base.vertices, found.base.faces, solid=found.solid).scaled(found.scale)
+            elif isinstance(found, collide.PointCloud):
+                fresh = collide.PointCloud(found.points, found.radius)
             else:
                 fresh = ConvexHull(found.points, faces=found.faces, radius=found.radius)
             assert found == fresh and answers(found) == answers(fresh), (name, how)
