@@ -1,7 +1,7 @@
 """LAS and LAZ, the files of aerial surveys, read by laspy piece by piece: no more is held than points that came.
 
-Headers are checked before laspy sees them. What is not: of a damaged LAZ 1.4 lazrs may reserve 4 GiB for a layer of a
-chunk, before it finds that the file ends.
+Headers, the table of chunks and the lengths of layers are checked before laspy sees them: lazrs reserves what they ask
+for, and ends the process where it cannot.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from collide.scenes.loaders.polygons import refuse
 _HEADER, _RECORD = 227, 54
 #: Where the header has the format of points, and a bit for LAZ; bytes of a chunk at least: its first point is as it is.
 _FORMAT, _CHUNK = 104, 20
+#: Bytes of a point and layers of a chunk, by the format of points; every extra byte has a layer.
+_LAYERED = {6: (30, 9), 7: (36, 10), 8: (38, 11), 9: (59, 10), 10: (67, 12)}
 #: Points read at once.
 _PIECE = 2**16
 
@@ -76,3 +78,19 @@ def _check_chunks(content: bytes, begin: int, path: Path) -> None:
     n_chunks = struct.unpack_from("<I", content, place + 4)[0]
     if n_chunks * _CHUNK > len(content):
         refuse(path, f"its table has {n_chunks} chunks, more than its {len(content)} bytes can hold")
+    _check_layers(content, begin + 8, place, n_chunks, path)
+
+
+def _check_layers(content: bytes, at: int, end: int, n_chunks: int, path: Path) -> None:
+    """Refuse a layer longer than the chunks: of points of formats 6 to 10, whose chunks begin with a point, the number
+    of points, and the length of each layer.
+    """
+    kind, size = struct.unpack_from("<BH", content, _FORMAT)
+    least, n_layers = _LAYERED.get(kind & 63, (size, 0))
+    n_layers += size - least
+    head = size + 4 + 4 * n_layers
+    for _ in range(n_chunks if n_layers > 0 else 0):
+        if at + head <= end:
+            at += head + int(np.frombuffer(content, "<u4", n_layers, at + size + 4).sum(dtype=np.int64))
+            if at > end:
+                refuse(path, f"a chunk of points ends at byte {at}, beyond {end}: the file is damaged")

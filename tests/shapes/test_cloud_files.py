@@ -222,6 +222,36 @@ def test_las_and_laz(laspy, suffix, point_format, tmp_path):
         read(bytes(grown), f"a{suffix}", tmp_path)
 
 
+def test_tables_that_ask_for_much_memory_are_refused(laspy, tmp_path):
+    """Lazrs would reserve what they say, and end the process."""
+    las(laspy, tmp_path / "a.laz", point_format=7)
+    content = (tmp_path / "a.laz").read_bytes()
+    begin = int.from_bytes(content[96:100], "little")
+    table = int.from_bytes(content[begin : begin + 8], "little")
+    for place, value, words in (
+        (table + 4, 2**32 - 1, "its table has 4294967295 chunks"), (begin, 2**31, "its table of chunks is said to"),
+        (begin + 8 + 36 + 4, 2**32 - 1, "a chunk of points ends at byte"), (100, 2**31, "declares 2147483648 records"),
+    ):
+        changed = bytearray(content)
+        changed[place : place + 4] = value.to_bytes(4, "little")
+        with pytest.raises(SceneError, match=words):
+            read(bytes(changed), "a.laz", tmp_path)
+    with pytest.raises(SceneError, match="is no LAS"):
+        read(content[:226], "a.laz", tmp_path)
+
+
+@pytest.mark.parametrize("point_format", [0, 6, 8])
+def test_laz_of_several_chunks_with_further_dimensions(laspy, point_format, tmp_path):
+    header = laspy.LasHeader(point_format=point_format, version="1.4")
+    header.add_extra_dim(laspy.ExtraBytesParams("height", "f8"))
+    data, rng = laspy.LasData(header), np.random.default_rng(6)
+    data.X, data.Y, data.Z = rng.integers(-1000, 1000, (3, 50_001)).astype(np.int32)
+    data.height = np.arange(50_001.0)
+    data.write(tmp_path / "a.laz")
+    cloud = PointCloud.from_file(tmp_path / "a.laz")
+    assert np.array_equal(cloud.points, np.stack([data.X, data.Y, data.Z], axis=1) * header.scales + header.offsets)
+
+
 def test_without_laspy_the_extra_is_named(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "laspy", None)
     with pytest.raises(MissingExtra, match=r"laspy is needed to read the points of a.laz: .*\[clouds\]"):
@@ -284,8 +314,8 @@ def samples(laspy_or_none, tmp_path) -> list[tuple[str, bytes]]:
     some = [(".pcd", pcd(points, data, "F4 U1 F8 F4", "x a y z")) for data in ("ascii", "binary", "binary_compressed")]
     some += [(".ply", (tmp_path / "a.ply").read_bytes()), (".csv", b"x,y,z\n" + b"1,2,3\n" * 20)]
     some += [(".xyz", b"#c\n" + b"1 2 3 4\n" * 20)]
-    for suffix in (".las", ".laz") if laspy_or_none else ():
-        las(laspy_or_none, tmp_path / f"b{suffix}", 50)
+    for suffix, kind in ((".las", 3), (".laz", 3), (".laz", 7)) if laspy_or_none else ():
+        las(laspy_or_none, tmp_path / f"b{suffix}", 50, kind)
         some.append((suffix, (tmp_path / f"b{suffix}").read_bytes()))
     return some
 
