@@ -27,8 +27,12 @@ MAX_PLACED = 50_000_000
 _PIECE = 2**20
 
 
-def read_mesh_bytes(path: Path, largest: int = LARGEST_MESH, what: str = "mesh") -> tuple[str, bytes]:
-    """The suffix of a mesh file in small letters, and its bytes; of ``part.stl.gz`` those of ``part.stl``."""
+def read_mesh_bytes(path: Path, largest: int | None = None, what: str = "mesh") -> tuple[str, bytes]:
+    """The suffix of a mesh file in small letters, and its bytes; of ``part.stl.gz`` those of ``part.stl``.
+
+    largest : how many bytes are read, unpacked; by default those of a mesh.
+    """
+    largest = LARGEST_MESH if largest is None else largest
     content = read_bytes(path, largest, what)
     if path.suffix.lower() != ".gz":
         return path.suffix.lower(), content

@@ -17,7 +17,7 @@ import pytest
 import collide
 from collide import InvalidShape, MissingExtra, PointCloud, SceneError
 from collide.fields.lzf_kernel import unpack_lzf
-from collide.scenes.loaders.cloud_file import READERS
+from collide.scenes.loaders import cloud_file
 
 #: 814 bytes, b"abcabcabcabcabc" * 30 + bytes(300) + bytes(range(64)), as liblzf 3.6 packs them.
 OF_LIBLZF = (
@@ -308,6 +308,14 @@ def test_files_that_are_not_there_and_suffixes_that_are_not_written(tmp_path):
         PointCloud.from_file(tmp_path / "mesh.npz")
 
 
+def test_packed_files_stop_at_the_limit(monkeypatch, tmp_path):
+    monkeypatch.setattr(cloud_file, "LARGEST_CLOUD", 2**20)
+    with pytest.raises(SceneError, match="unpacks to more than 1 MiB, the most that is read of a cloud"):
+        read(gzip.compress(b"1 2 3\n" * 10**6), "a.xyz.gz", tmp_path)
+    with pytest.raises(SceneError, match="is larger than 1 MiB, the most that is read of a cloud"):
+        read(b"1 2 3\n" * 10**6, "a.xyz", tmp_path)
+
+
 def samples(laspy_or_none, tmp_path) -> list[tuple[str, bytes]]:
     points = points_of(7, 30)
     PointCloud(points).save(tmp_path / "a.ply")
@@ -338,7 +346,7 @@ def test_mutated_bytes_are_refused_by_name_or_read(tmp_path):
                 mutant[int(place)] = int(rng.choice([0, 255, 48, 57, 10, 32, int(rng.integers(0, 256))]))
             tracemalloc.start()
             try:
-                points = READERS[suffix](bytes(mutant), PATH)
+                points = cloud_file.READERS[suffix](bytes(mutant), PATH)
                 assert points.ndim == 2 and points.shape[1] == 3 and points.dtype == np.float64
                 taken += 1
             except SceneError as error:
