@@ -46,7 +46,7 @@ _WRONG = {
 _HALF = 1 << LEVELS - 1
 
 
-class OctreeLeaves(NamedTuple):
+class StreamLeaves(NamedTuple):
     """The leaves of an octree of 2¹⁶ finest cells a side around its origin, in the order of their stream.
 
     resolution : side of a finest cell, > 0 [m].
@@ -64,7 +64,7 @@ class OctreeLeaves(NamedTuple):
     log_odds: np.ndarray | None = None
 
 
-def read_octree_file(path: str | Path, resolution: float | None = None) -> OctreeLeaves:
+def read_octree_file(path: str | Path, resolution: float | None = None) -> StreamLeaves:
     """The leaves of a .bt or .ot file, by its first line.
 
     Parameters
@@ -76,7 +76,7 @@ def read_octree_file(path: str | Path, resolution: float | None = None) -> Octre
 
     Returns
     -------
-    OctreeLeaves
+    StreamLeaves
 
     Raises
     ------
@@ -90,7 +90,7 @@ def read_octree_file(path: str | Path, resolution: float | None = None) -> Octre
     return leaves_of_file(content_of("octree", path), f"octree {path}", resolution)
 
 
-def leaves_of_file(content: bytes, what: str, resolution: float | None = None) -> OctreeLeaves:
+def leaves_of_file(content: bytes, what: str, resolution: float | None = None) -> StreamLeaves:
     """The leaves in the bytes of a .bt or .ot file; see `read_octree_file`. what : for messages."""
     first = first_line(content)
     if first not in _FIRST_LINES:
@@ -105,7 +105,7 @@ def leaves_of_file(content: bytes, what: str, resolution: float | None = None) -
     return _at_resolution(leaves, resolution, what)
 
 
-def leaves_of_message(message: Any, resolution: float | None = None) -> OctreeLeaves:
+def leaves_of_message(message: Any, resolution: float | None = None) -> StreamLeaves:
     """The leaves of an octomap_msgs/Octomap.
 
     message : an object, or a mapping, with ``id``, ``resolution``, ``binary`` and ``data``, int8 or any form that
@@ -119,7 +119,7 @@ def leaves_of_message(message: Any, resolution: float | None = None) -> OctreeLe
     return _at_resolution(_leaves(data, is_binary, entries, what)[0], resolution, what)
 
 
-def write_octree_file(path: str | Path, leaves: OctreeLeaves) -> None:
+def write_octree_file(path: str | Path, leaves: StreamLeaves) -> None:
     """Write leaves to a .bt file, whole or not at all: occupied and free alone. Raises InvalidShape, OSError."""
     stream, n_nodes = binary_stream(leaves)
     header = (
@@ -134,7 +134,7 @@ def write_octree_file(path: str | Path, leaves: OctreeLeaves) -> None:
 # --- reading ------------------------------------------------------------------------------------
 
 
-def _leaves(data: np.ndarray, is_binary: bool, entries: dict[str, str], what: str) -> tuple[OctreeLeaves, int]:
+def _leaves(data: np.ndarray, is_binary: bool, entries: dict[str, str], what: str) -> tuple[StreamLeaves, int]:
     """(leaves, number of nodes, the root's too) of a stream."""
     side, layout = _checked_header(entries, what)
     step = 2 if is_binary else layout.itemsize
@@ -145,14 +145,14 @@ def _leaves(data: np.ndarray, is_binary: bool, entries: dict[str, str], what: st
     if is_binary:
         log_odds, occupied = None, np.empty(int(_LEAVES_OF_BYTE[data].sum(dtype=np.int64)), dtype=bool)
         corners, exponents = _walked(data, n_records, len(occupied), what, occupied)
-        return OctreeLeaves(side, corners, exponents, occupied), n_records + len(occupied)
+        return StreamLeaves(side, corners, exponents, occupied), n_records + len(occupied)
     nodes = data.view(layout)
     children = np.ascontiguousarray(nodes["children"])
     log_odds = nodes["log_odds"][children == 0].astype(np.float32)
     if not np.isfinite(log_odds).all():
         raise InvalidShape(f"{what}: a leaf has log-odds of {log_odds[~np.isfinite(log_odds)][0]}")
     corners, exponents = _walked(children, n_records, len(log_odds), what)
-    return OctreeLeaves(side, corners, exponents, log_odds >= 0.0, log_odds), n_records
+    return StreamLeaves(side, corners, exponents, log_odds >= 0.0, log_odds), n_records
 
 
 def _checked_header(entries: dict[str, str], what: str) -> tuple[float, np.dtype]:
@@ -184,7 +184,7 @@ def _walked(
     return corners, exponents
 
 
-def _at_resolution(leaves: OctreeLeaves, resolution: float | None, what: str) -> OctreeLeaves:
+def _at_resolution(leaves: StreamLeaves, resolution: float | None, what: str) -> StreamLeaves:
     if resolution is None:
         return leaves
     wanted = checks.number(resolution)
@@ -196,7 +196,7 @@ def _at_resolution(leaves: OctreeLeaves, resolution: float | None, what: str) ->
 # --- writing ------------------------------------------------------------------------------------
 
 
-def binary_stream(leaves: OctreeLeaves) -> tuple[bytes, int]:
+def binary_stream(leaves: StreamLeaves) -> tuple[bytes, int]:
     """(the .bt stream of leaves in any order, its number of nodes).
 
     Level by level from the finest: children are put in order along Morton's curve, and states of eight make a word of

@@ -19,11 +19,16 @@ if TYPE_CHECKING:
 
 cell_tree: Any = lazy_module("collide.fields.cell_tree")
 ray_cells: Any = lazy_module("collide.fields.ray_cells")
+octree_files: Any = lazy_module("collide.fields.octree_files")
 
 #: Of a cell that a ray ends in, and of one that it goes through: OctoMap's log-odds.
 HIT, MISS = math.log(0.7 / 0.3), math.log(0.4 / 0.6)
+#: Of leaves of files that only say occupied or free: where OctoMap clamps log-odds.
+_OCCUPIED, _FREE = 3.5, -2.0
 #: A leaf has no more than 2^16 cells along an axis.
 _MAX_EXPONENT = 16
+#: Indices of cells in OctoMap's files lie within this.
+_FARTHEST = 1 << 15
 
 
 class OcTreeLeaves(NamedTuple):
@@ -85,7 +90,7 @@ class OcTree(VoxelGrid):
         if not isinstance(unknown, str) or unknown not in ("free", "occupied"):
             raise InvalidShape(f'OcTree: unknown must be "free" or "occupied", got {checks.brief(unknown)}')
         pose, sides = IDENTITY if X is None else as_pose(X, "OcTree: X"), np.full(3, resolution)
-        occupied = leaves.log_odds >= math.log(threshold / (1.0 - threshold))
+        occupied = leaves.log_odds >= _log_odds_of(threshold)
         cells, exponents = leaves.cell[occupied], leaves.exponent[occupied]
         if unknown == "occupied":
             more, of_more = _unknown_cubes(leaves, sides)
@@ -106,6 +111,93 @@ class OcTree(VoxelGrid):
     def resolution(self) -> float:
         """Side of the smallest cells [m]."""
         return float(self.cell[0])
+
+    @classmethod
+    def from_file(  # type: ignore[override]
+        cls, path, *, resolution: float | None = None, threshold: float = 0.5, unknown: str = "free",
+        X: ArrayLike | None = None,
+    ) -> OcTree:
+        """The map of an OctoMap file: ``.bt``, occupied or free, or ``.ot``, log-odds; colours are left out.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, at most 2 GiB; its first line says which form it has.
+        resolution : float, optional
+            What the file must say, to five digits [m].
+        threshold, unknown, X
+            As of the constructor. Leaves of a ``.bt`` count as occupied with any threshold up to 0.97, as in OctoMap.
+
+        Returns
+        -------
+        OcTree
+
+        Raises
+        ------
+        InvalidShape
+            For a missing or damaged file, one of another resolution; as the constructor.
+
+        Notes
+        -----
+        About 0.05 s for a million nodes, and O(n log n) for the tree.
+        """
+        leaves = octree_files.read_octree_file(path, resolution)
+        return cls._of_stream(leaves, threshold=threshold, unknown=unknown, X=X)
+
+    @classmethod
+    def from_message(
+        cls, message: Any, *, threshold: float = 0.5, unknown: str = "free", X: ArrayLike | None = None
+    ) -> OcTree:
+        """The map of an ``octomap_msgs/Octomap``, without ROS.
+
+        Parameters
+        ----------
+        message : object or mapping
+            With ``id``, ``resolution``, ``binary`` and ``data``: bytes, or int8 in any form.
+        threshold, unknown, X
+            As of the constructor. The origin of an ``OctomapWithPose`` is the ``X`` here.
+
+        Returns
+        -------
+        OcTree
+
+        Raises
+        ------
+        InvalidShape
+            For fields that are missing or do not match; as the constructor.
+        """
+        return cls._of_stream(octree_files.leaves_of_message(message), threshold=threshold, unknown=unknown, X=X)
+
+    @classmethod
+    def _of_stream(cls, leaves, **options) -> OcTree:
+        log_odds = np.where(leaves.occupied, _OCCUPIED, _FREE) if leaves.log_odds is None else leaves.log_odds
+        return cls((leaves.corners, leaves.exponents, log_odds), leaves.resolution, **options)
+
+    def save(self, path) -> None:
+        """Write the leaves to a ``.bt`` file, occupied by this map's threshold or free.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, ending in ``.bt``; an existing file is replaced, by all of the new file or not at all. ``X`` is
+            not written.
+
+        Raises
+        ------
+        InvalidShape
+            For another suffix, leaves beyond 32,768 cells from the origin, or a file that cannot be written.
+        """
+        if checks.file_path("OcTree.save: path", path, InvalidShape).suffix.lower() != ".bt":
+            raise InvalidShape(f"OcTree.save: {checks.brief(path)}: the suffix must be .bt")
+        cell, exponent, log_odds = self.leaves
+        if max(abs(int(cell.min())), abs(int(cell.max()))) > _FARTHEST:
+            raise InvalidShape(f"OcTree.save: a .bt file holds cells within ±{_FARTHEST}, got {checks.brief(cell)}")
+        occupied = log_odds >= _log_odds_of(self.threshold)
+        stream = octree_files.StreamLeaves(self.resolution, cell, exponent, occupied)
+        try:
+            octree_files.write_octree_file(path, stream)
+        except OSError as error:
+            raise InvalidShape(f"OcTree.save: {checks.brief(path)}: {error}") from None
 
     @classmethod
     def from_points(cls, points: ArrayLike, resolution: float) -> OcTree:  # type: ignore[override]
@@ -195,6 +287,10 @@ def _cells_of_points(name: str, field: str, points, resolution: float) -> np.nda
     if not np.abs(cells).max() < 2.0**53:
         raise InvalidShape(f"{name}: a resolution of {resolution:g} m is too fine for these points")
     return cells.astype(np.int64)
+
+
+def _log_odds_of(probability: float) -> float:
+    return math.log(probability / (1.0 - probability))
 
 
 def _checked_threshold(threshold) -> float:

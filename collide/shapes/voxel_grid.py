@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collide.fields.cell_tree import CellTree, Grid
 
 cell_tree: Any = lazy_module("collide.fields.cell_tree")
+voxel_files: Any = lazy_module("collide.fields.voxel_files")
 
 
 class VoxelGrid(Shape):
@@ -117,6 +118,57 @@ class VoxelGrid(Shape):
         if not np.abs(cells).max() < 2.0**62:
             raise InvalidShape(f"{cls.__name__}: cells of {checks.brief(cell)} m are too small for these points")
         return cls(cells.astype(np.int64), cell)
+
+    @classmethod
+    def from_file(cls, path) -> VoxelGrid:
+        """The grid of a binvox file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, at most 2 GiB; its scale and its shift are metres.
+
+        Returns
+        -------
+        VoxelGrid
+            Its ``X`` is the file's shift.
+
+        Raises
+        ------
+        InvalidShape
+            For a missing or damaged file, or one without an occupied cell.
+        """
+        occupied, sides, origin = voxel_files.read_voxel_file(path)
+        X = np.eye(4)
+        X[:3, 3] = origin
+        return cls(occupied, sides, X)
+
+    def save(self, path) -> None:
+        """Write the cells to a binvox file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, ending in ``.binvox``; an existing file is replaced, by all of the new file or not at all.
+
+        Raises
+        ------
+        InvalidShape
+            For another suffix, cells that are no cubes, a grid that is turned: the format has a scale and a shift
+            alone.
+        """
+        name = f"{type(self).__name__}.save"
+        if checks.file_path(f"{name}: path", path, InvalidShape).suffix.lower() != ".binvox":
+            raise InvalidShape(f"{name}: {checks.brief(path)}: the suffix must be .binvox")
+        if self.X_FG is not IDENTITY:
+            raise InvalidShape(f"{name}: the grid is turned, which a .binvox file cannot say; give X to the query")
+        tree, occupied = self.tree, np.zeros(self.tree.shape, dtype=bool)
+        occupied[tuple((self.cells - tree.least).T)] = True
+        origin = tree.least * tree.sides + tree.origin
+        try:
+            voxel_files.write_voxel_file(path, voxel_files.Voxels(occupied, tree.sides, origin))
+        except OSError as error:
+            raise InvalidShape(f"{name}: {checks.brief(path)}: {error}") from None
 
     @property
     def count(self) -> int:

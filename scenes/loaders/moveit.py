@@ -25,6 +25,7 @@ from collide.scenes.loaders.mesh_shapes import inline_shape
 from collide.scenes.loaders.robot_file import load_robot
 from collide.scenes.loaders.states import state_of
 from collide.shapes.compound import Compound
+from collide.shapes.octree import OcTree
 from collide.shapes.primitives import Box, Cone, Cylinder, Halfspace, Sphere
 from collide.shapes.shape import Shape
 from collide.transforms import as_poses, pose
@@ -66,6 +67,7 @@ def load_planning_scene(
     )
     frames = _Frames(fields, scene, robot)
     _add_objects(fields, scene, frames, meshes)
+    _add_octomap(fields, scene, frames)
     _add_attached(fields, scene, robot, meshes)
     _allow_pairs(fields, scene, robot)
     _note_what_is_ignored(fields, scene)
@@ -247,6 +249,27 @@ def _add_objects(fields: Fields, scene: Scene, frames: _Frames, meshes: str) -> 
         )
 
 
+def _add_octomap(fields: Fields, scene: Scene, frames: _Frames) -> None:
+    """The map of a sensed world, under MoveIt's name for it."""
+    world = fields.sub("world", ()) if isinstance(fields.get("world"), dict) else None
+    placed_map = world.sub("octomap", ()) if world is not None and isinstance(world.get("octomap"), dict) else None
+    cells = placed_map.get("octomap") if placed_map is not None else None
+    if placed_map is None or not isinstance(cells, dict) or not cells.get("data"):
+        return
+    X_WO = frames.pose(placed_map)
+    if placed_map.get("origin"):
+        X_WO = X_WO @ _pose(placed_map.sub("origin", ("position", "orientation")))
+    try:
+        tree = OcTree.from_message(cells)
+    except InvalidShape as error:
+        if "leaves is occupied" in str(error):
+            scene.notes.append(f"{Path(str(fields.path)).name}: no cell of the octomap is occupied")
+            return
+        raise InvalidShape(placed(error, fields.path, "world.octomap.octomap")) from None
+    place = _in_world(X_WO, placed_map)
+    scene.add(SceneBody("<octomap>", tree, place, static=True, source=f"{fields.path}: world.octomap"))
+
+
 def _in_world(X_WB: np.ndarray, thing: Fields) -> np.ndarray:
     """A pose that was multiplied together; InvalidPose names the object where it left the range of numbers."""
     try:
@@ -422,13 +445,6 @@ def matrix_pairs(matrix: Fields, names: list[str]) -> list[tuple[str, str]]:
 
 
 def _note_what_is_ignored(fields: Fields, scene: Scene) -> None:
-    world = fields.get("world")
-    octomap = world.get("octomap") if isinstance(world, dict) else None
-    cells = octomap.get("octomap") if isinstance(octomap, dict) else None
-    if isinstance(cells, dict) and cells.get("data"):
-        scene.notes.append(
-            f"{Path(str(fields.path)).name}: the octomap is not read; what it marks as occupied is NOT checked"
-        )
     for key, neutral in (("link_padding", 0), ("link_scale", 1)):
         for entry, _ in fields.items(key):
             value = entry.get("padding" if key == "link_padding" else "scale") if isinstance(entry, dict) else None

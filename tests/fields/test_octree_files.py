@@ -12,7 +12,7 @@ import pytest
 
 from collide import InvalidShape
 from collide.fields.octree_files import (
-    OctreeLeaves,
+    StreamLeaves,
     binary_stream,
     leaves_of_file,
     leaves_of_message,
@@ -80,7 +80,7 @@ def odds(rng) -> float:
     return float(np.float32(rng.normal()))
 
 
-def rows_of(leaves: OctreeLeaves, values) -> list[tuple]:
+def rows_of(leaves: StreamLeaves, values) -> list[tuple]:
     return sorted((*map(int, corner), int(s), v) for corner, s, v in zip(leaves.corners, leaves.exponents, values))
 
 
@@ -131,13 +131,13 @@ def test_messages_are_streams_without_a_header():
         leaves_of_message(message, 0.2)
 
 
-def random_leaves(seed: int, n: int) -> OctreeLeaves:
+def random_leaves(seed: int, n: int) -> StreamLeaves:
     """Leaves of several sizes that do not overlap: in each block of 8 cells a side those of one size."""
     rng = np.random.default_rng(seed)
     blocks = np.unique(rng.integers(-4096, 4096, (n, 3)), axis=0)
     exponents = rng.integers(0, 4, len(blocks))
     offsets = rng.integers(0, 8, (len(blocks), 3)) >> exponents[:, None] << exponents[:, None]
-    return OctreeLeaves(
+    return StreamLeaves(
         0.1, (8 * blocks + offsets).astype(np.int32), exponents.astype(np.int32), rng.random(len(blocks)) < 0.5
     )
 
@@ -155,10 +155,10 @@ def test_what_is_written_is_read_again(tmp_path):
         assert binary_stream(same) == binary_stream(leaves)
     for tree in trees(bits):
         rows = leaves_in(tree)
-        made = OctreeLeaves(1.0, np.array([row[:3] for row in rows]), np.array([row[3] for row in rows]),
+        made = StreamLeaves(1.0, np.array([row[:3] for row in rows]), np.array([row[3] for row in rows]),
                             np.array([row[4] == 2 for row in rows]))
         assert binary_stream(made) == (binary(tree), count(tree))
-    none = OctreeLeaves(0.1, np.zeros((0, 3), np.int32), np.zeros(0, np.int32), np.zeros(0, bool))
+    none = StreamLeaves(0.1, np.zeros((0, 3), np.int32), np.zeros(0, np.int32), np.zeros(0, bool))
     write_octree_file(tmp_path / "none.bt", none)
     assert len(read_octree_file(tmp_path / "none.bt").corners) == 0
 
@@ -176,7 +176,7 @@ def test_what_is_written_is_read_again(tmp_path):
 def test_leaves_that_are_no_octree_are_not_written(corners, exponents, words, tmp_path):
     words = words.replace("2^0", r"2\^0")
     with pytest.raises(InvalidShape, match=words):
-        write_octree_file(tmp_path / "a.bt", OctreeLeaves(0.1, corners, exponents, [True] * len(exponents)))
+        write_octree_file(tmp_path / "a.bt", StreamLeaves(0.1, corners, exponents, [True] * len(exponents)))
     assert not (tmp_path / "a.bt").exists()
 
 
@@ -265,7 +265,7 @@ def rows_of_octomap(tree, value) -> np.ndarray:
     return np.array(sorted(rows))
 
 
-def rows_in_metres(leaves: OctreeLeaves, values) -> np.ndarray:
+def rows_in_metres(leaves: StreamLeaves, values) -> np.ndarray:
     side = leaves.resolution * 2.0**leaves.exponents
     middle = leaves.resolution * leaves.corners + 0.5 * side[:, None]
     return np.array(sorted(map(tuple, np.column_stack([middle, side, values]).tolist())))

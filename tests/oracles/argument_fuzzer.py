@@ -152,7 +152,7 @@ def robot() -> collide.Robot:
 
 @cache
 def files() -> Path:
-    """A folder with a robot in URDF and its SRDF, and points."""
+    """A folder with a robot in URDF and its SRDF, points and maps of cells."""
     folder = Path(tempfile.mkdtemp(prefix="collide-arguments-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     link = '<link name="{0}"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
@@ -164,6 +164,8 @@ def files() -> Path:
         '<robot name="rail"><disable_collisions link1="a" link2="b" reason="Never"/></robot>'
     )
     (folder / "cloud.xyz").write_text("1 2 3\n4 5 6\n")
+    collide.OcTree(([[0, 0, 0]], [0], [1.0]), 0.1).save(folder / "map.bt")
+    collide.VoxelGrid([(0, 0, 0)], 0.1).save(folder / "grid.binvox")
     return folder
 
 
@@ -414,6 +416,8 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "HPolytope.closed": lambda: {"size": 1.0},
     "HeightField.cells_of": lambda: {"facets": [0]},
     "HeightField.from_image": lambda: {"image": np.eye(3), "cell": 1.0},
+    "OcTree.from_file": lambda: {"path": files() / "map.bt"},
+    "OcTree.from_message": lambda: {"message": {"id": "OcTree", "resolution": 0.1, "binary": True, "data": [3, 0] * 15 + [2, 0]}},
     "OcTree.cells_of": lambda: {"parts": [0]},
     "OcTree.from_points": lambda: {"points": np.eye(3), "resolution": 0.1},
     "OcTree.from_rays": lambda: {"origins": (0, 0, 0), "points": np.eye(3), "resolution": 0.1},
@@ -437,6 +441,7 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "SpacePartition.locate": lambda: {"points": (0, 0, 0)},
     "SpacePartition.portals": lambda: {"cells": partition().convex_pieces()},
     "TetMesh.from_file": lambda: {"path": "absent.msh"},
+    "VoxelGrid.from_file": lambda: {"path": files() / "grid.binvox"},
     "VoxelGrid.cells_of": lambda: {"parts": [0]},
     "VoxelGrid.from_points": lambda: {"points": np.eye(3), "cell": 0.1},
     "World.allow": lambda: {"a": "a", "b": "b"},

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from collide.errors import CollideError, SceneError
+import collide
+from collide.errors import CollideError, InvalidShape, SceneError
+from collide.fields.octree_files import StreamLeaves, binary_stream
 from collide.scenes import load
 from collide.shapes import Box, Compound, Cone, Cylinder, Halfspace, Mesh
 
@@ -213,3 +215,22 @@ def test_a_request_is_not_a_scene(planning_scene, tmp_path):
     planning_scene(request={"start_state": {"joint_state": {"name": ["lift"], "position": [0]}}})
     with pytest.raises(SceneError, match="is a MoveIt planning request: give the scene file"):
         load(tmp_path / "work/request0001.yaml")
+
+
+def test_an_octomap_is_an_obstacle(planning_scene):
+    tree = collide.OcTree(([[0, 0, 0], [4, 0, 0]], [2, 0], [3.5, -2.0]), 0.25)
+    leaves = StreamLeaves(0.25, tree.leaves.cell, tree.leaves.exponent, tree.leaves.log_odds >= 0.0)
+    data = np.frombuffer(binary_stream(leaves)[0], dtype=np.int8).tolist()
+    octomap = {"id": "OcTree", "resolution": 0.25, "binary": True, "data": data}
+    origin = {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+    scene = planning_scene(world={"octomap": {"header": {"frame_id": ""}, "origin": origin, "octomap": octomap}})
+    body = scene.body("<octomap>")
+    assert body.shape == collide.OcTree(tree.leaves, 0.25) and body.X_WB[:3, 3].tolist() == [1, 2, 3]
+    assert body.shape.count == 64 and not any("octomap" in note for note in scene.notes)
+    free = binary_stream(leaves._replace(occupied=leaves.occupied & False))[0]
+    empty = {**octomap, "data": np.frombuffer(free, dtype=np.int8).tolist()}
+    notes = planning_scene(world={"octomap": {"octomap": empty}}).notes
+    assert any("no cell of the octomap is occupied" in note for note in notes)
+    for change, match in (({"data": data[:-1]}, "whole number of nodes"), ({"id": "Else"}, "id must be one of")):
+        with pytest.raises(InvalidShape, match=rf"scene0001\.yaml: world\.octomap\.octomap: .*{match}"):
+            planning_scene(world={"octomap": {"octomap": {**octomap, **change}}})

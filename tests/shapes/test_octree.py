@@ -105,3 +105,24 @@ def test_bad_options_are_refused():
         collide.OcTree.from_rays(np.zeros((2, 3)), np.ones((3, 3)), 0.1)
     with pytest.raises(collide.InvalidShape, match="no ray of 3 ends within max_range"):
         collide.OcTree.from_rays((0, 0, 0), np.ones((3, 3)), 0.1, max_range=0.5)
+
+
+def test_files_hold_the_leaves(tmp_path):
+    rng = np.random.default_rng(3)
+    for case in range(8):
+        leaves = random_leaves(rng, 1 + case % 4)
+        tree = collide.OcTree(leaves, 0.125)
+        tree.save(tmp_path / "map.bt")
+        again = collide.OcTree.from_file(tmp_path / "map.bt", resolution=0.125)
+        assert np.array_equal(again.cells, tree.cells) and len(again.leaves.cell) == len(leaves.cell)
+        assert np.array_equal(collide.OcTree.from_file(tmp_path / "map.bt", threshold=0.9).cells, tree.cells)
+    with pytest.raises(collide.InvalidShape, match=r"its resolution is 0\.125 m, not 0\.1"):
+        collide.OcTree.from_file(tmp_path / "map.bt", resolution=0.1)
+    (tmp_path / "cut.bt").write_bytes((tmp_path / "map.bt").read_bytes()[:-3])
+    for path, match in (("cut.bt", "octree .*cut.bt"), ("none.bt", "none.bt")):
+        with pytest.raises(collide.InvalidShape, match=match):
+            collide.OcTree.from_file(tmp_path / path)
+    with pytest.raises(collide.InvalidShape, match=r"suffix must be \.bt"):
+        tree.save(tmp_path / "map.ply")
+    with pytest.raises(collide.InvalidShape, match="cells within ±32768"):
+        collide.OcTree(([[40_000, 0, 0]], [0], [1.0]), 0.1).save(tmp_path / "far.bt")

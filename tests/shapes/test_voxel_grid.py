@@ -112,3 +112,22 @@ def test_no_contact_pushes_through_a_face_between_cells():
             assert not filled.any()
         n_rows += len(rows)
     assert n_rows > 100
+
+
+def test_binvox_files_hold_the_cells(tmp_path):
+    grid = collide.VoxelGrid(np.random.default_rng(5).random((5, 6, 7)) < 0.4, 0.125, collide.pose((0.5, 1.0, -2.0)))
+    grid.save(tmp_path / "grid.binvox")
+    again = collide.VoxelGrid.from_file(tmp_path / "grid.binvox")
+    assert np.array_equal(again.cells, grid.cells) and np.array_equal(again.X, grid.X)
+    assert np.array_equal(again.cell, grid.cell)
+    turned = collide.VoxelGrid([(0, 0, 0)], 0.1, collide.pose((0, 0, 0), rpy=(0.1, 0, 0)))
+    for bad, path, match in (
+        (turned, "a.binvox", "the grid is turned"), (grid, "a.vox", r"suffix must be \.binvox"),
+        (collide.VoxelGrid([(0, 0, 0)], (0.1, 0.2, 0.1)), "a.binvox", "cells are cubes"),
+        (grid, "none/a.binvox", "none/a.binvox"),
+    ):
+        with pytest.raises(collide.InvalidShape, match=match):
+            bad.save(tmp_path / path)
+    (tmp_path / "cut.binvox").write_bytes((tmp_path / "grid.binvox").read_bytes()[:-2])
+    with pytest.raises(collide.InvalidShape, match="cut short"):
+        collide.VoxelGrid.from_file(tmp_path / "cut.binvox")
