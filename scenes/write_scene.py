@@ -1,6 +1,6 @@
 """Scenes written down as scene files (docs/scene-format.md): `load` reads back the same doubles.
 
-Meshes stand in the file itself, so that one file holds all there is to know. Robots are written as the bodies that
+Meshes and clouds stand in the file itself, so that one file holds all there is to know. Robots are written as the bodies that
 their links are, where they stand now; their joints are left out, and `about` may say so.
 """
 
@@ -28,6 +28,7 @@ from collide.shapes import (
     HeightField,
     HPolytope,
     Mesh,
+    PointCloud,
     Shape,
     Sphere,
 )
@@ -119,6 +120,7 @@ _FORMS: tuple[tuple[type[Shape], str, dict[str, str]], ...] = (
     (HPolytope, "hpolytope", {"normals": "normals", "offsets": "offsets", "bounded": "bounded"}),
     (HeightField, "heightfield", {"heights": "heights", "cell": "cell", "bottom": "bottom"}),
     (Mesh, "mesh", {"vertices": "vertices", "faces": "faces", "solid": "solid"}),
+    (PointCloud, "cloud", {"points": "points", "radius": "radius"}),
 )
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from collide.base.given_files import LARGEST_CLOUD
-from collide.errors import SceneError, cut
+from collide.errors import InvalidShape, SceneError, cut
 from collide.scenes.loaders import las, pcd, ply, point_text
 from collide.scenes.loaders.files import read_mesh_bytes
+from collide.shapes.point_cloud import PointCloud
 
 READERS: dict[str, Callable[[bytes, Path], np.ndarray]] = {
     ".pcd": pcd.read_points, ".ply": ply.read_points, ".las": las.read_points, ".laz": las.read_points,
@@ -24,3 +25,21 @@ def read_points(path: Path) -> np.ndarray:
     if inner not in READERS:
         raise SceneError(f"unknown format of points {cut(inner)!r}; known are .npz, {', '.join(READERS)}", path=path)
     return READERS[inner](read_mesh_bytes(path, LARGEST_CLOUD, "cloud")[1], path)
+
+
+def read_cloud(
+    path: Path, radius: float | np.ndarray | None = None, scale: float = 1.0, *, drop_invalid: bool = False
+) -> PointCloud:
+    """The cloud of a file, as of `PointCloud.from_file`.
+
+    radius : of the balls [m]; by default that of the file, 0 where it has none.   scale : metres in its unit of length.
+    Raises SceneError for what is no such file, MissingExtra.
+    """
+    try:
+        cloud = PointCloud.from_file(path, drop_invalid=drop_invalid)
+        radius = cloud.radius * scale if radius is None else radius
+        made = PointCloud(cloud.points * scale, radius)
+    except InvalidShape as error:
+        raise SceneError(str(error), path=path) from None
+    made._store(dropped=cloud.dropped)
+    return made

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from collide.errors import SceneError, brief, listing
 from collide.robots.kinematic_tree import COLUMNS, Joint, Mimic
 from collide.robots.robot import LinkShape, Robot
 from collide.scenes.loaders.fields import Fields, did_you_mean, read_pose
-from collide.scenes.loaders.shape_yaml import read_shape
+from collide.scenes.loaders.shape_yaml import Files, read_shape
 from collide.scenes.loaders.states import state_of
 
 _ROBOT = ("name", "links", "joints", "allow", "states")
@@ -20,7 +19,7 @@ _COLLISION = ("shape", "pose")
 _JOINT = ("name", "type", "parent", "child", "origin", "axis", "limits", "mimic")
 
 
-def inline_robot(entry: Fields, metres: float, mesh: Callable) -> Robot:
+def inline_robot(entry: Fields, metres: float, files: Files) -> Robot:
     """The robot under the key ``robot`` of an entry of ``robots``.
 
     metres : in a unit of length; limits and joint values are always metres and radians.
@@ -34,7 +33,7 @@ def inline_robot(entry: Fields, metres: float, mesh: Callable) -> Robot:
         name = link.text("name")
         link.named(name)
         links.append(name)
-        geometry[name] = _collision(link, metres, mesh, notes)
+        geometry[name] = _collision(link, metres, files, notes)
     joints = [_joint(Fields(data, fields.path, place, _JOINT), metres) for data, place in fields.items("joints")]
     pairs = _pairs(fields, links) if fields.get("allow") is not None else None
     try:
@@ -51,13 +50,13 @@ def inline_robot(entry: Fields, metres: float, mesh: Callable) -> Robot:
     return robot
 
 
-def _collision(link: Fields, metres: float, mesh: Callable, notes: list[str]) -> list[LinkShape]:
+def _collision(link: Fields, metres: float, files: Files, notes: list[str]) -> list[LinkShape]:
     shapes = []
     for data, place in link.items("collision"):
         element = Fields(data, link.path, place, _COLLISION)
         if "shape" not in element:
             element.fail("'shape' is missing")
-        described = read_shape(element.data["shape"], link.path, element.place("shape"), metres, mesh)
+        described = read_shape(element.data["shape"], link.path, element.place("shape"), metres, files)
         shapes.append(
             LinkShape(
                 described.shape, read_pose(element, "pose", metres), described.approximation, f"{link.path}: {place}"

@@ -61,13 +61,17 @@ class _Building:
         taken : how the shape itself says that the mesh is taken; else as meshes of the scene are.
         """
         started = time.perf_counter()
-        key = resources.find(filename, self.path, self.package_path, element=place), taken or self.meshes
+        key = self.find(filename, place), taken or self.meshes
         if key not in self.mesh_files:
             self.mesh_files[key] = read_mesh(*key)
             self.scene.notes += [note for note in self.mesh_files[key].notes if note not in self.scene.notes]
         file = self.mesh_files[key]
         self.seconds["meshes"] = self.seconds.get("meshes", 0.0) + time.perf_counter() - started
         return file
+
+    def find(self, filename: str, place: str) -> Path:
+        """Where the file is that a shape names."""
+        return resources.find(filename, self.path, self.package_path, element=place)
 
 
 def build(
@@ -163,7 +167,9 @@ def _read_robot(building: _Building, entry: Fields) -> Robot | mjcf.MjcfFile:
     meshes = entry.choice("meshes", OPTIONS, building.meshes)
     if "robot" in entry:
         return inline_robot(
-            entry, building.metres, lambda filename, place, taken=None: building.mesh(filename, place, taken or meshes)
+            entry, building.metres, shape_yaml.Files(
+                lambda filename, place, taken=None: building.mesh(filename, place, taken or meshes), building.find
+            ),
         )
     srdf = entry.get("srdf")
     if isinstance(srdf, str):
@@ -217,7 +223,8 @@ def _add_body(building: _Building, entry: Fields) -> None:
     if "shape" not in entry:
         entry.fail("'shape' is missing")
     described = shape_yaml.read_shape(
-        entry.data["shape"], entry.path, entry.place("shape"), building.metres, building.mesh
+        entry.data["shape"], entry.path, entry.place("shape"), building.metres,
+        shape_yaml.Files(building.mesh, building.find),
     )
     building.scene.add(
         SceneBody(

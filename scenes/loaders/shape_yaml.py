@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from collide.errors import InvalidPose, InvalidShape, brief
 from collide.scenes.loaders import mesh_file as mesh_loader
+from collide.scenes.loaders.cloud_file import read_cloud
 from collide.scenes.loaders.fields import Fields, did_you_mean, placed, read_pose, scaled
+from collide.scenes.loaders.mesh_parts import MeshFile
 from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
 from collide.shapes import (
     Box,
@@ -24,6 +27,7 @@ from collide.shapes import (
     HeightField,
     HPolytope,
     Mesh,
+    PointCloud,
     Shape,
     Sphere,
 )
@@ -41,6 +45,7 @@ KINDS = {
     "hpolytope": ("normals", "offsets", "bounded"),
     "heightfield": ("heights", "cell", "bottom"),
     "mesh": ("file", "scale", "as", "vertices", "faces", "solid"),
+    "cloud": ("points", "radius", "file", "scale", "drop_invalid"),
     "compound": ("shape", "pose"),
 }
 
@@ -54,11 +59,18 @@ class Described:
     notes: list[str] = field(default_factory=list)
 
 
-def read_shape(data: Any, path: object, place: str, metres: float, mesh: Callable) -> Described:
-    """A shape mapping such as ``{box: {size: [1, 2, 3]}}``.
+class Files(NamedTuple):
+    """How files are read that shapes name. mesh : (file name, place, how it is taken or None) -> `MeshFile`.
 
-    metres : in a unit of length.   mesh : (file name, place, how it is taken or None) -> `MeshFile`.
+    find : (file name, place) -> where the file is.
     """
+
+    mesh: Callable[..., MeshFile]
+    find: Callable[[str, str], Path]
+
+
+def read_shape(data: Any, path: object, place: str, metres: float, files: Files) -> Described:
+    """A shape mapping such as ``{box: {size: [1, 2, 3]}}``. metres : in a unit of length."""
     kinds = Fields(data, path, place)
     unknown = [kind for kind in kinds.data if kind not in KINDS]
     if unknown or len(kinds.data) != 1:
@@ -71,10 +83,12 @@ def read_shape(data: Any, path: object, place: str, metres: float, mesh: Callabl
     kind = next(iter(kinds.data))
     try:
         if kind == "compound":
-            return _compound(kinds, metres, mesh)
+            return _compound(kinds, metres, files)
         fields = kinds.sub(kind, KINDS[kind])
         if kind == "mesh":
-            return _mesh(fields, mesh) if "file" in fields else Described(_mesh_in_place(fields, metres))
+            return _mesh(fields, files) if "file" in fields else Described(_mesh_in_place(fields, metres))
+        if kind == "cloud":
+            return _cloud(fields, metres, files)
         return Described(_plain(kind, fields, metres))
     except InvalidShape as error:
         raise InvalidShape(_placed(error, path, f"{place}.{kind}")) from None
@@ -108,27 +122,27 @@ def _plain(kind: str, fields: Fields, metres: float) -> Shape:
     if kind == "hull":
         return ConvexHull(scaled(fields.numbers("points", (None, 3)), metres), radius=length("radius", 0.0))
     if kind == "heightfield":
-        heights, sides = scaled(fields.numbers("heights", (None, None)), metres), _cell(fields, metres)
+        heights, sides = scaled(fields.numbers("heights", (None, None)), metres), _one_or_each(fields, "cell", (2,), metres)
         return HeightField(heights, sides, bottom=length("bottom") if "bottom" in fields else None)
     normals = fields.numbers("normals", (None, 3))
     offsets = scaled(fields.numbers("offsets", (None,)), metres)
     return HPolytope(normals, offsets, bounded=fields.flag("bounded", True))
 
 
-def _cell(fields: Fields, metres: float) -> np.ndarray | float:
-    """A number, or two of them."""
-    if isinstance(fields.get("cell"), list):
-        return scaled(fields.numbers("cell", (2,)), metres)
-    return scaled(fields.number("cell"), metres)
+def _one_or_each(fields: Fields, key: str, shape: tuple[int | None, ...], metres: float) -> np.ndarray | float:
+    """A length for all, or a list with a length each."""
+    if isinstance(fields.get(key), list):
+        return scaled(fields.numbers(key, shape), metres)
+    return scaled(fields.number(key), metres)
 
 
-def _compound(kinds: Fields, metres: float, mesh: Callable) -> Described:
+def _compound(kinds: Fields, metres: float, files: Files) -> Described:
     items, about, notes = [], [], []
     for entry, place in kinds.items("compound"):
         item = Fields(entry, kinds.path, place, KINDS["compound"])
         if "shape" not in item:
             item.fail("'shape' is missing")
-        inner = read_shape(item.data["shape"], item.path, item.place("shape"), metres, mesh)
+        inner = read_shape(item.data["shape"], item.path, item.place("shape"), metres, files)
         items.append((inner.shape, read_pose(item, "pose", metres)))
         about += [inner.approximation] if inner.approximation else []
         notes += inner.notes
@@ -149,13 +163,13 @@ def _mesh_in_place(fields: Fields, metres: float) -> Mesh:
     return Mesh(vertices, faces.astype(np.int64), solid=fields.flag("solid", False) if "solid" in fields else None)
 
 
-def _mesh(fields: Fields, mesh: Callable) -> Described:
+def _mesh(fields: Fields, files: Files) -> Described:
     beside = [key for key in ("vertices", "faces", "solid") if key in fields]
     if beside:
         fields.fail(f"{beside[0]!r} stands in place of a file: give one of them")
     scale = _mesh_scale(fields)
     taken = fields.choice("as", mesh_loader.OPTIONS, "mesh") if "as" in fields else None
-    file = mesh(fields.text("file"), fields.place("file"), taken)
+    file = files.mesh(fields.text("file"), fields.place("file"), taken)
     shapes = element_shapes(file, scale, f"{fields.path}: {fields.element}")
     about = [approximation for _, approximation in shapes if approximation]
     note = mesh_loader.size_note(extent(file, scale), fields.element)
@@ -165,6 +179,27 @@ def _mesh(fields: Fields, mesh: Callable) -> Described:
     if len(shapes) == 1:
         return Described(shapes[0][0], about[0] if about else None, notes)
     return Described(Compound([(shape, np.eye(4)) for shape, _ in shapes]), "; ".join(about) or None, notes)
+
+
+def _cloud(fields: Fields, metres: float, files: Files) -> Described:
+    """Points that stand in the scene file itself, or in a file of their own."""
+    radius = _one_or_each(fields, "radius", (None,), metres) if "radius" in fields else None
+    if "file" not in fields:
+        beside = [key for key in ("scale", "drop_invalid") if key in fields]
+        if beside or "points" not in fields:
+            fields.fail(f"{beside[0]!r} goes with a file" if beside else "give either points, or a file")
+        points = scaled(fields.numbers("points", (None, 3)), metres)
+        return Described(PointCloud(points, 0.0 if radius is None else radius))
+    if "points" in fields:
+        fields.fail("'points' stands in place of a file: give one of them")
+    scale = fields.number("scale", 1.0)
+    if not scale > 0.0:
+        fields.fail(f"must be above 0, got {scale:g}", "scale")
+    path = files.find(fields.text("file"), fields.place("file"))
+    cloud = read_cloud(path, radius, scale, drop_invalid=fields.flag("drop_invalid", False))
+    about = mesh_loader.size_note(float(np.ptp(cloud.points, axis=0).max()), fields.element)
+    left_out = f"{path.name}: {cloud.dropped} points that are not finite were left out" if cloud.dropped else None
+    return Described(cloud, notes=[note for note in (left_out, about) if note])
 
 
 def _mesh_scale(fields: Fields) -> np.ndarray:
