@@ -4,10 +4,10 @@
     python benchmarks/page_sizes.py --open         # and in a headless Chromium, which draws in software (selenium)
 
 Scenes: both shipped ones with what their robots look like, 1,000 meshes of 524 facets each, no two of them the same,
-1,000 bodies that share one mesh, and one mesh of 500,000 facets, which is drawn with fewer. "report" is the time of the
-report itself, "page" of drawing, contacts and writing after it; s. With ``--open``: seconds from asking for the page
-until it is ready, and until its first picture stands; milliseconds a picture while the camera moves, at 1,280 by 800
-pixels; draw calls and triangles of a picture.
+1,000 bodies that share one mesh, one mesh of 500,000 facets, which is drawn with fewer, and a cloud of 10⁶ points, all
+of them drawn. "report" is the time of the report itself, "page" of drawing, contacts and writing after it; s. With
+``--open``: seconds from asking for the page until it is ready, and until its first picture stands; milliseconds a
+picture while the camera moves, at 1,280 by 800 pixels; draw calls and triangles of a picture.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from collide import Cylinder, Mesh, Sphere, pose, tessellate
+from collide import Cylinder, Mesh, PointCloud, Sphere, pose, tessellate
 from collide.adapters.bench.claims import Claim, Options, Race, grid, main
 from collide.pages.page_file import page_pieces, write_page
 from collide.pages.report_page import report_blocks
@@ -51,12 +51,20 @@ def large() -> Scene:
     return Scene("large", [SceneBody("ball", mesh, np.eye(4)), SceneBody("marble", Sphere(0.1), pose((2, 0, 0)))])
 
 
+def cloudy() -> Scene:
+    """A marble in a ball-shaped room of 10⁶ points."""
+    directions = np.random.default_rng(24).normal(size=(1_000_000, 3))
+    cloud = PointCloud(directions / np.linalg.norm(directions, axis=1)[:, None], 0.001)
+    return Scene("cloudy", [SceneBody("room", cloud, np.eye(4)), SceneBody("marble", Sphere(0.1), pose((0.3, 0, 0)))])
+
+
 SCENES: dict[str, Callable[[], Scene]] = {
     "workcell": lambda: load("workcell"),
     "panda_workbench": lambda: load("panda_workbench"),
     "1,000 meshes": lambda: crowd(False),
     "1,000 bodies, one mesh": lambda: crowd(True),
     "one large mesh": large,
+    "a cloud of 10^6 points": cloudy,
 }
 
 

@@ -1,7 +1,7 @@
 """Scenes written down as scene files (docs/scene-format.md): `load` reads back the same doubles.
 
-Meshes and clouds stand in the file itself, so that one file holds all there is to know. Robots are written as the bodies that
-their links are, where they stand now; their joints are left out, and `about` may say so.
+Meshes and clouds stand in the file itself, so that one file holds all there is to know. Robots are written as the
+bodies that their links are, where they stand now; their joints are left out, and `about` may say so.
 """
 
 from __future__ import annotations

@@ -92,6 +92,12 @@ def _about(bodies: list[dict], shapes: list[dict], table: ShapeTable) -> list[st
             f"{count(len(fewer), 'mesh', 'meshes')} drawn with {after} facets instead of {before}, at most {off} off: "
             "for display only, tests know nothing of it"
         )
+    clouds = [shape for shape in shapes if shape["points"] is not None]
+    if clouds:
+        drawn, of = (sum(shape["points"][key] for shape in clouds) for key in ("count", "of"))
+        off = brief_length(max(shape["deviation"] for shape in clouds))
+        part = f"{drawn} of {of} points: of each cloud the first of every few" if drawn < of else count(of, "point")
+        notes.append(f"{count(len(clouds), 'cloud')} drawn, {part}, at most {off} off")
     bare = [body["name"] for body in bodies if table.is_empty(body["shown"])]
     if bare:
         notes.append(f"{count(len(bare), 'body', 'bodies')} without triangles, not drawn: {', '.join(bare[:5])}")

@@ -1,11 +1,11 @@
-"""The shapes of a drawing: triangles as text, each once however many bodies share it, large meshes simplified.
+"""The shapes of a drawing: triangles and points as text, once for all bodies of a shape, large meshes simplified.
 
-A shape is drawn in the frame B of its body, in single precision. Triangles of shapes come from `collide.tessellate`.
+A shape is drawn in the frame B of its body, in single precision. Triangles of shapes come from `collide.tessellate`;
+clouds are points (`drawn_points.py`).
 """
 
 from __future__ import annotations
 
-import base64
 import hashlib
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -13,9 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.pages import drawn_points
+from collide.pages.drawn_points import MAX_POINTS, Points, as_base64
 from collide.pages.vertex_clustering import simplified
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
+from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Box, Halfspace
 from collide.shapes.shape import Shape
 from collide.shapes.tessellation import tessellate
@@ -33,14 +36,16 @@ _LARGEST = 1e30
 PosedShape = tuple[Shape, np.ndarray]
 
 
-class Triangles(NamedTuple):
-    """A shape before writing: vertices (V, 3) in B [m], faces (F, 3), their distance from the shape [m], its look."""
+class Drawn(NamedTuple):
+    """A shape before writing: vertices (V, 3) in B [m], faces (F, 3), their distance from the shape [m], its look, and
+    the balls of its clouds."""
 
     vertices: np.ndarray
     faces: np.ndarray
     deviation: float
     smooth: bool
     unbounded: bool
+    points: Points | None = None
 
 
 class ShapeTable:
@@ -55,27 +60,34 @@ class ShapeTable:
         self._rows: dict[tuple, int] = {}
         self._of_bytes: dict[bytes, int] = {}
         self._seen: list[Sequence[PosedShape]] = []  # kept alive, so that no other shape gets the id of a seen shape
-        self._shapes: list[Triangles] = []
+        self._shapes: list[Drawn] = []
 
     def row(self, shapes: Sequence[PosedShape]) -> int:
-        """The row of what several posed shapes look like together; the same for the same ones, or equal triangles."""
+        """The row of what several posed shapes look like together; the same for the same ones, or equal looks."""
         key = tuple((id(shape), X_BS.tobytes()) for shape, X_BS in shapes)
         if key not in self._rows:
             self._seen.append(shapes)
-            self._rows[key] = self._new_row(self._triangles(shapes))
+            self._rows[key] = self._new_row(self._drawn(shapes))
         return self._rows[key]
 
-    def _new_row(self, drawn: Triangles) -> int:
-        flags = bytes((drawn.smooth, drawn.unbounded))
-        digest = hashlib.sha256(drawn.vertices.tobytes() + drawn.faces.tobytes() + flags).digest()
+    def _new_row(self, drawn: Drawn) -> int:
+        flags = np.array((drawn.smooth, drawn.unbounded, len(drawn.vertices), len(drawn.faces)))
+        made = hashlib.sha256()
+        for array in (flags, drawn.vertices, drawn.faces, *(drawn.points or ())):
+            made.update(array.tobytes())
+        digest = made.digest()
         if digest not in self._of_bytes:
             self._of_bytes[digest] = len(self._shapes)
             self._shapes.append(drawn)
         return self._of_bytes[digest]
 
-    def _triangles(self, shapes: Sequence[PosedShape]) -> Triangles:
+    def _drawn(self, shapes: Sequence[PosedShape]) -> Drawn:
         vertices, faces, deviations, n = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [0.0], 0
+        clouds = []
         for shape, X_BS in shapes:
+            if isinstance(shape, PointCloud):
+                clouds.append(Points(shape.points @ X_BS[:3, :3].T + X_BS[:3, 3], shape.radii))
+                continue
             try:
                 points, corners = made = tessellate(shape, size=self._size)
             except (InvalidArgument, UnsupportedQuery):  # no triangles of its kind, or too many
@@ -84,28 +96,25 @@ class ShapeTable:
             faces.append(np.asarray(corners, dtype=np.int64) + n)
             deviations.append(made.deviation)
             n += len(points)
-        return Triangles(
+        return Drawn(
             np.concatenate(vertices), np.concatenate(faces), max(deviations),
             any(is_smooth(shape) for shape, _ in shapes),
-            any(isinstance(shape, Halfspace) or shape.is_region for shape, _ in shapes),
+            any(isinstance(shape, Halfspace) or shape.is_region for shape, _ in shapes), drawn_points.together(clouds),
         )
 
     def boxes(self) -> list[np.ndarray | None]:
         """(2, 3) lowest and highest corner of each shape in its frame [m]; None of unbounded and of empty ones."""
-        return [
-            None if drawn.unbounded or not len(drawn.vertices) else
-            np.array([drawn.vertices.min(axis=0), drawn.vertices.max(axis=0)])
-            for drawn in self._shapes
-        ]
+        return [None if drawn.unbounded else _box(drawn) for drawn in self._shapes]
 
     def is_empty(self, row: int) -> bool:
-        """Whether a shape has no triangle: a point, a segment, or what cannot be tessellated."""
-        return not len(self._shapes[row].faces)
+        """Whether a shape has neither triangles nor points: a segment, or what cannot be tessellated."""
+        return not len(self._shapes[row].faces) and self._shapes[row].points is None
 
     def written(self) -> list[dict]:
         """The table as plain data, simplified to about ``max_facets`` facets."""
         cap = facet_cap([len(drawn.faces) for drawn in self._shapes], self._max_facets)
-        return [_written(drawn, cap) for drawn in self._shapes]
+        sizes = sorted(len(drawn.points.centres) for drawn in self._shapes if drawn.points is not None)
+        return [_written(drawn, cap, max(_level(sizes, MAX_POINTS), 1)) for drawn in self._shapes]
 
 
 def is_smooth(shape: Shape) -> bool:
@@ -133,9 +142,15 @@ def _level(counts: list[int], total: int) -> int:
     return counts[-1] if counts else 0
 
 
-def _written(drawn: Triangles, cap: int) -> dict:
+def _box(drawn: Drawn) -> np.ndarray | None:
+    ends = np.concatenate([drawn.vertices, *([] if drawn.points is None else [drawn.points.box])])
+    return np.array([ends.min(axis=0), ends.max(axis=0)]) if len(ends) else None
+
+
+def _written(drawn: Drawn, cap: int, max_points: int) -> dict:
     vertices, faces, moved = simplified(drawn.vertices, drawn.faces, max(cap, 1))
     positions = np.clip(vertices, -_LARGEST, _LARGEST).astype("<f4")
+    points, off = (None, 0.0) if drawn.points is None else drawn_points.written(drawn.points, max_points)
     return {
         "positions": as_base64(positions),
         "triangles": as_base64(faces.astype("<u4")),
@@ -143,11 +158,7 @@ def _written(drawn: Triangles, cap: int) -> dict:
         "triangle_count": len(faces),
         "smooth": drawn.smooth,
         "simplified_from": len(drawn.faces) if len(faces) < len(drawn.faces) else None,
-        "deviation": float(drawn.deviation + moved),
+        "deviation": max(float(drawn.deviation + moved), off),
         "unbounded": drawn.unbounded,
+        "points": points,
     }
-
-
-def as_base64(array: np.ndarray) -> str:
-    """The bytes of an array, row by row, as text."""
-    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

@@ -14,7 +14,7 @@ import numpy as np
 
 from collide.errors import UnsupportedQuery
 from collide.pages.body_verdicts import NOT_ANSWERED, ORDER, body_verdicts, verdict_columns, worst
-from collide.pages.drawn_shapes import as_base64
+from collide.pages.drawn_points import as_base64
 from collide.reports import classes
 from collide.reports.number_format import count
 from collide.reports.report import Report

@@ -122,7 +122,8 @@ def _plain(kind: str, fields: Fields, metres: float) -> Shape:
     if kind == "hull":
         return ConvexHull(scaled(fields.numbers("points", (None, 3)), metres), radius=length("radius", 0.0))
     if kind == "heightfield":
-        heights, sides = scaled(fields.numbers("heights", (None, None)), metres), _one_or_each(fields, "cell", (2,), metres)
+        heights = scaled(fields.numbers("heights", (None, None)), metres)
+        sides = _one_or_each(fields, "cell", (2,), metres)
         return HeightField(heights, sides, bottom=length("bottom") if "bottom" in fields else None)
     normals = fields.numbers("normals", (None, 3))
     offsets = scaled(fields.numbers("offsets", (None,)), metres)

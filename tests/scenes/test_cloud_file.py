@@ -1,4 +1,4 @@
-"""Clouds of points in scene files: inline or in files of their own, read back as they were, and refused where they lie."""
+"""Clouds in scene files, inline or in files of their own: read back as they were, refused where they lie."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from collide.errors import CollideError
 from collide.scenes import load, save
 from collide.scenes.loaders import cloud_file
 
+HEADER = b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (9, 3), }"
 POINTS = np.random.default_rng(0).normal(size=(50, 3))
 
 
@@ -39,7 +40,8 @@ def test_a_cloud_comes_back(radius, tmp_path):
 
 
 def test_points_in_the_file_itself_are_in_its_units(tmp_path):
-    assert scene_of(tmp_path, "mm", points=[[0, 0, 1000]], radius=250).bodies[0].shape == collide.PointCloud([[0, 0, 1]], 0.25)
+    one = scene_of(tmp_path, "mm", points=[[0, 0, 1000]], radius=250).bodies[0].shape
+    assert one == collide.PointCloud([[0, 0, 1]], 0.25)
     each = scene_of(tmp_path, points=[[0, 0, 1], [1, 0, 0]], radius=[0.1, 0.2]).bodies[0].shape
     assert each == collide.PointCloud([[0, 0, 1], [1, 0, 0]], [0.1, 0.2])
 
@@ -72,17 +74,25 @@ def test_what_is_no_cloud_is_refused_with_its_place(tmp_path):
     (tmp_path / "text.npz").write_text("0 0 0")
     (tmp_path / "a.xyz").write_text("0 0 0")
     with zipfile.ZipFile(tmp_path / "cut.npz", "w") as members:
-        members.writestr("points.npy", b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (9, 3), }")
+        members.writestr("points.npy", HEADER)
     ends = [[0, 0, 0]]
     for cloud, complaint in (
-        ({"file": "other.npz"}, r'other.npz: has no array "points"'), ({"file": "flat.npz"}, "flat.npz: PointCloud: points"),
-        ({"file": "words.npz"}, "words.npz: .*no real numbers"), ({"file": "pickled.npz"}, "pickled.npz: is no file of arrays"),
-        ({"file": "text.npz"}, "text.npz: is no file of arrays"), ({"file": "cut.npz"}, "cut.npz: is no file of arrays"),
-        ({"file": "a.xyz"}, "unknown format of points"), ({"file": "gone.npz"}, r'bodies\[0\] "scan".shape.cloud.file: cannot find'),
-        ({"points": ends, "file": "other.npz"}, "'points' stands in place of a file"), ({}, "either points, or a file"),
-        ({"points": ends, "scale": 2}, "'scale' goes with a file"), ({"file": "other.npz", "scale": 0}, "must be above 0, got 0"),
-        ({"points": ends, "radius": -1}, r'shape.cloud: PointCloud: radius must be'), ({"points": []}, "cloud"),
-        ({"points": ends, "radius": [1, 2]}, "shape.cloud: PointCloud: radius"), ({"points": ends, "size": 1}, "unknown key"),
+        ({"file": "other.npz"}, r'other.npz: has no array "points"'),
+        ({"file": "flat.npz"}, "flat.npz: PointCloud: points"),
+        ({"file": "words.npz"}, "words.npz: .*no real numbers"),
+        ({"file": "pickled.npz"}, "pickled.npz: is no file of arrays"),
+        ({"file": "text.npz"}, "text.npz: is no file of arrays"),
+        ({"file": "cut.npz"}, "cut.npz: is no file of arrays"),
+        ({"file": "a.xyz"}, "unknown format of points"),
+        ({"file": "gone.npz"}, r'bodies\[0\] "scan".shape.cloud.file: cannot find'),
+        ({"points": ends, "file": "other.npz"}, "'points' stands in place of a file"),
+        ({}, "either points, or a file"),
+        ({"points": ends, "scale": 2}, "'scale' goes with a file"),
+        ({"file": "other.npz", "scale": 0}, "must be above 0, got 0"),
+        ({"points": ends, "radius": -1}, r'shape.cloud: PointCloud: radius must be'),
+        ({"points": []}, "cloud"),
+        ({"points": ends, "radius": [1, 2]}, "shape.cloud: PointCloud: radius"),
+        ({"points": ends, "size": 1}, "unknown key"),
     ):
         with pytest.raises(CollideError, match=complaint):
             scene_of(tmp_path, **cloud)

@@ -14,7 +14,7 @@ export class BodyBatch {
    * shapeOf : row of its shape for every body, null where a body has none.
    */
   constructor(geometries, shapeOf, material) {
-    const rows = [...new Set(shapeOf.filter((row) => row !== null && !geometries[row].isEmpty))];
+    const rows = [...new Set(shapeOf.filter((row) => row !== null && geometries[row].hasFacets))];
     const sum = (count) => rows.reduce((total, row) => total + count(geometries[row].solid), 0);
     const vertices = sum((solid) => solid.attributes.position.count);
     this.mesh = new BatchedMesh(Math.max(1, shapeOf.length), Math.max(3, vertices), Math.max(3, sum((solid) => solid.index.count)), material);
@@ -56,7 +56,7 @@ export class BodyBatch {
     const hits = raycaster.intersectObject(this.mesh).filter((hit) => planes.every((plane) => plane.distanceToPoint(hit.point) >= 0));
     const solid = hits.find((hit) => this._opacities[hit.batchId] >= OPAQUE);
     const hit = solid ?? hits[0];
-    return hit ? { body: this._bodies[hit.batchId], point: hit.point } : null;
+    return hit ? { body: this._bodies[hit.batchId], point: hit.point, distance: hit.distance, opaque: hit === solid } : null;
   }
 }
 
@@ -70,12 +70,11 @@ export function wireColor(color) {
   return new Vector4(color.r, color.g, color.b, 1);
 }
 
-const box = new Box3();
 const corner = new Vector3();
 
-/** The box around a shape's points at a pose. */
+/** The box around the box of a shape at a pose. */
 export function boxAt(geometry, matrix) {
-  box.setFromArray(geometry.positions);
+  const { box } = geometry;
   const placed = new Box3();
   for (let k = 0; k < 8; k += 1) {
     corner.set(k & 1 ? box.max.x : box.min.x, k & 2 ? box.max.y : box.min.y, k & 4 ? box.max.z : box.min.z);

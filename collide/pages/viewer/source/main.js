@@ -189,6 +189,7 @@ function announceMeasures(view, model, selection) {
   const measures = () => ({
     calls: view?.stage.renderer.info.render.calls ?? 0,
     triangles: view?.stage.renderer.info.render.triangles ?? 0,
+    points: view?.stage.renderer.info.render.points ?? 0,
     camera: view?.stage.camera.position.toArray() ?? null,
     target: view?.stage.controls.target.toArray() ?? null,
     flying: view?.moves.isFlying ?? false,

@@ -14,7 +14,7 @@ export function pairDetail(row, model, selection) {
     ...(full.verdict ? [["verdict", verdictNode(full.verdict)]] : []),
     ...(row.engine ? disputeFacts(row) : row.said ? engineFacts(row) : []),
     ...(full.engine || full.said ? [] : measureFacts(full)),
-    ...geometryFacts(full),
+    ...geometryFacts(full), ...partFacts(full, model),
     ...(full.at ? pathFacts(full) : []),
     ...(full.why ? [["not answered", full.why]] : []),
     ...knownFacts(full, model, selection.state),
@@ -62,8 +62,17 @@ function geometryFacts(row) {
     const move = row.normal.map((c) => c * row.depth);
     facts.push(["B is free after", `a move of ${pointText(move)} (${columnLength(row.depth)} along the normal)`]);
   }
-  if (row.part_a || row.part_b) facts.push(["parts", `${row.part_a} of A, ${row.part_b} of B`]);
   return facts;
+}
+
+/** Which part of a union, facet of a mesh or point of a cloud decided; nothing where both are the first of few. */
+function partFacts(row, model) {
+  if (row.part_a === undefined) return [];
+  const parts = ["a", "b"].map((side) => {
+    const isCloud = model.bodies[model.rowOfBody(row[side])]?.kind === "PointCloud";
+    return { isCloud, text: `${isCloud ? "point " : ""}${row[`part_${side}`]} of ${side.toUpperCase()}` };
+  });
+  return row.part_a || row.part_b || parts.some((part) => part.isCloud) ? [["parts", parts.map((part) => part.text).join(", ")]] : [];
 }
 
 function pathFacts(row) {

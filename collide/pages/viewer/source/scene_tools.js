@@ -145,7 +145,8 @@ export class SceneTools {
       return;
     }
     const body = this._model.bodies[hit.body];
-    const what = [body.kind, body.static ? "fixed" : null, body.owner ? `of ${printable(body.owner)}` : null].filter(Boolean).join(", ");
+    const point = hit.row === undefined ? null : `point ${hit.row}`;
+    const what = [body.kind, point, body.static ? "fixed" : null, body.owner ? `of ${printable(body.owner)}` : null].filter(Boolean).join(", ");
     hover.show(x, y, nameNode(body.name, 60), verdictNode(this._model.verdictsAt(this._selection.state)[hit.body]),
       element("span", { class: "remark" }, body.note ? `${what}; ≈ ${printable(body.note)}` : what));
   }

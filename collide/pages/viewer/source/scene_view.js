@@ -2,6 +2,7 @@
 import { AxesHelper, Box3, Color, GridHelper, Vector3 } from "three";
 import { BodyBatch, boxAt, poseMatrix, wireColor, wireMaterial } from "./body_batches.js";
 import { CameraMoves, VIEWS, clearestCorner } from "./camera_moves.js";
+import { CloudPoints } from "./cloud_points.js";
 import { EdgeLines } from "./edge_lines.js";
 import { columnLength } from "./lengths.js";
 import { PairMarks } from "./pair_marks.js";
@@ -18,7 +19,7 @@ const SEE_THROUGH = 0.42;
 const WITHOUT_END = 0.3;
 /** Dark in both themes: bodies are brighter than that in either. */
 const EDGE = new Color("#101216");
-/** Triangles up to which edges of the picture are smoothed. */
+/** Triangles and points up to which edges of the picture are smoothed. */
 const MAX_SMOOTHED = 400000;
 
 export class SceneView {
@@ -29,15 +30,17 @@ export class SceneView {
     this.options = { ghosts: true, wire: false, seeThrough: false };
     this._geometries = model.drawing.shapes.map((shape) => new ShapeGeometry(shape));
     this._placeOrigin();
-    const triangles = model.bodies.reduce((sum, body) => sum + (this._geometries[body.shown]?.triangles.length ?? 0) / 3, 0);
-    this.stage = new Stage(nodes.canvas, this._size, triangles <= MAX_SMOOTHED);
+    const drawn = (geometry) => (geometry ? geometry.triangles.length / 3 + (geometry.points?.count ?? 0) : 0);
+    const sum = model.bodies.reduce((total, body) => total + drawn(this._geometries[body.shown]), 0);
+    this.stage = new Stage(nodes.canvas, this._size, sum <= MAX_SMOOTHED);
     this.moves = new CameraMoves(this.stage);
     this.marks = new PairMarks(this.stage);
     this._labels = new SceneLabels(nodes.labels, this.stage);
     drawAxes(nodes.axes, this.stage);
     this._solid = solidMaterial();
     this._shown = new BodyBatch(this._geometries, model.bodies.map((body) => body.shown), this._solid.material);
-    this.stage.scene.add(this._shown.mesh);
+    this._clouds = new CloudPoints(this._geometries, model.bodies, this.stage, this._size);
+    this.stage.scene.add(this._shown.mesh, this._clouds.group);
     this._wire = null;
     this._planes = [];
     this._edges = new EdgeLines(this._geometries, model);
@@ -58,6 +61,7 @@ export class SceneView {
     this._solid.material.clippingPlanes = planes;
     if (this._wire) this._wire.mesh.material.clippingPlanes = planes;
     this._edges.setClipping(planes);
+    this._clouds.setClipping(planes);
     this._solid.uniforms.cutsOpen.value = planes.length ? 1 : 0;
     this._planes = planes;
     this._mark(this._selection.pair);
@@ -155,7 +159,7 @@ export class SceneView {
   setState(state) {
     this._matrices = this._model.bodies.map((body) => poseMatrix(body.X_WB, this._origin));
     this._model.visitPoses(state, (row, numbers) => { this._matrices[row] = poseMatrix(numbers, this._origin); });
-    for (const batch of [this._shown, this._wire]) {
+    for (const batch of [this._shown, this._wire, this._clouds]) {
       if (batch) this._matrices.forEach((matrix, row) => batch.setPose(row, matrix));
     }
     this._edges.setPoses(this._matrices);
@@ -202,6 +206,7 @@ export class SceneView {
       const { color, pattern } = pairLook ?? lookOf(verdicts[row]);
       const opacity = this._opacityOf(row, chosen);
       this._shown.setColor(row, paint(color, pattern, opacity), opacity);
+      this._clouds.setLook(row, color, pattern, opacity);
       if (this._wire) {
         this._wire.setColor(row, wireColor(ink), 1);
         this._wire.setVisible(row, !chosen.length || place >= 0 || !this.options.ghosts);
@@ -339,9 +344,12 @@ export class SceneView {
     this.moves.fit(box.isEmpty() ? this._standing() : [box.expandByScalar(0.15 * box.getSize(new Vector3()).length())], direction);
   }
 
-  /** The body under a place on the screen (client coordinates), null where there is none. */
+  /** The body under a place on the screen (client coordinates), of a cloud the point too; null where there is none. */
   bodyAt(x, y) {
-    return this._shown.pick(this.stage.rayThrough(x, y), this._planes);
+    const ray = this.stage.rayThrough(x, y);
+    const hits = [this._shown.pick(ray, this._planes), this._clouds.pick(ray, this._planes, this.stage)].filter(Boolean);
+    hits.sort((a, b) => Number(b.opaque) - Number(a.opaque) || a.distance - b.distance);
+    return hits[0] ?? null;
   }
 
   /** Colours that follow light and dark. */

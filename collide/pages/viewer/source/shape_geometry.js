@@ -3,7 +3,8 @@
  * reads as "the facet's own": vertices stay shared. Those of curved shapes are averaged over the facets around a vertex
  * that are no more than 30° off.
  */
-import { BufferAttribute, BufferGeometry, EdgesGeometry } from "three";
+import { Box3, BufferAttribute, BufferGeometry, EdgesGeometry } from "three";
+import { PointArrays } from "./cloud_points.js";
 import { decodeArray } from "./page_data.js";
 
 const COS_CREASE = Math.cos(Math.PI / 6);
@@ -16,9 +17,21 @@ export class ShapeGeometry {
     this.unbounded = shape.unbounded;
     this.positions = decodeArray(shape.positions, Float32Array);
     this.triangles = decodeArray(shape.triangles, Uint32Array);
-    this.isEmpty = this.triangles.length === 0;
+    this.points = shape.points ? new PointArrays(shape.points, decodeArray) : null;
+    this.hasFacets = this.triangles.length > 0;
+    this.isEmpty = !this.hasFacets && this.points === null;
+    this._box = null;
     this._solid = null;
     this._edges = undefined;
+  }
+
+  /** The box around all vertices and balls, in the shape's frame. */
+  get box() {
+    if (this._box === null) {
+      this._box = new Box3().setFromArray(this.positions);
+      if (this.points !== null) this._box.union(new Box3().setFromArray(this.points.corners));
+    }
+    return this._box;
   }
 
   /** Indexed triangles with normals. */

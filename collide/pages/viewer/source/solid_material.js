@@ -7,18 +7,20 @@
  */
 import { Color, DoubleSide, MeshLambertMaterial, Vector4 } from "three";
 
-const UNPACK = `
-  float colorPattern = floor( vColor.a * 0.5 + 0.01 );
-  float colorOpacity = clamp( vColor.a - 2.0 * colorPattern, 0.0, 1.0 );
-  vec2 pixel = gl_FragCoord.xy / pixelsPerUnit;
-  float ink = 0.0;
-  if ( colorPattern == 1.0 ) ink = step( mod( pixel.x + pixel.y, 7.0 ), 2.4 );
+/** GLSL that sets `ink` by `colorPattern` and `pixel`, the place on the screen: rows of `verdicts.js`. */
+export const INK = `if ( colorPattern == 1.0 ) ink = step( mod( pixel.x + pixel.y, 7.0 ), 2.4 );
   else if ( colorPattern == 2.0 ) ink = step( mod( pixel.x - pixel.y, 11.0 ), 2.0 );
   else if ( colorPattern == 3.0 ) ink = step( distance( mod( pixel, 7.0 ), vec2( 3.5 ) ), 1.7 );
   else if ( colorPattern == 4.0 ) ink = step( mod( pixel.y, 7.0 ), 1.6 );
   else if ( colorPattern == 5.0 ) ink = step( 0.5, abs( step( 4.0, mod( pixel.x, 8.0 ) ) - step( 4.0, mod( pixel.y, 8.0 ) ) ) ) * 0.45;
   else if ( colorPattern == 6.0 ) ink = max( step( mod( pixel.x + pixel.y, 9.0 ), 2.0 ), step( mod( pixel.x - pixel.y, 9.0 ), 2.0 ) );
-  diffuseColor = vec4( vColor.rgb * ( 1.0 - 0.34 * ink ), colorOpacity );
+`;
+const UNPACK = `
+  float colorPattern = floor( vColor.a * 0.5 + 0.01 );
+  float colorOpacity = clamp( vColor.a - 2.0 * colorPattern, 0.0, 1.0 );
+  vec2 pixel = gl_FragCoord.xy / pixelsPerUnit;
+  float ink = 0.0;
+  ${INK}  diffuseColor = vec4( vColor.rgb * ( 1.0 - 0.34 * ink ), colorOpacity );
 `;
 const NORMAL = `
   float faceDirection = gl_FrontFacing ? 1.0 : - 1.0;

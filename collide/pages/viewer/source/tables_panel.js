@@ -203,10 +203,14 @@ function bodyFacts(model, row, state) {
 }
 
 function drawnText(shape) {
-  const counts = `${shape.triangle_count.toLocaleString("en-US")} triangles`;
-  const fewer = shape.simplified_from ? `, simplified for display from ${shape.simplified_from.toLocaleString("en-US")}` : "";
+  const number = (n) => n.toLocaleString("en-US");
+  const counts = [
+    shape.triangle_count ? `${number(shape.triangle_count)} triangles` : "",
+    shape.points ? `${number(shape.points.count)} points${shape.points.every > 1 ? ` of ${number(shape.points.of)}` : ""}` : "",
+  ].filter(Boolean).join(" and ");
+  const fewer = shape.simplified_from ? `, simplified for display from ${number(shape.simplified_from)}` : "";
   const off = shape.deviation ? `, off by at most ${shape.deviation.toPrecision(2)} m` : "";
-  return shape.triangle_count ? counts + fewer + off : "nothing: it has no triangles";
+  return counts ? counts + fewer + off : "nothing: it has no triangles";
 }
 
 function bodyRow(view, name) {
