@@ -15,7 +15,20 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.errors import InvalidArgument
-from collide.shapes import Box, Capsule, Compound, Cone, ConvexHull, Cylinder, Ellipsoid, HPolytope, Mesh, Shape, Sphere
+from collide.shapes import (
+    Box,
+    Capsule,
+    Compound,
+    Cone,
+    ConvexHull,
+    Cylinder,
+    Ellipsoid,
+    HPolytope,
+    Mesh,
+    PointCloud,
+    Shape,
+    Sphere,
+)
 from collide.transforms import as_poses
 
 #: Pairs farther apart than this part of the scene are left out, unless every pair is asked for.
@@ -224,7 +237,7 @@ def _near(bodies: list[Body], pairs, max_distance: float) -> list[tuple[int, int
 
 
 def convex_parts(shape: Shape, X_WB: np.ndarray) -> Iterator[tuple[Shape, np.ndarray]]:
-    """The convex shapes and meshes whose union a body is, each with its pose in the world (4, 4)."""
+    """The convex shapes, meshes and clouds whose union a body is, each with its pose in the world (4, 4)."""
     if isinstance(shape, Compound):
         for part, X_BP in shape.items:
             yield from convex_parts(part, X_WB @ X_BP)
@@ -233,9 +246,9 @@ def convex_parts(shape: Shape, X_WB: np.ndarray) -> Iterator[tuple[Shape, np.nda
 
 
 def is_compound_or_mesh(shape: Shape) -> bool:
-    """True where the body is a union of several parts, or a mesh: how deep it overlaps no engine can say."""
+    """True where the body is a union of several parts, a mesh or a cloud: how deep it overlaps no engine can say."""
     parts = [part for part, _ in convex_parts(shape, np.eye(4))]
-    return len(parts) > 1 or has_mesh(shape)
+    return len(parts) > 1 or has_mesh(shape) or shape.is_field
 
 
 def has_mesh(shape: Shape) -> bool:
@@ -270,6 +283,9 @@ def _part_bounds(shape: Shape, X_WP: np.ndarray) -> tuple[np.ndarray, np.ndarray
     if points is not None:
         world = points[0] @ R_WP.T + p_WP
         return world.min(axis=0) - points[1], world.max(axis=0) + points[1]
+    if isinstance(shape, PointCloud):
+        world, radii = shape.points @ R_WP.T + p_WP, shape.radii[:, None]
+        return (world - radii).min(axis=0), (world + radii).max(axis=0)
     if isinstance(shape, Ellipsoid):
         half = np.linalg.norm(R_WP * shape.radii, axis=1)
     elif isinstance(shape, Cylinder | Cone):  # the cone by the cylinder around it

@@ -9,6 +9,8 @@ from collide.reports.number_format import brief_length, count, lengths
 from collide.reports.tables import Column, Line, Table, lay_out, missing_columns, table_lines, width_of, wrapped
 
 SHORT = 12
+#: Reasons told of an engine that was not asked about pairs.
+_REASONS = 3
 #: Blanks before a column of a table.
 _MARGIN = 2
 
@@ -80,6 +82,7 @@ def _engine_tables(data: dict, headers: list[str], rows: list[list[str]], width:
         groups[-1].append(row)
         free -= needed
     notes = [f"{name} was not asked: {why}" for name, why in skipped.items()]
+    notes += [_left_out(summary) for summary in data["summaries"] if summary["unsupported"]]
     tables = []
     for k, group in enumerate(groups):
         columns = [Column(headers[0], "label"), *(Column(row[0]) for row in group)]
@@ -87,6 +90,15 @@ def _engine_tables(data: dict, headers: list[str], rows: list[list[str]], width:
         title = f"ENGINES  {'more of them' if k else 'counts of pairs'}"
         tables.append(Table(title, columns, lines, notes=notes if group is groups[-1] else []))
     return tables
+
+
+def _left_out(summary: dict) -> str:
+    """Which pairs an engine was not asked about, the commonest reasons first."""
+    reasons = sorted(summary["unsupported"].items(), key=lambda item: -item[1])
+    told = [f"{why} ({n})" for why, n in reasons[:_REASONS]]
+    told += [f"{count(len(reasons) - _REASONS, 'other reason')}, in the JSON"] if len(reasons) > _REASONS else []
+    pairs = count(sum(summary["unsupported"].values()), "pair")
+    return f"{summary['engine']} was not asked about {pairs}: {'; '.join(told)}"
 
 
 _TITLES = {

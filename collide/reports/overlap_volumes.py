@@ -17,7 +17,8 @@ _NUMBERS = ("volume", "lower", "upper", "area_a", "area_b", "patch_area", "flush
 def of_pairs(scene, *groups: Pairs) -> list[dict]:
     """Overlap volumes of pairs as plain data, in the order of the scene's pairs.
 
-    Left out are bodies other than solids with facets (curved shapes, surfaces, unions), and pairs beyond the limits.
+    Left out are bodies other than solids with facets (curved shapes, surfaces, unions, clouds), and pairs beyond the
+    limits.
     """
     entries: list[dict] = []
     remaining = MAX_FACETS

@@ -17,6 +17,7 @@ from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
+from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import Shape, checked_shape
 
@@ -80,7 +81,8 @@ def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | No
     InvalidArgument
         For a tolerance or size that is not above 0, and where a shape would take more than 2,000,000 vertices.
     UnsupportedQuery
-        For a half-space, and an `HPolytope` with ``bounded=False``, without ``size``.
+        For a half-space, and an `HPolytope` with ``bounded=False``, without ``size``; for a `PointCloud`, balls by the
+        million: its points and radii are what to draw.
     """
     checked_shape("tessellate: shape", shape, "collide.Sphere(0.1)")
     for name, value in (("tolerance", tolerance), ("size", size)):
@@ -99,7 +101,8 @@ def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | No
             return made(shape, tolerance)
     if hasattr(shape, "vertices") and hasattr(shape, "faces"):
         return Tessellation(shape.vertices, np.asarray(shape.faces, dtype=np.int64))
-    raise UnsupportedQuery(f"tessellate: a {type(shape).__name__} has no triangles here")
+    what = "is balls around points: draw its points and radii" if isinstance(shape, PointCloud) else "has none here"
+    raise UnsupportedQuery(f"tessellate: a {type(shape).__name__} has no triangles: it {what}")
 
 
 def _length(value) -> float:

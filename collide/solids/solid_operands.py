@@ -22,6 +22,8 @@ def solid_operand(caller: str, name: str, shape, X, check: bool, pose_name: str 
     try:
         body = facet_body(shape, f"{caller}: {name}")
     except UnsupportedQuery as error:
+        if shape.is_field:
+            raise UnsupportedQuery(f"{caller}: {name}: a {type(shape).__name__} is no solid with facets") from None
         raise UnsupportedQuery(f"{error}; Mesh(*collide.tessellate(shape, tolerance)[:2]) is one") from None
     if not body.solid:
         raise InvalidArgument(f"{caller}: {name} has no inside: {_why_not(shape)}")

@@ -11,6 +11,7 @@ from collide.pairs.query import collide, distance
 from collide.robots.robot import Robot
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.point_cloud import PointCloud
 from collide.shapes.shape import Shape
 from collide.shapes.tessellation import tessellate
 
@@ -58,6 +59,8 @@ def link_bodies(robot: Robot) -> list[LinkBody]:
 
 
 def _hull_around(shape: Shape) -> Shape:
+    if isinstance(shape, PointCloud):
+        return ConvexHull(shape.points, radius=float(shape.radii.max()))
     vertices, _ = tessellate(shape, tolerance=_HULL_TOLERANCE)
     return ConvexHull(vertices, radius=_HULL_TOLERANCE)
 

@@ -40,7 +40,7 @@ def dispute(kind="hit", **changes):
 def summary(engine, **changes):
     return {
         "engine": engine, "skipped": "absent" if engine == "pybullet" else "", "wrong": 0, "wrong_distances": 0,
-        "contradictions": 0, "failed": [], "furthest_off": {"difference": 0.0}, **changes,
+        "contradictions": 0, "failed": [], "unsupported": {}, "furthest_off": {"difference": 0.0}, **changes,
     }
 
 
@@ -81,6 +81,14 @@ def test_what_a_peer_got_wrong_is_in_the_first_line_with_the_amount():
     asked.to_dict()["summaries"][1].update(wrong=1, wrong_distances=18, furthest_off={"difference": 0.912195})
     line = " ".join(text_of(comparing.render(asked, width=200))[:1])
     assert "coal: 1 wrong boolean, 18 wrong distances (912.195 mm off at worst)" in line
+
+
+def test_what_an_engine_was_not_asked_about_is_told_with_its_reasons():
+    asked = comparison()
+    asked.to_dict()["summaries"][1]["unsupported"] = {"no cone": 2, "no cloud": 7, "no plane": 1, "odd": 1, "odder": 1}
+    lines = text_of(comparing.render(asked, width=200))
+    told = "no cloud (7); no cone (2); no plane (1); 2 other reasons, in the JSON"
+    assert f"  coal was not asked about 12 pairs: {told}" in lines
 
 
 def test_wrong_distances_come_worst_first_and_say_who_judged():

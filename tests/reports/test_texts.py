@@ -107,7 +107,7 @@ def test_caches_that_are_there_and_that_are_not_yet(tmp_path):
 
 
 def summary(engine: str, **values) -> dict:
-    counts = {"skipped": None, "wrong": 0, "wrong_distances": 0, "contradictions": 0, "failed": []}
+    counts = {"skipped": None, "wrong": 0, "wrong_distances": 0, "contradictions": 0, "failed": [], "unsupported": {}}
     return {"engine": engine, **counts, **values}
 
 
