@@ -95,10 +95,10 @@ def _engine_tables(data: dict, headers: list[str], rows: list[list[str]], width:
 def _left_out(summary: dict) -> str:
     """Which pairs an engine was not asked about, the commonest reasons first."""
     reasons = sorted(summary["unsupported"].items(), key=lambda item: -item[1])
-    told = [f"{why} ({n})" for why, n in reasons[:_REASONS]]
-    told += [f"{count(len(reasons) - _REASONS, 'other reason')}, in the JSON"] if len(reasons) > _REASONS else []
+    listed = [f"{why} ({n})" for why, n in reasons[:_REASONS]]
+    listed += [f"{count(len(reasons) - _REASONS, 'other reason')}, in the JSON"] if len(reasons) > _REASONS else []
     pairs = count(sum(summary["unsupported"].values()), "pair")
-    return f"{summary['engine']} was not asked about {pairs}: {'; '.join(told)}"
+    return f"{summary['engine']} was not asked about {pairs}: {'; '.join(listed)}"
 
 
 _TITLES = {
