@@ -21,6 +21,7 @@ NEEDS = {
     "14_programs_for_python_fcl": "trimesh", "16_pybullet_arm": "pybullet", "17_newton_solver": "newton",
     "29_record_and_compare": "pybullet",
     **dict.fromkeys(("18_certified_planning", "19_nearest_obstacles", "20_reachable_positions"), "yaml"),
+    "32_depth_camera": "yaml",
 }
 #: What hosts print when they are imported.
 HOSTS_SAY = ("pybullet build time", "Warp CUDA warning")
@@ -47,6 +48,10 @@ SHOWS = {
     "29_record_and_compare": [
         "fcl-wrong-depth-box-box-touching: .json, .md, .py", "coal-false-miss-cylinder-cylinder",
         "pybullet: 1 pair recorded",
+    ],
+    "32_depth_camera": [
+        "4688 points seen; the straight motion collides at", "a path of 4 motions, 4 of them proven free",
+        "plan.html, 3.",
     ],
     "31_free_space_cells": ["35 convex cells, 56.490 m³ of 60 m³", "a path through 10 portals", "0 of 1100 points"],
     "27_solids": ["solid: True", "0 facets cross", "clash: 0.7200 mm³", "at rest: volume 0.0, patch 625.00 cm²"],

@@ -101,7 +101,7 @@ export class StatesStrip {
     const { samples } = this._model.states ?? {};
     const remarks = [];
     if (this._range) remarks.push(`least clearance from ${columnLength(this._range[0])} to ${columnLength(this._range[1])}; below the line bodies overlap`);
-    if (samples) remarks.push(printable(samples.note));
+    if (samples) remarks.push(`samples shown: ${printable(samples)}; nothing is certified between two of them`);
     else if (this._model.trajectory) remarks.push("looked at in samples: nothing is certified between them");
     return [element("p", { class: "remark" }, remarks.join("; "))];
   }
