@@ -21,7 +21,7 @@ depth = world.raycast(X_WC[:3, 3], rays_C @ X_WC[:3, :3].T)["distance"].reshape(
 seen = collide.PointCloud.from_depth(depth, fx=f, fy=f, radius=0.015, max_depth=2.5)
 # What the robot knows: itself, and the points.
 scene, plan, page = map(Path(tempfile.mkdtemp()).joinpath, ("seen.json", "plan.csv", "plan.html"))
-np.savez(scene.with_name("seen.npz"), points=seen.points, radius=seen.radius)
+seen.save(scene.with_name("seen.npz"))
 panda = {"urdf": "package://example-robot-data/robots/panda_description/urdf/panda.urdf", "meshes": "hull"}
 cloud = {"name": "seen", "shape": {"cloud": {"file": "seen.npz"}}, "pose": {"matrix": X_WC.tolist()}, "static": True}
 scene.write_text(json.dumps({"collide": 1, "robots": [panda | {"pose": {"xyz": [0, 0, 0.72]}}], "bodies": [cloud]}))

@@ -417,7 +417,9 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "HeightField.cells_of": lambda: {"facets": [0]},
     "HeightField.from_image": lambda: {"image": np.eye(3), "cell": 1.0},
     "OcTree.from_file": lambda: {"path": files() / "map.bt"},
-    "OcTree.from_message": lambda: {"message": {"id": "OcTree", "resolution": 0.1, "binary": True, "data": [3, 0] * 15 + [2, 0]}},
+    "OcTree.from_message": lambda: {
+        "message": {"id": "OcTree", "resolution": 0.1, "binary": True, "data": [3, 0] * 15 + [2, 0]}
+    },
     "OcTree.cells_of": lambda: {"parts": [0]},
     "OcTree.from_points": lambda: {"points": np.eye(3), "resolution": 0.1},
     "OcTree.from_rays": lambda: {"origins": (0, 0, 0), "points": np.eye(3), "resolution": 0.1},

@@ -32,7 +32,7 @@ ARM = {
 
 @pytest.fixture
 def place(tmp_path):
-    np.savez(tmp_path / "scan.npz", points=POINTS, radius=RADIUS)
+    collide.PointCloud(POINTS, RADIUS).save(tmp_path / "scan.npz")
     bodies = [
         {"name": "scan", "shape": {"cloud": {"file": "scan.npz"}}},
         {"name": "floor", "shape": {"halfspace": {"normal": [0, 0, 1], "offset": -1.5}}, "static": True},
