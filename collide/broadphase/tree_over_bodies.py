@@ -8,7 +8,7 @@ body moving within changes nothing. Changed bodies are noted, so that pairs of t
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from collide.broadphase.tree_in_memory import (
 )
 from collide.kernels import address_of
 from collide.numerics.growing_rows import GrowingRows
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 #: A tree is made anew once all sides of its nodes, added up, have grown by this factor: in metres, or in sides of the
 #: box around all.
@@ -87,6 +90,16 @@ class TreeOverBodies:
         """What has been done since this was last called: trees made, nodes fitted, leaves given other boxes."""
         work, self._work = self._work, dict(_NO_WORK)
         return work
+
+    def copied(self) -> Self:
+        """The same tree, to be changed beside this one, about whose pairs nobody asks meanwhile."""
+        made = object.__new__(type(self))
+        made.__dict__ = dict(self.__dict__)
+        made._columns = [GrowingRows(column.rows.copy()) for column in self._columns]
+        made.nodes, made.links, made._work = self.nodes.copy(), self.links.copy(), dict(_NO_WORK)
+        made.sections, made._sides, made._n_inner = list(self.sections), list(self._sides), list(self._n_inner)
+        made._take_columns()
+        return made
 
     def _take_columns(self) -> None:
         """Other rows than before, and so another header."""

@@ -5,6 +5,7 @@ Rows are flat because nine arrays cost 500 ns a call in Python and four addresse
 
 from __future__ import annotations
 
+import copy
 from bisect import bisect_left
 from collections.abc import Sequence
 from fractions import Fraction
@@ -90,6 +91,15 @@ class ShapeTable:
             first += len(body)
         table.addresses = address_of(table.ints), address_of(table.numbers)
         return table
+
+    def copied(self) -> ShapeTable:
+        """A table of the same rows, to which others can be added."""
+        made = copy.copy(self)
+        made.packed, made._contents, made._ranks = list(self.packed), list(self._contents), list(self._ranks)
+        made._without_tree = set(self._without_tree)  # first: another thread may be writing a tree's address
+        made.ints, made.numbers = self.ints.copy(), self.numbers.copy()
+        made.addresses = address_of(made.ints), address_of(made.numbers)
+        return made
 
     def append(self, packed: list[PackedConvex]) -> None:
         """Add rows: O(log n) each, and the copy of all rows where memory has run out."""

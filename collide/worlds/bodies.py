@@ -157,7 +157,7 @@ class WorldBodies:
     ) -> int:
         """The id of a new body; arguments as of `World.add`. Raises InvalidArgument, InvalidPose."""
         checked_shape("World.add: shape", shape, "collide.Sphere(0.1)")
-        X_WB = _IDENTITY if X_WB is None else as_pose(X_WB, "World.add: X_WB")
+        X_WB = _IDENTITY if X_WB is None else _pose("World.add: X_WB", X_WB)
         identity, row = self._next, len(self._ids)
         name = _name_or_none("World.add: name", name) or f"body {identity}"
         if name in self._id_of:
@@ -254,7 +254,7 @@ class WorldBodies:
 
     def move(self, identity: int, X_WB) -> None:
         """Give a body another pose. Raises InvalidPose."""
-        X_WB = as_pose(X_WB, "World.set_pose: X_WB")
+        X_WB = _pose("World.set_pose: X_WB", X_WB)
         row = self._row_of[identity]
         self._X_WBs[row] = X_WB
         self._moved[row] = True
@@ -332,7 +332,7 @@ class WorldBodies:
                 rows = np.ascontiguousarray(bodies, dtype=np.int64)
             except OverflowError:
                 rows = _NO_ROWS
-            if int(rows.view(np.uint64).max()) < n:  # one below 0 is above 2⁶³ there
+            if int(np.maximum.reduce(rows.view(np.uint64))) < n:  # one below 0 is above 2⁶³ there
                 return rows
         if isinstance(bodies, np.ndarray) and bodies.dtype.kind == "i" and self._row_of:
             ids = self.roster().ids
@@ -358,8 +358,12 @@ class WorldBodies:
         return self._roster
 
     def poses(self) -> np.ndarray:
-        """(n, 4, 4) poses by row: a view, changed when bodies move."""
+        """(n, 4, 4) poses by row: a view, changed when bodies move, until `leave_poses`."""
         return self._X_WBs[: len(self._ids)]
+
+    def leave_poses(self) -> None:
+        """Views of poses handed out stay as they are from now on."""
+        self._X_WBs = self._X_WBs.copy()
 
     def _close_gaps(self) -> None:
         """Drop the rows of removed bodies."""
@@ -384,6 +388,12 @@ def _columns_of(ids: list[int], flags: list[tuple[bool, int, int]]) -> list[Grow
 def _are_rigid_matrices(X) -> bool:
     """Whether X is an array of rigid poses for certain; all else is looked at by `as_poses`."""
     return type(X) is np.ndarray and are_rigid_matrices(X, SAFE_TOLERANCE, LARGEST)
+
+
+def _pose(what: str, X_WB) -> np.ndarray:
+    """(4, 4). Raises InvalidPose."""
+    is_rigid = type(X_WB) is np.ndarray and X_WB.ndim == 2 and _are_rigid_matrices(X_WB[None])
+    return X_WB if is_rigid else as_pose(X_WB, what)
 
 
 def _name_or_none(what: str, value) -> str | None:

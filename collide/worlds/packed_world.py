@@ -4,11 +4,13 @@ changes.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from collide.base.fork_safe_lock import ForkSafeLock
 from collide.base.lazy_modules import lazy_module
 from collide.base.threads import share
 from collide.broadphase.bounding_boxes import widened
@@ -23,7 +25,7 @@ from collide.results import EXACT, PAIR_DTYPE, UNDECIDED
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import Picked, ShapeSet
 from collide.worlds.bodies import BodiesAsTheyStood, Roster
-from collide.worlds.world_part_pairs import PartTrees, updating
+from collide.worlds.world_part_pairs import PartTrees
 from collide.worlds.world_parts import WorldParts
 
 #: Half of the engine, which scenes without meshes never load.
@@ -40,6 +42,9 @@ _MIN_SCANNED, _SCANNED, _FIRST_PAIRS = 256, 64, 32
 #: Of more candidates than this, booleans that stop at a hit ask first the so many whose boxes overlap most, of at most
 #: so many, evenly taken: to look at all would take half as long as to ask them.
 _MIN_SORTED, _LIKELIEST, _MAX_COMPARED = 512, 32, 2048
+#: The version of tables that are being changed, or whose poses are.
+STALE = -1
+_NO_WORK = {"added": 0, "removed": 0, "moved": 0}
 #: Poses of so many bodies are copied in the time that it takes to find out which are named.
 _MAX_COPIED = 128
 
@@ -70,34 +75,54 @@ class PairFilters(NamedTuple):
 
 
 class PackedWorld:
-    """Bodies by position (0 … n − 1), each a run of convex parts.
+    """Bodies by position (0 … n − 1), each a run of convex parts. A question is a ``with`` block: `WorldScene._pack`.
 
     roster : the bodies.   X_WBs : (n, 4, 4) their poses.
     filters : of pairs.   parts : the parts.   tree : the box-tree over bodies; ``None`` before
     the first body.   has_margins : whether any body or pair has.
+    readers : as long as the number of questions reading the tables.   version : number of changes of the World up to
+    these tables; STALE while nobody may read the tables.   shares_poses : whether the World moves bodies in X_WBs.
     """
 
     def __init__(self, roster: Roster, X_WBs: np.ndarray, filters: PairFilters):
         self.roster, self.filters = roster, filters
-        self.parts = WorldParts()
+        self.readers: list[None] = []
+        self.version, self.shares_poses = STALE, True
+        self.parts, self._lock = WorldParts(), ForkSafeLock()
         self.tree: BoxTree | None = None
         self._shape_set: ShapeSet | None = None
         self._part_trees = PartTrees(self.parts)
         self._inflation = np.zeros(0)
-        self._work = {"added": 0, "removed": 0, "moved": 0}
+        self._work = _NO_WORK.copy()
         self.has_margins = self._any_meshed = False
         self._append(roster, X_WBs)
         self._remove(np.flatnonzero(~roster.alive))
         self._take_sleep(roster._replace(sleeping=np.zeros(len(roster.ids), dtype=bool)), roster)
         self.set_filters(filters)
 
+    def __enter__(self) -> PackedWorld:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.readers.pop()
+
     # --- changes --------------------------------------------------------------------------------
+
+    def copied(self) -> PackedWorld:
+        """The same World, to be changed while readers go on with these tables; the tables here change no more."""
+        made = copy.copy(self)
+        made.readers, made.version, made._lock, made._work = [], STALE, ForkSafeLock(), _NO_WORK.copy()
+        with self._lock.now:  # what the tree keeps of pairs
+            made.parts, made.tree = self.parts.copied(), None if self.tree is None else self.tree.copied()
+        made._part_trees = PartTrees(made.parts)
+        return made
 
     def update(self, roster: Roster, X_WBs: np.ndarray, is_moved: np.ndarray) -> None:
         """Take what has changed since: bodies behind the others, removed ones, margins, sleep; poses of bodies with a
         flag in ``is_moved`` (n,), which is cleared.   X_WBs : (n, 4, 4), of all bodies, as of `_append`.
         """
         before, n = self.roster, len(self.roster.ids)
+        self.X_WBs, self.shares_poses = X_WBs, True
         if roster is not before:
             self._append(roster, X_WBs)
             dead = np.flatnonzero(before.alive & ~roster.alive[:n])
@@ -109,6 +134,7 @@ class PackedWorld:
             is_moved[n:] = False
         if self.tree is not None:
             self._work["moved"] += self._move(X_WBs, is_moved, self.tree)
+            self.tree.header()  # made before it is read: of two readers that made it one would lose theirs
 
     def _move(self, X_WBs: np.ndarray, is_moved: np.ndarray, tree: BoxTree) -> int:
         """Take poses of bodies that moved, clear their flags, return their number."""
@@ -161,6 +187,7 @@ class PackedWorld:
         if self.tree is not None:
             self.tree.set_allowed(filters.allowed)
             self._inflate()
+            self.tree.header()
 
     def _inflate(self) -> None:
         """Boxes in the tree have room for margins: two of them meet where the bodies' are within their margin."""
@@ -198,7 +225,7 @@ class PackedWorld:
 
     def take_work(self) -> dict:
         """{what: number} of what was brought up to date since this was last called."""
-        work, self._work = self._work, {"added": 0, "removed": 0, "moved": 0}
+        work, self._work = self._work, _NO_WORK.copy()
         return work if self.tree is None else work | self.tree.take_work()
 
     @property
@@ -217,7 +244,7 @@ class PackedWorld:
         """(k, 2) positions of bodies that are to be tested, sorted: not filtered, boxes within margin [m], and the
         margins of bodies and pairs.
         """
-        with updating():  # what the tree keeps of pairs
+        with self._lock.now:  # what the tree keeps of pairs
             return np.empty((0, 2), dtype=np.int64) if self.tree is None else self.tree.pairs(margin)
 
     def first_candidates(self) -> np.ndarray:
@@ -226,7 +253,7 @@ class PackedWorld:
         """
         if self.tree is None or self.has_margins or self._any_meshed or len(self.roster.ids) < _MIN_SCANNED:
             return np.empty((0, 2), dtype=np.int64)
-        with updating():
+        with self._lock.now:
             return self.tree.first_pairs(_SCANNED, _FIRST_PAIRS)
 
     def margins_of(self, pairs: np.ndarray) -> np.ndarray:

@@ -67,8 +67,9 @@ class WorldPairs(WorldScene):
         InvalidArgument; with a margin UnsupportedQuery for pairs that `collide.distance` does not answer.
         """
         margin = checked_margin("World.collides: security_margin", security_margin)
-        _, hits = self._answer(margin, check_threads(threads), boolean=True)
-        return bool(hits.any())
+        started, threads = time.perf_counter(), check_threads(threads)
+        with self._pack() as packed:
+            return bool(np.count_nonzero(self._answer(packed, started, margin, threads, boolean=True)))
 
     def collisions(self, *, threads: int = 1) -> WorldResult:
         """Every hitting pair with its depth.
@@ -86,7 +87,9 @@ class WorldPairs(WorldScene):
         ------
         UnsupportedQuery : for pairs that `collide.distance` does not answer; `unanswerable` names them.
         """
-        return _result(*self._answer(0.0, check_threads(threads)))
+        started, threads = time.perf_counter(), check_threads(threads)
+        with self._pack() as packed:
+            return _result(packed, self._answer(packed, started, 0.0, threads))
 
     def distances(self, max_distance: float = math.inf, *, threads: int = 1) -> WorldResult:
         """Every tested pair at most ``max_distance`` apart, hits included.
@@ -108,7 +111,9 @@ class WorldPairs(WorldScene):
         them.
         """
         limit = checks.limit("World.distances: max_distance", max_distance)
-        return _result(*self._answer(limit, check_threads(threads), margins=False))
+        started, threads = time.perf_counter(), check_threads(threads)
+        with self._pack() as packed:
+            return _result(packed, self._answer(packed, started, limit, threads, margins=False))
 
     def minimum(self, max_distance: float = math.inf, *, threads: int = 1) -> WorldResult:
         """The tested pair of least signed distance, of several pairs with the least ids.
@@ -128,9 +133,9 @@ class WorldPairs(WorldScene):
         ------
         InvalidArgument; UnsupportedQuery : as of `distances`.
         """
-        limit = checks.limit("World.minimum: max_distance", max_distance)
-        packed = self._pack()
-        return _result(packed, nearest_pair(packed, limit, check_threads(threads)))
+        limit, threads = checks.limit("World.minimum: max_distance", max_distance), check_threads(threads)
+        with self._pack() as packed:
+            return _result(packed, nearest_pair(packed, limit, threads))
 
     def contacts(self, margin: float = 0.0, *, max_contacts: int = 8, threads: int = 1) -> WorldContacts:
         """Contacts of every tested pair within a margin; `stats` stays unchanged.
@@ -154,17 +159,8 @@ class WorldPairs(WorldScene):
         margin = contact_query.check_margin("World.contacts", margin)
         max_contacts = contact_query.check_max_contacts("World.contacts", max_contacts)
         threads = check_threads(threads)
-        packed = self._pack()
-        pairs = packed.candidates(margin)
-        if not len(pairs):
-            return WorldContacts(no_rows(), packed.bodies_named(pairs))
-        counts = np.zeros(len(pairs), dtype=np.int64)
-        of_groups = []
-        for some, limit in _by_margin(packed, pairs, margin):
-            rows, counts[some] = world_contacts.contacts_in_pieces(packed, pairs[some], limit, max_contacts, threads)
-            of_groups.append(rows)
-        rows = of_groups[0] if len(of_groups) == 1 else _sorted_by_pair(np.concatenate(of_groups), CONTACT_DTYPE)
-        return WorldContacts(rows, packed.bodies_named(pairs[counts > 0]))
+        with self._pack() as packed:
+            return _contacts(packed, margin, max_contacts, threads)
 
     def overlaps(self, *, threads: int = 1) -> WorldOverlaps:
         """How much bodies overlap: volume, centroid and areas of every tested pair that hits; `stats` stays unchanged.
@@ -187,7 +183,9 @@ class WorldPairs(WorldScene):
         -----
         Milliseconds a pair, more with the number of facets in contact (docs/solids.md).
         """
-        return world_overlaps.overlaps_of(self._pack(), check_threads(threads))
+        threads = check_threads(threads)
+        with self._pack() as packed:
+            return world_overlaps.overlaps_of(packed, threads)
 
     def unanswerable(self, max_distance: float = math.inf) -> list[tuple[int, int, str]]:
         """Pairs for which `distances` raises UnsupportedQuery.
@@ -203,9 +201,9 @@ class WorldPairs(WorldScene):
         [(id, id, reason), …], sorted; for instance some shapes against a mesh.
         """
         limit = checks.limit("World.unanswerable: max_distance", max_distance)
-        packed = self._pack()
-        ids = packed.roster.ids.tolist()
-        return [(ids[a], ids[b], reason) for a, b, reason in packed.refused(packed.candidates(limit), limit)]
+        with self._pack() as packed:
+            ids = packed.roster.ids.tolist()
+            return [(ids[a], ids[b], reason) for a, b, reason in packed.refused(packed.candidates(limit), limit)]
 
     @property
     def stats(self) -> dict:
@@ -222,29 +220,31 @@ class WorldPairs(WorldScene):
         sum(skipped) + narrowphase = pairs, unless `collides` stopped at a hit; ``skipped["broadphase"]`` is missing
         where the hit came before all near pairs were looked for, of 256 bodies or more.
         """
-        if self._last_query is not None:
-            self._stats, self._last_query = self._last_query.stats(), None
+        if (record := self._last_query) is not None:
+            self._stats = record.stats()
+            if self._last_query is record:
+                self._last_query = None
         return self._stats
 
     # --- how they are answered ------------------------------------------------------------------
 
     def _answer(
-        self, limit: float, threads: int, *, boolean: bool = False, margins: bool = True
-    ) -> tuple[PackedWorld, np.ndarray]:
-        """(the packed World asked, rows of all its tested pairs within the limit [m], a and b positions).
+        self, packed: PackedWorld, started: float, limit: float, threads: int, *, boolean: bool = False,
+        margins: bool = True,
+    ) -> np.ndarray:
+        """Rows of all tested pairs within the limit [m], a and b positions.
 
-        margins : add the margins of bodies and pairs.   boolean : instead of rows a bool for each pair, up to a hit.
+        started : when the question was asked [s].   margins : add the margins of bodies and pairs.
+        boolean : instead of rows a bool for each pair, up to a hit.
         """
-        started = time.perf_counter()
-        packed = self._pack()
         ready = time.perf_counter()
         answers: list[Answer] = []
         if boolean and not limit and len(first := packed.first_candidates()):
             culled = time.perf_counter()
             answers.append(packed.answer(first, 0.0, boolean=True, stop_at_hit=True))
-            if answers[0].rows["hit"].any():
+            if np.count_nonzero(answers[0].rows["hit"]):  # an eighth of the time of `any`
                 self._record(packed, answers[0], None, (started, ready, culled))
-                return packed, answers[0].rows["hit"]
+                return answers[0].rows["hit"]
         candidates = packed.candidates(limit)
         culled = time.perf_counter()
         rest = _without(candidates, first) if answers else candidates
@@ -254,14 +254,14 @@ class WorldPairs(WorldScene):
             answer = packed.answer(rest[some], reach, boolean=is_boolean, stop_at_hit=is_boolean, threads=threads)
             answers.append(answer)
             wanted.append(_wanted(packed, answer.rows, reach, boolean, margins))
-            if boolean and wanted[-1].any():
+            if boolean and np.count_nonzero(wanted[-1]):
                 break
         answer = answers[0] if len(answers) == 1 else joined(answers, boolean=True)
         self._record(packed, answer, len(candidates), (started, ready, culled))
         if len(wanted) == 1:
-            return packed, wanted[0]
+            return wanted[0]
         all_wanted = np.concatenate(wanted)
-        return packed, all_wanted if boolean else _sorted_by_pair(all_wanted, PAIR_DTYPE)
+        return all_wanted if boolean else _sorted_by_pair(all_wanted, PAIR_DTYPE)
 
     def _record(
         self, packed: PackedWorld, answer: Answer, n_candidates: int | None, times: tuple[float, float, float]
@@ -276,6 +276,20 @@ class WorldPairs(WorldScene):
             answer.mesh_pairs, packed.take_work(),
             {"pack": ready - started, "broadphase": culled - ready, "narrowphase": ended - culled},
         )
+
+
+def _contacts(packed: PackedWorld, margin: float, max_contacts: int, threads: int) -> WorldContacts:
+    """As `WorldPairs.contacts`."""
+    pairs = packed.candidates(margin)
+    if not len(pairs):
+        return WorldContacts(no_rows(), packed.bodies_named(pairs))
+    counts = np.zeros(len(pairs), dtype=np.int64)
+    of_groups = []
+    for some, limit in _by_margin(packed, pairs, margin):
+        rows, counts[some] = world_contacts.contacts_in_pieces(packed, pairs[some], limit, max_contacts, threads)
+        of_groups.append(rows)
+    rows = of_groups[0] if len(of_groups) == 1 else _sorted_by_pair(np.concatenate(of_groups), CONTACT_DTYPE)
+    return WorldContacts(rows, packed.bodies_named(pairs[counts > 0]))
 
 
 def _result(packed: PackedWorld, rows: np.ndarray) -> WorldResult:

@@ -2,40 +2,92 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from threading import get_ident
 
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.fork_safe_lock import ForkSafeLock
 from collide.base.log import log_duration
 from collide.errors import InvalidArgument
 from collide.pairs.security_margin import checked_margin
 from collide.shapes.shape import Shape, checked_shape
 from collide.worlds.bodies import Body, Roster, WorldBodies
-from collide.worlds.packed_world import PackedWorld, PairFilters
-from collide.worlds.world_part_pairs import updating
+from collide.worlds.packed_world import STALE, PackedWorld, PairFilters
+from collide.worlds.ready_shapes import make_ready
 
 
 class WorldScene:
-    """Bodies that may touch, and pairs of bodies never to test. `collide.World` adds the questions."""
+    """Bodies that may touch, and pairs of bodies never to test. `collide.World` adds the questions.
+
+    A change writes bodies, filters and margins under the lock, and is counted. A question reads a `PackedWorld` with
+    every change so far, and is among its readers until answered: the next question brings tables without readers up to
+    date in place, and copies tables with readers first.
+    """
 
     def __init__(self) -> None:
         self._bodies = WorldBodies()
         self._allowed: dict[tuple[int, int], str] = {}
         self._pair_margins: dict[tuple[int, int], float] = {}
         self._partners: dict[int, set[int]] = {}
-        self._packed: PackedWorld | None = None
         self._pairs_changed = False
+        self._begin_unread()
+
+    def _begin_unread(self) -> None:
+        """As if nothing had been asked yet."""
+        self._lock, self._n_changes = ForkSafeLock(), 0
+        #: Tables of the bodies, made last; those that questions begin with: of before the changes of a `changes` block.
+        self._packed: PackedWorld | None = None
+        self._published: PackedWorld | None = None
+        #: The thread in a `changes` block; the thread that asked first; whether another one has asked.
+        self._changer: int | None = None
+        self._first_asker: int | None = None
+        self._is_shared = False
 
     def __getstate__(self) -> dict:
         """What a copy or a pickle takes along: bodies, names and what is said of pairs. The rest is made again."""
-        return {
-            "_bodies": copy.copy(self._bodies), "_allowed": dict(self._allowed),
-            "_pair_margins": dict(self._pair_margins), "_partners": copy.deepcopy(self._partners), "_packed": None,
-            "_pairs_changed": False,
-        }
+        with self._lock.now:
+            return {
+                "_bodies": copy.copy(self._bodies), "_allowed": dict(self._allowed),
+                "_pair_margins": dict(self._pair_margins), "_partners": copy.deepcopy(self._partners),
+                "_pairs_changed": False,
+            }
+
+    def __setstate__(self, state: dict) -> None:
+        vars(self).update(state)
+        self._begin_unread()
+
+    @contextlib.contextmanager
+    def changes(self) -> Iterator[None]:
+        """Several changes as one: ``with world.changes(): ...``.
+
+        Questions of other threads are answered as of before the block until the block ends, without a wait; later
+        questions see all changes of the block. Questions within the block see the changes so far. Changes by other
+        threads, and their reads of `body`, `ids`, `names` and `allowed`, wait for the end. Blocks may be nested. An
+        error within ends the block: changes made before stay, and are seen as a whole.
+
+        Notes
+        -----
+        Once another thread has asked, the changing thread makes the tables, beside the tables being read: O(n) bytes
+        are copied for n bodies, 0.6 kB each.
+        """
+        with self._lock.now:
+            others_ask = self._is_shared or self._first_asker not in (None, get_ident())
+            if self._changer is not None or not others_ask:
+                yield
+                return
+            self._published, self._changer = self._brought_up_to_date(), get_ident()
+            try:
+                yield
+            finally:
+                try:
+                    self._published = self._brought_up_to_date()
+                finally:
+                    self._changer = None
 
     def add(
         self, shape: Shape, X_WB=None, *, name: str | None = None, static: bool = False, group: int = 1,
@@ -63,7 +115,10 @@ class WorldScene:
         """
         if margin.__class__ is not float or margin != 0.0:
             margin = checked_margin("World.add: margin", margin)
-        return self._bodies.add(shape, X_WB, name, static, group, mask, margin)
+        with self._lock.now:
+            identity = self._bodies.add(shape, X_WB, name, static, group, mask, margin)
+            self._n_changes += 1
+            return identity
 
     def add_many(
         self, shapes: Shape | Sequence[Shape], X_WBs, *, names: Sequence[str | None] | None = None, static=False,
@@ -87,14 +142,18 @@ class WorldScene:
         ------
         InvalidArgument, InvalidPose : naming the argument, the place and the value; nothing is added.
         """
-        return self._bodies.add_many(shapes, X_WBs, names, static, group, mask, margin)
+        with self._lock.now:
+            ids = self._bodies.add_many(shapes, X_WBs, names, static, group, mask, margin)
+            self._n_changes += 1
+            return ids
 
     def replace(self, body: int | str, shape: Shape) -> None:
         """Give a body another shape: later questions are answered as if the body had been added with this shape.
 
-        Its id, name, pose, margins, filters and sleep stay. Tables and box-tree are made anew by the next question, in
-        about 2 µs a body of the World. A question of another thread in progress is answered to the end with the former
-        shape: no question sees half of a change. Results keep the shape of their time.
+        Its id, name, pose, margins, filters and sleep stay. The tree of a cloud or a mesh is made here, before anybody
+        sees the shape. Tables and box-tree of the World are made anew, in about 2 µs a body: by the next question, or
+        here once another thread has asked, so that questions of others do not wait. Results keep the shape of their
+        time.
 
         Parameters
         ----------
@@ -105,10 +164,11 @@ class WorldScene:
         ------
         UnknownBody, InvalidArgument
         """
-        identity = self._bodies.id_of(body)
-        checked_shape("World.replace: shape", shape)
-        with updating():
-            self._bodies.replace(identity, shape)
+        self._bodies.id_of(body)
+        make_ready(checked_shape("World.replace: shape", shape))
+        with self.changes():
+            self._bodies.replace(self._bodies.id_of(body), shape)
+            self._n_changes += 1
 
     def remove(self, body: int | str) -> None:
         """Take a body out, and what was allowed for it.
@@ -121,13 +181,15 @@ class WorldScene:
         ------
         UnknownBody
         """
-        identity = self._bodies.id_of(body)
-        self._bodies.remove(identity)
-        for partner in self._partners.pop(identity, ()):
-            pair = min(identity, partner), max(identity, partner)
-            self._allowed.pop(pair, None)
-            self._pair_margins.pop(pair, None)
-            self._partners[partner].discard(identity)
+        with self._lock.now:
+            identity = self._bodies.id_of(body)
+            self._bodies.remove(identity)
+            for partner in self._partners.pop(identity, ()):
+                pair = min(identity, partner), max(identity, partner)
+                self._allowed.pop(pair, None)
+                self._pair_margins.pop(pair, None)
+                self._partners[partner].discard(identity)
+            self._n_changes += 1
 
     def set_pose(self, body: int | str, X_WB) -> None:
         """Move a body. About 2 µs.
@@ -141,10 +203,16 @@ class WorldScene:
         ------
         UnknownBody, InvalidPose
         """
-        self._bodies.move(self._bodies.id_of(body), X_WB)
+        with self._lock.now:
+            identity = self._bodies.id_of(body)
+            if self._packed is not None and self._packed.shares_poses:
+                self._may_change(self._packed)
+            self._bodies.move(identity, X_WB)
+            self._n_changes += 1
 
     def set_poses(self, bodies: Iterable[int | str], X_WBs) -> None:
-        """Move k bodies. About 0.02 µs a body, by ids.
+        """Move k bodies, as a single change: no question of another thread sees some moved. About 0.02 µs a body, by
+        ids.
 
         Parameters
         ----------
@@ -155,7 +223,11 @@ class WorldScene:
         ------
         UnknownBody, InvalidPose : then no body has moved.
         """
-        self._bodies.move_many(bodies, X_WBs)
+        with self._lock.now:
+            if self._packed is not None and self._packed.shares_poses:
+                self._may_change(self._packed)
+            self._bodies.move_many(bodies, X_WBs)
+            self._n_changes += 1
 
     def sleep(self, bodies: Iterable[int | str]) -> None:
         """Put bodies to sleep: a pair of two bodies asleep or static is not tested until one of them is woken.
@@ -170,7 +242,7 @@ class WorldScene:
         ------
         UnknownBody : then no body has been put to sleep.
         """
-        self._bodies.set_sleeping(bodies, True)
+        self._set_sleeping(bodies, True)
 
     def wake(self, bodies: Iterable[int | str]) -> None:
         """Wake sleeping bodies; others stay as they are.
@@ -183,7 +255,12 @@ class WorldScene:
         ------
         UnknownBody : then no body has been woken.
         """
-        self._bodies.set_sleeping(bodies, False)
+        self._set_sleeping(bodies, False)
+
+    def _set_sleeping(self, bodies: Iterable[int | str], asleep: bool) -> None:
+        with self._lock.now:
+            self._bodies.set_sleeping(bodies, asleep)
+            self._n_changes += 1
 
     def set_margin(self, body: int | str, margin: float | None, *, partner: int | str | None = None) -> None:
         """Count a body as hit already at a distance.
@@ -201,15 +278,19 @@ class WorldScene:
         ------
         UnknownBody, InvalidArgument
         """
-        identity = self._bodies.id_of(body)
-        if margin is not None:
-            margin = checked_margin("World.set_margin: margin", margin)
-        if partner is None:
-            if margin is None:
-                raise InvalidArgument("World.set_margin: margin of a body must be a number [m], ≥ 0, got None")
-            self._bodies.set_margin(identity, margin)
-            return
-        pair = self._pair("World.set_margin", body=body, partner=partner)
+        with self._lock.now:
+            identity = self._bodies.id_of(body)
+            if margin is not None:
+                margin = checked_margin("World.set_margin: margin", margin)
+            if partner is None:
+                if margin is None:
+                    raise InvalidArgument("World.set_margin: margin of a body must be a number [m], ≥ 0, got None")
+                self._bodies.set_margin(identity, margin)
+            else:
+                self._set_pair_margin(self._pair("World.set_margin", body=body, partner=partner), margin)
+            self._n_changes += 1
+
+    def _set_pair_margin(self, pair: tuple[int, int], margin: float | None) -> None:
         if margin is None:
             self._pair_margins.pop(pair, None)
         else:
@@ -231,14 +312,16 @@ class WorldScene:
         UnknownBody; InvalidArgument : the same body twice, or a matrix of another form.
         """
         checks.text("World.allow: reason", reason)
-        if b is None:
-            matrix = checks.plain_array("World.allow: a", a, "(bodies, bodies)", InvalidArgument)
-            self._allow_matrix(matrix, reason)
-        else:
-            pair = self._pair("World.allow", a=a, b=b)
-            self._allowed.setdefault(pair, reason)
-            self._note_partners(pair)
-        self._pairs_changed = True
+        with self._lock.now:
+            if b is None:
+                matrix = checks.plain_array("World.allow: a", a, "(bodies, bodies)", InvalidArgument)
+                self._allow_matrix(matrix, reason)
+            else:
+                pair = self._pair("World.allow", a=a, b=b)
+                self._allowed.setdefault(pair, reason)
+                self._note_partners(pair)
+            self._pairs_changed = True
+            self._n_changes += 1
 
     def _pair(self, caller: str, **named: int | str) -> tuple[int, int]:
         """Ids of two bodies that arguments of these names give. Raises UnknownBody, InvalidArgument."""
@@ -271,12 +354,14 @@ class WorldScene:
     @property
     def ids(self) -> list[int]:
         """Ids of all bodies, ascending."""
-        return self._bodies.ids
+        with self._lock.now:
+            return self._bodies.ids
 
     @property
     def names(self) -> dict[int, str]:
         """Name of each body, by id."""
-        return self._bodies.names
+        with self._lock.now:
+            return self._bodies.names
 
     def body(self, body: int | str) -> Body:
         """The body of this id or name, in its present state.
@@ -293,31 +378,73 @@ class WorldScene:
         ------
         UnknownBody
         """
-        return self._bodies.body(self._bodies.id_of(body))
+        with self._lock.now:
+            return self._bodies.body(self._bodies.id_of(body))
 
     @property
     def allowed(self) -> dict[tuple[int, int], str]:
         """Pairs never tested: {(id, id): reason}, the smaller id first."""
-        return dict(self._allowed)
+        with self._lock.now:
+            return dict(self._allowed)
 
     # --- as queries see them --------------------------------------------------------------------
 
     def _pack(self) -> PackedWorld:
-        with updating():
-            return self._brought_up_to_date()
+        """What a question reads: ``with self._pack() as packed: ...``. No change reaches it within the block."""
+        me, packed = get_ident(), self._published
+        if me != self._first_asker:
+            self._is_shared = self._first_asker is not None
+            self._first_asker = self._first_asker or me
+        while packed is not None:
+            # A reader counts before it looks, and a change marks tables STALE before it counts: one of them gives way.
+            packed.readers.append(None)
+            if packed.version == self._n_changes:
+                return packed
+            is_in_block = self._changer is not None and self._changer != me
+            if is_in_block and packed is self._published:
+                return packed
+            packed.readers.pop()
+            packed = self._published if is_in_block else None
+        with self._lock.now:
+            packed = self._brought_up_to_date()
+            packed.readers.append(None)
+            return packed
+
+    def _may_change(self, packed: PackedWorld) -> bool:
+        """Whether nobody reads these tables, nor begins to: they are STALE until brought up to date. If not, they keep
+        the poses that they have, and another copy is to be changed.
+        """
+        may_change = self._changer is None or packed is not self._published
+        if may_change:
+            version, packed.version = packed.version, STALE
+            if packed.readers:
+                may_change, packed.version = False, version
+        if not may_change and packed.shares_poses:
+            self._bodies.leave_poses()
+        packed.shares_poses = False
+        return may_change
 
     def _brought_up_to_date(self) -> PackedWorld:
-        roster, X_WBs, is_moved = self._bodies.roster(), self._bodies.poses(), self._bodies.is_moved
+        """The tables with all changes so far; the lock is held."""
         packed = self._packed
+        if packed is not None and packed.version == self._n_changes:
+            return packed
+        may_change = packed is not None and (packed.version == STALE or self._may_change(packed))
+        self._packed = None  # an error leaves nothing half changed
+        roster, X_WBs, is_moved = self._bodies.roster(), self._bodies.poses(), self._bodies.is_moved
         if packed is None or packed.roster.generation != roster.generation:
             with log_duration("tables and box-tree of a World of %d bodies made", len(self)):
-                packed = self._packed = PackedWorld(roster, X_WBs, self._filters(roster))
+                packed = PackedWorld(roster, X_WBs, self._filters(roster))
                 is_moved[:] = False
         else:
+            packed = packed if may_change else packed.copied()
             packed.update(roster, X_WBs, is_moved)
             if self._pairs_changed:
                 packed.set_filters(self._filters(roster))
         self._pairs_changed = False
+        packed.version, self._packed = self._n_changes, packed
+        if self._changer is None:
+            self._published = packed
         return packed
 
     def _filters(self, roster: Roster) -> PairFilters:

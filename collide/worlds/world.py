@@ -41,8 +41,8 @@ class World(WorldPairs):
 
     Packed arrays and the box-tree are made when a query first needs them, and brought up to date by the next query, at
     a cost in proportion to the bodies added, moved or removed, but for copies of a few bytes a body. The list of near
-    pairs is kept from query to query while few bodies change. A World is not safe to change from a thread while
-    another thread asks, but by `replace`.
+    pairs is kept from query to query while few bodies change. Any number of threads may ask and change a World at once:
+    a query is answered as of before a change or as of after, and `changes` makes several changes one.
     """
 
     def query(
@@ -78,14 +78,14 @@ class World(WorldPairs):
         if not isinstance(shape, Shape):
             n = checks.matched_count("World.query", shape=len(shapes), X_WS=len(X_WS))
         X_WS = np.array(np.broadcast_to(X_WS, (n, 4, 4)))
-        packed = self._pack()
         rows = np.zeros(0, dtype=PAIR_DTYPE)
-        if n:
-            rows = answer_outside(packed, questions_of(shapes, X_WS), limit, threads)
-        rows = rows[~(rows["lower"] > limit)]
-        asked = rows["a"].copy()
-        rows["a"] = rows["b"]
-        bodies = packed.to_ids(rows)
+        with self._pack() as packed:
+            if n:
+                rows = answer_outside(packed, questions_of(shapes, X_WS), limit, threads)
+            rows = rows[~(rows["lower"] > limit)]
+            asked = rows["a"].copy()
+            rows["a"] = rows["b"]
+            bodies = packed.to_ids(rows)
         rows["a"] = -1 - asked
         for k in np.unique(asked).tolist() if n != 1 else [0]:
             name = "query" if n == 1 else f"query {k}"
@@ -119,14 +119,14 @@ class World(WorldPairs):
                 f"World.boxes_near: low_W and high_W must be corners (3,) of a box, low ≤ high, got "
                 f"{checks.brief(low_W)} and {checks.brief(high_W)}"
             )
-        packed = self._pack()
-        if packed.tree is None:
-            return []
-        low, high = corners
-        near = packed.tree.touching(np.concatenate([low, high]), margin)
-        boxes = packed.parts.body_boxes(near)  # those of the tree have room for margins
-        meets = ((boxes[:, :3] - margin <= high) & (low - margin <= boxes[:, 3:])).all(axis=1)
-        return packed.roster.ids[near[meets]].tolist()
+        with self._pack() as packed:
+            if packed.tree is None:
+                return []
+            low, high = corners
+            near = packed.tree.touching(np.concatenate([low, high]), margin)
+            boxes = packed.parts.body_boxes(near)  # those of the tree have room for margins
+            meets = ((boxes[:, :3] - margin <= high) & (low - margin <= boxes[:, 3:])).all(axis=1)
+            return packed.roster.ids[near[meets]].tolist()
 
     def bounding_boxes(self) -> tuple[np.ndarray, np.ndarray]:
         """The axis-aligned bounding box of every body.
@@ -136,9 +136,9 @@ class World(WorldPairs):
         (ids, boxes) : (n,) int32 ascending, and (n, 6) float64, low x, y, z, high x, y, z in W [m], rounded outwards by
             a few units in the last place; infinite of half-spaces.
         """
-        packed = self._pack()
-        alive = np.flatnonzero(packed.roster.alive)
-        return packed.roster.ids[alive], packed.parts.body_boxes(alive)
+        with self._pack() as packed:
+            alive = np.flatnonzero(packed.roster.alive)
+            return packed.roster.ids[alive], packed.parts.body_boxes(alive)
 
     def raycast(
         self, origins_W, directions_W, *, max_distance: float = math.inf, all_hits: bool = False,
@@ -174,9 +174,9 @@ class World(WorldPairs):
         origins, directions, _ = cast_arguments.checked_rays("World.raycast", origins_W, directions_W)
         which = casts.checked_filter("World.raycast", group, mask)
         all_hits = checks.true_or_false("World.raycast: all_hits", all_hits)
-        packed = self._pack()
-        rows, starts = casts.cast_rays(packed, origins, directions, limit, all_hits, which)
-        return _hits(packed, rows, starts)
+        with self._pack() as packed:
+            rows, starts = casts.cast_rays(packed, origins, directions, limit, all_hits, which)
+            return _hits(packed, rows, starts)
 
     def shape_cast(
         self, shape: Shape, X_WS, direction_W, *, max_distance: float = math.inf, start_normals: bool = False,
@@ -211,10 +211,10 @@ class World(WorldPairs):
         cast_arguments.refuse_unbounded("World.shape_cast: shape", shape)
         which = casts.checked_filter("World.shape_cast", group, mask)
         X_WS = np.ascontiguousarray(np.broadcast_to(X_WS, (n, 4, 4)))
-        packed = self._pack()
-        return _hits(
-            packed, casts.cast_shape(packed, shape, X_WS, directions.repeated(n), limit, which, start_normals)
-        )
+        with self._pack() as packed:
+            return _hits(
+                packed, casts.cast_shape(packed, shape, X_WS, directions.repeated(n), limit, which, start_normals)
+            )
 
     def nearest(
         self, points_W, *, max_distance: float = math.inf, group: int | None = None, mask: int | None = None
@@ -240,8 +240,8 @@ class World(WorldPairs):
         limit = checks.limit("World.nearest: max_distance", max_distance)
         points = cast_arguments.checked_points("World.nearest", "points_W", points_W)
         which = casts.checked_filter("World.nearest", group, mask)
-        packed = self._pack()
-        return _hits(packed, casts.nearest_bodies(packed, points, limit, which))
+        with self._pack() as packed:
+            return _hits(packed, casts.nearest_bodies(packed, points, limit, which))
 
 
 def _hits(packed: PackedWorld, rows: np.ndarray, starts: np.ndarray | None = None) -> WorldHits:

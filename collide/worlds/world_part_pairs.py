@@ -20,15 +20,11 @@ _TIMES_AS_WIDE = 4.0
 _ROUNDING = 2.0**-40
 
 
-#: Held while trees are made or brought up to date, of bodies and of their parts: threads may ask one World at once.
-updating = ForkSafeLock()
-
-
 class PartTrees:
     """Box-trees over the parts of bodies, by position."""
 
     def __init__(self, parts: WorldParts):
-        self._parts = parts
+        self._parts, self._lock = parts, ForkSafeLock()  # held while a tree is made or fitted: threads may ask at once
         self._trees: dict[int, BoxTree] = {}
 
     def are_mostly_near(self, candidates: np.ndarray, margin: float) -> np.ndarray:
@@ -102,7 +98,7 @@ class PartTrees:
     def _tree_of(self, body: int) -> BoxTree:
         """The tree over the parts of a body, where they are now."""
         boxes = self._parts.boxes[self._parts.first[body] : self._parts.first[body + 1]]
-        with updating():
+        with self._lock.now:
             tree = self._trees.get(body)
             if tree is None:
                 tree = self._trees[body] = BoxTree(boxes)

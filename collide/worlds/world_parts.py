@@ -6,6 +6,7 @@ stay in place.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -61,6 +62,7 @@ class WorldParts:
         self._first = GrowingRows(np.zeros(1, dtype=np.int64))
         self._terms = GrowingRows.empty(float, TERM_ROW)
         self.all_of_one_part = self.are_single = True
+        self._is_table_shared = False
         self._take_columns()
 
     def _take_columns(self) -> None:
@@ -96,8 +98,28 @@ class WorldParts:
         self.are_single = self.are_single and self.all_of_one_part and not has_pose.any()
         self._take_columns()
 
+    def copied(self) -> WorldParts:
+        """The same parts, to be changed beside these, which do not change any more: what is only added to is shared."""
+        made = copy.copy(self)
+        made._of_shapes, made._shape_parts, made._of_bodies, made._of_parts = (
+            [copy.copy(column) for column in columns]
+            for columns in (self._of_shapes, self._shape_parts, self._of_bodies, self._of_parts)
+        )
+        made._of_parts[-2:] = [GrowingRows(column.rows.copy()) for column in self._of_parts[-2:]]  # poses and boxes
+        made._first, made._terms = copy.copy(self._first), GrowingRows(self._terms.rows.copy())
+        made._is_table_shared = True
+        made._take_columns()
+        return made
+
+    def _own_table(self) -> None:
+        """Shapes and their table become those of these parts alone, before shapes are added."""
+        if self._is_table_shared:
+            self.shapes, self.table, self._is_table_shared = list(self.shapes), self.table.copied(), False
+            self._number_of, self._rows = dict(self._number_of), dict(self._rows)
+
     def _numbers_of(self, shapes: Sequence[Shape]) -> np.ndarray:
         """(k,) the number of each shape among the distinct shapes; new shapes are added."""
+        self._own_table()
         keys, number_of = list(map(id, shapes)), self._number_of
         distinct = {key: shape for key, shape in dict(zip(keys, shapes)).items() if key not in number_of}
         parts = [bounding_parts_of(shape) for shape in distinct.values()]

@@ -80,7 +80,8 @@ def test_moving_one_body_looks_at_one(monkeypatch):
 
     watch("boxes_of", lambda given: len(given[-1]))
     watch("pose_table", lambda given: len(given[-1]))
-    boxes = world._pack().parts.boxes
+    with world._pack() as packed:
+        boxes = packed.parts.boxes
     boxes[1:] = 7.0  # nobody reads them but to write the tree's
     world.set_pose(0, pose(t=(7.5, 0, 0)))
     assert world.collides() and not seen and world.stats["updates"]["moved"] == 1

@@ -1,0 +1,85 @@
+"""How long readers of a World wait while another thread exchanges a cloud of 10⁵ points again and again.
+
+    python benchmarks/live_worlds.py             # half a minute
+
+Readers ask what is near a box. "wait" is what a question takes until it has tables to read, "question" all of it; ms.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+
+import collide
+
+_POINTS, _SECONDS = 100_000, 3.0
+
+
+def scans(n: int) -> list[np.ndarray]:
+    """The walls of a room, n times, each with noise of its own."""
+    rng = np.random.default_rng(0)
+    d = rng.normal(size=(_POINTS, 3))
+    walls = 3.0 * d / np.abs(d).max(axis=1)[:, None]
+    return [walls + rng.normal(0.0, 0.003, walls.shape) for _ in range(n)]
+
+
+class _World(collide.World):
+    """Notes how long questions wait."""
+
+    delays: list[float]
+
+    def _pack(self):
+        started = time.perf_counter()
+        packed = super()._pack()
+        self.delays.append(time.perf_counter() - started)
+        return packed
+
+
+def measured(world: _World, seen: list[np.ndarray], n_readers: int) -> str:
+    """A line of the table."""
+    questions, writes, ended = [], [], threading.Event()
+    tool, X_WT = collide.Box((0.1, 0.1, 0.3)), collide.pose((0.5, 0.2, 2.9))
+
+    def read() -> None:
+        while not ended.is_set():
+            started = time.perf_counter()
+            world.query(tool, X_WT, 0.05)
+            questions.append(time.perf_counter() - started)
+
+    readers = [threading.Thread(target=read) for _ in range(n_readers)]
+    for reader in readers:
+        reader.start()
+    time.sleep(0.2)
+    world.delays.clear()
+    end = time.monotonic() + _SECONDS
+    while time.monotonic() < end:
+        started = time.perf_counter()
+        world.replace("scan", collide.PointCloud(seen[len(writes) % len(seen)], 0.01))
+        writes.append(time.perf_counter() - started)
+        time.sleep(0.01)
+    ended.set()
+    for reader in readers:
+        reader.join()
+    delays, asked, written = (1e3 * np.sort(times) for times in (world.delays, questions, writes))
+    return (
+        f"{n_readers} readers: {len(delays)} questions, wait {np.median(delays):.4f} (most {delays[-1]:.3f}), question "
+        f"{np.median(asked):.2f} ({asked[-1]:.1f}); {len(written)} replaced, each {np.median(written):.1f}"
+    )
+
+
+def main() -> None:
+    seen, rng = scans(4), np.random.default_rng(1)
+    for n_boxes in (30, 3000):
+        world = _World()
+        world.delays = []
+        world.add(collide.PointCloud(seen[0], 0.01), name="scan")
+        for _ in range(n_boxes):
+            world.add(collide.Box(rng.uniform(0.05, 0.2, 3)), collide.pose(rng.uniform(-2.5, 2.5, 3)))
+        for n_readers in (1, 4):
+            print(f"{n_boxes} boxes, {measured(world, seen, n_readers)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
