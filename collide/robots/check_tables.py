@@ -6,7 +6,7 @@ Made once a checker and World; nothing here looks at a configuration.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -58,7 +58,7 @@ class Surroundings(NamedTuple):
     """The surroundings' part of `CheckTables`.
 
     bodies : by number.   packed : of the parts.   poses : (parts, POSE).   body_of : (parts,) int64.
-    is_bound : (parts,) bool.   tree : over the parts.
+    is_bound : (parts,) bool.   tree : over the parts.   table : of the parts.   X_BP : (parts, 4, 4).
     """
 
     bodies: Sequence[BodyAround]
@@ -67,6 +67,8 @@ class Surroundings(NamedTuple):
     body_of: np.ndarray
     is_bound: np.ndarray
     tree: BoxTree | None
+    table: ShapeTable
+    X_BP: np.ndarray
 
 
 class CheckTables(NamedTuple):
@@ -91,12 +93,26 @@ class CheckTables(NamedTuple):
     slack: float
 
 
+class RobotTables(NamedTuple):
+    """The robot's part of `CheckTables`, constant while the World changes.   skew : of all matrices of the robot."""
+
+    bodies: np.ndarray
+    body_boxes: np.ndarray
+    parts: np.ndarray
+    padded: int
+    part_boxes: np.ndarray
+    is_bound: np.ndarray
+    table: ShapeTable
+    skew: float
+
+
 class Setting(NamedTuple):
     """A robot among the bodies of a World as it stood.
 
     bodies : of the robot.   base : pose of the root, as `forward_kinematics.LINK_POSE` doubles.
     self_pairs : (k, 2) int64 of tested bodies.   allowed : (bodies, around) uint8, 1 for pairs never tested.
     skipped : {reason: number of pairs never tested}.
+    seen : the World as of then.   spare : workspaces of threads not at work.
     """
 
     bodies: Sequence[RobotBody]
@@ -106,6 +122,8 @@ class Setting(NamedTuple):
     self_pairs: np.ndarray
     allowed: np.ndarray
     skipped: dict[str, int]
+    seen: Any = None
+    spare: Any = None
 
 
 class _LinkParts(NamedTuple):
@@ -113,32 +131,55 @@ class _LinkParts(NamedTuple):
     is_bound: bool
 
 
-def surroundings_of(bodies: Sequence[BodyAround]) -> Surroundings:
-    """Parts of the bodies around, posed, and a tree over them."""
-    of_bodies = [convex_parts_of(body.shape) for body in bodies]
-    counts = np.array([len(of_body.parts) for of_body in of_bodies], dtype=np.int64)
-    body_of = np.repeat(np.arange(len(bodies)), counts)
-    packed = [packed for of_body in of_bodies for packed, _ in of_body.parts]
-    is_bound = np.repeat(np.array([of_body.is_bound for of_body in of_bodies], dtype=bool), counts)
-    X_BP = np.array([X for of_body in of_bodies for _, X in of_body.parts]).reshape(-1, 4, 4)
+def surroundings_of(bodies: Sequence[BodyAround], before: Surroundings | None = None) -> Surroundings:
+    """Parts of the bodies around, posed, and a tree over them.
+
+    before : surroundings whose parts are taken over where bodies have at most moved.
+    """
+    if before is not None and _have_at_most_moved(before.bodies, bodies):
+        _, packed, _, body_of, is_bound, _, table, X_BP = before
+        poses = _poses_of(bodies, body_of, X_BP, packed)
+    else:
+        of_bodies = [convex_parts_of(body.shape) for body in bodies]
+        counts = np.array([len(of_body.parts) for of_body in of_bodies], dtype=np.int64)
+        body_of = np.repeat(np.arange(len(bodies)), counts)
+        packed = [packed for of_body in of_bodies for packed, _ in of_body.parts]
+        is_bound = np.repeat(np.array([of_body.is_bound for of_body in of_bodies], dtype=bool), counts)
+        X_BP = np.array([X for of_body in of_bodies for _, X in of_body.parts]).reshape(-1, 4, 4)
+        poses = _poses_of(bodies, body_of, X_BP, packed)
+        margins = np.repeat([body.margin for body in bodies], counts)
+        for k in np.flatnonzero(margins).tolist():
+            packed[k] = packed_within(packed[k], float(margins[k]), poses[k, :9].reshape(3, 3))
+        table = ShapeTable(packed)
+    tree = BoxTree(boxes_of(table, poses, np.arange(len(packed)))) if packed else None
+    return Surroundings(bodies, packed, poses, body_of, is_bound, tree, table, X_BP)
+
+
+def _have_at_most_moved(before: Sequence[BodyAround], now: Sequence[BodyAround]) -> bool:
+    """Whether all shapes are the same; False with margins, which swell parts by how their bodies are turned."""
+    return len(before) == len(now) and all(
+        a.shape is b.shape and a.margin == b.margin == 0.0 for a, b in zip(before, now)
+    )
+
+
+def _poses_of(
+    bodies: Sequence[BodyAround], body_of: np.ndarray, X_BP: np.ndarray, packed: Sequence[PackedConvex]
+) -> np.ndarray:
+    """(parts, POSE) rows of parts in the world."""
     X_WB = np.array([body.X_WB for body in bodies]).reshape(-1, 4, 4)[body_of]
-    poses = pose_table(X_WB, X_BP, np.array([part.reach for part in packed])).rows
+    poses = pose_table(X_WB, X_BP, np.array([part.reach for part in packed]), terms=False).rows
     poses[:, POSE_TERMS] = -1.0  # what products of poses lost is in their slop
     poses[:, POSE_STRETCH] = _stretches(poses)
-    margins = np.repeat([body.margin for body in bodies], counts)
-    for k in np.flatnonzero(margins).tolist():
-        packed[k] = packed_within(packed[k], float(margins[k]), poses[k, :9].reshape(3, 3))
-    tree = None
-    if packed:
-        tree = BoxTree(boxes_of(ShapeTable(packed), poses, np.arange(len(packed))))
-    return Surroundings(bodies, packed, poses, body_of, is_bound, tree)
+    return poses
 
 
 def check_tables(bodies: Sequence[RobotBody], around: Surroundings, matrices: np.ndarray) -> CheckTables:
-    """The `CheckTables` of a robot's bodies and what is around them.
+    """The `CheckTables` of a robot's bodies and what is around them; arguments as of `robot_tables`."""
+    return tables_among(robot_tables(bodies, matrices), around)
 
-    matrices : (k, 3, 3) every matrix that poses of links are products of.
-    """
+
+def robot_tables(bodies: Sequence[RobotBody], matrices: np.ndarray) -> RobotTables:
+    """Tables of a robot's bodies.   matrices : (k, 3, 3) every matrix that poses of links are products of."""
     of_bodies = [convex_parts_of(body.shape) for body in bodies]
     counts = np.array([len(of_body.parts) for of_body in of_bodies], dtype=np.int64)
     rows = np.zeros((len(bodies), BODY_INTS), dtype=np.int64)
@@ -151,14 +192,30 @@ def check_tables(bodies: Sequence[RobotBody], around: Surroundings, matrices: np
     if padded:
         packed = packed + [swollen(part, by) for part, by in zip(packed, padding.tolist())]
         parts, is_bound = np.concatenate([parts, parts]), np.concatenate([is_bound, is_bound])
-    table_of = ShapeTable([*packed, *around.packed])
-    table_of.build_trees(np.arange(len(table_of.packed)))  # else each support of a hull looks at all its vertices
-    part_boxes = np.array([box_of(part) for part in (*packed, *around.packed)]).reshape(-1, BOX)
-    poses = np.concatenate([np.zeros((len(packed), POSE)), around.poses])
+    table = ShapeTable(packed)
+    table.build_trees(np.arange(len(packed)))  # else each support of a hull looks at all its vertices
+    part_boxes = np.array([box_of(part) for part in packed]).reshape(-1, BOX)
+    return RobotTables(
+        rows, _body_boxes(rows, parts, part_boxes, padded), parts, padded, part_boxes, is_bound, table,
+        float(_skew(matrices).sum() + _skew(parts[:, :9].reshape(-1, 3, 3)).max(initial=0.0)),
+    )
+
+
+def tables_among(robot: RobotTables, around: Surroundings, before: Setting | None = None) -> CheckTables:
+    """The `CheckTables` of a robot among surroundings.   before : a setting of the robot, whose tables of shapes are
+    taken over where the surroundings have the same.
+    """
+    poses = np.concatenate([np.zeros((len(robot.part_boxes), POSE)), around.poses])
+    slack = _LEAST_SLACK + 8.0 * (robot.skew + _skew(around.poses[:, :9].reshape(-1, 3, 3)).max(initial=0.0))
+    if before is not None and before.surroundings.table is around.table:
+        return before.tables._replace(poses=poses, slack=slack)
+    table = robot.table.copied()
+    table.append(around.packed)
+    table.build_trees(np.arange(len(table.packed)))
     return CheckTables(
-        rows, _body_boxes(rows, parts, part_boxes, padded), parts, padded, part_boxes,
-        np.concatenate([is_bound, around.is_bound]).astype(np.uint8), table_of, np.arange(len(poses)), poses,
-        _slack_of(matrices, parts, around.poses),
+        robot.bodies, robot.body_boxes, robot.parts, robot.padded,
+        np.concatenate([robot.part_boxes, *(box_of(part)[None] for part in around.packed)]),
+        np.concatenate([robot.is_bound, around.is_bound]).astype(np.uint8), table, np.arange(len(poses)), poses, slack,
     )
 
 
@@ -256,15 +313,10 @@ def _stretches(poses: np.ndarray) -> np.ndarray:
     return np.sqrt(np.abs(np.swapaxes(R, 1, 2) @ R).sum(axis=2).max(axis=1, initial=0.0)) * (1 + 1e-15)
 
 
-def _slack_of(matrices: np.ndarray, parts: np.ndarray, around: np.ndarray) -> float:
-    """By what share boxes may be off: matrices within the tolerance of rotations are used as they are."""
-    of_links, of_around = parts[:, :9].reshape(-1, 3, 3), around[:, :9].reshape(-1, 3, 3)
-    of_parts = _skew(of_links).max(initial=0.0) + _skew(of_around).max(initial=0.0)
-    return _LEAST_SLACK + 8.0 * (_skew(matrices).sum() + of_parts)
-
-
 def _skew(R: np.ndarray) -> np.ndarray:
-    """(k,) how far matrices are from rotations; roundings of rotations count as none."""
+    """(k,) how far matrices are from rotations; roundings of rotations count as none. Matrices within the tolerance of
+    rotations are used as they are: boxes are off by a share in proportion.
+    """
     off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).sum(axis=(1, 2))
     return np.where(off < 1e-13, 0.0, off)
 

@@ -6,18 +6,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide.base import argument_checks as checks
 from collide.base.threads import check_threads, pieces_of, share
 from collide.errors import InvalidArgument
-from collide.robots.check_tables import Setting, check_tables, surroundings_of
+from collide.robots.check_tables import Setting, robot_tables, surroundings_of, tables_among
 from collide.robots.check_workspace import CheckWorkspace
 from collide.robots.robot import Robot
-from collide.robots.robot_bodies import bodies_around, filters_of, refuse_own_margins, robot_bodies
+from collide.robots.robot_bodies import SeenWorld, bodies_around, filters_of, refuse_own_margins, robot_bodies
 from collide.transforms import as_pose
 from collide.worlds.world import World
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 #: A thread is handed at least so many configurations.
 _LEAST_PIECE = 512
@@ -26,8 +30,11 @@ _LEAST_PIECE = 512
 class CheckerScene:
     """A robot among the bodies of a World; arguments as of `RobotChecker`.
 
-    setting : robot and World as of the last `prepare`.
+    setting : robot and World as of the last `prepare`. A question is asked of `_as_of_now`.
     """
+
+    #: Whether changes of the World do not reach this any more.
+    _is_fixed = False
 
     def __init__(
         self, robot: Robot, world: World | None, X_WR, attached: Iterable, padding, allowed: Iterable[tuple[str, str]],
@@ -43,17 +50,27 @@ class CheckerScene:
         self._bodies, self._objects = robot_bodies(robot, attached, padding)
         self._asked = checks.listed_entries("RobotChecker: allowed", allowed, "pairs of names")
         self._mobile = checks.true_or_false("RobotChecker: mobile", mobile)
-        self._seen: tuple | None = None
-        self._spare: list[CheckWorkspace] = []
+        self._make_tables()
+
+    def _make_tables(self) -> None:
+        """Those of the robot, and the first setting."""
+        matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
+        self._tables, self._setting = robot_tables(self._bodies, np.concatenate(matrices)), None
         self.prepare()
 
     def __getstate__(self) -> dict:
         """What a copy or a pickle takes along. What holds addresses is made again."""
-        return {name: value for name, value in vars(self).items() if name not in ("setting", "_seen", "_spare")}
+        return {name: value for name, value in vars(self).items() if name not in ("_setting", "_tables", "_is_fixed")}
 
     def __setstate__(self, state: dict) -> None:
-        vars(self).update(state, _seen=None, _spare=[])
-        self.prepare()
+        vars(self).update(state)
+        self._make_tables()
+
+    @property
+    def setting(self) -> Setting:
+        """Robot and World as of the last `prepare`."""
+        assert self._setting is not None
+        return self._setting
 
     @property
     def bodies(self) -> list[str]:
@@ -110,28 +127,47 @@ class CheckerScene:
         """
         return self.robot.link_poses(q, self._X_WR)
 
-    def prepare(self) -> None:
-        """Make the setting of the World as of now; an unchanged World keeps the last setting."""
-        packed = self.world._pack()
-        before, now = self._seen, (packed.roster, packed.filters, packed.X_WBs)
-        if before is not None and before[0] is now[0] and before[1] is now[1] and np.array_equal(before[2], now[2]):
-            return
-        refuse_own_margins(packed, self.robot)
-        self._seen = now[0], now[1], now[2].copy()
-        around = bodies_around(self.world, self.robot)
-        filters = filters_of(self.robot, self._bodies, self._objects, self.world, around, self._asked, self._mobile)
-        surroundings = surroundings_of(around)
-        matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
+    def prepare(self) -> Setting:
+        """Make the setting of the World as of now; an unchanged World keeps the last setting.
+
+        Returns
+        -------
+        Setting
+            Of a World whose bodies have moved, the robot's tables and those of all shapes are taken over; where shapes
+            are replaced, the robot's. Threads that ask at once may make a setting each.
+        """
+        before, world = self._setting, self.world
+        if self._is_fixed and before is not None:
+            return before
+        with world._pack() as packed:
+            if before is not None and before.seen.is_of_now(world, packed):
+                return before
+            seen = SeenWorld(world, packed)
+        refuse_own_margins(seen, self.robot)
+        around = bodies_around(seen, self.robot)
+        if before is not None and seen.has_pairs_of(before.seen):
+            filters = before.self_pairs, before.allowed, before.skipped
+        else:
+            filters = filters_of(self.robot, self._bodies, self._objects, seen, around, self._asked, self._mobile)
+        surroundings = surroundings_of(around, None if before is None else before.surroundings)
         base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
-        tables = check_tables(self._bodies, surroundings, np.concatenate(matrices))
-        self.setting = Setting(self._bodies, base, surroundings, tables, *filters)
-        self._spare = []
+        tables = tables_among(self._tables, surroundings, before)
+        self._setting = Setting(self._bodies, base, surroundings, tables, *filters, seen, [])
+        return self._setting
+
+    def _as_of_now(self) -> Self:
+        """The checker among the bodies as they stand now; changes of the World during a question do not reach it."""
+        if self._is_fixed:
+            return self
+        fixed = object.__new__(type(self))
+        vars(fixed).update(vars(self), _setting=self.prepare(), _is_fixed=True)
+        return fixed
 
     def in_pieces(self, n: int, threads: int, progress, work: Callable[[CheckWorkspace, slice], None]) -> None:
         """Have ``work`` done on pieces of n units by so many threads, each with a workspace of its own."""
         threads = check_threads(threads)
-        self.prepare()
-        spare, setting, done = self._spare, self.setting, 0
+        setting, done = self.prepare(), 0
+        spare = setting.spare
 
         def on_piece(piece: slice) -> None:
             nonlocal done

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from collide.robots.robot import Robot
 from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_pose
+from collide.worlds.bodies import Body, Roster
 from collide.worlds.packed_world import PackedWorld
 from collide.worlds.world import World
 
@@ -115,13 +117,61 @@ def _checked_padding(what: str, value) -> float:
     return length
 
 
-def bodies_around(world: World, robot: Robot) -> list[BodyAround]:
+class SeenWorld:
+    """Bodies and filters of a World as of a question, for `bodies_around` and `filters_of`; later changes of the World
+    do not reach it.   world : whose.   X_WBs : (n, 4, 4) copied.
+    """
+
+    def __init__(self, world: World, packed: PackedWorld):
+        self.world, self.roster, self.filters, self.X_WBs = world, packed.roster, packed.filters, packed.X_WBs.copy()
+
+    def is_of_now(self, world: World, packed: PackedWorld) -> bool:
+        return (
+            world is self.world and packed.roster is self.roster and packed.filters is self.filters
+            and np.array_equal(packed.X_WBs, self.X_WBs)
+        )
+
+    def has_pairs_of(self, before: SeenWorld) -> bool:
+        """Whether the same pairs are tested as before: shapes, poses and margins have no say."""
+        fields = [name for name in Roster._fields if name not in ("names", "shapes", "margin", "generation")]
+        return (
+            self.world is before.world and self.filters.reasons == before.filters.reasons
+            and np.array_equal(self.filters.allowed, before.filters.allowed)
+            and all(np.array_equal(getattr(self.roster, name), getattr(before.roster, name)) for name in fields)
+        )
+
+    @cached_property
+    def _positions(self) -> dict[str, int]:
+        alive = np.flatnonzero(self.roster.alive).tolist()
+        return {self.roster.names[k]: k for k in alive}
+
+    @property
+    def names(self) -> dict[int, str]:
+        """Name of each body, by id."""
+        ids = self.roster.ids.tolist()
+        return {ids[k]: name for name, k in self._positions.items()}
+
+    @property
+    def allowed(self) -> dict[tuple[int, int], str]:
+        """{(id, id): reason}."""
+        allowed, ids = self.filters.allowed, self.roster.ids
+        is_there = self.roster.alive[allowed].all(axis=1).tolist()
+        pairs = zip(ids[allowed].tolist(), self.filters.reasons, is_there)
+        return {(a, b): reason for (a, b), reason, both in pairs if both}
+
+    def body(self, name: str) -> Body:
+        """The body of this name."""
+        position = self._positions[name]
+        return self.roster.body(position, self.X_WBs[position])
+
+
+def bodies_around(world: World | SeenWorld, robot: Robot) -> list[BodyAround]:
     """Bodies of a World other than the robot's own, recognised by the names of links."""
     others = [world.body(name) for name in world.names.values() if name not in robot.geometry]
     return [BodyAround(body.name, body.shape, body.X_WB, body.margin) for body in others]
 
 
-def refuse_own_margins(packed: PackedWorld, robot: Robot) -> None:
+def refuse_own_margins(packed: PackedWorld | SeenWorld, robot: Robot) -> None:
     """Refuse a World with margins of links among each other: a checker does not keep these.
 
     Raises InvalidArgument naming the link.
@@ -140,8 +190,8 @@ def refuse_own_margins(packed: PackedWorld, robot: Robot) -> None:
 
 
 def filters_of(
-    robot: Robot, bodies: list[RobotBody], objects: dict[str, Attached], world: World, around: list[BodyAround],
-    allowed: Iterable[tuple[str, str]], mobile: bool,
+    robot: Robot, bodies: list[RobotBody], objects: dict[str, Attached], world: World | SeenWorld,
+    around: list[BodyAround], allowed: Iterable[tuple[str, str]], mobile: bool,
 ) -> Filters:
     """Tested pairs, and the number of untested pairs by reason.
 
@@ -179,7 +229,9 @@ def filters_of(
     return Filters(np.array(self_pairs, dtype=np.int64).reshape(-1, 2), matrix, skipped)
 
 
-def _groups_and_masks(bodies: list[RobotBody], objects: dict[str, Attached], world: World) -> list[tuple[int, int]]:
+def _groups_and_masks(
+    bodies: list[RobotBody], objects: dict[str, Attached], world: World | SeenWorld
+) -> list[tuple[int, int]]:
     """(group, mask) of each body: of the World's of its name, if it is a link."""
     names = set(world.names.values()) - objects.keys()
     in_world = [world.body(body.name) if body.name in names else None for body in bodies]
@@ -192,7 +244,8 @@ def _are_tested(A: tuple[int, int], B: tuple[int, int]) -> bool:
 
 
 def _named_pairs(
-    robot: Robot, objects: dict[str, Attached], world: World, allowed: Iterable[tuple[str, str]], known: set[str]
+    robot: Robot, objects: dict[str, Attached], world: World | SeenWorld, allowed: Iterable[tuple[str, str]],
+    known: set[str],
 ) -> dict[tuple[str, str], str]:
     """(name, name) → why the pair is never tested."""
     reasons = {(a, b): reason for a, b, reason in robot.disabled_pairs}

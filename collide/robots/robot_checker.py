@@ -34,7 +34,8 @@ class RobotChecker(CheckerScene):
         The surroundings. Bodies named like links of the robot with collision geometry are the robot itself, as in
         `Scene.world`: they are left out; pairs allowed for them, their groups and masks hold. Margins of the others
         swell them against the robot; sleeping bodies are obstacles, too. The next call sees every change of the
-        World; bodies moved during a call keep their poses from the call's begin.
+        World, which costs a millisecond or two of tables, none of the robot's. A call is answered as of its begin,
+        whatever other threads change.
     X_WR : (4, 4), optional
         Pose of the robot's root in the world W [m], by default the identity.
     attached : iterable of (name, link, shape, X_LS, touch)
@@ -145,7 +146,8 @@ class RobotChecker(CheckerScene):
         """
         q, is_single = self._configurations(Q)
         out = np.zeros(len(q), dtype=bool)
-        self.in_pieces(len(q), threads, progress, lambda space, piece: check_piece(self, space, q[piece], out[piece]))
+        now = self._as_of_now()
+        now.in_pieces(len(q), threads, progress, lambda space, piece: check_piece(now, space, q[piece], out[piece]))
         return bool(out[0]) if is_single else out
 
     def distances(
@@ -174,11 +176,12 @@ class RobotChecker(CheckerScene):
         limit = checks.limit("RobotChecker.distances: max_distance", max_distance)
         q, _ = self._configurations(Q)
         rows, gradient = np.zeros(len(q), dtype=NEAREST_DTYPE), np.zeros(q.shape)
-        self.in_pieces(
+        now = self._as_of_now()
+        now.in_pieces(
             len(q), threads, progress,
-            lambda space, piece: measure_piece(self, space, q[piece], rows[piece], gradient[piece], limit),
+            lambda space, piece: measure_piece(now, space, q[piece], rows[piece], gradient[piece], limit),
         )
-        return RobotDistances(rows, gradient, self.bodies, self.around)
+        return RobotDistances(rows, gradient, now.bodies, now.around)
 
     def edge_collides(self, Q0, Q1, *, resolution: float = 0.01, threads: int = 1) -> np.ndarray:
         """Whether straight motions collide at samples; motions between two samples are not checked.
@@ -199,7 +202,8 @@ class RobotChecker(CheckerScene):
         """
         q0, q1 = self._edges(Q0, Q1)
         step = _positive("RobotChecker.edge_collides: resolution", resolution)
-        return ~np.isnan(sampled_collision(q0, q1, step, lambda q: self.collides(q, threads=threads)))
+        now = self._as_of_now()
+        return ~np.isnan(sampled_collision(q0, q1, step, lambda q: now.collides(q, threads=threads)))
 
     def certify_edges(
         self, Q0, Q1, *, resolution: float = 1e-3, threads: int = 1, progress: Callable[[int, int], None] | None = None
@@ -235,8 +239,9 @@ class RobotChecker(CheckerScene):
         """
         q0, q1 = self._edges(Q0, Q1)
         step = _positive("RobotChecker.certify_edges: resolution", resolution)
-        times = sampled_collision(q0, q1, step, lambda q: self.collides(q, threads=threads), SAMPLED_HALVINGS)
-        return certify(self, q0, q1, times, step, threads, progress)
+        now = self._as_of_now()
+        times = sampled_collision(q0, q1, step, lambda q: now.collides(q, threads=threads), SAMPLED_HALVINGS)
+        return certify(now, q0, q1, times, step, threads, progress)
 
     def explain(self, q) -> ConfigurationReport:
         """Colliding pairs of a configuration with their depths, or the nearest pairs, to be printed.
@@ -260,8 +265,7 @@ class RobotChecker(CheckerScene):
         if not is_single:
             wanted = f"one configuration ({self.robot.dof},)"
             raise InvalidArgument(f"RobotChecker.explain: q must be {wanted}, got {q.shape}")
-        self.prepare()
-        return ConfigurationReport.of(self, q[0])
+        return ConfigurationReport.of(self._as_of_now(), q[0])
 
     def within_limits(self, Q) -> np.ndarray:
         """Whether configurations keep the joints' limits, those of mimicking joints, too.

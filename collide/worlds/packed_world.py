@@ -100,7 +100,7 @@ class PackedWorld:
         self._take_sleep(roster._replace(sleeping=np.zeros(len(roster.ids), dtype=bool)), roster)
         self.set_filters(filters)
 
-    def __enter__(self) -> PackedWorld:
+    def __enter__(self) -> PackedWorld:  # noqa: PYI034 - typing.Self is of Python 3.11
         return self
 
     def __exit__(self, *_) -> None:
