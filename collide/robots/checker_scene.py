@@ -55,7 +55,8 @@ class CheckerScene:
     def _make_tables(self) -> None:
         """Those of the robot, and the first setting."""
         matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
-        self._tables, self._setting = robot_tables(self._bodies, np.concatenate(matrices)), None
+        self._tables = robot_tables(self._bodies, np.concatenate(matrices))
+        self._setting: Setting | None = None
         self.prepare()
 
     def __getstate__(self) -> dict:
@@ -133,8 +134,8 @@ class CheckerScene:
         Returns
         -------
         Setting
-            Of a World whose bodies have moved, the robot's tables and those of all shapes are taken over; where shapes
-            are replaced, the robot's. Threads that ask at once may make a setting each.
+            Where bodies have moved, the tables of robot and shapes are taken over; where shapes are replaced, the
+            tables of the robot. Threads asking at once may make a setting each.
         """
         before, world = self._setting, self.world
         if self._is_fixed and before is not None:
@@ -152,8 +153,8 @@ class CheckerScene:
         surroundings = surroundings_of(around, None if before is None else before.surroundings)
         base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
         tables = tables_among(self._tables, surroundings, before)
-        self._setting = Setting(self._bodies, base, surroundings, tables, *filters, seen, [])
-        return self._setting
+        setting = self._setting = Setting(self._bodies, base, surroundings, tables, *filters, seen, [])
+        return setting
 
     def _as_of_now(self) -> Self:
         """The checker among the bodies as they stand now; changes of the World during a question do not reach it."""

@@ -64,7 +64,7 @@ def robot_bodies(robot: Robot, attached: Iterable, padding) -> tuple[list[RobotB
         if item.name in number or item.name in objects:
             raise InvalidArgument(f'attached: the name "{cut(item.name)}" is used twice; give the object another name')
         objects[item.name] = item
-    swelling = _padding_of(padding, {*number, *objects})
+    swelling = padding_of(padding, {*number, *objects})
     bodies = [
         RobotBody(item.name, number[item.link], Compound([(item.shape, item.X_LS)]), swelling.get(item.name, 0.0))
         for item in objects.values()
@@ -100,7 +100,7 @@ def _checked_object(robot: Robot, number: Mapping[str, int], values) -> Attached
     return item._replace(X_LS=X_LS, touch=tuple([item.touch] if isinstance(item.touch, str) else item.touch))
 
 
-def _padding_of(padding, names: set[str]) -> dict[str, float]:
+def padding_of(padding, names: set[str]) -> dict[str, float]:
     """Body → by how much it is swollen [m]."""
     if not isinstance(padding, Mapping):
         return dict.fromkeys(names, _checked_padding("padding", padding))

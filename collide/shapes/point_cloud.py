@@ -459,6 +459,7 @@ class PointCloud(Shape):
         return PointCloud(points, np.concatenate([self.radii[keep], *(cloud.radii for cloud in more)]))
 
     def _only(self, keep: np.ndarray, what: str) -> PointCloud:
+        """The cloud of the points of a mask.   what : the method and its arguments, for messages."""
         if not keep.any():
             raise InvalidShape(f"PointCloud.{what}: no point of {len(keep)} is left")
         made = PointCloud(self.points[keep], self.radius if np.ndim(self.radius) == 0 else self.radius[keep])

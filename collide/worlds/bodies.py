@@ -181,6 +181,9 @@ class WorldBodies:
         caller = "World.add_many"
         if isinstance(shapes, Shape):
             shapes = [shapes]
+        elif isinstance(shapes, dict):
+            got = f"got {checks.brief(shapes)}"
+            raise InvalidArgument(f"{caller}: shapes must be a shape or a sequence of shapes, {got}")
         else:
             shapes = checks.listed_entries(f"{caller}: shapes", shapes, "a shape or a sequence of shapes")
             if not all(issubclass(kind, Shape) for kind in set(map(type, shapes))):
