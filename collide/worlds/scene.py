@@ -73,7 +73,8 @@ class WorldScene:
         Notes
         -----
         Once another thread has asked, the changing thread makes the tables, beside the tables being read: O(n) bytes
-        are copied for n bodies, 0.6 kB each.
+        are copied for n bodies, 0.6 kB each. Before, a block copies nothing, and the first question of another thread
+        waits for the end.
         """
         with self._lock.now:
             others_ask = self._is_shared or self._first_asker not in (None, get_ident())

@@ -141,7 +141,7 @@ def test_four_readers_see_one_state_or_the_other(change, quick_switches):
     while time.monotonic() < begun + 20.0 and not wrong:
         change(world, n_changes % 2)
         n_changes += 1
-        if time.monotonic() > begun + 0.4 and min(seen.values()) and n_changes > 20:
+        if time.monotonic() > begun + 0.4 and min(seen.values()) and sum(seen.values()) > 40 and n_changes > 20:
             break
         ended.wait(0.001)
     ended.set()
