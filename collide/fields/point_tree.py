@@ -10,12 +10,14 @@ import math
 import numpy as np
 
 from collide.fields.point_tree_kernel import (
+    CELLS,
     MAX_LEVELS,
     WORK,
     WORK_BESIDES,
     balls_on_way,
     build_point_tree,
     nearest_in_tree,
+    order_along_curve,
     points_in_box,
 )
 from collide.kernels import address_of
@@ -23,6 +25,8 @@ from collide.mesh.bvh import MAX_LEAF, NODE, WIDTH
 
 #: Words of a walk's stack.
 _STACK = 2 * WIDTH * (MAX_LEVELS + 1)
+#: Points within less keep their order: cells so small have no inverse [m].
+_LEAST_WIDTH = 1e-300
 #: Points listed at once to begin with.
 _FIRST_LISTED = 256
 
@@ -104,6 +108,17 @@ class PointTree:
                 order = np.lexsort((ids[:n], times[:n]))
                 return ids[:n][order], times[:n][order]
             size = n
+
+
+def numbers_along_curve(points: np.ndarray) -> np.ndarray:
+    """(n,) int32 numbers of points (n, 3), C-contiguous and finite, in an order in which neighbours are near. O(n)."""
+    n = len(points)
+    ids, low = np.arange(n, dtype=np.int32), points.min(axis=0, initial=np.inf)
+    width = float((points.max(axis=0, initial=-np.inf) - low).max())
+    if width > _LEAST_WIDTH:
+        work = np.empty(WORK * n + WORK_BESIDES, dtype=np.int64)
+        order_along_curve(address_of(points), n, address_of(low), CELLS / width, address_of(ids), address_of(work))
+    return ids
 
 
 def _first_nodes(n: int) -> list[int]:

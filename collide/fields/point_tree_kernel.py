@@ -39,6 +39,8 @@ from collide.numerics.vec3 import Vec3, add, dot, norm1, scale, sub, vec3_at
 _BITS, _CURVED = 16, 10
 _DIGIT, _PASSES = 12, 4
 _VALUES = 1 << _DIGIT
+#: Cells a side.
+CELLS = float(1 << _BITS)
 #: Rounding of half lengths to floats, and of coordinates before.
 _WIDER, _LEAST = 1.0 + 2.0**-22, 2.0**-100
 #: Words of workspace a point: two keys and two numbers; besides them the counts.
@@ -115,6 +117,26 @@ def _sort(points, n, low, per_metre, ids, keys, other_keys, other_ids, counts):
         _sort_digit(n, _DIGIT * (step + 1), other_keys, other_ids, keys, ids, counts)
 
 
+@entry("void(int64, int64, int64, float64, int64, int64)")
+def order_along_curve(points_at, n, low_at, per_metre, ids_at, work_at):
+    """Numbers (n,) int32 of points along the curve.   work : WORK · n + WORK_BESIDES words.
+
+    low : (3,) the least coordinates.   per_metre : cells.
+    """
+    keys, others, other_ids, counts = _sorting_space(n, work_at)
+    low = vec3_at(view_f64(low_at, 3), 0)
+    _sort(view_f64(points_at, 3 * n), n, low, per_metre, view_i32(ids_at, n), keys, others, other_ids, counts)
+
+
+@kernel
+def _sorting_space(n, work_at):
+    """(keys, other keys, other ids, counts) of a workspace."""
+    return (
+        view_i64(work_at, n), view_i64(work_at + 8 * n, n), view_i32(work_at + 16 * n, n),
+        view_i64(work_at + 24 * n, _VALUES),
+    )
+
+
 @kernel
 def _sort_digit(n, shift, keys, ids, to_keys, to_ids, counts):
     for value in range(_VALUES):
@@ -147,10 +169,9 @@ def build_point_tree(header_at, work_at, first_nodes_at, n_levels):
     points, ids = view_f64(header[TRIANGLES_AT], 3 * n), view_i32(header[IDS_AT], n)
     numbers = view_f64(header[NUMBERS_AT], NUMBERS)
     centre, unit = vec3_at(numbers, CENTRE), math.ldexp(1.0, int(header[EXPONENT]))
-    keys, others = view_i64(work_at, n), view_i64(work_at + 8 * n, n)
-    other_ids, counts = view_i32(work_at + 16 * n, n), view_i64(work_at + 24 * n, _VALUES)
+    keys, others, other_ids, counts = _sorting_space(n, work_at)
     low = Vec3(centre.x - unit, centre.y - unit, centre.z - unit)
-    _sort(points, n, low, 0.5 * float(1 << _BITS) / unit, ids, keys, others, other_ids, counts)
+    _sort(points, n, low, 0.5 * CELLS / unit, ids, keys, others, other_ids, counts)
     first_nodes = view_i64(first_nodes_at, n_levels + 1)
     for level in range(n_levels - 1, -1, -1):
         for node in range(first_nodes[level], first_nodes[level + 1]):

@@ -38,6 +38,29 @@ def boxes_near_place(_context, boxes, at, x, y, z, limit):
 
 
 @intrinsic
+def patches_near_place(_context, boxes, at, slabs, slab_at, x, y, z, limit, reach):
+    """The same, without boxes whose slab is farther from the place than a reach."""
+    _check_floats(boxes, slabs)
+    real = types.float32
+    signature = types.int64(boxes, types.int64, slabs, types.int64, real, real, real, real, real)
+
+    def codegen(context, builder, signature, args):
+        data, slab = (
+            builder.gep(data_of(context, builder, signature.args[k], args[k]), [args[k + 1]]) for k in (0, 2)
+        )
+        near = _are_near(builder, data, args[4:7], args[7], True)
+        height = builder.fneg(_eight(builder, slab, 3))
+        for axis in range(3):
+            along = builder.fmul(_eight(builder, slab, axis), splat(builder, args[4 + axis], _FLOATS))
+            height = builder.fadd(height, along)
+        gap = builder.fsub(_abs(builder, height), _eight(builder, slab, 4))
+        near = builder.and_(near, builder.fcmp_ordered("<=", gap, splat(builder, args[8], _FLOATS)))
+        return builder.zext(builder.bitcast(near, I8), I64)
+
+    return signature, codegen
+
+
+@intrinsic
 def points_near_place(_context, points, at, x, y, z, limit):
     """The same of eight points."""
     return _near_place(points, False)
@@ -51,18 +74,22 @@ def _near_place(rows, have_sides):
 
     def codegen(context, builder, signature, args):
         data = builder.gep(data_of(context, builder, signature.args[0], args[0]), [args[1]])
-        nothing, square = ir.Constant(_FLOATS, [0.0] * LANES), None
-        for axis in range(3):
-            gap = _abs(builder, builder.fsub(_eight(builder, data, axis), splat(builder, args[2 + axis], _FLOATS)))
-            if have_sides:
-                gap = builder.fsub(gap, _eight(builder, data, 3 + axis))
-                gap = builder.select(builder.fcmp_ordered(">", gap, nothing), gap, nothing)
-            gap = builder.fmul(gap, gap)
-            square = gap if square is None else builder.fadd(square, gap)
-        near = builder.fcmp_ordered("<=", square, splat(builder, args[5], _FLOATS))
-        return builder.zext(builder.bitcast(near, I8), I64)
+        return builder.zext(builder.bitcast(_are_near(builder, data, args[2:5], args[5], have_sides), I8), I64)
 
     return signature, codegen
+
+
+def _are_near(builder, data, place, limit, have_sides):
+    """A vector of bits: whether the squared distance of each from a place is at most a limit."""
+    nothing, square = ir.Constant(_FLOATS, [0.0] * LANES), None
+    for axis in range(3):
+        gap = _abs(builder, builder.fsub(_eight(builder, data, axis), splat(builder, place[axis], _FLOATS)))
+        if have_sides:
+            gap = builder.fsub(gap, _eight(builder, data, 3 + axis))
+            gap = builder.select(builder.fcmp_ordered(">", gap, nothing), gap, nothing)
+        gap = builder.fmul(gap, gap)
+        square = gap if square is None else builder.fadd(square, gap)
+    return builder.fcmp_ordered("<=", square, splat(builder, limit, _FLOATS))
 
 
 def _meeting(boxes, frame, probe, parted):

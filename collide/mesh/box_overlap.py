@@ -70,6 +70,18 @@ def boxes_near_place_one_by_one(boxes, at, x, y, z, limit):
         return int(np.packbits(x * x + y * y + z * z <= np.float32(limit), bitorder="little")[0])
 
 
+def patches_near_place_one_by_one(boxes, at, slabs, slab_at, x, y, z, limit, reach):
+    """`patches_near_place` in numpy's floats."""
+    mask = boxes_near_place_one_by_one(boxes, at, x, y, z, limit)
+    with np.errstate(all="ignore"):
+        rows = slabs[slab_at : slab_at + 5 * WIDTH].reshape(5, WIDTH)
+        height = -rows[3]
+        for axis, place in enumerate(np.float32((x, y, z))):
+            height = height + rows[axis] * place
+        near = np.abs(height) - rows[4] <= np.float32(reach)
+    return mask & int(np.packbits(near, bitorder="little")[0])
+
+
 def points_near_place_one_by_one(points, at, x, y, z, limit):
     """`points_near_place` in numpy's floats."""
     with np.errstate(all="ignore"):
@@ -129,12 +141,14 @@ if not WITH_NUMBA:
     boxes_meeting, boxes_nearest = boxes_meeting_one_by_one, boxes_nearest_one_by_one
     boxes_meeting_prism = boxes_meeting_prism_one_by_one
     boxes_near_place, points_near_place = boxes_near_place_one_by_one, points_near_place_one_by_one
+    patches_near_place = patches_near_place_one_by_one
 else:
     from collide.kernels.box_vectors import (
         boxes_meeting,
         boxes_meeting_prism,
         boxes_near_place,
         boxes_nearest,
+        patches_near_place,
         points_near_place,
     )
 
@@ -144,9 +158,11 @@ else:
 #: where no axis separates), then eight squared lengths of lines between centres, in units of the probe's tree.
 #: ``boxes_near_place(boxes, at, x, y, z, limit) -> int``: bit k is set where the squared distance of box k of the node
 #: from a place is at most a limit, floats all, and not of slots that are not used; `points_near_place` reads three rows
-#: of eight coordinates.
+#: of eight coordinates. ``patches_near_place(boxes, at, slabs, slab_at, x, y, z, limit, reach)`` leaves out boxes whose
+#: slab is farther from the place than a reach, too.
 __all__ = [
     "FRAME", "NEAR_PROBE", "PRISM", "PROBE", "boxes_meeting", "boxes_meeting_one_by_one", "boxes_meeting_prism",
     "boxes_meeting_prism_one_by_one", "boxes_near_place", "boxes_near_place_one_by_one", "boxes_nearest",
-    "boxes_nearest_one_by_one", "points_near_place", "points_near_place_one_by_one",
+    "boxes_nearest_one_by_one", "patches_near_place", "patches_near_place_one_by_one", "points_near_place",
+    "points_near_place_one_by_one",
 ]

@@ -21,7 +21,7 @@ from collide.mesh.shell_volumes import without_area
 from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.facets.facet_geometry import RAY_DIRECTIONS, FacetCorners, exact_point, ray_crossing
 from collide.narrowphase.facets.facet_queries import points_in_solid, surfaces_meet
-from collide.narrowphase.facets.winding_numbers import INSIDE, OUTSIDE, UNDECIDED
+from collide.narrowphase.facets.winding_numbers import INSIDE, ON_SURFACE, OUTSIDE, UNDECIDED
 from collide.numerics.exact_points import on_one_grid, placed
 from collide.numerics.exact_vectors import minus
 from collide.pairs.batches import answer_batch
@@ -94,20 +94,28 @@ def _some(X: np.ndarray, rows) -> np.ndarray:
 
 
 def _in_mesh(mesh: Mesh, X_WA: np.ndarray, points: np.ndarray) -> np.ndarray:
-    body = body_of(mesh)
     if not mesh.solid:
-        return surfaces_meet(body.tree, _point_tree(), _some(X_WA, slice(None)), _at(points))
+        return on_facets(body_of(mesh).tree, X_WA, points)
+    return where_in_solid(mesh, X_WA, points) != OUTSIDE
+
+
+def on_facets(tree: MeshTree, X_WA: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(n,) bool: whether points (n, 3) of the world lie on facets, exactly; poses (n or 1, 4, 4)."""
+    return surfaces_meet(tree, _point_tree(), _some(X_WA, slice(None)), _at(points))
+
+
+def where_in_solid(mesh: Mesh, X_WA: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(n,) int64: OUTSIDE, ON_SURFACE or INSIDE of points (n, 3) of the world, exactly; poses (n or 1, 4, 4)."""
+    tree = body_of(mesh).tree
     poses = np.ascontiguousarray(np.broadcast_to(X_WA, (len(points), 4, 4)))
-    where = points_in_solid(body.tree, poses, points, np.eye(4))
+    where = points_in_solid(tree, poses, points, np.eye(4))
     for k in np.flatnonzero(where == UNDECIDED).tolist():
         where[k] = INSIDE if winds_around(mesh, _pose(X_WA, k), points[k]) else OUTSIDE
-    answer = where != OUTSIDE
-    thin = thin_facets(mesh, body.tree)
+    thin = thin_facets(mesh, tree)
     if thin is not None:  # points on facets without area count, too
-        rest = np.flatnonzero(~answer)
-        if len(rest):
-            answer[rest] = surfaces_meet(thin, _point_tree(), _some(X_WA, rest), _at(points[rest]))
-    return answer
+        rest = np.flatnonzero(where != ON_SURFACE)
+        where[rest[on_facets(thin, poses[rest], points[rest])]] = ON_SURFACE
+    return where
 
 
 def _point_tree() -> MeshTree:

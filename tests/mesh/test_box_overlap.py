@@ -12,6 +12,7 @@ from collide.mesh.box_overlap import (
     boxes_meeting_one_by_one,
     boxes_meeting_prism_one_by_one,
     boxes_nearest_one_by_one,
+    patches_near_place_one_by_one,
 )
 from collide.mesh.bvh import NODE, NOTHING, SLAB, WIDTH
 
@@ -105,3 +106,28 @@ def test_bounds_are_below_the_distances():
             positive += out[k] > 0
             tight += 0 < 0.7 * distance < out[k]
     assert positive > 400 and tight > 0.5 * positive, (tight, positive)
+
+
+def test_patches_near_a_place_are_never_left_out():
+    rng = rng_of("patches near")
+    kept = near = 0
+    for _ in range(200):
+        node, _, _, centres, halves, *_ = scene(rng, 1.0)
+        unused = rng.random(WIDTH) < 0.2
+        node[3 * WIDTH : 6 * WIDTH].reshape(3, WIDTH)[:, unused] = NOTHING
+        slabs = np.zeros(SLAB, dtype=np.float32)
+        normals = np.array([unit(rng.normal(size=3)) for _ in range(WIDTH)])
+        middles, widths = (normals * centres).sum(axis=1), rng.uniform(0.0, 0.1, WIDTH)
+        slabs[: 3 * WIDTH] = normals.T.ravel()
+        slabs[3 * WIDTH : 4 * WIDTH], slabs[4 * WIDTH :] = middles, widths + SLACK
+        place, reach = rng.normal(size=3), rng.uniform(0.1, 1.5)
+        x, y, z, limit, far = np.float32([*place, reach * reach, reach])
+        mask = patches_near_place_one_by_one(node, 0, slabs, 0, x, y, z, limit, far)
+        for k in range(WIDTH):
+            points = points_in(rng, centres[k], halves[k])
+            points = points[np.abs(points @ normals[k] - middles[k]) <= widths[k]]
+            is_near = bool((np.linalg.norm(points - place, axis=1) <= reach).any()) and not unused[k]
+            assert not is_near or mask >> k & 1
+            near += is_near
+        kept += mask.bit_count()
+    assert near > 100 and kept < 3 * near, (near, kept)

@@ -256,6 +256,7 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
     "Robot": lambda: {"name": "r", "links": ["a"], "joints": []},
     "RobotChecker": lambda: {"robot": robot()},
     "ShapeSet": lambda: {"shapes": [BOX]},
+    "signed_distances": lambda: {"mesh": mesh(), "points": (0, 0, 0)},
     "SpacePartition": lambda: {"mesh": mesh()},
     "Sphere": lambda: {"radius": 1},
     "TetMesh": lambda: {"vertices": tetrahedron().vertices, "cells": [[0, 1, 2, 3]]},
