@@ -83,6 +83,7 @@ if TYPE_CHECKING:
     from collide.surface_queries.contains import contains
     from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
     from collide.surface_queries.overlay import Overlay, overlay
+    from collide.surface_queries.signed_distance_grid import GridDistances, SignedDistanceGrid
     from collide.surface_queries.signed_distances import SignedDistances, signed_distances
     from collide.sweeps.configurations import DrawnConfigurations
     from collide.sweeps.pair_proposal import LinkPair, Proposal, propose_disabled_pairs
@@ -109,6 +110,7 @@ _HOMES = {
     "collide.contact.contact_rows": ("Contacts",),
     "collide.surface_queries.contains": ("contains",),
     "collide.surface_queries.overlay": ("Overlay", "overlay"),
+    "collide.surface_queries.signed_distance_grid": ("GridDistances", "SignedDistanceGrid"),
     "collide.surface_queries.signed_distances": ("SignedDistances", "signed_distances"),
     "collide.surface_queries.facet_pairs": ("FacetPairs", "SelfCollisions", "facet_pairs", "self_collisions"),
     "collide.papers.hierarchies.hierarchy_queries": ("walk",),
@@ -157,17 +159,18 @@ _RENAMED = {
 __all__ = [
     "BooleanResult", "Box", "Capsule", "CellOverlaps", "CellPlanes", "Certificate", "CertificateRefused",
     "CertifiedEdges", "CollideError", "Compound", "Cone", "ConfigurationObstacle", "Contacts", "ConvexCells",
-    "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs", "HPolytope",
-    "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located",
-    "Mesh", "MissingExtra", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult", "PartitionSize",
-    "PlanarObstacle", "PointCloud", "Portals", "Proposal", "RayHits", "Robot", "RobotChecker", "RobotDistances",
-    "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "SignedDistances", "SpacePartition",
-    "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World",
-    "WorldHits", "WorldResult", "boolean", "certify", "collide", "combine", "configuration_obstacle", "contacts",
-    "contains", "distance", "facet_pairs", "get_include", "get_library", "moved_poses", "overlap_volume",
-    "overlapping_cells", "overlay", "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast",
-    "read_sweep", "self_collisions", "self_overlapping_cells", "shape_cast", "signed_distances", "sweep",
-    "tessellate", "time_of_impact", "verify", "walk",
+    "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs", "GridDistances",
+    "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair",
+    "Located", "Mesh", "MissingExtra", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult",
+    "PartitionSize", "PlanarObstacle", "PointCloud", "Portals", "Proposal", "RayHits", "Robot", "RobotChecker",
+    "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "SignedDistanceGrid",
+    "SignedDistances", "SpacePartition", "Sphere", "SweepResults", "TetMesh", "TimeOfImpact", "UnknownBody",
+    "UnsupportedQuery", "VoxelGrid", "World", "WorldHits", "WorldResult", "boolean", "certify", "collide",
+    "combine", "configuration_obstacle", "contacts", "contains", "distance", "facet_pairs", "get_include",
+    "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses",
+    "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions",
+    "self_overlapping_cells", "shape_cast", "signed_distances", "sweep", "tessellate", "time_of_impact", "verify",
+    "walk",
 ]
 
 

@@ -1,1 +1,1 @@
-"""Worlds as sensors give them: points in trees, and messages and files of points, octrees and voxels as arrays."""
+"""Worlds as sensors give them: trees of points and cells, terrain, sampled distances, and files and messages as arrays."""

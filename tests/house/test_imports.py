@@ -62,8 +62,8 @@ ROOMS = {
         "narrowphase", "pairs",
     },
     "surface_queries": {
-        "errors", "base", "transforms", "results", "numerics", "mesh", "shapes", "lowering", "narrowphase", "pairs",
-        "casts",
+        "errors", "base", "transforms", "results", "numerics", "mesh", "fields", "shapes", "lowering", "narrowphase",
+        "pairs", "casts",
     },
     "solids": {
         "errors", "base", "kernels", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",

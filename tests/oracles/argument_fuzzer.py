@@ -389,6 +389,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
             "VoxelGrid",
         )
     },
+    "SignedDistanceGrid": lambda: collide.SignedDistanceGrid.from_arrays(np.zeros((2, 2, 2)), 1.0),
     "Robot": robot,
     "RobotChecker": checker,
     "World": world,
@@ -432,6 +433,9 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "PointCloud.nearest": lambda: {"p": (0, 0, 0)},
     "PointCloud.updated": lambda: {"added": [(0, 0, 1)]},
     "PointCloud.within": lambda: {"p": (0, 0, 0), "r": 1.0},
+    "SignedDistanceGrid.distances": lambda: {"points": (0, 0, 0)},
+    "SignedDistanceGrid.from_arrays": lambda: {"values": np.zeros((2, 2, 2)), "cell": 1.0},
+    "SignedDistanceGrid.from_mesh": lambda: {"mesh": mesh(), "cell": 0.5},
     "Proposal.pair": lambda: {"a": "base", "b": "slider"},
     "Robot.load": lambda: {"path": files() / "rail.urdf"},
     "Robot.configuration": lambda: {"values": {"slide": 0.1}},
@@ -494,6 +498,7 @@ _OF_ANY = {
 #: Public names whose arguments are not tried, and why.
 EXCUSED = {
     "Shape": "the base of shapes: it has no arguments",
+    "SignedDistanceGrid": "made by its class methods",
     "transforms.refuse_no_pose": "only ever raises, of what a check found",
     "transforms.rotation_from_rpy": "its numbers are checked by `pose` and `poses`",
     "transforms.rotation_from_unit": "as rotation_from_rpy",
