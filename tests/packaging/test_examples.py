@@ -168,6 +168,7 @@ GIVEN = {
     "README": "",
     "clouds": "",
     "voxels": "",
+    "distance_fields": "",
     "barba-langerman": "A = B = collide.ConvexHull(np.random.default_rng(0).normal(size=(60, 3)))\n"
     "X_WA, X_WB = np.eye(4), collide.pose((1, 0, 0))",
     "casts": "shape = A = B = collide.Box((1, 1, 1)); X_WA = X_WS = np.eye(4); X_WB = collide.pose((3, 0, 0))\n"
