@@ -61,7 +61,7 @@ BAD_SHAPES = [
     (lambda: Box([[1, 1, 1]]), ("Box", "size", "(1, 3)")),
     (lambda: Box((1, NAN, 1)), ("Box", "size[1]", "nan")),
     (lambda: Box((1, -2, 1)), ("Box", "size.y", "-2")),
-    (lambda: Box((1, 1, 0)), ("Box", "size.z", "0")),
+    (lambda: Box((1, 1, -0.5)), ("Box", "size.z", "≥ 0", "-0.5")),
     (lambda: Box((1, 1, 1e60)), ("Box", "size[2]", "1e+60")),
     (lambda: Box((1, 1e-60, 1)), ("Box", "size.y", "1e-60")),
     (lambda: Box("abc"), ("Box", "size", "text")),
@@ -346,7 +346,7 @@ def test_faces_are_rows_of_integers(faces):
 
 
 def test_values_are_shown_as_numbers_and_short():
-    with pytest.raises(InvalidShape, match=r"size\.y must be > 0, got -1\.0$"):
+    with pytest.raises(InvalidShape, match=r"size\.y must be ≥ 0, got -1\.0$"):
         Box(np.array([1.0, -1.0, 1.0]))
     for call in (
         lambda: Sphere("x" * 10**6),

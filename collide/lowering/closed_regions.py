@@ -86,7 +86,7 @@ def sizes_at(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, leeway: np.
 
 def name_of(shape: Shape) -> str:
     """What messages call a shape."""
-    return "HPolytope(bounded=False)" if shape.is_region else type(shape).__name__
+    return "HPolytope(bounded=False)" if shape.__class__ is HPolytope and shape.is_region else type(shape).__name__
 
 
 def _stretch(X: np.ndarray) -> np.ndarray | float:

@@ -63,6 +63,26 @@ class Compound(Shape):
         """True for a compound of one convex shape."""
         return len(self.items) == 1 and self.items[0][0].convex
 
+    def _scaled(self, s: np.ndarray) -> Compound:
+        """Of an item at (R, t) the image of p is S (R p + t) = (D R D) (D S' p) + S t with D the signs of S, where
+        |S| R = R S' for a diagonal S': where the entries other than 0 of each column of R meet equal factors.
+        """
+        signs, items = np.sign(s), []
+        for k, (item, X) in enumerate(self.items):
+            R, X_CS = X[:3, :3], X.copy()
+            along = np.abs(s)[np.abs(R).argmax(axis=0)]
+            turned = np.argwhere((R != 0.0) & (np.abs(s)[:, None] != along))
+            if len(turned):
+                i, j = turned[0].tolist()
+                raise InvalidShape(
+                    f"items[{k}] is turned by R[{i}, {j}] = {R[i, j]:g} between axes of unequal factors, which would "
+                    "shear it: such an entry must be 0. Scale the points of a ConvexHull or Mesh in the frame of the "
+                    "Compound instead"
+                )
+            X_CS[:3, :3], X_CS[:3, 3] = signs[:, None] * R * signs, s * X[:3, 3]
+            items.append((item.scaled(signs * along), X_CS))
+        return Compound(items)
+
     def __repr__(self) -> str:
         return f"Compound(<{len(self.items)} items>)"
 
@@ -90,8 +110,8 @@ def _checked_pose(k: int, shape, X) -> np.ndarray:
         raise InvalidShape(f"Compound: items[{k}] must start with a shape, got {type(shape).__name__}")
     if shape.is_region:
         raise InvalidShape(
-            f"Compound: items[{k}] is an HPolytope with bounded=False; make it a body of its own, or close it by "
-            "half-spaces far away and leave bounded=False out"
+            f"Compound: items[{k}] is an HPolytope with bounded=False, or a Plane; make it a body of its own, or close "
+            "it by half-spaces far away and leave bounded=False out"
         )
     if shape.is_field:
         raise InvalidShape(f"Compound: items[{k}] is a {type(shape).__name__}; make it a body of its own")

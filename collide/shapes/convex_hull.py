@@ -9,7 +9,7 @@ import numpy as np
 from collide.base.lazy_modules import lazy_module
 from collide.base.log import log_duration
 from collide.errors import InvalidShape
-from collide.shapes.shape import Shape, facet_ids, positive, rows
+from collide.shapes.shape import Shape, equal_but_for_signs, facet_ids, mirrors, positive, rows
 from collide.shapes.shape_files import Field, read_arrays, write_arrays
 from collide.transforms import SMALLEST
 
@@ -157,6 +157,11 @@ class ConvexHull(Shape):
             return cls(arrays["points"], faces=arrays.get("faces"), radius=float(arrays["radius"]))
         except InvalidShape as error:
             raise InvalidShape(f"ConvexHull.load: {path}: {error}") from None
+
+    def _scaled(self, s: np.ndarray) -> ConvexHull:
+        factor = equal_but_for_signs(s, "the ball swept over it would be no ball") if self.radius else 0.0
+        faces = self.faces if self.faces is None or not mirrors(s) else self.faces[:, ::-1]
+        return ConvexHull(self.points * s, faces=faces, radius=self.radius * factor)
 
     def without_repeats(self) -> ConvexHull:
         """The same set with every point once, in the order of first appearance.

@@ -1,4 +1,4 @@
-"""HPolytope: an intersection of half-spaces."""
+"""HPolytope: an intersection of half-spaces. Plane: that of two opposite ones."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from collide.base import argument_checks as checks
 from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidShape
-from collide.shapes.shape import Shape, rows
+from collide.shapes.shape import Shape, plane_numbers, positive, rows
 from collide.transforms import LARGEST
 
 if TYPE_CHECKING:
@@ -142,10 +142,65 @@ class HPolytope(Shape):
     def _fields(self) -> tuple[str, ...]:  # type: ignore[override]
         return ("normals", "offsets") if self.bounded else ("normals", "offsets", "bounded")
 
+    def _scaled(self, s: np.ndarray) -> HPolytope:
+        # {x : n·x ≤ d} becomes {y : (S⁻¹ n)·y ≤ d}; times the largest factor, equal factors leave normals as they are
+        largest = np.abs(s).max()
+        return HPolytope(self.normals * (largest / s), self.offsets * largest, bounded=self.bounded)
+
     @property
     def is_region(self) -> bool:  # type: ignore[override]
         """Whether it is kept as planes."""
         return not self.bounded
+
+
+class Plane(HPolytope):
+    """A wall without end, met from both sides: {x : |normal·x − offset| ≤ thickness / 2}.
+
+    Parameters
+    ----------
+    normal : (3,) array_like
+        Across the wall, in the frame of the shape. Any length within [1e-6, 1e6], kept as given.
+    offset : float
+        Of the middle, in the units of normal·x: metres, where the normal has length 1.
+    thickness : float
+        ≥ 0, in the same units; 0 makes a plane.
+
+    Raises
+    ------
+    InvalidShape
+        Where the normal has no direction, or a number is not finite or out of range.
+
+    Notes
+    -----
+    A region of two half-spaces, an `HPolytope` with ``bounded=False``: ``normals`` (2, 3) and ``offsets`` (2,) hold
+    them, and queries answer for those, exactly where they answer for regions exactly (docs/polytopes.md). The two
+    offsets, offset ± thickness / 2, are rounded once. A depth is the shortest way out to either side, or through a
+    plane. For a floor take a `Halfspace`: bodies that fell through are still in it.
+    """
+
+    __slots__ = ("normal", "offset", "thickness")
+    normal: np.ndarray
+    offset: float
+    thickness: float
+
+    def __init__(self, normal: ArrayLike, offset: float, thickness: float = 0.0):
+        normal, offset = plane_numbers("Plane", normal, offset)
+        thickness = positive("Plane", "thickness", thickness, zero=True)
+        half = 0.5 * thickness
+        super().__init__([normal, -normal], [offset + half, half - offset], bounded=False)
+        self._store(normal=normal, offset=offset, thickness=thickness)
+
+    @classmethod
+    def _from_fields(cls, normal, offset, thickness) -> Plane:  # type: ignore[override]
+        return cls(normal, offset, thickness)
+
+    @property
+    def _fields(self) -> tuple[str, ...]:  # type: ignore[override]
+        return Plane.__slots__
+
+    def _scaled(self, s: np.ndarray) -> Plane:
+        largest = np.abs(s).max()
+        return Plane(self.normal * (largest / s), self.offset * largest, self.thickness * largest)
 
 
 def _boundary_within(normals: np.ndarray, offsets: np.ndarray) -> float:

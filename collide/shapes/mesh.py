@@ -13,7 +13,7 @@ from collide.errors import InvalidShape
 from collide.shapes import mesh_formats
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh_report import MeshReport, make_report
-from collide.shapes.shape import Shape, facet_ids, positive, rows
+from collide.shapes.shape import Shape, facet_ids, mirrors, positive, rows
 from collide.shapes.shape_files import Field, read_arrays, refused_as_shape, shape_suffix, write_arrays
 from collide.transforms import SMALLEST
 
@@ -174,32 +174,39 @@ class Mesh(Shape):
         report = make_report(len(self.vertices), self.solid, self.survey)
         return report._replace(volume=report.volume * self.scale**3)
 
-    def scaled(self, factor: float) -> Mesh:
-        """The mesh with every coordinate times a factor, rounded once; its search tree is shared.
+    def scaled(self, factors: float | ArrayLike) -> Mesh:
+        """The mesh with every coordinate times a factor, rounded once; equal factors > 0 share the search tree.
 
-        The copy's ``base`` is the mesh that is copied and ``scale`` the factor; factors of copies of copies are
-        multiplied first. What is solid stays so.
+        The ``base`` of a copy by equal factors > 0 is the mesh copied, and ``scale`` the factor; factors of copies of
+        copies are multiplied first. Facets keep their numbers, and are turned over where factors mirror: a solid stays
+        a solid.
 
         Parameters
         ----------
-        factor : float
-            > 0, without a unit.
+        factors : float or (3,) array_like
+            Along x, y, z, or a single number for all axes, not 0, without a unit. Negative factors mirror.
 
         Returns
         -------
         Mesh
-            The scaled copy; ``base`` itself where the product of the factors is 1.
+            The scaled copy; ``base`` itself where the product of equal factors is 1.
 
         Raises
         ------
         InvalidShape
-            Where the factor is no positive finite number, or coordinates leave the supported range.
+            Where a factor is 0 or not finite, or coordinates leave the supported range.
         """
-        factor = positive("Mesh.scaled", "factor", factor) * self.scale
+        return super().scaled(factors)
+
+    def _scaled(self, s: np.ndarray) -> Mesh:
+        x, y, z = s.tolist()
+        if not x == y == z or x < 0.0:
+            faces = self.faces[:, ::-1] if mirrors(s) else self.faces
+            return Mesh(self.vertices * s, faces, solid=self.solid)
+        factor = positive("Mesh", "factor", x) * self.scale
         if factor == 1.0:
             return self.base
-        with np.errstate(over="ignore", under="ignore"):
-            vertices = _check_vertices(self.base.vertices * factor)
+        vertices = _check_vertices(self.base.vertices * factor)
         made = Mesh.__new__(Mesh)
         made._store(vertices=vertices, faces=self.faces, solid=self.solid, scale=factor, _copied=self.base)
         return made

@@ -15,7 +15,7 @@ from collide.base import argument_checks as checks
 from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidArgument, InvalidShape, SceneError
 from collide.shapes import cloud_formats
-from collide.shapes.shape import Shape, kept_with_shape, positive, rows, scalar
+from collide.shapes.shape import Shape, equal_but_for_signs, kept_with_shape, positive, rows, scalar
 from collide.shapes.shape_files import ANY, Field, read_arrays, refused_as_shape, shape_suffix, write_arrays
 from collide.transforms import LARGEST
 
@@ -96,6 +96,10 @@ class PointCloud(Shape):
                 f"{checks.brief(radius)}"
             )
         self._store(points=points, radius=radii, dropped=dropped)
+
+    def _scaled(self, s: np.ndarray) -> PointCloud:
+        factor = equal_but_for_signs(s, "its balls would be no balls") if np.any(self.radius) else 0.0
+        return PointCloud(self.points * s, self.radius * factor)
 
     @classmethod
     def from_depth(

@@ -6,13 +6,15 @@ in metres (MuJoCo's "size" holds half lengths).
 
 from __future__ import annotations
 
-import math
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide.errors import InvalidShape, brief
-from collide.shapes.shape import Shape, positive, rows, scalar, three_lengths
+from collide.shapes.compound import Compound
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.shape import POINTS_INSTEAD, Shape, equal_but_for_signs, plane_numbers, positive, three_lengths
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -39,6 +41,10 @@ class Sphere(Shape):
     def __init__(self, radius: float):
         self._store(radius=positive("Sphere", "radius", radius))
 
+    def _scaled(self, s: np.ndarray) -> Sphere | Ellipsoid:
+        radii = self.radius * np.abs(s)
+        return Sphere(float(radii[0])) if (radii == radii[0]).all() else Ellipsoid(radii)
+
 
 class Box(Shape):
     """A box centred at the origin of its frame, its edges along the axes.
@@ -46,14 +52,15 @@ class Box(Shape):
     Parameters
     ----------
     size : (3,) array_like, or float
-        Full edge lengths along x, y, z [m], each > 0. ``Box(1, 2, 3)`` is ``Box((1, 2, 3))``.
+        Full edge lengths along x, y, z [m], each ≥ 0. ``Box(1, 2, 3)`` is ``Box((1, 2, 3))``. A length of 0 makes a
+        rectangle without thickness, two a segment, three a point.
     y, z : float, optional
         The other two lengths [m], where ``size`` is the first of three numbers.
 
     Raises
     ------
     InvalidShape
-        Where a length is not a positive finite number, or two lengths are given.
+        Where a length is negative or not a finite number, or two lengths are given.
     """
 
     __slots__ = ("size",)
@@ -61,7 +68,41 @@ class Box(Shape):
     size: np.ndarray
 
     def __init__(self, size: ArrayLike, y: float | None = None, z: float | None = None):
-        self._store(size=three_lengths("Box", "size", size, y, z))
+        self._store(size=three_lengths("Box", "size", size, y, z, zero=True))
+
+    def _scaled(self, s: np.ndarray) -> Box:
+        return Box(self.size * np.abs(s))
+
+    @staticmethod
+    def rounded(size: ArrayLike, radius: float) -> ConvexHull:
+        """A box with rounded edges and corners: the hull of the corners of a smaller box, swept by a ball.
+
+        Parameters
+        ----------
+        size : (3,) array_like
+            Full lengths along x, y, z [m], rounding included, each > 0 and ≥ 2·radius.
+        radius : float
+            Of edges and corners [m], ≥ 0.
+
+        Returns
+        -------
+        ConvexHull
+            Of the corners (±(x/2 − radius), ±(y/2 − radius), ±(z/2 − radius)), each rounded once, with the radius. The
+            hull is asked about exactly as it stands.
+
+        Raises
+        ------
+        InvalidShape
+            Where a number is out of range, or a length is less than twice the radius.
+        """
+        lengths = three_lengths("Box.rounded", "size", size, None, None)
+        radius = positive("Box.rounded", "radius", radius, zero=True)
+        half = 0.5 * lengths - radius
+        if half.min() < 0.0:
+            raise InvalidShape(
+                f"Box.rounded: radius must be at most half of every length, got {radius!r} and size {lengths.tolist()}"
+            )
+        return ConvexHull(np.array(list(product(*[(-h, h) for h in half]))) + 0.0, radius=radius)
 
 
 def _one_length(shape: str, length, height):
@@ -104,6 +145,20 @@ class Capsule(Shape):
             radius=positive("Capsule", "radius", radius), length=positive("Capsule", "length", length, zero=True)
         )
 
+    def _scaled(self, s: np.ndarray) -> Capsule:
+        factor = equal_but_for_signs(s, "its caps would not be parts of spheres")
+        return Capsule(self.radius * factor, self.length * factor)
+
+
+def _factors_of_round(s: np.ndarray) -> tuple[float, float]:
+    """The factors of the radius and of the length of what is round about z."""
+    x, y, z = np.abs(s).tolist()
+    if x != y:
+        raise InvalidShape(
+            f"those along x and y must be equal but for signs, since its base would not be round{POINTS_INSTEAD}"
+        )
+    return x, z
+
 
 class Cylinder(Shape):
     """A solid cylinder along z, centred at the origin of its frame.
@@ -134,6 +189,10 @@ class Cylinder(Shape):
             radius=positive("Cylinder", "radius", radius), length=positive("Cylinder", "length", length)
         )
 
+    def _scaled(self, s: np.ndarray) -> Cylinder:
+        across, along = _factors_of_round(s)
+        return Cylinder(self.radius * across, self.length * along)
+
 
 class Cone(Shape):
     """A solid cone along z: its apex at +z·length/2, its base at −z·length/2.
@@ -162,6 +221,11 @@ class Cone(Shape):
         length = _one_length("Cone", length, height)
         self._store(radius=positive("Cone", "radius", radius), length=positive("Cone", "length", length))
 
+    def _scaled(self, s: np.ndarray) -> Cone | Compound:
+        across, along = _factors_of_round(s)
+        cone = Cone(self.radius * across, self.length * along)
+        return cone if s[2] > 0.0 else Compound([(cone, np.diag((1.0, -1.0, -1.0, 1.0)))])
+
 
 class Ellipsoid(Shape):
     """The ellipsoid {x : Σ (x_k / radii_k)² ≤ 1}.
@@ -186,6 +250,9 @@ class Ellipsoid(Shape):
     def __init__(self, radii: ArrayLike, y: float | None = None, z: float | None = None):
         self._store(radii=three_lengths("Ellipsoid", "radii", radii, y, z))
 
+    def _scaled(self, s: np.ndarray) -> Ellipsoid:
+        return Ellipsoid(self.radii * np.abs(s))
+
 
 class Halfspace(Shape):
     """The half-space {x : normal·x ≤ offset}: everything behind a plane, unbounded.
@@ -209,10 +276,9 @@ class Halfspace(Shape):
     offset: float
 
     def __init__(self, normal: ArrayLike, offset: float):
-        normal = rows("Halfspace", "normal", normal, (3,))
-        length = math.hypot(*normal.tolist())
-        if not 1e-6 <= length <= 1e6:
-            raise InvalidShape(
-                f"Halfspace: normal must have a length within [1e-6, 1e6] (1 is usual), got {length:g}"
-            )
-        self._store(normal=normal, offset=scalar("Halfspace", "offset", offset))
+        normal, offset = plane_numbers("Halfspace", normal, offset)
+        self._store(normal=normal, offset=offset)
+
+    def _scaled(self, s: np.ndarray) -> Halfspace:
+        largest = np.abs(s).max()
+        return Halfspace(self.normal * (largest / s), self.offset * largest)

@@ -108,6 +108,43 @@ class Shape:
     def __reduce__(self):
         return _rebuild, (type(self), tuple(getattr(self, f) for f in self._fields))
 
+    def scaled(self, factors: Any) -> Any:
+        """The image under factors along the axes of the frame: unequal, negative (a mirror image), or one for all.
+
+        Parameters
+        ----------
+        factors : float or (3,) array_like
+            Along x, y, z, none 0, without a unit.
+
+        Returns
+        -------
+        Shape
+            The image, where a shape of the library is the image: of a `Sphere` with unequal factors an `Ellipsoid`,
+            of a `Cone` turned over a `Compound` of one. Poses of the items of a `Compound` stay rotations.
+
+        Raises
+        ------
+        InvalidShape
+            Where a factor is 0 or not finite, numbers leave the supported range, or the image is no shape: unequal
+            factors of what is swept by balls, of the base of a cylinder or cone, of a turned item of a `Compound`.
+
+        Notes
+        -----
+        O(size of the shape). Lengths, points and offsets are products rounded once, normals rounded twice: exact where
+        factors are powers of two, ± 1 among them.
+        """
+        what = f"{type(self).__name__}.scaled"
+        s = _scale_factors(what, factors)
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # infinite numbers are refused by the image
+                return self._scaled(s)
+        except InvalidShape as error:
+            raise InvalidShape(f"{what}: factors {s.tolist()}: {error}") from None
+
+    def _scaled(self, s: np.ndarray) -> Any:
+        """The image under factors (3,) other than 0."""
+        raise InvalidShape(f"no rule for a {type(self).__name__}{POINTS_INSTEAD}")
+
     def _key(self) -> tuple:
         return tuple(_hashable(getattr(self, f)) for f in self._fields)
 
@@ -177,6 +214,34 @@ def _brief(value: Any) -> str:
 # --- checks, each naming shape, field and value -------------------------------------------------
 
 
+#: What to do about factors that a shape cannot be scaled by.
+POINTS_INSTEAD = "; scale the points of a ConvexHull or of a Mesh instead, of tessellate(shape) for example"
+
+
+def _scale_factors(what: str, factors: Any) -> np.ndarray:
+    """(3,) factors along x, y, z other than 0, given as one number or as three."""
+    single = checks.number(factors) is not None
+    s = rows(what, "factors", (factors,) * 3 if single else factors, (3,))
+    if not s.all():
+        raise InvalidShape(
+            f"{what}: factors must not be 0, got {checks.brief(factors)}; for a flat shape make a ConvexHull of points "
+            "in a plane"
+        )
+    return s
+
+
+def equal_but_for_signs(s: np.ndarray, why: str) -> float:
+    """The magnitude of scale factors. why : what unequal factors would make of a shape, for messages."""
+    if not (np.abs(s) == abs(s[0])).all():
+        raise InvalidShape(f"they must be equal but for signs, since {why}{POINTS_INSTEAD}")
+    return abs(float(s[0]))
+
+
+def mirrors(factors: Any) -> bool:
+    """Whether scale factors make a mirror image; their product could leave the range of numbers."""
+    return bool(np.prod(np.sign(factors)) < 0.0)
+
+
 _PLAIN = float, int, np.float64
 
 
@@ -216,8 +281,8 @@ def checked_shape(what: str, value: Any, example: str = "collide.Box((1, 1, 1))"
     return checks.instance(what, value, Shape, f"a shape, for example {example}")
 
 
-def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndarray:
-    """Three lengths > 0 along x, y, z, given as one sequence or as three numbers."""
+def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any, *, zero: bool = False) -> np.ndarray:
+    """Lengths > 0, or ≥ 0 where ``zero`` allows 0, along x, y, z: a sequence, or three arguments."""
     if (y is None) != (z is None):
         got = brief((value, y, z))
         raise InvalidShape(f"{shape}: {field} must be three lengths, ({field}) or (x, y, z), got {got}")
@@ -227,10 +292,21 @@ def three_lengths(shape: str, field: str, value: Any, y: Any, z: Any) -> np.ndar
         lengths = np.array(numbers, dtype=np.float64)
         lengths.setflags(write=False)
         return lengths
-    lengths = rows(shape, field, values, (3,))
-    for axis, length in zip("xyz", lengths):
-        positive(shape, f"{field}.{axis}", length)
+    read = rows(shape, field, values, (3,))
+    lengths = np.array([positive(shape, f"{field}.{axis}", length, zero=zero) for axis, length in zip("xyz", read)])
+    lengths.setflags(write=False)
     return lengths
+
+
+def plane_numbers(shape: str, normal: Any, offset: Any) -> tuple[np.ndarray, float]:
+    """A normal (3,) with a direction, its length within [1e-6, 1e6], and a finite offset."""
+    normal = rows(shape, "normal", normal, (3,))
+    length = math.hypot(*normal.tolist())
+    if not 1e-6 <= length <= 1e6:
+        raise InvalidShape(
+            f"{shape}: normal must have a length within [1e-6, 1e6] (1 is usual), got {length:g}"
+        )
+    return normal, scalar(shape, "offset", offset)
 
 
 def _is_plain_length(value: Any) -> bool:

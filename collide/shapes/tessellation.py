@@ -60,8 +60,9 @@ def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | No
     Parameters
     ----------
     shape : Shape
-        Convex shapes give a closed surface. A `ConvexHull` without an inside gives both sides of a flat polygon, or no
-        triangle at all (a segment, a point). A mesh is returned as it is; a `Compound` part by part, parts overlapping.
+        Convex shapes give a closed surface. A `ConvexHull` or `Box` without an inside gives both sides of a flat
+        polygon, or no triangle at all (a segment, a point). A mesh is returned as it is; a `Compound` part by part,
+        parts overlapping.
     tolerance : float, optional
         No point of the shape is farther than this [m] from the solid that the triangles bound; by default a hundredth
         of each shape's largest radius.
@@ -121,7 +122,8 @@ def _together(parts: list[tuple[Tessellation, np.ndarray]]) -> Tessellation:
 def _within_box(shape: Shape, size: float | None) -> Tessellation:
     if size is None:
         raise UnsupportedQuery(
-            "tessellate: an HPolytope with bounded=False may have no end; give the size [m] of a box to stand for it"
+            "tessellate: an HPolytope with bounded=False, or a Plane, may have no end; give the size [m] of a box to "
+            "stand for it"
         )
     assert isinstance(shape, HPolytope)
     half = max(0.5 * size, 2.0 * shape.boundary_within)
@@ -156,6 +158,8 @@ def _hull(points: np.ndarray) -> Tessellation:
 
 def _box(shape: Box, _) -> Tessellation:
     signs = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3, indexing="ij")).reshape(3, 8).T
+    if not shape.size.all():
+        return _hull(signs * shape.size + 0.0)
     sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     return Tessellation(signs * shape.size, np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))]))
 

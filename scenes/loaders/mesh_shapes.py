@@ -45,11 +45,6 @@ def part_shape(part: MeshPart, scale, place: str) -> Taken:
         raise InvalidShape(f"{place}: {error}") from None
 
 
-def mirrors(scale) -> bool:
-    """Whether factors turn a mesh into its mirror image; their product could leave the range of numbers."""
-    return bool(np.prod(np.sign(scale)) < 0.0)
-
-
 def extent(file: MeshFile, scale) -> float:
     """The longest side of the box around all meshes of a file, times their scale."""
     points = _times(np.concatenate([part.points for part in file.parts]), scale)
@@ -114,12 +109,7 @@ def _scaled(part: MeshPart, factors: np.ndarray) -> Shape:
     """What is known of the mesh at its own size stays known where nothing is rounded, or its tree can be shared."""
     facets = part.facets
     assert facets is not None
-    base = Mesh._known(part.points, facets, part.closed)
-    factor = float(factors[0])
-    if (factors == factor).all() and factor > 0.0:
-        mesh = base.scaled(factor)
-    else:
-        mesh = Mesh(_times(part.points, factors), facets[:, ::-1] if mirrors(factors) else facets)
+    mesh = Mesh._known(part.points, facets, part.closed).scaled(factors)
     exact = (np.abs(np.frexp(factors)[0]) == 0.5).all()
     convex = part.own_hull if exact else mesh.solid and is_own_hull(mesh.vertices, mesh.faces)
     return ConvexHull(mesh.vertices) if convex else mesh

@@ -17,7 +17,8 @@ from collide.robots.kinematic_tree import Joint, Mimic
 from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders import resources
 from collide.scenes.loaders.mesh_parts import MeshFile, MeshPart
-from collide.scenes.loaders.mesh_shapes import Taken, element_shapes, extent, mirrors
+from collide.scenes.loaders.mesh_shapes import Taken, element_shapes, extent
+from collide.shapes.shape import mirrors
 
 MISSING_MESHES = ("error", "skip")
 

@@ -14,7 +14,7 @@ from collide.scenes.loaders import mesh_file as mesh_loader
 from collide.scenes.loaders.cloud_file import read_cloud
 from collide.scenes.loaders.fields import Fields, did_you_mean, placed, read_pose, scaled
 from collide.scenes.loaders.mesh_parts import MeshFile
-from collide.scenes.loaders.mesh_shapes import element_shapes, extent, mirrors
+from collide.scenes.loaders.mesh_shapes import element_shapes, extent
 from collide.shapes import (
     Box,
     Capsule,
@@ -27,10 +27,12 @@ from collide.shapes import (
     HeightField,
     HPolytope,
     Mesh,
+    Plane,
     PointCloud,
     Shape,
     Sphere,
 )
+from collide.shapes.shape import mirrors
 
 #: kind -> its keys
 KINDS = {
@@ -41,6 +43,7 @@ KINDS = {
     "cone": ("radius", "length"),
     "ellipsoid": ("radii",),
     "halfspace": ("normal", "offset"),
+    "plane": ("normal", "offset", "thickness"),
     "hull": ("points", "radius"),
     "hpolytope": ("normals", "offsets", "bounded"),
     "heightfield": ("heights", "cell", "bottom"),
@@ -119,6 +122,8 @@ def _plain(kind: str, fields: Fields, metres: float) -> Shape:
         return Ellipsoid(scaled(fields.numbers("radii", (3,)), metres))
     if kind == "halfspace":
         return Halfspace(fields.numbers("normal", (3,)), length("offset"))
+    if kind == "plane":
+        return Plane(fields.numbers("normal", (3,)), length("offset"), length("thickness", 0.0))
     if kind == "hull":
         return ConvexHull(scaled(fields.numbers("points", (None, 3)), metres), radius=length("radius", 0.0))
     if kind == "heightfield":

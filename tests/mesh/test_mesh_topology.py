@@ -494,7 +494,7 @@ def test_scaled_copies(tmp_path):
     big.save(tmp_path / "big.npz")
     for other in (pickle.loads(pickle.dumps(big)), collide.Mesh.load(tmp_path / "big.npz")):
         assert other == big and other.scale == 3.0 and other.base == mesh
-    for factor in (0.0, -1.0, np.nan, np.inf, "two", None):
+    for factor in (0.0, (1, 0, 1), np.nan, np.inf, "two", None):
         with pytest.raises(collide.InvalidShape, match=r"Mesh\.scaled: factor"):
             mesh.scaled(factor)
     with pytest.raises(collide.InvalidShape, match="Mesh: vertices"):

@@ -190,6 +190,7 @@ GIVEN = {
     "low, high = (-2, -2, -2), (2, 2, 2)",
     "planar": "from collide.polytopes import planar_pose\nX_WBs = np.array([planar_pose((x, 0)) for x in (1, 5)])",
     "polytopes": "",
+    "shapes": "",
     "robots": "X_LS = np.eye(4); world = collide.World(); Q = Q0 = np.zeros((2, 1)); Q1 = Q + 0.1; q = Q[0]\n"
     "scan, X_WC = np.eye(3) * 5, X_LS",
     "solids": "",

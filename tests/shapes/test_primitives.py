@@ -8,6 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+import collide
 from collide import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, InvalidShape, Sphere
 from collide.transforms import LARGEST, SMALLEST
 
@@ -36,8 +37,8 @@ def test_three_lengths(kind, field):
     values = getattr(shape, field)
     assert values.tolist() == [1.0, 2.0, 3.0] and values.dtype == np.float64 and not values.flags.writeable
     for arguments, words in (
-        (((1, 2),), "shape"), ((1, 2), "got \\(1, 2, None\\)"), (((1, -2, 3),), rf"{field}\.y must be > 0"),
-        (((1, 2, math.inf),), "finite"), ((((1, 2, 3),) * 2,), "shape"), ((0, 1, 1), rf"{field}\.x"),
+        (((1, 2),), "shape"), ((1, 2), "got \\(1, 2, None\\)"), (((1, -2, 3),), rf"{field}\.y must be (>|≥) 0"),
+        (((1, 2, math.inf),), "finite"), ((((1, 2, 3),) * 2,), "shape"), ((-1, 1, 1), rf"{field}\.x"),
     ):
         with pytest.raises(InvalidShape, match=words):
             kind(*arguments)
@@ -55,7 +56,7 @@ def test_plain_numbers_make_what_any_numbers_make():
         assert type(size) is np.ndarray and size.dtype == np.float64 and size.tobytes() == wanted.tobytes(), values
         assert not size.flags.writeable and size is not values and Box(*values).size.tobytes() == wanted.tobytes()
     for values, words in (
-        ((1, 2, 0.0), "size.z must be > 0"), ((1, -2, 1), "size.y must be > 0"), ((10**400, 1, 1), "finite"),
+        ((1, 2, -1e-60), "size.z must be ≥ 0"), ((1, -2, 1), "size.y must be ≥ 0"), ((10**400, 1, 1), "finite"),
         ((1, math.nan, 1), "finite"), ((1, 2e50, 1), "size"), ((1, 1e-51, 1), "size.y must lie within"),
         ((1, 2), "shape"), (np.ones((3, 1)), "shape"), (np.ones((3, 3)), "shape"), ((1, 2, None), "real number"),
         ((1, 2, "3"), "real numbers"), ((1, (1,), 1), "rows of different lengths"),
@@ -82,3 +83,32 @@ def test_half_spaces():
     for arguments in (((0, 0, 0), 1.0), ((0, 0, math.nan), 1.0), ((0, 1), 1.0), ((0, 0, 1), math.inf)):
         with pytest.raises(InvalidShape, match="Halfspace"):
             Halfspace(*arguments)
+
+
+def test_rounded_boxes():
+    """The whole box has the lengths given; a ball meets faces, edges and corners by the closed form."""
+    size, radius = np.array([1.0, 0.5, 0.75]), 0.125
+    shape = Box.rounded(size, radius)
+    assert isinstance(shape, collide.ConvexHull) and shape.radius == radius and len(shape.points) == 8
+    rng = np.random.default_rng(0)
+    hits = 0
+    for p in rng.integers(-8, 9, (200, 3)) / 8.0:
+        core = float(np.linalg.norm(np.maximum(np.abs(p) - (0.5 * size - radius), 0.0)))
+        r = collide.distance(shape, Sphere(0.25), np.eye(4), collide.pose(p))
+        assert r.hit == (core <= 0.375) or abs(core - 0.375) < 1e-15, p
+        assert r.distance == pytest.approx(core - 0.375, abs=1e-15) or core == 0.0, p
+        hits += bool(r.hit)
+    assert 20 <= hits <= 180, hits
+    low, high = (f(collide.tessellate(shape).vertices, axis=0) for f in (np.min, np.max))
+    assert np.allclose(high - low, size, atol=1e-15)
+    assert Box.rounded((1, 1, 1), 0.5).points.tolist() == [[0.0, 0.0, 0.0]] * 8
+    ball = Box.rounded((1, 1, 1), 0.5)
+    assert collide.distance(ball, Sphere(0.5), np.eye(4), collide.pose((0, 0, 2))).distance == 1.0
+    assert Box.rounded((1, 2, 3), 0).points.tolist() == collide.tessellate(Box((1, 2, 3))).vertices.tolist()
+    for arguments, words in (
+        (((1, 0.2, 1), 0.125), r"at most half of every length, got 0\.125 and size \[1\.0, 0\.2, 1\.0\]"),
+        (((1, 0, 1), 0.0), "Box.rounded: size.y must be > 0"), (((1, 1, 1), -1), "Box.rounded: radius must be ≥ 0"),
+        (((1, 1), 0.1), "Box.rounded: size must have shape"),
+    ):
+        with pytest.raises(InvalidShape, match=words):
+            Box.rounded(*arguments)
