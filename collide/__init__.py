@@ -73,6 +73,7 @@ if TYPE_CHECKING:
         Shape,
         ShapeSet,
         Sphere,
+        SweptMesh,
         VoxelGrid,
     )
     from collide.shapes.tessellation import tessellate
@@ -131,7 +132,7 @@ _HOMES = {
     "collide.shapes": (
         "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
         "Halfspace", "HeightField", "Mesh", "OcTree", "OcTreeLeaves", "Plane", "PointCloud", "Shape", "ShapeSet",
-        "Sphere", "VoxelGrid",
+        "Sphere", "SweptMesh", "VoxelGrid",
     ),
     "collide.shapes.tessellation": ("tessellate",),
     "collide.solids.boolean": ("BooleanResult", "boolean"),
@@ -165,9 +166,9 @@ __all__ = [
     "Located", "Mesh", "MissingExtra", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult",
     "PartitionSize", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits", "Robot",
     "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
-    "SignedDistanceGrid", "SignedDistances", "SpacePartition", "Sphere", "SweepResults", "TetMesh", "TimeOfImpact",
-    "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldHits", "WorldResult", "boolean", "certify",
-    "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "facet_pairs",
+    "SignedDistanceGrid", "SignedDistances", "SpacePartition", "Sphere", "SweepResults", "SweptMesh", "TetMesh",
+    "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldHits", "WorldResult", "boolean",
+    "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "facet_pairs",
     "get_include", "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses",
     "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions",
     "self_overlapping_cells", "shape_cast", "signed_distances", "sweep", "tessellate", "time_of_impact", "verify",

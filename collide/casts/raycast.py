@@ -31,6 +31,7 @@ from collide.narrowphase.composite.balls_on_ways import SingleWay, near_on_ways
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.fields.field_items import NamedUnion, items_on_way, rounding_of_places
 from collide.narrowphase.fields.items_of import items_of
+from collide.narrowphase.fields.swept_triangles import SweptTriangles
 from collide.narrowphase.fields.terrain_columns import Columns
 from collide.narrowphase.prepared_pairs import single_calls_are_safe
 from collide.shapes.compound import Compound
@@ -139,6 +140,8 @@ def _on_field(
 ) -> RayEvents:
     """Events of n rays and a field: the items that a ray may meet first, as convex parts."""
     items, limits, events = items_of(field), directions.limits(limit), []
+    if isinstance(items, SweptTriangles):
+        return _on_swept_triangles(items, X_WA, origins, directions, limit, every)
     if isinstance(items, Columns):
         return _on_terrain(items, X_WA, origins, directions, limit, every)
     for begin in range(0, len(origins), _RAYS_TOGETHER):
@@ -157,6 +160,22 @@ def _on_field(
         of_some = Directions(directions.vectors[some], directions.exponents[some])
         on_items = _on_parts(parts, numbers, X, origins[some], of_some, limit, every, near)
         events.append(on_items._replace(ray=some[on_items.ray]))
+    return in_order(joined(events))
+
+
+def _on_swept_triangles(
+    items: SweptTriangles, X_WA: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, every: bool
+) -> RayEvents:
+    """Events of n rays and a swept mesh: each ray with the triangles on its way, as a union."""
+    limits, events = directions.limits(limit), []
+    for k in range(len(origins)):
+        of_k = Directions(directions.vectors[k : k + 1], directions.exponents[k : k + 1])
+        X = X_WA[k if len(X_WA) > 1 else 0]
+        some = items_on_way(items, X, origins[k], directions.vectors[k], float(limits[k]), 0.0)[0]
+        some = np.unique(np.append(some, 0))  # of no triangles there is no union
+        union = items.union_of(some)
+        met = surfaces_met(union.shape, X[None], origins[k : k + 1], of_k, limit, every=every)
+        events.append(met._replace(ray=np.full_like(met.ray, k), item=some[met.item]))
     return in_order(joined(events))
 
 

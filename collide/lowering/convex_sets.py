@@ -19,9 +19,11 @@ from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
+from collide.shapes.octree import OcTree
 from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import IDENTITY, Shape
+from collide.shapes.swept_mesh import SweptMesh
 from collide.shapes.voxel_grid import VoxelGrid
 
 __all__ = [
@@ -172,18 +174,24 @@ def _mesh(shape: Mesh) -> ConvexSet:
     )
 
 
-def _field(shape: PointCloud | VoxelGrid) -> ConvexSet:
-    name, remedy = type(shape).__name__, "Spheres at its points" if isinstance(shape, PointCloud) else "Boxes"
+def _field(shape: Shape) -> ConvexSet:
+    name, remedy = type(shape).__name__, _INSTEAD[type(shape)]
     raise UnsupportedQuery(
         f"{name}: a field is asked as a whole, and this query needs convex parts. collide(), distance(), contacts() "
         f"and World take it; elsewhere a Compound of {remedy} may do instead"
     )
 
 
+#: What may do instead of a field, where convex parts are needed.
+_INSTEAD: dict[type, str] = {
+    PointCloud: "Spheres at its points", VoxelGrid: "Boxes", OcTree: "Boxes",
+    SweptMesh: "ConvexHulls of its triangles, with its radius,",
+}
 _RULES: dict[type, Callable[..., ConvexSet]] = {
     ConvexHull: _convex_hull,
     HPolytope: _hpolytope,
     Mesh: _mesh,
     PointCloud: _field,
+    SweptMesh: _field,
     VoxelGrid: _field,
 }

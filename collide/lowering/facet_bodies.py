@@ -25,6 +25,7 @@ from collide.mesh.mesh_survey import one_of_each_part
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape, checked_shape, held_by, kept_with_shape
+from collide.shapes.swept_mesh import SweptMesh
 
 
 class Body(NamedTuple):
@@ -85,7 +86,11 @@ def has_facets(shape: Shape) -> bool:
 
 @kept_with_shape("_surface")
 def body_of(shape: Shape) -> Body:
-    """The body of a mesh or of a convex shape that `has_facets`, made when first asked for and kept with the shape."""
+    """The body of a mesh, a swept mesh or a convex shape that `has_facets`, made when first asked for and kept with the
+    shape.
+    """
+    if isinstance(shape, SweptMesh):
+        return _of_mesh(shape.mesh)._replace(of=held_by(shape, shape), radius=shape.radius)
     return _of_mesh(shape) if isinstance(shape, Mesh) else _of_convex(shape)
 
 
@@ -115,7 +120,7 @@ def facet_body(shape, what: str) -> Body:
 def hull_of(body: Body) -> Shape:
     """The hull of a mesh, without points inside; a convex shape itself."""
     shape = body.shape
-    return shape.convex_hull if isinstance(shape, Mesh) else shape
+    return shape.convex_hull if isinstance(shape, (Mesh, SweptMesh)) else shape
 
 
 def reach_of(body: Body) -> float:

@@ -22,6 +22,7 @@ from collide.shapes.hpolytope import HPolytope
 from collide.shapes.mesh import Mesh
 from collide.shapes.point_cloud import PointCloud
 from collide.shapes.shape import IDENTITY, Shape, kept_with_shape
+from collide.shapes.swept_mesh import SweptMesh
 from collide.shapes.voxel_grid import VoxelGrid
 
 #: A convex set and its (4, 4) pose in the shape's frame.
@@ -66,11 +67,13 @@ def bounding_parts_of(shape: Shape) -> Parts:
 
 
 @kept_with_shape("_bounds")
-def _bounds_around(shape: Compound | Mesh | HPolytope | PointCloud | VoxelGrid) -> Parts:
+def _bounds_around(shape: Compound | Mesh | HPolytope | PointCloud | SweptMesh | VoxelGrid) -> Parts:
     if isinstance(shape, HPolytope):
         return _alone(_half_space_around(shape))
     if isinstance(shape, Compound):
         return _compound(shape, bounding_parts_of)
+    if isinstance(shape, SweptMesh):
+        return _mesh_bounds(shape.mesh, shape.radius)
     if isinstance(shape, VoxelGrid):
         return _grid_bounds(shape)
     if isinstance(shape, HeightField) and shape.is_field:
@@ -144,10 +147,10 @@ def _placed(packed: PackedConvex, X_CS: np.ndarray, X_SP: np.ndarray) -> Part:
     return packed._replace(slop=packed.slop + 2 * _ULPS_PER_PRODUCT * _ULP * scale), X_CP
 
 
-def _mesh_bounds(mesh: Mesh) -> Parts:
+def _mesh_bounds(mesh: Mesh, radius: float = 0.0) -> Parts:
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[mesh.faces] = True
-    return _alone(pack_points(_points_around(mesh.vertices[used])))
+    return _alone(pack_points(_points_around(mesh.vertices[used]), radius))
 
 
 def _cloud_bounds(cloud: PointCloud) -> Parts:

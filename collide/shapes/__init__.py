@@ -16,10 +16,11 @@ from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import Shape
 from collide.shapes.shape_set import ShapeSet
+from collide.shapes.swept_mesh import SweptMesh
 from collide.shapes.voxel_grid import VoxelGrid
 
 __all__ = [
     "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid",
     "HPolytope", "Halfspace", "HeightField", "Mesh", "OcTree", "OcTreeLeaves", "Plane", "PointCloud", "Shape",
-    "ShapeSet", "Sphere", "VoxelGrid",
+    "ShapeSet", "Sphere", "SweptMesh", "VoxelGrid",
 ]

@@ -20,6 +20,7 @@ from collide.shapes.hpolytope import HPolytope
 from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import Shape, checked_shape
+from collide.shapes.swept_mesh import SweptMesh
 
 #: Where no tolerance is given: this part of a shape's largest radius.
 _USUAL = 0.01
@@ -189,6 +190,15 @@ def _swept_hull(points: np.ndarray, radius: float, tolerance: float | None) -> T
     return Tessellation(vertices, faces, ball.deviation)
 
 
+def _swept_mesh(shape: SweptMesh, tolerance: float | None) -> Tessellation:
+    if tolerance is not None and tolerance < shape.radius:
+        raise InvalidArgument(
+            f"tessellate: a SweptMesh is drawn by the triangles of its mesh, which are {shape.radius!r} m off; give a "
+            f"tolerance no smaller, got {tolerance!r}"
+        )
+    return Tessellation(shape.mesh.vertices, np.asarray(shape.mesh.faces, dtype=np.int64), shape.radius)
+
+
 # --- curved shapes -------------------------------------------------------------------------------
 
 
@@ -321,4 +331,5 @@ _KINDS: dict[type[Shape], Callable[..., Tessellation]] = {
     Ellipsoid: _ellipsoid,
     ConvexHull: lambda shape, tolerance: _swept_hull(shape.points, shape.radius, tolerance),
     HPolytope: lambda shape, _: _hull(shape.vertices),
+    SweptMesh: _swept_mesh,
 }

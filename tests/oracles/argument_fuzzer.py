@@ -260,6 +260,7 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
     "signed_distances": lambda: {"mesh": mesh(), "points": (0, 0, 0)},
     "SpacePartition": lambda: {"mesh": mesh()},
     "Sphere": lambda: {"radius": 1},
+    "SweptMesh": lambda: {"mesh": mesh(), "radius": 0.1},
     "TetMesh": lambda: {"vertices": tetrahedron().vertices, "cells": [[0, 1, 2, 3]]},
     "VoxelGrid": lambda: {"occupied": np.ones((2, 2, 2), dtype=bool), "cell": 0.1},
     "World": dict,
@@ -387,6 +388,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
             "PointCloud",
             "ShapeSet",
             "Sphere",
+            "SweptMesh",
             "TetMesh",
             "VoxelGrid",
         )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -98,8 +98,8 @@ class FieldItems(ABC):
         """
 
     @abstractmethod
-    def hulls(self, some: np.ndarray) -> list[ConvexHull]:
-        """Items, in the items' frame."""
+    def hulls(self, some: np.ndarray) -> list[Any]:
+        """Items as shapes in the items' frame: convex hulls, but for the inside of a solid."""
 
     def some(self) -> np.ndarray:
         """The number of an item."""
@@ -135,9 +135,9 @@ class FieldItems(ABC):
                 return some[:1]
 
 
-def as_union(hulls: list[ConvexHull], X: np.ndarray) -> Shape:
-    """Convex shapes at a pose as one shape, whose parts are numbered as these."""
-    if len(hulls) == 1 and len(hulls[0].points) == 1:  # a ball, whose only facet has the number 0
+def as_union(hulls: list[Any], X: np.ndarray) -> Shape:
+    """Shapes at a pose as one shape, whose parts are numbered as these."""
+    if len(hulls) == 1 and isinstance(hulls[0], ConvexHull) and len(hulls[0].points) == 1:  # a ball, whose only facet has the number 0
         return hulls[0]
     return Compound([(hull, X) for hull in hulls])
 

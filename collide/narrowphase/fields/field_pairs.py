@@ -1,4 +1,4 @@
-"""A field (point cloud, voxel grid, octree) and another shape, at n pairs of poses.
+"""A field (point cloud, voxel grid, octree, large terrain, mesh with thickness) and another shape, at n pairs of poses.
 
 Convex sets walk down the tree over the items (`nearest_item_kernel.py`). Open rests of the walk, and all other
 questions (depths, half-spaces, meshes, unions, other fields), go to the union of the items within the upper bound of
@@ -14,21 +14,26 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.kernels import address_of
+from collide.lowering.facet_bodies import body_of, has_facets
 from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.kinds import Kind
 from collide.lowering.packed_convex import HALFSPACE, PackedConvex
 from collide.lowering.parts import convex_set_of, is_single_convex, parts_of
 from collide.lowering.shape_table import moved_pose
 from collide.narrowphase.convex_batches import Question
+from collide.narrowphase.facets.facet_kernel_calls import body_rows, states
+from collide.narrowphase.facets.mesh_collide_kernel import HIT
+from collide.narrowphase.facets.mesh_collide_kernel import OPEN as UNTOLD
 from collide.narrowphase.facets.nearest_item_calls import gap_rows, prepared_items, surface_states
 from collide.narrowphase.fields.ball_walk_kernel import MEETS, OPEN, WORK, clouds_meet_balls
 from collide.narrowphase.fields.field_items import BoxAround, FieldItems, box_in_frame, lowest_items
 from collide.narrowphase.fields.items_of import items_of
 from collide.narrowphase.prepared_pairs import Prepared
-from collide.results import PAIR_DTYPE, flipped
+from collide.results import PAIR_DTYPE, UNDECIDED, flipped
 from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Halfspace
 from collide.shapes.shape import IDENTITY, Shape
+from collide.shapes.swept_mesh import SweptMesh
 
 #: Rows of two shapes: ``rows_of_pair(A, B, X_WA, X_WB, limit, depths=)``.
 RowsOfPair = Callable[..., np.ndarray]
@@ -48,13 +53,16 @@ def answer_field(
         return
     X_WA, X_WB = (np.ascontiguousarray(X) for X in poses)
     items, is_open = items_of(A), np.ones(len(out), dtype=bool)
-    if walks(B) and items.walked is not None and len(out):
+    if isinstance(A, SweptMesh):
+        if (has_facets(B) or isinstance(B, SweptMesh)) and len(out):
+            is_open = _facets_answer(out, A, B, X_WA, X_WB, question)
+    elif walks(B) and items.walked is not None and len(out):
         X_WG, slop = items.poses_of_items(X_WA)
         packed = _widened(convex_set_of(B), slop)
         if question.boolean:
-            states = surface_states(items.walked, packed, X_WG, X_WB)
-            out[states.meets] = True
-            is_open = ~(states.meets | states.apart)
+            told = surface_states(items.walked, packed, X_WG, X_WB)
+            out[told.meets] = True
+            is_open = ~(told.meets | told.apart)
         else:
             rows, is_written = gap_rows(items.walked, packed, X_WG, X_WB, question.depths)
             out[is_written] = _beyond_limit(rows[is_written], question.limit)
@@ -64,6 +72,19 @@ def answer_field(
     for k in np.flatnonzero(is_open).tolist():
         row = _union_row(rows_of, A, B, X_WA[k : k + 1], X_WB[k : k + 1], question)
         out[k] = bool(row["hit"][0]) if question.boolean else _beyond_limit(row, question.limit)[0]
+
+
+def _facets_answer(
+    out: np.ndarray, A: SweptMesh, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, question: Question
+) -> np.ndarray:
+    """(n,) bool: which poses of a swept mesh and a body of facets are left open; all others are answered."""
+    if question.boolean:
+        answers = states(body_of(A), body_of(B), X_WA, X_WB)
+        out[answers == HIT] = True
+        return answers == UNTOLD
+    rows = body_rows(body_of(A), body_of(B), X_WA, X_WB, limit=question.limit, depths=question.depths)
+    out[:] = rows
+    return rows["how"] == UNDECIDED
 
 
 def _widened(packed: PackedConvex, slop: np.ndarray) -> PackedConvex:
@@ -85,8 +106,8 @@ def _may_meet_parts(items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndar
             break
         X_WP, slop = moved_pose(X_WB[some], X_BP, np.full(len(some), packed.reach))
         margin = 2.0 * float(slop.max() + slop_of_grid.max())
-        states = surface_states(items.walked, packed, X_WG[some], X_WP, margin)
-        may_meet[some[~states.apart]] = True
+        told = surface_states(items.walked, packed, X_WG[some], X_WP, margin)
+        may_meet[some[~told.apart]] = True
     return may_meet
 
 
