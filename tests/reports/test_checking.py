@@ -362,7 +362,7 @@ def test_a_full_disk_is_told_with_the_name_of_the_file(command, option):
 
 
 def test_numbers_in_errors_are_plain():
-    with pytest.raises(collide.InvalidShape, match=r"size\.x must be > 0, got -1\.0$"):
+    with pytest.raises(collide.InvalidShape, match=r"size\.x must be ≥ 0, got -1\.0$"):
         Box((-1, 1, 1))
 
 

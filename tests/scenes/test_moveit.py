@@ -193,7 +193,7 @@ def test_robot_not_found_names_the_option(planning_scene, tmp_path):
     [
         ([thing(primitives=[{"type": "torus", "dimensions": [1]}])], {}, r'"thing".primitives\[0\].type: unknown primitive \'torus\''),
         ([thing(primitives=[{"type": "box", "dimensions": [1, 1]}])], {}, r"dimensions: must be 3 numbers, got \[1, 1\]"),
-        ([thing(primitives=[{"type": "box", "dimensions": [1, 1, -1]}])], {}, r'primitives\[0\]: Box: size.z must be > 0'),
+        ([thing(primitives=[{"type": "box", "dimensions": [1, 1, -1]}])], {}, r'primitives\[0\]: Box: size.z must be ≥ 0'),
         ([thing(primitives=[{"type": "sphere", "dimensions": [float("nan")]}])], {}, "must be finite"),
         ([thing()], {}, '"thing": has no primitives, meshes or planes'),
         ([{}], {}, r"collision_objects\[0\]: 'id' is missing"),
