@@ -14,9 +14,9 @@ import numpy as np
 
 from collide import distance
 from collide.adapters.fuzzing.fuzz_case import Case
-from collide.errors import CollideError
+from collide.errors import CollideError, InvalidShape
 from collide.scenes.loaders.fields import rotation_from_degrees
-from collide.shapes import Compound, ConvexHull, Halfspace, HeightField, HPolytope, Mesh, Shape
+from collide.shapes import Box, Compound, ConvexHull, Halfspace, HeightField, HPolytope, Mesh, Shape
 from collide.transforms import pose
 
 #: What a body, a part, and a point or facet weigh, in digits.
@@ -305,6 +305,8 @@ def _with_field(shape: Shape, field: str, value: np.ndarray) -> Shape:
     values = {name: getattr(shape, name) for name in shape._fields} | {field: _scalar(value)}
     if isinstance(shape, ConvexHull):
         return ConvexHull(values["points"], radius=float(values["radius"]))
+    if isinstance(shape, Box) and shape.size.all() and not np.all(value):
+        raise InvalidShape("Box: a flat box is another question, which few engines take")
     return type(shape)(*values.values())
 
 
