@@ -137,7 +137,8 @@ class FieldItems(ABC):
 
 def as_union(hulls: list[Any], X: np.ndarray) -> Shape:
     """Shapes at a pose as one shape, whose parts are numbered as these."""
-    if len(hulls) == 1 and isinstance(hulls[0], ConvexHull) and len(hulls[0].points) == 1:  # a ball, whose only facet has the number 0
+    is_ball = isinstance(hulls[0], ConvexHull) and len(hulls[0].points) == 1  # its only facet has the number 0
+    if len(hulls) == 1 and is_ball:
         return hulls[0]
     return Compound([(hull, X) for hull in hulls])
 
