@@ -13,6 +13,7 @@ import time
 import numpy as np
 
 import collide
+from collide.adapters.bench.claims import Claim, grid, main
 
 _POINTS, _SECONDS = 100_000, 3.0
 
@@ -37,8 +38,8 @@ class _World(collide.World):
         return packed
 
 
-def measured(world: _World, seen: list[np.ndarray], n_readers: int) -> str:
-    """A line of the table."""
+def asked(world: _World, seen: list[np.ndarray], n_readers: int) -> dict[str, float]:
+    """What readers and the writer took, ms."""
     questions, writes, ended = [], [], threading.Event()
     tool, X_WT = collide.Box((0.1, 0.1, 0.3)), collide.pose((0.5, 0.2, 2.9))
 
@@ -62,24 +63,28 @@ def measured(world: _World, seen: list[np.ndarray], n_readers: int) -> str:
     ended.set()
     for reader in readers:
         reader.join()
-    delays, asked, written = (1e3 * np.sort(times) for times in (world.delays, questions, writes))
-    return (
-        f"{n_readers} readers: {len(delays)} questions, wait {np.median(delays):.4f} (most {delays[-1]:.3f}), question "
-        f"{np.median(asked):.2f} ({asked[-1]:.1f}); {len(written)} replaced, each {np.median(written):.1f}"
-    )
+    delays, taken, written = (1e3 * np.sort(times) for times in (world.delays, questions, writes))
+    return {
+        "questions": len(delays), "wait_ms": float(np.median(delays)), "longest_wait_ms": float(delays[-1]),
+        "question_ms": float(np.median(taken)), "replaced": len(written), "replace_ms": float(np.median(written)),
+    }
 
 
-def main() -> None:
-    seen, rng = scans(4), np.random.default_rng(1)
-    for n_boxes in (30, 3000):
-        world = _World()
-        world.delays = []
-        world.add(collide.PointCloud(seen[0], 0.01), name="scan")
-        for _ in range(n_boxes):
-            world.add(collide.Box(rng.uniform(0.05, 0.2, 3)), collide.pose(rng.uniform(-2.5, 2.5, 3)))
-        for n_readers in (1, 4):
-            print(f"{n_boxes} boxes, {measured(world, seen, n_readers)}", flush=True)
+def waits(_options, boxes: int, readers: int) -> list[dict[str, float]]:
+    """Readers of a World of a cloud and boxes."""
+    seen, rng, world = scans(4), np.random.default_rng(1), _World()
+    world.delays = []
+    world.add(collide.PointCloud(seen[0], 0.01), name="scan")
+    for _ in range(boxes):
+        world.add(collide.Box(rng.uniform(0.05, 0.2, 3)), collide.pose(rng.uniform(-2.5, 2.5, 3)))
+    return [asked(world, seen, readers)]
+
+
+CLAIMS = [
+    Claim("waits", "how long readers wait while a cloud is exchanged", lambda o: grid(boxes=(30, 3000), readers=(1, 4)),
+          waits, file="live-worlds"),
+]
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, CLAIMS)

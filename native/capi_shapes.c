@@ -130,8 +130,11 @@ collide_status collide_box(const double size[3], collide_shape **shape)
     if (shape == NULL) return COLLIDE_INVALID_ARGUMENT;
     *shape = NULL;
     if (size == NULL) return COLLIDE_INVALID_ARGUMENT;
-    if (!is_length(size[0]) || !is_length(size[1]) || !is_length(size[2])) return COLLIDE_INVALID_SHAPE;
-    for (k = 0; k < 24; k++) corners[k] = (k / 3 >> (2 - k % 3) & 1 ? 0.5 : -0.5) * size[k % 3];
+    for (k = 0; k < 3; k++) if (!(size[k] == 0.0 || is_length(size[k]))) return COLLIDE_INVALID_SHAPE;
+    for (k = 0; k < 24; k++) {
+        double half = 0.5 * size[k % 3];
+        corners[k] = k / 3 >> (2 - k % 3) & 1 ? half : 0.0 - half; /* no minus zero of flat boxes */
+    }
     status = shape_of_points(corners, 8, 0.0, 0.0, 0, shape);
     for (k = 0; status == COLLIDE_OK && k < 3; k++) (*shape)->numbers[PARAMS + k] = 0.5 * size[k]; /* no part of the digest */
     return status;

@@ -118,7 +118,7 @@ def _flaw_of_hit(A: Shape, B: Shape, X_WA, X_WB, certificates: Sequence[Certific
     if len(certificates) != 1 or certificates[0].kind != TOGETHER:
         return f'a hit of a field is proven by one certificate "together", not {len(certificates)}'
     _, i, j, pairs = certificates[0]
-    bodies = []
+    bodies: list[ExactPart] = []
     for shape, X, number in ((A, X_WA, i), (B, X_WB, j)):
         if shape.is_field:
             part = _numbered(shape, X, number)
@@ -128,7 +128,7 @@ def _flaw_of_hit(A: Shape, B: Shape, X_WA, X_WB, certificates: Sequence[Certific
         if part is None:
             return f"there is no item or part {number}"
         bodies.append(part)
-    return flaw_of_proof(*bodies, pairs, hit=True)
+    return flaw_of_proof(bodies[0], bodies[1], pairs, hit=True)
 
 
 def _remaining(items: _Field, part: ExactPart, normals: Sequence[Point]) -> _Field:

@@ -24,13 +24,18 @@ def are_hits(
     pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround]
 ) -> np.ndarray:
     """(k,) bool: pairs with a hit. A body of the robot is swollen by its padding, a body around by its margin, where
-    the pair has a body around.
+    the pair has a body around. Of a configuration with a hit further pairs are not asked, and stay False.
 
     pairs : (k, 3 or more), configurations as rows of X_WLs (N, links, 4, 4).
     """
-    out = np.zeros(len(pairs), dtype=bool)
+    out, collides = np.zeros(len(pairs), dtype=bool), np.zeros(len(X_WLs), dtype=bool)
     for rows, A, B, X_WA, X_WB, padding, margin in _batches(pairs, X_WLs, bodies, around):
-        out[rows] = query.collide(A, B, X_WA, X_WB, security_margin=padding + margin, check_poses=False)
+        is_open = ~collides[pairs[rows, 0]]
+        if not is_open.all():
+            rows, X_WA, X_WB = rows[is_open], X_WA[is_open], X_WB[is_open] if len(X_WB) > 1 else X_WB
+        if len(rows):
+            out[rows] = query.collide(A, B, X_WA, X_WB, security_margin=padding + margin, check_poses=False)
+            collides[pairs[rows[out[rows]], 0]] = True
     return out
 
 

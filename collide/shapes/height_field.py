@@ -97,7 +97,9 @@ class HeightField(Mesh):
         x, y = _grid_line(heights.shape[1], cell[0], "dx"), _grid_line(heights.shape[0], cell[1], "dy")
         pyramid = height_pyramid.HeightPyramid(heights)
         if not pyramid.n_cells:
-            raise InvalidShape("HeightField: no cell has four heights: all have a corner in a hole (NaN)")
+            raise InvalidShape(
+                f"HeightField: heights: every cell has a corner in a hole (nan), got {checks.brief(heights)}"
+            )
         bottom = _check_bottom(bottom, heights, x, y)
         self._store(
             heights=heights, cell=cell, bottom=bottom, solid=True, scale=1.0, _copied=None, pyramid=pyramid,

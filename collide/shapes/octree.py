@@ -10,8 +10,8 @@ import numpy as np
 from collide.base import argument_checks as checks
 from collide.base.lazy_modules import lazy_module
 from collide.errors import InvalidShape
-from collide.shapes.shape import IDENTITY, positive, rows
-from collide.shapes.voxel_grid import VoxelGrid, tree_of_cells
+from collide.shapes.shape import IDENTITY, equal_but_for_signs, positive, rows
+from collide.shapes.voxel_grid import VoxelGrid, scaled_pose, tree_of_cells
 from collide.transforms import as_pose
 
 if TYPE_CHECKING:
@@ -122,9 +122,9 @@ class OcTree(VoxelGrid):
         Parameters
         ----------
         path : str or Path
-            The file, at most 2 GiB; its first line says which form it has.
+            The file, at most 2 GiB, in the form told by its first line.
         resolution : float, optional
-            What the file must say, to five digits [m].
+            The resolution wanted of the file, to five digits [m].
         threshold, unknown, X
             As of the constructor. Leaves of a ``.bt`` count as occupied with any threshold up to 0.97, as in OctoMap.
 
@@ -155,7 +155,7 @@ class OcTree(VoxelGrid):
         message : object or mapping
             With ``id``, ``resolution``, ``binary`` and ``data``: bytes, or int8 in any form.
         threshold, unknown, X
-            As of the constructor. The origin of an ``OctomapWithPose`` is the ``X`` here.
+            As of the constructor. Where a message has an origin besides, that is the ``X`` here.
 
         Returns
         -------
@@ -172,6 +172,13 @@ class OcTree(VoxelGrid):
     def _of_stream(cls, leaves, **options) -> OcTree:
         log_odds = np.where(leaves.occupied, _OCCUPIED, _FREE) if leaves.log_odds is None else leaves.log_odds
         return cls((leaves.corners, leaves.exponents, log_odds), leaves.resolution, **options)
+
+    def _scaled(self, s: np.ndarray) -> OcTree:
+        factor = equal_but_for_signs(s, "an octree has a single resolution")
+        cell, exponent, log_odds = self.leaves
+        mirrored = np.where(s < 0.0, -(cell + (1 << exponent)[:, None]), cell)
+        options = {"threshold": self.threshold, "unknown": self.unknown, "X": scaled_pose(self.X, s)}
+        return OcTree((mirrored, exponent, log_odds), self.resolution * factor, **options)
 
     def save(self, path) -> None:
         """Write the leaves to a ``.bt`` file, occupied by this map's threshold or free.

@@ -149,7 +149,7 @@ class VoxelGrid(Shape):
         Parameters
         ----------
         path : str or Path
-            The file, ending in ``.binvox``; an existing file is replaced, by all of the new file or not at all.
+            The file, ending in ``.binvox``; an existing file is replaced as a whole or not at all.
 
         Raises
         ------
@@ -211,6 +211,10 @@ class VoxelGrid(Shape):
             )
         return np.stack(np.unravel_index(array.astype(np.int64), self.tree.shape), axis=-1) + self.tree.least
 
+    def _scaled(self, s: np.ndarray) -> VoxelGrid:
+        cells = self.cells
+        return VoxelGrid(np.where(s < 0.0, -1 - cells, cells), self.cell * np.abs(s), scaled_pose(self.X, s))
+
     def _key(self) -> tuple:
         tree = self.tree
         return tree.shape, tuple(tree.least), tuple(tree.sides), (self.X + 0.0).tobytes(), tree.nodes[0].tobytes()
@@ -218,6 +222,15 @@ class VoxelGrid(Shape):
     def __repr__(self) -> str:
         cell = f"{self.cell[0]:g}" if len(set(self.cell)) == 1 else str(self.cell.tolist())
         return f"{type(self).__name__}(<{self.count} of {'×'.join(map(str, self.tree.shape))} cells>, cell={cell})"
+
+
+def scaled_pose(X: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """The pose of a grid under scale factors (3,). Raises InvalidShape for turned grids and a mirror image."""
+    if not _only_shifts(X) and not (s == abs(s[0])).all():
+        raise InvalidShape("they must be equal and above 0, since the grid is turned; scale before it is placed")
+    scaled = X.copy()
+    scaled[:3, 3] *= s
+    return scaled
 
 
 def _only_shifts(X: np.ndarray) -> bool:

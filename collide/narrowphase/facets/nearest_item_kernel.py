@@ -489,6 +489,12 @@ def _inside_or_apart(walk):
     return MAYBE_INSIDE if inside and abs(centre.z) <= reach.z + walk.slack else SURFACES_APART
 
 
+@kernel(inline=True)
+def _max_asked(walk):
+    """After how many items a boolean is given up: of balls and cells, whose unions take longer, after all."""
+    return _MAX_ASKED if walk.words[ITEMS_ARE] == FACETS else walk.tree.header[N_FACETS]
+
+
 @kernel
 def _is_proven_hit(row):
     return row.flags[HIT] != 0 and not is_undecided_or_refused(row)
@@ -517,7 +523,7 @@ def _gap(header_at, XA_at, XB_at, check, depths, row_at):
         return LONG_WAY
     nearest = _walk_down(walk, math.inf, 0.0, walk.tree.header[N_FACETS])
     if nearest.failed and not depths:
-        meeting = _walk_down(walk, 0.0, 0.0, _MAX_ASKED)  # the facet that batches name
+        meeting = _walk_down(walk, 0.0, 0.0, _max_asked(walk))  # the item that batches name
         if not (meeting.failed and _is_proven_hit(view_row(walk.words[ROW_AT] + ROW))):
             return LONG_WAY
         _write_meeting(walk, meeting.place, row_at)
@@ -539,11 +545,12 @@ def _state(header_at, XA_at, XB_at, check, margin):
     is_placed, walk = place_pair(header_at, XA_at, XB_at, check)
     if not is_placed:
         return LONG_WAY, -1, 0
-    nearest = _walk_down(walk, margin, margin, _MAX_ASKED)
+    max_asked = _max_asked(walk)
+    nearest = _walk_down(walk, margin, margin, max_asked)
     if nearest.failed:
         row = view_row(walk.words[ROW_AT] + ROW)
         return (MEETS if _is_proven_hit(row) else LONG_WAY), nearest.place, int(row.flags[HOW])
-    if nearest.n_asked > _MAX_ASKED:
+    if nearest.n_asked > max_asked:
         return LONG_WAY, -1, 0
     return (NEAR if nearest.lower <= margin else _inside_or_apart(walk)), -1, 0
 

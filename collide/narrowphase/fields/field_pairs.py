@@ -24,7 +24,7 @@ from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.facets.facet_kernel_calls import body_rows, states
 from collide.narrowphase.facets.mesh_collide_kernel import HIT
 from collide.narrowphase.facets.mesh_collide_kernel import OPEN as UNTOLD
-from collide.narrowphase.facets.nearest_item_calls import gap_rows, prepared_items, surface_states
+from collide.narrowphase.facets.nearest_item_calls import SurfaceStates, gap_rows, prepared_items, surface_states
 from collide.narrowphase.fields.ball_walk_kernel import MEETS, OPEN, WORK, clouds_meet_balls
 from collide.narrowphase.fields.field_items import BoxAround, FieldItems, box_in_frame, lowest_items
 from collide.narrowphase.fields.items_of import items_of
@@ -35,6 +35,9 @@ from collide.shapes.primitives import Halfspace
 from collide.shapes.shape import IDENTITY, Shape
 from collide.shapes.swept_mesh import SweptMesh
 
+#: Items of which a union is made to tell a depth; and by how much a way out is longer than it needs to be, as a part
+#: of it.
+_MAX_ITEMS, _BEYOND = 1024, 2.0**-40
 #: Rows of two shapes: ``rows_of_pair(A, B, X_WA, X_WB, limit, depths=)``.
 RowsOfPair = Callable[..., np.ndarray]
 
@@ -56,14 +59,14 @@ def answer_field(
     if isinstance(A, SweptMesh):
         if (has_facets(B) or isinstance(B, SweptMesh)) and len(out):
             is_open = _facets_answer(out, A, B, X_WA, X_WB, question)
-    elif walks(B) and items.walked is not None and len(out):
-        X_WG, slop = items.poses_of_items(X_WA)
-        packed = _widened(convex_set_of(B), slop)
+    elif items.walked is not None and walks(B) and len(out):
         if question.boolean:
-            told = surface_states(items.walked, packed, X_WG, X_WB)
-            out[told.meets] = True
-            is_open = ~(told.meets | told.apart)
+            walk = _walked(items, B, X_WA, X_WB)
+            out[walk.meets] = True
+            is_open = ~(walk.meets | walk.apart)
         else:
+            X_WG, slop = items.poses_of_items(X_WA)
+            packed = _widened(convex_set_of(B), slop)
             rows, is_written = gap_rows(items.walked, packed, X_WG, X_WB, question.depths)
             out[is_written] = _beyond_limit(rows[is_written], question.limit)
             is_open = ~is_written
@@ -87,6 +90,13 @@ def _facets_answer(
     return rows["how"] == UNDECIDED
 
 
+def _walked(items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> SurfaceStates:
+    """Whether items with a tree and a convex set with an end meet."""
+    assert items.walked is not None
+    X_WG, slop = items.poses_of_items(X_WA)
+    return surface_states(items.walked, _widened(convex_set_of(B), slop), X_WG, X_WB)
+
+
 def _widened(packed: PackedConvex, slop: np.ndarray) -> PackedConvex:
     """A convex set whose answers hold although poses are off [m]."""
     largest = float(slop.max())
@@ -97,6 +107,7 @@ def _may_meet_parts(items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndar
     """(n,) bool: whether items may meet a part of a union; False where all parts, whose poses are rounded, are farther
     from all items than rounding may have moved a part.
     """
+    assert items.walked is not None
     may_meet, (X_WG, slop_of_grid) = np.zeros(len(X_WA), dtype=bool), items.poses_of_items(X_WA)
     for packed, X_BP in parts_of(B):
         if packed.kind == HALFSPACE:
@@ -106,8 +117,8 @@ def _may_meet_parts(items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndar
             break
         X_WP, slop = moved_pose(X_WB[some], X_BP, np.full(len(some), packed.reach))
         margin = 2.0 * float(slop.max() + slop_of_grid.max())
-        told = surface_states(items.walked, packed, X_WG[some], X_WP, margin)
-        may_meet[some[~told.apart]] = True
+        walk = surface_states(items.walked, packed, X_WG[some], X_WP, margin)
+        may_meet[some[~walk.apart]] = True
     return may_meet
 
 
@@ -198,6 +209,14 @@ class _Nearby(NamedTuple):
     X_WA: np.ndarray
     X_WB: np.ndarray
 
+    def meets(self, some: np.ndarray) -> bool:
+        """Whether the other shape meets an item, of some items with all those among them that it may meet."""
+        if self.items.walked is not None and walks(self.B):
+            walk = _walked(self.items, self.B, self.X_WA, self.X_WB)
+            if walk.meets[0] or walk.apart[0]:
+                return bool(walk.meets[0])
+        return bool(self.row(some, False)["hit"][0])
+
     def row(self, some: np.ndarray, depths: bool) -> np.ndarray:
         """The row of some items and the other shape; of another field with its items that may be nearest."""
         _, items, B, X_WA, X_WB = self
@@ -215,11 +234,47 @@ class _Nearby(NamedTuple):
 
 
 def _depth(nearby: _Nearby, some: np.ndarray, box: BoxAround) -> np.ndarray:
-    """The row of an overlap: all items within its depth have a say."""
-    while True:
+    """The row of an overlap: all items within its depth have a say, or, of very many, all that are in the way out."""
+    few = some
+    while len(some) <= _MAX_ITEMS:
         row = nearby.row(some, True)
         depth = max(-float(row["lower"][0]), -float(row["distance"][0]), 0.0)
         more = nearby.items.within(box, depth)
         if len(more) <= len(some):
             return row
-        some = more
+        few, some = some, more
+    return _way_out(nearby, few, box)
+
+
+def _way_out(nearby: _Nearby, some: np.ndarray, box: BoxAround) -> np.ndarray:
+    """The row of a translation that parts B from all items: of some items, and, as long as B meets further ones behind
+    it, of these as well; else along the axis of the items' frame along which B leaves the box around all items first.
+
+    The lower bound of the depth is that of the items asked.
+    """
+    items = nearby.items
+    some = some[:: -(-len(some) // _MAX_ITEMS)]
+    while True:
+        row = nearby.row(some, True)
+        moved = nearby.X_WB.copy()
+        moved[0, :3, 3] += row["normal"][0] * (-float(row["distance"][0]) * (1.0 + _BEYOND) + _BEYOND)
+        met = np.setdiff1d(items.within(box_in_frame(nearby.B, items.pose(nearby.X_WA[0]), moved[0]), 0.0), some)
+        if not len(met) or not nearby._replace(X_WB=moved).meets(met):
+            return row
+        if len(some) + len(met) > _MAX_ITEMS:
+            met = met[:: -(-len(met) // max(len(some), 1))]
+        if len(some) + len(met) > 4 * _MAX_ITEMS:
+            return _out_of_box(nearby, row, box)
+        some = np.union1d(some, met)
+
+
+def _out_of_box(nearby: _Nearby, row: np.ndarray, box: BoxAround) -> np.ndarray:
+    """A row with a translation along an axis of the items' frame, out of the box around all items."""
+    items = nearby.items
+    ways = np.concatenate([items.high - box.low, box.high - items.low])
+    k = int(np.argmin(ways))
+    normal = items.pose(nearby.X_WA[0])[:3, k % 3] * (1.0 if k < 3 else -1.0)
+    length = float(ways[k]) * (1.0 + _BEYOND) + _BEYOND
+    row["distance"], row["lower"], row["normal"], row["certified"] = -length, -length, normal, False
+    row["point_a"] = row["point_b"] + length * normal
+    return row

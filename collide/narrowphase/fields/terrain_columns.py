@@ -95,7 +95,7 @@ class Columns(FieldItems):
         blocks = blocks[_times(way, low - reach, high + reach, limit) < math.inf]
         inside = (blocks[:, None] * size + np.array(list(np.ndindex(size, size)))).reshape(-1, 2)
         inside = inside[(inside < (self._rows, self._columns)).all(axis=1)]
-        row, column, heights = *inside.T, self._heights
+        row, column, heights = inside[:, 0], inside[:, 1], self._heights
         highest = np.maximum(
             np.maximum(heights[row, column], heights[row, column + 1]),
             np.maximum(heights[row + 1, column], heights[row + 1, column + 1]),

@@ -234,3 +234,23 @@ def test_matrices_that_are_no_poses_are_refused_by_number():
     for B in (collide.Sphere(0.1), collide.Box((1, 1, 1))):
         with pytest.raises(collide.InvalidPose, match=r"X_WB\[3\]"):
             collide.collide(cloud, B, EYE, Y)
+
+
+def test_depths_among_very_many_balls_are_ways_out():
+    """Boxes and balls deep in thousands of points: what is told parts them, and no ball alone is deeper."""
+    rng, hits = np.random.default_rng(17), 0
+    cloud = collide.PointCloud(rng.uniform(-1, 1, (6000, 3)), 0.01)
+    for case in range(8):
+        B = (collide.Box((0.5, 0.4, 0.3)), collide.Sphere(0.2))[case % 2]
+        X = collide.pose(rng.uniform(-0.7, 0.7, 3), rpy=rng.uniform(-3, 3, 3))
+        row = collide.distance(cloud, B, EYE, X)
+        assert row.hit and row.lower <= row.distance <= row.upper < 0.0
+        moved = X.copy()
+        moved[:3, 3] += row.normal * (-float(row.distance) * (1 + 1e-9) + 1e-9)
+        assert not collide.collide(cloud, B, EYE, moved), case
+        near = cloud.within(X[:3, 3], 0.1)
+        ball = collide.Sphere(0.01)
+        single = [float(collide.distance(ball, B, collide.pose(cloud.points[k]), X).distance) for k in near]
+        assert row.distance <= min(single) + 1e-12
+        hits += 1
+    assert hits == 8
