@@ -37,7 +37,8 @@ def settle_meshes(
         middle = 0.5 * (rows[:, 1] + rows[:, 2])
         X_WLs = checker.link_poses(q0[edges] + middle[:, None] * (q1 - q0)[edges])
         measured = open_pairs.distances(
-            _numbered(rows, setting.self_pairs), X_WLs, setting.bodies, setting.surroundings.bodies, limit=bounds
+            _numbered(rows, setting.self_pairs), X_WLs, setting.bodies, setting.surroundings.bodies, limit=bounds,
+            signed=False,
         )
         for k in np.flatnonzero(measured["hit"]).tolist():
             times[edges[k]] = middle[k]

@@ -27,7 +27,7 @@ def check_piece(checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, out
         pairs = space.open_pairs
         if len(pairs):
             pairs = pairs[verdicts[pairs[:, 0]] == IS_OPEN]
-            hits = open_pairs.are_hits(*_asked_poses(checker, pairs, q), *_both(checker))
+            hits = open_pairs.are_hits(*_asked_poses(checker, pairs, q), *_both(checker), once=True)
             verdicts[pairs[hits, 0]] = COLLIDES
     out[:] = verdicts == COLLIDES
 

@@ -21,17 +21,19 @@ from collide.shapes.shape import Shape
 
 
 def are_hits(
-    pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround]
+    pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround], *,
+    once: bool = False,
 ) -> np.ndarray:
     """(k,) bool: pairs with a hit. A body of the robot is swollen by its padding, a body around by its margin, where
-    the pair has a body around. Of a configuration with a hit further pairs are not asked, and stay False.
+    the pair has a body around.
 
+    once : of a configuration with a hit further pairs need not be asked, and may stay False.
     pairs : (k, 3 or more), configurations as rows of X_WLs (N, links, 4, 4).
     """
     out, collides = np.zeros(len(pairs), dtype=bool), np.zeros(len(X_WLs), dtype=bool)
     for rows, A, B, X_WA, X_WB, padding, margin in _batches(pairs, X_WLs, bodies, around):
         is_open = ~collides[pairs[rows, 0]]
-        if not is_open.all():
+        if once and not is_open.all():
             rows, X_WA, X_WB = rows[is_open], X_WA[is_open], X_WB[is_open] if len(X_WB) > 1 else X_WB
         if len(rows):
             out[rows] = query.collide(A, B, X_WA, X_WB, security_margin=padding + margin, check_poses=False)
@@ -41,12 +43,12 @@ def are_hits(
 
 def distances(
     pairs: np.ndarray, X_WLs: np.ndarray, bodies: Sequence[RobotBody], around: Sequence[BodyAround], *, limit,
-    by_parts: bool = False,
+    by_parts: bool = False, signed: bool = True,
 ) -> np.ndarray:
     """(k,) rows of PAIR_DTYPE of pairs as of `are_hits`, ``a`` and ``b`` numbered as in pairs; ``beyond`` a limit [m].
 
     limit : of all pairs, or (k,) of each, which may be exceeded.   by_parts : overlapping unions of convex parts give
-        their deepest two parts, else a separating translation of the unions.
+        their deepest two parts, else a separating translation of the unions.   signed : whether depths are wanted.
     Distances are of the swollen bodies: the distance of the bodies less padding and margin, for convex bodies exactly
     the signed distance of the swollen bodies. Points lie on the swollen bodies.
     """
@@ -55,7 +57,7 @@ def distances(
         farthest = float(np.max(limit if np.ndim(limit) == 0 else limit[rows]))
         if padding + margin > 0.0:  # two sums, each rounded to the nearest: what is beyond is to be beyond the limit
             farthest = math.nextafter(math.nextafter(farthest + padding + margin, math.inf), math.inf)
-        within = _rows_of(A, B, X_WA, X_WB, farthest, by_parts)
+        within = _rows_of(A, B, X_WA, X_WB, farthest, by_parts, signed)
         if padding + margin > 0.0:
             _swell(within, padding + margin)
         within["point_a"] += padding * within["normal"]
@@ -92,11 +94,14 @@ def distances_of(rows: np.ndarray) -> np.ndarray:
     return np.where(rows["a"] >= 0, rows["distance"], np.inf)
 
 
-def _rows_of(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float, by_parts: bool) -> np.ndarray:
+def _rows_of(
+    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, limit: float, by_parts: bool, signed: bool
+) -> np.ndarray:
     """Rows of two shapes at poses (k, 4, 4), as of `distances`."""
     parts_a, parts_b = (without_meshes(A), without_meshes(B)) if by_parts else (None, None)
     if parts_a is None or parts_b is None:
-        return query.distance(A, B, X_WA, X_WB, max_distance=limit, check_poses=False).rows.copy()
+        rows = query.distance(A, B, X_WA, X_WB, max_distance=limit, signed=signed, check_poses=False).rows
+        return rows.copy()
     A, B = parts_a, parts_b
     rows = query.distance(A, B, X_WA, X_WB, max_distance=limit, check_poses=False).rows.copy()
     overlap = np.flatnonzero(rows["distance"] < 0.0)

@@ -244,8 +244,9 @@ def _put_item(walk, place):
 
 
 @kernel
-def _ask_item(walk, place, depths):
-    """The row of an item and the shape, written behind the best row.   depths : whether a depth is wanted."""
+def _ask_item(walk, place, depths, limit):
+    """The row of an item and the shape, written behind the best row.   depths : whether a depth is wanted.   limit : of
+    items farther away no more is told [m]."""
     words = walk.words
     _put_item(walk, place)
     row_at = words[ROW_AT] + ROW
@@ -254,16 +255,18 @@ def _ask_item(walk, place, depths):
         words[CORE],
         (
             words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], 0, words[SHAPE_OF_AT], words[PAIRS_AT], 1, False,
-            depths, False, math.inf, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
+            depths, False, limit, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
         ),
     )
     return view_row(row_at)
 
 
 @kernel
-def _with_item(walk, nearest, place):
-    """The `_Nearest` with one item more."""
-    row = _ask_item(walk, place, False)
+def _with_item(walk, nearest, place, limit):
+    """The `_Nearest` with one item more.   limit : of the walk. A walk without a limit asks no more of an item than
+    whether it is nearer; with a limit that takes longer than the distance.
+    """
+    row = _ask_item(walk, place, False, nearest.upper if limit == math.inf else math.inf)
     lower, upper = row.doubles[LOWER], row.doubles[UPPER]
     failed = nearest.failed or is_undecided_or_refused(row) or not lower > 0.0
     key, best, along, above = nearest.key, nearest.place, nearest.along, nearest.above
@@ -367,7 +370,7 @@ def _walk_cells(walk, limit, enough, max_asked):
         stack = view_i64(words[STACK_AT], 2 * top + 2)
         word, node = stack[2 * top], stack[2 * top + 1]
         if node < 0:
-            nearest = _with_item(walk, nearest, word)
+            nearest = _with_item(walk, nearest, word, limit)
         else:
             top = _push_cells(walk, nearest, word, node, top)
     return nearest
@@ -406,7 +409,7 @@ def _walk_down(walk, limit, enough, max_asked):
         for place in range(run >> 3, (run >> 3) + (run & 7)):
             centre, half = _box_of_item(walk, place)
             if not (nearest.failed or _gap_of_box(walk, nearest, centre, half) > nearest.upper):
-                nearest = _with_item(walk, nearest, place)
+                nearest = _with_item(walk, nearest, place, limit)
     return nearest
 
 
@@ -447,7 +450,7 @@ def rows_within(walk, limit, capacity, rows_at, places_at):
         return LONG_WAY, 0
     n = 0
     for i in range(n_looked_at):
-        row = _ask_item(walk, places[i], True)
+        row = _ask_item(walk, places[i], True, math.inf)
         if row.doubles[LOWER] > limit:
             continue
         if is_undecided_or_refused(row):

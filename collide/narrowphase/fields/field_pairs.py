@@ -1,14 +1,14 @@
 """A field (point cloud, voxel grid, octree, large terrain, mesh with thickness) and another shape, at n pairs of poses.
 
-Convex sets walk down the tree over the items (`nearest_item_kernel.py`). Open rests of the walk, and all other
-questions (depths, half-spaces, meshes, unions, other fields), go to the union of the items within the upper bound of
-the gap, or within the depth, of a box around the other shape.
+Convex sets, and the parts of unions of these, walk down the tree over the items (`nearest_item_kernel.py`). Open rests
+of the walk, and all other questions (depths, half-spaces, meshes, other fields), go to the union of the items within
+the upper bound of the gap, or within the depth, of a box around the other shape.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from collide.narrowphase.convex_batches import Question
 from collide.narrowphase.facets.facet_kernel_calls import body_rows, states
 from collide.narrowphase.facets.mesh_collide_kernel import HIT
 from collide.narrowphase.facets.mesh_collide_kernel import OPEN as UNTOLD
-from collide.narrowphase.facets.nearest_item_calls import SurfaceStates, gap_rows, prepared_items, surface_states
+from collide.narrowphase.facets.nearest_item_calls import gap_rows, prepared_items, surface_states
 from collide.narrowphase.fields.ball_walk_kernel import MEETS, OPEN, WORK, clouds_meet_balls
 from collide.narrowphase.fields.field_items import BoxAround, FieldItems, box_in_frame, lowest_items
 from collide.narrowphase.fields.items_of import items_of
@@ -59,19 +59,21 @@ def answer_field(
     if isinstance(A, SweptMesh):
         if (has_facets(B) or isinstance(B, SweptMesh)) and len(out):
             is_open = _facets_answer(out, A, B, X_WA, X_WB, question)
-    elif items.walked is not None and walks(B) and len(out):
+    elif items.walked is not None and len(out) and (walks(B) or _is_of_parts(B)):
         if question.boolean:
-            walk = _walked(items, B, X_WA, X_WB)
-            out[walk.meets] = True
-            is_open = ~(walk.meets | walk.apart)
+            meets, apart = _walked(items, B, X_WA, X_WB)
+            out[meets] = True
+            is_open = ~(meets | apart)
         else:
-            X_WG, slop = items.poses_of_items(X_WA)
-            packed = _widened(convex_set_of(B), slop)
-            rows, is_written = gap_rows(items.walked, packed, X_WG, X_WB, question.depths)
-            out[is_written] = _beyond_limit(rows[is_written], question.limit)
-            is_open = ~is_written
-    elif question.boolean and kind_of(B) is Kind.COMPOUND and items.walked is not None:
-        is_open = _may_meet_parts(items, B, X_WA, X_WB)
+            near = np.arange(len(out))
+            if question.limit < math.inf:
+                _, beyond = _walked(items, B, X_WA, X_WB, max(question.limit, 0.0))
+                out[beyond] = _beyond(max(question.limit, 0.0))
+                near = np.flatnonzero(~beyond)
+            rows, is_written = _walked_rows(items, B, X_WA[near], X_WB[near], question.depths)
+            out[near[is_written]] = _beyond_limit(rows[is_written], question.limit)
+            is_open[:] = False
+            is_open[near[~is_written]] = True
     for k in np.flatnonzero(is_open).tolist():
         row = _union_row(rows_of, A, B, X_WA[k : k + 1], X_WB[k : k + 1], question)
         out[k] = bool(row["hit"][0]) if question.boolean else _beyond_limit(row, question.limit)[0]
@@ -90,36 +92,64 @@ def _facets_answer(
     return rows["how"] == UNDECIDED
 
 
-def _walked(items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> SurfaceStates:
-    """Whether items with a tree and a convex set with an end meet."""
-    assert items.walked is not None
-    X_WG, slop = items.poses_of_items(X_WA)
-    return surface_states(items.walked, _widened(convex_set_of(B), slop), X_WG, X_WB)
+def _is_of_parts(B: Shape) -> bool:
+    """Whether a shape is a union of convex sets with an end."""
+    return kind_of(B) is Kind.COMPOUND and all(packed.kind != HALFSPACE for packed, _ in parts_of(B))
 
 
-def _widened(packed: PackedConvex, slop: np.ndarray) -> PackedConvex:
-    """A convex set whose answers hold although poses are off [m]."""
-    largest = float(slop.max())
-    return packed if largest == 0.0 else packed._replace(slop=packed.slop + 2.0 * largest)
+def _posed_parts(
+    items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray
+) -> Iterator[tuple[PackedConvex, np.ndarray, np.ndarray]]:
+    """(convex set, poses of the items' frame, poses of the set) of each part; sets are widened by what rounding may
+    move.
+    """
+    X_WG, slop_of_items = items.poses_of_items(X_WA)
+    for packed, X_BP in parts_of(B):
+        X_WP, slop = moved_pose(X_WB, X_BP, np.full(len(X_WB), packed.reach))
+        off = 2.0 * float(slop.max(initial=0.0) + slop_of_items.max(initial=0.0))
+        yield packed if off == 0.0 else packed._replace(slop=packed.slop + off), X_WG, X_WP
 
 
-def _may_meet_parts(items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether items may meet a part of a union; False where all parts, whose poses are rounded, are farther
-    from all items than rounding may have moved a part.
+def _walked(
+    items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, margin: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) bool each: whether items with a tree and a shape of convex parts meet, and whether they are farther apart
+    than a margin [m]; else open.
     """
     assert items.walked is not None
-    may_meet, (X_WG, slop_of_grid) = np.zeros(len(X_WA), dtype=bool), items.poses_of_items(X_WA)
-    for packed, X_BP in parts_of(B):
-        if packed.kind == HALFSPACE:
-            return np.ones(len(X_WA), dtype=bool)
-        some = np.flatnonzero(~may_meet)
-        if not len(some):
-            break
-        X_WP, slop = moved_pose(X_WB[some], X_BP, np.full(len(some), packed.reach))
-        margin = 2.0 * float(slop.max() + slop_of_grid.max())
-        walk = surface_states(items.walked, packed, X_WG[some], X_WP, margin)
-        may_meet[some[~walk.apart]] = True
-    return may_meet
+    meets, apart = np.zeros(len(X_WA), dtype=bool), np.ones(len(X_WA), dtype=bool)
+    for packed, X_WG, X_WP in _posed_parts(items, B, X_WA, X_WB):
+        some = np.flatnonzero(~meets)
+        if len(some):
+            walk = surface_states(items.walked, packed, X_WG[some], X_WP[some], margin)
+            meets[some[walk.meets]] = True
+            apart[some] &= walk.apart
+    return meets, apart
+
+
+def _walked_rows(
+    items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, depths: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """(rows, (n,) bool whether they are written) of items with a tree and a shape of convex parts: of the nearest
+    part, its bracket that of the least distance of all parts.
+    """
+    assert items.walked is not None
+    out, is_written = np.zeros(0, dtype=PAIR_DTYPE), np.ones(len(X_WA), dtype=bool)
+    for k, (packed, X_WG, X_WP) in enumerate(_posed_parts(items, B, X_WA, X_WB)):
+        rows, written = gap_rows(items.walked, packed, X_WG, X_WP, depths)
+        rows["part_b"] = k
+        is_written &= written
+        if not k:
+            out = rows
+            continue
+        is_nearer = rows["hit"] & ~out["hit"] | (rows["hit"] == out["hit"]) & (rows["distance"] < out["distance"])
+        nearest, farther = np.where(is_nearer, rows, out), np.where(is_nearer, out, rows)
+        nearest["lower"] = np.minimum(nearest["lower"], farther["lower"])
+        is_rival = farther["lower"] <= nearest["upper"]
+        nearest["certified"] &= nearest["hit"] | farther["certified"] | ~is_rival
+        nearest["upper"] = np.minimum(nearest["upper"], farther["upper"])
+        out = nearest
+    return out, is_written
 
 
 def are_balls(A: Shape, B: Shape) -> bool:
@@ -170,6 +200,14 @@ def prepare_field(A: Shape, B: Shape) -> Prepared | None:
     return prepared_items(walked, convex_set_of(shape), exchanged)
 
 
+def _beyond(limit: float) -> np.ndarray:
+    """The row of bodies that are farther apart than a limit [m], and no more is known."""
+    row = np.zeros(1, dtype=PAIR_DTYPE)
+    row["lower"] = row["distance"] = math.nextafter(limit, math.inf)
+    row["upper"], row["beyond"], row["certified"] = math.inf, True, True
+    return row
+
+
 def _beyond_limit(rows: np.ndarray, limit: float) -> np.ndarray:
     """Rows farther apart than a limit [m] say no more than that they are."""
     beyond = rows["lower"] > limit
@@ -211,10 +249,10 @@ class _Nearby(NamedTuple):
 
     def meets(self, some: np.ndarray) -> bool:
         """Whether the other shape meets an item, of some items with all those among them that it may meet."""
-        if self.items.walked is not None and walks(self.B):
-            walk = _walked(self.items, self.B, self.X_WA, self.X_WB)
-            if walk.meets[0] or walk.apart[0]:
-                return bool(walk.meets[0])
+        if self.items.walked is not None and (walks(self.B) or _is_of_parts(self.B)):
+            meets, apart = _walked(self.items, self.B, self.X_WA, self.X_WB)
+            if meets[0] or apart[0]:
+                return bool(meets[0])
         return bool(self.row(some, False)["hit"][0])
 
     def row(self, some: np.ndarray, depths: bool) -> np.ndarray:
