@@ -70,7 +70,7 @@ def asked(world: _World, seen: list[np.ndarray], n_readers: int) -> dict[str, fl
     }
 
 
-def waits(_options, boxes: int, readers: int) -> list[dict[str, float]]:
+def asked_meanwhile(_options, boxes: int, readers: int) -> list[dict[str, float]]:
     """Readers of a World of a cloud and boxes."""
     seen, rng, world = scans(4), np.random.default_rng(1), _World()
     world.delays = []
@@ -82,7 +82,7 @@ def waits(_options, boxes: int, readers: int) -> list[dict[str, float]]:
 
 CLAIMS = [
     Claim("waits", "how long readers wait while a cloud is exchanged", lambda o: grid(boxes=(30, 3000), readers=(1, 4)),
-          waits, file="live-worlds"),
+          asked_meanwhile, file="live-worlds"),
 ]
 
 

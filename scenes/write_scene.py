@@ -32,6 +32,7 @@ from collide.shapes import (
     PointCloud,
     Shape,
     Sphere,
+    VoxelGrid,
 )
 from collide.worlds.world import World
 
@@ -102,6 +103,9 @@ def shape_document(shape: Shape) -> dict[str, Any]:
     """A shape as scene files write it: one key, its kind. Raises SceneError for one that has no such form."""
     if isinstance(shape, Compound):
         return {"compound": [{"shape": shape_document(part), "pose": _pose(X)} for part, X in shape.items]}
+    if isinstance(shape, VoxelGrid):
+        grid = {"cells": _plain(shape.cells), "cell": _plain(shape.cell)}
+        return {"voxels": grid if np.array_equal(shape.X, np.eye(4)) else grid | {"pose": _pose(shape.X)}}
     for kind, name, fields in _FORMS:
         if type(shape) is kind:
             return {name: {key: _plain(getattr(shape, field)) for key, field in fields.items()}}
@@ -156,4 +160,7 @@ def _pose(X: np.ndarray) -> dict[str, Any]:
 
 
 def _plain(value) -> Any:
+    """Numbers and lists of them; holes of a height field are null."""
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f" and np.isnan(value).any():
+        return [[None if np.isnan(number) else number for number in row] for row in value.tolist()]
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

@@ -182,7 +182,7 @@ class CellTree:
 
     def is_occupied(self, cells: np.ndarray) -> np.ndarray:
         """(n,) bool, of cells (n, 3) within the grid or not."""
-        inside = np.logical_and(cells >= 0, cells < np.array(self.shape)).all(axis=1)
+        inside = np.all((cells >= 0) & (cells < np.array(self.shape)), axis=1)
         sizes = self._sizes(np.where(inside[:, None], cells, 0).astype(np.int64))
         return inside & (sizes > 0)
 

@@ -155,7 +155,7 @@ class OcTree(VoxelGrid):
         message : object or mapping
             With ``id``, ``resolution``, ``binary`` and ``data``: bytes, or int8 in any form.
         threshold, unknown, X
-            As of the constructor. Where a message has an origin besides, that is the ``X`` here.
+            As of the constructor. An origin told beside the message is the ``X`` here.
 
         Returns
         -------
@@ -164,7 +164,7 @@ class OcTree(VoxelGrid):
         Raises
         ------
         InvalidShape
-            For fields that are missing or do not match; as the constructor.
+            For fields missing or not matching; as the constructor.
         """
         return cls._of_stream(octree_files.leaves_of_message(message), threshold=threshold, unknown=unknown, X=X)
 
@@ -177,8 +177,10 @@ class OcTree(VoxelGrid):
         factor = equal_but_for_signs(s, "an octree has a single resolution")
         cell, exponent, log_odds = self.leaves
         mirrored = np.where(s < 0.0, -(cell + (1 << exponent)[:, None]), cell)
-        options = {"threshold": self.threshold, "unknown": self.unknown, "X": scaled_pose(self.X, s)}
-        return OcTree((mirrored, exponent, log_odds), self.resolution * factor, **options)
+        return OcTree(
+            (mirrored, exponent, log_odds), self.resolution * factor, threshold=self.threshold, unknown=self.unknown,
+            X=scaled_pose(self.X, s),
+        )
 
     def save(self, path) -> None:
         """Write the leaves to a ``.bt`` file, occupied by this map's threshold or free.

@@ -21,11 +21,14 @@ from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
 from collide.shapes.shape import Shape, checked_shape
 from collide.shapes.swept_mesh import SweptMesh
+from collide.shapes.voxel_grid import VoxelGrid
 
 #: Where no tolerance is given: this part of a shape's largest radius.
 _USUAL = 0.01
 #: Larger tessellations are refused: a tolerance in the wrong unit, mostly.
 MAX_VERTICES = 2_000_000
+#: Cells that the surface of a grid is looked for among, at most.
+_MAX_DRAWN_CELLS = 1 << 27
 
 
 class Tessellation(tuple):
@@ -62,8 +65,8 @@ def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | No
     ----------
     shape : Shape
         Convex shapes give a closed surface. A `ConvexHull` or `Box` without an inside gives both sides of a flat
-        polygon, or no triangle at all (a segment, a point). A mesh is returned as it is; a `Compound` part by part,
-        parts overlapping.
+        polygon, or no triangle at all (a segment, a point). A `VoxelGrid` gives its outer faces. A mesh is returned
+        as it is; a `Compound` part by part, parts overlapping.
     tolerance : float, optional
         No point of the shape is farther than this [m] from the solid that the triangles bound; by default a hundredth
         of each shape's largest radius.
@@ -199,6 +202,32 @@ def _swept_mesh(shape: SweptMesh, tolerance: float | None) -> Tessellation:
     return Tessellation(shape.mesh.vertices, np.asarray(shape.mesh.faces, dtype=np.int64), shape.radius)
 
 
+def _voxel_grid(grid: VoxelGrid, _tolerance: float | None) -> Tessellation:
+    """Both triangles of every face between an occupied and a free cell."""
+    tree = grid.tree
+    if math.prod(tree.shape) > _MAX_DRAWN_CELLS:
+        raise InvalidArgument(
+            f"tessellate: the grid spans {math.prod(tree.shape)} cells, and {_MAX_DRAWN_CELLS} are the most; draw the "
+            "middles of its cells"
+        )
+    occupied = np.zeros(np.array(tree.shape) + 2, dtype=bool)
+    occupied[tuple((grid.cells - tree.least + 1).T)] = True
+    quads = []
+    for axis in range(3):
+        step = np.diff(occupied.astype(np.int8), axis=axis)
+        u, v = np.eye(3, dtype=np.int64)[[(axis + 1) % 3, (axis + 2) % 3]]
+        for side in (1, -1):  # the cell begins, or ends, behind the plane
+            corner = np.argwhere(step == side) - 1 + np.eye(3, dtype=np.int64)[axis]
+            around = (0 * u, v, u + v, u) if side > 0 else (0 * u, u, u + v, v)
+            quads.append(corner[:, None] + np.array(around))
+    corners, faces = np.unique(np.concatenate(quads).reshape(-1, 3), axis=0, return_inverse=True)
+    if len(corners) > MAX_VERTICES:
+        raise InvalidArgument(f"tessellate: the cells have {len(corners)} corners, and {MAX_VERTICES} are the most")
+    quad = faces.reshape(-1, 4)
+    vertices = ((corners + tree.least) * tree.sides + tree.origin) @ grid.X_FG[:3, :3].T + grid.X_FG[:3, 3]
+    return Tessellation(vertices, np.concatenate([quad[:, [0, 1, 2]], quad[:, [0, 2, 3]]]))
+
+
 # --- curved shapes -------------------------------------------------------------------------------
 
 
@@ -332,4 +361,5 @@ _KINDS: dict[type[Shape], Callable[..., Tessellation]] = {
     ConvexHull: lambda shape, tolerance: _swept_hull(shape.points, shape.radius, tolerance),
     HPolytope: lambda shape, _: _hull(shape.vertices),
     SweptMesh: _swept_mesh,
+    VoxelGrid: _voxel_grid,
 }

@@ -144,18 +144,17 @@ class VoxelGrid(Shape):
         return cls(occupied, sides, X)
 
     def save(self, path) -> None:
-        """Write the cells to a binvox file.
+        """Write the cells to a binvox file, numbered from the least.
 
         Parameters
         ----------
         path : str or Path
-            The file, ending in ``.binvox``; an existing file is replaced as a whole or not at all.
+            The file, ending in ``.binvox``; an existing file is replaced as a whole, or kept.
 
         Raises
         ------
         InvalidShape
-            For another suffix, cells that are no cubes, a grid that is turned: the format has a scale and a shift
-            alone.
+            For another suffix, cells other than cubes, a turned grid: the format has a scale and a shift alone.
         """
         name = f"{type(self).__name__}.save"
         if checks.file_path(f"{name}: path", path, InvalidShape).suffix.lower() != ".binvox":

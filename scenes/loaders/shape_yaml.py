@@ -27,10 +27,12 @@ from collide.shapes import (
     HeightField,
     HPolytope,
     Mesh,
+    OcTree,
     Plane,
     PointCloud,
     Shape,
     Sphere,
+    VoxelGrid,
 )
 from collide.shapes.shape import mirrors
 
@@ -49,6 +51,7 @@ KINDS = {
     "heightfield": ("heights", "cell", "bottom"),
     "mesh": ("file", "scale", "as", "vertices", "faces", "solid"),
     "cloud": ("points", "radius", "file", "scale", "drop_invalid"),
+    "voxels": ("cells", "cell", "pose", "file", "threshold", "unknown"),
     "compound": ("shape", "pose"),
 }
 
@@ -92,6 +95,8 @@ def read_shape(data: Any, path: object, place: str, metres: float, files: Files)
             return _mesh(fields, files) if "file" in fields else Described(_mesh_in_place(fields, metres))
         if kind == "cloud":
             return _cloud(fields, metres, files)
+        if kind == "voxels":
+            return Described(_voxels(fields, metres, files))
         return Described(_plain(kind, fields, metres))
     except InvalidShape as error:
         raise InvalidShape(_placed(error, path, f"{place}.{kind}")) from None
@@ -127,7 +132,7 @@ def _plain(kind: str, fields: Fields, metres: float) -> Shape:
     if kind == "hull":
         return ConvexHull(scaled(fields.numbers("points", (None, 3)), metres), radius=length("radius", 0.0))
     if kind == "heightfield":
-        heights = scaled(fields.numbers("heights", (None, None)), metres)
+        heights = scaled(_heights(fields), metres)
         sides = _one_or_each(fields, "cell", (2,), metres)
         return HeightField(heights, sides, bottom=length("bottom") if "bottom" in fields else None)
     normals = fields.numbers("normals", (None, 3))
@@ -206,6 +211,42 @@ def _cloud(fields: Fields, metres: float, files: Files) -> Described:
     about = mesh_loader.size_note(float(np.ptp(cloud.points, axis=0).max()), fields.element)
     left_out = f"{path.name}: {cloud.dropped} points that are not finite were left out" if cloud.dropped else None
     return Described(cloud, notes=[note for note in (left_out, about) if note])
+
+
+def _heights(fields: Fields) -> np.ndarray:
+    """Rows of heights, in which null is a hole."""
+    table = fields.get("heights")
+    is_table = isinstance(table, list) and all(isinstance(row, list) for row in table)
+    if not is_table or not any(None in row for row in table):
+        return fields.numbers("heights", (None, None))
+    holes = [[value is None for value in row] for row in table]
+    filled = [[0.0 if value is None else value for value in row] for row in table]
+    heights = Fields({"heights": filled}, fields.path, fields.element).numbers("heights", (None, None)).copy()
+    heights[np.array(holes)] = np.nan
+    return heights
+
+
+def _voxels(fields: Fields, metres: float, files: Files) -> Shape:
+    """Cells that stand in the scene file itself, or a map in a file of its own."""
+    if "file" in fields:
+        beside = [key for key in ("cells", "cell") if key in fields]
+        if beside:
+            fields.fail(f"{beside[0]!r} stands in place of a file: give one of them")
+        path, X = files.find(fields.text("file"), fields.place("file")), read_pose(fields, "pose", metres)
+        options = {key: fields.get(key) for key in ("threshold", "unknown") if key in fields}
+        if path.suffix.lower() != ".binvox":
+            return OcTree.from_file(path, X=X, **options)
+        if options or "pose" in fields:
+            fields.fail("a .binvox file says where it stands, and which cells are occupied: give the file alone")
+        return VoxelGrid.from_file(path)
+    beside = [key for key in ("threshold", "unknown") if key in fields]
+    if beside:
+        fields.fail(f"{beside[0]!r} goes with a file")
+    cells = fields.numbers("cells", (None, 3))
+    if (cells != np.round(cells)).any() or np.abs(cells).max(initial=0.0) >= 2.0**53:
+        fields.fail(f"must be whole numbers, got {brief(fields.get('cells'))}", "cells")
+    sides = _one_or_each(fields, "cell", (3,), metres)
+    return VoxelGrid(cells.astype(np.int64), sides, read_pose(fields, "pose", metres))
 
 
 def _mesh_scale(fields: Fields) -> np.ndarray:

@@ -309,7 +309,9 @@ def test_extreme_fields_answer_within_their_brackets(name):
 
 
 REFUSED = {
-    "holes alone": (lambda: HeightField([[0, 0], [0, np.nan]], 1), "HeightField: heights: every cell has a corner in a hole (nan)"),
+    "holes alone": (
+        lambda: HeightField([[0, 0], [0, np.nan]], 1), "HeightField: heights: every cell has a corner in a hole (nan)",
+    ),
     "infinite": (lambda: HeightField([[0, -np.inf], [0, 0]], 1), "HeightField: heights[0, 1] is -inf"),
     "too high": (lambda: HeightField([[0, 0], [1e60, 0]], 1), "HeightField: heights[1, 0] is 1e+60"),
     "one row": (lambda: HeightField([[0, 0, 0]], 1), "at least 2 rows and 2 columns of grid points, got shape (1, 3)"),

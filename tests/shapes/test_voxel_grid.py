@@ -131,3 +131,30 @@ def test_binvox_files_hold_the_cells(tmp_path):
     (tmp_path / "cut.binvox").write_bytes((tmp_path / "grid.binvox").read_bytes()[:-2])
     with pytest.raises(collide.InvalidShape, match="cut short"):
         collide.VoxelGrid.from_file(tmp_path / "cut.binvox")
+
+
+def test_the_surface_of_a_grid_closes_around_its_cells():
+    rng = np.random.default_rng(6)
+    for case in range(12):
+        occupied = rng.random(rng.integers(1, 7, 3)) < 0.6
+        occupied.flat[0] = True
+        X = collide.pose((0.5, 0, 1), rpy=(0.1, 0.2, 0.3)) if case % 2 else collide.pose((0.5, 0, 1))
+        grid = collide.VoxelGrid(occupied, (0.1, 0.2, 0.3), X)
+        mesh = collide.Mesh(*collide.tessellate(grid))
+        assert mesh.solid and mesh.report.volume == pytest.approx(grid.count * 0.006, rel=1e-9)
+
+
+def test_grids_scale_and_mirror():
+    cells = [(0, 0, 0), (1, 0, 0), (3, 2, 1)]
+    grid = collide.VoxelGrid(cells, 0.5, collide.pose((1.0, 0.0, 0.0)))
+    mirrored = grid.scaled((-2.0, 1.0, 0.5))
+    assert mirrored.cells.tolist() == [[-4, 2, 1], [-2, 0, 0], [-1, 0, 0]]
+    assert mirrored.cell.tolist() == [1.0, 0.5, 0.25]
+    assert mirrored.X[:3, 3].tolist() == [-2.0, 0.0, 0.0]
+    tree = collide.OcTree(([[0, 0, 0], [2, 0, 0]], [1, 0], [1.0, 1.0]), 0.5).scaled((-2.0, 2.0, 2.0))
+    assert tree.resolution == 1.0 and tree.cells[:, 0].tolist() == [-3, *[-2] * 4, *[-1] * 4]
+    turned = collide.VoxelGrid(cells, 0.5, collide.pose((0, 0, 0), rpy=(0.1, 0, 0)))
+    with pytest.raises(collide.InvalidShape, match="scale before it is placed"):
+        turned.scaled((1.0, 2.0, 1.0))
+    with pytest.raises(collide.InvalidShape, match="single resolution"):
+        tree.scaled((1.0, 2.0, 1.0))

@@ -263,8 +263,10 @@ def _ask_item(walk, place, depths, limit):
 
 @kernel
 def _with_item(walk, nearest, place, limit):
-    """The `_Nearest` with one item more.   limit : of the walk. A walk without a limit asks no more of an item than
-    whether it is nearer; with a limit that takes longer than the distance.
+    """The `_Nearest` with one item more.   limit : of the walk [m].
+
+    A walk without a limit asks an item only whether the item is nearer. In a walk with a limit the question takes
+    longer than the distance.
     """
     row = _ask_item(walk, place, False, nearest.upper if limit == math.inf else math.inf)
     lower, upper = row.doubles[LOWER], row.doubles[UPPER]

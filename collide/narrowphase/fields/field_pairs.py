@@ -248,7 +248,7 @@ class _Nearby(NamedTuple):
     X_WB: np.ndarray
 
     def meets(self, some: np.ndarray) -> bool:
-        """Whether the other shape meets an item, of some items with all those among them that it may meet."""
+        """Whether the other shape meets an item; among some items are all that may be met."""
         if self.items.walked is not None and (walks(self.B) or _is_of_parts(self.B)):
             meets, apart = _walked(self.items, self.B, self.X_WA, self.X_WB)
             if meets[0] or apart[0]:
@@ -273,22 +273,23 @@ class _Nearby(NamedTuple):
 
 def _depth(nearby: _Nearby, some: np.ndarray, box: BoxAround) -> np.ndarray:
     """The row of an overlap: all items within its depth have a say, or, of very many, all that are in the way out."""
-    few = some
+    asked = some
     while len(some) <= _MAX_ITEMS:
         row = nearby.row(some, True)
         depth = max(-float(row["lower"][0]), -float(row["distance"][0]), 0.0)
         more = nearby.items.within(box, depth)
         if len(more) <= len(some):
             return row
-        few, some = some, more
-    return _way_out(nearby, few, box)
+        asked, some = some, more
+    return _way_out(nearby, asked, box)
 
 
 def _way_out(nearby: _Nearby, some: np.ndarray, box: BoxAround) -> np.ndarray:
-    """The row of a translation that parts B from all items: of some items, and, as long as B meets further ones behind
-    it, of these as well; else along the axis of the items' frame along which B leaves the box around all items first.
+    """The row of a translation between B and all items: of some items first, then also of further items met behind the
+    translation, as long as B meets any. For too many items the translation goes along an axis of the items' frame, out
+    of the box around all items.
 
-    The lower bound of the depth is that of the items asked.
+    The lower bound of the depth is the bound of the items asked.
     """
     items = nearby.items
     some = some[:: -(-len(some) // _MAX_ITEMS)]
