@@ -212,22 +212,26 @@ def pack_cells(occupied_at, nx, ny, nz, levels, keys_at, words_at):
     n_nodes = -(-nx // SIDE) * -(-ny // SIDE) * -(-nz // SIDE)
     keys, words = view_i64(keys_at, n_nodes), view_i64(words_at, n_nodes)
     n, key, end = 0, 0, 1 << (3 * SIDE_BITS * (levels - 1))
-    while key < end:
+    while key < end:  # 64 nodes at once: those of a node of level 1
         x, y, z = SIDE * _axis_of(key, 4), SIDE * _axis_of(key, 2), SIDE * _axis_of(key, 0)
         if x >= nx or y >= ny or z >= nz:  # the largest node that begins here lies outside
-            step = 1
+            step = 64
             while key & (64 * step - 1) == 0 and step < end:
                 step *= 64
             key += step
             continue
-        if has_whole_rows and x + SIDE <= nx and y + SIDE <= ny:
-            word = _whole_word_at(rows, ny, nz, x, y, z)
-        else:
-            word = _word_at(occupied, nx, ny, nz, x, y, z)
-        if word != 0:
-            keys[n], words[n] = key, word
-            n += 1
-        key += 1
+        for child in range(64):
+            x0, y0, z0 = x + SIDE * (child >> 4), y + SIDE * (child >> 2 & 3), z + SIDE * (child & 3)
+            if x0 >= nx or y0 >= ny or z0 >= nz:
+                continue
+            if has_whole_rows and x0 + SIDE <= nx and y0 + SIDE <= ny:
+                word = _whole_word_at(rows, ny, nz, x0, y0, z0)
+            else:
+                word = _word_at(occupied, nx, ny, nz, x0, y0, z0)
+            if word != 0:
+                keys[n], words[n] = key + child, word
+                n += 1
+        key += 64
     return n
 
 
