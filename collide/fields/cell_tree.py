@@ -256,7 +256,7 @@ def tree_of_cubes(least: np.ndarray, exponents: np.ndarray, grid: Grid) -> CellT
         least, exponents = np.delete(least, k, axis=0), np.delete(exponents, k)
         least = np.concatenate([least, parts])
         exponents = np.concatenate([exponents, np.full(len(parts), 2 * levels - 2)])
-    runs = [_run_of(np.sort(keys)) for keys in _keys_by_level(least, exponents, levels)]  # np.unique takes ten times as long
+    runs = [_run_of(np.sort(keys)) for keys in _keys_by_level(least, exponents, levels)]
     return _tree_of(runs, grid)
 
 
