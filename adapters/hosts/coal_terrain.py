@@ -12,7 +12,7 @@ from collide.adapters.hosts.coal_enums import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.coal_geometry import CollisionGeometry
 from collide.adapters.hosts.coal_meshes import BVHModelOBB, BVHModelOBBRSS, rows_of
 from collide.adapters.hosts.host_numbers import real
-from collide.adapters.hosts.octomap_boxes import occupied_boxes, octomap_file
+from collide.adapters.hosts.octomap_boxes import occupied_boxes
 from collide.base import argument_checks as checks
 from collide.base.given_files import LARGEST_MESH, read_bytes
 from collide.errors import InvalidArgument, UnsupportedQuery
@@ -202,10 +202,9 @@ class MeshLoader:
         return model
 
     def loadOctree(self, filename):
-        """The `OcTree` of a binary octomap file (.bt). Raises InvalidArgument."""
+        """The `OcTree` of a file of octomap (.bt, .ot). Raises InvalidArgument."""
         try:
-            file = octomap_file(read_bytes(Path(filename), LARGEST_MESH, "octree"))
-            return OcTree(file.edge, occupied_boxes(*file))
+            return OcTree(*occupied_boxes(read_bytes(Path(filename), LARGEST_MESH, "octree")))
         except InvalidArgument as error:
             raise InvalidArgument(f"{filename}: {error}") from None
 

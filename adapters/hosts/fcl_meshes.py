@@ -12,7 +12,7 @@ import collide as engine
 from collide.adapters.hosts.fcl_geometry import CollisionGeometry
 from collide.adapters.hosts.fcl_requests import NODE_TYPE, OBJECT_TYPE
 from collide.adapters.hosts.host_numbers import real, shaped
-from collide.adapters.hosts.octomap_boxes import occupied_boxes, tree_of
+from collide.adapters.hosts.octomap_boxes import occupied_boxes
 from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 
@@ -111,7 +111,7 @@ class OcTree(CollisionGeometry):
 
     r : edge of the smallest box [m].   data : bytes, or numbers of them: the tree in octomap's binary form, for every
     node two bytes, two bits a child (nothing, free, occupied, or a node of its own), the first child lowest; or a whole
-    file (.bt) of it, whose resolution r must be.
+    file (.bt, .ot) of it, whose resolution r must be.
     """
 
     _node_type, _object_type = NODE_TYPE.GEOM_OCTREE, OBJECT_TYPE.OT_OCTREE
@@ -119,7 +119,7 @@ class OcTree(CollisionGeometry):
     def __init__(self, r, data):
         is_bytes = isinstance(data, bytes | bytearray | memoryview)
         values = data if is_bytes else (checks.whole_numbers("OcTree: data", data) & 255).tolist()
-        boxes = occupied_boxes(*tree_of(real("OcTree: r", r), bytes(values)))
+        boxes = occupied_boxes(bytes(values), real("OcTree: r", r)).boxes
         if not boxes:
             raise UnsupportedQuery("OcTree: data holds no occupied box; leave the object out")
         middles = np.array([middle for middle, _ in boxes])
