@@ -174,7 +174,7 @@ def test_octrees_are_their_occupied_boxes():
     assert math.isclose(fcl.distance(at(nested, 0, 0, 0), at(fcl.Sphere(0.5), 1.5, -1, -1)), 1.0)
     assert fcl.collide(at(nested, 0, 0, 0), at(fcl.Sphere(0.5), -1640, -1, -1)) == 0
     for wrong in (bytes([3, 0]), bytes([3])):
-        with pytest.raises(InvalidArgument, match="no octomap: .*ends before its last node|no whole number of nodes"):
+        with pytest.raises(InvalidArgument, match=r"no octomap: .*ends before its last node|no whole number of nodes"):
             fcl.OcTree(0.1, wrong)
     with pytest.raises(UnsupportedQuery, match="no occupied box"):
         fcl.OcTree(0.1, b"")
