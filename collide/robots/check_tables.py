@@ -236,7 +236,7 @@ def without_meshes(shape: Shape) -> Shape | None:
 
 @kept_with_shape("_hulls_instead")
 def _hulls_instead(shape: Shape) -> Shape | None:
-    if isinstance(shape, Mesh) and shape.solid and is_own_hull(shape.vertices, shape.faces):
+    if isinstance(shape, Mesh) and shape.meshed and shape.solid and is_own_hull(shape.vertices, shape.faces):
         return ConvexHull(shape.vertices[np.unique(shape.faces)])
     if not isinstance(shape, Compound):
         return None

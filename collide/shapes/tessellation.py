@@ -16,6 +16,7 @@ from collide.base import argument_checks as checks
 from collide.errors import InvalidArgument, UnsupportedQuery
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.height_field import HeightField
 from collide.shapes.hpolytope import HPolytope
 from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Box, Capsule, Cone, Cylinder, Ellipsoid, Halfspace, Sphere
@@ -104,6 +105,11 @@ def tessellate(shape: Shape, *, tolerance: float | None = None, size: float | No
     for kind, made in _KINDS.items():
         if isinstance(shape, kind):
             return made(shape, tolerance)
+    if isinstance(shape, HeightField) and shape.heights.size > MAX_VERTICES:
+        raise InvalidArgument(
+            f"tessellate: the terrain has {shape.heights.size} grid points, and {MAX_VERTICES} are the most; draw "
+            "every n-th: HeightField(field.heights[::n, ::n], n * field.cell)"
+        )
     if hasattr(shape, "vertices") and hasattr(shape, "faces"):
         return Tessellation(shape.vertices, np.asarray(shape.faces, dtype=np.int64))
     what = "is balls around points: draw its points and radii" if isinstance(shape, PointCloud) else "has none here"

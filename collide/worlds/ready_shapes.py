@@ -18,7 +18,7 @@ def make_ready(shape: Shape) -> None:
     bounding_parts_of(shape)
     if isinstance(shape, PointCloud):
         _ = shape.tree
-    elif isinstance(shape, Mesh):
+    elif isinstance(shape, Mesh) and shape.meshed:
         facet_bodies.body_of(shape)
     elif isinstance(shape, Compound):
         for item, _ in shape.items:

@@ -144,6 +144,35 @@ def test_no_triangle_is_made_before_it_is_needed():
     assert kept < 2.5 * field.heights.nbytes  # of a whole mesh: 40 times
 
 
+def test_no_query_makes_all_triangles(large_fields, tmp_path):
+    """Worlds, checkers and points inside ask large terrain as a whole: its vertices are never made."""
+    def made(name: str):
+        raise AssertionError(f"{name} of the whole terrain were asked for")
+
+    field = collide.HeightField(np.random.default_rng(5).random((300, 300)) * 0.1, 0.1, bottom=-1.0)
+    with mock.patch.object(height_field.HeightField, "__getattr__", lambda self, name: made(name) if name in (
+        "vertices", "faces") else object.__getattribute__(self, name)):
+        assert collide.contains(field, EYE, [(0, 0, -0.5), (0, 0, 0.5)]).tolist() == [True, False]
+        world = collide.World()
+        world.add(field, name="hills")
+        world.add(collide.Sphere(0.2), collide.pose((1, 2, 0.1)), name="ball")
+        world.replace("hills", field)
+        assert world.collides() and len(world.contacts().rows)
+        assert world.raycast((0, 0, 3), (0, 0, -1)).rows["hit"].all()
+        assert world.distances(max_distance=1.0).rows["hit"].all()
+        link = collide.Robot.load(_rail(tmp_path))
+        assert collide.RobotChecker(link, world).collides(np.zeros((1, 1))).shape == (1,)
+
+
+def _rail(folder):
+    path = folder / "rail.urdf"
+    body = '<link name="{0}"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
+    joint = '<joint name="slide" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/>'
+    path.write_text(f'<robot name="r">{body.format("a")}{body.format("b")}{joint}'
+                    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>')
+    return path
+
+
 def test_images_are_terrain(tmp_path):
     grey = np.array([[0, 255], [51, 102], [0, 0]], dtype=np.uint8)
     field = collide.HeightField.from_image(grey, 1.0, low=-1.0, high=4.0)
