@@ -70,8 +70,10 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
     points = np.ascontiguousarray(np.broadcast_to(points, (n, 3)))
     if n == 0:
         return np.zeros(0, dtype=bool)
-    is_mesh = isinstance(shape, Mesh) and shape.meshed
-    answer = _in_mesh(shape, X_WA, points) if is_mesh else _in_convex(shape, X_WA, points)
+    if isinstance(shape, Mesh) and shape.meshed:
+        answer = _in_mesh(shape, X_WA, points)
+    else:
+        answer = _in_convex(shape, X_WA, points)
     return bool(answer[0]) if single_point and single_pose else answer
 
 
