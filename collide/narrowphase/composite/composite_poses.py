@@ -480,17 +480,20 @@ def _list_pairs(block, k, nodes, reach, but, nhat, exactly, n_listed):
     exactly : leave out what is farther apart along ``nhat``, or along the way between the balls' centres, and have the
     exact terms of poses.
     """
-    header = block.header
-    n_near = _find_near(block, nodes, reach, header[PAIR], but)
-    for k_near in range(n_near):
-        pair = block.near[k_near]
-        if exactly and _are_apart(block, nodes, pair, nhat, reach):
-            continue
-        if n_listed == LIST:
-            header[PAIR] = pair
-            return n_listed
-        _list_pair(block, k, nodes.B.n_parts, pair, exactly, n_listed)
-        n_listed += 1
+    header, n_near = block.header, LIST + 1
+    while n_near > LIST:  # of so many there may be more, with larger numbers
+        n_near = _find_near(block, nodes, reach, header[PAIR], but)
+        for k_near in range(n_near):
+            pair = block.near[k_near]
+            if exactly and _are_apart(block, nodes, pair, nhat, reach):
+                continue
+            if n_listed == LIST:
+                header[PAIR] = pair
+                return n_listed
+            _list_pair(block, k, nodes.B.n_parts, pair, exactly, n_listed)
+            n_listed += 1
+        if n_near > 0:
+            header[PAIR] = block.near[n_near - 1] + 1
     header[PAIR] = nodes.A.n_parts * nodes.B.n_parts
     return n_listed
 

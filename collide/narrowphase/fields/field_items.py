@@ -56,11 +56,13 @@ class FieldItems(ABC):
     """The items of a field.
 
     X_FG : (4, 4) pose of the items' frame in the field's.   walked : items with a tree to walk down; None of terrain.
+    is_one_part : whether a union of items, however many, is a single part.
     low, high : (3,) box around all items, in their frame [m].
     """
 
     X_FG: np.ndarray = IDENTITY
     walked: Items | None = None
+    is_one_part = False
     low: np.ndarray
     high: np.ndarray
 

@@ -38,6 +38,10 @@ from collide.shapes.swept_mesh import SweptMesh
 #: Items of which a union is made to tell a depth; and by how much a way out is longer than it needs to be, as a part
 #: of it.
 _MAX_ITEMS, _BEYOND = 1024, 2.0**-40
+#: The same beside another field, every item of which is asked as well.
+_MAX_OF_FIELDS = 64
+#: Stands for the exponent of what rounding moves where poses are exact.
+_EXACT = -(1 << 20)
 #: Rows of two shapes: ``rows_of_pair(A, B, X_WA, X_WB, limit, depths=)``.
 RowsOfPair = Callable[..., np.ndarray]
 
@@ -97,17 +101,30 @@ def _is_of_parts(B: Shape) -> bool:
     return kind_of(B) is Kind.COMPOUND and all(packed.kind != HALFSPACE for packed, _ in parts_of(B))
 
 
-def _posed_parts(
-    items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray
-) -> Iterator[tuple[PackedConvex, np.ndarray, np.ndarray]]:
-    """(convex set, poses of the items' frame, poses of the set) of each part; sets are widened by what rounding may
-    move.
+class _PosedPart(NamedTuple):
+    """A convex set of a shape, widened by what rounding may move it, at the poses of some questions, by row."""
+
+    number: int
+    packed: PackedConvex
+    rows: np.ndarray
+    X_WG: np.ndarray
+    X_WP: np.ndarray
+
+
+def _posed_parts(items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> Iterator[_PosedPart]:
+    """The parts of a shape beside items. A part is widened by a power of two, so that an answer depends on its pose
+    alone, not on which poses are asked together.
     """
     X_WG, slop_of_items = items.poses_of_items(X_WA)
-    for packed, X_BP in parts_of(B):
+    for k, (packed, X_BP) in enumerate(parts_of(B)):
         X_WP, slop = moved_pose(X_WB, X_BP, np.full(len(X_WB), packed.reach))
-        off = 2.0 * float(slop.max(initial=0.0) + slop_of_items.max(initial=0.0))
-        yield packed if off == 0.0 else packed._replace(slop=packed.slop + off), X_WG, X_WP
+        exponents = np.broadcast_to(np.frexp(2.0 * (slop + slop_of_items))[1], len(X_WB))
+        off = np.broadcast_to(slop + slop_of_items, len(X_WB))
+        for exponent in np.unique(np.where(off > 0.0, exponents, _EXACT)).tolist():
+            rows = np.flatnonzero(off == 0.0 if exponent == _EXACT else (off > 0.0) & (exponents == exponent))
+            slop_of_part = packed.slop + (0.0 if exponent == _EXACT else math.ldexp(1.0, exponent))
+            widened = packed if slop_of_part == packed.slop else packed._replace(slop=slop_of_part)
+            yield _PosedPart(k, widened, rows, X_WG[rows], X_WP[rows])
 
 
 def _walked(
@@ -118,38 +135,42 @@ def _walked(
     """
     assert items.walked is not None
     meets, apart = np.zeros(len(X_WA), dtype=bool), np.ones(len(X_WA), dtype=bool)
-    for packed, X_WG, X_WP in _posed_parts(items, B, X_WA, X_WB):
-        some = np.flatnonzero(~meets)
-        if len(some):
-            walk = surface_states(items.walked, packed, X_WG[some], X_WP[some], margin)
-            meets[some[walk.meets]] = True
-            apart[some] &= walk.apart
+    for part in _posed_parts(items, B, X_WA, X_WB):
+        some = ~meets[part.rows]
+        if some.any():
+            rows, walk = part.rows[some], surface_states(
+                items.walked, part.packed, part.X_WG[some], part.X_WP[some], margin
+            )
+            meets[rows[walk.meets]] = True
+            apart[rows] &= walk.apart
     return meets, apart
 
 
 def _walked_rows(
     items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, depths: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(rows, (n,) bool whether they are written) of items with a tree and a shape of convex parts: of the nearest
-    part, its bracket that of the least distance of all parts.
+    """(rows, (n,) bool whether they are written) of items with a tree and a shape of convex parts: of the nearest part,
+    its bracket that of the least distance of all parts.
     """
     assert items.walked is not None
-    out, is_written = np.zeros(0, dtype=PAIR_DTYPE), np.ones(len(X_WA), dtype=bool)
-    for k, (packed, X_WG, X_WP) in enumerate(_posed_parts(items, B, X_WA, X_WB)):
-        rows, written = gap_rows(items.walked, packed, X_WG, X_WP, depths)
-        rows["part_b"] = k
-        is_written &= written
-        if not k:
-            out = rows
-            continue
-        is_nearer = rows["hit"] & ~out["hit"] | (rows["hit"] == out["hit"]) & (rows["distance"] < out["distance"])
-        nearest, farther = np.where(is_nearer, rows, out), np.where(is_nearer, out, rows)
-        nearest["lower"] = np.minimum(nearest["lower"], farther["lower"])
-        is_rival = farther["lower"] <= nearest["upper"]
-        nearest["certified"] &= nearest["hit"] | farther["certified"] | ~is_rival
-        nearest["upper"] = np.minimum(nearest["upper"], farther["upper"])
-        out = nearest
+    out, is_written = np.zeros(len(X_WA), dtype=PAIR_DTYPE), np.ones(len(X_WA), dtype=bool)
+    for part in _posed_parts(items, B, X_WA, X_WB):
+        rows, written = gap_rows(items.walked, part.packed, part.X_WG, part.X_WP, depths)
+        rows["part_b"] = part.number
+        is_written[part.rows] &= written
+        out[part.rows] = _nearer(out[part.rows], rows) if part.number else rows
     return out, is_written
+
+
+def _nearer(before: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """(n,) the nearer of each two rows, its bracket a bracket of the least distance of both."""
+    is_nearer = rows["hit"] & ~before["hit"] | (rows["hit"] == before["hit"]) & (rows["distance"] < before["distance"])
+    nearest, farther = np.where(is_nearer, rows, before), np.where(is_nearer, before, rows)
+    nearest["lower"] = np.minimum(nearest["lower"], farther["lower"])
+    is_rival = farther["lower"] <= nearest["upper"]
+    nearest["certified"] &= nearest["hit"] | farther["certified"] | ~is_rival
+    nearest["upper"] = np.minimum(nearest["upper"], farther["upper"])
+    return nearest
 
 
 def are_balls(A: Shape, B: Shape) -> bool:
@@ -231,7 +252,7 @@ def _union_row(
     some = nearby.items.within(box, 0.0)
     row = nearby.row(some, False) if len(some) else None
     if row is not None and row["hit"][0]:
-        return row if question.boolean or not question.depths else _depth(nearby, some, box)
+        return row if question.boolean or not question.depths else _depth(nearby, some, box, row)
     if question.boolean:
         return np.zeros(1, dtype=PAIR_DTYPE) if row is None else row
     first = nearby.row(nearby.items.nearest(box), False) if row is None else row
@@ -271,20 +292,23 @@ class _Nearby(NamedTuple):
         return row
 
 
-def _depth(nearby: _Nearby, some: np.ndarray, box: BoxAround) -> np.ndarray:
-    """The row of an overlap: all items within its depth have a say, or, of very many, all that are in the way out."""
-    asked = some
-    while len(some) <= _MAX_ITEMS:
+def _depth(nearby: _Nearby, some: np.ndarray, box: BoxAround, hit: np.ndarray) -> np.ndarray:
+    """The row of an overlap: all items within its depth have a say, or, of very many, all that are in the way out.
+
+    hit : the row without a depth.
+    """
+    asked, max_items = some, _MAX_OF_FIELDS if nearby.B.is_field else _MAX_ITEMS
+    while len(some) <= max_items or nearby.items.is_one_part:
         row = nearby.row(some, True)
         depth = max(-float(row["lower"][0]), -float(row["distance"][0]), 0.0)
         more = nearby.items.within(box, depth)
         if len(more) <= len(some):
             return row
         asked, some = some, more
-    return _way_out(nearby, asked, box)
+    return _out_of_box(nearby, hit, box) if nearby.B.is_field else _way_out(nearby, asked, box, hit)
 
 
-def _way_out(nearby: _Nearby, some: np.ndarray, box: BoxAround) -> np.ndarray:
+def _way_out(nearby: _Nearby, some: np.ndarray, box: BoxAround, hit: np.ndarray) -> np.ndarray:
     """The row of a translation between B and all items: of some items first, then also of further items met behind the
     translation, as long as B meets any. For too many items the translation goes along an axis of the items' frame, out
     of the box around all items.
@@ -292,9 +316,11 @@ def _way_out(nearby: _Nearby, some: np.ndarray, box: BoxAround) -> np.ndarray:
     The lower bound of the depth is the bound of the items asked.
     """
     items = nearby.items
-    some = some[:: -(-len(some) // _MAX_ITEMS)]
+    some = np.union1d(some[:: -(-len(some) // _MAX_ITEMS)], hit["part_a"])
     while True:
         row = nearby.row(some, True)
+        if not row["hit"][0]:  # none of these items meets B
+            return _out_of_box(nearby, hit, box)
         moved = nearby.X_WB.copy()
         moved[0, :3, 3] += row["normal"][0] * (-float(row["distance"][0]) * (1.0 + _BEYOND) + _BEYOND)
         met = np.setdiff1d(items.within(box_in_frame(nearby.B, items.pose(nearby.X_WA[0]), moved[0]), 0.0), some)
@@ -315,5 +341,6 @@ def _out_of_box(nearby: _Nearby, row: np.ndarray, box: BoxAround) -> np.ndarray:
     normal = items.pose(nearby.X_WA[0])[:3, k % 3] * (1.0 if k < 3 else -1.0)
     length = float(ways[k]) * (1.0 + _BEYOND) + _BEYOND
     row["distance"], row["lower"], row["normal"], row["certified"] = -length, -length, normal, False
+    row["upper"], row["hit"] = np.minimum(row["upper"], 0.0), True
     row["point_a"] = row["point_b"] + length * normal
     return row

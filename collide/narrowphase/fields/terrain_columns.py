@@ -41,6 +41,8 @@ class _Rectangle(NamedTuple):
 class Columns(FieldItems):
     """The cells of a height field that are no holes, numbered row by row, holes counted in."""
 
+    is_one_part = True
+
     def __init__(self, field: HeightField):
         self._pyramid, self._heights, self._bottom = field.pyramid, field.heights, field.bottom
         self._x, self._y = field.grid_lines

@@ -254,3 +254,44 @@ def test_depths_among_very_many_balls_are_ways_out():
         assert row.distance <= min(single) + 1e-12
         hits += 1
     assert hits == 8
+
+
+def diagonal() -> np.ndarray:
+    """The z axis along (1, 1, 1): a rod whose box holds far more than the rod."""
+    u = np.ones(3) / 3.0**0.5
+    x = np.cross(u, [1.0, 0.0, 0.0])
+    x /= np.linalg.norm(x)
+    X = np.eye(4)
+    X[:3, :3] = np.column_stack([x, np.cross(u, x), u])
+    return X
+
+
+def test_the_one_ball_that_is_met_has_its_say_among_thousands():
+    """A rod through one ball, 1,500 more within its box: a subset of them without that ball is apart."""
+    rng, X = np.random.default_rng(18), diagonal()
+    for place in range(5):
+        others_near = np.array([-0.4, 0.4, 0.0]) + rng.uniform(-0.05, 0.05, (1500, 3))
+        points = np.insert(others_near, place, [0.0, 0.0, 0.0], axis=0)
+        row = collide.distance(collide.PointCloud(points, 0.005), collide.Box((0.02, 0.02, 1.8)), EYE, X)
+        assert row.hit and row.distance == pytest.approx(-0.015, abs=1e-9), place
+    occupied = rng.random((60, 60, 60)) < 0.03
+    middles = (np.indices((60, 60, 60)).reshape(3, -1).T + 0.5) * 0.02 - 0.61
+    along = middles @ X[:3, 2]
+    occupied.reshape(-1)[np.linalg.norm(middles - along[:, None] * X[:3, 2], axis=1) < 0.2] = False
+    occupied[30, 30, 30] = True
+    grid = collide.VoxelGrid(occupied, 0.02, collide.pose((-0.61, -0.61, -0.61)))
+    row = collide.distance(grid, collide.Box((0.02, 0.02, 1.7)), EYE, X)
+    assert row.hit and -0.1 < row.distance < 0.0
+
+
+def test_what_is_asked_together_has_no_say():
+    """A part's pose far away in the same batch: the same bits."""
+    X = diagonal()
+    union = collide.Compound([(collide.Box((0.1, 0.1, 0.1)), X), (collide.Sphere(0.1), collide.pose((1, 0, 0)))])
+    A, B = X.copy(), X.copy()
+    A[:3, 3], B[:3, 3] = (3.0, 0.0, 0.2), (1e5, 0.0, 0.0)
+    turned_grid = collide.VoxelGrid([(0, 0, 0)], 0.1, collide.pose((0, 0, 0), rpy=(1, 2, 3)))
+    for field in (collide.PointCloud([[0, 0, 0]], 0.1), turned_grid):
+        alone = collide.distance(field, union, EYE, A)
+        together = collide.distance(field, union, EYE, np.array([A, B]))[0]
+        assert (alone.lower, alone.distance, alone.upper) == (together.lower, together.distance, together.upper)
