@@ -7,6 +7,7 @@ import copy
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from threading import get_ident
+from typing import Any
 
 import numpy as np
 
@@ -43,8 +44,8 @@ class WorldScene:
         #: Tables of the bodies, made last; those that questions begin with: of before the changes of a `changes` block.
         self._packed: PackedWorld | None = None
         self._published: PackedWorld | None = None
-        #: The thread in a `changes` block; the thread that asked first; whether another one has asked.
-        self._changer: int | None = None
+        #: The lock and the thread in a `changes` block; the thread that asked first; whether another one has asked.
+        self._changer: tuple[Any, int] | None = None
         self._first_asker: int | None = None
         self._is_shared = False
 
@@ -74,19 +75,22 @@ class WorldScene:
         -----
         Once another thread has asked, the changing thread makes the tables, beside the tables being read: O(n) bytes
         are copied for n bodies, 0.6 kB each. Before, a block copies nothing, and the first question of another thread
-        waits for the end.
+        waits for the end: a block that itself waits for such a thread waits for ever.
         """
         with self._lock.now:
-            others_ask = self._is_shared or self._first_asker not in (None, get_ident())
-            if self._changer is not None or not others_ask:
+            if self._is_in_block():
                 yield
                 return
-            self._published, self._changer = self._brought_up_to_date(), get_ident()
+            others_ask = self._is_shared or self._first_asker not in (None, get_ident())
+            # Without tables to begin with, the first question of another thread waits for the lock.
+            self._published = self._brought_up_to_date() if others_ask else None
+            self._changer = self._lock.now, get_ident()
             try:
                 yield
             finally:
                 try:
-                    self._published = self._brought_up_to_date()
+                    if others_ask:
+                        self._published = self._brought_up_to_date()
                 finally:
                     self._changer = None
 
@@ -390,6 +394,15 @@ class WorldScene:
 
     # --- as queries see them --------------------------------------------------------------------
 
+    def _is_in_block(self) -> bool:
+        """Whether a thread is in a `changes` block. A forked child has another lock, and not that thread: its tables
+        may be half changed, and are made anew.
+        """
+        if self._changer is None or self._changer[0] is self._lock.now:
+            return self._changer is not None
+        self._changer = self._packed = self._published = None
+        return False
+
     def _pack(self) -> PackedWorld:
         """What a question reads: ``with self._pack() as packed: ...``. No change reaches it within the block."""
         me, packed = get_ident(), self._published
@@ -401,7 +414,7 @@ class WorldScene:
             packed.readers.append(None)
             if packed.version == self._n_changes:
                 return packed
-            is_in_block = self._changer is not None and self._changer != me
+            is_in_block = self._is_in_block() and self._changer is not None and self._changer[1] != me
             if is_in_block and packed is self._published:
                 return packed
             packed.readers.pop()
@@ -415,7 +428,7 @@ class WorldScene:
         """Whether nobody reads these tables, nor begins to: they are STALE until brought up to date. If not, they keep
         the poses that they have, and another copy is to be changed.
         """
-        may_change = self._changer is None or packed is not self._published
+        may_change = not self._is_in_block() or packed is not self._published
         if may_change:
             version, packed.version = packed.version, STALE
             if packed.readers:
@@ -427,6 +440,7 @@ class WorldScene:
 
     def _brought_up_to_date(self) -> PackedWorld:
         """The tables with all changes so far; the lock is held."""
+        self._is_in_block()  # forgets tables of a block in the process before a fork
         packed = self._packed
         if packed is not None and packed.version == self._n_changes:
             return packed
@@ -444,7 +458,7 @@ class WorldScene:
                 packed.set_filters(self._filters(roster))
         self._pairs_changed = False
         packed.version, self._packed = self._n_changes, packed
-        if self._changer is None:
+        if not self._is_in_block():
             self._published = packed
         return packed
 

@@ -332,3 +332,57 @@ def test_tables_that_nobody_reads_are_changed_where_they_are():
         world.sleep([2]), world.collisions(), world.contacts()
         assert world._packed is packed is world._published and not packed.readers
         assert world._bodies._X_WBs is poses and np.shares_memory(packed.X_WBs, poses)
+
+
+def test_the_first_question_of_another_thread_sees_all_of_a_block_or_nothing():
+    """Nobody else has asked before the block, in which the changer asks: its half-changed tables are its own."""
+    world = collide.World()
+    world.add(collide.Sphere(1.0), name="a")
+    world.add(collide.Sphere(1.0), collide.pose((1, 0, 0)), name="b")
+    assert world.collides()
+    seen, begun = [], threading.Event()
+
+    def ask() -> None:
+        begun.set()
+        seen.append(world.collides())
+
+    stranger = threading.Thread(target=ask)
+    with world.changes():
+        world.set_pose("a", collide.pose((50, 0, 0)))
+        assert not world.collides()
+        stranger.start()
+        begun.wait(5.0)
+        stranger.join(0.05)
+        world.set_pose("b", collide.pose((51, 0, 0)))
+        assert world.collides()
+    stranger.join(5.0)
+    assert seen == [True]
+
+
+def test_a_child_forked_within_a_block_of_another_thread_goes_on():
+    """As of `os.fork`: the lock is another one, and the thread in the block is not there."""
+    world = collide.World()
+    world.add(collide.Sphere(1.0), name="a")
+    world.add(collide.Sphere(1.0), collide.pose((1, 0, 0)), name="b")
+    assert world.collides() and in_another_thread(world.collides)
+    inside, ended = threading.Event(), threading.Event()
+
+    def change() -> None:
+        with world.changes():
+            world.set_pose("a", collide.pose((50, 0, 0)))
+            inside.set()
+            ended.wait(5.0)
+
+    changer = threading.Thread(target=change)
+    changer.start()
+    assert inside.wait(5.0)
+    world._lock.renew()
+    assert not world.collides()
+    world.set_pose("a", collide.pose((0, 1, 0)))
+    assert world.collides()
+    with world.changes():
+        world.set_pose("b", collide.pose((90, 0, 0)))
+        assert not world.collides()
+    assert not world.collides() and not in_another_thread(world.collides)
+    ended.set()
+    changer.join(5.0)
