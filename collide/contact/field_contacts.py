@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from collide.contact.contact_rows import no_rows
-from collide.narrowphase.fields.field_items import box_in_frame
+from collide.narrowphase.fields.field_items import items_within
 from collide.narrowphase.fields.items_of import items_of
 from collide.pairs.pair_arguments import pose_at
 from collide.shapes.shape import Shape
@@ -38,7 +38,7 @@ def _contacts_of(rows_of: RowsOf, shapes: list, poses: list, margin: float) -> n
         field, B = shapes[side], shapes[1 - side]
         if field.is_field:
             items = items_of(field)
-            some = items.within(box_in_frame(B, items.pose(poses[side]), poses[1 - side]), margin)
+            some = items_within(items, B, poses[side], poses[1 - side], margin)
             if not len(some):
                 return no_rows()
             union = items.merged(some)

@@ -9,7 +9,7 @@ from collide.fields.ray_cells_kernel import walk_rays
 from collide.kernels import address_of
 
 #: Steps of all rays at most, before cells met twice are told.
-_MAX_STEPS = 1 << 30
+_MAX_STEPS = 1 << 27
 
 
 def cells_through(begins: np.ndarray, ends: np.ndarray) -> np.ndarray:
@@ -21,7 +21,10 @@ def cells_through(begins: np.ndarray, ends: np.ndarray) -> np.ndarray:
     first, last = np.floor(begins), np.floor(ends)
     n = np.abs(last - first).sum(axis=1)
     if not n.sum() < _MAX_STEPS:
-        raise InvalidShape(f"OcTree.from_rays: rays go through {n.sum():g} cells; give fewer rays, or larger cells")
+        raise InvalidShape(
+            f"OcTree.from_rays: {len(n)} rays go through {n.sum():g} cells, and {_MAX_STEPS} are the most; take larger "
+            "cells, a max_range, or fewer rays at once"
+        )
     cells = np.empty((int(n.sum()), 3), dtype=np.int64)
     begins, ends = (np.ascontiguousarray(x, dtype=np.float64) for x in (begins, ends))
     walk_rays(address_of(begins), address_of(ends), len(begins), address_of(cells))

@@ -14,6 +14,8 @@ from collide.errors import InvalidShape
 from collide.fields.headed_files import content_of, first_line, header_of, numbers_of
 
 _MAX_RUN = 255
+#: Cells of a file at most, those added up to a cube included: a byte each in memory.
+_MAX_CELLS = (1 << 31) - 1
 
 
 class Voxels(NamedTuple):
@@ -68,6 +70,8 @@ def voxels_of_file(content: bytes, what: str) -> Voxels:
         raise InvalidShape(
             f"{what}: dim must be three integers ≥ 1 and scale > 0, got {checks.brief(entries['dim'])} and {scale:g}"
         )
+    if math.prod(dims) > _MAX_CELLS:
+        raise InvalidShape(f"{what}: dim of {math.prod(dims)} cells: {_MAX_CELLS} are the most")
     runs = np.frombuffer(content, dtype=np.uint8, offset=begin)
     values, counts = runs[0::2], runs[1::2]
     if len(runs) % 2 or (values > 1).any() or int(counts.sum(dtype=np.int64)) != math.prod(dims):
@@ -95,6 +99,8 @@ def write_voxel_file(path: str | Path, voxels: Voxels) -> None:
     if len({*sizes}) != 1 or not 0.0 < sizes[0] < math.inf:
         raise InvalidShape(f"binvox: cell_sizes must be one number > 0 thrice: cells are cubes; got {sizes}")
     n = max(occupied.shape)
+    if n**3 > _MAX_CELLS:
+        raise InvalidShape(f"binvox: a cube of {n}³ cells, as the format has them, is more than {_MAX_CELLS}")
     cube = np.zeros((n, n, n), dtype=bool)
     cube[tuple(slice(count) for count in occupied.shape)] = occupied
     flat = cube.transpose(0, 2, 1).ravel()

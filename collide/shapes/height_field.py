@@ -153,7 +153,7 @@ class HeightField(Mesh):
         cell : float or (2,) array_like, float64
             Sides of a cell, as of the constructor [m].
         low, high : float
-            Heights of black and white [m].
+            Heights of black and white [m]; of an inverted picture ``high`` is the lower.
         bottom : float, optional
             As of the constructor.
 
@@ -297,6 +297,11 @@ def _grey_of(image) -> np.ndarray:
         raise InvalidShape(
             f"{name} must be (r, c) of unsigned integers or floats, got {grey.dtype} {grey.shape}; turn colours to "
             "grey first"
+        )
+    if grey.dtype.kind == "f" and ((grey < 0.0) | (grey > 1.0)).any():
+        raise InvalidShape(
+            f"{name}: grey values of floats lie within 0 … 1, got {np.nanmin(grey):g} … {np.nanmax(grey):g}; divide by "
+            "the value of white, or give unsigned integers"
         )
     return grey
 

@@ -229,7 +229,8 @@ class OcTree(VoxelGrid):
             For points of another shape, empty, not finite; as the constructor.
         """
         resolution = positive("OcTree.from_points", "resolution", resolution)
-        cells = np.unique(_cells_of_points("OcTree.from_points", "points", points, resolution), axis=0)
+        name = "OcTree.from_points"
+        cells = _distinct(name, _cells_of_points(name, "points", points, resolution))
         n = len(cells)
         return cls(OcTreeLeaves(cells, np.zeros(n, dtype=np.int64), np.full(n, HIT)), resolution)
 
@@ -279,10 +280,12 @@ class OcTree(VoxelGrid):
         ends[far] = begins[far] + (ends[far] - begins[far]) * (limit / lengths[far])[:, None]
         if not is_hit.any():
             raise InvalidShape(f"{name}: no ray of {len(ends)} ends within max_range {limit:g} m")
-        hits = np.unique(_cells_of_points(name, "points", ends[is_hit], resolution), axis=0)
+        hits = _distinct(name, _cells_of_points(name, "points", ends[is_hit], resolution))
+        for field, places in (("origins", begins), ("points", ends)):
+            _cells_of_points(name, field, places, resolution)  # refuses those too far away for cells to be numbered
         through = ray_cells.cells_through(begins / resolution, ends / resolution)
-        cells, first = np.unique(np.concatenate([hits, through]), axis=0, return_index=True)
-        log_odds = np.where(first < len(hits), HIT, MISS)
+        cells = _distinct(name, np.concatenate([hits, through]))
+        log_odds = np.where(_are_among(cells, hits), HIT, MISS)
         leaves = OcTreeLeaves(cells, np.zeros(len(cells), dtype=np.int64), log_odds)
         return cls(leaves, resolution, threshold=threshold, unknown=unknown)
 
@@ -296,6 +299,31 @@ def _cells_of_points(name: str, field: str, points, resolution: float) -> np.nda
     if not np.abs(cells).max() < 2.0**53:
         raise InvalidShape(f"{name}: a resolution of {resolution:g} m is too fine for these points")
     return cells.astype(np.int64)
+
+
+def _numbered(cells: np.ndarray, low: np.ndarray) -> np.ndarray:
+    """(n,) numbers of cells (n, 3) that span less than 2²⁰ along each axis from ``low`` on, x slowest."""
+    x, y, z = (cells - low).T
+    return x << 40 | y << 20 | z
+
+
+def _distinct(name: str, cells: np.ndarray) -> np.ndarray:
+    """Cells (n, 3), each once, in ascending order. Raises InvalidShape where they span too much."""
+    low = cells.min(axis=0)
+    span = int((cells - low).max())
+    if not span < 1 << 20:
+        raise InvalidShape(f"{name}: cells span {span} along an axis, and 2²⁰ are the most; take larger cells")
+    numbers = np.sort(_numbered(cells, low))
+    numbers = numbers[np.diff(numbers, prepend=-1) != 0]
+    return np.stack([numbers >> 40, numbers >> 20 & 0xFFFFF, numbers & 0xFFFFF], axis=1) + low
+
+
+def _are_among(cells: np.ndarray, some: np.ndarray) -> np.ndarray:
+    """(n,) bool: which distinct cells are among some of them, both ascending."""
+    low = cells.min(axis=0)
+    is_among = np.zeros(len(cells), dtype=bool)
+    is_among[np.searchsorted(_numbered(cells, low), _numbered(some, low))] = True
+    return is_among
 
 
 def _log_odds_of(probability: float) -> float:

@@ -35,6 +35,8 @@ _FILE_FIELDS = {"points": Field("f8", (None, 3)), "radius": ANY}
 
 #: Numbers of nearest points in an answer at most.
 _MAX_NEAREST = 1 << 26
+#: Of more points for a place all points are sorted: a walk sorts by insertion.
+_MAX_WALKED = 512
 
 
 class NearestPoints(NamedTuple):
@@ -334,11 +336,27 @@ class PointCloud(Shape):
                 f"got {checks.brief(k)}"
             )
         limit = checks.limit("PointCloud.nearest: max_distance", max_distance)
-        squares, row = self.tree.nearest(places, k, limit * limit)
+        asked = self._all_sorted if min(k, len(self)) > _MAX_WALKED else self.tree.nearest
+        squares, row = asked(places, min(k, len(self)), limit * limit)
+        if k > len(self):
+            beyond = (0, 0), (0, k - len(self))
+            squares, row = np.pad(squares, beyond, constant_values=math.inf), np.pad(row, beyond, constant_values=-1)
         distance = np.sqrt(squares)
         if k == 1:
             distance, row = distance[:, 0], row[:, 0]
         return NearestPoints(distance[0], row[0]) if single else NearestPoints(distance, row)
+
+    def _all_sorted(self, places: np.ndarray, k: int, largest: float) -> tuple[np.ndarray, np.ndarray]:
+        """As `PointTree.nearest`, of a large part of all points: these are sorted."""
+        squares, rows_of = np.empty((len(places), k)), np.empty((len(places), k), dtype=np.int64)
+        for at, place in enumerate(places):
+            away = self.points - place
+            square = away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1] + away[:, 2] * away[:, 2]
+            order = np.argsort(square, kind="stable")[:k]
+            squares[at], rows_of[at] = square[order], order
+        beyond = squares > largest
+        squares[beyond], rows_of[beyond] = math.inf, -1
+        return squares, rows_of
 
     def within(self, p: ArrayLike, r: float) -> np.ndarray:
         """Rows of the points no farther from a place than a distance, ascending.

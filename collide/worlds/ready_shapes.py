@@ -8,6 +8,7 @@ from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.point_cloud import PointCloud
 from collide.shapes.shape import Shape
+from collide.shapes.swept_mesh import SweptMesh
 
 #: Half of the engine, which scenes without meshes never load.
 facet_bodies = lazy_module("collide.lowering.facet_bodies")
@@ -18,7 +19,7 @@ def make_ready(shape: Shape) -> None:
     bounding_parts_of(shape)
     if isinstance(shape, PointCloud):
         _ = shape.tree
-    elif isinstance(shape, Mesh) and shape.meshed:
+    elif isinstance(shape, SweptMesh) or (isinstance(shape, Mesh) and shape.meshed):
         facet_bodies.body_of(shape)
     elif isinstance(shape, Compound):
         for item, _ in shape.items:

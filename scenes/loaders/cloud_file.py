@@ -36,9 +36,9 @@ def read_cloud(
     Raises SceneError for what is no such file, MissingExtra.
     """
     try:
-        cloud = PointCloud.from_file(path, drop_invalid=drop_invalid)
-        radius = cloud.radius * scale if radius is None else radius
-        made = PointCloud(cloud.points * scale, radius)
+        of_file = None if radius is None else radius / scale
+        cloud = PointCloud.from_file(path, of_file, drop_invalid=drop_invalid)
+        made = PointCloud(cloud.points * scale, cloud.radius * scale) if scale != 1.0 else cloud
     except InvalidShape as error:
         raise SceneError(str(error), path=path) from None
     made._store(dropped=cloud.dropped)

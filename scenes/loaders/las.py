@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from collide.base.given_files import LARGEST_CLOUD
 from collide.errors import MissingExtra, SceneError, cut
 from collide.scenes.loaders.polygons import refuse
 
@@ -39,8 +40,10 @@ def read_points(content: bytes, path: Path) -> np.ndarray:
             if file.header.are_points_compressed and not laspy.LazBackend.Lazrs.is_available():
                 raise MissingExtra("lazrs", extra="clouds", purpose=purpose)
             n_points = file.header.point_count
+            if 24 * n_points > LARGEST_CLOUD:
+                refuse(path, f"declares {n_points} points, more than the {LARGEST_CLOUD >> 20} MiB held of a cloud")
             pieces = [np.stack([piece.x, piece.y, piece.z], axis=1) for piece in file.chunk_iterator(_PIECE)]
-    except MissingExtra:
+    except (MissingExtra, SceneError):
         raise
     except BaseException as error:  # lazrs raises panics of its own
         if isinstance(error, (KeyboardInterrupt, SystemExit)):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.base.given_files import as_text
+from collide.base.given_files import LARGEST_CLOUD, as_text
 from collide.fields.lzf_kernel import unpack_lzf
 from collide.scenes.loaders.point_text import numbers_in_columns
 from collide.scenes.loaders.polygons import quoted, refuse, whole
@@ -84,6 +84,8 @@ def _unpacked(body: np.ndarray, header: _Header, path: Path) -> np.ndarray:
             path, f"its header declares {header.n_points * header.point_size} bytes of points, the data {size} in "
             f"{n_packed} packed bytes, of which {max(len(body) - 8, 0)} follow"
         )
+    if size > LARGEST_CLOUD:
+        refuse(path, f"unpacks to {size} bytes, more than the {LARGEST_CLOUD >> 20} MiB read of a cloud")
     unpacked = unpack_lzf(body[8 : 8 + n_packed], size)
     if unpacked is None:
         refuse(path, "its compressed data are damaged")

@@ -31,6 +31,9 @@ def read_points(content: bytes, path: Path) -> np.ndarray:
         refuse(path, "holds no points")
     delimiter = next((mark for mark in ";," if mark in first[1]), None)
     names = [word.strip(" \t\r\"'").lower() for word in first[1].split(delimiter)]
+    twice = next((axis for axis in "xyz" if names.count(axis) > 1), None)
+    if twice is not None:
+        refuse(path, f"has two columns {twice}", text.count("\n", 0, first.end()) + 1)
     if not {"x", "y", "z"} <= {*names}:
         return numbers_in_columns(text, (0, 1, 2), path, delimiter=delimiter, comments=comments)
     number = text.count("\n", 0, first.end()) + 2
@@ -51,6 +54,10 @@ def numbers_in_columns(
     """
     if _FIRST.search(text) is None:
         return np.zeros((0, len(columns)))
+    if width is not None:
+        for number, line in enumerate(io.StringIO(text), first):
+            if line.strip() and len(line.split(delimiter)) != width:
+                refuse(path, f"must have {width} words, got {quoted(line.encode())}", number)
     try:
         return np.loadtxt(
             io.StringIO(text), usecols=tuple(columns), delimiter=delimiter, comments=list(comments) or None, ndmin=2,

@@ -121,3 +121,16 @@ def test_worlds_cast_rays_and_shapes_at_clouds():
     assert np.array_equal(rows["distance"][alone.hit], alone.distance[alone.hit])
     assert (rows["body"][alone.hit] == body).all()
     assert len(world.contacts(margin=0.0).rows) == 0
+
+
+@pytest.mark.parametrize("height", [-3.0, -0.98])
+def test_a_floor_asks_the_lowest_items_alone(height):
+    """A scan over a floor: none of its balls and cells is made a shape but those that may touch the floor."""
+    cloud = collide.PointCloud(np.random.default_rng(8).uniform(-1, 1, (5000, 3)), 0.004)
+    for field in (cloud, collide.VoxelGrid.from_points(cloud.points, 0.05)):
+        for floor in (collide.Halfspace((0, 0, 1), height), collide.Plane((0, 0, 1), height)):
+            rows = collide.contacts(field, floor, EYE, EYE).rows
+            lowest = cloud.points[:, 2] - 0.004 if field is cloud else field.cells[:, 2] * 0.05
+            assert (len(rows) > 0) == bool((lowest <= height).any())
+            if isinstance(floor, collide.Halfspace) and field is cloud:
+                assert len(rows) == np.count_nonzero(lowest <= height)

@@ -81,7 +81,7 @@ GOOD = file_of(bytes([0, 3, 1, 5]))
         (file_of(bytes([0, 3, 2, 5])), "a value, 0 or 1"), (file_of(b"", "0 2 2"), "dim must be three integers"),
         (file_of(b"", "2 2"), "dim must be 3 finite numbers, got '2 2'"), (file_of(b"", "2 2 2.5"), "three integers"),
         (file_of(b"", "1e300 1e300 9"), "dim must be three"), (file_of(b"", "two 2 2"), "dim must be 3 finite"),
-        (file_of(b"", "99999 99999 99999"), "999970000299999 voxels must follow"),
+        (file_of(b"", "99999 99999 99999"), "dim of 999970000299999 cells: 2147483647 are the most"),
         (file_of(bytes([0, 8]), scale="0"), "scale > 0, got '2 2 2' and 0"), (file_of(b"", scale="nan"), "scale must"),
         (file_of(bytes([0, 8]), scale="5e-324"), "cells of a length above 0"),
         (GOOD.replace(b"translate", b"moved"), "translate must be 3 finite numbers, got None"),

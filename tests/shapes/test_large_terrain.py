@@ -184,6 +184,7 @@ def test_images_are_terrain(tmp_path):
     (tmp_path / "text.png").write_text("no picture")
     for bad, match in (
         (np.zeros((2, 2, 3), np.uint8), "turn colours to grey"), (np.zeros((2, 2), int), "unsigned integers or floats"),
+        (np.array([[0.0, 200.0], [300.0, 50.0]]), "lie within 0 … 1"),
         (tmp_path / "text.png", "cannot identify"), (tmp_path / "none.png", "No such file"),
     ):
         with pytest.raises(collide.InvalidShape, match=match):

@@ -126,3 +126,12 @@ def test_files_hold_the_leaves(tmp_path):
         tree.save(tmp_path / "map.ply")
     with pytest.raises(collide.InvalidShape, match="cells within ±32768"):
         collide.OcTree(([[40_000, 0, 0]], [0], [1.0]), 0.1).save(tmp_path / "far.bt")
+
+
+def test_rays_too_long_for_their_cells_are_refused_before_they_are_walked():
+    for arguments, match in (
+        (((0, 0, 0), [[1, 0, 0]], 1e-9), "134217728 are the most; take larger cells"),
+        (((1e19, 0, 0), [[1e19, 1, 0]], 1.0), "too fine for these points"),
+    ):
+        with pytest.raises(collide.InvalidShape, match=match):
+            collide.OcTree.from_rays(*arguments)

@@ -132,3 +132,16 @@ def test_bad_arguments_are_named(asked, message):
 def test_clouds_are_no_parts_of_compounds():
     with pytest.raises(InvalidShape, match=r"items\[1\] is a PointCloud"):
         collide.Compound([(collide.Sphere(1.0), EYE), (PointCloud([(0, 0, 0)]), EYE)])
+
+
+def test_more_neighbours_than_points_are_none():
+    """Sorted all at once where many are wanted: the same as by the walk, and −1 behind the last."""
+    rng = np.random.default_rng(21)
+    points = np.round(rng.uniform(-1, 1, (700, 3)), 2)
+    cloud, places = collide.PointCloud(points), rng.uniform(-1, 1, (3, 3))
+    many, few = cloud.nearest(places, k=900), cloud.nearest(places, k=300)
+    assert np.array_equal(many.row[:, :300], few.row) and np.array_equal(many.distance[:, :300], few.distance)
+    assert (many.row[:, 700:] == -1).all() and np.isinf(many.distance[:, 700:]).all()
+    assert (np.sort(many.row[:, :700], axis=1) == np.arange(700)).all()
+    near = cloud.nearest(places[0], k=900, max_distance=0.5)
+    assert np.array_equal(near.row[near.row >= 0], many.row[0, : np.count_nonzero(many.distance[0] <= 0.5)])

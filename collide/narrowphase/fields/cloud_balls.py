@@ -42,5 +42,8 @@ class Balls(FieldItems):
         heights = self._points @ n - self._radii
         return np.flatnonzero(heights <= heights.min() + slack)
 
+    def least_height(self, number: int, n: np.ndarray) -> float:
+        return float(self._points[number] @ n - self._radii[number])
+
     def hulls(self, some: np.ndarray) -> list[ConvexHull]:
         return [ConvexHull(self._points[k : k + 1], radius=float(self._radii[k])) for k in some.tolist()]

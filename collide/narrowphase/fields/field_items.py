@@ -55,9 +55,9 @@ class NamedUnion(NamedTuple):
 class FieldItems(ABC):
     """The items of a field.
 
-    X_FG : (4, 4) pose of the items' frame in the field's.   walked : items with a tree to walk down; None of terrain.
-    is_one_part : whether a union of items, however many, is a single part.
-    low, high : (3,) box around all items, in their frame [m].
+    X_FG : (4, 4) pose of the frame of the items in the field's.   walked : items with a tree to walk down, or None.
+    is_one_part : whether the union of many items has a single part.   low, high : (3,) box around all items, in their
+    frame [m].
     """
 
     X_FG: np.ndarray = IDENTITY
@@ -98,6 +98,15 @@ class FieldItems(ABC):
         """Numbers of the items that are higher along a normal than the lowest by no more than a slack [m],
         ascending.
         """
+
+    @abstractmethod
+    def least_height(self, number: int, n: np.ndarray) -> float:
+        """Of an item along a normal [m]."""
+
+    def below(self, n: np.ndarray, height: float) -> np.ndarray:
+        """Numbers of the items that reach below a height along a normal [m], ascending."""
+        least = self.least_height(int(self.lowest(n, 0.0)[0]), n)
+        return self.lowest(n, height - least) if least <= height else np.empty(0, dtype=np.int64)
 
     @abstractmethod
     def hulls(self, some: np.ndarray) -> list[Any]:
@@ -178,6 +187,26 @@ def rounding_of_places(items: FieldItems, X_WG: np.ndarray, p_W: np.ndarray, ext
     R, t = X_WG[:, :3, :3], X_WG[:, :3, 3]
     size = _reach(items) + np.abs(t).sum(axis=1).max() + np.abs(p_W).sum(axis=1).max() + extra
     return float((ROUNDING + 8.0 * np.abs(R.transpose(0, 2, 1) @ R - np.eye(3)).max()) * size)
+
+
+def items_within(
+    items: FieldItems, B: Shape, X_WF: np.ndarray, X_WB: np.ndarray, distance: float
+) -> np.ndarray:
+    """Numbers of items near another shape, ascending: all items within a distance of the shape [m] are among them.
+    Items are left out by the box around the shape, or, beside shapes without end, by a half-space around the shape.
+    """
+    X_WG = items.pose(X_WF)
+    parts = bounding_parts_of(B)
+    if len(parts) > 1 or parts[0][0].kind != HALFSPACE:
+        return items.within(box_in_frame(B, X_WG, X_WB), distance)
+    packed, X_BP = parts[0]
+    X_GP = inverse_pose(X_WG) @ X_WB @ X_BP
+    length = float(np.linalg.norm(packed.params[:3]))
+    n = X_GP[:3, :3] @ packed.params[:3] / length
+    height = float(packed.params[3]) / length + float(n @ X_GP[:3, 3])
+    size = _reach(items) + abs(height) + np.abs(X_WG[:3, 3]).sum() + np.abs(X_WB[:3, 3]).sum() + distance
+    off = sum(np.abs(X[:3, :3].T @ X[:3, :3] - np.eye(3)).max() for X in (X_WG, X_WB))
+    return items.below(n, height + distance * (1.0 + ROUNDING) + (ROUNDING + 8.0 * off) * size)
 
 
 def lowest_items(items: FieldItems, n_W: np.ndarray, X_WF: np.ndarray, X_WB: np.ndarray) -> np.ndarray:

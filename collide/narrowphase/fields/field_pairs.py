@@ -112,8 +112,8 @@ class _PosedPart(NamedTuple):
 
 
 def _posed_parts(items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray) -> Iterator[_PosedPart]:
-    """The parts of a shape beside items. A part is widened by a power of two, so that an answer depends on its pose
-    alone, not on which poses are asked together.
+    """The parts of a shape beside items. A part is widened by a power of two: an answer depends on its pose alone,
+    not on poses asked together.
     """
     X_WG, slop_of_items = items.poses_of_items(X_WA)
     for k, (packed, X_BP) in enumerate(parts_of(B)):

@@ -42,6 +42,11 @@ class Cells(FieldItems):
     def lowest(self, n: np.ndarray, slack: float) -> np.ndarray:
         return self._tree.lowest(n, slack).numbers
 
+    def least_height(self, number: int, n: np.ndarray) -> float:
+        boxes = self._boxes(np.array([number]))
+        low, high = self._tree.corners(boxes.least, boxes.size)
+        return float(np.minimum(n * low, n * high).sum())
+
     def hulls(self, some: np.ndarray) -> list[ConvexHull]:
         boxes = self._boxes(some)
         return self._hulls(boxes.least, boxes.size)

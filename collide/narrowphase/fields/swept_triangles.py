@@ -39,6 +39,9 @@ class SweptTriangles(FieldItems):
         heights = (self._mesh.vertices @ n)[self._mesh.faces].min(axis=1)
         return np.flatnonzero(heights <= heights.min() + slack)
 
+    def least_height(self, number: int, n: np.ndarray) -> float:
+        return float((self._mesh.vertices[self._mesh.faces[number]] @ n).min()) - self._radius
+
     def hulls(self, some: np.ndarray) -> list[Shape]:
         mesh, n = self._mesh, len(self._mesh.faces)
         return [

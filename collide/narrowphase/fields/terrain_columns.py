@@ -59,13 +59,10 @@ class Columns(FieldItems):
         self._tile_tops = highest[tuple(self._tiles.T)]
 
     def every(self) -> np.ndarray:
-        return self._in_rectangle(_Rectangle(0, 0, self._rows, self._columns), -math.inf)
+        return self._in_rectangle(_Rectangle(0, 0, self._rows, self._columns), None, math.inf)
 
     def within(self, box: BoxAround, distance: float) -> np.ndarray:
         low, high = box.low - distance, box.high + distance
-        if high[2] < self._bottom:
-            return np.empty(0, dtype=np.int64)
-        # a cell more on each side: no wall of the rectangle is within the distance
         column, last_column = (int(k) for k in np.searchsorted(self._x, (low[0], high[0])))
         row, last_row = (int(k) for k in np.searchsorted(self._y, (low[1], high[1])))
         if low[0] > self._x[-1] or high[0] < self._x[0] or low[1] > self._y[-1] or high[1] < self._y[0]:
@@ -73,22 +70,57 @@ class Columns(FieldItems):
         around = _Rectangle(
             max(row - 2, 0), max(column - 2, 0), min(last_row + 1, self._rows), min(last_column + 1, self._columns)
         )
-        return self._in_rectangle(around, float(low[2]))
+        return self._in_rectangle(around, box, distance)
 
-    def _in_rectangle(self, around: _Rectangle, low: float) -> np.ndarray:
-        """Cells of a rectangle whose highest corner is no lower than ``low`` [m], ascending."""
+    def nearest(self, box: BoxAround) -> np.ndarray:
+        """The column whose box is nearest to a box, by the block nearest to it."""
+        blocks = np.argwhere(self._pyramid.highest > -math.inf)
+        away = self._away(box, *self._corners(blocks * BLOCK, BLOCK, self._pyramid.highest[tuple(blocks.T)]))
+        row, column = (blocks[int(np.argmin(away))] * BLOCK).tolist()
+        inside = _Rectangle(row, column, min(row + BLOCK, self._rows), min(column + BLOCK, self._columns))
+        cells = self._in_rectangle(inside, None, math.inf)
+        at = np.stack([cells // self._columns, cells % self._columns], axis=1)
+        return cells[[int(np.argmin(self._away(box, *self._corners(at, 1, self._highest(at)))))]]
+
+    def _in_rectangle(self, around: _Rectangle, box: BoxAround | None, distance: float) -> np.ndarray:
+        """Cells of a rectangle whose columns come within a distance of a box [m], or all, ascending."""
         if around.row >= around.last_row or around.column >= around.last_column:
             return np.empty(0, dtype=np.int64)
         cells = []
-        for begin in range(around.row, around.last_row, BLOCK):
-            end = min(begin + BLOCK, around.last_row)
-            blocks = self._pyramid.highest[begin // BLOCK : (end - 1) // BLOCK + 1]
-            if not (blocks[:, around.column // BLOCK : (around.last_column - 1) // BLOCK + 1] >= low).any():
-                continue
-            heights = self._pyramid.cell_heights(slice(begin, end), slice(around.column, around.last_column))
-            row, column = np.nonzero((heights >= low) & (heights > -math.inf))
-            cells.append((row + begin) * self._columns + column + around.column)
+        for begin in range(around.row // BLOCK * BLOCK, around.last_row, BLOCK):
+            rows = slice(max(begin, around.row), min(begin + BLOCK, around.last_row))
+            columns = slice(around.column, around.last_column)
+            if box is not None:
+                first, last = columns.start // BLOCK, (columns.stop - 1) // BLOCK + 1
+                blocks = np.column_stack([np.full(last - first, begin), np.arange(first, last) * BLOCK])
+                highest = self._pyramid.highest[begin // BLOCK, first:last]
+                near = np.flatnonzero(self._away(box, *self._corners(blocks, BLOCK, highest)) <= distance)
+                if not len(near):
+                    continue
+                columns = slice(
+                    max((first + int(near[0])) * BLOCK, columns.start),
+                    min((first + int(near[-1]) + 1) * BLOCK, columns.stop),
+                )
+            at = np.argwhere(self._pyramid.cell_heights(rows, columns) > -math.inf)
+            at = np.add(at, (rows.start, columns.start))
+            if box is not None:
+                at = at[self._away(box, *self._corners(at, 1, self._highest(at))) <= distance]
+            cells.append(at[:, 0] * self._columns + at[:, 1])
         return np.concatenate(cells) if cells else np.empty(0, dtype=np.int64)
+
+    def _highest(self, at: np.ndarray) -> np.ndarray:
+        """(n,) the highest corners of cells by row and column (n, 2) [m]."""
+        row, column, heights = at[:, 0], at[:, 1], self._heights
+        return np.maximum(
+            np.maximum(heights[row, column], heights[row, column + 1]),
+            np.maximum(heights[row + 1, column], heights[row + 1, column + 1]),
+        )
+
+    @staticmethod
+    def _away(box: BoxAround, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """(n,) lower bounds of the distance of a box from boxes (n, 3) [m]."""
+        gaps = np.maximum(np.maximum(low - box.high, box.low - high), 0.0)
+        return np.sqrt(np.square(gaps).sum(axis=1)) * (1.0 - 2.0**-40)
 
     def on_way(self, way: np.ndarray, limit: float, extra: float, slack: float, first: bool):
         reach, size = extra + slack, BLOCK
@@ -97,11 +129,7 @@ class Columns(FieldItems):
         blocks = blocks[_times(way, low - reach, high + reach, limit) < math.inf]
         inside = (blocks[:, None] * size + np.array(list(np.ndindex(size, size)))).reshape(-1, 2)
         inside = inside[(inside < (self._rows, self._columns)).all(axis=1)]
-        row, column, heights = inside[:, 0], inside[:, 1], self._heights
-        highest = np.maximum(
-            np.maximum(heights[row, column], heights[row, column + 1]),
-            np.maximum(heights[row + 1, column], heights[row + 1, column + 1]),
-        )
+        row, column, highest = inside[:, 0], inside[:, 1], self._highest(inside)
         low, high = self._corners(inside, 1, highest)
         times = np.where(np.isnan(highest), math.inf, _times(way, low - reach, high + reach, limit))
         met = times < math.inf
@@ -124,7 +152,7 @@ class Columns(FieldItems):
                 break
             row, column = (blocks[k] * BLOCK).tolist()
             around = _Rectangle(row, column, min(row + BLOCK, self._rows), min(column + BLOCK, self._columns))
-            cells = self._in_rectangle(around, -math.inf)
+            cells = self._in_rectangle(around, None, math.inf)
             heights = self._least_heights(cells, n)
             least = min(least, float(heights.min()))
             lowest.append((cells, heights))
@@ -141,6 +169,9 @@ class Columns(FieldItems):
                 z = n[2] * self._heights[row + i, column + j]
                 least = np.minimum(least, across + np.minimum(z, n[2] * self._bottom))
         return least
+
+    def least_height(self, number: int, n: np.ndarray) -> float:
+        return float(self._least_heights(np.array([number]), n)[0])
 
     def hulls(self, some: np.ndarray) -> list[ConvexHull]:
         raise NotImplementedError("columns are no convex sets")
@@ -160,7 +191,7 @@ class Columns(FieldItems):
     def some(self) -> np.ndarray:
         row, column = (np.argwhere(self._pyramid.highest > -math.inf)[0] * BLOCK).tolist()
         block = _Rectangle(row, column, min(row + BLOCK, self._rows), min(column + BLOCK, self._columns))
-        return self._in_rectangle(block, -math.inf)[:1]
+        return self._in_rectangle(block, None, math.inf)[:1]
 
     def union_of(self, some: np.ndarray) -> NamedUnion:
         """A mesh of the rectangle around some cells, or, where these are few among many, of the cells themselves."""
