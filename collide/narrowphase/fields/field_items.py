@@ -55,7 +55,7 @@ class NamedUnion(NamedTuple):
 class FieldItems(ABC):
     """The items of a field.
 
-    X_FG : (4, 4) pose of the frame of the items in the field's.   walked : items with a tree to walk down, or None.
+    X_FG : (4, 4) pose of the frame of the items in the field's.   walked : items with a tree to walk down, or `None`.
     is_one_part : whether the union of many items has a single part.   low, high : (3,) box around all items, in their
     frame [m].
     """
