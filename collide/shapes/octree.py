@@ -342,6 +342,8 @@ def _checked_leaves(leaves) -> OcTreeLeaves:
         raise InvalidShape(f"OcTree: leaves must be (cell, exponent, log_odds), got {checks.brief(leaves)}")
     cell = checks.plain_array("OcTree: leaves.cell", leaves[0], "(n, 3)", InvalidShape)
     exponent = checks.plain_array("OcTree: leaves.exponent", leaves[1], "(n,)", InvalidShape)
+    if not np.size(leaves[2]):
+        raise InvalidShape("OcTree: the map has no leaf: it is empty, or nothing was seen yet; leave the body out")
     log_odds = rows("OcTree", "leaves.log_odds", leaves[2], (None,))
     n = len(log_odds)
     if cell.shape != (n, 3) or exponent.shape != (n,) or cell.dtype.kind not in "iu" or exponent.dtype.kind not in "iu":

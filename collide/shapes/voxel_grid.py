@@ -72,6 +72,8 @@ class VoxelGrid(Shape):
         name = type(self).__name__
         sides, pose = _checked_sides(name, cell), IDENTITY if X is None else as_pose(X, f"{name}: X")
         array = checks.plain_array(f"{name}: occupied", occupied, "(nx, ny, nz) or (k, 3)", InvalidShape)
+        if not array.size:
+            raise InvalidShape(f"{name}: no cell is occupied: occupied is empty, of shape {array.shape}")
         if array.dtype.kind not in "biu" or array.ndim not in (2, 3) or (array.ndim == 2 and array.shape[1] != 3):
             raise InvalidShape(
                 f"{name}: occupied must be (nx, ny, nz) of bool, or cells (k, 3) of int, got {checks.brief(occupied)}"
