@@ -72,6 +72,21 @@ def shapes() -> dict:
     }
 
 
+def coal_calls(places: np.ndarray, size: float, X: np.ndarray) -> dict:
+    """{shape: call}, each of coal's octree of cells of a size [m] around places (n, 3), against a shape at poses."""
+    import coal
+
+    octree, request = coal.makeOctree(places, size), coal.CollisionRequest()
+    sides = {"sphere": coal.Sphere(0.02), "box": coal.Box(0.05, 0.04, 0.06), "capsule": coal.Capsule(0.02, 0.05)}
+    eye, T = coal.Transform3s(), [coal.Transform3s(M[:3, :3], M[:3, 3]) for M in X]
+
+    def loop(shape):
+        for transform in T:
+            coal.collide(octree, eye, shape, transform, request, coal.CollisionResult())
+
+    return {name: partial(loop, shape) for name, shape in sides.items()}
+
+
 @cache
 def asked_of(points: int, where: str, n: int) -> dict:
     """{question: {engine: call}}"""
@@ -87,18 +102,8 @@ def asked_of(points: int, where: str, n: int) -> dict:
         calls["nearest"]["scipy"] = partial(tree.query, centres)
         calls["sphere"]["scipy"] = partial(tree.query_ball_point, centres, 0.02 + _RADIUS, return_length=True)
     if installed(coal="coal") and points <= 10**5:
-        import coal
-
-        octree, request = coal.makeOctree(places, 2.0 * _RADIUS), coal.CollisionRequest()
-        sides = {"sphere": coal.Sphere(0.02), "box": coal.Box(0.05, 0.04, 0.06), "capsule": coal.Capsule(0.02, 0.05)}
-        eye, T = coal.Transform3s(), [coal.Transform3s(M[:3, :3], M[:3, 3]) for M in X]
-
-        def loop(shape):
-            for transform in T:
-                coal.collide(octree, eye, shape, transform, request, coal.CollisionResult())
-
-        for name, shape in sides.items():
-            calls[name]["coal"] = partial(loop, shape)
+        for name, call in coal_calls(places, 2.0 * _RADIUS, X).items():
+            calls[name]["coal"] = call
     for tasks in calls.values():
         for call in tasks.values():
             call()

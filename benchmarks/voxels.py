@@ -14,7 +14,7 @@ from __future__ import annotations
 from functools import cache, partial
 
 import numpy as np
-from clouds import poses, shapes
+from clouds import coal_calls, poses, shapes
 
 import collide
 from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
@@ -62,18 +62,8 @@ def asked_of(n: int, where: str, asks: int) -> dict:
     calls: dict = {name: {"collide": partial(collide.collide, made_grid, S, _EYE, X)} for name, S in shapes().items()}
     calls["gap of a box"] = {"collide": partial(collide.distance, made_grid, shapes()["box"], _EYE, X, signed=False)}
     if installed(coal="coal") and made_grid.count <= _MAX_COAL:
-        import coal
-
-        octree, request = coal.makeOctree(middles(n, where), 2.0 / n), coal.CollisionRequest()
-        sides = {"sphere": coal.Sphere(0.02), "box": coal.Box(0.05, 0.04, 0.06), "capsule": coal.Capsule(0.02, 0.05)}
-        eye, T = coal.Transform3s(), [coal.Transform3s(M[:3, :3], M[:3, 3]) for M in X]
-
-        def loop(shape):
-            for transform in T:
-                coal.collide(octree, eye, shape, transform, request, coal.CollisionResult())
-
-        for name, shape in sides.items():
-            calls[name]["coal"] = partial(loop, shape)
+        for name, call in coal_calls(middles(n, where), 2.0 / n, X).items():
+            calls[name]["coal"] = call
     for tasks in calls.values():
         for call in tasks.values():
             call()

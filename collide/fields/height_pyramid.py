@@ -12,7 +12,7 @@ class HeightPyramid:
     """The cells of heights (r, c) without a corner of NaN.
 
     n_cells : how many cells there are.   highest : (⌈(r − 1)/16⌉, ⌈(c − 1)/16⌉) float64, the highest height of each
-    block of 16 × 16 cells, −∞ of blocks of holes [m].   lowest, top : of all [m].
+    block of 16 × 16 cells, −∞ of blocks of holes [m].   top : of all [m].
     """
 
     def __init__(self, heights: np.ndarray):

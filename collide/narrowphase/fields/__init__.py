@@ -1,1 +1,1 @@
-"""Point clouds against other shapes."""
+"""Point clouds, cells of voxels and large terrain against other shapes."""

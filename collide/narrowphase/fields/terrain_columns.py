@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -74,13 +75,22 @@ class Columns(FieldItems):
 
     def nearest(self, box: BoxAround) -> np.ndarray:
         """The column whose box is nearest to a box, by the block nearest to it."""
-        blocks = np.argwhere(self._pyramid.highest > -math.inf)
-        away = self._away(box, *self._corners(blocks * BLOCK, BLOCK, self._pyramid.highest[tuple(blocks.T)]))
-        row, column = (blocks[int(np.argmin(away))] * BLOCK).tolist()
-        inside = _Rectangle(row, column, min(row + BLOCK, self._rows), min(column + BLOCK, self._columns))
-        cells = self._in_rectangle(inside, None, math.inf)
+        least, low, high = self._blocks
+        cells = self._cells_of_block(least[int(np.argmin(self._away(box, low, high)))])
         at = np.stack([cells // self._columns, cells % self._columns], axis=1)
         return cells[[int(np.argmin(self._away(box, *self._corners(at, 1, self._highest(at)))))]]
+
+    @cached_property
+    def _blocks(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(n, 2) the least row and column of every block with a cell, and the corners (n, 3) of its box."""
+        blocks = np.argwhere(self._pyramid.highest > -math.inf)
+        return blocks * BLOCK, *self._corners(blocks * BLOCK, BLOCK, self._pyramid.highest[tuple(blocks.T)])
+
+    def _cells_of_block(self, least: np.ndarray) -> np.ndarray:
+        """The cells of a block by its least row and column, ascending."""
+        row, column = least.tolist()
+        around = _Rectangle(row, column, min(row + BLOCK, self._rows), min(column + BLOCK, self._columns))
+        return self._in_rectangle(around, None, math.inf)
 
     def _in_rectangle(self, around: _Rectangle, box: BoxAround | None, distance: float) -> np.ndarray:
         """Cells of a rectangle whose columns come within a distance of a box [m], or all, ascending."""
@@ -123,11 +133,10 @@ class Columns(FieldItems):
         return np.sqrt(np.square(gaps).sum(axis=1)) * (1.0 - 2.0**-40)
 
     def on_way(self, way: np.ndarray, limit: float, extra: float, slack: float, first: bool):
-        reach, size = extra + slack, BLOCK
-        blocks = np.argwhere(self._pyramid.highest > -math.inf)
-        low, high = self._corners(blocks * size, size, self._pyramid.highest[tuple(blocks.T)])
-        blocks = blocks[_times(way, low - reach, high + reach, limit) < math.inf]
-        inside = (blocks[:, None] * size + np.array(list(np.ndindex(size, size)))).reshape(-1, 2)
+        reach = extra + slack
+        least, low, high = self._blocks
+        least = least[_times(way, low - reach, high + reach, limit) < math.inf]
+        inside = (least[:, None] + np.array(list(np.ndindex(BLOCK, BLOCK)))).reshape(-1, 2)
         inside = inside[(inside < (self._rows, self._columns)).all(axis=1)]
         row, column, highest = inside[:, 0], inside[:, 1], self._highest(inside)
         low, high = self._corners(inside, 1, highest)
@@ -144,15 +153,12 @@ class Columns(FieldItems):
         return low, np.column_stack([self._x[last[:, 1]], self._y[last[:, 0]], highest])
 
     def lowest(self, n: np.ndarray, slack: float) -> np.ndarray:
-        blocks = np.argwhere(self._pyramid.highest > -math.inf)
-        low, high = self._corners(blocks * BLOCK, BLOCK, self._pyramid.highest[tuple(blocks.T)])
+        blocks, low, high = self._blocks
         bounds, least, lowest = np.minimum(n * low, n * high).sum(axis=1), math.inf, []
         for k in np.argsort(bounds, kind="stable").tolist():
             if bounds[k] > least + slack:
                 break
-            row, column = (blocks[k] * BLOCK).tolist()
-            around = _Rectangle(row, column, min(row + BLOCK, self._rows), min(column + BLOCK, self._columns))
-            cells = self._in_rectangle(around, None, math.inf)
+            cells = self._cells_of_block(blocks[k])
             heights = self._least_heights(cells, n)
             least = min(least, float(heights.min()))
             lowest.append((cells, heights))
