@@ -23,14 +23,14 @@ from collide.fields.cell_tree_kernel import (
     merge_cells,
     pack_cells,
 )
+from collide.fields.listings import listed
 from collide.kernels import address_of
 from collide.mesh.bvh import DEPTH, N_FACETS, NUMBERS_AT
 
 #: Bits of a key a level, and of a word's coordinate.
 _KEY_BITS, _WORD_BITS = 6, 16
-#: The children of a node, and words listed at once to begin with.
+#: The children of a node.
 _OFFSETS = np.array(list(np.ndindex(SIDE, SIDE, SIDE)), dtype=np.int64)
-_FIRST_LISTED = 256
 #: Cells of a grid at most, free or not, along an axis and in all: results hold their numbers in 31 bits.
 MAX_ALONG, MAX_NUMBER = MAX_CELLS, (1 << 31) - 1
 
@@ -115,14 +115,9 @@ class CellTree:
     def boxes_in(self, low: np.ndarray, high: np.ndarray) -> Boxes:
         """Occupied boxes with cells within a range of cells (3,), both ends included, by number."""
         limits = np.array([np.maximum(low, 0), np.minimum(high, np.array(self.shape) - 1)], dtype=np.int64)
-        size, stack = _FIRST_LISTED, np.empty(STACK, dtype=np.int64)
-        while True:
-            words = np.empty(size, dtype=np.int64)
-            corners = address_of(limits[0]), address_of(limits[1])
-            n = cells_in_range(self.address, *corners, address_of(words), size, address_of(stack))
-            if n <= size:
-                return self._sorted(words[:n])
-            size = n
+        stack, corners = np.empty(STACK, dtype=np.int64), (address_of(limits[0]), address_of(limits[1]))
+        (words,) = listed(lambda *out: cells_in_range(self.address, *corners, *out, address_of(stack)), np.int64)
+        return self._sorted(words)
 
     def range_of(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The least and largest cell that a box may reach [m], a cell more for what rounds."""
@@ -133,29 +128,22 @@ class CellTree:
 
     def on_way(self, way: np.ndarray, slack: float, limit: float, first: bool) -> tuple[Boxes, np.ndarray]:
         """(boxes, earliest t) on a way (6,), by t; arguments as of `cells_on_way`."""
-        size, stack = _FIRST_LISTED, np.empty(STACK, dtype=np.int64)
-        while True:
-            words, times = np.empty(size, dtype=np.int64), np.empty(size)
-            n = cells_on_way(
-                self.address, address_of(way), slack, limit, first, address_of(words), address_of(times), size,
-                address_of(stack),
-            )
-            if n <= size:
-                order = np.lexsort((words[:n], times[:n]))
-                return self._boxes(words[:n][order]), times[:n][order]
-            size = n
+        stack = np.empty(STACK, dtype=np.int64)
+        words, times = listed(
+            lambda *out: cells_on_way(self.address, address_of(way), slack, limit, first, *out, address_of(stack)),
+            np.int64, np.float64,
+        )
+        order = np.lexsort((words, times))
+        return self._boxes(words[order]), times[order]
 
     def lowest(self, normal: np.ndarray, slack: float) -> Boxes:
         """Occupied boxes that are higher along a normal (3,) than the lowest by no more than a slack [m], by number."""
-        size, stack, normal = _FIRST_LISTED, np.empty(STACK, dtype=np.int64), np.array(normal, dtype=np.float64)
-        while True:
-            words, heights = np.empty(size, dtype=np.int64), np.empty(size)
-            n = lowest_cells(
-                self.address, address_of(normal), slack, address_of(words), address_of(heights), size, address_of(stack)
-            )
-            if n <= size:
-                return self._sorted(words[:n][heights[:n] <= heights[:n].min() + slack])
-            size = n
+        stack, normal = np.empty(STACK, dtype=np.int64), np.array(normal, dtype=np.float64)
+        words, heights = listed(
+            lambda *out: lowest_cells(self.address, address_of(normal), slack, *out, address_of(stack)),
+            np.int64, np.float64,
+        )
+        return self._sorted(words[heights <= heights.min() + slack])
 
     def coarse_boxes(self, max_boxes: int) -> tuple[np.ndarray, np.ndarray]:
         """Corners (n, 3) of boxes that hold all cells: of the deepest level of nodes with no more than

@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from collide.fields.listings import listed
 from collide.fields.point_tree_kernel import (
     CELLS,
     MAX_LEVELS,
@@ -27,8 +28,6 @@ from collide.mesh.bvh import MAX_LEAF, NODE, WIDTH
 _STACK = 2 * WIDTH * (MAX_LEVELS + 1)
 #: Points within less keep their order: cells so small have no inverse [m].
 _LEAST_WIDTH = 1e-300
-#: Points listed at once to begin with.
-_FIRST_LISTED = 256
 
 
 class PointTree:
@@ -79,14 +78,9 @@ class PointTree:
     def in_box(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """(k,) numbers of the points within a box, ascending."""
         low, high = (np.array(corner, dtype=np.float64) for corner in (low, high))
-        size, stack = _FIRST_LISTED, np.empty(_STACK, dtype=np.int64)
-        while True:
-            ids = np.empty(size, dtype=np.int64)
-            corners = address_of(low), address_of(high)
-            n = points_in_box(self.address, *corners, address_of(ids), size, address_of(stack))
-            if n <= size:
-                return np.sort(ids[:n])
-            size = n
+        stack, corners = np.empty(_STACK, dtype=np.int64), (address_of(low), address_of(high))
+        (ids,) = listed(lambda *out: points_in_box(self.address, *corners, *out, address_of(stack)), np.int64)
+        return np.sort(ids)
 
     def on_way(
         self, radius, way: np.ndarray, limit: float, extra: float, slack: float, first: bool
@@ -96,18 +90,16 @@ class PointTree:
         radius : of all balls, or (n,) [m].   way : (6,) origin and vector.   limit, extra, slack, first : as of
         `balls_on_way`.
         """
-        size, stack = _FIRST_LISTED, np.empty(_STACK, dtype=np.int64)
+        stack, largest = np.empty(_STACK, dtype=np.int64), float(np.max(radius))
         radii = 0 if np.ndim(radius) == 0 else address_of(radius)
-        while True:
-            ids, times = np.empty(size, dtype=np.int64), np.empty(size)
-            n = balls_on_way(
-                self.address, radii, float(np.max(radius)), address_of(way), limit, extra, slack, first,
-                address_of(ids), address_of(times), size, address_of(stack),
-            )
-            if n <= size:
-                order = np.lexsort((ids[:n], times[:n]))
-                return ids[:n][order], times[:n][order]
-            size = n
+        ids, times = listed(
+            lambda *out: balls_on_way(
+                self.address, radii, largest, address_of(way), limit, extra, slack, first, *out, address_of(stack)
+            ),
+            np.int64, np.float64,
+        )
+        order = np.lexsort((ids, times))
+        return ids[order], times[order]
 
 
 def numbers_along_curve(points: np.ndarray) -> np.ndarray:
