@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from llvmlite import ir
 from numba.core import types
 from numba.core.errors import TypingError
@@ -23,12 +25,13 @@ def boxes_meeting(_context, boxes, at, frame, probe):
 @intrinsic
 def boxes_meeting_prism(_context, boxes, at, frame, probe):
     """The same of a triangle, with half-spaces along its edges."""
+    return _meeting(boxes, frame, probe, _parted_by_prism)
 
-    def parted(builder, data, frame, probe):
-        yield from _apart(builder, data, frame, probe)
-        yield from _outside(builder, data, probe)
 
-    return _meeting(boxes, frame, probe, parted)
+@intrinsic
+def points_meeting_prism(_context, points, at, frame, probe):
+    """The same of eight points."""
+    return _meeting(points, frame, probe, partial(_parted_by_prism, have_sides=False))
 
 
 @intrinsic
@@ -108,22 +111,30 @@ def _meeting(boxes, frame, probe, parted):
     return signature, codegen
 
 
-def _outside(builder, data, probe):
-    """Three vectors of bits: which boxes lie outside the half-space of each edge of the probe."""
+def _parted_by_prism(builder, data, frame, probe, have_sides=True):
+    yield from _apart(builder, data, frame, probe, have_sides)
+    yield from _outside(builder, data, probe, have_sides)
+
+
+def _outside(builder, data, probe, have_sides):
+    """Three vectors of bits: which boxes, or points, lie outside the half-space of each edge of the probe."""
     for edge in (17, 21, 25):
         out = _element(builder, probe, edge + 3)
         for j in range(3):
             entry = _element(builder, probe, edge + j)
             out = builder.fadd(out, builder.fmul(entry, _eight(builder, data, j)))
-            out = builder.fsub(out, builder.fmul(_abs(builder, entry), _eight(builder, data, 3 + j)))
+            if have_sides:
+                out = builder.fsub(out, builder.fmul(_abs(builder, entry), _eight(builder, data, 3 + j)))
         yield builder.fcmp_ordered(">", out, ir.Constant(_FLOATS, [0.0] * LANES))
 
 
-def _apart(builder, data, frame, probe):
-    """Eight vectors of bits: whether a slot is not used, and whether an axis parts its box from that of the probe."""
+def _apart(builder, data, frame, probe, have_sides=True):
+    """Vectors of bits: whether a slot is not used, and whether an axis parts its box, or point, from the probe's."""
     centres = [_eight(builder, data, axis) for axis in range(3)]
-    half_lengths = [_eight(builder, data, 3 + axis) for axis in range(3)]
-    yield _unused(builder, half_lengths)
+    half_lengths = [ir.Constant(_FLOATS, [0.0] * LANES)] * 3
+    if have_sides:
+        half_lengths = [_eight(builder, data, 3 + axis) for axis in range(3)]
+        yield _unused(builder, half_lengths)
     for axis in range(3):
         gap = builder.fsub(centres[axis], _element(builder, probe, axis))
         reach = builder.fadd(half_lengths[axis], _element(builder, probe, 3 + axis))

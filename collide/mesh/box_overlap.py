@@ -61,6 +61,13 @@ def boxes_meeting_prism_one_by_one(boxes, at, frame, probe):
     return mask
 
 
+def points_meeting_prism_one_by_one(points, at, frame, probe):
+    """`points_meeting_prism` in numpy's floats."""
+    rows = np.zeros((6, WIDTH), dtype=np.float32)
+    rows[:3] = points[at : at + 3 * WIDTH].reshape(3, WIDTH)
+    return boxes_meeting_prism_one_by_one(rows.reshape(-1), 0, frame, probe)
+
+
 def boxes_near_place_one_by_one(boxes, at, x, y, z, limit):
     """`boxes_near_place` in numpy's floats."""
     with np.errstate(all="ignore"):
@@ -141,6 +148,7 @@ if not WITH_NUMBA:
     boxes_meeting, boxes_nearest = boxes_meeting_one_by_one, boxes_nearest_one_by_one
     boxes_meeting_prism = boxes_meeting_prism_one_by_one
     boxes_near_place, points_near_place = boxes_near_place_one_by_one, points_near_place_one_by_one
+    points_meeting_prism = points_meeting_prism_one_by_one
     patches_near_place = patches_near_place_one_by_one
 else:
     from collide.kernels.box_vectors import (
@@ -149,11 +157,13 @@ else:
         boxes_near_place,
         boxes_nearest,
         patches_near_place,
+        points_meeting_prism,
         points_near_place,
     )
 
 #: ``boxes_meeting(boxes, at, frame, probe) -> int``: bit k is set unless an axis separates the probe's box from box k
-#: of the node whose first float is ``boxes[at]``. Views of float32. `boxes_meeting_prism` reads PRISM floats.
+#: of the node whose first float is ``boxes[at]``. Views of float32. `boxes_meeting_prism` reads PRISM floats;
+#: `points_meeting_prism` reads three rows of eight coordinates in place of boxes.
 #: ``boxes_nearest(boxes, at, slabs, slab_at, frame, probe, out)``: out becomes eight lower bounds of distances (≤ 0
 #: where no axis separates), then eight squared lengths of lines between centres, in units of the probe's tree.
 #: ``boxes_near_place(boxes, at, x, y, z, limit) -> int``: bit k is set where the squared distance of box k of the node
@@ -163,6 +173,6 @@ else:
 __all__ = [
     "FRAME", "NEAR_PROBE", "PRISM", "PROBE", "boxes_meeting", "boxes_meeting_one_by_one", "boxes_meeting_prism",
     "boxes_meeting_prism_one_by_one", "boxes_near_place", "boxes_near_place_one_by_one", "boxes_nearest",
-    "boxes_nearest_one_by_one", "patches_near_place", "patches_near_place_one_by_one", "points_near_place",
-    "points_near_place_one_by_one",
+    "boxes_nearest_one_by_one", "patches_near_place", "patches_near_place_one_by_one", "points_meeting_prism",
+    "points_meeting_prism_one_by_one", "points_near_place", "points_near_place_one_by_one",
 ]

@@ -13,6 +13,7 @@ import numpy as np
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
 from collide.lowering.compound_table import lay_out
+from collide.lowering.extents import box_of
 from collide.lowering.lazy_structures import may_have_tree, support_tree_of
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_halfspace, pack_points
 from collide.lowering.parts import Part, bounding_parts_of, parts_of
@@ -269,24 +270,6 @@ def packed_within(packed: PackedConvex, margin: float, R: np.ndarray) -> PackedC
     back = radius - packed.radius
     rounding = abs(packed.radius - (radius - back)) + abs(margin - back)  # of the sum, to the last digit
     return swollen(packed, margin)._replace(slop=packed.slop + rounding)
-
-
-def box_of(packed: PackedConvex) -> np.ndarray:
-    """(BOX,) centre and half sides of a box around a set, in the set's own frame; infinite half sides for a
-    half-space.
-    """
-    if packed.kind == HALFSPACE:
-        return np.array([0.0, 0.0, 0.0, np.inf, np.inf, np.inf])
-    if packed.kind == POINTS:
-        low, high = packed.points.min(axis=0), packed.points.max(axis=0)
-        return np.concatenate([0.5 * (low + high), 0.5 * (high - low) + packed.radius + packed.slop])
-    return np.concatenate([np.zeros(3), _curved_half(packed) + packed.radius + packed.slop])
-
-
-def _curved_half(packed: PackedConvex) -> np.ndarray:
-    """Half sides of a curved core's box: three radii of an ellipsoid, else a radius and half a length."""
-    from_radii = packed.params[:3]
-    return from_radii if packed.params[2] > 0.0 else np.array([from_radii[0], from_radii[0], from_radii[1]])
 
 
 def _body_boxes(rows: np.ndarray, parts: np.ndarray, part_boxes: np.ndarray, padded: int) -> np.ndarray:

@@ -11,6 +11,7 @@ from collide.results import PAIR_DTYPE
 from collide.robots import check_scene as layout
 from collide.robots import motion_bounds as motions
 from collide.robots.check_tables import Setting
+from collide.robots.field_walks import field_walks
 from collide.robots.forward_kinematics import JointTable
 
 #: Pairs left to others that a call has space for, at least.
@@ -52,6 +53,8 @@ class CheckWorkspace:
             layout.UNBOUNDED_AT: unbounded, layout.BODY_OF_AT: around.body_of, layout.ALLOWED_AT: allowed,
             layout.TERMS_AT: NO_TERMS, layout.SHAPE_OF_AT: tables.shape_of,
         }
+        self._walks = field_walks(around, *map(address_of, (buffers[layout.DOUBLES_AT], buffers[layout.INTEGERS_AT])))
+        buffers[layout.WALKS_AT] = self._walks.words
         numbers = {
             layout.N_JOINTS: len(joints.ints), layout.ROOT: joints.root, layout.N_LINKS: joints.n_links,
             layout.CORE: code_of(answer_pairs), layout.N_BODIES: n_bodies, layout.N_SELF_PAIRS: len(self_pairs),

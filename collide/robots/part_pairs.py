@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from collide.kernels import kernel, native_call, view_i64, view_u8
-from collide.lowering.shape_table import POSE
+from collide.lowering.shape_table import INTS, NUMBERS, POSE
+from collide.narrowphase.facets.nearest_item_kernel import LONG_WAY, MAYBE_INSIDE, MEETS, PART_SIGNATURE, SURFACES_APART
 from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.rows import HIT, LOWER, NORMAL, ROW, is_undecided_or_refused, view_row
 from collide.numerics.vec3 import Vec3, dot, put_vec3, rotate, rotate_back, sub, vec3_at
@@ -17,19 +18,26 @@ from collide.robots.check_scene import (
     INTEGERS_AT,
     INTS_AT,
     IS_BOUND_AT,
+    N_LINK_PARTS,
     N_PARTS,
     NUMBERS_AT,
     PAIR_AT,
+    PART_BOXES_AT,
     POSES_AT,
     ROW_AT,
     SHAPE_OF_AT,
     TERMS_AT,
+    WALK,
+    WALK_CODE,
+    WALK_HEADER,
+    WALKS_AT,
 )
 
 #: What is known of two parts: proven farther apart than the margin; nearer, and apart; they meet; left to others.
 BEYOND_MARGIN, NEAR, HITTING, OPEN = range(4)
 
 _answer_pairs_at = native_call(SIGNATURE)
+_state_of_part_at = native_call(PART_SIGNATURE)
 
 
 @kernel(inline=True)
@@ -40,6 +48,11 @@ def state_of_parts(scene, p, q, margin):
         d = sub(middle(scene, q), middle(scene, p))
         if boxes_are_apart(scene, p, q, d, margin):
             return BEYOND_MARGIN
+    if q >= scene.words[N_LINK_PARTS]:
+        walk = WALK * (q - scene.words[N_LINK_PARTS])
+        walks = view_i64(scene.words[WALKS_AT], walk + WALK)
+        if walks[walk + WALK_CODE] != 0:
+            return _state_of_field(scene, p, walks[walk + WALK_CODE], walks[walk + WALK_HEADER], margin)
     row = ask(scene, p, q, d, True, margin)
     if is_undecided_or_refused(row):
         return OPEN
@@ -48,6 +61,27 @@ def state_of_parts(scene, p, q, margin):
     if row.flags[HIT] == 0:
         return NEAR
     return OPEN if only_holds(scene, p) or only_holds(scene, q) else HITTING
+
+
+@kernel
+def _state_of_field(scene, p, code, header_at, margin):
+    """`state_of_parts` of a part and a field around; NEAR where items may be within the margin, and OPEN where a part
+    only holds what is meant: what the part is apart from, the mesh within is apart from.
+    """
+    words = scene.words
+    row = view_i64(words[SHAPE_OF_AT], p + 1)[p]
+    state = _state_of_part_at(
+        code,
+        (
+            header_at, words[INTS_AT] + 8 * INTS * row, words[NUMBERS_AT] + 8 * NUMBERS * row,
+            words[POSES_AT] + 8 * POSE * p, words[PART_BOXES_AT] + 8 * BOX * p, margin,
+        ),
+    )
+    if state == SURFACES_APART or state == MAYBE_INSIDE:
+        return BEYOND_MARGIN
+    if state == LONG_WAY or only_holds(scene, p):
+        return OPEN
+    return HITTING if state == MEETS else NEAR
 
 
 @kernel(inline=True)

@@ -10,16 +10,19 @@ import numpy as np
 from collide.fields.cell_tree_kernel import STACK
 from collide.kernels import address_of, code_of
 from collide.kernels.prepared import prepared_row
+from collide.lowering.extents import box_of
 from collide.lowering.facet_bodies import Body, reach_of
 from collide.lowering.facet_table import FacetTable
 from collide.lowering.packed_convex import POINTS, PackedConvex
 from collide.lowering.shape_table import COUNT, POSE, RADIUS
+from collide.mesh.box_overlap import FRAME, PRISM
 from collide.mesh.bvh import WIDTH
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_kernel_calls import scratch, space_of_single_calls
 from collide.narrowphase.facets.facet_queries import points_in_solid
 from collide.narrowphase.facets.nearest_item_kernel import (
     BALLS,
+    BOX_AT,
     CELLS,
     EXCHANGED,
     FACETS,
@@ -27,6 +30,7 @@ from collide.narrowphase.facets.nearest_item_kernel import (
     ITEMS_ARE,
     MAYBE_INSIDE,
     MEETS,
+    PROBE_AT,
     RADII_AT,
     REACH_OF_ITEMS,
     STACK_AT,
@@ -35,6 +39,7 @@ from collide.narrowphase.facets.nearest_item_kernel import (
     curved_gaps,
     curved_state_single,
     curved_states_of,
+    state_of_part,
 )
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
 from collide.narrowphase.pair_kernel import answer_pairs
@@ -51,12 +56,20 @@ def serves(packed: PackedConvex) -> bool:
 _CORNERS = {FACETS: 3, BALLS: 1, CELLS: 8}
 
 
+class StateKernels(NamedTuple):
+    """What tells whether items meet a shape: at many poses, in single calls, of a part in the tables of a robot."""
+
+    batch: Any = curved_states_of
+    single: Any = curved_state_single
+    part: Any = state_of_part
+
+
 class Items(NamedTuple):
     """The facets of a mesh, the balls of a cloud, or the cells of a grid.
 
     tree : over facets, points or cells.   reach : how far they reach from their origin [m].   solid : whether they
     enclose an inside.   radius : the largest of balls, 0 of facets [m].   radii : (n,) of balls, where they differ.
-    are : FACETS, BALLS or CELLS.
+    are : FACETS, BALLS or CELLS.   kernels : of states.
     """
 
     tree: Any
@@ -65,6 +78,7 @@ class Items(NamedTuple):
     radius: float = 0.0
     radii: np.ndarray | None = None
     are: int = FACETS
+    kernels: StateKernels = StateKernels()
 
 
 class GapQuestion:
@@ -88,6 +102,8 @@ class GapQuestion:
         )
         self.header[STACK_AT:EXCHANGED] = address_of(self.stack), address_of(self.bounds)
         self.header[ITEMS_ARE] = items.are
+        self.box, self.probe = box_of(packed), np.zeros(FRAME + PRISM, dtype=np.float32)
+        self.header[BOX_AT], self.header[PROBE_AT] = address_of(self.box), address_of(self.probe)
         self.header[RADII_AT] = 0 if items.radii is None else address_of(items.radii)
         promise = PROMISE_STORED if packed.kind == POINTS else PROMISE_CURVED
         self.header.view(np.float64)[REACH_OF_ITEMS:] = items.reach, items.radius, promise
@@ -122,7 +138,7 @@ def surface_states(
     state, place, how = np.empty((3, n), dtype=np.int64)
     X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
     question = GapQuestion(items, packed, scratch())
-    curved_states_of(
+    items.kernels.batch(
         address_of(question.header), address_of(X_WA), address_of(X_WB), n, margin, address_of(state),
         address_of(place), address_of(how),
     )
@@ -142,7 +158,7 @@ class _SingleQuestion:
         question = GapQuestion(items, packed, space.addresses)
         question.header[EXCHANGED] = exchanged
         self.header, self.held = question.header, (space, question, packed)
-        self._solid, self._state = items.solid, prepared_row(curved_state_single, question.header)
+        self._solid, self._state = items.solid, prepared_row(items.kernels.single, question.header)
 
     def state(self, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> int | None:
         """MEETS, NEAR, SURFACES_APART or, of solids alone, MAYBE_INSIDE; None of pairs left to another method.

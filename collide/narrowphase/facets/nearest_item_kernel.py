@@ -32,7 +32,20 @@ from collide.fields.cell_tree_kernel import (
 from collide.fields.point_tree_kernel import points_of
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import BLOCK, POINTS
-from collide.lowering.shape_table import ADDRESS, INTS, KIND, NUMBERS, PADDED, PARAMS, POSE, RADIUS, REACH, SLOP
+from collide.lowering.shape_table import (
+    ADDRESS,
+    INTS,
+    KIND,
+    NUMBERS,
+    PADDED,
+    PARAMS,
+    POSE,
+    POSE_SLOP,
+    RADIUS,
+    RANK,
+    REACH,
+    SLOP,
+)
 from collide.mesh.bvh import (
     CENTRE,
     EXPONENT,
@@ -95,14 +108,18 @@ _answer_pairs_at = native_call(SIGNATURE)
 
 # Header: addresses of `answer_pairs`, of the tree, of two rows of the `ShapeTable` (an item, the shape), of the item's
 # coordinates, of two poses, their shape rows, one pair, a row, the workspace, and two stacks of so many places; whether
-# the shape stands first in single calls; what items are, and the address of balls' radii, point by point, or 0;
+# the shape stands first in single calls; what items are, and the address of balls' radii, point by point, or 0; of the
+# shape's box in its frame, centre and half sides, and of the floats of a probe (`fields/convex_walk_kernel.py`);
 # doubles: the reach of the items from their origin, the largest radius of theirs, and the width that is promised, as a
 # part of the size.
 (
     CORE, TREE_AT, INTS_AT, NUMBERS_AT, COORDINATES_AT, POSES_AT, SHAPE_OF_AT, PAIRS_AT, ROW_AT, DOUBLES_AT,
-    INTEGERS_AT, STACK_AT, BOUNDS_AT, EXCHANGED, ITEMS_ARE, RADII_AT, REACH_OF_ITEMS, LARGEST_RADIUS, PROMISE,
-) = range(19)
-HEADER = 19
+    INTEGERS_AT, STACK_AT, BOUNDS_AT, EXCHANGED, ITEMS_ARE, RADII_AT, BOX_AT, PROBE_AT, REACH_OF_ITEMS, LARGEST_RADIUS,
+    PROMISE,
+) = range(21)
+HEADER = 21
+#: Doubles of a box.
+BOX = 6
 #: What items are.
 FACETS, BALLS, CELLS = range(3)
 #: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh; a facet meets the shape; a
@@ -160,7 +177,7 @@ class _Nearest(NamedTuple):
 
 
 @kernel(inline=True)
-def _height(walk, d):
+def height_along(walk, d):
     """How far the shape reaches along a direction of the world, from its own origin."""
     g, ints = rotate_back(walk.poses, POSE, d), walk.ints
     radius = walk.numbers[NUMBERS + RADIUS]
@@ -244,7 +261,7 @@ def _put_item(walk, place):
 
 
 @kernel
-def _ask_item(walk, place, depths, limit):
+def ask_item(walk, place, depths, limit):
     """The row of an item and the shape, written behind the best row.   depths : whether a depth is wanted.   limit : of
     items farther away no more is told [m]."""
     words = walk.words
@@ -262,13 +279,35 @@ def _ask_item(walk, place, depths, limit):
 
 
 @kernel
+def whether_item(walk, place, axis, margin):
+    """The row of whether an item comes within a margin of the shape [m]: hit, lower bound, the normal of a miss.
+
+    axis : from the item to the shape, to begin with.
+    """
+    words = walk.words
+    _put_item(walk, place)
+    row_at = words[ROW_AT] + ROW
+    clear_rows(row_at, 1)
+    row = view_row(row_at)
+    put_vec3(row.doubles, NORMAL, axis)
+    _answer_pairs_at(
+        words[CORE],
+        (
+            words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], 0, words[SHAPE_OF_AT], words[PAIRS_AT], 1, True, False,
+            True, margin, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
+        ),
+    )
+    return row
+
+
+@kernel
 def _with_item(walk, nearest, place, limit):
     """The `_Nearest` with one item more.   limit : of the walk [m].
 
     A walk without a limit asks an item only whether the item is nearer. In a walk with a limit the question takes
     longer than the distance.
     """
-    row = _ask_item(walk, place, False, nearest.upper if limit == math.inf else math.inf)
+    row = ask_item(walk, place, False, nearest.upper if limit == math.inf else math.inf)
     lower, upper = row.doubles[LOWER], row.doubles[UPPER]
     failed = nearest.failed or is_undecided_or_refused(row) or not lower > 0.0
     key, best, along, above = nearest.key, nearest.place, nearest.along, nearest.above
@@ -278,7 +317,7 @@ def _with_item(walk, nearest, place, limit):
         copy_row(walk.words[ROW_AT] + ROW, walk.words[ROW_AT])
         n = scale(1.0 - 2.0**-40, vec3_at(row.doubles, NORMAL))
         along = rotate_back(walk.poses, 0, n)
-        above = dot(n, walk.t) - _height(walk, neg(n))
+        above = dot(n, walk.t) - height_along(walk, neg(n))
     open_lower = nearest.open_lower if row.flags[CERTIFIED] != 0 else min(nearest.open_lower, lower)
     return _Nearest(
         key, place if failed else best, min(nearest.lower, lower), min(nearest.upper, upper), open_lower, along, above,
@@ -452,7 +491,7 @@ def rows_within(walk, limit, capacity, rows_at, places_at):
         return LONG_WAY, 0
     n = 0
     for i in range(n_looked_at):
-        row = _ask_item(walk, places[i], True, math.inf)
+        row = ask_item(walk, places[i], True, math.inf)
         if row.doubles[LOWER] > limit:
             continue
         if is_undecided_or_refused(row):
@@ -464,25 +503,48 @@ def rows_within(walk, limit, capacity, rows_at, places_at):
 
 
 @kernel
-def place_pair(header_at, XA_at, XB_at, check):
-    """(whether both matrices are poses, and near rotations, the `_Walk`) of one pair of poses."""
+def set_poses(header_at, XA_at, XB_at, check):
+    """Write one pair of poses into the tables; False where a matrix is no pose."""
+    poses = view_f64(view_i64(header_at, HEADER)[POSES_AT], 2 * POSE)
+    return set_pose(poses, 0, view_f64(XA_at, 16), check) and set_pose(poses, POSE, view_f64(XB_at, 16), check)
+
+
+@kernel
+def begin_walk(header_at):
+    """(whether the pose of the items is near a rotation, the `_Walk`, the shape's box still at its origin)."""
     words = view_i64(header_at, HEADER)
     ints, numbers = view_i64(words[INTS_AT], 2 * INTS), view_f64(words[NUMBERS_AT], 2 * NUMBERS)
-    poses = view_f64(words[POSES_AT], 2 * POSE)
-    placed = set_pose(poses, 0, view_f64(XA_at, 16), check) and set_pose(poses, POSE, view_f64(XB_at, 16), check)
-    off = off_rotation(poses) if placed else math.inf
-    tree = open_tree(words[TREE_AT])
+    poses, tree = view_f64(words[POSES_AT], 2 * POSE), open_tree(words[TREE_AT])
+    off = off_rotation(poses)
     t = sub(vec3_at(poses, POSE + 9), vec3_at(poses, 9))
     reach = norm1(vec3_at(tree.numbers, TREE_REACH)) + numbers[NUMBERS + REACH] + numbers[NUMBERS + RADIUS] + norm1(t)
     radius = view_f64(header_at + 8 * LARGEST_RADIUS, 1)[0]
     slack = (_ROUNDING + 8.0 * off) * (reach + radius) + numbers[NUMBERS + SLOP] + radius
-    walk = _Walk(header_at, tree, words, ints, numbers, poses, t, t, t, slack)
+    slack += poses[POSE_SLOP] + poses[POSE + POSE_SLOP]
+    return off < _FAR_OFF, _Walk(header_at, tree, words, ints, numbers, poses, t, t, t, slack)
+
+
+@kernel
+def with_box(walk):
+    """The `_Walk` with the box of the shape along the axes of the items."""
+    t, poses = walk.t, walk.poses
     x, y, z = _column(poses, 0), _column(poses, 1), _column(poses, 2)
     low = Vec3(
-        dot(x, t) - _height(walk, neg(x)), dot(y, t) - _height(walk, neg(y)), dot(z, t) - _height(walk, neg(z))
+        dot(x, t) - height_along(walk, neg(x)), dot(y, t) - height_along(walk, neg(y)),
+        dot(z, t) - height_along(walk, neg(z)),
     )
-    high = Vec3(dot(x, t) + _height(walk, x), dot(y, t) + _height(walk, y), dot(z, t) + _height(walk, z))
-    return off < _FAR_OFF, _Walk(header_at, tree, words, ints, numbers, poses, t, low, high, slack)
+    high = Vec3(
+        dot(x, t) + height_along(walk, x), dot(y, t) + height_along(walk, y), dot(z, t) + height_along(walk, z)
+    )
+    return _Walk(walk.header_at, walk.tree, walk.words, walk.ints, walk.numbers, poses, t, low, high, walk.slack)
+
+
+@kernel
+def place_pair(header_at, XA_at, XB_at, check):
+    """(whether both matrices are poses, and near rotations, the `_Walk`) of one pair of poses."""
+    placed = set_poses(header_at, XA_at, XB_at, check)
+    is_near, walk = begin_walk(header_at)
+    return placed and is_near, with_box(walk)
 
 
 @kernel
@@ -541,15 +603,21 @@ def _gap(header_at, XA_at, XB_at, check, depths, row_at):
 
 @kernel
 def _state(header_at, XA_at, XB_at, check, margin):
-    """(state, place, how) of one pair of poses, the mesh's first.
+    """`_state_of_walk` of one pair of poses, the mesh's first."""
+    is_placed, walk = place_pair(header_at, XA_at, XB_at, check)
+    if not is_placed:
+        return LONG_WAY, -1, 0
+    return _state_of_walk(walk, margin)
+
+
+@kernel
+def _state_of_walk(walk, margin):
+    """(state, place, how) of a mesh, or of items, and a shape.
 
     state : LONG_WAY, SURFACES_APART, MAYBE_INSIDE, MEETS or, with a margin above 0 [m], NEAR: apart is then farther
     apart than the margin.   place : of MEETS the triangle meeting the shape, in the order of the tree.   how : index
     into `results.HOW`.
     """
-    is_placed, walk = place_pair(header_at, XA_at, XB_at, check)
-    if not is_placed:
-        return LONG_WAY, -1, 0
     max_asked = _max_asked(walk)
     nearest = _walk_down(walk, margin, margin, max_asked)
     if nearest.failed:
@@ -580,6 +648,47 @@ def _write_gap(walk, nearest, row_at):
     row.words[ITERATIONS] = 0
     for k in range(4):
         row.words[VERTICES_A + k] = row.words[VERTICES_B + k] = -1
+
+
+@kernel
+def take_part(header_at, ints_at, numbers_at, pose_at, box_at):
+    """Make a convex set the shape that is asked about: its rows of a `ShapeTable`, its row of poses, its box."""
+    words = view_i64(header_at, HEADER)
+    ints, numbers = view_i64(words[INTS_AT], 2 * INTS), view_f64(words[NUMBERS_AT], 2 * NUMBERS)
+    poses, box = view_f64(words[POSES_AT], 2 * POSE), view_f64(words[BOX_AT], BOX)
+    from_ints, from_numbers = view_i64(ints_at, INTS), view_f64(numbers_at, NUMBERS)
+    from_pose, from_box = view_f64(pose_at, POSE), view_f64(box_at, BOX)
+    for k in range(INTS):
+        ints[INTS + k] = from_ints[k]
+    ints[INTS + RANK] = 1  # behind the items, as in other tables
+    for k in range(NUMBERS):
+        numbers[NUMBERS + k] = from_numbers[k]
+    for k in range(POSE):
+        poses[POSE + k] = from_pose[k]
+    for k in range(BOX):
+        box[k] = from_box[k]
+
+
+#: How a part's state is asked for, wherever items have a kernel for it.
+PART_SIGNATURE = "int64(int64, int64, int64, int64, int64, float64)"
+
+
+@entry(PART_SIGNATURE)
+def state_of_part(header_at, ints_at, numbers_at, pose_at, box_at, margin):
+    """The state, as of `_state_of_walk`, of items where they stand and a part as of `take_part`; never NEAR where an
+    item is known to meet the part.
+
+    With a margin an item within it ends the walk: whether another meets the part is asked once more.
+    """
+    take_part(header_at, ints_at, numbers_at, pose_at, box_at)
+    is_near, walk = begin_walk(header_at)
+    if not is_near:
+        return LONG_WAY
+    walk = with_box(walk)
+    state, _, _ = _state_of_walk(walk, margin)
+    if state == NEAR and _state_of_walk(walk, 0.0)[0] == MEETS:
+        return MEETS
+    return state
 
 
 @entry("int64(int64, int64, int64, int64, boolean, int64, int64)")

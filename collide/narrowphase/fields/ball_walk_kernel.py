@@ -98,10 +98,7 @@ def clouds_meet_balls(
     """
     tree, poses = open_tree(tree_at), view_f64(work_at, 2 * POSE)
     states, centre = view_u8(states_at, n), vec3_at(view_f64(centre_at, 3), 0)
-    stack = view_i64(work_at + 16 * POSE, WIDTH * (MAX_LEVELS + 1))
-    unit = math.ldexp(1.0, int(tree.header[EXPONENT]))
-    middle, reach = vec3_at(tree.numbers, CENTRE), norm1(vec3_at(tree.numbers, REACH))
-    radii, off = radius + other_radius, 0.0
+    stack, off = view_i64(work_at + 16 * POSE, WIDTH * (MAX_LEVELS + 1)), 0.0
     for k in range(n):
         if step_a != 0 or k == 0:
             if not set_pose(poses, 0, view_f64(XA_at + 8 * step_a * k, 16), check):
@@ -109,13 +106,24 @@ def clouds_meet_balls(
             off = off_rotation(poses)
         if (step_b != 0 or k == 0) and not set_pose(poses, POSE, view_f64(XB_at + 8 * step_b * k, 16), check):
             return k
-        c = add(rotate(poses, POSE, centre), vec3_at(poses, POSE + 9))
-        y = rotate_back(poses, 0, sub(c, vec3_at(poses, 9)))
-        size = reach + radii + norm1(centre) + norm1(vec3_at(poses, 9)) + norm1(vec3_at(poses, POSE + 9))
-        slack = (_ROUNDING + 8.0 * off) * size
-        x = scale(1.0 / unit, sub(y, middle))
-        farthest = (radii + slack) / unit + FLOAT_ERROR + _FLOAT_ROUNDING * (1.0 + norm1(x))
-        nearest = (radii - slack) / unit - FLOAT_ERROR - _ROUNDING * (1.0 + norm1(x))
-        far, near = farthest * farthest * (1.0 + _FLOAT_ROUNDING), nearest * nearest if nearest > 0.0 else -1.0
-        states[k] = _state(tree, _Look(x, y, far, near, radii, slack), stack) if far < _LARGEST_FLOAT else OPEN
+        states[k] = state_of_balls(tree, poses, centre, radius + other_radius, 0.0, off, stack)
     return n
+
+
+@kernel(inline=True)
+def state_of_balls(tree, poses, centre, radii, slop, off, stack):
+    """APART, MEETS or OPEN of the balls of a tree at the first of two poses and a ball at the second.
+
+    radii : of both, and a margin [m].   slop : how far places may be off besides rounding [m].   off : how far the
+    first pose is off a rotation.
+    """
+    unit, reach = math.ldexp(1.0, int(tree.header[EXPONENT])), norm1(vec3_at(tree.numbers, REACH))
+    c = add(rotate(poses, POSE, centre), vec3_at(poses, POSE + 9))
+    y = rotate_back(poses, 0, sub(c, vec3_at(poses, 9)))
+    size = reach + radii + norm1(centre) + norm1(vec3_at(poses, 9)) + norm1(vec3_at(poses, POSE + 9))
+    slack = (_ROUNDING + 8.0 * off) * size + slop
+    x = scale(1.0 / unit, sub(y, vec3_at(tree.numbers, CENTRE)))
+    farthest = (radii + slack) / unit + FLOAT_ERROR + _FLOAT_ROUNDING * (1.0 + norm1(x))
+    nearest = (radii - slack) / unit - FLOAT_ERROR - _ROUNDING * (1.0 + norm1(x))
+    far, near = farthest * farthest * (1.0 + _FLOAT_ROUNDING), nearest * nearest if nearest > 0.0 else -1.0
+    return _state(tree, _Look(x, y, far, near, radii, slack), stack) if far < _LARGEST_FLOAT else OPEN

@@ -1,0 +1,289 @@
+"""Whether balls of a cloud meet a convex set, or come within a margin of it: a walk down the tree with the set's box.
+
+Nodes and points are compared, eight at once, with the set's own box along six axes, and with the planes that parted the
+set from the last balls asked about (`mesh/box_overlap.py`). Balls left by these floats are asked of the narrowphase. A
+ball as the set goes by distances from its centre (`ball_walk_kernel.py`).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from collide.fields.point_tree_kernel import LEAF_FLOATS, MAX_LEVELS, floats_of, points_of
+from collide.kernels import entry, kernel, prepared, view_f32, view_f64, view_i64
+from collide.lowering.packed_convex import POINTS
+from collide.lowering.shape_table import ADDRESS, COUNT, INTS, KIND, NUMBERS, PADDED, POSE, POSE_SLOP, RADIUS, SLOP
+from collide.mesh.box_overlap import FRAME, PRISM, PROBE, boxes_meeting_prism, points_meeting_prism
+from collide.mesh.bvh import CENTRE, EXPONENT, MAX_LEAF, NODE, WIDTH, link_of
+from collide.narrowphase.facets.nearest_item_kernel import (
+    BOUNDS_AT,
+    BOX,
+    BOX_AT,
+    EXCHANGED,
+    HEADER,
+    LONG_WAY,
+    MEETS,
+    NEAR,
+    PART_SIGNATURE,
+    POSES_AT,
+    PROBE_AT,
+    RADII_AT,
+    STACK_AT,
+    SURFACES_APART,
+    ask_item,
+    begin_walk,
+    height_along,
+    set_poses,
+    take_part,
+    whether_item,
+)
+from collide.narrowphase.fields.ball_walk_kernel import MEETS as BALLS_MEET
+from collide.narrowphase.fields.ball_walk_kernel import OPEN, state_of_balls
+from collide.narrowphase.rows import HIT, LOWER, NORMAL, is_undecided_or_refused
+from collide.numerics.rigid_poses import off_rotation
+from collide.numerics.vec3 import (
+    Vec3,
+    absolute,
+    add,
+    column_at,
+    divide,
+    dot,
+    neg,
+    norm,
+    norm1,
+    rotate,
+    rotate_back,
+    scale,
+    sub,
+    vec3_at,
+)
+
+#: Of the numbers met, in units of the tree, what floats and their sums round.
+_FLOAT_ROUNDING = 2.0**-19
+#: Floats hold lengths below, in units, and their products.
+_LARGEST = 2.0**60
+#: Normals of a smaller size say nothing.
+_LEAST_NORMAL = 1e-100
+
+
+@kernel
+def _set_probe(walk, margin, frame, probe):
+    """Make the set's box the probe, wider by the margin, radii and rounding; returns by how many units, or −1 where
+    floats are too small for the box.
+
+    The point y of a ball within the margin [m] is within w = margin + slack of a point m + Σ λ_j a_j of the box,
+    |λ_j| ≤ h_j: y differs from m along axis i of the tree by at most Σ |a_j[i]| h_j + w, along axis a_k of the box by
+    at most h_k + w and the share by which the matrix is no rotation.
+    """
+    tree, poses, box = walk.tree, walk.poses, view_f64(walk.words[BOX_AT], BOX)
+    per_metre = math.ldexp(1.0, -int(tree.header[EXPONENT]))
+    c = rotate_back(poses, 0, add(rotate(poses, POSE, vec3_at(box, 0)), walk.t))
+    m, h = scale(per_metre, sub(c, vec3_at(tree.numbers, CENTRE))), scale(per_metre, vec3_at(box, 3))
+    wider = per_metre * (margin + walk.slack)
+    size = 4.0 + norm1(m) + norm1(h) + wider
+    if not size < _LARGEST:
+        return -1.0
+    off = off_rotation(view_f64(walk.words[POSES_AT] + 8 * POSE, POSE))
+    wider += (_FLOAT_ROUNDING + off) * size
+    reach = Vec3(wider, wider, wider)
+    for j in range(3):
+        a = rotate_back(poses, 0, Vec3(poses[POSE + j], poses[POSE + 3 + j], poses[POSE + 6 + j]))
+        half = h.x if j == 0 else h.y if j == 1 else h.z
+        reach = add(reach, scale(half, absolute(a)))
+        frame[3 * j], frame[3 * j + 1], frame[3 * j + 2] = np.float32(a.x), np.float32(a.y), np.float32(a.z)
+        probe[6 + j], probe[9 + j] = np.float32(-dot(a, m)), np.float32(half + wider)
+    probe[0], probe[1], probe[2] = np.float32(m.x), np.float32(m.y), np.float32(m.z)
+    probe[3], probe[4], probe[5] = np.float32(reach.x), np.float32(reach.y), np.float32(reach.z)
+    for k in range(PROBE - 5, PRISM):
+        probe[k] = np.float32(0.0)
+    return wider
+
+
+@kernel
+def _put_plane(walk, n, wider, number, probe):
+    """Let a probe leave out what lies beyond the plane of normal n, of the world, that bounds the set.
+
+    Points x of the set have n·x ≥ b. A ball within the margin has n·y ≥ b − wider for its point y.   number : how many
+    planes were put before: the last three count.
+    """
+    length = norm(n)
+    if not length > _LEAST_NORMAL:
+        return
+    n = divide(n, length)  # a radius reaches as far along unit vectors alone
+    g = rotate_back(walk.poses, 0, n)
+    per_metre = math.ldexp(1.0, -int(walk.tree.header[EXPONENT]))
+    least = dot(n, walk.t) - height_along(walk, neg(n)) - dot(g, vec3_at(walk.tree.numbers, CENTRE))
+    least = per_metre * least - wider
+    at = PROBE + 4 * (number % 3)
+    probe[at], probe[at + 1], probe[at + 2] = np.float32(-g.x), np.float32(-g.y), np.float32(-g.z)
+    probe[at + 3] = np.float32(least - _FLOAT_ROUNDING * (abs(least) + 8.0))
+
+
+@kernel
+def _state_of_ball(walk, place, margin):
+    """MEETS, NEAR, SURFACES_APART or LONG_WAY of a ball and the set, and a normal from the ball to the set.
+
+    Booleans look for a direction that parts two bodies, and often leave a point in a polytope open: the distance is
+    asked then.
+    """
+    box, tree = view_f64(walk.words[BOX_AT], BOX), walk.tree
+    p = vec3_at(points_of(tree), 3 * int(tree.ids[place]))
+    to_set = sub(add(rotate(walk.poses, POSE, vec3_at(box, 0)), walk.t), rotate(walk.poses, 0, p))
+    row = whether_item(walk, place, to_set, margin)
+    n = vec3_at(row.doubles, NORMAL)
+    if is_undecided_or_refused(row):
+        row = ask_item(walk, place, False, math.inf)
+    if is_undecided_or_refused(row):
+        return LONG_WAY, n
+    if row.flags[HIT] != 0:
+        return MEETS, n
+    return (NEAR if margin > 0.0 and not row.doubles[LOWER] > margin else SURFACES_APART), n
+
+
+@kernel(inline=True)
+def _nearness(frame, probe, x, y, z):
+    """The squared distance of a place from the probe's box, below 0 inside of it: an order, not a bound."""
+    square, inside = np.float32(0.0), np.float32(-math.inf)
+    for axis in range(3):
+        j = 3 * axis
+        along = probe[6 + axis] + frame[j] * x + frame[j + 1] * y + frame[j + 2] * z
+        gap = abs(along) - probe[9 + axis]
+        square += max(gap, np.float32(0.0)) * max(gap, np.float32(0.0))
+        inside = max(inside, gap)
+    return square if inside > 0.0 else inside
+
+
+@kernel
+def _push_boxes(tree, node, frame, probe, stack, keys, top):
+    """Put boxes of a node that meet the probe on the stack, the nearest on top; returns its height."""
+    first, boxes, near = top, tree.boxes, boxes_meeting_prism(tree.boxes, NODE * node, frame, probe)
+    for slot in range(WIDTH):
+        if not near >> slot & 1:
+            continue
+        at = NODE * node + slot
+        key = float(_nearness(frame, probe, boxes[at], boxes[at + WIDTH], boxes[at + 2 * WIDTH]))
+        k = top
+        while k > first and keys[k - 1] < key:
+            keys[k], stack[k] = keys[k - 1], stack[k - 1]
+            k -= 1
+        keys[k], stack[k] = key, WIDTH * node + slot
+        top += 1
+    return top
+
+
+@kernel(inline=True)
+def _nearest_of(near, floats, leaf, frame, probe):
+    """The number of the nearest point of a leaf among those of a mask."""
+    nearest, least = 0, np.float32(math.inf)
+    for i in range(MAX_LEAF):
+        if near >> i & 1:
+            at = leaf + i
+            key = _nearness(frame, probe, floats[at], floats[at + WIDTH], floats[at + 2 * WIDTH])
+            if key < least:
+                nearest, least = i, key
+    return nearest
+
+
+@kernel
+def _state_by_box(walk, margin):
+    """MEETS; NEAR at the first ball within a margin above 0 [m]; SURFACES_APART; LONG_WAY where a ball is left open."""
+    tree, words = walk.tree, walk.words
+    frame, probe = view_f32(words[PROBE_AT], FRAME), view_f32(words[PROBE_AT] + 4 * FRAME, PRISM)
+    wider, floats = _set_probe(walk, margin, frame, probe), floats_of(tree)
+    if wider < 0.0:
+        return LONG_WAY
+    n_stack, n_planes = WIDTH * (MAX_LEVELS + 1), 0
+    stack, keys, answer = view_i64(words[STACK_AT], n_stack), view_f64(words[BOUNDS_AT], n_stack), SURFACES_APART
+    top = _push_boxes(tree, 0, frame, probe, stack, keys, 0)
+    while top > 0:
+        top -= 1
+        link = link_of(tree.links, stack[top])
+        if link >= 0:
+            top = _push_boxes(tree, link, frame, probe, stack, keys, top)
+            continue
+        first, leaf = ~link >> 3, LEAF_FLOATS * ((~link >> 3) // MAX_LEAF)
+        remaining = (1 << (~link & 7)) - 1
+        near = points_meeting_prism(floats, leaf, frame, probe) & remaining
+        while near != 0:
+            i = _nearest_of(near, floats, leaf, frame, probe)
+            state, n = _state_of_ball(walk, first + i, margin)
+            if state == MEETS or state == NEAR:
+                return state
+            remaining &= ~(1 << i)
+            if state == LONG_WAY:
+                answer = LONG_WAY
+            else:
+                _put_plane(walk, n, wider, n_planes, probe)
+                n_planes += 1
+            near = points_meeting_prism(floats, leaf, frame, probe) & remaining
+    return answer
+
+
+@kernel
+def _state_by_centre(walk, margin):
+    """MEETS, NEAR, SURFACES_APART or LONG_WAY of a ball as the set and balls of one radius."""
+    ints, numbers, poses = walk.ints, walk.numbers, walk.poses
+    padded = ints[INTS + PADDED]
+    centre = column_at(view_f64(ints[INTS + ADDRESS], 3 * padded), padded, 0)
+    radii = numbers[RADIUS] + numbers[NUMBERS + RADIUS] + margin
+    slop = numbers[NUMBERS + SLOP] + poses[POSE_SLOP] + poses[POSE + POSE_SLOP]
+    stack = view_i64(walk.words[STACK_AT], WIDTH * (MAX_LEVELS + 1))
+    state = state_of_balls(walk.tree, poses, centre, radii, slop, off_rotation(poses), stack)
+    if state == OPEN:
+        return LONG_WAY
+    return SURFACES_APART if state != BALLS_MEET else NEAR if margin > 0.0 else MEETS
+
+
+@kernel
+def _state(walk, margin):
+    """`_state_by_centre` or `_state_by_box`; NEAR only where no ball is known to meet the set."""
+    is_ball = walk.ints[INTS + KIND] == POINTS and walk.ints[INTS + COUNT] == 1 and walk.words[RADII_AT] == 0
+    state = _state_by_centre(walk, margin) if is_ball else _state_by_box(walk, margin)
+    if state == NEAR and (_state_by_centre(walk, 0.0) if is_ball else _state_by_box(walk, 0.0)) == MEETS:
+        return MEETS
+    return state
+
+
+@kernel
+def _state_of_poses(header_at, XA_at, XB_at, check, margin):
+    placed = set_poses(header_at, XA_at, XB_at, check)
+    is_near, walk = begin_walk(header_at)
+    return _state(walk, margin) if placed and is_near else LONG_WAY
+
+
+@entry("int64(int64, int64, int64, int64, float64, int64, int64, int64)")
+def states_of_balls(header_at, XA_at, XB_at, n, margin, states_at, places_at, how_at):
+    """States of a cloud and a convex set at n pairs of checked poses, the cloud's first; returns how many are not left
+    to the long way.
+
+    header : of `nearest_item_kernel.py`.   XA, XB : 16 doubles a pose.   margin : how far balls may be apart [m].
+    states : n integers: MEETS, NEAR, SURFACES_APART or LONG_WAY.   places, how : n integers each, which say nothing.
+    """
+    states, places, how, n_decided = view_i64(states_at, n), view_i64(places_at, n), view_i64(how_at, n), 0
+    for k in range(n):
+        places[k], how[k] = -1, 0
+        states[k] = _state_of_poses(header_at, XA_at + 128 * k, XB_at + 128 * k, False, margin)
+        n_decided += int(states[k] != LONG_WAY)
+    return n_decided
+
+
+@entry(prepared.ROW, nogil=False)
+def state_of_balls_single(header_at, XA_at, XB_at, row_at, _unused, margin):
+    """1 with the state in the first word of a row; LONG_WAY.   header : its [EXCHANGED] says that the set stands first.
+    """
+    exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
+    state = _state_of_poses(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True, margin)
+    if state == LONG_WAY:
+        return LONG_WAY
+    view_i64(row_at, 1)[0] = state
+    return 1
+
+
+@entry(PART_SIGNATURE)
+def state_of_balls_and_part(header_at, ints_at, numbers_at, pose_at, box_at, margin):
+    """The state of a cloud where it stands and a part as of `take_part`."""
+    take_part(header_at, ints_at, numbers_at, pose_at, box_at)
+    is_near, walk = begin_walk(header_at)
+    return _state(walk, margin) if is_near else LONG_WAY

@@ -1,0 +1,93 @@
+"""Robots among point clouds and grids: verdicts of kernels beside pairs asked one by one, proofs beside samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from naive import pose, random_pose, rng_of
+from random_robots import random_robot
+from reproduction import reproducing
+
+import collide
+
+_SNIPPET = """
+# robots/test_field_walks.py: robot and field of seed {seed}, configuration {q}
+"""
+
+
+def field(rng, kind: str) -> collide.Shape:
+    places = rng.uniform(-0.8, 0.8, (400, 3))
+    if kind == "grid":
+        cells = np.unique(rng.integers(0, 24, (70, 3)), axis=0)
+        return collide.VoxelGrid(cells, (0.05, 0.06, 0.07), pose(t=(-0.6, -0.7, -0.8)))
+    return collide.PointCloud(places, {"balls": 0.01, "points": 0.0, "each": rng.uniform(0.0, 0.03, 400)}[kind])
+
+
+def arm_in_field(seed: int, kind: str, margin: float = 0.0, **options):
+    """(checker, X_WF, field) of an arm of every kind of shape, or of spheres for seeds above 2, and one field."""
+    rng = rng_of("fields around robots", kind, seed)
+    balls = (lambda rng, size: collide.Sphere(size * float(rng.uniform(0.5, 1.0)))) if seed > 2 else None
+    robot, shape, X_WF = random_robot(rng, types=("revolute", "prismatic"), shape=balls), field(rng, kind), np.eye(4)
+    X_WF[:] = random_pose(rng, 0.2)
+    world = collide.World()
+    world.add(shape, X_WF, name="field", margin=margin)
+    return collide.RobotChecker(robot, world, **options), X_WF, shape
+
+
+def configurations(checker, n: int) -> np.ndarray:
+    robot = checker.robot
+    return rng_of("configurations in fields", n).uniform(robot.lower, robot.upper, (n, robot.dof))
+
+
+@pytest.mark.parametrize("kind", ["balls", "points", "each", "grid"])
+def test_verdicts_are_those_of_pairs(kind):
+    """Of arms with padding and fields with margins as well."""
+    hits, n = 0, 0
+    for seed, (padding, margin) in enumerate([(0.0, 0.0), (0.01, 0.0), (0.0, 0.02), (0.0, 0.0), (0.02, 0.0)]):
+        checker, X_WF, shape = arm_in_field(seed, kind, margin, padding=padding)
+        robot, Q = checker.robot, configurations(checker, 40)
+        alone = collide.RobotChecker(robot, padding=padding).collides(Q)
+        verdicts, poses = checker.collides(Q), robot.link_poses(Q)
+        for k in np.flatnonzero(~alone).tolist():
+            with reproducing(_SNIPPET, seed=seed, q=Q[k]):
+                assert bool(verdicts[k]) == any(
+                    collide.collide(e.shape, shape, poses[k, robot.links.index(link)] @ e.X_LG, X_WF,
+                                    security_margin=padding + margin)
+                    for link, elements in robot.geometry.items() for e in elements
+                )
+            hits, n = hits + bool(verdicts[k]), n + 1
+    assert 0.15 * n < hits < 0.85 * n and n > 40, (hits, n)
+
+
+@pytest.mark.parametrize("kind", ["balls", "each", "grid"])
+def test_proven_motions_have_no_sample_that_collides(kind):
+    """And of those that collide the time is of a collision; nearly all are decided by kernels."""
+    free = met = still_open = 0
+    for seed in range(5):
+        checker, _, _ = arm_in_field(seed, kind)
+        Q = configurations(checker, 60)
+        ends = Q + 0.2 * rng_of("ways in fields", kind, seed).normal(size=Q.shape)
+        proven = checker.certify_edges(Q, ends)
+        for k in np.flatnonzero(proven.free).tolist():
+            t = np.linspace(0.0, 1.0, 60)[:, None]
+            with reproducing(_SNIPPET, seed=seed, q=Q[k]):
+                assert not checker.collides(Q[k] + t * (ends[k] - Q[k])).any()
+        for k in np.flatnonzero(proven.collides).tolist():
+            assert checker.collides(Q[k] + proven.time[k] * (ends[k] - Q[k]))
+        free, met = free + int(proven.free.sum()), met + int(proven.collides.sum())
+        still_open += int(proven.is_open.sum())
+    assert free > 20 and met > 20 and still_open < 0.05 * (free + met), (free, met, still_open)
+
+
+def test_a_field_that_moves_is_asked_where_it_stands():
+    checker, _, shape = arm_in_field(0, "balls")
+    Q = configurations(checker, 60)
+    before = checker.collides(Q)
+    checker.world.set_pose("field", pose(t=(50.0, 0.0, 0.0)))
+    assert np.array_equal(checker.collides(Q), collide.RobotChecker(checker.robot).collides(Q))
+    X = pose(t=(0.1, -0.1, 0.05))
+    checker.world.set_pose("field", X)
+    world = collide.World()
+    world.add(shape, X, name="field")
+    assert np.array_equal(checker.collides(Q), collide.RobotChecker(checker.robot, world).collides(Q))
+    assert before.any() and not before.all()
