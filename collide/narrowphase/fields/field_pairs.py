@@ -118,8 +118,11 @@ def _posed_parts(items: FieldItems, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray
     X_WG, slop_of_items = items.poses_of_items(X_WA)
     for k, (packed, X_BP) in enumerate(parts_of(B)):
         X_WP, slop = moved_pose(X_WB, X_BP, np.full(len(X_WB), packed.reach))
-        exponents = np.broadcast_to(np.frexp(2.0 * (slop + slop_of_items))[1], len(X_WB))
         off = np.broadcast_to(slop + slop_of_items, len(X_WB))
+        if not off.any():
+            yield _PosedPart(k, packed, np.arange(len(X_WB)), X_WG, X_WP)
+            continue
+        exponents = np.frexp(2.0 * off)[1]
         for exponent in np.unique(np.where(off > 0.0, exponents, _EXACT)).tolist():
             rows = np.flatnonzero(off == 0.0 if exponent == _EXACT else (off > 0.0) & (exponents == exponent))
             slop_of_part = packed.slop + (0.0 if exponent == _EXACT else math.ldexp(1.0, exponent))
@@ -136,11 +139,12 @@ def _walked(
     assert items.walked is not None
     meets, apart = np.zeros(len(X_WA), dtype=bool), np.ones(len(X_WA), dtype=bool)
     for part in _posed_parts(items, B, X_WA, X_WB):
-        some = ~meets[part.rows]
-        if some.any():
-            rows, walk = part.rows[some], surface_states(
-                items.walked, part.packed, part.X_WG[some], part.X_WP[some], margin
-            )
+        rows, X_WG, X_WP = part.rows, part.X_WG, part.X_WP
+        if part.number and meets.any():
+            some = ~meets[rows]
+            rows, X_WG, X_WP = rows[some], X_WG[some], X_WP[some]
+        if len(rows):
+            walk = surface_states(items.walked, part.packed, X_WG, X_WP, margin)
             meets[rows[walk.meets]] = True
             apart[rows] &= walk.apart
     return meets, apart
