@@ -210,8 +210,8 @@ def items_within(
 
 
 def lowest_items(items: FieldItems, n_W: np.ndarray, X_WF: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """Numbers of the items that are lowest along a normal, rounding counted in."""
-    X_WG = items.pose(X_WF)
+    """Numbers of the items that are lowest along a normal of any length above 0, rounding counted in."""
+    X_WG, n_W = items.pose(X_WF), n_W / np.linalg.norm(n_W)  # heights are in metres, as radii and the level are
     size = _reach(items) + np.abs(X_WF[:3, 3]).sum() + np.abs(X_WB[:3, 3]).sum()
     return items.lowest(X_WG[:3, :3].T @ n_W, _LEVEL * size)
 

@@ -131,6 +131,31 @@ def others(rng) -> list:
     ]
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_half_spaces_meet_the_lowest_ball_however_long_their_normal(seed):
+    """A normal of another length is the same plane: answers are those of the union, gaps those of a unit normal."""
+    rng, hits, asked = np.random.default_rng([18, seed]), 0, 0
+    for _ in range(40):
+        n, r = int(rng.integers(1, 12)), rng.uniform(0, 0.5, 12)
+        cloud = collide.PointCloud(rng.uniform(-1, 1, (n, 3)), r[:n])
+        X_WC, X_WB = collide.pose(rng.normal(size=3), quat_wxyz=rng.normal(size=4)), collide.pose(rng.normal(size=3))
+        normal = rng.normal(size=3)
+        normal *= float(10.0 ** rng.integers(-5, 6)) / np.linalg.norm(normal)
+        length, p_W = float(np.linalg.norm(normal)), cloud.points @ X_WC[:3, :3].T + X_WC[:3, 3] - X_WB[:3, 3]
+        low = min(p_W @ normal / length - r[:n])
+        half = collide.Halfspace(normal, (low + float(rng.uniform(-0.05, 0.05))) * length)
+        with reproducing(_QUESTION, field=spell(cloud), shape=spell(half), X_WC=X_WC, X_WB=X_WB):
+            hit = collide.collide(cloud, half, X_WC, X_WB)
+            gap = collide.distance(cloud, half, X_WC, X_WB)
+            assert hit == gap.hit == collide.collide(as_union(cloud), half, X_WC, X_WB)
+            wanted = low - half.offset / length
+            assert abs(gap.distance - wanted) < 1e-9 and gap.certified, (gap, wanted)
+            cast = collide.shape_cast(cloud, X_WC, normal * (-3.0 / length), half, X_WB)
+            assert hit or abs(3.0 * cast.distance - wanted) < 1e-9, (cast, wanted)
+        asked, hits = asked + 1, hits + hit
+    assert 0.2 * asked < hits < 0.8 * asked, (hits, asked)
+
+
 _QUESTION = "import collide\nprint(collide.distance({field}, {shape}, {X_WC}, {X_WB}, signed=False))"
 
 
