@@ -44,7 +44,8 @@ enum {
     M_HULL_EACH, M_HULL_FIXED,
     M_NODE, M_SLAB, M_WIDTH, M_TREE_INTS, M_TREE_NUMBERS, M_RECORD, M_TREE_WORK, M_DEEPEST_SPLIT,
     M_COUNTS,
-    M_MESH_HEADER, M_MESH_DOUBLES, M_MESH_INTEGERS, M_MESH_SCRATCH, M_DIGEST, MEASURES
+    M_MESH_HEADER, M_MESH_DOUBLES, M_MESH_INTEGERS, M_MESH_SCRATCH, M_DIGEST,
+    M_POINT_WORK, M_POINT_WORK_BESIDES, M_POINT_LEVELS, M_CELL_HEADER, M_CELL_NUMBERS, M_CELL_STACK, M_WALK_HEADER, MEASURES
 };
 
 /* Integers that a digest is worked out in (collide/numerics/number_digest.py). */
@@ -53,6 +54,8 @@ enum { DIGEST_WORDS = 24 };
 /* Sizes of things: nothing is larger, or a product of such would overflow. */
 #define LARGEST 1e50
 #define SMALLEST 1e-50
+static inline int is_length(double value) { return value >= SMALLEST && value <= LARGEST; }
+static inline int is_coordinate(double value) { return fabs(value) <= LARGEST; }
 
 static inline int64_t address_of(const void *place) { return (int64_t)(intptr_t)place; }
 
@@ -67,6 +70,7 @@ static inline int64_t code_at(const void *function)
 /* --- shapes -------------------------------------------------------------------------------------------------------- */
 
 struct mesh_workspace;
+struct field_workspace;
 struct hull_faces;
 struct manifold_space;
 
@@ -114,6 +118,7 @@ struct collide_workspace {
     collide_pair *rows;
     int64_t steps[3]; /* addresses of what `settle_exactly` calls */
     struct mesh_workspace *mesh;
+    struct field_workspace *field;
     struct manifold_space *manifold; /* of contacts; NULL until some are asked for */
     void *held[2];
 };
@@ -122,6 +127,10 @@ struct collide_workspace {
    is to be set in them, which are zeros. */
 size_t mesh_workspace_bytes(const int64_t *measures);
 void begin_mesh_workspace(collide_workspace *space, void *memory, const int64_t *measures);
+
+/* capi_field_pairs.c: the same of questions about fields. */
+size_t field_workspace_bytes(const int64_t *measures);
+void begin_field_workspace(collide_workspace *space, void *memory, const int64_t *measures);
 
 /* capi_pairs.c: the pair that is asked about next. */
 void take_pair(collide_workspace *space, const collide_shape *A, const collide_shape *B);

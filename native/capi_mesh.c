@@ -1,14 +1,13 @@
 /* Meshes from arrays, and the surfaces of polytopes: collide/shapes/mesh.py, collide/lowering/facet_bodies.py and the tree of
    collide/mesh/build_bvh.py. */
+#include "capi_box_tree.h"
 #include "capi_mesh.h"
 #include "capi_tree.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* The header of a box-tree (collide/mesh/bvh.py), its numbers, and the most facets that it holds. */
-enum { NODES_AT, TRIANGLES_AT, IDS_AT, TREE_NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT, HAS_ORIGINS, TREE_INTS };
-enum { CENTRE = 0, CORNER = 3, BALL = 6, TREE_NUMBERS };
+/* The most facets that a box-tree holds. */
 static const size_t MAX_FACETS = (size_t)1 << 28;
 
 typedef char headers_fit[sizeof ((struct collide_mesh *)0)->tree == TREE_INTS * sizeof(int64_t) &&

@@ -53,12 +53,13 @@ static int allocate_workspace(collide_workspace *space)
     struct buffers *buffers;
     double *doubles;
     int64_t *integers, *digits;
-    size_t words, meshes;
+    size_t words, meshes, fields;
     workspace_sizes(space->kernels, measures);
     meshes = mesh_workspace_bytes(measures);
+    fields = field_workspace_bytes(measures);
     words = (size_t)(measures[M_DOUBLES] + measures[M_INTEGERS] + measures[M_WORKSPACE]);
     buffers = cache_lines(sizeof *buffers, &space->held[0]);
-    doubles = cache_lines(8 * words + meshes, &space->held[1]);
+    doubles = cache_lines(8 * words + meshes + fields, &space->held[1]);
     if (buffers == NULL || doubles == NULL) return 0;
     integers = (int64_t *)(doubles + measures[M_DOUBLES]);
     digits = integers + measures[M_INTEGERS];
@@ -72,6 +73,7 @@ static int allocate_workspace(collide_workspace *space)
     space->requests_at = address_of(integers + measures[M_REQUESTS_AT]);
     space->header[DIGITS_AT] = address_of(digits);
     begin_mesh_workspace(space, digits + measures[M_WORKSPACE], measures);
+    begin_field_workspace(space, (char *)(digits + measures[M_WORKSPACE]) + meshes, measures);
     begin_pairs(space);
     return 1;
 }

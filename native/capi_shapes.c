@@ -11,9 +11,6 @@ enum { FEWEST_COARSE = 64, FEWEST_FOR_TREE = 224 };
 /* Rounds a root of a sum of squares upwards: it is good to 4 units in the last place. */
 static const double UPWARDS = 1 + 1e-15;
 
-static int is_length(double value) { return value >= SMALLEST && value <= LARGEST; }
-static int is_coordinate(double value) { return fabs(value) <= LARGEST; }
-
 /* Digest of kind, radius and parameters, then of the points; -0.0 and 0.0 are one number among these. */
 static void digest(collide_shape *shape, const double *points, size_t n)
 {

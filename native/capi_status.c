@@ -18,7 +18,7 @@ const char *collide_status_text(collide_status status)
     case COLLIDE_ENDLESS_DEPTH: return "the overlap has no end: no translation of finite length separates the bodies";
     case COLLIDE_UNSUPPORTED: return "not supported by the C interface";
     case COLLIDE_NO_KERNELS: return "no kernels for this processor, or COLLIDE_CPU names a level that is not to be had";
-    case COLLIDE_TOO_MANY: return "more contacts than there is room for";
+    case COLLIDE_TOO_MANY: return "more answers than there is room for";
     }
     return "unknown status";
 }
@@ -52,6 +52,7 @@ int workspace_sizes(const struct collide_kernels *kernels, int64_t measures[MEAS
     if (kernels->write_constants(address_of(measures), MEASURES) != MEASURES) return 0;
     return measures[M_BLOCK] == BLOCK && measures[M_HEADER] == HEADER && measures[M_INTS] == INTS &&
            measures[M_NUMBERS] == NUMBERS && measures[M_POSE] == POSE && mesh_workspace_bytes(measures) > 0 &&
+           field_workspace_bytes(measures) > 0 &&
            measures[M_ROW] == (int64_t)sizeof(collide_pair) && measures[M_DIGEST] == DIGEST_WORDS;
 }
 

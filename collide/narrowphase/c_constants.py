@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from collide.fields import cell_tree_kernel as cells
+from collide.fields import point_tree_kernel as points
 from collide.hull.quickhull import HULL_EACH, HULL_FIXED
 from collide.kernels import entry, view_i64
 from collide.lowering.shape_table import INTS, NUMBERS, POSE
@@ -16,6 +18,7 @@ from collide.mesh.bvh import NUMBERS as TREE_NUMBERS
 from collide.mesh.mesh_topology import COUNTS
 from collide.narrowphase.exact.settle_space import WORKSPACE
 from collide.narrowphase.facets import mesh_collide_kernel as pairs
+from collide.narrowphase.facets import nearest_item_kernel as items
 from collide.narrowphase.facets import surface_collision as surfaces
 from collide.narrowphase.facets import surface_distance as distances
 from collide.narrowphase.facets import winding_numbers as inside
@@ -30,14 +33,15 @@ from collide.support.coarse_points import COARSE
 _MESH_DOUBLES = max(module.DOUBLES + module.FLOATS for module in (surfaces, distances, inside))
 
 #: In this order: rooms of the narrowphase, layouts, rooms of hulls and of support trees; layouts and rooms of
-#: box-trees, what is found out about surfaces, rooms of questions about meshes and of a digest
-#: (`native/capi_internal.h`).
+#: box-trees, what is found out about surfaces, rooms of questions about meshes and of a digest; layouts and rooms of
+#: trees over points and cells, and of walks down these (`native/capi_internal.h`).
 _CONSTANTS = np.array([
     DOUBLES, INTEGERS, REQUESTS_AT, WORKSPACE, BLOCK, HEADER, INTS, NUMBERS, POSE, ROW, COARSE,
     HULL_EACH, HULL_FIXED,
     NODE, SLAB, WIDTH, TREE_INTS, TREE_NUMBERS, RECORD, TREE_WORK, DEEPEST_SPLIT,
     COUNTS,
     pairs.HEADER, _MESH_DOUBLES, MESH_INTEGERS, pairs.SCRATCH, DIGEST_WORDS,
+    points.WORK, points.WORK_BESIDES, points.MAX_LEVELS, cells.HEADER, cells.N_NUMBERS, cells.STACK, items.HEADER,
 ], dtype=np.int64)
 
 

@@ -77,6 +77,17 @@ _TYPES = {
     "collide_mesh_free": [c_void_p],
     "collide_mesh_collide": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, POINTER(c_int)],
     "collide_mesh_distance": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, c_void_p],
+    "collide_point_cloud_create": [c_void_p, c_size_t, c_void_p, c_size_t, c_void_p],
+    "collide_voxel_grid_create": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p],
+    "collide_field_free": [c_void_p],
+    "collide_field_collide": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_uint, POINTER(c_int)],
+    "collide_field_distance": [c_void_p, c_void_p, c_void_p, c_void_p, c_void_p, c_double, c_uint, c_void_p],
+    "collide_field_collide_batch": [c_void_p, c_void_p, c_void_p, Poses, Poses, c_uint, c_void_p, POINTER(c_size_t)],
+    "collide_field_distance_batch": [
+        c_void_p, c_void_p, c_void_p, Poses, Poses, c_double, c_uint, c_void_p, c_void_p, POINTER(c_size_t),
+    ],
+    "collide_point_cloud_nearest": [c_void_p, c_void_p, c_size_t, c_size_t, c_double, c_void_p, c_void_p],
+    "collide_point_cloud_within": [c_void_p, c_void_p, c_double, c_void_p, c_size_t, POINTER(c_size_t)],
 }
 _TEXTS = {"collide_status_text", "collide_version"}
 
@@ -162,6 +173,51 @@ class CMesh:
             library().collide_mesh_free(self.handle)
 
 
+def raw_cloud(points, radii) -> tuple[int, int | None]:
+    """(status, handle) of a cloud with a radius for all, or one each."""
+    points, radii = _doubles(points).reshape(-1, 3), np.atleast_1d(_doubles(radii))
+    return raw_shape("collide_point_cloud_create", points, len(points), radii, len(radii))
+
+
+def raw_grid(occupied, cell, origin=None) -> tuple[int, int | None]:
+    """(status, handle) of a grid."""
+    occupied = np.ascontiguousarray(occupied, dtype=np.uint8)
+    cells, cell = np.array(occupied.shape, dtype=np.uintp), np.broadcast_to(_doubles(cell), 3).copy()
+    return raw_shape("collide_voxel_grid_create", occupied, cells, cell, None if origin is None else _doubles(origin))
+
+
+class CField:
+    """A cloud of Python made once more in C; or a grid, by the array whose grid is given."""
+
+    def __init__(self, field: collide.PointCloud | collide.VoxelGrid, occupied: np.ndarray | None = None):
+        self._free = library().collide_field_free
+        if isinstance(field, collide.PointCloud):
+            status, self.handle = raw_cloud(field.points, field.radius)
+        else:
+            status, self.handle = raw_grid(occupied, field.cell, field.X[:3, 3])
+        assert status == OK, (field, library().collide_status_text(status))
+
+    def __del__(self):
+        self._free(self.handle)
+
+    def nearest(self, places, k: int, limit: float = math.inf) -> tuple[int, np.ndarray, np.ndarray]:
+        """(status, distances (m, k), numbers (m, k))."""
+        places = _doubles(places).reshape(-1, 3)
+        distances, rows = np.full((len(places), k), 7.0), np.full((len(places), k), 7, dtype=np.int64)
+        status = library().collide_point_cloud_nearest(
+            self.handle, places.ctypes.data, len(places), k, limit, distances.ctypes.data, rows.ctypes.data
+        )
+        return status, distances, rows
+
+    def within(self, place, r: float, capacity: int) -> tuple[int, np.ndarray, int]:
+        """(status, numbers that there is room for, how many there are)."""
+        place, rows, count = _doubles(place), np.full(max(capacity, 1), 7, dtype=np.int64), c_size_t()
+        status = library().collide_point_cloud_within(
+            self.handle, place.ctypes.data, r, rows.ctypes.data, capacity, count
+        )
+        return status, rows[: min(count.value, capacity)], count.value
+
+
 class CSet:
     """A set of shapes."""
 
@@ -243,6 +299,37 @@ class Asker:
             self.handle, A.handle, B.handle, X_WA.ctypes.data, X_WB.ctypes.data, flags, rows.ctypes.data
         )
         return status, rows
+
+    def field_meets(self, F: CField, S: CShape, X_WF, X_WS, flags: int = 0) -> tuple[int, bool]:
+        hit, X_WF, X_WS = c_int(), _doubles(X_WF), _doubles(X_WS)
+        status = library().collide_field_collide(
+            self.handle, F.handle, S.handle, X_WF.ctypes.data, X_WS.ctypes.data, flags, hit
+        )
+        return status, bool(hit.value)
+
+    def field_gap(self, F: CField, S: CShape, X_WF, X_WS, flags: int = 0, limit: float = math.inf):
+        """(status, row)."""
+        rows, X_WF, X_WS = np.zeros(1, dtype=PAIR_DTYPE), _doubles(X_WF), _doubles(X_WS)
+        status = library().collide_field_distance(
+            self.handle, F.handle, S.handle, X_WF.ctypes.data, X_WS.ctypes.data, limit, flags, rows.ctypes.data
+        )
+        return status, rows
+
+    def field_batch(self, F: CField, S: CShape, X_WF, X_WS, *, boolean: bool, flags: int = 0, limit: float = math.inf):
+        """(status, answers, statuses of rows, number of the pair to blame)."""
+        X_WF, X_WS, failed = _doubles(X_WF).reshape(-1, 4, 4), _doubles(X_WS).reshape(-1, 4, 4), c_size_t(0)
+        n = max(len(X_WF), len(X_WS)) if len(X_WF) and len(X_WS) else 0
+        out, statuses = np.zeros(n, dtype=np.uint8 if boolean else PAIR_DTYPE), np.full(n, -1, dtype=np.int32)
+        poses = Poses(X_WF.ctypes.data, len(X_WF)), Poses(X_WS.ctypes.data, len(X_WS))
+        if boolean:
+            status = library().collide_field_collide_batch(
+                self.handle, F.handle, S.handle, *poses, flags, out.ctypes.data, failed
+            )
+            return status, out.astype(bool), statuses, failed.value
+        status = library().collide_field_distance_batch(
+            self.handle, F.handle, S.handle, *poses, limit, flags, out.ctypes.data, statuses.ctypes.data, failed
+        )
+        return status, out, statuses, failed.value
 
     def batch(self, asked, X_WA, X_WB, *, boolean: bool, flags: int = 0, limit: float = math.inf, axes=None):
         """(status, answers, number of the pair to blame). asked : (A, B), or (set, (n, 2) numbers)."""

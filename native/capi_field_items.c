@@ -1,0 +1,337 @@
+/* What walks leave open: the items near a shape, asked as convex shapes of their own, as collide/narrowphase/fields/field_items.py
+   lists them and `_union_row` of field_pairs.py asks. */
+#include "capi_field.h"
+
+/* What rounding of a box's sides is, as a part of the numbers met (2^-40); heights over a plane that are looked at again
+   (2^-36). */
+static const double ROUNDING = 9.094947017729282e-13, LEVEL = 1.4551915228366852e-11;
+
+/* Numbers of balls or boxes of cells that may be met. */
+struct listing {
+    int64_t *numbers, n;
+};
+
+/* Row-major products with a pose's rotation, turned back: R^T v. */
+static void turn_back(const double *X, const double v[3], double out[3])
+{
+    int k;
+    for (k = 0; k < 3; k++) out[k] = X[k] * v[0] + X[4 + k] * v[1] + X[8 + k] * v[2];
+}
+
+/* The largest entry of R^T R - I. */
+static double off_rotation(const double *X)
+{
+    double off = 0.0, column[3], turned[3];
+    int i, j;
+    for (i = 0; i < 3; i++) {
+        for (j = 0; j < 3; j++) column[j] = X[4 * j + i];
+        turn_back(X, column, turned);
+        turned[i] -= 1.0;
+        for (j = 0; j < 3; j++) off = fabs(turned[j]) > off ? fabs(turned[j]) : off;
+    }
+    return off;
+}
+
+static double shift_of(const double *X) { return fabs(X[3]) + fabs(X[7]) + fabs(X[11]); }
+
+/* A box in the field's frame around the shape: box_in_frame of field_items.py. A place q of the world in an item is R p + t with
+   p in the item, so that R^T (q - t) is off p by (R^T R - I) p, along an axis at most 3 off |p|: within 8 off + 2^-40 of the size,
+   what rounds as well. */
+static void box_around(const struct field_pair *pair, double low[3], double high[3])
+{
+    const double *F = pair->X_WF, *S = pair->X_WS;
+    double pose[POSE] = {0.0}, box[6], column[3], turned[3], least = 0.0, largest = 0.0, slack;
+    int64_t first = 0;
+    int j, k;
+    for (j = 0; j < 4; j++) {
+        for (k = 0; k < 3; k++) column[k] = j < 3 ? S[4 * k + j] : S[4 * k + 3] - F[4 * k + 3];
+        turn_back(F, column, turned);
+        for (k = 0; k < 3; k++) pose[j < 3 ? 3 * k + j : 9 + k] = turned[k];
+    }
+    pair->space->kernels->bounding_boxes(address_of(pair->shape->ints), address_of(pair->shape->numbers), address_of(pose),
+                                         address_of(&first), 1, address_of(box));
+    for (k = 0; k < 3; k++) {
+        least = fabs(box[k]) > least ? fabs(box[k]) : least;
+        largest = fabs(box[3 + k]) > largest ? fabs(box[3 + k]) : largest;
+    }
+    slack = (ROUNDING + 8.0 * (off_rotation(F) + off_rotation(S))) * (least + largest + shift_of(F) + shift_of(S));
+    for (k = 0; k < 3; k++) {
+        low[k] = box[k] - slack;
+        high[k] = box[3 + k] + slack;
+    }
+}
+
+/* --- listings --------------------------------------------------------------------------------------------------------- */
+
+/* The balls that may come within a distance of what is in a box. */
+static struct listing balls_within(const struct field_pair *pair, struct arena *arena, const double low[3], const double high[3],
+                                   double distance)
+{
+    const collide_field *field = pair->field;
+    const double *points = (const double *)(intptr_t)field->tree[TRIANGLES_AT];
+    struct listing some = {NULL, 0};
+    int64_t stack[POINT_STACK], tree_at = address_of(field->tree), n, k;
+    double from[3], to[3], reach = distance * (1.0 + ROUNDING);
+    int i;
+    for (i = 0; i < 3; i++) {
+        from[i] = low[i] - (reach + field->radius);
+        to[i] = high[i] + (reach + field->radius);
+    }
+    n = pair->space->kernels->points_in_box(tree_at, address_of(from), address_of(to), 0, 0, address_of(stack));
+    if ((some.numbers = arena_take(arena, (size_t)n * sizeof *some.numbers)) == NULL) return some;
+    pair->space->kernels->points_in_box(tree_at, address_of(from), address_of(to), address_of(some.numbers), n, address_of(stack));
+    for (k = 0; k < n; k++) {
+        int64_t number = some.numbers[k];
+        double own = (field->radii == NULL ? field->radius : field->radii[number]) + reach;
+        int near = 1;
+        for (i = 0; i < 3; i++) near &= points[3 * number + i] >= low[i] - own && points[3 * number + i] <= high[i] + own;
+        if (near) some.numbers[some.n++] = number;
+    }
+    return some;
+}
+
+/* The same of cells, as words: those that the box may reach, a cell more on every side for what rounds. */
+static struct listing cells_within(const struct field_pair *pair, struct arena *arena, const double low[3], const double high[3],
+                                   double distance)
+{
+    const collide_field *field = pair->field;
+    struct listing some = {NULL, 0};
+    int64_t *stack, range[6], m[MEASURES], tree_at = address_of(field->tree);
+    double reach = distance * (1.0 + ROUNDING);
+    int k;
+    workspace_sizes(pair->space->kernels, m);
+    for (k = 0; k < 3; k++) {
+        double origin = field->numbers[ORIGIN + k], side = field->numbers[SIDES + k], most = (double)field->tree[CELLS_ALONG + k];
+        double first = (low[k] - reach - origin) / side, last = (high[k] + reach - origin) / side;
+        first = first > -2.0 ? first < most + 2.0 ? first : most + 2.0 : -2.0;
+        last = last > -2.0 ? last < most + 2.0 ? last : most + 2.0 : -2.0;
+        range[k] = first < 1.0 ? 0 : (int64_t)floor(first) - 1;
+        range[3 + k] = last + 1.0 > most - 1.0 ? field->tree[CELLS_ALONG + k] - 1 : (int64_t)floor(last) + 1;
+    }
+    if ((stack = arena_take(arena, (size_t)m[M_CELL_STACK] * sizeof *stack)) == NULL) return some;
+    some.n = pair->space->kernels->cells_in_range(tree_at, address_of(range), address_of(range + 3), 0, 0, address_of(stack));
+    if ((some.numbers = arena_take(arena, (size_t)some.n * sizeof *some.numbers)) == NULL) some.n = 0;
+    pair->space->kernels->cells_in_range(tree_at, address_of(range), address_of(range + 3), address_of(some.numbers), some.n,
+                                         address_of(stack));
+    return some;
+}
+
+/* The half-space's normal in the field's frame, of length 1: the lowest items along it alone say how near it is. Returns how much
+   higher others may be that rounding cannot tell from these. */
+static double normal_of(const struct field_pair *pair, double n[3])
+{
+    const double *own = pair->shape->numbers + PARAMS, *S = pair->X_WS;
+    double world[3], length, size = shift_of(pair->X_WF) + shift_of(S);
+    int k;
+    for (k = 0; k < 3; k++) world[k] = S[4 * k] * own[0] + S[4 * k + 1] * own[1] + S[4 * k + 2] * own[2];
+    length = sqrt(world[0] * world[0] + world[1] * world[1] + world[2] * world[2]);
+    for (k = 0; k < 3; k++) {
+        world[k] /= length;
+        size += fabs(pair->field->low[k]) > fabs(pair->field->high[k]) ? fabs(pair->field->low[k]) : fabs(pair->field->high[k]);
+    }
+    turn_back(pair->X_WF, world, n);
+    return LEVEL * size;
+}
+
+/* Of listed items with heights those no higher than the lowest and a slack. */
+static void keep_lowest(struct listing *some, const double *heights, double slack)
+{
+    double lowest = INFINITE;
+    int64_t k, n = some->n;
+    for (k = 0; k < n; k++) lowest = heights[k] < lowest ? heights[k] : lowest;
+    for (some->n = k = 0; k < n; k++)
+        if (heights[k] <= lowest + slack) some->numbers[some->n++] = some->numbers[k];
+}
+
+static struct listing lowest_balls(const struct field_pair *pair, struct arena *arena)
+{
+    const collide_field *field = pair->field;
+    const double *points = (const double *)(intptr_t)field->tree[TRIANGLES_AT];
+    struct listing some = {NULL, 0};
+    double n[3], slack = normal_of(pair, n), *heights = arena_take(arena, (size_t)field->tree[N_FACETS] * sizeof *heights);
+    int64_t k;
+    if ((some.numbers = arena_take(arena, (size_t)field->tree[N_FACETS] * sizeof *some.numbers)) == NULL) return some;
+    for (k = 0; k < field->tree[N_FACETS]; k++) {
+        const double *p = points + 3 * k;
+        heights[k] = p[0] * n[0] + p[1] * n[1] + p[2] * n[2] - (field->radii == NULL ? field->radius : field->radii[k]);
+        some.numbers[k] = k;
+    }
+    some.n = field->tree[N_FACETS];
+    keep_lowest(&some, heights, slack);
+    return some;
+}
+
+static struct listing lowest_cells(const struct field_pair *pair, struct arena *arena)
+{
+    const struct collide_kernels *kernels = pair->space->kernels;
+    struct listing some = {NULL, 0};
+    double n[3], slack = normal_of(pair, n), *heights;
+    int64_t m[MEASURES], *stack, tree_at = address_of(pair->field->tree);
+    workspace_sizes(kernels, m);
+    if ((stack = arena_take(arena, (size_t)m[M_CELL_STACK] * sizeof *stack)) == NULL) return some;
+    some.n = kernels->lowest_cells(tree_at, address_of(n), slack, 0, 0, 0, address_of(stack));
+    heights = arena_take(arena, (size_t)some.n * sizeof *heights);
+    if ((some.numbers = arena_take(arena, (size_t)some.n * sizeof *some.numbers)) == NULL) {
+        some.n = 0;
+        return some;
+    }
+    kernels->lowest_cells(tree_at, address_of(n), slack, address_of(some.numbers), address_of(heights), some.n, address_of(stack));
+    keep_lowest(&some, heights, slack);
+    return some;
+}
+
+/* The items that may come within a distance of the shape; of a half-space the lowest ones over it. */
+static struct listing items_within(const struct field_pair *pair, struct arena *arena, double distance)
+{
+    int balls = pair->field->are == BALLS;
+    double low[3], high[3];
+    if (pair->shape->ints[KIND] == HALFSPACE) return balls ? lowest_balls(pair, arena) : lowest_cells(pair, arena);
+    box_around(pair, low, high);
+    return balls ? balls_within(pair, arena, low, high, distance) : cells_within(pair, arena, low, high, distance);
+}
+
+/* --- items as shapes -------------------------------------------------------------------------------------------------- */
+
+/* The row of a convex item in the field's frame and the pair's shape. */
+static collide_status row_of_hull(const struct field_pair *pair, const double *points, size_t n, double radius, unsigned flags,
+                                  collide_pair *row)
+{
+    collide_shape *item;
+    collide_status status = collide_hull(points, n, radius, &item);
+    if (status == COLLIDE_OK)
+        status = collide_distance(pair->space, item, pair->shape, pair->X_WF, pair->X_WS, INFINITE, flags, row);
+    collide_shape_free(item);
+    return status == COLLIDE_INVALID_SHAPE ? COLLIDE_OUT_OF_RANGE : status; /* coordinates below 1e-50 m */
+}
+
+static collide_status row_of_ball(const struct field_pair *pair, int64_t number, unsigned flags, collide_pair *row)
+{
+    const double *points = (const double *)(intptr_t)pair->field->tree[TRIANGLES_AT];
+    double radius = pair->field->radii == NULL ? pair->field->radius : pair->field->radii[number];
+    return row_of_hull(pair, points + 3 * number, 1, radius, flags, row);
+}
+
+/* A box of cells, six numbers of `merge_cells` counted from a cell. */
+static collide_status row_of_box(const struct field_pair *pair, const int64_t *box, const int64_t first[3], unsigned flags,
+                                 collide_pair *row)
+{
+    const double *origin = pair->field->numbers + ORIGIN, *sides = pair->field->numbers + SIDES;
+    double corners[24];
+    int k;
+    for (k = 0; k < 24; k++) {
+        int axis = k % 3;
+        int64_t least = first[axis] + box[axis];
+        if (k / 3 >> (2 - axis) & 1) least += box[3 + axis];
+        corners[k] = (double)least * sides[axis] + origin[axis];
+    }
+    return row_of_hull(pair, corners, 8, 0.0, flags, row);
+}
+
+static int64_t axis_of(int64_t word, int axis) { return word >> (16 * (2 - axis)) & 0xFFFF; }
+
+/* Fewer boxes with the union of some cells, and whether the shape meets any. */
+static collide_status boxes_meet(const struct field_pair *pair, struct arena *arena, const struct listing *some, uint8_t *hit)
+{
+    collide_status status = COLLIDE_OK;
+    int64_t first[3], along[3], *boxes, n_boxes, k;
+    collide_pair row;
+    uint8_t *block;
+    int axis;
+    if (some->n == 0) return COLLIDE_OK;
+    for (axis = 0; axis < 3; axis++) {
+        int64_t last = first[axis] = axis_of(some->numbers[0], axis);
+        for (k = 1; k < some->n; k++) {
+            int64_t at = axis_of(some->numbers[k], axis);
+            first[axis] = at < first[axis] ? at : first[axis];
+            last = at > last ? at : last;
+        }
+        along[axis] = last + 1 - first[axis];
+    }
+    block = arena_take(arena, (size_t)(along[0] * along[1] * along[2]));
+    if ((boxes = arena_take(arena, 6 * (size_t)some->n * sizeof *boxes)) == NULL) return COLLIDE_NO_MEMORY;
+    memset(block, 0, (size_t)(along[0] * along[1] * along[2]));
+    for (k = 0; k < some->n; k++) {
+        int64_t word = some->numbers[k], row = (axis_of(word, 0) - first[0]) * along[1] + axis_of(word, 1) - first[1];
+        block[row * along[2] + axis_of(word, 2) - first[2]] = 1;
+    }
+    n_boxes = pair->space->kernels->merge_cells(address_of(block), along[0], along[1], along[2], address_of(boxes));
+    for (k = 0; k < n_boxes && status == COLLIDE_OK && !*hit; k++) {
+        status = row_of_box(pair, boxes + 6 * k, first, pair->flags | COLLIDE_UNSIGNED, &row);
+        *hit = row.hit;
+    }
+    return status;
+}
+
+static collide_status balls_meet(const struct field_pair *pair, const struct listing *some, uint8_t *hit)
+{
+    collide_status status = COLLIDE_OK;
+    collide_pair row;
+    int64_t k;
+    for (k = 0; k < some->n && status == COLLIDE_OK && !*hit; k++) {
+        status = row_of_ball(pair, some->numbers[k], pair->flags | COLLIDE_UNSIGNED, &row);
+        *hit = row.hit;
+    }
+    return status;
+}
+
+collide_status items_meet(const struct field_pair *pair, uint8_t *hit)
+{
+    struct arena arena;
+    struct listing some;
+    collide_status status;
+    *hit = 0;
+    arena_begin(&arena);
+    some = items_within(pair, &arena, 0.0);
+    if (arena.failed) status = COLLIDE_NO_MEMORY;
+    else status = pair->field->are == BALLS ? balls_meet(pair, &some, hit) : boxes_meet(pair, &arena, &some, hit);
+    arena_end(&arena);
+    return status;
+}
+
+/* --- a single item near ----------------------------------------------------------------------------------------------- */
+
+/* The row of a ball by its number, or of a cell by its word, and how results name it. */
+static collide_status row_named(const struct field_pair *pair, int64_t item, unsigned flags, collide_pair *row)
+{
+    static const int64_t first[3] = {0, 0, 0};
+    const int64_t *along = pair->field->tree + CELLS_ALONG;
+    int64_t box[6] = {axis_of(item, 0), axis_of(item, 1), axis_of(item, 2), 1, 1, 1};
+    collide_status status;
+    int k;
+    if (pair->field->are == BALLS) status = row_of_ball(pair, item, flags, row);
+    else status = row_of_box(pair, box, first, flags, row);
+    row->part_a = (int32_t)(pair->field->are == BALLS ? item : (box[0] * along[1] + box[1]) * along[2] + box[2]);
+    row->count = 0;
+    for (k = 0; k < 4; k++) row->vertices_a[k] = -1;
+    return status;
+}
+
+/* The row of an item that alone is near: `_union_row` and `_depth`, where the union has one part. */
+static collide_status row_of_lone_item(const struct field_pair *pair, struct arena *arena, int64_t item, collide_pair *row)
+{
+    collide_status status;
+    double distance;
+    if (pair->shape->ints[KIND] == HALFSPACE) return row_named(pair, item, pair->flags, row);
+    status = row_named(pair, item, pair->flags | COLLIDE_UNSIGNED, row);
+    if (status != COLLIDE_OK || (row->hit && pair->flags & COLLIDE_UNSIGNED)) return status;
+    distance = row->upper;
+    if (row->hit) {
+        if ((status = row_named(pair, item, pair->flags, row)) != COLLIDE_OK) return status;
+        distance = -row->lower > -row->distance ? -row->lower : -row->distance;
+        distance = distance > 0.0 ? distance : 0.0;
+    }
+    return items_within(pair, arena, distance).n == 1 ? COLLIDE_OK : COLLIDE_UNSUPPORTED;
+}
+
+collide_status row_of_item(const struct field_pair *pair, collide_pair *row)
+{
+    collide_status status = COLLIDE_UNSUPPORTED;
+    struct arena arena;
+    struct listing some;
+    arena_begin(&arena);
+    some = items_within(pair, &arena, 0.0);
+    if (!arena.failed && some.n == 1) status = row_of_lone_item(pair, &arena, some.numbers[0], row);
+    if (arena.failed) status = COLLIDE_NO_MEMORY;
+    arena_end(&arena);
+    return status;
+}
