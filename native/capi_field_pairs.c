@@ -5,9 +5,11 @@
 /* Header of walks, and how they end (collide/narrowphase/facets/nearest_item_kernel.py). */
 enum {
     WALK_CORE, WALK_TREE_AT, WALK_INTS_AT, WALK_NUMBERS_AT, COORDINATES_AT, WALK_POSES_AT, WALK_SHAPE_OF_AT, WALK_PAIRS_AT,
-    WALK_ROW_AT, WALK_DOUBLES_AT, WALK_INTEGERS_AT, WALK_STACK_AT, BOUNDS_AT, SHAPE_FIRST, ITEMS_ARE, RADII_AT, REACH_OF_ITEMS,
-    LARGEST_RADIUS, PROMISE, WALK_HEADER
+    WALK_ROW_AT, WALK_DOUBLES_AT, WALK_INTEGERS_AT, WALK_STACK_AT, BOUNDS_AT, SHAPE_FIRST, ITEMS_ARE, RADII_AT, BOX_AT, PROBE_AT,
+    REACH_OF_ITEMS, LARGEST_RADIUS, PROMISE, WALK_HEADER
 };
+/* Floats of a probe (collide/mesh/box_overlap.py). */
+enum { PROBE_FLOATS = 38 };
 enum { LONG_WAY = -1, MAYBE_INSIDE, APART, MEETS };
 /* What `clouds_meet_balls` leaves open (collide/narrowphase/fields/ball_walk_kernel.py). */
 enum { OPEN_BALL = 2 };
@@ -24,12 +26,14 @@ struct field_workspace {
     int64_t both[2]; /* 0 and 1: shapes of the poses, and the pair */
     collide_pair rows[2];
     int64_t ball[2 * POSE + POINT_STACK]; /* of `clouds_meet_balls` */
+    double box[6];                        /* around the shape, in its frame: centre and half sides */
+    float probe[PROBE_FLOATS];
 };
 
 size_t field_workspace_bytes(const int64_t *m)
 {
-    if (m[M_WALK_HEADER] != WALK_HEADER || m[M_CELL_HEADER] != FIELD_INTS || m[M_CELL_NUMBERS] != FIELD_NUMBERS ||
-        2 * m[M_WIDTH] * (m[M_POINT_LEVELS] + 1) != POINT_STACK || m[M_CELL_STACK] < POINT_STACK)
+    if (m[M_WALK_HEADER] != WALK_HEADER || m[M_PROBE] != PROBE_FLOATS || m[M_CELL_HEADER] != FIELD_INTS ||
+        m[M_CELL_NUMBERS] != FIELD_NUMBERS || 2 * m[M_WIDTH] * (m[M_POINT_LEVELS] + 1) != POINT_STACK || m[M_CELL_STACK] < POINT_STACK)
         return 0;
     return sizeof(struct field_workspace) + 2 * 8 * (size_t)m[M_CELL_STACK];
 }
@@ -54,6 +58,30 @@ void begin_field_workspace(collide_workspace *space, void *memory, const int64_t
     header[WALK_INTEGERS_AT] = space->header[INTEGERS_AT];
     header[WALK_STACK_AT] = address_of(walk + 1);
     header[BOUNDS_AT] = header[WALK_STACK_AT] + 8 * m[M_CELL_STACK];
+    header[BOX_AT] = address_of(walk->box);
+    header[PROBE_AT] = address_of(walk->probe);
+}
+
+/* The box around a shape in its own frame (collide/lowering/extents.py); of a half-space none is asked for. */
+static void set_box(const collide_shape *shape, double box[6])
+{
+    const double *corners = (const double *)(intptr_t)shape->ints[ADDRESS], *params = shape->numbers + PARAMS;
+    double wider = shape->numbers[RADIUS] + shape->numbers[SLOP];
+    int64_t i, k, n = shape->ints[PADDED];
+    for (k = 0; k < 3; k++) {
+        double low = INFINITE, high = -INFINITE;
+        for (i = 0; shape->ints[KIND] == POINTS && i < n; i++) {
+            double x = corners[k * n + i];
+            low = x < low ? x : low;
+            high = x > high ? x : high;
+        }
+        if (shape->ints[KIND] != POINTS) { /* three radii of an ellipsoid, else a radius and half a length */
+            high = params[2] > 0.0 ? params[k] : params[k == 2];
+            low = -high;
+        }
+        box[k] = 0.5 * (low + high);
+        box[3 + k] = 0.5 * (high - low) + wider;
+    }
 }
 
 /* Prepare the walk for a pair: the item, of one corner or eight, stands first in the table, and in rank. */
@@ -66,6 +94,7 @@ static void take_field(collide_workspace *space, const collide_field *field, con
     memcpy(walk->ints + INTS, shape->ints, sizeof shape->ints);
     memcpy(walk->numbers + NUMBERS, shape->numbers, sizeof shape->numbers);
     walk->ints[INTS + RANK] = 1;
+    if (shape->ints[KIND] != HALFSPACE) set_box(shape, walk->box);
     walk->header[WALK_TREE_AT] = address_of(field->tree);
     walk->header[ITEMS_ARE] = field->are;
     walk->header[RADII_AT] = address_of(field->radii);
@@ -78,8 +107,10 @@ static void take_field(collide_workspace *space, const collide_field *field, con
 static int64_t state_of(const struct field_pair *pair, double margin)
 {
     int64_t state, place, how, header_at = address_of(pair->space->field->header);
-    pair->space->kernels->curved_states_of(header_at, address_of(pair->X_WF), address_of(pair->X_WS), 1, margin, address_of(&state),
-                                           address_of(&place), address_of(&how));
+    const struct collide_kernels *kernels = pair->space->kernels;
+    (pair->field->are == BALLS ? kernels->states_of_balls : kernels->curved_states_of)(
+        header_at, address_of(pair->X_WF), address_of(pair->X_WS), 1, margin, address_of(&state), address_of(&place), address_of(&how)
+    );
     return state;
 }
 

@@ -9,6 +9,7 @@ from collide.fields import point_tree_kernel as points
 from collide.hull.quickhull import HULL_EACH, HULL_FIXED
 from collide.kernels import entry, view_i64
 from collide.lowering.shape_table import INTS, NUMBERS, POSE
+from collide.mesh.box_overlap import FRAME, PRISM
 from collide.mesh.build_bvh import _DEEPEST_SPLIT as DEEPEST_SPLIT
 from collide.mesh.build_bvh import _RECORD as RECORD
 from collide.mesh.build_bvh import _WORK as TREE_WORK
@@ -42,6 +43,7 @@ _CONSTANTS = np.array([
     COUNTS,
     pairs.HEADER, _MESH_DOUBLES, MESH_INTEGERS, pairs.SCRATCH, DIGEST_WORDS,
     points.WORK, points.WORK_BESIDES, points.MAX_LEVELS, cells.HEADER, cells.N_NUMBERS, cells.STACK, items.HEADER,
+    FRAME + PRISM,
 ], dtype=np.int64)
 
 
