@@ -135,13 +135,14 @@ static collide_status measure_pair(const struct field_pair *pair, double limit, 
 {
     uint8_t depths = !(pair->flags & COLLIDE_UNSIGNED), is_written = 0;
     int64_t header_at = address_of(pair->space->field->header);
+    const struct collide_kernels *kernels = pair->space->kernels;
     collide_status status = COLLIDE_OK;
     if (pair->shape->ints[KIND] != HALFSPACE) {
         int64_t state = limit < INFINITE ? state_of(pair, limit) : LONG_WAY;
         if (state == APART || state == MAYBE_INSIDE) row->lower = nextafter(limit, INFINITE);
         else
-            pair->space->kernels->curved_gaps(header_at, address_of(pair->X_WF), address_of(pair->X_WS), 1, depths, address_of(row),
-                                              address_of(&is_written));
+            (pair->field->are == BALLS ? kernels->gaps_of_balls : kernels->curved_gaps)(
+                header_at, address_of(pair->X_WF), address_of(pair->X_WS), 1, depths, address_of(row), address_of(&is_written));
         is_written |= state == APART || state == MAYBE_INSIDE;
     }
     if (!is_written) {
@@ -149,7 +150,7 @@ static collide_status measure_pair(const struct field_pair *pair, double limit, 
         status = row_of_item(pair, row);
     }
     cut_row(row, limit);
-    pair->space->kernels->finish_rows(address_of(row), 1, depths);
+    kernels->finish_rows(address_of(row), 1, depths);
     if (status != COLLIDE_OK) memset(row, 0, sizeof *row);
     return status;
 }

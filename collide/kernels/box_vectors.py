@@ -25,13 +25,24 @@ def boxes_meeting(_context, boxes, at, frame, probe):
 @intrinsic
 def boxes_meeting_prism(_context, boxes, at, frame, probe):
     """The same of a triangle, with half-spaces along its edges."""
-    return _meeting(boxes, frame, probe, _parted_by_prism)
+
+    def parted(builder, data, frame, probe):
+        yield from _apart(builder, data, frame, probe)
+        yield from _outside(builder, data, probe, True)
+
+    return _meeting(boxes, frame, probe, parted)
 
 
 @intrinsic
-def points_meeting_prism(_context, points, at, frame, probe):
+def boxes_within(_context, boxes, at, frame, probe):
+    """Bits of the boxes that are within a distance of a box and of half-spaces; see `mesh/box_overlap.py`."""
+    return _meeting(boxes, frame, probe, partial(_beyond, have_sides=True))
+
+
+@intrinsic
+def points_within(_context, points, at, frame, probe):
     """The same of eight points."""
-    return _meeting(points, frame, probe, partial(_parted_by_prism, have_sides=False))
+    return _meeting(points, frame, probe, partial(_beyond, have_sides=False))
 
 
 @intrinsic
@@ -111,8 +122,21 @@ def _meeting(boxes, frame, probe, parted):
     return signature, codegen
 
 
-def _parted_by_prism(builder, data, frame, probe, have_sides=True):
-    yield from _apart(builder, data, frame, probe, have_sides)
+def _beyond(builder, data, frame, probe, have_sides):
+    """Vectors of bits: whether a slot is not used, is farther along an axis of the node, or from the probe's box, than
+    the distance, or lies outside of a half-space.
+    """
+    centres, half_lengths = _centres_and_half_lengths(builder, data, have_sides)
+    if have_sides:
+        yield _unused(builder, half_lengths)
+    yield from _apart_along_node(builder, centres, half_lengths, probe)
+    square, nothing = None, ir.Constant(_FLOATS, [0.0] * LANES)
+    for gap, reach in _along_probe(builder, centres, half_lengths, frame, probe):
+        gap = builder.fsub(_abs(builder, gap), reach)
+        gap = builder.select(builder.fcmp_ordered(">", gap, nothing), gap, nothing)
+        gap = builder.fmul(gap, gap)
+        square = gap if square is None else builder.fadd(square, gap)
+    yield builder.fcmp_ordered(">", square, _element(builder, probe, 12))
     yield from _outside(builder, data, probe, have_sides)
 
 
@@ -128,23 +152,36 @@ def _outside(builder, data, probe, have_sides):
         yield builder.fcmp_ordered(">", out, ir.Constant(_FLOATS, [0.0] * LANES))
 
 
-def _apart(builder, data, frame, probe, have_sides=True):
-    """Vectors of bits: whether a slot is not used, and whether an axis parts its box, or point, from the probe's."""
-    centres = [_eight(builder, data, axis) for axis in range(3)]
-    half_lengths = [ir.Constant(_FLOATS, [0.0] * LANES)] * 3
-    if have_sides:
-        half_lengths = [_eight(builder, data, 3 + axis) for axis in range(3)]
-        yield _unused(builder, half_lengths)
+def _centres_and_half_lengths(builder, data, have_sides=True):
+    """Three vectors each; half lengths of points are 0."""
+    sides = [_eight(builder, data, 3 + axis) for axis in range(3)] if have_sides else None
+    return [_eight(builder, data, axis) for axis in range(3)], sides or [ir.Constant(_FLOATS, [0.0] * LANES)] * 3
+
+
+def _apart_along_node(builder, centres, half_lengths, probe):
     for axis in range(3):
         gap = builder.fsub(centres[axis], _element(builder, probe, axis))
         reach = builder.fadd(half_lengths[axis], _element(builder, probe, 3 + axis))
         yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
+
+
+def _along_probe(builder, centres, half_lengths, frame, probe):
+    """(how far centres are from the probe's, half lengths of both added) along each axis of the probe."""
     for axis in range(3):
         gap, reach = _element(builder, probe, 6 + axis), _element(builder, probe, 9 + axis)
         for j in range(3):
             entry = _element(builder, frame, 3 * axis + j)
             gap = builder.fadd(gap, builder.fmul(entry, centres[j]))
             reach = builder.fadd(reach, builder.fmul(_abs(builder, entry), half_lengths[j]))
+        yield gap, reach
+
+
+def _apart(builder, data, frame, probe):
+    """Eight vectors of bits: whether a slot is not used, and whether an axis parts its box from that of the probe."""
+    centres, half_lengths = _centres_and_half_lengths(builder, data)
+    yield _unused(builder, half_lengths)
+    yield from _apart_along_node(builder, centres, half_lengths, probe)
+    for gap, reach in _along_probe(builder, centres, half_lengths, frame, probe):
         yield builder.fcmp_ordered(">", _abs(builder, gap), reach)
     gap, reach = _element(builder, probe, 15), _element(builder, probe, 16)
     for j in range(3):  # the probe's slab

@@ -53,19 +53,32 @@ def boxes_meeting_prism_one_by_one(boxes, at, frame, probe):
     with np.errstate(all="ignore"):
         rows = boxes[at : at + 6 * WIDTH].reshape(6, WIDTH)
         for edge in range(PROBE, PRISM, 4):
-            out = np.full(WIDTH, probe[edge + 3])
-            for j in range(3):
-                out = out + probe[edge + j] * rows[j]
-                out = out - np.abs(probe[edge + j]) * rows[3 + j]
-            mask &= ~int(np.packbits(out > 0.0, bitorder="little")[0])
+            mask &= ~int(np.packbits(_outside(rows, probe, edge), bitorder="little")[0])
     return mask
 
 
-def points_meeting_prism_one_by_one(points, at, frame, probe):
-    """`points_meeting_prism` in numpy's floats."""
-    rows = np.zeros((6, WIDTH), dtype=np.float32)
-    rows[:3] = points[at : at + 3 * WIDTH].reshape(3, WIDTH)
-    return boxes_meeting_prism_one_by_one(rows.reshape(-1), 0, frame, probe)
+def boxes_within_one_by_one(boxes, at, frame, probe):
+    """`boxes_within` in numpy's floats."""
+    rows = boxes[at : at + 6 * WIDTH].reshape(6, WIDTH)
+    with np.errstate(all="ignore"):
+        beyond, square = rows[3] < 0.0, np.float32(0.0)
+        for axis in range(3):
+            beyond |= np.abs(rows[axis] - probe[axis]) > rows[3 + axis] + probe[3 + axis]
+            gap, reach = _along(rows, frame, probe, axis)
+            gap = np.abs(gap) - reach
+            gap = np.where(gap > 0.0, gap, np.float32(0.0))
+            square = square + gap * gap
+        beyond |= square > probe[12]
+        for plane in range(PROBE, PRISM, 4):
+            beyond |= _outside(rows, probe, plane)
+    return int(np.packbits(~beyond, bitorder="little")[0])
+
+
+def points_within_one_by_one(points, at, frame, probe):
+    """`points_within` in numpy's floats."""
+    rows = np.zeros(6 * WIDTH, dtype=np.float32)
+    rows[: 3 * WIDTH] = points[at : at + 3 * WIDTH]
+    return boxes_within_one_by_one(rows, 0, frame, probe)
 
 
 def boxes_near_place_one_by_one(boxes, at, x, y, z, limit):
@@ -144,11 +157,19 @@ def _along(rows, frame, probe, axis):
     return gap, reach
 
 
+def _outside(rows, probe, edge):
+    out = np.full(WIDTH, probe[edge + 3])
+    for j in range(3):
+        out = out + probe[edge + j] * rows[j]
+        out = out - np.abs(probe[edge + j]) * rows[3 + j]
+    return out > 0.0
+
+
 if not WITH_NUMBA:
     boxes_meeting, boxes_nearest = boxes_meeting_one_by_one, boxes_nearest_one_by_one
     boxes_meeting_prism = boxes_meeting_prism_one_by_one
     boxes_near_place, points_near_place = boxes_near_place_one_by_one, points_near_place_one_by_one
-    points_meeting_prism = points_meeting_prism_one_by_one
+    boxes_within, points_within = boxes_within_one_by_one, points_within_one_by_one
     patches_near_place = patches_near_place_one_by_one
 else:
     from collide.kernels.box_vectors import (
@@ -156,14 +177,17 @@ else:
         boxes_meeting_prism,
         boxes_near_place,
         boxes_nearest,
+        boxes_within,
         patches_near_place,
-        points_meeting_prism,
         points_near_place,
+        points_within,
     )
 
 #: ``boxes_meeting(boxes, at, frame, probe) -> int``: bit k is set unless an axis separates the probe's box from box k
-#: of the node whose first float is ``boxes[at]``. Views of float32. `boxes_meeting_prism` reads PRISM floats;
-#: `points_meeting_prism` reads three rows of eight coordinates in place of boxes.
+#: of the node whose first float is ``boxes[at]``. Views of float32. `boxes_meeting_prism` reads PRISM floats.
+#: ``boxes_within(boxes, at, frame, probe) -> int``: bit k is set unless box k is farther from the probe's box than the
+#: root of ``probe[12]``, farther along an axis of the node, or outside of a half-space; of the probe's half lengths in
+#: its own frame none is enlarged. `points_within` reads three rows of eight coordinates in place of boxes.
 #: ``boxes_nearest(boxes, at, slabs, slab_at, frame, probe, out)``: out becomes eight lower bounds of distances (≤ 0
 #: where no axis separates), then eight squared lengths of lines between centres, in units of the probe's tree.
 #: ``boxes_near_place(boxes, at, x, y, z, limit) -> int``: bit k is set where the squared distance of box k of the node
@@ -173,6 +197,7 @@ else:
 __all__ = [
     "FRAME", "NEAR_PROBE", "PRISM", "PROBE", "boxes_meeting", "boxes_meeting_one_by_one", "boxes_meeting_prism",
     "boxes_meeting_prism_one_by_one", "boxes_near_place", "boxes_near_place_one_by_one", "boxes_nearest",
-    "boxes_nearest_one_by_one", "patches_near_place", "patches_near_place_one_by_one", "points_meeting_prism",
-    "points_meeting_prism_one_by_one", "points_near_place", "points_near_place_one_by_one",
+    "boxes_nearest_one_by_one", "boxes_within", "boxes_within_one_by_one", "patches_near_place",
+    "patches_near_place_one_by_one", "points_near_place", "points_near_place_one_by_one", "points_within",
+    "points_within_one_by_one",
 ]

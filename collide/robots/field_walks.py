@@ -32,7 +32,7 @@ def field_walks(around: Surroundings, doubles_at: int, integers_at: int) -> Fiel
         body = around.bodies[number]
         question = _question(body, around, k, (doubles_at, integers_at)) if body.shape.is_field else None
         if question is not None:
-            words[k] = code_of(question.items.kernels.part), address_of(question.header)
+            words[k] = code_of(question.items.kernels.state_of_part), address_of(question.header)
             held.append(question)
     return FieldWalks(words, held)
 

@@ -20,8 +20,10 @@ from collide.mesh.box_overlap import (
     boxes_meeting_prism_one_by_one,
     boxes_nearest,
     boxes_nearest_one_by_one,
-    points_meeting_prism,
-    points_meeting_prism_one_by_one,
+    boxes_within,
+    boxes_within_one_by_one,
+    points_within,
+    points_within_one_by_one,
 )
 from collide.mesh.build_bvh import build_mesh_tree
 from collide.mesh.bvh import NODE, NOTHING, SLAB, MeshTree
@@ -147,8 +149,10 @@ def _meeting_prism(node_at, frame_at, probe_at):
 
 
 @entry("int64(int64, int64, int64)")
-def _points_meeting(points_at, frame_at, probe_at):
-    return points_meeting_prism(view_f32(points_at, 24), 0, view_f32(frame_at, 9), view_f32(probe_at, PRISM))
+def _within(node_at, frame_at, probe_at):
+    frame, probe = view_f32(frame_at, 9), view_f32(probe_at, PRISM)
+    boxes, points = view_f32(node_at, NODE), view_f32(node_at, 24)
+    return boxes_within(boxes, 0, frame, probe) | points_within(points, 0, frame, probe) << 8
 
 
 @entry("void(int64, int64, int64, int64, int64)")
@@ -182,8 +186,9 @@ def test_eight_boxes_are_eight_boxes():
         prism[3:6] += 2.0  # parted by its edges, if at all
         mask = _meeting_prism(address_of(node), address_of(frame), address_of(prism))
         assert mask == boxes_meeting_prism_one_by_one(node, 0, frame, prism)
-        mask_of_points = _points_meeting(address_of(node), address_of(frame), address_of(prism))
-        assert mask_of_points == points_meeting_prism_one_by_one(node, 0, frame, prism)
+        mask = _within(address_of(node), address_of(frame), address_of(prism))
+        assert mask & 0xFF == boxes_within_one_by_one(node, 0, frame, prism)
+        assert mask >> 8 == points_within_one_by_one(node, 0, frame, prism)
         by_edges.append(mask != boxes_meeting_one_by_one(node, 0, frame, prism))
         outs = np.zeros((2, 16), dtype=np.float32)
         _nearest(*(address_of(x) for x in (node, slab, frame, probe, outs[0])))

@@ -56,12 +56,16 @@ def serves(packed: PackedConvex) -> bool:
 _CORNERS = {FACETS: 3, BALLS: 1, CELLS: 8}
 
 
-class StateKernels(NamedTuple):
-    """What tells whether items meet a shape: at many poses, in single calls, of a part in the tables of a robot."""
+class WalkKernels(NamedTuple):
+    """What walks down a tree of items: for states at many poses, in single calls, of a part in the tables of a robot;
+    for gaps at many poses, in single calls.
+    """
 
-    batch: Any = curved_states_of
-    single: Any = curved_state_single
-    part: Any = state_of_part
+    states: Any = curved_states_of
+    single_state: Any = curved_state_single
+    state_of_part: Any = state_of_part
+    gaps: Any = curved_gaps
+    single_gap: Any = curved_gap_single
 
 
 class Items(NamedTuple):
@@ -69,7 +73,7 @@ class Items(NamedTuple):
 
     tree : over facets, points or cells.   reach : how far they reach from their origin [m].   solid : whether they
     enclose an inside.   radius : the largest of balls, 0 of facets [m].   radii : (n,) of balls, where they differ.
-    are : FACETS, BALLS or CELLS.   kernels : of states.
+    are : FACETS, BALLS or CELLS.   kernels : that walk.
     """
 
     tree: Any
@@ -78,7 +82,7 @@ class Items(NamedTuple):
     radius: float = 0.0
     radii: np.ndarray | None = None
     are: int = FACETS
-    kernels: StateKernels = StateKernels()
+    kernels: WalkKernels = WalkKernels()
 
 
 class GapQuestion:
@@ -138,7 +142,7 @@ def surface_states(
     state, place, how = np.empty((3, n), dtype=np.int64)
     X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
     question = GapQuestion(items, packed, scratch())
-    items.kernels.batch(
+    items.kernels.states(
         address_of(question.header), address_of(X_WA), address_of(X_WB), n, margin, address_of(state),
         address_of(place), address_of(how),
     )
@@ -158,7 +162,7 @@ class _SingleQuestion:
         question = GapQuestion(items, packed, space.addresses)
         question.header[EXCHANGED] = exchanged
         self.header, self.held = question.header, (space, question, packed)
-        self._solid, self._state = items.solid, prepared_row(items.kernels.single, question.header)
+        self._solid, self._state = items.solid, prepared_row(items.kernels.single_state, question.header)
 
     def state(self, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> int | None:
         """MEETS, NEAR, SURFACES_APART or, of solids alone, MAYBE_INSIDE; None of pairs left to another method.
@@ -184,7 +188,7 @@ def gap_rows(
     rows, is_written = np.zeros(n, dtype=PAIR_DTYPE), np.zeros(n, dtype=bool)
     X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
     question = GapQuestion(items, packed, scratch())
-    curved_gaps(
+    items.kernels.gaps(
         address_of(question.header), address_of(X_WA), address_of(X_WB), n, depths, address_of(rows),
         address_of(is_written),
     )
@@ -199,7 +203,7 @@ def prepared_items(
     exchanged : the shape stands first.   point : (3,) of the shape, in its frame, where items enclose an inside.
     """
     single = _SingleQuestion(items, packed, exchanged)
-    gap = prepared_row(curved_gap_single, single.header)
+    gap = prepared_row(items.kernels.single_gap, single.header)
 
     def is_outside(X_WA, X_WB) -> bool:
         """Whether the shape, whose surface the mesh's does not meet, is outside of the mesh."""

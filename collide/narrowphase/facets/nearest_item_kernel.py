@@ -156,7 +156,7 @@ class _Walk(NamedTuple):
     slack: float
 
 
-class _Nearest(NamedTuple):
+class Nearest(NamedTuple):
     """The nearest of the items asked about so far.
 
     key, place : of the best row, the first of the rows.   lower, upper : least bounds of all items [m].
@@ -301,8 +301,8 @@ def whether_item(walk, place, axis, margin):
 
 
 @kernel
-def _with_item(walk, nearest, place, limit):
-    """The `_Nearest` with one item more.   limit : of the walk [m].
+def with_item(walk, nearest, place, limit):
+    """The `Nearest` with one item more.   limit : of the walk [m].
 
     A walk without a limit asks an item only whether the item is nearer. In a walk with a limit the question takes
     longer than the distance.
@@ -319,7 +319,7 @@ def _with_item(walk, nearest, place, limit):
         along = rotate_back(walk.poses, 0, n)
         above = dot(n, walk.t) - height_along(walk, neg(n))
     open_lower = nearest.open_lower if row.flags[CERTIFIED] != 0 else min(nearest.open_lower, lower)
-    return _Nearest(
+    return Nearest(
         key, place if failed else best, min(nearest.lower, lower), min(nearest.upper, upper), open_lower, along, above,
         failed, nearest.n_asked + 1,
     )
@@ -402,7 +402,7 @@ def _push_cells(walk, nearest, word, node, top):
 def _walk_cells(walk, limit, enough, max_asked):
     """`_walk_down` of a tree of cells: the place of an item is the word of its box."""
     zero, words = Vec3(0.0, 0.0, 0.0), walk.words
-    nearest = _Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
+    nearest = Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
     top = _push_cells(walk, nearest, root_word(open_cells(words[TREE_AT])), 0, 0)
     while top > 0 and not nearest.failed and nearest.lower > enough and nearest.n_asked <= max_asked:
         top -= 1
@@ -411,7 +411,7 @@ def _walk_cells(walk, limit, enough, max_asked):
         stack = view_i64(words[STACK_AT], 2 * top + 2)
         word, node = stack[2 * top], stack[2 * top + 1]
         if node < 0:
-            nearest = _with_item(walk, nearest, word, limit)
+            nearest = with_item(walk, nearest, word, limit)
         else:
             top = _push_cells(walk, nearest, word, node, top)
     return nearest
@@ -427,7 +427,7 @@ def _number_of_item(walk, place):
 
 @kernel
 def _walk_down(walk, limit, enough, max_asked):
-    """The `_Nearest` of all items that may be nearest, and no farther than a limit [m].
+    """The `Nearest` of all items that may be nearest, and no farther than a limit [m].
 
     enough : a lower bound of no more than this ends the walk [m].   max_asked : the walk is given up after so many
     items; `n_asked` is then larger.
@@ -436,7 +436,7 @@ def _walk_down(walk, limit, enough, max_asked):
     if words[ITEMS_ARE] == CELLS:
         return _walk_cells(walk, limit, enough, max_asked)
     zero = Vec3(0.0, 0.0, 0.0)
-    nearest = _Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
+    nearest = Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
     top = _push_children(walk, nearest, 0, 0)
     while top > 0 and not nearest.failed and nearest.lower > enough and nearest.n_asked <= max_asked:
         top -= 1
@@ -450,7 +450,7 @@ def _walk_down(walk, limit, enough, max_asked):
         for place in range(run >> 3, (run >> 3) + (run & 7)):
             centre, half = _box_of_item(walk, place)
             if not (nearest.failed or _gap_of_box(walk, nearest, centre, half) > nearest.upper):
-                nearest = _with_item(walk, nearest, place, limit)
+                nearest = with_item(walk, nearest, place, limit)
     return nearest
 
 
@@ -459,7 +459,7 @@ def _places_within(walk, limit, capacity, places):
     """The number of the facets whose boxes may come within a limit [m]; their places, of no more than ``capacity``."""
     tree, words = walk.tree, walk.words
     zero = Vec3(0.0, 0.0, 0.0)
-    nearest = _Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
+    nearest = Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
     n, top = 0, _push_children(walk, nearest, 0, 0)
     while top > 0 and n <= capacity:
         top -= 1
@@ -588,7 +588,13 @@ def _gap(header_at, XA_at, XB_at, check, depths, row_at):
     is_placed, walk = place_pair(header_at, XA_at, XB_at, check)
     if not is_placed:
         return LONG_WAY
-    nearest = _walk_down(walk, math.inf, 0.0, walk.tree.header[N_FACETS])
+    return finish_gap(walk, _walk_down(walk, math.inf, 0.0, walk.tree.header[N_FACETS]), depths, row_at)
+
+
+@kernel
+def finish_gap(walk, nearest, depths, row_at):
+    """Write the row of the nearest item, or, without depths, of an item that meets the shape; returns as `_gap`."""
+    walk = with_box(walk)
     if nearest.failed and not depths:
         meeting = _walk_down(walk, 0.0, 0.0, _max_asked(walk))  # the item that batches name
         if not (meeting.failed and _is_proven_hit(view_row(walk.words[ROW_AT] + ROW))):
@@ -743,8 +749,14 @@ def curved_gap_single(header_at, XA_at, XB_at, row_at, depths, _unlimited):
     """
     exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
     status = _gap(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True, depths, row_at)
-    if status == LONG_WAY:
-        return LONG_WAY
+    if status != LONG_WAY:
+        finish_single(row_at, exchanged)
+    return status
+
+
+@kernel
+def finish_single(row_at, exchanged):
+    """Name the bodies of a row of a single call.   exchanged : the shape stands first."""
     row = view_row(row_at)
     row.words[BODY_B] = 1
     if exchanged:
@@ -753,4 +765,3 @@ def curved_gap_single(header_at, XA_at, XB_at, row_at, depths, _unlimited):
         put_vec3(row.doubles, POINT_A, vec3_at(row.doubles, POINT_B))
         put_vec3(row.doubles, POINT_B, p_a)
         row.words[PART_A], row.words[PART_B] = row.words[PART_B], row.words[PART_A]
-    return status

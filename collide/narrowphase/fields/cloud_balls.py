@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 
-from collide.narrowphase.facets.nearest_item_calls import BALLS, Items, StateKernels
+from collide.narrowphase.facets.nearest_item_calls import BALLS, Items, WalkKernels
 from collide.narrowphase.fields.convex_walk_kernel import (
+    gap_of_balls_single,
+    gaps_of_balls,
     state_of_balls_and_part,
     state_of_balls_single,
     states_of_balls,
@@ -16,7 +18,9 @@ from collide.narrowphase.fields.field_items import BoxAround, FieldItems
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.point_cloud import PointCloud
 
-_KERNELS = StateKernels(states_of_balls, state_of_balls_single, state_of_balls_and_part)
+_KERNELS = WalkKernels(
+    states_of_balls, state_of_balls_single, state_of_balls_and_part, gaps_of_balls, gap_of_balls_single
+)
 
 
 class Balls(FieldItems):

@@ -12,11 +12,11 @@ import math
 import numpy as np
 
 from collide.fields.point_tree_kernel import LEAF_FLOATS, MAX_LEVELS, floats_of, points_of
-from collide.kernels import entry, kernel, prepared, view_f32, view_f64, view_i64
+from collide.kernels import entry, kernel, prepared, view_f32, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import POINTS
 from collide.lowering.shape_table import ADDRESS, COUNT, INTS, KIND, NUMBERS, PADDED, POSE, POSE_SLOP, RADIUS, SLOP
-from collide.mesh.box_overlap import FRAME, PRISM, PROBE, boxes_meeting_prism, points_meeting_prism
-from collide.mesh.bvh import CENTRE, EXPONENT, MAX_LEAF, NODE, WIDTH, link_of
+from collide.mesh.box_overlap import FRAME, PRISM, PROBE, boxes_within, points_within
+from collide.mesh.bvh import CENTRE, EXPONENT, MAX_LEAF, NODE, NOTHING, WIDTH, link_of
 from collide.narrowphase.facets.nearest_item_kernel import (
     BOUNDS_AT,
     BOX,
@@ -30,18 +30,23 @@ from collide.narrowphase.facets.nearest_item_kernel import (
     POSES_AT,
     PROBE_AT,
     RADII_AT,
+    ROW_AT,
     STACK_AT,
     SURFACES_APART,
+    Nearest,
     ask_item,
     begin_walk,
+    finish_gap,
+    finish_single,
     height_along,
     set_poses,
     take_part,
     whether_item,
+    with_item,
 )
 from collide.narrowphase.fields.ball_walk_kernel import MEETS as BALLS_MEET
 from collide.narrowphase.fields.ball_walk_kernel import OPEN, state_of_balls
-from collide.narrowphase.rows import HIT, LOWER, NORMAL, is_undecided_or_refused
+from collide.narrowphase.rows import HIT, LOWER, NORMAL, ROW, is_undecided_or_refused, view_row
 from collide.numerics.rigid_poses import off_rotation
 from collide.numerics.vec3 import (
     Vec3,
@@ -62,6 +67,8 @@ from collide.numerics.vec3 import (
 
 #: Of the numbers met, in units of the tree, what floats and their sums round.
 _FLOAT_ROUNDING = 2.0**-19
+#: Where a probe has the square of how far from its box is near.
+_SQUARE = 12
 #: Floats hold lengths below, in units, and their products.
 _LARGEST = 2.0**60
 #: Normals of a smaller size say nothing.
@@ -74,8 +81,8 @@ def _set_probe(walk, margin, frame, probe):
     floats are too small for the box.
 
     The point y of a ball within the margin [m] is within w = margin + slack of a point m + Σ λ_j a_j of the box,
-    |λ_j| ≤ h_j: y differs from m along axis i of the tree by at most Σ |a_j[i]| h_j + w, along axis a_k of the box by
-    at most h_k + w and the share by which the matrix is no rotation.
+    |λ_j| ≤ h_j: y differs from m along axis i of the tree by at most Σ |a_j[i]| h_j + w, and from the box, whose axes
+    are a_k, by at most w and the share by which the matrix is no rotation.
     """
     tree, poses, box = walk.tree, walk.poses, view_f64(walk.words[BOX_AT], BOX)
     per_metre = math.ldexp(1.0, -int(tree.header[EXPONENT]))
@@ -93,10 +100,11 @@ def _set_probe(walk, margin, frame, probe):
         half = h.x if j == 0 else h.y if j == 1 else h.z
         reach = add(reach, scale(half, absolute(a)))
         frame[3 * j], frame[3 * j + 1], frame[3 * j + 2] = np.float32(a.x), np.float32(a.y), np.float32(a.z)
-        probe[6 + j], probe[9 + j] = np.float32(-dot(a, m)), np.float32(half + wider)
+        probe[6 + j], probe[9 + j] = np.float32(-dot(a, m)), np.float32(half)
     probe[0], probe[1], probe[2] = np.float32(m.x), np.float32(m.y), np.float32(m.z)
     probe[3], probe[4], probe[5] = np.float32(reach.x), np.float32(reach.y), np.float32(reach.z)
-    for k in range(PROBE - 5, PRISM):
+    probe[_SQUARE] = np.float32(wider * wider * (1.0 + _FLOAT_ROUNDING))
+    for k in range(PROBE, PRISM):
         probe[k] = np.float32(0.0)
     return wider
 
@@ -158,7 +166,7 @@ def _nearness(frame, probe, x, y, z):
 @kernel
 def _push_boxes(tree, node, frame, probe, stack, keys, top):
     """Put boxes of a node that meet the probe on the stack, the nearest on top; returns its height."""
-    first, boxes, near = top, tree.boxes, boxes_meeting_prism(tree.boxes, NODE * node, frame, probe)
+    first, boxes, near = top, tree.boxes, boxes_within(tree.boxes, NODE * node, frame, probe)
     for slot in range(WIDTH):
         if not near >> slot & 1:
             continue
@@ -205,7 +213,7 @@ def _state_by_box(walk, margin):
             continue
         first, leaf = ~link >> 3, LEAF_FLOATS * ((~link >> 3) // MAX_LEAF)
         remaining = (1 << (~link & 7)) - 1
-        near = points_meeting_prism(floats, leaf, frame, probe) & remaining
+        near = points_within(floats, leaf, frame, probe) & remaining
         while near != 0:
             i = _nearest_of(near, floats, leaf, frame, probe)
             state, n = _state_of_ball(walk, first + i, margin)
@@ -217,7 +225,7 @@ def _state_by_box(walk, margin):
             else:
                 _put_plane(walk, n, wider, n_planes, probe)
                 n_planes += 1
-            near = points_meeting_prism(floats, leaf, frame, probe) & remaining
+            near = points_within(floats, leaf, frame, probe) & remaining
     return answer
 
 
@@ -234,6 +242,69 @@ def _state_by_centre(walk, margin):
     if state == OPEN:
         return LONG_WAY
     return SURFACES_APART if state != BALLS_MEET else NEAR if margin > 0.0 else MEETS
+
+
+@kernel
+def _leaf_nearby(tree, frame, probe):
+    """The link of a leaf near the probe: at each node the box goes on whose centre is the nearest."""
+    boxes, link = tree.boxes, link_of(tree.links, 0)
+    while link >= 0:
+        at, nearest, least = NODE * link, 0, np.float32(math.inf)
+        for slot in range(WIDTH):
+            if boxes[at + slot + 3 * WIDTH] > NOTHING / 2:
+                key = _nearness(frame, probe, boxes[at + slot], boxes[at + slot + WIDTH], boxes[at + slot + 2 * WIDTH])
+                if key < least:
+                    nearest, least = slot, key
+        link = link_of(tree.links, WIDTH * link + nearest)
+    return link
+
+
+@kernel
+def _nearest_ball(walk):
+    """The `Nearest` of all balls: a ball nearby first, then the balls within the least upper bound so far."""
+    tree, words, zero = walk.tree, walk.words, Vec3(0.0, 0.0, 0.0)
+    frame, probe = view_f32(words[PROBE_AT], FRAME), view_f32(words[PROBE_AT] + 4 * FRAME, PRISM)
+    nothing = Nearest(math.inf, -1, math.inf, math.inf, math.inf, zero, -math.inf, False, 0)
+    wider, floats, n_stack = _set_probe(walk, 0.0, frame, probe), floats_of(tree), WIDTH * (MAX_LEVELS + 1)
+    if wider < 0.0:
+        return Nearest(math.inf, -1, math.inf, math.inf, math.inf, zero, -math.inf, True, 0)
+    run = ~_leaf_nearby(tree, frame, probe)
+    i = _nearest_of((1 << (run & 7)) - 1, floats, LEAF_FLOATS * ((run >> 3) // MAX_LEAF), frame, probe)
+    asked = (run >> 3) + i
+    nearest, wider = _with_ball(walk, nothing, asked, wider, frame, probe)
+    stack, keys = view_i64(words[STACK_AT], n_stack), view_f64(words[BOUNDS_AT], n_stack)
+    top = _push_boxes(tree, 0, frame, probe, stack, keys, 0)
+    while top > 0 and not nearest.failed:
+        top -= 1
+        link = link_of(tree.links, stack[top])
+        if link >= 0:
+            top = _push_boxes(tree, link, frame, probe, stack, keys, top)
+            continue
+        first, leaf, remaining = ~link >> 3, LEAF_FLOATS * ((~link >> 3) // MAX_LEAF), (1 << (~link & 7)) - 1
+        if 0 <= asked - first < MAX_LEAF:
+            remaining &= ~(1 << (asked - first))
+        near = points_within(floats, leaf, frame, probe) & remaining
+        while near != 0 and not nearest.failed:
+            i = _nearest_of(near, floats, leaf, frame, probe)
+            remaining &= ~(1 << i)
+            nearest, wider = _with_ball(walk, nearest, first + i, wider, frame, probe)
+            near = points_within(floats, leaf, frame, probe) & remaining
+    return nearest
+
+
+@kernel
+def _with_ball(walk, nearest, place, wider, frame, probe):
+    """(`Nearest`, how much wider the probe is) with a ball more: the probe shrinks with the least upper bound, and
+    leaves out what lies beyond the plane of the ball's row.
+    """
+    before = nearest.upper
+    nearest = with_item(walk, nearest, place, math.inf)
+    if nearest.failed:
+        return nearest, wider
+    if nearest.upper < before:
+        wider = _set_probe(walk, nearest.upper, frame, probe)
+    _put_plane(walk, vec3_at(view_row(walk.words[ROW_AT] + ROW).doubles, NORMAL), wider, nearest.n_asked, probe)
+    return nearest, wider
 
 
 @kernel
@@ -287,3 +358,32 @@ def state_of_balls_and_part(header_at, ints_at, numbers_at, pose_at, box_at, mar
     take_part(header_at, ints_at, numbers_at, pose_at, box_at)
     is_near, walk = begin_walk(header_at)
     return _state(walk, margin) if is_near else LONG_WAY
+
+
+@kernel
+def _gap(header_at, XA_at, XB_at, check, depths, row_at):
+    """The row of one pair of poses; LONG_WAY, SURFACES_APART or MAYBE_INSIDE, and without depths MEETS."""
+    placed = set_poses(header_at, XA_at, XB_at, check)
+    is_near, walk = begin_walk(header_at)
+    return finish_gap(walk, _nearest_ball(walk), depths, row_at) if placed and is_near else LONG_WAY
+
+
+@entry("int64(int64, int64, int64, int64, boolean, int64, int64)")
+def gaps_of_balls(header_at, XA_at, XB_at, n, depths, rows_at, states_at):
+    """Rows of a cloud and a convex set at n pairs of checked poses; arguments and result as of `curved_gaps`."""
+    states, n_written = view_u8(states_at, n), 0
+    for k in range(n):
+        status = _gap(header_at, XA_at + 128 * k, XB_at + 128 * k, False, depths, rows_at + ROW * k)
+        states[k] = 0 if status == LONG_WAY else 1
+        n_written += int(states[k])
+    return n_written
+
+
+@entry(prepared.ROW, nogil=False)
+def gap_of_balls_single(header_at, XA_at, XB_at, row_at, depths, _unlimited):
+    """`curved_gap_single` of a cloud and a convex set."""
+    exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
+    status = _gap(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True, depths, row_at)
+    if status != LONG_WAY:
+        finish_single(row_at, exchanged)
+    return status

@@ -9,7 +9,7 @@ from reproduction import reproducing
 
 import collide
 from collide.lowering.parts import convex_set_of
-from collide.narrowphase.facets.nearest_item_calls import Items, surface_states
+from collide.narrowphase.facets.nearest_item_calls import Items, gap_rows, surface_states
 from collide.narrowphase.fields.items_of import items_of
 
 _SNIPPET = """
@@ -79,6 +79,31 @@ def test_states_are_those_of_all_points(name):
                 assert bool(state.apart[0]) == (gap > margin), (gap, margin)
             n_met, n_apart, n_near = n_met + (gap < 0.0), n_apart + (gap > margin), n_near + (0.0 < gap < margin)
     assert min(n_met, n_apart, n_near) > 40, (n_met, n_apart, n_near)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_gaps_are_those_of_all_points(name):
+    """The bracket holds the least of all distances, and the row names a point at the distance."""
+    rng, (shape, away) = rng_of("gaps of convex sets", name), SHAPES[name]
+    n_apart = n_met = 0
+    for points, radius in clouds(rng):
+        cloud, middle = collide.PointCloud(points, radius), 0.5 * (points.min(axis=0) + points.max(axis=0))
+        tolerance = 1e-12 * (1.0 + np.abs(points).max())
+        for _ in range(100):
+            X_CS = pose(rotation(rng), middle + rng.uniform(-1.0, 1.0, 3) * rng.choice([0.6, 3.0, 100.0]))
+            gaps = away((points - X_CS[:3, 3]) @ X_CS[:3, :3]) - radius
+            with reproducing(_SNIPPET, points=points, radius=radius, shape=shape, X_WC=np.eye(4), X_WS=X_CS, margin=0):
+                rows, written = gap_rows(walked(cloud), convex_set_of(shape), np.eye(4)[None], X_CS[None], False)
+                row, least = rows[0], float(gaps.min())
+                if written[0] and not row["hit"]:
+                    assert row["certified"] and row["lower"] - tolerance <= least <= row["upper"] + tolerance
+                    assert abs(gaps[row["part_a"]] - least) <= 1e-9 * (1.0 + least) + tolerance
+                elif written[0]:
+                    assert gaps[row["part_a"]] <= tolerance
+                else:
+                    assert abs(least) <= 1e-6
+            n_apart, n_met = n_apart + (least > 0.0), n_met + (least < 0.0)
+    assert n_apart > 100 and n_met > 20, (n_apart, n_met)
 
 
 def walked(cloud: collide.PointCloud) -> Items:
