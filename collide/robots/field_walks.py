@@ -15,7 +15,9 @@ from collide.robots.check_tables import BodyAround, Surroundings
 
 
 class FieldWalks(NamedTuple):
-    """The words of WALKS in `check_scene.py`, (parts, WALK) int64, and the questions at their addresses."""
+    """The words of WALKS in `check_scene.py`, (1 + parts, WALK) int64, zeros first; and the questions at their
+    addresses.
+    """
 
     words: np.ndarray
     held: list[Any]
@@ -27,12 +29,13 @@ def field_walks(around: Surroundings, doubles_at: int, integers_at: int) -> Fiel
 
     doubles, integers : workspace of `answer_pairs`, a thread's.
     """
-    words, held = np.zeros((max(len(around.packed), 1), WALK), dtype=np.int64), []
+    words, held = np.zeros((1 + len(around.packed), WALK), dtype=np.int64), []
     for k, number in enumerate(around.body_of.tolist()):
         body = around.bodies[number]
         question = _question(body, around, k, (doubles_at, integers_at)) if body.shape.is_field else None
         if question is not None:
-            words[k] = code_of(question.items.kernels.state_of_part), address_of(question.header)
+            kernels = question.items.kernels
+            words[1 + k] = code_of(kernels.state_of_part), code_of(kernels.gap_of_part), address_of(question.header)
             held.append(question)
     return FieldWalks(words, held)
 

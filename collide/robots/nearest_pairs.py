@@ -36,6 +36,7 @@ from collide.robots.check_scene import (
     PADDED,
     ROW_AT,
     SELF_PAIRS_AT,
+    WALK_STATE,
     body_of_part,
     boxes_meet,
     find_parts_around,
@@ -43,7 +44,18 @@ from collide.robots.check_scene import (
     place,
     view_scene,
 )
-from collide.robots.part_pairs import ask, boxes_are_apart, is_bounded, middle, only_holds
+from collide.robots.part_pairs import (
+    BEYOND_MARGIN,
+    NEAR,
+    OPEN,
+    ask,
+    boxes_are_apart,
+    gap_of_field,
+    is_bounded,
+    middle,
+    only_holds,
+    walk_of,
+)
 
 #: The first distance looked within [m], and by how much more each time.
 FIRST_LIMIT, GROWTH = 0.05, 8.0
@@ -132,13 +144,18 @@ def _take_nearer(scene, p, q, a, b, number, row_at, limit):
         d = sub(middle(scene, q), middle(scene, p))
         if boxes_are_apart(scene, p, q, d, within):
             return limit
-    row = ask(scene, p, q, d, False, within)
-    if is_undecided_or_refused(row):
+    walk = walk_of(scene, q)
+    if walk[WALK_STATE] != 0:
+        state, row = gap_of_field(scene, p, walk, within)
+    else:
+        row = ask(scene, p, q, d, False, within)
+        state = OPEN if is_undecided_or_refused(row) else NEAR
+    if state == OPEN:
         leave_open(scene, number, a, b, -math.inf)
         return limit
-    if row.flags[BEYOND] != 0 or not row.doubles[LOWER] <= limit:
+    if state == BEYOND_MARGIN or row.flags[BEYOND] != 0 or not row.doubles[LOWER] <= limit:
         return limit
-    if only_holds(scene, p) or only_holds(scene, q):
+    if only_holds(scene, p) or (walk[WALK_STATE] == 0 and only_holds(scene, q)):
         leave_open(scene, number, a, b, row.doubles[LOWER])
         return limit
     out = view_row(row_at)

@@ -6,7 +6,14 @@ import math
 
 from collide.kernels import kernel, native_call, view_i64, view_u8
 from collide.lowering.shape_table import INTS, NUMBERS, POSE
-from collide.narrowphase.facets.nearest_item_kernel import LONG_WAY, MAYBE_INSIDE, MEETS, PART_SIGNATURE, SURFACES_APART
+from collide.narrowphase.facets.nearest_item_kernel import (
+    GAP_SIGNATURE,
+    LONG_WAY,
+    MAYBE_INSIDE,
+    MEETS,
+    PART_SIGNATURE,
+    SURFACES_APART,
+)
 from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.rows import HIT, LOWER, NORMAL, ROW, is_undecided_or_refused, view_row
 from collide.numerics.vec3 import Vec3, dot, put_vec3, rotate, rotate_back, sub, vec3_at
@@ -28,8 +35,9 @@ from collide.robots.check_scene import (
     SHAPE_OF_AT,
     TERMS_AT,
     WALK,
-    WALK_CODE,
+    WALK_GAP,
     WALK_HEADER,
+    WALK_STATE,
     WALKS_AT,
 )
 
@@ -37,7 +45,7 @@ from collide.robots.check_scene import (
 BEYOND_MARGIN, NEAR, HITTING, OPEN = range(4)
 
 _answer_pairs_at = native_call(SIGNATURE)
-_state_of_part_at = native_call(PART_SIGNATURE)
+_state_of_part_at, _gap_of_part_at = native_call(PART_SIGNATURE), native_call(GAP_SIGNATURE)
 
 
 @kernel(inline=True)
@@ -48,11 +56,9 @@ def state_of_parts(scene, p, q, margin):
         d = sub(middle(scene, q), middle(scene, p))
         if boxes_are_apart(scene, p, q, d, margin):
             return BEYOND_MARGIN
-    if q >= scene.words[N_LINK_PARTS]:
-        walk = WALK * (q - scene.words[N_LINK_PARTS])
-        walks = view_i64(scene.words[WALKS_AT], walk + WALK)
-        if walks[walk + WALK_CODE] != 0:
-            return _state_of_field(scene, p, walks[walk + WALK_CODE], walks[walk + WALK_HEADER], margin)
+    walk = walk_of(scene, q)
+    if walk[WALK_STATE] != 0:
+        return _state_of_field(scene, p, walk, margin)
     row = ask(scene, p, q, d, True, margin)
     if is_undecided_or_refused(row):
         return OPEN
@@ -63,25 +69,46 @@ def state_of_parts(scene, p, q, margin):
     return OPEN if only_holds(scene, p) or only_holds(scene, q) else HITTING
 
 
+@kernel(inline=True)
+def walk_of(scene, part):
+    """The words of a part's field; the first is 0 of what is no field around, or is asked as any shape."""
+    around = part - scene.words[N_LINK_PARTS]
+    return view_i64(scene.words[WALKS_AT] + 8 * WALK * (around + 1 if around >= 0 else 0), WALK)
+
+
 @kernel
-def _state_of_field(scene, p, code, header_at, margin):
+def _state_of_field(scene, p, walk, margin):
     """`state_of_parts` of a part and a field around; NEAR where items may be within the margin, and OPEN where a part
     only holds what is meant: what the part is apart from, the mesh within is apart from.
     """
-    words = scene.words
-    row = view_i64(words[SHAPE_OF_AT], p + 1)[p]
-    state = _state_of_part_at(
-        code,
-        (
-            header_at, words[INTS_AT] + 8 * INTS * row, words[NUMBERS_AT] + 8 * NUMBERS * row,
-            words[POSES_AT] + 8 * POSE * p, words[PART_BOXES_AT] + 8 * BOX * p, margin,
-        ),
-    )
+    state = _state_of_part_at(walk[WALK_STATE], (walk[WALK_HEADER], *_rows_of_part(scene, p), margin))
     if state == SURFACES_APART or state == MAYBE_INSIDE:
         return BEYOND_MARGIN
     if state == LONG_WAY or only_holds(scene, p):
         return OPEN
     return HITTING if state == MEETS else NEAR
+
+
+@kernel(inline=True)
+def gap_of_field(scene, p, walk, limit):
+    """(NEAR, BEYOND_MARGIN or OPEN, the row) of a part and a field around.   limit : [m]."""
+    row_at = scene.words[ROW_AT]
+    blank = view_i64(row_at, ROW // 8)
+    for k in range(ROW // 8):
+        blank[k] = 0
+    state = _gap_of_part_at(walk[WALK_GAP], (walk[WALK_HEADER], *_rows_of_part(scene, p), limit, row_at))
+    return (OPEN if state == LONG_WAY else BEYOND_MARGIN if state == SURFACES_APART else NEAR), view_row(row_at)
+
+
+@kernel(inline=True)
+def _rows_of_part(scene, p):
+    """Addresses of a part's rows of the shapes, of its pose, of its box."""
+    words = scene.words
+    row = view_i64(words[SHAPE_OF_AT], p + 1)[p]
+    return (
+        words[INTS_AT] + 8 * INTS * row, words[NUMBERS_AT] + 8 * NUMBERS * row, words[POSES_AT] + 8 * POSE * p,
+        words[PART_BOXES_AT] + 8 * BOX * p,
+    )
 
 
 @kernel(inline=True)

@@ -79,6 +79,33 @@ def test_proven_motions_have_no_sample_that_collides(kind):
     assert free > 20 and met > 20 and still_open < 0.05 * (free + met), (free, met, still_open)
 
 
+@pytest.mark.parametrize("kind", ["balls", "each", "grid"])
+def test_distances_are_those_of_pairs(kind):
+    """Of free configurations: the least of all gaps lies in the bracket, and points lie on both bodies of the pair."""
+    n = 0
+    for seed in range(5):
+        checker, X_WF, shape = arm_in_field(seed, kind, padding=0.01 * (seed == 1))
+        robot, padding, Q = checker.robot, 0.01 * (seed == 1), configurations(checker, 40)
+        Q = Q[~checker.collides(Q)]
+        near, alone, poses = checker.distances(Q), collide.RobotChecker(robot).distances(Q), robot.link_poses(Q)
+        for k, row in enumerate(near.rows):
+            with reproducing(_SNIPPET, seed=seed, q=Q[k]):
+                gaps = [
+                    (collide.distance(e.shape, shape, poses[k, robot.links.index(link)] @ e.X_LG, X_WF).distance, link)
+                    for link, elements in robot.geometry.items() for e in elements
+                ]
+                gap, link = min(gaps)
+                least = min(gap - padding, float(alone.distance[k]))
+                assert row["certified"] and abs(row["distance"] - least) <= 1e-9 and row["lower"] <= least + 1e-12
+                away = row["point_b"] - row["point_a"]
+                assert abs(np.linalg.norm(away) - row["distance"]) <= 1e-9
+                assert np.linalg.norm(away - row["distance"] * row["normal"]) <= 1e-6
+                if row["b"] < 0:
+                    assert checker.names_of(int(row["a"]), int(row["b"])) == (link, "field")
+                    n += 1
+    assert n > 30, n
+
+
 def test_a_field_that_moves_is_asked_where_it_stands():
     checker, _, shape = arm_in_field(0, "balls")
     Q = configurations(checker, 60)

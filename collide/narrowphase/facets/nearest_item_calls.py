@@ -39,6 +39,7 @@ from collide.narrowphase.facets.nearest_item_kernel import (
     curved_gaps,
     curved_state_single,
     curved_states_of,
+    gap_of_part,
     state_of_part,
 )
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
@@ -57,8 +58,8 @@ _CORNERS = {FACETS: 3, BALLS: 1, CELLS: 8}
 
 
 class WalkKernels(NamedTuple):
-    """What walks down a tree of items: for states at many poses, in single calls, of a part in the tables of a robot;
-    for gaps at many poses, in single calls.
+    """What walks down a tree of items for states, and for gaps: at many poses, in single calls, of a part in the tables
+    of a robot.
     """
 
     states: Any = curved_states_of
@@ -66,6 +67,7 @@ class WalkKernels(NamedTuple):
     state_of_part: Any = state_of_part
     gaps: Any = curved_gaps
     single_gap: Any = curved_gap_single
+    gap_of_part: Any = gap_of_part
 
 
 class Items(NamedTuple):

@@ -697,6 +697,36 @@ def state_of_part(header_at, ints_at, numbers_at, pose_at, box_at, margin):
     return state
 
 
+#: The same for a part's gap.
+GAP_SIGNATURE = "int64(int64, int64, int64, int64, int64, float64, int64)"
+
+
+@entry(GAP_SIGNATURE)
+def gap_of_part(header_at, ints_at, numbers_at, pose_at, box_at, limit, row_at):
+    """The row of a part as of `take_part`, as A, and of items where they stand; returns as `finish_part`.
+
+    limit : parts farther away have no row [m].
+    """
+    take_part(header_at, ints_at, numbers_at, pose_at, box_at)
+    is_near, walk = begin_walk(header_at)
+    if not is_near:
+        return LONG_WAY
+    walk = with_box(walk)
+    return finish_part(walk, _walk_down(walk, limit, 0.0, walk.tree.header[N_FACETS]), row_at)
+
+
+@kernel
+def finish_part(walk, nearest, row_at):
+    """Write the row of a part and the nearest item: NEAR; SURFACES_APART of items beyond the limit; LONG_WAY."""
+    if nearest.failed:
+        return LONG_WAY
+    if nearest.place < 0:
+        return SURFACES_APART
+    _write_gap(walk, nearest, row_at)
+    finish_single(row_at, True)
+    return NEAR
+
+
 @entry("int64(int64, int64, int64, int64, boolean, int64, int64)")
 def curved_gaps(header_at, XA_at, XB_at, n, depths, rows_at, states_at):
     """Rows of items and a shape at n pairs of checked poses that are apart, or, without depths, meet; returns how many

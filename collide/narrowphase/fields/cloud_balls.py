@@ -8,6 +8,7 @@ import numpy as np
 
 from collide.narrowphase.facets.nearest_item_calls import BALLS, Items, WalkKernels
 from collide.narrowphase.fields.convex_walk_kernel import (
+    gap_of_balls_and_part,
     gap_of_balls_single,
     gaps_of_balls,
     state_of_balls_and_part,
@@ -19,7 +20,8 @@ from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.point_cloud import PointCloud
 
 _KERNELS = WalkKernels(
-    states_of_balls, state_of_balls_single, state_of_balls_and_part, gaps_of_balls, gap_of_balls_single
+    states_of_balls, state_of_balls_single, state_of_balls_and_part, gaps_of_balls, gap_of_balls_single,
+    gap_of_balls_and_part,
 )
 
 

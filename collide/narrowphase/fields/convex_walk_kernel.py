@@ -22,6 +22,7 @@ from collide.narrowphase.facets.nearest_item_kernel import (
     BOX,
     BOX_AT,
     EXCHANGED,
+    GAP_SIGNATURE,
     HEADER,
     LONG_WAY,
     MEETS,
@@ -37,6 +38,7 @@ from collide.narrowphase.facets.nearest_item_kernel import (
     ask_item,
     begin_walk,
     finish_gap,
+    finish_part,
     finish_single,
     height_along,
     set_poses,
@@ -71,6 +73,8 @@ _FLOAT_ROUNDING = 2.0**-19
 _SQUARE = 12
 #: Floats hold lengths below, in units, and their products.
 _LARGEST = 2.0**60
+#: Of balls that are left to others.
+_UNTOLD = Nearest(math.inf, -1, math.inf, math.inf, math.inf, Vec3(0.0, 0.0, 0.0), -math.inf, True, 0)
 #: Normals of a smaller size say nothing.
 _LEAST_NORMAL = 1e-100
 
@@ -260,18 +264,20 @@ def _leaf_nearby(tree, frame, probe):
 
 
 @kernel
-def _nearest_ball(walk):
-    """The `Nearest` of all balls: a ball nearby first, then the balls within the least upper bound so far."""
-    tree, words, zero = walk.tree, walk.words, Vec3(0.0, 0.0, 0.0)
+def _nearest_ball(walk, limit):
+    """The `Nearest` of all balls within a limit [m]: a ball nearby first, then the balls within the least upper bound
+    so far.
+    """
+    tree, words = walk.tree, walk.words
     frame, probe = view_f32(words[PROBE_AT], FRAME), view_f32(words[PROBE_AT] + 4 * FRAME, PRISM)
-    nothing = Nearest(math.inf, -1, math.inf, math.inf, math.inf, zero, -math.inf, False, 0)
+    nothing = Nearest(math.inf, -1, math.inf, limit, math.inf, Vec3(0.0, 0.0, 0.0), -math.inf, False, 0)
     wider, floats, n_stack = _set_probe(walk, 0.0, frame, probe), floats_of(tree), WIDTH * (MAX_LEVELS + 1)
     if wider < 0.0:
-        return Nearest(math.inf, -1, math.inf, math.inf, math.inf, zero, -math.inf, True, 0)
+        return _UNTOLD
     run = ~_leaf_nearby(tree, frame, probe)
     i = _nearest_of((1 << (run & 7)) - 1, floats, LEAF_FLOATS * ((run >> 3) // MAX_LEAF), frame, probe)
     asked = (run >> 3) + i
-    nearest, wider = _with_ball(walk, nothing, asked, wider, frame, probe)
+    nearest, wider = _with_ball(walk, nothing, asked, -1.0, frame, probe)
     stack, keys = view_i64(words[STACK_AT], n_stack), view_f64(words[BOUNDS_AT], n_stack)
     top = _push_boxes(tree, 0, frame, probe, stack, keys, 0)
     while top > 0 and not nearest.failed:
@@ -294,15 +300,19 @@ def _nearest_ball(walk):
 
 @kernel
 def _with_ball(walk, nearest, place, wider, frame, probe):
-    """(`Nearest`, how much wider the probe is) with a ball more: the probe shrinks with the least upper bound, and
+    """(`Nearest`, how much wider the probe is) with a ball more: the probe is as wide as the least upper bound, and
     leaves out what lies beyond the plane of the ball's row.
+
+    wider : below 0 of a probe for another distance.
     """
     before = nearest.upper
     nearest = with_item(walk, nearest, place, math.inf)
     if nearest.failed:
         return nearest, wider
-    if nearest.upper < before:
+    if nearest.upper < before or wider < 0.0:
         wider = _set_probe(walk, nearest.upper, frame, probe)
+        if wider < 0.0:
+            return _UNTOLD, wider
     _put_plane(walk, vec3_at(view_row(walk.words[ROW_AT] + ROW).doubles, NORMAL), wider, nearest.n_asked, probe)
     return nearest, wider
 
@@ -365,7 +375,7 @@ def _gap(header_at, XA_at, XB_at, check, depths, row_at):
     """The row of one pair of poses; LONG_WAY, SURFACES_APART or MAYBE_INSIDE, and without depths MEETS."""
     placed = set_poses(header_at, XA_at, XB_at, check)
     is_near, walk = begin_walk(header_at)
-    return finish_gap(walk, _nearest_ball(walk), depths, row_at) if placed and is_near else LONG_WAY
+    return finish_gap(walk, _nearest_ball(walk, math.inf), depths, row_at) if placed and is_near else LONG_WAY
 
 
 @entry("int64(int64, int64, int64, int64, boolean, int64, int64)")
@@ -387,3 +397,11 @@ def gap_of_balls_single(header_at, XA_at, XB_at, row_at, depths, _unlimited):
     if status != LONG_WAY:
         finish_single(row_at, exchanged)
     return status
+
+
+@entry(GAP_SIGNATURE)
+def gap_of_balls_and_part(header_at, ints_at, numbers_at, pose_at, box_at, limit, row_at):
+    """The row of a part as of `take_part` and of a cloud where it stands; arguments and result as of `gap_of_part`."""
+    take_part(header_at, ints_at, numbers_at, pose_at, box_at)
+    is_near, walk = begin_walk(header_at)
+    return finish_part(walk, _nearest_ball(walk, limit), row_at) if is_near else LONG_WAY

@@ -131,7 +131,10 @@ def test_places_that_floats_do_not_hold_are_left_to_others():
     cloud, X = collide.PointCloud(np.eye(3), 0.1), pose(t=(1e30, 0.0, 0.0))
     state = surface_states(walked(cloud), convex_set_of(collide.Box((1, 1, 1))), np.eye(4)[None], X[None])
     assert not state.meets[0] and not state.apart[0]
-    assert not collide.collide(cloud, collide.Box((1, 1, 1)), np.eye(4), X)
+    rows, written = gap_rows(walked(cloud), convex_set_of(collide.Box((1, 1, 1))), np.eye(4)[None], X[None])
+    assert not written[0]
+    row = collide.distance(cloud, collide.Box((1, 1, 1)), np.eye(4), X)
+    assert not row.hit and row.distance == pytest.approx(1e30, rel=1e-15)
 
 
 def test_a_single_call_answers_as_a_batch():
