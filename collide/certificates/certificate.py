@@ -16,17 +16,18 @@ Unions of convex parts: together, a single certificate names the two meeting par
 parts has its own. Pairs with a mesh have a single certificate: together, two facets within r_A + r_B of each other,
 with the named vertices as corners (a convex shape is taken whole, its facet is 0); apart, an axis between the hulls.
 
-Point clouds and grids (`field_proofs.py`) have items in the place of parts: a row of ``points``, or the number of a
-cell. together, one item and one part meet; apart, for every part of the other body "plane" certificates with the item
-−1: every item lies beyond one of these planes, by more than both radii.
+Fields (`field_proofs.py`) have items in the place of parts: a row of ``points`` of a cloud, the number of a cell of a
+grid, a row of ``faces`` of a swept mesh, a facet on top of large terrain, for the prism between facet and bottom.
+Vertices of an item are numbered in sorted order. together, one item and one part meet; inside, a vertex of a part lies
+in a swept solid, whose inside is the item after its triangles; apart, for every part of the other body "plane"
+certificates with the item −1: every item lies beyond one of these planes, by more than both radii.
 
 A region of half-spaces (`HPolytope` with ``bounded=False``) and points swept by a ball have a certificate of their own
 (`region_proofs.py`), naming half-spaces.
 
-Without a certificate are: cylinders, cones and ellipsoids; two half-spaces; regions beside
-other bodies; fields beside meshes and fields, and large terrain; results with an open sign or
-beyond the query's max_distance; meshes apart whose hull meets the other body (a proof would need an axis for every pair
-of facets).
+Without a certificate are: cylinders, cones and ellipsoids; two half-spaces; regions beside other bodies; fields beside
+meshes and fields; results with an open sign or beyond the query's max_distance; meshes apart whose hull meets the other
+body (a proof would need an axis for every pair of facets).
 
 Vertex ids are rows of `PackedConvex.points`: the points of a `ConvexHull` as handed in, the corners of a `Box` by sign
 (−−−, −−+, …), the ends of a `Capsule`, the rounded ``vertices`` of an `HPolytope`; of a `Mesh` rows of its

@@ -1,167 +1,102 @@
-"""Proofs about point clouds and grids: a hit by one item, a gap by planes, each item beyond at least a plane.
+"""Proofs about fields (clouds, grids, swept meshes, large terrain): a hit by one item, a gap by planes, each item
+beyond at least a plane.
 
 With a normal n and the vertex b of the other body farthest along n, an item is beyond the plane where
-n·(p − b) > (r_p + r_b)|n|, p being its point, or its corner least far along n. The right side is replaced by a
-slightly larger fraction. The left side is taken in doubles with a bound of rounding, and as fractions for items left
-open by doubles.
+n·(p − b) > (r_p + r_b)|n| for all vertices p of the item. The right side is replaced by a slightly larger fraction. The
+left side is taken in doubles with a bound of rounding, and in integers for items that doubles place beyond no plane.
+A body parted from all triangles of a solid lies outside where the surface winds 0 times around a vertex of the body.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 
-from collide.certificates.certificate import PLANE, TOGETHER, Certificate
+from collide.certificates.certificate import INSIDE, NO_VERTEX, PLANE, TOGETHER, Certificate, VertexPair
 from collide.certificates.convex_proofs import flaw_of_proof
 from collide.certificates.exact_parts import ExactPart, exact_parts, has_exact_numbers
 from collide.certificates.nearest_to_origin import nearest_to_origin, nearest_vertex_pairs
-from collide.lowering.convex_sets import HALFSPACE, POINTS
-from collide.numerics.exact_points import Point, in_integers, leading_digits, opposite
+from collide.certificates.swept_hulls import SweptHulls, hull_numbered, hulls_of
+from collide.certificates.winding_number import winding_number_around
+from collide.lowering.convex_sets import HALFSPACE
+from collide.numerics.exact_points import (
+    PlacedPoints,
+    Point,
+    in_integers,
+    integers,
+    leading_digits,
+    opposite,
+    rounded,
+)
 from collide.numerics.exact_vectors import inner, minus
-from collide.shapes.point_cloud import PointCloud
 from collide.shapes.shape import Shape
-from collide.shapes.voxel_grid import VoxelGrid
+from collide.shapes.swept_mesh import SweptMesh
 
 #: Stands for all items of a field, which planes part from a body.
 EVERY_ITEM = -1
-#: Planes of a certificate at most: of more there is none. Bits of a normal's components.
-_MAX_PLANES, _BITS = 1000, 40
+#: Planes of a certificate at most: of more there is none. Bits of a normal's components. Blocks opened at a time.
+_MAX_PLANES, _BITS, _OPENED = 1000, 40, 256
 #: Of the numbers added up, what rounding of their products and sums is less than.
 _ROUNDING = 2.0**-48
-_CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=bool)
+#: Where an item lies: beyond a plane, not beyond, or left open by doubles.
+_BEYOND, _OPEN, _NOT_BEYOND = 1, 0, -1
 
 
 def has_field_certificates(A: Shape, B: Shape) -> bool:
-    """Whether pairs of these may have a certificate: a cloud or a grid, and convex parts of exact numbers."""
-    field, body = (A, B) if A.is_field else (B, A)
-    if not isinstance(field, (PointCloud, VoxelGrid)) or body.is_asked_whole:
-        return False
-    return all(has_exact_numbers(part) for part in exact_parts(body, np.eye(4)))
+    """Whether pairs of these may have a certificate: a field, and convex parts of exact numbers."""
+    body = B if A.is_field else A
+    return not body.is_asked_whole and all(has_exact_numbers(part) for part in exact_parts(body, np.eye(4)))
 
 
-class _Field(NamedTuple):
-    """Items in the field's frame: points (n, 3), or corners ``low``, ``high`` of boxes, radii (n,) and numbers (n,)."""
+class _Plane(NamedTuple):
+    """A plane that parts items from a part of the other body, in the items' frame: an item of radius r lies beyond
+    where n·p > limit + (r + radius)·length for all of its vertices p.
+    """
 
-    low: np.ndarray
-    high: np.ndarray
-    radii: np.ndarray
-    numbers: np.ndarray
-    X_WF: np.ndarray
-    X_FG: np.ndarray
+    normal: Point
+    n: tuple[Fraction, Fraction, Fraction]
+    limit: Fraction
+    length: Fraction
+    radius: Fraction
 
-    def picked(self, rows) -> _Field:
-        low, high, radii, numbers = (column[rows] for column in (self.low, self.high, self.radii, self.numbers))
-        return self._replace(low=low, high=high, radii=radii, numbers=numbers)
+    def sides(self, items: SweptHulls) -> np.ndarray:
+        """(n,) int8: where items lie.
 
-    def part(self, row: int) -> ExactPart:
-        """An item."""
-        points = np.unique(np.where(_CORNERS, self.high[row], self.low[row]), axis=0)
-        return ExactPart(POINTS, points, float(self.radii[row]), None, self.X_WF, self.X_FG)
+        Digits of n, products and sums are rounded by 2^-53 each of the numbers added up, fewer than 16 times.
+        """
+        n, limit, length = np.array([float(c) for c in self.n]), rounded(self.limit)[0], rounded(self.length)[0]
+        points, widths = items.facing(n), (items.radii + float(self.radius)) * length
+        heights = points @ n - (limit + widths)[:, None]
+        bound = _ROUNDING * (np.abs(points) @ np.abs(n) + (abs(limit) + widths)[:, None]) + 1e-290
+        is_beyond, is_not = (heights > bound).all(axis=1), (heights < -bound).any(axis=1)
+        return is_beyond.astype(np.int8) - is_not
 
-
-def _field_of(field: Shape, X_WF: np.ndarray) -> _Field:
-    if isinstance(field, PointCloud):
-        return _Field(field.points, field.points, field.radii, np.arange(len(field)), X_WF, np.eye(4))
-    assert isinstance(field, VoxelGrid)
-    tree = field.tree
-    boxes = tree.boxes_in(np.zeros(3), np.array(tree.shape))
-    return _Field(*tree.corners(boxes.least, boxes.size), np.zeros(len(boxes.numbers)), boxes.numbers, X_WF, field.X_FG)
-
-
-def _numbered(field: Shape, X_WF: np.ndarray, number: int) -> ExactPart | None:
-    """The item of a number; None for a number without an item."""
-    if isinstance(field, PointCloud):
-        single = _field_of(field, X_WF) if 0 <= number < len(field) else None
-        return None if single is None else single.part(number)
-    assert isinstance(field, VoxelGrid)
-    tree = field.tree
-    cell = np.array([np.unravel_index(number, tree.shape)]) if 0 <= number < math.prod(tree.shape) else None
-    if cell is None or not tree.is_occupied(cell)[0]:
-        return None
-    boxes = tree.boxes_at(cell)
-    low, high = tree.corners(boxes.least, boxes.size)
-    return _Field(low, high, np.zeros(1), boxes.numbers, X_WF, field.X_FG).part(0)
+    def parts_exactly(self, items: SweptHulls, row: int) -> bool:
+        """Whether an item lies beyond, in integers: n and vertices are whole numbers on grids of powers of two."""
+        reach = self.limit + (Fraction(float(items.radii[row])) + self.radius) * self.length
+        n, (numbers, grid) = in_integers(self.n), integers(items.vertices(row))
+        reach *= max(c.denominator for c in self.n) / Fraction(2) ** grid
+        whole_reach = reach.numerator // reach.denominator
+        return all(inner(n, vertex) > whole_reach for vertex in zip(numbers[0::3], numbers[1::3], numbers[2::3]))
 
 
-# --- checking -----------------------------------------------------------------------------------
+def _plane(items: SweptHulls, part: ExactPart, normal: Point) -> _Plane:
+    n, height = _in_items_frame(items, normal)
+    scale = Fraction(2) ** -max((c.numerator.bit_length() - c.denominator.bit_length() for c in n), default=0)
+    limit = scale * (_height_of(part, normal) - height)
+    x, y, z = (scale * c for c in n)  # digits of exact normals are many
+    return _Plane(normal, (x, y, z), limit, scale * _no_less_than_length(normal), part.radius)
 
 
-def flaw_of_field_certificates(
-    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, certificates: Sequence[Certificate], claim: str
-) -> str | None:
-    """Why certificates fail to prove a field and another shape "together" or "apart"; None for a proof."""
-    if not has_field_certificates(A, B):
-        return "a field and this body have no certificate"
-    if claim == TOGETHER:
-        return _flaw_of_hit(A, B, X_WA, X_WB, certificates)
-    field, parts = (A, exact_parts(B, X_WB)) if A.is_field else (B, exact_parts(A, X_WA))
-    items = _field_of(field, X_WA if A.is_field else X_WB)
-    normals: dict[int, list[Point]] = {j: [] for j in range(len(parts))}
-    for kind, *numbers, pairs in certificates:
-        i, j = numbers if A.is_field else numbers[::-1]
-        if kind != PLANE or i != EVERY_ITEM or j not in normals:
-            return f"no planes between a field and part {j}, but {kind!r} of item {i}"
-        normals[j].append(pairs[0] if A.is_field else opposite(pairs[0]))
-    for j, part in enumerate(parts):
-        remaining = _remaining(items, part, normals[j])
-        if len(remaining.numbers):
-            n, first = len(remaining.numbers), int(remaining.numbers[0])
-            return f"part {j}: no plane parts it from {n} items, as from number {first}"
-    return None
-
-
-def _flaw_of_hit(A: Shape, B: Shape, X_WA, X_WB, certificates: Sequence[Certificate]) -> str | None:
-    if len(certificates) != 1 or certificates[0].kind != TOGETHER:
-        return f'a hit of a field is proven by one certificate "together", not {len(certificates)}'
-    _, i, j, pairs = certificates[0]
-    bodies: list[ExactPart] = []
-    for shape, X, number in ((A, X_WA, i), (B, X_WB, j)):
-        if shape.is_field:
-            part = _numbered(shape, X, number)
-        else:
-            parts = exact_parts(shape, X)
-            part = parts[number] if 0 <= number < len(parts) else None
-        if part is None:
-            return f"there is no item or part {number}"
-        bodies.append(part)
-    return flaw_of_proof(bodies[0], bodies[1], pairs, hit=True)
-
-
-def _remaining(items: _Field, part: ExactPart, normals: Sequence[Point]) -> _Field:
-    """The items that no plane parts from a part of the other body; of a half-space its own plane alone counts."""
-    for normal in [in_integers(part.plane[0])] if part.kind == HALFSPACE and normals else normals:
-        items = items.picked(~_beyond(items, part, normal))
-    return items
-
-
-def _beyond(items: _Field, part: ExactPart, normal: Point) -> np.ndarray:
-    """(n,) bool: which items lie beyond a part along a normal of whole numbers, for sure."""
-    n_G, height = _in_items_frame(items, normal)
-    scale = Fraction(2) ** -max((c.numerator.bit_length() - c.denominator.bit_length() for c in n_G), default=0)
-    n_G = tuple(scale * c for c in n_G)  # type: ignore[assignment]  # digits of exact normals are many
-    limit, length = scale * (_height_of(part, normal) - height), scale * _no_less_than_length(normal)
-    n = np.array([float(c) for c in n_G])
-    p = np.where(n > 0.0, items.low, items.high)
-    reach = float(limit) + (items.radii + float(part.radius)) * float(length)
-    sizes = np.abs(p) @ np.abs(n) + abs(float(limit)) + (items.radii + float(part.radius)) * float(length)
-    heights, bound = p @ n - reach, _ROUNDING * sizes + 1e-290
-    beyond = heights > bound
-    for k in np.flatnonzero(np.abs(heights) <= bound).tolist():
-        corners = zip(n_G, items.low[k].tolist(), items.high[k].tolist())
-        corner = [Fraction(low if c > 0 else high) for c, low, high in corners]
-        beyond[k] = inner(n_G, corner) > limit + (Fraction(items.radii[k]) + part.radius) * length
-    return beyond
-
-
-def _in_items_frame(items: _Field, normal: Point) -> tuple[tuple[Fraction, Fraction, Fraction], Fraction]:
+def _in_items_frame(items: SweptHulls, normal: Point) -> tuple[tuple[Fraction, Fraction, Fraction], Fraction]:
     """(n_G, h) with n·(X p) = n_G·p + h for points p of the items' frame, entries taken as exact."""
     n: tuple = tuple(map(Fraction, normal))
     height = Fraction(0)
-    for X in (items.X_WF, items.X_FG):
+    for X in reversed(items.poses):
         rows = [[Fraction(v) for v in row] for row in X[:3].tolist()]
         height += inner(n, [row[3] for row in rows])
         n = tuple(sum(n[i] * rows[i][k] for i in range(3)) for k in range(3))
@@ -184,6 +119,119 @@ def _no_less_than_length(normal: Point) -> Fraction:
     return Fraction(math.isqrt(inner(normal, normal) << 2 * shift) + 1, 1 << shift)
 
 
+def _unparted(items: SweptHulls, planes: Sequence[_Plane]) -> Iterator[int]:
+    """Rows of items on no plane's far side: first all known by doubles, then the rows decided by integers."""
+    best = np.full(len(items.numbers), _NOT_BEYOND, dtype=np.int8)
+    for plane in planes:
+        rows = np.flatnonzero(best < _BEYOND)
+        best[rows] = np.maximum(best[rows], plane.sides(items.picked(rows)))
+    yield from np.flatnonzero(best == _NOT_BEYOND).tolist()
+    for row in np.flatnonzero(best == _OPEN).tolist():
+        if not any(plane.parts_exactly(items, row) for plane in planes):
+            yield row
+
+
+def _own_planes(items: SweptHulls, part: ExactPart) -> list[_Plane]:
+    """Of a half-space its own plane, to which proofs are limited; an empty list of points."""
+    return [_plane(items, part, in_integers(part.plane[0]))] if part.kind == HALFSPACE else []
+
+
+def _number_of_inside(field: Shape) -> int | None:
+    """The item that stands for the inside of a solid, the number after its last triangle; ``None`` of other fields."""
+    return len(field.mesh.faces) if isinstance(field, SweptMesh) and field.mesh.solid else None
+
+
+def _is_outside(field: Shape, X_WF: np.ndarray, part: ExactPart) -> bool:
+    """Whether a part, parted from all triangles, is proven to be outside of a solid, if the field is a solid.
+
+    No part reaches across the surface, so a vertex tells of all. A half-space has no end, and the solid has.
+    """
+    is_parted = part.kind == HALFSPACE or _number_of_inside(field) is None
+    return is_parted or _winding_number(field, X_WF, part, 0) == 0
+
+
+def _winding_number(field: Shape, X_WF: np.ndarray, part: ExactPart, vertex: int) -> int | None:
+    assert isinstance(field, SweptMesh)
+    vertices = PlacedPoints(field.mesh.vertices, [X_WF])
+    return winding_number_around(vertex, part.vertices, vertices, field.mesh.faces)
+
+
+def _turned(certificate: Certificate) -> Certificate:
+    """The certificate of the same bodies in the opposite order."""
+    kind, i, j, rows = certificate
+    return Certificate(kind, j, i, tuple(opposite(row) if kind == PLANE else row[::-1] for row in rows))
+
+
+# --- checking -----------------------------------------------------------------------------------
+
+
+def flaw_of_field_certificates(
+    A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, certificates: Sequence[Certificate], claim: str
+) -> str | None:
+    """Why certificates fail to prove a field and another shape "together" or "apart"; None for a proof."""
+    if not has_field_certificates(A, B):
+        return "a field and this body have no certificate"
+    if not A.is_field:
+        return flaw_of_field_certificates(B, A, X_WB, X_WA, list(map(_turned, certificates)), claim)
+    parts = exact_parts(B, X_WB)
+    if claim == TOGETHER:
+        return _flaw_of_hit(A, X_WA, parts, certificates)
+    items = hulls_of(A, X_WA)
+    planes = [_own_planes(items, part) for part in parts]
+    for kind, i, j, pairs in certificates:
+        if kind != PLANE or i != EVERY_ITEM or not 0 <= j < len(parts):
+            return f"no planes between a field and part {j}, but {kind!r} of item {i}"
+        if parts[j].kind != HALFSPACE:
+            planes[j].append(_plane(items, parts[j], pairs[0]))
+    named = {certificate.part_b for certificate in certificates}
+    for j, part in enumerate(parts):
+        first = _first_unparted(items, planes[j] if j in named else [])
+        if first is not None:
+            return f"part {j}: no plane parts it from an item, number {first}"
+        if not _is_outside(A, X_WA, part):
+            return f"part {j} is not proven to be outside of the solid"
+    return None
+
+
+def _first_unparted(items: SweptHulls, planes: Sequence[_Plane]) -> int | None:
+    """The number of an item not beyond any plane; ``None`` where every item is beyond a plane."""
+    unparted = _unparted(items, planes)
+    if items.opened is None:
+        row = next(unparted, None)
+        return None if row is None else int(items.numbers[row])
+    blocks = items.numbers[np.fromiter(unparted, dtype=np.int64)]
+    for k in range(0, len(blocks), _OPENED):
+        first = _first_unparted(items.opened(blocks[k : k + _OPENED]), planes)
+        if first is not None:
+            return first
+    return None
+
+
+def _flaw_of_hit(
+    field: Shape, X_WF: np.ndarray, parts: Sequence[ExactPart], certificates: Sequence[Certificate]
+) -> str | None:
+    if len(certificates) != 1 or certificates[0].kind not in (TOGETHER, INSIDE):
+        return f'a hit of a field is proven by one certificate "together" or "inside", not {len(certificates)}'
+    kind, i, j, pairs = certificates[0]
+    if not 0 <= j < len(parts):
+        return f"there is no part {j}"
+    if kind == INSIDE:
+        return _flaw_of_inside(field, X_WF, i, parts[j], pairs)
+    item = hull_numbered(field, X_WF, i)
+    return f"there is no item {i}" if item is None else flaw_of_proof(item, parts[j], pairs, hit=True)
+
+
+def _flaw_of_inside(
+    field: Shape, X_WF: np.ndarray, number: int, part: ExactPart, pairs: Sequence[VertexPair]
+) -> str | None:
+    if number != _number_of_inside(field):
+        return f"item {number} is not the inside of a solid"
+    if part.kind == HALFSPACE or len(pairs) != 1 or pairs[0][0] != NO_VERTEX or not 0 <= pairs[0][1] < len(part):
+        return "−1 is needed for the solid, and one vertex of the other body"
+    winding = _winding_number(field, X_WF, part, pairs[0][1])
+    return None if winding is not None and winding > 0 else f"vertex {pairs[0][1]} does not lie in the solid"
+
+
 # --- making -------------------------------------------------------------------------------------
 
 
@@ -191,94 +239,101 @@ def field_certificate(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, ro
     """The certificate of a row of `distance`, or None."""
     if not has_field_certificates(A, B):
         return None
-    field, body = (A, B) if A.is_field else (B, A)
-    X_WF, X_WS = (X_WA, X_WB) if A.is_field else (X_WB, X_WA)
+    field, body, X_WF, X_WS = (A, B, X_WA, X_WB) if A.is_field else (B, A, X_WB, X_WA)
     numbers = [int(row["part_a"]), int(row["part_b"])]
-    i, j = numbers if A.is_field else numbers[::-1]
-    parts = exact_parts(body, X_WS)
-    if row["hit"]:
-        return _of_hit(field, X_WF, i, parts, j, swapped=not A.is_field)
+    make = _of_hit if row["hit"] else _of_gap
+    certificates = make(field, X_WF, exact_parts(body, X_WS), numbers if A.is_field else numbers[::-1])
+    if certificates is None or A.is_field:
+        return certificates
+    return tuple(map(_turned, certificates))
+
+
+def _of_gap(field: Shape, X_WF: np.ndarray, parts: list[ExactPart], numbers) -> tuple[Certificate, ...] | None:
     certificates: list[Certificate] = []
-    for k, part in enumerate(parts):
-        normals = _normals(_field_of(field, X_WF), part)
-        if normals is None:
+    for j, part in enumerate(parts):
+        items = hulls_of(field, X_WF)
+        planes = _own_planes(items, part)
+        met = _part_all(items, part, planes)
+        if met is not None or len(planes) > _MAX_PLANES or not _is_outside(field, X_WF, part):
             return None
-        for normal in normals:
-            if A.is_field:
-                certificates.append(Certificate(PLANE, EVERY_ITEM, k, (normal,)))
-            else:
-                certificates.append(Certificate(PLANE, k, EVERY_ITEM, (opposite(normal),)))
+        certificates += [Certificate(PLANE, EVERY_ITEM, j, (plane.normal,)) for plane in planes]
     return tuple(certificates)
 
 
-def _of_hit(
-    field: Shape, X_WF: np.ndarray, i: int, parts: list[ExactPart], j: int, *, swapped: bool
-) -> tuple[Certificate, ...] | None:
-    """The item named and the part named first, then items that are not parted from a part by its normals."""
-    named = _numbered(field, X_WF, i)
-    tried = [] if named is None else [(i, named, j)]
-    for step in range(2):
-        for number, item, k in tried:
-            pairs = _pairs_of(item, parts[k])
-            if flaw_of_proof(item, parts[k], pairs, hit=True) is None:
-                if swapped:
-                    return (Certificate(TOGETHER, k, number, tuple((q, p) for p, q in pairs)),)
-                return (Certificate(TOGETHER, number, k, tuple(pairs)),)
-        if step == 0:
-            items = _field_of(field, X_WF)
-            tried = [
-                (int(remaining.numbers[row]), remaining.part(row), k)
-                for k, part in enumerate(parts)
-                for remaining in [_near(items, part)]
-                for row in range(min(len(remaining.numbers), _MAX_PLANES))
-            ]
+def _of_hit(field: Shape, X_WF: np.ndarray, parts: list[ExactPart], numbers) -> tuple[Certificate, ...] | None:
+    """Of the item and the part named, or of the first item that planes cannot part from a part."""
+    i, j = numbers
+    j = j if 0 <= j < len(parts) else 0  # facets of a convex body are numbered as well
+    named = hull_numbered(field, X_WF, i)
+    if named is not None and (certificate := _of_item(named, i, parts[j], j)):
+        return (certificate,)
+    for k in sorted(range(len(parts)), key=lambda k: k != j):
+        items = hulls_of(field, X_WF)
+        met = _part_all(items, parts[k], _own_planes(items, parts[k]))
+        if met is not None and (certificate := _of_item(met.part(0), int(met.numbers[0]), parts[k], k)):
+            return (certificate,)
+        inside = _number_of_inside(field)
+        if inside is not None and _flaw_of_inside(field, X_WF, inside, parts[k], [(NO_VERTEX, 0)]) is None:
+            return (Certificate(INSIDE, inside, k, ((NO_VERTEX, 0),)),)
     return None
 
 
-def _pairs_of(item: ExactPart, part: ExactPart) -> list[tuple[int, int]]:
+def _of_item(item: ExactPart, i: int, part: ExactPart, j: int) -> Certificate | None:
+    """That an item and a part meet, where they do."""
+    pairs = _pairs_of(item, part)
+    return Certificate(TOGETHER, i, j, tuple(pairs)) if flaw_of_proof(item, part, pairs, hit=True) is None else None
+
+
+def _pairs_of(item: ExactPart, part: ExactPart) -> list[VertexPair]:
     if part.kind == HALFSPACE:
-        return [(item.vertices.first_along(in_integers(part.plane[0])), -1)]
+        return [(item.vertices.first_along(in_integers(part.plane[0])), NO_VERTEX)]
     grid = min(item.vertices.grid, part.vertices.grid)
     return list(nearest_vertex_pairs(item.vertices.on_grid(grid), part.vertices.on_grid(grid), [(0, 0)]))
 
 
-def _near(items: _Field, part: ExactPart) -> _Field:
-    """Items that no plane along an axis parts from a part."""
+def _part_all(items: SweptHulls, part: ExactPart, planes: list[_Plane]) -> SweptHulls | None:
+    """Adds planes between all items and a part, of the nearest items first, until each item lies beyond a plane or
+    planes are too many. Returns an item not to be parted from the part, or None.
+
+    A block whose box overlaps the part is opened before the next block is looked at.
+    """
+    items = items.picked(list(_unparted(items, planes)))
+    items = items.picked(np.argsort(_away(items, part), kind="stable"))
+    while len(items.numbers) and len(planes) <= _MAX_PLANES:
+        known, item = len(planes), items.picked([0])
+        if any(True for _ in _unparted(item, planes)):
+            plane = _parting(item, part)
+            if plane is not None:
+                planes.append(plane)
+            elif item.opened is None:
+                return item
+            else:
+                met = _part_all(item.opened(item.numbers), part, planes)
+                if met is not None:
+                    return met
+        items = items.picked(slice(1, None))
+        for plane in planes[known:]:
+            items = items.picked(plane.sides(items) != _BEYOND)
+    return None
+
+
+def _away(items: SweptHulls, part: ExactPart) -> np.ndarray:
+    """(n,) about how far boxes around items are from the middle of a part, squared, or how high above a half-space."""
+    X = items.poses[1] @ items.poses[0]
     if part.kind == HALFSPACE:
-        return _remaining(items, part, [(0, 0, 0)])
-    axes = [tuple(sign * (axis == k) for k in range(3)) for axis in range(3) for sign in (1, -1)]
-    return _remaining(items, part, axes)  # type: ignore[arg-type]
-
-
-def _normals(items: _Field, part: ExactPart) -> list[Point] | None:
-    """Normals of planes between all items and a part; None for an item at the part, or for too many planes."""
-    if part.kind == HALFSPACE:
-        normals = [in_integers(part.plane[0])]
-        return None if len(_remaining(items, part, normals).numbers) else normals
-    normals, middle = [], _middle(items, part)
-    while len(items.numbers):
-        if len(normals) >= _MAX_PLANES:
-            return None
-        away = np.maximum(np.maximum(items.low - middle, middle - items.high), 0.0)
-        nearest = int(np.argmin(np.square(away).sum(axis=1)))
-        normal = _parting(items.picked([nearest]), part)
-        if normal is None:
-            return None
-        normals.append(normal)
-        items = items.picked(~_beyond(items, part, normal))
-    return normals
-
-
-def _middle(items: _Field, part: ExactPart) -> np.ndarray:
-    """About the middle of a part, in the items' frame."""
+        n = X[:3, :3].T @ np.array([float(c) for c in part.plane[0]])
+        return (items.facing(n) @ n).min(axis=1) - items.radii * np.linalg.norm(n)
     vertex = [float(Fraction(c) * Fraction(2) ** part.vertices.grid) for c in part.vertices[0]]
     centre = part.points_P.mean(axis=0) - part.points_P[0]
-    X = items.X_WF @ items.X_FG
-    return (np.array(vertex) + part._poses[-1][:3, :3] @ centre - X[:3, 3]) @ X[:3, :3]
+    middle = (np.array(vertex) + part._poses[-1][:3, :3] @ centre - X[:3, 3]) @ X[:3, :3]
+    low, high = items.points.min(axis=1), items.points.max(axis=1)
+    return np.square(np.maximum(np.maximum(low - middle, middle - high), 0.0)).sum(axis=1)
 
 
-def _parting(item: _Field, part: ExactPart) -> Point | None:
-    """A normal along which a single item lies beyond a part, of few digits where these do."""
+def _parting(item: SweptHulls, part: ExactPart) -> _Plane | None:
+    """A plane beyond which a single item lies, its normal of few digits where these do."""
+    if part.kind == HALFSPACE:
+        return None
     single = item.part(0)
     grid = min(single.vertices.grid, part.vertices.grid)
     points, vertices = single.vertices.on_grid(grid), part.vertices.on_grid(grid)
@@ -288,9 +343,9 @@ def _parting(item: _Field, part: ExactPart) -> Point | None:
         return None
     leading = leading_digits(exact)
     largest = max(map(abs, leading))
-    short = tuple(round(c / largest * (1 << _BITS)) for c in leading)
-    for normal in (short, exact):
-        if _beyond(item, part, normal)[0]:  # type: ignore[arg-type]
-            return normal  # type: ignore[return-value]
+    x, y, z = (round(c / largest * (1 << _BITS)) for c in leading)
+    for normal in ((x, y, z), exact):
+        plane = _plane(item, part, normal)
+        if plane.parts_exactly(item, 0):
+            return plane
     return None
-

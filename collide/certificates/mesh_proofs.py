@@ -9,7 +9,7 @@ import numpy as np
 from collide.certificates.certificate import APART, INSIDE, NO_VERTEX, TOGETHER, Certificate, VertexPair
 from collide.certificates.convex_proofs import flaw_of_plane_proof, flaw_of_proof
 from collide.certificates.exact_parts import IDENTITY, ExactPart, exact_part, has_exact_numbers
-from collide.certificates.winding_number import winding_number
+from collide.certificates.winding_number import winding_number_around
 from collide.lowering.convex_sets import HALFSPACE, POINTS, sets_of
 from collide.numerics.exact_points import PlacedPoints
 
@@ -144,8 +144,7 @@ def flaw_of_inside_proof(A: ProofBody, B: ProofBody, pairs: Sequence[VertexPair]
         return f"there is no vertex {vertex}"
     points = body.part([vertex] if body.is_mesh else None).vertices
     vertices = PlacedPoints(solid.shape.vertices, [solid.X])
-    grid = min(points.grid, vertices.grid)
-    origin = points.on_grid(grid)[0 if body.is_mesh else vertex]
-    if winding_number(vertices.on_grid(grid).minus(origin), solid.shape.faces) > 0:
+    number = winding_number_around(0 if body.is_mesh else vertex, points, vertices, solid.shape.faces)
+    if number is not None and number > 0:
         return None
     return f"vertex {vertex} does not lie in the solid"

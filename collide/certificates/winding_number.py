@@ -15,8 +15,17 @@ _DIRECTIONS: tuple[Point, ...] = (
 )
 
 
-def winding_number(points: PlacedPoints, faces: np.ndarray) -> int:
-    """Winding number of closed facets about the origin; 1 for an origin on a facet, 0 if every ray passes an edge.
+def winding_number_around(
+    k: int, points: PlacedPoints, vertices: PlacedPoints, faces: np.ndarray
+) -> int | None:
+    """The winding number of closed facets with these vertices about point k of others, as of `winding_number`."""
+    grid = min(points.grid, vertices.grid)
+    return winding_number(vertices.on_grid(grid).minus(points.on_grid(grid)[k]), faces)
+
+
+def winding_number(points: PlacedPoints, faces: np.ndarray) -> int | None:
+    """Winding number of closed facets about the origin; 1 for an origin on a facet, ``None`` if every ray passes an
+    edge.
 
     faces : (m, 3) numbers of points. Facets where the ray leaves count 1, facets where the ray enters −1. O(m) doubles,
     and integers for facets possibly met by the ray's line.
@@ -25,7 +34,7 @@ def winding_number(points: PlacedPoints, faces: np.ndarray) -> int:
         number = _along_ray(points, faces, direction)
         if number is not None:
             return number
-    return 0
+    return None
 
 
 def _along_ray(points: PlacedPoints, faces: np.ndarray, direction: Point) -> int | None:
