@@ -66,12 +66,15 @@ class _Plane(NamedTuple):
     def sides(self, items: SweptHulls) -> np.ndarray:
         """(n,) int8: where items lie.
 
-        Digits of n, products and sums are rounded by 2^-53 each of the numbers added up, fewer than 16 times.
+        Digits of n, products and sums are rounded by 2^-53 each of the numbers added up, fewer than 16 times;
+        components of n too small for that by 2^-1075, less than 2^-48 times 1e-300, and products by less than 1e-290.
         """
         n, limit, length = np.array([float(c) for c in self.n]), rounded(self.limit)[0], rounded(self.length)[0]
-        points, widths = items.facing(n), (items.radii + float(self.radius)) * length
-        heights = points @ n - (limit + widths)[:, None]
-        bound = _ROUNDING * (np.abs(points) @ np.abs(n) + (abs(limit) + widths)[:, None]) + 1e-290
+        points = items.facing(n)
+        with np.errstate(over="ignore", invalid="ignore"):  # infinities and what is no number tell nothing
+            widths = (items.radii + float(self.radius)) * length
+            heights = points @ n - (limit + widths)[:, None]
+            bound = _ROUNDING * (np.abs(points) @ (np.abs(n) + 1e-300) + (abs(limit) + widths)[:, None]) + 1e-290
         is_beyond, is_not = (heights > bound).all(axis=1), (heights < -bound).any(axis=1)
         return is_beyond.astype(np.int8) - is_not
 
@@ -250,8 +253,8 @@ def field_certificate(A: Shape, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray, ro
 
 def _of_gap(field: Shape, X_WF: np.ndarray, parts: list[ExactPart], numbers) -> tuple[Certificate, ...] | None:
     certificates: list[Certificate] = []
+    items = hulls_of(field, X_WF)
     for j, part in enumerate(parts):
-        items = hulls_of(field, X_WF)
         planes = _own_planes(items, part)
         met = _part_all(items, part, planes)
         if met is not None or len(planes) > _MAX_PLANES or not _is_outside(field, X_WF, part):
@@ -267,12 +270,11 @@ def _of_hit(field: Shape, X_WF: np.ndarray, parts: list[ExactPart], numbers) -> 
     named = hull_numbered(field, X_WF, i)
     if named is not None and (certificate := _of_item(named, i, parts[j], j)):
         return (certificate,)
+    items, inside = hulls_of(field, X_WF), _number_of_inside(field)
     for k in sorted(range(len(parts)), key=lambda k: k != j):
-        items = hulls_of(field, X_WF)
         met = _part_all(items, parts[k], _own_planes(items, parts[k]))
         if met is not None and (certificate := _of_item(met.part(0), int(met.numbers[0]), parts[k], k)):
             return (certificate,)
-        inside = _number_of_inside(field)
         if inside is not None and _flaw_of_inside(field, X_WF, inside, parts[k], [(NO_VERTEX, 0)]) is None:
             return (Certificate(INSIDE, inside, k, ((NO_VERTEX, 0),)),)
     return None
@@ -297,11 +299,13 @@ def _part_all(items: SweptHulls, part: ExactPart, planes: list[_Plane]) -> Swept
 
     A block whose box overlaps the part is opened before the next block is looked at.
     """
-    items = items.picked(list(_unparted(items, planes)))
-    items = items.picked(np.argsort(_away(items, part), kind="stable"))
-    while len(items.numbers) and len(planes) <= _MAX_PLANES:
-        known, item = len(planes), items.picked([0])
-        if any(True for _ in _unparted(item, planes)):
+    if planes:
+        items = items.picked(list(_unparted(items, planes)))
+    away = _away(items, part)
+    while len(away) and len(planes) <= _MAX_PLANES:
+        nearest, known = int(np.argmin(away)), len(planes)
+        item, remaining = items.picked([nearest]), np.arange(len(away)) != nearest
+        if next(_unparted(item, planes), None) is not None:
             plane = _parting(item, part)
             if plane is not None:
                 planes.append(plane)
@@ -311,9 +315,9 @@ def _part_all(items: SweptHulls, part: ExactPart, planes: list[_Plane]) -> Swept
                 met = _part_all(item.opened(item.numbers), part, planes)
                 if met is not None:
                     return met
-        items = items.picked(slice(1, None))
         for plane in planes[known:]:
-            items = items.picked(plane.sides(items) != _BEYOND)
+            remaining &= plane.sides(items) != _BEYOND
+        items, away = items.picked(remaining), away[remaining]
     return None
 
 

@@ -47,10 +47,10 @@ def certify(A, B, X_WA, X_WB, r: PairResult) -> Certificates | list[Certificates
 
     The vertices decisive in doubles are tried first, O(vertices) doubles; where they prove nothing exactly,
     Gilbert's, Johnson's and Keerthi's algorithm goes on from them, O(vertices) doubles a round: integers decide among
-    the vertices possibly farthest by a proven bound of rounding. Meshes apart use the vertices of
-    their hulls: O(n + m) a round; meeting meshes two facets; a body inside the
-    other, O(m) a connected part of the surface. For unions apart every pair of parts has a certificate: O(k l) searches
-    for k and l parts.
+    the vertices possibly farthest by a proven bound of rounding. Meshes apart use the vertices of their hulls: O(n + m)
+    a round; meeting meshes two facets; a body inside the other, O(m) a connected part of the surface. Fields get
+    planes beside the nearest item not parted yet: O(items) doubles a plane. For unions apart every pair of parts has
+    a certificate: O(k l) searches for k and l parts.
     """
     shapes_a, shapes_b = (S if isinstance(S, Sequence) else [S] for S in (A, B))
     check_question("certify", shapes_a, shapes_b, r)

@@ -42,7 +42,8 @@ def verify(A, B, X_WA, X_WB, r, *, certificate=None) -> None:
     InvalidPose : poses other than (4, 4) matrices of finite numbers.
 
     O(vertices) doubles a pair of parts, and integers for vertices left in doubt; O(facets) where a
-    body lies inside a solid mesh. The kinds of certificates, and their proofs:
+    body lies inside a solid mesh; O(items) doubles a plane beside fields, of terrain O(heights) once and boxes around
+    blocks. The kinds of certificates, and their proofs:
     `collide.certificates.certificate`.
     """
     check_question("verify", [A], [B], r)

@@ -10,6 +10,7 @@ import pytest
 from naive import random_pose, rng_of
 
 import collide
+from collide.certificates import winding_number as winding_rays
 from collide.certificates.exact_parts import exact_parts
 from collide.certificates.nearest_to_origin import nearest_to_origin, nearest_vertex_pairs
 from collide.certificates.winding_number import winding_number
@@ -131,6 +132,16 @@ def test_winding_numbers_of_a_box():
         assert winding_number(vertices, faces) == number, point
     turned_inside_out = faces[:, ::-1]
     assert winding_number(PlacedPoints((corners - (1, 2, 3)).astype(float), []), turned_inside_out) == -1
+
+
+def test_a_winding_number_is_not_guessed():
+    """Corners stand in the way of every ray: no number is told, though the solid holds the origin."""
+    away = np.array([np.array(d) * (10**9 // max(map(abs, d))) for d in winding_rays._DIRECTIONS], dtype=float)
+    corners = np.concatenate([away, -away])
+    faces = collide.ConvexHull(corners).hull.facets
+    assert len(np.unique(faces)) == 8
+    assert winding_number(PlacedPoints(corners, []), faces) is None
+    assert winding_number(PlacedPoints(corners + np.array([1.0, 0.0, 0.0]), []), faces) == 1
 
 
 def test_planes_and_vertices_of_nested_poses_are_exact():
