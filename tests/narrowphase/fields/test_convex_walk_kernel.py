@@ -93,7 +93,7 @@ def test_gaps_are_those_of_all_points(name):
             X_CS = pose(rotation(rng), middle + rng.uniform(-1.0, 1.0, 3) * rng.choice([0.6, 3.0, 100.0]))
             gaps = away((points - X_CS[:3, 3]) @ X_CS[:3, :3]) - radius
             with reproducing(_SNIPPET, points=points, radius=radius, shape=shape, X_WC=np.eye(4), X_WS=X_CS, margin=0):
-                _, written = gap_rows(walked(cloud), convex_set_of(shape), np.eye(4)[None], X_CS[None], False)
+                rows, written = gap_rows(walked(cloud), convex_set_of(shape), np.eye(4)[None], X_CS[None], False)
                 row, least = rows[0], float(gaps.min())
                 if written[0] and not row["hit"]:
                     assert row["certified"] and row["lower"] - tolerance <= least <= row["upper"] + tolerance
