@@ -405,3 +405,59 @@ def gap_of_balls_and_part(header_at, ints_at, numbers_at, pose_at, box_at, limit
     take_part(header_at, ints_at, numbers_at, pose_at, box_at)
     is_near, walk = begin_walk(header_at)
     return finish_part(walk, _nearest_ball(walk, limit), row_at) if is_near else LONG_WAY
+
+
+@kernel
+def _list_near(walk, margin, max_balls, numbers, at):
+    """(how many balls were listed from ``at`` on, whether these are all) of the balls whose points may be within the
+    margin and radii of the set's box, about the nearest first; −1 where floats are too small for the box.
+
+    An infinite margin lists one ball nearby.
+    """
+    tree, words = walk.tree, walk.words
+    frame, probe = view_f32(words[PROBE_AT], FRAME), view_f32(words[PROBE_AT] + 4 * FRAME, PRISM)
+    wider = _set_probe(walk, 0.0 if margin == math.inf else margin, frame, probe)
+    floats, n_stack = floats_of(tree), WIDTH * (MAX_LEVELS + 1)
+    if wider < 0.0:
+        return -1, False
+    if margin == math.inf:
+        run = ~_leaf_nearby(tree, frame, probe)
+        i = _nearest_of((1 << (run & 7)) - 1, floats, LEAF_FLOATS * ((run >> 3) // MAX_LEAF), frame, probe)
+        numbers[at] = int(tree.ids[(run >> 3) + i])
+        return 1, False
+    n, stack, keys = 0, view_i64(words[STACK_AT], n_stack), view_f64(words[BOUNDS_AT], n_stack)
+    top = _push_boxes(tree, 0, frame, probe, stack, keys, 0)
+    while top > 0:
+        top -= 1
+        link = link_of(tree.links, stack[top])
+        if link >= 0:
+            top = _push_boxes(tree, link, frame, probe, stack, keys, top)
+            continue
+        near = points_within(floats, LEAF_FLOATS * ((~link >> 3) // MAX_LEAF), frame, probe)
+        for i in range(~link & 7):
+            if near >> i & 1:
+                if n == max_balls:
+                    return n, False
+                numbers[at + n] = int(tree.ids[(~link >> 3) + i])
+                n += 1
+    return n, True
+
+
+@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64)")
+def list_balls_near(header_at, XA_at, XB_at, n, margins_at, max_balls, counts_at, numbers_at, states_at):
+    """Balls of a cloud near a convex set's box at n pairs of checked poses: whatever has a point within the margin, of
+    each pose, of the set is among them, but for poses with ``max_balls`` balls, whose list may be cut short.
+
+    margins : (n,) [m].   counts : (n,).   numbers : (n, max_balls).   states : a byte a pose: 0 for a list cut short,
+    1 for a whole list, 2 for poses left to others.
+    """
+    margins, counts = view_f64(margins_at, n), view_i64(counts_at, n)
+    numbers, states = view_i64(numbers_at, n * max_balls), view_u8(states_at, n)
+    for k in range(n):
+        placed = set_poses(header_at, XA_at + 128 * k, XB_at + 128 * k, False)
+        is_near, walk = begin_walk(header_at)
+        count, is_whole = -1, False
+        if placed and is_near:
+            count, is_whole = _list_near(walk, margins[k], max_balls, numbers, max_balls * k)
+        states[k] = 2 if count < 0 else 1 if is_whole else 0
+        counts[k] = max(count, 0)

@@ -25,6 +25,7 @@ from collide.narrowphase.facets.facet_kernel_calls import body_rows, states
 from collide.narrowphase.facets.mesh_collide_kernel import HIT
 from collide.narrowphase.facets.mesh_collide_kernel import OPEN as UNTOLD
 from collide.narrowphase.facets.nearest_item_calls import gap_rows, prepared_items, surface_states
+from collide.narrowphase.fields import clouds_and_meshes
 from collide.narrowphase.fields.ball_walk_kernel import MEETS, OPEN, WORK, clouds_meet_balls
 from collide.narrowphase.fields.field_items import BoxAround, FieldItems, box_in_frame, lowest_items
 from collide.narrowphase.fields.items_of import items_of
@@ -63,6 +64,8 @@ def answer_field(
     if isinstance(A, SweptMesh):
         if (has_facets(B) or isinstance(B, SweptMesh)) and len(out):
             is_open = _facets_answer(out, A, B, X_WA, X_WB, question)
+    elif isinstance(A, PointCloud) and kind_of(B) is Kind.MESH and len(out):
+        is_open = _mesh_answers(rows_of, out, A, B, X_WA, X_WB, question)
     elif items.walked is not None and len(out) and (walks(B) or _is_of_parts(B)):
         if question.boolean:
             meets, apart = _walked(items, B, X_WA, X_WB)
@@ -94,6 +97,26 @@ def _facets_answer(
     rows = body_rows(body_of(A), body_of(B), X_WA, X_WB, limit=question.limit, depths=question.depths)
     out[:] = rows
     return rows["how"] == UNDECIDED
+
+
+def _mesh_answers(
+    rows_of: RowsOfPair, out: np.ndarray, A: PointCloud, B: Shape, X_WA: np.ndarray, X_WB: np.ndarray,
+    question: Question,
+) -> np.ndarray:
+    """The same of a point cloud and a mesh."""
+    walked = items_of(A).walked
+    assert walked is not None
+    pair = clouds_and_meshes.CloudAndMesh(A, walked, B, X_WA, X_WB)
+    if question.boolean:
+        states = pair.states()
+        out[:] = states == clouds_and_meshes.MEETS
+        return states == clouds_and_meshes.OPEN
+    rows, is_written = pair.gaps(max(question.limit, 0.0))
+    out[is_written] = _beyond_limit(rows[is_written], question.limit)
+    for k in np.flatnonzero(~is_written & (pair.meeting >= 0)).tolist() if not question.depths else ():
+        row = _Nearby(rows_of, items_of(A), B, X_WA[k : k + 1], X_WB[k : k + 1]).row(pair.meeting[k : k + 1], False)
+        out[k], is_written[k] = row[0], bool(row["hit"][0])
+    return ~is_written
 
 
 def _is_of_parts(B: Shape) -> bool:
