@@ -1,4 +1,4 @@
-"""Point clouds beside meshes, by distances of all points from all facets, and windings, in plain numpy and fractions."""
+"""Point clouds beside meshes, by distances of all points from all facets and windings, in numpy and fractions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from collide.results import PAIR_DTYPE
 
 _SNIPPET = """
 import collide, numpy as np
-cloud, mesh = collide.PointCloud(np.array({points}), np.array({radius})), collide.Mesh({vertices}, {faces}, solid={solid})
+cloud = collide.PointCloud(np.array({points}), np.array({radius}))
+mesh = collide.Mesh({vertices}, {faces}, solid={solid})
 print(collide.distance(cloud, mesh, np.array({X_WC}), np.array({X_WM}), signed=False))
 """
 
