@@ -44,16 +44,18 @@ def test_single_calls_have_the_bytes_of_batches():
     assert by_kernel > 0.6 * asked and hits > 100 and far > 100, (by_kernel, hits, far, asked)
 
 
-def test_single_calls_of_curved_shapes_have_the_bytes_of_the_long_way():
+@pytest.mark.many(3)
+@pytest.mark.parametrize("part", range(6))
+def test_single_calls_of_curved_shapes_have_the_bytes_of_the_long_way(part):
     """On meshes of several sizes, whose marks share memory; solid ones and surfaces; in batches and lists, too."""
-    rng = np.random.default_rng(31)
+    rng = np.random.default_rng([31, part])
     meshes = [
         collide.Mesh(*box()), collide.Mesh(*block_ring()), collide.Mesh(*table(12, seed=1)),
         collide.Mesh(*table(40, seed=2)), collide.Mesh(*soup(rng, 40, 1.0, 0.3), solid=False),
     ]
     shapes = [collide.Cylinder(0.3, 0.5), collide.Cone(0.05, 0.1), collide.Ellipsoid((0.3, 0.2, 0.1))]
     by_kernel = hits = far = asked = swallowed = 0
-    for case in range(150):
+    for case in range(25 * part, 25 * part + 25):
         mesh, shape = meshes[case % 5], shapes[case % 3]
         A, B = (shape, mesh) if case % 4 == 0 else (mesh, shape)
         margin, most, X_WM = (0.0, 0.01, 0.1)[case % 7 % 3], int(rng.integers(1, 9)), random_pose(rng)
@@ -74,9 +76,8 @@ def test_single_calls_of_curved_shapes_have_the_bytes_of_the_long_way():
         for asked_a, asked_b in ((A, B), ([A] * 6, [B] * 6)):
             batch = collide.contacts(asked_a, asked_b, X_WA, X_WB, margin=margin, max_contacts=most).rows
             assert batch.tobytes() == np.concatenate(pieces).tobytes(), case
-    assert by_kernel > 0.5 * asked and hits > 300 and far > 100 and swallowed > 5, (
-        by_kernel, hits, far, asked, swallowed
-    )
+    seen = by_kernel, hits, far, asked, swallowed
+    assert by_kernel > 0.5 * asked and hits > 60 and far > 20 and swallowed > 1, seen
 
 
 def test_rows_of_many_patches_are_whole():
