@@ -280,9 +280,8 @@ class OcTree(VoxelGrid):
         ends[far] = begins[far] + (ends[far] - begins[far]) * (limit / lengths[far])[:, None]
         if not is_hit.any():
             raise InvalidShape(f"{name}: no ray of {len(ends)} ends within max_range {limit:g} m")
-        hits = _distinct(name, _cells_of_points(name, "points", ends[is_hit], resolution))
-        for field, places in (("origins", begins), ("points", ends)):
-            _cells_of_points(name, field, places, resolution)  # refuses those too far away for cells to be numbered
+        _cells_of_points(name, "origins", begins, resolution)  # refuses origins too far away for numbers of cells
+        hits = _distinct(name, _cells_of_points(name, "points", ends, resolution)[is_hit])
         through = ray_cells.cells_through(begins / resolution, ends / resolution)
         cells = _distinct(name, np.concatenate([hits, through]))
         log_odds = np.where(_are_among(cells, hits), HIT, MISS)

@@ -105,6 +105,9 @@ def test_bad_options_are_refused():
         collide.OcTree.from_rays(np.zeros((2, 3)), np.ones((3, 3)), 0.1)
     with pytest.raises(collide.InvalidShape, match="no ray of 3 ends within max_range"):
         collide.OcTree.from_rays((0, 0, 0), np.ones((3, 3)), 0.1, max_range=0.5)
+    for origins, points in (((1e6, 0, 0), np.ones((3, 3))), ((0, 0, 0), [[1, 1, 1], [1e6, 0, 0]])):
+        with pytest.raises(collide.InvalidShape, match="resolution of 1e-11 m is too fine"):
+            collide.OcTree.from_rays(origins, points, 1e-11)
 
 
 def test_files_hold_the_leaves(tmp_path):
