@@ -31,7 +31,7 @@ _LOADER = "collide.scenes.loaders.cloud_file", "read_points"
 
 #: Changes whenever files written before would be read wrongly. A radius each, or a single one for all.
 _FILE_FORMAT = 1
-_FILE_FIELDS = {"points": Field("f8", (None, 3)), "radius": ANY}
+_FILE_FIELDS = {"points": Field("f8", (None, 3)), "radius": ANY, "dropped": Field("i", (), needed=False)}
 
 #: Numbers of nearest points in an answer at most.
 _MAX_NEAREST = 1 << 26
@@ -84,7 +84,7 @@ class PointCloud(Shape):
     is_field = True
     points: np.ndarray
     radius: Any
-    #: How many points were left out, being not finite.
+    #: How many points were left out where the cloud was made; not compared.
     dropped: int
 
     def __init__(self, points: ArrayLike, radius: float | ArrayLike = 0.0, *, drop_invalid: bool = False):
@@ -101,7 +101,19 @@ class PointCloud(Shape):
 
     def _scaled(self, s: np.ndarray) -> PointCloud:
         factor = equal_but_for_signs(s, "its balls would be no balls") if np.any(self.radius) else 0.0
-        return PointCloud(self.points * s, self.radius * factor)
+        return PointCloud._of(self.points * s, self.radius * factor, self.dropped)
+
+    @classmethod
+    def _of(cls, points, radius, dropped: int) -> PointCloud:
+        made = cls(points, radius)
+        made._store(dropped=dropped)
+        return made
+
+    def __reduce__(self):
+        return *super().__reduce__(), self.dropped
+
+    def __setstate__(self, dropped: int) -> None:
+        self._store(dropped=dropped)
 
     @classmethod
     def from_depth(
@@ -153,9 +165,8 @@ class PointCloud(Shape):
             )
         row, column = np.nonzero(keep)
         z = z[keep]
-        made = cls(np.stack([(column - cx) / fx * z, (row - cy) / fy * z, z], axis=1), radius)
-        made._store(dropped=int(image.size - len(z)))
-        return made
+        points = np.stack([(column - cx) / fx * z, (row - cy) / fy * z, z], axis=1)
+        return cls._of(points, radius, int(image.size - len(z)))
 
     @classmethod
     def from_file(
@@ -198,7 +209,7 @@ class PointCloud(Shape):
         radius = None if radius is None else _checked_radius(radius)
         if path.suffix.lower() == ".npz":
             cloud = cls.load(path)
-            return cloud if radius is None else cls(cloud.points, radius)
+            return cloud if radius is None else cls._of(cloud.points, radius, cloud.dropped)
         points = getattr(import_module(_LOADER[0]), _LOADER[1])(path)
         with _refused_from(f"PointCloud.from_file: {path}"):
             return cls(points, 0.0 if radius is None else radius, drop_invalid=drop_invalid)
@@ -244,9 +255,9 @@ class PointCloud(Shape):
         Parameters
         ----------
         path : str or Path
-            The file. ``.npz``, or no suffix: points and radii, which `load` and `from_file` read. ``.pcd`` and
-            ``.ply`` (binary) and ``.xyz`` (text): the points without radii, which `from_file` reads as the same
-            doubles. An existing file is replaced, by all of the new file or not at all.
+            The file. ``.npz``, or no suffix: points, radii and ``dropped``, which `load` and `from_file` read. ``.pcd``
+            and ``.ply`` (binary) and ``.xyz`` (text): the points alone, without radii and without ``dropped``, which
+            `from_file` reads as the same doubles. An existing file is replaced, by all of the new file or not at all.
 
         Raises
         ------
@@ -259,7 +270,8 @@ class PointCloud(Shape):
             with refused_as_shape("PointCloud.save", path):
                 cloud_formats.write_points(path, self.points, suffix)
             return
-        write_arrays("PointCloud", path, _FILE_FORMAT, {"points": self.points, "radius": np.asarray(self.radius)})
+        arrays = {"points": self.points, "radius": np.asarray(self.radius), "dropped": np.array(self.dropped)}
+        write_arrays("PointCloud", path, _FILE_FORMAT, arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> PointCloud:
@@ -273,7 +285,7 @@ class PointCloud(Shape):
         Returns
         -------
         PointCloud
-            Equal to the saved cloud.
+            Equal to the saved cloud, with its ``dropped``.
 
         Raises
         ------
@@ -281,8 +293,11 @@ class PointCloud(Shape):
             Where the file is of another kind, or damaged, or describes no cloud.
         """
         arrays = read_arrays("PointCloud", path, _FILE_FORMAT, _FILE_FIELDS, "tree_")
+        dropped = int(arrays.get("dropped", 0))
+        if dropped < 0:
+            raise InvalidShape(f"PointCloud.load: {path}: dropped must be ≥ 0, got {dropped}")
         with _refused_from(f"PointCloud.load: {path}"):
-            return cls(arrays["points"], arrays["radius"])
+            return cls._of(arrays["points"], arrays["radius"], dropped)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -484,9 +499,8 @@ class PointCloud(Shape):
         """The cloud of the points of a mask.   what : the method and its arguments, for messages."""
         if not keep.any():
             raise InvalidShape(f"PointCloud.{what}: no point of {len(keep)} is left")
-        made = PointCloud(self.points[keep], self.radius if np.ndim(self.radius) == 0 else self.radius[keep])
-        made._store(dropped=int(np.count_nonzero(~keep)))
-        return made
+        radius = self.radius if np.ndim(self.radius) == 0 else self.radius[keep]
+        return PointCloud._of(self.points[keep], radius, int(np.count_nonzero(~keep)))
 
 
 @kept_with_shape("_tree")

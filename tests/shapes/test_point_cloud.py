@@ -9,6 +9,7 @@ import pytest
 
 import collide
 from collide import InvalidArgument, InvalidShape, PointCloud
+from collide.shapes.shape_files import write_arrays
 
 EYE = np.eye(4)
 
@@ -97,6 +98,34 @@ def test_clouds_that_are_cropped_filtered_and_updated_say_what_they_leave_out():
     assert collide.collide(both, collide.Sphere(0.1), EYE, collide.pose((5, 5, 5.35)))
     with pytest.raises(InvalidShape, match="no point of 2000 is left"):
         cloud.cropped([(5, 5, 5), (6, 6, 6)])
+
+
+def test_how_many_points_were_dropped_is_kept(tmp_path):
+    points = np.random.default_rng(4).uniform(-1, 1, (300, 3))
+    points[::7] = np.nan
+    finite = PointCloud(points, 0.01, drop_invalid=True)
+    part = finite.cropped([(-0.5,) * 3, (0.5,) * 3])
+    image = PointCloud.from_depth([[0.0, 1.0, 2.0]], fx=1.0, fy=1.0)
+    assert [cloud.dropped for cloud in (finite, part, image)] == [43, 257 - len(part), 1] and part.dropped > 50
+    path = tmp_path / "cloud.npz"
+    for cloud in (finite, part, image):
+        cloud.save(path)
+        read = PointCloud.load(path), PointCloud.from_file(path), PointCloud.from_file(path, 0.5)
+        pickled = [pickle.loads(pickle.dumps(cloud, protocol)) for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1)]
+        assert {copied.dropped for copied in (*read, *pickled, cloud.scaled(2.0))} == {cloud.dropped}
+        assert all(copied == cloud for copied in (*read[:2], *pickled))
+        assert PointCloud(cloud.points, cloud.radius) == cloud, "the number is not compared"
+        cloud.save(tmp_path / "cloud.pcd")
+        assert PointCloud.from_file(tmp_path / "cloud.pcd").dropped == 0
+
+
+def test_files_without_the_number_of_dropped_points_are_read_and_numbers_below_0_refused(tmp_path):
+    arrays, path = {"points": np.eye(3), "radius": np.array(0.1)}, tmp_path / "cloud.npz"
+    write_arrays("PointCloud", path, 1, arrays)
+    assert PointCloud.load(path) == PointCloud(np.eye(3), 0.1) and PointCloud.load(path).dropped == 0
+    write_arrays("PointCloud", path, 1, {**arrays, "dropped": np.array(-2)})
+    with pytest.raises(InvalidShape, match=r"cloud\.npz: dropped must be ≥ 0, got -2"):
+        PointCloud.load(path)
 
 
 def test_depth_images_become_points_in_the_frame_of_the_camera():
