@@ -219,5 +219,5 @@ def question_digest(checker: Any) -> str:
         return digest(checker.robot, *checker.state())
     checker.collides(np.zeros((0, checker.robot.dof)))  # makes the checker read its World
     setting = checker.setting
-    around = [(body.name, body.shape, body.X_WB) for body in setting.surroundings.bodies]
+    around = setting.surroundings.bodies
     return digest(checker.robot, setting.bodies, setting.base, around, setting.self_pairs, setting.allowed)

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from collide import Box, Robot, pose
+from collide import Box, Robot, RobotChecker, Sphere, World, pose
 from collide.robots.kinematic_tree import Joint
 from collide.robots.robot import LinkShape
 
@@ -34,6 +34,14 @@ def chain(n, *, length, width) -> Robot:
     ]
     shape = Box((length, width, width))
     return robot_of(links, joints, {link: (shape, (length / 2, 0, 0)) for link in links})
+
+
+def arm_checker(*, length=1.0, margin=0.0, radius=0.3, at=(2.5, 0, 0), name="ball", allow=(), **how) -> RobotChecker:
+    """An arm of three boxes beside a ball."""
+    world = World()
+    world.add(Sphere(radius), pose(at), name=name, margin=margin)
+    how["allowed"] = [(link, name) for link in allow]
+    return RobotChecker(chain(3, length=length, width=0.1), world, **how)
 
 
 def box_corners(size) -> np.ndarray:

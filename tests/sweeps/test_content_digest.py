@@ -8,11 +8,12 @@ import sys
 
 import numpy as np
 import pytest
-from plain_robots import chain, joint, robot_of
+from plain_robots import arm_checker, chain, joint, robot_of
 
 import collide
 from collide import Box, Compound, Sphere, World, pose
 from collide.sweeps.content_digest import digest
+from collide.sweeps.sweep_question import question_digest
 
 MESH = collide.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
@@ -69,6 +70,22 @@ def test_another_process_agrees():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60,
                           env={"PYTHONHASHSEED": "5", "PYTHONPATH": ":".join(filter(None, sys.path))})
     assert done.stdout.strip() == digest({"z": (1.5, None), "a": np.arange(3.0)}, Box((1, 2, 3)), "x")
+
+
+def test_whatever_decides_answers_is_in_the_digest_of_a_question():
+    tool = ("tool", "l2", Box((0.1, 0.1, 0.1)), pose((1, 0, 0)), ())
+    changes = [
+        {}, {"length": 1.5}, {"margin": 0.1}, {"margin": 0.2}, {"radius": 0.4}, {"at": (2.5, 0, 0.1)}, {"name": "b"},
+        {"allow": ["l2"]}, {"allow": ["l1", "l2"]}, {"padding": 0.1}, {"padding": {"l2": 0.1}},
+        {"X_WR": pose((0, 0, 1))}, {"attached": [tool]}, {"attached": [(*tool[:3], pose((1, 0, 1)), ())]},
+    ]
+    digests = [question_digest(arm_checker(**change)) for change in changes]
+    same = [(changes[k], changes[i]) for k in range(len(changes)) for i in range(k) if digests[k] == digests[i]]
+    assert not same, same
+    assert digests == [question_digest(arm_checker(**change)) for change in changes]
+    checker = arm_checker()
+    checker.world.set_margin("ball", 0.1)
+    assert question_digest(checker) == digests[2], "as of a World made with the margin"
 
 
 def test_what_has_no_digest_is_named():

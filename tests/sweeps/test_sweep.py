@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import slow_checker
+from plain_robots import arm_checker
 from slow_checker import SlowChecker, diary_lines
 
 import collide
@@ -153,6 +154,15 @@ def test_another_question_is_refused(tmp_path, change, words):
     assert all(file.read_bytes() == content for file, content in files.items())
     results = sweep(folder=tmp_path / "s", restart=True, **{**arguments, **change})
     assert results.done == results.rows and results.rows in (100, 101)
+
+
+def test_a_sweep_among_bodies_of_other_margins_is_refused(tmp_path):
+    checker, Q = arm_checker(at=(1.0, 0, 1.0)), DrawnConfigurations(100, 3)
+    before = sweep(checker, Q, tmp_path / "s", workers=0).colliding
+    checker.world.set_margin("ball", 0.4)
+    with pytest.raises(InvalidArgument, match="the scene or the robot changed"):
+        sweep(checker, Q, tmp_path / "s", workers=0)
+    assert sweep(checker, Q, tmp_path / "s", workers=0, restart=True).colliding > before > 0
 
 
 def test_folder_of_something_else_is_refused(tmp_path):
