@@ -43,6 +43,13 @@ def test_files_that_pages_name_exist():
                 assert any(place.exists() for place in places), f"{page.name} names {path}"
 
 
+def test_public_names_stand_on_pages():
+    import collide
+
+    text = "\n".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").glob("*.md"))
+    assert set(collide.__all__) <= set(re.findall(r"\w+", text)), set(collide.__all__) - set(re.findall(r"\w+", text))
+
+
 def test_commands_that_pages_show_exist():
     from collide.cli.arguments import parser
 
