@@ -31,7 +31,7 @@ from collide.lowering.shape_table import POSE, REACH, PoseTable, ShapeTable, pos
 from collide.mesh.bvh import MeshTree
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.facets.facet_geometry import FacetCorners
-from collide.shapes.mesh import Mesh
+from collide.shapes.mesh import Mesh, corners_of_facets
 
 
 class _Workspace(local):
@@ -112,7 +112,7 @@ def cast_leaves(A: list[Leaf], B: list[Leaf], X_WA, X_WB, casts: Casts, *, into_
 def _onto_plane(A: Leaf, B: Leaf, X_WA, X_WB, vectors, limits) -> PairRows:
     """A mesh meets a half-space where its corners do."""
     assert isinstance(A.shape, Mesh)
-    packed = [pack_points(A.shape.vertices[np.unique(A.shape.faces)]), convex_set_of(B.shape)]
+    packed = [pack_points(corners_of_facets(A.shape)), convex_set_of(B.shape)]
     n = len(limits)
     table, shape_of = ShapeTable(packed), np.repeat([0, 1], n)
     body_poses, part_poses = np.concatenate([X_WA, X_WB]), np.repeat([A.X, B.X], n, axis=0)

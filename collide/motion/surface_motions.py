@@ -58,7 +58,7 @@ from collide.narrowphase.facets.mesh_batches import pair_rows
 from collide.narrowphase.facets.near_facets import near_facets_up_to
 from collide.results import PAIR_DTYPE
 from collide.shapes.compound import Compound
-from collide.shapes.mesh import Mesh
+from collide.shapes.mesh import Mesh, corners_of_facets
 from collide.shapes.primitives import Sphere
 from collide.shapes.shape import IDENTITY, Shape, held_by, kept_with_shape
 from collide.transforms import SMALLEST
@@ -192,7 +192,7 @@ def _hull_of(piece: Piece) -> PackedConvex:
 @kept_with_shape("_vertex_set")
 def _vertices_of(mesh: Mesh) -> PackedConvex:
     """The vertices of a mesh's facets, whose hull is the mesh's."""
-    return pack_points(mesh.vertices[np.unique(mesh.faces)])
+    return pack_points(corners_of_facets(mesh))
 
 
 def _thickness(shape: Shape, tree: MeshTree) -> float:

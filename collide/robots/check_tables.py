@@ -22,7 +22,7 @@ from collide.mesh.convex_surface import is_own_hull
 from collide.robots.check_scene import BODY_INTS, BOX
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
-from collide.shapes.mesh import Mesh
+from collide.shapes.mesh import Mesh, corners_of_facets
 from collide.shapes.shape import Shape, kept_with_shape
 
 #: Boxes are moved outwards by this share of all that went into them, far more than roundings are.
@@ -238,7 +238,7 @@ def without_meshes(shape: Shape) -> Shape | None:
 @kept_with_shape("_hulls_instead")
 def _hulls_instead(shape: Shape) -> Shape | None:
     if isinstance(shape, Mesh) and shape.meshed and shape.solid and is_own_hull(shape.vertices, shape.faces):
-        return ConvexHull(shape.vertices[np.unique(shape.faces)])
+        return ConvexHull(corners_of_facets(shape))
     if not isinstance(shape, Compound):
         return None
     items = [(without_meshes(item), X) for item, X in shape.items]

@@ -140,7 +140,7 @@ class Mesh(Shape):
     def convex_hull(self) -> ConvexHull:
         """The convex hull of the facets: made when first asked for, and kept. Of large meshes only its corners."""
         if not hasattr(self, "_hull"):
-            used = self.vertices[np.unique(self.faces)]
+            used = corners_of_facets(self)
             with log_duration("convex hull around a mesh of %d facets made", len(self.faces)):
                 if len(used) > _MAX_HULL_POINTS:
                     used = used[exact_hull.convex_hull(used).vertices]
@@ -342,6 +342,13 @@ _FILE_FIELDS = {
     "vertices": Field("f8", (None, 3)), "faces": Field("i4", (None, 3)), "solid": Field("b1", ()),
     "scale": Field("f8", ()),
 }
+
+
+def corners_of_facets(mesh: Mesh) -> np.ndarray:
+    """(k, 3) the vertices of a mesh that facets have, in their order. O(vertices + facets)."""
+    is_used = np.zeros(len(mesh.vertices), dtype=bool)
+    is_used[mesh.faces] = True
+    return mesh.vertices[is_used]
 
 
 def _what_spoils(vertices: int, survey: Survey) -> str:
