@@ -99,6 +99,10 @@ class FieldItems(ABC):
         ascending.
         """
 
+    def extreme(self, n: np.ndarray, slack: float) -> np.ndarray:
+        """Numbers of items as low along a normal as all of `lowest`, maybe fewer, ascending."""
+        return self.lowest(n, slack)
+
     @abstractmethod
     def least_height(self, number: int, n: np.ndarray) -> float:
         """Of an item along a normal [m]."""
@@ -210,10 +214,12 @@ def items_within(
 
 
 def lowest_items(items: FieldItems, n_W: np.ndarray, X_WF: np.ndarray, X_WB: np.ndarray) -> np.ndarray:
-    """Numbers of the items that are lowest along a normal of any length above 0, rounding counted in."""
+    """Numbers of items that are lowest along a normal of any length above 0, rounding counted in: no item is lower than
+    all of these.
+    """
     X_WG, n_W = items.pose(X_WF), n_W / np.linalg.norm(n_W)  # heights are in metres, as radii and the level are
     size = _reach(items) + np.abs(X_WF[:3, 3]).sum() + np.abs(X_WB[:3, 3]).sum()
-    return items.lowest(X_WG[:3, :3].T @ n_W, _LEVEL * size)
+    return items.extreme(X_WG[:3, :3].T @ n_W, _LEVEL * size)
 
 
 def _reach(items: FieldItems) -> float:

@@ -26,6 +26,8 @@ _SPARE, _MAX_WHOLE = 4, 4096
 _MAX_MESHES, _STEP = 32, 8
 #: Cells of a tile along each axis, for rays, and tiles kept.
 _TILE, _MAX_TILES = 32, 1024
+#: Of more cells as low as each other ends of rows are taken; how much of a normal points up for sure.
+_MAX_LEVEL, _UPRIGHT = 1024, 2.0**-30
 #: How far next to a facet is, in sides of a cell: far above rounding.
 _NEXT = 2.0**-10
 
@@ -86,6 +88,11 @@ class Columns(FieldItems):
         blocks = np.argwhere(self._pyramid.highest > -math.inf)
         return blocks * BLOCK, *self._corners(blocks * BLOCK, BLOCK, self._pyramid.highest[tuple(blocks.T)])
 
+    def _in_blocks(self, least: np.ndarray) -> np.ndarray:
+        """(k, 2) rows and columns of the cells of blocks by their least rows and columns (n, 2), holes counted in."""
+        inside = (least[:, None] + np.array(list(np.ndindex(BLOCK, BLOCK)))).reshape(-1, 2)
+        return inside[(inside < (self._rows, self._columns)).all(axis=1)]
+
     def _cells_of_block(self, least: np.ndarray) -> np.ndarray:
         """The cells of a block by its least row and column, ascending."""
         row, column = least.tolist()
@@ -136,8 +143,7 @@ class Columns(FieldItems):
         reach = extra + slack
         least, low, high = self._blocks
         least = least[_times(way, low - reach, high + reach, limit) < math.inf]
-        inside = (least[:, None] + np.array(list(np.ndindex(BLOCK, BLOCK)))).reshape(-1, 2)
-        inside = inside[(inside < (self._rows, self._columns)).all(axis=1)]
+        inside = self._in_blocks(least)
         row, column, highest = inside[:, 0], inside[:, 1], self._highest(inside)
         low, high = self._corners(inside, 1, highest)
         times = np.where(np.isnan(highest), math.inf, _times(way, low - reach, high + reach, limit))
@@ -154,16 +160,37 @@ class Columns(FieldItems):
 
     def lowest(self, n: np.ndarray, slack: float) -> np.ndarray:
         blocks, low, high = self._blocks
-        bounds, least, lowest = np.minimum(n * low, n * high).sum(axis=1), math.inf, []
-        for k in np.argsort(bounds, kind="stable").tolist():
-            if bounds[k] > least + slack:
-                break
-            cells = self._cells_of_block(blocks[k])
-            heights = self._least_heights(cells, n)
-            least = min(least, float(heights.min()))
+        bounds = np.minimum(n * low, n * high).sum(axis=1)
+        order, least, lowest, some = np.argsort(bounds, kind="stable"), math.inf, [], 1
+        while len(order) and bounds[order[0]] <= least + slack:
+            cells = self._in_blocks(blocks[order[:some]]) @ (self._columns, 1)
+            heights = self._least_heights(cells, n)  # of holes NaN
+            least = min(least, float(np.nanmin(heights)))
             lowest.append((cells, heights))
+            order, some = order[some:], 4 * some
         cells, heights = (np.concatenate(part) for part in zip(*lowest))
         return np.sort(cells[heights <= least + slack])
+
+    def extreme(self, n: np.ndarray, slack: float) -> np.ndarray:
+        """As of the class: cells are left out whose corners lie between corners of other cells: of a bottom without
+        holes all but those in its corners, of cells in a row of level ground all but the first and the last.
+        """
+        last = self._rows * self._columns - 1
+        is_upright = n[2] > _UPRIGHT * np.abs(n).max()  # corners of the bottom are lower than those above
+        if is_upright and self._pyramid.n_cells == last + 1:
+            return np.unique([0, self._columns - 1, last - self._columns + 1, last])
+        cells = self.lowest(n, slack)
+        if len(cells) <= _MAX_LEVEL:
+            return cells
+        row, column = cells // self._columns, cells % self._columns
+        is_inner = np.zeros(len(cells), dtype=bool)
+        is_inner[1:-1] = (cells[2:] - cells[:-2] == 2) & (column[1:-1] > 0) & (column[1:-1] < self._columns - 1)
+        if not is_upright:
+            at = np.flatnonzero(is_inner)
+            rows, columns = np.ix_(range(2), range(-1, 3))
+            corners = self._heights[row[at, None, None] + rows, column[at, None, None] + columns]
+            is_inner[at] = (corners == corners[:, :1, :1]).all(axis=(1, 2))
+        return cells[~is_inner]
 
     def _least_heights(self, cells: np.ndarray, n: np.ndarray) -> np.ndarray:
         """(k,) of the corners of columns along a normal [m]."""
