@@ -24,7 +24,8 @@ from collide.narrowphase.bounds import PROMISE_STORED
 from collide.narrowphase.convex_batches import Question
 from collide.numerics.exact_vectors import dot
 from collide.results import EXACT, PAIR_DTYPE
-from collide.shapes.hpolytope import HPolytope
+from collide.shapes.height_field import HeightField
+from collide.shapes.hpolytope import HPolytope, Plane
 from collide.shapes.primitives import Halfspace
 from collide.shapes.shape import Shape
 from collide.transforms import LARGEST
@@ -50,6 +51,13 @@ def answer_closed(
 
     batch_of : what answers two other shapes.   out, question : as of `convex_batches.answer_sets`.
     """
+    answer = _answer_sides if _are_terrain_and_plane(A, B) else _answer_boxed
+    answer(batch_of, out, A, B, poses, question)
+
+
+def _answer_boxed(
+    batch_of: Callable[[Shape, Shape], Batch], out: np.ndarray, A: Shape, B: Shape, poses: Poses, question: Question
+) -> None:
     X_WA, X_WB = poses
     for K_a, K_b, some in closings(A, B, X_WA, X_WB):
         part, axes = out[some], None if question.axes is None else question.axes[some]
@@ -59,6 +67,63 @@ def answer_closed(
         out[some] = part
         if axes is not None and question.axes is not None:
             question.axes[some] = axes
+
+
+def _are_terrain_and_plane(A: Shape, B: Shape) -> bool:
+    """Whether a pair is a `Plane` and a height field without holes, in either order."""
+    plane, field = (A, B) if isinstance(A, Plane) else (B, A)
+    return isinstance(plane, Plane) and isinstance(field, HeightField) and not field.has_holes
+
+
+def _answer_sides(
+    batch_of: Callable[[Shape, Shape], Batch], out: np.ndarray, A: Shape, B: Shape, poses: Poses, question: Question
+) -> None:
+    """Answers of a `Plane` and terrain without holes by the two half-spaces of the plane; arguments as of
+    `answer_closed`.
+
+    Such terrain is connected: heights x · n of the terrain are an interval [m, M], heights of the plane [l, h]. Both
+    meet where m ≤ h and l ≤ M, so where the terrain meets both half-spaces, x · n ≤ h and x · n ≥ l. A translation
+    parts terrain and plane where terrain and a half-space part: the signed distance is the larger of m − h and l − M. A
+    common point and the facet nearest across a gap come from a walk down the tree of a mesh, where triangles of all
+    cells may be made.
+    """
+    plane, field = (A, B) if isinstance(A, Plane) else (B, A)
+    assert isinstance(plane, Plane) and isinstance(field, HeightField)
+    X_WA, X_WB = (np.ascontiguousarray(X) for X in poses)
+    answers = []
+    for normal, offset in zip(plane.normals, plane.offsets.tolist()):
+        side, answer = Halfspace(normal, offset), np.zeros_like(out)
+        pair = (side, B) if A is plane else (A, side)
+        batch_of(*pair)(answer, *pair, X_WA, X_WB, question._replace(check=False, axes=None))
+        answers.append(answer)
+    first, second = answers
+    if question.boolean:
+        out[:] = first & second
+        return
+    out[:] = np.where(first["distance"] >= second["distance"], first, second)
+    for bound in ("lower", "upper"):
+        out[bound] = np.maximum(first[bound], second[bound])
+    for verdict in ("hit", "certified"):
+        out[verdict] = first[verdict] & second[verdict]
+    out["part_b" if A is plane else "part_a"][out["hit"]] = -1
+    rest = np.flatnonzero(~out["hit"] & ~field.is_field | out["hit"] & ~question.depths)
+    if len(rest):
+        part = np.zeros_like(out[rest])
+        _answer_boxed(batch_of, part, A, B, (X_WA[rest], X_WB[rest]), question)
+        out[rest] = _as_far_as(part, out[rest])
+
+
+def _as_far_as(rows: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Rows of a plane within a box, whose corners are rounded, where they say the same as rows known of the plane
+    itself; else those, or a place halfway between two points a rounding apart.
+    """
+    rows = np.where(rows["hit"] > known["hit"], known, rows)
+    near = rows["hit"] < known["hit"]
+    rows["hit"][near] = rows["certified"][near] = True
+    for length in ("distance", "lower", "upper", "normal"):
+        rows[length][near] = 0.0
+    rows["point_a"][near] = rows["point_b"][near] = 0.5 * (rows["point_a"] + rows["point_b"])[near]
+    return rows
 
 
 def answer_unbounded(
