@@ -24,7 +24,15 @@ from collide.narrowphase.facets import surface_distance as distances
 from collide.narrowphase.facets import winding_numbers as inside
 from collide.narrowphase.facets.exact_triangles import INTEGERS, decide_exactly
 from collide.narrowphase.facets.mesh_collide_kernel import SCRATCH
-from collide.narrowphase.facets.surface_collision import COUNTERS, FULL, PROGRESS, SINGULAR, walk_surfaces
+from collide.narrowphase.facets.surface_collision import (
+    COUNTERS,
+    DONE,
+    FULL,
+    N_PAIRS,
+    PROGRESS,
+    SINGULAR,
+    walk_surfaces,
+)
 
 #: Pairs of boxes that wait in order; beyond them the walk of distances goes depth first.
 HEAP = 1 << 14
@@ -105,20 +113,28 @@ def first_hits(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> 
     return SurfacePairs(np.stack(np.divmod(keys, len(B.ids)), axis=1), starts, counters)
 
 
-def all_hits(A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray) -> SurfacePairs:
-    """All pairs of meeting facets; parameters as for `first_hits`. No pair is lost, however many meet."""
+def all_hits(
+    A: MeshTree, B: MeshTree, X_WA: np.ndarray, X_WB: np.ndarray, max_pairs: int | None = None
+) -> SurfacePairs:
+    """All pairs of meeting facets; parameters as for `first_hits`. No pair is lost, however many meet.
+
+    max_pairs : at a single pair of poses stop at so many pairs, or at up to four times as many (never before some
+    4,000), in the order of the trees.
+    """
     if B.content < A.content:
-        keys, starts, counters = _hit_keys(B, A, X_WB, X_WA, False)
+        keys, starts, counters = _hit_keys(B, A, X_WB, X_WA, False, max_pairs)
         b, a = np.divmod(keys, len(A.ids))
         keys = a * len(B.ids) + b
     else:
-        keys, starts, counters = _hit_keys(A, B, X_WA, X_WB, False)
+        keys, starts, counters = _hit_keys(A, B, X_WA, X_WB, False, max_pairs)
     for begin, end in zip(starts[:-1].tolist(), starts[1:].tolist()):
         keys[begin:end].sort()
     return SurfacePairs(np.stack(np.divmod(keys, len(B.ids)), axis=1), starts, counters)
 
 
-def _hit_keys(A: MeshTree, B: MeshTree, X_WA, X_WB, first_only: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _hit_keys(
+    A: MeshTree, B: MeshTree, X_WA, X_WB, first_only: bool, max_pairs: int | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(keys, starts, counters) of bodies in order; a key is a facet of A times B's number of facets, and one of B."""
     X_WA, X_WB, n = matched(X_WA, X_WB)
     work = workspace(stack_of(A, B))
@@ -133,6 +149,8 @@ def _hit_keys(A: MeshTree, B: MeshTree, X_WA, X_WB, first_only: bool) -> tuple[n
         )
         if status == SINGULAR:
             raise not_invertible(int(progress[0]))
+        if status == FULL and max_pairs is not None and progress[N_PAIRS] >= max_pairs:
+            starts[1], status = progress[N_PAIRS], DONE
         if status != FULL:
             return keys[: starts[-1]], starts, counters
         keys = np.concatenate([keys, np.empty(3 * len(keys), dtype=np.int64)])

@@ -22,6 +22,8 @@ _HALVINGS, _AGAIN = 16, 3
 _BETWEEN, _ROUNDS = 16, 3
 #: So few translations are tried at once.
 _FEWEST_TRIED = 16
+#: Meeting pairs of facets whose normals are added up to a guess, about so many at most: large terrain has millions.
+_MAX_GUESSED = 1 << 16
 #: Pairs of facets whose normals are tried one by one.
 _FACETS = 3
 _UP = 1 + 2.0**-48
@@ -133,7 +135,7 @@ def _length(step: np.ndarray) -> tuple[float, float]:
 
 def _directions(A: Body, B: Body, X_WA, X_WB, first: list[np.ndarray]) -> np.ndarray:
     """(k, 3) unit vectors along which a separating translation may be short: of hulls, of meeting facets, of axes."""
-    pairs = all_hits(A.tree, B.tree, X_WA, X_WB).pairs
+    pairs = all_hits(A.tree, B.tree, X_WA, X_WB, _MAX_GUESSED).pairs
     guesses = list(first)
     if len(pairs):
         of_a, of_b = _normals(A, X_WA, pairs[:, 0]), -_normals(B, X_WB, pairs[:, 1])

@@ -215,3 +215,22 @@ def test_the_first_hit_is_one_of_all():
         some = set(map(tuple, whole.pairs[whole.starts[k] : whole.starts[k + 1]].tolist()))
         one = set(map(tuple, first.pairs[first.starts[k] : first.starts[k + 1]].tolist()))
         assert one <= some and bool(one) == bool(some)
+
+
+def test_a_limited_number_of_hits_are_some_of_all():
+    """Of a bumpy sheet of 60 by 60 cells and the sheet made flat."""
+    x, y = np.meshgrid(np.arange(61.0), np.arange(61.0))
+    vertices = np.stack([x, y, np.sin(x * y)], axis=2).reshape(-1, 3)
+    corner = (np.arange(60)[:, None] * 61 + np.arange(60)).ravel()
+    faces = np.concatenate([np.stack([corner, corner + d, corner + 62], axis=1) for d in (1, 61)])
+    A, B = build_mesh_tree(vertices, faces), build_mesh_tree(vertices * np.array([1.0, 1.0, 0.0]), faces)
+    for (first, last), X in (((A, B), np.eye(4)), ((B, A), collide.pose((0.01, 0, 0)))):
+        whole = all_hits(first, last, X, np.eye(4)).pairs
+        assert len(whole) > 6000
+        for max_pairs in (1000, 5000, len(whole), 10 * len(whole)):
+            some = all_hits(first, last, X, np.eye(4), max_pairs).pairs
+            assert set(map(tuple, some.tolist())) <= set(map(tuple, whole.tolist()))
+            assert min(max_pairs, len(whole)) <= len(some) <= max(4096, 4 * max_pairs)
+            assert np.array_equal(some, all_hits(first, last, X, np.eye(4), max_pairs).pairs)
+            assert max_pairs < len(whole) or np.array_equal(some, whole)
+        assert len(all_hits(first, last, X, np.eye(4), 1000).pairs) < len(whole)
