@@ -80,6 +80,9 @@ class RayEvents(NamedTuple):
 
 
 def joined(events: list[RayEvents]) -> RayEvents:
+    if not events:  # of no rays
+        none, numbers, flags = np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
+        return RayEvents(numbers, none, none, numbers, numbers, flags, flags)
     return RayEvents._make(np.concatenate(columns) for columns in zip(*events))
 
 

@@ -12,6 +12,7 @@ from collide.broadphase.box_tree import BoxTree
 from collide.broadphase.boxes_ahead import bodies_ahead
 from collide.casts.cast_arguments import checked_rays
 from collide.casts.directions import Directions
+from collide.casts.grid_rays import begin_in_cells, on_surface
 from collide.casts.items_ahead import nearest_first
 from collide.casts.leaves import leaves_of, meshed_leaves
 from collide.casts.posed_parts import posed_parts
@@ -31,6 +32,7 @@ from collide.narrowphase.composite.balls_on_ways import SingleWay, near_on_ways
 from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.fields.field_items import NamedUnion, items_on_way, rounding_of_places
 from collide.narrowphase.fields.items_of import items_of
+from collide.narrowphase.fields.occupied_cells import Cells
 from collide.narrowphase.fields.swept_triangles import SweptTriangles
 from collide.narrowphase.fields.terrain_columns import Columns
 from collide.narrowphase.prepared_pairs import single_calls_are_safe
@@ -72,7 +74,7 @@ def raycast(
     RayHits. Surfaces are closed sets: a ray through a common edge or corner meets all facets around, a ray from the
         surface meets the surface at 0, a ray in a facet's plane meets the facet where entering. From inside a solid a
         ray meets the wall on its way out; `contains` says what is inside. In a `Compound` walls inside other items
-        count, too. The same bits in single calls and in batches.
+        count, too, in a `VoxelGrid` faces between occupied cells do not. The same bits in single calls and in batches.
 
     Raises
     ------
@@ -138,18 +140,24 @@ def surfaces_met(
 def _on_field(
     field: Shape, X_WA: np.ndarray, origins: np.ndarray, directions: Directions, limit: float, every: bool
 ) -> RayEvents:
-    """Events of n rays and a field: the items that a ray may meet first, as convex parts."""
+    """Events of n rays and a field: the items that a ray may meet first, as convex parts. Rays beginning in cells see
+    all walls on the way, since walls between cells are left out.
+    """
     items, limits, events = items_of(field), directions.limits(limit), []
     if isinstance(items, SweptTriangles):
         return _on_swept_triangles(items, X_WA, origins, directions, limit, every)
     if isinstance(items, Columns):
         return _on_terrain(items, X_WA, origins, directions, limit, every)
-    for begin in range(0, len(origins), _RAYS_TOGETHER):
-        some = np.arange(begin, min(begin + _RAYS_TOGETHER, len(origins)))
+    is_whole = np.full(len(origins), every)
+    if isinstance(items, Cells):
+        is_whole |= begin_in_cells(items, X_WA, origins)
+    order = np.argsort(is_whole, kind="stable")
+    for some in _together(order[~is_whole[order]]) + _together(order[is_whole[order]]):
+        whole = bool(is_whole[some[0]])
         X = X_WA if len(X_WA) == 1 else X_WA[some]
         met = [
             items_on_way(
-                items, X[min(i, len(X) - 1)], origins[k], directions.vectors[k], float(limits[k]), 0.0, first=not every
+                items, X[min(i, len(X) - 1)], origins[k], directions.vectors[k], float(limits[k]), 0.0, first=not whole
             )[0] for i, k in enumerate(some.tolist())
         ]
         numbers = np.unique(np.concatenate([*met, items.some()]))  # of no items there are no parts
@@ -158,9 +166,17 @@ def _on_field(
             near[i, np.searchsorted(numbers, of_ray)] = True
         parts = [(item, items.X_FG) for item in items.hulls(numbers)]
         of_some = Directions(directions.vectors[some], directions.exponents[some])
-        on_items = _on_parts(parts, numbers, X, origins[some], of_some, limit, every, near)
+        on_items = _on_parts(parts, numbers, X, origins[some], of_some, limit, whole, near)
         events.append(on_items._replace(ray=some[on_items.ray]))
-    return in_order(joined(events))
+    of_all = joined(events)
+    if isinstance(items, Cells):
+        of_all = of_all.of(on_surface(items, X_WA, origins, directions, of_all))
+    return in_order(of_all)
+
+
+def _together(rays: np.ndarray) -> list[np.ndarray]:
+    """Numbers of rays, as many as are asked together at a time."""
+    return [rays[k : k + _RAYS_TOGETHER] for k in range(0, len(rays), _RAYS_TOGETHER)]
 
 
 def _on_swept_triangles(

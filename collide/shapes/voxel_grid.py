@@ -49,7 +49,7 @@ class VoxelGrid(Shape):
     Queries answer for the union of the cells, each a closed box; cells side by side share a face to the last bit:
     planes between cells stand at i · cell, and with an ``X`` that only shifts at i · cell + shift, each step rounded
     once. ``part`` numbers of results name cells (`cells_of`). Inner faces, between two occupied cells, are no faces
-    to contacts and depths.
+    to contacts, depths and rays.
 
     A bit a cell under a tree of 64 children a node: O(cells of the array) for arrays, O(k log k) for lists of cells.
     Convex shapes walk down the tree; depths, contacts, half-spaces, meshes and unions take the cells nearby, merged

@@ -186,11 +186,16 @@ def items_on_way(
 
 
 def rounding_of_places(items: FieldItems, X_WG: np.ndarray, p_W: np.ndarray, extra: float = 0.0) -> float:
-    """How far places of the world (n, 3) may be off in the items' frame at poses (n, 4, 4) [m].   extra : of what is
-    around them."""
+    """How far any of the places of `rounding_of_each` may be off [m]."""
+    return float(rounding_of_each(items, X_WG, p_W, extra).max())
+
+
+def rounding_of_each(items: FieldItems, X_WG: np.ndarray, p_W: np.ndarray, extra: float = 0.0) -> np.ndarray:
+    """(n,) how far places of the world (n, 3) may be off in the items' frame at poses (n, 4, 4) [m].   extra : of what
+    is around them."""
     R, t = X_WG[:, :3, :3], X_WG[:, :3, 3]
-    size = _reach(items) + np.abs(t).sum(axis=1).max() + np.abs(p_W).sum(axis=1).max() + extra
-    return float((ROUNDING + 8.0 * np.abs(R.transpose(0, 2, 1) @ R - np.eye(3)).max()) * size)
+    size = _reach(items) + np.abs(t).sum(axis=1) + np.abs(p_W).sum(axis=1) + extra
+    return (ROUNDING + 8.0 * np.abs(R.transpose(0, 2, 1) @ R - np.eye(3)).max(axis=(1, 2))) * size
 
 
 def items_within(

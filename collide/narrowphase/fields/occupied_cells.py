@@ -43,8 +43,7 @@ class Cells(FieldItems):
         return self._tree.lowest(n, slack).numbers
 
     def least_height(self, number: int, n: np.ndarray) -> float:
-        boxes = self._boxes(np.array([number]))
-        low, high = self._tree.corners(boxes.least, boxes.size)
+        low, high = self.corners_of(number)
         return float(np.minimum(n * low, n * high).sum())
 
     def hulls(self, some: np.ndarray) -> list[ConvexHull]:
@@ -57,7 +56,26 @@ class Cells(FieldItems):
     def hidden(self, numbers: np.ndarray, p_F: np.ndarray, n_F: np.ndarray) -> np.ndarray:
         tree, X = self._tree, self.X_FG
         p = (p_F - X[:3, 3]) @ X[:3, :3] + _NEXT * tree.sides.min() * (n_F @ X[:3, :3])
-        return tree.is_occupied(np.floor((p - tree.origin) / tree.sides) - tree.least)
+        return tree.is_occupied(self.cells_at(p))
+
+    def cells_at(self, p_G: np.ndarray) -> np.ndarray:
+        """Cells (n, 3), occupied or not, around places (n, 3) of the items' frame; cut two cells beyond the grid."""
+        cells = np.floor((p_G - self._tree.origin) / self._tree.sides) - self._tree.least
+        return np.clip(cells, -2.0, np.array(self._tree.shape) + 2.0).astype(np.int64)
+
+    def are_occupied(self, cells: np.ndarray) -> np.ndarray:
+        """(n,) bool, of cells (n, 3) within the grid or not."""
+        return self._tree.is_occupied(cells)
+
+    def corners_of(self, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """The least and the largest corner (3,) of an item, in the items' frame."""
+        boxes = self._boxes(np.array([number]))
+        low, high = self._tree.corners(boxes.least, boxes.size)
+        return low[0], high[0]
+
+    def plane(self, axis: int, cell: int) -> float:
+        """Where the cells of an index along an axis begin, in the items' frame [m]."""
+        return float(self._tree.corners(np.full((1, 3), cell), np.zeros((1, 3), dtype=np.int64))[0][0, axis])
 
     def merged(self, some: np.ndarray) -> NamedUnion:
         boxes = self._boxes(some)
