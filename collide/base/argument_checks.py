@@ -213,6 +213,12 @@ def plain_array(what: str, value: Any, wanted: str, error: type[CollideError]) -
         ) from None
 
 
+def no_path(what: str, value: Any, reader: str, error: type[CollideError]) -> None:
+    """Raises ``error`` for a path or text where numbers are wanted.   reader : what reads files, for the message."""
+    if isinstance(value, (str, os.PathLike)):
+        raise error(f"{what} must be numbers, got {brief(value)}; files are read by {reader}")
+
+
 def _is_masked(value: Any) -> bool:
     # Whoever has a masked array has imported the module, all of it; importing it costs a tenth of numpy's own start.
     masks = sys.modules.get("numpy.ma")

@@ -40,7 +40,7 @@ _LEAVES_OF_BYTE = np.array(
     [sum(byte >> shift & 3 in (1, 2) for shift in (0, 2, 4, 6)) for byte in range(256)], dtype=np.uint8
 )
 _WRONG = {
-    CUT_SHORT: "ends before its last node", TOO_DEEP: f"has nodes more than {LEVELS} levels deep",
+    CUT_SHORT: "ends before its last node: was it cut short?", TOO_DEEP: f"has nodes more than {LEVELS} levels deep",
     CHILDLESS: "has a node without children",
 }
 _HALF = 1 << LEVELS - 1
@@ -189,7 +189,10 @@ def _at_resolution(leaves: StreamLeaves, resolution: float | None, what: str) ->
         return leaves
     wanted = checks.number(resolution)
     if wanted is None or not math.isclose(wanted, leaves.resolution, rel_tol=1e-5):
-        raise InvalidShape(f"{what}: its resolution is {leaves.resolution:g} m, not {checks.brief(resolution)}")
+        raise InvalidShape(
+            f"{what}: its resolution is {leaves.resolution:g} m, not {checks.brief(resolution)}; without resolution "
+            "any is taken"
+        )
     return leaves
 
 

@@ -269,6 +269,7 @@ _FILE_FIELDS = {"heights": Field("f8", (None, None)), "cell": Field("f8", (2,)),
 
 
 def _check_heights(heights) -> np.ndarray:
+    checks.no_path("HeightField: heights", heights, "HeightField.from_image and HeightField.load", InvalidShape)
     array = checks.array("HeightField: heights", heights, "(r, c)", InvalidShape)
     if array.ndim != 2 or min(array.shape) < 2:
         raise InvalidShape(

@@ -97,7 +97,10 @@ class OcTree(VoxelGrid):
             cells, exponents = np.concatenate([cells, more]), np.concatenate([exponents, of_more])
         if not len(cells):
             n = len(leaves.cell)
-            raise InvalidShape(f"OcTree: none of {n} leaves is occupied, the threshold being {threshold:g}")
+            raise InvalidShape(
+                f"OcTree: none of {n} leaves is occupied, the threshold being {threshold:g}; take a lower one, or make "
+                "no body of an empty map"
+            )
         self._keep(tree_of_cells("OcTree", cells, exponents, sides, pose), pose)
         for part in leaves:
             part.flags.writeable = False
@@ -296,7 +299,7 @@ class OcTree(VoxelGrid):
 def _cells_of_points(name: str, field: str, points, resolution: float) -> np.ndarray:
     cells = np.floor(rows(name, field, points, (None, 3)) / resolution)
     if not np.abs(cells).max() < 2.0**53:
-        raise InvalidShape(f"{name}: a resolution of {resolution:g} m is too fine for these points")
+        raise InvalidShape(f"{name}: a resolution of {resolution:g} m is too fine for these points; take larger cells")
     return cells.astype(np.int64)
 
 
@@ -337,8 +340,12 @@ def _checked_threshold(threshold) -> float:
 
 
 def _checked_leaves(leaves) -> OcTreeLeaves:
+    checks.no_path("OcTree: leaves", leaves, "OcTree.from_file", InvalidShape)
     if not isinstance(leaves, (tuple, list)) or len(leaves) != 3:
-        raise InvalidShape(f"OcTree: leaves must be (cell, exponent, log_odds), got {checks.brief(leaves)}")
+        raise InvalidShape(
+            f"OcTree: leaves must be (cell, exponent, log_odds), got {checks.brief(leaves)}; points are taken by "
+            "OcTree.from_points, cells alone by VoxelGrid"
+        )
     cell = checks.plain_array("OcTree: leaves.cell", leaves[0], "(n, 3)", InvalidShape)
     exponent = checks.plain_array("OcTree: leaves.exponent", leaves[1], "(n,)", InvalidShape)
     if not np.size(leaves[2]):

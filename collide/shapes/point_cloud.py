@@ -88,10 +88,11 @@ class PointCloud(Shape):
     dropped: int
 
     def __init__(self, points: ArrayLike, radius: float | ArrayLike = 0.0, *, drop_invalid: bool = False):
+        checks.no_path("PointCloud: points", points, "PointCloud.from_file", InvalidShape)
         points, radii, dropped = _of_records(points), _checked_radius(radius), 0
         if checks.true_or_false("PointCloud: drop_invalid", drop_invalid):
             points, radii, dropped = _only_finite(points, radii)
-        points = rows("PointCloud", "points", points, (None, 3))
+        points = _checked_points(points)
         if np.ndim(radii) and len(radii) != len(points):
             raise InvalidShape(
                 f"PointCloud: radius must be a number or one for each of {len(points)} points, got {len(radii)}: "
@@ -292,7 +293,8 @@ class PointCloud(Shape):
         InvalidShape
             Where the file is of another kind, or damaged, or describes no cloud.
         """
-        arrays = read_arrays("PointCloud", path, _FILE_FORMAT, _FILE_FIELDS, "tree_")
+        others = "PCD, PLY, LAS and text are read by PointCloud.from_file"
+        arrays = read_arrays("PointCloud", path, _FILE_FORMAT, _FILE_FIELDS, "tree_", others)
         dropped = int(arrays.get("dropped", 0))
         if dropped < 0:
             raise InvalidShape(f"PointCloud.load: {path}: dropped must be ≥ 0, got {dropped}")
@@ -536,6 +538,18 @@ def _checked_radius(radius) -> Any:
     return values
 
 
+def _checked_points(points) -> np.ndarray:
+    array = checks.array("PointCloud: points", points, "(N, 3)", InvalidShape)
+    if not array.size:
+        raise InvalidShape(f"PointCloud: points is empty, {array.shape}; of a scan without echoes make no body")
+    try:
+        return rows("PointCloud", "points", array, (None, 3))
+    except InvalidShape as error:
+        if np.isfinite(array).all():
+            raise
+        raise InvalidShape(f"{error}; drop_invalid=True leaves out points that are not finite") from None
+
+
 def _only_finite(points, radius) -> tuple[Any, Any, int]:
     """(finite points, their radii, how many were left out)."""
     array = checks.array("PointCloud: points", points, "(N, 3)", InvalidShape)
@@ -545,7 +559,7 @@ def _only_finite(points, radius) -> tuple[Any, Any, int]:
     if finite.all():
         return array, radius, 0
     if not finite.any():
-        raise InvalidShape(f"PointCloud: none of {len(array)} points is finite")
+        raise InvalidShape(f"PointCloud: none of {len(array)} points is finite; of a scan without echoes make no body")
     if np.ndim(radius) and len(radius) == len(array):
         radius = rows("PointCloud", "radius", radius[finite], (None,))
     return array[finite], radius, int(np.count_nonzero(~finite))

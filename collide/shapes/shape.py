@@ -318,10 +318,10 @@ def rows(shape: str, field: str, value: Any, wanted: tuple) -> np.ndarray:
     """Finite numbers of a shape (None stands for any length), as a read-only float64 copy."""
     expected = _in_words(wanted)
     array = np.array(checks.array(f"{shape}: {field}", value, expected, InvalidShape), order="C")
+    if wanted[0] is None and not len(np.atleast_1d(array)):
+        raise InvalidShape(f"{shape}: {field} is empty; at least one row is needed")
     if array.ndim != len(wanted) or any(w not in (None, s) for w, s in zip(wanted, array.shape)):
         raise InvalidShape(f"{shape}: {field} must have shape {expected}, got {array.shape}")
-    if array.shape[0] == 0:
-        raise InvalidShape(f"{shape}: {field} is empty; at least one row is needed")
     if not np.abs(array).max(initial=0.0) <= LARGEST:  # NaN, too
         bad = ~(np.abs(array) <= LARGEST)
         where = tuple(int(k) for k in np.argwhere(bad)[0])

@@ -80,11 +80,18 @@ def pack(file: IO[bytes], version: int, arrays: dict[str, np.ndarray]) -> None:
     np.savez(file, format=np.array(version), digest=_digest(arrays), **arrays)  # type: ignore[arg-type]
 
 
-def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped: str) -> dict[str, np.ndarray]:
+#: What reads other files, for messages.
+_OF_MESHES = "Files of meshes (STL, OBJ, PLY, …) are read by collide.scenes.load(path).bodies[0].shape"
+
+
+def read_arrays(
+    who: str, path, version: int, fields: dict[str, Field], dropped: str, others: str = _OF_MESHES
+) -> dict[str, np.ndarray]:
     """The arrays of a file that `write_arrays` wrote.
 
     version : changes whenever files written before would be read wrongly.   fields : what the format has.
-    dropped : prefix of further arrays in older files; they count for the digest alone.
+    dropped : prefix of further arrays in older files; they count for the digest alone.   others : what reads other
+    files, for messages.
     Raises InvalidShape where the file is of another kind or version, or damaged.
     """
     path = checks.file_path(f"{who}.load: path", path, InvalidShape)
@@ -94,10 +101,7 @@ def read_arrays(who: str, path, version: int, fields: dict[str, Field], dropped:
             raise InvalidShape(f"{named} is no regular file")
         with path.open("rb") as file:
             if file.read(2) != b"PK":
-                raise InvalidShape(
-                    f"{named} is no file that {who}.save wrote. Files of meshes (STL, OBJ, PLY, …) are read by "
-                    "collide.scenes.load(path).bodies[0].shape"
-                )
+                raise InvalidShape(f"{named} is no file that {who}.save wrote. {others}")
             older = {True: ANY, False: None}
             needed = [name for name, field in fields.items() if field.needed]
             field_of = lambda name: fields.get(name, older[name.startswith(dropped)])
@@ -136,7 +140,7 @@ def unpack(
         OSError, TypeError, AttributeError, ValueError, EOFError, KeyError, IndexError, OverflowError, MemoryError,
         RuntimeError, SyntaxError, struct.error, zipfile.BadZipFile,
     ) as error:
-        raise InvalidShape(f"{named} is no file that collide wrote ({error})") from None
+        raise InvalidShape(f"{named} is no file that collide wrote, or was cut short ({error})") from None
     if not {*_STAMPS, *needed} <= arrays.keys() or int(arrays.pop("format")) != version:
         raise InvalidShape(complaint)
     digest = arrays.pop("digest")

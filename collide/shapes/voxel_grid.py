@@ -71,12 +71,16 @@ class VoxelGrid(Shape):
     def __init__(self, occupied: ArrayLike, cell: float | ArrayLike, X: ArrayLike | None = None):
         name = type(self).__name__
         sides, pose = _checked_sides(name, cell), IDENTITY if X is None else as_pose(X, f"{name}: X")
+        checks.no_path(f"{name}: occupied", occupied, f"{name}.from_file", InvalidShape)
         array = checks.plain_array(f"{name}: occupied", occupied, "(nx, ny, nz) or (k, 3)", InvalidShape)
         if not array.size:
-            raise InvalidShape(f"{name}: no cell is occupied: occupied is empty, of shape {array.shape}")
+            raise InvalidShape(
+                f"{name}: no cell is occupied: occupied is empty, of shape {array.shape}; of an empty map make no body"
+            )
         if array.dtype.kind not in "biu" or array.ndim not in (2, 3) or (array.ndim == 2 and array.shape[1] != 3):
             raise InvalidShape(
-                f"{name}: occupied must be (nx, ny, nz) of bool, or cells (k, 3) of int, got {checks.brief(occupied)}"
+                f"{name}: occupied must be (nx, ny, nz) of bool, or cells (k, 3) of int, got {array.shape} "
+                f"{array.dtype}; of probabilities take occupied > 0.5, of places [m] {name}.from_points"
             )
         if array.ndim == 3:
             self._keep(_of_array(name, array, sides, pose), pose)
@@ -118,7 +122,8 @@ class VoxelGrid(Shape):
         sides = _checked_sides(cls.__name__, cell)
         cells = np.floor(rows(cls.__name__, "points", points, (None, 3)) / sides)
         if not np.abs(cells).max() < 2.0**62:
-            raise InvalidShape(f"{cls.__name__}: cells of {checks.brief(cell)} m are too small for these points")
+            name, side = cls.__name__, checks.brief(cell)
+            raise InvalidShape(f"{name}: cells of {side} m are too small for these points; take larger cells")
         return cls(cells.astype(np.int64), cell)
 
     @classmethod
@@ -261,7 +266,9 @@ def grid_of(name: str, shape: tuple[int, ...], least: np.ndarray, sides: np.ndar
 
 def _of_array(name: str, array: np.ndarray, sides: np.ndarray, X: np.ndarray) -> CellTree:
     if not array.size or not array.any():
-        raise InvalidShape(f"{name}: none of {' × '.join(map(str, array.shape))} cells is occupied")
+        raise InvalidShape(
+            f"{name}: none of {' × '.join(map(str, array.shape))} cells is occupied; of an empty map make no body"
+        )
     grid = grid_of(name, array.shape, np.zeros(3, dtype=np.int64), sides, X)
     return cell_tree.tree_of_array(np.ascontiguousarray(array, dtype=bool).view(np.uint8), grid)
 

@@ -319,7 +319,7 @@ REFUSED = {
     "empty": (lambda: HeightField([], 1), "at least 2 rows and 2 columns of grid points, got shape (0,)"),
     "a row": (lambda: HeightField([0.0, 1.0], 1), "got shape (2,)"),
     "points": (lambda: HeightField(np.zeros((2, 2, 3)), 1), "got shape (2, 2, 3)"),
-    "text": (lambda: HeightField("high", 1), "HeightField: heights must be real numbers (r, c), got text"),
+    "text": (lambda: HeightField("high", 1), "heights must be numbers, got 'high'; files are read by HeightField"),
     "too many": (
         lambda: HeightField(np.broadcast_to(0.0, (40_000, 40_000)), 1),
         "heights of shape (40000, 40000) are more than the 2³⁰ that a field holds; cut it",

@@ -76,7 +76,9 @@ def test_rays_free_the_cells_that_they_go_through():
 @pytest.mark.parametrize(
     ("arguments", "match"),
     [
-        ((([[0, 0, 0]], [0]), 0.1), r"must be \(cell, exponent, log_odds\)"),
+        ((([[0, 0, 0]], [0]), 0.1), r"must be \(cell, exponent, log_odds\).*taken by OcTree\.from_points"),
+        (("map.bt", 0.1), r"leaves must be numbers, got 'map\.bt'; files are read by OcTree\.from_file"),
+        ((([[0, 0, 0]], [0], [-1.0]), 0.1), "none of 1 leaves is occupied, the threshold being 0.5; take a lower"),
         ((([[0, 0]], [0], [1.0]), 0.1), r"cell \(n, 3\) and exponent \(n,\) of int"),
         ((([[0.5, 0, 0]], [0], [1.0]), 0.1), "of int"),
         ((([[1, 0, 0]], [1], [1.0]), 0.1), "no multiple of its leaf's 2 cells"),

@@ -48,7 +48,9 @@ def test_a_bit_a_cell_is_kept():
 @pytest.mark.parametrize(
     ("arguments", "match"),
     [
-        ((np.zeros((2, 2, 2), bool), 0.1), "none of 2 × 2 × 2 cells is occupied"),
+        ((np.zeros((2, 2, 2), bool), 0.1), "none of 2 × 2 × 2 cells is occupied; of an empty map make no body"),
+        (("room.binvox", 0.1), r"must be numbers, got 'room\.binvox'; files are read by VoxelGrid\.from_file"),
+        ((np.ones((2, 2, 2)), 0.1), r"\(2, 2, 2\) float64; of probabilities take occupied > 0\.5"),
         ((np.zeros((0, 3), int), 0.1), "no cell is occupied"),
         ((np.ones((2, 2)), 0.1), r"\(nx, ny, nz\) of bool, or cells \(k, 3\) of int"),
         ((np.ones((2, 2, 2)), 0.1), "of bool"),
