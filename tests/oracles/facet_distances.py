@@ -1,6 +1,6 @@
 """Squared distances of points from triangles as fractions: the least over corners, edges and the inside.
 
-Shares no code with the engine. Coordinates are doubles, taken as they are.
+Shares no code with the engine. Coordinates are doubles, taken as they are. `to_facets` has the same in doubles.
 """
 
 from __future__ import annotations
@@ -45,3 +45,17 @@ def nearest_square(point, triangles: np.ndarray) -> Fraction:
     corners = np.sqrt(np.square((triangles - point) / size).sum(axis=2))
     near = np.flatnonzero(gaps <= corners.min() * (1.0 + 1e-9) + 1e-300)
     return min(square_to_triangle(point, triangles[k]) for k in near.tolist())
+
+
+def to_facets(points: np.ndarray, mesh) -> np.ndarray:
+    """(n,) distances of points (n, 3) from the facets of a mesh, in doubles: edges, and the inside of each facet."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]][None] for k in range(3))
+    p, squares = points[:, None], []
+    for u, v in ((a, b), (b, c), (c, a)):
+        t = np.clip(((p - u) * (v - u)).sum(axis=2) / ((v - u) ** 2).sum(axis=2), 0.0, 1.0)
+        squares.append(((p - u - t[..., None] * (v - u)) ** 2).sum(axis=2))
+    n = np.cross(b - a, c - a)
+    height = ((p - a) * n).sum(axis=2)
+    inside = np.all([(np.cross(v - u, p - u) * n).sum(axis=2) >= 0.0 for u, v in ((a, b), (b, c), (c, a))], axis=0)
+    squares.append(np.where(inside, height**2 / (n**2).sum(axis=2), np.inf))
+    return np.sqrt(np.min(squares, axis=0)).min(axis=1)

@@ -30,6 +30,7 @@ from collide.narrowphase.facets.nearest_item_kernel import (
     ITEMS_ARE,
     MAYBE_INSIDE,
     MEETS,
+    PRISMS,
     PROBE_AT,
     RADII_AT,
     REACH_OF_ITEMS,
@@ -54,7 +55,7 @@ def serves(packed: PackedConvex) -> bool:
 
 
 #: Corners of items, by what they are.
-_CORNERS = {FACETS: 3, BALLS: 1, CELLS: 8}
+_CORNERS = {FACETS: 3, BALLS: 1, CELLS: 8, PRISMS: 6}
 
 
 class WalkKernels(NamedTuple):
@@ -71,11 +72,11 @@ class WalkKernels(NamedTuple):
 
 
 class Items(NamedTuple):
-    """The facets of a mesh, the balls of a cloud, or the cells of a grid.
+    """The facets of a mesh, the balls of a cloud, the cells of a grid, or the prisms of terrain.
 
-    tree : over facets, points or cells.   reach : how far they reach from their origin [m].   solid : whether they
-    enclose an inside.   radius : the largest of balls, 0 of facets [m].   radii : (n,) of balls, where they differ.
-    are : FACETS, BALLS or CELLS.   kernels : that walk.
+    tree : over facets, points or cells, or terrain.   reach : how far they reach from their origin [m].
+    solid : whether they enclose an inside.   radius : the largest of balls, 0 of facets [m].   radii : (n,) of balls,
+    where they differ.   are : FACETS, BALLS, CELLS or PRISMS.   kernels : that walk.
     """
 
     tree: Any

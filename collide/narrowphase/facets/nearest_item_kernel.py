@@ -1,10 +1,10 @@
 """A mesh and a curved shape, or a field and a convex set: a walk down the box-tree, the convex engine at items.
 
-Items are facets of a mesh, balls of a point cloud, or boxes of cells of a grid. They are taken nearest first, by the
-gaps between boxes along their axes and along the normal of the nearest item so far; what is farther than the least
-upper bound is left out, and an item that meets the shape ends the walk. The bracket of the whole is the least of the
-items'. A boolean is a walk with the upper bound 0 from the beginning, and whether the bodies come within a margin a
-walk with the margin.
+Items are facets of a mesh, balls of a point cloud, boxes of cells of a grid, or prisms of terrain. They are taken
+nearest first, by the gaps between boxes along their axes and along the normal of the nearest item so far; what is
+farther than the least upper bound is left out, and an item that meets the shape ends the walk. The bracket of the whole
+is the least of the items'. A boolean is a walk with the upper bound 0 from the beginning, and whether the bodies come
+within a margin a walk with the margin.
 """
 
 from __future__ import annotations
@@ -30,6 +30,14 @@ from collide.fields.cell_tree_kernel import (
     z_of,
 )
 from collide.fields.point_tree_kernel import points_of
+from collide.fields.terrain_kernel import (
+    ALONG,
+    blocks_within,
+    box_of_cells,
+    corner_of_prism,
+    open_terrain,
+    top_of_cell,
+)
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import BLOCK, POINTS
 from collide.lowering.shape_table import (
@@ -121,7 +129,7 @@ HEADER = 21
 #: Doubles of a box.
 BOX = 6
 #: What items are.
-FACETS, BALLS, CELLS = range(3)
+FACETS, BALLS, CELLS, PRISMS = range(4)
 #: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh; a facet meets the shape; a
 #: facet is within the margin, or may be.
 LONG_WAY, SURFACES_APART, MAYBE_INSIDE, MEETS, NEAR = -1, 1, 0, 2, 3
@@ -233,11 +241,26 @@ def _put_cell(walk, word):
 
 
 @kernel
+def _put_prism(walk, place):
+    """What lies between a triangle of terrain and the bottom as row 0 of the tables."""
+    terrain, coordinates = open_terrain(walk.words[TREE_AT]), view_f64(walk.words[COORDINATES_AT], 3 * BLOCK)
+    square = 0.0
+    for k in range(BLOCK):
+        p = corner_of_prism(terrain, place, k % 6)
+        coordinates[k], coordinates[BLOCK + k], coordinates[2 * BLOCK + k] = p.x, p.y, p.z
+        square = max(square, dot(p, p))
+    walk.numbers[REACH] = math.sqrt(square) * (1 + 1e-15)
+
+
+@kernel
 def _put_item(walk, place):
-    """A facet, a ball, or a box of cells as row 0 of the tables."""
+    """An item as row 0 of the tables."""
     words, tree = walk.words, walk.tree
     if words[ITEMS_ARE] == CELLS:
         _put_cell(walk, place)
+        return
+    if words[ITEMS_ARE] == PRISMS:
+        _put_prism(walk, place)
         return
     coordinates = view_f64(words[COORDINATES_AT], 3 * BLOCK)
     corners, at, n = tree.triangles, 9 * place, 3
@@ -417,11 +440,52 @@ def _walk_cells(walk, limit, enough, max_asked):
     return nearest
 
 
+@kernel
+def _walk_block(walk, nearest, row, column, limit, enough, max_asked):
+    """The `Nearest` with the prisms of a block of terrain, by its number along each axis."""
+    terrain = open_terrain(walk.words[TREE_AT])
+    bounds = box_of_cells(terrain, ALONG * row, ALONG * column, ALONG, terrain.tops[row * terrain.n_across + column])
+    if not bounds.half.z >= 0.0 or _gap_of_box(walk, nearest, bounds.centre, bounds.half) > nearest.upper:
+        return nearest
+    for i in range(ALONG * row, min(ALONG * (row + 1), terrain.rows)):
+        for j in range(ALONG * column, min(ALONG * (column + 1), terrain.columns)):
+            bounds = box_of_cells(terrain, i, j, 1, top_of_cell(terrain, i, j))
+            if not bounds.half.z >= 0.0 or _gap_of_box(walk, nearest, bounds.centre, bounds.half) > nearest.upper:
+                continue
+            for triangle in range(2):
+                if nearest.failed or nearest.lower <= enough or nearest.n_asked > max_asked:
+                    return nearest
+                nearest = with_item(walk, nearest, 2 * (i * terrain.columns + j) + triangle, limit)
+    return nearest
+
+
+@kernel
+def _walk_terrain(walk, limit, enough, max_asked):
+    """`_walk_down` of terrain: the blocks below the shape, then, for the least bound so far, the blocks around; blocks
+    without a bound are looked at one after another.
+    """
+    terrain, zero = open_terrain(walk.words[TREE_AT]), Vec3(0.0, 0.0, 0.0)
+    nearest = Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
+    inner = blocks_within(terrain, walk.low, walk.high, 0.0)
+    for row in range(inner.row, inner.last_row + 1):
+        for column in range(inner.column, inner.last_column + 1):
+            nearest = _walk_block(walk, nearest, row, column, limit, enough, max_asked)
+    outer = blocks_within(terrain, walk.low, walk.high, max(nearest.upper, 0.0) + walk.slack)
+    for row in range(outer.row, outer.last_row + 1):
+        for column in range(outer.column, outer.last_column + 1):
+            is_below = inner.row <= row <= inner.last_row and inner.column <= column <= inner.last_column
+            if not is_below and not (nearest.failed or nearest.lower <= enough or nearest.n_asked > max_asked):
+                nearest = _walk_block(walk, nearest, row, column, limit, enough, max_asked)
+    return nearest
+
+
 @kernel(inline=True)
 def _number_of_item(walk, place):
     """The number that results name."""
     if walk.words[ITEMS_ARE] == CELLS:
         return number_of(open_cells(walk.words[TREE_AT]), place)
+    if walk.words[ITEMS_ARE] == PRISMS:
+        return place
     return int(walk.tree.ids[place])
 
 
@@ -435,6 +499,8 @@ def _walk_down(walk, limit, enough, max_asked):
     tree, words = walk.tree, walk.words
     if words[ITEMS_ARE] == CELLS:
         return _walk_cells(walk, limit, enough, max_asked)
+    if words[ITEMS_ARE] == PRISMS:
+        return _walk_terrain(walk, limit, enough, max_asked)
     zero = Vec3(0.0, 0.0, 0.0)
     nearest = Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
     top = _push_children(walk, nearest, 0, 0)

@@ -56,6 +56,7 @@ class FieldItems(ABC):
     """The items of a field.
 
     X_FG : (4, 4) pose of the frame of the items in the field's.   walked : items with a tree to walk down, or `None`.
+    names_are_changed : whether `names_of_walked` are others than the items'.
     is_one_part : whether the union of many items has a single part.   low, high : (3,) box around all items, in their
     frame [m].
     """
@@ -63,6 +64,7 @@ class FieldItems(ABC):
     X_FG: np.ndarray = IDENTITY
     walked: Items | None = None
     is_one_part = False
+    names_are_changed = False
     low: np.ndarray
     high: np.ndarray
 
@@ -137,6 +139,10 @@ class FieldItems(ABC):
     def name(self, union: NamedUnion, part: np.ndarray, p_F: np.ndarray) -> np.ndarray:
         """What results name for parts (n,) of a union, at points (n, 3) of the field's frame; −1 for −1."""
         return np.where(part < 0, -1, union.numbers[part])
+
+    def names_of_walked(self, rows: np.ndarray, X_WG: np.ndarray) -> np.ndarray:
+        """(n,) what results name in place of the items of walks, of their rows at poses (n, 4, 4) of the items."""
+        return rows["part_a"]
 
     def nearest(self, box: BoxAround) -> np.ndarray:
         """Numbers of some items near the middle of a box, among them maybe the nearest; at least one."""

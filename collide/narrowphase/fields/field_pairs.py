@@ -184,6 +184,7 @@ def _walked_rows(
     for part in _posed_parts(items, B, X_WA, X_WB):
         rows, written = gap_rows(items.walked, part.packed, part.X_WG, part.X_WP, depths)
         rows["part_b"] = part.number
+        rows["part_a"] = items.names_of_walked(rows, part.X_WG)
         is_written[part.rows] &= written
         out[part.rows] = _nearer(out[part.rows], rows) if part.number else rows
     return out, is_written
@@ -242,10 +243,13 @@ def prepare_field(A: Shape, B: Shape) -> Prepared | None:
     """A field and a convex set with an end made ready for single calls; ``None`` of other pairs."""
     exchanged = not A.is_field
     field, shape = (B, A) if exchanged else (A, B)
-    walked = items_of(field).walked
-    if not walks(shape) or walked is None or items_of(field).X_FG is not IDENTITY:
+    items = items_of(field)
+    if not walks(shape) or items.walked is None or items.X_FG is not IDENTITY:
         return None
-    return prepared_items(walked, convex_set_of(shape), exchanged)
+    prepared = prepared_items(items.walked, convex_set_of(shape), exchanged)
+    if items.names_are_changed:
+        prepared.distance = None
+    return prepared
 
 
 def _beyond(limit: float) -> np.ndarray:

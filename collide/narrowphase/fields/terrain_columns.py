@@ -13,8 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.fields import terrain_kernel
 from collide.fields.height_pyramid import BLOCK
 from collide.fields.terrain_surface import surface_of
+from collide.kernels import address_of
+from collide.mesh.bvh import DEPTH, N_FACETS, NUMBERS_AT
+from collide.narrowphase.facets.nearest_item_calls import PRISMS, Items
 from collide.narrowphase.fields.field_items import BoxAround, FieldItems, NamedUnion
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.height_field import HeightField
@@ -26,7 +30,7 @@ _SPARE, _MAX_WHOLE = 4, 4096
 _MAX_MESHES, _STEP = 32, 8
 #: Cells of a tile along each axis, for rays, and tiles kept.
 _TILE, _MAX_TILES = 32, 1024
-#: Of more cells as low as each other ends of rows are taken; how much of a normal points up for sure.
+#: Of more cells as low as each other ends of rows are taken; how much of a normal points up at least.
 _MAX_LEVEL, _UPRIGHT = 1024, 2.0**-30
 #: How far next to a facet is, in sides of a cell: far above rounding.
 _NEXT = 2.0**-10
@@ -41,10 +45,32 @@ class _Rectangle(NamedTuple):
     last_column: int
 
 
+class _Prisms:
+    """Terrain for kernels.   address : of the header of `fields/terrain_kernel.py`, valid as long as this lives."""
+
+    depth = 1
+
+    def __init__(self, field: HeightField):
+        x, y = (np.ascontiguousarray(line) for line in field.grid_lines)
+        heights, tops = np.ascontiguousarray(field.heights), np.ascontiguousarray(field.pyramid.highest)
+        low, high = np.array([x[0], y[0], field.bottom]), np.array([x[-1], y[-1], field.pyramid.top])
+        corner = np.maximum(np.abs(low), np.abs(high))
+        radius = 0.5 * float(np.linalg.norm(high - low)) * (1.0 + 2.0**-50)
+        numbers = np.concatenate([0.5 * low + 0.5 * high, corner, [radius, field.bottom]])
+        self.reach = float(np.linalg.norm(corner)) * (1.0 + 2.0**-50)
+        self._header, self._held = np.zeros(terrain_kernel.HEADER, dtype=np.int64), (x, y, heights, tops, numbers)
+        self._header[[NUMBERS_AT, DEPTH, N_FACETS]] = address_of(numbers), self.depth, 2 * field.pyramid.n_cells
+        rows, columns = heights.shape[0] - 1, heights.shape[1] - 1
+        self._header[terrain_kernel.HEIGHTS_AT :] = (
+            *map(address_of, (heights, x, y, tops)), rows, columns, tops.shape[1],
+        )
+        self.address = address_of(self._header)
+
+
 class Columns(FieldItems):
     """The cells of a height field that are no holes, numbered row by row, holes counted in."""
 
-    is_one_part = True
+    is_one_part = names_are_changed = True
 
     def __init__(self, field: HeightField):
         self._pyramid, self._heights, self._bottom = field.pyramid, field.heights, field.bottom
@@ -52,6 +78,8 @@ class Columns(FieldItems):
         self._rows, self._columns = field.heights.shape[0] - 1, field.heights.shape[1] - 1
         self.low = np.array([self._x[0], self._y[0], self._bottom])
         self.high = np.array([self._x[-1], self._y[-1], self._pyramid.top])
+        prisms = _Prisms(field)
+        self.walked = Items(prisms, prisms.reach, False, are=PRISMS)
         self._mesh_cache: dict[_Rectangle, NamedUnion] = {}
         self._tile_cache: dict[_Rectangle, NamedUnion] = {}
         tops, n = field.pyramid.highest, _TILE // BLOCK
@@ -220,6 +248,15 @@ class Columns(FieldItems):
         corner = np.where(u >= v, z[row, column + 1], z[row + 1, column])
         height = first + np.maximum(u, v) * (corner - first) + np.minimum(u, v) * (last - corner)
         return (numbers < 0) & inside & (p[:, 2] < height)  # NaN is no height
+
+    def names_of_walked(self, rows: np.ndarray, X_WG: np.ndarray) -> np.ndarray:
+        """Facets of the top are numbered without holes; −1 for walls and bottom, whose normals do not point up, and for
+        the upper rim of walls along a level normal.
+        """
+        is_top = np.einsum("ni,ni->n", rows["normal"], X_WG[:, :3, 2]) > _UPRIGHT
+        is_top |= rows["hit"]
+        cell, triangle = np.divmod(rows["part_a"], 2)
+        return np.where(is_top, 2 * self._pyramid.numbers_of(cell.astype(np.int64)) + triangle, -1)
 
     def some(self) -> np.ndarray:
         row, column = (np.argwhere(self._pyramid.highest > -math.inf)[0] * BLOCK).tolist()

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from facet_distances import nearest_square
+from facet_distances import nearest_square, to_facets
 from mesh_shapes import block_ring, box, bumpy_sphere
 from naive import pose, random_pose, rng_of, rotation
 from reproduction import reproducing
@@ -23,20 +23,6 @@ cloud = collide.PointCloud(np.array({points}), np.array({radius}))
 mesh = collide.Mesh({vertices}, {faces}, solid={solid})
 print(collide.distance(cloud, mesh, np.array({X_WC}), np.array({X_WM}), signed=False))
 """
-
-
-def to_facets(points: np.ndarray, mesh: collide.Mesh) -> np.ndarray:
-    """(n,) distances of points (n, 3) from the facets, in doubles: corners, edges, and the inside of each."""
-    a, b, c = (mesh.vertices[mesh.faces[:, k]][None] for k in range(3))
-    p, squares = points[:, None], []
-    for u, v in ((a, b), (b, c), (c, a)):
-        t = np.clip(((p - u) * (v - u)).sum(axis=2) / ((v - u) ** 2).sum(axis=2), 0.0, 1.0)
-        squares.append(((p - u - t[..., None] * (v - u)) ** 2).sum(axis=2))
-    n = np.cross(b - a, c - a)
-    height = ((p - a) * n).sum(axis=2)
-    inside = np.all([(np.cross(v - u, p - u) * n).sum(axis=2) >= 0.0 for u, v in ((a, b), (b, c), (c, a))], axis=0)
-    squares.append(np.where(inside, height**2 / (n**2).sum(axis=2), np.inf))
-    return np.sqrt(np.min(squares, axis=0)).min(axis=1)
 
 
 def winds(points: np.ndarray, mesh: collide.Mesh) -> np.ndarray:
