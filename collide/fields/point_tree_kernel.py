@@ -29,6 +29,7 @@ from collide.mesh.bvh import (
     TRIANGLES_AT,
     WIDTH,
     box_at,
+    leaf_link,
     link_of,
     open_tree,
 )
@@ -176,14 +177,35 @@ def build_point_tree(header_at, work_at, first_nodes_at, n_levels):
     for level in range(n_levels - 1, -1, -1):
         for node in range(first_nodes[level], first_nodes[level + 1]):
             _fill_node(header, points, ids, centre, unit, node, node - first_nodes[level], level, first_nodes, n_levels)
-    n_leaves = leaves_of(n)
-    floats = view_f32(header[SLABS_AT], LEAF_FLOATS * n_leaves)
-    for leaf in range(n_leaves):
-        for i in range(WIDTH):
-            place, at = min(MAX_LEAF * leaf + min(i, MAX_LEAF - 1), n - 1), LEAF_FLOATS * leaf + i
-            p = scale(1.0 / unit, sub(vec3_at(points, 3 * int(ids[place])), centre))
-            floats[at], floats[at + WIDTH], floats[at + 2 * WIDTH] = p.x, p.y, p.z
+    floats = view_f32(header[SLABS_AT], LEAF_FLOATS * leaves_of(n))
+    for first in range(0, n, MAX_LEAF):
+        put_floats(floats, points, ids, centre, unit, first, min(MAX_LEAF, n - first))
     return first_nodes[n_levels]
+
+
+@kernel(inline=True)
+def place_in_units(points, number, centre, unit):
+    """A point by number, in units from the centre."""
+    return scale(1.0 / unit, sub(vec3_at(points, 3 * int(number)), centre))
+
+
+@kernel
+def put_floats(floats, points, ids, centre, unit, first, count):
+    """The floats of a leaf of points at places first … first + count − 1."""
+    at = LEAF_FLOATS * (first // MAX_LEAF)
+    for i in range(WIDTH):
+        p = place_in_units(points, ids[first + min(i, count - 1)], centre, unit)
+        floats[at + i], floats[at + WIDTH + i], floats[at + 2 * WIDTH + i] = p.x, p.y, p.z
+
+
+@kernel
+def box_of_points(points, ids, centre, unit, first, count):
+    """(least, largest corner) of the points at places first … first + count − 1, in units."""
+    low, high = Vec3(math.inf, math.inf, math.inf), Vec3(-math.inf, -math.inf, -math.inf)
+    for place in range(first, first + count):
+        p = place_in_units(points, ids[place], centre, unit)
+        low, high = lower_of(low, p), higher_of(high, p)
+    return low, high
 
 
 @kernel(inline=True)
@@ -209,44 +231,46 @@ def _fill_node(header, points, ids, centre, unit, node, number, level, first_nod
             if is_used:
                 first = MAX_LEAF * child
                 count = min(MAX_LEAF, n - first)
-                for i in range(first, first + count):
-                    p = scale(1.0 / unit, sub(vec3_at(points, 3 * int(ids[i])), centre))
-                    low, high = _lower(low, p), _higher(high, p)
-                link = ~(first << 3 | count)
+                low, high = box_of_points(points, ids, centre, unit, first, count)
+                link = leaf_link(first, count)
         else:
             is_used = is_used and first_nodes[level + 1] + child < first_nodes[level + 2]
             if is_used:
                 link = first_nodes[level + 1] + child
-                low, high = _box_of_node(boxes, NODE * link)
-        _put_box(boxes, at + slot, low, high, is_used)
+                low, high = box_of_node(boxes, NODE * link)
+        put_box(boxes, at + slot, low, high, is_used)
         links[at + 6 * WIDTH + slot] = link
 
 
 @kernel(inline=True)
-def _lower(a, b):
+def lower_of(a, b):
     return Vec3(min(a.x, b.x), min(a.y, b.y), min(a.z, b.z))
 
 
 @kernel(inline=True)
-def _higher(a, b):
+def higher_of(a, b):
     return Vec3(max(a.x, b.x), max(a.y, b.y), max(a.z, b.z))
 
 
 @kernel
-def _box_of_node(boxes, at):
-    """(least, largest corner) of all boxes of a node, in units."""
+def box_of_node(boxes, at):
+    """(least, largest corner) of all boxes of a node, in units: doubles, as corners in floats would cut boxes off."""
     low, high = Vec3(math.inf, math.inf, math.inf), Vec3(-math.inf, -math.inf, -math.inf)
-    for slot in range(WIDTH):
-        i = at + slot
+    for i in range(at, at + WIDTH):
         if boxes[i + 3 * WIDTH] > NOTHING / 2:
-            c = Vec3(float(boxes[i]), float(boxes[i + WIDTH]), float(boxes[i + 2 * WIDTH]))
-            h = Vec3(float(boxes[i + 3 * WIDTH]), float(boxes[i + 4 * WIDTH]), float(boxes[i + 5 * WIDTH]))
-            low, high = _lower(low, sub(c, h)), _higher(high, Vec3(c.x + h.x, c.y + h.y, c.z + h.z))
+            c, h = _doubles_at(boxes, i), _doubles_at(boxes, i + 3 * WIDTH)
+            low, high = lower_of(low, sub(c, h)), higher_of(high, add(c, h))
     return low, high
 
 
+@kernel(inline=True)
+def _doubles_at(boxes, at):
+    """A centre or half lengths; ``float`` of a float stays a float in kernels."""
+    return Vec3(np.float64(boxes[at]), np.float64(boxes[at + WIDTH]), np.float64(boxes[at + 2 * WIDTH]))
+
+
 @kernel
-def _put_box(boxes, at, low, high, is_used):
+def put_box(boxes, at, low, high, is_used):
     """A box as centre and half lengths in floats, rounded outwards; of nothing where it is not used."""
     for axis in range(3):
         l, h = (low.x, high.x) if axis == 0 else (low.y, high.y) if axis == 1 else (low.z, high.z)
