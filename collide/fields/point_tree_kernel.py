@@ -48,7 +48,7 @@ _WIDER, _LEAST = 1.0 + 2.0**-22, 2.0**-100
 WORK = 3
 WORK_BESIDES = _VALUES
 #: Levels of nodes at most.
-MAX_LEVELS = 12
+MAX_LEVELS = 16
 #: How far a point may be from its coordinates in floats, in units: √3 · 2⁻²⁴, and what taking off the centre rounds.
 FLOAT_ERROR = 2.0**-23
 #: Floats of a leaf.
@@ -288,7 +288,7 @@ def put_box(boxes, at, low, high, is_used):
 
 @kernel(inline=True)
 def points_of(tree):
-    """The points of a tree, in their own order."""
+    """The points of a tree, in their own order: as many as the tree has places, of which some may be empty."""
     return view_f64(tree.header[TRIANGLES_AT], 3 * tree.header[N_FACETS])
 
 

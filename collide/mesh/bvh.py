@@ -38,7 +38,8 @@ MAX_LEAF = 7
 #: Facets of a mesh at most: a leaf's link holds its first triangle in 28 bits.
 MAX_FACETS = 1 << 28
 
-# Header that kernels read: integers, and the address of the numbers.
+# Header that kernels read: integers, and the address of the numbers. Trees over points that came and went have empty
+# places in leaves: N_FACETS counts places, and is no less than the points.
 NODES_AT, TRIANGLES_AT, IDS_AT, NUMBERS_AT, N_NODES, N_FACETS, DEPTH, EXPONENT, SLABS_AT, HAS_ORIGINS = range(10)
 INTS = 10
 # Numbers: centre (3), largest |coordinate| of the triangles by axis (3), radius of a ball around the centre.

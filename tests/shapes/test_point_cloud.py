@@ -98,6 +98,14 @@ def test_clouds_that_are_cropped_filtered_and_updated_say_what_they_leave_out():
     both = cloud.updated(added=PointCloud([(5.0, 5.0, 5.0)], 0.3), removed=points[:, 0] > 0.0)
     assert len(both) == (points[:, 0] <= 0.0).sum() + 1 and both.radii[-1] == 0.3
     assert len(cloud) == 2000, "the old cloud stays"
+    mixed = PointCloud(points[:3], 0.5).updated(added=PointCloud(points[3:5], 0.1), removed=[0])
+    assert mixed.radii.tolist() == [0.5, 0.5, 0.1, 0.1] and not mixed.radius.flags.writeable
+    alike = PointCloud(points[:3], 0.5).updated(added=PointCloud(points[3:5], 0.5), removed=[0, 1, 2])
+    assert alike.radius == 0.5 and np.array_equal(alike.points, points[3:5])
+    with pytest.raises(InvalidShape, match="updated: no point of 3 is left"):
+        PointCloud(points[:3]).updated(removed=[2, 0, 1, 1])
+    with pytest.raises(InvalidShape, match="added is empty"):
+        PointCloud(points[:3]).updated(added=np.zeros((0, 3)))
     assert collide.collide(both, collide.Sphere(0.1), EYE, collide.pose((5, 5, 5.35)))
     with pytest.raises(InvalidShape, match="no point of 2000 is left"):
         cloud.cropped([(5, 5, 5), (6, 6, 6)])
