@@ -11,6 +11,8 @@ from struct import Struct
 
 import numpy as np
 
+from collide.kernels import address_of
+from collide.lowering.cell_boxes import CELLS, boxes_of_cells
 from collide.lowering.convex_sets import PRIMITIVE_NUMBERS, ConvexSet, convex_set, moved, primitive_numbers_of
 from collide.lowering.lower_numbers import N_NUMBERS
 from collide.lowering.lowered_sets import LoweredSets, PlacedSets
@@ -39,8 +41,8 @@ _parts_of_numbers: dict[bytes, Parts] = {}
 #: last place of its terms: three products and three sums for the rotation, one more for the shift.
 _ULPS_PER_PRODUCT = 8
 _ULP = 2.0**-53
-#: Points of a mesh that are their own bounds; of more, boxes of so many cells along each axis hold them.
-_MAX_OWN_BOUNDS, _CELLS = 512, 6
+#: Points that are their own bounds; of more, boxes of cells hold them.
+_MAX_OWN_BOUNDS = 512
 _CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=bool)
 
 
@@ -176,13 +178,7 @@ def _points_around(points: np.ndarray) -> np.ndarray:
     """Points (k, 3) whose hull holds the ones given, and is not much larger: few, or corners of boxes around groups."""
     if len(points) <= _MAX_OWN_BOUNDS:
         return points
-    low, high = points.min(axis=0), points.max(axis=0)
-    with np.errstate(under="ignore"):
-        share = 0.5 * points - 0.5 * low, 0.5 * high - 0.5 * low
-    cell = np.minimum(share[0] / np.where(share[1] > 0.0, share[1], 1.0) * _CELLS, _CELLS - 1).astype(np.int64)
-    numbers = (cell[:, 0] * _CELLS + cell[:, 1]) * _CELLS + cell[:, 2]
-    order = np.argsort(numbers, kind="stable")
-    starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
-    lows = np.minimum.reduceat(points[order], starts)[:, None]
-    highs = np.maximum.reduceat(points[order], starts)[:, None]
+    boxes = np.empty((CELLS**3, 2, 3))
+    boxes_of_cells(address_of(points), len(points), address_of(boxes))
+    lows, highs = boxes[boxes[:, 0, 0] < np.inf].transpose(1, 0, 2)[:, :, None]
     return np.unique(np.where(_CORNERS, highs, lows).reshape(-1, 3), axis=0)

@@ -152,6 +152,16 @@ def test_bounds_of_many_points_hold_them(n, kind):
     np.testing.assert_array_equal([found.min(axis=0), found.max(axis=0)], [points.min(axis=0), points.max(axis=0)])
 
 
+@pytest.mark.parametrize("scale, shift", [(1.0, 0.0), (1e49, 0.0), (1e-300, 0.0), (1.0, 1e9)])
+def test_boxes_of_cells_are_those_of_points_sorted_into_cells(scale, shift):
+    points = rng_of("cells", scale, shift).normal(size=(4000, 3)) * (1.0, 0.0, 3.0) * scale + shift
+    low, side = 0.5 * points.min(axis=0), 0.5 * points.max(axis=0) - 0.5 * points.min(axis=0)
+    cells = np.minimum((0.5 * points - low) / np.where(side > 0.0, side, 1.0) * 6, 5).astype(int)
+    groups = [points[(cells == cell).all(axis=1)] for cell in np.unique(cells, axis=0)]
+    corners = [np.where(list(np.ndindex(2, 2, 2)), group.max(axis=0), group.min(axis=0)) for group in groups]
+    assert len(groups) > 20 and np.array_equal(P._points_around(points), np.unique(np.concatenate(corners), axis=0))
+
+
 def test_what_is_no_shape_of_ours_is_named():
     class Other(collide.Shape):
         __slots__ = ()
