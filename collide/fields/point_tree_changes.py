@@ -199,7 +199,7 @@ def _put_in(patch, number):
     """Whether a point found a place."""
     tree, way = patch.tree, patch.way
     p = place_in_units(patch.points, number, patch.centre, patch.unit)
-    if not max_abs(p) <= 1.0:  # the range that FLOAT_ERROR counts on
+    if not max_abs(p) < 1.0:  # FLOAT_ERROR counts on it; √3 · (1 − 2⁻⁵³) units are within RADIUS, which is rounded
         return False
     ref, level = 0, 0
     _widen(tree, ref, p)
