@@ -15,8 +15,8 @@ enum {
 };
 enum { ORIGIN = TREE_NUMBERS, SIDES = ORIGIN + 3, FIELD_NUMBERS = SIDES + 3 };
 
-/* Words of a walk's stack down a tree of points: two for each of 8 boxes on 13 levels. */
-enum { POINT_STACK = 2 * 8 * 13 };
+/* Words of a walk's stack down a tree of points: two for each of 8 boxes on 17 levels. */
+enum { POINT_STACK = 2 * 8 * 17 };
 
 struct collide_field {
     int64_t tree[FIELD_INTS];
