@@ -1,10 +1,12 @@
 """What a point cloud costs, to make and to ask, beside scipy's k-d tree and coal's octree, from 10³ to 10⁷ points.
 
-    python benchmarks/clouds.py --table made asked updated worn read
+    python benchmarks/clouds.py --table made asked robots updated worn read
 
 made    a cloud and its tree, beside cKDTree and coal's OcTree of the same points, cells as large as a ball
 asked   spheres, convex shapes, gaps, nearest points; ours in batches, coal in a loop of Python, scipy in one call:
         for spheres the points within both radii are counted
+robots  a Panda of hulls, and of spheres (from ../shared/data), among points on a table and 50 obstacles: configurations
+        at random, distances and straight motions proven of free configurations; beside the obstacles as solids
 updated points come and go, beside a cloud and its tree made anew of the points after the change
 worn    what is asked of a cloud after updates of 1/100 of its points, beside a cloud made anew
 read    a file of each format, in µs a point, and the peak of memory while reading, in bytes a point; beside laspy's
@@ -24,7 +26,8 @@ from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
-from inputs import rotations
+from inputs import SHARED, rotations
+from robot_peers import at_random, clutter, panda
 
 import collide
 from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
@@ -95,6 +98,8 @@ def asked_of(points: int, where: str, n: int) -> dict:
     places, X = points_of(points, where), poses(n)
     cloud, centres = collide.PointCloud(places, _RADIUS), np.ascontiguousarray(X[:, :3, 3])
     calls: dict = {name: {"collide": partial(collide.collide, cloud, S, _EYE, X)} for name, S in shapes().items()}
+    gap = partial(collide.distance, cloud, shapes()["mesh of 720"], _EYE, X[: n // 10], signed=False)
+    calls["gap of a mesh"] = {"collide": lambda: [gap() for _ in range(10)]}  # so that times are of as many questions
     calls["gap of a box"] = {"collide": partial(collide.distance, cloud, shapes()["box"], _EYE, X, signed=False)}
     calls["nearest"] = {"collide": partial(cloud.nearest, centres)}
     if installed(scipy="scipy"):
@@ -110,6 +115,45 @@ def asked_of(points: int, where: str, n: int) -> dict:
         for call in tasks.values():
             call()
     return calls
+
+
+def surface_points(world: collide.World, n: int) -> np.ndarray:
+    """Points on the surfaces of the bodies of a World, evenly by area."""
+    rng, triangles = np.random.default_rng(1), []
+    for body in map(world.body, world.ids):
+        mesh = collide.tessellate(body.shape)
+        triangles.append((mesh.vertices @ body.X_WB[:3, :3].T + body.X_WB[:3, 3])[mesh.faces])
+    a, b, c = np.concatenate(triangles).transpose(1, 0, 2)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    k, (u, v) = rng.choice(len(a), n, p=area / area.sum()), np.sort(rng.random((2, n)), axis=0)
+    return a[k] + u[:, None] * (b - a)[k] + (v - u)[:, None] * (c - a)[k]
+
+
+@cache
+def checkers(robot: str, points: int) -> dict[str, collide.RobotChecker]:
+    arm = panda()[0] if robot == "hulls" else collide.Robot.load(SHARED / "robots/panda/panda_spherized.urdf")
+    solids, seen = clutter(50), collide.World()
+    seen.add(collide.PointCloud(surface_points(solids, points), _RADIUS), name="seen", static=True)
+    return {"collide": collide.RobotChecker(arm, seen), "solid": collide.RobotChecker(arm, solids)}
+
+
+def robots(options: Options, robot: str, points: int, question: str) -> Race:
+    n, asked_of_both = 200 if options.quick else 4000, checkers(robot, points)
+    Q = at_random(asked_of_both["collide"].robot, n)
+    tasks, per, columns = {}, {}, {}
+    for name, checker in asked_of_both.items():
+        free = Q[~checker.collides(Q)]
+        begin = free[: n // 20]
+        end = begin + np.random.default_rng(3).uniform(-0.5, 0.5, begin.shape)
+        if question == "motions proven":
+            is_free = checker.certify_edges(begin, end).free
+            tasks[name] = partial(checker.certify_edges, begin[is_free], end[is_free])
+            per[name] = float(is_free.sum())
+        else:
+            call, asked_configurations = (checker.collides, Q) if question == "booleans" else (checker.distances, begin)
+            tasks[name], per[name] = partial(call, asked_configurations), float(len(asked_configurations))
+        columns[f"free_{name}"] = len(free) / n
+    return Race(tasks, per, columns)
 
 
 def asked(options: Options, points: int, where: str, question: str) -> Race:
@@ -211,8 +255,14 @@ def made_cases(options: Options):
 
 
 def asked_cases(options: Options):
-    questions = (*shapes(), "gap of a box", "nearest")
+    questions = (*shapes(), "gap of a box", "gap of a mesh", "nearest")
     return grid(points=sizes(options)[:4], where=("cube", "room"), question=questions)
+
+
+def robot_cases(options: Options):
+    arms = ("hulls", *(("spheres",) if SHARED.is_dir() else ()))
+    points = (10**4,) if options.quick else (10**4, 10**5, 10**6)
+    return grid(robot=arms, points=points, question=("booleans", "distances", "motions proven"))
 
 
 def updated_cases(options: Options):
@@ -236,6 +286,8 @@ CLAIMS = [
     Claim("updated", "µs until a changed cloud has its tree", updated_cases, updated, file="clouds-updated", turns=9),
     Claim("worn", "µs a question to a cloud after updates", worn_cases, worn, file="clouds-worn", turns=9),
     Claim("asked", "µs a question to a cloud", asked_cases, asked, file="clouds-asked", turns=5),
+    Claim("robots", "µs a configuration, or a motion, of a robot among points", robot_cases, robots,
+          file="clouds-robots", turns=5),
 ]
 
 
