@@ -105,13 +105,13 @@ static collide_status make_cloud(const double *points, int64_t n, double radius,
     return build_points(kernels, points, n, cloud);
 }
 
-/* Whether radii are those of balls, and the largest of them: a radius of all is 0 or a length, those of each any up to that. */
+/* Whether radii are those of balls, 0 or lengths, and the largest of them. */
 static int are_radii(const double *radii, size_t n, double *largest)
 {
     size_t k;
     *largest = 0.0;
     for (k = 0; k < n; k++) {
-        if (!(radii[k] >= 0.0 && radii[k] <= LARGEST) || (n == 1 && radii[k] > 0.0 && radii[k] < SMALLEST)) return 0;
+        if (!(radii[k] >= 0.0 && radii[k] <= LARGEST) || (radii[k] > 0.0 && radii[k] < SMALLEST)) return 0;
         if (radii[k] > *largest) *largest = radii[k];
     }
     return 1;

@@ -5,6 +5,8 @@
 /* What rounding of a box's sides is, as a part of the numbers met (2^-40); heights over a plane that are looked at again
    (2^-36). */
 static const double ROUNDING = 9.094947017729282e-13, LEVEL = 1.4551915228366852e-11;
+/* Matrices no farther off rotations are rounded rotations; farther off (2^-10) they are inverted. */
+static const double ROTATION = 1e-13, FAR_OFF = 0.0009765625;
 
 /* Numbers of balls or boxes of cells that may be met. */
 struct listing {
@@ -34,19 +36,54 @@ static double off_rotation(const double *X)
 
 static double shift_of(const double *X) { return fabs(X[3]) + fabs(X[7]) + fabs(X[11]); }
 
-/* A box in the field's frame around the shape: box_in_frame of field_items.py. A place q of the world in an item is R p + t with
-   p in the item, so that R^T (q - t) is off p by (R^T R - I) p, along an axis at most 3 off |p|: within 8 off + 2^-40 of the size,
-   what rounds as well. */
-static void box_around(const struct field_pair *pair, double low[3], double high[3])
+/* A box in a field's frame; lengths there are at most `stretch` times as long as in the world. */
+struct seen_box {
+    double low[3], high[3], stretch;
+};
+
+static double length_of(const double *rows, int step)
+{
+    double square = 0.0;
+    int i, j;
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) square += rows[step * i + j] * rows[step * i + j];
+    return sqrt(square);
+}
+
+/* The inverse of a matrix, row by row: the transpose where the matrix is near a rotation. */
+static void invert(const double *X, double off, double inverse[9])
+{
+    double determinant;
+    int i, j;
+    for (i = 0; i < 3; i++)
+        for (j = 0; j < 3; j++) {
+            int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
+            inverse[3 * i + j] = off > FAR_OFF ? X[4 * c + a] * X[4 * d + b] - X[4 * c + b] * X[4 * d + a] : X[4 * j + i];
+        }
+    if (!(off > FAR_OFF)) return;
+    determinant = X[0] * inverse[0] + X[1] * inverse[3] + X[2] * inverse[6];
+    for (i = 0; i < 9; i++) inverse[i] /= determinant;
+}
+
+/* The box around the shape: box_in_frame of field_items.py, where the bounds of what rounds are derived. */
+static struct seen_box box_around(const struct field_pair *pair)
 {
     const double *F = pair->X_WF, *S = pair->X_WS;
-    double pose[POSE] = {0.0}, box[6], column[3], turned[3], least = 0.0, largest = 0.0, slack;
+    double pose[POSE] = {0.0}, box[6], inverse[9], column[3], least = 0.0, largest = 0.0, slack, wider;
+    double off = off_rotation(F), condition = 1.0;
+    struct seen_box seen;
     int64_t first = 0;
-    int j, k;
+    int i, j, k;
+    invert(F, off, inverse);
+    seen.stretch = off < ROTATION ? 1.0 : 1.0 + 2.0 * off;
+    if (off > FAR_OFF) {
+        seen.stretch = length_of(inverse, 3);
+        condition = seen.stretch * length_of(F, 4);
+    }
     for (j = 0; j < 4; j++) {
         for (k = 0; k < 3; k++) column[k] = j < 3 ? S[4 * k + j] : S[4 * k + 3] - F[4 * k + 3];
-        turn_back(F, column, turned);
-        for (k = 0; k < 3; k++) pose[j < 3 ? 3 * k + j : 9 + k] = turned[k];
+        for (k = 0; k < 3; k++)
+            for (i = 0; i < 3; i++) pose[j < 3 ? 3 * k + j : 9 + k] += inverse[3 * k + i] * column[i];
     }
     pair->space->kernels->bounding_boxes(address_of(pair->shape->ints), address_of(pair->shape->numbers), address_of(pose),
                                          address_of(&first), 1, address_of(box));
@@ -54,55 +91,57 @@ static void box_around(const struct field_pair *pair, double low[3], double high
         least = fabs(box[k]) > least ? fabs(box[k]) : least;
         largest = fabs(box[3 + k]) > largest ? fabs(box[3 + k]) : largest;
     }
-    slack = (ROUNDING + 8.0 * (off_rotation(F) + off_rotation(S))) * (least + largest + shift_of(F) + shift_of(S));
+    slack = ROUNDING * condition + 8.0 * ((off > FAR_OFF ? 0.0 : off) + off_rotation(S));
+    slack *= least + largest + seen.stretch * (shift_of(F) + shift_of(S));
+    wider = slack + pair->shape->numbers[RADIUS] * (seen.stretch - 1.0);
     for (k = 0; k < 3; k++) {
-        low[k] = box[k] - slack;
-        high[k] = box[3 + k] + slack;
+        seen.low[k] = box[k] - wider;
+        seen.high[k] = box[3 + k] + wider;
     }
+    return seen;
 }
 
 /* --- listings --------------------------------------------------------------------------------------------------------- */
 
 /* The balls that may come within a distance of what is in a box. */
-static struct listing balls_within(const struct field_pair *pair, struct arena *arena, const double low[3], const double high[3],
-                                   double distance)
+static struct listing balls_within(const struct field_pair *pair, struct arena *arena, const struct seen_box *box, double distance)
 {
     const collide_field *field = pair->field;
     const double *points = (const double *)(intptr_t)field->tree[TRIANGLES_AT];
     struct listing some = {NULL, 0};
     int64_t stack[POINT_STACK], tree_at = address_of(field->tree), n, k;
-    double from[3], to[3], reach = distance * (1.0 + ROUNDING);
+    double from[3], to[3], stretch = box->stretch * (1.0 + ROUNDING), reach = stretch * (distance + field->radius);
     int i;
     for (i = 0; i < 3; i++) {
-        from[i] = low[i] - (reach + field->radius);
-        to[i] = high[i] + (reach + field->radius);
+        from[i] = box->low[i] - reach;
+        to[i] = box->high[i] + reach;
     }
     n = pair->space->kernels->points_in_box(tree_at, address_of(from), address_of(to), 0, 0, address_of(stack));
     if ((some.numbers = arena_take(arena, (size_t)n * sizeof *some.numbers)) == NULL) return some;
     pair->space->kernels->points_in_box(tree_at, address_of(from), address_of(to), address_of(some.numbers), n, address_of(stack));
     for (k = 0; k < n; k++) {
         int64_t number = some.numbers[k];
-        double own = (field->radii == NULL ? field->radius : field->radii[number]) + reach;
+        const double *p = points + 3 * number;
+        double own = stretch * ((field->radii == NULL ? field->radius : field->radii[number]) + distance);
         int near = 1;
-        for (i = 0; i < 3; i++) near &= points[3 * number + i] >= low[i] - own && points[3 * number + i] <= high[i] + own;
+        for (i = 0; i < 3; i++) near &= p[i] >= box->low[i] - own && p[i] <= box->high[i] + own;
         if (near) some.numbers[some.n++] = number;
     }
     return some;
 }
 
 /* The same of cells, as words: those that the box may reach, a cell more on every side for what rounds. */
-static struct listing cells_within(const struct field_pair *pair, struct arena *arena, const double low[3], const double high[3],
-                                   double distance)
+static struct listing cells_within(const struct field_pair *pair, struct arena *arena, const struct seen_box *box, double distance)
 {
     const collide_field *field = pair->field;
     struct listing some = {NULL, 0};
     int64_t *stack, range[6], m[MEASURES], tree_at = address_of(field->tree);
-    double reach = distance * (1.0 + ROUNDING);
+    double reach = distance * box->stretch * (1.0 + ROUNDING);
     int k;
     workspace_sizes(pair->space->kernels, m);
     for (k = 0; k < 3; k++) {
         double origin = field->numbers[ORIGIN + k], side = field->numbers[SIDES + k], most = (double)field->tree[CELLS_ALONG + k];
-        double first = (low[k] - reach - origin) / side, last = (high[k] + reach - origin) / side;
+        double first = (box->low[k] - reach - origin) / side, last = (box->high[k] + reach - origin) / side;
         first = first > -2.0 ? first < most + 2.0 ? first : most + 2.0 : -2.0;
         last = last > -2.0 ? last < most + 2.0 ? last : most + 2.0 : -2.0;
         range[k] = first < 1.0 ? 0 : (int64_t)floor(first) - 1;
@@ -184,10 +223,10 @@ static struct listing lowest_cells(const struct field_pair *pair, struct arena *
 static struct listing items_within(const struct field_pair *pair, struct arena *arena, double distance)
 {
     int balls = pair->field->are == BALLS;
-    double low[3], high[3];
+    struct seen_box box;
     if (pair->shape->ints[KIND] == HALFSPACE) return balls ? lowest_balls(pair, arena) : lowest_cells(pair, arena);
-    box_around(pair, low, high);
-    return balls ? balls_within(pair, arena, low, high, distance) : cells_within(pair, arena, low, high, distance);
+    box = box_around(pair);
+    return balls ? balls_within(pair, arena, &box, distance) : cells_within(pair, arena, &box, distance);
 }
 
 /* --- items as shapes -------------------------------------------------------------------------------------------------- */

@@ -145,7 +145,8 @@ def _take_nearer(scene, p, q, a, b, number, row_at, limit):
         if boxes_are_apart(scene, p, q, d, within):
             return limit
     walk = walk_of(scene, q)
-    if walk[WALK_STATE] != 0:
+    is_walked = walk[WALK_STATE] != 0 and is_bounded(scene, p)
+    if is_walked:
         state, row = gap_of_field(scene, p, walk, within)
     else:
         row = ask(scene, p, q, d, False, within)
@@ -155,7 +156,7 @@ def _take_nearer(scene, p, q, a, b, number, row_at, limit):
         return limit
     if state == BEYOND_MARGIN or row.flags[BEYOND] != 0 or not row.doubles[LOWER] <= limit:
         return limit
-    if only_holds(scene, p) or (walk[WALK_STATE] == 0 and only_holds(scene, q)):
+    if only_holds(scene, p) or (not is_walked and only_holds(scene, q)):
         leave_open(scene, number, a, b, row.doubles[LOWER])
         return limit
     out = view_row(row_at)

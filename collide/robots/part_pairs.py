@@ -57,7 +57,7 @@ def state_of_parts(scene, p, q, margin):
         if boxes_are_apart(scene, p, q, d, margin):
             return BEYOND_MARGIN
     walk = walk_of(scene, q)
-    if walk[WALK_STATE] != 0:
+    if walk[WALK_STATE] != 0 and is_bounded(scene, p):  # fields know no sets without end
         return _state_of_field(scene, p, walk, margin)
     row = ask(scene, p, q, d, True, margin)
     if is_undecided_or_refused(row):

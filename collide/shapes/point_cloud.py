@@ -17,7 +17,7 @@ from collide.errors import InvalidArgument, InvalidShape, SceneError
 from collide.shapes import cloud_formats
 from collide.shapes.shape import Shape, equal_but_for_signs, kept_with_shape, positive, rows, scalar
 from collide.shapes.shape_files import ANY, Field, read_arrays, refused_as_shape, shape_suffix, write_arrays
-from collide.transforms import LARGEST
+from collide.transforms import LARGEST, SMALLEST
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -561,9 +561,11 @@ def _checked_radius(radius) -> Any:
     if checks.number(radius) is not None:
         return positive("PointCloud", "radius", radius, zero=True)
     values = rows("PointCloud", "radius", radius, (None,))
-    if (values < 0.0).any():
-        k = int(np.flatnonzero(values < 0.0)[0])
-        raise InvalidShape(f"PointCloud: radius[{k}] must be ≥ 0, got {values[k]:g}")
+    wrong = ~((values == 0.0) | (values >= SMALLEST))
+    if wrong.any():
+        k = int(np.flatnonzero(wrong)[0])
+        least = "≥ 0" if values[k] < 0.0 else f"0, or at least {SMALLEST:g} m"
+        raise InvalidShape(f"PointCloud: radius[{k}] must be {least}, got {values[k]:g}")
     return values
 
 

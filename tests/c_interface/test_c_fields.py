@@ -273,7 +273,7 @@ def test_four_threads_share_a_field():
         (np.zeros((0, 3)), 0.1), ([[0.0, 0.0, math.nan]], 0.1), ([[0.0, math.inf, 0.0]], 0.1),
         ([[0.0, 0.0, 1.1e50]], 0.1),
         (np.zeros((2, 3)), -0.1), (np.zeros((2, 3)), math.nan), (np.zeros((2, 3)), math.inf), (np.zeros((2, 3)), 1e-51),
-        (np.zeros((2, 3)), [0.1, -0.1]), (np.zeros((2, 3)), [0.1, math.nan]),
+        (np.zeros((2, 3)), [0.1, -0.1]), (np.zeros((2, 3)), [0.1, math.nan]), (np.zeros((2, 3)), [0.1, 1e-51]),
     ],
 )
 def test_what_python_takes_for_no_cloud_is_none(points, radii):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from naive import pose, random_pose, rng_of
@@ -9,6 +11,9 @@ from random_robots import random_robot
 from reproduction import reproducing
 
 import collide
+from collide.pairs import query
+from collide.robots.kinematic_tree import Joint
+from collide.robots.robot import LinkShape, Robot
 
 _SNIPPET = """
 # robots/test_field_walks.py: robot and field of seed {seed}, configuration {q}
@@ -104,6 +109,47 @@ def test_distances_are_those_of_pairs(kind):
                     assert checker.names_of(int(row["a"]), int(row["b"])) == (link, "field")
                     n += 1
     assert n > 30, n
+
+
+@pytest.mark.parametrize("kind", ["balls", "grid"])
+def test_a_limit_within_a_bracket_is_no_upper_bound(kind):
+    """A ball slides along x towards a point, or a cell: the gap is a difference of doubles."""
+    joint = Joint("slide", "prismatic", "base", "ball", np.eye(4), np.array([1.0, 0.0, 0.0]), -2.0, 2.0, None)
+    shape = LinkShape(collide.Sphere(0.1), np.eye(4), None, "test")
+    robot = Robot("slider", ["base", "ball"], [joint], {"ball": [shape]})
+    world, n = collide.World(), 0
+    edge = 0.0 if kind == "balls" else 0.125
+    field = collide.PointCloud([(0.0, 0.0, 0.0)], 0.0)
+    if kind == "grid":
+        field = collide.VoxelGrid([(0, 0, 0)], 0.25, pose(t=(-0.125, -0.125, -0.125)))
+    world.add(field, name="field")
+    checker, rng = collide.RobotChecker(robot, world), rng_of("limits within brackets", kind)
+    for q in rng.uniform(0.3, 2.0, 200):
+        gap = Fraction(q) - Fraction(0.1) - Fraction(edge)
+        row = checker.distances([[q]]).rows[0]
+        lower, upper = float(row["lower"]), float(row["upper"])
+        for limit in (lower, np.nextafter(lower, 0.0), float(row["distance"]), upper):
+            within = checker.distances([[q]], max_distance=limit).rows[0]
+            assert Fraction(float(within["lower"])) <= gap
+            assert within["beyond"] or gap <= Fraction(float(within["upper"]))
+            n += bool(not within["beyond"] and gap > Fraction(limit))
+    assert n > 0 or kind == "balls", n
+
+
+def test_links_without_end_are_told_by_what_is_around_the_field():
+    world, ground = collide.World(), LinkShape(collide.Halfspace((0.0, 0.0, 1.0), -1.0), np.eye(4), None, "test")
+    world.add(collide.PointCloud(rng_of("over ground").uniform(-0.5, 0.5, (2000, 3)), 0.01), name="cloud")
+    joint = Joint("lift", "prismatic", "base", "plate", np.eye(4), np.array([0.0, 0.0, 1.0]), -2.0, 2.0, None)
+    robot = Robot("lift", ["base", "plate"], [joint], {"plate": [ground]})
+    checker = collide.RobotChecker(robot, world)
+    asked = []
+    collides = query.collide
+    try:
+        query.collide = lambda *args, **options: asked.append(args) or collides(*args, **options)
+        assert checker.collides([[0.0], [0.3], [0.9]]).tolist() == [False, False, True]
+    finally:
+        query.collide = collides
+    assert len(asked) == 1 and len(asked[0][2]) == 1
 
 
 def test_a_field_that_moves_is_asked_where_it_stands():

@@ -48,7 +48,9 @@ def test_points_that_are_not_finite_are_refused_or_dropped_and_counted():
         ([(0, 0, np.nan)], 0.1, r"points\[0, 2\] is nan.*; drop_invalid=True leaves out points"),
         (np.zeros((2, 2)), 0.1, "points must have shape"),
         ([[1, 2, "x"]], 0.1, "points"), (np.zeros((2, 3)), -1.0, "radius must be ≥ 0"),
-        (np.zeros((2, 3)), [0.1, -1.0], r"radius\[1\] must be ≥ 0"), (np.zeros((2, 3)), [0.1] * 3, "one for each of 2"),
+        (np.zeros((2, 3)), [0.1, -1.0], r"radius\[1\] must be ≥ 0"),
+        (np.zeros((2, 3)), [1e-60, 0.1], r"radius\[0\] must be 0, or at least"),
+        (np.zeros((2, 3)), [0.1] * 3, "one for each of 2"),
         (np.zeros((2, 3)), np.nan, "radius must be finite"), (np.full((1, 3), 1e60), 0.0, "within"),
     ],
 )

@@ -168,6 +168,7 @@ class Nearest(NamedTuple):
     """The nearest of the items asked about so far.
 
     key, place : of the best row, the first of the rows.   lower, upper : least bounds of all items [m].
+    limit : items farther away do not count: the least of upper bounds and of the limit that was given [m].
     open_lower : least lower bound of the items without a certificate [m].   along, above : direction in the items'
     frame in which the shape is looked for, and height of the shape's lowest point [m].
     failed : an item has no proven gap: the item asked last.   n_asked : how many items were asked about.
@@ -177,11 +178,18 @@ class Nearest(NamedTuple):
     place: int
     lower: float
     upper: float
+    limit: float
     open_lower: float
     along: Vec3
     above: float
     failed: bool
     n_asked: int
+
+
+@kernel(inline=True)
+def begin_nearest(limit):
+    """The `Nearest` before any item is asked about."""
+    return Nearest(math.inf, -1, math.inf, math.inf, limit, math.inf, Vec3(0.0, 0.0, 0.0), -math.inf, False, 0)
 
 
 @kernel(inline=True)
@@ -330,7 +338,7 @@ def with_item(walk, nearest, place, limit):
     A walk without a limit asks an item only whether the item is nearer. In a walk with a limit the question takes
     longer than the distance.
     """
-    row = ask_item(walk, place, False, nearest.upper if limit == math.inf else math.inf)
+    row = ask_item(walk, place, False, nearest.limit if limit == math.inf else math.inf)
     lower, upper = row.doubles[LOWER], row.doubles[UPPER]
     failed = nearest.failed or is_undecided_or_refused(row) or not lower > 0.0
     key, best, along, above = nearest.key, nearest.place, nearest.along, nearest.above
@@ -343,8 +351,8 @@ def with_item(walk, nearest, place, limit):
         above = dot(n, walk.t) - height_along(walk, neg(n))
     open_lower = nearest.open_lower if row.flags[CERTIFIED] != 0 else min(nearest.open_lower, lower)
     return Nearest(
-        key, place if failed else best, min(nearest.lower, lower), min(nearest.upper, upper), open_lower, along, above,
-        failed, nearest.n_asked + 1,
+        key, place if failed else best, min(nearest.lower, lower), min(nearest.upper, upper),
+        min(nearest.limit, upper), open_lower, along, above, failed, nearest.n_asked + 1,
     )
 
 
@@ -364,7 +372,7 @@ def _push_children(walk, nearest, node, top):
         centre = box_at(tree, WIDTH * node + slot).centre
         centre = Vec3(middle.x + unit * centre.x, middle.y + unit * centre.y, middle.z + unit * centre.z)
         bound = _gap_of_box(walk, nearest, centre, scale(unit, half))
-        if bound > nearest.upper:
+        if bound > nearest.limit:
             continue
         k = top
         while k > first and bounds[k - 1] < bound:
@@ -388,7 +396,7 @@ def _push_cells(walk, nearest, word, node, top):
     cells = open_cells(walk.words[TREE_AT])
     stack, bounds = view_i64(walk.words[STACK_AT], 2 * (top + 64)), view_f64(walk.words[BOUNDS_AT], top + 64)
     level, bits, first = level_of(word) - 1, cells.bits[node], top
-    n, reach = cells_along(level), nearest.upper + walk.slack
+    n, reach = cells_along(level), nearest.limit + walk.slack
     least, o, s, low, high = cells.least, cells.origin, cells.sides, walk.low, walk.high
     for i in range(4):
         x = x_of(word) + n * i
@@ -407,7 +415,7 @@ def _push_cells(walk, nearest, word, node, top):
                 lz, hz = plane_at(o.z, s.z, least.z + z), plane_at(o.z, s.z, least.z + z + n)
                 centre = scale(0.5, Vec3(lx + hx, ly + hy, lz + hz))
                 bound = _gap_of_box(walk, nearest, centre, scale(0.5, Vec3(hx - lx, hy - ly, hz - lz)))
-                if bound > nearest.upper:
+                if bound > nearest.limit:
                     continue
                 at = top
                 while at > first and bounds[at - 1] < bound:
@@ -424,12 +432,12 @@ def _push_cells(walk, nearest, word, node, top):
 @kernel
 def _walk_cells(walk, limit, enough, max_asked):
     """`_walk_down` of a tree of cells: the place of an item is the word of its box."""
-    zero, words = Vec3(0.0, 0.0, 0.0), walk.words
-    nearest = Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
+    words = walk.words
+    nearest = begin_nearest(limit)
     top = _push_cells(walk, nearest, root_word(open_cells(words[TREE_AT])), 0, 0)
     while top > 0 and not nearest.failed and nearest.lower > enough and nearest.n_asked <= max_asked:
         top -= 1
-        if view_f64(words[BOUNDS_AT], top + 1)[top] > nearest.upper:
+        if view_f64(words[BOUNDS_AT], top + 1)[top] > nearest.limit:
             continue
         stack = view_i64(words[STACK_AT], 2 * top + 2)
         word, node = stack[2 * top], stack[2 * top + 1]
@@ -445,12 +453,12 @@ def _walk_block(walk, nearest, row, column, limit, enough, max_asked):
     """The `Nearest` with the prisms of a block of terrain, by its number along each axis."""
     terrain = open_terrain(walk.words[TREE_AT])
     bounds = box_of_cells(terrain, ALONG * row, ALONG * column, ALONG, terrain.tops[row * terrain.n_across + column])
-    if not bounds.half.z >= 0.0 or _gap_of_box(walk, nearest, bounds.centre, bounds.half) > nearest.upper:
+    if not bounds.half.z >= 0.0 or _gap_of_box(walk, nearest, bounds.centre, bounds.half) > nearest.limit:
         return nearest
     for i in range(ALONG * row, min(ALONG * (row + 1), terrain.rows)):
         for j in range(ALONG * column, min(ALONG * (column + 1), terrain.columns)):
             bounds = box_of_cells(terrain, i, j, 1, top_of_cell(terrain, i, j))
-            if not bounds.half.z >= 0.0 or _gap_of_box(walk, nearest, bounds.centre, bounds.half) > nearest.upper:
+            if not bounds.half.z >= 0.0 or _gap_of_box(walk, nearest, bounds.centre, bounds.half) > nearest.limit:
                 continue
             for triangle in range(2):
                 if nearest.failed or nearest.lower <= enough or nearest.n_asked > max_asked:
@@ -464,13 +472,13 @@ def _walk_terrain(walk, limit, enough, max_asked):
     """`_walk_down` of terrain: the blocks below the shape, then, for the least bound so far, the blocks around; blocks
     without a bound are looked at one after another.
     """
-    terrain, zero = open_terrain(walk.words[TREE_AT]), Vec3(0.0, 0.0, 0.0)
-    nearest = Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
+    terrain = open_terrain(walk.words[TREE_AT])
+    nearest = begin_nearest(limit)
     inner = blocks_within(terrain, walk.low, walk.high, 0.0)
     for row in range(inner.row, inner.last_row + 1):
         for column in range(inner.column, inner.last_column + 1):
             nearest = _walk_block(walk, nearest, row, column, limit, enough, max_asked)
-    outer = blocks_within(terrain, walk.low, walk.high, max(nearest.upper, 0.0) + walk.slack)
+    outer = blocks_within(terrain, walk.low, walk.high, max(nearest.limit, 0.0) + walk.slack)
     for row in range(outer.row, outer.last_row + 1):
         for column in range(outer.column, outer.last_column + 1):
             is_below = inner.row <= row <= inner.last_row and inner.column <= column <= inner.last_column
@@ -501,12 +509,11 @@ def _walk_down(walk, limit, enough, max_asked):
         return _walk_cells(walk, limit, enough, max_asked)
     if words[ITEMS_ARE] == PRISMS:
         return _walk_terrain(walk, limit, enough, max_asked)
-    zero = Vec3(0.0, 0.0, 0.0)
-    nearest = Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
+    nearest = begin_nearest(limit)
     top = _push_children(walk, nearest, 0, 0)
     while top > 0 and not nearest.failed and nearest.lower > enough and nearest.n_asked <= max_asked:
         top -= 1
-        if view_f64(words[BOUNDS_AT], top + 1)[top] > nearest.upper:
+        if view_f64(words[BOUNDS_AT], top + 1)[top] > nearest.limit:
             continue
         link = link_of(tree.links, view_i64(words[STACK_AT], top + 1)[top])
         if link >= 0:
@@ -515,7 +522,7 @@ def _walk_down(walk, limit, enough, max_asked):
         run = ~link
         for place in range(run >> 3, (run >> 3) + (run & 7)):
             centre, half = _box_of_item(walk, place)
-            if not (nearest.failed or _gap_of_box(walk, nearest, centre, half) > nearest.upper):
+            if not (nearest.failed or _gap_of_box(walk, nearest, centre, half) > nearest.limit):
                 nearest = with_item(walk, nearest, place, limit)
     return nearest
 
@@ -524,8 +531,7 @@ def _walk_down(walk, limit, enough, max_asked):
 def _places_within(walk, limit, capacity, places):
     """The number of the facets whose boxes may come within a limit [m]; their places, of no more than ``capacity``."""
     tree, words = walk.tree, walk.words
-    zero = Vec3(0.0, 0.0, 0.0)
-    nearest = Nearest(math.inf, -1, math.inf, limit, math.inf, zero, -math.inf, False, 0)
+    nearest = begin_nearest(limit)
     n, top = 0, _push_children(walk, nearest, 0, 0)
     while top > 0 and n <= capacity:
         top -= 1

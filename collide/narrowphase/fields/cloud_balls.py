@@ -40,12 +40,11 @@ class Balls(FieldItems):
         return np.arange(len(self._points))
 
     def within(self, box: BoxAround, distance: float) -> np.ndarray:
-        distance = distance * (1.0 + 2.0**-40)
-        reach = distance + float(np.max(self._radius))
+        reach = box.reach(distance + float(np.max(self._radius)))
         some = self._tree.in_box(box.low - reach, box.high + reach)
         if np.ndim(self._radius) == 0:
             return some
-        reaches, points = (self._radii[some] + distance)[:, None], self._points[some]
+        reaches, points = box.reach(self._radii[some, None] + distance), self._points[some]
         return some[((points >= box.low - reaches) & (points <= box.high + reaches)).all(axis=1)]
 
     def on_way(self, way: np.ndarray, limit: float, extra: float, slack: float, first: bool):

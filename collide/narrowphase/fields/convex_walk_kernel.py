@@ -36,6 +36,7 @@ from collide.narrowphase.facets.nearest_item_kernel import (
     SURFACES_APART,
     Nearest,
     ask_item,
+    begin_nearest,
     begin_walk,
     finish_gap,
     finish_part,
@@ -74,7 +75,7 @@ _SQUARE = 12
 #: Floats hold lengths below, in units, and their products.
 _LARGEST = 2.0**60
 #: Of balls that are left to others.
-_UNTOLD = Nearest(math.inf, -1, math.inf, math.inf, math.inf, Vec3(0.0, 0.0, 0.0), -math.inf, True, 0)
+_UNTOLD = Nearest(math.inf, -1, math.inf, math.inf, math.inf, math.inf, Vec3(0.0, 0.0, 0.0), -math.inf, True, 0)
 #: Normals of a smaller size say nothing.
 _LEAST_NORMAL = 1e-100
 
@@ -84,9 +85,10 @@ def _set_probe(walk, margin, frame, probe):
     """Make the set's box the probe, wider by the margin, radii and rounding; returns by how many units, or −1 where
     floats are too small for the box.
 
-    The point y of a ball within the margin [m] is within w = margin + slack of a point m + Σ λ_j a_j of the box,
-    |λ_j| ≤ h_j: y differs from m along axis i of the tree by at most Σ |a_j[i]| h_j + w, and from the box, whose axes
-    are a_k, by at most w and the share by which the matrix is no rotation.
+    The point y of a ball within the margin [m] is within w = margin + slack of a point m + A λ of the box, |λ_j| ≤ h_j,
+    with the axes a_j of the box as columns of A: y differs from m along axis i of the tree by at most Σ |a_j[i]| h_j +
+    w. Along the axes of the box y − m is λ + (AᵀA − I) λ + Aᵀe with |e| ≤ w. No entry of AᵀA − I is above off, so this
+    is farther from the box, in all, than w by at most √3 · off · |h|₁ + 1.5 · off · w, less than 2 · off · size.
     """
     tree, poses, box = walk.tree, walk.poses, view_f64(walk.words[BOX_AT], BOX)
     per_metre = math.ldexp(1.0, -int(tree.header[EXPONENT]))
@@ -94,10 +96,10 @@ def _set_probe(walk, margin, frame, probe):
     m, h = scale(per_metre, sub(c, vec3_at(tree.numbers, CENTRE))), scale(per_metre, vec3_at(box, 3))
     wider = per_metre * (margin + walk.slack)
     size = 4.0 + norm1(m) + norm1(h) + wider
-    if not size < _LARGEST:
-        return -1.0
     off = off_rotation(view_f64(walk.words[POSES_AT] + 8 * POSE, POSE))
-    wider += (_FLOAT_ROUNDING + off) * size
+    wider += (_FLOAT_ROUNDING + 2.0 * off) * size
+    if not (size + wider) * (2.0 + off) < _LARGEST:  # 2 + off is more than the length of an axis
+        return -1.0
     reach = Vec3(wider, wider, wider)
     for j in range(3):
         a = rotate_back(poses, 0, Vec3(poses[POSE + j], poses[POSE + 3 + j], poses[POSE + 6 + j]))
@@ -188,12 +190,12 @@ def _push_boxes(tree, node, frame, probe, stack, keys, top):
 @kernel(inline=True)
 def _nearest_of(near, floats, leaf, frame, probe):
     """The number of the nearest point of a leaf among those of a mask."""
-    nearest, least = 0, np.float32(math.inf)
+    nearest, least = -1, np.float32(math.inf)
     for i in range(MAX_LEAF):
         if near >> i & 1:
             at = leaf + i
             key = _nearness(frame, probe, floats[at], floats[at + WIDTH], floats[at + 2 * WIDTH])
-            if key < least:
+            if key < least or nearest < 0:
                 nearest, least = i, key
     return nearest
 
@@ -253,11 +255,11 @@ def _leaf_nearby(tree, frame, probe):
     """The link of a leaf near the probe: at each node the box goes on whose centre is the nearest."""
     boxes, link = tree.boxes, link_of(tree.links, 0)
     while link >= 0:
-        at, nearest, least = NODE * link, 0, np.float32(math.inf)
+        at, nearest, least = NODE * link, -1, np.float32(math.inf)
         for slot in range(WIDTH):
             if boxes[at + slot + 3 * WIDTH] > NOTHING / 2:
                 key = _nearness(frame, probe, boxes[at + slot], boxes[at + slot + WIDTH], boxes[at + slot + 2 * WIDTH])
-                if key < least:
+                if key < least or nearest < 0:
                     nearest, least = slot, key
         link = link_of(tree.links, WIDTH * link + nearest)
     return link
@@ -270,7 +272,7 @@ def _nearest_ball(walk, limit):
     """
     tree, words = walk.tree, walk.words
     frame, probe = view_f32(words[PROBE_AT], FRAME), view_f32(words[PROBE_AT] + 4 * FRAME, PRISM)
-    nothing = Nearest(math.inf, -1, math.inf, limit, math.inf, Vec3(0.0, 0.0, 0.0), -math.inf, False, 0)
+    nothing = begin_nearest(limit)
     wider, floats, n_stack = _set_probe(walk, 0.0, frame, probe), floats_of(tree), WIDTH * (MAX_LEVELS + 1)
     if wider < 0.0:
         return _UNTOLD
@@ -305,12 +307,12 @@ def _with_ball(walk, nearest, place, wider, frame, probe):
 
     wider : below 0 of a probe for another distance.
     """
-    before = nearest.upper
+    before = nearest.limit
     nearest = with_item(walk, nearest, place, math.inf)
     if nearest.failed:
         return nearest, wider
-    if nearest.upper < before or wider < 0.0:
-        wider = _set_probe(walk, nearest.upper, frame, probe)
+    if nearest.limit < before or wider < 0.0:
+        wider = _set_probe(walk, nearest.limit, frame, probe)
         if wider < 0.0:
             return _UNTOLD, wider
     _put_plane(walk, vec3_at(view_row(walk.words[ROW_AT] + ROW).doubles, NORMAL), wider, nearest.n_asked, probe)

@@ -30,13 +30,23 @@ _FIRST_ASKED, _GROWTH = 16, 4
 #: Heights over a plane that differ by less than this part of the size are looked at again, item by item.
 _LEVEL = 2.0**-36
 _AXES = np.concatenate([np.eye(3), -np.eye(3)])
+#: Matrices no farther off rotations are rounded rotations; farther off they are inverted.
+_ROTATION, _FAR_OFF = 1e-13, 2.0**-10
 
 
 class BoxAround(NamedTuple):
-    """A box along the axes of the items' frame around another shape [m]; infinite around half-spaces."""
+    """A box along the axes of the items' frame around another shape [m]; infinite around half-spaces.
+
+    stretch : lengths in the items' frame are at most so many times as long as in the world.
+    """
 
     low: np.ndarray
     high: np.ndarray
+    stretch: float = 1.0
+
+    def reach(self, distance: Any) -> Any:
+        """How far distances of the world, a number or an array, reach in the frame, rounding added [m]."""
+        return distance * self.stretch * (1.0 + ROUNDING)
 
 
 class NamedUnion(NamedTuple):
@@ -165,19 +175,30 @@ def as_union(hulls: list[Any], X: np.ndarray) -> Shape:
 
 
 def box_in_frame(shape: Shape, X_WC: np.ndarray, X_WS: np.ndarray) -> BoxAround:
-    """The box around a shape at X_WS in the frame at X_WC, (4, 4) each, rounding added."""
-    X_CS = inverse_pose(X_WC) @ X_WS
+    """The box around a shape at X_WS in the frame at X_WC, (4, 4) each, rounding added.
+
+    A place p of the frame is R⁻¹ (q − t) of a place q of the world. Where RᵀR is within off ≤ 2⁻¹⁰ of the identity, Rᵀ
+    stands for R⁻¹, and is wrong by at most 3 off |p|; other matrices are inverted, which rounds by their condition.
+    """
+    R, t = X_WC[:3, :3], X_WC[:3, 3]
+    off, off_s = (float(np.abs(X[:3, :3].T @ X[:3, :3] - np.eye(3)).max()) for X in (X_WC, X_WS))
+    inverse, stretch, condition = R.T, 1.0 if off < _ROTATION else 1.0 + 2.0 * off, 1.0
+    if off > _FAR_OFF:
+        inverse = np.linalg.inv(R)
+        stretch = float(np.linalg.norm(inverse))
+        condition = stretch * float(np.linalg.norm(R))
+    X_CS = np.eye(4)
+    X_CS[:3, :3], X_CS[:3, 3] = inverse @ X_WS[:3, :3], inverse @ (X_WS[:3, 3] - t)
     low, high = np.full(3, math.inf), np.full(3, -math.inf)
     for packed, X_SP in bounding_parts_of(shape):
         if packed.kind == HALFSPACE:
             return BoxAround(np.full(3, -math.inf), np.full(3, math.inf))
         X_CP = X_CS @ X_SP
-        ends = np.array([extent_of(packed, X_CP, axis) for axis in _AXES])
+        ends = np.array([extent_of(packed, X_CP, axis) for axis in _AXES]) + packed.radius * (stretch - 1.0)
         low, high = np.minimum(low, -ends[3:]), np.maximum(high, ends[:3])
-    size = np.abs(low).max() + np.abs(high).max() + np.abs(X_WC[:3, 3]).sum() + np.abs(X_WS[:3, 3]).sum()
-    off = sum(np.abs(X[:3, :3].T @ X[:3, :3] - np.eye(3)).max() for X in (X_WC, X_WS))
-    slack = (ROUNDING + 8.0 * off) * size
-    return BoxAround(low - slack, high + slack)
+    size = np.abs(low).max() + np.abs(high).max() + stretch * (np.abs(t).sum() + np.abs(X_WS[:3, 3]).sum())
+    slack = (ROUNDING * condition + 8.0 * (0.0 if off > _FAR_OFF else off) + 8.0 * off_s) * size
+    return BoxAround(low - slack, high + slack, stretch)
 
 
 def items_on_way(

@@ -31,7 +31,7 @@ class Cells(FieldItems):
         return self._tree.boxes_in(np.zeros(3), np.array(self._tree.shape)).numbers
 
     def within(self, box: BoxAround, distance: float) -> np.ndarray:
-        distance = distance * (1.0 + 2.0**-40)
+        distance = box.reach(distance)
         return self._tree.boxes_in(*self._tree.range_of(box.low - distance, box.high + distance)).numbers
 
     def on_way(self, way: np.ndarray, limit: float, extra: float, slack: float, first: bool):

@@ -93,6 +93,7 @@ class Columns(FieldItems):
         return self._in_rectangle(_Rectangle(0, 0, self._rows, self._columns), None, math.inf)
 
     def within(self, box: BoxAround, distance: float) -> np.ndarray:
+        distance = box.reach(distance)
         low, high = box.low - distance, box.high + distance
         column, last_column = (int(k) for k in np.searchsorted(self._x, (low[0], high[0])))
         row, last_row = (int(k) for k in np.searchsorted(self._y, (low[1], high[1])))

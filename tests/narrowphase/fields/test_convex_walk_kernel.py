@@ -127,6 +127,58 @@ def test_matrices_within_the_tolerance_of_rotations_part_nothing_that_meets():
     assert met > 290, met
 
 
+def test_a_large_sheared_box_meets_the_ball_in_its_corner():
+    """A matrix √(I + off · ones) with the diagonal of a box along x: the box's corner is farther out, along its own
+    axes together, than the share by which each entry of RᵀR is off.
+    """
+    values, vectors = np.linalg.eigh(np.eye(3) + 9.9e-5 * np.ones((3, 3)))
+    d = np.ones(3) / 3**0.5
+    k = np.cross(d, (1.0, 0.0, 0.0))
+    K = np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
+    R = (np.eye(3) + K + K @ K / (1.0 + d[0])) @ (vectors * np.sqrt(values)) @ vectors.T
+    far = [(1.0, y, z) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
+    for side in (10.0, 100.0, 400.0, 16e3):
+        X = pose(R, -R @ np.full(3, 0.5 * side))
+        for gap in (-1e-4, 1e-3):
+            cloud = collide.PointCloud([(0.01 + gap, 0.0, 0.0), *far, (2.0, 0.0, 0.0)], 0.01)
+            box, ball = collide.Box((side,) * 3), collide.Sphere(0.01)
+            alone = collide.distance(ball, box, pose(t=(0.01 + gap, 0.0, 0.0)), X, signed=False)
+            assert alone.hit == (gap < 0.0)
+            assert collide.collide(cloud, box, np.eye(4), X) == alone.hit
+            row = collide.distance(cloud, box, np.eye(4), X, signed=False)
+            assert row.hit == alone.hit and row.lower <= alone.upper and alone.lower <= row.upper
+
+
+@pytest.mark.parametrize(("scale", "away"), [(1e3, 1e14), (1e20, 0.0), (1e-3, 1e20)])
+def test_numbers_beyond_floats_end_the_walk(scale, away):
+    """Matrices are linear maps where poses are not checked."""
+    cloud, box, X = collide.PointCloud(1e-3 * np.eye(3), 0.0), collide.Box((1e-3,) * 3), np.diag([scale] * 3 + [1.0])
+    X[0, 3] = away
+    points = [collide.ConvexHull(point[None]) for point in 1e-3 * np.eye(3)]
+    hits = [collide.collide(point, box, np.eye(4), X, check_poses=False) for point in points]
+    assert collide.collide(cloud, box, np.eye(4), X, check_poses=False) == any(hits)
+
+
+def test_a_scaled_cloud_is_the_union_of_its_scaled_points():
+    """Cores are linear images, balls are added to these in the world."""
+    rng, n = rng_of("scaled clouds"), np.zeros(2, dtype=int)
+    points = np.array([(1.0, 0.0, 0.0), (2.0, 0.0, 0.0), (0.0, 3.0, -1.0)])
+    cloud, ball = collide.PointCloud(points, 0.01), collide.Sphere(0.01)
+    for _ in range(150):
+        X_WC = pose(rotation(rng) * rng.choice([0.05, 0.3, 1.0, 7.0]) @ np.diag(rng.uniform(0.5, 2.0, 3)))
+        X_WB = pose(rotation(rng), X_WC[:3, :3] @ points[rng.integers(3)] + rng.normal(size=3) * 0.01)
+        box = collide.Box(rng.uniform(1e-3, 0.02, 3))
+        rows = [
+            collide.distance(ball, box, pose(t=X_WC[:3, :3] @ point), X_WB, signed=False, check_poses=False)
+            for point in points
+        ]
+        mine = collide.distance(cloud, box, X_WC, X_WB, signed=False, check_poses=False)
+        assert mine.hit == any(row.hit for row in rows) == collide.collide(cloud, box, X_WC, X_WB, check_poses=False)
+        assert mine.hit or mine.distance == pytest.approx(min(row.distance for row in rows), abs=1e-9)
+        n += [mine.hit, not mine.hit]
+    assert n.min() > 20, n
+
+
 def test_places_that_floats_do_not_hold_are_left_to_others():
     cloud, X = collide.PointCloud(np.eye(3), 0.1), pose(t=(1e30, 0.0, 0.0))
     state = surface_states(walked(cloud), convex_set_of(collide.Box((1, 1, 1))), np.eye(4)[None], X[None])
