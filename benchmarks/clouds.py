@@ -1,14 +1,10 @@
 """What a point cloud costs, to make and to ask, beside scipy's k-d tree and coal's octree, from 10³ to 10⁷ points.
 
-    python benchmarks/clouds.py --table made asked robots updated worn read
+    python benchmarks/clouds.py --table made asked read
 
 made    a cloud and its tree, beside cKDTree and coal's OcTree of the same points, cells as large as a ball
 asked   spheres, convex shapes, gaps, nearest points; ours in batches, coal in a loop of Python, scipy in one call:
         for spheres the points within both radii are counted
-robots  a Panda of hulls, and of spheres (from ../shared/data), among points on a table and 50 obstacles: configurations
-        at random, distances and straight motions proven of free configurations; beside the obstacles as solids
-updated points come and go, beside a cloud and its tree made anew of the points after the change
-worn    what is asked of a cloud after updates of 1/100 of its points, beside a cloud made anew
 read    a file of each format, in µs a point, and the peak of memory while reading, in bytes a point; beside laspy's
         whole records, numpy.loadtxt, trimesh
 
@@ -26,8 +22,7 @@ from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
-from inputs import SHARED, rotations
-from robot_peers import at_random, clutter, panda
+from inputs import rotations
 
 import collide
 from collide.adapters.bench.claims import Claim, Options, Race, grid, installed, main
@@ -117,91 +112,9 @@ def asked_of(points: int, where: str, n: int) -> dict:
     return calls
 
 
-def surface_points(world: collide.World, n: int) -> np.ndarray:
-    """Points on the surfaces of the bodies of a World, evenly by area."""
-    rng, triangles = np.random.default_rng(1), []
-    for body in map(world.body, world.ids):
-        mesh = collide.tessellate(body.shape)
-        triangles.append((mesh.vertices @ body.X_WB[:3, :3].T + body.X_WB[:3, 3])[mesh.faces])
-    a, b, c = np.concatenate(triangles).transpose(1, 0, 2)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    k, (u, v) = rng.choice(len(a), n, p=area / area.sum()), np.sort(rng.random((2, n)), axis=0)
-    return a[k] + u[:, None] * (b - a)[k] + (v - u)[:, None] * (c - a)[k]
-
-
-@cache
-def checkers(robot: str, points: int) -> dict[str, collide.RobotChecker]:
-    arm = panda()[0] if robot == "hulls" else collide.Robot.load(SHARED / "robots/panda/panda_spherized.urdf")
-    solids, seen = clutter(50), collide.World()
-    seen.add(collide.PointCloud(surface_points(solids, points), _RADIUS), name="seen", static=True)
-    return {"collide": collide.RobotChecker(arm, seen), "solid": collide.RobotChecker(arm, solids)}
-
-
-def robots(options: Options, robot: str, points: int, question: str) -> Race:
-    n, asked_of_both = 200 if options.quick else 4000, checkers(robot, points)
-    Q = at_random(asked_of_both["collide"].robot, n)
-    tasks, per, columns = {}, {}, {}
-    for name, checker in asked_of_both.items():
-        free = Q[~checker.collides(Q)]
-        begin = free[: n // 20]
-        end = begin + np.random.default_rng(3).uniform(-0.5, 0.5, begin.shape)
-        if question == "motions proven":
-            is_free = checker.certify_edges(begin, end).free
-            tasks[name] = partial(checker.certify_edges, begin[is_free], end[is_free])
-            per[name] = float(is_free.sum())
-        else:
-            call, asked_configurations = (checker.collides, Q) if question == "booleans" else (checker.distances, begin)
-            tasks[name], per[name] = partial(call, asked_configurations), float(len(asked_configurations))
-        columns[f"free_{name}"] = len(free) / n
-    return Race(tasks, per, columns)
-
-
 def asked(options: Options, points: int, where: str, question: str) -> Race:
     n = 500 if options.quick else 5000
     return Race(asked_of(points, where, n)[question], per=n)
-
-
-def change_of(cloud: collide.PointCloud, where: str, n: int, rng: np.random.Generator) -> dict:
-    """n points come and as many go."""
-    return {
-        "added": 0.99 * points_of(10**6, where)[rng.integers(0, 10**6, n)],
-        "removed": rng.choice(len(cloud), n, replace=False),
-    }
-
-
-def updated(options: Options, points: int, where: str, change: str) -> Race:
-    cloud = collide.PointCloud(points_of(points, where), _RADIUS)
-    n = points // 10 if change == "10 %" else int(change)
-    comes_and_goes = change_of(cloud, where, n, np.random.default_rng(4))
-    bare = cloud.updated(**comes_and_goes)
-    tasks = {"without a tree": lambda: cloud.updated(**comes_and_goes)}
-    with_tree = collide.PointCloud(cloud.points, _RADIUS)
-    with_tree.nearest((0.0, 0.0, 0.0))
-    tasks["collide"] = lambda: with_tree.updated(**comes_and_goes)
-    tasks["made anew"] = lambda: collide.PointCloud(bare.points, _RADIUS).tree
-    return Race(tasks)
-
-
-@cache
-def worn_cloud(points: int, where: str, updates: int) -> collide.PointCloud:
-    cloud, rng = collide.PointCloud(points_of(points, where), _RADIUS), np.random.default_rng(5)
-    cloud.nearest((0.0, 0.0, 0.0))
-    for _ in range(updates):
-        cloud = cloud.updated(**change_of(cloud, where, points // 200, rng))
-    return cloud
-
-
-def worn(options: Options, points: int, where: str, updates: int, question: str) -> Race:
-    n = 500 if options.quick else 5000
-    cloud, X = worn_cloud(points, where, updates), poses(n)
-    tasks = {}
-    for name, asked_cloud in (("collide", cloud), ("made anew", collide.PointCloud(cloud.points, _RADIUS))):
-        if question == "nearest":
-            tasks[name] = partial(asked_cloud.nearest, np.ascontiguousarray(X[:, :3, 3]))
-        else:
-            tasks[name] = partial(collide.collide, asked_cloud, shapes()[question], _EYE, X)
-        tasks[name]()
-    return Race(tasks, per=n)
 
 
 @cache
@@ -259,22 +172,6 @@ def asked_cases(options: Options):
     return grid(points=sizes(options)[:4], where=("cube", "room"), question=questions)
 
 
-def robot_cases(options: Options):
-    arms = ("hulls", *(("spheres",) if SHARED.is_dir() else ()))
-    points = (10**4,) if options.quick else (10**4, 10**5, 10**6)
-    return grid(robot=arms, points=points, question=("booleans", "distances", "motions proven"))
-
-
-def updated_cases(options: Options):
-    return grid(points=sizes(options)[1:4], where=("cube", "room"), change=("10", "300", "10 %"))
-
-
-def worn_cases(options: Options):
-    questions = ("sphere", "box", "hull of 64", "nearest")
-    points = sizes(options)[1:2] if options.quick else (10**5,)
-    return grid(points=points, where=("cube", "room"), updates=(1, 10, 100), question=questions)
-
-
 def read_cases(options: Options):
     kinds = ("pcd", "ply", "npz", "xyz", *(("las", "laz") if installed(laspy="laspy") else ()))
     return grid(points=(10**4,) if options.quick else (10**6,), kind=kinds)
@@ -283,11 +180,7 @@ def read_cases(options: Options):
 CLAIMS = [
     Claim("made", "µs to make a cloud with its tree", made_cases, made, file="clouds-made", turns=5),
     Claim("read", "µs a point read", read_cases, read, file="clouds-read", turns=5),
-    Claim("updated", "µs until a changed cloud has its tree", updated_cases, updated, file="clouds-updated", turns=9),
-    Claim("worn", "µs a question to a cloud after updates", worn_cases, worn, file="clouds-worn", turns=9),
     Claim("asked", "µs a question to a cloud", asked_cases, asked, file="clouds-asked", turns=5),
-    Claim("robots", "µs a configuration, or a motion, of a robot among points", robot_cases, robots,
-          file="clouds-robots", turns=5),
 ]
 
 

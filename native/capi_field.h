@@ -6,7 +6,7 @@
 #include "capi_box_tree.h"
 #include "capi_internal.h"
 
-/* What items are (collide/narrowphase/facets/nearest_item_kernel.py). */
+/* What items are (collide/narrowphase/facets/item_questions.py). */
 enum { FACETS, BALLS, CELLS };
 
 /* A tree's header and numbers behind those of a box-tree (collide/fields/cell_tree_kernel.py). */

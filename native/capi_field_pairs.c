@@ -2,7 +2,7 @@
    collide/narrowphase/facets/nearest_item_calls.py. */
 #include "capi_field.h"
 
-/* Header of walks, and how they end (collide/narrowphase/facets/nearest_item_kernel.py). */
+/* Header of walks (collide/narrowphase/facets/item_questions.py), and how they end (nearest_item_kernel.py). */
 enum {
     WALK_CORE, WALK_TREE_AT, WALK_INTS_AT, WALK_NUMBERS_AT, COORDINATES_AT, WALK_POSES_AT, WALK_SHAPE_OF_AT, WALK_PAIRS_AT,
     WALK_ROW_AT, WALK_DOUBLES_AT, WALK_INTEGERS_AT, WALK_STACK_AT, BOUNDS_AT, SHAPE_FIRST, ITEMS_ARE, RADII_AT, BOX_AT, PROBE_AT,

@@ -1,6 +1,6 @@
 """Contacts of a mesh and a cylinder, cone or ellipsoid at a single pair of poses: from matrices to rows in a kernel.
 
-The facets within the margin by a walk down the mesh's tree (`nearest_item_kernel.py`), their patches by the kernel of
+The facets within the margin by a walk down the mesh's tree (`item_walks.py`), their patches by the kernel of
 batches (`curved_manifolds.py`).
 """
 
@@ -11,21 +11,15 @@ from collide.contact.near_the_margin import is_near_the_margin
 from collide.contact.patch_rows import CONTACT, clear_words, flip_row, is_cleared_by, patch_of_row
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64
 from collide.mesh.bvh import open_tree
-from collide.narrowphase.facets.nearest_item_kernel import (
-    EXCHANGED,
-    MAYBE_INSIDE,
-    NEAR,
-    SURFACES_APART,
-    place_pair,
-    rows_within,
-)
-from collide.narrowphase.facets.nearest_item_kernel import HEADER as GAP_HEADER
+from collide.narrowphase.facets.item_questions import EXCHANGED, place_pair
+from collide.narrowphase.facets.item_questions import HEADER as GAP_HEADER
+from collide.narrowphase.facets.nearest_item_kernel import MAYBE_INSIDE, NEAR, SURFACES_APART, rows_within
 from collide.narrowphase.rows import DISTANCE, HIT, ROW, copy_row, view_row
 
 _curved_manifolds_at = native_call(SIGNATURE)
 
 # Header: the kernel of batches; how many rows there is space for; how far both bodies reach from their origins, summed
-# (a double) [m]; address of the header of `nearest_item_kernel.py`; whether the mesh is solid; facets that there is
+# (a double) [m]; address of the header of `item_questions.py`; whether the mesh is solid; facets that there is
 # space for, addresses of their rows and places as they are met, of their order, of their numbers and rows in order; of
 # the call where the facets begin and end, where the contacts end, and what they lack. Then the header of
 # `curved_manifolds.py`.

@@ -49,9 +49,9 @@ from collide.narrowphase.composite.composite_parts import compound_parts
 from collide.narrowphase.convex_kernel_calls import space_of_single_calls
 from collide.narrowphase.facets.facet_kernel_calls import step_of
 from collide.narrowphase.facets.facets_against_curved import facet_rows
+from collide.narrowphase.facets.item_questions import EXCHANGED
 from collide.narrowphase.facets.near_facets import near_facets
 from collide.narrowphase.facets.nearest_item_calls import GapQuestion, facets_of, serves, surface_states
-from collide.narrowphase.facets.nearest_item_kernel import EXCHANGED
 from collide.narrowphase.prepared_pairs import Single
 from collide.results import PAIR_DTYPE
 from collide.shapes.shape import Shape

@@ -18,8 +18,8 @@ from collide.mesh.bvh import NODE, SLAB, WIDTH
 from collide.mesh.bvh import NUMBERS as TREE_NUMBERS
 from collide.mesh.mesh_topology import COUNTS
 from collide.narrowphase.exact.settle_space import WORKSPACE
+from collide.narrowphase.facets import item_questions as items
 from collide.narrowphase.facets import mesh_collide_kernel as pairs
-from collide.narrowphase.facets import nearest_item_kernel as items
 from collide.narrowphase.facets import surface_collision as surfaces
 from collide.narrowphase.facets import surface_distance as distances
 from collide.narrowphase.facets import winding_numbers as inside

@@ -167,9 +167,12 @@ def test_values_and_what_is_refused():
         with pytest.raises(collide.CollideError, match="SweptMesh"):
             query()
     r = collide.distance(shape, box, EYE, EYE)
-    assert r.certificate is None
+    assert r.hit and r.certificate[0].kind == "together"
+    collide.verify(shape, box, EYE, EYE, r)
+    between = collide.distance(shape, mesh, EYE, EYE)
+    assert between.certificate is None
     with pytest.raises(collide.InvalidArgument, match="carries no certificate"):
-        collide.verify(shape, box, EYE, EYE, r)
+        collide.verify(shape, mesh, EYE, EYE, between)
 
 
 def _world_of(shape) -> collide.World:

@@ -20,7 +20,7 @@ from collide.mesh.bvh import WIDTH
 from collide.narrowphase.bounds import PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.convex_kernel_calls import scratch, space_of_single_calls
 from collide.narrowphase.facets.facet_queries import points_in_solid
-from collide.narrowphase.facets.nearest_item_kernel import (
+from collide.narrowphase.facets.item_questions import (
     BALLS,
     BOX_AT,
     CELLS,
@@ -28,13 +28,15 @@ from collide.narrowphase.facets.nearest_item_kernel import (
     FACETS,
     HEADER,
     ITEMS_ARE,
-    MAYBE_INSIDE,
-    MEETS,
     PRISMS,
     PROBE_AT,
     RADII_AT,
     REACH_OF_ITEMS,
     STACK_AT,
+)
+from collide.narrowphase.facets.nearest_item_kernel import (
+    MAYBE_INSIDE,
+    MEETS,
     SURFACES_APART,
     curved_gap_single,
     curved_gaps,

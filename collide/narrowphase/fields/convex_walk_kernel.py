@@ -17,35 +17,37 @@ from collide.lowering.packed_convex import POINTS
 from collide.lowering.shape_table import ADDRESS, COUNT, INTS, KIND, NUMBERS, PADDED, POSE, POSE_SLOP, RADIUS, SLOP
 from collide.mesh.box_overlap import FRAME, PRISM, PROBE, boxes_within, points_within
 from collide.mesh.bvh import CENTRE, EXPONENT, MAX_LEAF, NODE, NOTHING, WIDTH, link_of
-from collide.narrowphase.facets.nearest_item_kernel import (
+from collide.narrowphase.facets.item_questions import (
     BOUNDS_AT,
     BOX,
     BOX_AT,
     EXCHANGED,
-    GAP_SIGNATURE,
     HEADER,
-    LONG_WAY,
-    MEETS,
-    NEAR,
-    PART_SIGNATURE,
     POSES_AT,
     PROBE_AT,
     RADII_AT,
     ROW_AT,
     STACK_AT,
-    SURFACES_APART,
     Nearest,
     ask_item,
     begin_nearest,
     begin_walk,
-    finish_gap,
-    finish_part,
-    finish_single,
     height_along,
     set_poses,
     take_part,
     whether_item,
     with_item,
+)
+from collide.narrowphase.facets.nearest_item_kernel import (
+    GAP_SIGNATURE,
+    LONG_WAY,
+    MEETS,
+    NEAR,
+    PART_SIGNATURE,
+    SURFACES_APART,
+    finish_gap,
+    finish_part,
+    finish_single,
 )
 from collide.narrowphase.fields.ball_walk_kernel import MEETS as BALLS_MEET
 from collide.narrowphase.fields.ball_walk_kernel import OPEN, state_of_balls
@@ -341,7 +343,7 @@ def states_of_balls(header_at, XA_at, XB_at, n, margin, states_at, places_at, ho
     """States of a cloud and a convex set at n pairs of checked poses, the cloud's first; returns how many are not left
     to the long way.
 
-    header : of `nearest_item_kernel.py`.   XA, XB : 16 doubles a pose.   margin : how far balls may be apart [m].
+    header : of `item_questions.py`.   XA, XB : 16 doubles a pose.   margin : how far balls may be apart [m].
     states : n integers: MEETS, NEAR, SURFACES_APART or LONG_WAY.   places, how : n integers each, which say nothing.
     """
     states, places, how, n_decided = view_i64(states_at, n), view_i64(places_at, n), view_i64(how_at, n), 0

@@ -1,8 +1,9 @@
 """A field (point cloud, voxel grid, octree, large terrain, mesh with thickness) and another shape, at n pairs of poses.
 
-Convex sets, and the parts of unions of these, walk down the tree over the items (`nearest_item_kernel.py`). Open rests
-of the walk, and all other questions (depths, half-spaces, meshes, other fields), go to the union of the items within
-the upper bound of the gap, or within the depth, of a box around the other shape.
+Convex sets, and the parts of unions of these, walk to the nearest items (`item_walks.py`, `convex_walk_kernel.py`);
+clouds and meshes ask points for facets (`clouds_and_meshes.py`). Open rests, and all other questions (depths,
+half-spaces, other fields), go to the union of the items within the upper bound of the gap, or within the depth, of a
+box around the other shape.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ def test_is_immutable_and_a_value():
 @pytest.mark.parametrize(
     ("points", "complaint"),
     [
-        ([], "points must have shape"), ([(0, 0, 0)], r"points must have shape \(N, 2\)"),
+        ([], "points is empty"), ([(0, 0, 0)], r"points must have shape \(N, 2\)"),
         (np.zeros((0, 2)), "points is empty"), ([(0, np.nan)], r"points\[0, 1\] is nan"),
         ([(1e60, 0)], "within ±1e"), ([(1e-60, 0)], "at least 1e-50"), ("no", "real numbers"),
     ],
