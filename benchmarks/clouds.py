@@ -69,7 +69,15 @@ def shapes() -> dict:
     return {
         "sphere": collide.Sphere(0.02), "box": collide.Box((0.05, 0.04, 0.06)), "capsule": collide.Capsule(0.02, 0.05),
         "hull of 64": collide.ConvexHull(0.03 * unit), "cylinder": collide.Cylinder(0.02, 0.05),
+        "mesh of 720": dented_ball(),
     }
+
+
+def dented_ball() -> collide.Mesh:
+    """A solid of 720 facets that is not convex."""
+    mesh = collide.tessellate(collide.Ellipsoid((0.04, 0.03, 0.02)))
+    away = np.square(mesh.vertices - (0.0, 0.0, 0.02)).sum(axis=1)
+    return collide.Mesh(mesh.vertices * (1.0 - 0.3 * np.exp(-away / 2e-4))[:, None], mesh.faces)
 
 
 def coal_calls(places: np.ndarray, size: float, X: np.ndarray) -> dict:
