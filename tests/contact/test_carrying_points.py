@@ -125,7 +125,8 @@ def test_of_one_class_the_farthest_are_chosen():
     assert order[:3].tolist() == [0, 2, 4]
 
 
-@pytest.mark.parametrize("shape", ["bowl", "rough"])
+@pytest.mark.many(2)
+@pytest.mark.parametrize("shape", ["rough", "bowl"])
 def test_of_many_points_few_are_asked_and_each_compared_with_all(shape, monkeypatch):
     """More than MAX_CLASSED points: at most CELLS are asked whether they carry, whichever do so do it among all of
     them, the deepest comes first, and what is kept spans as much as what is kept of all."""

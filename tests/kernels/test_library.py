@@ -266,6 +266,7 @@ def test_a_new_entry_is_compiled_and_the_library_serves_the_others(site, ask):
     assert told["mode"] == "just in time" and told["edited"] == ["answer_of_all"] and told["box"] == RIGHT
 
 
+@pytest.mark.many(2)
 @pytest.mark.parametrize("edit", ["docstrings", "comments and lines"])
 def test_words_in_every_source_keep_the_library(site, ask, edit):
     from collide.kernels import sources

@@ -131,6 +131,7 @@ def changed_by(hashes, file: Path, old: str, new: str) -> set[str]:
 
 
 @pytest.mark.many(2)
+@pytest.mark.many(2)
 @pytest.mark.parametrize(
     ("name", "old", "new", "stale", "fresh"),
     [
