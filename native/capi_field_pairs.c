@@ -108,7 +108,7 @@ static int64_t state_of(const struct field_pair *pair, double margin)
 {
     int64_t state, place, how, header_at = address_of(pair->space->field->header);
     const struct collide_kernels *kernels = pair->space->kernels;
-    (pair->field->are == BALLS ? kernels->states_of_balls : kernels->curved_states_of)(
+    kernels->curved_states_of(
         header_at, address_of(pair->X_WF), address_of(pair->X_WS), 1, margin, address_of(&state), address_of(&place), address_of(&how)
     );
     return state;
@@ -141,7 +141,7 @@ static collide_status measure_pair(const struct field_pair *pair, double limit, 
         int64_t state = limit < INFINITE ? state_of(pair, limit) : LONG_WAY;
         if (state == APART || state == MAYBE_INSIDE) row->lower = nextafter(limit, INFINITE);
         else
-            (pair->field->are == BALLS ? kernels->gaps_of_balls : kernels->curved_gaps)(
+            kernels->curved_gaps(
                 header_at, address_of(pair->X_WF), address_of(pair->X_WS), 1, depths, address_of(row), address_of(&is_written));
         is_written |= state == APART || state == MAYBE_INSIDE;
     }

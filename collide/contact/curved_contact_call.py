@@ -11,9 +11,17 @@ from collide.contact.near_the_margin import is_near_the_margin
 from collide.contact.patch_rows import CONTACT, clear_words, flip_row, is_cleared_by, patch_of_row
 from collide.kernels import entry, kernel, native_call, prepared, view_f64, view_i64
 from collide.mesh.bvh import open_tree
-from collide.narrowphase.facets.item_questions import EXCHANGED, place_pair
+from collide.narrowphase.facets.item_questions import (
+    EXCHANGED,
+    MAYBE_INSIDE,
+    NEAR,
+    SURFACES_APART,
+    place_pair,
+)
 from collide.narrowphase.facets.item_questions import HEADER as GAP_HEADER
-from collide.narrowphase.facets.nearest_item_kernel import MAYBE_INSIDE, NEAR, SURFACES_APART, rows_within
+from collide.narrowphase.facets.nearest_item_kernel import (
+    rows_within,
+)
 from collide.narrowphase.rows import DISTANCE, HIT, ROW, copy_row, view_row
 
 _curved_manifolds_at = native_call(SIGNATURE)

@@ -35,16 +35,13 @@ from collide.robots.forward_kinematics import Joints, view_joints
     POSES_AT, LINKS_AT, WORLD_BOXES_AT, PLACED_AT, CANDIDATES_AT, PAIR_AT, ROW_AT, DOUBLES_AT, INTEGERS_AT,
     # what is left to others: where it is written, for how many, how many there are; configurations seen so far
     OPEN_AT, OPEN_CAPACITY, N_OPEN, STAMP,
-    # of each part of the surroundings: the kernels and the header that ask a field about a part; zeros of other shapes
-    WALKS_AT,
+    # addresses of `state_of_part` and `gap_of_part`, and of what they ask: behind a 0, of each part of the surroundings
+    # the header of its field, 0 of other shapes
+    STATE_OF_PART, GAP_OF_PART, WALKS_AT,
     # a double: boxes are moved outwards by this share of all that went into them
     SLACK,
-) = range(45)
-HEADER = 45
-# Words of a part of the surroundings in WALKS: addresses of kernels of `PART_SIGNATURE` and `GAP_SIGNATURE`, and of
-# their header.
-WALK_STATE, WALK_GAP, WALK_HEADER = range(3)
-WALK = 3
+) = range(47)
+HEADER = 47
 
 # Integers of a body: its link, its first part and how many there are.
 LINK, FIRST, COUNT = range(3)

@@ -6,6 +6,7 @@ import numpy as np
 
 from collide.kernels import address_of, code_of
 from collide.lowering.shape_table import NO_TERMS, POSE
+from collide.narrowphase.facets.nearest_item_kernel import gap_of_part, state_of_part
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, answer_pairs
 from collide.results import PAIR_DTYPE
 from collide.robots import check_scene as layout
@@ -57,7 +58,8 @@ class CheckWorkspace:
         buffers[layout.WALKS_AT] = self._walks.words
         numbers = {
             layout.N_JOINTS: len(joints.ints), layout.ROOT: joints.root, layout.N_LINKS: joints.n_links,
-            layout.CORE: code_of(answer_pairs), layout.N_BODIES: n_bodies, layout.N_SELF_PAIRS: len(self_pairs),
+            layout.CORE: code_of(answer_pairs), layout.STATE_OF_PART: code_of(state_of_part),
+            layout.GAP_OF_PART: code_of(gap_of_part), layout.N_BODIES: n_bodies, layout.N_SELF_PAIRS: len(self_pairs),
             layout.N_LINK_PARTS: n_parts - n_around, layout.PADDED: tables.padded, layout.N_PARTS: n_parts,
             layout.N_UNBOUNDED: len(unbounded), layout.N_AROUND: allowed.shape[1],
             layout.OPEN_CAPACITY: capacity,

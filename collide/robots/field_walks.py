@@ -6,18 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from collide.kernels import address_of, code_of
+from collide.kernels import address_of
 from collide.lowering.shape_table import POSE_SLOP, POSE_STRETCH, POSE_TERMS
 from collide.narrowphase.facets.nearest_item_calls import GapQuestion
 from collide.narrowphase.fields.items_of import items_of
-from collide.robots.check_scene import WALK
 from collide.robots.check_tables import BodyAround, Surroundings
 
 
 class FieldWalks(NamedTuple):
-    """The words of WALKS in `check_scene.py`, (1 + parts, WALK) int64, zeros first; and the questions at their
-    addresses.
-    """
+    """The words of WALKS in `check_scene.py`, (1 + parts,) int64, and the questions at their addresses."""
 
     words: np.ndarray
     held: list[Any]
@@ -29,13 +26,12 @@ def field_walks(around: Surroundings, doubles_at: int, integers_at: int) -> Fiel
 
     doubles, integers : workspace of `answer_pairs`, a thread's.
     """
-    words, held = np.zeros((1 + len(around.packed), WALK), dtype=np.int64), []
+    words, held = np.zeros(1 + len(around.packed), dtype=np.int64), []
     for k, number in enumerate(around.body_of.tolist()):
         body = around.bodies[number]
         question = _question(body, around, k, (doubles_at, integers_at)) if body.shape.is_field else None
         if question is not None:
-            kernels = question.items.kernels
-            words[1 + k] = code_of(kernels.state_of_part), code_of(kernels.gap_of_part), address_of(question.header)
+            words[1 + k] = address_of(question.header)
             held.append(question)
     return FieldWalks(words, held)
 

@@ -36,7 +36,6 @@ from collide.robots.check_scene import (
     PADDED,
     ROW_AT,
     SELF_PAIRS_AT,
-    WALK_STATE,
     body_of_part,
     boxes_meet,
     find_parts_around,
@@ -145,7 +144,7 @@ def _take_nearer(scene, p, q, a, b, number, row_at, limit):
         if boxes_are_apart(scene, p, q, d, within):
             return limit
     walk = walk_of(scene, q)
-    is_walked = walk[WALK_STATE] != 0 and is_bounded(scene, p)
+    is_walked = walk != 0 and is_bounded(scene, p)
     if is_walked:
         state, row = gap_of_field(scene, p, walk, within)
     else:

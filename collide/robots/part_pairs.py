@@ -6,13 +6,15 @@ import math
 
 from collide.kernels import kernel, native_call, view_i64, view_u8
 from collide.lowering.shape_table import INTS, NUMBERS, POSE
-from collide.narrowphase.facets.nearest_item_kernel import (
-    GAP_SIGNATURE,
+from collide.narrowphase.facets.item_questions import (
     LONG_WAY,
     MAYBE_INSIDE,
     MEETS,
-    PART_SIGNATURE,
     SURFACES_APART,
+)
+from collide.narrowphase.facets.nearest_item_kernel import (
+    GAP_SIGNATURE,
+    PART_SIGNATURE,
 )
 from collide.narrowphase.pair_kernel import SIGNATURE
 from collide.narrowphase.rows import HIT, LOWER, NORMAL, ROW, is_undecided_or_refused, view_row
@@ -21,6 +23,7 @@ from collide.robots.check_scene import (
     BOX,
     CORE,
     DOUBLES_AT,
+    GAP_OF_PART,
     HALF,
     INTEGERS_AT,
     INTS_AT,
@@ -33,11 +36,8 @@ from collide.robots.check_scene import (
     POSES_AT,
     ROW_AT,
     SHAPE_OF_AT,
+    STATE_OF_PART,
     TERMS_AT,
-    WALK,
-    WALK_GAP,
-    WALK_HEADER,
-    WALK_STATE,
     WALKS_AT,
 )
 
@@ -57,7 +57,7 @@ def state_of_parts(scene, p, q, margin):
         if boxes_are_apart(scene, p, q, d, margin):
             return BEYOND_MARGIN
     walk = walk_of(scene, q)
-    if walk[WALK_STATE] != 0 and is_bounded(scene, p):  # fields know no sets without end
+    if walk != 0 and is_bounded(scene, p):  # fields know no sets without end
         return _state_of_field(scene, p, walk, margin)
     row = ask(scene, p, q, d, True, margin)
     if is_undecided_or_refused(row):
@@ -71,9 +71,9 @@ def state_of_parts(scene, p, q, margin):
 
 @kernel(inline=True)
 def walk_of(scene, part):
-    """The words of a part's field; the first is 0 of what is no field around, or is asked as any shape."""
-    around = part - scene.words[N_LINK_PARTS]
-    return view_i64(scene.words[WALKS_AT] + 8 * WALK * (around + 1 if around >= 0 else 0), WALK)
+    """The address of a part's field; 0 of what is no field around, or is asked as any shape."""
+    k = max(part - scene.words[N_LINK_PARTS] + 1, 0)
+    return view_i64(scene.words[WALKS_AT], k + 1)[k]
 
 
 @kernel
@@ -81,7 +81,7 @@ def _state_of_field(scene, p, walk, margin):
     """`state_of_parts` of a part and a field around; NEAR where items may be within the margin, and OPEN where a part
     only holds what is meant: what the part is apart from, the mesh within is apart from.
     """
-    state = _state_of_part_at(walk[WALK_STATE], (walk[WALK_HEADER], *_rows_of_part(scene, p), margin))
+    state = _state_of_part_at(scene.words[STATE_OF_PART], (walk, *_rows_of_part(scene, p), margin))
     if state == SURFACES_APART or state == MAYBE_INSIDE:
         return BEYOND_MARGIN
     if state == LONG_WAY or only_holds(scene, p):
@@ -96,7 +96,7 @@ def gap_of_field(scene, p, walk, limit):
     blank = view_i64(row_at, ROW // 8)
     for k in range(ROW // 8):
         blank[k] = 0
-    state = _gap_of_part_at(walk[WALK_GAP], (walk[WALK_HEADER], *_rows_of_part(scene, p), limit, row_at))
+    state = _gap_of_part_at(scene.words[GAP_OF_PART], (walk, *_rows_of_part(scene, p), limit, row_at))
     return (OPEN if state == LONG_WAY else BEYOND_MARGIN if state == SURFACES_APART else NEAR), view_row(row_at)
 
 

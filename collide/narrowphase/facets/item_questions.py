@@ -88,6 +88,9 @@ HEADER = 21
 BOX = 6
 #: What items are.
 FACETS, BALLS, CELLS, PRISMS = range(4)
+#: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh; a facet meets the shape; a
+#: facet is within the margin, or may be.
+LONG_WAY, SURFACES_APART, MAYBE_INSIDE, MEETS, NEAR = -1, 1, 0, 2, 3
 #: A matrix farther off a rotation is left to the long way.
 _FAR_OFF = 2.0**-40
 #: Of the pair's size, what rounding takes off a gap between boxes.
@@ -318,18 +321,7 @@ def number_of_item(walk, place):
 def ask_item(walk, place, depths, limit):
     """The row of an item and the shape, written behind the best row.   depths : whether a depth is wanted.   limit : of
     items farther away no more is told [m]."""
-    words = walk.words
-    _put_item(walk, place)
-    row_at = words[ROW_AT] + ROW
-    clear_rows(row_at, 1)
-    _answer_pairs_at(
-        words[CORE],
-        (
-            words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], 0, words[SHAPE_OF_AT], words[PAIRS_AT], 1, False,
-            depths, False, limit, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
-        ),
-    )
-    return view_row(row_at)
+    return _answer(walk, place, Vec3(0.0, 0.0, 0.0), False, depths, limit)
 
 
 @kernel
@@ -338,6 +330,12 @@ def whether_item(walk, place, axis, margin):
 
     axis : from the item to the shape, to begin with.
     """
+    return _answer(walk, place, axis, True, False, margin)
+
+
+@kernel
+def _answer(walk, place, axis, boolean, depths, limit):
+    """The row of `answer_pairs` of an item and the shape."""
     words = walk.words
     _put_item(walk, place)
     row_at = words[ROW_AT] + ROW
@@ -347,8 +345,8 @@ def whether_item(walk, place, axis, margin):
     _answer_pairs_at(
         words[CORE],
         (
-            words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], 0, words[SHAPE_OF_AT], words[PAIRS_AT], 1, True, False,
-            True, margin, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
+            words[INTS_AT], words[NUMBERS_AT], words[POSES_AT], 0, words[SHAPE_OF_AT], words[PAIRS_AT], 1, boolean,
+            depths, boolean, limit, row_at, words[DOUBLES_AT], words[INTEGERS_AT],
         ),
     )
     return row

@@ -28,22 +28,20 @@ from collide.narrowphase.facets.item_questions import (
     FACETS,
     HEADER,
     ITEMS_ARE,
+    MAYBE_INSIDE,
+    MEETS,
     PRISMS,
     PROBE_AT,
     RADII_AT,
     REACH_OF_ITEMS,
     STACK_AT,
+    SURFACES_APART,
 )
 from collide.narrowphase.facets.nearest_item_kernel import (
-    MAYBE_INSIDE,
-    MEETS,
-    SURFACES_APART,
     curved_gap_single,
     curved_gaps,
     curved_state_single,
     curved_states_of,
-    gap_of_part,
-    state_of_part,
 )
 from collide.narrowphase.facets.winding_numbers import OUTSIDE
 from collide.narrowphase.pair_kernel import answer_pairs
@@ -60,25 +58,12 @@ def serves(packed: PackedConvex) -> bool:
 _CORNERS = {FACETS: 3, BALLS: 1, CELLS: 8, PRISMS: 6}
 
 
-class WalkKernels(NamedTuple):
-    """What walks down a tree of items for states, and for gaps: at many poses, in single calls, of a part in the tables
-    of a robot.
-    """
-
-    states: Any = curved_states_of
-    single_state: Any = curved_state_single
-    state_of_part: Any = state_of_part
-    gaps: Any = curved_gaps
-    single_gap: Any = curved_gap_single
-    gap_of_part: Any = gap_of_part
-
-
 class Items(NamedTuple):
     """The facets of a mesh, the balls of a cloud, the cells of a grid, or the prisms of terrain.
 
     tree : over facets, points or cells, or terrain.   reach : how far they reach from their origin [m].
     solid : whether they enclose an inside.   radius : the largest of balls, 0 of facets [m].   radii : (n,) of balls,
-    where they differ.   are : FACETS, BALLS, CELLS or PRISMS.   kernels : that walk.
+    where they differ.   are : FACETS, BALLS, CELLS or PRISMS.
     """
 
     tree: Any
@@ -87,7 +72,6 @@ class Items(NamedTuple):
     radius: float = 0.0
     radii: np.ndarray | None = None
     are: int = FACETS
-    kernels: WalkKernels = WalkKernels()
 
 
 class GapQuestion:
@@ -147,7 +131,7 @@ def surface_states(
     state, place, how = np.empty((3, n), dtype=np.int64)
     X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
     question = GapQuestion(items, packed, scratch())
-    items.kernels.states(
+    curved_states_of(
         address_of(question.header), address_of(X_WA), address_of(X_WB), n, margin, address_of(state),
         address_of(place), address_of(how),
     )
@@ -167,7 +151,7 @@ class _SingleQuestion:
         question = GapQuestion(items, packed, space.addresses)
         question.header[EXCHANGED] = exchanged
         self.header, self.held = question.header, (space, question, packed)
-        self._solid, self._state = items.solid, prepared_row(items.kernels.single_state, question.header)
+        self._solid, self._state = items.solid, prepared_row(curved_state_single, question.header)
 
     def state(self, X_WA: np.ndarray, X_WB: np.ndarray, margin: float) -> int | None:
         """MEETS, NEAR, SURFACES_APART or, of solids alone, MAYBE_INSIDE; None of pairs left to another method.
@@ -193,7 +177,7 @@ def gap_rows(
     rows, is_written = np.zeros(n, dtype=PAIR_DTYPE), np.zeros(n, dtype=bool)
     X_WA, X_WB = np.ascontiguousarray(X_WA), np.ascontiguousarray(X_WB)
     question = GapQuestion(items, packed, scratch())
-    items.kernels.gaps(
+    curved_gaps(
         address_of(question.header), address_of(X_WA), address_of(X_WB), n, depths, address_of(rows),
         address_of(is_written),
     )
@@ -208,7 +192,7 @@ def prepared_items(
     exchanged : the shape stands first.   point : (3,) of the shape, in its frame, where items enclose an inside.
     """
     single = _SingleQuestion(items, packed, exchanged)
-    gap = prepared_row(items.kernels.single_gap, single.header)
+    gap = prepared_row(curved_gap_single, single.header)
 
     def is_outside(X_WA, X_WB) -> bool:
         """Whether the shape, whose surface the mesh's does not meet, is outside of the mesh."""

@@ -18,22 +18,29 @@ from collide.mesh.bvh import (
 )
 from collide.mesh.bvh import REACH as TREE_REACH
 from collide.narrowphase.facets.item_questions import (
+    BALLS,
     EXCHANGED,
     FACETS,
     HEADER,
     ITEMS_ARE,
+    LONG_WAY,
+    MAYBE_INSIDE,
+    MEETS,
+    NEAR,
     PROMISE,
     REACH_OF_ITEMS,
     ROW_AT,
+    SURFACES_APART,
     ask_item,
     begin_walk,
     number_of_item,
-    place_pair,
+    set_poses,
     take_part,
     with_box,
 )
 from collide.narrowphase.facets.item_walks import places_within, walk_down
 from collide.narrowphase.fallback_searches import lay_row_apart
+from collide.narrowphase.fields.convex_walk_kernel import nearest_ball, state_of_cloud
 from collide.narrowphase.finish_rows import forget_depth
 from collide.narrowphase.rows import (
     BEYOND,
@@ -67,9 +74,6 @@ from collide.numerics.vec3 import (
     vec3_at,
 )
 
-#: How a pose ends: left to the long way; apart; apart, unless the shape is inside the mesh; a facet meets the shape; a
-#: facet is within the margin, or may be.
-LONG_WAY, SURFACES_APART, MAYBE_INSIDE, MEETS, NEAR = -1, 1, 0, 2, 3
 #: Where so many facets of a mesh leave it open whether it meets the shape, polytopes around and inside the shape may
 #: decide sooner: a tube around a cylinder, whose facets are all near.
 _MAX_ASKED = 64
@@ -136,22 +140,27 @@ def _write_meeting(walk, place, row_at):
         row.words[VERTICES_A + k] = row.words[VERTICES_B + k] = -1
 
 
+@kernel(inline=True)
+def _is_cloud(walk):
+    """Whether items are balls, which have a walk of their own (`fields/convex_walk_kernel.py`)."""
+    return walk.words[ITEMS_ARE] == BALLS
+
+
 @kernel
 def _gap(header_at, XA_at, XB_at, check, depths, row_at):
     """The row of one pair of poses, the mesh's first; LONG_WAY, SURFACES_APART or MAYBE_INSIDE, and without depths
     MEETS."""
-    is_placed, walk = place_pair(header_at, XA_at, XB_at, check)
-    if not is_placed:
+    placed = set_poses(header_at, XA_at, XB_at, check)
+    is_near, walk = begin_walk(header_at)
+    if not (placed and is_near):
         return LONG_WAY
-    return finish_gap(walk, walk_down(walk, math.inf, 0.0, walk.tree.header[N_FACETS]), depths, row_at)
-
-
-@kernel
-def finish_gap(walk, nearest, depths, row_at):
-    """Write the row of the nearest item, or, without depths, of an item that meets the shape; returns as `_gap`."""
-    walk = with_box(walk)
+    if _is_cloud(walk):
+        nearest = nearest_ball(walk, math.inf)
+    else:
+        walk = with_box(walk)
+        nearest = walk_down(walk, math.inf, 0.0, walk.tree.header[N_FACETS])
     if nearest.failed and not depths:
-        meeting = walk_down(walk, 0.0, 0.0, _max_asked(walk))  # the item that batches name
+        meeting = walk_down(with_box(walk), 0.0, 0.0, _max_asked(walk))  # the item that batches name
         if not (meeting.failed and _is_proven_hit(view_row(walk.words[ROW_AT] + ROW))):
             return LONG_WAY
         _write_meeting(walk, meeting.place, row_at)
@@ -159,16 +168,19 @@ def finish_gap(walk, nearest, depths, row_at):
     if nearest.failed or nearest.place < 0:
         return LONG_WAY
     _write_gap(walk, nearest, row_at)
-    return _inside_or_apart(walk)
+    return SURFACES_APART if _is_cloud(walk) else _inside_or_apart(walk)
 
 
 @kernel
 def _state(header_at, XA_at, XB_at, check, margin):
-    """`_state_of_walk` of one pair of poses, the mesh's first."""
-    is_placed, walk = place_pair(header_at, XA_at, XB_at, check)
-    if not is_placed:
+    """`_state_of_walk` of one pair of poses, the mesh's first; of balls no place, nor how."""
+    placed = set_poses(header_at, XA_at, XB_at, check)
+    is_near, walk = begin_walk(header_at)
+    if not (placed and is_near):
         return LONG_WAY, -1, 0
-    return _state_of_walk(walk, margin)
+    if _is_cloud(walk):
+        return state_of_cloud(walk, margin), -1, 0
+    return _state_of_walk(with_box(walk), margin)
 
 
 @kernel
@@ -226,6 +238,8 @@ def state_of_part(header_at, ints_at, numbers_at, pose_at, box_at, margin):
     is_near, walk = begin_walk(header_at)
     if not is_near:
         return LONG_WAY
+    if _is_cloud(walk):
+        return state_of_cloud(walk, margin)
     walk = with_box(walk)
     state, _, _ = _state_of_walk(walk, margin)
     if state == NEAR and _state_of_walk(walk, 0.0)[0] == MEETS:
@@ -239,27 +253,23 @@ GAP_SIGNATURE = "int64(int64, int64, int64, int64, int64, float64, int64)"
 
 @entry(GAP_SIGNATURE)
 def gap_of_part(header_at, ints_at, numbers_at, pose_at, box_at, limit, row_at):
-    """The row of a part as of `take_part`, as A, and of items where they stand; returns as `finish_part`.
-
-    limit : parts farther away have no row [m].
+    """Write the row of a part as of `take_part`, as A, and of the nearest item where items stand: NEAR; SURFACES_APART
+    of items beyond the limit [m]; LONG_WAY.
     """
     take_part(header_at, ints_at, numbers_at, pose_at, box_at)
     is_near, walk = begin_walk(header_at)
     if not is_near:
         return LONG_WAY
-    walk = with_box(walk)
-    return finish_part(walk, walk_down(walk, limit, 0.0, walk.tree.header[N_FACETS]), row_at)
-
-
-@kernel
-def finish_part(walk, nearest, row_at):
-    """Write the row of a part and the nearest item: NEAR; SURFACES_APART of items beyond the limit; LONG_WAY."""
+    if _is_cloud(walk):
+        nearest = nearest_ball(walk, limit)
+    else:
+        nearest = walk_down(with_box(walk), limit, 0.0, walk.tree.header[N_FACETS])
     if nearest.failed:
         return LONG_WAY
     if nearest.place < 0:
         return SURFACES_APART
     _write_gap(walk, nearest, row_at)
-    finish_single(row_at, True)
+    _finish_single(row_at, True)
     return NEAR
 
 
@@ -316,12 +326,12 @@ def curved_gap_single(header_at, XA_at, XB_at, row_at, depths, _unlimited):
     exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
     status = _gap(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True, depths, row_at)
     if status != LONG_WAY:
-        finish_single(row_at, exchanged)
+        _finish_single(row_at, exchanged)
     return status
 
 
 @kernel
-def finish_single(row_at, exchanged):
+def _finish_single(row_at, exchanged):
     """Name the bodies of a row of a single call.   exchanged : the shape stands first."""
     row = view_row(row_at)
     row.words[BODY_B] = 1

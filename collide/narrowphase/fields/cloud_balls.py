@@ -6,23 +6,10 @@ import math
 
 import numpy as np
 
-from collide.narrowphase.facets.nearest_item_calls import BALLS, Items, WalkKernels
-from collide.narrowphase.fields.convex_walk_kernel import (
-    gap_of_balls_and_part,
-    gap_of_balls_single,
-    gaps_of_balls,
-    state_of_balls_and_part,
-    state_of_balls_single,
-    states_of_balls,
-)
+from collide.narrowphase.facets.nearest_item_calls import BALLS, Items
 from collide.narrowphase.fields.field_items import BoxAround, FieldItems
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.point_cloud import PointCloud
-
-_KERNELS = WalkKernels(
-    states_of_balls, state_of_balls_single, state_of_balls_and_part, gaps_of_balls, gap_of_balls_single,
-    gap_of_balls_and_part,
-)
 
 
 class Balls(FieldItems):
@@ -34,7 +21,7 @@ class Balls(FieldItems):
         self.low, self.high = tree.low - radius, tree.high + radius
         reach = math.sqrt(float(np.square(np.maximum(np.abs(tree.low), np.abs(tree.high))).sum())) * (1.0 + 2.0**-50)
         radii = cloud.radius if np.ndim(cloud.radius) else None
-        self.walked = Items(tree, reach + radius, False, radius, radii, BALLS, _KERNELS)
+        self.walked = Items(tree, reach + radius, False, radius, radii, BALLS)
 
     def every(self) -> np.ndarray:
         return np.arange(len(self._points))

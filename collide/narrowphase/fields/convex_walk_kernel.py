@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from collide.fields.point_tree_kernel import LEAF_FLOATS, MAX_LEVELS, floats_of, points_of
-from collide.kernels import entry, kernel, prepared, view_f32, view_f64, view_i64, view_u8
+from collide.kernels import entry, kernel, view_f32, view_f64, view_i64, view_u8
 from collide.lowering.packed_convex import POINTS
 from collide.lowering.shape_table import ADDRESS, COUNT, INTS, KIND, NUMBERS, PADDED, POSE, POSE_SLOP, RADIUS, SLOP
 from collide.mesh.box_overlap import FRAME, PRISM, PROBE, boxes_within, points_within
@@ -21,33 +21,23 @@ from collide.narrowphase.facets.item_questions import (
     BOUNDS_AT,
     BOX,
     BOX_AT,
-    EXCHANGED,
-    HEADER,
+    LONG_WAY,
+    MEETS,
+    NEAR,
     POSES_AT,
     PROBE_AT,
     RADII_AT,
     ROW_AT,
     STACK_AT,
+    SURFACES_APART,
     Nearest,
     ask_item,
     begin_nearest,
     begin_walk,
     height_along,
     set_poses,
-    take_part,
     whether_item,
     with_item,
-)
-from collide.narrowphase.facets.nearest_item_kernel import (
-    GAP_SIGNATURE,
-    LONG_WAY,
-    MEETS,
-    NEAR,
-    PART_SIGNATURE,
-    SURFACES_APART,
-    finish_gap,
-    finish_part,
-    finish_single,
 )
 from collide.narrowphase.fields.ball_walk_kernel import MEETS as BALLS_MEET
 from collide.narrowphase.fields.ball_walk_kernel import OPEN, state_of_balls
@@ -159,6 +149,20 @@ def _state_of_ball(walk, place, margin):
 
 
 @kernel(inline=True)
+def _open_probe(walk):
+    """(frame, probe) of a walk's workspace."""
+    at = walk.words[PROBE_AT]
+    return view_f32(at, FRAME), view_f32(at + 4 * FRAME, PRISM)
+
+
+@kernel(inline=True)
+def _open_stack(walk):
+    """(stack, keys) of a walk's workspace."""
+    n = WIDTH * (MAX_LEVELS + 1)
+    return view_i64(walk.words[STACK_AT], n), view_f64(walk.words[BOUNDS_AT], n)
+
+
+@kernel(inline=True)
 def _nearness(frame, probe, x, y, z):
     """The squared distance of a place from the probe's box, below 0 inside of it: an order, not a bound."""
     square, inside = np.float32(0.0), np.float32(-math.inf)
@@ -189,6 +193,18 @@ def _push_boxes(tree, node, frame, probe, stack, keys, top):
     return top
 
 
+@kernel
+def _next_leaf(tree, frame, probe, stack, keys, top):
+    """(link of the next leaf, stack's height without the leaf): nodes on top are opened; 0 for an empty stack."""
+    while top > 0:
+        top -= 1
+        link = link_of(tree.links, stack[top])
+        if link < 0:
+            return link, top
+        top = _push_boxes(tree, link, frame, probe, stack, keys, top)
+    return 0, 0
+
+
 @kernel(inline=True)
 def _nearest_of(near, floats, leaf, frame, probe):
     """The number of the nearest point of a leaf among those of a mask."""
@@ -205,20 +221,13 @@ def _nearest_of(near, floats, leaf, frame, probe):
 @kernel
 def _state_by_box(walk, margin):
     """MEETS; NEAR at the first ball within a margin above 0 [m]; SURFACES_APART; LONG_WAY where a ball is left open."""
-    tree, words = walk.tree, walk.words
-    frame, probe = view_f32(words[PROBE_AT], FRAME), view_f32(words[PROBE_AT] + 4 * FRAME, PRISM)
+    tree, (frame, probe) = walk.tree, _open_probe(walk)
     wider, floats = _set_probe(walk, margin, frame, probe), floats_of(tree)
     if wider < 0.0:
         return LONG_WAY
-    n_stack, n_planes = WIDTH * (MAX_LEVELS + 1), 0
-    stack, keys, answer = view_i64(words[STACK_AT], n_stack), view_f64(words[BOUNDS_AT], n_stack), SURFACES_APART
-    top = _push_boxes(tree, 0, frame, probe, stack, keys, 0)
-    while top > 0:
-        top -= 1
-        link = link_of(tree.links, stack[top])
-        if link >= 0:
-            top = _push_boxes(tree, link, frame, probe, stack, keys, top)
-            continue
+    (stack, keys), n_planes, answer = _open_stack(walk), 0, SURFACES_APART
+    link, top = _next_leaf(tree, frame, probe, stack, keys, _push_boxes(tree, 0, frame, probe, stack, keys, 0))
+    while link < 0:
         first, leaf = ~link >> 3, LEAF_FLOATS * ((~link >> 3) // MAX_LEAF)
         remaining = (1 << (~link & 7)) - 1
         near = points_within(floats, leaf, frame, probe) & remaining
@@ -234,6 +243,7 @@ def _state_by_box(walk, margin):
                 _put_plane(walk, n, wider, n_planes, probe)
                 n_planes += 1
             near = points_within(floats, leaf, frame, probe) & remaining
+        link, top = _next_leaf(tree, frame, probe, stack, keys, top)
     return answer
 
 
@@ -253,8 +263,8 @@ def _state_by_centre(walk, margin):
 
 
 @kernel
-def _leaf_nearby(tree, frame, probe):
-    """The link of a leaf near the probe: at each node the box goes on whose centre is the nearest."""
+def _place_nearby(tree, frame, probe):
+    """The place of a ball near the probe: at each node the box goes on whose centre is the nearest."""
     boxes, link = tree.boxes, link_of(tree.links, 0)
     while link >= 0:
         at, nearest, least = NODE * link, -1, np.float32(math.inf)
@@ -264,32 +274,22 @@ def _leaf_nearby(tree, frame, probe):
                 if key < least or nearest < 0:
                     nearest, least = slot, key
         link = link_of(tree.links, WIDTH * link + nearest)
-    return link
+    first, remaining = ~link >> 3, (1 << (~link & 7)) - 1
+    return first + _nearest_of(remaining, floats_of(tree), LEAF_FLOATS * (first // MAX_LEAF), frame, probe)
 
 
 @kernel
-def _nearest_ball(walk, limit):
+def nearest_ball(walk, limit):
     """The `Nearest` of all balls within a limit [m]: a ball nearby first, then the balls within the least upper bound
     so far.
     """
-    tree, words = walk.tree, walk.words
-    frame, probe = view_f32(words[PROBE_AT], FRAME), view_f32(words[PROBE_AT] + 4 * FRAME, PRISM)
-    nothing = begin_nearest(limit)
-    wider, floats, n_stack = _set_probe(walk, 0.0, frame, probe), floats_of(tree), WIDTH * (MAX_LEVELS + 1)
-    if wider < 0.0:
+    tree, (frame, probe) = walk.tree, _open_probe(walk)
+    if _set_probe(walk, 0.0, frame, probe) < 0.0:
         return _UNTOLD
-    run = ~_leaf_nearby(tree, frame, probe)
-    i = _nearest_of((1 << (run & 7)) - 1, floats, LEAF_FLOATS * ((run >> 3) // MAX_LEAF), frame, probe)
-    asked = (run >> 3) + i
-    nearest, wider = _with_ball(walk, nothing, asked, -1.0, frame, probe)
-    stack, keys = view_i64(words[STACK_AT], n_stack), view_f64(words[BOUNDS_AT], n_stack)
-    top = _push_boxes(tree, 0, frame, probe, stack, keys, 0)
-    while top > 0 and not nearest.failed:
-        top -= 1
-        link = link_of(tree.links, stack[top])
-        if link >= 0:
-            top = _push_boxes(tree, link, frame, probe, stack, keys, top)
-            continue
+    (stack, keys), floats, asked = _open_stack(walk), floats_of(tree), _place_nearby(tree, frame, probe)
+    nearest, wider = _with_ball(walk, begin_nearest(limit), asked, -1.0, frame, probe)
+    link, top = _next_leaf(tree, frame, probe, stack, keys, _push_boxes(tree, 0, frame, probe, stack, keys, 0))
+    while link < 0 and not nearest.failed:
         first, leaf, remaining = ~link >> 3, LEAF_FLOATS * ((~link >> 3) // MAX_LEAF), (1 << (~link & 7)) - 1
         if 0 <= asked - first < MAX_LEAF:
             remaining &= ~(1 << (asked - first))
@@ -299,6 +299,7 @@ def _nearest_ball(walk, limit):
             remaining &= ~(1 << i)
             nearest, wider = _with_ball(walk, nearest, first + i, wider, frame, probe)
             near = points_within(floats, leaf, frame, probe) & remaining
+        link, top = _next_leaf(tree, frame, probe, stack, keys, top)
     return nearest
 
 
@@ -322,7 +323,7 @@ def _with_ball(walk, nearest, place, wider, frame, probe):
 
 
 @kernel
-def _state(walk, margin):
+def state_of_cloud(walk, margin):
     """`_state_by_centre` or `_state_by_box`; NEAR only where no ball is known to meet the set."""
     is_ball = walk.ints[INTS + KIND] == POINTS and walk.ints[INTS + COUNT] == 1 and walk.words[RADII_AT] == 0
     state = _state_by_centre(walk, margin) if is_ball else _state_by_box(walk, margin)
@@ -332,111 +333,21 @@ def _state(walk, margin):
 
 
 @kernel
-def _state_of_poses(header_at, XA_at, XB_at, check, margin):
-    placed = set_poses(header_at, XA_at, XB_at, check)
-    is_near, walk = begin_walk(header_at)
-    return _state(walk, margin) if placed and is_near else LONG_WAY
-
-
-@entry("int64(int64, int64, int64, int64, float64, int64, int64, int64)")
-def states_of_balls(header_at, XA_at, XB_at, n, margin, states_at, places_at, how_at):
-    """States of a cloud and a convex set at n pairs of checked poses, the cloud's first; returns how many are not left
-    to the long way.
-
-    header : of `item_questions.py`.   XA, XB : 16 doubles a pose.   margin : how far balls may be apart [m].
-    states : n integers: MEETS, NEAR, SURFACES_APART or LONG_WAY.   places, how : n integers each, which say nothing.
-    """
-    states, places, how, n_decided = view_i64(states_at, n), view_i64(places_at, n), view_i64(how_at, n), 0
-    for k in range(n):
-        places[k], how[k] = -1, 0
-        states[k] = _state_of_poses(header_at, XA_at + 128 * k, XB_at + 128 * k, False, margin)
-        n_decided += int(states[k] != LONG_WAY)
-    return n_decided
-
-
-@entry(prepared.ROW, nogil=False)
-def state_of_balls_single(header_at, XA_at, XB_at, row_at, _unused, margin):
-    """1 with the state in the first word of a row; LONG_WAY.   header : its [EXCHANGED] says that the set stands first.
-    """
-    exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
-    state = _state_of_poses(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True, margin)
-    if state == LONG_WAY:
-        return LONG_WAY
-    view_i64(row_at, 1)[0] = state
-    return 1
-
-
-@entry(PART_SIGNATURE)
-def state_of_balls_and_part(header_at, ints_at, numbers_at, pose_at, box_at, margin):
-    """The state of a cloud where it stands and a part as of `take_part`."""
-    take_part(header_at, ints_at, numbers_at, pose_at, box_at)
-    is_near, walk = begin_walk(header_at)
-    return _state(walk, margin) if is_near else LONG_WAY
-
-
-@kernel
-def _gap(header_at, XA_at, XB_at, check, depths, row_at):
-    """The row of one pair of poses; LONG_WAY, SURFACES_APART or MAYBE_INSIDE, and without depths MEETS."""
-    placed = set_poses(header_at, XA_at, XB_at, check)
-    is_near, walk = begin_walk(header_at)
-    return finish_gap(walk, _nearest_ball(walk, math.inf), depths, row_at) if placed and is_near else LONG_WAY
-
-
-@entry("int64(int64, int64, int64, int64, boolean, int64, int64)")
-def gaps_of_balls(header_at, XA_at, XB_at, n, depths, rows_at, states_at):
-    """Rows of a cloud and a convex set at n pairs of checked poses; arguments and result as of `curved_gaps`."""
-    states, n_written = view_u8(states_at, n), 0
-    for k in range(n):
-        status = _gap(header_at, XA_at + 128 * k, XB_at + 128 * k, False, depths, rows_at + ROW * k)
-        states[k] = 0 if status == LONG_WAY else 1
-        n_written += int(states[k])
-    return n_written
-
-
-@entry(prepared.ROW, nogil=False)
-def gap_of_balls_single(header_at, XA_at, XB_at, row_at, depths, _unlimited):
-    """`curved_gap_single` of a cloud and a convex set."""
-    exchanged = view_i64(header_at, HEADER)[EXCHANGED] != 0
-    status = _gap(header_at, XB_at if exchanged else XA_at, XA_at if exchanged else XB_at, True, depths, row_at)
-    if status != LONG_WAY:
-        finish_single(row_at, exchanged)
-    return status
-
-
-@entry(GAP_SIGNATURE)
-def gap_of_balls_and_part(header_at, ints_at, numbers_at, pose_at, box_at, limit, row_at):
-    """The row of a part as of `take_part` and of a cloud where it stands; arguments and result as of `gap_of_part`."""
-    take_part(header_at, ints_at, numbers_at, pose_at, box_at)
-    is_near, walk = begin_walk(header_at)
-    return finish_part(walk, _nearest_ball(walk, limit), row_at) if is_near else LONG_WAY
-
-
-@kernel
 def _list_near(walk, margin, max_balls, numbers, at):
     """(how many balls were listed from ``at`` on, whether these are all) of the balls whose points may be within the
     margin and radii of the set's box, about the nearest first; −1 where floats are too small for the box.
 
     An infinite margin lists one ball nearby.
     """
-    tree, words = walk.tree, walk.words
-    frame, probe = view_f32(words[PROBE_AT], FRAME), view_f32(words[PROBE_AT] + 4 * FRAME, PRISM)
-    wider = _set_probe(walk, 0.0 if margin == math.inf else margin, frame, probe)
-    floats, n_stack = floats_of(tree), WIDTH * (MAX_LEVELS + 1)
-    if wider < 0.0:
+    tree, (frame, probe) = walk.tree, _open_probe(walk)
+    if _set_probe(walk, 0.0 if margin == math.inf else margin, frame, probe) < 0.0:
         return -1, False
     if margin == math.inf:
-        run = ~_leaf_nearby(tree, frame, probe)
-        i = _nearest_of((1 << (run & 7)) - 1, floats, LEAF_FLOATS * ((run >> 3) // MAX_LEAF), frame, probe)
-        numbers[at] = int(tree.ids[(run >> 3) + i])
+        numbers[at] = int(tree.ids[_place_nearby(tree, frame, probe)])
         return 1, False
-    n, stack, keys = 0, view_i64(words[STACK_AT], n_stack), view_f64(words[BOUNDS_AT], n_stack)
-    top = _push_boxes(tree, 0, frame, probe, stack, keys, 0)
-    while top > 0:
-        top -= 1
-        link = link_of(tree.links, stack[top])
-        if link >= 0:
-            top = _push_boxes(tree, link, frame, probe, stack, keys, top)
-            continue
+    (stack, keys), floats, n = _open_stack(walk), floats_of(tree), 0
+    link, top = _next_leaf(tree, frame, probe, stack, keys, _push_boxes(tree, 0, frame, probe, stack, keys, 0))
+    while link < 0:
         near = points_within(floats, LEAF_FLOATS * ((~link >> 3) // MAX_LEAF), frame, probe)
         for i in range(~link & 7):
             if near >> i & 1:
@@ -444,6 +355,7 @@ def _list_near(walk, margin, max_balls, numbers, at):
                     return n, False
                 numbers[at + n] = int(tree.ids[(~link >> 3) + i])
                 n += 1
+        link, top = _next_leaf(tree, frame, probe, stack, keys, top)
     return n, True
 
 
