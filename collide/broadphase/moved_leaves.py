@@ -68,8 +68,12 @@ def fit_inner_nodes(links_at, nodes_at, begin, end):
 
     nodes : 6 doubles a node: low x, y, z, high x, y, z.
     """
-    links = view_i64(links_at, LINK * end)
-    nodes = view_f64(nodes_at, 6 * end)
+    return fit_nodes(view_i64(links_at, LINK * end), view_f64(nodes_at, 6 * end), begin, end)
+
+
+@kernel(inline=True)
+def fit_nodes(links, nodes, begin, end):
+    """`fit_inner_nodes` of views, from the last node to the first: children stand behind their parents."""
     sides = 0.0
     for node in range(end - 1, begin - 1, -1):
         if links[LINK * node + SKIP] > node + 1:

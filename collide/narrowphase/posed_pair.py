@@ -33,7 +33,7 @@ from collide.lowering.shape_table import (
 from collide.numerics.vec3 import Vec3
 
 #: A matrix is said to stretch by the root of this at least, 3e-151.
-_LEAST_SQUARE = 2.0**-1000
+LEAST_SQUARE = 2.0**-1000
 
 
 @kernel(inline=True)
@@ -227,7 +227,7 @@ def stretch_of(xx, yy, zz, xy, yz, zx):
     xy = abs(xy)
     yz = abs(yz)
     zx = abs(zx)
-    return math.sqrt(max(xx + xy + zx, yy + xy + yz, zz + yz + zx, _LEAST_SQUARE))
+    return math.sqrt(max(xx + xy + zx, yy + xy + yz, zz + yz + zx, LEAST_SQUARE))
 
 
 @kernel(inline=True)

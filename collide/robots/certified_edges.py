@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,19 +10,16 @@ from collide.errors import InvalidArgument
 from collide.kernels import address_of
 from collide.robots.certify_meshes import settle_meshes
 from collide.robots.certify_motions import certify_motions
-from collide.robots.check_tables import UNBOUNDED_HALF
 from collide.robots.check_workspace import CheckWorkspace, MotionWorkspace
 from collide.robots.checker_scene import CheckerScene
 from collide.robots.motion_bounds import OPEN_INTERVAL
-from collide.robots.robot_bodies import paths_to_root
+from collide.robots.open_pairs import are_hits
+from collide.robots.sample_motions import CURSOR, MOTION, N_OPEN_SAMPLES, sample_motions
 
 #: Before anything is proven, motions are asked at their ends and, so many times halved, in between.
-SAMPLED_HALVINGS = 2
+_SAMPLED_HALVINGS = 2
 #: A motion that is sampled alone is halved at most so often: 2^30 samples take an hour.
 _MAX_HALVINGS = 30
-#: Roundings of forward kinematics, as a share of where links are and how far they reach.
-_ROUNDING = 2.0**-40
-
 #: An open interval of a motion.
 OPEN_DTYPE = np.dtype([("edge", "i8"), ("begin", "f8"), ("end", "f8")])
 
@@ -73,71 +69,97 @@ class CertifiedEdges:
 
 
 def sampled_collision(
-    q0: np.ndarray, q1: np.ndarray, step: float, collides: Callable[[np.ndarray], np.ndarray],
-    n_halvings: int | None = None,
+    checker: CheckerScene, q0: np.ndarray, q1: np.ndarray, step: float, threads: int,
+    max_halvings: int | None = None,
 ) -> np.ndarray:
     """(N,) a t at which each motion collides, NaN where all samples are free.
 
     Ends first, then the middle, then quarters, …, until no column changes by more than ``step``; a motion is asked no
-    more after its first hit.   n_halvings : the most halvings.
+    more after its first hit.   max_halvings : the most halvings.
     """
     times = np.full(len(q0), np.nan)
+    if max_halvings is None:
+        _refuse_too_many(q0, q1, step)
+        max_halvings = _MAX_HALVINGS
+
+    def on_piece(space: CheckWorkspace, piece: slice) -> None:
+        sample_piece(checker, space, q0[piece], q1[piece], step, max_halvings, times[piece])
+
+    checker.in_pieces(len(q0), threads, None, on_piece)
+    return times
+
+
+def sample_piece(
+    checker: CheckerScene, space: CheckWorkspace, q0: np.ndarray, q1: np.ndarray, step: float, max_halvings: int,
+    times: np.ndarray,
+) -> None:
+    """Write ``times`` (n,), NaN before, of motions with a sample in collision."""
+    dof, cursor = q0.shape[1], np.zeros(CURSOR, dtype=np.int64)
+    q, samples = space.sample
+    while cursor[MOTION] < len(q0):
+        sample_motions(
+            space.address, address_of(q0), address_of(q1), dof, len(q0), step, max_halvings, address_of(q),
+            address_of(cursor), address_of(samples), address_of(times),
+        )
+        if cursor[N_OPEN_SAMPLES]:
+            _settle_samples(checker, space, q0, q1, samples[: cursor[N_OPEN_SAMPLES]], times)
+            here = cursor[MOTION]
+            if here < len(q0) and not np.isnan(times[here]):
+                cursor[:N_OPEN_SAMPLES] = here + 1, 0, 0
+
+
+def _settle_samples(
+    checker: CheckerScene, space: CheckWorkspace, q0: np.ndarray, q1: np.ndarray, samples: np.ndarray, times: np.ndarray
+) -> None:
+    """Ask the pairs that samples left to others (k, OPEN_SAMPLE), in the order of the samples."""
+    motions, at = samples[:, 0].astype(np.int64), samples[:, 1]
+    q = np.where(at[:, None] < 1.0, q0[motions] + at[:, None] * (q1[motions] - q0[motions]), q1[motions])
+    hits = np.zeros(len(samples), dtype=bool)
+    pairs = space.open_pairs
+    setting = checker.setting
+    meets = are_hits(pairs, checker.link_poses(q), setting.bodies, setting.surroundings.bodies, once=True)
+    hits[pairs[meets, 0]] = True
+    for k in np.flatnonzero(hits)[::-1].tolist():  # the first of a motion is written last
+        times[motions[k]] = at[k]
+
+
+def _refuse_too_many(q0: np.ndarray, q1: np.ndarray, step: float) -> None:
     change = np.abs(q1 - q0).max(axis=1, initial=0.0)
-    with np.errstate(over="ignore"):
-        needed = np.minimum(np.ceil(np.log2(np.maximum(change / step, 1.0))), 2000.0).astype(np.int64)
-    if n_halvings is None and needed.max(initial=0) > _MAX_HALVINGS:
-        k = int(needed.argmax())
+    if change.max(initial=0.0) / step > 2.0**_MAX_HALVINGS:
+        k = int(change.argmax())
         raise InvalidArgument(
             f"RobotChecker: from Q0 to Q1, motion {k} changes a column by {change[k]:g} [rad or m]: in steps of "
             f"{step:g} that is more than 2^{_MAX_HALVINGS} samples; take a larger resolution"
         )
-    if n_halvings is not None:
-        needed = np.minimum(needed, n_halvings)
-    for level in range(-1, int(needed.max(initial=-1)) + 1):
-        if level == 0:
-            continue  # the ends are all of a motion that is not halved
-        alive = np.flatnonzero(np.isnan(times) & (needed >= level))
-        n_samples = 2 if level < 0 else 2 ** (level - 1)
-        for k in range(n_samples):  # in sequence: up to 2^29 samples, and the first may be a hit
-            t = float(k) if level < 0 else (k + 0.5) / n_samples
-            alive = alive[np.isnan(times[alive])]
-            if not len(alive):
-                break
-            q = q0[alive] + t * (q1[alive] - q0[alive]) if t < 1.0 else q1[alive]
-            times[alive[collides(np.ascontiguousarray(q))]] = t
-    return times
 
 
 def certify(
-    checker: CheckerScene, q0: np.ndarray, q1: np.ndarray, times: np.ndarray, resolution: float, threads: int, progress
+    checker: CheckerScene, q0: np.ndarray, q1: np.ndarray, resolution: float, threads: int, progress
 ) -> CertifiedEdges:
-    """`RobotChecker.certify_edges` of checked arguments (N, dof).
-
-    times : (N,) of known collisions, NaN for motions to be certified; filled in.
-    """
-    remaining = np.flatnonzero(np.isnan(times))
-    ends = np.ascontiguousarray(q0[remaining]), np.ascontiguousarray(q1[remaining])
-    later = np.full(len(remaining), np.nan)
-    open_rows: list[np.ndarray] = [np.zeros((0, OPEN_INTERVAL))]
+    """`RobotChecker.certify_edges` of checked arguments (N, dof)."""
+    times = np.full(len(q0), np.nan)
+    open_rows: list[np.ndarray] = []
     counts: list[int] = []
 
     def on_piece(space: CheckWorkspace, piece: slice) -> None:
-        work = _motion_workspace(checker, resolution)
-        begin, end, hit_at = ends[0][piece], ends[1][piece], later[piece]
+        work, begin, end, hit_at = space.motions(resolution), q0[piece], q1[piece], times[piece]
+        sample_piece(checker, space, begin, end, resolution, _SAMPLED_HALVINGS, hit_at)
         intervals, meshes = _certify_piece(space, work, begin, end, hit_at)
-        of_meshes = settle_meshes(checker, space, work, begin, end, meshes, hit_at, resolution)
-        rows = np.concatenate([intervals, *of_meshes])
-        rows[:, 0] += piece.start
-        open_rows.append(rows)
+        rows = [intervals] if len(intervals) else []
+        if len(meshes):
+            rows += settle_meshes(checker, space, work, begin, end, meshes, hit_at, resolution)
         counts.append(work.n_checked)
+        for some in rows:
+            some[:, 0] += piece.start
+            open_rows.append(some)
 
-    checker.in_pieces(len(remaining), threads, progress, on_piece)
-    times[remaining] = later
-    rows = np.concatenate(open_rows)
-    rows = rows[np.isnan(later[rows[:, 0].astype(np.int64)])]
-    rows[:, 0] = remaining[rows[:, 0].astype(np.int64)]
-    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+    checker.in_pieces(len(q0), threads, progress, on_piece)
     free = np.isnan(times)
+    if not open_rows:
+        return CertifiedEdges(free, times, np.zeros(0, dtype=OPEN_DTYPE), [], sum(counts))
+    rows = np.concatenate(open_rows)
+    rows = rows[free[rows[:, 0].astype(np.int64)]]
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     out = np.zeros(len(rows), dtype=OPEN_DTYPE)
     out["edge"], out["begin"], out["end"] = rows[:, :3].T
     free[out["edge"]] = False
@@ -146,8 +168,10 @@ def certify(
 
 
 def _certify_piece(space: CheckWorkspace, work: MotionWorkspace, q0, q1, times) -> tuple[np.ndarray, np.ndarray]:
-    """(open intervals, pairs of meshes), (k, OPEN_INTERVAL) each, of some motions; ``times`` of collisions written."""
-    open_rows, meshes = [np.zeros((0, OPEN_INTERVAL))], [np.zeros((0, OPEN_INTERVAL))]
+    """(open intervals, pairs of meshes), (k, OPEN_INTERVAL) each, of motions without a time; ``times`` of collisions
+    written.
+    """
+    open_rows, meshes = [], []
     done = 0
     while done < len(q0):
         before, done = done, certify_motions(
@@ -157,7 +181,9 @@ def _certify_piece(space: CheckWorkspace, work: MotionWorkspace, q0, q1, times) 
         meshes.append(work.mesh_pairs.copy())
         if done == before:
             work.grow()
-    return np.concatenate(open_rows), np.concatenate(meshes)
+    if len(open_rows) == 1:
+        return open_rows[0], meshes[0]
+    return tuple(np.concatenate(rows or [np.zeros((0, OPEN_INTERVAL))]) for rows in (open_rows, meshes))  # type: ignore
 
 
 def _names_of(checker: CheckerScene, body: int, partner: int) -> tuple[str, str]:
@@ -165,23 +191,3 @@ def _names_of(checker: CheckerScene, body: int, partner: int) -> tuple[str, str]
     if body >= 0:
         return checker.names_of(body, partner)
     return checker.names_of(*checker.setting.self_pairs[partner].tolist())
-
-
-def _motion_workspace(checker: CheckerScene, resolution: float) -> MotionWorkspace:
-    """Paths of joints from each body to the root, and how many of them stand between the bodies of each pair."""
-    robot, setting = checker.robot, checker.setting
-    number = {joint.name: k for k, joint in enumerate(robot.sorted_joints)}
-    paths = paths_to_root(robot, [body.link for body in setting.bodies])
-    between = np.zeros((max(len(setting.self_pairs), 1), 2), dtype=np.int64)
-    for k, (a, b) in enumerate(setting.self_pairs.tolist()):
-        shared = set(paths[a]) & set(paths[b])
-        between[k] = len(paths[a]) - len(shared), len(paths[b]) - len(shared)
-    # Where a body without end meets another of the robot, roundings are as large as the other reaches.
-    boxes = np.abs(setting.tables.body_boxes)
-    reach = float(boxes[boxes.max(axis=1) < UNBOUNDED_HALF].sum(axis=1).max(initial=0.0))
-    reach += float(np.abs(setting.base[9:]).sum())
-    reach += float(np.abs(robot.joint_table.doubles[:, 9:12]).sum())
-    return MotionWorkspace(
-        [np.array([number[name] for name in path], dtype=np.int64) for path in paths], between, robot.dof,
-        checker.n_pairs, resolution, _ROUNDING * reach,
-    )

@@ -55,8 +55,8 @@ from collide.robots.part_pairs import BEYOND_MARGIN, HITTING, OPEN, only_holds, 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64)")
 def certify_motions(header_at, motions_at, q0_at, q1_at, dof, first, n, times_at):
-    """Write a time of collision of each motion from ``first`` on, of n, NaN where free; returns the first motion not
-    done.
+    """Write a time of collision of each motion from ``first`` on, of n, whose time is NaN so far and stays NaN where
+    free; returns the first motion not done.
 
     The kernel ends early once the open intervals of a motion exceed the workspace.
     """
@@ -67,6 +67,8 @@ def certify_motions(header_at, motions_at, q0_at, q1_at, dof, first, n, times_at
     words[N_OPEN_INTERVALS] = 0
     words[N_MESH_PAIRS] = 0
     for k in range(first, n):
+        if times[k] == times[k]:
+            continue
         motion = motion_at(scene, motions_at, q0, q1, dof * k, dof)
         n_open = words[N_OPEN_INTERVALS]
         n_mesh = words[N_MESH_PAIRS]

@@ -53,7 +53,7 @@ def check_configurations(header_at, q_at, dof, first, n, verdicts_at):
     # A configuration leaves each pair of bodies to others once, and once more for what stands in between.
     for k in range(first, n):
         n_open = words[N_OPEN]
-        verdicts[k] = _verdict(scene, q, dof * k, k)
+        verdicts[k] = verdict_of(scene, q, dof * k, k)
         if words[N_OPEN] > words[OPEN_CAPACITY]:
             words[N_OPEN] = n_open
             return k
@@ -70,8 +70,9 @@ def begin_configuration(scene, q, first):
     put_world_boxes(scene)
 
 
-@kernel(inline=True)
-def _verdict(scene, q, at, number):
+@kernel
+def verdict_of(scene, q, at, number):
+    """IS_FREE, COLLIDES or IS_OPEN of the configuration at ``at`` of q; pairs left to others name it by a number."""
     words = scene.words
     begin_configuration(scene, q, at)
     verdict = IS_FREE

@@ -25,9 +25,9 @@ from collide.robots.forward_kinematics import Joints, view_joints
     # parts of bodies in their links, how many there are of these, and how many numbers on their padded twins stand;
     # boxes of all parts in their own frames; whether a part only holds what is meant; all parts
     PARTS_AT, N_LINK_PARTS, PADDED, PART_BOXES_AT, IS_BOUND_AT, N_PARTS,
-    # surroundings: nodes of the tree over their parts, their links, how many; those without end; bodies of parts; a
-    # byte for every body and body of the surroundings: never tested; how many of the latter
-    NODES_AT, NODE_LINKS_AT, N_NODES, UNBOUNDED_AT, N_UNBOUNDED, BODY_OF_AT, ALLOWED_AT, N_AROUND,
+    # surroundings: nodes of the tree over their parts, their links, how many; those without end; bodies of parts, and
+    # poses in them; a byte for every body and body of the surroundings: never tested; how many of the latter
+    NODES_AT, NODE_LINKS_AT, N_NODES, UNBOUNDED_AT, N_UNBOUNDED, BODY_OF_AT, PART_POSES_AT, ALLOWED_AT, N_AROUND,
     # shapes
     INTS_AT, NUMBERS_AT, TERMS_AT, SHAPE_OF_AT,
     # workspace of one thread: poses of all parts; of links; boxes of bodies in the world; for which configuration a
@@ -40,9 +40,11 @@ from collide.robots.forward_kinematics import Joints, view_joints
     STATE_OF_PART, GAP_OF_PART, WALKS_AT,
     # a double: boxes are moved outwards by this share of all that went into them
     SLACK,
-) = range(47)
-HEADER = 47
+) = range(48)
+HEADER = 48
 
+#: Sums of |RᵀR − 1| below this count as roundings of a rotation R.
+ROUNDINGS_OF_ROTATIONS = 1e-13
 # Integers of a body: its link, its first part and how many there are.
 LINK, FIRST, COUNT = range(3)
 BODY_INTS = 3

@@ -19,7 +19,8 @@ from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack
 from collide.lowering.parts import Part, bounding_parts_of, parts_of
 from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, ShapeTable, pose_table
 from collide.mesh.convex_surface import is_own_hull
-from collide.robots.check_scene import BODY_INTS, BOX
+from collide.narrowphase.posed_pair import LEAST_SQUARE
+from collide.robots.check_scene import BODY_INTS, BOX, ROUNDINGS_OF_ROTATIONS
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh, corners_of_facets
@@ -47,19 +48,41 @@ class RobotBody(NamedTuple):
 
 
 class BodyAround(NamedTuple):
-    """A body of the surroundings.   X_WB : (4, 4).   margin : swelling against the robot [m]."""
+    """A body of the surroundings.   X_WB : (4, 4).   margin : swelling against the robot [m].   row : of its pose among
+    those of the World's bodies.
+    """
 
     name: str
     shape: Shape
     X_WB: np.ndarray
     margin: float = 0.0
+    row: int = 0
+
+
+class MovedBodies(Sequence):
+    """Bodies around at other poses.   X_WBs : (n, 4, 4) of the World's bodies."""
+
+    def __init__(self, bodies: Sequence[BodyAround], X_WBs: np.ndarray):
+        self._bodies: Sequence[BodyAround] = bodies._bodies if isinstance(bodies, MovedBodies) else bodies
+        self._X_WBs = X_WBs
+
+    def __len__(self) -> int:
+        return len(self._bodies)
+
+    def __getitem__(self, k):
+        if isinstance(k, slice):
+            return [self[j] for j in range(*k.indices(len(self)))]
+        body = self._bodies[k]
+        return body._replace(X_WB=self._X_WBs[body.row])
 
 
 class Surroundings(NamedTuple):
     """The surroundings' part of `CheckTables`.
 
-    bodies : by number.   packed : of the parts.   poses : (parts, POSE).   body_of : (parts,) int64.
-    is_bound : (parts,) bool.   tree : over the parts.   table : of the parts.   X_BP : (parts, 4, 4).
+    bodies : by number.   packed : of the parts.   body_of : (parts,) int64.   is_bound : (parts,) bool.
+    table : of the parts.   X_BP : (parts, 4, 4).   rows : (parts,) int64, of the parts' bodies among the World's.
+    poses : (parts, POSE).   tree : over the parts.   Both are of when the tables were made: a `CheckWorkspace` has them
+        as the bodies stand.
     """
 
     bodies: Sequence[BodyAround]
@@ -70,6 +93,12 @@ class Surroundings(NamedTuple):
     tree: BoxTree | None
     table: ShapeTable
     X_BP: np.ndarray
+    rows: np.ndarray
+
+    @property
+    def has_margins(self) -> bool:
+        """Whether a body is swollen."""
+        return any(body.margin != 0.0 for body in self.bodies)
 
 
 class CheckTables(NamedTuple):
@@ -113,7 +142,8 @@ class Setting(NamedTuple):
     bodies : of the robot.   base : pose of the root, as `forward_kinematics.LINK_POSE` doubles.
     self_pairs : (k, 2) int64 of tested bodies.   allowed : (bodies, around) uint8, 1 for pairs never tested.
     skipped : {reason: number of pairs never tested}.
-    seen : the World as of then.   spare : workspaces of threads not at work.
+    seen : the World as of then.   made_of : the World as of when the tables were made.   spare : workspaces of threads
+        not at work.
     """
 
     bodies: Sequence[RobotBody]
@@ -124,6 +154,7 @@ class Setting(NamedTuple):
     allowed: np.ndarray
     skipped: dict[str, int]
     seen: Any = None
+    made_of: Any = None
     spare: Any = None
 
 
@@ -138,7 +169,7 @@ def surroundings_of(bodies: Sequence[BodyAround], before: Surroundings | None = 
     before : surroundings whose parts are taken over where bodies have at most moved.
     """
     if before is not None and _have_at_most_moved(before.bodies, bodies):
-        _, packed, _, body_of, is_bound, _, table, X_BP = before
+        _, packed, _, body_of, is_bound, _, table, X_BP, _ = before
         poses = _poses_of(bodies, body_of, X_BP, packed)
     else:
         of_bodies = [convex_parts_of(body.shape) for body in bodies]
@@ -153,7 +184,8 @@ def surroundings_of(bodies: Sequence[BodyAround], before: Surroundings | None = 
             packed[k] = packed_within(packed[k], float(margins[k]), poses[k, :9].reshape(3, 3))
         table = ShapeTable(packed)
     tree = BoxTree(boxes_of(table, poses, np.arange(len(packed)))) if packed else None
-    return Surroundings(bodies, packed, poses, body_of, is_bound, tree, table, X_BP)
+    rows = np.array([body.row for body in bodies], dtype=np.int64)[body_of]
+    return Surroundings(bodies, packed, poses, body_of, is_bound, tree, table, X_BP, rows)
 
 
 def _have_at_most_moved(before: Sequence[BodyAround], now: Sequence[BodyAround]) -> bool:
@@ -291,9 +323,13 @@ def _body_boxes(rows: np.ndarray, parts: np.ndarray, part_boxes: np.ndarray, pad
 
 
 def _stretches(poses: np.ndarray) -> np.ndarray:
-    """(k,) by how much each matrix lengthens a vector at most: the root of the largest row sum of |RᵀR|."""
-    R = poses[:, :9].reshape(-1, 3, 3)
-    return np.sqrt(np.abs(np.swapaxes(R, 1, 2) @ R).sum(axis=2).max(axis=1, initial=0.0)) * (1 + 1e-15)
+    """(k,) `posed_pair.stretch_of_pose` of each, number by number."""
+    x, y, z = (poses[:, axis:9:3] for axis in range(3))
+    xx, yy, zz, xy, yz, zx = (
+        np.abs(u[:, 0] * v[:, 0] + u[:, 1] * v[:, 1] + u[:, 2] * v[:, 2])
+        for u, v in ((x, x), (y, y), (z, z), (x, y), (y, z), (z, x))
+    )
+    return np.sqrt(np.maximum.reduce([xx + xy + zx, yy + xy + yz, zz + yz + zx, np.full(len(x), LEAST_SQUARE)]))
 
 
 def _skew(R: np.ndarray) -> np.ndarray:
@@ -301,5 +337,5 @@ def _skew(R: np.ndarray) -> np.ndarray:
     rotations are used as they are: boxes are off by a share in proportion.
     """
     off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).sum(axis=(1, 2))
-    return np.where(off < 1e-13, 0.0, off)
+    return np.where(off < ROUNDINGS_OF_ROTATIONS, 0.0, off)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from collide.kernels import address_of, code_of
@@ -11,36 +13,39 @@ from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, answer_pairs
 from collide.results import PAIR_DTYPE
 from collide.robots import check_scene as layout
 from collide.robots import motion_bounds as motions
-from collide.robots.check_tables import Setting
+from collide.robots.check_tables import UNBOUNDED_HALF, Setting, Surroundings
 from collide.robots.field_walks import field_walks
-from collide.robots.forward_kinematics import JointTable
+from collide.robots.move_surroundings import FIELD_MOVED, SKEWED, move_surroundings
+from collide.robots.robot import Robot
+from collide.robots.robot_bodies import paths_to_root
+from collide.robots.sample_motions import OPEN_SAMPLE
 
 #: Pairs left to others that a call has space for, at least.
 _LEAST_OPEN = 4096
 #: Pairs of parts that may stay open at once while a motion is halved, at most.
 _MAX_ITEMS = 1 << 20
 _OPEN_INTERVALS = 4096
+#: Roundings of forward kinematics, as a share of where links are and how far they reach.
+_ROUNDING = 2.0**-40
 
 
 class CheckWorkspace:
-    """One thread's buffers.
+    """One thread's buffers, and the surroundings as they stand for its questions.
 
-    header, motion_header : of `check_scene.py` and `motion_bounds.py`.
-    open_pairs : (k, OPEN_INTS) what the last call left to others.   open_intervals : (k, OPEN_INTERVAL).
+    header, address : of `check_scene.py`.   open_pairs : (k, OPEN_INTS) what the last call left to others.
     """
 
-    def __init__(self, joints: JointTable, setting: Setting):
-        self._setting = joints, setting  # kernels read what they hold
-        tables, around = setting.tables, setting.surroundings
-        self_pairs, allowed = setting.self_pairs, setting.allowed
+    def __init__(self, robot: Robot, setting: Setting):
+        self.robot, self._setting = robot, setting  # kernels read what they hold
+        tables, around, joints = setting.tables, setting.surroundings, robot.joint_table
         n_bodies, n_parts, n_around = len(tables.bodies), len(tables.poses), len(around.packed)
-        nothing = np.zeros(1, dtype=np.int64)
-        tree = around.tree
+        nothing, tree = np.zeros(1, dtype=np.int64), around.tree
         unbounded = np.ascontiguousarray(tree.unbounded, dtype=np.int64) if tree is not None else nothing[:0]
         n_link_parts = n_parts - n_around
         # One configuration leaves each pair of parts to others at most once.
         capacity = max(_LEAST_OPEN, n_link_parts * (n_around + n_link_parts) + 1)
         self._open = np.empty((capacity, layout.OPEN_INTS), dtype=np.int64)
+        self._seen, self._rows, self._boxes = setting.made_of, around.rows, _boxes_around(around)
         self._buffers = buffers = {
             layout.POSES_AT: tables.poses.copy(), layout.LINKS_AT: np.zeros((joints.n_links, POSE)),
             layout.WORLD_BOXES_AT: np.zeros((n_bodies, layout.BOX)),
@@ -49,23 +54,23 @@ class CheckWorkspace:
             layout.ROW_AT: np.zeros(1, dtype=PAIR_DTYPE), layout.DOUBLES_AT: np.zeros(DOUBLES),
             layout.INTEGERS_AT: np.zeros(INTEGERS, dtype=np.int64), layout.OPEN_AT: self._open,
             layout.JOINT_INTS_AT: joints.ints, layout.JOINT_DOUBLES_AT: joints.doubles, layout.BASE_AT: setting.base,
-            layout.BODIES_AT: tables.bodies, layout.BODY_BOXES_AT: tables.body_boxes, layout.SELF_PAIRS_AT: self_pairs,
-            layout.PARTS_AT: tables.parts, layout.PART_BOXES_AT: tables.part_boxes, layout.IS_BOUND_AT: tables.is_bound,
-            layout.UNBOUNDED_AT: unbounded, layout.BODY_OF_AT: around.body_of, layout.ALLOWED_AT: allowed,
-            layout.TERMS_AT: NO_TERMS, layout.SHAPE_OF_AT: tables.shape_of,
+            layout.BODIES_AT: tables.bodies, layout.BODY_BOXES_AT: tables.body_boxes,
+            layout.SELF_PAIRS_AT: setting.self_pairs, layout.PARTS_AT: tables.parts,
+            layout.PART_BOXES_AT: tables.part_boxes, layout.IS_BOUND_AT: tables.is_bound,
+            layout.UNBOUNDED_AT: unbounded, layout.BODY_OF_AT: around.body_of, layout.PART_POSES_AT: around.X_BP,
+            layout.ALLOWED_AT: setting.allowed, layout.TERMS_AT: NO_TERMS, layout.SHAPE_OF_AT: tables.shape_of,
         }
-        self._walks = field_walks(around, *map(address_of, (buffers[layout.DOUBLES_AT], buffers[layout.INTEGERS_AT])))
-        buffers[layout.WALKS_AT] = self._walks.words
         numbers = {
             layout.N_JOINTS: len(joints.ints), layout.ROOT: joints.root, layout.N_LINKS: joints.n_links,
             layout.CORE: code_of(answer_pairs), layout.STATE_OF_PART: code_of(state_of_part),
-            layout.GAP_OF_PART: code_of(gap_of_part), layout.N_BODIES: n_bodies, layout.N_SELF_PAIRS: len(self_pairs),
-            layout.N_LINK_PARTS: n_parts - n_around, layout.PADDED: tables.padded, layout.N_PARTS: n_parts,
-            layout.N_UNBOUNDED: len(unbounded), layout.N_AROUND: allowed.shape[1],
-            layout.OPEN_CAPACITY: capacity,
+            layout.GAP_OF_PART: code_of(gap_of_part), layout.N_BODIES: n_bodies,
+            layout.N_SELF_PAIRS: len(setting.self_pairs), layout.N_LINK_PARTS: n_link_parts,
+            layout.PADDED: tables.padded, layout.N_PARTS: n_parts, layout.N_UNBOUNDED: len(unbounded),
+            layout.N_AROUND: setting.allowed.shape[1], layout.OPEN_CAPACITY: capacity,
         }
         if tree is not None:
-            buffers |= {layout.NODES_AT: tree.nodes, layout.NODE_LINKS_AT: tree.links}
+            nodes = tree.nodes[: tree.n_nodes].copy()
+            buffers |= {layout.NODES_AT: nodes, layout.NODE_LINKS_AT: tree.links}
             numbers |= {layout.N_NODES: tree.n_nodes}
         self.header = np.zeros(layout.HEADER, dtype=np.int64)
         for word, number in numbers.items():
@@ -75,10 +80,55 @@ class CheckWorkspace:
         self.header[layout.INTS_AT], self.header[layout.NUMBERS_AT] = tables.table.addresses
         self.header[layout.SLACK : layout.SLACK + 1].view(np.float64)[:] = tables.slack
         self.address = address_of(self.header)
+        self.verdict = bytearray(1)  # of a single configuration
+        self.verdict_at = address_of(np.frombuffer(self.verdict, dtype=np.uint8))
+        self._walk_fields(setting)
+        self._motions: MotionWorkspace | None = None
+
+    def _walk_fields(self, setting: Setting) -> None:
+        """Questions about fields around, where they stand."""
+        workspace = (address_of(self._buffers[layout.DOUBLES_AT]), address_of(self._buffers[layout.INTEGERS_AT]))
+        self._walks = field_walks(setting.surroundings, *workspace)
+        self.header[layout.WALKS_AT] = address_of(self._walks.words)
+
+    def stand(self, setting: Setting) -> bool:
+        """Bring the surroundings to where a setting of the same tables has them: O(parts) comparisons, O(nodes) where a
+        body has moved. False, and nothing is done, where a body's matrix is not a rotation.
+        """
+        if setting.seen is self._seen:
+            return True
+        X_WBs = setting.seen.X_WBs
+        moved = move_surroundings(
+            self.address, address_of(X_WBs), address_of(self._seen.X_WBs), address_of(self._rows),
+            address_of(self._boxes),
+        )
+        if moved == SKEWED:
+            return False
+        self._seen = setting.seen
+        if moved == FIELD_MOVED:
+            self._walk_fields(setting)
+        return True
+
+    def motions(self, resolution: float) -> MotionWorkspace:
+        """The workspace of `certify_motions`, for this resolution [rad or m]."""
+        if self._motions is None:
+            self._motions = MotionWorkspace(self.robot, self._setting)
+        self._motions.begin(resolution)
+        return self._motions
+
+    @functools.cached_property
+    def sample(self) -> tuple[np.ndarray, np.ndarray]:
+        """A configuration (dof,), and space for the samples that `sample_motions` leaves to others."""
+        return np.zeros(max(self.robot.dof, 1)), np.empty((len(self._open), OPEN_SAMPLE))
 
     @property
     def open_pairs(self) -> np.ndarray:
         return self._open[: self.header[layout.N_OPEN]]
+
+
+def _boxes_around(around: Surroundings) -> np.ndarray:
+    """(parts, 6) boxes of the parts in the world, those of the tree."""
+    return np.zeros((0, 6)) if around.tree is None else around.tree.boxes.copy()
 
 
 class MotionWorkspace:
@@ -87,17 +137,21 @@ class MotionWorkspace:
     open_intervals, mesh_pairs : (k, OPEN_INTERVAL) what the last call left open, and to others.
     """
 
-    def __init__(self, paths: list[np.ndarray], between: np.ndarray, dof: int, n_pairs: int, resolution: float,
-                 rounding: float):
+    def __init__(self, robot: Robot, setting: Setting):
+        number = {joint.name: k for k, joint in enumerate(robot.sorted_joints)}
+        names = paths_to_root(robot, [body.link for body in setting.bodies])
+        paths = [np.array([number[name] for name in path], dtype=np.int64) for path in names]
         lengths = np.array([len(path) for path in paths], dtype=np.int64)
         stride = max(int(lengths.max(initial=0)), 1)
         table = np.zeros((len(paths), stride), dtype=np.int64)
         for k, path in enumerate(paths):
             table[k, : len(path)] = path
+        n_pairs = len(setting.self_pairs) + int((setting.allowed == 0).sum())
         n_items = min(_MAX_ITEMS, max(1024, motions.MAX_INTERVALS * n_pairs))
         self._buffers = {
-            motions.PATHS_AT: table, motions.PATH_LENGTHS_AT: lengths, motions.BETWEEN_AT: between,
-            motions.CONFIGURATION_AT: np.zeros(max(dof, 1)), motions.MOVED_AT: np.zeros((len(paths), stride + 1)),
+            motions.PATHS_AT: table, motions.PATH_LENGTHS_AT: lengths,
+            motions.BETWEEN_AT: _joints_between(names, setting.self_pairs),
+            motions.CONFIGURATION_AT: np.zeros(max(robot.dof, 1)), motions.MOVED_AT: np.zeros((len(paths), stride + 1)),
             motions.INTERVALS_AT: np.zeros((motions.MAX_INTERVALS + 1, motions.INTERVAL)),
             motions.ITEMS_AT: np.empty((n_items + 1, motions.ITEM), dtype=np.int64),
         }
@@ -106,8 +160,13 @@ class MotionWorkspace:
             self.header[word] = address_of(buffer)
         self.header[motions.PATH_STRIDE], self.header[motions.ITEM_CAPACITY] = stride, n_items
         self._make_space(_OPEN_INTERVALS)
-        self.header[motions.RESOLUTION :].view(np.float64)[:] = resolution, rounding
+        self.header[motions.ROUNDING :].view(np.float64)[:] = _ROUNDING * _reach_of(robot, setting)
         self.address = address_of(self.header)
+
+    def begin(self, resolution: float) -> None:
+        """Count anew, of motions with this resolution [rad or m]."""
+        self.header[motions.N_CHECKED] = 0
+        self.header[motions.RESOLUTION : motions.ROUNDING].view(np.float64)[:] = resolution
 
     def _make_space(self, n: int) -> None:
         """For so many open intervals and pairs of meshes."""
@@ -133,3 +192,21 @@ class MotionWorkspace:
     def n_checked(self) -> int:
         """Configurations asked so far."""
         return int(self.header[motions.N_CHECKED])
+
+
+def _joints_between(paths: list[list[str]], self_pairs: np.ndarray) -> np.ndarray:
+    """(pairs, 2) how many joints of each body's path stand between the bodies of each pair."""
+    out = np.zeros((max(len(self_pairs), 1), 2), dtype=np.int64)
+    for k, (a, b) in enumerate(self_pairs.tolist()):
+        shared = set(paths[a]) & set(paths[b])
+        out[k] = len(paths[a]) - len(shared), len(paths[b]) - len(shared)
+    return out
+
+
+def _reach_of(robot: Robot, setting: Setting) -> float:
+    """What links' places are made of, added up [m]. Where a body without end meets a body of the robot, roundings are
+    as large as the latter reaches.
+    """
+    boxes = np.abs(setting.tables.body_boxes)
+    reach = float(boxes[boxes.max(axis=1) < UNBOUNDED_HALF].sum(axis=1).max(initial=0.0))
+    return reach + float(np.abs(setting.base[9:]).sum()) + float(np.abs(robot.joint_table.doubles[:, 9:12]).sum())

@@ -13,7 +13,9 @@ import numpy as np
 from collide.base import argument_checks as checks
 from collide.base.threads import check_threads, pieces_of, share
 from collide.errors import InvalidArgument
-from collide.robots.check_tables import Setting, robot_tables, surroundings_of, tables_among
+from collide.kernels import address_of
+from collide.robots.check_configurations import check_configurations
+from collide.robots.check_tables import MovedBodies, Setting, robot_tables, surroundings_of, tables_among
 from collide.robots.check_workspace import CheckWorkspace
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import SeenWorld, bodies_around, filters_of, refuse_own_margins, robot_bodies
@@ -134,12 +136,17 @@ class CheckerScene:
         Returns
         -------
         Setting
-            Where bodies have moved, the tables of robot and shapes are taken over; where shapes are replaced, the
-            tables of the robot. Threads asking at once may make a setting each.
+            Where bodies have moved, all tables are taken over, and workspaces bring poses up to date; where shapes are
+            replaced, the tables of the robot. Threads asking at once may make a setting each.
         """
         before, world = self._setting, self.world
-        if self._is_fixed and before is not None:
-            return before
+        if before is not None:
+            if self._is_fixed or (before.seen.world is world and world._is_as_of(before.seen.version)):
+                return before
+            moved = self._among_moved_bodies(before)
+            if moved is not None:
+                self._setting = moved
+                return moved
         with world._pack() as packed:
             if before is not None and before.seen.is_of_now(world, packed):
                 return before
@@ -153,8 +160,40 @@ class CheckerScene:
         surroundings = surroundings_of(around, None if before is None else before.surroundings)
         base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
         tables = tables_among(self._tables, surroundings, before)
-        setting = self._setting = Setting(self._bodies, base, surroundings, tables, *filters, seen, [])
+        setting = self._setting = Setting(self._bodies, base, surroundings, tables, *filters, seen, seen, [])
         return setting
+
+    def _among_moved_bodies(self, before: Setting) -> Setting | None:
+        """The setting before, and the World's bodies as they stand, where they have at most moved; ``None`` where poses
+        are to be read anew: margins swell parts by how their bodies are turned, matrices that are no rotations change
+        the slack of boxes.
+        """
+        seen = before.seen.moved() if before.seen.world is self.world and not before.surroundings.has_margins else None
+        if seen is None:
+            return None
+        bodies = MovedBodies(before.surroundings.bodies, seen.X_WBs)
+        moved = before._replace(seen=seen, surroundings=before.surroundings._replace(bodies=bodies))
+        space = self._workspace(before)
+        stands = space.stand(moved)
+        before.spare.append(space)
+        return moved if stands else None
+
+    def _verdict(self, q: np.ndarray) -> int:
+        """IS_FREE, COLLIDES or IS_OPEN, of a configuration (1, dof)."""
+        setting = self.prepare()
+        space = self._workspace(setting)
+        space.stand(setting)
+        check_configurations(space.address, address_of(q), self.robot.dof, 0, 1, space.verdict_at)
+        verdict = space.verdict[0]
+        setting.spare.append(space)
+        return verdict
+
+    def _workspace(self, setting: Setting) -> CheckWorkspace:
+        """A workspace not in use, to be put back into ``setting.spare``."""
+        try:
+            return setting.spare.pop()
+        except IndexError:  # all are in use: another thread may have taken the last
+            return CheckWorkspace(self.robot, setting)
 
     def _as_of_now(self) -> Self:
         """The checker among the bodies as they stand now; changes of the World during a question do not reach it."""
@@ -168,16 +207,13 @@ class CheckerScene:
         """Have ``work`` done on pieces of n units by so many threads, each with a workspace of its own."""
         threads = check_threads(threads)
         setting, done = self.prepare(), 0
-        spare = setting.spare
 
         def on_piece(piece: slice) -> None:
             nonlocal done
-            try:
-                space = spare.pop()
-            except IndexError:  # all are in use: another thread may have taken the last
-                space = CheckWorkspace(self.robot.joint_table, setting)
+            space = self._workspace(setting)
+            space.stand(setting)
             work(space, piece)
-            spare.append(space)
+            setting.spare.append(space)
             done += piece.stop - piece.start
             if progress is not None:
                 progress(done, n)

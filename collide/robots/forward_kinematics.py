@@ -100,6 +100,16 @@ def link_poses_of(table: JointTable, q: np.ndarray, X_WR: np.ndarray) -> np.ndar
     return out
 
 
+@entry("boolean(int64, int64)", nogil=False)
+def are_finite(at, n):
+    """Whether n doubles are numbers."""
+    values = view_f64(at, n)
+    for k in range(n):
+        if not abs(values[k]) < math.inf:
+            return False
+    return True
+
+
 class Joints(NamedTuple):
     """Views of a `JointTable`.   n : joints.   root : link.   base : X_WR, LINK_POSE doubles."""
 

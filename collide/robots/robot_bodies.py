@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -118,18 +119,29 @@ def _checked_padding(what: str, value) -> float:
 
 
 class SeenWorld:
-    """Bodies and filters of a World as of a question, for `bodies_around` and `filters_of`; later changes of the World
-    do not reach it.   world : whose.   X_WBs : (n, 4, 4) copied.
+    """Bodies and filters of a World as of a question, for `bodies_around` and `filters_of`, without later changes.
+
+    world : whose.   X_WBs : (n, 4, 4) copied.   version : of the World's tables.
     """
 
     def __init__(self, world: World, packed: PackedWorld):
         self.world, self.roster, self.filters, self.X_WBs = world, packed.roster, packed.filters, packed.X_WBs.copy()
+        self.version = packed.version
 
     def is_of_now(self, world: World, packed: PackedWorld) -> bool:
         return (
             world is self.world and packed.roster is self.roster and packed.filters is self.filters
             and np.array_equal(packed.X_WBs, self.X_WBs)
         )
+
+    def moved(self) -> SeenWorld | None:
+        """The World as of now, where bodies have at most moved since; else ``None``."""
+        now = self.world._poses_beside(self.roster, self.filters)
+        if now is None:
+            return None
+        made = copy.copy(self)
+        made.version, made.X_WBs = now
+        return made
 
     def has_pairs_of(self, before: SeenWorld) -> bool:
         """Whether the same pairs are tested as before: shapes, poses and margins have no say."""
@@ -141,7 +153,8 @@ class SeenWorld:
         )
 
     @cached_property
-    def _positions(self) -> dict[str, int]:
+    def rows(self) -> dict[str, int]:
+        """Row of each body in ``X_WBs``, by name."""
         alive = np.flatnonzero(self.roster.alive).tolist()
         return {self.roster.names[k]: k for k in alive}
 
@@ -149,7 +162,7 @@ class SeenWorld:
     def names(self) -> dict[int, str]:
         """Name of each body, by id."""
         ids = self.roster.ids.tolist()
-        return {ids[k]: name for name, k in self._positions.items()}
+        return {ids[k]: name for name, k in self.rows.items()}
 
     @property
     def allowed(self) -> dict[tuple[int, int], str]:
@@ -161,14 +174,15 @@ class SeenWorld:
 
     def body(self, name: str) -> Body:
         """The body of this name."""
-        position = self._positions[name]
+        position = self.rows[name]
         return self.roster.body(position, self.X_WBs[position])
 
 
 def bodies_around(world: World | SeenWorld, robot: Robot) -> list[BodyAround]:
     """Bodies of a World other than the robot's own, recognised by the names of links."""
-    others = [world.body(name) for name in world.names.values() if name not in robot.geometry]
-    return [BodyAround(body.name, body.shape, body.X_WB, body.margin) for body in others]
+    rows = world.rows if isinstance(world, SeenWorld) else {}
+    others = (world.body(name) for name in world.names.values() if name not in robot.geometry)
+    return [BodyAround(B.name, B.shape, B.X_WB, B.margin, rows.get(B.name, k)) for k, B in enumerate(others)]
 
 
 def refuse_own_margins(packed: PackedWorld | SeenWorld, robot: Robot) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 from collide.base import argument_checks as checks
 from collide.base.threads import check_threads
 from collide.errors import InvalidArgument, brief, listing
-from collide.robots.certified_edges import SAMPLED_HALVINGS, CertifiedEdges, certify, sampled_collision
+from collide.robots.certified_edges import CertifiedEdges, certify, sampled_collision
+from collide.robots.check_configurations import COLLIDES, IS_OPEN
 from collide.robots.checker_scene import CheckerScene
 from collide.robots.configuration_batches import check_piece, measure_piece
 from collide.robots.configuration_report import ConfigurationReport
@@ -150,6 +151,10 @@ class RobotChecker(CheckerScene):
             For another number of columns; for values that are not finite, naming row and joint.
         """
         q, is_single = self._configurations(Q)
+        if is_single and threads == 1 and progress is None:
+            verdict = self._verdict(q)
+            if verdict != IS_OPEN:
+                return verdict == COLLIDES
         out = np.zeros(len(q), dtype=bool)
         now = self._as_of_now()
         now.in_pieces(len(q), threads, progress, lambda space, piece: check_piece(now, space, q[piece], out[piece]))
@@ -207,8 +212,7 @@ class RobotChecker(CheckerScene):
         """
         q0, q1 = self._edges(Q0, Q1)
         step = _positive("RobotChecker.edge_collides: resolution", resolution)
-        now = self._as_of_now()
-        return ~np.isnan(sampled_collision(q0, q1, step, lambda q: now.collides(q, threads=threads)))
+        return ~np.isnan(sampled_collision(self._as_of_now(), q0, q1, step, threads))
 
     def certify_edges(
         self, Q0, Q1, *, resolution: float = 1e-3, threads: int = 1, progress: Callable[[int, int], None] | None = None
@@ -244,9 +248,7 @@ class RobotChecker(CheckerScene):
         """
         q0, q1 = self._edges(Q0, Q1)
         step = _positive("RobotChecker.certify_edges: resolution", resolution)
-        now = self._as_of_now()
-        times = sampled_collision(q0, q1, step, lambda q: now.collides(q, threads=threads), SAMPLED_HALVINGS)
-        return certify(now, q0, q1, times, step, threads, progress)
+        return certify(self._as_of_now(), q0, q1, step, threads, progress)
 
     def explain(self, q) -> ConfigurationReport:
         """Colliding pairs of a configuration with their depths, or the nearest pairs, to be printed.
@@ -339,11 +341,13 @@ class RobotChecker(CheckerScene):
 
     def _configurations(self, Q, name: str = "Q") -> tuple[np.ndarray, bool]:
         """((N, dof) C-contiguous, whether a single one was given). Raises InvalidArgument."""
-        q = np.ascontiguousarray(self.robot.checked_configurations(Q, name))
-        return q, np.ndim(Q) == 1
+        q = self.robot.checked_configurations(Q, name)
+        return q if q.flags.c_contiguous else np.ascontiguousarray(q), np.ndim(Q) == 1
 
     def _edges(self, Q0, Q1) -> tuple[np.ndarray, np.ndarray]:
         q0, q1 = self._configurations(Q0, "Q0")[0], self._configurations(Q1, "Q1")[0]
+        if len(q0) == len(q1):
+            return q0, q1
         n = checks.matched_count("RobotChecker: edges", Q0=len(q0), Q1=len(q1))
         return tuple(np.ascontiguousarray(np.broadcast_to(q, (n, q.shape[1]))) for q in (q0, q1))  # type: ignore
 

@@ -424,6 +424,28 @@ class WorldScene:
             packed.readers.append(None)
             return packed
 
+    def _is_as_of(self, version: int) -> bool:
+        """Whether nothing has changed since tables of this version; a question that begins without `_pack` asks so."""
+        if get_ident() != self._first_asker:
+            self._is_shared = True
+        return version == self._n_changes
+
+    def _poses_beside(self, roster: Roster, filters: PairFilters) -> tuple[int, np.ndarray] | None:
+        """(version, (n, 4, 4) copied poses) where nothing but poses has changed since `_pack` gave these; ``None``
+        where more has changed, and while another thread changes the World. The tables of the World stay as they are.
+        """
+        if not self._lock.now.acquire(blocking=False):
+            return None
+        try:
+            packed = self._packed
+            if packed is None or packed.filters is not filters or self._pairs_changed:
+                return None
+            if self._bodies.roster() is not roster:
+                return None
+            return self._n_changes, self._bodies.poses().copy()
+        finally:
+            self._lock.now.release()
+
     def _may_change(self, packed: PackedWorld) -> bool:
         """Whether nobody reads these tables, nor begins to: they are STALE until brought up to date. If not, they keep
         the poses that they have, and another copy is to be changed.

@@ -138,63 +138,88 @@ def test_threads_give_the_same():
 # --- samples --------------------------------------------------------------------------------------
 
 
-class Asked:
-    """Whether columns are within a window, and what was asked."""
+def rail(*places: float, mesh: bool = False) -> collide.RobotChecker:
+    """A point-like ball that slides along x by its single column, among others at these places."""
+    joint = Joint("slide", "prismatic", "base", "cart", np.eye(4), (1.0, 0.0, 0.0), lower=-1e300, upper=1e300)
+    ball = LinkShape(collide.Sphere(1e-3), np.eye(4), None, "test")
+    world, small = collide.World(), collide.Mesh([(1e-3, 0, 0), (0, 1e-3, 0), (0, 0, 1e-3), (-1e-3, -1e-3, -1e-3)],
+                                                 [(0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3)], solid=False)
+    for place in places:
+        world.add(small if mesh else collide.Sphere(1e-3), pose(t=(place, 0, 0)))
+    return collide.RobotChecker(Robot("rail", ["base", "cart"], [joint], {"cart": [ball]}), world)
 
-    def __init__(self, low: float = np.inf, high: float = np.inf):
-        self.low, self.high, self.batches = low, high, []
 
-    def __call__(self, q: np.ndarray) -> np.ndarray:
-        assert q.flags.c_contiguous and len(q)
-        self.batches.append(q[:, 0].tolist())
-        return (q[:, 0] >= self.low) & (q[:, 0] <= self.high)
+def time_of(place: float, q0: float, q1: float, step: float, most: int | None = None, mesh: bool = False) -> float:
+    checker = rail(place, mesh=mesh)
+    return float(sampled_collision(checker, np.array([[q0]]), np.array([[q1]]), step, 1, most)[0])
 
 
-def test_samples_are_the_ends_then_the_middle_then_quarters():
-    asked = Asked()
-    times = sampled_collision(np.array([[0.0]]), np.array([[8.0]]), 1.0, asked)
-    assert np.isnan(times).all()
-    assert asked.batches == [[t] for t in (0.0, 8.0, 4.0, 2.0, 6.0, 1.0, 3.0, 5.0, 7.0)]
-    for change, step, n in ((1.0, 1.0, 2), (1.0, 0.5, 3), (1.0, 0.49, 5), (2.0, 1.0, 3), (1.0, 9.0, 2), (0.0, 1.0, 2)):
-        asked = Asked()
-        sampled_collision(np.array([[0.0, -change]]), np.array([[0.0, 0.0]]), step, asked)
-        assert len(asked.batches) == n, (change, step)
+@pytest.mark.parametrize("mesh", [False, True])
+def test_samples_are_the_ends_then_the_middle_then_quarters(mesh):
+    for place, time in ((0.0, 0.0), (8.0, 1.0), (4.0, 0.5), (2.0, 0.25), (6.0, 0.75), (1.0, 0.125), (7.0, 0.875)):
+        assert time_of(place, 0.0, 8.0, 1.0, mesh=mesh) == time, place
+        assert time_of(-place, 0.0, -8.0, 1.0, mesh=mesh) == time, place
+    assert np.isnan([time_of(0.5, 0.0, 8.0, 1.0, mesh=mesh), time_of(8.1, 0.0, 8.0, 1.0, mesh=mesh)]).all()
+    order, q0, q1 = (0.0, 8.0, 4.0, 2.0, 6.0, 1.0, 3.0, 5.0, 7.0), np.array([[0.0]]), np.array([[8.0]])
+    for k, first in enumerate(order):  # of several hits the first in this order counts
+        assert sampled_collision(rail(*order[k:], mesh=mesh), q0, q1, 1.0, 1)[0] == first / 8.0
+
+
+def test_motions_are_halved_until_no_step_is_longer_than_asked():
+    for step, halvings in ((1.0, 0), (0.5, 1), (0.49, 2), (2.0, 0), (0.25, 2), (0.125, 3)):
+        for level in range(5):
+            time = 0.5**level
+            assert (time_of(-time, 0.0, -1.0, step) == time) == (level <= halvings), (step, level)
+    for most in range(3):
+        assert [time_of(0.5**k, 0.0, 1.0, 1e-3, most) == 0.5**k for k in range(4)] == [k <= most for k in range(4)]
+    assert np.isnan(time_of(1.0, 0.0, 1e300, 1e-300, 0))  # a quotient beyond the doubles
 
 
 def test_the_last_sample_is_the_end_itself():
-    """From −0.9 to −0.3, a + 1.0 · (b − a) is another double than b."""
-    q0, q1 = np.array([[-0.9]]), np.array([[-0.3]])
-    assert q0[0, 0] + 1.0 * (q1[0, 0] - q0[0, 0]) != q1[0, 0]
-    asked = Asked(-0.3, -0.3)
-    assert sampled_collision(q0, q1, 1.0, asked).tolist() == [1.0] and asked.batches == [[-0.9], [-0.3]]
+    """From −0.9 to −0.3, a + 1.0 · (b − a) is another double than b: a wall that ends in between is met by b alone."""
+    a, b = -0.9, -0.3
+    assert a + 1.0 * (b - a) != b
+    low, high = sorted((b, a + 1.0 * (b - a)))
+    sign = 1.0 if b == high else -1.0
+    wall = collide.Halfspace((-sign, 0, 0), -sign * high) if sign > 0 else collide.Halfspace((1, 0, 0), low)
+    point = LinkShape(collide.ConvexHull([(0.0, 0.0, 0.0)]), np.eye(4), None, "test")
+    joint = Joint("slide", "prismatic", "base", "cart", np.eye(4), (1.0, 0.0, 0.0), lower=-9.0, upper=9.0)
+    world = collide.World()
+    world.add(wall)
+    checker = collide.RobotChecker(Robot("rail", ["base", "cart"], [joint], {"cart": [point]}), world)
+    assert checker.collides([b]) and not checker.collides([a + 1.0 * (b - a)])
+    begin = a if not checker.collides([a]) else 0.9
+    assert sampled_collision(checker, np.array([[begin]]), np.array([[b]]), 1.0, 1).tolist() == [1.0]
 
 
-def test_what_was_hit_is_not_asked_again_and_short_motions_are_not_halved():
-    asked = Asked(4.0, 4.0)
+def test_of_many_motions_each_has_its_own_time():
     q0, q1 = np.array([[4.0], [0.0], [0.0], [9.0]]), np.array([[0.0], [4.0], [8.0], [9.5]])
-    times = sampled_collision(q0, q1, 4.0, asked)
-    assert times.tolist()[:3] == [0.0, 1.0, 0.5] and np.isnan(times[3])
-    assert asked.batches == [[4.0, 0.0, 0.0, 9.0], [4.0, 8.0, 9.5], [4.0]]
+    for mesh in (False, True):
+        times = sampled_collision(rail(4.0, mesh=mesh), q0, q1, 4.0, 1)
+        assert times.tolist()[:3] == [0.0, 1.0, 0.5] and np.isnan(times[3])
+    assert sampled_collision(rail(1.0), np.zeros((0, 1)), np.zeros((0, 1)), 1.0, 1).shape == (0,)
 
 
-def test_halvings_may_be_limited():
-    for n_halvings, n in ((0, 2), (1, 3), (2, 5), (9, 9)):
-        asked = Asked()
-        sampled_collision(np.array([[0.0]]), np.array([[8.0]]), 1.0, asked, n_halvings)
-        assert len(asked.batches) == n
-    asked = Asked()
-    sampled_collision(np.array([[0.0]]), np.array([[1e300]]), 1e-300, asked, 0)  # a quotient beyond the doubles
-    assert len(asked.batches) == 2
-    assert sampled_collision(np.zeros((0, 1)), np.zeros((0, 1)), 1.0, asked).shape == (0,)
-    assert np.isnan(sampled_collision(np.zeros((2, 0)), np.zeros((2, 0)), 1.0, lambda q: np.zeros(2, bool))).all()
+def test_samples_left_to_others_go_on_where_space_ended(monkeypatch):
+    """The hull of a mesh around the way is met by every sample, the mesh by none but the last asked."""
+    corners = np.array([(x, y, z) for x in (-40.0, 40.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    sides = [(0, 1, 3), (0, 3, 2), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 3, 7), (2, 7, 6)]
+    checker = rail()
+    checker.world.add(collide.Mesh(corners, sides, solid=False), name="tunnel")
+    checker.world.add(collide.Sphere(1e-3), pose(t=(31.0 / 32.0 * 16.0, 0, 0)))
+    monkeypatch.setattr(check_workspace, "_LEAST_OPEN", 3)
+    q0, q1 = np.array([[0.0], [0.0], [-16.0]]), np.array([[16.0], [8.0], [0.0]])
+    times = sampled_collision(checker, q0, q1, 0.5, 1)
+    assert times[0] == 31.0 / 32.0 and np.isnan(times[1:]).all()
+    assert len(checker._workspace(checker.setting)._open) < 16
 
 
 def test_more_samples_than_can_be_asked_are_refused_with_the_motion():
     q0, q1 = np.zeros((3, 1)), np.array([[1.0], [-(2.0**30) * 1.5], [2.0]])
     with pytest.raises(InvalidArgument, match=r"motion 1 changes a column by 1\.61061e\+09 .* more than 2\^30 samples"):
-        sampled_collision(q0, q1, 1.0, Asked())
-    most = Asked(0.0, 0.0)  # 2^30 samples may be asked; the first one is a hit
-    assert sampled_collision(q0[:1], np.array([[2.0**30]]), 1.0, most).tolist() == [0.0]
+        sampled_collision(rail(), q0, q1, 1.0, 1)
+    # 2^30 samples may be asked; the first is a hit
+    assert sampled_collision(rail(0.0), q0[:1], np.array([[2.0**30]]), 1.0, 1).tolist() == [0.0]
 
 
 # --- results --------------------------------------------------------------------------------------

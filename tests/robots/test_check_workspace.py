@@ -12,11 +12,10 @@ from collide.kernels import address_of
 from collide.results import PAIR_DTYPE
 from collide.robots import check_scene as layout
 from collide.robots import motion_bounds as motions
-from collide.robots.certified_edges import _motion_workspace
 from collide.robots.certify_meshes import settle_meshes
 from collide.robots.certify_motions import certify_motions
 from collide.robots.check_configurations import COLLIDES, IS_FREE, IS_OPEN, check_configurations
-from collide.robots.check_workspace import CheckWorkspace, MotionWorkspace
+from collide.robots.check_workspace import CheckWorkspace
 from collide.robots.distance_gradients import distance_gradients
 from collide.robots.kinematic_tree import Joint
 from collide.robots.motion_bounds import bound_motions
@@ -38,7 +37,8 @@ def checker_of(*shapes, robot: Robot | None = None) -> RobotChecker:
 
 
 def space_of(checker: RobotChecker, **words: int) -> CheckWorkspace:
-    space = CheckWorkspace(checker.robot.joint_table, checker.setting)
+    space = CheckWorkspace(checker.robot, checker.setting)
+    assert space.stand(checker.setting)
     for name, value in words.items():
         space.header[getattr(layout, name)] = value
     return space
@@ -56,7 +56,7 @@ def test_states_and_words_are_numbers_of_their_own():
     words = [value for name, value in vars(layout).items() if name.isupper() and name not in (
         "BODY", "SKIP", "NODE_LINK", "MEASURE", "PART", "TURNED", "POSE", "POSE_SLOP", "POSE_STRETCH", "POSE_TERMS",
         "PRODUCT_SLOP", "HEADER", "LINK", "FIRST", "COUNT", "BODY_INTS", "CENTRE", "HALF", "BOX", "OPEN_INTS",
-        "OPEN_LOWER",
+        "OPEN_LOWER", "ROUNDINGS_OF_ROTATIONS",
     )]
     assert sorted(words) == list(range(layout.HEADER))
     assert motions.ROUNDING + 1 == motions.MOTION_HEADER and motions.RESOLUTION + 1 == motions.ROUNDING
@@ -131,10 +131,11 @@ def test_gradients_of_rows_that_have_one():
 
 
 def motion(checker: RobotChecker, q0, q1, capacity: int | None = None, resolution: float = 1e-2):
-    space, work = space_of(checker), _motion_workspace(checker, resolution)
+    space = space_of(checker)
+    work = space.motions(resolution)
     if capacity is not None:
         work.header[[motions.OPEN_INTERVAL_CAPACITY, motions.MESH_PAIR_CAPACITY]] = capacity
-    q0, q1, times = np.array(q0, dtype=float), np.array(q1, dtype=float), np.full(len(q0), 7.0)
+    q0, q1, times = np.array(q0, dtype=float), np.array(q1, dtype=float), np.full(len(q0), np.nan)
     end = certify_motions(
         space.address, work.address, address_of(q0), address_of(q1), q0.shape[1], 0, len(q0), address_of(times)
     )
@@ -156,7 +157,7 @@ def test_a_motion_without_space_for_its_intervals_is_begun_again():
     assert end == 3 and np.isnan(times).all() and work.open_intervals[:, 0].tolist() == [0.0, 2.0]
     assert work.open_intervals[:, 3:].tolist() == [[0.0, -1.0]] * 2
     end, times, _, work = motion(checker, *ends, capacity=1)
-    assert end == 2 and np.isnan(times[:2]).all() and times[2] == 7.0 and work.open_intervals[:, 0].tolist() == [0.0]
+    assert end == 2 and np.isnan(times).all() and work.open_intervals[:, 0].tolist() == [0.0]
     before = work.header[motions.OPEN_INTERVAL_CAPACITY], work.header[motions.OPEN_INTERVALS_AT]
     work.grow()
     assert work.header[motions.OPEN_INTERVAL_CAPACITY] > before[0] == 1
@@ -184,7 +185,8 @@ def test_bounds_of_motions_are_of_the_half_interval_and_hold():
     box = [LinkShape(collide.Box((0.2, 0.1, 0.3)), pose(t=(0.1, 0, 0)), None, "test")]
     robot = Robot("chain", ["base", "a", "b", "c"], joints, {"a": box, "c": box})
     checker = checker_of(collide.Sphere(0.1), robot=robot)
-    space, work = space_of(checker), _motion_workspace(checker, 1e-3)
+    space = space_of(checker)
+    work = space.motions(1e-3)
     q0, q1 = rng.normal(size=(2, 20, 3))
     assert checker.bodies == ["c", "a"]
     corners = np.array([(0.1 + x, y, z, 1.0) for x in (-0.1, 0.1) for y in (-0.05, 0.05) for z in (-0.15, 0.15)])
@@ -209,9 +211,15 @@ def test_bounds_of_motions_are_of_the_half_interval_and_hold():
     assert tightest < 3.0
 
 
-def test_workspaces_of_robots_without_joints_or_pairs():
-    work = MotionWorkspace([], np.zeros((1, 2), dtype=np.int64), 0, 0, 0.5, 0.25)
-    assert work.header[motions.RESOLUTION :].view(np.float64).tolist() == [0.5, 0.25]
+def test_workspaces_of_motions_are_made_once_and_take_each_resolution():
+    joints = [Joint("weld", "fixed", "base", "a", pose(t=(0, 0, 0.2)))]
+    box = [LinkShape(collide.Box((0.2, 0.1, 0.3)), np.eye(4), None, "test")]
+    checker = checker_of(collide.Sphere(0.1), robot=Robot("still", ["base", "a"], joints, {"a": box}))
+    space = space_of(checker)
+    work = space.motions(0.5)
+    assert work.header[motions.RESOLUTION : motions.ROUNDING].view(np.float64).tolist() == [0.5]
     assert work.header[motions.PATH_STRIDE] == 1 and work.header[motions.ITEM_CAPACITY] == 1024
-    many = MotionWorkspace([np.arange(3), np.arange(2)], np.zeros((1, 2), dtype=np.int64), 3, 10**6, 0.5, 0.25)
-    assert many.header[motions.PATH_STRIDE] == 3 and many.header[motions.ITEM_CAPACITY] == 1 << 20
+    work.header[motions.N_CHECKED] = 7
+    assert space.motions(0.25) is work and work.n_checked == 0
+    assert work.header[motions.RESOLUTION : motions.ROUNDING].view(np.float64).tolist() == [0.25]
+    assert checker.certify_edges(np.zeros((2, 0)), np.zeros((2, 0))).free.all()

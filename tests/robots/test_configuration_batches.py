@@ -43,7 +43,7 @@ def checker_of(*placed: tuple, robot: Robot | None = None) -> collide.RobotCheck
 def measured(checker, q, limit: float = np.inf):
     q = np.array(q, dtype=float)
     rows, gradient = np.zeros(len(q), dtype=NEAREST_DTYPE), np.zeros(q.shape)
-    measure_piece(checker, CheckWorkspace(checker.robot.joint_table, checker.setting), q, rows, gradient, limit)
+    measure_piece(checker, CheckWorkspace(checker.robot, checker.setting), q, rows, gradient, limit)
     return rows, gradient
 
 
@@ -52,7 +52,7 @@ def test_what_is_left_to_others_is_asked_of_its_own_configuration():
     checker = checker_of((LIDLESS, 0.5), (collide.Sphere(0.1), -0.5))
     q = np.array([[0.5], [0.7], [-0.5], [0.0], [0.55], [0.19], [0.9]])
     out = np.ones(len(q), dtype=bool)
-    check_piece(checker, CheckWorkspace(checker.robot.joint_table, checker.setting), q, out)
+    check_piece(checker, CheckWorkspace(checker.robot, checker.setting), q, out)
     assert out[:3].tolist() == [False, True, True] and not out[6]
     X_WB = pose(t=(0.5, 0, 0))
     for value, hit in zip(q[:, 0].tolist(), out.tolist()):

@@ -89,14 +89,49 @@ def test_what_has_not_changed_is_taken_over():
     before = checker.setting
     world.set_pose("b1", np.eye(4))
     moved = checker.prepare()
-    assert moved.tables.table is before.tables.table and moved.allowed is before.allowed
-    assert moved.tables.poses is not before.tables.poses and moved.spare is not before.spare
+    assert moved.tables is before.tables and moved.allowed is before.allowed and moved.spare is before.spare
+    assert (moved.surroundings.bodies[2].X_WB == np.eye(4)).all()
+    sheared = np.eye(4)
+    sheared[0, 1] = 1e-10
+    world.set_pose("b1", sheared)  # boxes of bodies that are not quite turned have other slack
+    skewed = checker.prepare()
+    assert skewed.tables.slack > moved.tables.slack and skewed.tables.table is moved.tables.table
     world.replace("scan", cloud_of(9))
     replaced = checker.prepare()
     assert replaced.tables.table is not moved.tables.table and replaced.allowed is before.allowed
     assert checker._tables.table.packed[0] is replaced.tables.table.packed[0]
     world.allow("b0", "b1")
     assert checker.prepare().allowed is not before.allowed
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_workspaces_follow_bodies_that_move(seed):
+    """Without margins nothing is made anew; each of three moves, a cloud's and a turned union's as well, is answered as
+    by a checker made anew, by workspaces that were made before and after.
+    """
+    rng = rng_of("moves", seed)
+    robot, world = arm_and_world(seed)
+    for k in range(4):
+        world.set_margin(f"b{k}", 0.0)
+    for k in range(12):
+        world.add(collide.Box(rng.uniform(0.05, 0.3, 3)), random_pose(rng, 1.5), name=f"more {k}")
+    checker = collide.RobotChecker(robot, world, padding=0.01 * (seed % 2))
+    Q = rng.uniform(np.maximum(robot.lower, -3), np.minimum(robot.upper, 3), (40, robot.dof))
+    tables, before = checker.setting.tables, told(checker, Q)
+    other, n_changed = checker._workspace(checker.setting), 0  # of another thread, three moves behind
+    names = list(world.names.values())
+    for move in range(3):
+        moved = rng.choice(names, size=(1, 3, len(names))[move], replace=False).tolist()
+        world.set_poses(moved, np.array([random_pose(rng, 1.2) for _ in moved]))
+        if move == 1:
+            world.set_pose(moved[0], np.eye(4))
+        now = told(checker, Q)
+        assert now == told(collide.RobotChecker(robot, world, padding=0.01 * (seed % 2)), Q), (seed, move)
+        assert checker.setting.tables is tables
+        n_changed, before = n_changed + (now != before), now
+    checker.setting.spare[:] = [other]
+    assert told(checker, Q) == before
+    assert n_changed >= 1, n_changed
 
 
 @pytest.mark.parametrize("how", ["moved", "replaced", "both"])
