@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 from collide.kernels import kernel
+from collide.kernels.lanes import select
 
 #: Angles up to this [rad]: a quarter quadrant's first part, of 33 bits, times their number of quarter turns is exact.
 LARGEST_ANGLE = 1e6
@@ -17,6 +18,8 @@ LARGEST_ANGLE = 1e6
 #: A quarter quadrant in two parts: 33 bits, and the rest to 2⁻⁸⁶.
 _QUARTER, _QUARTER_REST = 1.57079632673412561417, 6.07710050650619224932e-11
 _PER_QUARTER = 0.636619772367581382433
+#: Doubles from here on are integers.
+_INTEGERS = 2.0**52
 
 
 class SineCosine(NamedTuple):
@@ -25,9 +28,17 @@ class SineCosine(NamedTuple):
 
 
 @kernel(inline=True)
+def floor_of(y):
+    """The integer at or below y ≥ 0: sums with 2⁵² are rounded to integers. Larger numbers are integers."""
+    nearest = (y + _INTEGERS) - _INTEGERS
+    below = select(nearest > y, nearest - 1.0, nearest)
+    return select(y < _INTEGERS, below, y)
+
+
+@kernel(inline=True)
 def sine_cosine(angle):
-    """The `SineCosine` of an angle [rad], 0 ≤ angle ≤ LARGEST_ANGLE."""
-    quarters = math.floor(angle * _PER_QUARTER + 0.5)
+    """The `SineCosine` of an angle [rad], 0 ≤ angle ≤ LARGEST_ANGLE, or of `Lanes` of them: the same bits."""
+    quarters = floor_of(angle * _PER_QUARTER + 0.5)
     head = angle - quarters * _QUARTER
     rest = quarters * _QUARTER_REST
     x = head - rest
@@ -42,14 +53,13 @@ def sine_cosine(angle):
     half = 0.5 * z
     w = 1.0 - half
     cosine = w + (((1.0 - w) - half) + (z * r - x * low))
-    quadrant = int(quarters) & 3
-    if quadrant == 0:
-        return SineCosine(sine, cosine)
-    if quadrant == 1:
-        return SineCosine(cosine, -sine)
-    if quadrant == 2:
-        return SineCosine(-sine, -cosine)
-    return SineCosine(-cosine, sine)
+    quadrant = quarters - 4.0 * floor_of(0.25 * quarters)
+    is_odd = (quadrant == 1.0) | (quadrant == 3.0)
+    up = select(is_odd, cosine, sine)
+    along = select(is_odd, sine, cosine)
+    return SineCosine(
+        select(quadrant > 1.5, -up, up), select((quadrant == 1.0) | (quadrant == 2.0), -along, along)
+    )
 
 
 @kernel

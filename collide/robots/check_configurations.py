@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
+from collide.kernels.lanes import LANES
 from collide.lowering.shape_table import POSE
 from collide.robots.check_scene import (
     BODY_INTS,
@@ -23,6 +24,7 @@ from collide.robots.check_scene import (
     OPEN_LOWER,
     PADDED,
     SELF_PAIRS_AT,
+    SPHERE_HEADER_AT,
     STAMP,
     body_of_part,
     boxes_meet,
@@ -34,6 +36,7 @@ from collide.robots.check_scene import (
 )
 from collide.robots.forward_kinematics import pose_links
 from collide.robots.part_pairs import HITTING, OPEN, state_of_parts
+from collide.robots.sphere_lanes import COLUMNS_AT, FEWEST, VERDICTS_AT, check_eight, view_spheres
 
 #: What is known of a configuration: free; it collides; free but for the pairs left to others.
 IS_FREE, COLLIDES, IS_OPEN = range(3)
@@ -50,8 +53,13 @@ def check_configurations(header_at, q_at, dof, first, n, verdicts_at):
     q = view_f64(q_at, dof * n)
     verdicts = view_u8(verdicts_at, n)
     words[N_OPEN] = 0
+    settled = first
     # A configuration leaves each pair of bodies to others once, and once more for what stands in between.
     for k in range(first, n):
+        if k >= settled and words[SPHERE_HEADER_AT] != 0:
+            settled = _settle_eight(scene, q, dof, k, n, verdicts)
+        if k < settled and verdicts[k] != IS_OPEN:
+            continue
         n_open = words[N_OPEN]
         verdicts[k] = verdict_of(scene, q, dof * k, k)
         if words[N_OPEN] > words[OPEN_CAPACITY]:
@@ -60,6 +68,28 @@ def check_configurations(header_at, q_at, dof, first, n, verdicts_at):
         if verdicts[k] == COLLIDES:
             words[N_OPEN] = n_open
     return n
+
+
+@kernel
+def _settle_eight(scene, q, dof, first, n, verdicts):
+    """Write verdicts of eight configurations from ``first`` on, IS_OPEN where spheres settle nothing; returns the first
+    configuration without a verdict: ``first`` itself where too few remain.
+    """
+    spheres = view_spheres(scene, scene.words[SPHERE_HEADER_AT])
+    count = min(n - first, LANES)
+    if count < spheres.words[FEWEST]:
+        return first
+    columns = view_f64(spheres.words[COLUMNS_AT], LANES * dof)
+    for lane in range(LANES):
+        at = dof * (first + min(lane, count - 1))
+        for j in range(dof):
+            columns[LANES * j + lane] = q[at + j]
+    check_eight(scene, spheres)
+    answers = view_f64(spheres.words[VERDICTS_AT], 2 * LANES)
+    for lane in range(count):
+        is_open = answers[LANES + lane] != 0.0
+        verdicts[first + lane] = COLLIDES if answers[lane] != 0.0 else IS_OPEN if is_open else IS_FREE
+    return first + count
 
 
 @kernel(inline=True)

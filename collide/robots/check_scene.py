@@ -38,10 +38,12 @@ from collide.robots.forward_kinematics import Joints, view_joints
     # addresses of `state_of_part` and `gap_of_part`, and of what they ask: behind a 0, of each part of the surroundings
     # the header of its field, 0 of other shapes
     STATE_OF_PART, GAP_OF_PART, WALKS_AT,
+    # the header of `sphere_lanes.py`, 0 without
+    SPHERE_HEADER_AT,
     # a double: boxes are moved outwards by this share of all that went into them
     SLACK,
-) = range(48)
-HEADER = 48
+) = range(49)
+HEADER = 49
 
 #: Sums of |RᵀR − 1| below this count as roundings of a rotation R.
 ROUNDINGS_OF_ROTATIONS = 1e-13

@@ -13,6 +13,7 @@ from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, answer_pairs
 from collide.results import PAIR_DTYPE
 from collide.robots import check_scene as layout
 from collide.robots import motion_bounds as motions
+from collide.robots.bounding_spheres import SphereWorkspace
 from collide.robots.check_tables import UNBOUNDED_HALF, Setting, Surroundings
 from collide.robots.field_walks import field_walks
 from collide.robots.move_surroundings import FIELD_MOVED, SKEWED, move_surroundings
@@ -82,6 +83,9 @@ class CheckWorkspace:
         self.address = address_of(self.header)
         self.verdict = bytearray(1)  # of a single configuration
         self.verdict_at = address_of(np.frombuffer(self.verdict, dtype=np.uint8))
+        self._spheres = None if setting.spheres is None else SphereWorkspace(robot, setting, setting.spheres)
+        if self._spheres is not None:
+            self.header[layout.SPHERE_HEADER_AT] = self._spheres.address
         self._walk_fields(setting)
         self._motions: MotionWorkspace | None = None
 

@@ -14,8 +14,9 @@ from collide.base import argument_checks as checks
 from collide.base.threads import check_threads, pieces_of, share
 from collide.errors import InvalidArgument
 from collide.kernels import address_of
+from collide.robots.bounding_spheres import SphereTables, sphere_tables
 from collide.robots.check_configurations import check_configurations
-from collide.robots.check_tables import MovedBodies, Setting, robot_tables, surroundings_of, tables_among
+from collide.robots.check_tables import MovedBodies, Setting, Surroundings, robot_tables, surroundings_of, tables_among
 from collide.robots.check_workspace import CheckWorkspace
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import SeenWorld, bodies_around, filters_of, refuse_own_margins, robot_bodies
@@ -58,12 +59,14 @@ class CheckerScene:
         """Those of the robot, and the first setting."""
         matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
         self._tables = robot_tables(self._bodies, np.concatenate(matrices))
+        self._spheres = sphere_tables(self._tables, [body.padding for body in self._bodies])
         self._setting: Setting | None = None
         self.prepare()
 
     def __getstate__(self) -> dict:
         """What a copy or a pickle takes along. What holds addresses is made again."""
-        return {name: value for name, value in vars(self).items() if name not in ("_setting", "_tables", "_is_fixed")}
+        made = ("_setting", "_tables", "_spheres", "_is_fixed")
+        return {name: value for name, value in vars(self).items() if name not in made}
 
     def __setstate__(self, state: dict) -> None:
         vars(self).update(state)
@@ -160,8 +163,14 @@ class CheckerScene:
         surroundings = surroundings_of(around, None if before is None else before.surroundings)
         base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
         tables = tables_among(self._tables, surroundings, before)
-        setting = self._setting = Setting(self._bodies, base, surroundings, tables, *filters, seen, seen, [])
+        spheres = self._spheres_among(surroundings)
+        setting = Setting(self._bodies, base, surroundings, tables, *filters, spheres, seen, seen, [])
+        self._setting = setting
         return setting
+
+    def _spheres_among(self, around: Surroundings) -> SphereTables | None:
+        """Spheres of the robot, but not among fields, whose boxes the robot is in."""
+        return None if any(body.shape.is_field for body in around.bodies) else self._spheres
 
     def _among_moved_bodies(self, before: Setting) -> Setting | None:
         """The setting before, and the World's bodies as they stand, where they have at most moved; ``None`` where poses

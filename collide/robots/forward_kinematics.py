@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from collide.kernels import address_of, entry, kernel, view_f64, view_i64
-from collide.numerics.sine_cosine import LARGEST_ANGLE, SineCosine, sine_cosine
+from collide.kernels.lanes import any_of, select
+from collide.numerics.sine_cosine import LARGEST_ANGLE, SineCosine, floor_of, sine_cosine
 from collide.robots.kinematic_tree import Joint
 
 #: What a joint does. A turn about a coordinate axis of its frame, as nearly all are, mixes two columns of the pose.
@@ -198,15 +199,16 @@ def _put_product(A, a, B, b, out, to):
 @kernel(inline=True)
 def sine_cosine_of(angle):
     """`sine_cosine` of any angle [rad]. Angles beyond LARGEST_ANGLE are first reduced in doubles, whose spacing at such
-    sizes makes the reduction no worse.
+    sizes makes the reduction no worse; NaN for infinite ones.
     """
     size = abs(angle)
-    if not size < math.inf:
-        return SineCosine(math.nan, math.nan)
-    if size > LARGEST_ANGLE:
-        size = min(max(size - math.floor(size / _FULL_CIRCLE) * _FULL_CIRCLE, 0.0), _FULL_CIRCLE)
+    is_large = size > LARGEST_ANGLE
+    if any_of(is_large):
+        rest = size - floor_of(size / _FULL_CIRCLE) * _FULL_CIRCLE
+        rest = select(rest < 0.0, 0.0, select(rest > _FULL_CIRCLE, _FULL_CIRCLE, rest))
+        size = select(is_large, rest, size)
     pair = sine_cosine(size)
-    return SineCosine(-pair.sine if angle < 0.0 else pair.sine, pair.cosine)
+    return SineCosine(select(angle < 0.0, -pair.sine, pair.sine), pair.cosine)
 
 
 @kernel(inline=True)
