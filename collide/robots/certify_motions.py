@@ -35,6 +35,7 @@ from collide.robots.motion_bounds import (
     ITEM,
     ITEM_CAPACITY,
     MAX_INTERVALS,
+    MAX_PIECES,
     MESH_PAIR_CAPACITY,
     MESH_PAIRS_AT,
     MOTION_HEADER,
@@ -46,6 +47,7 @@ from collide.robots.motion_bounds import (
     OPEN_INTERVALS_AT,
     PATH_LENGTHS_AT,
     PATH_STRIDE,
+    PIECE,
     begin_interval,
     motion_at,
     moved_between,
@@ -89,8 +91,12 @@ def certify_motions(header_at, motions_at, q0_at, q1_at, dof, first, n, times_at
 def _certify(motion, number):
     """Time of a collision, or NaN: proven free but for the intervals and pairs that are left open."""
     intervals = motion.intervals
+    # Pairs far apart are told from their boxes where bounds of the motion are small: long intervals are not asked.
     n_stack = 1
-    _push(intervals, 0, 0.0, 1.0, 0.0, -1.0)
+    while n_stack < MAX_PIECES and n_stack * PIECE < motion.max_change:
+        n_stack *= 2
+    for k in range(n_stack):
+        _push(intervals, n_stack - 1 - k, k / n_stack, (k + 1) / n_stack, 0.0, -1.0)
     while n_stack > 0:
         n_stack -= 1
         at = INTERVAL * n_stack
@@ -107,7 +113,7 @@ def _certify(motion, number):
             return time
         if state == 0:
             continue
-        if motion.max_change * (end - begin) <= motion.resolution or n_stack + 2 > MAX_INTERVALS:
+        if _is_last(motion) or n_stack + 2 > MAX_INTERVALS:
             _leave_interval(motion, number, begin, end, top, state)
             continue
         # Both halves read the same pairs; what the left one keeps stands beyond them, and is gone when the right one
@@ -116,6 +122,13 @@ def _certify(motion, number):
         _push(intervals, n_stack + 1, begin, time, float(top), float(state))
         n_stack += 2
     return math.nan
+
+
+@kernel(inline=True)
+def _is_last(motion):
+    """Whether the interval at work is not halved any more."""
+    length = motion.intervals[CURRENT + END] - motion.intervals[CURRENT + BEGIN]
+    return motion.max_change * length <= motion.resolution
 
 
 @kernel(inline=True)
@@ -177,7 +190,8 @@ def _take(motion, top, n, p, q, body, partner, margin):
         return -2
     if state == BEYOND_MARGIN:
         return n
-    if state == OPEN and (only_holds(motion.scene, p) or only_holds(motion.scene, q)):
+    # Parts around meshes that are near to the last may be far from the meshes.
+    if (state == OPEN or _is_last(motion)) and (only_holds(motion.scene, p) or only_holds(motion.scene, q)):
         _leave_meshes(motion, body, partner)
         return n
     has_space = top + n < motion.words[ITEM_CAPACITY]

@@ -49,8 +49,10 @@ MOTION_HEADER = 18
 #: are.
 BEGIN, END, FIRST_ITEM, N_ITEMS = range(4)
 INTERVAL = 4
-#: Intervals on the stack: one more with every halving.
-MAX_INTERVALS = 64
+#: Intervals on the stack: those that a motion begins with, a power of two and at most so many, no longer than PIECE
+#: where that suffices [rad or m, of the column that moves by most]; and one more with every halving.
+MAX_PIECES, PIECE = 32, 0.05
+MAX_INTERVALS = 96
 #: Integers of a pair of parts: both, and the pair of bodies: a body and −1 − a body around, or −1 and a tested pair.
 ITEM = 4
 #: Doubles of an interval that stays open for a pair: motion, begin, end, and as in ITEM a body and its partner.

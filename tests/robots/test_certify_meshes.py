@@ -41,6 +41,18 @@ def test_a_rod_is_proven_to_pass_through_a_ring():
     assert edges.collides[0] and edges.free[1]
 
 
+def test_a_rod_just_above_the_hole_of_a_ring_is_proven_free():
+    """The hull of the ring is 10 µm away all of the way, the ring itself 0.2 m: the interval is not left open."""
+    world = collide.World()
+    world.add(ring(), name="ring", static=True)
+    joints = [Joint("slide", "prismatic", "base", "rod", np.eye(4), (0, 0, 1.0), -2.0, 2.0),
+              Joint("shift", "prismatic", "rod", "tip", np.eye(4), (1.0, 0, 0), -2.0, 2.0)]
+    rod = [LinkShape(collide.Capsule(0.1, 0.4), np.eye(4), None, "test")]
+    checker = collide.RobotChecker(Robot("rod", ["base", "rod", "tip"], joints, {"tip": rod}), world)
+    edges = checker.certify_edges([0.35001, -0.2], [0.35001, 0.2])
+    assert edges.free.all() and len(edges.open) == 0
+
+
 def test_motions_of_meshes_have_no_sample_that_collides():
     decided = total = 0
     for seed in range(4):
