@@ -11,6 +11,7 @@ import numpy as np
 from collide.kernels import address_of
 from collide.kernels.lanes import LANES
 from collide.lowering.packed_convex import CYLINDER, HALFSPACE, POINTS, PackedConvex
+from collide.robots import motion_bounds as motions
 from collide.robots import sphere_lanes as layout
 from collide.robots.check_scene import BOX, HALF
 from collide.robots.check_tables import CheckTables, RobotTables, Setting, Surroundings
@@ -123,6 +124,8 @@ class SphereWorkspace:
             layout.COLUMNS_AT: columns, layout.LINK_LANES_AT: self.links,
             layout.AROUND_LANES_AT: np.zeros((layout.SPHERE_PLACE * n_bodies, LANES)),
             layout.SPHERE_LANES_AT: np.zeros((layout.SPHERE_PLACE * n, LANES)),
+            layout.PIECES_AT: np.zeros((motions.MAX_PIECES + LANES, 2)), layout.HALF_LANES_AT: np.zeros((1, LANES)),
+            layout.MOVED_LANES_AT: np.zeros((n_bodies * (len(robot.joints) + 1), LANES)),
             layout.PLACED_AT: np.zeros(n_bodies, dtype=np.int64), layout.VERDICTS_AT: self.verdicts,
         }
         self.header = np.zeros(layout.SPHERE_HEADER, dtype=np.int64)

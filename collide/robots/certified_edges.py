@@ -105,7 +105,7 @@ def sample_piece(
             _settle_samples(checker, space, q0, q1, samples[: cursor[N_OPEN_SAMPLES]], times)
             here = cursor[MOTION]
             if here < len(q0) and not np.isnan(times[here]):
-                cursor[:N_OPEN_SAMPLES] = here + 1, 0, 0
+                cursor[:N_OPEN_SAMPLES] = here + 1, 0
 
 
 def _settle_samples(

@@ -19,6 +19,7 @@ from collide.robots.check_scene import (
     N_SELF_PAIRS,
     PADDED,
     SELF_PAIRS_AT,
+    SPHERE_HEADER_AT,
     body_of_part,
     boxes_meet,
     find_parts_around,
@@ -53,6 +54,7 @@ from collide.robots.motion_bounds import (
     moved_between,
 )
 from collide.robots.part_pairs import BEYOND_MARGIN, HITTING, OPEN, only_holds, state_of_parts
+from collide.robots.sphere_motions import settle_pieces
 
 
 @entry("int64(int64, int64, int64, int64, int64, int64, int64, int64)")
@@ -93,10 +95,15 @@ def _certify(motion, number):
     intervals = motion.intervals
     # Pairs far apart are told from their boxes where bounds of the motion are small: long intervals are not asked.
     n_stack = 1
-    while n_stack < MAX_PIECES and n_stack * PIECE < motion.max_change:
-        n_stack *= 2
-    for k in range(n_stack):
-        _push(intervals, n_stack - 1 - k, k / n_stack, (k + 1) / n_stack, 0.0, -1.0)
+    if motion.scene.words[SPHERE_HEADER_AT] != 0:
+        time, n_stack = settle_pieces(motion)
+        if not math.isnan(time):
+            return time
+    else:
+        while n_stack < MAX_PIECES and n_stack * PIECE < motion.max_change:
+            n_stack *= 2
+        for k in range(n_stack):
+            _push(intervals, n_stack - 1 - k, k / n_stack, (k + 1) / n_stack, 0.0, -1.0)
     while n_stack > 0:
         n_stack -= 1
         at = INTERVAL * n_stack

@@ -57,7 +57,9 @@ def check_configurations(header_at, q_at, dof, first, n, verdicts_at):
     # A configuration leaves each pair of bodies to others once, and once more for what stands in between.
     for k in range(first, n):
         if k >= settled and words[SPHERE_HEADER_AT] != 0:
-            settled = _settle_eight(scene, q, dof, k, n, verdicts)
+            settled = settle_eight(scene, q, dof, k, n)
+            for j in range(k, settled):
+                verdicts[j] = verdict_in_lane(scene, j - k)
         if k < settled and verdicts[k] != IS_OPEN:
             continue
         n_open = words[N_OPEN]
@@ -71,9 +73,9 @@ def check_configurations(header_at, q_at, dof, first, n, verdicts_at):
 
 
 @kernel
-def _settle_eight(scene, q, dof, first, n, verdicts):
-    """Write verdicts of eight configurations from ``first`` on, IS_OPEN where spheres settle nothing; returns the first
-    configuration without a verdict: ``first`` itself where too few remain.
+def settle_eight(scene, q, dof, first, n):
+    """Ask spheres about eight configurations from ``first`` on, of n; returns the first configuration not asked:
+    ``first`` itself where too few remain.
     """
     spheres = view_spheres(scene, scene.words[SPHERE_HEADER_AT])
     count = min(n - first, LANES)
@@ -85,11 +87,15 @@ def _settle_eight(scene, q, dof, first, n, verdicts):
         for j in range(dof):
             columns[LANES * j + lane] = q[at + j]
     check_eight(scene, spheres)
-    answers = view_f64(spheres.words[VERDICTS_AT], 2 * LANES)
-    for lane in range(count):
-        is_open = answers[LANES + lane] != 0.0
-        verdicts[first + lane] = COLLIDES if answers[lane] != 0.0 else IS_OPEN if is_open else IS_FREE
     return first + count
+
+
+@kernel(inline=True)
+def verdict_in_lane(scene, lane):
+    """The verdict of spheres, IS_OPEN where they settle nothing."""
+    spheres_at = scene.words[SPHERE_HEADER_AT]
+    answers = view_f64(view_i64(spheres_at, VERDICTS_AT + 1)[VERDICTS_AT], 2 * LANES)
+    return COLLIDES if answers[lane] != 0.0 else IS_OPEN if answers[LANES + lane] != 0.0 else IS_FREE
 
 
 @kernel(inline=True)

@@ -7,6 +7,7 @@ import functools
 import numpy as np
 
 from collide.kernels import address_of, code_of
+from collide.kernels.lanes import LANES
 from collide.lowering.shape_table import NO_TERMS, POSE
 from collide.narrowphase.facets.nearest_item_kernel import gap_of_part, state_of_part
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, answer_pairs
@@ -122,8 +123,8 @@ class CheckWorkspace:
 
     @functools.cached_property
     def sample(self) -> tuple[np.ndarray, np.ndarray]:
-        """A configuration (dof,), and space for the samples that `sample_motions` leaves to others."""
-        return np.zeros(max(self.robot.dof, 1)), np.empty((len(self._open), OPEN_SAMPLE))
+        """Configurations (LANES, dof), and space for the samples that `sample_motions` leaves to others."""
+        return np.zeros((LANES, max(self.robot.dof, 1))), np.empty((len(self._open), OPEN_SAMPLE))
 
     @property
     def open_pairs(self) -> np.ndarray:

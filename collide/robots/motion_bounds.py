@@ -143,25 +143,26 @@ def _moved_by_joint(motion, joint, c, radius, moved, half):
     kind = joints.ints[JOINT_INTS * joint + KIND]
     child = POSE * joints.ints[JOINT_INTS * joint + CHILD]
     column = joints.ints[JOINT_INTS * joint + COLUMN]
-    angle = _change(motion, column) * abs(joints.doubles[at + MULTIPLIER]) * half
+    angle = change_of(motion, column) * abs(joints.doubles[at + MULTIPLIER]) * half
     if kind == TRANSLATION:
         return angle
     arm = sub(c, vec3_at(links, child + 9))
     if kind == FLOATING:
-        shift = _change(motion, column) + _change(motion, column + 1) + _change(motion, column + 2)
-        angle = _change(motion, column + 3) + _change(motion, column + 4) + _change(motion, column + 5)
+        shift = change_of(motion, column) + change_of(motion, column + 1) + change_of(motion, column + 2)
+        angle = change_of(motion, column + 3) + change_of(motion, column + 4) + change_of(motion, column + 5)
         return half * (shift + angle * (norm(arm) + radius + moved + half * shift))
     shift = 0.0
     if kind == PLANAR:
-        shift = half * (_change(motion, column) + _change(motion, column + 1))
-        angle = half * _change(motion, column + 2)
+        shift = half * (change_of(motion, column) + change_of(motion, column + 1))
+        angle = half * change_of(motion, column + 2)
     axis = rotate(links, child, vec3_at(joints.doubles, at + AXIS))
     across = cross(arm, axis)
     return shift + angle * (math.sqrt(dot(across, across)) + radius + moved + shift)
 
 
 @kernel(inline=True)
-def _change(motion, column):
+def change_of(motion, column):
+    """By how much a column changes, all of the way."""
     return abs(motion.q1[motion.at + column] - motion.q0[motion.at + column])
 
 

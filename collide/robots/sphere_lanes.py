@@ -51,8 +51,10 @@ from collide.robots.forward_kinematics import LINK_POSE, pose_links
     COLUMNS_AT, N_COLUMNS, LINK_LANES_AT, AROUND_LANES_AT, SPHERE_LANES_AT, PLACED_AT, N_PLACED,
     # verdicts: hits and open ones, in lanes; of fewer configurations none are asked so
     VERDICTS_AT, FEWEST,
-) = range(15)
-SPHERE_HEADER = 15
+    # of `sphere_motions.py`: intervals; half their lengths, and how far bodies may move, in lanes
+    PIECES_AT, HALF_LANES_AT, MOVED_LANES_AT,
+) = range(18)
+SPHERE_HEADER = 18
 # Integers of a body: its first outer sphere, how many; its first inner sphere, how many. Where its outer spheres are
 # the body itself it has no others.
 FIRST_OUTER, N_OUTER, FIRST_INNER, N_INNER, IS_EXACT = range(5)
@@ -102,12 +104,6 @@ def view_spheres(scene, spheres_at):
     )
 
 
-@kernel(inline=True)
-def no_lane(lanes):
-    """A mask without a lane."""
-    return (lanes < 0.0) & (lanes > 0.0)
-
-
 class Verdicts(NamedTuple):
     """Masks: lanes in collision, and lanes in which something is left to others."""
 
@@ -119,20 +115,39 @@ class Verdicts(NamedTuple):
 def check_eight(scene, spheres):
     """Write the verdicts of eight configurations, whose columns are written: hits, and lanes left to others."""
     words = scene.words
+    place_bodies(scene, spheres)
+    verdicts = no_verdicts(spheres)
+    for body in range(words[N_BODIES]):
+        verdicts = check_among_parts(scene, spheres, body, 0.0, verdicts)
+        if not any_of(~verdicts.hits):
+            break
+    pairs = view_i64(words[SELF_PAIRS_AT], 2 * words[N_SELF_PAIRS])
+    for k in range(words[N_SELF_PAIRS]):
+        verdicts = check_pair(scene, spheres, pairs[2 * k], pairs[2 * k + 1], 0.0, verdicts)
+    put_verdicts(spheres, verdicts)
+
+
+@kernel(inline=True)
+def place_bodies(scene, spheres):
+    """Place links, and the spheres around bodies, for the columns written."""
     columns = view_lanes(spheres.words[COLUMNS_AT], spheres.words[N_COLUMNS])
     pose_links(scene.joints, columns, 0, spheres.links, LINK_POSE)
     spheres.words[N_PLACED] += 1
-    base = spheres.links[LINK_POSE * scene.joints.root]
-    open_lanes = hits = no_lane(base)
-    for body in range(words[N_BODIES]):
+    for body in range(scene.words[N_BODIES]):
         _put_place(scene, spheres.around_bodies, body, body, spheres, spheres.around_lanes)
-    for body in range(words[N_BODIES]):
-        verdicts = _check_among_parts(scene, spheres, body, hits, open_lanes)
-        hits = verdicts.hits
-        open_lanes = verdicts.open
-        if not any_of(~hits):
-            break
-    verdicts = _check_themselves(scene, spheres, hits, open_lanes)
+
+
+@kernel(inline=True)
+def no_verdicts(spheres):
+    """`Verdicts` before anything is asked."""
+    some = spheres.around_lanes[0]
+    nothing = (some < 0.0) & (some > 0.0)
+    return Verdicts(nothing, nothing)
+
+
+@kernel(inline=True)
+def put_verdicts(spheres, verdicts):
+    """Write hits, and lanes left to others."""
     out = view_lanes(spheres.words[VERDICTS_AT], 2)
     out[0] = select(verdicts.hits, 1.0, 0.0)
     out[1] = select(verdicts.open & ~verdicts.hits, 1.0, 0.0)
@@ -168,12 +183,15 @@ def _place_spheres(scene, spheres, body):
 
 
 @kernel
-def _check_among_parts(scene, spheres, body, hits, open_lanes):
-    """The `Verdicts` after a body has been asked about the parts around: down their tree, wherever a lane is near."""
+def check_among_parts(scene, spheres, body, margin, verdicts):
+    """The `Verdicts` after a body has been asked about the parts around: down their tree, wherever a lane is near.
+
+    margin : what is not farther apart is left open [m], a number or lanes.
+    """
     words = scene.words
     place = spheres.around_lanes
     at = SPHERE_PLACE * body
-    reach = spheres.around_bodies[SPHERE * body + PADDED_RADIUS] + place[at + 3]
+    reach = spheres.around_bodies[SPHERE * body + PADDED_RADIUS] + place[at + 3] + margin
     low_x = place[at] - reach
     low_y = place[at + 1] - reach
     low_z = place[at + 2] - reach
@@ -188,45 +206,43 @@ def _check_among_parts(scene, spheres, body, hits, open_lanes):
         n = 6 * node
         is_apart = (low_x > nodes[n + 3]) | (high_x < nodes[n]) | (low_y > nodes[n + 4]) | (high_y < nodes[n + 1]) | (
             (low_z > nodes[n + 5]) | (high_z < nodes[n + 2]))
-        is_near = ~hits & ~is_apart
+        is_near = ~verdicts.hits & ~is_apart
         meets = any_of(is_near)
         part = links[NODE_LINK * node + BODY]
         if meets and part >= 0:
-            verdicts = _check_part(scene, spheres, body, part, is_near, hits, open_lanes)
-            hits = verdicts.hits
-            open_lanes = verdicts.open
+            verdicts = _check_part(scene, spheres, body, part, margin, is_near, verdicts)
         node = node + 1 if meets else links[NODE_LINK * node + SKIP]
     unbounded = view_i64(words[UNBOUNDED_AT], words[N_UNBOUNDED])
     for k in range(words[N_UNBOUNDED]):
-        verdicts = _check_part(scene, spheres, body, unbounded[k], ~hits, hits, open_lanes)
-        hits = verdicts.hits
-        open_lanes = verdicts.open
-    return Verdicts(hits, open_lanes)
+        verdicts = _check_part(scene, spheres, body, unbounded[k], margin, ~verdicts.hits, verdicts)
+    return verdicts
 
 
 @kernel
-def _check_part(scene, spheres, body, part, is_near, hits, open_lanes):
+def _check_part(scene, spheres, body, part, margin, is_near, verdicts):
     """The `Verdicts` after a body has been asked about a part around, in the lanes that are near."""
     words = scene.words
     if is_allowed(scene, body, view_i64(words[BODY_OF_AT], part + 1)[part]):
-        return Verdicts(hits, open_lanes)
+        return verdicts
     place = spheres.around_lanes
-    rows = spheres.around_bodies
     core = _core_of(scene, spheres, part)
-    is_near = is_near & ~_is_beyond(core, place, body, rows[SPHERE * body + PADDED_RADIUS])
+    radius = spheres.around_bodies[SPHERE * body + PADDED_RADIUS]
+    reach = radius + core.at_most + place[SPHERE_PLACE * body + 3] + margin
+    is_near = is_near & ~(_squared_gap(core, place, body) > reach * reach)
     if not any_of(is_near):
-        return Verdicts(hits, open_lanes)
+        return verdicts
     _place_spheres(scene, spheres, body)
     at = BODY_SPHERES * body
     is_exact = spheres.counts[at + IS_EXACT] != 0
+    hits = verdicts.hits
     possible = hits & ~hits
     place = spheres.sphere_lanes
     rows = spheres.spheres
     for k in range(spheres.counts[at + FIRST_OUTER], spheres.counts[at + FIRST_OUTER] + spheres.counts[at + N_OUTER]):
         radius = rows[SPHERE * k + PADDED_RADIUS]
         square = _squared_gap(core, place, k)
-        beyond = radius + core.at_most + place[SPHERE_PLACE * k + 3]
-        possible = possible | (is_near & ~(square > beyond * beyond))
+        reach = radius + core.at_most + place[SPHERE_PLACE * k + 3] + margin
+        possible = possible | (is_near & ~(square > reach * reach))
         if is_exact:
             within = radius + core.at_least - place[SPHERE_PLACE * k + 3]
             hits = hits | (is_near & (within > 0.0) & (square < within * within))
@@ -235,7 +251,7 @@ def _check_part(scene, spheres, body, part, is_near, hits, open_lanes):
         for k in range(first, first + spheres.counts[at + N_INNER]):
             within = rows[SPHERE * k + PADDED_RADIUS] + core.at_least - place[SPHERE_PLACE * k + 3]
             hits = hits | (possible & (within > 0.0) & (_squared_gap(core, place, k) < within * within))
-    return Verdicts(hits, open_lanes | possible)
+    return Verdicts(hits, verdicts.open | possible)
 
 
 class Core(NamedTuple):
@@ -317,38 +333,6 @@ def _or_nothing(length):
 
 
 @kernel(inline=True)
-def _is_beyond(core, place, k, radius):
-    """Lanes whose k-th sphere, of this radius, is apart from a part."""
-    reach = radius + core.at_most + place[SPHERE_PLACE * k + 3]
-    return _squared_gap(core, place, k) > reach * reach
-
-
-@kernel
-def _check_themselves(scene, spheres, hits, open_lanes):
-    """The `Verdicts` after the robot's tested pairs of bodies have been asked."""
-    words = scene.words
-    pairs = view_i64(words[SELF_PAIRS_AT], 2 * words[N_SELF_PAIRS])
-    place = spheres.around_lanes
-    rows = spheres.around_bodies
-    for k in range(words[N_SELF_PAIRS]):
-        a = pairs[2 * k]
-        b = pairs[2 * k + 1]
-        radii = rows[SPHERE * a + RADIUS] + rows[SPHERE * b + RADIUS]
-        is_near = ~hits & ~_are_beyond(place, a, place, b, radii)
-        if any_of(is_near):
-            verdicts = _check_pair(scene, spheres, a, b, is_near, hits, open_lanes)
-            hits = verdicts.hits
-            open_lanes = verdicts.open
-    return Verdicts(hits, open_lanes)
-
-
-@kernel(inline=True)
-def _are_beyond(places_a, a, places_b, b, radii):
-    """Lanes whose two spheres, of these radii added, are apart."""
-    return _squared_between(places_a, a, places_b, b) > _squared_reach(places_a, a, places_b, b, radii, 1.0)
-
-
-@kernel(inline=True)
 def _squared_between(places_a, a, places_b, b):
     dx = places_a[SPHERE_PLACE * a] - places_b[SPHERE_PLACE * b]
     dy = places_a[SPHERE_PLACE * a + 1] - places_b[SPHERE_PLACE * b + 1]
@@ -365,8 +349,15 @@ def _squared_reach(places_a, a, places_b, b, radii, sign):
 
 
 @kernel
-def _check_pair(scene, spheres, a, b, is_near, hits, open_lanes):
-    """The `Verdicts` after two bodies of the robot have been asked, in the lanes that are near."""
+def check_pair(scene, spheres, a, b, margin, verdicts):
+    """The `Verdicts` after two bodies of the robot have been asked.   margin : as of `check_among_parts`."""
+    around = spheres.around_lanes
+    radius_b = spheres.around_bodies[SPHERE * b + RADIUS]
+    radii = spheres.around_bodies[SPHERE * a + RADIUS] + radius_b
+    is_near = ~verdicts.hits & ~(
+        _squared_between(around, a, around, b) > _squared_reach(around, a, around, b, radii + margin, 1.0))
+    if not any_of(is_near):
+        return verdicts
     _place_spheres(scene, spheres, a)
     _place_spheres(scene, spheres, b)
     place = spheres.sphere_lanes
@@ -375,23 +366,24 @@ def _check_pair(scene, spheres, a, b, is_near, hits, open_lanes):
     at = BODY_SPHERES * a
     to = BODY_SPHERES * b
     are_exact = counts[at + IS_EXACT] != 0 and counts[to + IS_EXACT] != 0
+    hits = verdicts.hits
     possible = hits & ~hits
     for i in range(counts[at + FIRST_OUTER], counts[at + FIRST_OUTER] + counts[at + N_OUTER]):
         radius = rows[SPHERE * i + RADIUS]
-        around = radius + spheres.around_bodies[SPHERE * b + RADIUS]
-        some = is_near & ~_are_beyond(place, i, spheres.around_lanes, b, around)
+        some = is_near & ~(
+            _squared_between(place, i, around, b)
+            > _squared_reach(place, i, around, b, radius + radius_b + margin, 1.0))
         if not any_of(some):
             continue
         for j in range(counts[to + FIRST_OUTER], counts[to + FIRST_OUTER] + counts[to + N_OUTER]):
             radii = radius + rows[SPHERE * j + RADIUS]
             square = _squared_between(place, i, place, j)
-            possible = possible | (some & ~(square > _squared_reach(place, i, place, j, radii, 1.0)))
+            possible = possible | (some & ~(square > _squared_reach(place, i, place, j, radii + margin, 1.0)))
             if are_exact:
                 hits = hits | (some & (square < _squared_reach(place, i, place, j, radii, -1.0)))
-    possible = possible & ~hits
     if not are_exact and any_of(possible):
         hits = _check_within(spheres, a, b, possible, hits)
-    return Verdicts(hits, open_lanes | possible)
+    return Verdicts(hits, verdicts.open | possible)
 
 
 @kernel

@@ -60,6 +60,33 @@ def random_link_shape(rng, size: float) -> collide.Shape:
     return collide.Compound([(ball, pose(t=(r, 0, 0))), (block, random_pose(rng, r))])
 
 
+def some_spheres(rng, size: float) -> collide.Shape:
+    return collide.Compound([
+        (collide.Sphere(size * float(rng.uniform(0.2, 0.6))), pose(t=rng.uniform(-size, size, 3)))
+        for _ in range(int(rng.integers(1, 5)))
+    ])
+
+
+def _obstacle(rng) -> collide.Shape:
+    kind = int(rng.integers(5))
+    if kind == 0:
+        return collide.Halfspace(rng.normal(size=3), -2.5)
+    if kind == 1:
+        return collide.ConvexHull([(0.0, 0.0, 0.0), tuple(rng.normal(size=3) * 0.2)], radius=0.05)
+    if kind == 2:
+        corners = 0.2 * rng.normal(size=(4, 3))
+        return collide.Mesh(corners, [(0, 1, 2), (0, 1, 3), (1, 2, 3)], solid=False)
+    return random_link_shape(rng, 0.25)
+
+
+def scene_of_spheres(rng, n: int = 5, **options) -> collide.RobotChecker:
+    """A robot of spheres among planes, swept segments, open meshes and others."""
+    world = collide.World()
+    for k in range(n):
+        world.add(_obstacle(rng), random_pose(rng, 1.0), name=f"body{k}")
+    return collide.RobotChecker(random_robot(rng, n_links=5, shape=some_spheres, size=0.06), world, **options)
+
+
 def plain_link_poses(robot: Robot, q: np.ndarray) -> dict[str, np.ndarray]:
     """Link → (4, 4) pose by matrix products and `math`, from the joints as they were given."""
     column = {name: k for k, name in enumerate(robot.joint_names)}

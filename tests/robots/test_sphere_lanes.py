@@ -6,38 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from naive import pose, random_pose, rng_of
-from random_robots import random_configurations, random_link_shape, random_robot
+from naive import pose, rng_of
+from random_robots import random_configurations, random_robot, scene_of_spheres, some_spheres
 
 import collide
 from collide.kernels import address_of
 from collide.robots.check_configurations import check_configurations
-
-
-def some_spheres(rng, size: float) -> collide.Shape:
-    return collide.Compound([
-        (collide.Sphere(size * float(rng.uniform(0.2, 0.6))), pose(t=rng.uniform(-size, size, 3)))
-        for _ in range(int(rng.integers(1, 5)))
-    ])
-
-
-def obstacle(rng) -> collide.Shape:
-    kind = int(rng.integers(5))
-    if kind == 0:
-        return collide.Halfspace(rng.normal(size=3), -2.5)
-    if kind == 1:
-        return collide.ConvexHull([(0.0, 0.0, 0.0), tuple(rng.normal(size=3) * 0.2)], radius=0.05)
-    if kind == 2:
-        corners = 0.2 * rng.normal(size=(4, 3))
-        return collide.Mesh(corners, [(0, 1, 2), (0, 1, 3), (1, 2, 3)], solid=False)
-    return random_link_shape(rng, 0.25)
-
-
-def a_scene(rng, n: int = 5, **options) -> collide.RobotChecker:
-    world = collide.World()
-    for k in range(n):
-        world.add(obstacle(rng), random_pose(rng, 1.0), name=f"body{k}")
-    return collide.RobotChecker(random_robot(rng, n_links=5, shape=some_spheres, size=0.06), world, **options)
 
 
 def asked_alone(checker: collide.RobotChecker, q: np.ndarray) -> bool:
@@ -71,7 +45,7 @@ def test_verdicts_are_those_of_every_pair_asked_alone():
     n_hits, shares = [], []
     for seed in range(12):
         rng = rng_of("spheres of robots", seed)
-        checker = a_scene(rng, padding=0.02 * (seed % 2))
+        checker = scene_of_spheres(rng, padding=0.02 * (seed % 2))
         Q = random_configurations(rng, checker.robot, 61)
         expected = [asked_alone(checker, q) for q in Q]
         wrong = np.flatnonzero(checker.collides(Q) != expected)
@@ -112,7 +86,7 @@ def test_at_a_touch_verdicts_are_exact(seed):
 def test_links_in_lanes_have_the_bits_of_links_alone():
     for seed in range(12):
         rng = rng_of("links in lanes", seed)
-        checker = a_scene(rng, n=1)
+        checker = scene_of_spheres(rng, n=1)
         Q = random_configurations(rng, checker.robot, 8)
         Q[1] *= 1e3
         Q[2] *= -1e7  # turned further than LARGEST_ANGLE
@@ -128,7 +102,7 @@ def test_links_in_lanes_have_the_bits_of_links_alone():
 
 def test_spheres_beside_other_bodies_and_attached_ones():
     rng = rng_of("attached to spheres", 2)
-    checker = a_scene(rng)
+    checker = scene_of_spheres(rng)
     link = checker.bodies[0]
     held = collide.RobotChecker(checker.robot, checker.world, attached=[
         ("box", link, collide.Box((0.3, 0.4, 0.5)), pose(t=(0.3, 0, 0.2)))])
