@@ -13,13 +13,12 @@ from collide.kernels.lanes import LANES
 from collide.lowering.packed_convex import CYLINDER, HALFSPACE, POINTS, PackedConvex
 from collide.robots import motion_bounds as motions
 from collide.robots import sphere_lanes as layout
+from collide.robots.body_spheres import ROUNDING, are_spheres, spheres_of
 from collide.robots.check_scene import BOX, HALF
-from collide.robots.check_tables import CheckTables, RobotTables, Setting, Surroundings
+from collide.robots.check_tables import CheckTables, RobotBody, RobotTables, Setting, Surroundings
 from collide.robots.forward_kinematics import LINK_POSE
 from collide.robots.robot import Robot
 
-#: Radii are larger, or smaller, by this share of all that goes into them.
-_ROUNDING = 2.0**-44
 #: Of fewer configurations none are asked by their spheres: of robots of spheres alone, and of others.
 _FEWEST_EXACT, _FEWEST = 2, 4
 
@@ -35,50 +34,26 @@ class SphereTables(NamedTuple):
     fewest: int
 
 
-class BodySpheres(NamedTuple):
-    """Spheres of a body in its link.   outer, inner : (n, 4) centres and radii; the body lies within the union of the
-    outer ones, and the inner ones lie within the body.   is_exact : whether the body is the union of the outer ones.
+def sphere_tables(robot: RobotTables, bodies: Sequence[RobotBody], *, of_any: bool) -> SphereTables | None:
+    """Those of a robot's bodies; ``None`` where a body has no end.
+
+    of_any : False for ``None`` as well where fewer than half of the bodies are made of spheres, and spheres of the
+        others take milliseconds a body.
     """
-
-    outer: np.ndarray
-    inner: np.ndarray
-    is_exact: bool
-
-
-def sphere_tables(robot: RobotTables, paddings: Sequence[float]) -> SphereTables | None:
-    """Those of a robot's bodies; ``None`` where a body has no end, and where fewer than half are made of spheres."""
-    if not np.isfinite(robot.part_boxes).all():
+    is_sphere = [are_spheres(body.shape) for body in bodies]
+    if not np.isfinite(robot.part_boxes).all() or not (of_any or 2 * sum(is_sphere) >= len(bodies)):
         return None
-    of_bodies = [_spheres_of(robot, k) for k in range(len(robot.bodies))]
-    if 2 * sum(body.is_exact for body in of_bodies) < len(of_bodies):
-        return None
-    counts = np.zeros((len(of_bodies), layout.BODY_SPHERES), dtype=np.int64)
-    around, rows, n = np.zeros((len(of_bodies), layout.SPHERE)), [], 0
-    for k, (body, padding) in enumerate(zip(of_bodies, paddings)):
-        counts[k] = n, len(body.outer), n + len(body.outer), len(body.inner), body.is_exact
-        n += len(body.outer) + len(body.inner)
-        rows += [_padded(body.outer, padding, 1.0), _padded(body.inner, padding, 1.0 if body.is_exact else -1.0)]
-        around[k] = _padded(_sphere_around(body.outer)[None], padding, 1.0)[0]
-    is_exact = all(body.is_exact for body in of_bodies)
-    return SphereTables(counts, around, np.concatenate(rows), _FEWEST_EXACT if is_exact else _FEWEST)
-
-
-def _spheres_of(robot: RobotTables, body: int) -> BodySpheres:
-    _, first, count = robot.bodies[body].tolist()
-    packed = robot.table.packed[first : first + count]
-    parts = robot.parts[first : first + count]
-    nothing = np.zeros((0, 4))
-    if all(part.kind == POINTS and len(part.points) == 1 for part in packed) and not robot.is_bound[first]:
-        centres = [_moved(part.points[0], row) for part, row in zip(packed, parts)]
-        spheres = np.column_stack([centres, [part.radius for part in packed]])
-        return BodySpheres(spheres, nothing, True)
-    box = robot.body_boxes[body]
-    return BodySpheres(np.array([[*box[:HALF], np.linalg.norm(box[HALF:]) * (1.0 + _ROUNDING)]]), nothing, False)
-
-
-def _moved(point: np.ndarray, row: np.ndarray) -> np.ndarray:
-    """A point of a part in the link.   row : of `compound_table`."""
-    return row[:9].reshape(3, 3) @ point + row[9:12]
+    counts = np.zeros((len(bodies), layout.BODY_SPHERES), dtype=np.int64)
+    around, rows, n = np.zeros((len(bodies), layout.SPHERE)), [], 0
+    for k, body in enumerate(bodies):
+        spheres = spheres_of(body)
+        counts[k] = n, len(spheres.outer), n + len(spheres.outer), len(spheres.inner), spheres.is_exact
+        n += len(spheres.outer) + len(spheres.inner)
+        sign = 1.0 if spheres.is_exact else -1.0
+        rows += [_padded(spheres.outer, body.padding, 1.0), _padded(spheres.inner, body.padding, sign)]
+        around[k] = _padded(_sphere_around(spheres.outer)[None], body.padding, 1.0)[0]
+    fewest = _FEWEST_EXACT if all(is_sphere) else _FEWEST
+    return SphereTables(counts, around, np.concatenate(rows), fewest)
 
 
 def _padded(spheres: np.ndarray, padding: float, sign: float) -> np.ndarray:
@@ -86,8 +61,8 @@ def _padded(spheres: np.ndarray, padding: float, sign: float) -> np.ndarray:
     out = np.zeros((len(spheres), layout.SPHERE))
     out[:, :4] = spheres
     size = np.abs(spheres).sum(axis=1) + padding
-    out[:, layout.PADDED_RADIUS] = spheres[:, 3] + padding + sign * _ROUNDING * size
-    out[:, layout.RADIUS] += sign * _ROUNDING * size
+    out[:, layout.PADDED_RADIUS] = spheres[:, 3] + padding + sign * ROUNDING * size
+    out[:, layout.RADIUS] += sign * ROUNDING * size
     return out
 
 
@@ -100,7 +75,7 @@ def _sphere_around(spheres: np.ndarray) -> np.ndarray:
         reach = np.linalg.norm(spheres[:, :3] - centre, axis=1) + spheres[:, 3]
         farthest = int(reach.argmax())
         if best is None or reach[farthest] < best[3]:
-            best = np.array([*centre, reach[farthest] * (1.0 + _ROUNDING)])
+            best = np.array([*centre, reach[farthest] * (1.0 + ROUNDING)])
         centre = centre + (spheres[farthest, :3] - centre) / (step + 1.0)
     assert best is not None
     return best
@@ -149,7 +124,7 @@ def _parts_around(tables: CheckTables, around: Surroundings) -> tuple[np.ndarray
 def _part_of(packed: PackedConvex, box: np.ndarray, is_bound: bool) -> tuple[int, np.ndarray]:
     """(kind, numbers) of a part around.   box : (BOX,) around it."""
     out = np.zeros(layout.PART_NUMBERS)
-    radius, slop = packed.radius, packed.slop + _ROUNDING * (packed.reach + packed.radius)
+    radius, slop = packed.radius, packed.slop + ROUNDING * (packed.reach + packed.radius)
     out[layout.AT_MOST], out[layout.AT_LEAST] = radius + slop, radius - slop
     if packed.kind == HALFSPACE:
         normal = packed.params[:3]
@@ -161,8 +136,8 @@ def _part_of(packed: PackedConvex, box: np.ndarray, is_bound: bool) -> tuple[int
     if packed.kind == POINTS and not is_bound and _are_all_corners(packed.points):
         out[:3] = 0.5 * (packed.points.max(axis=0) - packed.points.min(axis=0))
         return layout.SWEPT_BOX, out
-    out[:3] = box[HALF:BOX] * (1.0 + _ROUNDING)
-    out[layout.AT_MOST], out[layout.AT_LEAST] = _ROUNDING * float(np.abs(box).sum()), -math.inf
+    out[:3] = box[HALF:BOX] * (1.0 + ROUNDING)
+    out[layout.AT_MOST], out[layout.AT_LEAST] = ROUNDING * float(np.abs(box).sum()), -math.inf
     return layout.ONLY_BOXED, out
 
 

@@ -26,6 +26,8 @@ from collide.worlds.world import World
 if TYPE_CHECKING:
     from typing_extensions import Self
 
+#: Once so many configurations have been asked, spheres are made of bodies that are not: in a tenth of a second.
+_PAY_FOR_SPHERES = 20_000
 #: A thread is handed at least so many configurations.
 _LEAST_PIECE = 512
 
@@ -59,13 +61,14 @@ class CheckerScene:
         """Those of the robot, and the first setting."""
         matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
         self._tables = robot_tables(self._bodies, np.concatenate(matrices))
-        self._spheres = sphere_tables(self._tables, [body.padding for body in self._bodies])
+        self._spheres = sphere_tables(self._tables, self._bodies, of_any=False)
+        self._n_asked = _PAY_FOR_SPHERES if self._spheres is not None else 0
         self._setting: Setting | None = None
         self.prepare()
 
     def __getstate__(self) -> dict:
         """What a copy or a pickle takes along. What holds addresses is made again."""
-        made = ("_setting", "_tables", "_spheres", "_is_fixed")
+        made = ("_setting", "_tables", "_spheres", "_n_asked", "_is_fixed")
         return {name: value for name, value in vars(self).items() if name not in made}
 
     def __setstate__(self, state: dict) -> None:
@@ -167,6 +170,15 @@ class CheckerScene:
         setting = Setting(self._bodies, base, surroundings, tables, *filters, spheres, seen, seen, [])
         self._setting = setting
         return setting
+
+    def _count(self, n: int) -> None:
+        """Take note of n configurations to be asked. Where so many have been asked that spheres pay, they are made."""
+        if self._n_asked >= _PAY_FOR_SPHERES:
+            return
+        self._n_asked += n
+        if self._n_asked >= _PAY_FOR_SPHERES:
+            setting, self._spheres = self.prepare(), sphere_tables(self._tables, self._bodies, of_any=True)
+            self._setting = setting._replace(spheres=self._spheres_among(setting.surroundings), spare=[])
 
     def _spheres_among(self, around: Surroundings) -> SphereTables | None:
         """Spheres of the robot, but not among fields, whose boxes the robot is in."""

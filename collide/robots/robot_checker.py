@@ -23,6 +23,9 @@ from collide.shapes.point_cloud import PointCloud
 from collide.transforms import LARGEST, as_pose
 from collide.worlds.world import World
 
+#: A motion counts as so many configurations.
+_CONFIGURATIONS_OF_A_MOTION = 20
+
 
 class RobotChecker(CheckerScene):
     """Checks whole configurations of a robot: against itself, and against the bodies of a World.
@@ -155,6 +158,7 @@ class RobotChecker(CheckerScene):
             verdict = self._verdict(q)
             if verdict != IS_OPEN:
                 return verdict == COLLIDES
+        self._count(len(q))
         out = np.zeros(len(q), dtype=bool)
         now = self._as_of_now()
         now.in_pieces(len(q), threads, progress, lambda space, piece: check_piece(now, space, q[piece], out[piece]))
@@ -212,6 +216,7 @@ class RobotChecker(CheckerScene):
         """
         q0, q1 = self._edges(Q0, Q1)
         step = _positive("RobotChecker.edge_collides: resolution", resolution)
+        self._count(_CONFIGURATIONS_OF_A_MOTION * len(q0))
         return ~np.isnan(sampled_collision(self._as_of_now(), q0, q1, step, threads))
 
     def certify_edges(
@@ -248,6 +253,7 @@ class RobotChecker(CheckerScene):
         """
         q0, q1 = self._edges(Q0, Q1)
         step = _positive("RobotChecker.certify_edges: resolution", resolution)
+        self._count(_CONFIGURATIONS_OF_A_MOTION * len(q0))
         return certify(self._as_of_now(), q0, q1, step, threads, progress)
 
     def explain(self, q) -> ConfigurationReport:

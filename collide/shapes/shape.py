@@ -25,7 +25,7 @@ class Shape:
 
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges",
-        "_hulls_instead", "_items", "_kind", "_laid_out", "_leaves", "_meshed_leaves", "_partners",
+        "_hulls_instead", "_items", "_kind", "_laid_out", "_leaves", "_link_spheres", "_meshed_leaves", "_partners",
         "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_single_facets", "_surface", "_topology",
         "_union", "_vertex_set", "_walk",
     )
@@ -36,6 +36,7 @@ class Shape:
     #: The same with meshes that are convex as what they are (`robots/check_tables.py`).
     _convex_parts: Any
     _hulls_instead: Any
+    _link_spheres: Any
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
     _prepared: dict[int, Any]
     _serial: int

@@ -1,0 +1,246 @@
+"""Spheres around and within the links of a robot: few, and made in milliseconds.
+
+A convex set is halved across an axis again and again, where the largest sphere around a piece is: a piece is the hull
+of its corners, and so within a sphere around these. A sphere within a set is as large as the distance of its centre
+from the surface, as `collide.distance` proves it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from collide.hull.exact_hull import convex_hull
+from collide.lowering.extents import box_of
+from collide.lowering.packed_convex import POINTS, PackedConvex
+from collide.lowering.parts import bounding_parts_of, is_single_convex
+from collide.pairs import query
+from collide.robots.check_tables import RobotBody, without_meshes
+from collide.shapes.compound import Compound
+from collide.shapes.convex_hull import ConvexHull
+from collide.shapes.mesh import Mesh
+from collide.shapes.shape import Shape, kept_with_shape
+
+#: Radii are larger, or smaller, by this share of all that goes into them: far more than is rounded in a dozen cuts.
+ROUNDING = 2.0**-40
+#: Spheres around a link; pieces whose halves have no smaller spheres than this share are not halved.
+_COUNT, _WORTH = 8, 0.97
+#: Steps towards the middle of a sphere around points, and towards the middle of a set.
+_STEPS, _ASCENTS = 16, 24
+
+
+class BodySpheres(NamedTuple):
+    """Spheres of a body in its frame.   outer, inner : (n, 4) centres and radii [m]; the body lies within the union of
+    the outer ones, and the inner ones lie within the body.   is_exact : whether the body is the union of the outer
+    ones.
+    """
+
+    outer: np.ndarray
+    inner: np.ndarray
+    is_exact: bool
+
+
+_NOTHING = np.zeros((0, 4))
+
+
+def spheres_of(body: RobotBody) -> BodySpheres:
+    """Those of a body of a robot, whose shape is a `Compound` of collision elements."""
+    items = body.shape.items if isinstance(body.shape, Compound) else [(body.shape, np.eye(4))]
+    count = max(1, _COUNT // len(items))
+    made = [(_spheres_of_shape(shape)(count), X) for shape, X in items]
+    return BodySpheres(
+        np.concatenate([_moved(spheres.outer, X, 1.0) for spheres, X in made]),
+        np.concatenate([_moved(spheres.inner, X, -1.0) for spheres, X in made]),
+        all(spheres.is_exact for spheres, _ in made),
+    )
+
+
+def _moved(spheres: np.ndarray, X: np.ndarray, sign: float) -> np.ndarray:
+    """Spheres (n, 4) at a pose, larger (sign 1) or smaller (−1) where its matrix is not quite a rotation."""
+    out, skew = spheres.copy(), float(np.abs(X[:3, :3].T @ X[:3, :3] - np.eye(3)).sum())
+    out[:, :3] = spheres[:, :3] @ X[:3, :3].T + X[:3, 3]
+    if (X != np.eye(4)).any():
+        out[:, 3] += sign * (ROUNDING * (np.abs(out).sum(axis=1) + np.abs(spheres).sum(axis=1)) + skew * spheres[:, 3])
+    return out[out[:, 3] > 0.0] if sign < 0.0 else out
+
+
+@kept_with_shape("_link_spheres")
+def _spheres_of_shape(shape: Shape):
+    """A function of how many spheres are wanted, which keeps what was made."""
+    kept: dict[int, BodySpheres] = {}
+
+    def of(count: int) -> BodySpheres:
+        if count not in kept:
+            kept[count] = _made(shape, count)
+        return kept[count]
+
+    return of
+
+
+def are_spheres(shape: Shape) -> bool:
+    """Whether a shape is a union of spheres, or of points."""
+    if isinstance(shape, Compound):
+        return all(are_spheres(item) for item, _ in shape.items)
+    return not shape.is_asked_whole and all(
+        part.kind == POINTS and len(part.points) == 1 for part, _ in bounding_parts_of(shape)
+    )
+
+
+def _made(shape: Shape, count: int) -> BodySpheres:
+    parts = bounding_parts_of(shape)
+    same = without_meshes(shape)
+    if are_spheres(shape):
+        centres = [X[:3, :3] @ part.points[0] + X[:3, 3] for part, X in parts]
+        return BodySpheres(np.column_stack([centres, [part.radius for part, _ in parts]]), _NOTHING, True)
+    share = max(1, count // len(parts))
+    outer = np.concatenate([_moved(outer_spheres(part, share), X, 1.0) for part, X in parts])
+    return BodySpheres(outer, _inner_spheres(shape if same is None else same, outer[:, :3]), False)
+
+
+def outer_spheres(packed: PackedConvex, count: int) -> np.ndarray:
+    """(n, 4) at most so many spheres whose union holds a convex set."""
+    if packed.kind == POINTS:
+        corners, beyond = packed.points, packed.radius + packed.slop
+    else:
+        box = box_of(packed)
+        signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        corners, beyond = box[:3] + signs * box[3:], 0.0
+    pieces, whole = [(corners, _ball_around(corners))], []
+    while pieces and len(pieces) + len(whole) < count:
+        pieces.sort(key=lambda piece: piece[1][3])
+        corners, ball = pieces.pop()
+        halves = _best_halves(corners)
+        if halves is None or max(half[1][3] for half in halves) > _WORTH * ball[3]:
+            whole.append((corners, ball))
+        else:
+            pieces += halves
+    spheres = np.array([ball for _, ball in (*pieces, *whole)])
+    spheres[:, 3] += beyond + ROUNDING * (np.abs(spheres).sum(axis=1) + beyond)
+    return spheres
+
+
+def _best_halves(corners: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]] | None:
+    """Both halves of the hull of points, with spheres around them, cut across the axis of the smallest spheres."""
+    edges, best = _edges_of(corners), None
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    for axis in np.argsort(low - high)[:2].tolist():
+        at = 0.5 * (low[axis] + high[axis])
+        heights = corners[:, axis] - at
+        a, b = heights[edges[:, 0]], heights[edges[:, 1]]
+        crossing = (a < 0.0) != (b < 0.0)
+        share = (a[crossing] / (a[crossing] - b[crossing]))[:, None]
+        first, second = corners[edges[crossing, 0]], corners[edges[crossing, 1]]
+        cut = first + share * (second - first)
+        if not len(cut):
+            continue
+        halves = [np.concatenate([corners[side], cut]) for side in (heights < 0.0, heights >= 0.0)]
+        found = [(half, _ball_around(half)) for half in halves]
+        if best is None or max(ball[3] for _, ball in found) < max(ball[3] for _, ball in best):
+            best = found
+    return best
+
+
+def _edges_of(points: np.ndarray) -> np.ndarray:
+    """(k, 2) edges of the hull of points."""
+    hull = convex_hull(points)
+    if hull.dimension < 2:
+        return hull.vertices[None, [0, -1]] if hull.dimension else np.zeros((0, 2), dtype=np.int64)
+    return np.concatenate([hull.facets[:, [0, 1]], hull.facets[:, [1, 2]], hull.facets[:, [2, 0]]])
+
+
+def _ball_around(points: np.ndarray) -> np.ndarray:
+    """(4,) a sphere around points: about the middle of their box, moved towards the farthest, ever less (Badoiu and
+    Clarkson, "Smaller core-sets for balls", 2003).
+    """
+    centre, best = 0.5 * (points.min(axis=0) + points.max(axis=0)), np.full(4, np.inf)
+    for step in range(_STEPS):
+        squares = ((points - centre) ** 2).sum(axis=1)
+        k = int(squares.argmax())
+        if squares[k] < best[3]:
+            best = np.array([*centre, squares[k]])
+        centre = centre + (points[k] - centre) / (step + 2.0)
+    best[3] = math.sqrt(best[3])
+    return best
+
+
+def _inner_spheres(shape: Shape, centres: np.ndarray) -> np.ndarray:
+    """(n, 4) spheres within a shape, about centres (k, 3) moved inwards; none within surfaces."""
+    if isinstance(shape, Compound):
+        made = [_moved(_inner_spheres(item, _in_frame(centres, X)), X, -1.0) for item, X in shape.items]
+        return np.concatenate(made or [_NOTHING])
+    if isinstance(shape, Mesh) and shape.meshed:
+        return _within_mesh(shape, centres) if shape.solid else _NOTHING
+    if not is_single_convex(shape):
+        return _NOTHING
+    packed = bounding_parts_of(shape)[0][0]
+    if packed.kind == POINTS:
+        centres = _moved_inwards(packed.points, centres)
+    rows = query.distance(shape, _POINT, np.eye(4), _at(centres), check_poses=False).rows
+    return _with_radii(centres, -rows["upper"])
+
+
+_POINT = ConvexHull(np.zeros((1, 3)))
+
+
+def _at(points: np.ndarray) -> np.ndarray:
+    """(n, 4, 4) poses at points."""
+    X = np.tile(np.eye(4), (len(points), 1, 1))
+    X[:, :3, 3] = points
+    return X
+
+
+def _in_frame(points: np.ndarray, X: np.ndarray) -> np.ndarray:
+    return (points - X[:3, 3]) @ X[:3, :3]
+
+
+def _with_radii(centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """(n, 4) spheres of the positive radii, a little smaller; of such within each other the largest."""
+    spheres = np.column_stack([centres, radii - ROUNDING * (np.abs(centres).sum(axis=1) + np.abs(radii))])
+    spheres = spheres[spheres[:, 3] > 0.0]
+    chosen: list[np.ndarray] = []
+    for sphere in spheres[np.argsort(-spheres[:, 3])]:
+        if all(np.linalg.norm(sphere[:3] - one[:3]) > 0.25 * one[3] for one in chosen):
+            chosen.append(sphere)
+    return np.array(chosen[:_COUNT]).reshape(-1, 4)
+
+
+def _moved_inwards(points: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """Centres (k, 3) moved away from the nearest facets of the hull of points, and their mean."""
+    hull = convex_hull(points)
+    if hull.dimension < 3:
+        return centres
+    corners = points[hull.facets]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    normals = normals[lengths > 0.0] / lengths[lengths > 0.0, None]
+    offsets = (normals * corners[lengths > 0.0, 0]).sum(axis=1)
+    middle = points[hull.vertices].mean(axis=0)
+    centres = np.concatenate([centres, middle[None], 0.5 * (centres + middle)])
+    best, radii = centres.copy(), np.full(len(centres), -np.inf)
+    step = 0.3 * float((points.max(axis=0) - points.min(axis=0)).min())
+    for _ in range(_ASCENTS):
+        depths = offsets - centres @ normals.T
+        nearest = depths.argmin(axis=1)
+        depth = depths[np.arange(len(centres)), nearest]
+        better = depth > radii
+        best[better], radii[better] = centres[better], depth[better]
+        centres = centres - step * normals[nearest]
+        step *= 0.8
+    return best
+
+
+def _within_mesh(mesh: Mesh, centres: np.ndarray) -> np.ndarray:
+    """Spheres within a solid mesh: about points inside, as large as the distance to the surface."""
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    cells = np.maximum(1, np.minimum(8, np.ceil(6 * (high - low) / (high - low).max()))).astype(int)
+    axes = [low[k] + (np.arange(n) + 0.5) / n * (high[k] - low[k]) for k, n in enumerate(cells.tolist())]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = np.concatenate([centres, grid])
+    points = points[query.collide(mesh, _POINT, np.eye(4), _at(points), check_poses=False)]
+    if not len(points):
+        return _NOTHING
+    surface = Mesh(mesh.vertices, mesh.faces, solid=False)
+    rows = query.distance(surface, _POINT, np.eye(4), _at(points), check_poses=False).rows
+    return _with_radii(points, rows["lower"])
