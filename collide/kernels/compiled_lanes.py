@@ -184,6 +184,17 @@ def any_of(_context, condition):
     return types.boolean(condition), codegen
 
 @intrinsic
+def bits_of(_context, condition):
+    """An integer whose bit k is the condition in lane k."""
+
+    def codegen(_context, builder, _signature, args):
+        return builder.zext(builder.bitcast(args[0], ir.IntType(LANES)), _I64)
+
+    if condition != mask:
+        raise TypingError(f"bits are those of a Mask, not of {condition}")
+    return types.int64(condition), codegen
+
+@intrinsic
 def product_error(_context, a, b, product):
     """a·b − product, rounded once: the exact error of the product a·b that was rounded to ``product``."""
     number = _number(a, b, product)

@@ -16,10 +16,18 @@ from collide.kernels.mode import WITH_NUMBA
 from collide.kernels.plain_lanes import LANES
 
 if WITH_NUMBA:
-    from collide.kernels.compiled_lanes import any_of, product_error, root_of, select, transpose_eight, view_lanes
+    from collide.kernels.compiled_lanes import (
+        any_of,
+        bits_of,
+        product_error,
+        root_of,
+        select,
+        transpose_eight,
+        view_lanes,
+    )
 else:
-    from collide.kernels.plain_lanes import any_of, root_of, select, transpose_eight, view_lanes
+    from collide.kernels.plain_lanes import any_of, bits_of, root_of, select, transpose_eight, view_lanes
 
-__all__ = ["LANES", "any_of", "root_of", "select", "transpose_eight", "view_lanes"]
+__all__ = ["LANES", "any_of", "bits_of", "root_of", "select", "transpose_eight", "view_lanes"]
 if WITH_NUMBA:
     __all__ += ["product_error"]

@@ -55,5 +55,8 @@ def select(condition, a, b):
 def root_of(a):
     return np.sqrt(a)
 
+def bits_of(condition):
+    return sum(1 << k for k in range(LANES) if condition[k])
+
 def any_of(condition):
     return bool(np.any(condition))

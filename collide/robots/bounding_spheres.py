@@ -17,10 +17,13 @@ from collide.robots.body_spheres import ROUNDING, are_spheres, spheres_of
 from collide.robots.check_scene import BOX, HALF
 from collide.robots.check_tables import CheckTables, RobotBody, RobotTables, Setting, Surroundings
 from collide.robots.forward_kinematics import LINK_POSE
+from collide.robots.pair_maps import PairMaps
 from collide.robots.robot import Robot
 
 #: Of fewer configurations none are asked by their spheres: of robots of spheres alone, and of others.
 _FEWEST_EXACT, _FEWEST = 2, 4
+#: Pairs that eight configurations may leave open and are remembered; where they leave more all pairs are asked.
+_PAIRS = 256
 
 
 class SphereTables(NamedTuple):
@@ -87,7 +90,7 @@ class SphereWorkspace:
     header, address : of `sphere_lanes.py`.   links : (LINK_POSE links, LANES).   verdicts : (2, LANES).
     """
 
-    def __init__(self, robot: Robot, setting: Setting, spheres: SphereTables):
+    def __init__(self, robot: Robot, setting: Setting, spheres: SphereTables, maps: PairMaps | None):
         tables, around = setting.tables, setting.surroundings
         kinds, numbers = _parts_around(tables, around)
         n_bodies, n = len(spheres.counts), len(spheres.spheres)
@@ -99,15 +102,20 @@ class SphereWorkspace:
             layout.COLUMNS_AT: columns, layout.LINK_LANES_AT: self.links,
             layout.AROUND_LANES_AT: np.zeros((layout.SPHERE_PLACE * n_bodies, LANES)),
             layout.SPHERE_LANES_AT: np.zeros((layout.SPHERE_PLACE * n, LANES)),
+            layout.SPANS_AT: np.zeros_like(columns), layout.FLAGS_AT: np.zeros(LANES),
+            layout.PAIRS_AT: np.zeros((_PAIRS, layout.OPEN_PAIR), dtype=np.int64),
             layout.PIECES_AT: np.zeros((motions.MAX_PIECES + LANES, 2)), layout.HALF_LANES_AT: np.zeros((1, LANES)),
             layout.MOVED_LANES_AT: np.zeros((n_bodies * (len(robot.joints) + 1), LANES)),
             layout.PLACED_AT: np.zeros(n_bodies, dtype=np.int64), layout.VERDICTS_AT: self.verdicts,
         }
+        if maps is not None and maps.ints.any():
+            self._buffers |= {layout.MAP_INTS_AT: maps.ints, layout.MAP_DOUBLES_AT: maps.doubles}
+            self._buffers |= {layout.MAP_CELLS_AT: maps.cells}
         self.header = np.zeros(layout.SPHERE_HEADER, dtype=np.int64)
         for word, buffer in self._buffers.items():
             self.header[word] = address_of(buffer)
         self.header[layout.N_SPHERES], self.header[layout.N_COLUMNS] = n, len(columns)
-        self.header[layout.FEWEST] = spheres.fewest
+        self.header[layout.FEWEST], self.header[layout.PAIR_CAPACITY] = spheres.fewest, _PAIRS
         self.address = address_of(self.header)
 
 

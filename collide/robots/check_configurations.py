@@ -36,7 +36,18 @@ from collide.robots.check_scene import (
 )
 from collide.robots.forward_kinematics import pose_links
 from collide.robots.part_pairs import HITTING, OPEN, state_of_parts
-from collide.robots.sphere_lanes import COLUMNS_AT, FEWEST, VERDICTS_AT, check_eight, view_spheres
+from collide.robots.sphere_lanes import (
+    COLUMNS_AT,
+    FEWEST,
+    N_PAIRS,
+    OPEN_PAIR,
+    PAIR_CAPACITY,
+    PAIRS_AT,
+    VERDICTS_AT,
+    check_eight,
+    copy_links,
+    view_spheres,
+)
 
 #: What is known of a configuration: free; it collides; free but for the pairs left to others.
 IS_FREE, COLLIDES, IS_OPEN = range(3)
@@ -53,17 +64,21 @@ def check_configurations(header_at, q_at, dof, first, n, verdicts_at):
     q = view_f64(q_at, dof * n)
     verdicts = view_u8(verdicts_at, n)
     words[N_OPEN] = 0
-    settled = first
+    begin = settled = first
     # A configuration leaves each pair of bodies to others once, and once more for what stands in between.
     for k in range(first, n):
         if k >= settled and words[SPHERE_HEADER_AT] != 0:
+            begin = k
             settled = settle_eight(scene, q, dof, k, n)
             for j in range(k, settled):
                 verdicts[j] = verdict_in_lane(scene, j - k)
         if k < settled and verdicts[k] != IS_OPEN:
             continue
         n_open = words[N_OPEN]
-        verdicts[k] = verdict_of(scene, q, dof * k, k)
+        if k < settled:
+            verdicts[k] = verdict_after(scene, q, dof * k, k, k - begin)
+        else:
+            verdicts[k] = verdict_of(scene, q, dof * k, k)
         if words[N_OPEN] > words[OPEN_CAPACITY]:
             words[N_OPEN] = n_open
             return k
@@ -96,6 +111,37 @@ def verdict_in_lane(scene, lane):
     spheres_at = scene.words[SPHERE_HEADER_AT]
     answers = view_f64(view_i64(spheres_at, VERDICTS_AT + 1)[VERDICTS_AT], 2 * LANES)
     return COLLIDES if answers[lane] != 0.0 else IS_OPEN if answers[LANES + lane] != 0.0 else IS_FREE
+
+
+@kernel
+def verdict_after(scene, q, at, number, lane):
+    """`verdict_of` a configuration that spheres left open in a lane: the pairs that they left open are asked."""
+    words = scene.words
+    spheres = view_spheres(scene, words[SPHERE_HEADER_AT])
+    if spheres.words[N_PAIRS] > spheres.words[PAIR_CAPACITY]:
+        return verdict_of(scene, q, at, number)
+    copy_links(scene, spheres, lane)
+    pairs = view_i64(spheres.words[PAIRS_AT], OPEN_PAIR * spheres.words[N_PAIRS])
+    verdict = IS_FREE
+    for k in range(spheres.words[N_PAIRS]):
+        if (pairs[OPEN_PAIR * k + 2] >> lane) & 1 == 0:
+            continue
+        a = pairs[OPEN_PAIR * k]
+        b = pairs[OPEN_PAIR * k + 1]
+        first = scene.bodies[BODY_INTS * a + FIRST]
+        if b < 0:
+            part = -1 - b
+            around = -1 - body_of_part(scene, part)
+            first += words[PADDED]
+            state = _state_of_bodies(scene, number, a, first, around, words[N_LINK_PARTS] + part, 1)
+        else:
+            at_b = BODY_INTS * b
+            state = _state_of_bodies(scene, number, a, first, b, scene.bodies[at_b + FIRST], scene.bodies[at_b + COUNT])
+        if state == HITTING:
+            return COLLIDES
+        if state == OPEN:
+            verdict = IS_OPEN
+    return verdict
 
 
 @kernel(inline=True)

@@ -142,7 +142,7 @@ class Setting(NamedTuple):
     bodies : of the robot.   base : pose of the root, as `forward_kinematics.LINK_POSE` doubles.
     self_pairs : (k, 2) int64 of tested bodies.   allowed : (bodies, around) uint8, 1 for pairs never tested.
     skipped : {reason: number of pairs never tested}.
-    spheres : `bounding_spheres.SphereTables` of the robot, or ``None``.
+    spheres, maps : `bounding_spheres.SphereTables` of the robot, and `pair_maps.PairMaps` of its pairs, or ``None``.
     seen : the World as of then.   made_of : the World as of when the tables were made.   spare : workspaces of threads
         not at work.
     """
@@ -155,6 +155,7 @@ class Setting(NamedTuple):
     allowed: np.ndarray
     skipped: dict[str, int]
     spheres: Any = None
+    maps: Any = None
     seen: Any = None
     made_of: Any = None
     spare: Any = None

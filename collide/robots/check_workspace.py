@@ -84,7 +84,8 @@ class CheckWorkspace:
         self.address = address_of(self.header)
         self.verdict = bytearray(1)  # of a single configuration
         self.verdict_at = address_of(np.frombuffer(self.verdict, dtype=np.uint8))
-        self._spheres = None if setting.spheres is None else SphereWorkspace(robot, setting, setting.spheres)
+        self._spheres = None if setting.spheres is None else SphereWorkspace(
+            robot, setting, setting.spheres, setting.maps)
         if self._spheres is not None:
             self.header[layout.SPHERE_HEADER_AT] = self._spheres.address
         self._walk_fields(setting)

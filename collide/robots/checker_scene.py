@@ -18,6 +18,7 @@ from collide.robots.bounding_spheres import SphereTables, sphere_tables
 from collide.robots.check_configurations import check_configurations
 from collide.robots.check_tables import MovedBodies, Setting, Surroundings, robot_tables, surroundings_of, tables_among
 from collide.robots.check_workspace import CheckWorkspace
+from collide.robots.pair_maps import pair_maps
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import SeenWorld, bodies_around, filters_of, refuse_own_margins, robot_bodies
 from collide.transforms import as_pose
@@ -167,7 +168,8 @@ class CheckerScene:
         base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
         tables = tables_among(self._tables, surroundings, before)
         spheres = self._spheres_among(surroundings)
-        setting = Setting(self._bodies, base, surroundings, tables, *filters, spheres, seen, seen, [])
+        maps = before.maps if before is not None and filters[0] is before.self_pairs else None
+        setting = Setting(self._bodies, base, surroundings, tables, *filters, spheres, maps, seen, seen, [])
         self._setting = setting
         return setting
 
@@ -178,7 +180,11 @@ class CheckerScene:
         self._n_asked += n
         if self._n_asked >= _PAY_FOR_SPHERES:
             setting, self._spheres = self.prepare(), sphere_tables(self._tables, self._bodies, of_any=True)
-            self._setting = setting._replace(spheres=self._spheres_among(setting.surroundings), spare=[])
+            spheres = self._spheres_among(setting.surroundings)
+            setting = self._setting = setting._replace(spheres=spheres, spare=[])
+            if spheres is not None:
+                maps = pair_maps(self.robot, setting, CheckWorkspace(self.robot, setting))
+                self._setting = setting._replace(maps=maps, spare=[])
 
     def _spheres_among(self, around: Surroundings) -> SphereTables | None:
         """Spheres of the robot, but not among fields, whose boxes the robot is in."""

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 
 from collide.broadphase.graded_boxes import BODY, SKIP
 from collide.broadphase.graded_boxes import LINK as NODE_LINK
-from collide.kernels import kernel, view_f64, view_i64
-from collide.kernels.lanes import any_of, root_of, select, view_lanes
+from collide.kernels import kernel, view_f64, view_i64, view_u8
+from collide.kernels.lanes import LANES, any_of, bits_of, root_of, select, view_lanes
 from collide.lowering.shape_table import POSE
 from collide.numerics.vec3 import Vec3
 from collide.robots.check_scene import (
@@ -37,10 +37,24 @@ from collide.robots.check_scene import (
     NODE_LINKS_AT,
     NODES_AT,
     SELF_PAIRS_AT,
+    STAMP,
     UNBOUNDED_AT,
     is_allowed,
 )
 from collide.robots.forward_kinematics import LINK_POSE, pose_links
+from collide.robots.map_layout import (
+    CELLS_AT,
+    FIRST_COLUMN,
+    LOW_FIRST,
+    LOW_SECOND,
+    MAP_DOUBLES,
+    MAP_INTS,
+    N_FIRST,
+    N_SECOND,
+    PER_FIRST,
+    PER_SECOND,
+    SECOND_COLUMN,
+)
 
 # Header: for each body how many spheres it has (BODY_SPHERES integers), and the sphere around it; all spheres; parts
 # around: what they are, and their numbers; how many spheres there are.
@@ -49,16 +63,21 @@ from collide.robots.forward_kinematics import LINK_POSE, pose_links
     # workspace, in lanes: columns of q; poses of links; spheres around bodies, and all spheres, in the world; for which
     # eight configurations a body's were placed; how often that was
     COLUMNS_AT, N_COLUMNS, LINK_LANES_AT, AROUND_LANES_AT, SPHERE_LANES_AT, PLACED_AT, N_PLACED,
-    # verdicts: hits and open ones, in lanes; of fewer configurations none are asked so
-    VERDICTS_AT, FEWEST,
+    # verdicts: hits and open ones, in lanes; of fewer configurations none are asked so; pairs that spheres leave open,
+    # their number and how many there may be
+    VERDICTS_AT, FEWEST, PAIRS_AT, N_PAIRS, PAIR_CAPACITY,
+    # of `pair_maps.py`: integers, 0 without, doubles, cells; by how much each column may differ, and flags, in lanes
+    MAP_INTS_AT, MAP_DOUBLES_AT, MAP_CELLS_AT, SPANS_AT, FLAGS_AT,
     # of `sphere_motions.py`: intervals; half their lengths, and how far bodies may move, in lanes
     PIECES_AT, HALF_LANES_AT, MOVED_LANES_AT,
-) = range(18)
-SPHERE_HEADER = 18
+) = range(26)
+SPHERE_HEADER = 26
 # Integers of a body: its first outer sphere, how many; its first inner sphere, how many. Where its outer spheres are
 # the body itself it has no others.
 FIRST_OUTER, N_OUTER, FIRST_INNER, N_INNER, IS_EXACT = range(5)
 BODY_SPHERES = 5
+# Integers of a pair left open: a body, another or −1 − a part around, and the lanes as bits.
+OPEN_PAIR = 3
 # Doubles of a sphere: its centre in the link; its radius among the robot's bodies, and with the padding.
 CENTRE, RADIUS, PADDED_RADIUS = 0, 3, 4
 SPHERE = 5
@@ -123,7 +142,7 @@ def check_eight(scene, spheres):
             break
     pairs = view_i64(words[SELF_PAIRS_AT], 2 * words[N_SELF_PAIRS])
     for k in range(words[N_SELF_PAIRS]):
-        verdicts = check_pair(scene, spheres, pairs[2 * k], pairs[2 * k + 1], 0.0, verdicts)
+        verdicts = check_pair(scene, spheres, k, pairs[2 * k], pairs[2 * k + 1], 0.0, verdicts)
     put_verdicts(spheres, verdicts)
 
 
@@ -133,8 +152,19 @@ def place_bodies(scene, spheres):
     columns = view_lanes(spheres.words[COLUMNS_AT], spheres.words[N_COLUMNS])
     pose_links(scene.joints, columns, 0, spheres.links, LINK_POSE)
     spheres.words[N_PLACED] += 1
+    spheres.words[N_PAIRS] = 0
     for body in range(scene.words[N_BODIES]):
         _put_place(scene, spheres.around_bodies, body, body, spheres, spheres.around_lanes)
+
+
+@kernel
+def copy_links(scene, spheres, lane):
+    """Write the poses of all links in a lane where `begin_configuration` has them: the same bits."""
+    scene.words[STAMP] += 1
+    lanes = view_f64(spheres.words[LINK_LANES_AT], LANES * LINK_POSE * scene.words[N_LINKS])
+    for link in range(scene.words[N_LINKS]):
+        for k in range(LINK_POSE):
+            scene.links[POSE * link + k] = lanes[LANES * (LINK_POSE * link + k) + lane]
 
 
 @kernel(inline=True)
@@ -251,7 +281,7 @@ def _check_part(scene, spheres, body, part, margin, is_near, verdicts):
         for k in range(first, first + spheres.counts[at + N_INNER]):
             within = rows[SPHERE * k + PADDED_RADIUS] + core.at_least - place[SPHERE_PLACE * k + 3]
             hits = hits | (possible & (within > 0.0) & (_squared_gap(core, place, k) < within * within))
-    return Verdicts(hits, verdicts.open | possible)
+    return _open_in(spheres, body, -1 - part, hits, possible & ~hits, verdicts)
 
 
 class Core(NamedTuple):
@@ -349,8 +379,8 @@ def _squared_reach(places_a, a, places_b, b, radii, sign):
 
 
 @kernel
-def check_pair(scene, spheres, a, b, margin, verdicts):
-    """The `Verdicts` after two bodies of the robot have been asked.   margin : as of `check_among_parts`."""
+def check_pair(scene, spheres, number, a, b, margin, verdicts):
+    """The `Verdicts` after a tested pair of the robot's bodies has been asked.   margin : as of `check_among_parts`."""
     around = spheres.around_lanes
     radius_b = spheres.around_bodies[SPHERE * b + RADIUS]
     radii = spheres.around_bodies[SPHERE * a + RADIUS] + radius_b
@@ -358,6 +388,10 @@ def check_pair(scene, spheres, a, b, margin, verdicts):
         _squared_between(around, a, around, b) > _squared_reach(around, a, around, b, radii + margin, 1.0))
     if not any_of(is_near):
         return verdicts
+    if spheres.words[MAP_INTS_AT] != 0:
+        is_near = is_near & ~_are_mapped_apart(spheres, number)
+        if not any_of(is_near):
+            return verdicts
     _place_spheres(scene, spheres, a)
     _place_spheres(scene, spheres, b)
     place = spheres.sphere_lanes
@@ -383,6 +417,50 @@ def check_pair(scene, spheres, a, b, margin, verdicts):
                 hits = hits | (some & (square < _squared_reach(place, i, place, j, radii, -1.0)))
     if not are_exact and any_of(possible):
         hits = _check_within(spheres, a, b, possible, hits)
+    return _open_in(spheres, a, b, hits, possible & ~hits, verdicts)
+
+
+@kernel
+def _are_mapped_apart(spheres, number):
+    """Lanes in which a tested pair is apart by its map: in all cells that the columns may be in."""
+    ints = view_i64(spheres.words[MAP_INTS_AT] + 8 * MAP_INTS * number, MAP_INTS)
+    doubles = view_f64(spheres.words[MAP_DOUBLES_AT] + 8 * MAP_DOUBLES * number, MAP_DOUBLES)
+    flags = view_f64(spheres.words[FLAGS_AT], LANES)
+    columns = view_f64(spheres.words[COLUMNS_AT], LANES * spheres.words[N_COLUMNS])
+    spans = view_f64(spheres.words[SPANS_AT], LANES * spheres.words[N_COLUMNS])
+    n_first = ints[N_FIRST]
+    n_second = ints[N_SECOND]
+    cells = view_u8(spheres.words[MAP_CELLS_AT] + ints[CELLS_AT], n_first * n_second)
+    for lane in range(LANES):
+        at = LANES * ints[FIRST_COLUMN] + lane
+        to = LANES * ints[SECOND_COLUMN] + lane
+        low = (columns[at] - spans[at] - doubles[LOW_FIRST]) * doubles[PER_FIRST]
+        high = (columns[at] + spans[at] - doubles[LOW_FIRST]) * doubles[PER_FIRST]
+        low_second = 0.0
+        high_second = 0.0
+        if n_second > 1:
+            low_second = (columns[to] - spans[to] - doubles[LOW_SECOND]) * doubles[PER_SECOND]
+            high_second = (columns[to] + spans[to] - doubles[LOW_SECOND]) * doubles[PER_SECOND]
+        is_apart = low >= 0.0 and high < n_first and low_second >= 0.0 and high_second < n_second
+        if is_apart:
+            for i in range(int(low), int(high) + 1):
+                for j in range(int(low_second), int(high_second) + 1):
+                    is_apart = is_apart and cells[i * n_second + j] != 0
+        flags[lane] = 1.0 if is_apart else 0.0
+    return view_lanes(spheres.words[FLAGS_AT], 1)[0] > 0.5
+
+
+@kernel(inline=True)
+def _open_in(spheres, body, partner, hits, possible, verdicts):
+    """The `Verdicts` with these hits, and a pair left open in these lanes. Without space pairs are counted alone."""
+    if any_of(possible):
+        n = spheres.words[N_PAIRS]
+        if n < spheres.words[PAIR_CAPACITY]:
+            pairs = view_i64(spheres.words[PAIRS_AT], OPEN_PAIR * (n + 1))
+            pairs[OPEN_PAIR * n] = body
+            pairs[OPEN_PAIR * n + 1] = partner
+            pairs[OPEN_PAIR * n + 2] = bits_of(possible)
+        spheres.words[N_PAIRS] = n + 1
     return Verdicts(hits, verdicts.open | possible)
 
 

@@ -13,10 +13,16 @@ from collide.kernels import kernel, view_f64, view_i64
 from collide.kernels.lanes import LANES, root_of, view_lanes
 from collide.numerics.vec3 import Vec3, cross, dot, rotate, sub, vec3_at
 from collide.robots.check_scene import (
+    BODY_INTS,
+    COUNT,
+    FIRST,
     N_BODIES,
+    N_LINK_PARTS,
     N_SELF_PAIRS,
+    PADDED,
     SELF_PAIRS_AT,
     SPHERE_HEADER_AT,
+    body_of_part,
 )
 from collide.robots.forward_kinematics import (
     AXIS,
@@ -34,6 +40,8 @@ from collide.robots.forward_kinematics import (
 from collide.robots.motion_bounds import (
     BETWEEN_AT,
     INTERVAL,
+    ITEM,
+    ITEM_CAPACITY,
     MAX_PIECES,
     N_CHECKED,
     PATH_LENGTHS_AT,
@@ -47,8 +55,13 @@ from collide.robots.sphere_lanes import (
     HALF_LANES_AT,
     IS_EXACT,
     MOVED_LANES_AT,
+    N_PAIRS,
+    OPEN_PAIR,
+    PAIR_CAPACITY,
+    PAIRS_AT,
     PIECES_AT,
     RADIUS,
+    SPANS_AT,
     SPHERE,
     SPHERE_PLACE,
     VERDICTS_AT,
@@ -63,6 +76,7 @@ from collide.robots.sphere_lanes import (
 #: Intervals that a motion begins with, and the shortest that are halved further, as a share of the motion, where a
 #: robot is not made of spheres alone.
 _FIRST, _SHORTEST = 8, 1.0 / 8.0
+_ROUNDING = 2.0**-50
 #: Behind the intervals that remain: the eight at work.
 _GROUP = 2 * MAX_PIECES
 
@@ -107,7 +121,70 @@ def settle_pieces(motion):
                 pieces[2 * n + 3] = middle
                 n += 2
     _sort(motion.intervals, n_open)
+    if _SHORTEST == shortest and spheres.words[N_PAIRS] <= spheres.words[PAIR_CAPACITY]:
+        _put_items(motion, spheres, pieces, n_open)
     return math.nan, n_open
+
+
+@kernel
+def _put_items(motion, spheres, pieces, n_open):
+    """Write the pairs of parts that intervals on the stack leave open: the last interval's behind all others'. Without
+    space an interval is asked about all pairs, and those above it as well.
+    """
+    pairs = view_i64(spheres.words[PAIRS_AT], OPEN_PAIR * spheres.words[N_PAIRS])
+    top = 0
+    for k in range(n_open):
+        lane = 0
+        while pieces[_GROUP + 2 * lane] != motion.intervals[INTERVAL * k]:
+            lane += 1
+        first = top
+        for j in range(spheres.words[N_PAIRS]):
+            if (pairs[OPEN_PAIR * j + 2] >> lane) & 1 != 0:
+                top = _put_pair(motion, top, pairs[OPEN_PAIR * j], pairs[OPEN_PAIR * j + 1])
+                if top < 0:
+                    return
+        motion.intervals[INTERVAL * k + 2] = float(first)
+        motion.intervals[INTERVAL * k + 3] = float(top - first)
+
+
+@kernel
+def _put_pair(motion, top, a, b):
+    """Write all pairs of parts of two bodies, or of a body and a part around, from ``top`` on; −1 without space."""
+    scene, items = motion.scene, motion.items
+    words = scene.words
+    first_a = scene.bodies[BODY_INTS * a + FIRST]
+    n_a = scene.bodies[BODY_INTS * a + COUNT]
+    body = -1
+    if b < 0:
+        first_a += words[PADDED]
+        first_b = words[N_LINK_PARTS] - 1 - b
+        n_b = 1
+        body = a
+        partner = -1 - body_of_part(scene, -1 - b)
+    else:
+        first_b = scene.bodies[BODY_INTS * b + FIRST]
+        n_b = scene.bodies[BODY_INTS * b + COUNT]
+        partner = number_of_pair(scene, a, b)
+    if top + n_a * n_b > motion.words[ITEM_CAPACITY]:
+        return -1
+    for p in range(first_a, first_a + n_a):
+        for r in range(first_b, first_b + n_b):
+            items[ITEM * top] = p
+            items[ITEM * top + 1] = r
+            items[ITEM * top + 2] = body
+            items[ITEM * top + 3] = partner
+            top += 1
+    return top
+
+
+@kernel(inline=True)
+def number_of_pair(scene, a, b):
+    """The number of a tested pair of bodies."""
+    pairs = view_i64(scene.words[SELF_PAIRS_AT], 2 * scene.words[N_SELF_PAIRS])
+    k = 0
+    while pairs[2 * k] != a or pairs[2 * k + 1] != b:
+        k += 1
+    return k
 
 
 @kernel(inline=True)
@@ -142,6 +219,7 @@ def _ask(motion, spheres, pieces):
     """Write the verdicts of the eight intervals at work."""
     scene, words = motion.scene, motion.words
     columns = view_f64(spheres.words[COLUMNS_AT], LANES * motion.dof)
+    spans = view_f64(spheres.words[SPANS_AT], LANES * motion.dof)
     half = view_lanes(spheres.words[HALF_LANES_AT], 1)
     half_lengths = view_f64(spheres.words[HALF_LANES_AT], LANES)
     for lane in range(LANES):
@@ -151,7 +229,10 @@ def _ask(motion, spheres, pieces):
         half_lengths[lane] = 0.5 * (end - begin)
         for j in range(motion.dof):
             a = motion.q0[motion.at + j]
-            columns[LANES * j + lane] = a + time * (motion.q1[motion.at + j] - a)
+            b = motion.q1[motion.at + j]
+            columns[LANES * j + lane] = a + time * (b - a)
+            # Roundings of columns are a share of both ends.
+            spans[LANES * j + lane] = half_lengths[lane] * abs(b - a) + _ROUNDING * (abs(a) + abs(b))
     words[N_CHECKED] += LANES
     place_bodies(scene, spheres)
     stride = words[PATH_STRIDE] + 1
@@ -168,8 +249,10 @@ def _ask(motion, spheres, pieces):
         a = pairs[2 * k]
         b = pairs[2 * k + 1]
         margin = moved[a * stride + between[2 * k]] + moved[b * stride + between[2 * k + 1]]
-        verdicts = check_pair(scene, spheres, a, b, margin, verdicts)
+        verdicts = check_pair(scene, spheres, k, a, b, margin, verdicts)
     put_verdicts(spheres, verdicts)
+    for k in range(LANES * motion.dof):
+        spans[k] = 0.0
 
 
 @kernel
