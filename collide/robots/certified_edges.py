@@ -102,6 +102,7 @@ def sample_piece(
             address_of(cursor), address_of(samples), address_of(times),
         )
         if cursor[N_OPEN_SAMPLES]:
+            space.ask_meshes(checker.setting)
             _settle_samples(checker, space, q0, q1, samples[: cursor[N_OPEN_SAMPLES]], times)
             here = cursor[MOTION]
             if here < len(q0) and not np.isnan(times[here]):
@@ -143,6 +144,7 @@ def certify(
 
     def on_piece(space: CheckWorkspace, piece: slice) -> None:
         work, begin, end, hit_at = space.motions(resolution), q0[piece], q1[piece], times[piece]
+        space.ask_meshes(checker.setting)
         sample_piece(checker, space, begin, end, resolution, _SAMPLED_HALVINGS, hit_at)
         intervals, meshes = _certify_piece(space, work, begin, end, hit_at)
         rows = [intervals] if len(intervals) else []

@@ -27,6 +27,7 @@ from collide.robots.check_scene import (
     place,
     view_scene,
 )
+from collide.robots.mesh_states import state_of_meshes
 from collide.robots.motion_bounds import (
     BEGIN,
     CURRENT,
@@ -197,10 +198,16 @@ def _take(motion, top, n, p, q, body, partner, margin):
         return -2
     if state == BEYOND_MARGIN:
         return n
-    # Parts around meshes that are near to the last may be far from the meshes.
-    if (state == OPEN or _is_last(motion)) and (only_holds(motion.scene, p) or only_holds(motion.scene, q)):
-        _leave_meshes(motion, body, partner)
-        return n
+    if only_holds(motion.scene, p) or only_holds(motion.scene, q):
+        meshes = _state_of_meshes(motion, body, partner, p, q, margin)
+        if meshes == HITTING:
+            return -2
+        if meshes == BEYOND_MARGIN:
+            return n
+        # Parts around meshes that are near to the last may be far from the meshes.
+        if meshes == OPEN and (state == OPEN or _is_last(motion)):
+            _leave_meshes(motion, body, partner)
+            return n
     has_space = top + n < motion.words[ITEM_CAPACITY]
     at = ITEM * (top + n if has_space else motion.words[ITEM_CAPACITY])  # the last place is for a name without space
     motion.items[at] = p
@@ -208,6 +215,15 @@ def _take(motion, top, n, p, q, body, partner, margin):
     motion.items[at + 2] = body
     motion.items[at + 3] = partner
     return n + 1 if has_space else -1
+
+
+@kernel
+def _state_of_meshes(motion, body, partner, p, q, margin):
+    """`state_of_meshes` of a pair as `_take` has it."""
+    if body >= 0:
+        return state_of_meshes(motion.scene, body, partner, p, q, margin)
+    pair = view_i64(motion.scene.words[SELF_PAIRS_AT] + 16 * partner, 2)
+    return state_of_meshes(motion.scene, pair[0], pair[1], p, q, margin)
 
 
 @kernel

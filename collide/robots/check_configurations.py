@@ -35,6 +35,7 @@ from collide.robots.check_scene import (
     view_scene,
 )
 from collide.robots.forward_kinematics import pose_links
+from collide.robots.mesh_states import state_of_meshes
 from collide.robots.part_pairs import HITTING, OPEN, state_of_parts
 from collide.robots.sphere_lanes import (
     COLUMNS_AT,
@@ -203,6 +204,9 @@ def _state_of_bodies(scene, number, a, first_a, partner, first_b, n_b):
             if state == HITTING:
                 return HITTING
             if state == OPEN:
+                state = state_of_meshes(scene, a, partner, p, r, 0.0)
+                if state != OPEN:
+                    return state if state == HITTING else 0
                 leave_open(scene, number, a, partner, -math.inf)
                 return OPEN
     return 0

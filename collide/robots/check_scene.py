@@ -38,12 +38,13 @@ from collide.robots.forward_kinematics import Joints, view_joints
     # addresses of `state_of_part` and `gap_of_part`, and of what they ask: behind a 0, of each part of the surroundings
     # the header of its field, 0 of other shapes
     STATE_OF_PART, GAP_OF_PART, WALKS_AT,
-    # the header of `sphere_lanes.py`, 0 without
-    SPHERE_HEADER_AT,
+    # the header of `sphere_lanes.py`, 0 without; questions of `mesh_states.py`, 0 without, two matrices, and a row with
+    # a few bytes behind
+    SPHERE_HEADER_AT, MESH_QUESTIONS_AT, MESH_POSES_AT, MESH_ROW_AT,
     # a double: boxes are moved outwards by this share of all that went into them
     SLACK,
-) = range(49)
-HEADER = 49
+) = range(52)
+HEADER = 52
 
 #: Sums of |RᵀR − 1| below this count as roundings of a rotation R.
 ROUNDINGS_OF_ROTATIONS = 1e-13

@@ -17,6 +17,7 @@ from collide.robots import motion_bounds as motions
 from collide.robots.bounding_spheres import SphereWorkspace
 from collide.robots.check_tables import UNBOUNDED_HALF, Setting, Surroundings
 from collide.robots.field_walks import field_walks
+from collide.robots.mesh_questions import MeshQuestions
 from collide.robots.move_surroundings import FIELD_MOVED, SKEWED, move_surroundings
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import paths_to_root
@@ -53,6 +54,7 @@ class CheckWorkspace:
             layout.WORLD_BOXES_AT: np.zeros((n_bodies, layout.BOX)),
             layout.PLACED_AT: np.zeros(n_parts, dtype=np.int64),
             layout.CANDIDATES_AT: np.zeros(n_parts + 1, dtype=np.int64), layout.PAIR_AT: np.zeros(2, dtype=np.int64),
+            layout.MESH_POSES_AT: np.zeros((2, 16)), layout.MESH_ROW_AT: np.zeros(2, dtype=PAIR_DTYPE),
             layout.ROW_AT: np.zeros(1, dtype=PAIR_DTYPE), layout.DOUBLES_AT: np.zeros(DOUBLES),
             layout.INTEGERS_AT: np.zeros(INTEGERS, dtype=np.int64), layout.OPEN_AT: self._open,
             layout.JOINT_INTS_AT: joints.ints, layout.JOINT_DOUBLES_AT: joints.doubles, layout.BASE_AT: setting.base,
@@ -90,6 +92,7 @@ class CheckWorkspace:
             self.header[layout.SPHERE_HEADER_AT] = self._spheres.address
         self._walk_fields(setting)
         self._motions: MotionWorkspace | None = None
+        self._meshes: MeshQuestions | None = None
 
     def _walk_fields(self, setting: Setting) -> None:
         """Questions about fields around, where they stand."""
@@ -121,6 +124,19 @@ class CheckWorkspace:
             self._motions = MotionWorkspace(self.robot, self._setting)
         self._motions.begin(resolution)
         return self._motions
+
+    def ask_meshes(self, setting: Setting) -> None:
+        """Have kernels ask about meshes themselves; trees of the meshes are made, unless they are made already."""
+        if self._meshes is not None or not setting.tables.is_bound.any():
+            return
+        rows, n = {}, int(self.header[layout.N_LINK_PARTS])
+        counts = np.bincount(setting.surroundings.body_of, minlength=1)
+        for k, body in enumerate(setting.surroundings.body_of.tolist()):
+            if counts[body] == 1:
+                rows[body] = n + k
+        workspace = (address_of(self._buffers[layout.DOUBLES_AT]), address_of(self._buffers[layout.INTEGERS_AT]))
+        self._meshes = MeshQuestions(setting, rows, workspace)
+        self.header[layout.MESH_QUESTIONS_AT] = address_of(self._meshes.words)
 
     @functools.cached_property
     def sample(self) -> tuple[np.ndarray, np.ndarray]:

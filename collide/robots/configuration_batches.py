@@ -26,6 +26,7 @@ def check_piece(checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, out
         )
         pairs = space.open_pairs
         if len(pairs):
+            space.ask_meshes(checker.setting)
             pairs = pairs[verdicts[pairs[:, 0]] == IS_OPEN]
             hits = open_pairs.are_hits(*_asked_poses(checker, pairs, q), *_both(checker), once=True)
             verdicts[pairs[hits, 0]] = COLLIDES

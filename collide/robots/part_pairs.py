@@ -81,7 +81,7 @@ def _state_of_field(scene, p, walk, margin):
     """`state_of_parts` of a part and a field around; NEAR where items may be within the margin, and OPEN where a part
     only holds what is meant: what the part is apart from, the mesh within is apart from.
     """
-    state = _state_of_part_at(scene.words[STATE_OF_PART], (walk, *_rows_of_part(scene, p), margin))
+    state = _state_of_part_at(scene.words[STATE_OF_PART], (walk, *rows_of_part(scene, p), margin))
     if state == SURFACES_APART or state == MAYBE_INSIDE:
         return BEYOND_MARGIN
     if state == LONG_WAY or only_holds(scene, p):
@@ -96,12 +96,12 @@ def gap_of_field(scene, p, walk, limit):
     blank = view_i64(row_at, ROW // 8)
     for k in range(ROW // 8):
         blank[k] = 0
-    state = _gap_of_part_at(scene.words[GAP_OF_PART], (walk, *_rows_of_part(scene, p), limit, row_at))
+    state = _gap_of_part_at(scene.words[GAP_OF_PART], (walk, *rows_of_part(scene, p), limit, row_at))
     return (OPEN if state == LONG_WAY else BEYOND_MARGIN if state == SURFACES_APART else NEAR), view_row(row_at)
 
 
 @kernel(inline=True)
-def _rows_of_part(scene, p):
+def rows_of_part(scene, p):
     """Addresses of a part's rows of the shapes, of its pose, of its box."""
     words = scene.words
     row = view_i64(words[SHAPE_OF_AT], p + 1)[p]
