@@ -81,6 +81,7 @@ class Surroundings(NamedTuple):
 
     bodies : by number.   packed : of the parts.   body_of : (parts,) int64.   is_bound : (parts,) bool.
     table : of the parts.   X_BP : (parts, 4, 4).   rows : (parts,) int64, of the parts' bodies among the World's.
+    has_margins : whether a body is swollen.
     poses : (parts, POSE).   tree : over the parts.   Both are of when the tables were made: a `CheckWorkspace` has them
         as the bodies stand.
     """
@@ -94,11 +95,7 @@ class Surroundings(NamedTuple):
     table: ShapeTable
     X_BP: np.ndarray
     rows: np.ndarray
-
-    @property
-    def has_margins(self) -> bool:
-        """Whether a body is swollen."""
-        return any(body.margin != 0.0 for body in self.bodies)
+    has_margins: bool
 
 
 class CheckTables(NamedTuple):
@@ -172,7 +169,7 @@ def surroundings_of(bodies: Sequence[BodyAround], before: Surroundings | None = 
     before : surroundings whose parts are taken over where bodies have at most moved.
     """
     if before is not None and _have_at_most_moved(before.bodies, bodies):
-        _, packed, _, body_of, is_bound, _, table, X_BP, _ = before
+        _, packed, _, body_of, is_bound, _, table, X_BP, *_ = before
         poses = _poses_of(bodies, body_of, X_BP, packed)
     else:
         of_bodies = [convex_parts_of(body.shape) for body in bodies]
@@ -188,7 +185,8 @@ def surroundings_of(bodies: Sequence[BodyAround], before: Surroundings | None = 
         table = ShapeTable(packed)
     tree = BoxTree(boxes_of(table, poses, np.arange(len(packed)))) if packed else None
     rows = np.array([body.row for body in bodies], dtype=np.int64)[body_of]
-    return Surroundings(bodies, packed, poses, body_of, is_bound, tree, table, X_BP, rows)
+    has_margins = any(body.margin != 0.0 for body in bodies)
+    return Surroundings(bodies, packed, poses, body_of, is_bound, tree, table, X_BP, rows, has_margins)
 
 
 def _have_at_most_moved(before: Sequence[BodyAround], now: Sequence[BodyAround]) -> bool:

@@ -147,17 +147,16 @@ class CheckerScene:
             replaced, the tables of the robot. Threads asking at once may make a setting each.
         """
         before, world = self._setting, self.world
-        if before is not None:
-            if self._is_fixed or (before.seen.world is world and world._is_as_of(before.seen.version)):
-                return before
-            moved = self._among_moved_bodies(before)
+        if before is not None and (
+            self._is_fixed or (before.seen.world is world and world._is_as_of(before.seen.version))
+        ):
+            return before
+        seen = SeenWorld(world)
+        if before is not None and seen.differs_in_poses_from(before.seen):
+            moved = self._among_moved_bodies(before, seen)
             if moved is not None:
                 self._setting = moved
                 return moved
-        with world._pack() as packed:
-            if before is not None and before.seen.is_of_now(world, packed):
-                return before
-            seen = SeenWorld(world, packed)
         refuse_own_margins(seen, self.robot)
         around = bodies_around(seen, self.robot)
         if before is not None and seen.has_pairs_of(before.seen):
@@ -190,13 +189,11 @@ class CheckerScene:
         """Spheres of the robot, but not among fields, whose boxes the robot is in."""
         return None if any(body.shape.is_field for body in around.bodies) else self._spheres
 
-    def _among_moved_bodies(self, before: Setting) -> Setting | None:
-        """The setting before, and the World's bodies as they stand, where they have at most moved; ``None`` where poses
-        are to be read anew: margins swell parts by how their bodies are turned, matrices that are no rotations change
-        the slack of boxes.
+    def _among_moved_bodies(self, before: Setting, seen: SeenWorld) -> Setting | None:
+        """The setting before among bodies that have at most moved; ``None`` where tables are to be made anew: margins
+        swell parts by how their bodies are turned, matrices that are no rotations change the slack of boxes.
         """
-        seen = before.seen.moved() if before.seen.world is self.world and not before.surroundings.has_margins else None
-        if seen is None:
+        if before.surroundings.has_margins:
             return None
         bodies = MovedBodies(before.surroundings.bodies, seen.X_WBs)
         moved = before._replace(seen=seen, surroundings=before.surroundings._replace(bodies=bodies))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -19,7 +18,6 @@ from collide.shapes.compound import Compound
 from collide.shapes.shape import Shape
 from collide.transforms import as_pose
 from collide.worlds.bodies import Body, Roster
-from collide.worlds.packed_world import PackedWorld
 from collide.worlds.world import World
 
 #: The mask of bodies that nothing is said of, as of `World.add`.
@@ -121,27 +119,16 @@ def _checked_padding(what: str, value) -> float:
 class SeenWorld:
     """Bodies and filters of a World as of a question, for `bodies_around` and `filters_of`, without later changes.
 
-    world : whose.   X_WBs : (n, 4, 4) copied.   version : of the World's tables.
+    world : whose.   X_WBs : (n, 4, 4) copied.   version : number of the World's changes.
     """
 
-    def __init__(self, world: World, packed: PackedWorld):
-        self.world, self.roster, self.filters, self.X_WBs = world, packed.roster, packed.filters, packed.X_WBs.copy()
-        self.version = packed.version
+    def __init__(self, world: World):
+        self.world = world
+        self.version, self.roster, self.filters, self.X_WBs = world._read()
 
-    def is_of_now(self, world: World, packed: PackedWorld) -> bool:
-        return (
-            world is self.world and packed.roster is self.roster and packed.filters is self.filters
-            and np.array_equal(packed.X_WBs, self.X_WBs)
-        )
-
-    def moved(self) -> SeenWorld | None:
-        """The World as of now, where bodies have at most moved since; else ``None``."""
-        now = self.world._poses_beside(self.roster, self.filters)
-        if now is None:
-            return None
-        made = copy.copy(self)
-        made.version, made.X_WBs = now
-        return made
+    def differs_in_poses_from(self, before: SeenWorld) -> bool:
+        """Whether nothing but poses may have changed since."""
+        return self.world is before.world and self.roster is before.roster and self.filters is before.filters
 
     def has_pairs_of(self, before: SeenWorld) -> bool:
         """Whether the same pairs are tested as before: shapes, poses and margins have no say."""
@@ -185,7 +172,7 @@ def bodies_around(world: World | SeenWorld, robot: Robot) -> list[BodyAround]:
     return [BodyAround(B.name, B.shape, B.X_WB, B.margin, rows.get(B.name, k)) for k, B in enumerate(others)]
 
 
-def refuse_own_margins(packed: PackedWorld | SeenWorld, robot: Robot) -> None:
+def refuse_own_margins(packed: SeenWorld, robot: Robot) -> None:
     """Refuse a World with margins of links among each other: a checker does not keep these.
 
     Raises InvalidArgument naming the link.

@@ -7,7 +7,7 @@ import copy
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from threading import get_ident
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,17 @@ from collide.shapes.shape import Shape, checked_shape
 from collide.worlds.bodies import Body, Roster, WorldBodies
 from collide.worlds.packed_world import STALE, PackedWorld, PairFilters
 from collide.worlds.ready_shapes import make_ready
+
+
+class WorldReading(NamedTuple):
+    """A World as of a question.   version : number of changes so far.   X_WBs : (n, 4, 4) poses by position, copied.
+    roster, filters : of the bodies; the same objects as long as nothing about them has changed.
+    """
+
+    version: int
+    roster: Roster
+    filters: PairFilters
+    X_WBs: np.ndarray
 
 
 class WorldScene:
@@ -48,6 +59,9 @@ class WorldScene:
         self._changer: tuple[Any, int] | None = None
         self._first_asker: int | None = None
         self._is_shared = False
+        #: How often what is said of pairs has changed; the roster and this number of which filters were read last.
+        self._n_pair_changes = 0
+        self._read_filters: tuple[Roster, int, PairFilters] | None = None
 
     def __getstate__(self) -> dict:
         """What a copy or a pickle takes along: bodies, names and what is said of pairs. The rest is made again."""
@@ -302,6 +316,7 @@ class WorldScene:
             self._pair_margins[pair] = margin
             self._note_partners(pair)
         self._pairs_changed = True
+        self._n_pair_changes += 1
 
     def allow(self, a, b=None, *, reason: str = "allowed") -> None:
         """Never test a pair: ``allow("link3", "link4")``; or many, ``allow(matrix)``.
@@ -326,6 +341,7 @@ class WorldScene:
                 self._allowed.setdefault(pair, reason)
                 self._note_partners(pair)
             self._pairs_changed = True
+            self._n_pair_changes += 1
             self._n_changes += 1
 
     def _pair(self, caller: str, **named: int | str) -> tuple[int, int]:
@@ -406,9 +422,7 @@ class WorldScene:
     def _pack(self) -> PackedWorld:
         """What a question reads: ``with self._pack() as packed: ...``. No change reaches it within the block."""
         me, packed = get_ident(), self._published
-        if me != self._first_asker:
-            self._is_shared = self._first_asker is not None
-            self._first_asker = self._first_asker or me
+        self._note_asker()
         while packed is not None:
             # A reader counts before it looks, and a change marks tables STALE before it counts: one of them gives way.
             packed.readers.append(None)
@@ -425,26 +439,31 @@ class WorldScene:
             return packed
 
     def _is_as_of(self, version: int) -> bool:
-        """Whether nothing has changed since tables of this version; a question that begins without `_pack` asks so."""
-        if get_ident() != self._first_asker:
-            self._is_shared = True
+        """Whether nothing has changed since a reading of this version; a question that needs no tables asks so."""
+        self._note_asker()
         return version == self._n_changes
 
-    def _poses_beside(self, roster: Roster, filters: PairFilters) -> tuple[int, np.ndarray] | None:
-        """(version, (n, 4, 4) copied poses) where nothing but poses has changed since `_pack` gave these; ``None``
-        where more has changed, and while another thread changes the World. The tables of the World stay as they are.
+    def _note_asker(self) -> None:
+        me = get_ident()
+        if me != self._first_asker:
+            self._is_shared = self._first_asker is not None
+            self._first_asker = self._first_asker or me
+
+    def _read(self) -> WorldReading:
+        """The World for a question that needs no tables, with every change so far; while another thread is within a
+        `changes` block, of before the block.
         """
-        if not self._lock.now.acquire(blocking=False):
-            return None
-        try:
-            packed = self._packed
-            if packed is None or packed.filters is not filters or self._pairs_changed:
-                return None
-            if self._bodies.roster() is not roster:
-                return None
-            return self._n_changes, self._bodies.poses().copy()
-        finally:
-            self._lock.now.release()
+        self._note_asker()
+        if self._lock.now.acquire(blocking=False):
+            try:
+                roster, filters = self._bodies.roster(), self._read_filters
+                if filters is None or filters[0] is not roster or filters[1] != self._n_pair_changes:
+                    filters = self._read_filters = roster, self._n_pair_changes, self._filters(roster)
+                return WorldReading(self._n_changes, roster, filters[2], self._bodies.poses().copy())
+            finally:
+                self._lock.now.release()
+        with self._pack() as packed:
+            return WorldReading(packed.version, packed.roster, packed.filters, packed.X_WBs.copy())
 
     def _may_change(self, packed: PackedWorld) -> bool:
         """Whether nobody reads these tables, nor begins to: they are STALE until brought up to date. If not, they keep
