@@ -69,12 +69,12 @@ def _moved(spheres: np.ndarray, X: np.ndarray, sign: float) -> np.ndarray:
 @kept_with_shape("_link_spheres")
 def _spheres_of_shape(shape: Shape):
     """A function of how many spheres are wanted, which keeps what was made."""
-    kept: dict[int, BodySpheres] = {}
+    made: dict[int, BodySpheres] = {}
 
     def of(count: int) -> BodySpheres:
-        if count not in kept:
-            kept[count] = _made(shape, count)
-        return kept[count]
+        if count not in made:
+            made[count] = _made(shape, count)
+        return made[count]
 
     return of
 
@@ -107,15 +107,16 @@ def outer_spheres(packed: PackedConvex, count: int) -> np.ndarray:
         box = box_of(packed)
         signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         corners, beyond = box[:3] + signs * box[3:], 0.0
-    pieces, whole = [(corners, _ball_around(corners))], []
+    pieces = [(corners, _ball_around(corners))]
+    whole: list[tuple[np.ndarray, np.ndarray]] = []
     while pieces and len(pieces) + len(whole) < count:
         pieces.sort(key=lambda piece: piece[1][3])
         corners, ball = pieces.pop()
-        halves = _best_halves(corners)
-        if halves is None or max(half[1][3] for half in halves) > _WORTH * ball[3]:
+        both = _best_halves(corners)
+        if both is None or max(half[1][3] for half in both) > _WORTH * ball[3]:
             whole.append((corners, ball))
         else:
-            pieces += halves
+            pieces += both
     spheres = np.array([ball for _, ball in (*pieces, *whole)])
     spheres[:, 3] += beyond + ROUNDING * (np.abs(spheres).sum(axis=1) + beyond)
     return spheres
@@ -135,10 +136,10 @@ def _best_halves(corners: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]] | N
         cut = first + share * (second - first)
         if not len(cut):
             continue
-        halves = [np.concatenate([corners[side], cut]) for side in (heights < 0.0, heights >= 0.0)]
-        found = [(half, _ball_around(half)) for half in halves]
-        if best is None or max(ball[3] for _, ball in found) < max(ball[3] for _, ball in best):
-            best = found
+        both = [np.concatenate([corners[side], cut]) for side in (heights < 0.0, heights >= 0.0)]
+        candidates = [(half, _ball_around(half)) for half in both]
+        if best is None or max(ball[3] for _, ball in candidates) < max(ball[3] for _, ball in best):
+            best = candidates
     return best
 
 
@@ -199,11 +200,11 @@ def _with_radii(centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
     """(n, 4) spheres of the positive radii, a little smaller; of such within each other the largest."""
     spheres = np.column_stack([centres, radii - ROUNDING * (np.abs(centres).sum(axis=1) + np.abs(radii))])
     spheres = spheres[spheres[:, 3] > 0.0]
-    chosen: list[np.ndarray] = []
+    spread: list[np.ndarray] = []
     for sphere in spheres[np.argsort(-spheres[:, 3])]:
-        if all(np.linalg.norm(sphere[:3] - one[:3]) > 0.25 * one[3] for one in chosen):
-            chosen.append(sphere)
-    return np.array(chosen[:_COUNT]).reshape(-1, 4)
+        if all(np.linalg.norm(sphere[:3] - larger[:3]) > 0.25 * larger[3] for larger in spread):
+            spread.append(sphere)
+    return np.array(spread[:_COUNT]).reshape(-1, 4)
 
 
 def _moved_inwards(points: np.ndarray, centres: np.ndarray) -> np.ndarray:

@@ -53,6 +53,7 @@ from collide.robots.motion_bounds import (
     begin_interval,
     motion_at,
     moved_between,
+    shortest_interval,
 )
 from collide.robots.part_pairs import BEYOND_MARGIN, HITTING, OPEN, only_holds, state_of_parts
 from collide.robots.sphere_motions import settle_pieces
@@ -135,8 +136,7 @@ def _certify(motion, number):
 @kernel(inline=True)
 def _is_last(motion):
     """Whether the interval at work is not halved any more."""
-    length = motion.intervals[CURRENT + END] - motion.intervals[CURRENT + BEGIN]
-    return motion.max_change * length <= motion.resolution
+    return motion.intervals[CURRENT + END] - motion.intervals[CURRENT + BEGIN] <= shortest_interval(motion)
 
 
 @kernel(inline=True)

@@ -116,7 +116,7 @@ def verdict_in_lane(scene, lane):
 
 @kernel
 def verdict_after(scene, q, at, number, lane):
-    """`verdict_of` a configuration that spheres left open in a lane: the pairs that they left open are asked."""
+    """`verdict_of` a configuration left open by spheres in a lane: pairs left open there are asked."""
     words = scene.words
     spheres = view_spheres(scene, words[SPHERE_HEADER_AT])
     if spheres.words[N_PAIRS] > spheres.words[PAIR_CAPACITY]:

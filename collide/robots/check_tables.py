@@ -235,6 +235,21 @@ def robot_tables(bodies: Sequence[RobotBody], matrices: np.ndarray) -> RobotTabl
     )
 
 
+def joined_tables(objects: RobotTables, links: RobotTables) -> RobotTables:
+    """Tables of attached objects and, behind them, of links; neither padded. Parts of the links stand first."""
+    bodies = objects.bodies.copy()
+    bodies[:, 1] += len(links.parts)
+    table = links.table.copied()
+    table.append(objects.table.packed)
+    table.build_trees(np.arange(len(links.parts), len(table.packed)))
+    fields = ("parts", "part_boxes", "is_bound")
+    parts, part_boxes, is_bound = (np.concatenate([getattr(links, f), getattr(objects, f)]) for f in fields)
+    return RobotTables(
+        np.concatenate([bodies, links.bodies]), np.concatenate([objects.body_boxes, links.body_boxes]), parts, 0,
+        part_boxes, is_bound, table, max(objects.skew, links.skew),
+    )
+
+
 def tables_among(robot: RobotTables, around: Surroundings, before: Setting | None = None) -> CheckTables:
     """The `CheckTables` of a robot among surroundings.   before : a setting of the robot, whose tables of shapes are
     taken over where the surroundings have the same.

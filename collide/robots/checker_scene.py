@@ -5,22 +5,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from collide.base import argument_checks as checks
 from collide.base.threads import check_threads, pieces_of, share
-from collide.errors import InvalidArgument
+from collide.errors import InvalidArgument, brief, listing
 from collide.kernels import address_of
 from collide.robots.bounding_spheres import SphereTables, sphere_tables
 from collide.robots.check_configurations import check_configurations
-from collide.robots.check_tables import MovedBodies, Setting, Surroundings, robot_tables, surroundings_of, tables_among
+from collide.robots.check_tables import (
+    MovedBodies,
+    RobotTables,
+    Setting,
+    Surroundings,
+    joined_tables,
+    robot_tables,
+    surroundings_of,
+    tables_among,
+)
 from collide.robots.check_workspace import CheckWorkspace
-from collide.robots.pair_maps import pair_maps
+from collide.robots.pair_maps import PairMaps, names_of_pairs, pair_maps
 from collide.robots.robot import Robot
-from collide.robots.robot_bodies import SeenWorld, bodies_around, filters_of, refuse_own_margins, robot_bodies
+from collide.robots.robot_bodies import (
+    SeenWorld,
+    bodies_around,
+    body_of_object,
+    checked_object,
+    filters_of,
+    refuse_own_margins,
+    robot_bodies,
+)
 from collide.transforms import as_pose
 from collide.worlds.world import World
 
@@ -54,18 +71,77 @@ class CheckerScene:
         self._X_WR = np.eye(4) if X_WR is None else as_pose(X_WR, "RobotChecker: X_WR").copy()
         attached = checks.listed_entries("RobotChecker: attached", attached, "tuples (name, link, shape, X_LB)")
         self._bodies, self._objects = robot_bodies(robot, attached, padding)
+        self._padding = padding
         self._asked = checks.listed_entries("RobotChecker: allowed", allowed, "pairs of names")
         self._mobile = checks.true_or_false("RobotChecker: mobile", mobile)
+        self._maps: PairMaps | None = None
         self._make_tables()
 
-    def _make_tables(self) -> None:
-        """Those of the robot, and the first setting."""
+    def _make_tables(self, *, of_any: bool = False) -> None:
+        """Those of the robot, and the first setting.   of_any : whether spheres are made of all bodies."""
         matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
-        self._tables = robot_tables(self._bodies, np.concatenate(matrices))
-        self._spheres = sphere_tables(self._tables, self._bodies, of_any=False)
-        self._n_asked = _PAY_FOR_SPHERES if self._spheres is not None else 0
+        self._tables = self._joined_tables(np.concatenate(matrices))
+        self._spheres = sphere_tables(self._tables, self._bodies, of_any=of_any)
+        self._n_asked = _PAY_FOR_SPHERES if of_any or self._spheres is not None else 0
         self._setting: Setting | None = None
         self.prepare()
+
+    def _joined_tables(self, matrices: np.ndarray) -> RobotTables:
+        """Tables of attached objects and links; those of links are kept with the robot, for other checkers as well."""
+        n = len(self._objects)
+        objects, links = self._bodies[:n], self._bodies[n:]
+        if not links or any(body.padding for body in self._bodies):
+            return robot_tables(self._bodies, matrices)
+        key = matrices.tobytes(), tuple(id(body.shape) for body in links)
+        if self.robot.link_tables is None or self.robot.link_tables[0] != key:
+            self.robot.link_tables = key, robot_tables(links, matrices)
+        tables = self.robot.link_tables[1]
+        return joined_tables(robot_tables(objects, matrices), tables) if objects else tables
+
+    def _attach(self, values: tuple) -> None:
+        """Attach an object (name, link, shape, X_LS, touch). Raises InvalidArgument, InvalidPose."""
+        item = checked_object(self.robot, self._objects, values)
+        padding = 0.0 if isinstance(self._padding, Mapping) else float(self._padding)
+        self._objects = {**self._objects, item.name: item}
+        self._bodies = [body_of_object(self.robot, item, padding), *self._bodies]
+        self._make_tables(of_any=self._spheres is not None)
+
+    def _detach(self, name: str) -> None:
+        """Take an attached object away, and what was allowed for it. Raises InvalidArgument."""
+        if name not in self._objects:
+            known = listing(self._objects) or "none"
+            raise InvalidArgument(f"RobotChecker.detach: no attached object is called {brief(name)}; attached: {known}")
+        self._objects = {known: item for known, item in self._objects.items() if known != name}
+        self._bodies = [body for body in self._bodies if body.name != name]
+        self._asked = [pair for pair in self._asked if name not in pair[:2]]
+        self._make_tables(of_any=self._spheres is not None)
+
+    def _allow(self, a: str, b: str) -> None:
+        """Test a pair no more. Raises InvalidArgument."""
+        setting = self.prepare()
+        bodies = {body.name: k for k, body in enumerate(setting.bodies)}
+        around = {body.name: k for k, body in enumerate(setting.surroundings.bodies)}
+        for name in (a, b):
+            if not (name in bodies or name in around or name in self.robot.links):
+                raise InvalidArgument(f"RobotChecker.allow: no link, attached object or body is called {brief(name)}")
+        self._asked = [*self._asked, (a, b)]
+        self_pairs, allowed, n_before = setting.self_pairs, setting.allowed.copy(), self.n_pairs
+        a, b = (b, a) if a in around else (a, b)
+        if a in bodies and b in bodies:
+            pair = sorted((bodies[a], bodies[b]))
+            self_pairs = np.ascontiguousarray(self_pairs[(self_pairs != pair).any(axis=1)])
+        elif a in bodies and b in around:
+            allowed[bodies[a], around[b]] = 1
+        skipped = dict(setting.skipped)
+        n_fewer = n_before - len(self_pairs) - int((allowed == 0).sum())
+        if n_fewer:
+            skipped["allowed"] = skipped.get("allowed", 0) + n_fewer
+        maps = self._maps_of(self_pairs)
+        self._setting = setting._replace(
+            self_pairs=self_pairs, allowed=allowed, skipped=skipped, maps=maps, made_of=setting.made_of, spare=[])
+
+    def _maps_of(self, self_pairs: np.ndarray) -> PairMaps | None:
+        return None if self._maps is None else self._maps.among(names_of_pairs(self._bodies, self_pairs))
 
     def __getstate__(self) -> dict:
         """What a copy or a pickle takes along. What holds addresses is made again."""
@@ -167,7 +243,7 @@ class CheckerScene:
         base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
         tables = tables_among(self._tables, surroundings, before)
         spheres = self._spheres_among(surroundings)
-        maps = before.maps if before is not None and filters[0] is before.self_pairs else None
+        maps = before.maps if before is not None and filters[0] is before.self_pairs else self._maps_of(filters[0])
         setting = Setting(self._bodies, base, surroundings, tables, *filters, spheres, maps, seen, seen, [])
         self._setting = setting
         return setting
@@ -182,16 +258,16 @@ class CheckerScene:
             spheres = self._spheres_among(setting.surroundings)
             setting = self._setting = setting._replace(spheres=spheres, spare=[])
             if spheres is not None:
-                maps = pair_maps(self.robot, setting, CheckWorkspace(self.robot, setting))
-                self._setting = setting._replace(maps=maps, spare=[])
+                self._maps = pair_maps(self.robot, setting, CheckWorkspace(self.robot, setting))
+                self._setting = setting._replace(maps=self._maps, spare=[])
 
     def _spheres_among(self, around: Surroundings) -> SphereTables | None:
         """Spheres of the robot, but not among fields, whose boxes the robot is in."""
         return None if any(body.shape.is_field for body in around.bodies) else self._spheres
 
     def _among_moved_bodies(self, before: Setting, seen: SeenWorld) -> Setting | None:
-        """The setting before among bodies that have at most moved; ``None`` where tables are to be made anew: margins
-        swell parts by how their bodies are turned, matrices that are no rotations change the slack of boxes.
+        """The setting before, among moved bodies; ``None`` where tables are to be made anew: margins swell parts by how
+        their bodies are turned, and matrices not quite rotations change the slack of boxes.
         """
         if before.surroundings.has_margins:
             return None

@@ -58,16 +58,16 @@ class MeshQuestions:
         """(how, header, row of poses) of a pair; UNKNOWN of pairs without a mesh, and of pairs that others answer."""
         if A is None or B is None or not (_is_mesh(A.shape) or _is_mesh(B.shape)):
             return layout.UNKNOWN, 0, row
-        A, is_given_a = A
-        B, is_given_b = B
-        method = method_of(kind_of(A), kind_of(B))
+        method = method_of(kind_of(A.shape), kind_of(B.shape))
         if method is Method.HULL:
             return layout.HULLS, 0, row
-        if is_given_a and is_given_b and method is Method.FACETS:
-            return layout.FACETS, self._of_facets(A, B), row
-        mesh, other, how = (A, B, layout.FACETS_OF_BODY) if _is_mesh(A) else (B, A, layout.FACETS_OF_PARTNER)
-        if other.is_asked_whole or not is_single_convex(other):  # its part only holds it
+        if A.is_given and B.is_given and method is Method.FACETS:
+            return layout.FACETS, self._of_facets(A.shape, B.shape), row
+        is_body = _is_mesh(A.shape)
+        mesh, partner = (A.shape, B.shape) if is_body else (B.shape, A.shape)
+        if partner.is_asked_whole or not is_single_convex(partner):  # its part only holds it
             return layout.UNKNOWN, 0, row
+        how = layout.FACETS_OF_BODY if is_body else layout.FACETS_OF_PARTNER
         return how, self._of_items(mesh, setting, workspace), row
 
     def _of_items(self, mesh: Shape, setting: Setting, workspace: tuple[int, int]) -> int:
@@ -89,8 +89,8 @@ class MeshQuestions:
 
 
 class Single(NamedTuple):
-    """The only shape of a body.   is_given : whether it stands in the frame of the body: else its pose is a product,
-    which is rounded.
+    """The only shape of a body.   is_given : whether the shape stands in the frame of the body; else its pose is a
+    rounded product.
     """
 
     shape: Shape

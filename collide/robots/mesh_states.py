@@ -42,9 +42,9 @@ _state_of_part_at = native_call(PART_SIGNATURE)
 
 @kernel
 def state_of_meshes(scene, body, partner, p, q, margin):
-    """BEYOND_MARGIN, NEAR, HITTING or OPEN of two bodies, one of them a mesh, whose links are placed.
+    """BEYOND_MARGIN, NEAR, HITTING or OPEN of two bodies with a mesh, at the poses of links.
 
-    partner : a body, or −1 − a body around.   p, q : their parts, placed, if they have one each.
+    partner : a body, or −1 − a body around.   p, q : a part of each, placed.
     """
     words = scene.words
     if words[MESH_QUESTIONS_AT] == 0:

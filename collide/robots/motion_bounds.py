@@ -99,6 +99,16 @@ def motion_at(scene, motions_at, q0, q1, at, dof):
 
 
 @kernel(inline=True)
+def shortest_interval(motion):
+    """The length of intervals not halved any more, as a share of the motion: no column changes by more than the
+    resolution, nor by more than PIECE, the length of the first intervals.
+    """
+    if motion.max_change <= 0.0:
+        return 1.0
+    return min(motion.resolution, max(PIECE, motion.max_change / MAX_PIECES)) / motion.max_change
+
+
+@kernel(inline=True)
 def begin_interval(motion, time, half):
     """Place links for the middle of an interval, and bound how far bodies move within half of it."""
     for j in range(motion.dof):

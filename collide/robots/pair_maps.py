@@ -9,6 +9,7 @@ each other within the cell as a margin (`motion_bounds.py`: the bounds hold for 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -30,18 +31,30 @@ from collide.robots.part_pairs import BEYOND_MARGIN, state_of_parts
 #: Cells of a column, of one and of two between both links.
 _CELLS_OF_ONE, _CELLS = 256, 96
 #: Where fewer cells than this share are free, cells of a quarter of the width are asked as well.
-_FEW, FINER = 0.9, 4
+_MIN_FREE, FINER = 0.9, 4
 #: Cells are wider than said by this share of the numbers they are made of.
 _WIDER = 1e-12
 
 class PairMaps(NamedTuple):
     """Of each tested pair of bodies.   ints : (pairs, MAP_INTS) int64.   doubles : (pairs, MAP_DOUBLES).
-    cells : (n,) uint8, 1 of a cell proven free; the second column's stand side by side.
+    cells : (n,) uint8, 1 of a cell proven free; the second column's stand side by side.   names : of both bodies.
     """
 
     ints: np.ndarray
     doubles: np.ndarray
     cells: np.ndarray
+    names: list[tuple[str, str]]
+
+    def among(self, names: list[tuple[str, str]]) -> PairMaps:
+        """The maps of pairs by names; none of unknown pairs."""
+        rows = {pair: k for k, pair in enumerate(self.names)}
+        known = [(k, rows[pair]) for k, pair in enumerate(names) if pair in rows]
+        ints = np.zeros((len(names), MAP_INTS), dtype=np.int64)
+        doubles = np.zeros((len(names), MAP_DOUBLES))
+        if known:
+            at, of = np.array(known).T
+            ints[at], doubles[at] = self.ints[of], self.doubles[of]
+        return PairMaps(ints, doubles, self.cells, names)
 
 
 @entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")
@@ -98,7 +111,7 @@ def _are_apart(motion, pair):
 
 
 def pair_maps(robot, setting, space) -> PairMaps:
-    """Maps of all tested pairs with one or two columns between both bodies.
+    """Maps of tested pairs of bodies with a column or two between both.
 
     robot : `Robot`.   setting : `Setting`.   space : `CheckWorkspace` of it.
     """
@@ -120,7 +133,7 @@ def pair_maps(robot, setting, space) -> PairMaps:
                 space.address, work.address, k, address_of(q[0]), address_of(q[1]), robot.dof, address_of(ints[k]),
                 address_of(lows), address_of(widths), address_of(of_pair), 0 if coarse is None else address_of(coarse),
             )
-            if coarse is not None or of_pair.mean() >= _FEW:
+            if coarse is not None or of_pair.mean() >= _MIN_FREE:
                 break
             coarse, numbers = of_pair, [FINER * n if n > 1 else 1 for n in numbers]
         doubles[k] = *lows, *(1.0 / widths)
@@ -128,7 +141,13 @@ def pair_maps(robot, setting, space) -> PairMaps:
         at += len(of_pair)
         if not of_pair.any():
             ints[k, N_FIRST] = 0
-    return PairMaps(ints, doubles, np.concatenate(cells))
+    return PairMaps(ints, doubles, np.concatenate(cells), names_of_pairs(setting.bodies, setting.self_pairs))
+
+
+def names_of_pairs(bodies: Sequence, self_pairs: np.ndarray) -> list[tuple[str, str]]:
+    """Names of both bodies of each pair."""
+    names = [body.name for body in bodies]
+    return [(names[a], names[b]) for a, b in self_pairs.tolist()]
 
 
 def _ranges(robot) -> tuple[np.ndarray, np.ndarray]:
@@ -139,8 +158,8 @@ def _ranges(robot) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _columns_between(robot, setting) -> list[list[int] | None]:
-    """Of each tested pair the one or two columns that move its bodies against each other; ``None`` where there are
-    others, or joints with several columns.
+    """Of each tested pair the columns, at most two, that move its bodies against each other; ``None`` of pairs with
+    more, or with a joint of several columns.
     """
     table = robot.joint_table.ints
     kinds = (ROTATION, ROTATION_ABOUT_COORDINATE, TRANSLATION)

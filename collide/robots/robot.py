@@ -148,6 +148,9 @@ class Robot:
         for link in self.geometry:
             if link not in self._index:
                 raise SceneError(f"unknown link; the robot has {listing(self.links)}", element=f'link "{cut(link)}"')
+        #: What checkers make of links and share: link → its elements, and their shape; what tables are of, and tables.
+        self.link_shapes: dict[str, tuple] = {}
+        self.link_tables: tuple | None = None
         self.rigid_clusters = rigid_clusters(self.links, self.joints)
         self.base_links = next(cluster for cluster in self.rigid_clusters if self.root in cluster)
         self.semantic_pairs = None if semantic_pairs is None else _checked_pairs(semantic_pairs)
@@ -182,6 +185,10 @@ class Robot:
             Naming file, element and value of anything unreadable. MissingExtra for MJCF without the package mujoco.
         """
         return getattr(import_module(_LOADER[0]), _LOADER[1])(path, srdf=srdf, **options)
+
+    def __getstate__(self) -> dict:
+        """What a copy or a pickle takes along: tables hold addresses."""
+        return {**vars(self), "link_shapes": {}, "link_tables": None}
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {len(self.links)} links, {self.dof} degrees of freedom)"

@@ -56,22 +56,15 @@ def robot_bodies(robot: Robot, attached: Iterable, padding) -> tuple[list[RobotB
 
     Raises InvalidArgument, InvalidPose: unknown links, names used twice, paddings out of range.
     """
-    number = {link: k for k, link in enumerate(robot.links)}
     objects: dict[str, Attached] = {}
     for values in attached:
-        item = _checked_object(robot, number, values)
-        if item.name in number or item.name in objects:
-            raise InvalidArgument(f'attached: the name "{cut(item.name)}" is used twice; give the object another name')
+        item = checked_object(robot, objects, values)
         objects[item.name] = item
-    swelling = padding_of(padding, {*number, *objects})
-    bodies = [
-        RobotBody(item.name, number[item.link], Compound([(item.shape, item.X_LS)]), swelling.get(item.name, 0.0))
-        for item in objects.values()
-    ]
-    for link in reversed(robot.links):
+    swelling = padding_of(padding, {*robot.links, *objects})
+    bodies = [body_of_object(robot, item, swelling.get(item.name, 0.0)) for item in objects.values()]
+    for number, link in reversed(list(enumerate(robot.links))):
         if link in robot.geometry:
-            shape = Compound([(element.shape, element.X_LG) for element in robot.geometry[link]])
-            bodies.append(RobotBody(link, number[link], shape, swelling.get(link, 0.0)))
+            bodies.append(RobotBody(link, number, _link_shape(robot, link), swelling.get(link, 0.0)))
     if not bodies:
         raise InvalidArgument(
             f"RobotChecker: {robot.place} has no collision geometry, so nothing can be tested; look at its <collision> "
@@ -80,7 +73,22 @@ def robot_bodies(robot: Robot, attached: Iterable, padding) -> tuple[list[RobotB
     return bodies, objects
 
 
-def _checked_object(robot: Robot, number: Mapping[str, int], values) -> Attached:
+def _link_shape(robot: Robot, link: str) -> Compound:
+    """The collision elements of a link as a shape, the same for all checkers: with the shape is kept what is made."""
+    elements = tuple(robot.geometry[link])
+    known = robot.link_shapes.get(link)
+    if known is None or len(known[0]) != len(elements) or any(a is not b for a, b in zip(known[0], elements)):
+        known = robot.link_shapes[link] = elements, Compound([(item.shape, item.X_LG) for item in elements])
+    return known[1]
+
+
+def body_of_object(robot: Robot, item: Attached, padding: float) -> RobotBody:
+    """The body of an attached object."""
+    return RobotBody(item.name, robot.links.index(item.link), Compound([(item.shape, item.X_LS)]), padding)
+
+
+def checked_object(robot: Robot, objects: Mapping[str, Attached], values) -> Attached:
+    """An object to be attached beside others. Raises InvalidArgument, InvalidPose."""
     try:
         item = Attached(*values)
     except TypeError:
@@ -89,7 +97,9 @@ def _checked_object(robot: Robot, number: Mapping[str, int], values) -> Attached
         ) from None
     if not isinstance(item.name, str) or not item.name:
         raise InvalidArgument(f"attached: a name must be a non-empty string, got {brief(item.name)}")
-    if item.link not in number:
+    if item.name in robot.links or item.name in objects:
+        raise InvalidArgument(f'attached: the name "{cut(item.name)}" is used twice; give the object another name')
+    if item.link not in robot.links:
         raise InvalidArgument(
             f'attached "{cut(item.name)}": {robot.name} has no link {brief(item.link)}; it has {listing(robot.links)}'
         )

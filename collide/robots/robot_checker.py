@@ -128,6 +128,65 @@ class RobotChecker(CheckerScene):
             f"{self.n_pairs} pairs tested)"
         )
 
+    # --- changes --------------------------------------------------------------------------------
+
+    def attach(self, name: str, link: str, shape, X_LS=None, *, touch: Iterable[str] = ()) -> None:
+        """Attach an object to a link, as with ``attached``: a grasped part.
+
+        Parameters
+        ----------
+        name : str
+            Unique among links and attached objects.
+        link : str
+            It carries the object.
+        shape : Shape
+        X_LS : (4, 4), optional
+            Pose of the shape in the link [m], by default the identity.
+        touch : iterable of str
+            Links and bodies whose contact with the object is allowed, beside its own link.
+
+        Raises
+        ------
+        InvalidArgument, InvalidPose
+            Naming the argument; nothing is attached.
+
+        Notes
+        -----
+        Tables of links, spheres and maps are taken over. Questions begun before are answered without the object. A
+        number as ``padding`` holds for the object, too.
+        """
+        self._attach((name, link, shape, X_LS, (touch,) if isinstance(touch, str) else tuple(touch)))
+
+    def detach(self, name: str) -> None:
+        """Take an attached object away: a part that was put down.
+
+        Parameters
+        ----------
+        name : str
+            Of an attached object.
+
+        Raises
+        ------
+        InvalidArgument
+            Where no attached object has this name.
+        """
+        self._detach(name)
+
+    def allow(self, a: str, b: str) -> None:
+        """Never test a pair from now on, as with ``allowed``.
+
+        Parameters
+        ----------
+        a, b : str
+            Names of links, attached objects or bodies of the World.
+
+        Raises
+        ------
+        InvalidArgument
+            For unknown names.
+        """
+        self._allow(a, b)
+
     # --- questions ------------------------------------------------------------------------------
 
     def collides(self, Q, *, threads: int = 1, progress: Callable[[int, int], None] | None = None):

@@ -422,7 +422,7 @@ def check_pair(scene, spheres, number, a, b, margin, verdicts):
 
 @kernel
 def _are_mapped_apart(spheres, number):
-    """Lanes in which a tested pair is apart by its map: in all cells that the columns may be in."""
+    """Lanes in which a tested pair is apart by its map: in all cells around the columns."""
     ints = view_i64(spheres.words[MAP_INTS_AT] + 8 * MAP_INTS * number, MAP_INTS)
     doubles = view_f64(spheres.words[MAP_DOUBLES_AT] + 8 * MAP_DOUBLES * number, MAP_DOUBLES)
     flags = view_f64(spheres.words[FLAGS_AT], LANES)

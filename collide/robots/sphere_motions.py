@@ -48,6 +48,7 @@ from collide.robots.motion_bounds import (
     PATH_STRIDE,
     PATHS_AT,
     change_of,
+    shortest_interval,
 )
 from collide.robots.sphere_lanes import (
     BODY_SPHERES,
@@ -128,8 +129,8 @@ def settle_pieces(motion):
 
 @kernel
 def _put_items(motion, spheres, pieces, n_open):
-    """Write the pairs of parts that intervals on the stack leave open: the last interval's behind all others'. Without
-    space an interval is asked about all pairs, and those above it as well.
+    """Write the open pairs of parts of the intervals on the stack, in the order of the stack. Without space an interval
+    is asked about all pairs, and so are all intervals above.
     """
     pairs = view_i64(spheres.words[PAIRS_AT], OPEN_PAIR * spheres.words[N_PAIRS])
     top = 0
@@ -193,7 +194,7 @@ def _shortest(motion, spheres):
     for body in range(motion.scene.words[N_BODIES]):
         if spheres.counts[BODY_SPHERES * body + IS_EXACT] == 0:
             return _SHORTEST
-    return motion.resolution / motion.max_change if motion.max_change > 0.0 else 1.0
+    return shortest_interval(motion)
 
 
 @kernel(inline=True)

@@ -74,8 +74,8 @@ ROOMS = {
         "certificates", "pairs", "contact", "casts", "solids",
     },
     "robots": {
-        "errors", "base", "kernels", "transforms", "results", "numerics", "mesh", "shapes", "lowering", "broadphase",
-        "narrowphase", "pairs", "worlds",
+        "errors", "base", "kernels", "transforms", "results", "numerics", "hull", "mesh", "shapes", "lowering",
+        "broadphase", "narrowphase", "pairs", "worlds",
     },
     "reports": {"", "errors", "base", "kernels", "results", "shapes", "lowering", "solids"},
     "sweeps": {"", "errors", "base", "shapes", "pairs", "worlds", "robots", "reports"},

@@ -1,0 +1,113 @@
+"""Objects attached and put down, pairs allowed, while a checker is in use: answers are those of a checker made anew."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from naive import pose, random_pose, rng_of
+from random_robots import random_configurations, random_link_shape, random_robot, scene_of_spheres
+
+import collide
+from collide.errors import InvalidArgument
+
+
+def a_scene(seed: int) -> tuple[collide.Robot, collide.World, np.random.Generator]:
+    rng, world = rng_of("attached", seed), collide.World()
+    for k in range(6):
+        world.add(random_link_shape(rng, 0.2), random_pose(rng, 0.9), name=f"body{k}")
+    return random_robot(rng, n_links=5, size=0.08), world, rng
+
+
+def told(checker: collide.RobotChecker, Q: np.ndarray) -> tuple:
+    near = checker.distances(Q)
+    return (
+        checker.collides(Q).tolist(), near.distance.tobytes(), [frozenset(pair or ()) for pair in near.names],
+        checker.edge_collides(Q[:-1], Q[1:], resolution=0.1).tolist(), checker.n_pairs, checker.skipped,
+    )
+
+
+def contradict(A: collide.RobotChecker, B: collide.RobotChecker, Q: np.ndarray) -> bool:
+    """Whether motions are proven free by a checker and hit by another: spheres and maps prove other motions free."""
+    first, second = (checker.certify_edges(Q[:-1], Q[1:], resolution=0.05) for checker in (A, B))
+    assert first.free.any() or first.collides.any()
+    return bool((first.free & second.collides).any() or (second.free & first.collides).any())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_answers_are_those_of_a_checker_made_anew(seed):
+    robot, world, rng = a_scene(seed)
+    padding = 0.01 * (seed == 5)
+    checker = collide.RobotChecker(robot, world, padding=padding)
+    Q = random_configurations(rng, robot, 40)
+
+    def anew(**options) -> collide.RobotChecker:
+        made = collide.RobotChecker(robot, world, padding=padding, **options)
+        made._count(10**6 * (seed % 2))
+        return made
+
+    checker._count(10**6 * (seed % 2))  # with spheres and maps
+    before, links, held, n_changed = told(checker, Q), list(robot.geometry), [], 0
+    for k in range(2):
+        item = (f"held{k}", links[k], random_link_shape(rng, 0.15), random_pose(rng, 0.1), (f"body{k}",))
+        checker.attach(*item[:4], touch=item[4])
+        held.append(item)
+        fresh = anew(attached=held[::-1])
+        assert told(checker, Q) == told(fresh, Q), (seed, k)
+        assert not contradict(checker, fresh, Q)
+        n_changed += told(checker, Q)[1] != before[1]
+    checker.allow("held0", "body5")
+    checker.allow(links[0], links[-1])
+    allowed = [("held0", "body5"), (links[0], links[-1])]
+    fresh = anew(attached=held[::-1], allowed=allowed)
+    assert told(checker, Q)[:5] == told(fresh, Q)[:5]
+    world.set_pose("body2", random_pose(rng, 0.5))
+    assert told(checker, Q)[:5] == told(fresh, Q)[:5]
+    checker.detach("held0")
+    checker.detach("held1")
+    fresh = anew(allowed=allowed[1:])
+    assert told(checker, Q)[:5] == told(fresh, Q)[:5]
+    assert n_changed >= 1
+
+
+def test_spheres_and_maps_are_taken_over():
+    checker = scene_of_spheres(rng_of("spheres that hold", 1))
+    checker._count(10**6)
+    spheres, maps = checker.setting.spheres, checker._maps
+    checker.attach("box", checker.bodies[0], collide.Box((0.1, 0.1, 0.1)))
+    assert len(checker.setting.spheres.counts) == len(spheres.counts) + 1 and checker._maps is maps
+    checker.detach("box")
+    assert checker.setting.spheres.spheres.tobytes() == spheres.spheres.tobytes()
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda robot: pickle.loads(pickle.dumps(robot))])
+def test_a_copy_of_a_robot_makes_tables_of_its_own(copied):
+    robot, world, rng = a_scene(9)
+    checker, Q = collide.RobotChecker(robot, world), random_configurations(rng, robot, 30)
+    twin = copied(robot)
+    assert robot.link_tables is not None and twin.link_tables is None and not twin.link_shapes
+    assert collide.RobotChecker(twin, world).collides(Q).tolist() == checker.collides(Q).tolist()
+    again = collide.RobotChecker(robot, world)
+    assert again._tables is checker._tables
+    robot.geometry[next(iter(robot.geometry))] = [collide.robots.robot.LinkShape(
+        collide.Sphere(0.5), np.eye(4), None, "test")]
+    assert collide.RobotChecker(robot, world)._tables is not checker._tables
+
+
+def test_errors_name_what_is_wrong_and_leave_the_checker():
+    robot, world, rng = a_scene(3)
+    checker, Q = collide.RobotChecker(robot, world), random_configurations(rng, robot, 10)
+    checker.attach("cup", robot.links[1], collide.Sphere(0.05), pose(t=(0, 0, 0.1)))
+    before = told(checker, Q)
+    for call, message in (
+        (lambda: checker.attach("cup", robot.links[1], collide.Sphere(0.1)), 'the name "cup" is used twice'),
+        (lambda: checker.attach("jug", "elbow", collide.Sphere(0.1)), "has no link 'elbow'"),
+        (lambda: checker.attach("jug", robot.links[1], 0.1), "not a shape but 0.1"),
+        (lambda: checker.detach("jug"), "no attached object is called 'jug'; attached: cup"),
+        (lambda: checker.allow("cup", "jug"), "no link, attached object or body is called 'jug'"),
+    ):
+        with pytest.raises(InvalidArgument, match=message):
+            call()
+    assert told(checker, Q) == before
