@@ -82,6 +82,7 @@ if TYPE_CHECKING:
     from collide.solids.configuration_obstacle import ConfigurationObstacle, configuration_obstacle
     from collide.solids.overlap_volume import OverlapVolume, overlap_volume
     from collide.solids.planar_obstacle import PlanarObstacle
+    from collide.spheres.enclosing_spheres import EnclosingSpheres, enclosing_spheres
     from collide.surface_queries.contains import contains
     from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
     from collide.surface_queries.overlay import Overlay, overlay
@@ -110,6 +111,7 @@ _HOMES = {
     "collide.certificates.verify": ("verify",),
     "collide.contact.contact_query": ("contacts",),
     "collide.contact.contact_rows": ("Contacts",),
+    "collide.spheres.enclosing_spheres": ("EnclosingSpheres", "enclosing_spheres"),
     "collide.surface_queries.contains": ("contains",),
     "collide.surface_queries.overlay": ("Overlay", "overlay"),
     "collide.surface_queries.signed_distance_grid": ("GridDistances", "SignedDistanceGrid"),
@@ -161,16 +163,16 @@ _RENAMED = {
 __all__ = [
     "BooleanResult", "Box", "Capsule", "CellOverlaps", "CellPlanes", "Certificate", "CertificateRefused",
     "CertifiedEdges", "CollideError", "Compound", "Cone", "ConfigurationObstacle", "Contacts", "ConvexCells",
-    "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "FacetPairs", "GridDistances",
-    "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair",
-    "Located", "Mesh", "MissingExtra", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult",
+    "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "EnclosingSpheres", "FacetPairs",
+    "GridDistances", "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape",
+    "LinkPair", "Located", "Mesh", "MissingExtra", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult",
     "PartitionSize", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits", "Robot",
     "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
     "SignedDistanceGrid", "SignedDistances", "SpacePartition", "Sphere", "SweepResults", "SweptMesh", "TetMesh",
     "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldHits", "WorldResult", "boolean",
-    "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "facet_pairs",
-    "get_include", "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay", "pose", "poses",
-    "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions",
+    "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres",
+    "facet_pairs", "get_include", "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay",
+    "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions",
     "self_overlapping_cells", "shape_cast", "signed_distances", "sweep", "tessellate", "time_of_impact", "verify",
     "walk",
 ]

@@ -69,6 +69,9 @@ ROOMS = {
         "errors", "base", "kernels", "transforms", "numerics", "mesh", "shapes", "lowering", "narrowphase",
         "surface_queries",
     },
+    "spheres": {
+        "errors", "base", "shapes", "lowering", "certificates", "pairs", "surface_queries",
+    },
     "worlds": {
         "errors", "base", "transforms", "results", "numerics", "shapes", "lowering", "broadphase", "narrowphase",
         "certificates", "pairs", "contact", "casts", "solids",

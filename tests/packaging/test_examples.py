@@ -194,6 +194,7 @@ GIVEN = {
     "robots": "X_LS = np.eye(4); world = collide.World(); Q = Q0 = np.zeros((2, 1)); Q1 = Q + 0.1; q = Q[0]\n"
     "scan, X_WC = np.eye(3) * 5, X_LS",
     "solids": "",
+    "spheres": "",
     "worlds": "",
     "disabled-pairs": "robot = collide.Robot.load('two_links.urdf')",
     "engines": "",

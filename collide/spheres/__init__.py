@@ -1,0 +1,1 @@
+"""Spheres around bodies, proven to contain them, and audits of published spheres."""
