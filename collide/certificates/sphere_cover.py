@@ -96,10 +96,7 @@ def flaw_of_cover(shape: Shape, centers: np.ndarray, radii: np.ndarray, covers: 
     O(pieces) integers; corners of the union by triples of balls that meet: O(n³) at worst. Of all corners off the balls
     O(facets) doubles.
     """
-    values, grid = integers(np.column_stack([centers, radii]))
-    balls = _Balls(
-        list(zip(values[0::4], values[1::4], values[2::4])), values[3::4], grid
-    )
+    balls = _exact_balls(centers, radii)
     leaves = list(leaves_of(shape))
     if len(leaves) != len(covers):
         return f"the body has {len(leaves)} parts, the certificate {len(covers)}"
@@ -137,6 +134,18 @@ def _surface(leaf: Shape, cover: PartCover) -> tuple[np.ndarray, np.ndarray] | s
     if not np.isfinite(vertices).all() or faces.min(initial=0) < 0 or faces.max(initial=-1) >= len(vertices):
         return "facets around the part name no vertices, or vertices that are not finite"
     return vertices, faces
+
+
+def ball_around(leaf: Shape, poses: tuple[np.ndarray, ...], centers: np.ndarray, radii: np.ndarray) -> int:
+    """The number of a ball around a whole `Sphere`, decided exactly; −1 without such a ball, and for other parts."""
+    balls = _exact_balls(centers, radii)
+    numbers = range(len(radii)) if isinstance(leaf, Sphere) else ()
+    return next((k for k in numbers if _flaw_of_ball(leaf, poses, k, balls) is None), -1)
+
+
+def _exact_balls(centers: np.ndarray, radii: np.ndarray) -> _Balls:
+    values, grid = integers(np.column_stack([centers, radii]))
+    return _Balls(list(zip(values[0::4], values[1::4], values[2::4])), values[3::4], grid)
 
 
 def _flaw_of_ball(leaf: Shape, poses: tuple[np.ndarray, ...], number: int, balls: _Balls) -> str | None:

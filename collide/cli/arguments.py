@@ -19,6 +19,7 @@ from collide.cli import fuzz as cli_fuzz
 from collide.cli import locality_command as cli_locality
 from collide.cli import numbers as cli_numbers
 from collide.cli import pages as cli_pages
+from collide.cli import spheres_command as cli_spheres
 from collide.cli import srdf as cli_srdf
 from collide.cli import sweep_command as cli_sweep
 from collide.cli import view as cli_view
@@ -169,6 +170,8 @@ def parser() -> argparse.ArgumentParser:
     _output_arguments(locality)
     _add_scenes(commands)
     cli_srdf.add_arguments(_add(commands, "srdf", "which links of a robot can collide at all?", cli_srdf.EPILOG))
+    spheres = _add(commands, "spheres", "spheres around a robot's links, proven, and audits", cli_spheres.EPILOG)
+    cli_spheres.add_arguments(spheres)
     sweep = _add(commands, "sweep", "millions of configurations, to files", cli_sweep.EPILOG)
     cli_sweep.add_arguments(sweep, _scene_arguments)
     _add(commands, "doctor", "is this installation sound?", _DOCTOR)

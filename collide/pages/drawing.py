@@ -18,7 +18,7 @@ from collide.reports.report import Report
 
 VERSION = 1
 #: Kinds of page.
-REPORT, CHECK, COMPARE = "report", "check", "compare"
+REPORT, CHECK, COMPARE, SPHERES = "report", "check", "compare", "spheres"
 _ITSELF = np.eye(4)
 
 
@@ -32,7 +32,7 @@ def of_scene(
     ----------
     scene : `collide.scenes.Scene`.
     report : of the scene, by `collide.reports.report.make`: source of the verdicts.
-    kind : "report", "check" or "compare".
+    kind : "report", "check", "compare" or "spheres".
     looks : body name → its look, where other than the tested shape: shapes with their poses X_BS in the
         body's frame (4, 4).
     notes : for the reader, on ``looks``.

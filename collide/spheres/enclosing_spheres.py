@@ -16,7 +16,7 @@ from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Sphere
 from collide.shapes.shape import Shape, checked_shape
 from collide.spheres.body_facets import BodyPart, Reach, body_parts
-from collide.spheres.facet_cover import FacetCover, cover_facets
+from collide.spheres.facet_cover import certificate_of, cover_facets
 from collide.spheres.place_spheres import (
     Placement,
     Samples,
@@ -292,20 +292,9 @@ def _proven(shape: Shape, reach: Reach, samples: Samples, place: Placement) -> E
         grown = _rounded_up(away[np.arange(len(holes)), balls] + 2.0 * _NEAR * samples.size, largest, grid)
         np.maximum.at(radii, balls, grown)
     bracket = excess_bracket(shape, parts, centers, radii)
-    return EnclosingSpheres(centers, radii, bracket, _certificate(parts, cover, used))
+    return EnclosingSpheres(centers, radii, bracket, certificate_of(parts, cover, used))
 
 
 def _rounded_up(distances: np.ndarray, largest: float, grid: float) -> np.ndarray:
     """Radii on a grid, above distances by more than corners and distances were rounded: 2^-44 of the largest number."""
     return np.ceil((distances * (1.0 + 2.0**-44) + 2.0**-44 * largest) / grid) * grid
-
-
-def _certificate(parts: list[BodyPart], cover: FacetCover, used: np.ndarray) -> tuple[PartCover, ...]:
-    numbers = np.zeros(int(max(cover.pieces.max(), used.max())) + 1, dtype=np.int32)
-    numbers[used] = np.arange(len(used))
-    pieces = np.where(cover.pieces < 0, cover.pieces, numbers[np.maximum(cover.pieces, 0)])
-    ends = np.cumsum([len(part.mesh.faces) for part in parts])
-    cuts = np.append(cover.starts, len(pieces))[np.concatenate([[0], ends])]
-    return tuple(
-        PartCover(-1, part.vertices, part.faces, pieces[start:end]) for part, start, end in zip(parts, cuts, cuts[1:])
-    )

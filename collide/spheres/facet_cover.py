@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from collide.certificates.sphere_cover import CUT_AT
+from collide.certificates.sphere_cover import CUT_AT, PartCover
+from collide.spheres.body_facets import BodyPart
 
 #: Distances of corners from balls worked on at a time.
 _BLOCK = 1 << 20
@@ -53,7 +54,7 @@ def cover_facets(
         if reached > lower:
             lower, farthest = reached, at
         is_cut = (values > max(lower + tolerance, least)) & (depth < _MAX_DEPTH)
-        pieces, edges = _bisected(corners[is_cut])
+        pieces, edges = bisected(corners[is_cut])
         owners[is_cut] = CUT_AT - edges
         levels.append((corners, owners, values, is_cut))
         corners, depth = pieces, depth + 1
@@ -88,7 +89,7 @@ def _judge(
     return owners, values, reached, at
 
 
-def _bisected(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def bisected(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(the halves of m triangles, (2 m, 3, 3), cut at the middle of their longest edges; (m,) the edges)."""
     edges = np.square(np.roll(corners, -1, axis=1) - corners).sum(axis=2).argmax(axis=1)
     rows = np.arange(len(corners))
@@ -117,3 +118,15 @@ def _in_preorder(levels: list) -> tuple[np.ndarray, np.ndarray]:
             at = at[is_cut][:, None] + 1 + np.column_stack([np.zeros_like(sizes[k + 1][::2]), sizes[k + 1][::2]])
             at = at.reshape(-1)
     return pieces, starts
+
+
+def certificate_of(parts: list[BodyPart], cover: FacetCover, used: np.ndarray) -> tuple[PartCover, ...]:
+    """The certificate of a cover of all facets of parts, with the balls of rows ``used``, numbered anew."""
+    numbers = np.zeros(int(max(cover.pieces.max(), used.max())) + 1, dtype=np.int32)
+    numbers[used] = np.arange(len(used))
+    pieces = np.where(cover.pieces < 0, cover.pieces, numbers[np.maximum(cover.pieces, 0)])
+    ends = np.cumsum([len(part.mesh.faces) for part in parts])
+    cuts = np.append(cover.starts, len(pieces))[np.concatenate([[0], ends])]
+    return tuple(
+        PartCover(-1, part.vertices, part.faces, pieces[start:end]) for part, start, end in zip(parts, cuts, cuts[1:])
+    )

@@ -253,3 +253,21 @@ def placed_spheres(reach: Reach, samples: Samples, count: int, start: Placement 
         failures = 0 if trial.excess < best.excess * 0.995 else failures + 1
         best = min(best, trial, key=lambda place: place.excess)
     return best
+
+
+def shared_counts(bodies: list[Samples], total: int) -> list[int]:
+    """How many of ``total`` spheres each body gets, for a small greatest excess: greedy covers of a bisected excess.
+
+    total : at least the number of bodies.
+    """
+    low, high = 0.0, max(float(samples.needs.max(axis=1).min()) for samples in bodies)
+    counts = [1] * len(bodies)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        covers = [greedy_cover(samples, middle, total) for samples in bodies]
+        sizes = [total + 1 if cover is None else len(cover) for cover in covers]
+        if sum(sizes) <= total:
+            counts, high = sizes, middle
+        else:
+            low = middle
+    return counts

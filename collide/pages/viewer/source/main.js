@@ -122,7 +122,7 @@ function showVerdict(model) {
   refill(byId("verdict"), ...lines.map(([text, worst]) => element("span", {}, swatch(worst), " ", printable(text))));
   const scene = model.reportAt(0).scene;
   byId("scene-name").textContent = scene ? shorten(printable(scene.name), 80) : "comparison of engines";
-  byId("kind").textContent = { check: "collide check", compare: "collide compare" }[model.kind] ?? (isLive() ? "collide view" : "collide report");
+  byId("kind").textContent = { check: "collide check", compare: "collide compare", spheres: "collide spheres" }[model.kind] ?? (isLive() ? "collide view" : "collide report");
 }
 
 /** What is selected, over the scene and for screen readers. */
