@@ -36,10 +36,12 @@ class CheckWorkspace:
     """One thread's buffers, and the surroundings as they stand for its questions.
 
     header, address : of `check_scene.py`.   open_pairs : (k, OPEN_INTS) what the last call left to others.
+    slots : buffers of searches for distances, by their kind.
     """
 
     def __init__(self, robot: Robot, setting: Setting):
-        self.robot, self._setting = robot, setting  # kernels read what they hold
+        self.robot, self.setting = robot, setting  # kernels read what they hold
+        self.slots: dict = {}
         tables, around, joints = setting.tables, setting.surroundings, robot.joint_table
         n_bodies, n_parts, n_around = len(tables.bodies), len(tables.poses), len(around.packed)
         nothing, tree = np.zeros(1, dtype=np.int64), around.tree
@@ -121,7 +123,7 @@ class CheckWorkspace:
     def motions(self, resolution: float) -> MotionWorkspace:
         """The workspace of `certify_motions`, for this resolution [rad or m]."""
         if self._motions is None:
-            self._motions = MotionWorkspace(self.robot, self._setting)
+            self._motions = MotionWorkspace(self.robot, self.setting)
         self._motions.begin(resolution)
         return self._motions
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from collide.kernels import entry, kernel, view_f64, view_u8
+from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.lowering.shape_table import POSE
 from collide.narrowphase.rows import BODY_B, CERTIFIED, DISTANCE, NORMAL, POINT_A, POINT_B, ROW, view_row
 from collide.numerics.vec3 import Vec3, cross, dot, neg, rotate, sub, vec3_at
@@ -38,20 +38,22 @@ from collide.robots.forward_kinematics import (
 from collide.robots.nearest_pairs import BODY_A, NONE
 
 
-@entry("void(int64, int64, int64, int64, int64, int64, int64)")
-def distance_gradients(header_at, q_at, dof, n, moves_at, rows_at, out_at):
-    """(n, dof) derivatives [m/rad or m/m] for the rows of `nearest_pairs`; NaN where the distance has no derivative,
-    for the reason in `RobotDistances.no_gradient`.
+@entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64)")
+def distance_gradients(header_at, q_at, dof, n, of_at, m, moves_at, rows_at, out_at):
+    """(m, dof) derivatives [m/rad or m/m] for rows of `nearest_pairs.py`; NaN where the distance has no derivative, for
+    the reason in `RobotDistances.no_gradient`.
 
-    moves : (joints, links) bytes, 1 where a joint moves a link.
+    of : (m,) the configuration of each row, of n.   moves : (joints, links) bytes, 1 where a joint moves a link.
     """
     scene = view_scene(header_at)
     joints = scene.joints
     n_links = scene.words[N_LINKS]
     q = view_f64(q_at, dof * n)
-    out = view_f64(out_at, dof * n)
+    of = view_i64(of_at, m)
+    out = view_f64(out_at, dof * m)
     moves = view_u8(moves_at, joints.n * n_links)
-    for k in range(n):
+    placed = -1
+    for k in range(m):
         row = view_row(rows_at + ROW * k)
         is_known = row.words[BODY_A] != NONE and row.flags[CERTIFIED] != 0
         is_differentiable = is_known and row.doubles[DISTANCE] != 0.0
@@ -59,7 +61,10 @@ def distance_gradients(header_at, q_at, dof, n, moves_at, rows_at, out_at):
             out[dof * k + j] = 0.0 if is_differentiable else math.nan
         if not is_differentiable:
             continue
-        begin_configuration(scene, q, dof * k)
+        at = dof * of[k]
+        if placed != at:
+            placed = at
+            begin_configuration(scene, q, at)
         link_a = scene.bodies[BODY_INTS * row.words[BODY_A] + LINK]
         link_b = scene.bodies[BODY_INTS * row.words[BODY_B] + LINK] if row.words[BODY_B] >= 0 else -1
         nhat = vec3_at(row.doubles, NORMAL)
@@ -67,23 +72,26 @@ def distance_gradients(header_at, q_at, dof, n, moves_at, rows_at, out_at):
             moves_a = moves[n_links * j + link_a] != 0
             moves_b = link_b >= 0 and moves[n_links * j + link_b] != 0
             if moves_a and not moves_b:
-                _add_joint(scene, j, q, dof * k, neg(nhat), vec3_at(row.doubles, POINT_A), out)
+                _add_joint(scene, j, q, at, neg(nhat), vec3_at(row.doubles, POINT_A), out, dof * k)
             elif moves_b and not moves_a:
-                _add_joint(scene, j, q, dof * k, nhat, vec3_at(row.doubles, POINT_B), out)
+                _add_joint(scene, j, q, at, nhat, vec3_at(row.doubles, POINT_B), out, dof * k)
 
 
 @kernel
-def _add_joint(scene, j, q, first, direction, p_W, out):
-    """Add what the columns of joint j do to a point p along a direction."""
+def _add_joint(scene, j, q, first, direction, p_W, out, to):
+    """Add what the columns of joint j do to a point p along a direction.
+
+    first, to : where the configuration begins in q, and the row of derivatives in out.
+    """
     joints, links = scene.joints, scene.links
     at = JOINT_DOUBLES * j
     kind = joints.ints[JOINT_INTS * j + KIND]
-    column = first + joints.ints[JOINT_INTS * j + COLUMN]
+    column = to + joints.ints[JOINT_INTS * j + COLUMN]
     child = POSE * joints.ints[JOINT_INTS * j + CHILD]
     if kind == FIXED:
         return
     if kind == FLOATING:
-        _add_floating(scene, j, q, column, direction, p_W, out)
+        _add_floating(scene, j, q[first + joints.ints[JOINT_INTS * j + COLUMN] + 5], column, direction, p_W, out)
         return
     axis = rotate(links, child, vec3_at(joints.doubles, at + AXIS))
     multiplier = joints.doubles[at + MULTIPLIER]
@@ -101,14 +109,14 @@ def _add_joint(scene, j, q, first, direction, p_W, out):
 
 
 @kernel(cold=True)
-def _add_floating(scene, j, q, column, direction, p_W, out):
+def _add_floating(scene, j, yaw, column, direction, p_W, out):
     """x, y, z along the joint frame's axes; yaw about its z, pitch about its y as yaw leaves it, roll about the child's
     x.
     """
     links = scene.links
     child = POSE * scene.joints.ints[JOINT_INTS * j + CHILD]
     arm = sub(p_W, vec3_at(links, child + 9))
-    rotation = sine_cosine_of(q[column + 5])
+    rotation = sine_cosine_of(yaw)
     z = _in_joint_frame(scene, j, Vec3(0.0, 0.0, 1.0))
     out[column] += dot(_in_joint_frame(scene, j, Vec3(1.0, 0.0, 0.0)), direction)
     out[column + 1] += dot(_in_joint_frame(scene, j, Vec3(0.0, 1.0, 0.0)), direction)

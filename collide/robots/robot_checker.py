@@ -13,11 +13,12 @@ from collide.errors import InvalidArgument, brief, listing
 from collide.robots.certified_edges import CertifiedEdges, certify, sampled_collision
 from collide.robots.check_configurations import COLLIDES, IS_OPEN
 from collide.robots.checker_scene import CheckerScene
-from collide.robots.configuration_batches import check_piece, measure_piece
+from collide.robots.configuration_batches import check_piece
 from collide.robots.configuration_report import ConfigurationReport
+from collide.robots.distance_batches import BETWEEN, PER, DistanceQuestion, measure
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import padding_of
-from collide.robots.robot_distances import NEAREST_DTYPE, RobotDistances
+from collide.robots.robot_distances import RobotDistances
 from collide.robots.self_filter import points_in_world, points_of_robot
 from collide.shapes.point_cloud import PointCloud
 from collide.transforms import LARGEST, as_pose
@@ -224,9 +225,10 @@ class RobotChecker(CheckerScene):
         return bool(out[0]) if is_single else out
 
     def distances(
-        self, Q, *, max_distance: float = math.inf, threads: int = 1, progress: Callable[[int, int], None] | None = None
+        self, Q, *, max_distance: float = math.inf, per: str = "robot", between: str = "all", threads: int = 1,
+        progress: Callable[[int, int], None] | None = None,
     ) -> RobotDistances:
-        """The nearest pair of each configuration, or the deepest where some overlap.
+        """Signed distances of tested pairs within a limit: the nearest of each configuration, of each link, or all.
 
         Parameters
         ----------
@@ -234,27 +236,35 @@ class RobotChecker(CheckerScene):
             As of `collides`.
         max_distance : float
             [m], ≥ 0: what is farther apart does not count.
+        per : "robot", "link" or "pair"
+            Rows of the result: the nearest pair of a configuration, or the deepest where some overlap; the nearest pair
+            of each body of the robot, in the order of ``bodies``; all pairs within ``max_distance``, and every tested
+            pair without a limit.
+        between : "all", "world" or "self"
+            Pairs with bodies around, among bodies of the robot, or both. The nearest pair of a robot is often two of
+            its links at a distance that hardly changes, with a gradient of 0: optimisers ask for "world", or per pair.
 
         Returns
         -------
         RobotDistances
-            Signed distance with its proven bracket, the two bodies by name, witness points, normal, and the gradient
-            with respect to q. Of a body of several convex parts the nearest or deepest part counts.
+            Of M rows, sorted by configuration: signed distance with its proven bracket, the two bodies by name, witness
+            points, normal, and the gradient with respect to q. Of a body of several convex parts the nearest or deepest
+            part counts.
 
         Raises
         ------
         InvalidArgument
-            As of `collides`. UnsupportedQuery as of `collide.distance`.
+            As of `collides`, and for other words than these. UnsupportedQuery as of `collide.distance`.
+
+        Notes
+        -----
+        Pairs whose boxes are farther apart than ``max_distance`` cost a comparison, others about a microsecond, of
+        convex parts. O(N P) for all P pairs without a limit.
         """
         limit = checks.limit("RobotChecker.distances: max_distance", max_distance)
+        question = DistanceQuestion(limit, _word("per", per, PER), _word("between", between, BETWEEN))
         q, _ = self._configurations(Q)
-        rows, gradient = np.zeros(len(q), dtype=NEAREST_DTYPE), np.zeros(q.shape)
-        now = self._as_of_now()
-        now.in_pieces(
-            len(q), threads, progress,
-            lambda space, piece: measure_piece(now, space, q[piece], rows[piece], gradient[piece], limit),
-        )
-        return RobotDistances(rows, gradient, now.bodies, now.around)
+        return measure(self._as_of_now(), q, question, threads, progress)
 
     def edge_collides(self, Q0, Q1, *, resolution: float = 0.01, threads: int = 1) -> np.ndarray:
         """Whether straight motions collide at samples; motions between two samples are not checked.
@@ -421,3 +431,10 @@ def _positive(what: str, value) -> float:
     if number is None or not 0.0 < number < math.inf:
         raise InvalidArgument(f"{what} must be a positive number [rad or m], got {brief(value)}")
     return number
+
+
+def _word(name: str, value, words: dict[str, int]) -> int:
+    if not isinstance(value, str) or value not in words:
+        known = ", ".join(f'"{word}"' for word in words)
+        raise InvalidArgument(f"RobotChecker.distances: {name} must be one of {known}, got {brief(value)}")
+    return words[value]

@@ -1,4 +1,4 @@
-"""The nearest pair of each configuration as a result: names, signed distance, and its derivatives by the joints."""
+"""Distances of a robot as a result: names of pairs, signed distances, and their derivatives by the joints."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-#: One row a configuration.
+#: A row of a pair.
 NEAREST_DTYPE = np.dtype(
     [
         ("distance", "f8"), ("lower", "f8"), ("upper", "f8"), ("normal", "f8", 3), ("point_a", "f8", 3),
@@ -28,31 +28,52 @@ NO_GRADIENT = {
 
 
 class RobotDistances:
-    """The nearest pair of each configuration; fields of `NEAREST_DTYPE` as attributes, arrays with a leading N.
+    """Pairs of N configurations, M rows: fields of `NEAREST_DTYPE` as attributes, arrays with a leading M.
+
+    Rows are sorted by configuration; ``starts[k]:starts[k + 1]`` are of configuration k: a single row of the nearest
+    pair (``per="robot"``); a row for each body of the robot, body i in row ``starts[k] + i`` and the first of the row's
+    pair (``per="link"``); all pairs within the limit, sorted by bodies, with those around last (``per="pair"``).
 
     Parameters
     ----------
-    rows : (N,) NEAREST_DTYPE
+    rows : (M,) NEAREST_DTYPE
         ``distance`` [m], signed, with ``lower ≤ truth ≤ upper`` proven; ``normal`` (3,) a unit vector in W from A, on
         the robot, towards B; ``point_a``, ``point_b`` (3,) in W [m]; ``hit``, ``certified``; ``beyond`` where every
         tested pair is beyond the ``max_distance`` asked: distance and upper are infinite then. ``a`` is the number of a
         body, −1 without a pair; ``b`` of another, or −1 − the number of a body around.
         For overlapping bodies that are not convex, ``distance`` is minus the length of some separating
         translation, the bracket reaches up to 0, and ``certified`` is False.
-    gradient : (N, dof) float64
+    gradient : (M, dof) float64
         Derivative of ``distance`` by each column of q [m/rad or m/m]; NaN where no derivative is known, for the reason
         in `no_gradient`. Of two equally near pairs the gradient is the named pair's.
     bodies, around : sequence of str
         Names of the robot's bodies, and of the bodies around.
+    starts : (N + 1,) int64
+        Where rows of configurations begin and end, by default a row each.
+
     """
 
-    def __init__(self, rows: np.ndarray, gradient: np.ndarray, bodies: Sequence[str], around: Sequence[str]):
+    def __init__(
+        self, rows: np.ndarray, gradient: np.ndarray, bodies: Sequence[str], around: Sequence[str],
+        starts: np.ndarray | None = None,
+    ):
         self.rows, self.gradient = rows, gradient
+        self.starts = np.arange(len(rows) + 1) if starts is None else starts
         self._bodies, self._around = list(bodies), list(around)
 
     @property
+    def configuration(self) -> np.ndarray:
+        """The configuration of each row.
+
+        Returns
+        -------
+        (M,) int64
+        """
+        return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
+
+    @property
     def names(self) -> list[tuple[str, str] | None]:
-        """Names of both bodies of each configuration; ``None`` without a pair."""
+        """Names of both bodies of each row; ``None`` without a pair."""
         return [
             None if a < 0 else (self._bodies[a], self._bodies[b] if b >= 0 else self._around[-1 - b])
             for a, b in zip(self.rows["a"].tolist(), self.rows["b"].tolist())
@@ -60,11 +81,11 @@ class RobotDistances:
 
     @property
     def no_gradient(self) -> list[str | None]:
-        """Why a configuration's gradient is NaN, in the words of `NO_GRADIENT`; ``None`` beside a gradient.
+        """Why a row's gradient is NaN, in the words of `NO_GRADIENT`; ``None`` beside a gradient.
 
         Returns
         -------
-        list of N ``str | None``
+        list of M ``str | None``
         """
         return [_why_no_gradient(row) for row in self.rows]
 
@@ -79,7 +100,11 @@ class RobotDistances:
     def __repr__(self) -> str:
         near = self.rows["distance"][~self.rows["beyond"]]
         least = f", least {near.min():.6g} m" if len(near) else ""
-        return f"RobotDistances({len(self)} configurations, {int(self.rows['hit'].sum())} in collision{least})"
+        n_hits = int(self.rows["hit"].sum())
+        n = len(self.starts) - 1
+        if n == len(self) and (np.diff(self.starts) == 1).all():
+            return f"RobotDistances({n} configurations, {n_hits} in collision{least})"
+        return f"RobotDistances({len(self)} rows of {n} configurations, {n_hits} hits{least})"
 
 
 def _why_no_gradient(row) -> str | None:

@@ -1,10 +1,10 @@
-"""Bodies that are far from their convex hulls: rings, shells, terrains, unions with meshes."""
+"""Bodies that are far from their convex hulls, and robots among them: rings, shells, terrains, unions with meshes."""
 
 from __future__ import annotations
 
 import numpy as np
-from naive import random_pose
-from random_robots import random_link_shape
+from naive import random_pose, rng_of
+from random_robots import random_link_shape, random_robot
 
 import collide
 
@@ -42,3 +42,16 @@ def hollow(rng, size: float) -> collide.Shape:
     if kind == 4:
         return collide.Compound([(collide.Box(0.4 * size * np.ones(3)), random_pose(rng, size)) for _ in range(2)])
     return random_link_shape(rng, 0.5 * size)
+
+
+def hollow_scene(seed: int):
+    """(robot, World) of few small links among large rings, shells and terrains."""
+    rng = rng_of("hollow bodies", seed)
+    of_links = hollow if seed % 2 else random_link_shape
+    robot = random_robot(rng, n_links=4, shape=lambda rng, size: of_links(rng, size), size=0.06)
+    world = collide.World()
+    for k in range(5):
+        world.add(hollow(rng, float(rng.uniform(0.3, 0.9))), random_pose(rng, 1.2), name=f"body{k}")
+    if seed % 3 == 0:
+        world.add(collide.Halfspace((0.1, 0.0, 1.0), -float(rng.uniform(0.6, 1.2))), name="ground")
+    return rng, robot, world

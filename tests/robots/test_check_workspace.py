@@ -16,6 +16,7 @@ from collide.robots.certify_meshes import settle_meshes
 from collide.robots.certify_motions import certify_motions
 from collide.robots.check_configurations import COLLIDES, IS_FREE, IS_OPEN, check_configurations
 from collide.robots.check_workspace import CheckWorkspace
+from collide.robots.distance_batches import DistanceQuestion, Slots
 from collide.robots.distance_gradients import distance_gradients
 from collide.robots.kinematic_tree import Joint
 from collide.robots.motion_bounds import bound_motions
@@ -99,7 +100,8 @@ def nearest(checker: RobotChecker, q: np.ndarray, limit: float, within: float = 
     space = space_of(checker)
     rows, limits = np.zeros(len(q), dtype=PAIR_DTYPE), np.full(len(q), min(within, limit))
     end = nearest_pairs(
-        space.address, address_of(q), q.shape[1], 0, len(q), limit, address_of(limits), address_of(rows)
+        space.address, address_of(q), q.shape[1], 0, len(q), limit, address_of(limits),
+        Slots(DistanceQuestion(), checker.setting).address, address_of(rows),
     )
     assert end == len(q)
     return space, rows, limits
@@ -120,9 +122,10 @@ def test_gradients_of_rows_that_have_one():
     q = np.array([[0.0], [0.875], [0.0], [0.0]])
     space, rows, _ = nearest(checker, q, np.inf)
     rows["certified"][2], rows["a"][3] = False, NONE
-    out = np.full((4, 1), 7.0)
+    out, of = np.full((4, 1), 7.0), np.arange(4)
     distance_gradients(
-        space.address, address_of(q), 1, 4, address_of(checker.robot.moves), address_of(rows), address_of(out)
+        space.address, address_of(q), 1, 4, address_of(of), 4, address_of(checker.robot.moves), address_of(rows),
+        address_of(out),
     )
     assert np.allclose(out[:2, 0], (-1.0, 1.0), atol=1e-12) and np.isnan(out[2:]).all()
 

@@ -5,14 +5,18 @@ A gradient is right, or NaN with a reason that is told; how many are of which ki
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 
 import numpy as np
 import pytest
-from naive import pose, random_pose, rng_of
+from curved_oracle import bracket
+from naive import SHARED, pose, random_pose, rng_of
 from random_robots import DEMO, asked_one_by_one, random_configurations, random_link_shape, random_robot, slider
 
 import collide
+from collide.robots.kinematic_tree import Joint
+from collide.robots.robot import LinkShape, Robot
 from collide.robots.robot_distances import NO_GRADIENT
 
 STEP = 1e-6
@@ -127,3 +131,151 @@ def test_reasons_speak_of_the_pair_named():
         assert (measured.no_gradient[0] == NO_GRADIENT["depth"]) == (is_mesh and bool(measured.hit[0]))
         n_named += is_mesh
     assert 2 <= n_named <= 9, n_named
+
+
+# --- near pairs: every row against differences of its own pair ------------------------------------
+
+MODELS = {name: SHARED / "data" / "robots" / name / f"{name}.urdf" for name in ("panda", "ur5", "fetch")}
+needs_models = pytest.mark.skipif(not MODELS["panda"].is_file(), reason="../shared/data/robots is absent")
+
+
+def parts_of_row(checker, names) -> tuple:
+    """(parts of A, link of A, parts of B, link of B or None, X_WB or None) of two bodies by name; a part is (shape,
+    X_LG).
+    """
+    robot, (a, b) = checker.robot, names
+    number = {link: k for k, link in enumerate(robot.links)}
+    of_a = [(element.shape, element.X_LG) for element in robot.geometry[a]]
+    if b in robot.geometry:
+        return of_a, number[a], [(element.shape, element.X_LG) for element in robot.geometry[b]], number[b], None
+    body = checker.world.body(b)
+    return of_a, number[a], [(body.shape, np.eye(4))], None, body.X_WB
+
+
+def distances_at(checker, names, Q) -> tuple[np.ndarray, np.ndarray]:
+    """((n,) distances, (n,) widths of brackets) of two bodies at configurations: the least of any two parts."""
+    of_a, link_a, of_b, link_b, X_WB = parts_of_row(checker, names)
+    X_WLs = checker.link_poses(Q)
+    distance, width = np.full(len(Q), np.inf), np.zeros(len(Q))
+    for (A, X_A), (B, X_B) in itertools.product(of_a, of_b):
+        X_WBs = np.broadcast_to(X_WB, (len(Q), 4, 4)) if link_b is None else X_WLs[:, link_b] @ X_B
+        r = collide.distance(A, B, X_WLs[:, link_a] @ X_A, X_WBs)
+        width = np.where(r.distance < distance, r.upper - r.lower, width)
+        distance = np.minimum(distance, r.distance)
+    return distance, width
+
+
+def slopes(checker, measured, Q, step: float = STEP) -> tuple[np.ndarray, np.ndarray]:
+    """((M, 3, dof) differences backward, central and forward of each row's own pair, (M,) widths of brackets)."""
+    n, dof = len(measured), checker.robot.dof
+    out, widths, names = np.zeros((n, 3, dof)), np.zeros(n), np.array([" ".join(pair) for pair in measured.names])
+    steps = step * np.concatenate([np.eye(dof), -np.eye(dof), np.zeros((1, dof))])
+    for pair in sorted(set(measured.names)):
+        rows = np.flatnonzero(names == " ".join(pair))
+        asked = (Q[measured.configuration[rows], None] + steps).reshape(-1, dof)
+        d, width = (values.reshape(len(rows), -1) for values in distances_at(checker, pair, asked))
+        after, before, at = d[:, :dof], d[:, dof:-1], d[:, -1:]
+        out[rows] = np.stack([at - before, 0.5 * (after - before), after - at], axis=1) / step
+        widths[rows] = width.max(axis=1)
+    return out, widths
+
+
+def judged_rows(checker, Q, told: str, limit: float = 0.15) -> Counter:
+    """How many rows of near pairs are of which kind, as of `judged`: gradients are right to 1e-6, where the brackets of
+    both ends are narrow enough to tell; beside a kink they lie between the slopes of both sides."""
+    measured, counts = checker.distances(Q, max_distance=limit, per="pair"), Counter()
+    expected, widths = slopes(checker, measured, Q)
+    for k, reason in enumerate(measured.no_gradient):
+        gradient, (before, central, after) = measured.gradient[k], expected[k]
+        say = f"{told}, {measured.names[k]}, q = {Q[measured.configuration[k]].tolist()}: {gradient}, {central}"
+        assert np.isnan(gradient).all() if reason else not np.isnan(gradient).any(), say
+        if reason:
+            assert not measured.certified[k] or measured.distance[k] == 0.0, say
+            counts[reason] += 1
+        elif np.abs(after - before).max() > 1e-2:
+            low, high = np.minimum(before, after), np.maximum(before, after)
+            assert ((gradient >= low - 1e-3) & (gradient <= high + 1e-3)).all(), say
+            counts["kink"] += 1
+        elif widths[k] > STEP * 1e-6:
+            assert np.abs(gradient - central).max() <= 1e-6 + widths[k] / STEP, say
+            counts["wide"] += 1
+        else:
+            assert np.abs(gradient - central).max() <= 1e-6, say
+            counts["overlap" if measured.hit[k] else "gap"] += 1
+    return counts
+
+
+@needs_models
+@pytest.mark.many(3)
+@pytest.mark.parametrize("name", MODELS)
+def test_near_pairs_of_hulls(name):
+    rng = rng_of("gradients of near pairs", name)
+    robot = Robot.load(MODELS[name], meshes="hull")
+    checker = collide.RobotChecker(robot, boxes_around(rng))
+    counts = judged_rows(checker, random_configurations(rng, robot, 250), name)
+    assert counts["gap"] >= 300 and counts["overlap"] >= 20 and set(counts) <= {"gap", "overlap", "kink"}, counts
+    assert counts["kink"] <= 0.01 * sum(counts.values()), counts
+
+
+@needs_models
+@pytest.mark.many(3)
+@pytest.mark.parametrize("name", MODELS)
+def test_near_pairs_of_meshes(name):
+    """Gaps have gradients; overlaps of meshes have the reason, in place of a wrong one."""
+    rng = rng_of("gradients of near meshes", name)
+    robot = Robot.load(MODELS[name], meshes="mesh")
+    checker = collide.RobotChecker(robot, boxes_around(rng))
+    Q = random_configurations(rng, robot, 40)
+    counts = judged_rows(checker, Q, name, limit=0.1)
+    assert counts["gap"] >= 30 and counts[NO_GRADIENT["depth"]] >= 3, counts
+    assert counts["kink"] <= 0.02 * sum(counts.values()), counts
+    with_hulls = checker.distances(Q, max_distance=0.0, per="pair")
+    assert (with_hulls.certified | np.isnan(with_hulls.gradient).all(axis=1)).all()
+
+
+@pytest.mark.parametrize("name", [*MODELS, "random"])
+def test_near_pairs_against_brackets_in_decimals(name):
+    """Along a random direction, by proven brackets of 80 digits that share nothing with the engine."""
+    if name in MODELS and not MODELS[name].is_file():
+        pytest.skip("../shared/data/robots is absent")
+    rng = rng_of("gradients in decimals", name)
+    robot = Robot.load(MODELS[name], meshes="hull") if name in MODELS else random_robot(rng, n_links=6, size=0.15)
+    checker = collide.RobotChecker(robot, boxes_around(rng))
+    Q, counts = random_configurations(rng, robot, 30), Counter()
+    measured = checker.distances(Q, max_distance=0.2, per="pair")
+    rows = rng.permutation(len(measured))
+    hits = measured.hit[rows]
+    for k in [*rows[hits][:6], *rows[~hits][:10]]:
+        of_a, link_a, of_b, link_b, X_WB = parts_of_row(checker, measured.names[k])
+        if len(of_a) > 1 or len(of_b) > 1 or any(isinstance(s, collide.Compound) for s, _ in (*of_a, *of_b)):
+            continue
+        (A, X_A), (B, X_B) = of_a[0], of_b[0]
+        q, way = Q[measured.configuration[k]], rng.normal(size=robot.dof)
+        ends = []
+        for X_WL in robot.link_poses(np.stack([q + STEP * way, q - STEP * way])):
+            ends.append(bracket(A, B, X_WL[link_a] @ X_A, X_WB if link_b is None else X_WL[link_b] @ X_B))
+        low, high = (float(x) / (2 * STEP) for x in (ends[0].lower - ends[1].upper, ends[0].upper - ends[1].lower))
+        slope = float(measured.gradient[k] @ way)
+        assert high - low <= 1e-6 and low - 1e-6 <= slope <= high + 1e-6, (measured.names[k], q.tolist(), slope, low)
+        counts["overlap" if measured.hit[k] else "gap"] += 1
+    assert counts["gap"] >= 5 and counts["overlap"] >= 2, counts
+
+
+def test_gradients_at_kinks_lie_between_the_slopes_of_both_sides():
+    """Boxes face to face, where every turn brings some corner nearer; a face in the middle between two walls."""
+    joints = [
+        Joint("slide", "prismatic", "base", "stage", np.eye(4), (1.0, 0, 0), -1.0, 1.0),
+        Joint("turn", "revolute", "stage", "arm", np.eye(4), (0, 0, 1.0), -1.0, 1.0),
+        Joint("tilt", "revolute", "arm", "block", np.eye(4), (0, 1.0, 0), -1.0, 1.0),
+    ]
+    block = [LinkShape(collide.Box((0.2, 0.2, 0.2)), np.eye(4), None, "test")]
+    robot = Robot("block", ["base", "stage", "arm", "block"], joints, {"block": block})
+    world = collide.World()
+    for x in (-1.0, 1.0):
+        world.add(collide.Box((0.2, 2.0, 2.0)), pose(t=(x, 0, 0)), name=f"wall {x}")
+    checker = collide.RobotChecker(robot, world)
+    Q = np.array([(x, turn, 0.0) for x in (-0.9, -0.5, 0.0, 0.25, 0.85) for turn in (0.0, 0.5)])
+    counts = judged_rows(checker, Q, "block", limit=2.0)
+    assert counts["kink"] >= 10 and counts["gap"] + counts["overlap"] + counts["kink"] == 20, counts
+    measured = checker.distances(Q, per="pair")
+    assert (np.abs(measured.gradient[:, 0]) > 0.999).all()  # along x nothing is a kink

@@ -11,14 +11,12 @@ from fractions import Fraction
 import naive_soups
 import numpy as np
 import pytest
-from hollow_bodies import hollow, torus
-from naive import pose, random_pose, rng_of
+from hollow_bodies import hollow_scene, torus
+from naive import pose, rng_of
 from random_robots import (
     asked_one_by_one,
     pairs_to_test,
     random_configurations,
-    random_link_shape,
-    random_robot,
     slider,
 )
 
@@ -26,19 +24,6 @@ import collide
 
 #: More for a soak.
 N_SCENES = int(os.environ.get("COLLIDE_HOLLOW_SCENES", "12"))
-
-
-def hollow_scene(seed: int):
-    """(robot, World) of few small links among large rings, shells and terrains."""
-    rng = rng_of("hollow bodies", seed)
-    of_links = hollow if seed % 2 else random_link_shape
-    robot = random_robot(rng, n_links=4, shape=lambda rng, size: of_links(rng, size), size=0.06)
-    world = collide.World()
-    for k in range(5):
-        world.add(hollow(rng, float(rng.uniform(0.3, 0.9))), random_pose(rng, 1.2), name=f"body{k}")
-    if seed % 3 == 0:
-        world.add(collide.Halfspace((0.1, 0.0, 1.0), -float(rng.uniform(0.6, 1.2))), name="ground")
-    return rng, robot, world
 
 
 def told(seed: int, q) -> str:

@@ -469,3 +469,19 @@ def test_edges_of_one_end_or_many_and_resolutions_that_are_none():
         for ask in (checker.edge_collides, checker.certify_edges):
             with pytest.raises(InvalidArgument, match=r"resolution must be a positive number .*, got"):
                 ask([0.0], [1.0], resolution=wrong)
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    ({"per": "body"}, r'RobotChecker.distances: per must be one of "robot", "link", "pair", got \'body\''),
+    ({"per": None}, r'per must be one of "robot", "link", "pair", got None'),
+    ({"per": ["pair"]}, r"per must be one of .*, got \['pair'\]"),
+    ({"between": "obstacles"}, r'between must be one of "all", "world", "self", got \'obstacles\''),
+    ({"between": 1}, r"between must be one of .*, got 1"),
+    ({"max_distance": -0.1}, r"max_distance must be a number ≥ 0 \[m\].*, got -0.1"),
+    ({"max_distance": np.nan}, r"max_distance must be a number ≥ 0"),
+    ({"max_distance": "near", "per": "pair"}, r"max_distance must be a number ≥ 0.*, got 'near'"),
+])
+def test_what_distances_are_asked_for_is_checked(options, words):
+    checker = collide.RobotChecker(slider())
+    with pytest.raises(InvalidArgument, match=words):
+        checker.distances([[0.0]], **options)

@@ -53,3 +53,14 @@ def test_the_least_distance_is_of_what_is_within_the_limit():
     )
     assert repr(made(far)) == "RobotDistances(1 configurations, 0 in collision)"
     assert repr(made()) == "RobotDistances(0 configurations, 0 in collision)"
+
+
+def test_rows_of_configurations_begin_and_end_at_starts():
+    rows = np.zeros(4, dtype=NEAREST_DTYPE)
+    rows["distance"], rows["hit"] = [0.5, -0.25, 1.0, 2.0], [False, True, False, False]
+    measured = RobotDistances(rows, np.zeros((4, 2)), ["a", "b"], ["wall"], np.array([0, 0, 3, 3, 4]))
+    assert measured.configuration.tolist() == [1, 1, 1, 3] and len(measured) == 4
+    assert repr(measured) == "RobotDistances(4 rows of 4 configurations, 1 hits, least -0.25 m)"
+    one_each = made({"distance": 1.0}, {"distance": 2.0})
+    assert one_each.configuration.tolist() == [0, 1] and one_each.starts.tolist() == [0, 1, 2]
+    assert made().configuration.tolist() == [] and made().starts.tolist() == [0]
