@@ -9,6 +9,8 @@ clutter    µs a configuration: a Panda (9 hulls, 8 boxes of fingers; meshes of 
            and proves both verdicts; MuJoCo makes all contacts, Pinocchio stops at the first hit: pair by pair, and
            through its broadphase manager. One thread each. Bars are µs that ours is to stay below
 batches    µs a configuration of ours by the size of the batch, in the same scenes, and of distances with gradients
+distances  µs a configuration of ours, with gradients: rows per robot, link and pair, with the world, among links, and
+           both, within three limits; and how many rows come of it
 motions    scenes of MotionBenchMaker (from ../shared/data): µs a random configuration, a motion of 32 samples, and a
            motion proven free or hit, with the share that stays open. Motions begin at random free configurations and
            change every joint by up to 0.5 rad
@@ -60,6 +62,18 @@ def batch_cases(options: Options):
     yield from grid(obstacles=OBSTACLES, question=["distances"], batch=(1, 100, 2000))
 
 
+def near(options: Options, per: str, between: str, max_distance: float) -> Race:
+    checker = collide.RobotChecker(panda()[0], clutter(50))
+    Q = at_random(checker.robot, 500 if per == "pair" and max_distance == np.inf else 2000)
+    ask = partial(checker.distances, Q, per=per, between=between, max_distance=max_distance)
+    return Race({"collide": ask}, len(Q), {"rows": len(ask()) / len(Q)})
+
+
+def near_cases(options: Options):
+    yield from grid(per=["robot", "link", "pair"], between=["all"], max_distance=(0.05, 0.2, np.inf))
+    yield from grid(per=["robot", "link", "pair"], between=["world", "self"], max_distance=(0.2,))
+
+
 @cache
 def checker_of(path: Path, meshes: str) -> collide.RobotChecker:
     return collide.RobotChecker.from_scene(load(path, meshes=meshes))
@@ -96,6 +110,7 @@ CLAIMS = [
     Claim("clutter", "µs a configuration", lambda o: grid(obstacles=OBSTACLES), cluttered, file="robots_clutter",
           bar="median"),
     Claim("batches", "µs a configuration", batch_cases, batches, file="robots_batches", seconds=2.0),
+    Claim("distances", "µs a configuration", near_cases, near, file="robots_distances", seconds=2.0),
     Claim("motions", "µs a configuration or motion", motion_cases, motions, file="robots_motions", turns=5),
 ]
 

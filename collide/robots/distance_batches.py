@@ -96,12 +96,12 @@ def measure(checker: CheckerScene, q: np.ndarray, question: DistanceQuestion, th
             pieces[piece.start] = near_piece(checker, space, q[piece], question)
 
         checker.in_pieces(n, threads, progress, put)
-        in_order = [pieces[start] for start in sorted(pieces)] or [near_piece(checker, None, q, question)]
-        rows, gradient, counts = map(np.concatenate, zip(*in_order))
-        starts = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(counts)])
+        rows, gradient, counts = _joined([pieces[start] for start in sorted(pieces)], q.shape[1])
+        starts = np.zeros(n + 1, dtype=np.int64)
+        np.cumsum(counts, out=starts[1:])
         return RobotDistances(rows, gradient, checker.bodies, checker.around, starts)
     width = len(checker.setting.bodies) if question.per == OF_BODY else 1
-    rows, gradient = np.zeros(n * width, dtype=NEAREST_DTYPE), np.zeros((n * width, q.shape[1]))
+    rows, gradient = np.zeros(n * width, dtype=NEAREST_DTYPE), np.empty((n * width, q.shape[1]))
 
     def fill(space: CheckWorkspace, piece: slice) -> None:
         to = slice(width * piece.start, width * piece.stop)
@@ -109,6 +109,14 @@ def measure(checker: CheckerScene, q: np.ndarray, question: DistanceQuestion, th
 
     checker.in_pieces(n, threads, progress, fill)
     return RobotDistances(rows, gradient, checker.bodies, checker.around, width * np.arange(n + 1))
+
+
+def _joined(pieces: list[tuple], dof: int) -> tuple:
+    """(rows, gradients, counts) of pieces one after the other."""
+    if len(pieces) == 1:
+        return pieces[0]
+    nothing = np.zeros(0, dtype=NEAREST_DTYPE), np.zeros((0, dof)), np.zeros(0, dtype=np.int64)
+    return tuple(map(np.concatenate, zip(nothing, *pieces)))
 
 
 def measure_piece(
@@ -122,23 +130,18 @@ def measure_piece(
     if question.per == OF_BODY:  # the slot's body comes first
         is_second = (rows["a"] != NONE) & (rows["a"] != np.arange(rows.shape[1]))
         rows[is_second] = flipped(rows[is_second])
-    of = np.arange(rows.size) // rows.shape[1]
+    of = np.arange(len(q)) if rows.shape[1] == 1 else np.arange(rows.size) // rows.shape[1]
     rows = rows.reshape(-1)
-    gradient[:] = _gradients(checker, space, q, of, rows)
+    _put_gradients(checker, space, q, of, rows, gradient)
     _finish(rows, out, question.limit)
 
 
-def near_piece(
-    checker: CheckerScene, space: CheckWorkspace | None, q: np.ndarray, question: DistanceQuestion
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def near_piece(checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, question: DistanceQuestion) -> tuple:
     """((m,) NEAREST_DTYPE, (m, dof) gradients, (n,) numbers of rows) of all pairs within the limit, of configurations q
     (n, dof).
     """
-    out, gradients = [np.zeros(0, dtype=NEAREST_DTYPE)], [np.zeros((0, q.shape[1]))]
-    counts, starts, done = np.zeros(len(q), dtype=np.int64), np.zeros(len(q) + 1, dtype=np.int64), 0
-    least = _PAIR_SLOTS
+    starts, done, least, pieces = np.zeros(len(q) + 1, dtype=np.int64), 0, _PAIR_SLOTS, []
     while done < len(q):
-        assert space is not None
         slots = Slots.of(question, space, least)
         first, done = done, near_pairs(
             space.address, address_of(q), checker.robot.dof, done, len(q), question.limit, address_of(starts),
@@ -148,17 +151,16 @@ def near_piece(
             least = 2 * len(slots.rows)
             continue
         of = np.repeat(np.arange(first, done), np.diff(starts[first : done + 1]))
-        of, near = _with_open(checker, space, q, of, slots.rows[: len(of)], question)
-        gradients.append(_gradients(checker, space, q, of, near))
-        out.append(np.zeros(len(near), dtype=NEAREST_DTYPE))
-        _finish(near, out[-1], question.limit)
-        counts += np.bincount(of, minlength=len(q))
-    return np.concatenate(out), np.concatenate(gradients), counts
+        of, near = _with_open(checker, space, q, of, slots.rows[: len(of)], question.limit)
+        rows, gradient = np.zeros(len(near), dtype=NEAREST_DTYPE), np.empty((len(near), q.shape[1]))
+        _put_gradients(checker, space, q, of, near, gradient)
+        _finish(near, rows, question.limit)
+        pieces.append((rows, gradient, np.bincount(of - first, minlength=done - first)))
+    return _joined(pieces, q.shape[1])
 
 
 def _with_open(
-    checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, of: np.ndarray, rows: np.ndarray,
-    question: DistanceQuestion,
+    checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, of: np.ndarray, rows: np.ndarray, limit: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows (m,) with configurations ``of`` (m,), and the rows of pairs left to others: sorted by configuration, then by
     bodies, those around last; a row for every two bodies.
@@ -167,30 +169,29 @@ def _with_open(
     if len(opened):
         pairs = np.unique(opened[:, :OPEN_LOWER], axis=0)
         numbered, X_WLs = asked_poses(checker, pairs, q)
-        measured = open_pairs.distances(numbered, X_WLs, *both_bodies(checker), limit=question.limit, by_parts=True)
+        measured = open_pairs.distances(numbered, X_WLs, *both_bodies(checker), limit=limit, by_parts=True)
         is_near = ~measured["beyond"]
-        of = np.concatenate([of, pairs[is_near, 0]])
-        rows = np.concatenate([rows, measured[is_near]])
-    b, n_bodies = rows["b"], len(checker.setting.bodies)
-    order = np.lexsort((np.where(b >= 0, b, n_bodies - 1 - b), rows["a"], of))
+        of, rows = np.append(of, pairs[is_near, 0]), np.concatenate([rows, measured[is_near]])
+    a, b = rows["a"], rows["b"]
+    order = np.lexsort((np.where(b >= 0, b, len(checker.setting.bodies) - 1 - b), a, of))
     of, rows = of[order], rows[order]
+    if not len(opened):
+        return of, rows
     keys = np.stack([of, rows["a"], rows["b"]])
-    is_again = np.append(False, (keys[:, 1:] == keys[:, :-1]).all(axis=0))[: len(of)]
-    again = np.flatnonzero(is_again)
-    rows[again - 1] = open_pairs.nearer_of(rows[again - 1], rows[again])
-    return of[~is_again], rows[~is_again]
+    is_second = np.append(False, (keys[:, 1:] == keys[:, :-1]).all(axis=0))[: len(of)]
+    second = np.flatnonzero(is_second)
+    rows[second - 1] = open_pairs.nearer_of(rows[second - 1], rows[second])
+    return of[~is_second], rows[~is_second]
 
 
-def _gradients(
-    checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, of: np.ndarray, rows: np.ndarray
-) -> np.ndarray:
-    """(m, dof) gradients of rows (m,) of PAIR_DTYPE of the configurations ``of`` (m,) among q (n, dof)."""
-    out = np.zeros((len(rows), q.shape[1]))
+def _put_gradients(
+    checker: CheckerScene, space: CheckWorkspace, q: np.ndarray, of: np.ndarray, rows: np.ndarray, out: np.ndarray
+) -> None:
+    """``out`` (m, dof) becomes gradients of rows (m,) of PAIR_DTYPE, of the configurations ``of`` (m,) among q."""
     distance_gradients(
         space.address, address_of(q), checker.robot.dof, len(q), address_of(of), len(of),
         address_of(checker.robot.moves), address_of(rows), address_of(out),
     )
-    return out
 
 
 def _finish(rows: np.ndarray, out: np.ndarray, limit: float) -> None:
