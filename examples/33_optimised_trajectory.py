@@ -26,7 +26,7 @@ def cost(inner, start, goal):
     return 0.1 * (steps**2).sum() + (lacks**2).sum(), slope[1:-1].ravel()
 
 
-def tell(name, path):
+def report(name, path):
     near, proven = checker.distances(path), checker.certify_edges(path[:-1], path[1:], resolution=0.01)
     print(f"{name}: {near.hit.sum()} of {len(path)} waypoints collide, least distance {near.distance.min():+.4f} m")
     print(f"  {proven.free.sum()} of {len(proven)} motions proven free")
@@ -35,12 +35,12 @@ def tell(name, path):
 Q = np.random.default_rng(5).uniform(lower, upper, (3000, dof))
 Q = Q[checker.distances(Q).distance > CLEARANCE]
 line = np.linspace(Q[8], Q[9], WAYPOINTS + 2)  # straight from one posture to another
-tell("straight", line)
+report("straight", line)
 begin, limits = time.perf_counter(), list(zip(lower, upper)) * WAYPOINTS
 result = minimize(cost, line[1:-1].ravel(), (line[0], line[-1]), method="L-BFGS-B", jac=True, bounds=limits)
 spent = time.perf_counter() - begin
 path = np.concatenate([line[:1], result.x.reshape(-1, dof), line[-1:]])
-tell("optimised", path)
+report("optimised", path)
 names, counts = np.unique(checker.distances(path, max_distance=CLEARANCE, per="pair").names, axis=0, return_counts=True)
 for (a, b), count in zip(names, counts):
     print(f"  within the clearance in {count} waypoints: {a} and {b}")

@@ -170,6 +170,7 @@ def _with_open(
         pairs = np.unique(opened[:, :OPEN_LOWER], axis=0)
         numbered, X_WLs = asked_poses(checker, pairs, q)
         measured = open_pairs.distances(numbered, X_WLs, *both_bodies(checker), limit=limit, by_parts=True)
+        measured["part_a"] = measured["part_b"] = NONE
         is_near = ~measured["beyond"]
         of, rows = np.append(of, pairs[is_near, 0]), np.concatenate([rows, measured[is_near]])
     a, b = rows["a"], rows["b"]
@@ -279,6 +280,7 @@ def _measure_open(
         numbered, X_WLs = asked_poses(checker, pairs[to_ask], q)
         measured = open_pairs.distances(numbered, X_WLs, *both_bodies(checker), limit=limit, by_parts=True)
         measured["a"][measured["beyond"]] = NONE
+        measured["part_a"] = measured["part_b"] = NONE
         is_asked = np.isin(which, to_ask)
         _put_nearer(flat, at[is_asked], measured[np.searchsorted(to_ask, which[is_asked])])
         asked = np.concatenate([asked, pairs[to_ask, :3]])

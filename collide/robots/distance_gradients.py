@@ -1,11 +1,12 @@
-"""Derivatives of the distance of the nearest pair by each column of q.
+"""Derivatives of distances by each column of q.
 
 Moving with joint j, a point p of its child's subtree has velocity ω × (p − o) or along the axis; the distance of
 separate bodies changes by the normal times the difference of both witness points' velocities.
 
 A depth has a derivative where proven the least of all directions. The depth of bodies that are not convex is the length
 of some separating translation; a shorter translation may exist, and the next configuration may find the shorter. These
-rows are not certified, and only certified rows have a gradient.
+rows are not certified, and only certified rows have a gradient. Between curved parts normals are taken to more digits
+than rows have (`settled_normals.py`).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import math
 
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
 from collide.lowering.shape_table import POSE
-from collide.narrowphase.rows import BODY_B, CERTIFIED, DISTANCE, NORMAL, POINT_A, POINT_B, ROW, view_row
+from collide.narrowphase.rows import BODY_B, CERTIFIED, DISTANCE, ROW, view_row
 from collide.numerics.vec3 import Vec3, cross, dot, neg, rotate, sub, vec3_at
 from collide.robots.check_configurations import begin_configuration
 from collide.robots.check_scene import BODY_INTS, LINK, N_LINKS, view_scene
@@ -36,6 +37,7 @@ from collide.robots.forward_kinematics import (
     sine_cosine_of,
 )
 from collide.robots.nearest_pairs import BODY_A, NONE
+from collide.robots.settled_normals import normal_of_row, unknown_normal
 
 
 @entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64)")
@@ -56,25 +58,27 @@ def distance_gradients(header_at, q_at, dof, n, of_at, m, moves_at, rows_at, out
     for k in range(m):
         row = view_row(rows_at + ROW * k)
         is_known = row.words[BODY_A] != NONE and row.flags[CERTIFIED] != 0
-        is_differentiable = is_known and row.doubles[DISTANCE] != 0.0
+        normal = unknown_normal()
+        at = dof * of[k]
+        if is_known and row.doubles[DISTANCE] != 0.0:
+            if placed != at:
+                placed = at
+                begin_configuration(scene, q, at)
+            normal = normal_of_row(scene, row)
+        is_differentiable = normal.nhat.x == normal.nhat.x
         for j in range(dof):
             out[dof * k + j] = 0.0 if is_differentiable else math.nan
         if not is_differentiable:
             continue
-        at = dof * of[k]
-        if placed != at:
-            placed = at
-            begin_configuration(scene, q, at)
         link_a = scene.bodies[BODY_INTS * row.words[BODY_A] + LINK]
         link_b = scene.bodies[BODY_INTS * row.words[BODY_B] + LINK] if row.words[BODY_B] >= 0 else -1
-        nhat = vec3_at(row.doubles, NORMAL)
         for j in range(joints.n):
             moves_a = moves[n_links * j + link_a] != 0
             moves_b = link_b >= 0 and moves[n_links * j + link_b] != 0
             if moves_a and not moves_b:
-                _add_joint(scene, j, q, at, neg(nhat), vec3_at(row.doubles, POINT_A), out, dof * k)
+                _add_joint(scene, j, q, at, neg(normal.nhat), normal.p_a, out, dof * k)
             elif moves_b and not moves_a:
-                _add_joint(scene, j, q, at, nhat, vec3_at(row.doubles, POINT_B), out, dof * k)
+                _add_joint(scene, j, q, at, normal.nhat, normal.p_b, out, dof * k)
 
 
 @kernel

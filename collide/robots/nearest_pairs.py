@@ -22,6 +22,8 @@ from collide.narrowphase.rows import (
     CERTIFIED,
     DISTANCE,
     LOWER,
+    PART_A,
+    PART_B,
     ROW,
     UPPER,
     copy_row,
@@ -99,7 +101,8 @@ def nearest_pairs(header_at, q_at, dof, first, n, max_distance, limits_at, searc
         pair not left to others is farther apart than the limit, or at least as far apart as the slot's pair.
     search : of OF_ROBOT, a slot a configuration, or of OF_BODY, a slot a body, filled by all pairs with the body.
     A row's ``a`` is a body, or NONE where no pair is known within the limit; ``b`` is another body, or −1 − the number
-    of a body around. Pairs left to others may be nearer; a configuration with open pairs tries no larger limit.
+    of a body around; ``part_a`` and ``part_b`` are numbers of parts, NONE of a field. Pairs left to others may be
+    nearer; a configuration with open pairs tries no larger limit.
     """
     scene = view_scene(header_at)
     words, search_words = scene.words, view_i64(search_at, SEARCH)
@@ -316,6 +319,7 @@ def _ask_parts(scene, search, p, q, a, b, number, slot, slot_b):
     if only_holds(scene, p) or (not is_walked and only_holds(scene, q)):
         leave_open(scene, number, a, b, row.doubles[LOWER])
         return
+    row.words[PART_A], row.words[PART_B] = p, NONE if is_walked else q
     _put_nearer(scene, search, slot, a, b, row)
     if slot_b != NONE:
         _put_nearer(scene, search, slot_b, a, b, row)

@@ -24,6 +24,10 @@ NO_GRADIENT = {
         'and bodies of hulls have (meshes="hull")'
     ),
     "bracket": "the bracket of the distance is not certified",
+    "normal": (
+        "a cylinder, a cone or an ellipsoid overlaps or nearly touches, and its normal is not known to the digits of a "
+        "derivative"
+    ),
 }
 
 
@@ -87,7 +91,8 @@ class RobotDistances:
         -------
         list of M ``str | None``
         """
-        return [_why_no_gradient(row) for row in self.rows]
+        is_unknown = np.isnan(self.gradient).any(axis=1).tolist()
+        return [_why_no_gradient(*row_and_gradient) for row_and_gradient in zip(self.rows, is_unknown)]
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -107,9 +112,11 @@ class RobotDistances:
         return f"RobotDistances({len(self)} rows of {n} configurations, {n_hits} hits{least})"
 
 
-def _why_no_gradient(row) -> str | None:
+def _why_no_gradient(row, is_unknown: bool) -> str | None:
     if row["beyond"]:
         return NO_GRADIENT["beyond"]
     if not row["certified"]:
         return NO_GRADIENT["depth" if row["upper"] <= 0.0 and row["hit"] else "bracket"]
-    return NO_GRADIENT["touching"] if row["distance"] == 0.0 else None
+    if row["distance"] == 0.0:
+        return NO_GRADIENT["touching"]
+    return NO_GRADIENT["normal"] if is_unknown else None

@@ -36,6 +36,8 @@ def test_names_of_bodies_and_of_what_is_around():
 ])
 def test_why_there_is_no_gradient(values, reason):
     assert made(values).no_gradient == [NO_GRADIENT[reason] if reason else None]
+    without = made(values, gradient=np.array([[0.0, np.nan]]))
+    assert without.no_gradient == [NO_GRADIENT[reason or "normal"]]
 
 
 def test_fields_are_attributes_and_others_are_told():
