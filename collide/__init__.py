@@ -50,10 +50,13 @@ if TYPE_CHECKING:
     from collide.papers.tetrahedra.tet_mesh import TetMesh
     from collide.pose_arrays import poses
     from collide.results import How, PairResult, WorldResult
+    from collide.robots.certified_boxes import CertifiedBoxes
     from collide.robots.certified_edges import CertifiedEdges
+    from collide.robots.certified_motions import CertifiedMotion
     from collide.robots.robot import Robot
     from collide.robots.robot_checker import RobotChecker
     from collide.robots.robot_distances import RobotDistances
+    from collide.robots.splines import Spline
     from collide.shapes import (
         Box,
         Capsule,
@@ -127,10 +130,13 @@ _HOMES = {
     "collide.pairs.query": ("collide", "distance"),
     "collide.pose_arrays": ("poses",),
     "collide.results": ("How", "PairResult", "WorldResult"),
+    "collide.robots.certified_boxes": ("CertifiedBoxes",),
     "collide.robots.certified_edges": ("CertifiedEdges",),
+    "collide.robots.certified_motions": ("CertifiedMotion",),
     "collide.robots.robot": ("Robot",),
     "collide.robots.robot_checker": ("RobotChecker",),
     "collide.robots.robot_distances": ("RobotDistances",),
+    "collide.robots.splines": ("Spline",),
     "collide.shapes": (
         "Box", "Capsule", "Compound", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HPolytope",
         "Halfspace", "HeightField", "Mesh", "OcTree", "OcTreeLeaves", "Plane", "PointCloud", "Shape", "ShapeSet",
@@ -162,15 +168,16 @@ _RENAMED = {
 
 __all__ = [
     "BooleanResult", "Box", "Capsule", "CellOverlaps", "CellPlanes", "Certificate", "CertificateRefused",
-    "CertifiedEdges", "CollideError", "Compound", "Cone", "ConfigurationObstacle", "Contacts", "ConvexCells",
-    "ConvexHull", "ConvexPolygon", "Cylinder", "DrawnConfigurations", "Ellipsoid", "EnclosingSpheres", "FacetPairs",
-    "GridDistances", "HPolytope", "Halfspace", "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape",
-    "LinkPair", "Located", "Mesh", "MissingExtra", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult",
-    "PartitionSize", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits", "Robot",
-    "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
-    "SignedDistanceGrid", "SignedDistances", "SpacePartition", "Sphere", "SweepResults", "SweptMesh", "TetMesh",
-    "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldHits", "WorldResult", "boolean",
-    "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres",
+    "CertifiedBoxes", "CertifiedEdges", "CertifiedMotion", "CollideError", "Compound", "Cone",
+    "ConfigurationObstacle", "Contacts", "ConvexCells", "ConvexHull", "ConvexPolygon", "Cylinder",
+    "DrawnConfigurations", "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace",
+    "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
+    "MissingExtra", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult", "PartitionSize",
+    "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits", "Robot", "RobotChecker",
+    "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "SignedDistanceGrid",
+    "SignedDistances", "SpacePartition", "Sphere", "Spline", "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact",
+    "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldHits", "WorldResult", "boolean", "certify",
+    "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres",
     "facet_pairs", "get_include", "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay",
     "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions",
     "self_overlapping_cells", "shape_cast", "signed_distances", "sweep", "tessellate", "time_of_impact", "verify",

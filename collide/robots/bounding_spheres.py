@@ -38,12 +38,15 @@ class SphereTables(NamedTuple):
 
 
 def sphere_tables(robot: RobotTables, bodies: Sequence[RobotBody], *, of_any: bool) -> SphereTables | None:
-    """Those of a robot's bodies; ``None`` where a body has no end.
+    """Those of a robot's bodies; ``None`` where a body has no end, and with obstacles that move along, whose pairs have
+    paddings that spheres do not know.
 
     of_any : False for ``None`` as well where fewer than half of the bodies are made of spheres, and spheres of the
         others take milliseconds a body.
     """
     is_sphere = [are_spheres(body.shape) for body in bodies]
+    if any(body.is_obstacle for body in bodies):
+        return None
     if not np.isfinite(robot.part_boxes).all() or not (of_any or 2 * sum(is_sphere) >= len(bodies)):
         return None
     counts = np.zeros((len(bodies), layout.BODY_SPHERES), dtype=np.int64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -139,45 +140,62 @@ def certify(
 ) -> CertifiedEdges:
     """`RobotChecker.certify_edges` of checked arguments (N, dof)."""
     times = np.full(len(q0), np.nan)
+
+    def sample(space: CheckWorkspace, work: MotionWorkspace, piece: slice) -> None:
+        sample_piece(checker, space, q0[piece], q1[piece], resolution, _SAMPLED_HALVINGS, times[piece])
+
+    rows, n_checked = prove(checker, q0, q1, times, resolution, threads, progress, sample)
+    free = np.isnan(times)
+    out = np.zeros(len(rows), dtype=OPEN_DTYPE)
+    out["edge"], out["begin"], out["end"] = rows[:, :3].T
+    free[out["edge"]] = False
+    return CertifiedEdges(free, times, out, open_names(checker, rows), n_checked)
+
+
+def prove(
+    checker: CheckerScene, q0: np.ndarray, q1: np.ndarray, times: np.ndarray, resolution: float, threads: int,
+    progress, begin: Callable[[CheckWorkspace, MotionWorkspace, slice], None],
+) -> tuple[np.ndarray, int]:
+    """(rows of what stays open, configurations asked) of motions q0 and q1, as of `certify_motions`; ``times`` (N,) of
+    collisions, NaN so far, are written.
+
+    begin : called first with each piece of the motions: tells the workspace their kind, or samples them.
+    Rows, (k, OPEN_INTERVAL or more), are sorted by motion and begin, and end at the latest at a known collision.
+    """
     open_rows: list[np.ndarray] = []
     counts: list[int] = []
 
     def on_piece(space: CheckWorkspace, piece: slice) -> None:
-        work, begin, end, hit_at = space.motions(resolution), q0[piece], q1[piece], times[piece]
+        work, hit_at = space.motions(resolution), times[piece]
         space.ask_meshes(checker.setting)
-        sample_piece(checker, space, begin, end, resolution, _SAMPLED_HALVINGS, hit_at)
-        intervals, meshes = _certify_piece(space, work, begin, end, hit_at)
+        begin(space, work, piece)
+        intervals, meshes = _certify_piece(space, work, q0[piece], q1[piece], hit_at)
         rows = [intervals] if len(intervals) else []
         if len(meshes):
-            rows += settle_meshes(checker, space, work, begin, end, meshes, hit_at, resolution)
+            rows += settle_meshes(checker, space, work, q0[piece], q1[piece], meshes, hit_at, resolution)
         counts.append(work.n_checked)
         for some in rows:
+            known = hit_at[some[:, 0].astype(np.int64)]
+            some[:, 2] = np.fmin(some[:, 2], known)
             some[:, 0] += piece.start
-            open_rows.append(some)
+            open_rows.append(some[np.isnan(known) | (work.is_earliest & (some[:, 1] < known))])
 
     checker.in_pieces(len(q0), threads, progress, on_piece)
-    free = np.isnan(times)
     if not open_rows:
-        return CertifiedEdges(free, times, np.zeros(0, dtype=OPEN_DTYPE), [], sum(counts))
+        return np.zeros((0, OPEN_INTERVAL)), sum(counts)
     rows = np.concatenate(open_rows)
-    rows = rows[free[rows[:, 0].astype(np.int64)]]
-    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-    out = np.zeros(len(rows), dtype=OPEN_DTYPE)
-    out["edge"], out["begin"], out["end"] = rows[:, :3].T
-    free[out["edge"]] = False
-    names = [_names_of(checker, int(body), int(partner)) for body, partner in rows[:, 3:].tolist()]
-    return CertifiedEdges(free, times, out, names, sum(counts))
+    return rows[np.lexsort((rows[:, 1], rows[:, 0]))], sum(counts)
 
 
 def _certify_piece(space: CheckWorkspace, work: MotionWorkspace, q0, q1, times) -> tuple[np.ndarray, np.ndarray]:
-    """(open intervals, pairs of meshes), (k, OPEN_INTERVAL) each, of motions without a time; ``times`` of collisions
-    written.
+    """(open intervals, pairs of meshes), (k, OPEN_INTERVAL or more) each, of motions without a time, q0 and q1 as of
+    `certify_motions`; ``times`` of collisions written.
     """
     open_rows, meshes = [], []
     done = 0
     while done < len(q0):
         before, done = done, certify_motions(
-            space.address, work.address, address_of(q0), address_of(q1), q0.shape[1], done, len(q0), address_of(times)
+            space.address, work.address, address_of(q0), address_of(q1), q0.shape[-1], done, len(q0), address_of(times)
         )
         open_rows.append(work.open_intervals.copy())
         meshes.append(work.mesh_pairs.copy())
@@ -185,7 +203,12 @@ def _certify_piece(space: CheckWorkspace, work: MotionWorkspace, q0, q1, times) 
             work.grow()
     if len(open_rows) == 1:
         return open_rows[0], meshes[0]
-    return tuple(np.concatenate(rows or [np.zeros((0, OPEN_INTERVAL))]) for rows in (open_rows, meshes))  # type: ignore
+    return tuple(np.concatenate(rows or [work.open_intervals[:0]]) for rows in (open_rows, meshes))  # type: ignore
+
+
+def open_names(checker: CheckerScene, rows: np.ndarray) -> list[tuple[str, str]]:
+    """Names of both bodies of each open row."""
+    return [_names_of(checker, int(body), int(partner)) for body, partner in rows[:, 3:5].tolist()]
 
 
 def _names_of(checker: CheckerScene, body: int, partner: int) -> tuple[str, str]:

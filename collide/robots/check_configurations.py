@@ -32,6 +32,7 @@ from collide.robots.check_scene import (
     is_allowed,
     place,
     put_world_boxes,
+    twins_of_pair,
     view_scene,
 )
 from collide.robots.forward_kinematics import pose_links
@@ -179,8 +180,10 @@ def verdict_of(scene, q, at, number):
         if not boxes_meet(scene, a, b, 0.0):
             continue
         at_b = BODY_INTS * b
-        first = scene.bodies[BODY_INTS * a + FIRST]
-        state = _state_of_bodies(scene, number, a, first, b, scene.bodies[at_b + FIRST], scene.bodies[at_b + COUNT])
+        twins = twins_of_pair(scene, a, b)
+        first = scene.bodies[BODY_INTS * a + FIRST] + twins
+        first_b = scene.bodies[at_b + FIRST] + twins
+        state = _state_of_bodies(scene, number, a, first, b, first_b, scene.bodies[at_b + COUNT])
         if state == HITTING:
             return COLLIDES
         if state == OPEN:

@@ -48,9 +48,10 @@ HEADER = 52
 
 #: Sums of |RᵀR − 1| below this count as roundings of a rotation R.
 ROUNDINGS_OF_ROTATIONS = 1e-13
-# Integers of a body: its link, its first part and how many there are.
-LINK, FIRST, COUNT = range(3)
-BODY_INTS = 3
+# Integers of a body: its link, its first part and how many there are; of an obstacle that moves along, how many numbers
+# on the padded twins of parts stand, which are asked in its pairs, else 0.
+LINK, FIRST, COUNT, TWINS = range(4)
+BODY_INTS = 4
 # Doubles of a box: centre and half its sides.
 CENTRE, HALF = 0, 3
 BOX = 6
@@ -158,6 +159,12 @@ def find_parts_around(scene, body, margin):
             count += 1
         node = node + 1 if meets else links[NODE_LINK * node + SKIP]
     return count
+
+
+@kernel(inline=True)
+def twins_of_pair(scene, a, b):
+    """How many numbers on the parts to be asked of two bodies stand: padded where one of both is an obstacle."""
+    return max(scene.bodies[BODY_INTS * a + TWINS], scene.bodies[BODY_INTS * b + TWINS])
 
 
 @kernel(inline=True)

@@ -38,13 +38,14 @@ class RobotBody(NamedTuple):
     """A body of the robot, moving with a link.
 
     name : of the link, or of the attached object.   link : number of the link.   shape : in the link's frame.
-    padding : swelling against the surroundings [m].
+    padding : swelling against the surroundings [m].   is_obstacle : of the surroundings, and moves along.
     """
 
     name: str
     link: int
     shape: Shape
     padding: float
+    is_obstacle: bool = False
 
 
 class BodyAround(NamedTuple):
@@ -223,6 +224,7 @@ def robot_tables(bodies: Sequence[RobotBody], matrices: np.ndarray) -> RobotTabl
     is_bound = np.repeat([of_body.is_bound for of_body in of_bodies], counts)
     padding = np.repeat([body.padding for body in bodies], counts)
     padded = len(packed) if padding.any() else 0
+    rows[:, 3] = [padded if body.is_obstacle else 0 for body in bodies]
     if padded:
         packed = packed + [swollen(part, by) for part, by in zip(packed, padding.tolist())]
         parts, is_bound = np.concatenate([parts, parts]), np.concatenate([is_bound, is_bound])
@@ -325,7 +327,7 @@ def _body_boxes(rows: np.ndarray, parts: np.ndarray, part_boxes: np.ndarray, pad
     sides of UNBOUNDED_HALF.
     """
     out = np.empty((len(rows), BOX))
-    for k, (_, first, count) in enumerate(rows.tolist()):
+    for k, (_, first, count, _) in enumerate(rows.tolist()):
         which = slice(first + padded, first + padded + count)
         if np.isinf(part_boxes[which]).any():
             out[k] = 0.0, 0.0, 0.0, UNBOUNDED_HALF, UNBOUNDED_HALF, UNBOUNDED_HALF

@@ -28,8 +28,6 @@ _LEAST_OPEN = 4096
 #: Pairs of parts that may stay open at once while a motion is halved, at most.
 _MAX_ITEMS = 1 << 20
 _OPEN_INTERVALS = 4096
-#: Roundings of forward kinematics, as a share of where links are and how far they reach.
-_ROUNDING = 2.0**-40
 
 
 class CheckWorkspace:
@@ -177,24 +175,58 @@ class MotionWorkspace:
             motions.BETWEEN_AT: _joints_between(names, setting.self_pairs),
             motions.CONFIGURATION_AT: np.zeros(max(robot.dof, 1)), motions.MOVED_AT: np.zeros((len(paths), stride + 1)),
             motions.INTERVALS_AT: np.zeros((motions.MAX_INTERVALS + 1, motions.INTERVAL)),
-            motions.ITEMS_AT: np.empty((n_items + 1, motions.ITEM), dtype=np.int64),
+            motions.ITEMS_AT: np.zeros((n_items + 1, motions.ITEM), dtype=np.int64),
+            motions.CHANGES_AT: np.zeros(robot.dof + 1), motions.POINTS_AT: np.zeros(motions.MAX_DEGREE + 1),
+            motions.BOXES_AT: np.zeros((motions.MAX_INTERVALS + 1, 2 * robot.dof + 1)),
         }
         self.header = np.zeros(motions.MOTION_HEADER, dtype=np.int64)
         for word, buffer in self._buffers.items():
             self.header[word] = address_of(buffer)
         self.header[motions.PATH_STRIDE], self.header[motions.ITEM_CAPACITY] = stride, n_items
-        self._make_space(_OPEN_INTERVALS)
-        self.header[motions.ROUNDING :].view(np.float64)[:] = _ROUNDING * _reach_of(robot, setting)
+        self._make_space(_OPEN_INTERVALS, motions.OPEN_INTERVAL)
+        self.header[motions.ROUNDING :].view(np.float64)[:] = motions.ROUNDING_SHARE * _reach_of(robot, setting)
         self.address = address_of(self.header)
 
     def begin(self, resolution: float) -> None:
-        """Count anew, of motions with this resolution [rad or m]."""
-        self.header[motions.N_CHECKED] = 0
+        """Count anew, of straight motions with this resolution [rad or m]."""
+        words = [motions.N_CHECKED, motions.MOTION_KIND, motions.IS_EARLIEST, motions.CELL_LIMIT]
+        self.header[words] = 0, motions.STRAIGHT, 0, 0
         self.header[motions.RESOLUTION : motions.ROUNDING].view(np.float64)[:] = resolution
+        self._hits: np.ndarray | None = None
+        if self.header[motions.OPEN_STRIDE] != motions.OPEN_INTERVAL:
+            self._make_space(_OPEN_INTERVALS, motions.OPEN_INTERVAL)
 
-    def _make_space(self, n: int) -> None:
-        """For so many open intervals and pairs of meshes."""
-        self._open, self._meshes = np.empty((n, motions.OPEN_INTERVAL)), np.empty((n, motions.OPEN_INTERVAL))
+    def ask_about_curves(self, degree: int) -> None:
+        """Have the earliest collisions of Bézier curves searched; degree 1 is straight, too."""
+        self.header[[motions.MOTION_KIND, motions.DEGREE, motions.IS_EARLIEST]] = motions.CURVED, degree, 1
+
+    def ask_about_boxes(self, hits: np.ndarray, cell_limit: int) -> None:
+        """Have boxes of configurations asked in so many cells each.   hits : (n, dof) of configurations to write."""
+        self._hits = hits
+        words = [motions.MOTION_KIND, motions.HITS_AT, motions.CELL_LIMIT]
+        self.header[words] = motions.BOX_OF_CONFIGURATIONS, address_of(hits), cell_limit
+        self._make_space(_OPEN_INTERVALS, motions.OPEN_INTERVAL + 2 * hits.shape[1])
+
+    @property
+    def is_earliest(self) -> bool:
+        """Whether an earlier collision is searched after a hit."""
+        return bool(self.header[motions.IS_EARLIEST])
+
+    @property
+    def cell_limit(self) -> int:
+        """The most cells of a box that are asked; 0 where motions are not boxes."""
+        return int(self.header[motions.CELL_LIMIT])
+
+    def note_hit(self, times: np.ndarray, number: int, time: float, q: np.ndarray) -> None:
+        """Write a collision found outside of the kernel, unless an earlier one is known and wanted."""
+        times[number] = np.fmin(times[number], time) if self.is_earliest else time
+        if self._hits is not None:
+            self._hits[number] = q
+
+    def _make_space(self, n: int, stride: int) -> None:
+        """For so many open intervals and pairs of meshes, rows of so many doubles."""
+        self.header[motions.OPEN_STRIDE] = stride
+        self._open, self._meshes = np.empty((n, stride)), np.empty((n, stride))
         self.header[motions.OPEN_INTERVALS_AT], self.header[motions.MESH_PAIRS_AT] = map(
             address_of, (self._open, self._meshes)
         )
@@ -202,7 +234,7 @@ class MotionWorkspace:
 
     def grow(self) -> None:
         """Make space for twice as many."""
-        self._make_space(2 * len(self._open))
+        self._make_space(2 * len(self._open), self._open.shape[1])
 
     @property
     def open_intervals(self) -> np.ndarray:

@@ -54,6 +54,7 @@ class CheckerScene:
     """A robot among the bodies of a World; arguments as of `RobotChecker`.
 
     setting : robot and World as of the last `prepare`. A question is asked of `_as_of_now`.
+    obstacles : names of links that are obstacles moving along: `padding` swells both bodies of their pairs.
     """
 
     #: Whether changes of the World do not reach this any more.
@@ -61,7 +62,7 @@ class CheckerScene:
 
     def __init__(
         self, robot: Robot, world: World | None, X_WR, attached: Iterable, padding, allowed: Iterable[tuple[str, str]],
-        mobile: bool,
+        mobile: bool, obstacles: frozenset[str] = frozenset(),
     ):
         if not isinstance(robot, Robot):
             raise InvalidArgument(f"RobotChecker: robot must be a collide.Robot, got {checks.brief(robot)}")
@@ -70,7 +71,8 @@ class CheckerScene:
         self.robot, self.world = robot, World() if world is None else world
         self._X_WR = np.eye(4) if X_WR is None else as_pose(X_WR, "RobotChecker: X_WR").copy()
         attached = checks.listed_entries("RobotChecker: attached", attached, "tuples (name, link, shape, X_LB)")
-        self._bodies, self._objects = robot_bodies(robot, attached, padding)
+        bodies, self._objects = robot_bodies(robot, attached, padding)
+        self._bodies = [body._replace(is_obstacle=body.name in obstacles) for body in bodies]
         self._padding = padding
         self._asked = checks.listed_entries("RobotChecker: allowed", allowed, "pairs of names")
         self._mobile = checks.true_or_false("RobotChecker: mobile", mobile)

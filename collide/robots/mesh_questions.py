@@ -45,7 +45,9 @@ class MeshQuestions:
         shape = len(bodies), len(bodies) + len(around), layout.QUESTION
         table = np.zeros(shape, dtype=np.int64)
         for a, b in setting.self_pairs.tolist():
-            table[a, b] = self._question(unpadded[a], unpadded[b], -1, setting, workspace)
+            # Moving obstacles are asked with their padding, as obstacles are.
+            shapes = of_bodies if bodies[a].is_obstacle or bodies[b].is_obstacle else unpadded
+            table[a, b] = self._question(shapes[a], shapes[b], -1, setting, workspace)
         for a, b in np.argwhere(setting.allowed == 0).tolist():
             row = part_rows.get(b, -1)
             table[a, len(bodies) + b] = self._question(of_bodies[a], of_around[b], row, setting, workspace)

@@ -50,6 +50,7 @@ from collide.robots.check_scene import (
     find_parts_around,
     is_allowed,
     place,
+    twins_of_pair,
     view_scene,
 )
 from collide.robots.part_pairs import (
@@ -274,8 +275,9 @@ def _fill_among_robot(scene, search, number, limit):
         reach = _reach_of(search, slot, slot_b)
         if reach == -math.inf or not boxes_meet(scene, a, b, reach):
             continue
-        first_a = scene.bodies[BODY_INTS * a + FIRST]
-        first_b = scene.bodies[BODY_INTS * b + FIRST]
+        twins = twins_of_pair(scene, a, b)
+        first_a = scene.bodies[BODY_INTS * a + FIRST] + twins
+        first_b = scene.bodies[BODY_INTS * b + FIRST] + twins
         for p in range(first_a, first_a + scene.bodies[BODY_INTS * a + COUNT]):
             place(scene, p, a)
             for r in range(first_b, first_b + scene.bodies[BODY_INTS * b + COUNT]):

@@ -144,7 +144,9 @@ def _batches(
         A, k = bodies[a], pairs[rows, 0]
         X_WA = np.ascontiguousarray(X_WLs[k, A.link])
         if b >= 0:
-            yield rows, A.shape, bodies[b].shape, X_WA, np.ascontiguousarray(X_WLs[k, bodies[b].link]), 0.0, 0.0
+            B = bodies[b]
+            swell = (A.padding, B.padding) if A.is_obstacle or B.is_obstacle else (0.0, 0.0)
+            yield rows, A.shape, B.shape, X_WA, np.ascontiguousarray(X_WLs[k, B.link]), *swell
         else:
-            B = around[-1 - b]
-            yield rows, A.shape, B.shape, X_WA, B.X_WB[None], A.padding, B.margin
+            stands = around[-1 - b]
+            yield rows, A.shape, stands.shape, X_WA, stands.X_WB[None], A.padding, stands.margin

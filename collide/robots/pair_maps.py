@@ -80,8 +80,8 @@ def map_pair(header_at, motions_at, pair, q0_at, q1_at, dof, ints_at, lows_at, w
                 if view_u8(coarse_at, coarse + 1)[coarse] != 0:
                     cells[i * ints[N_SECOND] + j] = 1
                     continue
-            motion = motion_at(scene, motions_at, q0, q1, 0, dof)
-            begin_interval(motion, 0.5, 0.5)
+            motion = motion_at(scene, motions_at, q0_at, q1_at, dof, 0)
+            begin_interval(motion, 0.0, 1.0)
             cells[i * ints[N_SECOND] + j] = 1 if _are_apart(motion, pair) else 0
 
 

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
 from collide.base import argument_checks as checks
 from collide.base.threads import check_threads
 from collide.errors import InvalidArgument, brief, listing
+from collide.robots.certified_boxes import CertifiedBoxes, certify_boxes
 from collide.robots.certified_edges import CertifiedEdges, certify, sampled_collision
+from collide.robots.certified_motions import CertifiedMotion, certify_pieces, refuse_degrees, shortest_ways
 from collide.robots.check_configurations import COLLIDES, IS_OPEN
 from collide.robots.checker_scene import CheckerScene
 from collide.robots.configuration_batches import check_piece
 from collide.robots.configuration_report import ConfigurationReport
 from collide.robots.distance_batches import BETWEEN, PER, DistanceQuestion, measure
+from collide.robots.moving_obstacles import among_moving
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import padding_of
 from collide.robots.robot_distances import RobotDistances
 from collide.robots.self_filter import points_in_world, points_of_robot
+from collide.robots.splines import Spline
 from collide.shapes.point_cloud import PointCloud
 from collide.transforms import LARGEST, as_pose
 from collide.worlds.world import World
@@ -266,7 +270,7 @@ class RobotChecker(CheckerScene):
         q, _ = self._configurations(Q)
         return measure(self._as_of_now(), q, question, threads, progress)
 
-    def edge_collides(self, Q0, Q1, *, resolution: float = 0.01, threads: int = 1) -> np.ndarray:
+    def edge_collides(self, Q0, Q1, *, resolution: float = 0.01, wrap: bool = False, threads: int = 1) -> np.ndarray:
         """Whether straight motions collide at samples; motions between two samples are not checked.
 
         Parameters
@@ -275,6 +279,9 @@ class RobotChecker(CheckerScene):
             Where the motions begin and end [rad or m]; a single configuration goes with all of the other.
         resolution : float
             No column changes by more from one sample to the next [rad or m].
+        wrap : bool
+            Angles without limits go the shortest way: continuous joints, yaws of planar and angles of floating ones
+            take whole turns off ``Q1``. Of an even choice, half a turn, the way of the given sign is kept.
         threads : int
             As of `collides`.
 
@@ -283,13 +290,14 @@ class RobotChecker(CheckerScene):
         (N,) bool
             Both ends are samples. Halves come before quarters: most collisions are found after a few samples.
         """
-        q0, q1 = self._edges(Q0, Q1)
+        q0, q1 = self._edges(Q0, Q1, wrap)
         step = _positive("RobotChecker.edge_collides: resolution", resolution)
         self._count(_CONFIGURATIONS_OF_A_MOTION * len(q0))
         return ~np.isnan(sampled_collision(self._as_of_now(), q0, q1, step, threads))
 
     def certify_edges(
-        self, Q0, Q1, *, resolution: float = 1e-3, threads: int = 1, progress: Callable[[int, int], None] | None = None
+        self, Q0, Q1, *, resolution: float = 1e-3, wrap: bool = False, threads: int = 1,
+        progress: Callable[[int, int], None] | None = None,
     ) -> CertifiedEdges:
         """Proves straight motions free, all of the way, or names a time of a collision.
 
@@ -300,6 +308,8 @@ class RobotChecker(CheckerScene):
         resolution : float
             Intervals in which no column changes by more [rad or m] are not halved any more: they stay open. Motions
             past an obstacle at a distance d need about d / (length of the arm).
+        wrap : bool
+            As of `edge_collides`.
         threads, progress
             As of `collides`.
 
@@ -320,10 +330,154 @@ class RobotChecker(CheckerScene):
         the largest change of a column over ``resolution``, where pairs stay open. Meshes that are not convex cost a
         `collide.distance` in each. A fixed number of samples is checked for collisions first.
         """
-        q0, q1 = self._edges(Q0, Q1)
+        q0, q1 = self._edges(Q0, Q1, wrap)
         step = _positive("RobotChecker.certify_edges: resolution", resolution)
         self._count(_CONFIGURATIONS_OF_A_MOTION * len(q0))
         return certify(self._as_of_now(), q0, q1, step, threads, progress)
+
+    def certify_path(
+        self, Q, times=None, *, wrap: bool = False, moving: Mapping[str, Spline] | None = None,
+        resolution: float = 1e-3, threads: int = 1, progress: Callable[[int, int], None] | None = None,
+    ) -> CertifiedMotion:
+        """Proves a path of straight segments free, all of the way, or names its first known collision.
+
+        Parameters
+        ----------
+        Q : (M, dof) array_like
+            Waypoints [rad or m], two or more.
+        times : (M,) array_like, optional
+            When the robot passes the waypoints, increasing: the unit of all times of the result. By default 0, 1, 2, ….
+        wrap : bool
+            As of `edge_collides`, from waypoint to waypoint.
+        moving, resolution, threads, progress
+            As of `certify_spline`.
+
+        Returns
+        -------
+        CertifiedMotion
+            A verdict for each segment, and of the whole: ``is_free``, ``share`` proven, ``first`` collision, ``open``.
+
+        Raises
+        ------
+        InvalidArgument
+            As of `certify_spline`.
+        """
+        q, _ = self._configurations(Q)
+        if len(q) < 2:
+            raise InvalidArgument(f"RobotChecker.certify_path: Q must be two waypoints or more, got {brief(Q)}")
+        refuse_degrees(self.robot, "RobotChecker.certify_path: Q", q)
+        if checks.true_or_false("RobotChecker.certify_path: wrap", wrap):
+            q = q.copy()
+            for k in range(1, len(q)):
+                q[k] = shortest_ways(self.robot, q[k - 1 : k], q[k : k + 1])[0]
+        spline = Spline.straight(q, times)
+        lengths = np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0) if times is None else np.diff(spline.breaks)
+        return self._certify("RobotChecker.certify_path", spline, lengths, moving, resolution, threads, progress)
+
+    def certify_spline(
+        self, motion, *, moving: Mapping[str, Spline] | None = None, resolution: float = 1e-3, threads: int = 1,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> CertifiedMotion:
+        """Proves a motion of piecewise polynomials free, at all times, or names its first known collision.
+
+        Parameters
+        ----------
+        motion : Spline
+            Of the robot's columns: B-splines, Bézier curves, polynomials, quintic segments (`collide.Spline`); or a
+            BSpline or PPoly of scipy.
+        moving : mapping of str to Spline, optional
+            Bodies of the World that move meanwhile, by name: the position of the body's origin in W, three columns
+            [m], the body turned as it stands; or six, with roll, pitch and yaw [rad] about W's axes. Margins and pairs
+            never tested stay those of the World; links of a fixed base are tested against what moves. The motion is to
+            last at least as long as the robot's.
+        resolution : float
+            Intervals in which no column differs by more [rad or m] are not halved any more: they stay open.
+        threads, progress
+            As of `collides`.
+
+        Returns
+        -------
+        CertifiedMotion
+            A verdict for each piece of the motion, and of the whole.
+
+        Raises
+        ------
+        InvalidArgument
+            For a motion of other columns, for angles that look like degrees, for unknown moving bodies.
+
+        Notes
+        -----
+        As of `certify_edges`, with the hull of a piece's control points as the bound of each column in an interval
+        (`motion_bounds.py`); roundings of the pieces are part of the bound (`splines.py`). After a hit the search goes
+        on before the hit, so that what lies before the told time is proven free or open. Moving bodies are bodies of a
+        robot behind floating joints: their motion is bounded, not sampled. A call with ``moving`` makes the tables of
+        robot and World anew, some milliseconds.
+        """
+        name = "RobotChecker.certify_spline"
+        spline = Spline.of(motion)
+        if spline.columns != self.robot.dof:
+            raise InvalidArgument(
+                f"{name}: the motion must have {self.robot.dof} columns, one for each of "
+                f"{listing(self.robot.joint_names) or 'no joints'}; got {spline.columns}"
+            )
+        refuse_degrees(self.robot, f"{name}: motion", spline.control_points.reshape(-1, spline.columns))
+        return self._certify(name, spline, np.diff(spline.breaks), moving, resolution, threads, progress)
+
+    def certify_boxes(
+        self, lo, hi, *, resolution: float = 1e-2, max_cells: int = 10_000, threads: int = 1,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> CertifiedBoxes:
+        """Proves boxes of configurations free, all of their inside, or names a colliding configuration.
+
+        Parameters
+        ----------
+        lo, hi : (N, dof) or (dof,) array_like
+            Lowest and highest corners [rad or m], lo ≤ hi in each column.
+        resolution : float
+            Columns no wider are not halved any more [rad or m]: a cell without a wider column for its pair stays open.
+        max_cells : int
+            So many cells of a box are asked, at most; the others stay open.
+        threads, progress
+            As of `collides`.
+
+        Returns
+        -------
+        CertifiedBoxes
+            ``free`` (proven), a colliding ``configuration``, open cells: each box is exactly free, colliding or open.
+
+        Raises
+        ------
+        InvalidArgument
+            For corners of another shape, not finite, or with lo above hi, naming row and joint.
+
+        Notes
+        -----
+        As of `certify_edges`, with half a cell's width as the bound of each column. A cell with pairs not proven apart
+        is halved in the column that moves the first pair by most: joints that do not move a pair stay whole. The number
+        of cells grows as (width / gap) to the power of the number of joints that move the pair.
+        """
+        name = "RobotChecker.certify_boxes"
+        low, high = self._configurations(lo, "lo")[0], self._configurations(hi, "hi")[0]
+        n = checks.matched_count(f"{name}: corners", lo=len(low), hi=len(high))
+        low, high = (np.ascontiguousarray(np.broadcast_to(q, (n, q.shape[1]))) for q in (low, high))
+        wrong = np.argwhere(~((low <= high) & (np.abs(low) <= LARGEST) & (np.abs(high) <= LARGEST)))
+        if len(wrong):
+            row, column = wrong[0]
+            raise InvalidArgument(
+                f"{name}: box {row}, joint {self.robot.joint_names[column]}, goes from {low[row, column]:g} to "
+                f"{high[row, column]:g}: lo must be at most hi, and both within ±{LARGEST:g}"
+            )
+        cells = min(checks.integer(f"{name}: max_cells", max_cells, 1), 1 << 40)
+        step = _positive(f"{name}: resolution", resolution)
+        return certify_boxes(self._as_of_now(), low, high, step, cells, threads, progress)
+
+    def _certify(self, name, spline, lengths, moving, resolution, threads, progress) -> CertifiedMotion:
+        checker: CheckerScene
+        step = _positive(f"{name}: resolution", resolution)
+        breaks, checker = spline.breaks, self._as_of_now()
+        if moving is not None:
+            checker, spline = among_moving(self, name, spline, moving)
+        return certify_pieces(checker, spline, breaks, lengths, step, threads, progress)
 
     def explain(self, q) -> ConfigurationReport:
         """Colliding pairs of a configuration with their depths, or the nearest pairs, to be printed.
@@ -419,12 +573,14 @@ class RobotChecker(CheckerScene):
         q = self.robot.checked_configurations(Q, name)
         return q if q.flags.c_contiguous else np.ascontiguousarray(q), np.ndim(Q) == 1
 
-    def _edges(self, Q0, Q1) -> tuple[np.ndarray, np.ndarray]:
+    def _edges(self, Q0, Q1, wrap: bool = False) -> tuple[np.ndarray, np.ndarray]:
         q0, q1 = self._configurations(Q0, "Q0")[0], self._configurations(Q1, "Q1")[0]
-        if len(q0) == len(q1):
-            return q0, q1
-        n = checks.matched_count("RobotChecker: edges", Q0=len(q0), Q1=len(q1))
-        return tuple(np.ascontiguousarray(np.broadcast_to(q, (n, q.shape[1]))) for q in (q0, q1))  # type: ignore
+        if len(q0) != len(q1):
+            n = checks.matched_count("RobotChecker: edges", Q0=len(q0), Q1=len(q1))
+            q0, q1 = (np.ascontiguousarray(np.broadcast_to(q, (n, q.shape[1]))) for q in (q0, q1))
+        is_wrapped = checks.true_or_false("RobotChecker: wrap", wrap)
+        return q0, shortest_ways(self.robot, q0, q1) if is_wrapped else q1
+
 
 def _positive(what: str, value) -> float:
     number = checks.number(value)

@@ -170,6 +170,10 @@ def files() -> Path:
 
 
 @cache
+def spline() -> collide.Spline:
+    return collide.Spline.straight([[0.0], [0.1]])
+
+
 def checker() -> collide.RobotChecker:
     return collide.RobotChecker(robot(), world())
 
@@ -260,6 +264,7 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
     "signed_distances": lambda: {"mesh": mesh(), "points": (0, 0, 0)},
     "SpacePartition": lambda: {"mesh": mesh()},
     "Sphere": lambda: {"radius": 1},
+    "Spline": lambda: {"breaks": [0.0, 1.0], "control_points": [[[0.0], [1.0]]]},
     "SweptMesh": lambda: {"mesh": mesh(), "radius": 0.1},
     "TetMesh": lambda: {"vertices": tetrahedron().vertices, "cells": [[0, 1, 2, 3]]},
     "VoxelGrid": lambda: {"occupied": np.ones((2, 2, 2), dtype=bool), "cell": 0.1},
@@ -396,6 +401,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "SignedDistanceGrid": lambda: collide.SignedDistanceGrid.from_arrays(np.zeros((2, 2, 2)), 1.0),
     "Robot": robot,
     "RobotChecker": checker,
+    "Spline": spline,
     "World": world,
     "SpacePartition": partition,
     "ConvexCells": lambda: partition().convex_pieces(),
@@ -452,6 +458,17 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "RobotChecker.names_of": lambda: {"a": 0, "b": 1},
     "RobotChecker.self_filter": lambda: {"points": np.eye(3), "Q": [0.0]},
     "RobotChecker.from_scene": lambda: {"scene": scene()},
+    "RobotChecker.certify_path": lambda: {"Q": [[0.0], [0.1]]},
+    "RobotChecker.certify_spline": lambda: {"motion": spline()},
+    "RobotChecker.certify_boxes": lambda: {"lo": [[0.0]], "hi": [[0.1]]},
+    "Spline.straight": lambda: {"Q": [[0.0], [0.1]]},
+    "Spline.min_jerk": lambda: {"Q": [[0.0], [0.1]]},
+    "Spline.hermite": lambda: {"times": [0.0, 1.0], "Q": [[0.0], [0.1]], "velocities": [[0.0], [0.0]]},
+    "Spline.bspline": lambda: {"knots": np.arange(8.0), "coefficients": np.zeros((4, 1))},
+    "Spline.polynomials": lambda: {"breaks": [0.0, 1.0], "coefficients": np.zeros((3, 1, 1))},
+    "Spline.bezier": lambda: {"control_points": [[0.0], [0.1]]},
+    "Spline.of": lambda: {"motion": spline()},
+    "Spline.beside": lambda: {"motion": spline()},
     "SpacePartition.locate": lambda: {"points": (0, 0, 0)},
     "SpacePartition.portals": lambda: {"cells": partition().convex_pieces()},
     "TetMesh.from_file": lambda: {"path": "absent.msh"},
@@ -517,7 +534,9 @@ EXCUSED = {
     "Contacts": "made by queries",
     "RayHits": "a tuple, made by queries",
     "ConvexCells": "made by SpacePartition",
+    "CertifiedBoxes": "made by RobotChecker",
     "CertifiedEdges": "made by RobotChecker",
+    "CertifiedMotion": "made by RobotChecker",
     "RobotDistances": "made by RobotChecker",
     "LinkPair": "made by Proposal",
     "Proposal": "made by propose_disabled_pairs",

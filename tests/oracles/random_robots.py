@@ -181,3 +181,13 @@ def asked_one_by_one(checker, Q, ask):
             for A, a, B, b, X_WB in pairs_to_test(checker)
         ])
     return answers
+
+
+def any_pair_hits(checker, Q) -> np.ndarray:
+    """(N,) bool: configurations at which `collide.collide` finds a hit of some pair that is to be tested."""
+    robot, hits = checker.robot, np.zeros(len(Q), dtype=bool)
+    X_WLs, number = robot.link_poses(Q), {link: k for k, link in enumerate(robot.links)}
+    for A, a, B, b, X_WB in pairs_to_test(checker):
+        X_WBs = X_WLs[:, number[b]] if X_WB is None else np.broadcast_to(X_WB, (len(Q), 4, 4))
+        hits |= collide.collide(A, B, X_WLs[:, number[a]], np.ascontiguousarray(X_WBs))
+    return hits

@@ -22,6 +22,7 @@ NEEDS = {
     "29_record_and_compare": "pybullet",
     **dict.fromkeys(("18_certified_planning", "19_nearest_obstacles", "20_reachable_positions"), "yaml"),
     "32_depth_camera": "yaml", "33_optimised_trajectory": "yaml scipy",
+    "34_free_box": "yaml",
 }
 #: What hosts print when they are imported.
 HOSTS_SAY = ("pybullet build time", "Warp CUDA warning")
@@ -53,6 +54,7 @@ SHOWS = {
         "straight: 10 of 32 waypoints collide", "optimised: 0 of 32 waypoints collide", "31 of 31 motions proven free",
         "within the clearance in",
     ],
+    "34_free_box": ["box grown in", "0 of 100000 samples of the box collide", "path of 49 segments", "49 proven free"],
     "32_depth_camera": [
         "4688 points seen; the straight motion collides at", "a path of 4 motions, 4 of them proven free",
         "plan.html, 3.",
@@ -197,6 +199,11 @@ GIVEN = {
     "shapes": "",
     "robots": "X_LS = np.eye(4); world = collide.World(); Q = Q0 = np.zeros((2, 1)); Q1 = Q + 0.1; q = Q[0]\n"
     "scan, X_WC = np.eye(3) * 5, X_LS",
+    "planned_motions": "robot = collide.Robot.load('two_links.urdf'); world = collide.World()\n"
+    "world.add(collide.Sphere(0.1), collide.pose((3, 1, 1)), name='ball')\n"
+    "checker = collide.RobotChecker(robot, world)\n"
+    "Q = np.zeros((2, robot.dof)); q, times = Q[0], [0.0, 1.0]\n"
+    "knots, coefficients = np.arange(9.0), np.zeros((5, robot.dof))",
     "solids": "",
     "spheres": "",
     "worlds": "",

@@ -84,7 +84,7 @@ def test_boxes_of_bodies_hold_their_parts():
         shape = collide.Compound([(random_link_shape(rng, 0.3), random_pose(rng, 0.5)) for _ in range(3)])
         bodies = [RobotBody("first", 0, CUBE, 0.0), RobotBody("second", 1, shape, 0.125 * (seed % 2))]
         made = tables_of(*bodies)
-        _, first, count = made.bodies[1].tolist()
+        _, first, count, _ = made.bodies[1].tolist()
         corners = []
         for k in range(first + made.padded, first + made.padded + count):
             R, t = made.parts[k, :9].reshape(3, 3), made.parts[k, 9:12]
@@ -108,7 +108,7 @@ def test_rows_of_bodies_and_the_padded_twins_behind_them():
     two = collide.Compound([(CUBE, np.eye(4)), (collide.Sphere(0.5), pose(t=(2, 0, 0)))])
     around = [BodyAround("mesh", OPEN_BRICK, np.eye(4)), BodyAround("ball", collide.Sphere(1.0), np.eye(4))]
     plain = tables_of(RobotBody("a", 3, two, 0.0), RobotBody("b", 1, BRICK, 0.0), around=around)
-    assert plain.bodies.tolist() == [[3, 0, 2], [1, 2, 1]] and plain.padded == 0
+    assert plain.bodies.tolist() == [[3, 0, 2, 0], [1, 2, 1, 0]] and plain.padded == 0
     assert plain.is_bound.tolist() == [0, 0, 0, 1, 0] and len(plain.poses) == 5
     padded = tables_of(RobotBody("a", 3, two, 0.0), RobotBody("b", 1, OPEN_BRICK, 0.25), around=around)
     assert padded.padded == 3 and padded.is_bound.tolist() == [0, 0, 1, 0, 0, 1, 1, 0]

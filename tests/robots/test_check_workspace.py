@@ -56,7 +56,7 @@ def test_states_and_words_are_numbers_of_their_own():
     assert sorted((BEYOND_MARGIN, NEAR, HITTING, OPEN)) == [0, 1, 2, 3]
     words = [value for name, value in vars(layout).items() if name.isupper() and name not in (
         "BODY", "SKIP", "NODE_LINK", "MEASURE", "PART", "TURNED", "POSE", "POSE_SLOP", "POSE_STRETCH", "POSE_TERMS",
-        "PRODUCT_SLOP", "HEADER", "LINK", "FIRST", "COUNT", "BODY_INTS", "CENTRE", "HALF", "BOX", "OPEN_INTS",
+        "PRODUCT_SLOP", "HEADER", "LINK", "FIRST", "COUNT", "TWINS", "BODY_INTS", "CENTRE", "HALF", "BOX", "OPEN_INTS",
         "OPEN_LOWER", "ROUNDINGS_OF_ROTATIONS",
     )]
     assert sorted(words) == list(range(layout.HEADER))
@@ -197,10 +197,12 @@ def test_bounds_of_motions_are_of_the_half_interval_and_hold():
     for begin, end in ((0.0, 1.0), (0.25, 0.5), (0.5, 0.5)):
         for body, link in ((0, 3), (1, 1)):
             rows = np.array([(k, begin, end, body, -1) for k in range(20)], dtype=float)
-            bounds = np.empty(20)
+            answers = np.empty((20, 5))
             bound_motions(space.address, work.address, address_of(q0), address_of(q1), 3, address_of(rows), 20,
-                          address_of(bounds))
-            middle = 0.5 * (begin + end)
+                          address_of(answers))
+            bounds, middle = answers[:, 0], 0.5 * (begin + end)
+            assert np.array_equal(answers[:, 1], np.abs(q1 - q0).max(axis=1) * (end - begin))
+            assert np.array_equal(answers[:, 2:], q0 + middle * (q1 - q0))
             at_middle = robot.link_poses(q0 + middle * (q1 - q0))[:, link] @ corners.T
             moved = np.zeros(20)
             for t in np.linspace(begin, end, 33):
