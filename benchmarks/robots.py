@@ -15,6 +15,10 @@ motions    scenes of MotionBenchMaker (from ../shared/data): µs a random config
            motion proven free or hit, with the share that stays open. Motions begin at random free configurations and
            change every joint by up to 0.5 rad
 
+planned    a Panda over a table with 10, 50 and 200 boxes and hulls: µs a motion proven or hit, of the same waypoints as
+           straight motions, as segments of a path, as cubic B-splines, quintic segments at rest and Bézier curves of
+           degree 7; and µs a box of configurations of half a tenth of a radian, with at most 500 cells
+
 CPU time. `tests/differential/test_robots.py` judges the verdicts of these scenes.
 """
 
@@ -106,11 +110,44 @@ def motion_cases(options: Options):
             yield from grid(robot=[robot], family=[family.name], meshes=("hull", "mesh"))
 
 
+def planned(options: Options, obstacles: int) -> Race:
+    """Motions of up to 0.5 rad a joint from free configurations, and how many are proven free of each kind."""
+    robot = panda()[0]
+    checker, rng = collide.RobotChecker(robot, clutter(obstacles)), np.random.default_rng(11)
+    Q = at_random(robot, 4000)
+    free = Q[~checker.collides(Q)][:200]
+    ends = np.clip(free + rng.uniform(-0.5, 0.5, free.shape), robot.lower, robot.upper)
+    inner = [free + s * (ends - free) + rng.uniform(-0.05, 0.05, free.shape) for s in np.linspace(0.15, 0.85, 6)]
+    points = np.stack([free, *inner, ends], axis=1)
+    knots = np.concatenate([[0.0] * 4, np.linspace(0.2, 0.8, 4), [1.0] * 4])
+    splines = {
+        "path": [collide.Spline.straight(pair) for pair in points[:, [0, 7]]],
+        "B-spline": [collide.Spline.bspline(knots, row, 3) for row in points],
+        "quintic": [collide.Spline.min_jerk(row[[0, 7]]) for row in points],
+        "degree 7": [collide.Spline.bezier(row) for row in points],
+    }
+
+    def prove(motions: list[collide.Spline]) -> list[bool]:
+        return [checker.certify_spline(motion).is_free for motion in motions]
+
+    lo, hi = free - 0.025, free + 0.025
+    tasks = {"straight": lambda: checker.certify_edges(free, ends),
+             "straight one by one": lambda: [checker.certify_edges(a, b).free[0] for a, b in zip(free, ends)]}
+    tasks |= {name: partial(prove, motions) for name, motions in splines.items()}
+    tasks["box"] = lambda: checker.certify_boxes(lo, hi, max_cells=500)
+    columns = {"straight_free": float(checker.certify_edges(free, ends).free.mean())}
+    columns |= {f"{name}_free": float(np.mean(prove(motions))) for name, motions in splines.items()}
+    columns["box_free"] = float(checker.certify_boxes(lo, hi, max_cells=500).free.mean())
+    return Race(tasks, dict.fromkeys(tasks, float(len(free))), columns)
+
+
 CLAIMS = [
     Claim("clutter", "µs a configuration", lambda o: grid(obstacles=OBSTACLES), cluttered, file="robots_clutter",
           bar="median"),
     Claim("batches", "µs a configuration", batch_cases, batches, file="robots_batches", seconds=2.0),
     Claim("distances", "µs a configuration", near_cases, near, file="robots_distances", seconds=2.0),
+    Claim("planned", "µs a motion or box", lambda o: grid(obstacles=OBSTACLES), planned, file="robots_planned",
+          turns=5),
     Claim("motions", "µs a configuration or motion", motion_cases, motions, file="robots_motions", turns=5),
 ]
 
