@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from collide.robots.certified_boxes import CertifiedBoxes
     from collide.robots.certified_edges import CertifiedEdges
     from collide.robots.certified_motions import CertifiedMotion
+    from collide.robots.motion_plan import MotionPlan, plan
     from collide.robots.robot import Robot
     from collide.robots.robot_checker import RobotChecker
     from collide.robots.robot_distances import RobotDistances
@@ -133,6 +134,7 @@ _HOMES = {
     "collide.robots.certified_boxes": ("CertifiedBoxes",),
     "collide.robots.certified_edges": ("CertifiedEdges",),
     "collide.robots.certified_motions": ("CertifiedMotion",),
+    "collide.robots.motion_plan": ("MotionPlan", "plan"),
     "collide.robots.robot": ("Robot",),
     "collide.robots.robot_checker": ("RobotChecker",),
     "collide.robots.robot_distances": ("RobotDistances",),
@@ -172,14 +174,15 @@ __all__ = [
     "ConfigurationObstacle", "Contacts", "ConvexCells", "ConvexHull", "ConvexPolygon", "Cylinder",
     "DrawnConfigurations", "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace",
     "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
-    "MissingExtra", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult", "PartitionSize",
-    "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits", "Robot", "RobotChecker",
-    "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet", "SignedDistanceGrid",
-    "SignedDistances", "SpacePartition", "Sphere", "Spline", "SweepResults", "SweptMesh", "TetMesh", "TimeOfImpact",
-    "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldHits", "WorldResult", "boolean", "certify",
-    "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance", "enclosing_spheres",
-    "facet_pairs", "get_include", "get_library", "moved_poses", "overlap_volume", "overlapping_cells", "overlay",
-    "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast", "read_sweep", "self_collisions",
+    "MissingExtra", "MotionPlan", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult",
+    "PartitionSize", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits", "Robot",
+    "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
+    "SignedDistanceGrid", "SignedDistances", "SpacePartition", "Sphere", "Spline", "SweepResults", "SweptMesh",
+    "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldHits", "WorldResult",
+    "boolean", "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance",
+    "enclosing_spheres", "facet_pairs", "get_include", "get_library", "moved_poses", "overlap_volume",
+    "overlapping_cells", "overlay", "plan", "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast",
+    "read_sweep", "self_collisions",
     "self_overlapping_cells", "shape_cast", "signed_distances", "sweep", "tessellate", "time_of_impact", "verify",
     "walk",
 ]

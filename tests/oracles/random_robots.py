@@ -87,6 +87,20 @@ def scene_of_spheres(rng, n: int = 5, **options) -> collide.RobotChecker:
     return collide.RobotChecker(random_robot(rng, n_links=5, shape=some_spheres, size=0.06), world, **options)
 
 
+def ring() -> collide.Mesh:
+    """A square frame in the plane across z, 2 m wide with a hole of 1 m: its hull fills the hole."""
+    outer, inner = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]), 0.5 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    corners = np.array([(*xy, z) for z in (-0.05, 0.05) for xy in (*outer, *inner)], dtype=float)
+    faces = []
+    for k in range(4):
+        j = (k + 1) % 4
+        across = (k, 4 + k, 4 + j, j), (8 + k, 8 + j, 12 + j, 12 + k)
+        around = (k, j, 8 + j, 8 + k), (4 + k, 12 + k, 12 + j, 4 + j)
+        for a, b, c, d in across + around:
+            faces += [(a, b, c), (a, c, d)]
+    return collide.Mesh(corners, faces)
+
+
 def plain_link_poses(robot: Robot, q: np.ndarray) -> dict[str, np.ndarray]:
     """Link → (4, 4) pose by matrix products and `math`, from the joints as they were given."""
     column = {name: k for k, name in enumerate(robot.joint_names)}

@@ -204,6 +204,8 @@ GIVEN = {
     "checker = collide.RobotChecker(robot, world)\n"
     "Q = np.zeros((2, robot.dof)); q, times = Q[0], [0.0, 1.0]\n"
     "knots, coefficients = np.arange(9.0), np.zeros((5, robot.dof))",
+    "planning": "q0 = [-2.8, 1.04, 2.76, -1.97, -1.81, 3.39, 2.56, 0.04]\n"
+    "q1 = [2.8, 0.37, 0.12, -1.48, -2.48, 3.24, -0.28, 0.03]",
     "solids": "",
     "spheres": "",
     "worlds": "",
@@ -219,7 +221,7 @@ GIVEN = {
 #: Packages that a page's Python needs.
 NEEDED = {
     "robots": ("yaml", "mujoco"), "disabled-pairs": ("yaml",), "engines": ("mujoco",), "pages": ("yaml",),
-    "report-schema": ("yaml", "trimesh"), "scene-format": ("yaml",),
+    "report-schema": ("yaml", "trimesh"), "scene-format": ("yaml",), "planning": ("yaml",),
 }
 #: Pages whose Python is not run here, and where it is, or why it is not.
 ELSEWHERE = {

@@ -4,25 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from naive import pose, rng_of
-from random_robots import random_configurations, random_robot
+from random_robots import random_configurations, random_robot, ring
 
 import collide
 from collide.robots.kinematic_tree import Joint
 from collide.robots.robot import LinkShape, Robot
-
-
-def ring() -> collide.Mesh:
-    """A square frame in the plane across z, 2 m wide with a hole of 1 m: its hull fills the hole."""
-    outer, inner = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]), 0.5 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-    corners = np.array([(*xy, z) for z in (-0.05, 0.05) for xy in (*outer, *inner)], dtype=float)
-    faces = []
-    for k in range(4):
-        j = (k + 1) % 4
-        across = (k, 4 + k, 4 + j, j), (8 + k, 8 + j, 12 + j, 12 + k)
-        around = (k, j, 8 + j, 8 + k), (4 + k, 12 + k, 12 + j, 4 + j)
-        for a, b, c, d in across + around:
-            faces += [(a, b, c), (a, c, d)]
-    return collide.Mesh(corners, faces)
 
 
 def test_a_rod_is_proven_to_pass_through_a_ring():
