@@ -43,6 +43,7 @@ MODULES = {
         "Other engines, asked the same",
         tuple(f"collide.adapters.peers.{name}" for name in ("compare", "exact", "protocol", "question", "stress")),
     ),
+    "planners": ("Planners with our proofs", ("collide.adapters.planning.ompl",)),
     "hosts": (
         "Programs written for other engines",
         tuple(

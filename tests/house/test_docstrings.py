@@ -22,6 +22,7 @@ import collide.scenes
 from collide.adapters.fuzzing import fuzz_run, recorders, scene_findings
 from collide.adapters.live import world_viewer
 from collide.adapters.peers import compare, exact, protocol, question, stress
+from collide.adapters.planning import ompl
 
 #: Modules, and their public names.
 PUBLIC = {
@@ -37,6 +38,7 @@ PUBLIC = {
     fuzz_run: ("fuzz", "FuzzRun"),
     recorders: ("record_fcl", "record_coal", "record_pybullet", "record_mujoco"),
     scene_findings: ("save_findings",),
+    ompl: ("PlanningProblem",),
 }
 SECTIONS = ("Parameters", "Attributes", "Returns", "Yields", "Raises", "Notes", "Examples", "References", "See Also")
 #: Parameters that are lengths, whatever function has them: their description names the unit.

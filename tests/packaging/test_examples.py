@@ -221,7 +221,7 @@ GIVEN = {
 #: Packages that a page's Python needs.
 NEEDED = {
     "robots": ("yaml", "mujoco"), "disabled-pairs": ("yaml",), "engines": ("mujoco",), "pages": ("yaml",),
-    "report-schema": ("yaml", "trimesh"), "scene-format": ("yaml",), "planning": ("yaml",),
+    "report-schema": ("yaml", "trimesh"), "scene-format": ("yaml",), "planning": ("yaml", "ompl"),
 }
 #: Pages whose Python is not run here, and where it is, or why it is not.
 ELSEWHERE = {
