@@ -33,12 +33,15 @@ The file keeps what the robot's SRDF, beside it or given, says besides: groups,
 states, end effectors, virtual joints. --pairs-only leaves them out.
 
 --compare judges the disabled pairs of an SRDF: one that it says never collide,
-and that do, is wrong, and a configuration is shown.
+and that do, is wrong, and a configuration is shown. A pair that it leaves out,
+and that collides in every configuration of the sample, is named: with the file
+the robot is never free.
 
 ROBOT is a URDF, MJCF or SDFormat file, or a scene (a file or a shipped one)
 with a robot in it.
 
-exit status: 0 done, 1 the SRDF compared with is wrong about a pair, 2 error"""
+exit status: 0 done, 1 the SRDF compared with is wrong about a pair, or leaves
+out one that always collides, 2 error"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -92,7 +95,7 @@ def run(args: argparse.Namespace, progress: Callable) -> bool:
         write_json(to_dict(proposal, comparison, args.compare).items(), args.json)
     if args.json != "-" and not args.quiet:
         _print(proposal, comparison, args, carried)
-    return comparison is None or not comparison.wrong
+    return comparison is None or not (comparison.wrong or comparison.left_out)
 
 
 def _print(proposal, comparison, args: argparse.Namespace, carried: list[tuple[str, str]]) -> None:

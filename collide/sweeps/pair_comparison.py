@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from collide.pairs.query import distance
-from collide.sweeps.link_bodies import link_bodies, link_poses
-from collide.sweeps.pair_proposal import NEVER, Proposal
+from collide.sweeps.link_bodies import link_bodies, link_poses, pair_hits
+from collide.sweeps.pair_proposal import NEVER, LinkPair, Proposal
+from collide.sweeps.random_configurations import random_configurations
+
+#: Configurations in which adjacent links left out by an SRDF are asked, at most.
+_MAX_SAMPLES = 1000
 
 
 class PairDifference(NamedTuple):
@@ -20,6 +24,7 @@ class PairDifference(NamedTuple):
     wrong : the SRDF says the pair never collides, and a collision was found.
     q, depth : a colliding configuration, and the depth of the collision [m]; ``None`` without a known collision.
     gap : the least gap [m] met, ``None`` without a search.
+    always : links that move against each other collided in every configuration of the sample.
     """
 
     a: str
@@ -30,6 +35,7 @@ class PairDifference(NamedTuple):
     q: np.ndarray | None
     depth: float | None
     gap: float | None
+    always: bool = False
 
 
 @dataclass
@@ -50,6 +56,11 @@ class PairComparison:
     def wrong(self) -> list[PairDifference]:
         """Pairs disabled by the SRDF as never colliding, with a collision within the limits."""
         return [pair for pair in self.only_theirs if pair.wrong]
+
+    @property
+    def left_out(self) -> list[PairDifference]:
+        """Pairs tested with the SRDF though always in collision: with the SRDF no configuration is free."""
+        return [pair for pair in self.only_ours if pair.always]
 
 
 def compare_pairs(proposal: Proposal, theirs: Iterable[tuple[str, str, str]]) -> PairComparison:
@@ -84,7 +95,8 @@ def compare_pairs(proposal: Proposal, theirs: Iterable[tuple[str, str, str]]) ->
                 result.only_theirs.append(_difference(pair, reason, wrong, depth_of))
     for pair in proposal.disabled:
         if (pair.a, pair.b) not in seen:
-            result.only_ours.append(_difference(pair, pair.reason or "", False, depth_of))
+            asked = pair if pair.samples else _sampled(proposal, pair)
+            result.only_ours.append(_difference(asked, pair.reason or "", False, depth_of))
     return result
 
 
@@ -92,7 +104,17 @@ def _difference(pair, reason: str, wrong: bool, depth_of: _Depths) -> PairDiffer
     depth = None if pair.q is None else depth_of(pair.a, pair.b, pair.q)
     gap = None if pair.nearest is None else pair.nearest.gap
     share = pair.hits / pair.samples if pair.samples else 0.0
-    return PairDifference(pair.a, pair.b, reason, share, wrong, pair.q, depth, gap)
+    always = share == 1.0 and not pair.fixed  # links joined rigidly are not tested in any case
+    return PairDifference(pair.a, pair.b, reason, share, wrong, pair.q, depth, gap, always)
+
+
+def _sampled(proposal: Proposal, pair: LinkPair) -> LinkPair:
+    """The pair with figures of a sample of its own: a proposal does not sample adjacent links."""
+    bodies = {body.link: body for body in link_bodies(proposal.robot)}
+    Q = random_configurations(proposal.robot, 0, min(_MAX_SAMPLES, proposal.samples), proposal.seed)
+    hits = pair_hits(bodies[pair.a], bodies[pair.b], link_poses(proposal.robot, Q))
+    q = Q[int(hits.argmax())] if hits.any() else None
+    return replace(pair, samples=len(Q), hits=int(hits.sum()), q=q)
 
 
 class _Depths:

@@ -96,11 +96,17 @@ def comparison_tables(comparison: PairComparison, place: str) -> list[Table]:
         notes = ["wrong: it says that they never collide, and within the limits they do."]
         notes += [f"{pair.a} and {pair.b}: {state_words(pair.q)}" for pair in comparison.wrong if pair.q is not None]
         tables.append(Table(f"ONLY IN {place}", columns, rows, notes=notes))
-    if comparison.only_ours:
+    if comparison.left_out:
+        rows = [[pair.a, pair.b, pair.reason, _depth(pair)] for pair in comparison.left_out]
+        tables.append(Table(
+            f"LEFT OUT OF {place}  collide in every configuration: with this file the robot is never free",
+            [*_A_AND_B, Column("reason", "label"), Column("depth")], rows,
+        ))
+    if spared := [pair for pair in comparison.only_ours if not pair.always]:
         rows = [
             [pair.a, pair.b, pair.reason, f"{100 * pair.share:.3g} %",
              "" if pair.gap is None else lengths([pair.gap])[0].strip()]
-            for pair in comparison.only_ours
+            for pair in spared
         ]
         columns = [*_A_AND_B, Column("reason", "label"), Column("collide in"), Column("least gap", optional=1)]
         tables.append(Table(f"NOT IN {place}  tests of these pairs could be spared", columns, rows))
@@ -113,6 +119,8 @@ def comparison_words(comparison: PairComparison, place: str) -> str:
         f"{place}: {len(comparison.both)} pairs in both, {len(comparison.only_theirs)} only there "
         f"({len(comparison.wrong)} wrong), {len(comparison.only_ours)} only here"
     )
+    if comparison.left_out:
+        text += f" ({len(comparison.left_out)} of them always in collision)"
     left_out = len(comparison.not_comparable)
     return text + (f"; {count(left_out, 'pair')} with a link without collision geometry" if left_out else "")
 

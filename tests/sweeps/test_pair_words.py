@@ -126,7 +126,10 @@ def test_differences_have_reasons_shares_gaps_and_depths():
     assert [(d.a, d.b, d.reason) for d in compared.only_ours] == [(p.a, p.b, p.reason) for p in proposal.disabled]
     for side, pairs in ((compared.only_theirs, tested), (compared.only_ours, proposal.disabled)):
         for found, pair in zip(side, pairs, strict=True):
-            assert found.share == (pair.hits / pair.samples if pair.samples else 0.0)
+            if pair.samples:
+                assert found.share == pair.hits / pair.samples
+            else:  # neighbours that overlap at their joint are asked by the comparison
+                assert pair.reason == ADJACENT and found.share == 1.0 and found.always
             assert found.gap == (pair.nearest and pair.nearest.gap) and (found.q is None) == (found.depth is None)
     assert all(found.wrong and found.depth > 0 for found in compared.only_theirs) and len(tested) >= 2
     assert any(found.gap is None for found in compared.only_ours)

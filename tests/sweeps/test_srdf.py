@@ -218,6 +218,32 @@ def test_comparison_by_hand():
         assert result.only_theirs[0].depth > 0 and len(result.wrong) == wrong
 
 
+def test_pairs_left_out_that_always_collide_are_named():
+    """Neighbours that overlap at their joint, whatever its value; a pair that never meets may be left out."""
+    proposal = propose_disabled_pairs(chain(4, length=0.3, width=0.1), 300)
+    theirs = [(p.a, p.b, p.reason) for p in proposal.disabled]
+    assert not compare_pairs(proposal, theirs).left_out and ("l0", "l1", "Adjacent") in theirs
+    for pair in theirs:
+        result = compare_pairs(proposal, [other for other in theirs if other != pair])
+        assert [(p.a, p.b, p.reason) for p in result.left_out] == [pair] * (pair[2] == "Adjacent")
+        assert all(p.share == 1.0 and p.depth > 0 for p in result.left_out) and not result.wrong
+        assert len(result.only_ours) == 1
+
+
+@pytest.mark.skipif(not ROBOTS.is_dir(), reason="the shared robots are not here")
+def test_the_srdf_of_the_ur5_does_not_fit_its_spheres(capsys):
+    folder = ROBOTS / "ur5"
+    spheres = ["srdf", str(folder / "ur5_spherized.urdf"), "--samples", "500", "--rounds", "0"]
+    assert main([*spheres, "--compare", str(folder / "ur5.srdf")]) == 1
+    said = capsys.readouterr().out
+    assert "LEFT OUT OF ur5.srdf" in said and "1 of them always in collision" in " ".join(said.split())
+    table = said.split("LEFT OUT OF")[1].split("NOT IN")[0]
+    assert "wrist_2_link" in table and "fts_robotside" in table and "robotiq" not in table
+    meshes = ["srdf", str(folder / "ur5.urdf"), "--samples", "500", "--rounds", "0", "--meshes", "hull"]
+    assert main([*meshes, "--compare", str(folder / "ur5.srdf")]) == 0
+    assert "LEFT OUT" not in capsys.readouterr().out
+
+
 # --- into a World ---------------------------------------------------------------------------------
 
 
