@@ -6,7 +6,7 @@ from collide.kernels import kernel, native_call, view_f64, view_i64, view_u8
 from collide.lowering.shape_table import POSE, POSE_SLOP, POSE_STRETCH, POSE_TERMS
 from collide.narrowphase.facets.item_questions import MEETS, SURFACES_APART
 from collide.narrowphase.facets.item_questions import POSES_AT as ITEM_POSES_AT
-from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT
+from collide.narrowphase.facets.mesh_collide_kernel import APART, HIT, RADIUS_A
 from collide.narrowphase.facets.nearest_item_kernel import PART_SIGNATURE
 from collide.narrowphase.rows import HIT as HIT_FLAG
 from collide.narrowphase.rows import LOWER, ROW, is_undecided_or_refused, view_row
@@ -123,12 +123,15 @@ def _state_of_facets(scene, table, header_at, margin):
             (header_at, XA_at, 0, XA_at + 128, 0, 0, 1, False, False, 0, words[MESH_ROW_AT] + ROW),
         )
         return OPEN if done < 1 or states[0] > HIT else BEYOND_MARGIN if states[0] == APART else HITTING
+    # Cores are looked for as far as the margin and both radii reach, rounded upwards.
+    radii = view_f64(header_at + 8 * RADIUS_A, 2)
+    reach = (margin + (radii[0] + radii[1])) * (1.0 + 2.0**-50)
     blank = view_i64(words[MESH_ROW_AT], ROW // 8)
     for k in range(ROW // 8):
         blank[k] = 0
     done = _gap_at(table[GAP_AT], (
-        header_at, XA_at, 0, XA_at + 128, 0, 0, 1, False, margin, margin * (1.0 + 2.0**-50), False, 0,
-        words[MESH_ROW_AT], words[MESH_ROW_AT] + ROW,
+        header_at, XA_at, 0, XA_at + 128, 0, 0, 1, False, margin, reach, False, 0, words[MESH_ROW_AT],
+        words[MESH_ROW_AT] + ROW,
     ))
     row = view_row(words[MESH_ROW_AT])
     if done < 1 or is_undecided_or_refused(row):

@@ -113,3 +113,33 @@ def test_a_mesh_around_a_body_is_no_hit_of_its_hull():
     Q = np.linspace(-1.5, 1.5, 61)[:, None]
     expected = [asked_alone(checker, q) for q in Q]
     assert 10 < sum(expected) < 50 and checker.collides(Q).tolist() == checker.collides(Q).tolist() == expected
+
+
+def test_margins_count_from_swept_surfaces():
+    """Boxes of places around a body among a mesh: those proven free have no place that meets the mesh; far places of
+    large boxes are told apart by the margin alone.
+    """
+    n_free = n_others = 0
+    for seed in range(36):
+        rng = rng_of("margins of meshes", seed)
+        joints = [
+            collide.robots.kinematic_tree.Joint(
+                f"j{k}", "prismatic", f"l{k}", f"l{k + 1}", np.eye(4), np.eye(3)[k], lower=-9.0, upper=9.0)
+            for k in range(3)
+        ]
+        shape = [collide.Sphere(0.2), collide.Capsule(0.1, 0.3), hollow(rng, 0.2), collide.Box((0.2, 0.3, 0.1)),
+                 collide.Cylinder(0.1, 0.3), collide.ConvexHull(rng.uniform(-0.2, 0.2, (9, 3)), radius=0.1)][seed % 6]
+        element = collide.robots.robot.LinkShape(shape, np.eye(4), None, "test")
+        world = collide.World()
+        world.add(hollow(rng, 0.6), random_pose(rng, 0.2), name="hollow")
+        checker = collide.RobotChecker(
+            collide.Robot("crane", ["l0", "l1", "l2", "l3"], joints, {"l3": [element]}), world)
+        centres, half = rng.uniform(-1.2, 1.2, (30, 3)), rng.uniform(0.01, 0.4, (30, 1))
+        result = checker.certify_boxes(centres - half, centres + half, resolution=0.05, max_cells=200)
+        for k in range(30):
+            steps = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3), axis=-1).reshape(-1, 3)
+            places = centres[k] + half[k] * steps
+            hits = [asked_alone(checker, q) for q in places] if result.free[k] else []
+            assert not any(hits), (seed, centres[k].tolist(), half[k])
+        n_free, n_others = n_free + int(result.free.sum()), n_others + int((~result.free).sum())
+    assert n_free > 100 and n_others > 100, (n_free, n_others)
