@@ -77,10 +77,7 @@ def check_configurations(header_at, q_at, dof, first, n, verdicts_at):
         if k < settled and verdicts[k] != IS_OPEN:
             continue
         n_open = words[N_OPEN]
-        if k < settled:
-            verdicts[k] = verdict_after(scene, q, dof * k, k, k - begin)
-        else:
-            verdicts[k] = verdict_of(scene, q, dof * k, k)
+        verdicts[k] = verdict_among(scene, q, dof * k, k, k - begin, k < settled)
         if words[N_OPEN] > words[OPEN_CAPACITY]:
             words[N_OPEN] = n_open
             return k
@@ -113,6 +110,12 @@ def verdict_in_lane(scene, lane):
     spheres_at = scene.words[SPHERE_HEADER_AT]
     answers = view_f64(view_i64(spheres_at, VERDICTS_AT + 1)[VERDICTS_AT], 2 * LANES)
     return COLLIDES if answers[lane] != 0.0 else IS_OPEN if answers[LANES + lane] != 0.0 else IS_FREE
+
+
+@kernel(inline=True)
+def verdict_among(scene, q, at, number, lane, in_lanes):
+    """`verdict_of`, or `verdict_after` where eight configurations were asked in lanes."""
+    return verdict_after(scene, q, at, number, lane) if in_lanes else verdict_of(scene, q, at, number)
 
 
 @kernel

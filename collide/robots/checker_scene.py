@@ -44,8 +44,9 @@ from collide.worlds.world import World
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-#: Once so many configurations have been asked, spheres are made of bodies that are not: in a tenth of a second.
-_PAY_FOR_SPHERES = 20_000
+#: Once so many configurations have been asked, spheres are made of bodies that are not, and maps: in a few tenths of a
+#: second, kept with the robot.
+_PAY_FOR_SPHERES = 50_000
 #: A thread is handed at least so many configurations.
 _LEAST_PIECE = 512
 
@@ -83,6 +84,9 @@ class CheckerScene:
         """Those of the robot, and the first setting.   of_any : whether spheres are made of all bodies."""
         matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
         self._tables = self._joined_tables(np.concatenate(matrices))
+        known = self.robot.link_maps
+        if known is not None and known[0] == self._key_of_links():  # another checker has made spheres of these links
+            self._maps, of_any = known[1], True
         self._spheres = sphere_tables(self._tables, self._bodies, of_any=of_any)
         self._n_asked = _PAY_FOR_SPHERES if of_any or self._spheres is not None else 0
         self._setting: Setting | None = None
@@ -94,11 +98,15 @@ class CheckerScene:
         objects, links = self._bodies[:n], self._bodies[n:]
         if not links or any(body.padding for body in self._bodies):
             return robot_tables(self._bodies, matrices)
-        key = matrices.tobytes(), tuple(id(body.shape) for body in links)
+        key = matrices.tobytes(), *self._key_of_links()
         if self.robot.link_tables is None or self.robot.link_tables[0] != key:
             self.robot.link_tables = key, robot_tables(links, matrices)
         tables = self.robot.link_tables[1]
         return joined_tables(robot_tables(objects, matrices), tables) if objects else tables
+
+    def _key_of_links(self) -> tuple:
+        """What tables of links depend on; the shapes are kept with the robot."""
+        return tuple(id(body.shape) for body in self._bodies[len(self._objects) :])
 
     def _attach(self, values: tuple) -> None:
         """Attach an object (name, link, shape, X_LS, touch). Raises InvalidArgument, InvalidPose."""
@@ -262,6 +270,7 @@ class CheckerScene:
             if spheres is not None:
                 self._maps = pair_maps(self.robot, setting, CheckWorkspace(self.robot, setting))
                 self._setting = setting._replace(maps=self._maps, spare=[])
+                self.robot.link_maps = self._key_of_links(), self._maps
 
     def _spheres_among(self, around: Surroundings) -> SphereTables | None:
         """Spheres of the robot, but not among fields, whose boxes the robot is in."""

@@ -132,6 +132,7 @@ def plan(
     search = PlanSearch(now, ends, settings, random)
     now.in_pieces(1, 1, None, lambda space, _: search.run(space))
     count = search.words.tolist()
+    checker._count(count[N_CHECKED])
     return MotionPlan(
         search.path, search.simplified, len(search.path) > 0, search.n_iterations, count[N_START] + count[N_GOALS],
         count[N_EDGES], count[N_CHECKED], search.n_proofs, search.n_refused, search.refused_pair,

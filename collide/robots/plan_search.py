@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from collide.kernels import address_of
+from collide.kernels.lanes import LANES
 from collide.robots import rrt_connect as words
 from collide.robots.certified_edges import certify, sampled_collision
 from collide.robots.check_configurations import COLLIDES, IS_FREE
@@ -59,8 +60,10 @@ class PlanSearch:
         self._has_failed = np.empty((2, 0), dtype=np.uint8)
         self._make_space(max(_NODES, len(ends) + 1))
         self._nodes[0, 0], self._nodes[1, :n_goals], self._parents[:, :n_goals] = ends[0], ends[1:], -1
-        self._target, self._candidate, self._middle = self._line = np.zeros((3, self._dof))
-        for word, row in zip((words.TARGET_AT, words.CANDIDATE_AT, words.MIDDLE_AT), self._line):
+        self._target, self._candidate = self._line = np.zeros((2, self._dof))
+        self._samples_of_edge = np.zeros((LANES, self._dof))
+        rows = *self._line, self._samples_of_edge
+        for word, row in zip((words.TARGET_AT, words.CANDIDATE_AT, words.MIDDLE_AT), rows):
             self.words[word] = address_of(row)
         # The first edges go straight from the start to the nearest goal.
         nearest = int(np.square(ends[1:] - ends[0]).sum(axis=1).argmin())

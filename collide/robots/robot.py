@@ -148,9 +148,11 @@ class Robot:
         for link in self.geometry:
             if link not in self._index:
                 raise SceneError(f"unknown link; the robot has {listing(self.links)}", element=f'link "{cut(link)}"')
-        #: What checkers make of links and share: link → its elements, and their shape; what tables are of, and tables.
+        #: What checkers make of links and share: link → its elements, and their shape; what tables are of, and tables;
+        #: what maps are of, and maps.
         self.link_shapes: dict[str, tuple] = {}
         self.link_tables: tuple | None = None
+        self.link_maps: tuple | None = None
         self.rigid_clusters = rigid_clusters(self.links, self.joints)
         self.base_links = next(cluster for cluster in self.rigid_clusters if self.root in cluster)
         self.semantic_pairs = None if semantic_pairs is None else _checked_pairs(semantic_pairs)
@@ -188,7 +190,7 @@ class Robot:
 
     def __getstate__(self) -> dict:
         """What a copy or a pickle takes along: tables hold addresses."""
-        return {**vars(self), "link_shapes": {}, "link_tables": None}
+        return {**vars(self), "link_shapes": {}, "link_tables": None, "link_maps": None}
 
     def __repr__(self) -> str:
         return f"Robot({self.name!r}, {len(self.links)} links, {self.dof} degrees of freedom)"

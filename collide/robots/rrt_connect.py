@@ -11,8 +11,17 @@ import math
 from typing import Any, NamedTuple
 
 from collide.kernels import entry, kernel, view_f64, view_i64, view_u8
-from collide.robots.check_configurations import COLLIDES, IS_FREE, IS_OPEN, verdict_of
-from collide.robots.check_scene import N_OPEN, view_scene
+from collide.kernels.lanes import LANES
+from collide.robots.check_configurations import (
+    COLLIDES,
+    IS_FREE,
+    IS_OPEN,
+    settle_eight,
+    verdict_among,
+    verdict_in_lane,
+)
+from collide.robots.check_scene import N_OPEN, SPHERE_HEADER_AT, view_scene
+from collide.robots.sample_motions import time_of_sample
 
 # Words of a search. Columns of a configuration; both trees: nodes (2, capacity, dof), their parents (2, capacity), −1
 # of roots, and a byte each, whether an edge from there to a sample has collided; how many nodes the tree of the start
@@ -60,7 +69,7 @@ def _view_search(search_at):
     return Search(
         words, dof, view_f64(words[NODES_AT], 2 * capacity * dof), view_i64(words[PARENTS_AT], 2 * capacity),
         view_u8(words[HAS_FAILED_AT], 2 * capacity), view_f64(words[TARGET_AT], dof),
-        view_f64(words[CANDIDATE_AT], dof), view_f64(words[MIDDLE_AT], dof), lengths[0], lengths[1], lengths[2],
+        view_f64(words[CANDIDATE_AT], dof), view_f64(words[MIDDLE_AT], LANES * dof), lengths[0], lengths[1], lengths[2],
     )
 
 
@@ -180,21 +189,27 @@ def _edge_verdict(scene, search, q0, at0, q1, at1):
     for j in range(search.dof):
         change = max(change, abs(q1[at1 + j] - q0[at0 + j]))
     is_open = False
-    n = 0  # samples of this halving; the end first
-    while n == 0 or n * search.spacing < change:
-        for k in range(max(n, 1)):
-            t = (k + 0.5) / n if n > 0 else 1.0
+    n_samples = 1
+    while n_samples * search.spacing < change:
+        n_samples *= 2
+    for first in range(0, n_samples, LANES):
+        count = min(LANES, n_samples - first)
+        for lane in range(count):
+            t = time_of_sample(first + lane + 1)
             for j in range(search.dof):
                 a = q0[at0 + j]
                 b = q1[at1 + j]
-                search.middle[j] = a + t * (b - a) if t < 1.0 else b
-            search.words[N_CHECKED] += 1
-            verdict = verdict_of(scene, search.middle, 0, 0)
-            scene.words[N_OPEN] = 0  # others ask about the whole edge
+                search.middle[search.dof * lane + j] = a + t * (b - a) if t < 1.0 else b
+        search.words[N_CHECKED] += count
+        in_lanes = scene.words[SPHERE_HEADER_AT] != 0 and settle_eight(scene, search.middle, search.dof, 0, count) > 0
+        for lane in range(count):
+            verdict = verdict_in_lane(scene, lane) if in_lanes else IS_OPEN
+            if verdict == IS_OPEN:
+                verdict = verdict_among(scene, search.middle, search.dof * lane, 0, lane, in_lanes)
+                scene.words[N_OPEN] = 0  # others ask about the whole edge
             if verdict == COLLIDES:
                 return COLLIDES
             is_open = is_open or verdict == IS_OPEN
-        n = max(2 * n, 1)
     return IS_OPEN if is_open else IS_FREE
 
 

@@ -9,9 +9,8 @@ from collide.robots.check_configurations import (
     IS_FREE,
     IS_OPEN,
     settle_eight,
-    verdict_after,
+    verdict_among,
     verdict_in_lane,
-    verdict_of,
 )
 from collide.robots.check_scene import N_OPEN, OPEN_CAPACITY, SPHERE_HEADER_AT, view_scene
 
@@ -99,10 +98,8 @@ def _sample(scene, q0, q1, at, dof, n_samples, q, cursor, samples, times):
                 cursor[SAMPLE] += 1
                 continue
             n_open = words[N_OPEN]
-            if verdict == IS_OPEN and in_lanes:
-                verdict = verdict_after(scene, q, dof * lane, cursor[N_OPEN_SAMPLES], lane)
-            elif verdict == IS_OPEN:
-                verdict = verdict_of(scene, q, dof * lane, cursor[N_OPEN_SAMPLES])
+            if verdict == IS_OPEN:
+                verdict = verdict_among(scene, q, dof * lane, cursor[N_OPEN_SAMPLES], lane, in_lanes)
             time = time_of_sample(cursor[SAMPLE])
             if verdict == COLLIDES:
                 times[cursor[MOTION]] = time

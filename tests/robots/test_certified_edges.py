@@ -127,6 +127,7 @@ def test_threads_give_the_same():
     rng = rng_of("threads of edges")
     robot = random_robot(rng, n_links=5)
     checker = collide.RobotChecker(robot, scattered(rng, 25))
+    checker._count(10**6)  # spheres and maps, which prove other intervals, are there from the beginning
     Q = random_configurations(rng, robot, 2001)
     one, two = checker.certify_edges(Q[:-1], Q[1:], resolution=0.05), checker.certify_edges(
         Q[:-1], Q[1:], resolution=0.05, threads=2)
