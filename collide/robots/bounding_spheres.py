@@ -19,6 +19,7 @@ from collide.robots.check_tables import CheckTables, RobotBody, RobotTables, Set
 from collide.robots.forward_kinematics import LINK_POSE
 from collide.robots.pair_maps import PairMaps
 from collide.robots.robot import Robot
+from collide.shapes.shape import Shape, kept_with_shape
 
 #: Of fewer configurations none are asked by their spheres: of robots of spheres alone, and of others.
 _FEWEST_EXACT, _FEWEST = 2, 4
@@ -52,14 +53,30 @@ def sphere_tables(robot: RobotTables, bodies: Sequence[RobotBody], *, of_any: bo
     counts = np.zeros((len(bodies), layout.BODY_SPHERES), dtype=np.int64)
     around, rows, n = np.zeros((len(bodies), layout.SPHERE)), [], 0
     for k, body in enumerate(bodies):
-        spheres = spheres_of(body)
-        counts[k] = n, len(spheres.outer), n + len(spheres.outer), len(spheres.inner), spheres.is_exact
-        n += len(spheres.outer) + len(spheres.inner)
-        sign = 1.0 if spheres.is_exact else -1.0
-        rows += [_padded(spheres.outer, body.padding, 1.0), _padded(spheres.inner, body.padding, sign)]
-        around[k] = _padded(_sphere_around(spheres.outer)[None], body.padding, 1.0)[0]
+        by_padding = _rows_by_padding(body.shape)
+        if body.padding not in by_padding:
+            by_padding[body.padding] = _rows_of(body)
+        counts[k], rows_of_body, around[k] = by_padding[body.padding]
+        counts[k, [layout.FIRST_OUTER, layout.FIRST_INNER]] += n
+        n += len(rows_of_body)
+        rows.append(rows_of_body)
     fewest = _FEWEST_EXACT if all(is_sphere) else _FEWEST
     return SphereTables(counts, around, np.concatenate(rows), fewest)
+
+
+@kept_with_shape("_sphere_rows")
+def _rows_by_padding(_shape: Shape) -> dict[float, tuple]:
+    """What `_rows_of` makes of a shape, by the padding."""
+    return {}
+
+
+def _rows_of(body: RobotBody) -> tuple[tuple[int, ...], np.ndarray, np.ndarray]:
+    """(integers of a body whose spheres begin at 0, (n, SPHERE) its spheres, (SPHERE,) the sphere around them)."""
+    spheres = spheres_of(body)
+    n_outer, n_inner = len(spheres.outer), len(spheres.inner)
+    rows = np.concatenate([_padded(spheres.outer, body.padding, 1.0), _padded(spheres.inner, body.padding, -1.0)])
+    around = _padded(_sphere_around(spheres.outer)[None], body.padding, 1.0)[0]
+    return (0, n_outer, n_outer, n_inner, int(spheres.is_exact)), rows, around
 
 
 def _padded(spheres: np.ndarray, padding: float, sign: float) -> np.ndarray:

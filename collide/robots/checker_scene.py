@@ -78,6 +78,7 @@ class CheckerScene:
         self._asked = checks.listed_entries("RobotChecker: allowed", allowed, "pairs of names")
         self._mobile = checks.true_or_false("RobotChecker: mobile", mobile)
         self._maps: PairMaps | None = None
+        self._around: Surroundings | None = None
         self._make_tables()
 
     def _make_tables(self, *, of_any: bool = False) -> None:
@@ -156,7 +157,7 @@ class CheckerScene:
     def __getstate__(self) -> dict:
         """What a copy or a pickle takes along. What holds addresses is made again."""
         made = ("_setting", "_tables", "_spheres", "_n_asked", "_is_fixed")
-        return {name: value for name, value in vars(self).items() if name not in made}
+        return {name: value for name, value in vars(self).items() if name not in made} | {"_around": None}
 
     def __setstate__(self, state: dict) -> None:
         vars(self).update(state)
@@ -249,7 +250,7 @@ class CheckerScene:
             filters = before.self_pairs, before.allowed, before.skipped
         else:
             filters = filters_of(self.robot, self._bodies, self._objects, seen, around, self._asked, self._mobile)
-        surroundings = surroundings_of(around, None if before is None else before.surroundings)
+        surroundings = self._around = surroundings_of(around, self._around)
         base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
         tables = tables_among(self._tables, surroundings, before)
         spheres = self._spheres_among(surroundings)

@@ -26,8 +26,8 @@ class Shape:
     __slots__ = (
         "__weakref__", "_as_solid", "_bounds", "_convex_parts", "_crossings", "_facet_edges",
         "_hulls_instead", "_items", "_kind", "_laid_out", "_leaves", "_link_spheres", "_meshed_leaves", "_partners",
-        "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_single_facets", "_surface", "_topology",
-        "_union", "_vertex_set", "_walk",
+        "_parts", "_pieces", "_prepared", "_ray_way", "_reach", "_serial", "_single_facets", "_sphere_rows", "_surface",
+        "_topology", "_union", "_vertex_set", "_walk",
     )
     _fields: tuple[str, ...] = ()
     #: Convex parts, and sets that hold them (`lowering/parts.py`).
@@ -36,7 +36,9 @@ class Shape:
     #: The same with meshes that are convex as what they are (`robots/check_tables.py`).
     _convex_parts: Any
     _hulls_instead: Any
+    #: Spheres around and within it, for links (`robots/body_spheres.py`), and as kernels read them, by padding.
     _link_spheres: Any
+    _sphere_rows: dict[float, tuple]
     #: Pairs made ready for single calls, by the number of the other shape (`query.py`).
     _prepared: dict[int, Any]
     _serial: int
