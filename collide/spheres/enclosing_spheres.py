@@ -23,8 +23,8 @@ from collide.spheres.place_spheres import (
     best_addition,
     greedy_cover,
     moved_centers,
-    placed_spheres,
     placement_of,
+    placements,
     sampled,
     with_points,
     without_least_missed,
@@ -38,12 +38,12 @@ _MAX_SPHERES = 1000
 #: Facets are cut until it is known to this part of the excess how large the balls have to be.
 _TOLERANCE = 0.02
 #: Rounds in which samples are added where facets need more.
-_ROUNDS = 3
+_ROUNDS = 5
 #: Centres and radii are multiples of this part of the body's size, so that integers of proofs are short.
 _GRID = 2.0**-26
 #: Corners of the union this near a solid, in parts of its size, are taken into a ball.
 _NEAR = 1e-7
-_MAX_GROWTH = 200
+_MARGIN_GROWTH = 1.5
 
 
 class EnclosingSpheres(NamedTuple):
@@ -186,7 +186,9 @@ def _spheres_of(shape: Shape) -> EnclosingSpheres | None:
 
 def _best_of(shape: Shape, reach: Reach, count: int) -> EnclosingSpheres:
     samples = sampled(reach, _scale_of(count))
-    return _proven(shape, reach, *_refined(reach, samples, placed_spheres(reach, samples, count)))
+    refined = [_refined(reach, samples, place) for place in placements(reach, samples, count)]
+    best = min(refined, key=lambda made: made.needed)
+    return _proven(shape, reach, best.samples, best.place)
 
 
 def _scale_of(count: int) -> int:
@@ -213,7 +215,7 @@ def _within(shape: Shape, reach: Reach, excess: float) -> EnclosingSpheres:
         fewer = moved_centers(reach, samples, fewer, rng)
         place, step = (fewer, step) if fewer.excess <= 0.98 * excess else (place, step // 2)
     while True:
-        samples, place = _refined(reach, samples, place)
+        samples, place, _ = _refined(reach, samples, place)
         made = _proven(shape, reach, samples, place)
         if made.excess[1] <= excess:
             return made
@@ -238,7 +240,15 @@ def _all_corners(parts: list[BodyPart]) -> np.ndarray:
     return np.concatenate([part.corners for part in parts])
 
 
-def _refined(reach: Reach, samples: Samples, place: Placement) -> tuple[Samples, Placement]:
+class _Refined(NamedTuple):
+    """More samples, the best placement, and the excess needed by facets and the inside for this placement."""
+
+    samples: Samples
+    place: Placement
+    needed: float
+
+
+def _refined(reach: Reach, samples: Samples, place: Placement) -> _Refined:
     """Samples added where facets and the inside need larger balls than the samples, and centres moved for them."""
     corners, rng = _all_corners(reach.parts), np.random.default_rng(1)
     best, least = place, math.inf
@@ -254,7 +264,7 @@ def _refined(reach: Reach, samples: Samples, place: Placement) -> tuple[Samples,
         worst = np.argsort(-cover.values)[: min(150, int((cover.values > place.excess).sum()))]
         samples = with_points(samples, np.unique(np.vstack([*cover.corners[worst], holes]), axis=0))
         place = moved_centers(reach, samples, place, rng)
-    return samples, best
+    return _Refined(samples, best, least)
 
 
 def _tolerance(samples: Samples, place: Placement) -> float:
@@ -282,15 +292,15 @@ def _proven(shape: Shape, reach: Reach, samples: Samples, place: Placement) -> E
         used = np.zeros(1, dtype=np.int64)
     centers, reaches = centers[used], reaches[used]
     radii = _rounded_up(cover.distances[used], largest, grid)
-    for _ in range(_MAX_GROWTH):
-        holes = _holes(reach, samples, centers, radii)
-        if not len(holes):
-            break
-        # Each is taken in by the ball that exceeds the body least then.
+    margin = 2.0 * _NEAR * samples.size
+    while len(holes := _holes(reach, samples, centers, radii)):
+        # Each is taken in by the ball that exceeds the body least then, and by a margin that grows: a ball with the
+        # corner on its sphere would creep. In the end a ball holds the body, and there are no corners in it.
         away = np.sqrt(np.square(holes[:, None] - centers).sum(axis=2))
         balls = (away + reaches).argmin(axis=1)
-        grown = _rounded_up(away[np.arange(len(holes)), balls] + 2.0 * _NEAR * samples.size, largest, grid)
+        grown = _rounded_up(away[np.arange(len(holes)), balls] + margin, largest, grid)
         np.maximum.at(radii, balls, grown)
+        margin *= _MARGIN_GROWTH
     bracket = excess_bracket(shape, parts, centers, radii)
     return EnclosingSpheres(centers, radii, bracket, certificate_of(parts, cover, used))
 

@@ -8,6 +8,7 @@ grid; a greedy cover gives a start, made better by moves of single centres and s
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,8 @@ _N_SURFACE, _N_RAYS, _N_GRID = 1200, 350, 900
 #: Rounds of moves at most, for many spheres, and how small the last steps are, in parts of the body's size.
 _ROUNDS, _MIN_ROUNDS, _LAST_STEP = 40, 12, 5e-4
 _HALVINGS = 12
+#: So many spheres are placed from half as many, too.
+_MAX_HALVED = 64
 
 
 class Placement(NamedTuple):
@@ -243,10 +246,21 @@ def swapped(samples: Samples, place: Placement, rank: int) -> Placement:
     return _placement(samples, centers, reaches)
 
 
-def placed_spheres(reach: Reach, samples: Samples, count: int, start: Placement | None = None) -> Placement:
-    """The best place found for ``count`` spheres."""
+def placements(reach: Reach, samples: Samples, count: int) -> Iterator[Placement]:
+    """Good places for ``count`` spheres: from a greedy cover, and from half as many with others added."""
+    yield _improved(reach, samples, start_of(samples, count))
+    if 1 < count <= _MAX_HALVED:
+        place = _improved(reach, samples, start_of(samples, count // 2))
+        while len(place.centers) < count:
+            place = best_addition(samples, place)
+        yield _improved(reach, samples, place)
+
+
+def _improved(reach: Reach, samples: Samples, start: Placement) -> Placement:
+    """Moves and swaps for as long as they help."""
+    count = len(start.centers)
     rng = np.random.default_rng(count)
-    best = moved_centers(reach, samples, start_of(samples, count) if start is None else start, rng)
+    best = moved_centers(reach, samples, start, rng)
     failures = 0
     while 1 < count and failures < min(count, 5):
         trial = moved_centers(reach, samples, swapped(samples, best, failures), rng)

@@ -308,3 +308,13 @@ def test_arguments_are_checked():
         collide.enclosing_spheres(collide.PointCloud(np.eye(3), 0.1))
     with pytest.raises(collide.CollideError, match="shape"):
         collide.enclosing_spheres("box")
+
+
+@pytest.mark.slow
+def test_many_spheres_leave_no_holes_inside():
+    """Holes whose corners lie on the ball that takes them in: growing by roundings alone would never close them."""
+    shape = SOLIDS["bumps"]
+    for count in (64, 128):
+        spheres = collide.enclosing_spheres(shape, count)
+        spheres.verify(shape)
+        assert not left_out(points_of(shape, rng_of("many", count), 300), spheres.centers, spheres.radii)
