@@ -36,6 +36,8 @@ PER = {"robot": OF_ROBOT, "link": OF_BODY, "pair": OF_PAIR}
 BETWEEN = {"all": WITH_AROUND | AMONG_ROBOT, "world": WITH_AROUND, "self": AMONG_ROBOT}
 #: Slots for rows of pairs that a search begins with.
 _PAIR_SLOTS = 4096
+#: Slots that a workspace keeps for the next search, at most: 13 MB.
+_MOST_KEPT = 1 << 16
 
 
 class DistanceQuestion(NamedTuple):
@@ -72,7 +74,9 @@ class Slots:
         kind = question.per, question.between
         slots = space.slots.get(kind)
         if slots is None or len(slots.rows) < least:
-            slots = space.slots[kind] = cls(question, space.setting, least)
+            slots = cls(question, space.setting, least)
+            if least <= _MOST_KEPT:
+                space.slots[kind] = slots
         return slots
 
 
