@@ -8,9 +8,11 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 
+import naive_soups
 import numpy as np
 import pytest
 from curved_oracle import bracket
+from hollow_bodies import hollow_scene
 from naive import SHARED, pose, random_pose, rng_of
 from random_robots import DEMO, asked_one_by_one, random_configurations, random_link_shape, random_robot, slider
 
@@ -230,6 +232,42 @@ def test_near_pairs_of_meshes(name):
     assert counts["kink"] <= 0.02 * sum(counts.values()), counts
     with_hulls = checker.distances(Q, max_distance=0.0, per="pair")
     assert (with_hulls.certified | np.isnan(with_hulls.gradient).all(axis=1)).all()
+
+
+def test_near_pairs_of_rings_and_shells_against_every_triangle():
+    """Gaps of bodies far from their hulls: differences of the least of all triangles against all others, in numpy."""
+    counts: Counter = Counter()
+    for seed in (4, 5, 8, 10):
+        rng, robot, world = hollow_scene(seed)
+        checker = collide.RobotChecker(robot, world)
+        Q = random_configurations(rng, robot, 6)
+        measured = checker.distances(Q, max_distance=0.3, per="pair")
+        for k in rng.permutation(np.flatnonzero(~measured.hit))[:8]:
+            q, way = Q[measured.configuration[k]], rng.normal(size=robot.dof)
+            before, at, after = (gap_of_triangles(checker, measured.names[k], q + t * 1e-5 * way) for t in (-1, 0, 1))
+            if None in (before, at, after):
+                counts["curved"] += 1
+                continue
+            slopes_of_sides = (at - before) / 1e-5, (after - at) / 1e-5
+            slope, say = float(measured.gradient[k] @ way), f"seed {seed}, {measured.names[k]}, q = {q.tolist()}"
+            if abs(slopes_of_sides[1] - slopes_of_sides[0]) > 1e-2:
+                assert min(slopes_of_sides) - 1e-3 <= slope <= max(slopes_of_sides) + 1e-3, say
+                counts["kink"] += 1
+            else:
+                assert abs(slope - (after - before) / 2e-5) <= 1e-6, say
+                counts["gap"] += 1
+    assert counts["gap"] >= 15 and counts["kink"] <= 2, counts
+
+
+def gap_of_triangles(checker, names, q) -> float | None:
+    """The least distance of two bodies by name, by their triangles alone; ``None`` for curved shapes."""
+    of_a, link_a, of_b, link_b, X_WB = parts_of_row(checker, names)
+    X_WL = checker.link_poses(q)[0]
+    gaps = [
+        naive_soups.gap(A, B, X_WL[link_a] @ X_A, X_WB if link_b is None else X_WL[link_b] @ X_B, limit=0.5)
+        for (A, X_A), (B, X_B) in itertools.product(of_a, of_b)
+    ]
+    return None if None in gaps else min(gaps)
 
 
 def test_near_pairs_of_curved_links():
