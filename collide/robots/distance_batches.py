@@ -37,7 +37,7 @@ BETWEEN = {"all": WITH_AROUND | AMONG_ROBOT, "world": WITH_AROUND, "self": AMONG
 #: Slots for rows of pairs that a search begins with.
 _PAIR_SLOTS = 4096
 #: Slots that a workspace keeps for the next search, at most: 13 MB.
-_MOST_KEPT = 1 << 16
+_MAX_KEPT_SLOTS = 1 << 16
 
 
 class DistanceQuestion(NamedTuple):
@@ -75,7 +75,7 @@ class Slots:
         slots = space.slots.get(kind)
         if slots is None or len(slots.rows) < least:
             slots = cls(question, space.setting, least)
-            if least <= _MOST_KEPT:
+            if least <= _MAX_KEPT_SLOTS:
                 space.slots[kind] = slots
         return slots
 
