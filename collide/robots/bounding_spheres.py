@@ -39,8 +39,8 @@ class SphereTables(NamedTuple):
 
 
 def sphere_tables(robot: RobotTables, bodies: Sequence[RobotBody], *, of_any: bool) -> SphereTables | None:
-    """Those of a robot's bodies; ``None`` where a body has no end, and with obstacles that move along, whose pairs have
-    paddings that spheres do not know.
+    """Those of a robot's bodies; ``None`` where a body has no end, and with moving obstacles: spheres lack the padding
+    of pairs with them.
 
     of_any : False for ``None`` as well where fewer than half of the bodies are made of spheres, and spheres of the
         others take milliseconds a body.

@@ -278,6 +278,10 @@ def _take(motion, top, n, p, q, body, partner, margin):
             _leave_meshes(motion, body, partner)
             return n
         state = meshes
+    elif state == OPEN and motion.kind != STRAIGHT:
+        # Samples of straight motions decide what doubles do not; other motions have none.
+        _leave_meshes(motion, body, partner)
+        return n
     has_space = top + n < motion.words[ITEM_CAPACITY] and state != HITTING
     at = ITEM * (top + n if has_space else motion.words[ITEM_CAPACITY])  # the last place is for names alone
     motion.items[at] = p

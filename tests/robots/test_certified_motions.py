@@ -266,6 +266,21 @@ def test_meshes_of_curves_are_proven_by_their_own_distances():
     assert proven_at(hit, np.array([0.5 * first]))[0]
 
 
+def test_flush_boxes_that_doubles_cannot_decide_are_met_at_their_contact():
+    """Equal cubes in one row: faces beside each other lie in common planes at all times."""
+    block = [LinkShape(collide.Box((0.2, 0.2, 0.2)), np.eye(4), None, "test")]
+    slide = Joint("slide", "prismatic", "base", "cart", np.eye(4), (1.0, 0, 0))
+    world = collide.World()
+    world.add(collide.Box((0.2, 0.2, 0.2)), pose(t=(0.7, 0, 0)), name="post")
+    checker = collide.RobotChecker(Robot("cart", ["base", "cart"], [slide], {"cart": block}), world)
+    for motion in (collide.Spline.straight([[0.0], [0.9]]), collide.Spline.min_jerk([[0.0], [0.9]])):
+        result = checker.certify_spline(motion, resolution=1e-4)
+        assert result.first is not None and 0.0 <= motion(result.first[1])[0] - 0.5 < 1e-3, result
+        assert result.proven[0] * 0.9 < 0.5 or motion.degree > 1
+    boxes = checker.certify_boxes([[0.0], [0.4], [0.55]], [[0.49], [0.6], [0.6]])
+    assert boxes.free.tolist() == [True, False, False] and boxes.collides.tolist() == [False, True, True]
+
+
 # --- shortest ways --------------------------------------------------------------------------------
 
 
