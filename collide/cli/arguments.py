@@ -97,8 +97,9 @@ known.
 A pair is touching where its proven bracket lower <= distance <= upper reaches
 to both sides of 0, or lies within 2^-40 (a trillionth) of the coordinates.
 
-A trajectory is looked at in samples. Nothing is certified between them, and
-the report says so.
+A trajectory is looked at in samples. Nothing is certified between them unless
+--certify is given, which proves one moving robot free at all times, or names
+where its path collides or could not be proven; the report says which.
 
 The exit status is 0 whenever a report was made: use `collide check` to branch
 on collisions. The JSON is described in docs/report-schema.md."""
@@ -109,9 +110,11 @@ _CHECK = """examples:
   collide check scene.yaml | cut -f2,3       the names of the pairs
   collide check cell.yaml --write-baseline known.json     once, then in CI:
   collide check cell.yaml --baseline known.json --junit collisions.xml
+  collide check cell.yaml --trajectory plan.csv --certify --clearance 50mm
 
 Each line of output is one pair, fields separated by tabs: `collision`,
-`shallow` or `touching`, body A, body B, signed distance in metres (negative:
+`shallow`, `touching`, `near` (than --clearance) or `unproven` (--certify; the
+distance is 0 there), body A, body B, signed distance in metres (negative:
 overlapping); of several states a fifth field, the state; of a trajectory the
 share of the path, where the collision begins. The verdict goes to stderr, and
 there which bodies are surfaces without an inside or not the shape the scene
@@ -228,6 +231,9 @@ def _add_check(commands) -> None:
     _motion_arguments(parser)
     parser.add_argument("--min-depth", type=_length, default=0.0, metavar="D",
                         help="collisions proven less deep than this do not count: 0.001 (metres), 1mm")
+    parser.add_argument("--clearance", type=_length, default=0.0, metavar="D",
+                        help="robots nearer than this to anything but themselves count as colliding: 0.05 (metres), "
+                             "50mm")
     parser.add_argument("--allow-missing-meshes", action="store_true",
                         help="with --missing-meshes skip: free counts although what was skipped is not checked")
     parser.add_argument("--touching-is-collision", action="store_true",
@@ -240,6 +246,8 @@ def _add_check(commands) -> None:
                        help="a known collision deeper than it was by more than this counts as new (0.1mm)")
     group.add_argument("--write-baseline", metavar="FILE", help="write the collisions there are as known ones; exit 0")
     group.add_argument("--junit", metavar="FILE", help="write JUnit XML, a test case for every body")
+    group.add_argument("--csv", metavar="FILE",
+                       help="write the lines of output as a table: what,a,b,distance,state,where")
     _output_arguments(parser)
     cli_pages.add_argument(parser)
 
@@ -284,6 +292,8 @@ def _motion_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("motion")
     group.add_argument("--trajectory", metavar="FILE",
                        help="follow joint values, waypoint by waypoint: CSV, YAML or JSON, also ROS's JointTrajectory")
+    group.add_argument("--certify", action="store_true",
+                       help="prove the path free at all times, not only at samples")
     group.add_argument("--resolution", type=_resolution, default=0.02, metavar="STEP",
                        help="no joint moves more between two samples of it: radians, or metres (0.02)")
 

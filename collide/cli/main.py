@@ -166,15 +166,17 @@ def _check(args) -> int:
     from collide.reports import checking, junit
 
     known = checking.read_baseline(args.baseline) if args.baseline else None
-    for place, suffix in ((args.write_baseline, ".json"), (args.junit, ".xml")):
+    for option, suffix in (("--write-baseline", ".json"), ("--junit", ".xml"), ("--csv", ".csv")):
+        place = getattr(args, option[2:].replace("-", "_"))
         if place:
-            check_place("--write-baseline" if suffix == ".json" else "--junit", place, suffix)
+            check_place(option, place, suffix)
     progress = _progress(args.quiet)
-    made = cli_scenes.reports(args, progress, _STARTED, min_depth=args.min_depth)
+    made = cli_scenes.reports(args, progress, _STARTED, min_depth=args.min_depth, clearance=args.clearance)
     checks = [
         checking.check(
             result.report, result.label, touching_counts=args.touching_is_collision, known=known,
             tolerance=args.baseline_tolerance,
+            robots=_robots(result.scene) if args.clearance else (),
         )
         for result in made
     ]
@@ -183,6 +185,8 @@ def _check(args) -> int:
         write_whole(args.write_baseline, checking.baseline_text(checks))
     if args.junit:
         write_whole(args.junit, junit.text(checks))
+    if args.csv:
+        write_whole(args.csv, checking.csv_text(checks))
     if args.html:
         cli_pages.write_check(args, made, checks, progress)
     if _has_stdout(args):
@@ -206,6 +210,11 @@ def _check(args) -> int:
         first = unanswered[0]
         raise UnsupportedQuery(f"whether the scene is free is not known: {first['a']} and {first['b']}: {first['why']}")
     return FREE
+
+
+def _robots(scene) -> list[frozenset[str]]:
+    """Bodies of each robot."""
+    return [frozenset(placement.carried) for placement in scene.placements.values()]
 
 
 def _say_what_was_taken(report) -> None:

@@ -15,6 +15,9 @@ def reports(args, progress: Callable, started: float | None, **limits) -> list:
     """
     scenes = load_states(args, progress)
     trajectory = _trajectory(args, scenes)
+    if args.certify and (trajectory is None or limits.get("min_depth")):
+        wanted = "leave out --min-depth" if trajectory is not None else "give --trajectory"
+        raise InvalidArgument(f"--certify proves that nothing meets along a trajectory: {wanted}")
     ignore = [_pair(scenes[0][1], words) for words in args.ignore]
     from collide.reports import report
     from collide.reports import state_reports as states
@@ -31,6 +34,13 @@ def reports(args, progress: Callable, started: float | None, **limits) -> list:
                 tested, trajectory, resolution=args.resolution, progress=progress, keep=bool(args.html), **limits
             )
             state_report.trajectory = watch.to_dict()
+            if args.certify:
+                from collide.reports.trajectory_proof import RESOLUTION, prove
+
+                with progress("proving the trajectory"):
+                    resolution = min(args.resolution, RESOLUTION)
+                    proof = prove(tested, watch.path, limits.get("clearance", 0.0), resolution)
+                state_report.trajectory |= {"proof": proof, "certified": proof["free"]}
         made.append(states.Stated(label, scene, state_report, watch))
     return made
 

@@ -6,9 +6,11 @@ baseline has the pair and the pair is at most a tolerance deeper than in the bas
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -22,10 +24,12 @@ from collide.reports.tables import printable
 
 SCHEMA = "collide-baseline/1"
 COLLISION, SHALLOW, TOUCHING, KNOWN, DEEPER, GONE = "collision", "shallow", "touching", "known", "deeper", "gone"
+#: Nearer than the clearance; neither proven apart nor met along a trajectory.
+NEAR, UNPROVEN = "near", "unproven"
 #: Classes that a baseline may hold.
 _KNOWN_CLASSES = (COLLISION, TOUCHING)
 #: Names of the kinds of findings, by class of the report; the worst first.
-_CLASSES = {COLLISION: "colliding", SHALLOW: "shallow", TOUCHING: "touching"}
+_CLASSES = {COLLISION: "colliding", SHALLOW: "shallow", TOUCHING: "touching", NEAR: "near"}
 
 
 class Finding(NamedTuple):
@@ -94,21 +98,30 @@ def _length(depth: float | None) -> str:
     return "unbounded" if depth is None or math.isinf(depth) else brief_length(depth)
 
 
-def check(report: Report, label: str, *, touching_counts: bool, known: Baseline | None, tolerance: float) -> Check:
+def check(
+    report: Report, label: str, *, touching_counts: bool, known: Baseline | None, tolerance: float,
+    robots: Sequence[frozenset[str]] = (),
+) -> Check:
     """Sort the pairs of a report, and of its trajectory, into failing and other findings.
 
     touching_counts : pairs touching within rounding count as collisions.   known : from `read_baseline`, or ``None``.
     tolerance : the most a known collision may be deeper than in the baseline [m].
+    robots : bodies of each robot, which are to keep clear of all but themselves; without, all bodies are.
     """
     made = Check(label, report.scene["name"], report.bodies, report.verdict(), against_baseline=known is not None)
     made.unanswered = [*report.unanswered, *(report.trajectory or {}).get("unanswered", [])]
     if report.trajectory is not None:
-        made.summary = (
-            f"{trajectory.verdict(report.trajectory)}, sampled, not certified in between; at the start: {made.summary}"
-        )
+        proof = report.trajectory.get("proof")
+        how = "sampled, not certified in between" if proof is None else proof["text"]
+        made.summary = f"{trajectory.verdict(report.trajectory)}, {how}; at the start: {made.summary}"
+        if proof is not None and proof["why"] is not None:
+            made.unanswered.append({"a": "the robots", "b": "what is around", "why": proof["why"]})
+    clearance = report.query["clearance"]
     unmatched = dict(known.of(label)) if known is not None else {}
     for finding in _pairs(report):
-        counts = finding.what == COLLISION or (finding.what == TOUCHING and touching_counts)
+        keeps_clear = not robots or any((finding.a in robot) != (finding.b in robot) for robot in robots)
+        counts = finding.what in (COLLISION, UNPROVEN) or (finding.what == NEAR and keeps_clear)
+        counts |= finding.what == TOUCHING and (touching_counts or (clearance > 0.0 and keeps_clear))
         entry = unmatched.pop(_key(finding), None)
         if counts and entry is not None:
             before = math.inf if entry.distance is None else entry.depth
@@ -129,11 +142,42 @@ def _pairs(report: Report) -> Iterator[Finding]:
         for pair in (report.trajectory or {}).get(name, []):
             finding = Finding(what, pair["a"], pair["b"], pair["distance"], trajectory.place(pair["from"]))
             followed.setdefault(frozenset((pair["a"], pair["b"])), finding)
+    for finding in _of_proof((report.trajectory or {}).get("proof")):
+        if finding.what == UNPROVEN or frozenset((finding.a, finding.b)) not in followed:
+            followed[frozenset((finding.a, finding.b, finding.what))] = finding
     yield from followed.values()
     for what, name in _CLASSES.items():
         for pair in getattr(report, name):
             if frozenset((pair.a, pair.b)) not in followed:
                 yield Finding(what, pair.a, pair.b, pair.distance)
+
+
+def _of_proof(proof: dict | None) -> Iterator[Finding]:
+    """The first collision of a proof, and the first open interval of each pair not proven apart."""
+    if proof is None:
+        return
+    first = proof["first_collision"]
+    if first is not None:
+        what = COLLISION if first["distance"] <= 0.0 else NEAR
+        at = {"share": first["share"], "time": first["time"]}
+        yield Finding(what, first["a"], first["b"], first["distance"], trajectory.place(at))
+    seen: set[frozenset] = set()
+    for entry in proof["open"]:
+        pair = frozenset((entry["a"], entry["b"]))
+        if pair not in seen:
+            seen.add(pair)
+            at = {"share": entry["begin"], "time": None}
+            yield Finding(UNPROVEN, entry["a"], entry["b"], 0.0, trajectory.place(at))
+
+
+def csv_text(checks: Iterable[Check]) -> str:
+    """The findings as a table for spreadsheets; distances in metres, empty where a depth is unbounded."""
+    out = io.StringIO()
+    rows = csv.writer(out, lineterminator="\n")
+    rows.writerow(("what", "a", "b", "distance", "state", "where"))
+    for result in checks:
+        rows.writerows((f.what, f.a, f.b, f.distance, result.label, f.where) for f in result.findings)
+    return out.getvalue()
 
 
 # --- baselines ----------------------------------------------------------------------------------

@@ -75,7 +75,9 @@ def _page(report: Report, *, everything: bool, proofs: bool, width: int, whole_n
     trajectory = report.trajectory
     if trajectory is None:
         return page
-    style = "colliding" if trajectory["collides"] else "free"
+    first = (trajectory.get("proof") or {}).get("first_collision")
+    meets = trajectory["collides"] or (first is not None and first["distance"] <= 0.0)
+    style = "colliding" if meets else "free"
     lines: list[Line] = [[(line, style)] for line in wrapped(verdict(trajectory), width, hanging=2)]
     lines += [[(line, "note")] for line in wrapped(_how_sampled(trajectory), width, hanging=2)]
     for table in _trajectory_tables(trajectory, None if everything else _SHORT):
@@ -84,11 +86,13 @@ def _page(report: Report, *, everything: bool, proofs: bool, width: int, whole_n
 
 
 def _how_sampled(trajectory: dict) -> str:
+    proof = trajectory.get("proof")
+    how = ": by sampling, not certified in between" if proof is None else f"; {proof['text']}"
     notes = f"; {count(len(trajectory['notes']), 'note')}: {trajectory['notes'][0]}" if trajectory["notes"] else ""
     return (
         f"{count(trajectory['samples'], 'sample')} through {count(trajectory['waypoints'], 'waypoint')}, no joint "
         "moving more than "
-        f"{trajectory['resolution']:g} rad or m between two of them: by sampling, not certified in between{notes}"
+        f"{trajectory['resolution']:g} rad or m between two of them{how}{notes}"
     )
 
 

@@ -64,10 +64,11 @@ function depthOrDistance(measure) {
 }
 
 function pathFacts(trajectory) {
-  const { samples, waypoints, resolution, duration, moving, least, source } = trajectory;
+  const { samples, waypoints, resolution, duration, moving, least, source, proof } = trajectory;
+  const between = proof ? `; ${proof.text}` : ": by sampling, not certified in between";
   const facts = [
     ["looked at", `${counted(samples, "sample")} through ${counted(waypoints, "waypoint")}, no joint moving more than ` +
-      `${resolution} rad or m between two of them: by sampling, not certified in between`],
+      `${resolution} rad or m between two of them${between}`],
     ["read from", source],
   ];
   if (duration !== null && duration !== undefined) facts.push(["takes", `${duration} s`]);

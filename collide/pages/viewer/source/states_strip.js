@@ -7,6 +7,8 @@ const WIDTH = 1000;
 const STRIP = 26;
 const PLOT = 64;
 const SECONDS_UNTIMED = 8;
+/** Height of the band of what is proven, between verdicts and curve. */
+const BAND = 5;
 
 export class StatesStrip {
   constructor(node, model, selection) {
@@ -54,7 +56,7 @@ export class StatesStrip {
     const chart = svgElement("svg", {
       class: "chart", viewBox: `0 0 ${WIDTH} ${STRIP + PLOT}`, preserveAspectRatio: "none", role: "img",
       "aria-label": describe(rows, (k) => this._model.stateLabel(k)), onclick: (event) => this._clicked(event),
-    }, ...this._bars(rows), ...this._curve(rows), this._cursor);
+    }, ...this._bars(rows), ...this._proofBand(), ...this._curve(rows), this._cursor);
     return chart;
   }
 
@@ -74,6 +76,21 @@ export class StatesStrip {
       k = end + 1;
     }
     return bars;
+  }
+
+  /** What of the path is proven free, what stays open, and what is sampled alone. */
+  _proofBand() {
+    const proof = this._model.trajectory?.proof;
+    if (!proof || !this._model.states?.shares) return [];
+    const part = (kind, begin, end, fill, text) => svgElement("rect", {
+      class: `proof ${kind}`, x: WIDTH * begin, width: Math.max(2, WIDTH * (end - begin)), y: STRIP, height: BAND, fill,
+    }, svgElement("title", {}, `${text}: ${percent(begin)} to ${percent(end)} of the path`));
+    const pair = (row) => `not proven, ${printable(row.a)} and ${printable(row.b)}`;
+    return [
+      part("sampled", 0, 1, "#b9b9b9", "sampled alone"),
+      ...proof.proven.map(([begin, end]) => part("proven", begin, end, lookOf("free").color, "proven free")),
+      ...proof.open.map((row) => part("open", row.begin, row.end, lookOf("touching").color, pair(row))),
+    ];
   }
 
   /** The least clearance of every state; below the line bodies overlap. */
@@ -101,8 +118,10 @@ export class StatesStrip {
     const { samples } = this._model.states ?? {};
     const remarks = [];
     if (this._range) remarks.push(`least clearance from ${columnLength(this._range[0])} to ${columnLength(this._range[1])}; below the line bodies overlap`);
-    if (samples) remarks.push(`samples shown: ${printable(samples)}; nothing is certified between two of them`);
-    else if (this._model.trajectory) remarks.push("looked at in samples: nothing is certified between them");
+    const proof = this._model.trajectory?.proof;
+    const between = proof ? `${printable(proof.text)} (the band under the verdicts)` : "nothing is certified between two of them";
+    if (samples) remarks.push(`samples shown: ${printable(samples)}; ${between}`);
+    else if (this._model.trajectory) remarks.push(`looked at in samples: ${between}`);
     return [element("p", { class: "remark" }, remarks.join("; "))];
   }
 
@@ -164,6 +183,10 @@ export class StatesStrip {
       if (this._timer) this._next();
     }, 1000 * Math.min(2, Math.max(0.016, seconds)));
   }
+}
+
+function percent(share) {
+  return `${Number((100 * share).toPrecision(4))} %`;
 }
 
 function worstOf(report) {
