@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from naive import pose, rng_of
+from naive import pose, rng_of, rotation
 from random_robots import any_pair_hits, plain_link_poses, random_configurations, random_link_shape, random_robot
 from random_splines import KINDS, random_spline
 
@@ -156,23 +156,21 @@ def test_bounds_of_curves_and_cells_hold_for_points_of_all_bodies(seed):
             )
             bound, width, middle = answers[0, 0], answers[0, 1], answers[0, 2:]
             if is_cell:
-                q = rng.uniform(low, high, (200, robot.dof))
-                q[:100] = np.where(rng.random((100, robot.dof)) < 0.5, low, high)
+                q = rng.uniform(low, high, (50, robot.dof))
+                q[:25] = np.where(rng.random((25, robot.dof)) < 0.5, low, high)
                 assert np.allclose(middle, 0.5 * (low + high), atol=1e-15) and width in (0.0, (high - low).max())
                 assert width > 0.0 or row[0, 1] == -1.0
             else:
                 begins, length = spline.breaks[0], spline.breaks[1] - spline.breaks[0]
-                q = spline(begins + length * np.linspace(begin, end, 200))
+                q = spline(begins + length * np.linspace(begin, end, 50))
                 assert np.allclose(middle, spline(begins + length * 0.5 * (begin + end)), atol=1e-12)
                 assert (2.0 * np.abs(q - middle).max() <= width + 1e-12)
             element = robot.geometry[name][0]
             corners = element.X_LG @ np.array([(*(0.5 * np.array(s) * element.shape.size), 1.0) for s in
                                                np.ndindex(2, 2, 2) for s in [2 * np.array(s) - 1]]).T
-            moved = max(
-                float(np.linalg.norm(((plain_link_poses(robot, at)[name] - plain_link_poses(robot, middle)[name])
-                                      @ corners)[:3], axis=0).max())
-                for at in q
-            )
+            stood = plain_link_poses(robot, middle)[name]
+            shifts = np.array([plain_link_poses(robot, at)[name] - stood for at in q]) @ corners
+            moved = float(np.linalg.norm(shifts[:, :3], axis=1).max())
             assert bound >= moved - 1e-12, f"seed {seed}, {name}, cell {is_cell}: moved {moved}, bound {bound}"
             if moved > 1e-3:
                 slack.append(bound / moved)
@@ -236,12 +234,12 @@ def test_threads_and_resolution_of_roundings_end():
         assert getattr(one, field).tobytes() == getattr(two, field).tobytes()
     assert one.n_checked == two.n_checked
     world = pin_at(0.0, radius=0.01, distance=1.011)  # touches at one instant
-    result = collide.RobotChecker(pendulum(), world).certify_path([[-1e3], [1e3]], resolution=1e-300)
+    result = collide.RobotChecker(pendulum(), world).certify_path([[-30.0], [30.0]], resolution=1e-300)
     assert not result.is_free and result.n_checked < 10_000_000
 
 
-def test_meshes_of_curves_are_proven_by_their_own_distances():
-    """A rod goes through a ring along an arc; a higher arc meets the ring, and the earliest time is told."""
+def ring() -> collide.Mesh:
+    """A square frame across z, 2 m wide with a hole of 1 m: its hull fills the hole."""
     outer, inner = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]), 0.5 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     corners = np.array([(*xy, z) for z in (-0.05, 0.05) for xy in (*outer, *inner)], dtype=float)
     quads = []
@@ -249,9 +247,50 @@ def test_meshes_of_curves_are_proven_by_their_own_distances():
         j = (k + 1) % 4
         quads += [(k, 4 + k, 4 + j, j), (8 + k, 8 + j, 12 + j, 12 + k)]
         quads += [(k, j, 8 + j, 8 + k), (4 + k, 12 + k, 12 + j, 4 + j)]
-    ring = collide.Mesh(corners, [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))])
+    return collide.Mesh(corners, [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_free_times_among_meshes_have_no_sample_that_collides(seed):
+    """Links of all kinds among frames and open tubes, splines and boxes: swept, curved and flat parts beside facets."""
+    rng = rng_of("splines among meshes", seed)
+    frame = collide.Mesh(0.25 * ring().vertices, ring().faces)
+    square = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    tube = 0.2 * np.array([(x, y, z) for z in (-1, 1) for x, y in square], dtype=float)
+    sides = [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)]
+    pipe = collide.Mesh(tube, [face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
     world = collide.World()
-    world.add(ring, name="ring")
+    for k in range(10):
+        world.add((frame, pipe)[k % 2], pose(rotation(rng), rng.uniform(-0.7, 0.7, 3)), name=f"body{k}")
+    kinds = [lambda rng, size: collide.Capsule(0.3 * size, size), lambda rng, size: collide.Sphere(size), None]
+    Q, n_free = np.zeros((0, 0)), 0
+    while len(Q) < 5:  # of some robots no configuration is free
+        robot = random_robot(rng, n_links=4, shape=kinds[seed % 3])
+        checker = collide.RobotChecker(robot, world)
+        Q = random_configurations(rng, robot, 60)
+        Q = Q[~checker.collides(Q)][:5]
+    for q in Q:
+        spline = random_spline(rng, q)
+        result = checker.certify_spline(spline, resolution=5e-3)
+        t = rng.uniform(spline.breaks[0], spline.breaks[-1], 200)
+        t = np.concatenate([t, spline.breaks[:-1], (result.time - 1e-3)[result.collides]]).clip(*spline.breaks[[0, -1]])
+        t = t[proven_at(result, t)]
+        hits = any_pair_hits(checker, spline(t))
+        assert not hits.any(), f"seed {seed}, {spline}: proven free, and hits at {t[hits][:3].tolist()}"
+        n_free += len(t)
+        width = rng.uniform(0.0, 0.2, q.shape)
+        boxes = checker.certify_boxes(q - width, q + width, resolution=0.02, max_cells=100)
+        if boxes.free[0]:
+            ends = np.sign(rng.normal(size=(150, len(q)))) * (rng.random((150, len(q))) < 0.7)
+            hits = any_pair_hits(checker, q + width * ends)
+            assert not hits.any(), f"seed {seed}: a free box around {q.tolist()} collides"
+    assert n_free >= 50
+
+
+def test_meshes_of_curves_are_proven_by_their_own_distances():
+    """A rod goes through a ring along an arc; a higher arc meets the ring, and the earliest time is told."""
+    world = collide.World()
+    world.add(ring(), name="ring")
     joints = [Joint("slide", "prismatic", "base", "rod", np.eye(4), (0, 0, 1.0), -2.0, 2.0),
               Joint("shift", "prismatic", "rod", "tip", np.eye(4), (1.0, 0, 0), -2.0, 2.0)]
     rod = [LinkShape(collide.Capsule(0.1, 0.4), np.eye(4), None, "test")]
