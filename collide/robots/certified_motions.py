@@ -16,6 +16,7 @@ from collide.robots.robot import Robot
 from collide.robots.splines import Spline
 
 _FULL_CIRCLE = 2.0 * np.pi
+_NONE_OPEN = np.zeros(0, dtype=OPEN_DTYPE)
 
 
 @dataclass(frozen=True)
@@ -124,6 +125,9 @@ def certify_pieces(
         threads, progress, lambda space, work, piece: work.ask_about_curves(spline.degree),
     )
     shares[asked] = later
+    if not len(rows) and np.isnan(shares).all():
+        free = np.ones(len(breaks) - 1, dtype=bool)
+        return CertifiedMotion(breaks, free, np.full(len(free), np.nan), _NONE_OPEN, [], lengths, n_checked)
     pieces = asked[rows[:, 0].astype(np.int64)]
     segment_of = np.searchsorted(breaks, begins, "right") - 1
     times = np.full(len(breaks) - 1, np.nan)
@@ -174,9 +178,11 @@ def refuse_degrees(robot: Robot, what: str, q: np.ndarray) -> None:
 
     Raises InvalidArgument.
     """
+    if not np.abs(q).max(initial=0.0) > 2.0 * _FULL_CIRCLE:
+        return
     turns = {joint.name for joint in robot.joints if joint.type == "revolute"}
     columns = [k for k, name in enumerate(robot.joint_names) if name in turns and np.isfinite(robot.upper[k])]
-    if not columns or not len(q):
+    if not columns:
         return
     low, high = q[:, columns].min(axis=0), q[:, columns].max(axis=0)
     leaves = (high > robot.upper[columns]) | (low < robot.lower[columns])
