@@ -1,4 +1,4 @@
-"""RRT-Connect for the panda on the shipped workbench: every motion of both trees is proven free, not sampled."""
+"""Plans for the panda on the shipped workbench, every motion proven free: `collide.plan`, and a loop in Python."""
 
 import time
 
@@ -29,21 +29,20 @@ def extend(tree, target, step=1.0):
         return q
 
 
-Q = sorted((q for q in random.uniform(lower, upper, (5000, 8)) if not checker.collides(q)), key=lambda q: q[0])
-here, there = [[Q[0]]], [[Q[-1]]]  # from one side of the bench to the other
-started, reached, q = time.perf_counter(), None, None
+Q = [q for q in random.uniform(lower, upper, (5000, 8)) if checker.within_limits(q) and not checker.collides(q)]
+start, goal = min(Q, key=lambda q: q[0]), max(Q, key=lambda q: q[0])  # from one side of the bench to the other
+plan = collide.plan(checker, start, goal, seed=4)
+print(f"collide.plan: {plan.n_nodes} nodes, {len(plan.path) - 1} motions, {len(plan.simplified) - 1} after shortcuts,")
+print(f"  {plan.length:.1f} rad, all of it proven free in {plan.seconds * 1e3:.1f} ms")
+
+here, there, started, reached, q = [[start]], [[goal]], time.perf_counter(), None, None
 while q is None or reached is not q:
     here, there = there, here
     q = reached = extend(here, random.uniform(lower, upper))
     while q is not None and (reached := extend(there, q)) is not None and reached is not q:
         pass
-path = here[-1] + there[-1][-2::-1]
-length = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
-for i, j in np.sort(random.integers(0, len(path), (200, 2))):  # shortcuts between two nodes of the path
-    if j < len(path) and j - i > 1 and is_free(path[i], path[j]):
-        path[i + 1 : j] = []
-total, proven = time.perf_counter() - started, checker.certify_edges(path[:-1], path[1:])
-shorter = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
-print(f"{len(here) + len(there)} nodes; a path {length:.1f} rad long, after shortcuts {shorter:.1f} rad")
-print(f"{proven.free.sum()} of its {len(proven)} motions are proven free")
-print(f"{len(spent)} motions asked in {total:.2f} s, {100 * sum(spent) / total:.0f} % of it in collision checks")
+path, total = here[-1] + there[-1][-2::-1], time.perf_counter() - started
+proven = checker.certify_edges(path[:-1], path[1:])
+print(f"in Python: {len(here) + len(there)} nodes; a path of {len(path) - 1} motions")
+print(f"  {proven.free.sum()} of its {len(proven)} motions are proven free")
+print(f"  {len(spent)} motions in {total * 1e3:.0f} ms, {100 * sum(spent) / total:.0f} % of it in collision checks")

@@ -71,7 +71,7 @@ class MotionPlan:
 
 def plan(
     checker: RobotChecker, start, goal, *, joints: Iterable[str] | None = None, seed: int = 0, step: float = 1.0,
-    spacing: float = 0.1, resolution: float = 1e-3, max_iterations: int = 1_000_000, max_seconds: float = 10.0,
+    spacing: float = 0.1, resolution: float = 1e-3, max_iterations: int = 10_000_000, max_seconds: float = 10.0,
 ) -> MotionPlan:
     """A path from a start to one of several goals, every edge proven free.
 

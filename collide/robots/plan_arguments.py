@@ -33,7 +33,7 @@ def checked_ends(robot: Robot, start, goal) -> np.ndarray:
     if not len(goals):
         raise InvalidArgument("plan: goal must be one configuration or several, got none")
     ends = np.concatenate([q0, goals])
-    for row in np.flatnonzero(~robot.within_limits(ends)).tolist():
+    for row in np.flatnonzero(~_within_limits(robot, ends)).tolist():
         raise InvalidArgument(
             f"plan: the {_name_of_end(row, ends)} is out of limits: {'; '.join(robot.limit_notes(ends[row]))}. "
             f"{_hint(robot, ends[row])}"
@@ -53,7 +53,7 @@ def _hint(robot: Robot, q: np.ndarray) -> str:
     """What may have gone wrong with values outside the limits: degrees, or columns in another order."""
     is_angle = _turns(robot)
     in_radians = np.where(is_angle, np.deg2rad(q), q)
-    if np.abs(q[is_angle]).max(initial=0.0) > 2.0 * math.pi and robot.within_limits(in_radians)[0]:
+    if np.abs(q[is_angle]).max(initial=0.0) > 2.0 * math.pi and _within_limits(robot, in_radians[None])[0]:
         return "As degrees all are within: np.deg2rad makes radians of them"
     return (
         f"Columns are {listing(robot.joint_names)}, in this order; a mapping {{joint: value}} leaves no doubt, "
@@ -105,6 +105,13 @@ def column_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
         ends = sorted(((joint.lower - offset) / multiplier, (joint.upper - offset) / multiplier))
         lower[column], upper[column] = max(lower[column], ends[0]), min(upper[column], ends[1])
     return lower, upper
+
+
+def _within_limits(robot: Robot, Q: np.ndarray) -> np.ndarray:
+    """(N,) bool: `Robot.within_limits`, of all columns at once."""
+    lower, upper = column_limits(robot)
+    slack = 1e-9 * np.maximum(1.0, np.abs(Q))
+    return ((lower - slack <= Q) & (upper + slack >= Q)).all(axis=1)
 
 
 def _turns(robot: Robot) -> np.ndarray:

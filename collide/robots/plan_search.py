@@ -20,8 +20,8 @@ from collide.robots.check_workspace import CheckWorkspace
 from collide.robots.robot_checker import RobotChecker
 from collide.robots.rrt_connect import grow_trees, shorten_path
 
-#: Samples drawn at first, and places for nodes in each tree; both are doubled while they do not suffice.
-_SAMPLES, _NODES = 64, 256
+#: Samples drawn at first, as many again each time, and at once at most. Places for nodes in each tree, doubled at need.
+_SAMPLES, _MAX_SAMPLES, _NODES = 64, 4096, 256
 #: A node from which an edge has collided grows to samples so near, as a share of the root mean square distance of two
 #: samples: 2/3 solves MotionBenchMaker's problems with half the edges that 1 takes, and smaller shares leave some out.
 _REACH = 2.0 / 3.0
@@ -60,11 +60,10 @@ class PlanSearch:
         self._has_failed = np.empty((2, 0), dtype=np.uint8)
         self._make_space(max(_NODES, len(ends) + 1))
         self._nodes[0, 0], self._nodes[1, :n_goals], self._parents[:, :n_goals] = ends[0], ends[1:], -1
-        self._target, self._candidate = self._line = np.zeros((2, self._dof))
-        self._samples_of_edge = np.zeros((LANES, self._dof))
-        rows = *self._line, self._samples_of_edge
-        for word, row in zip((words.TARGET_AT, words.CANDIDATE_AT, words.MIDDLE_AT), rows):
-            self.words[word] = address_of(row)
+        self._target, self._candidate = np.zeros((2, self._dof))
+        self._samples, self._edge = np.empty((0, self._dof)), np.zeros((LANES, self._dof))
+        buffers = self._target, self._candidate, self._edge
+        self.words[words.TARGET_AT : words.EDGE_AT + 1] = [*map(address_of, buffers)]
         # The first edges go straight from the start to the nearest goal.
         nearest = int(np.square(ends[1:] - ends[0]).sum(axis=1).argmin())
         self.words[words.PHASE], self.words[words.TO], self._target[:] = words.CONNECTING, nearest, ends[1 + nearest]
@@ -85,7 +84,7 @@ class PlanSearch:
     def _draw_samples(self) -> bool:
         """As many as were drawn before; false at the end of the search."""
         settings = self.settings
-        n = min(max(self.n_drawn, _SAMPLES), settings.max_iterations - self.n_drawn)
+        n = min(max(self.n_drawn, _SAMPLES), _MAX_SAMPLES, settings.max_iterations - self.n_drawn)
         if n <= 0 or time.perf_counter() > settings.deadline:
             return False
         self._samples = settings.lower + (settings.upper - settings.lower) * self._random.random((n, self._dof))
@@ -108,12 +107,15 @@ class PlanSearch:
             if why == words.NEEDS_SPACE:
                 self._make_space(2 * self._nodes.shape[1])
             elif why == words.NEEDS_ANSWER:
+                if time.perf_counter() > self.settings.deadline:
+                    return
                 begin = self._nodes[self.words[words.TREE], self.words[words.FROM]]
                 answer = self._sampled(begin, self._candidate)
             elif why == words.NEEDS_SAMPLES and not self._draw_samples():
                 return
             elif why == words.CONNECTED and self._prove_path():
-                return self._shorten(space)
+                self._shorten(space)
+                return
 
     def _sampled(self, q0: np.ndarray, q1: np.ndarray) -> int:
         """The answer to an edge left open by the kernel, near meshes that are not convex."""

@@ -17,8 +17,9 @@ from collide.robots.check_configurations import (
     IS_FREE,
     IS_OPEN,
     settle_eight,
-    verdict_among,
+    verdict_after,
     verdict_in_lane,
+    verdict_of,
 )
 from collide.robots.check_scene import N_OPEN, SPHERE_HEADER_AT, view_scene
 from collide.robots.sample_motions import time_of_sample
@@ -28,8 +29,9 @@ from collide.robots.sample_motions import time_of_sample
 # has, and that of the goals.
 (
     DOF, CAPACITY, NODES_AT, PARENTS_AT, HAS_FAILED_AT, N_START, N_GOALS,
-    # samples (n, dof), how many, the next; the configuration a tree grows to, the next node on the way, a sample
-    SAMPLES_AT, N_SAMPLES, NEXT_SAMPLE, TARGET_AT, CANDIDATE_AT, MIDDLE_AT,
+    # samples (n, dof), how many, the next; the configuration a tree grows to, the next node on the way; samples of the
+    # edge between
+    SAMPLES_AT, N_SAMPLES, NEXT_SAMPLE, TARGET_AT, CANDIDATE_AT, EDGE_AT,
     # whether a tree grows to a sample or to a node of the other; which tree, from which of its nodes, to which node
     PHASE, TREE, FROM, TO,
     # how many edges and configurations were asked; three doubles: the longest edge, the largest change of a column from
@@ -56,7 +58,7 @@ class Search(NamedTuple):
     has_failed: Any
     target: Any
     candidate: Any
-    middle: Any
+    samples: Any
     step: float
     spacing: float
     reach: float
@@ -69,7 +71,7 @@ def _view_search(search_at):
     return Search(
         words, dof, view_f64(words[NODES_AT], 2 * capacity * dof), view_i64(words[PARENTS_AT], 2 * capacity),
         view_u8(words[HAS_FAILED_AT], 2 * capacity), view_f64(words[TARGET_AT], dof),
-        view_f64(words[CANDIDATE_AT], dof), view_f64(words[MIDDLE_AT], LANES * dof), lengths[0], lengths[1], lengths[2],
+        view_f64(words[CANDIDATE_AT], dof), view_f64(words[EDGE_AT], LANES * dof), lengths[0], lengths[1], lengths[2],
     )
 
 
@@ -185,31 +187,53 @@ def _square_to_target(search, at):
 def _edge_verdict(scene, search, q0, at0, q1, at1):
     """COLLIDES, IS_OPEN or IS_FREE of samples of an edge: its end, the middle, quarters, …; its begin is free."""
     search.words[N_EDGES] += 1
+    dof, q = search.dof, search.samples
     change = 0.0
-    for j in range(search.dof):
+    for j in range(dof):
         change = max(change, abs(q1[at1 + j] - q0[at0 + j]))
+    n = 1
+    while n * search.spacing < change:
+        n *= 2
     is_open = False
-    n_samples = 1
-    while n_samples * search.spacing < change:
-        n_samples *= 2
-    for first in range(0, n_samples, LANES):
-        count = min(LANES, n_samples - first)
+    first = 1
+    while first <= n:
+        count = 1 if first == 1 else min(LANES, n + 1 - first)  # most edges that collide do so at their end
         for lane in range(count):
-            t = time_of_sample(first + lane + 1)
-            for j in range(search.dof):
+            t = time_of_sample(first + lane)
+            for j in range(dof):
                 a = q0[at0 + j]
                 b = q1[at1 + j]
-                search.middle[search.dof * lane + j] = a + t * (b - a) if t < 1.0 else b
+                q[dof * lane + j] = a + t * (b - a) if t < 1.0 else b
+        verdict = _verdict_of_samples(scene, search, q, count)
+        if verdict == COLLIDES:
+            return COLLIDES
+        is_open = is_open or verdict == IS_OPEN
+        first += count
+    return IS_OPEN if is_open else IS_FREE
+
+
+@kernel
+def _verdict_of_samples(scene, search, q, count):
+    """COLLIDES, IS_OPEN or IS_FREE of up to LANES configurations: of all at once where the robot has spheres."""
+    in_lanes = scene.words[SPHERE_HEADER_AT] != 0 and settle_eight(scene, q, search.dof, 0, count) > 0
+    if in_lanes:
         search.words[N_CHECKED] += count
-        in_lanes = scene.words[SPHERE_HEADER_AT] != 0 and settle_eight(scene, search.middle, search.dof, 0, count) > 0
         for lane in range(count):
-            verdict = verdict_in_lane(scene, lane) if in_lanes else IS_OPEN
-            if verdict == IS_OPEN:
-                verdict = verdict_among(scene, search.middle, search.dof * lane, 0, lane, in_lanes)
-                scene.words[N_OPEN] = 0  # others ask about the whole edge
-            if verdict == COLLIDES:
+            if verdict_in_lane(scene, lane) == COLLIDES:
                 return COLLIDES
-            is_open = is_open or verdict == IS_OPEN
+    is_open = False
+    for lane in range(count):
+        if in_lanes and verdict_in_lane(scene, lane) == IS_FREE:
+            continue
+        if in_lanes:
+            verdict = verdict_after(scene, q, search.dof * lane, 0, lane)
+        else:
+            verdict = verdict_of(scene, q, search.dof * lane, 0)
+            search.words[N_CHECKED] += 1
+        scene.words[N_OPEN] = 0  # others ask about the whole edge
+        if verdict == COLLIDES:
+            return COLLIDES
+        is_open = is_open or verdict == IS_OPEN
     return IS_OPEN if is_open else IS_FREE
 
 

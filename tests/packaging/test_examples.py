@@ -62,7 +62,9 @@ SHOWS = {
     "31_free_space_cells": ["35 convex cells, 56.490 m³ of 60 m³", "a path through 10 portals", "0 of 1100 points"],
     "27_solids": ["solid: True", "0 facets cross", "clash: 0.7200 mm³", "at rest: volume 0.0, patch 625.00 cm²"],
     "30_base_as_a_point": ["an obstacle of ", "a path of 4.81 m in 44 steps", "steps that hit: 0 of 44"],
-    "18_certified_planning": ["nodes; a path", "motions are proven free", "of it in collision checks"],
+    "18_certified_planning": [
+        "rad, all of it proven free in", "nodes; a path", "motions are proven free", "of it in collision checks",
+    ],
     "19_nearest_obstacles": ["in something, gaps up to", "collide, depths up to", "nearest in"],
     "21_look_at_a_world": ["13 bodies at http://127.0.0.1:", "no longer live"],
     "20_reachable_positions": ["200000 postures", "free of collision, layer by layer", "m above the floor"],
