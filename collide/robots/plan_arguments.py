@@ -25,20 +25,14 @@ def positive(name: str, value) -> float:
 
 
 def checked_ends(robot: Robot, start, goal) -> np.ndarray:
-    """(1 + k, dof) the start and k goals, within the limits. Raises InvalidArgument."""
+    """(1 + k, dof) the start and k goals. Raises InvalidArgument."""
     q0 = _configurations(robot, "start", start, None)
     if len(q0) != 1:
         raise InvalidArgument(f"plan: start must be a single configuration ({robot.dof},), got {len(q0)}")
     goals = _configurations(robot, "goal", goal, q0[0])
     if not len(goals):
         raise InvalidArgument("plan: goal must be one configuration or several, got none")
-    ends = np.concatenate([q0, goals])
-    for row in np.flatnonzero(~_within_limits(robot, ends)).tolist():
-        raise InvalidArgument(
-            f"plan: the {_name_of_end(row, ends)} is out of limits: {'; '.join(robot.limit_notes(ends[row]))}. "
-            f"{_hint(robot, ends[row])}"
-        )
-    return ends
+    return np.concatenate([q0, goals])
 
 
 def _configurations(robot: Robot, name: str, values, others: np.ndarray | None) -> np.ndarray:
@@ -53,7 +47,7 @@ def _hint(robot: Robot, q: np.ndarray) -> str:
     """What may have gone wrong with values outside the limits: degrees, or columns in another order."""
     is_angle = _turns(robot)
     in_radians = np.where(is_angle, np.deg2rad(q), q)
-    if np.abs(q[is_angle]).max(initial=0.0) > 2.0 * math.pi and _within_limits(robot, in_radians[None])[0]:
+    if np.abs(q[is_angle]).max(initial=0.0) > 2.0 * math.pi and robot.within_limits(in_radians)[0]:
         return "As degrees all are within: np.deg2rad makes radians of them"
     return (
         f"Columns are {listing(robot.joint_names)}, in this order; a mapping {{joint: value}} leaves no doubt, "
@@ -64,8 +58,12 @@ def _hint(robot: Robot, q: np.ndarray) -> str:
 def sampled_box(robot: Robot, joints: Iterable[str] | None, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(dof,) least and largest values of samples: the limits, or of a joint at rest the start's value.
 
-    Raises InvalidArgument for unknown joints, for goals that need others, and for lengths without limits.
+    Raises InvalidArgument for ends out of limits, unknown joints, goals that need others, and lengths without limits.
     """
+    lower, upper = _column_limits(robot)
+    slack = 1e-9 * np.maximum(1.0, np.abs(ends))  # as of `Robot.within_limits`
+    if ((ends < lower - slack) | (ends > upper + slack)).any():
+        _refuse_ends_out_of_limits(robot, ends)
     moves = np.ones(robot.dof, dtype=bool)
     if joints is not None:
         names = checks.listed_entries("plan: joints", joints, "names of joints")
@@ -79,20 +77,30 @@ def sampled_box(robot: Robot, joints: Iterable[str] | None, ends: np.ndarray) ->
         raise InvalidArgument(
             f"plan: joint {robot.joint_names[differs[0]]} differs between start and goal, and joints= does not name it"
         )
-    lower, upper = column_limits(robot)
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    lower, upper = np.minimum(lower, low), np.maximum(upper, high)
     unbounded = moves & (np.isinf(lower) | np.isinf(upper))
+    if not unbounded.any():
+        return np.where(moves, lower, ends[0]), np.where(moves, upper, ends[0])
     for column in np.flatnonzero(unbounded & ~_turns(robot)).tolist():
         raise InvalidArgument(
             f"plan: joint {robot.joint_names[column]} has no limits to draw samples within; name other joints in "
             "joints=, or give the robot's joint limits"
         )
-    low, high = ends.min(axis=0), ends.max(axis=0)
-    lower = np.where(unbounded, low - _HALF_TURN, np.minimum(lower, low))
-    upper = np.where(unbounded, high + _HALF_TURN, np.maximum(upper, high))
+    lower = np.where(unbounded, low - _HALF_TURN, lower)
+    upper = np.where(unbounded, high + _HALF_TURN, upper)
     return np.where(moves, lower, ends[0]), np.where(moves, upper, ends[0])
 
 
-def column_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+def _refuse_ends_out_of_limits(robot: Robot, ends: np.ndarray) -> None:
+    for row in np.flatnonzero(~robot.within_limits(ends)).tolist():
+        raise InvalidArgument(
+            f"plan: the {_name_of_end(row, ends)} is out of limits: {'; '.join(robot.limit_notes(ends[row]))}. "
+            f"{_hint(robot, ends[row])}"
+        )
+
+
+def _column_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """(dof,) lower and upper limits of columns, narrowed to the limits of mimicking joints."""
     lower, upper = robot.lower.copy(), robot.upper.copy()
     for joint in robot.joints:
@@ -105,13 +113,6 @@ def column_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
         ends = sorted(((joint.lower - offset) / multiplier, (joint.upper - offset) / multiplier))
         lower[column], upper[column] = max(lower[column], ends[0]), min(upper[column], ends[1])
     return lower, upper
-
-
-def _within_limits(robot: Robot, Q: np.ndarray) -> np.ndarray:
-    """(N,) bool: `Robot.within_limits`, of all columns at once."""
-    lower, upper = column_limits(robot)
-    slack = 1e-9 * np.maximum(1.0, np.abs(Q))
-    return ((lower - slack <= Q) & (upper + slack >= Q)).all(axis=1)
 
 
 def _turns(robot: Robot) -> np.ndarray:
