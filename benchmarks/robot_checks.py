@@ -95,18 +95,18 @@ def batches(options: Options, robot: str, geometry: str, family: str) -> Race:
     checker._count(ENOUGH)
     plain, is_mesh = by_pairs(checker), geometry == "mesh"
     Q = at_random(checker, 4_000 if is_mesh else 20_000)
-    few, (q0, q1) = Q[: 400 if is_mesh else 4_000], motions_of(checker, 50 if is_mesh else 500)
+    some, (q0, q1) = Q[: 400 if is_mesh else 4_000], motions_of(checker, 50 if is_mesh else 500)
     checker.certify_edges(q0, q1), plain.certify_edges(q0, q1)  # trees of meshes
     edges = checker.certify_edges(q0, q1)
     tasks = {
-        "configurations": partial(checker.collides, Q), "by pairs": partial(plain.collides, few),
+        "configurations": partial(checker.collides, Q), "by pairs": partial(plain.collides, some),
         "motions proven": partial(checker.certify_edges, q0, q1),
         "motions by pairs": partial(plain.certify_edges, q0, q1),
         "motions sampled": partial(checker.edge_collides, q0, q1),
     }
-    per = {"configurations": len(Q), "by pairs": len(few)} | dict.fromkeys(list(tasks)[2:], len(q0))
-    differ = int((checker.collides(few) != plain.collides(few)).sum())
-    columns = {"hit": float(checker.collides(Q).mean()), "left_open": share_open(checker, few), "differ": float(differ),
+    per = {"configurations": len(Q), "by pairs": len(some)} | dict.fromkeys(list(tasks)[2:], len(q0))
+    differ = float((checker.collides(some) != plain.collides(some)).sum())
+    columns = {"hit": float(checker.collides(Q).mean()), "left_open": share_open(checker, some), "differ": differ,
                "proven_free": float(edges.free.mean()), "motions_open": float(edges.is_open.mean())}
     return Race(tasks, per, columns)
 
