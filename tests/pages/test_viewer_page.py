@@ -324,7 +324,7 @@ def test_hostile_names_stay_text(page):
 SAMPLES = "5 of 2001"
 
 
-def states_page(page: PageBrowser):
+def states_page(page: PageBrowser, proof: dict | None = None):
     """Two boxes, the second coming nearer in five states; the pair's row is of the worst of them."""
     gaps = [0.5, 0.25, 0.0, -0.5, 0.125]
     classes = ["free", "near", "touching", "colliding", "near"]
@@ -351,6 +351,8 @@ def states_page(page: PageBrowser):
         "moving": ["mover"], "collides": True, "first_collision": worst, "least": worst, "colliding": [worst],
         "shallow": [], "touching": [], "near": [], "unanswered": [], "notes": [],
     }
+    if proof is not None:
+        data["trajectory"]["proof"] = proof
     bodies = [body("still", (0, 0, 0), "free", static=True), body("mover", (2.5, 0, 0), "free")]
     return page.write("states", report=data, drawing=drawing_of([box(1.0)], bodies, states))
 
@@ -375,6 +377,27 @@ def test_states_move_the_bodies_and_tell_their_verdicts(page):
     assert page.run(place) == [2.125, 0, 0] and page.texts("#states .play") == ["▶ play"]
     page.open(page._folder / "states.html", "#pair=still|mover&state=3")
     assert page.run(place) == [1.5, 0, 0] and "depth 500.000 mm" in selected(page)
+
+
+def test_a_proof_is_a_band_under_the_verdicts(page):
+    """A quarter of the path is proven, a quarter open, the rest sampled alone."""
+    proof = {
+        "robot": "r", "why": None, "clearance": 0.0, "free": False, "share": 0.25, "first_collision": None,
+        "proven": [[0.0, 0.25]], "open": [{"a": "still", "b": "mover", "begin": 0.25, "end": 0.5}], "checked": 9,
+        "text": "25 % of the path is proven free; 1 interval stays open",
+    }
+    page.open(states_page(page, proof))
+    parts = page.run(
+        "return [...document.querySelectorAll('#states rect.proof')].map((r) => [r.getAttribute('class'), "
+        "Number(r.getAttribute('x')), Number(r.getAttribute('width')), r.textContent])"
+    )
+    assert [part[:3] for part in parts] == [
+        ["proof sampled", 0, 1000], ["proof proven", 0, 250], ["proof open", 250, 250]
+    ]
+    assert parts[2][3] == "not proven, still and mover: 25 % to 50 % of the path"
+    remark = page.texts("#states .remark")[0]
+    assert proof["text"] in remark and "nothing is certified" not in remark
+    assert any(proof["text"] in text for text in page.texts("#table-path td"))
 
 
 def test_several_states_have_tables_and_contacts_of_their_own(page):
