@@ -119,9 +119,11 @@ class CheckerScene:
 
     def _detach(self, name: str) -> None:
         """Take an attached object away, and what was allowed for it. Raises InvalidArgument."""
-        if name not in self._objects:
+        if checks.text("RobotChecker.detach: name", name) not in self._objects:
             known = listing(self._objects) or "none"
-            raise InvalidArgument(f"RobotChecker.detach: no attached object is called {brief(name)}; attached: {known}")
+            raise InvalidArgument(
+                f"RobotChecker.detach: name: no attached object is called {brief(name)}; attached: {known}"
+            )
         self._objects = {known: item for known, item in self._objects.items() if known != name}
         self._bodies = [body for body in self._bodies if body.name != name]
         self._asked = [pair for pair in self._asked if name not in pair[:2]]
@@ -132,9 +134,11 @@ class CheckerScene:
         setting = self.prepare()
         bodies = {body.name: k for k, body in enumerate(setting.bodies)}
         around = {body.name: k for k, body in enumerate(setting.surroundings.bodies)}
-        for name in (a, b):
+        for argument, name in (("a", a), ("b", b)):
+            checks.text(f"RobotChecker.allow: {argument}", name)
             if not (name in bodies or name in around or name in self.robot.links):
-                raise InvalidArgument(f"RobotChecker.allow: no link, attached object or body is called {brief(name)}")
+                unknown = f"no link, attached object or body is called {brief(name)}"
+                raise InvalidArgument(f"RobotChecker.allow: {argument}: {unknown}")
         self._asked = [*self._asked, (a, b)]
         self_pairs, allowed, n_before = setting.self_pairs, setting.allowed.copy(), self.n_pairs
         a, b = (b, a) if a in around else (a, b)

@@ -160,7 +160,9 @@ class RobotChecker(CheckerScene):
         Tables of links, spheres and maps are taken over. Questions begun before are answered without the object. A
         number as ``padding`` holds for the object, too.
         """
-        self._attach((name, link, shape, X_LS, (touch,) if isinstance(touch, str) else tuple(touch)))
+        names = [touch] if isinstance(touch, str) else checks.listed_entries(
+            "RobotChecker.attach: touch", touch, "names of links and bodies")
+        self._attach((name, link, shape, X_LS, tuple(names)))
 
     def detach(self, name: str) -> None:
         """Take an attached object away: a part that was put down.

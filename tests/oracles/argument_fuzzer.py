@@ -175,7 +175,8 @@ def spline() -> collide.Spline:
 
 
 def checker() -> collide.RobotChecker:
-    return collide.RobotChecker(robot(), world())
+    held = [("held", robot().links[-1], collide.Sphere(0.01))]
+    return collide.RobotChecker(robot(), world(), attached=held)
 
 
 def world() -> collide.World:
@@ -260,6 +261,10 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
     "PointCloud": lambda: {"points": np.eye(3)},
     "Robot": lambda: {"name": "r", "links": ["a"], "joints": []},
     "RobotChecker": lambda: {"robot": robot()},
+    "enclosing_spheres": lambda: {"shape": collide.Box((1.0, 1.0, 1.0))},
+    "plan": lambda: {
+        "checker": collide.RobotChecker(robot(), allowed=[("base", "slider")]), "start": [0.0], "goal": [0.1],
+    },
     "ShapeSet": lambda: {"shapes": [BOX]},
     "signed_distances": lambda: {"mesh": mesh(), "points": (0, 0, 0)},
     "SpacePartition": lambda: {"mesh": mesh()},
@@ -458,6 +463,9 @@ METHODS: dict[str, Callable[[], dict[str, Any]]] = {
     "RobotChecker.names_of": lambda: {"a": 0, "b": 1},
     "RobotChecker.self_filter": lambda: {"points": np.eye(3), "Q": [0.0]},
     "RobotChecker.from_scene": lambda: {"scene": scene()},
+    "RobotChecker.attach": lambda: {"name": "cup", "link": robot().links[-1], "shape": collide.Sphere(0.01)},
+    "RobotChecker.detach": lambda: {"name": "held"},
+    "RobotChecker.allow": lambda: {"a": robot().links[-1], "b": "held"},
     "RobotChecker.certify_path": lambda: {"Q": [[0.0], [0.1]]},
     "RobotChecker.certify_spline": lambda: {"motion": spline()},
     "RobotChecker.certify_boxes": lambda: {"lo": [[0.0]], "hi": [[0.1]]},
@@ -537,6 +545,7 @@ EXCUSED = {
     "CertifiedBoxes": "made by RobotChecker",
     "CertifiedEdges": "made by RobotChecker",
     "CertifiedMotion": "made by RobotChecker",
+    "MotionPlan": "made by plan",
     "RobotDistances": "made by RobotChecker",
     "LinkPair": "made by Proposal",
     "Proposal": "made by propose_disabled_pairs",
