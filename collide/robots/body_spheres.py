@@ -33,8 +33,8 @@ _STEPS, _ASCENTS = 16, 24
 
 class BodySpheres(NamedTuple):
     """Spheres of a body in its frame.   outer, inner : (n, 4) centres and radii [m]; the body lies within the union of
-    the outer ones, and the inner ones lie within the body.   is_exact : whether the body is the union of the outer
-    ones.
+    the outer ones, and the inner ones lie within the body.   is_exact : whether the body is a union of spheres: outer
+    and inner ones are these, larger and smaller by roundings, radii below 0 among them.
     """
 
     outer: np.ndarray
@@ -50,11 +50,10 @@ def spheres_of(body: RobotBody) -> BodySpheres:
     items = body.shape.items if isinstance(body.shape, Compound) else [(body.shape, np.eye(4))]
     count = max(1, _COUNT // len(items))
     made = [(_spheres_of_shape(shape)(count), X) for shape, X in items]
-    return BodySpheres(
-        np.concatenate([_moved(spheres.outer, X, 1.0) for spheres, X in made]),
-        np.concatenate([_moved(spheres.inner, X, -1.0) for spheres, X in made]),
-        all(spheres.is_exact for spheres, _ in made),
-    )
+    outer, inner = (
+        np.concatenate([_moved(spheres[k], X, sign) for spheres, X in made]) for k, sign in ((0, 1.0), (1, -1.0)))
+    is_exact = all(spheres.is_exact for spheres, _ in made)
+    return BodySpheres(outer, inner if is_exact else inner[inner[:, 3] > 0.0], is_exact)
 
 
 def _moved(spheres: np.ndarray, X: np.ndarray, sign: float) -> np.ndarray:
@@ -63,7 +62,7 @@ def _moved(spheres: np.ndarray, X: np.ndarray, sign: float) -> np.ndarray:
     out[:, :3] = spheres[:, :3] @ X[:3, :3].T + X[:3, 3]
     if (X != np.eye(4)).any():
         out[:, 3] += sign * (ROUNDING * (np.abs(out).sum(axis=1) + np.abs(spheres).sum(axis=1)) + skew * spheres[:, 3])
-    return out[out[:, 3] > 0.0] if sign < 0.0 else out
+    return out
 
 
 @kept_with_shape("_link_spheres")
@@ -92,8 +91,9 @@ def _made(shape: Shape, count: int) -> BodySpheres:
     parts = bounding_parts_of(shape)
     same = without_meshes(shape)
     if are_spheres(shape):
-        centres = [X[:3, :3] @ part.points[0] + X[:3, 3] for part, X in parts]
-        return BodySpheres(np.column_stack([centres, [part.radius for part, _ in parts]]), _NOTHING, True)
+        rows = [(np.array([[*part.points[0], part.radius]]), X) for part, X in parts]
+        outer, inner = (np.concatenate([_moved(row, X, sign) for row, X in rows]) for sign in (1.0, -1.0))
+        return BodySpheres(outer, inner, True)
     share = max(1, count // len(parts))
     outer = np.concatenate([_moved(outer_spheres(part, share), X, 1.0) for part, X in parts])
     return BodySpheres(outer, _inner_spheres(shape if same is None else same, outer[:, :3]), False)

@@ -73,10 +73,12 @@ def _rows_by_padding(_shape: Shape) -> dict[float, tuple]:
 def _rows_of(body: RobotBody) -> tuple[tuple[int, ...], np.ndarray, np.ndarray]:
     """(integers of a body whose spheres begin at 0, (n, SPHERE) its spheres, (SPHERE,) the sphere around them)."""
     spheres = spheres_of(body)
-    n_outer, n_inner = len(spheres.outer), len(spheres.inner)
-    rows = np.concatenate([_padded(spheres.outer, body.padding, 1.0), _padded(spheres.inner, body.padding, -1.0)])
+    outer, inner = _padded(spheres.outer, body.padding, 1.0), _padded(spheres.inner, body.padding, -1.0)
+    if spheres.is_exact:
+        less = (outer - inner)[:, [layout.RADIUS, layout.PADDED_RADIUS]].max(axis=1)
+        outer[:, layout.LESS_WITHIN], inner = less * (1.0 + ROUNDING), inner[:0]
     around = _padded(_sphere_around(spheres.outer)[None], body.padding, 1.0)[0]
-    return (0, n_outer, n_outer, n_inner, int(spheres.is_exact)), rows, around
+    return (0, len(outer), len(outer), len(inner), int(spheres.is_exact)), np.concatenate([outer, inner]), around
 
 
 def _padded(spheres: np.ndarray, padding: float, sign: float) -> np.ndarray:

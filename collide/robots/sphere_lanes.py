@@ -78,9 +78,10 @@ FIRST_OUTER, N_OUTER, FIRST_INNER, N_INNER, IS_EXACT = range(5)
 BODY_SPHERES = 5
 # Integers of a pair left open: a body, another or −1 − a part around, and the lanes as bits.
 OPEN_PAIR = 3
-# Doubles of a sphere: its centre in the link; its radius among the robot's bodies, and with the padding.
-CENTRE, RADIUS, PADDED_RADIUS = 0, 3, 4
-SPHERE = 5
+# Doubles of a sphere: its centre in the link; its radius among the robot's bodies, and with the padding; by how much
+# less of a sphere that is the body itself lies within.
+CENTRE, RADIUS, PADDED_RADIUS, LESS_WITHIN = 0, 3, 4, 5
+SPHERE = 6
 # Lanes of a sphere in the world: its centre, and by how much rounding may have moved it.
 SPHERE_PLACE = 4
 #: What a part around is: a box swept by a ball; a cylinder likewise; a half-space; a part known by its box alone.
@@ -274,7 +275,7 @@ def _check_part(scene, spheres, body, part, margin, is_near, verdicts):
         reach = radius + core.at_most + place[SPHERE_PLACE * k + 3] + margin
         possible = possible | (is_near & ~(square > reach * reach))
         if is_exact:
-            within = radius + core.at_least - place[SPHERE_PLACE * k + 3]
+            within = radius - rows[SPHERE * k + LESS_WITHIN] + core.at_least - place[SPHERE_PLACE * k + 3]
             hits = hits | (is_near & (within > 0.0) & (square < within * within))
     if any_of(possible & ~hits) and core.at_least > -math.inf:
         first = spheres.counts[at + FIRST_INNER]
@@ -414,7 +415,8 @@ def check_pair(scene, spheres, number, a, b, margin, verdicts):
             square = _squared_between(place, i, place, j)
             possible = possible | (some & ~(square > _squared_reach(place, i, place, j, radii + margin, 1.0)))
             if are_exact:
-                hits = hits | (some & (square < _squared_reach(place, i, place, j, radii, -1.0)))
+                within = radii - (rows[SPHERE * i + LESS_WITHIN] + rows[SPHERE * j + LESS_WITHIN])
+                hits = hits | (some & (square < _squared_reach(place, i, place, j, within, -1.0)))
     if not are_exact and any_of(possible):
         hits = _check_within(spheres, a, b, possible, hits)
     return _open_in(spheres, a, b, hits, possible & ~hits, verdicts)
@@ -476,7 +478,8 @@ def _check_within(spheres, a, b, possible, hits):
     which_b = FIRST_OUTER if counts[to + IS_EXACT] != 0 else FIRST_INNER
     for i in range(counts[at + which_a], counts[at + which_a] + counts[at + which_a + 1]):
         for j in range(counts[to + which_b], counts[to + which_b] + counts[to + which_b + 1]):
-            radii = rows[SPHERE * i + RADIUS] + rows[SPHERE * j + RADIUS]
-            reach = _squared_reach(place, i, place, j, radii, -1.0)
+            within = rows[SPHERE * i + RADIUS] - rows[SPHERE * i + LESS_WITHIN] + (
+                rows[SPHERE * j + RADIUS] - rows[SPHERE * j + LESS_WITHIN])
+            reach = _squared_reach(place, i, place, j, within, -1.0)
             hits = hits | (possible & (_squared_between(place, i, place, j) < reach))
     return hits

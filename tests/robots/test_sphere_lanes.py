@@ -12,6 +12,8 @@ from random_robots import random_configurations, random_robot, scene_of_spheres,
 import collide
 from collide.kernels import address_of
 from collide.robots.check_configurations import check_configurations
+from collide.robots.kinematic_tree import Joint
+from collide.robots.robot import LinkShape, Robot
 
 
 def asked_alone(checker: collide.RobotChecker, q: np.ndarray) -> bool:
@@ -81,6 +83,23 @@ def test_at_a_touch_verdicts_are_exact(seed):
             n_open += share_settled(checker, Q) == 0.0
             verdicts.add(expected)
     assert verdicts == {True, False} and 8 <= n_open <= 20, n_open
+
+
+def test_spheres_turned_in_their_links_do_not_meet_across_a_gap_of_roundings():
+    """Two balls of 1 m, each at a pose of its own in its link, 2 m and 1e-12 m apart: proven to be apart."""
+    turned = pose(t=(0.0, 0.0, 0.0))
+    turned[:2, :2] = (0.0, -1.0), (1.0, 0.0)
+    geometry = {name: [LinkShape(collide.Sphere(1.0), turned, None, "test")] for name in ("base", "cart")}
+    verdicts = []
+    for gap in (1e-12, 3e-13, 0.0, -1e-12):
+        slide = Joint("slide", "prismatic", "base", "cart", pose(t=(2.0 + gap, 0, 0)), (1.0, 0, 0), -1.0, 1.0)
+        checker = collide.RobotChecker(Robot("balls", ["base", "cart"], [slide], geometry, semantic_pairs=[]))
+        expected, Q = asked_alone(checker, np.zeros(1)), np.zeros((8, 1))
+        assert checker.setting.spheres is not None
+        assert checker.collides(Q).tolist() == [expected] * 8, gap
+        assert checker.certify_edges(Q, Q).collides.tolist() == [expected] * 8, gap
+        verdicts.append(expected)
+    assert verdicts == [False, False, True, True]
 
 
 def test_links_in_lanes_have_the_bits_of_links_alone():
