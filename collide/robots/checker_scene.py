@@ -86,7 +86,7 @@ class CheckerScene:
         matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
         self._tables = self._joined_tables(np.concatenate(matrices))
         known = self.robot.link_maps
-        if known is not None and known[0] == self._key_of_links():  # another checker has made spheres of these links
+        if known is not None and known[0] == self._key_of_maps():  # another checker has made spheres of these links
             self._maps, of_any = known[1], True
         self._spheres = sphere_tables(self._tables, self._bodies, of_any=of_any)
         self._n_asked = _PAY_FOR_SPHERES if of_any or self._spheres is not None else 0
@@ -108,6 +108,10 @@ class CheckerScene:
     def _key_of_links(self) -> tuple:
         """What tables of links depend on; the shapes are kept with the robot."""
         return tuple(id(body.shape) for body in self._bodies[len(self._objects) :])
+
+    def _key_of_maps(self) -> tuple:
+        """What maps of links depend on: their bounds of roundings, on where the robot stands as well."""
+        return self._X_WR.tobytes(), *self._key_of_links()
 
     def _attach(self, values: tuple) -> None:
         """Attach an object (name, link, shape, X_LS, touch). Raises InvalidArgument, InvalidPose."""
@@ -273,9 +277,11 @@ class CheckerScene:
             spheres = self._spheres_among(setting.surroundings)
             setting = self._setting = setting._replace(spheres=spheres, spare=[])
             if spheres is not None:
-                self._maps = pair_maps(self.robot, setting, CheckWorkspace(self.robot, setting))
-                self._setting = setting._replace(maps=self._maps, spare=[])
-                self.robot.link_maps = self._key_of_links(), self._maps
+                maps = pair_maps(self.robot, setting, CheckWorkspace(self.robot, setting))
+                self._setting = setting._replace(maps=maps, spare=[])
+                # Another object may be attached by the same name: maps of links alone are kept.
+                self._maps = maps.among([pair for pair in maps.names if self._objects.keys().isdisjoint(pair)])
+                self.robot.link_maps = self._key_of_maps(), self._maps
 
     def _spheres_among(self, around: Surroundings) -> SphereTables | None:
         """Spheres of the robot, but not among fields, whose boxes the robot is in."""

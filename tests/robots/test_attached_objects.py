@@ -12,6 +12,9 @@ from random_robots import random_configurations, random_link_shape, random_robot
 
 import collide
 from collide.errors import InvalidArgument
+from collide.robots.kinematic_tree import Joint
+from collide.robots.map_layout import N_FIRST
+from collide.robots.robot import LinkShape, Robot
 
 
 def a_scene(seed: int) -> tuple[collide.Robot, collide.World, np.random.Generator]:
@@ -80,6 +83,29 @@ def test_spheres_and_maps_are_taken_over():
     assert len(checker.setting.spheres.counts) == len(spheres.counts) + 1 and checker._maps is maps
     checker.detach("box")
     assert checker.setting.spheres.spheres.tobytes() == spheres.spheres.tobytes()
+
+
+@pytest.mark.parametrize("how", ["attached anew", "of another checker"])
+def test_maps_of_an_object_are_not_those_of_the_next_by_its_name(how):
+    """A small part is taken from the cart, then a long one, which reaches into the base: nothing is proven free."""
+    block = [LinkShape(collide.Box((0.1, 0.1, 0.1)), np.eye(4), None, "test")]
+    slide = Joint("slide", "prismatic", "base", "cart", pose(t=(0.5, 0, 0)), (1.0, 0, 0), -0.1, 0.1)
+    robot = Robot("blocks", ["base", "cart"], [slide], {"base": block, "cart": block}, semantic_pairs=[])
+    small, Q = ("part", "cart", collide.Box((0.1, 0.1, 0.1)), pose(t=(0, 0, 0.2))), np.zeros((8, 1))
+    long = ("part", "cart", collide.Box((1.9, 0.1, 0.1)))
+    checker = collide.RobotChecker(robot, attached=[small])
+    checker._count(10**6)
+    assert checker.setting.maps is not None and (checker.setting.maps.ints[:, N_FIRST] > 0).any()
+    assert not checker.collides(Q).any()
+    if how == "attached anew":
+        checker.detach("part")
+        checker.attach(*long)
+    else:
+        checker = collide.RobotChecker(robot, attached=[long])
+        assert checker.setting.maps is not None
+    assert checker.collides(Q).all() and checker.collides(Q[0])
+    edges = checker.certify_edges(Q, Q + 0.01)
+    assert edges.collides.all() and not edges.free.any()
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda robot: pickle.loads(pickle.dumps(robot))])
