@@ -79,7 +79,9 @@ class CheckerScene:
         self._mobile = checks.true_or_false("RobotChecker: mobile", mobile)
         self._maps: PairMaps | None = None
         self._around: Surroundings | None = None
+        self._names_asked: set[str] = set()  # checked: their bodies may leave the World
         self._make_tables()
+        self._names_asked = {name for pair in self._asked for name in pair[:2]}
 
     def _make_tables(self, *, of_any: bool = False) -> None:
         """Those of the robot, and the first setting.   of_any : whether spheres are made of all bodies."""
@@ -143,7 +145,7 @@ class CheckerScene:
             if not (name in bodies or name in around or name in self.robot.links):
                 unknown = f"no link, attached object or body is called {brief(name)}"
                 raise InvalidArgument(f"RobotChecker.allow: {argument}: {unknown}")
-        self._asked = [*self._asked, (a, b)]
+        self._asked, self._names_asked = [*self._asked, (a, b)], self._names_asked | {a, b}
         self_pairs, allowed, n_before = setting.self_pairs, setting.allowed.copy(), self.n_pairs
         a, b = (b, a) if a in around else (a, b)
         if a in bodies and b in bodies:
@@ -257,7 +259,8 @@ class CheckerScene:
         if before is not None and seen.has_pairs_of(before.seen):
             filters = before.self_pairs, before.allowed, before.skipped
         else:
-            filters = filters_of(self.robot, self._bodies, self._objects, seen, around, self._asked, self._mobile)
+            filters = filters_of(
+                self.robot, self._bodies, self._objects, seen, around, self._asked, self._mobile, self._names_asked)
         surroundings = self._around = surroundings_of(around, self._around)
         base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
         tables = tables_among(self._tables, surroundings, before)

@@ -82,7 +82,9 @@ def _with_obstacles(checker: CheckerScene, world, joints: list[Joint], geometry,
         semantic_pairs=[*robot.disabled_pairs, *among],
     )
     around = [body for body in world.names.values() if body not in extended.geometry]
-    asked = [*checker._asked, *((a, b, "both are obstacles") for a in obstacles for b in around)]
+    known = {*extended.links, *checker._objects, *around}
+    asked = [pair for pair in checker._asked if known.issuperset(pair[:2])]
+    asked += [(a, b, "both are obstacles") for a in obstacles for b in around]
     padding = {body.name: body.padding for body in checker._bodies} | margins
     objects = list(checker._objects.values())
     return CheckerScene(extended, world, None, objects, padding, asked, checker._mobile, frozenset(obstacles))

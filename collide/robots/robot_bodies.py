@@ -202,15 +202,17 @@ def refuse_own_margins(packed: SeenWorld, robot: Robot) -> None:
 
 def filters_of(
     robot: Robot, bodies: list[RobotBody], objects: dict[str, Attached], world: World | SeenWorld,
-    around: list[BodyAround], allowed: Iterable[tuple[str, str]], mobile: bool,
+    around: list[BodyAround], allowed: Iterable[tuple[str, str]], mobile: bool, gone: Iterable[str] = (),
 ) -> Filters:
     """Tested pairs, and the number of untested pairs by reason.
+
+    gone : names of bodies that have left the World, which ``allowed`` may have as well.
 
     Never tested: pairs disabled by the robot, pairs named in ``allowed`` or in the World, links of a fixed base against
     static or sleeping bodies, and pairs excluded by groups and masks: a link has group and mask of the World's body of
     its name, else group 1 with all.
     """
-    known = {body.name for body in bodies} | {body.name for body in around}
+    known = {body.name for body in bodies} | {body.name for body in around} | set(gone)
     reasons = _named_pairs(robot, objects, world, allowed, known)
     skipped: dict[str, int] = {}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 import threading
 import time
@@ -9,7 +10,7 @@ import time
 import numpy as np
 import pytest
 from naive import pose, random_pose, rng_of
-from random_robots import random_robot
+from random_robots import random_robot, slider
 
 import collide
 
@@ -67,6 +68,29 @@ def test_after_a_change_answers_are_those_of_a_checker_made_anew(name, seed):
         CHANGES[names[k]](world, k)
         assert told(checker, Q) == told(collide.RobotChecker(robot, world, padding=0.01 * seed), Q), (seed, names[k])
         assert checker._tables is kept
+
+
+@pytest.mark.parametrize("is_later", [False, True])
+def test_a_body_of_an_allowed_pair_may_leave_the_world_and_come_back(is_later):
+    """Questions go on without the body, copies' too; its pair is allowed again once a body has its name."""
+    world, robot = collide.World(), slider()
+    world.add(collide.Sphere(0.1), name="ball")
+    checker = collide.RobotChecker(robot, world, allowed=[] if is_later else [("cart", "ball")])
+    assert checker.collides([0.0]) == is_later
+    if is_later:
+        checker.allow("ball", "cart")
+    assert not checker.collides([0.0])
+    world.remove("ball")
+    world.add(collide.Sphere(0.1), pose(t=(0.5, 0, 0)), name="other")
+    straight = collide.Spline.straight([[0.0], [0.2]])
+    for asked in (checker, copy.copy(checker)):
+        assert asked.collides([0.5]) and not asked.collides([0.0])
+        moved = asked.certify_spline(straight, moving={"other": collide.Spline.straight([[0.5, 0, 0], [0.1, 0, 0]])})
+        assert moved.collides.all()
+    world.add(collide.Sphere(0.1), name="ball")
+    assert not checker.collides([0.0]) and checker.collides([0.5])
+    with pytest.raises(collide.InvalidArgument, match="ghost"):
+        collide.RobotChecker(robot, world, allowed=[("cart", "ghost")])
 
 
 def test_the_changes_of_these_tests_change_answers():
