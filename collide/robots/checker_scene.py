@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
@@ -47,6 +48,8 @@ if TYPE_CHECKING:
 #: Once so many configurations have been asked, spheres are made of bodies that are not, and maps: in a few tenths of a
 #: second, kept with the robot.
 _PAY_FOR_SPHERES = 50_000
+#: Held for moments, while attributes of a checker are read or written together.
+_PUBLISHING = threading.Lock()
 #: A thread is handed at least so many configurations.
 _LEAST_PIECE = 512
 
@@ -117,11 +120,11 @@ class CheckerScene:
 
     def _attach(self, values: tuple) -> None:
         """Attach an object (name, link, shape, X_LS, touch). Raises InvalidArgument, InvalidPose."""
-        item = checked_object(self.robot, self._objects, values)
+        item, changed = checked_object(self.robot, self._objects, values), self._as_it_is()
         padding = 0.0 if isinstance(self._padding, Mapping) else float(self._padding)
-        self._objects = {**self._objects, item.name: item}
-        self._bodies = [body_of_object(self.robot, item, padding), *self._bodies]
-        self._make_tables(of_any=self._spheres is not None)
+        changed._objects = {**self._objects, item.name: item}
+        changed._bodies = [body_of_object(self.robot, item, padding), *self._bodies]
+        self._become(changed)
 
     def _detach(self, name: str) -> None:
         """Take an attached object away, and what was allowed for it. Raises InvalidArgument."""
@@ -130,10 +133,30 @@ class CheckerScene:
             raise InvalidArgument(
                 f"RobotChecker.detach: name: no attached object is called {brief(name)}; attached: {known}"
             )
-        self._objects = {known: item for known, item in self._objects.items() if known != name}
-        self._bodies = [body for body in self._bodies if body.name != name]
-        self._asked = [pair for pair in self._asked if name not in pair[:2]]
-        self._make_tables(of_any=self._spheres is not None)
+        changed = self._as_it_is()
+        changed._objects = {known: item for known, item in self._objects.items() if known != name}
+        changed._bodies = [body for body in self._bodies if body.name != name]
+        changed._asked = [pair for pair in self._asked if name not in pair[:2]]
+        self._become(changed)
+
+    def _as_it_is(self) -> Self:
+        """A checker with the attributes of an instant: questions read them while threads attach and allow."""
+        read = object.__new__(type(self))
+        with _PUBLISHING:
+            vars(read).update(vars(self))
+        return read
+
+    def _become(self, changed: CheckerScene) -> None:
+        """Take over other bodies, once their tables are made: questions begun before go on with what they have read."""
+        changed._make_tables(of_any=self._spheres is not None)
+        with _PUBLISHING:
+            vars(self).update({name: value for name, value in vars(changed).items() if name != "world"})
+
+    def _publish(self, read: CheckerScene, **made) -> None:
+        """Keep what was made of attributes as they were read, unless bodies or pairs have changed since."""
+        with _PUBLISHING:
+            if self._bodies is read._bodies:
+                vars(self).update(made)
 
     def _allow(self, a: str, b: str) -> None:
         """Test a pair no more. Raises InvalidArgument."""
@@ -145,7 +168,7 @@ class CheckerScene:
             if not (name in bodies or name in around or name in self.robot.links):
                 unknown = f"no link, attached object or body is called {brief(name)}"
                 raise InvalidArgument(f"RobotChecker.allow: {argument}: {unknown}")
-        self._asked, self._names_asked = [*self._asked, (a, b)], self._names_asked | {a, b}
+        named, asked = self._names_asked | {a, b}, [*self._asked, (a, b)]
         self_pairs, allowed, n_before = setting.self_pairs, setting.allowed.copy(), self.n_pairs
         a, b = (b, a) if a in around else (a, b)
         if a in bodies and b in bodies:
@@ -158,8 +181,10 @@ class CheckerScene:
         if n_fewer:
             skipped["allowed"] = skipped.get("allowed", 0) + n_fewer
         maps = self._maps_of(self_pairs)
-        self._setting = setting._replace(
-            self_pairs=self_pairs, allowed=allowed, skipped=skipped, maps=maps, made_of=setting.made_of, spare=[])
+        again = [*setting.bodies]  # settings without the pair are known by their bodies
+        setting = setting._replace(
+            bodies=again, self_pairs=self_pairs, allowed=allowed, skipped=skipped, maps=maps, spare=[])
+        self._publish(self, _bodies=again, _setting=setting, _asked=asked, _names_asked=named)
 
     def _maps_of(self, self_pairs: np.ndarray) -> PairMaps | None:
         return None if self._maps is None else self._maps.among(names_of_pairs(self._bodies, self_pairs))
@@ -248,11 +273,17 @@ class CheckerScene:
             self._is_fixed or (before.seen.world is world and world._is_as_of(before.seen.version))
         ):
             return before
-        seen = SeenWorld(world)
+        read = self._as_it_is()
+        setting = read._made_setting(SeenWorld(read.world))
+        self._publish(read, _setting=setting, _around=read._around)
+        return setting
+
+    def _made_setting(self, seen: SeenWorld) -> Setting:
+        """The setting of a World as seen; what has not changed since the last setting is taken over."""
+        before = self._setting
         if before is not None and seen.differs_in_poses_from(before.seen):
             moved = self._among_moved_bodies(before, seen)
             if moved is not None:
-                self._setting = moved
                 return moved
         refuse_own_margins(seen, self.robot)
         around = bodies_around(seen, self.robot)
@@ -266,9 +297,7 @@ class CheckerScene:
         tables = tables_among(self._tables, surroundings, before)
         spheres = self._spheres_among(surroundings)
         maps = before.maps if before is not None and filters[0] is before.self_pairs else self._maps_of(filters[0])
-        setting = Setting(self._bodies, base, surroundings, tables, *filters, spheres, maps, seen, seen, [])
-        self._setting = setting
-        return setting
+        return Setting(self._bodies, base, surroundings, tables, *filters, spheres, maps, seen, seen, [])
 
     def _count(self, n: int) -> None:
         """Take note of n configurations to be asked. Where so many have been asked that spheres pay, they are made."""
@@ -276,15 +305,17 @@ class CheckerScene:
             return
         self._n_asked += n
         if self._n_asked >= _PAY_FOR_SPHERES:
-            setting, self._spheres = self.prepare(), sphere_tables(self._tables, self._bodies, of_any=True)
-            spheres = self._spheres_among(setting.surroundings)
-            setting = self._setting = setting._replace(spheres=spheres, spare=[])
+            read = self._as_of_now()
+            read._spheres = sphere_tables(read._tables, read._bodies, of_any=True)
+            spheres = read._spheres_among(read.setting.surroundings)
+            setting = read.setting._replace(spheres=spheres, spare=[])
             if spheres is not None:
                 maps = pair_maps(self.robot, setting, CheckWorkspace(self.robot, setting))
-                self._setting = setting._replace(maps=maps, spare=[])
+                setting = setting._replace(maps=maps, spare=[])
                 # Another object may be attached by the same name: maps of links alone are kept.
-                self._maps = maps.among([pair for pair in maps.names if self._objects.keys().isdisjoint(pair)])
-                self.robot.link_maps = self._key_of_maps(), self._maps
+                read._maps = maps.among([pair for pair in maps.names if read._objects.keys().isdisjoint(pair)])
+                self.robot.link_maps = read._key_of_maps(), read._maps
+            self._publish(read, _setting=setting, _spheres=read._spheres, _maps=read._maps)
 
     def _spheres_among(self, around: Surroundings) -> SphereTables | None:
         """Spheres of the robot, but not among fields, whose boxes the robot is in."""
@@ -324,9 +355,11 @@ class CheckerScene:
         """The checker among the bodies as they stand now; changes of the World during a question do not reach it."""
         if self._is_fixed:
             return self
-        fixed = object.__new__(type(self))
-        vars(fixed).update(vars(self), _setting=self.prepare(), _is_fixed=True)
-        return fixed
+        while True:
+            setting, fixed = self.prepare(), self._as_it_is()
+            if setting.bodies is fixed._bodies:  # nothing was attached in between
+                fixed._setting, fixed._is_fixed = setting, True
+                return fixed
 
     def in_pieces(self, n: int, threads: int, progress, work: Callable[[CheckWorkspace, slice], None]) -> None:
         """Have ``work`` done on pieces of n units by so many threads, each with a workspace of its own."""

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import pickle
+import threading
 
 import numpy as np
 import pytest
 from naive import pose, random_pose, rng_of
-from random_robots import random_configurations, random_link_shape, random_robot, scene_of_spheres
+from random_robots import random_configurations, random_link_shape, random_robot, scene_of_spheres, slider
 
 import collide
 from collide.errors import InvalidArgument
+from collide.robots import checker_scene
 from collide.robots.kinematic_tree import Joint
 from collide.robots.map_layout import N_FIRST
 from collide.robots.robot import LinkShape, Robot
@@ -106,6 +109,62 @@ def test_maps_of_an_object_are_not_those_of_the_next_by_its_name(how):
     assert checker.collides(Q).all() and checker.collides(Q[0])
     edges = checker.certify_edges(Q, Q + 0.01)
     assert edges.collides.all() and not edges.free.any()
+
+
+@pytest.mark.parametrize("step", ["filters_of", "surroundings_of", "tables_among"])
+def test_an_object_attached_while_another_question_makes_tables_is_not_lost(step, monkeypatch):
+    """A question that sees a change of the World is amid its tables when an object is attached: it goes on without the
+    object, questions behind it have the object.
+    """
+    world, made = collide.World(), getattr(checker_scene, step)
+    checker = collide.RobotChecker(slider(), world)
+
+    def attach_once(*arguments):
+        monkeypatch.setattr(checker_scene, step, made)
+        checker.attach("rod", "cart", collide.Box((1.0, 0.1, 0.1)))
+        return made(*arguments)
+
+    monkeypatch.setattr(checker_scene, step, attach_once)
+    world.add(collide.Sphere(0.1), pose(t=(0.55, 0, 0)), name="ball")
+    assert not checker.collides([0.0])
+    assert checker.bodies == ["rod", "cart"] and checker.n_pairs == 2
+    assert checker.collides(np.zeros((8, 1))).all() and checker.collides([0.0]) and not checker.collides([-0.5])
+
+
+def test_threads_ask_while_objects_are_attached_and_bodies_move():
+    robot, world, rng = a_scene(4)
+    link, Q, wrong = robot.links[-1], random_configurations(rng, robot, 12), []
+    rod, name = collide.Box((0.8, 0.1, 0.1)), world.names[world.ids[0]]
+    places, known = [random_pose(rng, 0.6) for _ in range(2)], []
+    for X_WB in places:
+        world.set_pose(name, X_WB)
+        for attached in ([], [("rod", link, rod)]):
+            known.append(collide.RobotChecker(robot, world, attached=attached).collides(Q).tolist())
+    checker, is_over = collide.RobotChecker(robot, world), threading.Event()
+
+    def ask():
+        while not is_over.is_set():
+            told_now = checker.collides(Q).tolist()
+            if told_now not in known:
+                wrong.append(told_now)
+
+    def move():
+        for X_WB in itertools.cycle(places):
+            if is_over.is_set():
+                return
+            world.set_pose(name, X_WB)
+
+    threads = [threading.Thread(target=work) for work in (ask, ask, move)]
+    for thread in threads:
+        thread.start()
+    for _ in range(40):
+        checker.attach("rod", link, rod)
+        checker.detach("rod")
+    is_over.set()
+    for thread in threads:
+        thread.join()
+    assert not wrong and len({tuple(verdicts) for verdicts in known}) > 1
+    assert checker.collides(Q).tolist() == collide.RobotChecker(robot, world).collides(Q).tolist()
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda robot: pickle.loads(pickle.dumps(robot))])
