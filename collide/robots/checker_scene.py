@@ -94,7 +94,7 @@ class CheckerScene:
         if known is not None and known[0] == self._key_of_maps():  # another checker has made spheres of these links
             self._maps, of_any = known[1], True
         self._spheres = sphere_tables(self._tables, self._bodies, of_any=of_any)
-        self._n_asked = _PAY_FOR_SPHERES if of_any or self._spheres is not None else 0
+        self._n_asked = _PAY_FOR_SPHERES if of_any else 0
         self._setting: Setting | None = None
         self.prepare()
 

@@ -48,8 +48,8 @@ class RobotChecker(CheckerScene):
         The surroundings. Bodies named like links of the robot with collision geometry are the robot itself, as in
         `Scene.world`: they are left out; pairs allowed for them, their groups and masks hold. Margins of the others
         swell them against the robot; sleeping bodies are obstacles, too. The next call sees every change of the
-        World, which costs a millisecond or two of tables, none of the robot's. A call is answered as of its begin,
-        whatever other threads change.
+        World: a moved body costs microseconds, another shape a millisecond of tables, none of the robot's. A call is
+        answered as of its begin, whatever other threads change.
     X_WR : (4, 4), optional
         Pose of the robot's root in the world W [m], by default the identity.
     attached : iterable of (name, link, shape, X_LS, touch)
