@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.base.poses_at import poses_at
 from collide.lowering.facet_bodies import body_of
 from collide.mesh.bvh import MeshTree
 from collide.narrowphase.facets.facet_queries import points_in_solid, surface_distances
@@ -83,8 +84,6 @@ class CommonPoints:
         rows = np.flatnonzero(points_in_solid(tree, X[which], points, np.eye(4)) == INSIDE)
         proven = np.zeros(len(placed), dtype=bool)
         if len(rows):
-            at = np.tile(np.eye(4), (len(rows), 1, 1))
-            at[:, :3, 3] = points[rows]
-            gaps = surface_distances(tree, body_of(_POINT).tree, X[which[rows]], at)
+            gaps = surface_distances(tree, body_of(_POINT).tree, X[which[rows]], poses_at(points[rows]))
             proven[which[rows[gaps.lower > error[which[rows]]]]] = True
         return proven

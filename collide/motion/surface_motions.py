@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from collide.base.poses_at import poses_at
 from collide.kernels import address_of
 from collide.lowering.compound_table import PART, TURNED
 from collide.lowering.enclosures import enclosure_of
@@ -199,9 +200,7 @@ def _thickness(shape: Shape, tree: MeshTree) -> float:
     """How far a polytope around a convex shape is from it at most, at its corners [m]; its surface is as far from the
     shape's."""
     corners = np.unique(tree.triangles.reshape(-1, 3), axis=0)
-    places = np.tile(np.eye(4), (len(corners), 1, 1))
-    places[:, :3, 3] = corners
-    rows = convex_rows(Sphere(SMALLEST), shape, places, np.eye(4)[None], depths=False)
+    rows = convex_rows(Sphere(SMALLEST), shape, poses_at(corners), np.eye(4)[None], depths=False)
     return float(rows["upper"].max(initial=0.0)) * (1 + 1e-12) + 1e-12 * _extent(shape)
 
 

@@ -7,11 +7,11 @@ from the surface, as `collide.distance` proves it.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
+from collide.base.poses_at import poses_at
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.extents import box_of
 from collide.lowering.packed_convex import POINTS, PackedConvex
@@ -107,7 +107,7 @@ def outer_spheres(packed: PackedConvex, count: int) -> np.ndarray:
         box = box_of(packed)
         signs = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
         corners, beyond = box[:3] + signs * box[3:], 0.0
-    pieces = [(corners, _ball_around(corners))]
+    pieces = [(corners, ball_around(corners))]
     whole: list[tuple[np.ndarray, np.ndarray]] = []
     while pieces and len(pieces) + len(whole) < count:
         pieces.sort(key=lambda piece: piece[1][3])
@@ -137,7 +137,7 @@ def _best_halves(corners: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]] | N
         if not len(cut):
             continue
         both = [np.concatenate([corners[side], cut]) for side in (heights < 0.0, heights >= 0.0)]
-        candidates = [(half, _ball_around(half)) for half in both]
+        candidates = [(half, ball_around(half)) for half in both]
         if best is None or max(ball[3] for _, ball in candidates) < max(ball[3] for _, ball in best):
             best = candidates
     return best
@@ -151,18 +151,19 @@ def _edges_of(points: np.ndarray) -> np.ndarray:
     return np.concatenate([hull.facets[:, [0, 1]], hull.facets[:, [1, 2]], hull.facets[:, [2, 0]]])
 
 
-def _ball_around(points: np.ndarray) -> np.ndarray:
-    """(4,) a sphere around points: about the middle of their box, moved towards the farthest, ever less (Badoiu and
-    Clarkson, "Smaller core-sets for balls", 2003).
+def ball_around(centres: np.ndarray, radii: np.ndarray | float = 0.0, *, steps: int = _STEPS) -> np.ndarray:
+    """(4,) a sphere around spheres or points: about the middle of their box, moved towards the farthest, ever less
+    (Badoiu and Clarkson, "Smaller core-sets for balls", 2003).   radii : (n,), or of all.   steps : how often.
     """
-    centre, best = 0.5 * (points.min(axis=0) + points.max(axis=0)), np.full(4, np.inf)
-    for step in range(_STEPS):
-        squares = ((points - centre) ** 2).sum(axis=1)
-        k = int(squares.argmax())
-        if squares[k] < best[3]:
-            best = np.array([*centre, squares[k]])
-        centre = centre + (points[k] - centre) / (step + 2.0)
-    best[3] = math.sqrt(best[3])
+    beyond = np.reshape(radii, (-1, 1))
+    centre = 0.5 * ((centres - beyond).min(axis=0) + (centres + beyond).max(axis=0))
+    best = np.full(4, np.inf)
+    for step in range(steps):
+        reach = np.sqrt(((centres - centre) ** 2).sum(axis=1)) + radii
+        k = int(reach.argmax())
+        if reach[k] < best[3]:
+            best = np.array([*centre, reach[k]])
+        centre = centre + (centres[k] - centre) / (step + 2.0)
     return best
 
 
@@ -178,18 +179,11 @@ def _inner_spheres(shape: Shape, centres: np.ndarray) -> np.ndarray:
     packed = bounding_parts_of(shape)[0][0]
     if packed.kind == POINTS:
         centres = _moved_inwards(packed.points, centres)
-    rows = query.distance(shape, _POINT, np.eye(4), _at(centres), check_poses=False).rows
+    rows = query.distance(shape, _POINT, np.eye(4), poses_at(centres), check_poses=False).rows
     return _with_radii(centres, -rows["upper"])
 
 
 _POINT = ConvexHull(np.zeros((1, 3)))
-
-
-def _at(points: np.ndarray) -> np.ndarray:
-    """(n, 4, 4) poses at points."""
-    X = np.tile(np.eye(4), (len(points), 1, 1))
-    X[:, :3, 3] = points
-    return X
 
 
 def _in_frame(points: np.ndarray, X: np.ndarray) -> np.ndarray:
@@ -239,9 +233,9 @@ def _within_mesh(mesh: Mesh, centres: np.ndarray) -> np.ndarray:
     axes = [low[k] + (np.arange(n) + 0.5) / n * (high[k] - low[k]) for k, n in enumerate(cells.tolist())]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     points = np.concatenate([centres, grid])
-    points = points[query.collide(mesh, _POINT, np.eye(4), _at(points), check_poses=False)]
+    points = points[query.collide(mesh, _POINT, np.eye(4), poses_at(points), check_poses=False)]
     if not len(points):
         return _NOTHING
     surface = Mesh(mesh.vertices, mesh.faces, solid=False)
-    rows = query.distance(surface, _POINT, np.eye(4), _at(points), check_poses=False).rows
+    rows = query.distance(surface, _POINT, np.eye(4), poses_at(points), check_poses=False).rows
     return _with_radii(points, rows["lower"])

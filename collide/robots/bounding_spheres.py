@@ -13,7 +13,7 @@ from collide.kernels.lanes import LANES
 from collide.lowering.packed_convex import CYLINDER, HALFSPACE, POINTS, PackedConvex
 from collide.robots import motion_bounds as motions
 from collide.robots import sphere_lanes as layout
-from collide.robots.body_spheres import ROUNDING, are_spheres, spheres_of
+from collide.robots.body_spheres import ROUNDING, are_spheres, ball_around, spheres_of
 from collide.robots.check_scene import BOX, HALF
 from collide.robots.check_tables import CheckTables, RobotBody, RobotTables, Setting, Surroundings
 from collide.robots.forward_kinematics import LINK_POSE
@@ -77,7 +77,8 @@ def _rows_of(body: RobotBody) -> tuple[tuple[int, ...], np.ndarray, np.ndarray]:
     if spheres.is_exact:
         less = (outer - inner)[:, [layout.RADIUS, layout.PADDED_RADIUS]].max(axis=1)
         outer[:, layout.LESS_WITHIN], inner = less * (1.0 + ROUNDING), inner[:0]
-    around = _padded(_sphere_around(spheres.outer)[None], body.padding, 1.0)[0]
+    sphere = ball_around(spheres.outer[:, :3], spheres.outer[:, 3], steps=40)
+    around = _padded(sphere[None], body.padding, 1.0)[0]
     return (0, len(outer), len(outer), len(inner), int(spheres.is_exact)), np.concatenate([outer, inner]), around
 
 
@@ -89,21 +90,6 @@ def _padded(spheres: np.ndarray, padding: float, sign: float) -> np.ndarray:
     out[:, layout.PADDED_RADIUS] = spheres[:, 3] + padding + sign * ROUNDING * size
     out[:, layout.RADIUS] += sign * ROUNDING * size
     return out
-
-
-def _sphere_around(spheres: np.ndarray) -> np.ndarray:
-    """(4,) a sphere around spheres (n, 4): about the middle of their box, moved towards the farthest a few times."""
-    low = (spheres[:, :3] - spheres[:, 3:]).min(axis=0)
-    high = (spheres[:, :3] + spheres[:, 3:]).max(axis=0)
-    best, centre = None, 0.5 * (low + high)
-    for step in range(1, 40):
-        reach = np.linalg.norm(spheres[:, :3] - centre, axis=1) + spheres[:, 3]
-        farthest = int(reach.argmax())
-        if best is None or reach[farthest] < best[3]:
-            best = np.array([*centre, reach[farthest] * (1.0 + ROUNDING)])
-        centre = centre + (spheres[farthest, :3] - centre) / (step + 1.0)
-    assert best is not None
-    return best
 
 
 class SphereWorkspace:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from collide.base.poses_at import poses_at
 from collide.pairs import query
 from collide.robots.check_scene import HALF
 from collide.robots.check_tables import RobotBody, RobotTables, without_meshes
@@ -104,8 +105,7 @@ def _meet(
     body: RobotBody, X_WL: np.ndarray, points_W: np.ndarray, radii: np.ndarray | float, threads: int
 ) -> np.ndarray:
     """(k,) bool: balls around points (k, 3) in contact with a body.   radii : of all, or (k,)."""
-    X_WB = np.tile(np.eye(4), (len(points_W), 1, 1))
-    X_WB[:, :3, 3] = points_W
+    X_WB = poses_at(points_W)
     X_WA, shape = np.ascontiguousarray(X_WL), without_meshes(body.shape) or body.shape
     if isinstance(shape, Compound) and len(shape.items) == 1 and (shape.items[0][1] == np.eye(4)).all():
         shape = shape.items[0][0]

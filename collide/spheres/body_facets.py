@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from collide.base.poses_at import poses_at
 from collide.certificates.sphere_cover import leaves_of
 from collide.errors import UnsupportedQuery
 from collide.lowering.convex_sets import convex_set
@@ -68,15 +69,8 @@ def _part(leaf: Shape, poses: tuple[np.ndarray, ...]) -> BodyPart:
         return BodyPart(leaf, X, None, None, mesh, leaf.solid, 0.0)
     vertices, faces = facets_around(leaf)
     # The distance from a convex set is convex: on a facet it is largest at a corner.
-    deviation = np.max(distance(leaf, _POINT, np.eye(4), _at(vertices), signed=False, check_poses=False).upper)
+    deviation = np.max(distance(leaf, _POINT, np.eye(4), poses_at(vertices), signed=False, check_poses=False).upper)
     return BodyPart(leaf, X, vertices, faces, Mesh(_placed(vertices, X), faces), True, max(float(deviation), 0.0))
-
-
-def _at(points: np.ndarray) -> np.ndarray:
-    """(n, 4, 4) poses at points."""
-    X = np.tile(np.eye(4), (len(points), 1, 1))
-    X[:, :3, 3] = points
-    return X
 
 
 def _placed(points: np.ndarray, X: np.ndarray) -> np.ndarray:
@@ -190,7 +184,7 @@ def _winding_of_samples(samples: np.ndarray, vectors: np.ndarray, points: np.nda
 def farthest_reaches(parts: list[BodyPart], points: np.ndarray) -> np.ndarray:
     """(n,) proven upper bounds of how far points are from a body, negative inside; curved parts as they are."""
     out = np.full(len(points), np.inf)
-    X_WP = _at(points)
+    X_WP = poses_at(points)
     for part in parts:
         if not isinstance(part.shape, Mesh):
             away = distance(part.shape, _POINT, part.X, X_WP, check_poses=False).upper

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.poses_at import poses_at
 from collide.certificates.certificate import CertificateRefused
 from collide.certificates.sphere_cover import PartCover, flaw_of_cover, leaves_of
 from collide.errors import InvalidArgument
@@ -69,9 +70,7 @@ class EnclosingSpheres(NamedTuple):
         Compound
             Of a `Sphere` for each ball, in the frame of the body [m]. O(n).
         """
-        poses = np.tile(np.eye(4), (len(self.radii), 1, 1))
-        poses[:, :3, 3] = self.centers
-        return Compound([(Sphere(r), X) for r, X in zip(self.radii.tolist(), poses)])
+        return Compound([(Sphere(r), X) for r, X in zip(self.radii.tolist(), poses_at(self.centers))])
 
     def as_cloud(self) -> PointCloud:
         """The union as a cloud, for hundreds of balls and more.

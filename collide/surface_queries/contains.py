@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.poses_at import poses_at
 from collide.casts.raycast import raycast
 from collide.errors import UnsupportedQuery
 from collide.lowering.facet_bodies import body_of
@@ -77,13 +78,6 @@ def contains(shape: Shape, X_WA, points_W, *, check_poses: bool = True):
     return bool(answer[0]) if single_point and single_pose else answer
 
 
-def _at(points: np.ndarray) -> np.ndarray:
-    """(n, 4, 4) poses whose origins are the points."""
-    X = np.tile(np.eye(4), (len(points), 1, 1))
-    X[:, :3, 3] = points
-    return X
-
-
 def _pose(X: np.ndarray, k: int) -> np.ndarray:
     return X[k if len(X) > 1 else 0]
 
@@ -104,7 +98,7 @@ def _in_mesh(mesh: Mesh, X_WA: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 def on_facets(tree: MeshTree, X_WA: np.ndarray, points: np.ndarray) -> np.ndarray:
     """(n,) bool: whether points (n, 3) of the world lie on facets, exactly; poses (n or 1, 4, 4)."""
-    return surfaces_meet(tree, _point_tree(), _some(X_WA, slice(None)), _at(points))
+    return surfaces_meet(tree, _point_tree(), _some(X_WA, slice(None)), poses_at(points))
 
 
 def where_in_solid(mesh: Mesh, X_WA: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -157,7 +151,7 @@ _POINT = ConvexHull(np.zeros((1, 3)))
 
 
 def _in_convex(shape: Shape, X_WA: np.ndarray, points: np.ndarray) -> np.ndarray:
-    rows = answer_batch(shape, _POINT, X_WA, _at(points), Question(False, 0.0, depths=False))
+    rows = answer_batch(shape, _POINT, X_WA, poses_at(points), Question(False, 0.0, depths=False))
     answer = rows["hit"].copy()
     for k in np.flatnonzero(answer & (rows["how"] == SIGN_OPEN)).tolist():
         answer[k] = holds(shape, [_pose(X_WA, k)], points[k])

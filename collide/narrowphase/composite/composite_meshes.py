@@ -14,6 +14,7 @@ from functools import cache
 
 import numpy as np
 
+from collide.base.poses_at import poses_at
 from collide.lowering.facet_bodies import Body, PosesWithSlop, body_of
 from collide.lowering.packed_convex import PackedConvex
 from collide.lowering.shape_table import ShapeTable
@@ -204,8 +205,7 @@ def _ball_gaps(
     reach = radii + placed.slop
     some = np.flatnonzero(np.isfinite(reach))
     if len(some):
-        X = np.tile(np.eye(4), (len(some), 1, 1))
-        X[:, :3, 3] = centres[some]
+        X = poses_at(centres[some])
         limit = float((within + reach)[some].max()) * (1.0 + 2.0**-40)
         lower = surface_distances(body.tree, _point().tree, placed.X[some], X, limit).lower
         gap = (lower - reach[some]) * (1.0 - 2.0**-40)

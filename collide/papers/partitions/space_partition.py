@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from collide.base import argument_checks as checks
+from collide.base.poses_at import poses_at
 from collide.errors import InvalidArgument
 from collide.lowering.facet_bodies import body_of
 from collide.mesh.shell_volumes import without_area
@@ -174,8 +175,7 @@ class SpacePartition:
         suspects = np.zeros(len(points), dtype=bool)
         suspects[touched.on_point] = True
         rows = np.flatnonzero(~some & suspects) if thin is None else np.flatnonzero(~some)
-        X = np.tile(np.eye(4), (len(rows), 1, 1))
-        X[:, :3, 3] = points[rows]
+        X = poses_at(points[rows])
         hit = np.zeros(len(rows), dtype=bool)
         for facets in (tree, thin):
             if facets is not None and len(rows):
