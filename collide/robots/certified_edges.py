@@ -25,8 +25,25 @@ _MAX_HALVINGS = 30
 OPEN_DTYPE = np.dtype([("edge", "i8"), ("begin", "f8"), ("end", "f8")])
 
 
+class Verdicts:
+    """Motions, or segments of a motion, in arrays: free, colliding at a time, or open."""
+
+    free: np.ndarray
+    time: np.ndarray
+
+    @property
+    def collides(self) -> np.ndarray:
+        """(N,) bool: motions with a collision ``time``."""
+        return ~np.isnan(self.time)
+
+    @property
+    def is_open(self) -> np.ndarray:
+        """(N,) bool: motions neither proven free nor colliding."""
+        return ~self.free & np.isnan(self.time)
+
+
 @dataclass(frozen=True)
-class CertifiedEdges:
+class CertifiedEdges(Verdicts):
     """Verdicts on straight motions q(t) = Q0 + t (Q1 − Q0), 0 ≤ t ≤ 1: free, colliding, or open.
 
     Parameters
@@ -48,16 +65,6 @@ class CertifiedEdges:
     open: np.ndarray
     open_names: list[tuple[str, str]]
     n_checked: int
-
-    @property
-    def collides(self) -> np.ndarray:
-        """(N,) bool: motions with a collision ``time``."""
-        return ~np.isnan(self.time)
-
-    @property
-    def is_open(self) -> np.ndarray:
-        """(N,) bool: motions neither proven free nor colliding."""
-        return ~self.free & np.isnan(self.time)
 
     def __len__(self) -> int:
         return len(self.free)

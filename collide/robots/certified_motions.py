@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from collide.errors import InvalidArgument, cut
-from collide.robots.certified_edges import OPEN_DTYPE, open_names, prove
+from collide.robots.certified_edges import OPEN_DTYPE, Verdicts, open_names, prove
 from collide.robots.checker_scene import CheckerScene
 from collide.robots.configuration_batches import check_piece
 from collide.robots.kinematic_tree import COLUMNS
@@ -20,7 +20,7 @@ _NONE_OPEN = np.zeros(0, dtype=OPEN_DTYPE)
 
 
 @dataclass(frozen=True)
-class CertifiedMotion:
+class CertifiedMotion(Verdicts):
     """Verdicts on the segments of a motion, in its own time: proven free, colliding, or open.
 
     Parameters
@@ -49,16 +49,6 @@ class CertifiedMotion:
     open_names: list[tuple[str, str]]
     lengths: np.ndarray
     n_checked: int
-
-    @property
-    def collides(self) -> np.ndarray:
-        """(M,) bool: segments with a collision ``time``."""
-        return ~np.isnan(self.time)
-
-    @property
-    def is_open(self) -> np.ndarray:
-        """(M,) bool: segments neither proven free nor colliding."""
-        return ~self.free & np.isnan(self.time)
 
     @property
     def is_free(self) -> bool:
