@@ -14,6 +14,7 @@ from collide.lowering.shape_table import NO_TERMS, POSE, PoseTable, ShapeTable
 from collide.narrowphase.exact.depth_requests import ROWS_PER_BATCH
 from collide.narrowphase.exact.exact_stage import settle_exactly, settle_rows, step_codes
 from collide.narrowphase.exact.settle_space import WORKSPACE
+from collide.narrowphase.exact_curved.settle_curved import settle_curved
 from collide.narrowphase.fallback_searches import settle_by_other_searches
 from collide.narrowphase.finish_rows import finish_rows
 from collide.narrowphase.pair_kernel import DOUBLES, INTEGERS, REQUESTS_AT, answer_pairs
@@ -127,6 +128,20 @@ def _finish(
                 address_of(shape_of), address_of(pairs), len(rows), boolean, depths, limit, address_of(rows),
                 *_of_thread.space.addresses, address_of(_of_thread.space.digits),
             )
+            _settle_curved(rows, pairs, table, poses, shape_of, boolean=boolean, limit=limit)
+
+
+def _settle_curved(rows, pairs, table: ShapeTable, poses: PoseTable, shape_of, *, boolean: bool, limit: float) -> None:
+    """Settle in place what is still open, by `settle_curved`, which needs the rows of a distance."""
+    undecided = np.flatnonzero(rows["how"] == UNDECIDED)
+    if not len(undecided):
+        return
+    if not boolean:
+        settle_curved(rows, undecided, pairs, table, poses, shape_of, limit)
+        return
+    measured = run_pairs(table, poses, shape_of, pairs[undecided], boolean=False, limit=limit)
+    for name in ("how", "hit", "certified"):
+        rows[name][undecided] = measured[name]
 
 
 def number_of_poses(X_WA: np.ndarray, X_WB: np.ndarray) -> int:

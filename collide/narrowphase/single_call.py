@@ -72,35 +72,37 @@ def settle_row(header, boolean, depths, limit, row_at):
     long way has to, or an error has to be raised.
 
     header : of `pose_batches.py`; the second row of the block is written over.   boolean, depths, limit : as asked.
-    Hulls and half-spaces, boxes that touch for example, go through the exact stage; a depth that it leaves open is for
-    the long way. No step of the exact stage takes a curved core, so a pair with a curved core goes on to
-    the other searches (`fallback_searches.py`), and stays open where they prove nothing either: a can at rest on a box.
+    Boxes that touch, or a can at rest on a box, are settled by the exact stage; a depth left open there is for the long
+    way. Other pairs with a curved core go on to the other searches (`fallback_searches.py`); what they leave open is
+    for the long way, too (`exact_curved/`).
     """
     row = view_row(row_at)
     if row.flags[HOW] == REFUSED:
         return False
-    if _has_curved_core(header):
+    is_open = _settle_exactly(header, boolean, depths, limit, row_at) > 0
+    if is_open and _has_curved_core(header):
         core = Core(
             header[CORE], header[INTS_AT], header[NUMBERS_AT], header[POSES_AT], 0, header[SHAPE_OF_AT],
             header[DOUBLES_AT], header[INTEGERS_AT],
         )
         result_at = header[ROWS_AT] + ROW
         settle_row_by_other_searches(core, header[PAIRS_AT], boolean, depths, limit, row_at, result_at)
-        return row.flags[HOW] != REFUSED
-    if _settle_exactly(header, boolean, depths, limit, row_at) > 0:
-        return False
-    return not (depths and row.flags[HOW] == EXACT and row.flags[HIT] == 1 and row.flags[CERTIFIED] == 0)
+        return not is_undecided_or_refused(row)
+    is_without_depth = row.flags[HOW] == EXACT and row.flags[HIT] == 1 and row.flags[CERTIFIED] == 0
+    return not (is_open or (depths and is_without_depth))
 
 
 @kernel(inline=True)
 def _has_curved_core(header):
-    """Whether a shape of the first pair of the block is neither points nor a half-space."""
+    """Whether the first pair of the block has a cylinder, cone or ellipsoid, and no half-space."""
     shape_of = view_i64(header[SHAPE_OF_AT], BLOCK + 1)
+    is_curved = False
     for k in range(2):
         kind = view_i64(header[INTS_AT] + 8 * INTS * shape_of[BLOCK * k], INTS)[KIND]
-        if kind != POINTS and kind != HALFSPACE:
-            return True
-    return False
+        if kind == HALFSPACE:
+            return False
+        is_curved = is_curved or kind != POINTS
+    return is_curved
 
 
 @kernel

@@ -19,16 +19,17 @@ import numpy as np
 
 from collide.kernels import address_of, code_of, entry, native_call, view_i64, view_u8
 from collide.lowering.shape_table import PoseTable, ShapeTable
-from collide.narrowphase.exact import exact_depth, settle_halfspaces, settle_hulls
+from collide.narrowphase.exact import exact_depth, settle_faces, settle_halfspaces, settle_hulls
 from collide.narrowphase.exact.settle_regions import settle_regions
 from collide.narrowphase.rows import HOW, ROW
 from collide.results import UNDECIDED
 
 _settle_hulls_at = native_call(settle_hulls.SIGNATURE)
 _settle_halfspaces_at = native_call(settle_halfspaces.SIGNATURE)
+_settle_faces_at = native_call(settle_faces.SIGNATURE)
 _exact_depth_at = native_call(exact_depth.SIGNATURE)
-#: Addresses of the three in `settle_exactly`'s list.
-_HULLS, _HALFSPACES, _DEPTH, _CODES = range(4)
+#: Addresses of the four in `settle_exactly`'s list.
+_HULLS, _HALFSPACES, _FACES, _DEPTH, _CODES = range(5)
 
 
 #: How `settle_exactly` is called.
@@ -51,12 +52,13 @@ def settle_exactly(
        where a sign stays unproven, decides whether they share a point; integers then know the distance of disjoint
        cores to all digits, or double-doubles where rounding cannot tell (`face_height.py`). Depths below
        rounding come from the facets nearest the origin, as named by doubles (`depth_requests.py`, `plane_depth.py`).
-    2. `settle_halfspaces`: a half-space against a swept hull, the sign of a polynomial a vertex; two half-spaces with
-       opposite normals (`opposite_halfspaces.py`). Only if step 1 met a half-space.
-    3. `exact_depth`: overlaps settled by step 1 without a depth, where depths are wanted and hulls are small: the
+    2. `settle_halfspaces`: a half-space against a convex set, the sign of a polynomial a vertex, or of a curved set's
+       reach; two half-spaces with opposite normals (`opposite_halfspaces.py`). Only if step 1 met a half-space.
+    3. `settle_faces`: a curved set on a flat face of another set, the same sign for the face's plane.
+    4. `exact_depth`: overlaps settled by step 1 without a depth, where depths are wanted and hulls are small: the
        least extent over all candidate planes (`all_planes.py`).
 
-    codes : addresses of the three.   Other arguments as of `settle_hulls`. The steps are called where they were
+    codes : addresses of the four.   Other arguments as of `settle_hulls`. The steps are called where they were
     compiled, so that they are compiled once.
     """
     codes = view_i64(codes_at, _CODES)
@@ -76,6 +78,13 @@ def settle_exactly(
                 n_terms, digits_at,
             ),
         )
+    _settle_faces_at(
+        codes[_FACES],
+        (
+            ints_at, numbers_at, poses_at, shape_of_at, pairs_at, n_pairs, boolean, limit, rows_at, terms_at, n_terms,
+            digits_at,
+        ),
+    )
     if depths:
         _exact_depth_at(
             codes[_DEPTH],
@@ -93,7 +102,10 @@ def settle_exactly(
 @cache
 def step_codes() -> np.ndarray:
     """What `settle_exactly` calls, once it is needed."""
-    steps = settle_hulls.settle_hulls, settle_halfspaces.settle_halfspaces, exact_depth.exact_depth
+    steps = (
+        settle_hulls.settle_hulls, settle_halfspaces.settle_halfspaces, settle_faces.settle_faces,
+        exact_depth.exact_depth,
+    )
     return np.array([code_of(step) for step in steps])
 
 
@@ -115,8 +127,8 @@ def settle_rows(
     `settle_exactly`, then `settle_regions`: a closed region, whose corners are rounded, against a swept hull, by its
     planes.
 
-    What stays open: curved cores, other shapes whose stored numbers are rounded, and magnitudes that span more than
-    1600 bits.
+    What stays open: curved sets in other places (`exact_curved/`), shapes whose stored numbers are rounded, and
+    magnitudes that span more than 1600 bits.
 
     Parameters
     ----------

@@ -1,12 +1,11 @@
-"""A step of the exact stage: rows of half-spaces against each other and against swept hulls, whose signs or last digits
-doubles leave open."""
+"""A step of the exact stage: rows of half-spaces against convex sets, whose signs or last digits doubles leave open."""
 
 from __future__ import annotations
 
 import math
 
 from collide.kernels import entry, kernel, view_i64, view_u8
-from collide.lowering.packed_convex import HALFSPACE, POINTS
+from collide.lowering.packed_convex import HALFSPACE
 from collide.narrowphase.exact.exact_gjk import SEPARATE, TOUCHING, UNDONE
 from collide.narrowphase.exact.exact_halfspace import reach_plane_exactly
 from collide.narrowphase.exact.opposite_halfspaces import settle_opposite
@@ -37,15 +36,17 @@ def settle_halfspaces(
             continue
         ordered = ordered_pair(ints_at, numbers_at, poses_at, shape_of_at, pairs[2 * k], pairs[2 * k + 1])
         pair = ordered.pair
-        if ordered.exact_numbers and pair.A.kind == HALFSPACE and pair.B.kind == POINTS:
-            _settle(ordered, space, row_at, boolean, limit)
-        elif ordered.exact_numbers and pair.A.kind == HALFSPACE and pair.B.kind == HALFSPACE:
+        if not (ordered.exact_numbers and pair.A.kind == HALFSPACE):
+            continue
+        if pair.B.kind == HALFSPACE:
             settle_opposite(ordered, space, view_row(row_at))
+        else:
+            _settle(ordered, space, row_at, boolean, limit)
 
 
 @kernel(inline=True)
 def _settle(ordered, space, row_at, boolean, limit):
-    """Settle a row of a half-space and a swept hull."""
+    """Settle a row of a half-space and another convex set."""
     row = view_row(row_at)
     pair = ordered.pair
     _, skew = reach_of_plane(pair, pair.A)
