@@ -23,11 +23,11 @@ from collide.numerics.exact_vectors import inner
 
 
 class Decision(NamedTuple):
-    """The proof about A and B.
+    """Proof of a sign.
 
-    point : common to A and B; None of bodies apart.
+    point : common to A and B, of bodies in contact.
     normal : of bodies apart, a direction with all of A before all of B; of bodies in contact, a direction with A not
-        beyond B: A and B touch, without depth. None without a known direction.
+        beyond B: A and B touch, without depth. An unknown point or direction is None.
     is_open : without a proof.
     """
 
