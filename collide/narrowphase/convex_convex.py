@@ -10,6 +10,7 @@ from collide.narrowphase.bounds import ERROR, PROMISE_CURVED, PROMISE_STORED
 from collide.narrowphase.capsule_capsule import segment_cores
 from collide.narrowphase.core_distance import convex_cores, request_plane
 from collide.narrowphase.exact.depth_requests import add_request
+from collide.narrowphase.gap.curved_gap import refine_curved_gap
 from collide.narrowphase.gap.gap_queue import enqueue, write_guess
 from collide.narrowphase.gap.precise_pair import is_refinable
 from collide.narrowphase.gjk.minkowski_difference import AXIS, POINT_OF_A, POINT_OF_B, weighted_sum
@@ -29,6 +30,8 @@ from collide.narrowphase.rows import (
 )
 from collide.narrowphase.sphere_capsule import point_segment_cores
 from collide.narrowphase.sphere_sphere import point_cores
+from collide.numerics import double_double as dd
+from collide.numerics.error_free import two_sum
 from collide.numerics.vec3 import add, put_vec3, scale, sub, vec3_at
 from collide.results import FORMULA, PLANE, SIMPLEX, SWEPT, UNDECIDED
 
@@ -66,6 +69,10 @@ def convex_convex(ordered, how, query, row, row_number, n_start, work):
         write_guess(row, distance, lower, upper, core.nhat)
         write_vertices(row, work.ids, core.n_vertices, flip)
         return enqueue(ordered, query, work, core.n_points, argument, row_number, error)
+    is_curved_gap = curved and ordered.exact_numbers and core.depth < -error and lower <= query.limit
+    is_wanted = is_curved_gap and not (query.boolean or query.resumes)
+    if is_wanted and _write_curved_gap(ordered, query, work, core, row, lower, upper):
+        return -1
     decided = lower > 0.0 or upper <= 0.0
     if core.deepest < math.inf:
         rounding = 4.0 * 2.0**-53 * radius
@@ -97,6 +104,31 @@ def convex_convex(ordered, how, query, row, row_number, n_start, work):
     write_witness_points(pair, core, work, row, radius_a, radius_b, share, flip)
     write_vertices(row, work.ids, core.n_vertices, flip)
     return -1
+
+
+@kernel
+def _write_curved_gap(ordered, query, work, core, row, lower, upper):
+    """Write the row of curved cores apart, if `refine_curved_gap` proves more than doubles: lower, upper."""
+    pair = ordered.pair
+    gap = refine_curved_gap(ordered, work, core.n_points, core.nhat)
+    if not gap.is_proven:
+        return False
+    radius_a, radius_b = radius_of(pair, pair.A), radius_of(pair, pair.B)
+    radius = two_sum(radius_a, radius_b)
+    least, greatest = dd.sub(gap.lower, radius), dd.sub(gap.upper, radius)
+    low, high = dd.bracket(least, gap.error).lower, dd.bracket(greatest, gap.error).upper
+    if not high - low < upper - lower:
+        return False
+    middle = dd.scale(0.5, dd.add(least, greatest))
+    argument = PLANE if low > 0.0 else SWEPT
+    write_verdict(
+        row, middle.high, max(low, lower), min(high, upper), argument, PROMISE_CURVED * ordered.size, query.limit
+    )
+    p_WA, p_WB = vec3_at(pair.poses, pair.A.pose_at + 9), vec3_at(pair.poses, pair.B.pose_at + 9)
+    p_WAa, p_WBb = add(gap.a, add(scale(radius_a, gap.nhat), p_WA)), sub(add(gap.b, p_WB), scale(radius_b, gap.nhat))
+    write_vectors(row, gap.nhat, p_WAa, p_WBb, ordered.flip)
+    write_vertices(row, work.ids, core.n_vertices, ordered.flip)
+    return True
 
 
 @kernel(inline=True)

@@ -1,10 +1,10 @@
 """Flat faces of boxes, cylinders and cones against a convex set beyond them, exactly: what rests on a face, flush too.
 
 Let F be the body with the face, in the half-space H of the face, B the other body, p its deepest point in H, and e the
-signed distance of p from H. B is no nearer to F than e, since F lies in H, and no deeper in F than −e, since moving B by
-as much takes B out of H. Both are equal where p is above the face, and where p is in F with the face as its nearest part
-of the surface: p has to leave F. So e is the signed distance, to all digits; where p is elsewhere, e > 0 still says that
-the bodies are apart.
+signed distance of p from H. B is no nearer to F than e, since F lies in H, and no deeper in F than −e, since moving B
+by as much takes B out of H. Both are equal where p is above the face, and where p is in F with the face as the nearest
+part of F's surface: p has to leave F. So e is the signed distance, to all digits; where p is elsewhere, e > 0 still
+says that the bodies are apart.
 
 e is (s − √q) / |n| of `exact_halfspace.py`. p is taken in doubles: it has to be farther inside the face's edges, and F
 deeper behind the face, than 2e-9 of the pair's size S while |e| is at most 1e-9 S; the rounding of p is at most 64u·S
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from collide.kernels import kernel
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, POINTS
-from collide.narrowphase.exact.exact_gjk import SEPARATE, TOUCHING, UNDONE
+from collide.narrowphase.exact.exact_gjk import SEPARATE, UNDONE
 from collide.narrowphase.exact.exact_halfspace import (
     PlaneContact,
     posed_half_space,

@@ -2,8 +2,9 @@
 
 Doubles stop at 2⁻⁵³ of the size. Here the same search (Gilbert, Johnson and Keerthi 1988) goes on in 40, 80 and 160
 digits d, with supports of bodies that are smaller by 10^(−d/2), so that convex combinations of supports lie within
-the bodies though they are rounded. A direction is rounded to integers, and `integer_bodies.is_apart_along` says exactly whether the direction
-separates; a point counts where both bodies hold the point. Bodies touching exactly give neither.
+the bodies though they are rounded. A direction is rounded to integers, and `integer_bodies.is_apart_along` says
+exactly whether the direction separates; a point counts where both bodies hold the point. Bodies touching exactly give
+neither.
 """
 
 from __future__ import annotations

@@ -1,0 +1,497 @@
+"""The last digits of the gap between two convex sets, a cylinder, cone or ellipsoid among them.
+
+GJK leaves the direction n of a gap about √u off, and with a smooth set the bracket too. The gap g is where the nearest
+points a, b and the unit vector n solve
+
+    b − a = g n,   |n|² = 1,   n·d = 0 for every flat direction d that a or b moves along,
+
+a being a point of A farthest along n and b one of B farthest along −n. Each set has a *feature*: a vertex, the rim of
+an end, an ellipsoid's surface, which turn with n (their derivative by n is the Hessian of the support function), plus
+flat directions: an edge or facet of a polytope, an end, the side of a cylinder, the line of a cone from rim to tip.
+Newton's method, residuals in double-doubles and the matrix in doubles, gains 2⁵³ a step once it is near.
+
+The solution is a proposal. Proven are the lower bound −σ_A(n) − σ_B(−n) over |n|, with σ the supports over all of
+both sets (the gap is the largest of these over all n), and the upper bound |b − a|, for a and b within their sets: flat
+coordinates are kept within their ranges. Each support and each point is good to 2⁻⁹⁰ of the pair's size S: some dozen
+operations in double-doubles, of 16u² each, of numbers below 4 S.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from collide.kernels import kernel, view_f64, view_i64
+from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, POINTS
+from collide.narrowphase.gap.precise_pair import is_composed, is_refinable
+from collide.narrowphase.gap.tied_vertices import MAX_TIES, tied_vertices, vertices_of
+from collide.narrowphase.gjk.minkowski_difference import POINT_OF_A, POINT_OF_B, weighted_sum
+from collide.narrowphase.posed_pair import reach_of
+from collide.numerics import double_double as dd
+from collide.numerics.double_double import DD, DDVec3
+from collide.numerics.error_free import two_product, two_sum
+from collide.numerics.vec3 import (
+    Vec3,
+    add,
+    column_at,
+    dot,
+    neg,
+    norm,
+    rotate,
+    rotate_back,
+    scale,
+    sub,
+    vec3_at,
+)
+
+#: Of a support and of a point, in units of S.
+ERROR = 2.0**-90
+#: How near to a flat feature, in radians and in units of the set, a proposal takes it for one.
+_FLAT = 1e-4
+_INSIDE = 1e-6
+_STEPS = 5
+#: What ends the search: b − a is off g n by so much of g (the points of a row lie on its normal), and flat directions
+#: lean to n by so much of g, which the lower bound is too small.
+_ACROSS, _ALONG = 2.0**-51, 2.0**-56
+# Unknowns: n, g, up to two flat coordinates of each set.
+_MAX_UNKNOWNS = 8
+#: Doubles of workspace.
+DOUBLES = _MAX_UNKNOWNS * (_MAX_UNKNOWNS + 1)
+
+VERTEX, SMOOTH, RIM, SIDE, END, TIP = range(6)
+_ZERO = DD(0.0, 0.0)
+
+
+class Feature(NamedTuple):
+    """What of a set is nearest to the other one.
+
+    kind : VERTEX, SMOOTH (an ellipsoid), RIM, SIDE, END or TIP.   end : ±1, of a rim or end.   flat : directions.
+    i, j, k : vertices of a polytope: the point is p_i + s (p_j − p_i) + t (p_k − p_i).   s, t : flat coordinates.
+    """
+
+    kind: int
+    end: float
+    flat: int
+    i: int
+    j: int
+    k: int
+    s: DD
+    t: DD
+
+
+class Placed(NamedTuple):
+    """A feature at a direction: the point, its flat directions, the Hessian's six entries, all in W's axes."""
+
+    point: DDVec3
+    d: DDVec3
+    e: DDVec3
+    xx: float
+    yy: float
+    zz: float
+    xy: float
+    yz: float
+    zx: float
+
+
+class CurvedGap(NamedTuple):
+    """lower ≤ gap ≤ upper of two cores, each within ``error`` [m]; n from A to B; nearest points in W's axes, a from
+    A's origin, b from B's."""
+
+    is_proven: bool
+    lower: DD
+    upper: DD
+    error: float
+    nhat: Vec3
+    a: Vec3
+    b: Vec3
+
+
+@kernel
+def refine_curved_gap(ordered, work, n_points, nhat):
+    """The `CurvedGap` of cores apart, from GJK's last simplex of n points and the direction n̂ from A to B.
+
+    The memory of EPA serves as workspace. False where poses are rounded products, or nothing better is proven.
+    """
+    pair, size = ordered.pair, ordered.size
+    A, B, poses = pair.A, pair.B, pair.poses
+    zero = Vec3(0.0, 0.0, 0.0)
+    nothing = CurvedGap(False, _ZERO, _ZERO, 0.0, zero, zero, zero)
+    if is_composed(poses, A.pose_at) or is_composed(poses, B.pose_at) or not is_refinable(size):
+        return nothing
+    a = weighted_sum(work.points, work.weights, n_points, POINT_OF_A)
+    b = weighted_sum(work.points, work.weights, n_points, POINT_OF_B)
+    f = _feature(pair, A, work, n_points, 0, rotate_back(poses, A.pose_at, nhat), _local(poses, A.pose_at, a))
+    h = _feature(pair, B, work, n_points, 1, neg(rotate_back(poses, B.pose_at, nhat)), _local(poses, B.pose_at, b))
+    t = dd.difference(vec3_at(poses, B.pose_at + 9), vec3_at(poses, A.pose_at + 9))
+    n = dd.exact_vec3(nhat)
+    gap = DD(dot(nhat, sub(add(b, pair.t), a)), 0.0)
+    M = view_f64(work.epa_at, DOUBLES)
+    p, q = _placed(pair, A, f, n), _placed(pair, B, h, dd.neg_vec3(n))
+    for _ in range(_STEPS):
+        residual = dd.sub_vec3(dd.sub_vec3(_plus(q.point, t), p.point), _times(gap, n))
+        off = norm(dd.leading(residual))
+        if off <= _ACROSS * gap.high and _lean(f, h, p, q, n) <= _ALONG * gap.high:
+            break
+        if not off < size:
+            return nothing
+        _fill(M, f, h, p, q, n, gap, residual)
+        m = 4 + f.flat + h.flat
+        _solve(M, m)
+        n = DDVec3(_moved(n.x, M, 0, m), _moved(n.y, M, 1, m), _moved(n.z, M, 2, m))
+        gap = _moved(gap, M, 3, m)
+        f = _with_flats(f, M, 4, m)
+        h = _with_flats(h, M, 4 + f.flat, m)
+        p, q = _placed(pair, A, f, n), _placed(pair, B, h, dd.neg_vec3(n))
+    return _proven(pair, A, B, f, h, p, q, n, t, size, work)
+
+
+@kernel(inline=True)
+def _lean(f, h, p, q, n):
+    """How far the flat directions are from being across n, at most [m]."""
+    largest = 0.0
+    if f.flat > 0:
+        largest = abs(dd.inner(n, p.d).high)
+    if f.flat > 1:
+        largest = max(largest, abs(dd.inner(n, p.e).high))
+    if h.flat > 0:
+        largest = max(largest, abs(dd.inner(n, q.d).high))
+    if h.flat > 1:
+        largest = max(largest, abs(dd.inner(n, q.e).high))
+    return largest
+
+
+@kernel(inline=True)
+def _moved(x, M, row, m):
+    return dd.add(x, DD(M[(m + 1) * row + m], 0.0))
+
+
+@kernel(inline=True)
+def _with_flats(f, M, row, m):
+    s = _moved(f.s, M, row, m) if f.flat > 0 else f.s
+    t = _moved(f.t, M, row + 1, m) if f.flat > 1 else f.t
+    return Feature(f.kind, f.end, f.flat, f.i, f.j, f.k, s, t)
+
+
+# --- features -----------------------------------------------------------------------------------
+
+
+@kernel(inline=True)
+def _local(poses, at, a):
+    """The frame's point of a point in W's axes from the frame's origin."""
+    return rotate_back(poses, at, a)
+
+
+@kernel
+def _feature(pair, body, work, n_points, which, w, u):
+    """The `Feature` of a body.   w : outward, in its frame, of unit length.   u : the nearest point, about."""
+    numbers, at = pair.numbers, body.params_at
+    if body.kind == POINTS:
+        return _vertices(work, n_points, which)
+    if body.kind == ELLIPSOID:
+        return Feature(SMOOTH, 0.0, 0, -1, -1, -1, _ZERO, _ZERO)
+    radius, half = numbers[at], numbers[at + 1]
+    across = math.sqrt(w.x * w.x + w.y * w.y)
+    beside = math.sqrt(u.x * u.x + u.y * u.y)
+    end = 1.0 if w.z > 0.0 else -1.0
+    if body.kind == CONE:
+        share = 0.5 * (u.z + half) / half
+        lean = (2.0 * half * w.z - radius * across) / math.sqrt(4.0 * half * half + radius * radius)
+        if abs(lean) < _FLAT and _INSIDE < share < 1.0 - _INSIDE:
+            return Feature(SIDE, -1.0, 1, -1, -1, -1, DD(share, 0.0), _ZERO)
+        if lean > 0.0:
+            return Feature(TIP, 1.0, 0, -1, -1, -1, _ZERO, _ZERO)
+        end = -1.0
+    elif abs(w.z) < _FLAT and abs(u.z) < half * (1.0 - _INSIDE):
+        return Feature(SIDE, 0.0, 1, -1, -1, -1, DD(u.z, 0.0), _ZERO)
+    if across < _FLAT and beside < radius * (1.0 - _INSIDE):
+        return Feature(END, end, 2, -1, -1, -1, DD(u.x, 0.0), DD(u.y, 0.0))
+    return Feature(RIM, end, 0, -1, -1, -1, _ZERO, _ZERO)
+
+
+@kernel
+def _vertices(work, n_points, which):
+    """The vertex, edge or triangle of a polytope that GJK's simplex has the nearest point in."""
+    ids, weights = work.ids, work.weights
+    i, j, k = int(ids[which]), -1, -1
+    s, t = 0.0, 0.0
+    for m in range(1, n_points):
+        v, share = int(ids[2 * m + which]), weights[m]
+        if v == i:
+            continue
+        if j < 0 or v == j:
+            j, s = v, s + share
+        elif k < 0 or v == k:
+            k, t = v, t + share
+    flat = (1 if j >= 0 else 0) + (1 if k >= 0 else 0)
+    return Feature(VERTEX, 0.0, flat, i, j, k, DD(s, 0.0), DD(t, 0.0))
+
+
+@kernel
+def _placed(pair, body, f, u):
+    """The `Placed` feature of a body in the outward direction u."""
+    poses, at, numbers, params = pair.poses, body.pose_at, pair.numbers, body.params_at
+    none = DDVec3(_ZERO, _ZERO, _ZERO)
+    if f.kind == VERTEX:
+        x = dd.exact_vec3(column_at(body.coords, body.padded, f.i))
+        d = e = none
+        if f.flat > 0:
+            d = dd.difference(column_at(body.coords, body.padded, f.j), column_at(body.coords, body.padded, f.i))
+            x = _plus(x, _times(f.s, d))
+        if f.flat > 1:
+            e = dd.difference(column_at(body.coords, body.padded, f.k), column_at(body.coords, body.padded, f.i))
+            x = _plus(x, _times(f.t, e))
+        return Placed(_turned(poses, at, x), _turned(poses, at, d), _turned(poses, at, e), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if f.kind == SMOOTH:
+        return _placed_ellipsoid(pair, body, u)
+    radius, half = DD(numbers[params], 0.0), DD(numbers[params + 1], 0.0)
+    end = dd.scale(f.end, half)
+    if f.kind == TIP:
+        return Placed(_turned(poses, at, DDVec3(_ZERO, _ZERO, half)), none, none, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if f.kind == END:
+        d, e = DDVec3(DD(1.0, 0.0), _ZERO, _ZERO), DDVec3(_ZERO, DD(1.0, 0.0), _ZERO)
+        x = DDVec3(f.s, f.t, end)
+        return Placed(_turned(poses, at, x), _turned(poses, at, d), _turned(poses, at, e), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    w = _turned_back(poses, at, u)
+    across = dd.sqrt(dd.add(dd.mul(w.x, w.x), dd.mul(w.y, w.y)))
+    if not across.high > 0.0:
+        across = DD(1.0, 0.0)
+    c, s = dd.div(w.x, across), dd.div(w.y, across)
+    x = DDVec3(dd.mul(radius, c), dd.mul(radius, s), end)
+    d = none
+    bend = numbers[params] / across.high
+    if f.kind == SIDE and body.kind == CYLINDER:
+        d = DDVec3(_ZERO, _ZERO, DD(1.0, 0.0))
+        x = DDVec3(x.x, x.y, f.s)
+    elif f.kind == SIDE:
+        d = DDVec3(dd.neg(x.x), dd.neg(x.y), dd.scale(2.0, half))
+        x = _plus(x, _times(f.s, d))
+        bend *= 1.0 - f.s.high
+    around = rotate(poses, at, Vec3(-s.high, c.high, 0.0))
+    return Placed(
+        _turned(poses, at, x), _turned(poses, at, d), none, bend * around.x * around.x, bend * around.y * around.y,
+        bend * around.z * around.z, bend * around.x * around.y, bend * around.y * around.z, bend * around.z * around.x,
+    )
+
+
+@kernel
+def _placed_ellipsoid(pair, body, u):
+    poses, at, numbers, params = pair.poses, body.pose_at, pair.numbers, body.params_at
+    none = DDVec3(_ZERO, _ZERO, _ZERO)
+    w = _turned_back(poses, at, u)
+    a, b, c = DD(numbers[params], 0.0), DD(numbers[params + 1], 0.0), DD(numbers[params + 2], 0.0)
+    g = DDVec3(dd.mul(a, w.x), dd.mul(b, w.y), dd.mul(c, w.z))
+    h = dd.sqrt(dd.inner(g, g))
+    x = DDVec3(dd.div(dd.mul(a, g.x), h), dd.div(dd.mul(b, g.y), h), dd.div(dd.mul(c, g.z), h))
+    p = _turned(poses, at, x)
+    y, over = dd.leading(p), 1.0 / h.high
+    ax = scale(a.high, Vec3(poses[at], poses[at + 3], poses[at + 6]))
+    ay = scale(b.high, Vec3(poses[at + 1], poses[at + 4], poses[at + 7]))
+    az = scale(c.high, Vec3(poses[at + 2], poses[at + 5], poses[at + 8]))
+    return Placed(
+        p, none, none, over * (ax.x * ax.x + ay.x * ay.x + az.x * az.x - y.x * y.x),
+        over * (ax.y * ax.y + ay.y * ay.y + az.y * az.y - y.y * y.y),
+        over * (ax.z * ax.z + ay.z * ay.z + az.z * az.z - y.z * y.z),
+        over * (ax.x * ax.y + ay.x * ay.y + az.x * az.y - y.x * y.y),
+        over * (ax.y * ax.z + ay.y * ay.z + az.y * az.z - y.y * y.z),
+        over * (ax.z * ax.x + ay.z * ay.x + az.z * az.x - y.z * y.x),
+    )
+
+
+@kernel(inline=True)
+def _turned(poses, at, x):
+    """R x."""
+    return DDVec3(
+        _along(vec3_at(poses, at), x), _along(vec3_at(poses, at + 3), x), _along(vec3_at(poses, at + 6), x)
+    )
+
+
+@kernel(inline=True)
+def _turned_back(poses, at, x):
+    """Rᵀ x."""
+    return DDVec3(
+        _along(Vec3(poses[at], poses[at + 3], poses[at + 6]), x),
+        _along(Vec3(poses[at + 1], poses[at + 4], poses[at + 7]), x),
+        _along(Vec3(poses[at + 2], poses[at + 5], poses[at + 8]), x)
+    )
+
+
+@kernel(inline=True)
+def _along(a, x):
+    """a·x for a vector of doubles, as `double_double.inner`."""
+    total, rest = two_product(a.x, x.x.high)
+    second, third = two_product(a.y, x.y.high), two_product(a.z, x.z.high)
+    total, error = two_sum(total, second.high)
+    rest += error + second.low
+    total, error = two_sum(total, third.high)
+    rest += (error + third.low) + (a.x * x.x.low + a.y * x.y.low + a.z * x.z.low)
+    return two_sum(total, rest)
+
+
+@kernel(inline=True)
+def _plus(a, b):
+    return DDVec3(dd.add(a.x, b.x), dd.add(a.y, b.y), dd.add(a.z, b.z))
+
+
+@kernel(inline=True)
+def _times(s, a):
+    return DDVec3(dd.mul(s, a.x), dd.mul(s, a.y), dd.mul(s, a.z))
+
+
+# --- Newton's step ------------------------------------------------------------------------------
+
+
+@kernel
+def _fill(M, f, h, p, q, n, gap, residual):
+    """The equations of a step, an (m, m + 1) matrix."""
+    m = 4 + f.flat + h.flat
+    for k in range(m * (m + 1)):
+        M[k] = 0.0
+    w, y = m + 1, dd.leading(n)
+    xy, yz, zx = -(p.xy + q.xy), -(p.yz + q.yz), -(p.zx + q.zx)
+    _put(M, w, 0, -(p.xx + q.xx) - gap.high, xy, zx, -y.x, -residual.x.high)
+    _put(M, w, 1, xy, -(p.yy + q.yy) - gap.high, yz, -y.y, -residual.y.high)
+    _put(M, w, 2, zx, yz, -(p.zz + q.zz) - gap.high, -y.z, -residual.z.high)
+    square = dd.sub(DD(1.0, 0.0), dd.inner(n, n))
+    _put(M, w, 3, y.x, y.y, y.z, 0.0, 0.5 * square.high)
+    row = 4
+    for k in range(4):
+        flats = f.flat if k < 2 else h.flat
+        if k % 2 < flats:
+            d = p.d if k == 0 else p.e if k == 1 else q.d if k == 2 else q.e
+            z = dd.leading(d)
+            sign = -1.0 if k < 2 else 1.0
+            M[row], M[w + row], M[2 * w + row] = sign * z.x, sign * z.y, sign * z.z
+            _put(M, w, row, z.x, z.y, z.z, 0.0, -dd.inner(n, d).high)
+            row += 1
+
+
+@kernel(inline=True)
+def _put(M, w, row, x, y, z, g, right):
+    at = w * row
+    M[at], M[at + 1], M[at + 2], M[at + 3], M[at + w - 1] = x, y, z, g, right
+
+
+@kernel
+def _solve(M, m):
+    """Gauss–Jordan with full pivots among the rows; the solution stands in the last column, 0 where a pivot is none."""
+    w = m + 1
+    for k in range(m):
+        best = k
+        for i in range(k + 1, m):
+            if abs(M[w * i + k]) > abs(M[w * best + k]):
+                best = i
+        largest = 0.0
+        for j in range(m):
+            largest = max(largest, abs(M[w * best + j]))
+        if not abs(M[w * best + k]) > 1e-13 * largest or largest == 0.0:
+            for i in range(m):
+                M[w * i + k] = 0.0
+            M[w * k + k] = 1.0
+            for j in range(k + 1, w):
+                M[w * k + j] = 0.0
+            continue
+        if best != k:
+            for j in range(k, w):
+                M[w * k + j], M[w * best + j] = M[w * best + j], M[w * k + j]
+        over = 1.0 / M[w * k + k]
+        for j in range(k, w):
+            M[w * k + j] *= over
+        for i in range(m):
+            factor = M[w * i + k]
+            if i != k and factor != 0.0:
+                for j in range(k, w):
+                    M[w * i + j] -= factor * M[w * k + j]
+
+
+# --- proof --------------------------------------------------------------------------------------
+
+
+@kernel
+def _proven(pair, A, B, f, h, p, q, n, t, size, work):
+    """The `CurvedGap` of a solution.   p, q : the placed features."""
+    away = dd.neg_vec3(n)
+    if f.flat > 0 or h.flat > 0:
+        f, h = _within(pair, A, f), _within(pair, B, h)
+        p, q = _placed(pair, A, f, n), _placed(pair, B, h, away)
+    v = dd.sub_vec3(_plus(q.point, t), p.point)
+    length = dd.sqrt(dd.inner(n, n))
+    beyond = dd.add(_beyond(pair, A, f, p, n, work), _beyond(pair, B, h, q, away, work))
+    lower = dd.div(dd.sub(dd.inner(n, v), beyond), length)
+    upper = dd.sqrt(dd.inner(v, v))
+    error = ERROR * size
+    is_proven = 0.5 < length.high < 2.0 and lower.high > 4.0 * error and upper.high < math.inf
+    return CurvedGap(is_proven, lower, upper, error, dd.leading(n), dd.leading(p.point), dd.leading(q.point))
+
+
+@kernel
+def _within(pair, body, f):
+    """The feature with its flat coordinates within the set."""
+    numbers, params = pair.numbers, body.params_at
+    s, t = f.s, f.t
+    if f.kind == VERTEX and f.flat > 0:
+        s, t = _clamped(s, 0.0, 1.0), _clamped(t, 0.0, 1.0)
+        total = s.high + t.high
+        if total > 1.0:
+            s, t = DD(s.high / total * (1.0 - 2.0**-50), 0.0), DD(t.high / total * (1.0 - 2.0**-50), 0.0)
+    elif f.kind == SIDE:
+        half = numbers[params + 1]
+        s = _clamped(s, -half, half) if body.kind == CYLINDER else _clamped(s, 0.0, 1.0)
+    elif f.kind == END:
+        beside = math.sqrt(s.high * s.high + t.high * t.high)
+        radius = numbers[params] * (1.0 - 2.0**-50)
+        if beside > radius:
+            s, t = DD(s.high * radius / beside, 0.0), DD(t.high * radius / beside, 0.0)
+    return Feature(f.kind, f.end, f.flat, f.i, f.j, f.k, s, t)
+
+
+@kernel(inline=True)
+def _clamped(x, low, high):
+    if x.high <= low:
+        return DD(low, 0.0)
+    return DD(high, 0.0) if x.high >= high else x
+
+
+@kernel
+def _beyond(pair, body, f, p, u, work):
+    """How much farther a body reaches along u than its placed feature does.
+
+    A rim and an ellipsoid's point are where the reach is taken: nothing, but for an end of a cylinder or cone that is
+    reached farther: 2 h |u_z| for a cylinder, the tip's lead over the rim for a cone.
+    """
+    numbers, params, poses, at = pair.numbers, body.params_at, pair.poses, body.pose_at
+    if body.kind == POINTS:
+        reach = _reach_of_vertices(body, _turned_back(poses, at, u), reach_of(pair, body), work)
+        return dd.sub(reach, dd.inner(u, p.point))
+    if body.kind == ELLIPSOID:
+        return _ZERO
+    w = _turned_back(poses, at, u)
+    across = dd.sqrt(dd.add(dd.mul(w.x, w.x), dd.mul(w.y, w.y)))
+    rim, along = dd.mul(DD(numbers[params], 0.0), across), dd.mul(DD(numbers[params + 1], 0.0), w.z)
+    reach = dd.sub(rim, along)
+    if body.kind == CYLINDER:
+        reach = dd.add(rim, along if along.high > 0.0 else dd.neg(along))
+    elif dd.less(reach, along):
+        reach = along
+    return dd.sub(reach, dd.inner(u, p.point))
+
+
+@kernel
+def _reach_of_vertices(body, w, farthest, work):
+    """farthest : of a vertex from the frame's origin; doubles are off by 8u of that along w."""
+    ties = view_i64(work.ties_at, MAX_TIES + 1)
+    g = neg(dd.leading(w))
+    best, at = math.inf, 0
+    for k in range(body.n):
+        value = dot(column_at(body.coords, body.padded, k), g)
+        if value < best:
+            best, at = value, k
+    ties[0] = at
+    n_tied, _ = tied_vertices(vertices_of(body), ties, g, 2.0**-48 * farthest)
+    largest = DD(-math.inf, 0.0)
+    if n_tied > MAX_TIES:
+        return DD(math.inf, 0.0)
+    for k in range(n_tied):
+        value = dd.inner(dd.exact_vec3(column_at(body.coords, body.padded, ties[k])), w)
+        if dd.less(largest, value):
+            largest = value
+    return largest
