@@ -87,6 +87,8 @@ if TYPE_CHECKING:
     from collide.solids.overlap_volume import OverlapVolume, overlap_volume
     from collide.solids.planar_obstacle import PlanarObstacle
     from collide.spheres.enclosing_spheres import EnclosingSpheres, enclosing_spheres
+    from collide.spheres.facets_outside import PieceAudit
+    from collide.spheres.piece_audit import audit_pieces
     from collide.surface_queries.contains import contains
     from collide.surface_queries.facet_pairs import FacetPairs, SelfCollisions, facet_pairs, self_collisions
     from collide.surface_queries.overlay import Overlay, overlay
@@ -116,6 +118,8 @@ _HOMES = {
     "collide.contact.contact_query": ("contacts",),
     "collide.contact.contact_rows": ("Contacts",),
     "collide.spheres.enclosing_spheres": ("EnclosingSpheres", "enclosing_spheres"),
+    "collide.spheres.facets_outside": ("PieceAudit",),
+    "collide.spheres.piece_audit": ("audit_pieces",),
     "collide.surface_queries.contains": ("contains",),
     "collide.surface_queries.overlay": ("Overlay", "overlay"),
     "collide.surface_queries.signed_distance_grid": ("GridDistances", "SignedDistanceGrid"),
@@ -175,12 +179,12 @@ __all__ = [
     "DrawnConfigurations", "Ellipsoid", "EnclosingSpheres", "FacetPairs", "GridDistances", "HPolytope", "Halfspace",
     "HeightField", "How", "InvalidArgument", "InvalidPose", "InvalidShape", "LinkPair", "Located", "Mesh",
     "MissingExtra", "MotionPlan", "OcTree", "OcTreeLeaves", "OverlapVolume", "Overlay", "PairResult",
-    "PartitionSize", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits", "Robot",
+    "PartitionSize", "PieceAudit", "PlanarObstacle", "Plane", "PointCloud", "Portals", "Proposal", "RayHits", "Robot",
     "RobotChecker", "RobotDistances", "SceneError", "SelfCollisions", "Shape", "ShapeCasts", "ShapeSet",
     "SignedDistanceGrid", "SignedDistances", "SpacePartition", "Sphere", "Spline", "SweepResults", "SweptMesh",
     "TetMesh", "TimeOfImpact", "UnknownBody", "UnsupportedQuery", "VoxelGrid", "World", "WorldHits", "WorldResult",
-    "boolean", "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains", "distance",
-    "enclosing_spheres", "facet_pairs", "get_include", "get_library", "moved_poses", "overlap_volume",
+    "audit_pieces", "boolean", "certify", "collide", "combine", "configuration_obstacle", "contacts", "contains",
+    "distance", "enclosing_spheres", "facet_pairs", "get_include", "get_library", "moved_poses", "overlap_volume",
     "overlapping_cells", "overlay", "plan", "pose", "poses", "poses_in_motion", "propose_disabled_pairs", "raycast",
     "read_sweep", "self_collisions",
     "self_overlapping_cells", "shape_cast", "signed_distances", "sweep", "tessellate", "time_of_impact", "verify",

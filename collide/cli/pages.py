@@ -74,22 +74,24 @@ def write_comparison(args, scene, comparison, progress: Callable) -> None:
     _write(args, scene.name, progress, blocks, [Stated("", scene, ours)])
 
 
-def write_audit(args, robot, bodies: dict, published: dict, links: list, progress: Callable) -> None:
-    """The page of an audit of spheres: links, their spheres, and the pieces of links outside (`AuditedLink`)."""
+def write_audit(args, robot, bodies: dict, published: dict, links: list, place: str, progress: Callable) -> None:
+    """The page of an audit of spheres or other convex pieces: links, their pieces, and what of links is outside
+    (`AuditedLink`).   place : what is audited.
+    """
     from collide.pages.audit_page import audit_blocks
     from collide.pages.page_file import page_pieces, write_page
     from collide.reports.checking import Finding
-    from collide.reports.sphere_report import audit_words
-    from collide.scenes.sphere_scene import sphere_scene, spheres_of
+    from collide.reports.sphere_report import audit_words, audited_kind
+    from collide.scenes.sphere_scene import pieces_of, sphere_scene
 
     with progress("writing the page"):
         scene, looks = sphere_scene(robot, bodies, published, links)
-        place, out = os.path.basename(args.audit), [link for link in links if not link.encloses]
+        kind, out = audited_kind(links), [link for link in links if not link.encloses]
         findings = [
-            Finding("outside", link.link, spheres_of(link.link), -link.audit.outside[1] if link.audit else None)
+            Finding("outside", link.link, pieces_of(link.link, kind), -link.audit.outside[1] if link.audit else None)
             for link in out
         ]
-        blocks = audit_blocks(scene, looks, findings, audit_words(robot.name, place, links))
+        blocks = audit_blocks(scene, looks, findings, audit_words(robot.name, place, links), kind)
         write_page(page_pieces(f"collide spheres: {robot.name} beside {place}", blocks), args.html)
 
 

@@ -15,12 +15,16 @@ from collide.cli.srdf import load_options, robot_of
 from collide.errors import InvalidArgument
 from collide.reports.number_format import parse_length
 
+#: What --audit takes in place of a file: a robot's own meshes as hulls, or as unions of convex pieces.
+_FORMS = ("hull", "pieces")
+
 EPILOG = """examples:
   collide spheres robot.urdf --out spheres.urdf              8 spheres a link
   collide spheres robot.urdf --out spheres.urdf --excess 10mm
   collide spheres robot.urdf --out spheres.urdf --total 60
   collide spheres robot.urdf --audit published_spheres.urdf
   collide spheres robot.urdf --audit published_spheres.urdf --html page.html
+  collide spheres robot.urdf --audit hull                    or pieces, or F.urdf
 
 Makes spheres whose union contains the collision geometry of each link, with
 a proof that is checked in integers, for planners that take robots as spheres.
@@ -35,7 +39,10 @@ by more. docs/spheres.md says how they are placed and proven.
 --audit tells, link by link, what a published set leaves outside: the share
 of the link's surface, its greatest distance from the spheres, and how far the
 spheres exceed the link. Every number has proven bounds. --html shows links,
-spheres and what lies outside.
+spheres and what lies outside. The set may as well be of boxes, cylinders and
+other convex shapes; its meshes are taken as their convex hulls. --audit hull
+and --audit pieces judge what --meshes hull and --meshes pieces would put in
+place of ROBOT's own meshes.
 
 ROBOT is a URDF, MJCF or SDFormat file, or a scene (a file or a shipped one)
 with a robot in it; --out needs a URDF.
@@ -51,7 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     how_many.add_argument("--total", type=count, metavar="N", help="spheres for all links together, at most")
     how_many.add_argument("--excess", type=_length, metavar="D",
                           help="as few as go beyond no link by more: 0.01 (metres), 10mm, 1cm")
-    how_many.add_argument("--audit", metavar="F.urdf", help="a robot of spheres to be judged, links by their names")
+    how_many.add_argument("--audit", metavar="F.urdf|hull|pieces",
+                          help="judge a robot of spheres or other convex shapes, links by their names; or the "
+                               "hulls, or the convex pieces, of the robot's own meshes")
     parser.add_argument("--out", metavar="F.urdf", help="write the URDF with the spheres")
     parser.add_argument("--force", action="store_true", help="let --out overwrite a file")
     parser.add_argument("--meshes", choices=("mesh", "hull", "pieces"),
@@ -153,46 +162,53 @@ def _check_out(args: argparse.Namespace) -> None:
 
 
 def _audit(args: argparse.Namespace, robot, bodies: dict, progress: Callable) -> bool:
+    from collide import Sphere, audit_pieces
     from collide.reports import sphere_report
-    from collide.spheres.sphere_audit import audit_spheres
 
-    published = _published(args, robot, bodies)
-    place = os.path.basename(args.audit)
+    with progress("reading what is audited"):
+        published, place = _published(args, robot, bodies)
     links = []
     for link, body in bodies.items():
-        centers, radii = published.get(link, ((), ()))
+        pieces = published.get(link)
         with progress(f"auditing {link}"):
-            audit = audit_spheres(body, centers, radii) if len(radii) else None
-        links.append(sphere_report.AuditedLink(link, len(radii), audit))
+            audit = audit_pieces(body, pieces) if pieces is not None else None
+        shapes = _leaves(pieces) if pieces is not None else []
+        n_spheres = sum(isinstance(shape, Sphere) for shape in shapes)
+        links.append(sphere_report.AuditedLink(link, n_spheres, len(shapes), audit))
     if args.json:
         write_json(sphere_report.audit_items(robot.name, place, links).items(), args.json)
     if args.html:
-        cli_pages.write_audit(args, robot, bodies, published, links, progress)
+        cli_pages.write_audit(args, robot, bodies, published, links, place, progress)
     words = sphere_report.audit_words(robot.name, place, links)
     _print(args, sphere_report.audit_table(links, place), words, robot)
     return all(link.encloses for link in links)
 
 
-def _published(args: argparse.Namespace, robot, bodies: dict) -> dict:
-    """Link → (centres (n, 3), radii (n,)) of a robot of spheres."""
-    import numpy as np
+def _published(args: argparse.Namespace, robot, bodies: dict) -> tuple[dict, str]:
+    """(link → the convex pieces in the frame of the link, what they are called) of another robot, or of the robot with
+    its meshes as hulls or pieces.
+    """
+    from collide import Compound
 
-    from collide import Sphere
-
-    spheres = robot_of(args.audit, None, {"srdf": False, "missing_meshes": "skip"})
-    unknown = [link for link in spheres.geometry if link not in bodies and spheres.geometry[link]]
-    if unknown and not any(link in bodies for link in spheres.geometry):
+    if args.audit in _FORMS:
+        others = robot_of(args.robot, args.name, load_options(args) | {"srdf": False, "meshes": args.audit})
+        place = f"{robot.name} with meshes as {args.audit.removesuffix('s')}s"
+    else:
+        others = robot_of(args.audit, None, {"srdf": False, "missing_meshes": "skip", "meshes": "hull"})
+        place = os.path.basename(args.audit)
+    if not any(link in bodies for link, parts in others.geometry.items() if parts):
         raise InvalidArgument(f"--audit: {args.audit} and {robot.place} share no link with collision geometry")
-    published = {}
-    for link, parts in spheres.geometry.items():
-        strange = [part for part in parts if not isinstance(part.shape, Sphere)]
-        if strange:
-            kind = type(strange[0].shape).__name__
-            raise InvalidArgument(f"--audit: link {link} of {args.audit} has a {kind}: only spheres are audited")
-        if parts:
-            centers = np.array([part.X_LG[:3, 3] for part in parts])
-            published[link] = (centers, np.array([part.shape.radius for part in parts]))
-    return published
+    pieces = {
+        link: Compound([(part.shape, part.X_LG) for part in parts]) for link, parts in others.geometry.items() if parts
+    }
+    return pieces, place
+
+
+def _leaves(shape) -> list:
+    """The shapes of a compound, of compounds in it as well."""
+    from collide import Compound
+
+    return [leaf for item, _ in shape.items for leaf in _leaves(item)] if isinstance(shape, Compound) else [shape]
 
 
 # --- printing -----------------------------------------------------------------------------------

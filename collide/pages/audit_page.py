@@ -1,4 +1,4 @@
-"""The data of a page on spheres around links: the scene, with all that lies outside in the colour of collisions."""
+"""The data of a page on pieces around links: the scene, with all that lies outside in the colour of collisions."""
 
 from __future__ import annotations
 
@@ -13,20 +13,22 @@ from collide.reports.checking import Finding
 from collide.reports.classes import COLLIDING
 
 _NOTE = (
-    "links are drawn as far as they are outside their spheres, in the colour of collisions; links inside are hidden by "
-    "their spheres. Wires show whole links. No pair of bodies was tested"
+    "links are drawn as far as they are outside their {kind}, in the colour of collisions; links inside are hidden by "
+    "their {kind}. Wires show whole links. No pair of bodies was tested"
 )
 
 
 def audit_blocks(
-    scene, looks: Mapping[str, Sequence[PosedShape]], findings: Sequence[Finding], verdict: str
+    scene, looks: Mapping[str, Sequence[PosedShape]], findings: Sequence[Finding], verdict: str, kind: str
 ) -> list[ReportBlock | DataBlock]:
     """The blocks of a page.
 
-    scene : of links and spheres, no pair tested.   looks : link → the parts outside its spheres.   findings : a row
-    for each link outside: the link, its spheres, minus the greatest distance [m].   verdict : all of it in a line.
+    scene : of links and pieces, no pair tested.   looks : link → the parts outside its pieces.   findings : a row
+    for each link outside: the link, its pieces, minus the greatest distance [m].   verdict : all of it in a line.
+    kind : "spheres" or "pieces".
     """
-    drawn = drawing.of_scene(scene, report.make(scene), kind=drawing.SPHERES, looks=looks, notes=[_NOTE])
+    note = _NOTE.format(kind=kind)
+    drawn = drawing.of_scene(scene, report.make(scene), kind=drawing.SPHERES, looks=looks, notes=[note])
     outside = {finding.a for finding in findings}
     for body in drawn["bodies"]:
         body["verdict"] = COLLIDING if body["name"] in outside else FREE

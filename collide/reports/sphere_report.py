@@ -1,4 +1,4 @@
-"""Spheres of a robot's links, made or audited, as tables, words and JSON."""
+"""Spheres of a robot's links, made, and spheres or other convex pieces, audited, as tables, words and JSON."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from collide.reports.tables import Column, Table
 
 if TYPE_CHECKING:
     from collide.spheres.enclosing_spheres import EnclosingSpheres
-    from collide.spheres.sphere_audit import SphereAudit
+    from collide.spheres.facets_outside import PieceAudit
 
 SCHEMA = "collide-spheres/1"
-#: Of a link that spheres leave out whole.
-BARE = "no spheres"
 
 
 class MadeLink(NamedTuple):
@@ -24,11 +22,16 @@ class MadeLink(NamedTuple):
 
 
 class AuditedLink(NamedTuple):
-    """A link beside published spheres.   n_spheres : of the link.   audit : ``None`` for a link without spheres."""
+    """A link beside published spheres, or other convex pieces.
+
+    link : its name.   n_spheres, n_pieces : of the link, spheres among the pieces.   audit : ``None`` for a link
+    without pieces.
+    """
 
     link: str
     n_spheres: int
-    audit: SphereAudit | None
+    n_pieces: int
+    audit: PieceAudit | None
 
     @property
     def encloses(self) -> bool:
@@ -78,31 +81,39 @@ def made_items(robot: str, links: list[MadeLink]) -> dict[str, Any]:
 # --- audited ------------------------------------------------------------------------------------
 
 
+def audited_kind(links: list[AuditedLink]) -> str:
+    """What pieces are called: spheres, if all are, or pieces."""
+    return "spheres" if all(link.n_spheres == link.n_pieces for link in links) else "pieces"
+
+
 def audit_table(links: list[AuditedLink], place: str) -> Table:
-    columns = [Column("link", "name"), Column("spheres"), Column("surface outside"), Column("up to"),
+    kind = audited_kind(links)
+    columns = [Column("link", "name"), Column(kind), Column("surface outside"), Column("up to"),
                Column("exceed it by", optional=1)]
-    with_spheres = [link for link in links if link.audit is not None]
-    out = iter(lengths([_outside(link)[1] for link in with_spheres]))
-    beyond = iter(lengths([_audit(link).excess[1] for link in with_spheres]))
+    with_pieces = [link for link in links if link.audit is not None]
+    out = iter(lengths([_outside(link)[1] for link in with_pieces]))
+    beyond = iter(lengths([_audit(link).excess[1] for link in with_pieces]))
     rows = []
     for link in links:
         if link.audit is None:
-            rows.append([link.link, "0", "100 %", BARE, ""])
+            rows.append([link.link, "0", "100 %", f"no {kind}", ""])
         else:
             reach, excess = next(out), next(beyond)
-            rows.append([link.link, str(link.n_spheres), *_outside_words(link.audit, reach), excess])
+            rows.append([link.link, str(link.n_pieces), *_outside_words(link.audit, reach), excess])
     notes = [
         "surface outside, up to: its share of the link's surface, and the greatest distance; no more, proven.",
-        "exceed it by: no point of the spheres is farther from the link. --json has both bounds of every number.",
+        f"exceed it by: no point of the {kind} is farther from the link. --json has both bounds of every number.",
     ]
-    return Table(f"SPHERES OF {place}", columns, rows, notes=notes)
+    return Table(f"{kind.upper()} OF {place}", columns, rows, notes=notes)
 
 
-def _outside_words(audit: SphereAudit, reach: str) -> list[str]:
+def _outside_words(audit: PieceAudit, reach: str) -> list[str]:
     if audit.encloses:
         return ["none, proven", ""]
     if len(audit.holes):
         return ["holes inside", ""]
+    if audit.outside[1] == 0.0:
+        return ["none; inside open", ""]
     low, high = (100.0 * x for x in audit.share)
     share = f"{high:.2g} %" if high < 1.0 else f"{low:.0f} %" if f"{low:.0f}" == f"{high:.0f}" else (
         f"{low:.0f} – {high:.0f} %"
@@ -120,18 +131,19 @@ def audit_words(robot: str, place: str, links: list[AuditedLink]) -> str:
         worst = max(measured, key=lambda link: _outside(link)[0])
         text += f", by {_brief(_outside(worst)[0])} at most ({worst.link})"
     bare = len(outside) - len(measured)
-    return text + (f"; {count(bare, 'link')} without spheres" if bare else "")
+    return text + (f"; {count(bare, 'link')} without {audited_kind(links)}" if bare else "")
 
 
 def link_words(link: AuditedLink) -> str:
     """What a page says of a link."""
+    kind = audited_kind([link]).removesuffix("s")
     if link.audit is None:
-        return "the link has no spheres: all of it is outside"
+        return "the link has no pieces: all of it is outside"
     if link.encloses:
-        return f"inside its {count(link.n_spheres, 'sphere')}, proven"
+        return f"inside its {count(link.n_pieces, kind)}, proven"
     share, reach = _outside_words(link.audit, _brief(link.audit.outside[1]))
     what = f"{share} of the surface, up to {reach}" if reach else share
-    return f"outside its {count(link.n_spheres, 'sphere')}: {what}"
+    return f"outside its {count(link.n_pieces, kind)}: {what}"
 
 
 def audit_items(robot: str, place: str, links: list[AuditedLink]) -> dict[str, Any]:
@@ -142,7 +154,9 @@ def audit_items(robot: str, place: str, links: list[AuditedLink]) -> dict[str, A
 
 
 def _audit_item(link: AuditedLink) -> dict[str, Any]:
-    item: dict[str, Any] = {"link": link.link, "spheres": link.n_spheres, "encloses": link.encloses}
+    item: dict[str, Any] = {
+        "link": link.link, "spheres": link.n_spheres, "pieces": link.n_pieces, "encloses": link.encloses,
+    }
     if link.audit is not None:
         audit = link.audit
         item |= {
@@ -153,7 +167,7 @@ def _audit_item(link: AuditedLink) -> dict[str, Any]:
     return item
 
 
-def _audit(link: AuditedLink) -> SphereAudit:
+def _audit(link: AuditedLink) -> PieceAudit:
     assert link.audit is not None
     return link.audit
 

@@ -55,37 +55,52 @@ class BodyPart(NamedTuple):
         return self.mesh.vertices[self.mesh.faces]
 
 
-def body_parts(shape: Shape) -> list[BodyPart]:
-    """The parts of a body, in the order of `leaves_of`. Raises UnsupportedQuery for what has no facets."""
-    return [_part(leaf, poses) for leaf, poses in leaves_of(shape)]
+def is_same(a: BodyPart, b: BodyPart) -> bool:
+    """Whether two parts are equal shapes at the same pose."""
+    return np.array_equal(a.X, b.X) and a.shape == b.shape
 
 
-def _part(leaf: Shape, poses: tuple[np.ndarray, ...]) -> BodyPart:
+def body_parts(shape: Shape, what: str = "enclosing_spheres: shape") -> list[BodyPart]:
+    """The parts of a body, in the order of `leaves_of`. Raises UnsupportedQuery for what has no facets, in the words of
+    an argument ``what``.
+    """
+    return [_part(leaf, poses, what) for leaf, poses in leaves_of(shape)]
+
+
+def _part(leaf: Shape, poses: tuple[np.ndarray, ...], what: str) -> BodyPart:
     X = np.eye(4)
     for step in poses:
         X = step @ X
     if isinstance(leaf, Mesh):
-        mesh = leaf if np.array_equal(X, np.eye(4)) else Mesh(_placed(leaf.vertices, X), leaf.faces)
+        mesh = leaf if np.array_equal(X, np.eye(4)) else Mesh(placed(leaf.vertices, X), leaf.faces)
         return BodyPart(leaf, X, None, None, mesh, leaf.solid, 0.0)
-    vertices, faces = facets_around(leaf)
+    vertices, faces = facets_around(leaf, what)
     # The distance from a convex set is convex: on a facet it is largest at a corner.
     deviation = np.max(distance(leaf, _POINT, np.eye(4), poses_at(vertices), signed=False, check_poses=False).upper)
-    return BodyPart(leaf, X, vertices, faces, Mesh(_placed(vertices, X), faces), True, max(float(deviation), 0.0))
+    return BodyPart(leaf, X, vertices, faces, Mesh(placed(vertices, X), faces), True, max(float(deviation), 0.0))
 
 
-def _placed(points: np.ndarray, X: np.ndarray) -> np.ndarray:
+def placed(points: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """Points (n, 3) of a frame with the pose X (4, 4)."""
     return points @ X[:3, :3].T + X[:3, 3]
+
+
+def shells_of(part: BodyPart) -> np.ndarray:
+    """(m,) the number of the shell of each facet of a mesh, from 0; facets of no shell have numbers for themselves."""
+    n = len(part.mesh.faces)
+    shells = part.mesh.survey.shells.astype(np.int64) if part.solid else np.full(n, -1)
+    return np.unique(np.where(shells < 0, np.arange(n) + shells.max() + 1, shells), return_inverse=True)[1]
 
 
 # --- closed surfaces around convex parts --------------------------------------------------------
 
 
-def facets_around(leaf: Shape) -> tuple[np.ndarray, np.ndarray]:
+def facets_around(leaf: Shape, what: str) -> tuple[np.ndarray, np.ndarray]:
     """(vertices, faces) of a closed surface around a convex shape: its own facets, or facets around a curved shape."""
     if not isinstance(leaf, (Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, HPolytope, Sphere)) or leaf.is_region:
         raise UnsupportedQuery(
-            f"enclosing_spheres: a {type(leaf).__name__} cannot be enclosed here: give primitives, hulls, meshes or a "
-            "Compound of these"
+            f"{what}: a {type(leaf).__name__} has no facets around it: give primitives, hulls, meshes or a Compound of "
+            "these"
         )
     if isinstance(leaf, (Cylinder, Cone, Ellipsoid)) or convex_set(leaf).radius > 0.0:
         return _pushed_outwards(leaf)
@@ -183,22 +198,35 @@ def _winding_of_samples(samples: np.ndarray, vectors: np.ndarray, points: np.nda
 
 def farthest_reaches(parts: list[BodyPart], points: np.ndarray) -> np.ndarray:
     """(n,) proven upper bounds of how far points are from a body, negative inside; curved parts as they are."""
-    out = np.full(len(points), np.inf)
+    return reach_bounds(parts, points)[1]
+
+
+def reach_bounds(parts: list[BodyPart], points: np.ndarray, *, wrapped: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """(lower, upper) proven bounds (n,) of how far points are from a body, negative inside; curved parts as they are.
+
+    Inside, bounds are of the part with the point deepest. What a surface wraps counts as body, known from a single
+    side: lower bounds are −inf then. ``wrapped`` : whether to ask what is wrapped, O(n m) for m facets; upper bounds
+    are larger without.
+    """
+    lower, upper = np.full(len(points), np.inf), np.full(len(points), np.inf)
     X_WP = poses_at(points)
     for part in parts:
         if not isinstance(part.shape, Mesh):
-            away = distance(part.shape, _POINT, part.X, X_WP, check_poses=False).upper
+            away = distance(part.shape, _POINT, part.X, X_WP, check_poses=False)
+            least, largest = np.asarray(away.lower), np.asarray(away.upper)
         else:
-            away = signed_distances(part.mesh, points, signed=part.solid).upper
+            near = signed_distances(part.mesh, points, signed=part.solid)
+            least, largest = np.asarray(near.lower), np.asarray(near.upper)
             if not part.solid:
                 # Solid angles are sums of rounded terms: 1e-9 is far above what their rounding adds up to.
-                wrapped = winding_of_surface(part.corners, points) >= 0.5 + 1e-9
-                lower = signed_distances(part.mesh, points, signed=False).lower
-                away = np.where(wrapped, -lower, away)
+                winding = winding_of_surface(part.corners, points) if wrapped else np.zeros(len(points))
+                least, largest = np.full(len(points), -np.inf), np.where(winding >= 0.5 + 1e-9, -least, largest)
             if part.mesh is not part.shape:  # vertices were rounded when placed, by less than 2^-50 of the largest
-                away = away + 2.0**-50 * (np.abs(part.mesh.vertices).max() + np.abs(part.X[:3, 3]).max())
-        np.minimum(out, away, out=out)
-    return out
+                rounding = 2.0**-50 * (np.abs(part.mesh.vertices).max() + np.abs(part.X[:3, 3]).max())
+                least, largest = least - rounding, largest + rounding
+        np.minimum(lower, least, out=lower)
+        np.minimum(upper, largest, out=upper)
+    return lower, upper
 
 
 def winding_of_surface(corners: np.ndarray, points: np.ndarray) -> np.ndarray:

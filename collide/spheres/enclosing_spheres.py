@@ -17,6 +17,7 @@ from collide.shapes.point_cloud import PointCloud
 from collide.shapes.primitives import Sphere
 from collide.shapes.shape import Shape, checked_shape
 from collide.spheres.body_facets import BodyPart, Reach, body_parts
+from collide.spheres.convex_pieces import Balls
 from collide.spheres.facet_cover import certificate_of, cover_facets
 from collide.spheres.place_spheres import (
     Placement,
@@ -252,7 +253,7 @@ def _refined(reach: Reach, samples: Samples, place: Placement) -> _Refined:
     corners, rng = _all_corners(reach.parts), np.random.default_rng(1)
     best, least = place, math.inf
     for _ in range(_ROUNDS):
-        cover = cover_facets(corners, place.centers, -place.reaches, _tolerance(samples, place))
+        cover = cover_facets(corners, Balls(place.centers, -place.reaches), _tolerance(samples, place))
         holes = _holes(reach, samples, place.centers, np.maximum(cover.upper - place.reaches, 0.0))
         away = np.sqrt(np.square(holes[:, None] - place.centers).sum(axis=2)) + place.reaches
         needed = max(cover.upper, float(away.min(axis=1).max(initial=-math.inf)))
@@ -285,12 +286,15 @@ def _proven(shape: Shape, reach: Reach, samples: Samples, place: Placement) -> E
     grid = math.ldexp(1.0, math.frexp(max(_GRID * samples.size, 2.0**-45 * largest, 1e-300))[1])
     centers = np.rint(place.centers / grid) * grid
     reaches = reach(centers)
-    cover = cover_facets(corners, centers, -reaches, _tolerance(samples, place))
-    used = np.flatnonzero(cover.distances > 0.0)
+    cover = cover_facets(corners, Balls(centers, -reaches), _tolerance(samples, place))
+    away = np.sqrt(np.square(cover.corners - centers[cover.owners][:, None]).sum(axis=2)).max(axis=1)
+    needed = np.zeros(len(centers))
+    np.maximum.at(needed, cover.owners, away)
+    used = np.flatnonzero(needed > 0.0)
     if not len(used):  # a body without extent
         used = np.zeros(1, dtype=np.int64)
     centers, reaches = centers[used], reaches[used]
-    radii = _rounded_up(cover.distances[used], largest, grid)
+    radii = _rounded_up(needed[used], largest, grid)
     margin = 2.0 * _NEAR * samples.size
     while len(holes := _holes(reach, samples, centers, radii)):
         # Each is taken in by the ball that exceeds the body least then, and by a margin that grows: a ball with the

@@ -8,6 +8,7 @@ import numpy as np
 
 from collide.certificates.sphere_cover import CUT_AT, PartCover
 from collide.spheres.body_facets import BodyPart
+from collide.spheres.convex_pieces import Balls, ConvexPieces
 
 #: Distances of corners from balls worked on at a time.
 _BLOCK = 1 << 20
@@ -23,8 +24,7 @@ class FacetCover(NamedTuple):
     farthest : (3,) where ``lower`` is reached.
     pieces : (k,) int32, as of `PartCover`: every piece is in the ball named, if radii grow by ``upper``.
     starts : (m,) where the pieces of each facet begin.
-    distances : (n,) how large the radius of each ball has to be to hold its pieces; 0 without pieces.
-    corners, values : (l, 3, 3) and (l,) the last pieces, and what their own upper bounds are.
+    corners, owners, values : (l, 3, 3), (l,), (l,) the last pieces, the ball of each, and their own upper bounds.
     """
 
     lower: float
@@ -32,25 +32,28 @@ class FacetCover(NamedTuple):
     farthest: np.ndarray
     pieces: np.ndarray
     starts: np.ndarray
-    distances: np.ndarray
     corners: np.ndarray
+    owners: np.ndarray
     values: np.ndarray
 
 
 def cover_facets(
-    corners: np.ndarray, centers: np.ndarray, radii: np.ndarray, tolerance: float, *, least: float = -np.inf
+    corners: np.ndarray, cover: Balls | ConvexPieces, tolerance: float, *, least: float = -np.inf
 ) -> FacetCover:
-    """Cut facets (m, 3, 3) until the bracket of their greatest distance outside balls is as narrow as a tolerance [m].
+    """Cut facets (m, 3, 3) until the bracket of their greatest distance outside balls, or other convex sets, is as
+    narrow as a tolerance [m].
 
-    Radii may be negative: only differences count. ``least`` : pieces that are no farther outside need not be cut.
+    Radii of balls may be negative: only differences count. ``least`` : pieces that are no farther outside need not be
+    cut.
 
-    A ball's distance |x − c| − r is convex in x: on a triangle a corner has the largest. So the least over balls of
-    the largest over corners bounds a piece from above, and the least over balls at any point from below.
+    The signed distance of a convex set, of a ball |x − c| − r, is convex in x: on a triangle a corner has the largest.
+    So the least over sets of the largest over corners bounds a piece from above, and the least over sets at any point
+    from below.
     """
     lower, farthest, levels = -np.inf, corners[0, 0], []
     depth = 0
     while len(corners):
-        owners, values, reached, at = _judge(corners, centers, radii)
+        owners, values, reached, at = _judge(corners, cover)
         if reached > lower:
             lower, farthest = reached, at
         is_cut = (values > max(lower + tolerance, least)) & (depth < _MAX_DEPTH)
@@ -61,24 +64,21 @@ def cover_facets(
     leaf_corners = np.concatenate([level[0][~level[3]] for level in levels])
     leaf_owners = np.concatenate([level[1][~level[3]] for level in levels])
     leaf_values = np.concatenate([level[2][~level[3]] for level in levels])
-    away = np.sqrt(np.square(leaf_corners - centers[leaf_owners][:, None]).sum(axis=2)).max(axis=1)
-    distances = np.zeros(len(centers))
-    np.maximum.at(distances, leaf_owners, away)
     return FacetCover(
-        lower, float(leaf_values.max()), farthest, *_in_preorder(levels), distances, leaf_corners, leaf_values
+        lower, float(leaf_values.max()), farthest, *_in_preorder(levels), leaf_corners, leaf_owners, leaf_values
     )
 
 
 def _judge(
-    corners: np.ndarray, centers: np.ndarray, radii: np.ndarray
+    corners: np.ndarray, cover: Balls | ConvexPieces
 ) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
-    """(the best ball for each piece, its value; the farthest corner's distance, and the corner)."""
+    """(the best set for each piece, its value; the farthest corner's distance, and the corner)."""
     owners, values = np.empty(len(corners), dtype=np.int32), np.empty(len(corners))
     reached, at = -np.inf, corners[0, 0]
-    step = max(1, _BLOCK // (3 * len(centers)))
+    step = max(1, _BLOCK // (3 * cover.size))
     for start in range(0, len(corners), step):
         some = corners[start : start + step]
-        outside = np.sqrt(np.square(some[:, :, None] - centers).sum(axis=3)) - radii
+        outside = cover.away(some)
         worst = outside.max(axis=1)
         owners[start : start + step] = worst.argmin(axis=1)
         values[start : start + step] = worst.min(axis=1)

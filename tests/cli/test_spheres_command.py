@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from mesh_shapes import block_ring
 from page_browser import browser
 
 import collide
@@ -98,8 +99,47 @@ def test_an_audit_tells_what_is_outside(robot, tmp_path, capsys):
               for s in (-1, 1) for t in (-1, 1)]
     far = max(np.sqrt(0.2**2 + y**2 + (0.5 + z) ** 2) for y, z in turned) - 0.5
     assert base["outside"][0] <= far <= base["outside"][1] < far + 1e-3
-    assert tip == {"link": "tip", "spheres": 0, "encloses": False}
+    assert tip == {"link": "tip", "spheres": 0, "pieces": 0, "encloses": False}
     assert not audit["encloses"] and audit["audited"] == "published.urdf"
+
+
+def test_pieces_of_any_convex_shapes_are_audited(robot, tmp_path, capsys):
+    """A robot against itself is contained; a smaller box in the place of the base's shapes is not, by half of what it
+    lacks along the box, and a mesh that is not convex enters as its hull.
+    """
+    assert main(["spheres", str(robot), "--audit", str(robot), "--json", "-"]) == 0
+    links = json.loads(capsys.readouterr().out)["links"]
+    assert [(link["pieces"], link["spheres"], link["encloses"], link["excess"]) for link in links] == [
+        (2, 0, True, [0.0, 0.0]), (1, 1, True, links[1]["excess"]),
+    ]
+    other = tmp_path / "other.urdf"
+    other.write_text(URDF.replace("0.4 0.2 0.6", "0.36 0.2 0.6"), encoding="utf-8")
+    assert main(["spheres", str(robot), "--audit", str(other)]) == 1
+    told = capsys.readouterr().out
+    assert "PIECES OF other.urdf" in told and "other.urdf does not contain arm: 1 of 2 links" in told
+    assert "by 20 mm at most (base)" in told
+
+    vertices, faces = block_ring()
+    collide.Mesh(vertices, faces).save(tmp_path / "ring.stl")
+    mesh = URDF.replace('<box size="0.4 0.2 0.6"/>', '<mesh filename="ring.stl"/>').replace(" rpy=\"0.3 0 0\"", "")
+    (tmp_path / "ring.urdf").write_text(mesh, encoding="utf-8")
+    hole = collide.audit_pieces(collide.Mesh(vertices, faces), collide.ConvexHull(vertices)).excess
+    for audited, place in (("hull", "arm with meshes as hulls"), (str(tmp_path / "ring.urdf"), "ring.urdf")):
+        assert main(["spheres", str(tmp_path / "ring.urdf"), "--audit", audited, "--json", "-"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["audited"] == place and found["encloses"]
+        lower, upper = found["links"][0]["excess"]
+        assert 0.0 < lower <= hole[1] and hole[0] <= upper
+
+
+def test_a_page_shows_pieces(robot, tmp_path):
+    other, page = tmp_path / "other.urdf", tmp_path / "page.html"
+    other.write_text(URDF.replace("0.4 0.2 0.6", "0.36 0.2 0.6"), encoding="utf-8")
+    assert main(["spheres", str(robot), "--audit", str(other), "--html", str(page), "--quiet"]) == 1
+    drawing = json.loads(re.search(r'id="drawing">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL)[1])
+    verdicts = {body["name"]: body["verdict"] for body in drawing["bodies"]}
+    assert verdicts == {"base": "colliding", "base: pieces": "free", "tip": "free", "tip: pieces": "free"}
+    assert "outside their pieces" in page.read_text(encoding="utf-8")
 
 
 def test_a_page_shows_what_is_outside(robot, tmp_path):
@@ -137,8 +177,8 @@ def test_the_page_opens_in_a_browser(robot, tmp_path):
         (["--out", "x.txt"], "must end in .urdf"),
         (["--out", "arm.urdf"], "--force overwrites it"),
         (["--audit", "arm.urdf", "--out", "y.urdf"], "an audit makes no spheres"),
-        (["--audit", "arm.urdf"], "link base of arm.urdf has a Box"),
         (["--audit", "none.urdf"], "none.urdf"),
+        (["--audit", "hulls"], "hulls"),
         (["--html", "page.html"], "shows an audit"),
         (["--excess", "1um"], "more than 1000 spheres"),
     ],

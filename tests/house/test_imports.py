@@ -70,7 +70,7 @@ ROOMS = {
         "surface_queries",
     },
     "spheres": {
-        "errors", "base", "shapes", "lowering", "certificates", "pairs", "surface_queries",
+        "errors", "base", "mesh", "shapes", "lowering", "certificates", "pairs", "surface_queries",
     },
     "worlds": {
         "errors", "base", "transforms", "results", "numerics", "shapes", "lowering", "broadphase", "narrowphase",

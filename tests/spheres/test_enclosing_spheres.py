@@ -14,6 +14,7 @@ from solid_membership import windings
 import collide
 from collide.certificates.certificate import CertificateRefused
 from collide.errors import InvalidArgument, UnsupportedQuery
+from collide.spheres.convex_pieces import Balls
 from collide.spheres.facet_cover import cover_facets
 
 
@@ -285,7 +286,7 @@ def test_a_hole_inside_is_no_cover():
     grid = np.stack(np.meshgrid(*[np.linspace(-1, 1, 9)] * 3), axis=-1).reshape(-1, 3)
     skin = grid[np.abs(grid).max(axis=1) == 1.0]
     radii = np.full(len(skin), 0.2)
-    cover = cover_facets(v[f], skin, radii, 1e-3)
+    cover = cover_facets(v[f], Balls(skin, radii), 1e-3)
     assert cover.upper < 0.0
     part = spheres.certificate[0]._replace(pieces=cover.pieces)
     forged = spheres._replace(centers=skin, radii=radii, certificate=(part,))

@@ -26,7 +26,7 @@ def test_a_ball_inside_a_cube_leaves_known_parts_outside():
     share = 1.0 - math.pi * (1.2**2 - 1.0) / 4.0
     assert audit.share[0] <= share <= audit.share[1] <= audit.share[0] + 0.006
     assert audit.area == pytest.approx(24.0) and audit.excess[0] <= 0.2 <= audit.excess[1] + 1e-12
-    drawn = np.cross(audit.pieces[:, 1] - audit.pieces[:, 0], audit.pieces[:, 2] - audit.pieces[:, 0])
+    drawn = np.cross(audit.patches[:, 1] - audit.patches[:, 0], audit.patches[:, 2] - audit.patches[:, 0])
     assert 0.5 * np.linalg.norm(drawn, axis=1).sum() == pytest.approx(share * 24.0, rel=0.02)
 
 
@@ -38,7 +38,7 @@ def test_spheres_that_enclose_are_known_to():
         made = collide.enclosing_spheres(shape, 6)
         audit = audit_spheres(shape, made.centers, made.radii)
         assert audit.encloses and audit.outside == audit.share == (0.0, 0.0), name
-        assert not len(audit.pieces) and not len(audit.holes)
+        assert not len(audit.patches) and not len(audit.holes)
         less = audit_spheres(shape, made.centers, made.radii * 0.98)
         assert not less.encloses and less.outside[1] > 0.0, name
 
