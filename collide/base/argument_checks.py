@@ -120,6 +120,15 @@ def listed_entries(what: str, value: Any, wanted: str, error: type[CollideError]
     raise error(f"{what} must be {wanted}, got {brief(value)}")
 
 
+def listed_texts(what: str, value: Any, wanted: str, error: type[CollideError] = InvalidArgument) -> list[str]:
+    """The entries, each a text, of whatever can be gone through but a text. wanted : for messages. Raises ``error``."""
+    entries = listed_entries(what, value, wanted, error)
+    for k, entry in enumerate(entries):
+        if not isinstance(entry, str):
+            raise error(f"{what} must be {wanted}, got {brief(entry)} as entry {k}")
+    return [str(entry) for entry in entries]
+
+
 def mapping(what: str, value: Any, wanted: str, error: type[CollideError] = InvalidArgument) -> Mapping:
     """A mapping. wanted : for messages. Raises ``error``."""
     return instance(what, value, Mapping, f"a mapping, {wanted}", error)

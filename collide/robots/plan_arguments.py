@@ -66,7 +66,7 @@ def sampled_box(robot: Robot, joints: Iterable[str] | None, ends: np.ndarray) ->
         _refuse_ends_out_of_limits(robot, ends)
     moves = np.ones(robot.dof, dtype=bool)
     if joints is not None:
-        names = checks.listed_entries("plan: joints", joints, "names of joints")
+        names = checks.listed_texts("plan: joints", joints, "names of joints")
         unknown = [name for name in names if name not in robot.joint_names]
         if unknown or not names:
             what = f"unknown {brief(unknown[0])}" if unknown else "no name"

@@ -99,14 +99,17 @@ def checked_object(robot: Robot, objects: Mapping[str, Attached], values) -> Att
         raise InvalidArgument(f"attached: a name must be a non-empty string, got {brief(item.name)}")
     if item.name in robot.links or item.name in objects:
         raise InvalidArgument(f'attached: the name "{cut(item.name)}" is used twice; give the object another name')
-    if item.link not in robot.links:
+    if not isinstance(item.link, str) or item.link not in robot.links:
         raise InvalidArgument(
             f'attached "{cut(item.name)}": {robot.name} has no link {brief(item.link)}; it has {listing(robot.links)}'
         )
     if not isinstance(item.shape, Shape):
         raise InvalidArgument(f'attached "{cut(item.name)}": not a shape but {brief(item.shape)}')
     X_LS = np.eye(4) if item.X_LS is None else as_pose(item.X_LS, f'attached "{cut(item.name)}": X_LS').copy()
-    return item._replace(X_LS=X_LS, touch=tuple([item.touch] if isinstance(item.touch, str) else item.touch))
+    touch = [item.touch] if isinstance(item.touch, str) else checks.listed_texts(
+        f'attached "{cut(item.name)}": touch', item.touch, "names of links and bodies"
+    )
+    return item._replace(X_LS=X_LS, touch=tuple(touch))
 
 
 def padding_of(padding, names: set[str]) -> dict[str, float]:

@@ -151,7 +151,7 @@ def enclosing_spheres(shape: Shape, count: int | None = None, excess: float | No
             raise InvalidArgument(f"enclosing_spheres: excess must be a length above 0 [m], got {excess!r}")
     n = checks.integer("enclosing_spheres: count", _USUAL_COUNT if count is None else count, 1)
     if n > _MAX_SPHERES:
-        raise InvalidArgument(f"enclosing_spheres: count must be at most {_MAX_SPHERES}, got {n}")
+        raise InvalidArgument(f"enclosing_spheres: count must be at most {_MAX_SPHERES}, got {checks.brief(n)}")
     spheres = _spheres_of(shape)
     if spheres is not None and (excess is not None or len(spheres.radii) <= n):
         return spheres

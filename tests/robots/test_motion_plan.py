@@ -181,6 +181,10 @@ def test_joints_that_are_not_named_stay():
         collide.plan(checker, q0, goal, joints=["turn0", "turn1"])
     with pytest.raises(collide.InvalidArgument, match="unknown 'elbow'; the robot has turn0"):
         collide.plan(checker, q0, goal, joints=["elbow"])
+    for joints, words in ((np.zeros((3, 4, 4)), "got array.*as entry 0"), ([3], "got 3 as entry 0"), (3, "got 3"),
+                          ([["turn0"]], r"got \['turn0'\] as entry 0"), ("turn0", "got 'turn0'")):
+        with pytest.raises(collide.InvalidArgument, match=f"(?s)plan: joints must be names of joints, {words}"):
+            collide.plan(checker, q0, goal, joints=joints)
 
 
 def test_joints_without_limits_turn_half_a_turn_beyond():

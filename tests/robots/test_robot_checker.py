@@ -352,6 +352,13 @@ def test_bad_arguments_are_named():
         (lambda: collide.RobotChecker(robot, world, attached=[("tool", "hand", ball)]), "no link 'hand'"),
         (lambda: collide.RobotChecker(robot, world, attached=[("cart", "cart", ball)]), "used twice"),
         (lambda: collide.RobotChecker(robot, world, attached=[("tool", "cart", 3)]), "not a shape"),
+        (lambda: checker.attach("tool", np.zeros(2), ball), r"no link array\(\[0., 0.\]\); it has base, cart"),
+        (lambda: checker.attach("tool", np.array(["cart", "base"]), ball), "no link array.*it has base, cart"),
+        (lambda: checker.attach("tool", ["cart"], ball), r"no link \['cart'\]; it has base, cart"),
+        (lambda: checker.attach("tool", "cart", ball, touch=np.zeros((2, 2))),
+         r"touch must be names of links and bodies, got array\(\[0., 0.\]\) as entry 0"),
+        (lambda: checker.attach("tool", "cart", ball, touch=["base", 3]), "touch must be names.*got 3 as entry 1"),
+        (lambda: collide.RobotChecker(robot, world, attached=[("tool", "cart", ball, None, 3)]), "touch must be names"),
         (lambda: collide.RobotChecker(robot, world, attached=[3]), "name, link, shape"),
         (lambda: collide.RobotChecker(robot, world, padding=-1.0), "padding"),
         (lambda: collide.RobotChecker(robot, world, padding={"hand": 0.1}), "hand"),
@@ -360,6 +367,7 @@ def test_bad_arguments_are_named():
     ):
         with pytest.raises(InvalidArgument, match=words):
             ask()
+    assert checker.bodies == collide.RobotChecker(robot, world).bodies  # nothing was attached
     assert checker.within_limits([[0.5], [1.5], [1.0 + 1e-12]]).tolist() == [True, False, True]
 
 

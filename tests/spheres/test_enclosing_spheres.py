@@ -299,6 +299,7 @@ def test_arguments_are_checked():
     for arguments, match in (
         ({"count": 0}, "count"), ({"count": 2.5}, "count"), ({"excess": 0.0}, "excess"), ({"excess": -1.0}, "excess"),
         ({"excess": float("nan")}, "excess"), ({"count": 3, "excess": 0.1}, "not both"), ({"count": 1001}, "1000"),
+        ({"count": 10**400}, "count must be at most 1000, got an integer of 1329 bits"),
         ({"excess": 1e-9}, "larger"),
     ):
         with pytest.raises(InvalidArgument, match=match):
