@@ -15,6 +15,9 @@ from collide.robots.plan_search import PlanSearch, SearchSettings
 from collide.robots.robot_checker import RobotChecker
 from collide.robots.rrt_connect import N_CHECKED, N_EDGES, N_GOALS, N_START
 
+#: Edges of a motion across all limits, at most.
+_MAX_EDGES = 1 << 20
+
 
 @dataclass(frozen=True)
 class MotionPlan:
@@ -107,7 +110,7 @@ def plan(
     ------
     InvalidArgument
         Where start or goal collide, naming the pair, or are outside the limits, naming the joint; unknown joints;
-        lengths without limits, as of a floating joint.
+        lengths without limits, as of a floating joint; a step of less than a millionth of the way across the limits.
 
     Notes
     -----
@@ -126,7 +129,13 @@ def plan(
     deadline = started + positive("max_seconds", max_seconds)
     random = np.random.default_rng(checks.integer("plan: seed", seed, 0))
     ends = checked_ends(checker.robot, start, goal)
-    settings = SearchSettings(*sampled_box(checker.robot, joints, ends), *lengths, n_samples, deadline)
+    low, high = sampled_box(checker.robot, joints, ends)
+    if np.sqrt(np.square(high - low).sum()) > _MAX_EDGES * lengths[0]:
+        raise InvalidArgument(
+            f"plan: step {lengths[0]:g} cuts a motion across the limits into more than {_MAX_EDGES:,} edges; take a "
+            "larger step"
+        )
+    settings = SearchSettings(low, high, *lengths, n_samples, deadline)
     now = checker._as_of_now()
     refuse_collisions(now, ends)
     search = PlanSearch(now, ends, settings, random)

@@ -265,7 +265,6 @@ GOOD: dict[str, Callable[[], dict[str, Any]]] = {
     "audit_pieces": lambda: {"shape": collide.Box((1.0, 1.0, 1.0)), "pieces": collide.Box((1.0, 1.0, 1.1))},
     "plan": lambda: {
         "checker": collide.RobotChecker(robot(), allowed=[("base", "slider")]), "start": [0.0], "goal": [0.1],
-        "max_seconds": 1.0,
     },
     "ShapeSet": lambda: {"shapes": [BOX]},
     "signed_distances": lambda: {"mesh": mesh(), "points": (0, 0, 0)},

@@ -170,6 +170,13 @@ def test_of_several_goals_the_one_within_reach_is_planned_to():
     assert collide.plan(checker, {"slide": 0.0}, [{"slide": 0.5}, {"slide": -0.9}]).path[-1] == -0.9
 
 
+def test_steps_too_short_to_cross_the_limits_are_refused():
+    checker = collide.RobotChecker(slider())
+    with pytest.raises(collide.InvalidArgument, match="step 4.94066e-324 cuts a motion across the limits"):
+        collide.plan(checker, [0.0], [0.5], step=5e-324)
+    assert collide.plan(checker, [0.0], [0.5], step=1e-4)
+
+
 def test_joints_that_are_not_named_stay():
     _, checker, q0, q1 = next(iter(problems(1)))
     goal = np.where([True, True, False, True], q1, q0)
