@@ -172,7 +172,7 @@ def test_of_several_goals_the_one_within_reach_is_planned_to():
 
 def test_steps_too_short_to_cross_the_limits_are_refused():
     checker = collide.RobotChecker(slider())
-    with pytest.raises(collide.InvalidArgument, match="step 4.94066e-324 cuts a motion across the limits"):
+    with pytest.raises(collide.InvalidArgument, match=r"step 4.94066e-324 cuts a motion across the limits"):
         collide.plan(checker, [0.0], [0.5], step=5e-324)
     assert collide.plan(checker, [0.0], [0.5], step=1e-4)
 
