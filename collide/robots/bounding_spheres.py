@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from collide.kernels import address_of
 from collide.kernels.lanes import LANES
+from collide.lowering.convex_sets import PRIMITIVE_NUMBERS
 from collide.lowering.packed_convex import CYLINDER, HALFSPACE, POINTS, PackedConvex
+from collide.lowering.parts import convex_set_of
 from collide.robots import motion_bounds as motions
 from collide.robots import sphere_lanes as layout
 from collide.robots.body_spheres import ROUNDING, are_spheres, ball_around, spheres_of
 from collide.robots.check_scene import BOX, HALF
 from collide.robots.check_tables import CheckTables, RobotBody, RobotTables, Setting, Surroundings
 from collide.robots.forward_kinematics import LINK_POSE
-from collide.robots.pair_maps import PairMaps
 from collide.robots.robot import Robot
 from collide.shapes.shape import Shape, kept_with_shape
 
@@ -27,19 +28,34 @@ _FEWEST_EXACT, _FEWEST = 2, 4
 _PAIRS = 256
 
 
+class SphereRows(NamedTuple):
+    """Spheres of a body.   counts : BODY_SPHERES integers, of spheres that begin at 0.   n_outer : how many are outer.
+    rows : (1 + n, SPHERE), the sphere around the body before all.
+    """
+
+    counts: tuple[int, ...]
+    n_outer: int
+    rows: np.ndarray
+
+    def counts_from(self, first: int) -> tuple[int, ...]:
+        """The integers of spheres that begin at a number."""
+        outer, n_outer, inner, n_inner, is_exact = self.counts
+        return first + outer, n_outer, first + inner, n_inner, is_exact
+
+
 class SphereTables(NamedTuple):
-    """What is constant of a robot.   counts : (bodies, BODY_SPHERES) int64.   around_bodies : (bodies, SPHERE).
-    spheres : (n, SPHERE).   fewest : of fewer configurations none are asked by their spheres.
+    """What is constant of a robot's links.   counts : (bodies, BODY_SPHERES) int64.   around_bodies : (bodies, SPHERE).
+    spheres : (n, SPHERE).   are_exact : whether every body is a union of spheres.
     """
 
     counts: np.ndarray
     around_bodies: np.ndarray
     spheres: np.ndarray
-    fewest: int
+    are_exact: bool
 
 
 def sphere_tables(robot: RobotTables, bodies: Sequence[RobotBody], *, of_any: bool) -> SphereTables | None:
-    """Those of a robot's bodies; ``None`` where a body has no end, and with moving obstacles: spheres lack the padding
+    """Those of a robot's links; ``None`` where a link has no end, and with moving obstacles: spheres lack the padding
     of pairs with them.
 
     of_any : False for ``None`` as well where fewer than half of the bodies are made of spheres, and spheres of the
@@ -51,35 +67,40 @@ def sphere_tables(robot: RobotTables, bodies: Sequence[RobotBody], *, of_any: bo
     if not np.isfinite(robot.part_boxes).all() or not (of_any or 2 * sum(is_sphere) >= len(bodies)):
         return None
     counts = np.zeros((len(bodies), layout.BODY_SPHERES), dtype=np.int64)
-    around, rows, n = np.zeros((len(bodies), layout.SPHERE)), [], 0
+    around, rows, n = np.zeros((len(bodies), layout.SPHERE)), [np.zeros((0, layout.SPHERE))], 0
     for k, body in enumerate(bodies):
-        by_padding = _rows_by_padding(body.shape)
-        if body.padding not in by_padding:
-            by_padding[body.padding] = _rows_of(body)
-        counts[k], rows_of_body, around[k] = by_padding[body.padding]
-        counts[k, [layout.FIRST_OUTER, layout.FIRST_INNER]] += n
-        n += len(rows_of_body)
-        rows.append(rows_of_body)
-    fewest = _FEWEST_EXACT if all(is_sphere) else _FEWEST
-    return SphereTables(counts, around, np.concatenate(rows), fewest)
+        made = sphere_rows(body)
+        counts[k], around[k] = made.counts_from(n), made.rows[0]
+        n += len(made.rows) - 1
+        rows.append(made.rows[1:])
+    return SphereTables(counts, around, np.concatenate(rows), all(is_sphere))
 
 
 @kept_with_shape("_sphere_rows")
-def _rows_by_padding(_shape: Shape) -> dict[float, tuple]:
-    """What `_rows_of` makes of a shape, by the padding."""
-    return {}
+def rows_of_shape(shape: Shape) -> dict[tuple, Any]:
+    """What is made of a shape for robots, by padding. Primitives of equal numbers share it."""
+    is_primitive = shape.__class__ in PRIMITIVE_NUMBERS
+    return convex_set_of(shape).prepared.made.setdefault("robot rows", {}) if is_primitive else {}
 
 
-def _rows_of(body: RobotBody) -> tuple[tuple[int, ...], np.ndarray, np.ndarray]:
-    """(integers of a body whose spheres begin at 0, (n, SPHERE) its spheres, (SPHERE,) the sphere around them)."""
+def sphere_rows(body: RobotBody) -> SphereRows:
+    """Those of a body, kept with its shape."""
+    known, key = rows_of_shape(body.shape), ("spheres", body.padding)
+    if key not in known:
+        known[key] = _rows_of(body)
+    return known[key]
+
+
+def _rows_of(body: RobotBody) -> SphereRows:
     spheres = spheres_of(body)
     outer, inner = _padded(spheres.outer, body.padding, 1.0), _padded(spheres.inner, body.padding, -1.0)
     if spheres.is_exact:
         less = (outer - inner)[:, [layout.RADIUS, layout.PADDED_RADIUS]].max(axis=1)
         outer[:, layout.LESS_WITHIN], inner = less * (1.0 + ROUNDING), inner[:0]
     sphere = ball_around(spheres.outer[:, :3], spheres.outer[:, 3], steps=40)
-    around = _padded(sphere[None], body.padding, 1.0)[0]
-    return (0, len(outer), len(outer), len(inner), int(spheres.is_exact)), np.concatenate([outer, inner]), around
+    around, n_outer = _padded(sphere[None], body.padding, 1.0), len(outer)
+    counts = 0, n_outer, n_outer, len(inner), int(spheres.is_exact)
+    return SphereRows(counts, n_outer, np.concatenate([around, outer, inner]))
 
 
 def _padded(spheres: np.ndarray, padding: float, sign: float) -> np.ndarray:
@@ -98,15 +119,19 @@ class SphereWorkspace:
     header, address : of `sphere_lanes.py`.   links : (LINK_POSE links, LANES).   verdicts : (2, LANES).
     """
 
-    def __init__(self, robot: Robot, setting: Setting, spheres: SphereTables, maps: PairMaps | None):
+    def __init__(self, robot: Robot, setting: Setting, spheres: SphereTables):
         tables, around = setting.tables, setting.surroundings
         kinds, numbers = _parts_around(tables, around)
-        n_bodies, n = len(spheres.counts), len(spheres.spheres)
+        self._tables, spare = spheres, tables.spare_rows
+        self.counts = np.concatenate([spheres.counts, np.zeros((spare.bodies, layout.BODY_SPHERES), dtype=np.int64)])
+        self.around_bodies = np.concatenate([spheres.around_bodies, np.zeros((spare.bodies, layout.SPHERE))])
+        self.spheres = np.concatenate([spheres.spheres, np.zeros((spare.spheres, layout.SPHERE))])
+        n_bodies, n = len(self.counts), len(self.spheres)
         columns, self.verdicts = np.zeros((max(robot.dof, 1), LANES)), np.zeros((2, LANES))
         self.links = np.zeros((LINK_POSE * len(robot.links), LANES))
         self._buffers = {
-            layout.COUNTS_AT: spheres.counts, layout.AROUND_BODIES_AT: spheres.around_bodies,
-            layout.SPHERES_AT: spheres.spheres, layout.PART_KINDS_AT: kinds, layout.PART_NUMBERS_AT: numbers,
+            layout.COUNTS_AT: self.counts, layout.AROUND_BODIES_AT: self.around_bodies,
+            layout.SPHERES_AT: self.spheres, layout.PART_KINDS_AT: kinds, layout.PART_NUMBERS_AT: numbers,
             layout.COLUMNS_AT: columns, layout.LINK_LANES_AT: self.links,
             layout.AROUND_LANES_AT: np.zeros((layout.SPHERE_PLACE * n_bodies, LANES)),
             layout.SPHERE_LANES_AT: np.zeros((layout.SPHERE_PLACE * n, LANES)),
@@ -116,15 +141,29 @@ class SphereWorkspace:
             layout.MOVED_LANES_AT: np.zeros((n_bodies * (len(robot.joints) + 1), LANES)),
             layout.PLACED_AT: np.zeros(n_bodies, dtype=np.int64), layout.VERDICTS_AT: self.verdicts,
         }
-        if maps is not None and maps.ints.any():
-            self._buffers |= {layout.MAP_INTS_AT: maps.ints, layout.MAP_DOUBLES_AT: maps.doubles}
-            self._buffers |= {layout.MAP_CELLS_AT: maps.cells}
         self.header = np.zeros(layout.SPHERE_HEADER, dtype=np.int64)
         for word, buffer in self._buffers.items():
             self.header[word] = address_of(buffer)
         self.header[layout.N_SPHERES], self.header[layout.N_COLUMNS] = n, len(columns)
-        self.header[layout.FEWEST], self.header[layout.PAIR_CAPACITY] = spheres.fewest, _PAIRS
+        self.header[layout.PAIR_CAPACITY] = _PAIRS
         self.address = address_of(self.header)
+
+    def carry(self, setting: Setting) -> None:
+        """Take over attached objects, all of which have spheres, and maps of a setting."""
+        first, are_exact = len(self._tables.spheres), self._tables.are_exact
+        for number, rows in enumerate(setting.objects, len(self._tables.counts)):
+            made = rows.spheres
+            assert made is not None
+            self.counts[number], self.around_bodies[number] = made.counts_from(first), made.rows[0]
+            end = first + len(made.rows) - 1
+            self.spheres[first:end] = made.rows[1:]
+            first, are_exact = end, are_exact and bool(made.counts[layout.IS_EXACT])
+        header, maps = self.header, setting.maps
+        header[layout.FEWEST] = _FEWEST_EXACT if are_exact else _FEWEST
+        header[layout.N_MAPS] = 0 if maps is None else len(maps.ints)
+        if maps is not None:
+            header[layout.MAP_INTS_AT], header[layout.MAP_DOUBLES_AT] = address_of(maps.ints), address_of(maps.doubles)
+            header[layout.MAP_CELLS_AT] = address_of(maps.cells)
 
 
 def _parts_around(tables: CheckTables, around: Surroundings) -> tuple[np.ndarray, np.ndarray]:

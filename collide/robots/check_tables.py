@@ -12,7 +12,7 @@ import numpy as np
 
 from collide.broadphase.bounding_boxes import boxes_of
 from collide.broadphase.box_tree import BoxTree
-from collide.lowering.compound_table import lay_out
+from collide.lowering.compound_table import PART, lay_out
 from collide.lowering.extents import box_of
 from collide.lowering.lazy_structures import may_have_tree, support_tree_of
 from collide.lowering.packed_convex import HALFSPACE, POINTS, PackedConvex, pack_halfspace, pack_points
@@ -20,7 +20,7 @@ from collide.lowering.parts import Part, bounding_parts_of, parts_of
 from collide.lowering.shape_table import POSE, POSE_STRETCH, POSE_TERMS, ShapeTable, pose_table
 from collide.mesh.convex_surface import is_own_hull
 from collide.narrowphase.posed_pair import LEAST_SQUARE
-from collide.robots.check_scene import BODY_INTS, BOX, ROUNDINGS_OF_ROTATIONS
+from collide.robots.check_scene import BODY_INTS, BOX, ROUNDINGS_OF_ROTATIONS, TWINS
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 from collide.shapes.mesh import Mesh, corners_of_facets
@@ -32,6 +32,8 @@ _LEAST_SLACK = 2.0**-40
 #: row of a rotation has an entry of at least 0.5, so that a turned box still reaches 5e149 m, and nothing in the world
 #: is farther than 1e50 m; its square is finite.
 UNBOUNDED_HALF = 1e150
+#: Tables of shapes with attached objects that are kept with the tables of a setting, at most.
+_MAX_JOINED = 8
 
 
 class RobotBody(NamedTuple):
@@ -82,7 +84,7 @@ class Surroundings(NamedTuple):
 
     bodies : by number.   packed : of the parts.   body_of : (parts,) int64.   is_bound : (parts,) bool.
     table : of the parts.   X_BP : (parts, 4, 4).   rows : (parts,) int64, of the parts' bodies among the World's.
-    has_margins : whether a body is swollen.
+    has_margins, has_fields : whether a body is swollen, and whether a body is a field.
     poses : (parts, POSE).   tree : over the parts.   Both are of when the tables were made: a `CheckWorkspace` has them
         as the bodies stand.
     """
@@ -97,16 +99,43 @@ class Surroundings(NamedTuple):
     X_BP: np.ndarray
     rows: np.ndarray
     has_margins: bool
+    has_fields: bool
+
+
+class SpareRows(NamedTuple):
+    """How many bodies, parts and spheres of attached objects tables have rows for."""
+
+    bodies: int
+    parts: int
+    spheres: int
+
+    def holds(self, objects: Sequence[Any]) -> bool:
+        """Whether objects fit in."""
+        bodies, parts, spheres = _needed(objects)
+        return bodies <= self.bodies and parts <= self.parts and spheres <= self.spheres
+
+    @classmethod
+    def of(cls, objects: Sequence[Any]) -> SpareRows:
+        """Rows for objects, and for as many again."""
+        return cls(*(max(least, 2 * needed) for least, needed in zip((4, 16, 64), _needed(objects))))
+
+
+def _needed(objects: Sequence[Any]) -> tuple[int, int, int]:
+    parts = sum([rows.n_parts for rows in objects])
+    return len(objects), parts, sum([len(rows.spheres.rows) for rows in objects if rows.spheres is not None])
 
 
 class CheckTables(NamedTuple):
-    """Tables constant between configurations.
+    """Tables constant between configurations. Behind the rows of links are rows for attached objects: each
+    `CheckWorkspace` writes into its copies what a setting has attached.
 
     bodies : (n, BODY_INTS) int64.   body_boxes : (n, BOX), in their links.   parts : (twins of) parts in their links.
     padded : offset from a part's number to the number of its padded twin, 0 without padding.
     part_boxes : (all parts, BOX), in their own frames.   is_bound : (all parts,) uint8.
     table, shape_of : shapes of all parts.   poses : (all parts, POSE), written of the surroundings.
     slack : share by which boxes are moved outwards.
+    n_bodies, n_parts : of links, without twins.   spare_rows : for attached objects.   joined : {ids of the convex
+        sets of attached objects: table of shapes with these behind}.
     """
 
     bodies: np.ndarray
@@ -119,15 +148,38 @@ class CheckTables(NamedTuple):
     shape_of: np.ndarray
     poses: np.ndarray
     slack: float
+    n_bodies: int
+    n_parts: int
+    spare_rows: SpareRows
+    joined: dict[tuple[int, ...], ShapeTable]
+
+    def table_with(self, objects: Sequence[Any]) -> ShapeTable:
+        """The table of shapes, with those of attached objects behind: of each the parts, then their twins."""
+        packed = [part for rows in objects for part in rows.tables.table.packed]
+        if not packed:
+            return self.table
+        key = tuple(map(id, packed))  # the sets are in the table that is kept, so that ids stay theirs
+        table = self.joined.get(key)
+        if table is None:
+            table = self.table.copied()
+            table.append(packed)
+            table.build_trees(np.arange(len(self.table.packed), len(table.packed)))
+            if len(self.joined) >= _MAX_JOINED:
+                self.joined.clear()
+            self.joined[key] = table
+        return table
 
 
 class RobotTables(NamedTuple):
-    """The robot's part of `CheckTables`, constant while the World changes.   skew : of all matrices of the robot."""
+    """The links' part of `CheckTables`, constant while the World changes, or an attached object's.
+
+    is_padded : whether twins of all parts stand behind the parts.   skew : of all matrices.
+    """
 
     bodies: np.ndarray
     body_boxes: np.ndarray
     parts: np.ndarray
-    padded: int
+    is_padded: bool
     part_boxes: np.ndarray
     is_bound: np.ndarray
     table: ShapeTable
@@ -135,28 +187,46 @@ class RobotTables(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """A robot among the bodies of a World as it stood.
+    """A robot among the bodies of a World at a moment.
 
-    bodies : of the robot.   base : pose of the root, as `forward_kinematics.LINK_POSE` doubles.
-    self_pairs : (k, 2) int64 of tested bodies.   allowed : (bodies, around) uint8, 1 for pairs never tested.
-    skipped : {reason: number of pairs never tested}.
-    spheres, maps : `bounding_spheres.SphereTables` of the robot, and `pair_maps.PairMaps` of its pairs, or ``None``.
+    bodies : of the robot: links, then attached objects.   base : pose of the root, as `forward_kinematics.LINK_POSE`
+        doubles.
+    objects, table : attached objects, and `CheckTables.table_with` these.
+    rules, filters : `robot_bodies.PairRules` and `Filters`: pairs never tested, and tested pairs.
+    spheres, maps : of the robot's links, and of the first of the tested pairs of bodies, or ``None``.
     seen : the World as of then.   made_of : the World as of when the tables were made.   spare : workspaces of threads
-        not at work.
+        not at work, shared with settings of the same tables.
     """
 
     bodies: Sequence[RobotBody]
     base: np.ndarray
     surroundings: Surroundings
     tables: CheckTables
-    self_pairs: np.ndarray
-    allowed: np.ndarray
-    skipped: dict[str, int]
-    spheres: Any = None
-    maps: Any = None
-    seen: Any = None
-    made_of: Any = None
-    spare: Any = None
+    objects: tuple[Any, ...]
+    table: ShapeTable
+    rules: Any
+    filters: Any
+    spheres: Any
+    maps: Any
+    seen: Any
+    made_of: Any
+    spare: list[Any]
+
+    @property
+    def self_pairs(self) -> np.ndarray:
+        """(k, 2) int64 of tested bodies."""
+        return self.filters.self_pairs
+
+    @property
+    def body_boxes(self) -> np.ndarray:
+        """(bodies, BOX) in their links."""
+        of_links = self.tables.body_boxes[: self.tables.n_bodies]
+        return np.concatenate([of_links, *(rows.tables.body_boxes for rows in self.objects)])
+
+    @property
+    def allowed(self) -> np.ndarray:
+        """(bodies, around) uint8, 1 for pairs never tested."""
+        return self.filters.allowed
 
 
 class _LinkParts(NamedTuple):
@@ -186,8 +256,8 @@ def surroundings_of(bodies: Sequence[BodyAround], before: Surroundings | None = 
         table = ShapeTable(packed)
     tree = BoxTree(boxes_of(table, poses, np.arange(len(packed)))) if packed else None
     rows = np.array([body.row for body in bodies], dtype=np.int64)[body_of]
-    has_margins = any(body.margin != 0.0 for body in bodies)
-    return Surroundings(bodies, packed, poses, body_of, is_bound, tree, table, X_BP, rows, has_margins)
+    has_margins, has_fields = any(body.margin != 0.0 for body in bodies), any(body.shape.is_field for body in bodies)
+    return Surroundings(bodies, packed, poses, body_of, is_bound, tree, table, X_BP, rows, has_margins, has_fields)
 
 
 def _have_at_most_moved(before: Sequence[BodyAround], now: Sequence[BodyAround]) -> bool:
@@ -210,63 +280,66 @@ def _poses_of(
 
 def check_tables(bodies: Sequence[RobotBody], around: Surroundings, matrices: np.ndarray) -> CheckTables:
     """The `CheckTables` of a robot's bodies and what is around them; arguments as of `robot_tables`."""
-    return tables_among(robot_tables(bodies, matrices), around)
+    return tables_among(robot_tables(bodies, matrices), around, SpareRows(0, 0, 0))
 
 
-def robot_tables(bodies: Sequence[RobotBody], matrices: np.ndarray) -> RobotTables:
-    """Tables of a robot's bodies.   matrices : (k, 3, 3) every matrix that poses of links are products of."""
+def robot_tables(bodies: Sequence[RobotBody], matrices: np.ndarray, *, is_padded: bool = False) -> RobotTables:
+    """Tables of a robot's bodies.   matrices : (k, 3, 3) every matrix that poses of links are products of.
+    is_padded : whether parts have twins where no body is swollen, as well.
+    """
     of_bodies = [convex_parts_of(body.shape) for body in bodies]
     counts = np.array([len(of_body.parts) for of_body in of_bodies], dtype=np.int64)
     rows = np.zeros((len(bodies), BODY_INTS), dtype=np.int64)
     rows[:, 0], rows[:, 1], rows[:, 2] = [body.link for body in bodies], np.cumsum(counts) - counts, counts
     packed = [packed for of_body in of_bodies for packed, _ in of_body.parts]
-    parts = np.concatenate([lay_out(of_body.parts).parts for of_body in of_bodies])
-    is_bound = np.repeat([of_body.is_bound for of_body in of_bodies], counts)
-    padding = np.repeat([body.padding for body in bodies], counts)
-    padded = len(packed) if padding.any() else 0
-    rows[:, 3] = [padded if body.is_obstacle else 0 for body in bodies]
-    if padded:
+    parts = np.concatenate([np.zeros((0, PART)), *(lay_out(of_body.parts).parts for of_body in of_bodies)])
+    is_bound = np.repeat(np.array([of_body.is_bound for of_body in of_bodies], dtype=bool), counts)
+    padding = np.repeat(np.array([body.padding for body in bodies]), counts)
+    is_padded = is_padded or bool(padding.any())
+    padded = len(packed) if is_padded else 0
+    rows[:, TWINS] = [padded if body.is_obstacle else 0 for body in bodies]
+    if is_padded:
         packed = packed + [swollen(part, by) for part, by in zip(packed, padding.tolist())]
         parts, is_bound = np.concatenate([parts, parts]), np.concatenate([is_bound, is_bound])
     table = ShapeTable(packed)
     table.build_trees(np.arange(len(packed)))  # else each support of a hull looks at all its vertices
     part_boxes = np.array([box_of(part) for part in packed]).reshape(-1, BOX)
     return RobotTables(
-        rows, _body_boxes(rows, parts, part_boxes, padded), parts, padded, part_boxes, is_bound, table,
+        rows, _body_boxes(rows, parts, part_boxes, padded), parts, is_padded, part_boxes, is_bound, table,
         float(_skew(matrices).sum() + _skew(parts[:, :9].reshape(-1, 3, 3)).max(initial=0.0)),
     )
 
 
-def joined_tables(objects: RobotTables, links: RobotTables) -> RobotTables:
-    """Tables of attached objects and, behind them, of links; neither padded. Parts of the links stand first."""
-    bodies = objects.bodies.copy()
-    bodies[:, 1] += len(links.parts)
-    table = links.table.copied()
-    table.append(objects.table.packed)
-    table.build_trees(np.arange(len(links.parts), len(table.packed)))
-    fields = ("parts", "part_boxes", "is_bound")
-    parts, part_boxes, is_bound = (np.concatenate([getattr(links, f), getattr(objects, f)]) for f in fields)
-    return RobotTables(
-        np.concatenate([bodies, links.bodies]), np.concatenate([objects.body_boxes, links.body_boxes]), parts, 0,
-        part_boxes, is_bound, table, max(objects.skew, links.skew),
-    )
+def tables_among(
+    robot: RobotTables, around: Surroundings, spare: SpareRows, before: Setting | None = None
+) -> CheckTables:
+    """The `CheckTables` of a robot among surroundings, with spare rows for attached objects.
 
-
-def tables_among(robot: RobotTables, around: Surroundings, before: Setting | None = None) -> CheckTables:
-    """The `CheckTables` of a robot among surroundings.   before : a setting of the robot, whose tables of shapes are
-    taken over where the surroundings have the same.
+    before : a setting of the robot, whose tables of shapes are taken over where the surroundings have the same.
     """
-    poses = np.concatenate([np.zeros((len(robot.part_boxes), POSE)), around.poses])
+    n_parts = len(robot.parts) // 2 if robot.is_padded else len(robot.parts)
+
+    def with_spare(rows: np.ndarray) -> np.ndarray:
+        both, empty = [rows[:n_parts], rows[n_parts:]], np.zeros((spare.parts, *rows.shape[1:]), dtype=rows.dtype)
+        return np.concatenate([both[0], empty, both[1], empty] if robot.is_padded else [both[0], empty])
+
+    poses = np.concatenate([with_spare(np.zeros((len(robot.parts), POSE))), around.poses])
     slack = _LEAST_SLACK + 8.0 * (robot.skew + _skew(around.poses[:, :9].reshape(-1, 3, 3)).max(initial=0.0))
     if before is not None and before.surroundings.table is around.table:
         return before.tables._replace(poses=poses, slack=slack)
     table = robot.table.copied()
     table.append(around.packed)
     table.build_trees(np.arange(len(table.packed)))
+    bodies = np.concatenate([robot.bodies, np.zeros((spare.bodies, BODY_INTS), dtype=np.int64)])
+    bodies[:, TWINS] += spare.parts * (bodies[:, TWINS] > 0)
+    shape_of = np.arange(len(table.packed))
     return CheckTables(
-        robot.bodies, robot.body_boxes, robot.parts, robot.padded,
-        np.concatenate([robot.part_boxes, *(box_of(part)[None] for part in around.packed)]),
-        np.concatenate([robot.is_bound, around.is_bound]).astype(np.uint8), table, np.arange(len(poses)), poses, slack,
+        bodies, np.concatenate([robot.body_boxes, np.zeros((spare.bodies, BOX))]), with_spare(robot.parts),
+        n_parts + spare.parts if robot.is_padded else 0,
+        np.concatenate([with_spare(robot.part_boxes), *(box_of(part)[None] for part in around.packed)]),
+        np.concatenate([with_spare(robot.is_bound), around.is_bound]).astype(np.uint8), table,
+        np.concatenate([with_spare(shape_of[: len(robot.parts)]), shape_of[len(robot.parts) :]]), poses, slack,
+        len(robot.bodies), n_parts, spare, {},
     )
 
 

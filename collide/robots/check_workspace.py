@@ -20,7 +20,7 @@ from collide.robots.field_walks import field_walks
 from collide.robots.mesh_questions import MeshQuestions
 from collide.robots.move_surroundings import FIELD_MOVED, SKEWED, move_surroundings
 from collide.robots.robot import Robot
-from collide.robots.robot_bodies import paths_to_root
+from collide.robots.robot_bodies import Filters, paths_to_root
 from collide.robots.sample_motions import OPEN_SAMPLE
 
 #: Pairs left to others that a call has space for, at least.
@@ -31,10 +31,10 @@ _OPEN_INTERVALS = 4096
 
 
 class CheckWorkspace:
-    """One thread's buffers, and the surroundings as they stand for its questions.
+    """One thread's buffers, the surroundings as they stand for its questions, and rows of attached objects.
 
-    header, address : of `check_scene.py`.   open_pairs : (k, OPEN_INTS) what the last call left to others.
-    slots : buffers of searches for distances, by their kind.
+    setting : as of the last `stand`.   header, address : of `check_scene.py`.   open_pairs : (k, OPEN_INTS) what the
+    last call left to others.   slots : buffers of searches for distances, by their kind.
     """
 
     def __init__(self, robot: Robot, setting: Setting):
@@ -49,6 +49,10 @@ class CheckWorkspace:
         capacity = max(_LEAST_OPEN, n_link_parts * (n_around + n_link_parts) + 1)
         self._open = np.empty((capacity, layout.OPEN_INTS), dtype=np.int64)
         self._seen, self._rows, self._boxes = setting.made_of, around.rows, _boxes_around(around)
+        # Behind links are rows for attached objects.
+        self._bodies, self._body_boxes, self._parts, self._part_boxes, self._is_bound, self._shape_of = (
+            table.copy() for table in (
+                tables.bodies, tables.body_boxes, tables.parts, tables.part_boxes, tables.is_bound, tables.shape_of))
         self._buffers = buffers = {
             layout.POSES_AT: tables.poses.copy(), layout.LINKS_AT: np.zeros((joints.n_links, POSE)),
             layout.WORLD_BOXES_AT: np.zeros((n_bodies, layout.BOX)),
@@ -58,17 +62,15 @@ class CheckWorkspace:
             layout.ROW_AT: np.zeros(1, dtype=PAIR_DTYPE), layout.DOUBLES_AT: np.zeros(DOUBLES),
             layout.INTEGERS_AT: np.zeros(INTEGERS, dtype=np.int64), layout.OPEN_AT: self._open,
             layout.JOINT_INTS_AT: joints.ints, layout.JOINT_DOUBLES_AT: joints.doubles, layout.BASE_AT: setting.base,
-            layout.BODIES_AT: tables.bodies, layout.BODY_BOXES_AT: tables.body_boxes,
-            layout.SELF_PAIRS_AT: setting.self_pairs, layout.PARTS_AT: tables.parts,
-            layout.PART_BOXES_AT: tables.part_boxes, layout.IS_BOUND_AT: tables.is_bound,
+            layout.BODIES_AT: self._bodies, layout.BODY_BOXES_AT: self._body_boxes, layout.PARTS_AT: self._parts,
+            layout.PART_BOXES_AT: self._part_boxes, layout.IS_BOUND_AT: self._is_bound,
             layout.UNBOUNDED_AT: unbounded, layout.BODY_OF_AT: around.body_of, layout.PART_POSES_AT: around.X_BP,
-            layout.ALLOWED_AT: setting.allowed, layout.TERMS_AT: NO_TERMS, layout.SHAPE_OF_AT: tables.shape_of,
+            layout.TERMS_AT: NO_TERMS, layout.SHAPE_OF_AT: self._shape_of,
         }
         numbers = {
             layout.N_JOINTS: len(joints.ints), layout.ROOT: joints.root, layout.N_LINKS: joints.n_links,
             layout.CORE: code_of(answer_pairs), layout.STATE_OF_PART: code_of(state_of_part),
-            layout.GAP_OF_PART: code_of(gap_of_part), layout.N_BODIES: n_bodies,
-            layout.N_SELF_PAIRS: len(setting.self_pairs), layout.N_LINK_PARTS: n_link_parts,
+            layout.GAP_OF_PART: code_of(gap_of_part), layout.N_LINK_PARTS: n_link_parts,
             layout.PADDED: tables.padded, layout.N_PARTS: n_parts, layout.N_UNBOUNDED: len(unbounded),
             layout.N_AROUND: setting.allowed.shape[1], layout.OPEN_CAPACITY: capacity,
         }
@@ -81,18 +83,44 @@ class CheckWorkspace:
             self.header[word] = number
         for word, buffer in buffers.items():
             self.header[word] = address_of(buffer)
-        self.header[layout.INTS_AT], self.header[layout.NUMBERS_AT] = tables.table.addresses
-        self.header[layout.SLACK : layout.SLACK + 1].view(np.float64)[:] = tables.slack
         self.address = address_of(self.header)
         self.verdict = bytearray(1)  # of a single configuration
         self.verdict_at = address_of(np.frombuffer(self.verdict, dtype=np.uint8))
-        self._spheres = None if setting.spheres is None else SphereWorkspace(
-            robot, setting, setting.spheres, setting.maps)
-        if self._spheres is not None:
-            self.header[layout.SPHERE_HEADER_AT] = self._spheres.address
-        self._walk_fields(setting)
+        self._spheres: SphereWorkspace | None = None
         self._motions: MotionWorkspace | None = None
         self._meshes: MeshQuestions | None = None
+        self._walk_fields(setting)
+        self._carry(setting)
+        self.stand(setting)
+
+    def _carry(self, setting: Setting) -> None:
+        """Take over attached objects and tested pairs. O(parts of objects)."""
+        self.setting, tables, header = setting, setting.tables, self.header
+        first, shape, skew = tables.n_parts, len(tables.table.packed), 0.0
+        for number, rows in enumerate(setting.objects, tables.n_bodies):
+            made, n = rows.tables, rows.n_parts
+            self._bodies[number], self._body_boxes[number] = (rows.body.link, first, n, 0), made.body_boxes[0]
+            for k in range(0, len(made.parts), n):  # parts, then their twins
+                to = first if k == 0 else first + tables.padded
+                some, of = slice(to, to + n), slice(k, k + n)
+                self._parts[some], self._part_boxes[some] = made.parts[of], made.part_boxes[of]
+                self._is_bound[some], self._shape_of[some] = made.is_bound[of], range(shape, shape + n)
+                shape += n
+            first, skew = first + n, max(skew, made.skew)
+        header[layout.N_BODIES], header[layout.N_SELF_PAIRS] = len(setting.bodies), len(setting.self_pairs)
+        header[layout.SELF_PAIRS_AT] = address_of(setting.self_pairs)
+        header[layout.ALLOWED_AT] = address_of(setting.allowed)
+        header[layout.INTS_AT], header[layout.NUMBERS_AT] = setting.table.addresses
+        header[layout.SLACK : layout.SLACK + 1].view(np.float64)[:] = tables.slack + 8.0 * skew
+        self.slots.clear()
+        header[layout.SPHERE_HEADER_AT] = 0
+        if setting.spheres is not None:
+            if self._spheres is None:
+                self._spheres = SphereWorkspace(self.robot, setting, setting.spheres)
+            self._spheres.carry(setting)
+            header[layout.SPHERE_HEADER_AT] = self._spheres.address
+        if self._meshes is not None and not self._meshes.carry(setting):
+            self._meshes, header[layout.MESH_QUESTIONS_AT] = None, 0
 
     def _walk_fields(self, setting: Setting) -> None:
         """Questions about fields around, where they stand."""
@@ -101,33 +129,37 @@ class CheckWorkspace:
         self.header[layout.WALKS_AT] = address_of(self._walks.words)
 
     def stand(self, setting: Setting) -> bool:
-        """Bring the surroundings to where a setting of the same tables has them: O(parts) comparisons, O(nodes) where a
-        body has moved. False, and nothing is done, where a body's matrix is not a rotation.
+        """Bring the surroundings to where a setting of the same tables has them, and take over what the setting has
+        attached: O(parts) comparisons, O(nodes) where a body has moved. False, and nothing is done, where the matrix of
+        a body that has moved is not a rotation.
         """
-        if setting.seen is self._seen:
-            return True
-        X_WBs = setting.seen.X_WBs
-        moved = move_surroundings(
-            self.address, address_of(X_WBs), address_of(self._seen.X_WBs), address_of(self._rows),
-            address_of(self._boxes),
-        )
-        if moved == SKEWED:
-            return False
-        self._seen = setting.seen
-        if moved == FIELD_MOVED:
-            self._walk_fields(setting)
+        if setting.seen is not self._seen:
+            X_WBs = setting.seen.X_WBs
+            moved = move_surroundings(
+                self.address, address_of(X_WBs), address_of(self._seen.X_WBs), address_of(self._rows),
+                address_of(self._boxes),
+            )
+            if moved == SKEWED:
+                return False
+            self._seen = setting.seen
+            if moved == FIELD_MOVED:
+                self._walk_fields(setting)
+        before, self.setting = self.setting, setting
+        if setting.filters is not before.filters or setting.maps is not before.maps:
+            self._carry(setting)
         return True
 
     def motions(self, resolution: float) -> MotionWorkspace:
         """The workspace of `certify_motions`, for this resolution [rad or m]."""
         if self._motions is None:
             self._motions = MotionWorkspace(self.robot, self.setting)
+        self._motions.carry(self._bodies, self.setting)
         self._motions.begin(resolution)
         return self._motions
 
     def ask_meshes(self, setting: Setting) -> None:
         """Have kernels ask about meshes themselves; trees of the meshes are made, unless they are made already."""
-        if self._meshes is not None or not setting.tables.is_bound.any():
+        if self._meshes is not None or not self._is_bound.any():
             return
         rows, n = {}, int(self.header[layout.N_LINK_PARTS])
         counts = np.bincount(setting.surroundings.body_of, minlength=1)
@@ -136,6 +168,7 @@ class CheckWorkspace:
                 rows[body] = n + k
         workspace = (address_of(self._buffers[layout.DOUBLES_AT]), address_of(self._buffers[layout.INTEGERS_AT]))
         self._meshes = MeshQuestions(setting, rows, workspace)
+        self._meshes.carry(setting)
         self.header[layout.MESH_QUESTIONS_AT] = address_of(self._meshes.words)
 
     @functools.cached_property
@@ -160,20 +193,32 @@ class MotionWorkspace:
     """
 
     def __init__(self, robot: Robot, setting: Setting):
-        number = {joint.name: k for k, joint in enumerate(robot.sorted_joints)}
-        names = paths_to_root(robot, [body.link for body in setting.bodies])
+        number, n_bodies = {joint.name: k for k, joint in enumerate(robot.sorted_joints)}, len(setting.tables.bodies)
+        names = paths_to_root(robot, [*range(len(robot.links))])
         paths = [np.array([number[name] for name in path], dtype=np.int64) for path in names]
-        lengths = np.array([len(path) for path in paths], dtype=np.int64)
-        stride = max(int(lengths.max(initial=0)), 1)
-        table = np.zeros((len(paths), stride), dtype=np.int64)
+        self._lengths_of_links = np.array([len(path) for path in paths], dtype=np.int64)
+        stride = max(int(self._lengths_of_links.max(initial=0)), 1)
+        self._paths_of_links = np.zeros((len(paths), stride), dtype=np.int64)
         for k, path in enumerate(paths):
-            table[k, : len(path)] = path
-        n_pairs = len(setting.self_pairs) + int((setting.allowed == 0).sum())
+            self._paths_of_links[k, : len(path)] = path
+        moves = np.zeros((len(robot.sorted_joints), len(paths)), dtype=bool)
+        for link, path in enumerate(paths):
+            moves[path, link] = True
+        beyond = (moves[:, :, None] & ~moves[:, None, :]).sum(axis=0)
+        #: (links · links, 2) how many joints of each one's path are not of the other's.
+        self._joints_between = np.stack([beyond, beyond.T], axis=2).reshape(-1, 2)
+        links = setting.tables.bodies[:, layout.LINK]  # behind those of the robot's links, objects write theirs
+        self._paths, self._lengths = self._paths_of_links[links], self._lengths_of_links[links]
+        n_pairs = n_bodies * (n_bodies - 1) // 2 + n_bodies * setting.allowed.shape[1]
+        self._filters: Filters | None = None
         n_items = min(_MAX_ITEMS, max(1024, motions.MAX_INTERVALS * n_pairs))
+        # What links' places are made of, added up [m]. Where a body without end meets a body of the robot, roundings
+        # are as large as the latter reaches.
+        self._shifts = float(np.abs(setting.base[9:]).sum()) + float(np.abs(robot.joint_table.doubles[:, 9:12]).sum())
+        self._reach = max(map(_reach_of, setting.tables.body_boxes[: setting.tables.n_bodies].tolist()), default=0.0)
         self._buffers = {
-            motions.PATHS_AT: table, motions.PATH_LENGTHS_AT: lengths,
-            motions.BETWEEN_AT: _joints_between(names, setting.self_pairs),
-            motions.CONFIGURATION_AT: np.zeros(max(robot.dof, 1)), motions.MOVED_AT: np.zeros((len(paths), stride + 1)),
+            motions.PATHS_AT: self._paths, motions.PATH_LENGTHS_AT: self._lengths,
+            motions.CONFIGURATION_AT: np.zeros(max(robot.dof, 1)), motions.MOVED_AT: np.zeros((n_bodies, stride + 1)),
             motions.INTERVALS_AT: np.zeros((motions.MAX_INTERVALS + 1, motions.INTERVAL)),
             motions.ITEMS_AT: np.zeros((n_items + 1, motions.ITEM), dtype=np.int64),
             motions.CHANGES_AT: np.zeros(robot.dof + 1), motions.POINTS_AT: np.zeros(motions.MAX_DEGREE + 1),
@@ -184,8 +229,21 @@ class MotionWorkspace:
             self.header[word] = address_of(buffer)
         self.header[motions.PATH_STRIDE], self.header[motions.ITEM_CAPACITY] = stride, n_items
         self._make_space(_OPEN_INTERVALS, motions.OPEN_INTERVAL)
-        self.header[motions.ROUNDING :].view(np.float64)[:] = motions.ROUNDING_SHARE * _reach_of(robot, setting)
         self.address = address_of(self.header)
+
+    def carry(self, bodies: np.ndarray, setting: Setting) -> None:
+        """Take over attached objects and tested pairs.   bodies : (n, BODY_INTS) of a `CheckWorkspace`. O(pairs)."""
+        if setting.filters is self._filters:
+            return
+        self._filters = setting.filters
+        for number, rows in enumerate(setting.objects, setting.tables.n_bodies):
+            link = rows.body.link
+            self._paths[number], self._lengths[number] = self._paths_of_links[link], self._lengths_of_links[link]
+        links = bodies[:, layout.LINK].take(setting.self_pairs)
+        self._between = self._joints_between.take(links[:, 0] * len(self._paths_of_links) + links[:, 1], axis=0)
+        self.header[motions.BETWEEN_AT] = address_of(self._between)
+        reach = max([self._reach, *(_reach_of(rows.tables.body_boxes[0].tolist()) for rows in setting.objects)])
+        self.header[motions.ROUNDING :].view(np.float64)[:] = motions.ROUNDING_SHARE * (reach + self._shifts)
 
     def begin(self, resolution: float) -> None:
         """Count anew, of straight motions with this resolution [rad or m]."""
@@ -250,19 +308,6 @@ class MotionWorkspace:
         return int(self.header[motions.N_CHECKED])
 
 
-def _joints_between(paths: list[list[str]], self_pairs: np.ndarray) -> np.ndarray:
-    """(pairs, 2) how many joints of each body's path stand between the bodies of each pair."""
-    out = np.zeros((max(len(self_pairs), 1), 2), dtype=np.int64)
-    for k, (a, b) in enumerate(self_pairs.tolist()):
-        shared = set(paths[a]) & set(paths[b])
-        out[k] = len(paths[a]) - len(shared), len(paths[b]) - len(shared)
-    return out
-
-
-def _reach_of(robot: Robot, setting: Setting) -> float:
-    """What links' places are made of, added up [m]. Where a body without end meets a body of the robot, roundings are
-    as large as the latter reaches.
-    """
-    boxes = np.abs(setting.tables.body_boxes)
-    reach = float(boxes[boxes.max(axis=1) < UNBOUNDED_HALF].sum(axis=1).max(initial=0.0))
-    return reach + float(np.abs(setting.base[9:]).sum()) + float(np.abs(robot.joint_table.doubles[:, 9:12]).sum())
+def _reach_of(box: list[float]) -> float:
+    """How far a body reaches in its link [m]; 0 without an end."""
+    return sum(map(abs, box)) if max(box) < UNBOUNDED_HALF else 0.0

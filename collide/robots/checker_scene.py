@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,23 +19,26 @@ from collide.robots.bounding_spheres import SphereTables, sphere_tables
 from collide.robots.check_configurations import check_configurations
 from collide.robots.check_tables import (
     MovedBodies,
+    RobotBody,
     RobotTables,
     Setting,
+    SpareRows,
     Surroundings,
-    joined_tables,
     robot_tables,
     surroundings_of,
     tables_among,
 )
 from collide.robots.check_workspace import CheckWorkspace
+from collide.robots.object_rows import ObjectRows, rows_of_object
 from collide.robots.pair_maps import PairMaps, names_of_pairs, pair_maps
 from collide.robots.robot import Robot
 from collide.robots.robot_bodies import (
+    ALLOWED,
+    Attached,
+    PairRules,
     SeenWorld,
     bodies_around,
-    body_of_object,
     checked_object,
-    filters_of,
     refuse_own_margins,
     robot_bodies,
 )
@@ -77,7 +80,9 @@ class CheckerScene:
         attached = checks.listed_entries("RobotChecker: attached", attached, "tuples (name, link, shape, X_LB)")
         bodies, self._objects = robot_bodies(robot, attached, padding)
         self._bodies = [body._replace(is_obstacle=body.name in obstacles) for body in bodies]
-        self._padding = padding
+        is_by_name = isinstance(padding, Mapping)
+        #: By name, or of all.
+        self._padding = {name: float(by) for name, by in padding.items()} if is_by_name else float(padding)
         self._asked = checks.listed_entries("RobotChecker: allowed", allowed, "pairs of names")
         self._mobile = checks.true_or_false("RobotChecker: mobile", mobile)
         self._maps: PairMaps | None = None
@@ -86,33 +91,35 @@ class CheckerScene:
         self._make_tables()
         self._names_asked = {name for pair in self._asked for name in pair[:2]}
 
-    def _make_tables(self, *, of_any: bool = False) -> None:
-        """Those of the robot, and the first setting.   of_any : whether spheres are made of all bodies."""
+    @property
+    def _links(self) -> list[RobotBody]:
+        """The bodies before attached objects."""
+        return self._bodies[: len(self._bodies) - len(self._objects)]
+
+    def _make_tables(self) -> None:
+        """Those of the robot, and the first setting."""
         matrices = [self.robot.joint_table.doubles[:, :9].reshape(-1, 3, 3), self._X_WR[None, :3, :3]]
-        self._tables = self._joined_tables(np.concatenate(matrices))
-        known = self.robot.link_maps
+        self._tables = self._tables_of_links(np.concatenate(matrices))
+        known, of_any = self.robot.link_maps, False
         if known is not None and known[0] == self._key_of_maps():  # another checker has made spheres of these links
             self._maps, of_any = known[1], True
-        self._spheres = sphere_tables(self._tables, self._bodies, of_any=of_any)
+        self._spheres = sphere_tables(self._tables, self._links, of_any=of_any)
         self._n_asked = _PAY_FOR_SPHERES if of_any else 0
         self._setting: Setting | None = None
         self.prepare()
 
-    def _joined_tables(self, matrices: np.ndarray) -> RobotTables:
-        """Tables of attached objects and links; those of links are kept with the robot, for other checkers as well."""
-        n = len(self._objects)
-        objects, links = self._bodies[:n], self._bodies[n:]
-        if not links or any(body.padding for body in self._bodies):
-            return robot_tables(self._bodies, matrices)
+    def _tables_of_links(self, matrices: np.ndarray) -> RobotTables:
+        """Tables without padding are kept with the robot, for other checkers as well."""
+        if any(self._padding.values() if isinstance(self._padding, dict) else [self._padding]):
+            return robot_tables(self._links, matrices, is_padded=True)
         key = matrices.tobytes(), *self._key_of_links()
         if self.robot.link_tables is None or self.robot.link_tables[0] != key:
-            self.robot.link_tables = key, robot_tables(links, matrices)
-        tables = self.robot.link_tables[1]
-        return joined_tables(robot_tables(objects, matrices), tables) if objects else tables
+            self.robot.link_tables = key, robot_tables(self._links, matrices)
+        return self.robot.link_tables[1]
 
     def _key_of_links(self) -> tuple:
         """What tables of links depend on; the shapes are kept with the robot."""
-        return tuple(id(body.shape) for body in self._bodies[len(self._objects) :])
+        return tuple(id(body.shape) for body in self._links)
 
     def _key_of_maps(self) -> tuple:
         """What maps of links depend on: their bounds of roundings, on where the robot stands as well."""
@@ -120,24 +127,68 @@ class CheckerScene:
 
     def _attach(self, values: tuple) -> None:
         """Attach an object (name, link, shape, X_LS, touch). Raises InvalidArgument, InvalidPose."""
-        item, changed = checked_object(self.robot, self._objects, values), self._as_it_is()
-        padding = 0.0 if isinstance(self._padding, Mapping) else float(self._padding)
-        changed._objects = {**self._objects, item.name: item}
-        changed._bodies = [body_of_object(self.robot, item, padding), *self._bodies]
-        self._become(changed)
+        def change(read: Self) -> dict:
+            item = checked_object(self.robot, read._objects, values)
+            rows, setting = read._rows_of(item), read.prepare()
+            setting = read._carrying(setting, len(setting.objects), [rows])
+            return {"_objects": {**read._objects, item.name: item}, "_bodies": setting.bodies, "_setting": setting}
+
+        self._change(change)
 
     def _detach(self, name: str) -> None:
         """Take an attached object away, and what was allowed for it. Raises InvalidArgument."""
-        if checks.text("RobotChecker.detach: name", name) not in self._objects:
-            known = listing(self._objects) or "none"
-            raise InvalidArgument(
-                f"RobotChecker.detach: name: no attached object is called {brief(name)}; attached: {known}"
-            )
-        changed = self._as_it_is()
-        changed._objects = {known: item for known, item in self._objects.items() if known != name}
-        changed._bodies = [body for body in self._bodies if body.name != name]
-        changed._asked = [pair for pair in self._asked if name not in pair[:2]]
-        self._become(changed)
+        checks.text("RobotChecker.detach: name", name)
+
+        def change(read: Self) -> dict:
+            if name not in read._objects:
+                known = listing(read._objects) or "none"
+                raise InvalidArgument(
+                    f"RobotChecker.detach: name: no attached object is called {brief(name)}; attached: {known}"
+                )
+            objects, setting, asked = read._objects.copy(), read.prepare(), read._asked
+            number = list(objects).index(name)
+            del objects[name]
+            rules = setting.rules.forgetting(name)
+            if rules is not setting.rules:
+                asked = [pair for pair in asked if name not in pair[:2]]
+                setting = setting._replace(rules=rules)
+            setting = read._carrying(setting, number, setting.objects[number + 1 :])
+            return {"_objects": objects, "_bodies": setting.bodies, "_asked": asked, "_setting": setting}
+
+        self._change(change)
+
+    def _rows_of(self, item: Attached) -> ObjectRows:
+        """The rows of an object, with spheres where links have spheres."""
+        padding = self._padding.get(item.name, 0.0) if isinstance(self._padding, dict) else self._padding
+        rows = rows_of_object(self.robot, item, padding, is_padded=self._tables.is_padded)
+        return rows if self._spheres is None else rows.with_spheres()
+
+    def _carrying(self, setting: Setting, n_kept: int, added: Sequence[ObjectRows]) -> Setting:
+        """A setting with its first attached objects, and others behind: tables of links and World are the same."""
+        objects, filters = setting.objects[:n_kept], setting.filters.of_first(n_kept)
+        bodies, maps = setting.bodies[: len(filters.allowed)], setting.maps
+        if maps is not None:
+            maps = maps.of_first(len(filters.self_pairs))
+        for rows in added:
+            before = [attached.item for attached in objects]
+            filters = setting.rules.with_object(filters, before, rows.item, rows.body.link)
+            objects, bodies = (*objects, rows), [*bodies, rows.body]
+        tables, spare = setting.tables, setting.spare
+        if not tables.spare_rows.holds(objects):
+            tables, spare = tables_among(self._tables, setting.surroundings, SpareRows.of(objects)), []
+        return setting._replace(
+            bodies=bodies, objects=objects, filters=filters, tables=tables, table=tables.table_with(objects), maps=maps,
+            spheres=self._spheres_with(setting.surroundings, objects), spare=spare,
+        )
+
+    def _change(self, change: Callable[[Self], dict]) -> None:
+        """Publish what a change makes of attributes as read, anew where another thread has published in between.
+        Questions begun before go on with what they have read.
+        """
+        while True:
+            read = self._as_it_is()
+            if self._publish(read, **change(read), _around=read._around):
+                return
 
     def _as_it_is(self) -> Self:
         """A checker with the attributes of an instant: questions read them while threads attach and allow."""
@@ -146,48 +197,41 @@ class CheckerScene:
             vars(read).update(vars(self))
         return read
 
-    def _become(self, changed: CheckerScene) -> None:
-        """Take over other bodies, once their tables are made: questions begun before go on with what they have read."""
-        changed._make_tables(of_any=self._spheres is not None)
-        with _PUBLISHING:
-            vars(self).update({name: value for name, value in vars(changed).items() if name != "world"})
-
-    def _publish(self, read: CheckerScene, **made) -> None:
+    def _publish(self, read: CheckerScene, **made) -> bool:
         """Keep what was made of attributes as they were read, unless bodies or pairs have changed since."""
         with _PUBLISHING:
-            if self._bodies is read._bodies:
+            is_current = self._bodies is read._bodies
+            if is_current:
                 vars(self).update(made)
+        return is_current
 
     def _allow(self, a: str, b: str) -> None:
         """Test a pair no more. Raises InvalidArgument."""
-        setting = self.prepare()
-        bodies = {body.name: k for k, body in enumerate(setting.bodies)}
-        around = {body.name: k for k, body in enumerate(setting.surroundings.bodies)}
-        for argument, name in (("a", a), ("b", b)):
-            checks.text(f"RobotChecker.allow: {argument}", name)
-            if not (name in bodies or name in around or name in self.robot.links):
-                unknown = f"no link, attached object or body is called {brief(name)}"
-                raise InvalidArgument(f"RobotChecker.allow: {argument}: {unknown}")
-        named, asked = self._names_asked | {a, b}, [*self._asked, (a, b)]
-        self_pairs, allowed, n_before = setting.self_pairs, setting.allowed.copy(), self.n_pairs
-        a, b = (b, a) if a in around else (a, b)
-        if a in bodies and b in bodies:
-            pair = sorted((bodies[a], bodies[b]))
-            self_pairs = np.ascontiguousarray(self_pairs[(self_pairs != pair).any(axis=1)])
-        elif a in bodies and b in around:
-            allowed[bodies[a], around[b]] = 1
-        skipped = dict(setting.skipped)
-        n_fewer = n_before - len(self_pairs) - int((allowed == 0).sum())
-        if n_fewer:
-            skipped["allowed"] = skipped.get("allowed", 0) + n_fewer
-        maps = self._maps_of(self_pairs)
-        again = [*setting.bodies]  # settings without the pair are known by their bodies
-        setting = setting._replace(
-            bodies=again, self_pairs=self_pairs, allowed=allowed, skipped=skipped, maps=maps, spare=[])
-        self._publish(self, _bodies=again, _setting=setting, _asked=asked, _names_asked=named)
+        def change(read: Self) -> dict:
+            setting = read.prepare()
+            rules, filters, maps = setting.rules.allowing(a, b), setting.filters, setting.maps
+            first = len(filters.allowed) - len(setting.objects)
+            objects = {name: k for k, name in enumerate(read._objects, first)}
+            for argument, name in (("a", a), ("b", b)):
+                checks.text(f"RobotChecker.allow: {argument}", name)
+                if not (name in objects or name in rules.numbers or name in self.robot.links):
+                    unknown = f"no link, attached object or body is called {brief(name)}"
+                    raise InvalidArgument(f"RobotChecker.allow: {argument}: {unknown}")
+            # A body around may have the name of an object, and the pair is of both.
+            for i in (objects.get(a), rules.numbers.get(a)):
+                for j in (objects.get(b), rules.numbers.get(b)):
+                    if i is None or j is None or i == j or (i < 0 and j < 0):
+                        continue
+                    filters, row = filters.without_pair(i, j, ALLOWED)
+                    if row is not None and maps is not None:
+                        maps = maps.without(row)
+            again = [*setting.bodies]  # what is published is known by its bodies
+            return {
+                "_bodies": again, "_asked": [*read._asked, (a, b)], "_names_asked": read._names_asked | {a, b},
+                "_setting": setting._replace(bodies=again, rules=rules, filters=filters, maps=maps),
+            }
 
-    def _maps_of(self, self_pairs: np.ndarray) -> PairMaps | None:
-        return None if self._maps is None else self._maps.among(names_of_pairs(self._bodies, self_pairs))
+        self._change(change)
 
     def __getstate__(self) -> dict:
         """What a copy or a pickle takes along. What holds addresses is made again."""
@@ -217,12 +261,12 @@ class CheckerScene:
     @property
     def n_pairs(self) -> int:
         """Pairs of bodies that are tested."""
-        return len(self.setting.self_pairs) + int((self.setting.allowed == 0).sum())
+        return self.setting.filters.n_pairs
 
     @property
     def skipped(self) -> dict[str, int]:
         """Pairs of bodies that are never tested, by reason."""
-        return dict(self.setting.skipped)
+        return self.setting.filters.reasons
 
     def names_of(self, a: int, b: int) -> tuple[str, str]:
         """Names of two bodies by their numbers in results.
@@ -287,17 +331,27 @@ class CheckerScene:
                 return moved
         refuse_own_margins(seen, self.robot)
         around = bodies_around(seen, self.robot)
-        if before is not None and seen.has_pairs_of(before.seen):
-            filters = before.self_pairs, before.allowed, before.skipped
+        if before is None:
+            objects = tuple(self._rows_of(item) for item in self._objects.values())
         else:
-            filters = filters_of(
-                self.robot, self._bodies, self._objects, seen, around, self._asked, self._mobile, self._names_asked)
+            objects = before.objects
+        if before is not None and seen.has_pairs_of(before.seen):
+            rules, filters, maps = before.rules, before.filters, before.maps
+        else:
+            known = {*self._objects, *self._names_asked}
+            rules = PairRules(self.robot, self._links, known, seen, around, self._asked, self._mobile)
+            filters, items = rules.of_links(), list(self._objects.values())
+            maps = None if self._maps is None else self._maps.among(names_of_pairs(self._bodies, filters.self_pairs))
+            for k, rows in enumerate(objects):
+                filters = rules.with_object(filters, items[:k], rows.item, rows.body.link)
         surroundings = self._around = surroundings_of(around, self._around)
+        spare_rows = SpareRows.of(objects) if before is None else before.tables.spare_rows
+        tables = tables_among(self._tables, surroundings, spare_rows, before)
         base = np.concatenate([self._X_WR[:3, :3].ravel(), self._X_WR[:3, 3]])
-        tables = tables_among(self._tables, surroundings, before)
-        spheres = self._spheres_among(surroundings)
-        maps = before.maps if before is not None and filters[0] is before.self_pairs else self._maps_of(filters[0])
-        return Setting(self._bodies, base, surroundings, tables, *filters, spheres, maps, seen, seen, [])
+        return Setting(
+            self._bodies, base, surroundings, tables, objects, tables.table_with(objects), rules, filters,
+            self._spheres_with(surroundings, objects), maps, seen, seen, [],
+        )
 
     def _count(self, n: int) -> None:
         """Take note of n configurations to be asked. Where so many have been asked that spheres pay, they are made."""
@@ -306,20 +360,29 @@ class CheckerScene:
         self._n_asked += n
         if self._n_asked >= _PAY_FOR_SPHERES:
             read = self._as_of_now()
-            read._spheres = sphere_tables(read._tables, read._bodies, of_any=True)
-            spheres = read._spheres_among(read.setting.surroundings)
-            setting = read.setting._replace(spheres=spheres, spare=[])
-            if spheres is not None:
+            read._spheres = sphere_tables(read._tables, read._links, of_any=True)
+            setting = read.setting
+            if read._spheres is not None:
+                objects = tuple(rows.with_spheres() for rows in setting.objects)
+                setting = setting._replace(objects=objects)
+                setting = read._carrying(setting._replace(maps=None, spare=[]), len(objects), ())
+            if setting.spheres is not None:
                 maps = pair_maps(self.robot, setting, CheckWorkspace(self.robot, setting))
-                setting = setting._replace(maps=maps, spare=[])
+                setting = setting._replace(maps=maps)
                 # Another object may be attached by the same name: maps of links alone are kept.
                 read._maps = maps.among([pair for pair in maps.names if read._objects.keys().isdisjoint(pair)])
                 self.robot.link_maps = read._key_of_maps(), read._maps
-            self._publish(read, _setting=setting, _spheres=read._spheres, _maps=read._maps)
+            made = {"_bodies": setting.bodies, "_spheres": read._spheres, "_maps": read._maps}
+            if not self._publish(read, _setting=setting, **made):
+                self._n_asked = 0
+
+    def _spheres_with(self, around: Surroundings, objects: Sequence[ObjectRows]) -> SphereTables | None:
+        """Spheres of the links, unless an attached object has none."""
+        return self._spheres_among(around) if all(rows.spheres is not None for rows in objects) else None
 
     def _spheres_among(self, around: Surroundings) -> SphereTables | None:
-        """Spheres of the robot, but not among fields, whose boxes the robot is in."""
-        return None if any(body.shape.is_field for body in around.bodies) else self._spheres
+        """Spheres of the links, but not among fields, whose boxes the robot is in."""
+        return None if around.has_fields else self._spheres
 
     def _among_moved_bodies(self, before: Setting, seen: SeenWorld) -> Setting | None:
         """The setting before, among moved bodies; ``None`` where tables are to be made anew: margins swell parts by how
@@ -338,18 +401,18 @@ class CheckerScene:
         """IS_FREE, COLLIDES or IS_OPEN, of a configuration (1, dof)."""
         setting = self.prepare()
         space = self._workspace(setting)
-        space.stand(setting)
         check_configurations(space.address, address_of(q), self.robot.dof, 0, 1, space.verdict_at)
         verdict = space.verdict[0]
         setting.spare.append(space)
         return verdict
 
     def _workspace(self, setting: Setting) -> CheckWorkspace:
-        """A workspace not in use, to be put back into ``setting.spare``."""
+        """A workspace not in use that stands at a setting, to be put back into ``setting.spare``."""
         try:
-            return setting.spare.pop()
+            space = setting.spare.pop()
         except IndexError:  # all are in use: another thread may have taken the last
             return CheckWorkspace(self.robot, setting)
+        return space if space.setting is setting or space.stand(setting) else CheckWorkspace(self.robot, setting)
 
     def _as_of_now(self) -> Self:
         """The checker among the bodies as they stand now; changes of the World during a question do not reach it."""
@@ -369,7 +432,6 @@ class CheckerScene:
         def on_piece(piece: slice) -> None:
             nonlocal done
             space = self._workspace(setting)
-            space.stand(setting)
             work(space, piece)
             setting.spare.append(space)
             done += piece.stop - piece.start

@@ -12,11 +12,13 @@ from collide.lowering.kind_of_shape import kind_of
 from collide.lowering.parts import is_single_convex
 from collide.narrowphase.dispatch import Method, method_of
 from collide.robots import mesh_states as layout
-from collide.robots.check_tables import Setting, without_meshes
+from collide.robots.check_tables import RobotBody, Setting, without_meshes
 from collide.shapes.compound import Compound
 from collide.shapes.mesh import Mesh
 from collide.shapes.shape import Shape
 
+#: Objects whose questions are kept, at most.
+_MAX_KNOWN = 64
 #: Half of the engine, which robots without meshes never load.
 facet_calls = lazy_module("collide.narrowphase.facets.facet_kernel_calls")
 item_calls = lazy_module("collide.narrowphase.facets.nearest_item_calls")
@@ -27,7 +29,7 @@ mesh_distance = lazy_module("collide.narrowphase.facets.mesh_distance_kernel")
 
 
 class MeshQuestions:
-    """A thread's.   words : QUESTIONS + QUESTION · bodies · (bodies + around) int64."""
+    """A thread's.   words : QUESTIONS + QUESTION · bodies · (around + bodies) int64."""
 
     def __init__(self, setting: Setting, part_rows: dict[int, int], workspace: tuple[int, int]):
         """part_rows : body around with one part → row of its pose.   workspace : doubles and integers of
@@ -35,28 +37,61 @@ class MeshQuestions:
         """
         self._held: list[Any] = []
         self._of_meshes: dict[int, Any] = {}
-        self._space = facet_queries.Workspace(512)
-        bodies, around = setting.bodies, setting.surroundings.bodies
-        unpadded = [_single(body.shape) for body in bodies]
-        of_bodies = [None if body.padding else shape for body, shape in zip(bodies, unpadded)]
-        of_around = [
-            None if body.margin or k not in part_rows else _single(body.shape) for k, body in enumerate(around)
+        self._known: dict[tuple, tuple] = {}
+        self._space, self._workspace, self._packed = facet_queries.Workspace(512), workspace, setting.table.packed[0]
+        self._bodies = [_Asked.of(body) for body in setting.bodies[: setting.tables.n_bodies]]
+        self._around = [
+            (None if body.margin or k not in part_rows else _single(body.shape), part_rows.get(k, -1))
+            for k, body in enumerate(setting.surroundings.bodies)
         ]
-        shape = len(bodies), len(bodies) + len(around), layout.QUESTION
-        table = np.zeros(shape, dtype=np.int64)
-        for a, b in setting.self_pairs.tolist():
-            # Moving obstacles are asked with their padding, as obstacles are.
-            shapes = of_bodies if bodies[a].is_obstacle or bodies[b].is_obstacle else unpadded
-            table[a, b] = self._question(shapes[a], shapes[b], -1, setting, workspace)
-        for a, b in np.argwhere(setting.allowed == 0).tolist():
-            row = part_rows.get(b, -1)
-            table[a, len(bodies) + b] = self._question(of_bodies[a], of_around[b], row, setting, workspace)
-        codes = [code_of(mesh_collide.meet_poses), code_of(mesh_distance.gap_poses)]
-        self.words = np.concatenate([np.array(codes, dtype=np.int64), table.ravel()])
+        n_bodies, n_around = len(setting.tables.bodies), len(self._around)
+        self.words = np.zeros(layout.QUESTIONS + layout.QUESTION * n_bodies * (n_around + n_bodies), dtype=np.int64)
+        self.words[: layout.QUESTIONS] = code_of(mesh_collide.meet_poses), code_of(mesh_distance.gap_poses), (
+            n_around + n_bodies)
+        self._table = self.words[layout.QUESTIONS :].reshape(n_bodies, n_around + n_bodies, layout.QUESTION)
+        filters = setting.filters.of_first(0)
+        for a, b in filters.self_pairs.tolist():
+            self._table[a, n_around + b] = self._question_of(self._bodies[a], self._bodies[b])
+        for a, asked in enumerate(self._bodies):
+            self._table[a, :n_around] = self._questions_around(asked, filters.allowed[a])
 
-    def _question(
-        self, A: Single | None, B: Single | None, row: int, setting: Setting, workspace: tuple[int, int]
-    ) -> tuple[int, int, int]:
+    def carry(self, setting: Setting) -> bool:
+        """Ask about attached objects, too; what is known of an object's shape is taken over. False, and nothing holds,
+        once so many are known that all are to be made anew.
+        """
+        filters, n_around, bodies = setting.filters, len(self._around), self._bodies.copy()
+        objects: tuple = ()
+        ends = [*filters.starts[1:], len(filters.self_pairs)]
+        for number, (rows, first, end) in enumerate(zip(setting.objects, filters.starts, ends), len(bodies)):
+            others, allowed = filters.self_pairs[first:end, 0], filters.allowed[number]
+            asked = _Asked.of(rows.body)
+            bodies.append(asked)
+            objects += (asked.key,)
+            key = objects, others.tobytes(), allowed.tobytes()
+            if key not in self._known:
+                if len(self._known) >= _MAX_KNOWN:
+                    return False
+                column = np.zeros((len(self._table), layout.QUESTION), dtype=np.int64)
+                for a in others.tolist():
+                    column[a] = self._question_of(bodies[a], asked)
+                self._known[key] = column, self._questions_around(asked, allowed), bodies
+            self._table[:, n_around + number], self._table[number, :n_around], _ = self._known[key]
+        return True
+
+    def _question_of(self, A: _Asked, B: _Asked) -> tuple[int, int, int]:
+        """That of two bodies of the robot: moving obstacles are asked with their padding, as obstacles are."""
+        if A.is_obstacle or B.is_obstacle:
+            return self._question(A.padded, B.padded, -1)
+        return self._question(A.plain, B.plain, -1)
+
+    def _questions_around(self, asked: _Asked, allowed: np.ndarray) -> np.ndarray:
+        """(around, QUESTION) of a body of the robot."""
+        out = np.zeros((len(self._around), layout.QUESTION), dtype=np.int64)
+        for k in np.flatnonzero(allowed == 0).tolist():
+            out[k] = self._question(asked.padded, *self._around[k])
+        return out
+
+    def _question(self, A: Single | None, B: Single | None, row: int) -> tuple[int, int, int]:
         """(how, header, row of poses) of a pair; UNKNOWN of pairs without a mesh, and of pairs that others answer."""
         if A is None or B is None or not (_is_mesh(A.shape) or _is_mesh(B.shape)):
             return layout.UNKNOWN, 0, row
@@ -70,13 +105,13 @@ class MeshQuestions:
         if partner.is_asked_whole or not is_single_convex(partner):  # its part only holds it
             return layout.UNKNOWN, 0, row
         how = layout.FACETS_OF_BODY if is_body else layout.FACETS_OF_PARTNER
-        return how, self._of_items(mesh, setting, workspace), row
+        return how, self._of_items(mesh), row
 
-    def _of_items(self, mesh: Shape, setting: Setting, workspace: tuple[int, int]) -> int:
+    def _of_items(self, mesh: Shape) -> int:
         """A question of the facets of a mesh, beside a part in whose place kernels write others."""
         if id(mesh) not in self._of_meshes:
-            items, packed = item_calls.facets_of(facet_bodies.body_of(mesh)), setting.tables.table.packed[0]
-            self._of_meshes[id(mesh)] = item_calls.GapQuestion(items, packed, workspace)
+            items = item_calls.facets_of(facet_bodies.body_of(mesh))
+            self._of_meshes[id(mesh)] = item_calls.GapQuestion(items, self._packed, self._workspace)
         return address_of(self._of_meshes[id(mesh)].header)
 
     def _of_facets(self, A: Shape, B: Shape) -> int:
@@ -97,6 +132,24 @@ class Single(NamedTuple):
 
     shape: Shape
     is_given: bool
+
+
+class _Asked(NamedTuple):
+    """A body of the robot by its only shape.   padded : the shape if the body has no padding."""
+
+    plain: Single | None
+    padded: Single | None
+    is_obstacle: bool
+
+    @classmethod
+    def of(cls, body: RobotBody) -> _Asked:
+        plain = _single(body.shape)
+        return cls(plain, None if body.padding else plain, body.is_obstacle)
+
+    @property
+    def key(self) -> tuple | None:
+        """By what it is known while its shape lives."""
+        return self.plain and (id(self.plain.shape), self.plain.is_given, self.padded is None)
 
 
 def _single(shape: Shape) -> Single | None:

@@ -18,7 +18,6 @@ from collide.robots.check_scene import (
     MESH_QUESTIONS_AT,
     MESH_ROW_AT,
     N_AROUND,
-    N_BODIES,
     STATE_OF_PART,
 )
 from collide.robots.part_pairs import BEYOND_MARGIN, HITTING, NEAR, OPEN, ask, rows_of_part
@@ -29,8 +28,9 @@ UNKNOWN, FACETS, FACETS_OF_BODY, FACETS_OF_PARTNER, HULLS = range(5)
 # Integers of a question: how, the address of its header, and the row of the poses of a body around, −1 of a link's.
 HOW, HEADER_AT, POSE_ROW = range(3)
 QUESTION = 3
-#: `meet_poses` and `gap_poses`, whose addresses stand before the questions.
-MEET_AT, GAP_AT, QUESTIONS = 0, 1, 2
+#: `meet_poses` and `gap_poses`, whose addresses stand before the questions, and how many questions a body has: those
+#: about bodies around first.
+MEET_AT, GAP_AT, STRIDE, QUESTIONS = range(4)
 
 _MEET_SIGNATURE = "int64(int64, int64, int64, int64, int64, int64, int64, boolean, boolean, int64, int64)"
 _GAP_SIGNATURE = (
@@ -49,9 +49,9 @@ def state_of_meshes(scene, body, partner, p, q, margin):
     words = scene.words
     if words[MESH_QUESTIONS_AT] == 0:
         return OPEN
-    n_bodies = words[N_BODIES]
-    column = partner if partner >= 0 else n_bodies - 1 - partner
-    at = QUESTIONS + QUESTION * (body * (n_bodies + words[N_AROUND]) + column)
+    column = words[N_AROUND] + partner if partner >= 0 else -1 - partner
+    stride = view_i64(words[MESH_QUESTIONS_AT], QUESTIONS)[STRIDE]
+    at = QUESTIONS + QUESTION * (body * stride + column)
     table = view_i64(words[MESH_QUESTIONS_AT], at + QUESTION)
     how = table[at + HOW]
     if how == UNKNOWN:

@@ -36,7 +36,7 @@ _MIN_FREE, FINER = 0.9, 4
 _WIDER = 1e-12
 
 class PairMaps(NamedTuple):
-    """Of each tested pair of bodies.   ints : (pairs, MAP_INTS) int64.   doubles : (pairs, MAP_DOUBLES).
+    """Of the first of the tested pairs of bodies.   ints : (pairs, MAP_INTS) int64.   doubles : (pairs, MAP_DOUBLES).
     cells : (n,) uint8, 1 of a cell proven free; the second column's stand side by side.   names : of both bodies.
     """
 
@@ -55,6 +55,17 @@ class PairMaps(NamedTuple):
             at, of = np.array(known).T
             ints[at], doubles[at] = self.ints[of], self.doubles[of]
         return PairMaps(ints, doubles, self.cells, names)
+
+    def of_first(self, n: int) -> PairMaps:
+        """The maps of the first n pairs."""
+        return PairMaps(self.ints[:n], self.doubles[:n], self.cells, self.names[:n]) if n < len(self.names) else self
+
+    def without(self, row: int) -> PairMaps:
+        """The maps without the map of a pair."""
+        if row >= len(self.names):
+            return self
+        ints, doubles = np.delete(self.ints, row, axis=0), np.delete(self.doubles, row, axis=0)
+        return PairMaps(ints, doubles, self.cells, [*self.names[:row], *self.names[row + 1 :]])
 
 
 @entry("void(int64, int64, int64, int64, int64, int64, int64, int64, int64, int64, int64)")

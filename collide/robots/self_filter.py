@@ -15,7 +15,7 @@ import numpy as np
 from collide.base.poses_at import poses_at
 from collide.pairs import query
 from collide.robots.check_scene import HALF
-from collide.robots.check_tables import RobotBody, RobotTables, without_meshes
+from collide.robots.check_tables import RobotBody, without_meshes
 from collide.shapes.compound import Compound
 from collide.shapes.convex_hull import ConvexHull
 
@@ -25,24 +25,25 @@ _ORIGIN = np.zeros((1, 3))
 
 
 def points_of_robot(
-    bodies: Sequence[RobotBody], tables: RobotTables, X_WLs: np.ndarray, points_W: np.ndarray,
+    bodies: Sequence[RobotBody], body_boxes: np.ndarray, X_WLs: np.ndarray, points_W: np.ndarray,
     radii: np.ndarray | float, padding: Mapping[str, float], slop: float, threads: int,
 ) -> np.ndarray:
     """(n,) bool: points within padding of a body's shape.
 
-    X_WLs : (links, 4, 4).   points_W : (n, 3).   radii : of balls around the points [m], of all or (n,).
-    slop : how far rounding may have moved points [m], added to radii.
+    body_boxes : (bodies, BOX).   X_WLs : (links, 4, 4).   points_W : (n, 3).
+    radii : of balls around the points [m], of all or (n,).   slop : how far rounding may have moved points [m], added
+        to radii.
     """
     belongs = np.zeros(len(points_W), dtype=bool)
     extra = np.array([padding.get(body.name, 0.0) for body in bodies]) + float(np.max(radii, initial=0.0)) + slop
-    boxes = [_box_in_world(tables.body_boxes[k], X_WLs[body.link], extra[k]) for k, body in enumerate(bodies)]
+    boxes = [_box_in_world(body_boxes[k], X_WLs[body.link], extra[k]) for k, body in enumerate(bodies)]
     low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
     near = _within(points_W, np.arange(len(points_W)), low, high)
     columns = np.ascontiguousarray(points_W[near].T)
     for k, body in enumerate(bodies):
         some = np.flatnonzero(_are_inside(columns, *boxes[k]))
         some = some[~belongs[near[some]]]
-        some = some[_are_in_turned_box(columns[:, some].T, tables.body_boxes[k], X_WLs[body.link], extra[k])]
+        some = some[_are_in_turned_box(columns[:, some].T, body_boxes[k], X_WLs[body.link], extra[k])]
         if len(some):
             which, by = near[some], padding.get(body.name, 0.0)
             of_balls = radii if np.ndim(radii) == 0 else radii[which]  # type: ignore[index]

@@ -66,12 +66,13 @@ from collide.robots.map_layout import (
     # verdicts: hits and open ones, in lanes; of fewer configurations none are asked so; pairs that spheres leave open,
     # their number and how many there may be
     VERDICTS_AT, FEWEST, PAIRS_AT, N_PAIRS, PAIR_CAPACITY,
-    # of `pair_maps.py`: integers, 0 without, doubles, cells; by how much each column may differ, and flags, in lanes
-    MAP_INTS_AT, MAP_DOUBLES_AT, MAP_CELLS_AT, SPANS_AT, FLAGS_AT,
+    # of `pair_maps.py`: integers, doubles, cells, how many of the first tested pairs have a map; by how much each
+    # column may differ, and flags, in lanes
+    MAP_INTS_AT, MAP_DOUBLES_AT, MAP_CELLS_AT, N_MAPS, SPANS_AT, FLAGS_AT,
     # of `sphere_motions.py`: intervals; half their lengths, and how far bodies may move, in lanes
     PIECES_AT, HALF_LANES_AT, MOVED_LANES_AT,
-) = range(26)
-SPHERE_HEADER = 26
+) = range(27)
+SPHERE_HEADER = 27
 # Integers of a body: its first outer sphere, how many; its first inner sphere, how many. Where its outer spheres are
 # the body itself it has no others.
 FIRST_OUTER, N_OUTER, FIRST_INNER, N_INNER, IS_EXACT = range(5)
@@ -389,7 +390,7 @@ def check_pair(scene, spheres, number, a, b, margin, verdicts):
         _squared_between(around, a, around, b) > _squared_reach(around, a, around, b, radii + margin, 1.0))
     if not any_of(is_near):
         return verdicts
-    if spheres.words[MAP_INTS_AT] != 0:
+    if number < spheres.words[N_MAPS]:
         is_near = is_near & ~_are_mapped_apart(spheres, number)
         if not any_of(is_near):
             return verdicts

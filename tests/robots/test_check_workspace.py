@@ -223,7 +223,7 @@ def test_workspaces_of_motions_are_made_once_and_take_each_resolution():
     space = space_of(checker)
     work = space.motions(0.5)
     assert work.header[motions.RESOLUTION : motions.ROUNDING].view(np.float64).tolist() == [0.5]
-    assert work.header[motions.PATH_STRIDE] == 1 and work.header[motions.ITEM_CAPACITY] == 1024
+    assert work.header[motions.PATH_STRIDE] == 1 and work.header[motions.ITEM_CAPACITY] == 15 * motions.MAX_INTERVALS
     work.header[motions.N_CHECKED] = 7
     assert space.motions(0.25) is work and work.n_checked == 0
     assert work.header[motions.RESOLUTION : motions.ROUNDING].view(np.float64).tolist() == [0.25]

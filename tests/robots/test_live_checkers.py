@@ -213,3 +213,21 @@ def test_readers_in_other_threads_see_one_world_or_the_other(how):
     for reader in readers:
         reader.join()
     assert not wrong and min(seen.values()) > 2 and n_changes > 10, (wrong, seen, n_changes)
+
+
+def test_a_question_of_before_is_answered_as_of_before_where_a_matrix_is_no_rotation():
+    """A ball stands sheared in front of the cart, then is moved away: workspaces cannot be moved back, and others are
+    made for a question that began before.
+    """
+    world, robot = collide.World(), slider()
+    sheared = pose(t=(0.5, 0, 0))
+    sheared[0, 1] = 1e-10
+    world.add(collide.Sphere(0.1), sheared, name="ball")
+    checker = collide.RobotChecker(robot, world)
+    before = checker._as_of_now()
+    world.set_pose("ball", pose(t=(-0.5, 0, 0)))
+    Q = np.array([[0.5], [-0.5], [0.0]])
+    assert checker.collides(Q).tolist() == [False, True, False]
+    assert before.setting.spare is checker.setting.spare and len(before.setting.spare) == 1
+    assert before.collides(Q).tolist() == [True, False, False] and before.collides(Q[0])
+    assert checker.collides(Q).tolist() == [False, True, False]

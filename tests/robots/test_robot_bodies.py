@@ -11,17 +11,17 @@ import collide
 from collide.errors import InvalidArgument, InvalidPose
 from collide.robots.kinematic_tree import Joint
 from collide.robots.robot import LinkShape, Robot
-from collide.robots.robot_bodies import bodies_around, filters_of, paths_to_root, refuse_own_margins, robot_bodies
+from collide.robots.robot_bodies import PairRules, bodies_around, paths_to_root, refuse_own_margins, robot_bodies
 
 BALL = collide.Sphere(0.1)
 ELEMENT = [LinkShape(BALL, np.eye(4), None, "test")]
 
 
-def test_bodies_go_from_the_last_link_to_the_root_and_objects_come_first():
+def test_bodies_go_from_the_last_link_to_the_root_and_objects_come_behind():
     robot = slider(base=ELEMENT)
     bodies, objects = robot_bodies(robot, [("tool", "cart", BALL), ("cap", "base", BALL, pose(t=(1, 2, 3)), "x")], 0.25)
     assert [(body.name, body.link, body.padding) for body in bodies] == [
-        ("tool", 1, 0.25), ("cap", 0, 0.25), ("cart", 1, 0.25), ("base", 0, 0.25),
+        ("cart", 1, 0.25), ("base", 0, 0.25), ("tool", 1, 0.25), ("cap", 0, 0.25),
     ]
     assert objects["tool"].touch == () and objects["cap"].touch == ("x",)
     assert np.array_equal(objects["tool"].X_LS, np.eye(4)) and objects["cap"].X_LS[:3, 3].tolist() == [1, 2, 3]
@@ -107,7 +107,12 @@ def filters(robot=None, world=None, attached=(), allowed=(), mobile=False):
     robot = robot or slider(base=ELEMENT)
     world = world or collide.World()
     bodies, objects = robot_bodies(robot, attached, 0.0)
-    return filters_of(robot, bodies, objects, world, bodies_around(world, robot), allowed, mobile)
+    links, items = bodies[: len(bodies) - len(objects)], list(objects.values())
+    rules = PairRules(robot, links, objects, world, bodies_around(world, robot), allowed, mobile)
+    made = rules.of_links()
+    for k, body in enumerate(bodies[len(links) :]):
+        made = rules.with_object(made, items[:k], items[k], body.link)
+    return made
 
 
 def test_objects_may_touch_their_link_and_what_they_are_told_to():
@@ -116,20 +121,21 @@ def test_objects_may_touch_their_link_and_what_they_are_told_to():
         world.add(BALL, name=name)
     tool = ("tool", "cart", BALL, None, ("table", "base"))
     made = filters(world=world, attached=[tool])
-    # bodies: tool, cart, base.   Of tool and cart it is the same link; base is next to cart in the tree.
+    # bodies: cart, base, tool.   Of tool and cart it is the same link; base is next to cart in the tree.
     assert made.self_pairs.shape == (0, 2) and made.self_pairs.dtype == np.int64
-    assert made.allowed.tolist() == [[1, 0], [0, 0], [0, 0]]
-    assert made.skipped == {
+    assert made.allowed.tolist() == [[0, 0], [0, 0], [1, 0]]
+    assert made.reasons == {
         "moves with the same link": 1, "attached object may touch": 2, "adjacent links": 1,
     }
-    assert filters(world=world, attached=[tool[:3]]).self_pairs.tolist() == [[0, 2]]
+    assert filters(world=world, attached=[tool[:3]]).self_pairs.tolist() == [[1, 2]]
 
 
 def test_two_objects_of_one_link_are_never_tested():
     tools = [("left", "cart", BALL), ("right", "cart", BALL), ("stand", "base", BALL)]
     made = filters(slider(), attached=tools)
-    # bodies: left, right, stand, cart
-    assert made.self_pairs.tolist() == [[0, 2], [1, 2], [2, 3]] and made.skipped == {"moves with the same link": 3}
+    # bodies: cart, left, right, stand
+    assert made.self_pairs.tolist() == [[0, 3], [1, 3], [2, 3]] and made.reasons == {"moves with the same link": 3}
+    assert made.starts == (0, 0, 0) and len(made.of_first(2).self_pairs) == 0 and made.of_first(3) is made
 
 
 def test_static_and_sleeping_bodies_rest_with_the_base_alone():
@@ -141,7 +147,7 @@ def test_static_and_sleeping_bodies_rest_with_the_base_alone():
     assert made.allowed.tolist() == [[0, 0, 0], [1, 1, 0]]
     assert filters(world=world, mobile=True).allowed.tolist() == [[0, 0, 0], [0, 0, 0]]
     # A reason that is given is told before the one that the body sleeps, and after the one that it is static.
-    reasons = filters(world=world, allowed=[("base", "crate", "stays"), ("base", "floor", "lies")]).skipped
+    reasons = filters(world=world, allowed=[("base", "crate", "stays"), ("base", "floor", "lies")]).reasons
     assert reasons == {"static–static": 1, "stays": 1, "adjacent links": 1}
 
 
@@ -153,7 +159,7 @@ def test_both_masks_must_hold_the_other_group(groups, is_tested):
     world.add(BALL, name="wall", group=groups[2], mask=groups[3])
     made = filters(slider(), world)
     assert made.allowed.tolist() == [[int(not is_tested)]]
-    assert made.skipped == ({} if is_tested else {"filtered by group and mask": 1})
+    assert made.reasons == ({} if is_tested else {"filtered by group and mask": 1})
 
 
 def test_an_object_named_like_a_body_of_the_world_is_not_that_body():
@@ -161,7 +167,7 @@ def test_an_object_named_like_a_body_of_the_world_is_not_that_body():
     world.add(BALL, name="tool", group=2, mask=0)
     world.add(BALL, name="wall")
     made = filters(slider(), world, [("tool", "cart", BALL)])
-    assert made.allowed[0, 1] == 0  # the attached object is of group 1, with all
+    assert made.allowed[1, 1] == 0  # the attached object is of group 1, with all
 
 
 def test_pairs_that_the_caller_allows():
@@ -169,7 +175,7 @@ def test_pairs_that_the_caller_allows():
     world.add(BALL, name="wall")
     for pair in (("cart", "wall"), ["wall", "cart"], ("cart", "wall", "reason of mine")):
         made = filters(slider(), world, allowed=[pair])
-        assert made.allowed.tolist() == [[1]] and made.skipped == {pair[2] if len(pair) == 3 else "allowed": 1}
+        assert made.allowed.tolist() == [[1]] and made.reasons == {pair[2] if len(pair) == 3 else "allowed": 1}
     assert filters(slider(), world, allowed=[("base", "wall")]).allowed.tolist() == [[0]]  # a link without geometry
     for wrong in ("ab", ("cart",), ("cart", "wall", "why", "so"), 3):
         with pytest.raises(InvalidArgument, match="allowed must be pairs of names, got"):

@@ -451,7 +451,7 @@ def test_a_checker_of_a_scene():
     scene = SimpleNamespace(name="scene", placements=placements, bodies=bodies, allowed=[("cart", "wall")])
     for name in (None, "slider"):
         checker = collide.RobotChecker.from_scene(scene, name, padding=0.0)
-        assert checker.bodies == ["cup", "cart"] and checker.around == ["post", "ghost", "wall"]
+        assert checker.bodies == ["cart", "cup"] and checker.around == ["post", "ghost", "wall"]
         assert checker.collides([[0.0], [0.5]]).tolist() == [False, True]
         assert checker.explain([0.5]).collisions[0][:2] == ("cup", "post") and checker.n_pairs == 3
         assert checker.world.body("post").static and not checker.world.body("ghost").static
