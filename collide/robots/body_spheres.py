@@ -14,7 +14,7 @@ import numpy as np
 from collide.base.poses_at import poses_at
 from collide.hull.exact_hull import convex_hull
 from collide.lowering.extents import box_of
-from collide.lowering.packed_convex import POINTS, PackedConvex
+from collide.lowering.packed_convex import CYLINDER, POINTS, PackedConvex
 from collide.lowering.parts import bounding_parts_of, is_single_convex
 from collide.pairs import query
 from collide.robots.check_tables import RobotBody, without_meshes
@@ -94,9 +94,65 @@ def _made(shape: Shape, count: int) -> BodySpheres:
         rows = [(np.array([[*part.points[0], part.radius]]), X) for part, X in parts]
         outer, inner = (np.concatenate([_moved(row, X, sign) for row, X in rows]) for sign in (1.0, -1.0))
         return BodySpheres(outer, inner, True)
+    if is_single_convex(shape):
+        outer, inner = _of_swept_box(parts[0][0], count)
+        if len(outer):
+            return BodySpheres(outer, inner, False)
     share = max(1, count // len(parts))
     outer = np.concatenate([_moved(outer_spheres(part, share), X, 1.0) for part, X in parts])
     return BodySpheres(outer, _inner_spheres(shape if same is None else same, outer[:, :3]), False)
+
+
+def _of_swept_box(packed: PackedConvex, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Spheres around and within a box or a cylinder swept by a ball, in closed form; empty for further sets.
+
+    Cells of the box are within spheres around their middles. A sphere as large as the shortest half side fits around
+    every point of the box shrunk by as much. In a cylinder the middles must be within the circle shrunk by as much:
+    up to 4 · 2 cells of the square around the circle have such middles.
+    """
+    if packed.kind == CYLINDER:
+        middle, half = np.zeros(3), np.array([packed.params[0], packed.params[0], packed.params[1]])
+    elif packed.kind == POINTS and are_all_corners(packed.points):
+        low, high = packed.points.min(axis=0), packed.points.max(axis=0)
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    else:
+        return _NOTHING, _NOTHING
+    outer, cell = _cells_of(half, count)
+    if packed.kind == CYLINDER and (outer[:, :2] == 0.0).all():
+        cell = cell * (2.0**-0.5, 2.0**-0.5, 1.0)
+    within = float(half.min())
+    inner, _ = _cells_of(half - within, _COUNT)
+    radii = float(np.linalg.norm(cell)) + packed.radius + packed.slop, within + packed.radius - packed.slop
+    spheres = [np.column_stack([middle + at, np.full(len(at), r)]) for at, r in zip((outer, inner), radii)]
+    for made, sign in zip(spheres, (1.0, -1.0)):
+        made[:, 3] += sign * ROUNDING * (np.abs(made).sum(axis=1) + np.abs(middle).sum() + half.sum())
+    return spheres[0], spheres[1][spheres[1][:, 3] > 0.0]
+
+
+def _cells_of(half: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """((n, 3) middles of at most so many equal cells of a box about the origin, (3,) their half sides), long sides cut
+    in half.
+    """
+    counts = np.ones(3, dtype=np.int64)
+    while 2 * counts.prod() <= count:
+        cell = half / counts
+        longest = int(cell.argmax())
+        shorter = cell.copy()
+        shorter[longest] *= 0.5
+        if not np.linalg.norm(shorter) < _WORTH * np.linalg.norm(cell):
+            break
+        counts[longest] *= 2
+    axes = [half[k] * ((2.0 * np.arange(n) + 1.0) / n - 1.0) for k, n in enumerate(counts.tolist())]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3), half / counts
+
+
+def are_all_corners(points: np.ndarray) -> bool:
+    """Whether the hull of points is their box: the points are its corners, or two of them along an axis, or one."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    if not ((points == low) | (points == high)).all():
+        return False
+    n_corners = 2 ** int((low != high).sum())
+    return len(np.unique(points, axis=0)) == n_corners
 
 
 def outer_spheres(packed: PackedConvex, count: int) -> np.ndarray:

@@ -15,7 +15,7 @@ from collide.lowering.packed_convex import CYLINDER, HALFSPACE, POINTS, PackedCo
 from collide.lowering.parts import convex_set_of
 from collide.robots import motion_bounds as motions
 from collide.robots import sphere_lanes as layout
-from collide.robots.body_spheres import ROUNDING, are_spheres, ball_around, spheres_of
+from collide.robots.body_spheres import ROUNDING, are_all_corners, are_spheres, ball_around, spheres_of
 from collide.robots.check_scene import BOX, HALF
 from collide.robots.check_tables import CheckTables, RobotBody, RobotTables, Setting, Surroundings
 from collide.robots.forward_kinematics import LINK_POSE
@@ -188,18 +188,9 @@ def _part_of(packed: PackedConvex, box: np.ndarray, is_bound: bool) -> tuple[int
     if packed.kind == CYLINDER:
         out[:2] = packed.params[:2]
         return layout.SWEPT_CYLINDER, out
-    if packed.kind == POINTS and not is_bound and _are_all_corners(packed.points):
+    if packed.kind == POINTS and not is_bound and are_all_corners(packed.points):
         out[:3] = 0.5 * (packed.points.max(axis=0) - packed.points.min(axis=0))
         return layout.SWEPT_BOX, out
     out[:3] = box[HALF:BOX] * (1.0 + ROUNDING)
     out[layout.AT_MOST], out[layout.AT_LEAST] = ROUNDING * float(np.abs(box).sum()), -math.inf
     return layout.ONLY_BOXED, out
-
-
-def _are_all_corners(points: np.ndarray) -> bool:
-    """Whether the hull of points is their box: the points are its corners, or two of them along an axis, or one."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    if not ((points == low) | (points == high)).all():
-        return False
-    n_corners = 2 ** int((low != high).sum())
-    return len(np.unique(points, axis=0)) == n_corners
