@@ -12,7 +12,7 @@ from collide.base.threads import check_threads, share_if_it_helps
 from collide.errors import InvalidArgument, InvalidPose, UnsupportedQuery
 from collide.lowering.closed_regions import reach_of
 from collide.lowering.kind_of_shape import kind_of
-from collide.motion.convex_impact import CONTACT, FREE, OPEN_START, TOO_SMALL
+from collide.motion.convex_impact import CONTACT, FREE, OPEN, OPEN_START, TOO_SMALL
 from collide.motion.convex_motions import convex_impacts, single_impact
 from collide.motion.field_motions import field_impacts
 from collide.motion.impact_jobs import WRONG_TURN
@@ -298,18 +298,39 @@ def _answer(question: _Question) -> np.ndarray:
     _refuse(question, rows)
     _ask_start(question, rows, np.flatnonzero(rows["status"] == OPEN_START))
     _describe_start(question, rows)
+    _ask_end(question, rows)
     return rows
 
 
-def _start_of(question: _Question, some: np.ndarray):
-    """(A, B, X_WA, X_WB) of motions at their start, as batches take them."""
-    shapes, a, b, motions = question[:4]
-    picked = motions.picked(some)
+def _shapes_of(question: _Question, some: np.ndarray) -> list:
+    """Shapes A and B of motions, as batches take them."""
     sides = []
-    for which in (a[some], b[some]):
+    for which in (question.a[some], question.b[some]):
         same = len(which) and (which == which[0]).all()
-        sides.append(shapes[which[0]] if same else [shapes[k] for k in which.tolist()])
-    return sides[0], sides[1], picked.X_WA0, picked.X_WB0
+        sides.append(question.shapes[which[0]] if same else [question.shapes[k] for k in which.tolist()])
+    return sides
+
+
+def _start_of(question: _Question, some: np.ndarray):
+    """(A, B, X_WA, X_WB) of motions at their start."""
+    picked = question.motions.picked(some)
+    return *_shapes_of(question, some), picked.X_WA0, picked.X_WB0
+
+
+def _ask_end(question: _Question, rows: np.ndarray) -> None:
+    """Open motions that end in contact, decided as `distance` does at the last poses as given, have it by time 1.
+
+    A motion that just reaches its last pose to touch there is open without, since times before come within rounding.
+    """
+    some = np.flatnonzero((rows["status"] == OPEN) & np.isinf(rows["upper"]))
+    picked = question.motions.picked(some)
+    if not len(some) or picked.omega_WA is not None or picked.omega_WB is not None:
+        return
+    poses = picked.X_WA1, picked.X_WB1
+    pairs = answer_batch(*_shapes_of(question, some), *poses, Question(False, np.inf, False), question.threads)
+    pairs = np.broadcast_to(pairs, len(some))
+    touching = some[pairs["hit"] & (pairs["how"] != UNDECIDED)]
+    rows["upper"][touching], rows["status"][touching] = 1.0, CONTACT
 
 
 def _ask_start(question: _Question, rows: np.ndarray, some: np.ndarray) -> None:
