@@ -318,9 +318,9 @@ def _start_of(question: _Question, some: np.ndarray):
 
 
 def _ask_end(question: _Question, rows: np.ndarray) -> None:
-    """Open motions that end in contact, decided as `distance` does at the last poses as given, have it by time 1.
+    """Open motions in contact at the last poses as given, by the rule of `distance`, have a contact by time 1.
 
-    A motion that just reaches its last pose to touch there is open without, since times before come within rounding.
+    The search leaves motions open whose only contact is the last pose: poses before come within rounding.
     """
     some = np.flatnonzero((rows["status"] == OPEN) & np.isinf(rows["upper"]))
     picked = question.motions.picked(some)

@@ -181,7 +181,7 @@ def test_points_of_lines_that_lean_are_on_their_bodies(part):
         where = f"{A!r}, {B!r}, X_WA = np.array({X_WA.tolist()!r}), X_WB = np.array({X_WB.tolist()!r}), {margin!r}"
         assert not told, (number, kinds, told, where)
         with_ends[kinds] += len(c) > 1
-    assert len(with_ends) == 20 and min(with_ends.values()) >= 2, with_ends
+    assert len(with_ends) == 20 and with_ends.total() >= 130, with_ends
 
 
 @pytest.mark.parametrize("body", ROUND)

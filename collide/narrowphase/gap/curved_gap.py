@@ -13,7 +13,8 @@ Newton's method, residuals in double-doubles and the matrix in doubles, gains 2�
 The solution is a proposal. Proven are the lower bound −σ_A(n) − σ_B(−n) over |n|, with σ the supports over all of
 both sets (the gap is the largest of these over all n), and the upper bound |b − a|, for a and b within their sets: flat
 coordinates are kept within their ranges. Each support and each point is good to 2⁻⁹⁰ of the pair's size S: some dozen
-operations in double-doubles, of 16u² each, of numbers below 4 S.
+operations in double-doubles, of 16u² each, of numbers below 4 S. All lengths are scaled by a power of two to pairs of
+size about 1, so that answers scale with the pair.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from typing import NamedTuple
 
 from collide.kernels import kernel, view_f64, view_i64
 from collide.lowering.packed_convex import CONE, CYLINDER, ELLIPSOID, POINTS
-from collide.narrowphase.gap.precise_pair import is_composed, is_refinable
+from collide.narrowphase.bounds import SMALLEST_NORMAL, SUBNORMAL
+from collide.narrowphase.gap.precise_pair import is_composed, unit_scale
 from collide.narrowphase.gap.tied_vertices import MAX_TIES, tied_vertices, vertices_of
 from collide.narrowphase.gjk.minkowski_difference import POINT_OF_A, POINT_OF_B, weighted_sum
 from collide.narrowphase.posed_pair import reach_of
@@ -34,6 +36,7 @@ from collide.numerics.vec3 import (
     Vec3,
     add,
     column_at,
+    divide,
     dot,
     neg,
     norm,
@@ -116,17 +119,21 @@ def refine_curved_gap(ordered, work, n_points, nhat):
     A, B, poses = pair.A, pair.B, pair.poses
     zero = Vec3(0.0, 0.0, 0.0)
     nothing = CurvedGap(False, _ZERO, _ZERO, 0.0, zero, zero, zero)
-    if is_composed(poses, A.pose_at) or is_composed(poses, B.pose_at) or not is_refinable(size):
+    if is_composed(poses, A.pose_at) or is_composed(poses, B.pose_at):
         return nothing
+    unit = unit_scale(size)
+    size *= unit
     a = weighted_sum(work.points, work.weights, n_points, POINT_OF_A)
     b = weighted_sum(work.points, work.weights, n_points, POINT_OF_B)
-    f = _feature(pair, A, work, n_points, 0, rotate_back(poses, A.pose_at, nhat), _local(poses, A.pose_at, a))
-    h = _feature(pair, B, work, n_points, 1, neg(rotate_back(poses, B.pose_at, nhat)), _local(poses, B.pose_at, b))
-    t = dd.difference(vec3_at(poses, B.pose_at + 9), vec3_at(poses, A.pose_at + 9))
+    w, u = rotate_back(poses, A.pose_at, nhat), rotate_back(poses, A.pose_at, a)
+    f = _feature(pair, A, work, n_points, 0, w, u, unit)
+    w, u = neg(rotate_back(poses, B.pose_at, nhat)), rotate_back(poses, B.pose_at, b)
+    h = _feature(pair, B, work, n_points, 1, w, u, unit)
+    t = dd.scale_vec3(unit, dd.difference(vec3_at(poses, B.pose_at + 9), vec3_at(poses, A.pose_at + 9)))
     n = dd.exact_vec3(nhat)
-    gap = DD(dot(nhat, sub(add(b, pair.t), a)), 0.0)
+    gap = DD(unit * dot(nhat, sub(add(b, pair.t), a)), 0.0)
     M = view_f64(work.epa_at, DOUBLES)
-    p, q = _placed(pair, A, f, n), _placed(pair, B, h, dd.neg_vec3(n))
+    p, q = _placed(pair, A, f, n, unit), _placed(pair, B, h, dd.neg_vec3(n), unit)
     for _ in range(_STEPS):
         residual = dd.sub_vec3(dd.sub_vec3(_plus(q.point, t), p.point), _times(gap, n))
         off = norm(dd.leading(residual))
@@ -141,8 +148,8 @@ def refine_curved_gap(ordered, work, n_points, nhat):
         gap = _moved(gap, M, 3, m)
         f = _with_flats(f, M, 4, m)
         h = _with_flats(h, M, 4 + f.flat, m)
-        p, q = _placed(pair, A, f, n), _placed(pair, B, h, dd.neg_vec3(n))
-    return _proven(pair, A, B, f, h, p, q, n, t, size, work)
+        p, q = _placed(pair, A, f, n, unit), _placed(pair, B, h, dd.neg_vec3(n), unit)
+    return _proven(pair, A, B, f, h, p, q, n, t, size, unit, work)
 
 
 @kernel(inline=True)
@@ -175,14 +182,8 @@ def _with_flats(f, M, row, m):
 # --- features -----------------------------------------------------------------------------------
 
 
-@kernel(inline=True)
-def _local(poses, at, a):
-    """The frame's point of a point in W's axes from the frame's origin."""
-    return rotate_back(poses, at, a)
-
-
 @kernel
-def _feature(pair, body, work, n_points, which, w, u):
+def _feature(pair, body, work, n_points, which, w, u, unit):
     """The `Feature` of a body.   w : outward, in its frame, of unit length.   u : the nearest point, about."""
     numbers, at = pair.numbers, body.params_at
     if body.kind == POINTS:
@@ -202,9 +203,9 @@ def _feature(pair, body, work, n_points, which, w, u):
             return Feature(TIP, 1.0, 0, -1, -1, -1, _ZERO, _ZERO)
         end = -1.0
     elif abs(w.z) < _FLAT and abs(u.z) < half * (1.0 - _INSIDE):
-        return Feature(SIDE, 0.0, 1, -1, -1, -1, DD(u.z, 0.0), _ZERO)
+        return Feature(SIDE, 0.0, 1, -1, -1, -1, DD(unit * u.z, 0.0), _ZERO)
     if across < _FLAT and beside < radius * (1.0 - _INSIDE):
-        return Feature(END, end, 2, -1, -1, -1, DD(u.x, 0.0), DD(u.y, 0.0))
+        return Feature(END, end, 2, -1, -1, -1, DD(unit * u.x, 0.0), DD(unit * u.y, 0.0))
     return Feature(RIM, end, 0, -1, -1, -1, _ZERO, _ZERO)
 
 
@@ -227,23 +228,23 @@ def _vertices(work, n_points, which):
 
 
 @kernel
-def _placed(pair, body, f, u):
-    """The `Placed` feature of a body in the outward direction u."""
+def _placed(pair, body, f, u, unit):
+    """The `Placed` feature of a body in the outward direction u, lengths times ``unit``."""
     poses, at, numbers, params = pair.poses, body.pose_at, pair.numbers, body.params_at
     none = DDVec3(_ZERO, _ZERO, _ZERO)
     if f.kind == VERTEX:
-        x = dd.exact_vec3(column_at(body.coords, body.padded, f.i))
+        x = dd.exact_vec3(scale(unit, column_at(body.coords, body.padded, f.i)))
         d = e = none
         if f.flat > 0:
-            d = dd.difference(column_at(body.coords, body.padded, f.j), column_at(body.coords, body.padded, f.i))
+            d = _edge(body, f.i, f.j, unit)
             x = _plus(x, _times(f.s, d))
         if f.flat > 1:
-            e = dd.difference(column_at(body.coords, body.padded, f.k), column_at(body.coords, body.padded, f.i))
+            e = _edge(body, f.i, f.k, unit)
             x = _plus(x, _times(f.t, e))
         return Placed(_turned(poses, at, x), _turned(poses, at, d), _turned(poses, at, e), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if f.kind == SMOOTH:
-        return _placed_ellipsoid(pair, body, u)
-    radius, half = DD(numbers[params], 0.0), DD(numbers[params + 1], 0.0)
+        return _placed_ellipsoid(pair, body, u, unit)
+    radius, half = DD(unit * numbers[params], 0.0), DD(unit * numbers[params + 1], 0.0)
     end = dd.scale(f.end, half)
     if f.kind == TIP:
         return Placed(_turned(poses, at, DDVec3(_ZERO, _ZERO, half)), none, none, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -258,7 +259,7 @@ def _placed(pair, body, f, u):
     c, s = dd.div(w.x, across), dd.div(w.y, across)
     x = DDVec3(dd.mul(radius, c), dd.mul(radius, s), end)
     d = none
-    bend = numbers[params] / across.high
+    bend = radius.high / across.high
     if f.kind == SIDE and body.kind == CYLINDER:
         d = DDVec3(_ZERO, _ZERO, DD(1.0, 0.0))
         x = DDVec3(x.x, x.y, f.s)
@@ -273,12 +274,19 @@ def _placed(pair, body, f, u):
     )
 
 
+@kernel(inline=True)
+def _edge(body, i, j, unit):
+    """From vertex i to vertex j."""
+    start, end = column_at(body.coords, body.padded, i), column_at(body.coords, body.padded, j)
+    return dd.scale_vec3(unit, dd.difference(end, start))
+
+
 @kernel
-def _placed_ellipsoid(pair, body, u):
+def _placed_ellipsoid(pair, body, u, unit):
     poses, at, numbers, params = pair.poses, body.pose_at, pair.numbers, body.params_at
     none = DDVec3(_ZERO, _ZERO, _ZERO)
     w = _turned_back(poses, at, u)
-    a, b, c = DD(numbers[params], 0.0), DD(numbers[params + 1], 0.0), DD(numbers[params + 2], 0.0)
+    a, b, c = DD(unit * numbers[params], 0.0), DD(unit * numbers[params + 1], 0.0), DD(unit * numbers[params + 2], 0.0)
     g = DDVec3(dd.mul(a, w.x), dd.mul(b, w.y), dd.mul(c, w.z))
     h = dd.sqrt(dd.inner(g, g))
     x = DDVec3(dd.div(dd.mul(a, g.x), h), dd.div(dd.mul(b, g.y), h), dd.div(dd.mul(c, g.z), h))
@@ -407,24 +415,28 @@ def _solve(M, m):
 
 
 @kernel
-def _proven(pair, A, B, f, h, p, q, n, t, size, work):
+def _proven(pair, A, B, f, h, p, q, n, t, size, unit, work):
     """The `CurvedGap` of a solution.   p, q : the placed features."""
     away = dd.neg_vec3(n)
     if f.flat > 0 or h.flat > 0:
-        f, h = _within(pair, A, f), _within(pair, B, h)
-        p, q = _placed(pair, A, f, n), _placed(pair, B, h, away)
+        f, h = _within(pair, A, f, unit), _within(pair, B, h, unit)
+        p, q = _placed(pair, A, f, n, unit), _placed(pair, B, h, away, unit)
     v = dd.sub_vec3(_plus(q.point, t), p.point)
     length = dd.sqrt(dd.inner(n, n))
-    beyond = dd.add(_beyond(pair, A, f, p, n, work), _beyond(pair, B, h, q, away, work))
+    beyond = dd.add(_beyond(pair, A, p, n, unit, work), _beyond(pair, B, q, away, unit, work))
     lower = dd.div(dd.sub(dd.inner(n, v), beyond), length)
     upper = dd.sqrt(dd.inner(v, v))
-    error = ERROR * size
+    error, over = ERROR * size, 1.0 / unit
+    vanishing = SUBNORMAL if lower.high * over < SMALLEST_NORMAL else 0.0
     is_proven = 0.5 < length.high < 2.0 and lower.high > 4.0 * error and upper.high < math.inf
-    return CurvedGap(is_proven, lower, upper, error, dd.leading(n), dd.leading(p.point), dd.leading(q.point))
+    return CurvedGap(
+        is_proven, dd.scale(over, lower), dd.scale(over, upper), over * error + vanishing,
+        divide(dd.leading(n), length.high), scale(over, dd.leading(p.point)), scale(over, dd.leading(q.point))
+    )
 
 
 @kernel
-def _within(pair, body, f):
+def _within(pair, body, f, unit):
     """The feature with its flat coordinates within the set."""
     numbers, params = pair.numbers, body.params_at
     s, t = f.s, f.t
@@ -434,11 +446,11 @@ def _within(pair, body, f):
         if total > 1.0:
             s, t = DD(s.high / total * (1.0 - 2.0**-50), 0.0), DD(t.high / total * (1.0 - 2.0**-50), 0.0)
     elif f.kind == SIDE:
-        half = numbers[params + 1]
+        half = unit * numbers[params + 1]
         s = _clamped(s, -half, half) if body.kind == CYLINDER else _clamped(s, 0.0, 1.0)
     elif f.kind == END:
         beside = math.sqrt(s.high * s.high + t.high * t.high)
-        radius = numbers[params] * (1.0 - 2.0**-50)
+        radius = unit * numbers[params] * (1.0 - 2.0**-50)
         if beside > radius:
             s, t = DD(s.high * radius / beside, 0.0), DD(t.high * radius / beside, 0.0)
     return Feature(f.kind, f.end, f.flat, f.i, f.j, f.k, s, t)
@@ -452,7 +464,7 @@ def _clamped(x, low, high):
 
 
 @kernel
-def _beyond(pair, body, f, p, u, work):
+def _beyond(pair, body, p, u, unit, work):
     """How much farther a body reaches along u than its placed feature does.
 
     A rim and an ellipsoid's point are where the reach is taken: nothing, but for an end of a cylinder or cone that is
@@ -461,12 +473,12 @@ def _beyond(pair, body, f, p, u, work):
     numbers, params, poses, at = pair.numbers, body.params_at, pair.poses, body.pose_at
     if body.kind == POINTS:
         reach = _reach_of_vertices(body, _turned_back(poses, at, u), reach_of(pair, body), work)
-        return dd.sub(reach, dd.inner(u, p.point))
+        return dd.sub(dd.scale(unit, reach), dd.inner(u, p.point))
     if body.kind == ELLIPSOID:
         return _ZERO
     w = _turned_back(poses, at, u)
     across = dd.sqrt(dd.add(dd.mul(w.x, w.x), dd.mul(w.y, w.y)))
-    rim, along = dd.mul(DD(numbers[params], 0.0), across), dd.mul(DD(numbers[params + 1], 0.0), w.z)
+    rim, along = dd.mul(DD(unit * numbers[params], 0.0), across), dd.mul(DD(unit * numbers[params + 1], 0.0), w.z)
     reach = dd.sub(rim, along)
     if body.kind == CYLINDER:
         reach = dd.add(rim, along if along.high > 0.0 else dd.neg(along))
